@@ -64,7 +64,7 @@ pub enum Command {
         /// Folder for the scene and its meshes, or name of the scene file (.toml) with the meshes beside it.
         #[arg(short, long, value_name = "DIR|FILE")]
         out: PathBuf,
-        /// Translate a model with unsupported parts (shells, membranes, contact) without these parts.
+        /// Translate a model with unsupported parts (shells that bend, radii that change) without these parts.
         #[arg(long)]
         allow_partial: bool,
     },
@@ -496,7 +496,7 @@ pub struct Overrides {
     /// Read only files in the folder of the scene, links resolved, for untrusted scenes (see SECURITY.md).
     #[arg(long)]
     pub sandbox: bool,
-    /// Omit parts of a NiftySim model that Pliant does not support (shells, membranes, contact); this changes the model.
+    /// Omit parts of a NiftySim model that Pliant does not support (shells that bend, radii that change); this changes the model.
     #[arg(long)]
     pub allow_partial: bool,
 }

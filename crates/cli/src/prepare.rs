@@ -142,9 +142,9 @@ pub fn translate(
     }
     let folder = file.parent().unwrap_or(Path::new(""));
     let meshes = imported.meshes.iter().map(|(name, mesh)| (folder.join(name), mesh));
-    if let Some(taken) =
-        meshes.clone().map(|(path, _)| path).chain([file.to_owned()]).find(|path| path.exists())
-    {
+    let tables = imported.tables.iter().map(|(name, text)| (folder.join(name), text));
+    let written = meshes.clone().map(|(path, _)| path).chain(tables.clone().map(|(path, _)| path));
+    if let Some(taken) = written.chain([file.to_owned()]).find(|path| path.exists()) {
         return Err(Failure::plain(format!("`{}` exists already", taken.display()), "choose another name"));
     }
     let unwritable = |error: &dyn std::fmt::Display| {
@@ -156,6 +156,9 @@ pub fn translate(
     }
     for (path, mesh) in meshes {
         io::write(&path, mesh).map_err(|error| unwritable(&error))?;
+    }
+    for (path, text) in tables {
+        fs::write(path, text).map_err(|error| unwritable(&error))?;
     }
     fs::write(file, &imported.scene).map_err(|error| unwritable(&error))?;
     Ok(imported.notes)

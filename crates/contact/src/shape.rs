@@ -21,6 +21,13 @@ pub enum Shape {
         /// Length of the segment [m].
         length: f64,
     },
+    /// A cylinder along z with flat ends, centred at the origin.
+    Cylinder {
+        /// Its radius [m].
+        radius: f64,
+        /// Its length [m].
+        length: f64,
+    },
     /// A box centred at the origin.
     Cuboid {
         /// Its edges [m].
@@ -57,6 +64,7 @@ impl Shape {
                 let z = point.z.clamp(-0.5 * length, 0.5 * length);
                 around(point - Vector3::z() * z, *radius)
             }
+            Self::Cylinder { radius, length } => cylinder(point, *radius, 0.5 * length),
             Self::Cuboid { size } => cuboid(point, &(0.5 * Vector3::from(*size))),
             Self::Cone { radius, height } => cone(point, *radius, *height),
             Self::HalfSpace => Near { distance: point.z, normal: Vector3::z() },
@@ -68,6 +76,7 @@ impl Shape {
     pub fn thinnest(&self) -> f64 {
         match self {
             Self::Sphere { radius } | Self::Capsule { radius, .. } => *radius,
+            Self::Cylinder { radius, length } => radius.min(0.5 * length),
             Self::Cuboid { size } => 0.5 * size.iter().copied().fold(f64::INFINITY, f64::min),
             Self::Cone { radius, height } => 0.5 * radius.min(*height),
             Self::HalfSpace => f64::INFINITY,
@@ -80,6 +89,7 @@ impl Shape {
         match self {
             Self::Sphere { radius } => *radius,
             Self::Capsule { radius, length } => radius + 0.5 * length,
+            Self::Cylinder { radius, length } => radius.hypot(0.5 * length),
             Self::Cuboid { size } => 0.5 * Vector3::from(*size).norm(),
             Self::Cone { radius, height } => radius.max(*height),
             Self::HalfSpace => 0.0,
@@ -108,6 +118,10 @@ impl Shape {
             Self::Capsule { radius, length } => {
                 let [low, high] = [-0.5, 0.5].map(|part| part * length);
                 revolved(&arc(low, radius, -8, 0).chain(arc(high, radius, 0, 8)).collect::<Vec<_>>())
+            }
+            Self::Cylinder { radius, length } => {
+                let [low, high] = [-0.5, 0.5].map(|part| part * length);
+                revolved(&[[0.0, low], [radius, low], [radius, high], [0.0, high]])
             }
             Self::Cone { radius, height } => revolved(&[[0.0, 0.0], [radius, 0.0], [0.0, height]]),
             Self::Cuboid { size } => {
@@ -160,6 +174,23 @@ fn around(from: Vector3<f64>, radius: f64) -> Near {
     Near { distance: distance - radius, normal }
 }
 
+/// In the half-plane of the distance from the axis and the height, a rectangle of this width and half height.
+fn cylinder(point: &Vector3<f64>, radius: f64, half: f64) -> Near {
+    let from_axis = Vector2::new(point.x, point.y);
+    let q = from_axis.norm();
+    let radial = if q > 0.0 { from_axis / q } else { Vector2::x() };
+    let up = if point.z < 0.0 { -1.0 } else { 1.0 };
+    let beyond = Vector2::new(q - radius, point.z.abs() - half);
+    let outside = beyond.map(|x| x.max(0.0));
+    let distance = outside.norm();
+    let (distance, flat) = match distance > 0.0 {
+        true => (distance, outside / distance),
+        false if beyond.x > beyond.y => (beyond.x, Vector2::x()),
+        false => (beyond.y, Vector2::y()),
+    };
+    Near { distance, normal: Vector3::new(radial.x * flat.x, radial.y * flat.x, up * flat.y) }
+}
+
 fn cuboid(point: &Vector3<f64>, half: &Vector3<f64>) -> Near {
     let beyond = point.abs() - half;
     let outside = beyond.map(|x| x.max(0.0));
@@ -208,6 +239,7 @@ mod tests {
         let shapes = [
             Shape::Sphere { radius: 0.3 },
             Shape::Capsule { radius: 0.2, length: 0.7 },
+            Shape::Cylinder { radius: 0.3, length: 0.8 },
             Shape::Cuboid { size: [0.5, 0.9, 0.4] },
             Shape::Cone { radius: 0.4, height: 0.6 },
             Shape::HalfSpace,
@@ -245,6 +277,7 @@ mod tests {
         for shape in [
             Shape::Sphere { radius: 0.3 },
             Shape::Capsule { radius: 0.2, length: 0.7 },
+            Shape::Cylinder { radius: 0.3, length: 0.8 },
             Shape::Cuboid { size: [0.5, 0.9, 0.4] },
             Shape::Cone { radius: 0.4, height: 0.6 },
             Shape::HalfSpace,
@@ -269,6 +302,12 @@ mod tests {
         assert_eq!(near(Shape::Capsule { radius: 1.0, length: 4.0 }, [0.0, 0.0, 5.0]).distance, 2.0);
         assert_eq!(near(Shape::Cuboid { size: [2.0, 2.0, 2.0] }, [4.0, 5.0, 0.0]).distance, 5.0);
         assert_eq!(near(Shape::Cuboid { size: [2.0, 2.0, 2.0] }, [0.25, 0.0, 0.0]).distance, -0.75);
+        let cylinder = Shape::Cylinder { radius: 1.0, length: 4.0 };
+        assert_eq!(near(cylinder.clone(), [3.0, 0.0, 1.0]).distance, 2.0);
+        assert_eq!(near(cylinder.clone(), [0.5, 0.0, -4.0]).distance, 2.0);
+        assert_eq!(near(cylinder.clone(), [0.0, 4.0, 6.0]).distance, 5.0);
+        assert_eq!(near(cylinder.clone(), [0.25, 0.0, 0.0]).distance, -0.75);
+        assert_eq!(near(cylinder, [0.0, 0.0, 1.5]).normal, Vector3::z());
         let cone = Shape::Cone { radius: 3.0, height: 4.0 };
         assert_eq!(near(cone.clone(), [0.0, 0.0, -2.0]).distance, 2.0);
         assert_eq!(near(cone.clone(), [0.0, 0.0, 6.0]).distance, 2.0);

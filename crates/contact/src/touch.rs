@@ -274,6 +274,22 @@ impl Passage {
         self.travel
     }
 
+    /// The largest way [m] of a point of the thing from a pose to that at the end of the step; infinite of a half-space that turns.
+    pub fn travel_from(&self, rigid: &Rigid, pose: &Pose) -> f64 {
+        let after = &self.poses[1];
+        let is_endless = matches!(rigid.shape, Shape::HalfSpace);
+        if is_endless && pose.rotation != after.rotation {
+            f64::INFINITY
+        } else {
+            travel(rigid, &[*pose, *after])
+        }
+    }
+
+    /// The pose at the end of the step.
+    pub fn pose(&self) -> Pose {
+        self.poses[1]
+    }
+
     /// The pose after a share of the step.
     fn at(&self, share: f64) -> Pose {
         let [from, to] = &self.poses;

@@ -1472,14 +1472,15 @@ fn a_niftysim_model_runs_as_it_is_or_as_the_scene_it_becomes() {
     assert_eq!(direct["reactions"], scene["reactions"]);
     let again = workshop.pliant(&["import", "model.xml", "-o", "translated.toml"]);
     assert!(again.code == 2 && again.err.contains("exists already"), "{}", again.err);
-    let contact = "<ContactPlate><a>0 0 0</a></ContactPlate><ShellElements Type=\"SURFACE\"/></Model>";
-    workshop.write("partial.xml", model.replace("</Model>", contact));
+    let more = "<KinematicContact/><ShellElements Type=\"SURFACE\"/><ShellElementSet Size=\"all\"><Material Type=\"LinearShell\">\
+                1 0.4 1 0.4<Density>1</Density><Thickness>1</Thickness></Material></ShellElementSet></Model>";
+    workshop.write("partial.xml", model.replace("</Model>", more));
     for arguments in
         [&["run", "partial.xml"][..], &["import", "partial.xml", "-o", "partial"], &["check", "partial.xml"]]
     {
         let told = workshop.pliant(arguments);
         assert_eq!(told.code, 2, "{arguments:?}: {}", told.err);
-        for part in ["partial.xml", "shells and membranes; contact (ContactPlate)", "--allow-partial"] {
+        for part in ["partial.xml", "LinearShell bends", "contact (KinematicContact", "--allow-partial"] {
             assert!(told.err.contains(part), "{arguments:?}: no `{part}` in {}", told.err);
         }
         assert!(!workshop.path("out/partial").exists() && !workshop.path("partial").exists());
@@ -1489,6 +1490,19 @@ fn a_niftysim_model_runs_as_it_is_or_as_the_scene_it_becomes() {
     assert_eq!(told.done()["reactions"], direct["reactions"]);
     workshop.pliant(&["import", "partial.xml", "-o", "partial", "--allow-partial"]).words();
     assert!(workshop.path("partial/scene.toml").is_file());
+    // A plate that turns away from the tip, which moves off it, and a rigid surface that follows a table of poses.
+    let contact = "<ContactPlate><a>-1 -1 -1</a><b>1 -1 -1</b><c>-1 1 -1</c><Disp>0 0 -0.1</Disp>\
+                   <SlvNodes NumNodes=\"3\">0 1 2</SlvNodes></ContactPlate>\
+                   <ContactSurface><Nodes NumNodes=\"3\">-1 -1 -0.5  1 -1 -0.5  0 1 -0.5</Nodes><Elements NumEls=\"1\" Type=\"T3\">0 1 2\
+                   </Elements><Motion Type=\"Rotation\">0.1 0.1 0  0 0 -0.5</Motion></ContactSurface>\
+                   <ShellElements Type=\"SURFACE\"/><ShellElementSet Size=\"all\"><Material Type=\"NeoHookean\">100\
+                   <Density>1000</Density><Thickness>1e-3</Thickness></Material></ShellElementSet></Model>";
+    workshop.write("touching.xml", model.replace("</Model>", contact));
+    let direct = workshop.pliant(&["run", "touching.xml", "--json"]).done();
+    workshop.pliant(&["import", "touching.xml", "-o", "carried"]).words();
+    assert!(workshop.path("carried/touching-surface-0.csv").is_file());
+    let scene = workshop.pliant(&["run", "carried", "--json"]).done();
+    assert_eq!(direct["reactions"], scene["reactions"]);
     workshop.write("broken.xml", &model[..200]);
     let told = workshop.pliant(&["run", "broken.xml"]);
     assert!(told.code == 2 && told.err.contains("broken.xml"), "{}", told.err);

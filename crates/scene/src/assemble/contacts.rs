@@ -87,6 +87,7 @@ impl Builder<'_> {
         let shape = match &table.shape {
             ShapeName::Sphere(of) => Shape::Sphere { radius: of.radius },
             ShapeName::Capsule(of) => Shape::Capsule { radius: of.radius, length: of.length },
+            ShapeName::Cylinder(of) => Shape::Cylinder { radius: of.radius, length: of.length },
             ShapeName::Box(of) if of.size.iter().any(|&edge| edge <= 0.0) => {
                 self.error(&at("shape"), "a box without a volume", "its edges", "give three lengths above 0");
                 return None;
@@ -461,7 +462,7 @@ impl Builder<'_> {
 pub(super) fn hang(rigid: &Rigid, edge: f64) -> f64 {
     let radius = rigid.shape.thinnest();
     match rigid.shape {
-        Shape::Sphere { .. } | Shape::Capsule { .. } | Shape::Grid(_) => {
+        Shape::Sphere { .. } | Shape::Capsule { .. } | Shape::Cylinder { .. } | Shape::Grid(_) => {
             (edge * edge / (8.0 * radius)).min(0.1 * radius)
         }
         _ => 0.0,

@@ -56,6 +56,8 @@ pub enum ShapeName {
     Sphere(SphereTool),
     /// All within a radius of a segment along z, centred at the origin.
     Capsule(CapsuleTool),
+    /// A cylinder along z with flat ends, centred at the origin.
+    Cylinder(CylinderTool),
     /// A box centred at the origin.
     Box(BoxTool),
     /// A cone along z: its base in the plane z = 0, its tip above.
@@ -88,6 +90,18 @@ pub struct CapsuleTool {
     pub radius: f64,
     /// Length of the segment [m].
     #[schemars(range(min = 0.0))]
+    pub length: f64,
+}
+
+/// A cylinder with flat ends.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct CylinderTool {
+    /// Radius [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub radius: f64,
+    /// Length [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub length: f64,
 }
 

@@ -87,10 +87,34 @@ impl Geometry {
         self.cells().len() / self.solid.cell().node_count()
     }
 
+    /// How many parts have no node in common.
+    pub fn piece_count(&self) -> usize {
+        let mut parent: Vec<u32> = (0..self.node_count() as u32).collect();
+        let mut used = vec![false; parent.len()];
+        for cell in self.cells().chunks_exact(self.solid.cell().node_count()) {
+            let first = root(&mut parent, cell[0]);
+            for &node in cell {
+                used[node as usize] = true;
+                let other = root(&mut parent, node);
+                parent[other as usize] = first;
+            }
+        }
+        (0..parent.len()).filter(|&node| used[node] && parent[node] as usize == node).count()
+    }
+
     /// Nodes of all cells, one after another.
     pub fn cells(&self) -> &[u32] {
         self.mesh.block(self.solid.cell()).map_or(&[], |block| &block.nodes)
     }
+}
+
+/// The node that stands for all that are connected with one; the way to it becomes shorter.
+fn root(parent: &mut [u32], mut node: u32) -> u32 {
+    while parent[node as usize] != node {
+        parent[node as usize] = parent[parent[node as usize] as usize];
+        node = parent[node as usize];
+    }
+    node
 }
 
 /// Reads the geometry of a model or submodel.
@@ -118,7 +142,7 @@ fn listed(of: Element<'_>) -> Result<Geometry, Fault> {
 }
 
 /// Whether as many numbers are listed as the attribute says, or whole items where it is missing.
-fn check_listed(
+pub(super) fn check_listed(
     of: Element<'_>,
     name: &str,
     what: &'static str,
@@ -154,7 +178,7 @@ fn from_file(of: Element<'_>, files: &Files<'_>, notes: &mut Vec<String>) -> Res
 }
 
 /// Turns about a centre, then scales about the origin, then shifts: NiftySim's order, wherever they stand.
-fn place(of: Element<'_>, points: &mut [Vector3]) -> Result<(), Fault> {
+pub(super) fn place(of: Element<'_>, points: &mut [Vector3]) -> Result<(), Fault> {
     if let Some(rotation) = child(of, "Rotation") {
         let [x, y, z, angles @ ..] = numbers_of::<6>(rotation, "numbers of a rotation")?;
         let centre = Vector3::new(x, y, z);

@@ -3,13 +3,17 @@
 //! What NiftySim computes is kept, also where it is not what its guide says: the published fibre modulus, hourglass
 //! stiffness by λ + 2μ, backward Euler for relaxation, tractions that pull against the vector they are given by. The
 //! notes name each. Load shapes act at the same steps as NiftySim's, which sets a load after a step for the next one.
-//! Leaves out: shells, membranes, contact, reduced bases, values read from files; [`Imported::missing`] names them.
+//! Leaves out: shells that bend, radii that change, reduced bases, values read from files; [`Imported::missing`] names them.
 
 mod conditions;
+mod contact;
 mod error;
 mod geometry;
 mod material;
 mod parts;
+mod rigid_surface;
+mod shells;
+mod touching;
 mod write;
 mod xml;
 
@@ -49,8 +53,10 @@ impl Files<'_> {
 pub struct Imported {
     /// The text of a scene file.
     pub scene: String,
-    /// The meshes that it names, with their file names, in metres if the model is.
+    /// The meshes of bodies and rigid surfaces that it names, with their file names, in metres if the model is.
     pub meshes: Vec<(String, Mesh)>,
+    /// The tables that it names, with their file names, as text.
+    pub tables: Vec<(String, String)>,
     /// What is worth knowing of the translation, a sentence each; what was left out is one of them.
     pub notes: Vec<String>,
     /// Parts of the model that the scene does not have. Unless this is empty, the scene is another model.

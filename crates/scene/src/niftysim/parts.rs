@@ -4,11 +4,14 @@ use pliant_geometry::Mesh;
 
 use super::Files;
 use super::conditions::{self, Condition, Remarks, settle, sorted};
+use super::contact::{self, Contact};
 use super::error::{Fault, ImportProblem};
 use super::geometry::{self, Geometry, join, positive};
 use super::material::Material;
+use super::shells::{self, Membrane};
 use super::xml::{
-    Element, attribute, child, children, count, fault, indices, line, needed, number, run_of_indices, text,
+    Element, attribute, child, children, count, fault, indices, is_on, line, needed, number, run_of_indices,
+    text,
 };
 
 /// A model.
@@ -17,6 +20,7 @@ pub(super) struct Model {
     /// What becomes bodies: submodels, or one for all.
     pub parts: Vec<Part>,
     pub materials: Vec<Material>,
+    pub contact: Contact,
     pub system: System,
     pub output: Option<Output>,
     pub remarks: Remarks,
@@ -31,6 +35,7 @@ pub(super) struct Part {
     /// Density of each cell [kg/m³].
     pub density: Vec<f64>,
     pub conditions: Vec<Condition>,
+    pub membranes: Vec<Membrane>,
 }
 
 /// `<SystemParams>`.
@@ -65,6 +70,7 @@ pub(super) fn read(root: Element<'_>, files: &Files<'_>) -> Result<Model, Fault>
     let mut model = Model {
         parts: Vec::new(),
         materials: Vec::new(),
+        contact: Contact::default(),
         system: System::read(root)?,
         output: Output::read(root)?,
         remarks: Remarks::default(),
@@ -82,6 +88,8 @@ pub(super) fn read(root: Element<'_>, files: &Files<'_>) -> Result<Model, Fault>
     for part in &mut model.parts {
         part.conditions = settle(std::mem::take(&mut part.conditions))?;
     }
+    let nodes = model.parts.iter().map(|part| part.geometry.node_count()).sum();
+    model.contact = contact::read(root, nodes, &model.system, files, &mut model.remarks)?;
     model.name_what_is_missing(root);
     Ok(model)
 }
@@ -93,15 +101,18 @@ impl Model {
         sets.read(root, self)?;
         let (material, density) = sets.finish(root)?;
         let conditions = conditions::read(root, &geometry, &mut self.remarks)?;
-        self.parts.push(Part { geometry, material, density, conditions });
+        let membranes = shells::read(root, &geometry, &mut self.remarks)?;
+        self.parts.push(Part { geometry, material, density, conditions, membranes });
         Ok(())
     }
 
-    /// Submodels stay bodies of their own, unless nodes merge or the model itself has constraints or materials.
+    /// Submodels stay bodies of their own, unless nodes merge or the model itself has constraints, materials or shells.
     fn read_submodels(&mut self, root: Element<'_>, files: &Files<'_>) -> Result<(), Fault> {
         let distance = child(root, "SubModelNodeMergerDistance").map(number).transpose()?;
         let whole = distance.is_some_and(|d| d >= 0.0)
-            || ["Constraint", "ElementSet"].iter().any(|name| child(root, name).is_some());
+            || ["Constraint", "ElementSet", "ShellElements", "ShellElementSet"]
+                .iter()
+                .any(|name| child(root, name).is_some());
         if !whole {
             for submodel in children(root, "SubModel") {
                 self.read_whole(submodel, files)?;
@@ -120,18 +131,25 @@ impl Model {
             let mut sets = Sets::new(&geometry);
             sets.read(submodel, self)?;
             assigned.extend(sets.0);
-            apart.push(conditions::read(submodel, &geometry, &mut self.remarks)?);
+            let membranes = shells::read(submodel, &geometry, &mut self.remarks)?;
+            apart.push((conditions::read(submodel, &geometry, &mut self.remarks)?, membranes));
             geometries.push(geometry);
         }
         let (geometry, maps) = self.weld(root, &geometries, distance)?;
         let mut sets = Sets(assigned);
         sets.read(root, self)?;
         let (material, density) = sets.finish(root)?;
-        let parts = apart.into_iter().zip(&maps);
-        let mut conditions: Vec<Condition> =
-            parts.flat_map(|(part, map)| part.into_iter().map(|c| renumbered(c, map))).collect();
+        let (mut conditions, mut membranes) = (Vec::new(), Vec::new());
+        for ((own, walls), map) in apart.into_iter().zip(&maps) {
+            conditions.extend(own.into_iter().map(|condition| renumbered(condition, map)));
+            membranes.extend(walls.into_iter().map(|membrane: Membrane| Membrane {
+                faces: renumbered_faces(&membrane.faces, map),
+                ..membrane
+            }));
+        }
         conditions.extend(conditions::read(root, &geometry, &mut self.remarks)?);
-        self.parts.push(Part { geometry, material, density, conditions });
+        membranes.extend(shells::read(root, &geometry, &mut self.remarks)?);
+        self.parts.push(Part { geometry, material, density, conditions, membranes });
         Ok(())
     }
 
@@ -174,25 +192,17 @@ impl Model {
 
     /// What of the model a scene has no words for yet.
     fn name_what_is_missing(&mut self, root: Element<'_>) {
-        let within = |name: &str| root.descendants().filter(|e| e.has_tag_name(name)).count();
         let missing = &mut self.remarks.missing;
-        let shells = within("ShellElementSet").max(within("ShellElements"));
-        if shells > 0 {
-            missing.push("shells and membranes".into());
+        for submodel in children(root, "SubModel") {
+            let ignored = |of: &Element<'_>| CONTACT.contains(&of.tag_name().name());
+            for of in submodel.children().filter(ignored) {
+                let (name, line) = (of.tag_name().name(), line(of));
+                missing.push(format!(
+                    "contact ({name} of line {line}, in a submodel, where NiftySim does not look)"
+                ));
+            }
         }
-        let contact =
-            ["ContactPlate", "ContactCylinder", "ContactUSProbe", "KinematicContact", "ContactSurface"];
-        let system = child(root, "SystemParams");
-        let is_on = |name: &'static str| {
-            let switch = system.and_then(|system| child(system, name));
-            switch.is_some_and(|switch| !matches!(text(switch).as_str(), "" | "0"))
-        };
-        let mut found: Vec<&str> = contact.into_iter().filter(|name| within(name) > 0).collect();
-        found.extend(["DoDeformableCollision", "DoSelfCollision"].into_iter().filter(|name| is_on(name)));
-        if !found.is_empty() {
-            missing.push(format!("contact ({})", found.join(", ")));
-        }
-        if is_on("ROM") {
+        if child(root, "SystemParams").is_some_and(|system| is_on(system, "ROM")) {
             let note = "ROM: the full model is computed, not its reduction to a basis";
             self.remarks.notes.push(note.into());
         }
@@ -213,12 +223,16 @@ impl Model {
         ];
         for element in root.children().filter(|child| child.is_element()) {
             let name = element.tag_name().name();
-            if !known.contains(&name) && !contact.contains(&name) {
+            if !known.contains(&name) && !CONTACT.contains(&name) {
                 missing.push(format!("<{name}> of line {} (unknown)", line(element)));
             }
         }
     }
 }
+
+/// Elements that are about contact.
+const CONTACT: [&str; 5] =
+    ["ContactPlate", "ContactCylinder", "ContactUSProbe", "KinematicContact", "ContactSurface"];
 
 fn mixed(of: Element<'_>, first: geometry::Solid, other: geometry::Solid) -> Fault {
     let what = format!("this submodel has elements {}, an earlier one {}", other.name(), first.name());
@@ -229,10 +243,12 @@ fn mixed(of: Element<'_>, first: geometry::Solid, other: geometry::Solid) -> Fau
 fn renumbered(mut condition: Condition, map: &[u32]) -> Condition {
     let new = |node: &u32| map[*node as usize];
     condition.nodes = sorted(condition.nodes.iter().map(new).collect());
-    for face in &mut condition.faces {
-        *face = face.iter().map(new).collect();
-    }
+    condition.faces = renumbered_faces(&condition.faces, map);
     condition
+}
+
+fn renumbered_faces(faces: &[Vec<u32>], map: &[u32]) -> Vec<Vec<u32>> {
+    faces.iter().map(|face| face.iter().map(|&node| map[node as usize]).collect()).collect()
 }
 
 /// Material and density of each cell, as far as they are known.

@@ -11,6 +11,8 @@ use super::error::Fault;
 use super::geometry::Solid;
 use super::material::{Elastic, Material};
 use super::parts::{Model, Output, Part, System};
+use super::shells::{Membrane, MembraneLaw};
+use super::touching::Touching;
 
 /// Greatest multiple of the shear modulus that a scene takes as hourglass stiffness.
 const MOST_HOURGLASS: f64 = 10.0;
@@ -27,7 +29,7 @@ const FRAMES: f64 = 20.0;
 
 /// Writes a model read from the file `stem`.xml.
 pub(super) fn write(model: Model, stem: &str) -> Result<Imported, Fault> {
-    let Model { parts, materials, system, output, remarks } = model;
+    let Model { parts, materials, contact, system, output, remarks } = model;
     let mut writer = Writer {
         system,
         laws: materials,
@@ -35,17 +37,23 @@ pub(super) fn write(model: Model, stem: &str) -> Result<Imported, Fault> {
         notes: remarks.notes,
         missing: remarks.missing,
         numbers: BTreeMap::new(),
+        files: Vec::new(),
     };
     let stem = plain(stem);
     let mut meshes = Vec::new();
     let several = parts.len() > 1;
+    let mut touching = Touching::new(contact, several);
+    let mut first = 0;
     for (index, part) in parts.into_iter().enumerate() {
         let (body, file) = match several {
             true => (format!("part-{index}"), format!("{stem}-part-{index}.vtu")),
             false => ("model".to_owned(), format!("{stem}.vtu")),
         };
-        meshes.push((file.clone(), writer.part(part, &body, &file)));
+        let count = part.geometry.node_count() as u32;
+        meshes.push((file.clone(), writer.part(part, &body, &file, (&mut touching, first))));
+        first += count;
     }
+    meshes.extend(writer.contact(touching, &stem));
     writer.note_laws();
     writer.outputs(output.as_ref());
     Ok(writer.finish(&stem, meshes))
@@ -94,22 +102,25 @@ fn by_label(regions: &[Region], value: impl Fn(&Region) -> String) -> String {
     format!("{{ {} }}", entries.join(", "))
 }
 
-struct Writer {
-    system: System,
+pub(super) struct Writer {
+    pub system: System,
     laws: Vec<Material>,
     /// Tables of bodies and what acts on them.
     tables: String,
-    notes: Vec<String>,
-    missing: Vec<String>,
+    pub notes: Vec<String>,
+    pub missing: Vec<String>,
     /// How many tables of each name there are.
     numbers: BTreeMap<&'static str, usize>,
+    /// Tables of poses, with their file names.
+    pub files: Vec<(String, String)>,
 }
 
 impl Writer {
-    /// The mesh of a part; its tables are written.
-    fn part(&mut self, part: Part, body: &str, file: &str) -> Mesh {
+    /// The mesh of a part, whose nodes begin at a number of the whole model; its tables are written.
+    fn part(&mut self, part: Part, body: &str, file: &str, (touching, first): (&mut Touching, u32)) -> Mesh {
         let regions = regions(&part);
         let hourglass = self.hourglass(&part, &regions, body);
+        let pieces = if touching.asks_for_pieces() { part.geometry.piece_count() } else { 1 };
         let mut mesh = part.geometry.mesh;
         let solid = part.geometry.solid;
         if regions.len() > 1 {
@@ -141,6 +152,10 @@ impl Writer {
         for condition in part.conditions {
             self.condition(condition, body, solid, whole, &mut mesh);
         }
+        for membrane in part.membranes {
+            self.membrane(membrane, body, solid, &mut mesh);
+        }
+        touching.body(self, body, pieces, first, solid, &mut mesh);
         let dropped = mesh.drop_unused_points();
         if dropped > 0 {
             self.notes.push(format!(
@@ -171,6 +186,48 @@ impl Writer {
         Some(written)
     }
 
+    /// A name with the next number of its kind.
+    pub fn numbered(&mut self, kind: &'static str) -> String {
+        let number = self.numbers.entry(kind).or_insert(0);
+        *number += 1;
+        format!("{kind}-{}", *number - 1)
+    }
+
+    /// A wall on the boundary of a body.
+    fn membrane(&mut self, membrane: Membrane, body: &str, solid: Solid, mesh: &mut Mesh) {
+        let name = self.numbered("membrane");
+        let Membrane { line, law, density, thickness, faces } = membrane;
+        let found = add_faces(mesh, solid, &name, &faces);
+        if found.inside > 0 {
+            let inside = found.inside;
+            self.missing.push(format!(
+                "{inside} of the shells of line {line} (no faces of the boundary, where a body's membranes lie)"
+            ));
+        }
+        if found.outside == 0 {
+            return;
+        }
+        if matches!(law, MembraneLaw::Linear(_)) {
+            self.note(
+                "membranes Linear: NiftySim's are linear in the displacements, with axes that do not turn; the scene's \
+                 are nearly the same for small ones only, and right for large ones",
+            );
+        }
+        self.line(format!("[law.{name}]"));
+        law.lines().into_iter().for_each(|line| self.line(line));
+        self.line(String::new());
+        self.line(format!("[body.{name}]"));
+        self.line("model = \"membrane\"".into());
+        self.line(format!("on = \"{body}\""));
+        if !found.all {
+            self.line(format!("faces = {{ set = \"{name}\" }}"));
+        }
+        self.line(format!("law = \"{name}\""));
+        self.line(format!("density = {density:?}"));
+        self.line(format!("thickness = {thickness:?}"));
+        self.line(String::new());
+    }
+
     fn condition(&mut self, condition: Condition, body: &str, solid: Solid, whole: usize, mesh: &mut Mesh) {
         let (kind, name) = match condition.action {
             Action::Fix(_) => ("constraint", "fix"),
@@ -180,9 +237,7 @@ impl Writer {
             Action::Pressure(_) => ("load", "pressure"),
             Action::Traction(_) => ("load", "traction"),
         };
-        let number = self.numbers.entry(name).or_insert(0);
-        let set = format!("{name}-{number}");
-        *number += 1;
+        let set = self.numbered(name);
         let Some(selection) = self.selection(&condition, &set, solid, whole, mesh) else { return };
         self.line(format!("[{kind}.{set}]"));
         self.line(format!("type = \"{name}\""));
@@ -199,7 +254,8 @@ impl Writer {
         }
         self.action(&condition, &set);
         if !matches!(condition.action, Action::Fix(_)) {
-            self.curve(condition.shape, &condition.action);
+            let moves = matches!(condition.action, Action::Move(_));
+            self.curve(condition.shape, moves);
         }
         self.line(String::new());
     }
@@ -274,7 +330,8 @@ impl Writer {
         }
     }
 
-    fn curve(&mut self, shape: Shape, action: &Action) {
+    /// The course of a load, or of what moves.
+    pub fn curve(&mut self, shape: Shape, moves: bool) {
         let total = self.system.total;
         match shape {
             Shape::Polynomial => {
@@ -303,7 +360,7 @@ impl Writer {
             Shape::Step => {
                 self.line("curve = \"hold\"".into());
                 // Nodes that jump while the run goes on would throw its energies off balance.
-                if matches!(action, Action::Move(_)) {
+                if moves {
                     self.note("STEP of a Disp: the nodes start displaced; NiftySim displaces them in its first step");
                     return;
                 }
@@ -389,13 +446,13 @@ impl Writer {
         }
     }
 
-    fn line(&mut self, line: String) {
+    pub fn line(&mut self, line: String) {
         self.tables.push_str(&line);
         self.tables.push('\n');
     }
 
     /// Notes something once.
-    fn note(&mut self, note: &str) {
+    pub fn note(&mut self, note: &str) {
         if !self.notes.iter().any(|known| known == note) {
             self.notes.push(note.to_owned());
         }
@@ -422,22 +479,22 @@ impl Writer {
         }
         scene.push_str(self.tables.trim_end());
         scene.push('\n');
-        Imported { scene, meshes, notes: self.notes, missing: self.missing }
+        Imported { scene, meshes, tables: self.files, notes: self.notes, missing: self.missing }
     }
 }
 
 /// How faces became a set of a mesh.
-struct Faces {
+pub(super) struct Faces {
     /// How many of them are on the boundary.
-    outside: usize,
+    pub outside: usize,
     /// How many are not.
-    inside: usize,
+    pub inside: usize,
     /// True if they are the whole boundary, which needs no set.
-    all: bool,
+    pub all: bool,
 }
 
 /// Adds faces as cells of a named set; those that are not on the boundary stay out.
-fn add_faces(mesh: &mut Mesh, solid: Solid, set: &str, faces: &[Vec<u32>]) -> Faces {
+pub(super) fn add_faces(mesh: &mut Mesh, solid: Solid, set: &str, faces: &[Vec<u32>]) -> Faces {
     let surface = boundary(mesh);
     let key = |nodes: &[u32]| sorted(nodes.to_vec());
     let outer: BTreeSet<Vec<u32>> = surface.faces.iter().map(|face| key(face.nodes())).collect();

@@ -124,3 +124,8 @@ pub(super) fn run_of_indices(
         _ => Err(fault(of, ImportProblem::Count { what, found: listed.len(), wanted: size.to_string() })),
     }
 }
+
+/// Whether a child is a switch that is on.
+pub(super) fn is_on(of: Element<'_>, name: &'static str) -> bool {
+    child(of, name).is_some_and(|switch| !matches!(text(switch).as_str(), "" | "0"))
+}

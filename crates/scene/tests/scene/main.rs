@@ -8,6 +8,7 @@ mod corpus;
 mod grasper;
 mod grips;
 mod niftysim;
+mod niftysim_contact;
 mod obstacles;
 mod participants;
 mod penalty;
