@@ -3,34 +3,32 @@
 //! λ g = 0, and against its slip by at most μ λ. Projected Gauss–Seidel finds them, in the order of the rows: momentum is kept to the last bit of
 //! each impulse. A last pass over nodes alone keeps these out of curved rigid things, too.
 
+mod at_rigid;
 mod nodal;
+mod rows;
 
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 use pliant_contact::pairs::{Pairs, Surface};
 use pliant_contact::pose::Pose;
-use pliant_contact::shape::{Near, Shape};
+use pliant_contact::shape::Near;
 use pliant_contact::touch::{
-    Contact, Contacts, FOUND, Gripped, LEFT, LIFTED, LIFTS, MARGIN, OFF, PASSES, Passage, ROUNDS, Rigid,
-    SIDES, With, lattice, parts_of,
+    Contact, Contacts, FOUND, Gripped, LIFTED, LIFTS, OFF, PASSES, Passage, ROUNDS, Rigid, SIDES, With,
 };
 use pliant_mechanics::tensor::{Vector, add};
 
+use at_rigid::AtRigid;
 pub use nodal::NodeContact;
+use rows::{NONE, Row, idle, push_alone, take_back};
 
 /// Gaps, over the depth of the deepest point, up to which points take part.
 const BAND: f64 = 8.0;
-/// How much farther than nodes count as near they are listed, over that margin.
-const SKIN: f64 = 1.0;
 
 /// Distance [thinnest part of a jaw] at which a node touches it.
 const TOUCHING: f64 = 1e-6;
 /// Cosine of the angle to the normal of a jaw's inner face up to which nodes are between the jaws.
 const INWARD: f64 = 0.7;
-
-/// No row.
-const NONE: u32 = u32::MAX;
 
 /// How a rigid thing is in a step.
 pub(crate) struct Posture {
@@ -93,186 +91,6 @@ enum Own {
     Rigid(AtRigid),
     /// Bodies in the order of their nodes, with −1 where the contact names them in the other one: results don't depend on that.
     Bodies(Pairs, f64),
-}
-
-/// A surface at a rigid thing.
-struct AtRigid {
-    /// The thing, by its place in [`Contacts::rigids`].
-    rigid: usize,
-    surface: Surface,
-    /// Points of each face.
-    samples: Vec<[f64; 3]>,
-    /// How far [m] a point of a face can be from its nearest corner.
-    reach: f64,
-    /// Distance [m] at which a node at rest still counts as near.
-    margin: f64,
-    passage: Passage,
-    /// Whether it is a jaw that holds what touches it.
-    grips: bool,
-    listed: Listed,
-}
-
-/// What may come near a rigid thing, until the surface and the thing have moved too far.
-#[derive(Default)]
-struct Listed {
-    /// Distance [m] up to which nodes and faces are listed.
-    reach: f64,
-    /// The pose of the thing then, and the places [m] of the nodes of the surface.
-    pose: Pose,
-    places: Vec<Vector3<f64>>,
-    /// Nodes of the surface with the corners of the faces, and faces by their place; increasing.
-    nodes: Vec<u32>,
-    faces: Vec<u32>,
-}
-
-/// A pair of points that may touch.
-struct Row {
-    contact: usize,
-    nodes: [u32; 4],
-    weights: [f64; 4],
-    /// How many nodes take part.
-    count: usize,
-    normal: Vector3<f64>,
-    /// The gap [m] as predicted, and Σ cᵢ xᵢ [m] then.
-    gap: f64,
-    place: Vector3<f64>,
-    /// Σ cᵢ xᵢ [m] of no slip.
-    carried: Vector3<f64>,
-    mobility: Vector3<f64>,
-    /// Impulse over the step along the normal [N], and across it.
-    push: f64,
-    drag: Vector3<f64>,
-    /// 1 if the impulse acts on the first surface of the contact, −1 if on the second.
-    sign: f64,
-    /// Of a row on a node alone: the next one.
-    next: u32,
-}
-
-impl Row {
-    fn new<const N: usize>(contact: usize, nodes: [u32; N], weights: [f64; N]) -> Self {
-        let zero = Vector3::zeros();
-        let (normal, place, carried, mobility, drag) = (zero, zero, zero, zero, zero);
-        let at = |k: usize| k.min(N - 1);
-        let nodes = std::array::from_fn(|k| nodes[at(k)]);
-        let weights = std::array::from_fn(|k| weights[at(k)]);
-        Self {
-            contact,
-            nodes,
-            weights,
-            count: N,
-            normal,
-            gap: 0.0,
-            place,
-            carried,
-            mobility,
-            push: 0.0,
-            drag,
-            sign: 1.0,
-            next: NONE,
-        }
-    }
-
-    /// The nodes that take part, with their weights.
-    fn parts(&self) -> impl Iterator<Item = (usize, f64)> {
-        self.nodes.iter().zip(&self.weights).take(self.count).map(|(&node, &weight)| (node as usize, weight))
-    }
-
-    /// Finds its impulse with the others as they are. How far it moves its point [m].
-    fn push_apart(&mut self, nodes: &mut [Node], friction: f64) -> f64 {
-        let along = self.mobility.component_mul(&self.normal).dot(&self.normal);
-        if along <= 0.0 {
-            return 0.0;
-        }
-        let mut place = Vector3::zeros();
-        for (node, weight) in self.parts() {
-            place += nodes[node].then * weight;
-        }
-        let gap = self.gap + self.normal.dot(&(place - self.place));
-        let before = self.push;
-        self.push = (before - gap / along).max(0.0);
-        let mut more = self.normal * (self.push - before);
-        if friction > 0.0 && (self.push > 0.0 || before > 0.0) {
-            let slip = place + self.mobility.component_mul(&more) - self.carried;
-            let slip = slip - self.normal * self.normal.dot(&slip);
-            let across = self.mobility.component_mul(&slip).dot(&slip) / slip.norm_squared();
-            let wanted = if across > 0.0 { self.drag - slip / across } else { self.drag };
-            let limit = friction * self.push;
-            let size = wanted.norm();
-            let drag = if size > limit { wanted * (limit / size) } else { wanted };
-            more += drag - self.drag;
-            self.drag = drag;
-        }
-        if more == Vector3::zeros() {
-            return 0.0;
-        }
-        for (node, weight) in self.parts() {
-            let node = &mut nodes[node];
-            node.then += node.mobility.component_mul(&more) * weight;
-        }
-        self.mobility.component_mul(&more).norm()
-    }
-
-    /// Takes places and mobilities; returns Σ cᵢ xᵢ [m] before the step.
-    fn place(&mut self, nodes: &[Node]) -> Vector3<f64> {
-        let mut now = Vector3::zeros();
-        let (mut place, mut mobility) = (Vector3::zeros(), Vector3::zeros());
-        for (node, weight) in self.parts() {
-            let node = &nodes[node];
-            place += node.then * weight;
-            now += node.now * weight;
-            mobility += node.mobility * (weight * weight);
-        }
-        (self.place, self.mobility) = (place, mobility);
-        now
-    }
-}
-
-/// Of the rows of a contact on a node alone, one without an impulse, or a new one; `None` if there are as many as can be.
-fn idle(rows: &mut Vec<Row>, node: &mut Node, new: Row) -> Option<u32> {
-    let (mut next, mut last, mut count) = (node.first, NONE, 0);
-    while let Some(row) = rows.get(next as usize) {
-        let is_own = row.contact == new.contact;
-        if is_own && row.push == 0.0 {
-            return Some(next);
-        }
-        count += usize::from(is_own);
-        (last, next) = (next, row.next);
-    }
-    (count < SIDES[1]).then(|| {
-        let number = rows.len() as u32;
-        rows.push(new);
-        *rows.get_mut(last as usize).map_or(&mut node.first, |row| &mut row.next) = number;
-        number
-    })
-}
-
-/// Takes back the impulses of a contact on a node alone; the last such row, if there are any.
-fn take_back(rows: &mut [Row], node: &mut Node, contact: usize) -> Option<u32> {
-    let (mut next, mut last) = (node.first, None);
-    while let Some(row) = rows.get_mut(next as usize) {
-        if row.contact == contact && row.push > 0.0 {
-            node.then -= node.mobility.component_mul(&(row.normal * row.push + row.drag));
-            (row.push, row.drag) = (0.0, Vector3::zeros());
-            last = Some(next);
-        }
-        next = row.next;
-    }
-    last
-}
-
-/// Impulses of the rows of a node alone, until they move it by no more than a length [m].
-fn push_alone(rows: &mut [Row], nodes: &mut [Node], number: u32, found: f64, friction: impl Fn(&Row) -> f64) {
-    for _ in 0..PASSES {
-        let (mut moved, mut next) = (0.0_f64, nodes[number as usize].first);
-        while let Some(row) = rows.get_mut(next as usize) {
-            let friction = friction(row);
-            moved = moved.max(row.push_apart(nodes, friction));
-            next = row.next;
-        }
-        if moved <= found {
-            break;
-        }
-    }
 }
 
 /// The contacts of a model, with the nodes that they are about.
@@ -621,199 +439,7 @@ impl Touching {
     }
 }
 
-impl AtRigid {
-    fn new(rigid: &Rigid, number: usize, surface: Surface, place: impl Fn(u32) -> Vector3<f64>) -> Self {
-        let edges = surface.faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-        let longest = edges.map(|[a, b]| (place(a) - place(b)).norm()).fold(0.0, f64::max);
-        Self {
-            rigid: number,
-            samples: lattice(parts_of(longest, &rigid.shape)),
-            reach: longest,
-            margin: MARGIN * longest,
-            passage: Passage::new(rigid, [Pose::identity(); 2]),
-            grips: false,
-            listed: Listed::default(),
-            surface,
-        }
-    }
-
-    /// How far behind an offset [m] a node may stay that is at a place [m] before the step: at most 0.
-    fn left(&self, rigid: &Rigid, offset: f64, now: &Vector3<f64>) -> f64 {
-        LEFT * (self.passage.distance_before(rigid, now) - offset).min(0.0)
-    }
-
-    /// Lists what is within a distance [m] of the thing, if the list does not hold so much any more.
-    fn list(&mut self, rigid: &Rigid, room: f64, nodes: &[Node]) {
-        let Self { surface, samples, margin, passage, listed, .. } = self;
-        let places = || surface.nodes.iter().map(|&node| nodes[node as usize].now);
-        let moved = places().zip(&listed.places).map(|(now, then)| (now - then).norm_squared());
-        let moved = moved.fold(0.0, f64::max).sqrt() + passage.travel_from(rigid, &listed.pose);
-        if !listed.places.is_empty() && room + moved <= listed.reach {
-            return;
-        }
-        let Listed { reach, pose, places: then, nodes: near, faces } = listed;
-        // Sampled distances can change faster than a point moves.
-        let grows_evenly = !matches!(rigid.shape, Shape::Grid(_));
-        (*reach, *pose) = (if grows_evenly { room + SKIN * *margin } else { f64::INFINITY }, passage.pose());
-        then.clear();
-        then.extend(places());
-        near.clear();
-        faces.clear();
-        let distance = |point: &Vector3<f64>| passage.near(rigid, point).distance;
-        near.extend(surface.nodes.iter().filter(|&&node| distance(&nodes[node as usize].now) < *reach));
-        if samples.is_empty() {
-            return;
-        }
-        for (face, number) in surface.faces.iter().zip(0..) {
-            let (middle, around) = middle(face, nodes);
-            if distance(&middle) < *reach + around {
-                faces.push(number);
-                near.extend(face);
-            }
-        }
-        near.sort_unstable();
-        near.dedup();
-    }
-
-    /// Marks the nodes that may come nearer than a room [m] in the passage; rows of these and of points between them.
-    fn look(
-        &mut self,
-        rigid: &Rigid,
-        room: f64,
-        nodes: &mut [Node],
-        distances: &mut [f64],
-        mut found: impl FnMut(Row),
-    ) {
-        let room = room + self.margin + self.passage.travel();
-        self.list(rigid, room, nodes);
-        let mut nearest = f64::INFINITY;
-        for &node in &self.listed.nodes {
-            let distance = self.passage.near(rigid, &nodes[node as usize].now).distance;
-            distances[node as usize] = distance;
-            nearest = nearest.min(distance);
-            if distance < room {
-                nodes[node as usize].near = true;
-                found(Row::new(0, [node], [1.0]));
-            }
-        }
-        if nearest > room + self.reach {
-            return;
-        }
-        for &face in &self.listed.faces {
-            let face = self.surface.faces[face as usize];
-            let corners = face.map(|node| nodes[node as usize].now);
-            let (middle, around) = middle(&face, nodes);
-            // No point is nearer than one beside it by more than the way between both.
-            let own = face.map(|node| distances[node as usize]);
-            if own.iter().all(|&distance| distance > room + 2.0 * around) {
-                continue;
-            }
-            let between = self.passage.near(rigid, &middle).distance;
-            if between > room + around {
-                continue;
-            }
-            let mut is_near = false;
-            for &weights in &self.samples {
-                let place = (0..3).map(|k| corners[k] * weights[k]).sum::<Vector3<f64>>();
-                let is_beyond = |at: &Vector3<f64>, distance: f64| {
-                    let far = distance - room;
-                    far > 0.0 && (place - at).norm_squared() < far * far
-                };
-                if !is_beyond(&middle, between) && !(0..3).any(|k| is_beyond(&corners[k], own[k])) {
-                    is_near = true;
-                    found(Row::new(0, face, weights));
-                }
-            }
-            if is_near {
-                face.iter().for_each(|&node| nodes[node as usize].near = true);
-            }
-        }
-    }
-}
-
-/// The middle of a face [m], and how far its corners are from there at most [m].
-fn middle(face: &[u32; 3], nodes: &[Node]) -> (Vector3<f64>, f64) {
-    let corners = face.map(|node| nodes[node as usize].now);
-    let middle = corners.iter().sum::<Vector3<f64>>() / 3.0;
-    (middle, corners.iter().map(|corner| (corner - middle).norm()).fold(0.0, f64::max))
-}
-
 /// The force [N] of a way [m] over a mobility [m/N].
 fn over(moved: &Vector3<f64>, mobility: &Vector3<f64>) -> Vector3<f64> {
     moved.zip_map(mobility, |moved, m| if m > 0.0 { moved / m } else { 0.0 })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use pliant_contact::pose::Course;
-    use pliant_testing::Random;
-
-    const CELLS: u32 = 12;
-
-    /// A sheet of triangles over the unit square.
-    fn sheet() -> (Surface, Vec<Vector3<f64>>) {
-        let across = CELLS + 1;
-        let node = |i: u32, j: u32| i * across + j;
-        let cells = (0..CELLS).flat_map(|i| (0..CELLS).map(move |j| (i, j)));
-        let faces = cells.flat_map(|(i, j)| {
-            let [a, b, c, d] = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
-            [[a, b, c], [a, c, d]]
-        });
-        let place =
-            |k: u32| Vector3::new(f64::from(k / across), f64::from(k % across), 0.0) / f64::from(CELLS);
-        let nodes: Vec<u32> = (0..across * across).collect();
-        (Surface { faces: faces.collect(), nodes: nodes.clone() }, nodes.into_iter().map(place).collect())
-    }
-
-    /// The rows of a step are those of lists made in this step, however the sheet waves and the thing moves and turns.
-    #[test]
-    fn lists_leave_nothing_out() {
-        let (surface, rest) = sheet();
-        let shapes = [
-            Shape::Capsule { radius: 0.05, length: 0.3 },
-            Shape::Cuboid { size: [0.1, 0.3, 0.2] },
-            Shape::HalfSpace,
-        ];
-        for shape in shapes {
-            let rigid = Rigid {
-                name: "thing".into(),
-                shape,
-                course: Course::fixed(Pose::identity()),
-                inside: false,
-                jaw: None,
-            };
-            let fresh = || AtRigid::new(&rigid, 0, surface.clone(), |node| rest[node as usize]);
-            let (mut own, mut random) = (fresh(), Random::new(7));
-            let mut nodes = vec![Node::NONE; rest.len()];
-            let mut before = Pose::translation(0.1, 0.5, 0.1);
-            let (mut listed, mut found) = (0, 0);
-            for step in 0..400 {
-                let time = f64::from(step) * 0.01;
-                for (node, at) in nodes.iter_mut().zip(&rest) {
-                    node.now =
-                        at + Vector3::z() * (0.02 * (3.0 * time + 5.0 * at.x).sin() + 1e-4 * random.part());
-                }
-                let turn = Vector3::new(0.2 * time.sin(), 0.0, 0.1 * time);
-                let after = Pose::new(Vector3::new(0.1 + 0.2 * time, 0.5, 0.08 + 0.05 * time.cos()), turn);
-                let mut rows = |own: &mut AtRigid| {
-                    own.passage = Passage::new(&rigid, [before, after]);
-                    let mut rows = Vec::new();
-                    let mut distances = vec![0.0; rest.len()];
-                    own.look(&rigid, 1e-3, &mut nodes, &mut distances, |row| {
-                        rows.push((row.nodes, row.weights))
-                    });
-                    rows
-                };
-                let anew = rows(&mut fresh());
-                let (pose, reach) = (own.listed.pose, own.listed.reach);
-                assert_eq!(rows(&mut own), anew, "{:?} at {time} s", rigid.shape);
-                listed += u32::from((own.listed.pose, own.listed.reach) != (pose, reach));
-                found += anew.len();
-                before = after;
-            }
-            println!("{:?}: {found} rows in 400 steps, listed anew in {listed}", rigid.shape);
-            assert!(found > 1000 && (listed < 200 || matches!(rigid.shape, Shape::HalfSpace)));
-        }
-    }
 }
