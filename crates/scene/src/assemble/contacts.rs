@@ -21,6 +21,8 @@ use crate::reads::{rows_of, table as table_file};
 /// What a row of a table of poses holds.
 const ROW: &str =
     "each row is `t,x,y,z,qw,qx,qy,qz`: a time in seconds, a position in metres, a unit quaternion";
+/// The fastest that a tool goes by a table of poses [m/s]: faster than hands, and slow enough for nodes to be pushed along.
+const FASTEST: f64 = 10.0;
 /// How far the length of a quaternion may be off 1.
 const UNIT: f64 = 1e-3;
 
@@ -122,8 +124,24 @@ impl Builder<'_> {
             Course::turn(start, axis.into(), rotate.centre, rotate.angle, self.curve(&table.timing, &path)?)
         } else if let Some(file) = &table.poses {
             let text = self.scene.file(file).and_then(|found| table_file(&found));
-            match poses(file, text).map(|poses| Course::table(start, poses)) {
-                Ok(Some(course)) => course,
+            let reach = shape.reach();
+            let course = poses(file, text).map(|poses| {
+                let (poses, jump) = slowed(poses, reach);
+                Course::table(start, poses).map(|course| (course, jump))
+            });
+            match course {
+                Ok(Some((course, jump))) => {
+                    if let Some(Jump { time, speed, late }) = jump {
+                        self.notes.push(format!(
+                            "{kind} `{name}`: by its table of poses it goes at {} m/s from t = {} s on; it goes at {FASTEST} m/s and is late by up to \
+                             {} s",
+                            number(speed),
+                            number(time),
+                            number(late)
+                        ));
+                    }
+                    course
+                }
                 Ok(None) => {
                     let message = format!("`{}` has no poses, or its times do not increase", file.display());
                     self.error(&at("poses"), message, "this table", ROW);
@@ -476,6 +494,50 @@ pub(crate) fn touches(contacts: &Contacts, body: &Body) -> bool {
         std::iter::once(&contact.surface).chain(other)
     });
     surfaces.any(|surface| body.all_nodes().any(|node| surface.nodes.binary_search(&node).is_ok()))
+}
+
+/// A part of a table of poses that is too fast.
+struct Jump {
+    /// When the fastest one begins [s].
+    time: f64,
+    /// How fast it is [m/s].
+    speed: f64,
+    /// How late the tool comes to a row at most [s].
+    late: f64,
+}
+
+/// A table of poses without motions that are faster than [`FASTEST`]: rows come later where the tool cannot be there before, and it catches up
+/// after them. The tool has a radius [m].
+fn slowed(poses: Vec<(f64, Pose)>, reach: f64) -> (Vec<(f64, Pose)>, Option<Jump>) {
+    if poses.windows(2).any(|rows| rows[0].0 >= rows[1].0) {
+        return (poses, None);
+    }
+    let mut jump: Option<Jump> = None;
+    let mut slowed: Vec<(f64, Pose)> = Vec::with_capacity(poses.len());
+    let mut before: Option<(f64, Pose)> = None;
+    for &(time, pose) in &poses {
+        let (Some((asked, from)), Some(&(then, _))) = (before.replace((time, pose)), slowed.last()) else {
+            slowed.push((time, pose));
+            continue;
+        };
+        let way = (pose.translation.vector - from.translation.vector).norm()
+            + from.rotation.angle_to(&pose.rotation) * reach;
+        let (speed, arrives) = (way / (time - asked), time.max(then + way / FASTEST));
+        if speed > FASTEST {
+            let known = jump.get_or_insert(Jump { time: asked, speed, late: 0.0 });
+            if speed > known.speed {
+                (known.time, known.speed) = (asked, speed);
+            }
+        }
+        if let Some(jump) = &mut jump {
+            jump.late = jump.late.max(arrives - time);
+        }
+        // A tool that rests while it is late has no row there.
+        if arrives > then {
+            slowed.push((arrives, pose));
+        }
+    }
+    (slowed, jump)
 }
 
 /// The poses of a table. Empty lines, a header and what follows a # are passed over.

@@ -150,6 +150,31 @@ fn tools_follow_tables_of_poses_and_are_written_with_the_bodies() {
     assert!(bytes.unwrap().len() > 1000);
 }
 
+/// A table that jumps by 30 mm within 0.1 ms is followed at 10 m/s, and the tool catches up.
+#[test]
+fn jumps_of_poses_are_slowed_and_told() {
+    let place = tempfile::tempdir().unwrap();
+    let poses = place.path().join("poses.csv");
+    let rows = ["0,0,0,0", "0.1,0,0,0", "0.1001,0,0,0.03", "0.102,0,0,0.03", "0.2,0,0,0.02"];
+    let text: String = rows.iter().map(|row| format!("{row},1,0,0,0\n")).collect();
+    std::fs::write(&poses, text).unwrap();
+    let text =
+        pressed("", "").replace("by = [0, 0, -0.005]\nto = 0.2", &format!("poses = '{}'", poses.display()));
+    let world = world(&text).unwrap();
+    let note = world.notes().find(|note| note.contains("table of poses")).unwrap();
+    assert!(
+        note.contains("300 m/s from t = 0.1 s on; it goes at 10 m/s and is late by up to 0.0029 s"),
+        "{note}"
+    );
+    let contacts = world.participants[0].built.contacts.as_ref().unwrap();
+    let height = |time: f64| {
+        contacts.rigids[0].at(time, None).translation.z - contacts.rigids[0].at(0.0, None).translation.z
+    };
+    for (time, expected) in [(0.1, 0.0), (0.1015, 0.015), (0.103, 0.03), (0.2, 0.02)] {
+        assert!((height(time) - expected).abs() < 1e-12, "{} m at {time} s", height(time));
+    }
+}
+
 #[test]
 fn contact_that_cannot_be_is_refused_with_its_line() {
     let plain = pressed("", "");
