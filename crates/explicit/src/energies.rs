@@ -67,15 +67,9 @@ pub fn model_balance_floor<R: Scalar>(model: &Model) -> f64 {
 }
 
 impl Work {
-    /// Begins with the kinetic energy [J] given at the start and ⅛ Δt² Σ m|a|² there.
-    pub fn begin(&mut self, kinetic: f64, shock: f64) {
-        (self.external, self.at_start) = (kinetic, shock);
-    }
-
-    /// Begins with an energy [J] that is stored at the start, too.
-    pub(crate) fn begin_with_stored(&mut self, stored: f64) {
-        self.external += stored;
-        self.internal = stored;
+    /// Begins with the kinetic energy [J] given at the start, the energy [J] stored there and ⅛ Δt² Σ m|a|².
+    pub fn begin(&mut self, kinetic: f64, stored: f64, shock: f64) {
+        (self.external, self.internal, self.at_start) = (kinetic + stored, stored, shock);
     }
 
     /// Goes on with another model: a law that is stiffer at once strikes the body as a load would. The balance is judged again from when it

@@ -25,7 +25,7 @@ use crate::collective::{Collective, Predicted};
 use crate::energies::{Sums, model_balance_floor};
 use crate::forces::{Deformed, Found, InternalForces};
 use crate::lanes::{Instructions, Lanes, MissingInstructions, Processor, Work};
-use crate::recover::Recovery;
+use crate::recover::stored_at_start;
 use crate::stability::{CHECK_EVERY, Monitor};
 use crate::state::State;
 use crate::step_control::{Clock, Lengths, StepControl};
@@ -503,7 +503,7 @@ impl<R: Scalar> CentralDifference<R> {
         self.applied.update(state.time, &state.displacement);
         self.set_factors(state.time);
         if state.is_at_start() {
-            let stored = self.stored_at_start(state, found.hourglass);
+            let stored = stored_at_start(&self.model, &self.owners, state, found.hourglass);
             self.start(state, stored);
             // Half of a step's force moves a node in the first one: its other half is in the increment before.
             if self.touch(state, 0.5) {
@@ -571,16 +571,6 @@ impl<R: Scalar> CentralDifference<R> {
         }
     }
 
-    /// The energy [J] stored in a state whose free nodes start displaced, that of hourglass patterns included.
-    fn stored_at_start(&self, state: &State<R>, hourglass: f64) -> f64 {
-        let mut free = state.displacement.iter().zip(&self.owners);
-        let moved = |(u, owner): (&Vector<R>, &[u32; 3])| (0..3).any(|c| owner[c] == FREE && u[c] != R::ZERO);
-        match free.any(moved) {
-            true => Recovery::new(&self.model, state).stored_energy() + hourglass,
-            false => 0.0,
-        }
-    }
-
     /// u⁻¹ = u⁰ − Δt v⁰ + ½ Δt² a⁰ with a⁰ = (R − f)/m − α v⁰: the increment before the first step. A prescribed
     /// component has no velocity of its own.
     fn start(&self, state: &mut State<R>, stored: f64) {
@@ -604,8 +594,7 @@ impl<R: Scalar> CentralDifference<R> {
                 kinetic += 0.5 * m * velocity[c] * velocity[c];
             }
         }
-        state.work.begin(kinetic, shock);
-        state.work.begin_with_stored(stored);
+        state.work.begin(kinetic, stored, shock);
     }
 
     /// Where a node goes with the forces that are found.

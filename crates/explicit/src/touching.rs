@@ -88,7 +88,7 @@ impl Node {
 
 /// What a contact is about, in numbers of nodes of [`Touching`].
 enum Own {
-    Rigid(AtRigid),
+    Rigid(Box<AtRigid>),
     /// Bodies in the order of their nodes, with −1 where the contact names them in the other one: results don't depend on that.
     Bodies(Pairs, f64),
 }
@@ -136,9 +136,12 @@ impl Touching {
             Own::Bodies(Pairs::new(first, second, contact.touch.offset, place), sign)
         };
         let parts = contacts.contacts.iter().map(|contact| match &contact.with {
-            &With::Rigid(rigid) => {
-                Own::Rigid(AtRigid::new(&contacts.rigids[rigid], rigid, own(&contact.surface), place))
-            }
+            &With::Rigid(rigid) => Own::Rigid(Box::new(AtRigid::new(
+                &contacts.rigids[rigid],
+                rigid,
+                own(&contact.surface),
+                place,
+            ))),
             With::Body(second) => pairs(contact, Some(&own(second))),
             With::Itself => pairs(contact, None),
         });
@@ -235,7 +238,7 @@ impl Touching {
             let Own::Rigid(own) = own else { return None };
             let holds =
                 own.rigid == held.rigid as usize && own.surface.nodes.binary_search(&(node as u32)).is_ok();
-            holds.then_some((index, own, node))
+            holds.then_some((index, &**own, node))
         })
     }
 
@@ -264,7 +267,10 @@ impl Touching {
     /// Lets jaws that are closed hold the nodes that touch their inner faces.
     fn take(&self, gripped: &mut Vec<Gripped>) {
         for (contact, own) in self.contacts.contacts.iter().zip(&self.own) {
-            let Own::Rigid(own @ AtRigid { grips: true, .. }) = own else { continue };
+            let Own::Rigid(own) = own else { continue };
+            if !own.grips {
+                continue;
+            }
             let rigid = &self.contacts.rigids[own.rigid];
             let inward = rigid.jaw.as_ref().map_or(0.0, |jaw| jaw.part.signum());
             for &node in own.surface.nodes.iter().filter(|&&node| self.nodes[node as usize].near) {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant as Clock};
 
 use pliant_contact::touch::Contacts;
+use pliant_explicit::recover::stored_at_start;
 use pliant_explicit::stability::{Monitor, Stability};
 use pliant_explicit::{
     CentralDifference, Deformed, Lengths, Observable, State, StepControl, StepError, Sums, Wanted,
@@ -369,7 +370,8 @@ impl GpuStepper {
         }
         let at_start = state.is_at_start();
         if at_start {
-            state.work.begin(self.kinetic_at_start(), results.shock);
+            let stored = stored_at_start(&self.model, &self.owners, state, results.hourglass);
+            state.work.begin(self.kinetic_at_start(), stored, results.shock);
         }
         let before = (!at_start).then_some(self.lengths.before);
         self.energies = state.work.settle(&results.sums, results.hourglass, before, self.balance_floor);

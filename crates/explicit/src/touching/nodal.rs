@@ -7,9 +7,9 @@ use pliant_contact::shape::Near;
 use pliant_contact::touch::{Contacts, With};
 use pliant_mechanics::tensor::Vector;
 
-use super::{AtRigid, Own, Touching, over};
+use super::{Own, Touching, over};
 
-/// Gap, over [`AtRigid::margin`], up to which a touch lasts that nothing bears on.
+/// Gap, over the margin of a surface at a thing, up to which a touch lasts that nothing bears on.
 const LASTS: f64 = 0.1;
 
 /// A node of a surface that may touch, at an instant.
@@ -68,7 +68,10 @@ impl Touching {
         }
         // Jaws that hold a node press on it along their normal.
         for own in &self.own {
-            let Own::Rigid(own @ AtRigid { grips: true, .. }) = own else { continue };
+            let Own::Rigid(own) = own else { continue };
+            if !own.grips {
+                continue;
+            }
             let rigid = &self.contacts.rigids[own.rigid];
             for &number in &own.surface.nodes {
                 let node = &self.nodes[number as usize];
