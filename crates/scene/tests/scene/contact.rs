@@ -163,7 +163,7 @@ fn jumps_of_poses_are_slowed_and_told() {
     let world = world(&text).unwrap();
     let note = world.notes().find(|note| note.contains("table of poses")).unwrap();
     assert!(
-        note.contains("300 m/s from t = 0.1 s on; it goes at 10 m/s and is late by up to 0.0029 s"),
+        note.contains("300.0 m/s from t = 0.1000 s on; it goes at 10 m/s and is late by up to 0.002900 s"),
         "{note}"
     );
     let contacts = world.participants[0].built.contacts.as_ref().unwrap();
