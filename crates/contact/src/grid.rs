@@ -169,7 +169,7 @@ impl Grid {
         }
         let beyond = (along - inner) * self.spacing;
         if distance <= 0.0 {
-            // The shape goes on beyond the grid, as a plane.
+            // Beyond the grid the shape continues as a plane.
             return Near { distance: distance + normal.dot(&beyond), normal };
         }
         let from_surface = beyond + normal * distance;

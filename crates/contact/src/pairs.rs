@@ -39,6 +39,14 @@ pub struct Surface {
     pub faces: Vec<[u32; 3]>,
 }
 
+impl Surface {
+    /// Length [m] of its longest edge, with nodes at these places [m].
+    pub fn longest_edge(&self, place: impl Fn(u32) -> Vector3<f64>) -> f64 {
+        let edges = self.faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        edges.map(|[a, b]| (place(a) - place(b)).norm()).fold(0.0, f64::max)
+    }
+}
+
 /// A point of one surface beside a point of another.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair {

@@ -126,7 +126,7 @@ fn sampled(at: u32, point: vec3f) -> Near {
     }
     let beyond = (along - inner) * spacing;
     if distance <= 0.0 {
-        // The shape goes on beyond the grid, as a plane.
+        // Beyond the grid the shape continues as a plane.
         return Near(distance + dot(normal, beyond), normal);
     }
     let from_surface = beyond + normal * distance;

@@ -28,8 +28,10 @@ pub const PASSES: usize = 30;
 pub const FOUND: f64 = 1e-3;
 /// Times at most that impulses are found with sides of things where nodes came to lie.
 pub const ROUNDS: usize = 4;
-/// Sides of a thing at most that are looked for at a node in a round, and that a node has at a time.
-pub const SIDES: [usize; 2] = [8, 4];
+/// Sides of a thing at most that are looked for at a node in a round.
+pub const LOOKED: usize = 8;
+/// Sides of a thing at most that a node has at a time.
+pub const SIDES: usize = 4;
 /// Distance of a node from the surface of a thing, over its depth as predicted, from which on it lies off or behind it.
 pub const OFF: f64 = 1e-3;
 /// Times at most that a node is lifted out of a thing: creases turn it from one side to another.
@@ -325,6 +327,14 @@ pub struct Contact {
     pub with: With,
     /// How.
     pub touch: Touch,
+}
+
+impl Contact {
+    /// The surfaces that take part: its own, and that of another body.
+    pub fn surfaces(&self) -> impl Iterator<Item = &Surface> {
+        let other = if let With::Body(other) = &self.with { Some(other) } else { None };
+        std::iter::once(&self.surface).chain(other)
+    }
 }
 
 /// What the surface of a body touches.

@@ -14,7 +14,7 @@ use pliant_contact::pairs::{Pairs, Surface};
 use pliant_contact::pose::Pose;
 use pliant_contact::shape::Near;
 use pliant_contact::touch::{
-    Contact, Contacts, FOUND, Gripped, LIFTED, LIFTS, OFF, PASSES, Passage, ROUNDS, Rigid, SIDES, With,
+    Contact, Contacts, FOUND, Gripped, LIFTED, LIFTS, LOOKED, OFF, PASSES, Passage, ROUNDS, Rigid, With,
 };
 use pliant_mechanics::tensor::{Vector, add};
 
@@ -64,7 +64,7 @@ struct Node {
     near: bool,
     /// The first of the rows on it alone.
     first: u32,
-    /// How deep [m] it lies in things as predicted.
+    /// Its depth [m] in things at the predicted place.
     depth: f64,
 }
 
@@ -113,10 +113,7 @@ pub(crate) struct Touching {
 impl Touching {
     /// Those of a model with these nodes at rest [m].
     pub fn new(contacts: Arc<Contacts>, rest: &[Vector<f64>]) -> Self {
-        let surfaces = contacts.contacts.iter().flat_map(|Contact { surface, with, .. }| {
-            let other = if let With::Body(other) = with { Some(other) } else { None };
-            std::iter::once(surface).chain(other)
-        });
+        let surfaces = contacts.contacts.iter().flat_map(Contact::surfaces);
         let mut numbers: Vec<u32> = surfaces.flat_map(|surface| &surface.nodes).copied().collect();
         numbers.sort_unstable();
         numbers.dedup();
@@ -360,7 +357,7 @@ impl Touching {
         for _ in 0..PASSES {
             let mut moved = 0.0_f64;
             for row in rows.iter_mut() {
-                moved = moved.max(row.push_apart(nodes, contacts.contacts[row.contact].touch.friction));
+                moved = moved.max(row.push_apart(nodes, contacts));
             }
             if moved < FOUND * deepest {
                 break;
@@ -382,15 +379,11 @@ impl Touching {
                 }
                 let depth = nodes[at].depth.max(FOUND * deepest);
                 let before = nodes[at].then;
-                for _ in 0..SIDES[0] {
-                    let (place, now) = (nodes[at].then, nodes[at].now);
-                    let Near { distance, normal } = own.passage.near(rigid, &place);
-                    let mut gap = distance - touch.offset;
-                    if gap < 0.0 {
-                        gap -= own.left(rigid, touch.offset, &now);
-                    }
+                for _ in 0..LOOKED {
+                    let place = nodes[at].then;
+                    let (gap, normal) = own.gap(rigid, touch.offset, &nodes[at]);
                     let side = if gap < -OFF * depth {
-                        let carried = own.passage.carry(&now);
+                        let carried = own.passage.carry(&nodes[at].now);
                         idle(rows, &mut nodes[at], Row { carried, ..Row::new(index, [number], [1.0]) })
                     } else if gap > OFF * depth {
                         take_back(rows, &mut nodes[at], index)
@@ -401,9 +394,7 @@ impl Touching {
                     let row = &mut rows[side as usize];
                     (row.place, row.mobility) = (place, nodes[at].mobility);
                     (row.normal, row.gap) = (normal, gap);
-                    push_alone(rows, nodes, number, FOUND * depth, |row| {
-                        contacts.contacts[row.contact].touch.friction
-                    });
+                    push_alone(rows, nodes, number, FOUND * depth, contacts);
                 }
                 farthest = farthest.max((nodes[at].then - before).norm());
             }
@@ -421,21 +412,15 @@ impl Touching {
                 if !node.near {
                     continue;
                 }
-                let offset = contact.touch.offset;
                 let mut first = None;
                 for _ in 0..LIFTS {
-                    let Near { distance, normal } = own.passage.near(rigid, &node.then);
-                    let gap = distance - offset;
-                    if gap >= 0.0 {
-                        break;
-                    }
-                    let left = || own.left(rigid, offset, &node.now);
-                    let (deepest, left) = *first.get_or_insert_with(|| (gap, left()));
+                    let (gap, normal) = own.gap(rigid, contact.touch.offset, node);
+                    let deepest = *first.get_or_insert(gap.min(0.0));
                     let along = node.mobility.component_mul(&normal);
-                    if gap - left >= LIFTED * deepest || along.dot(&normal) <= 0.0 {
+                    if gap >= LIFTED * deepest || along.dot(&normal) <= 0.0 {
                         break;
                     }
-                    let push = (left - gap) / along.dot(&normal);
+                    let push = -gap / along.dot(&normal);
                     node.then += along * push;
                     node.lifted += normal * push;
                     *force = add(*force, (normal * push).into());

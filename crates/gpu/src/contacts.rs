@@ -4,12 +4,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use pliant_contact::pairs::Surface;
 use pliant_contact::pose::Leg;
 use pliant_contact::shader::{PASSAGE, THING, shader, split, things};
 use pliant_contact::touch::{
-    Contact, Contacts, FOUND, LIFTED, LIFTS, MARGIN, OFF, PASSES, Passage, ROUNDS, SIDES, With, lattice,
-    parts_of,
+    Contact, Contacts, FOUND, LIFTED, LIFTS, LOOKED, MARGIN, OFF, PASSES, Passage, ROUNDS, SIDES, With,
+    lattice, parts_of,
 };
 use pliant_mechanics::model::Model;
 use pliant_mechanics::tensor::Vector;
@@ -106,8 +105,8 @@ impl DeviceContacts {
         let counts = [
             ("PASSES", PASSES),
             ("ROUNDS", ROUNDS),
-            ("LOOKED", SIDES[0]),
-            ("SIDES", SIDES[1]),
+            ("LOOKED", LOOKED),
+            ("SIDES", SIDES),
             ("LIFTS", LIFTS),
             ("ROWS", NODE_ROWS),
         ];
@@ -148,7 +147,7 @@ impl DeviceContacts {
 }
 
 /// Fours of `rows` of a contact at a node: its force, and three of each side of the thing.
-const NODE_ROWS: usize = 1 + 3 * SIDES[1];
+const NODE_ROWS: usize = 1 + 3 * SIDES;
 
 /// A face with points that touch.
 #[derive(Default)]
@@ -187,7 +186,7 @@ impl Lists {
         for (index, Contact { surface, with, touch, .. }) in contacts.iter().enumerate() {
             let &With::Rigid(rigid) = with else { continue };
             surface.nodes.iter().for_each(|&node| at_node[place_of(node)].push(index));
-            let longest = longest_edge(surface, rest);
+            let longest = surface.longest_edge(|node| rest[node as usize].into());
             let own = lattice(parts_of(longest, &rigids[rigid].shape));
             // Edges may be twice as long as at rest.
             let beyond = if own.is_empty() { 0.0 } else { 2.0 * longest };
@@ -269,16 +268,6 @@ impl Lists {
     fn queue(&self) -> usize {
         2 + self.colours + self.nodes + self.faces
     }
-}
-
-/// The longest edge [m] of a surface at rest.
-fn longest_edge(surface: &Surface, rest: &[Vector<f64>]) -> f64 {
-    let edges = surface.faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-    let length = |[a, b]: [u32; 2]| {
-        let square = |c: usize| (rest[a as usize][c] - rest[b as usize][c]).powi(2);
-        (square(0) + square(1) + square(2)).sqrt()
-    };
-    edges.map(length).fold(0.0, f64::max)
 }
 
 /// Faces in the order of colours, so that those of a colour share no node: each takes the first one that is free.

@@ -44,7 +44,7 @@ pub fn arrow_unit<'p>(points: impl IntoIterator<Item = &'p Vector3>, largest: f6
     }
 }
 
-/// What the longest arrow stands for, in words.
+/// The force of the longest arrow, in words.
 pub fn arrow_note(largest: f64) -> String {
     let (unit, factor) = readable("N", largest);
     let value = largest * factor;
@@ -133,7 +133,7 @@ mod tests {
     use super::*;
     use pliant_geometry::DataArray;
 
-    /// A dot lies at the point, the arrow above it as far as the force says, and nothing beneath or beside.
+    /// The picture has a dot at the point and an arrow above it as long as its force asks; other pixels stay empty.
     #[test]
     fn an_arrow_begins_at_its_point_and_is_as_long_as_its_force() {
         let mut picture = Picture { width: 200, height: 200, rgba: vec![0; 160_000] };

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use pliant_contact::pairs::Surface;
 use pliant_contact::pose::Pose;
-use pliant_contact::shape::Shape;
+use pliant_contact::shape::{Near, Shape};
 use pliant_contact::touch::{LEFT, MARGIN, Passage, Rigid, lattice, parts_of};
 
 use super::Node;
@@ -18,9 +18,9 @@ pub(super) struct AtRigid {
     pub rigid: usize,
     pub surface: Surface,
     /// Points of each face.
-    pub samples: Vec<[f64; 3]>,
+    samples: Vec<[f64; 3]>,
     /// How far [m] a point of a face can be from its nearest corner.
-    pub reach: f64,
+    reach: f64,
     /// Distance [m] at which a node at rest still counts as near.
     pub margin: f64,
     pub passage: Passage,
@@ -33,19 +33,18 @@ pub(super) struct AtRigid {
 #[derive(Default)]
 pub(super) struct Listed {
     /// Distance [m] up to which nodes and faces are listed.
-    pub reach: f64,
+    reach: f64,
     /// The pose of the thing then, and the places [m] of the nodes of the surface.
-    pub pose: Pose,
-    pub places: Vec<Vector3<f64>>,
+    pose: Pose,
+    places: Vec<Vector3<f64>>,
     /// Nodes of the surface with the corners of the faces, and faces by their place; increasing.
     pub nodes: Vec<u32>,
-    pub faces: Vec<u32>,
+    faces: Vec<u32>,
 }
 
 impl AtRigid {
     pub fn new(rigid: &Rigid, number: usize, surface: Surface, place: impl Fn(u32) -> Vector3<f64>) -> Self {
-        let edges = surface.faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-        let longest = edges.map(|[a, b]| (place(a) - place(b)).norm()).fold(0.0, f64::max);
+        let longest = surface.longest_edge(place);
         Self {
             rigid: number,
             samples: lattice(parts_of(longest, &rigid.shape)),
@@ -58,13 +57,18 @@ impl AtRigid {
         }
     }
 
-    /// How far behind an offset [m] a node may stay that is at a place [m] before the step: at most 0.
-    pub fn left(&self, rigid: &Rigid, offset: f64, now: &Vector3<f64>) -> f64 {
-        LEFT * (self.passage.distance_before(rigid, now) - offset).min(0.0)
+    /// The gap [m] of a node as it lies in the step, less what may be left of it, and the direction away from the thing.
+    pub fn gap(&self, rigid: &Rigid, offset: f64, node: &Node) -> (f64, Vector3<f64>) {
+        let Near { distance, normal } = self.passage.near(rigid, &node.then);
+        let mut gap = distance - offset;
+        if gap < 0.0 {
+            gap -= LEFT * (self.passage.distance_before(rigid, &node.now) - offset).min(0.0);
+        }
+        (gap, normal)
     }
 
     /// Lists what is within a distance [m] of the thing, if the list does not hold so much any more.
-    pub fn list(&mut self, rigid: &Rigid, room: f64, nodes: &[Node]) {
+    fn list(&mut self, rigid: &Rigid, room: f64, nodes: &[Node]) {
         let Self { surface, samples, margin, passage, listed, .. } = self;
         let places = || surface.nodes.iter().map(|&node| nodes[node as usize].now);
         let moved = places().zip(&listed.places).map(|(now, then)| (now - then).norm_squared());
@@ -153,7 +157,7 @@ impl AtRigid {
 }
 
 /// The middle of a face [m], and how far its corners are from there at most [m].
-pub(super) fn middle(face: &[u32; 3], nodes: &[Node]) -> (Vector3<f64>, f64) {
+fn middle(face: &[u32; 3], nodes: &[Node]) -> (Vector3<f64>, f64) {
     let corners = face.map(|node| nodes[node as usize].now);
     let middle = corners.iter().sum::<Vector3<f64>>() / 3.0;
     (middle, corners.iter().map(|corner| (corner - middle).norm()).fold(0.0, f64::max))

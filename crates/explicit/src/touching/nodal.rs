@@ -4,7 +4,7 @@
 
 use nalgebra::Vector3;
 use pliant_contact::shape::Near;
-use pliant_contact::touch::{Contacts, With};
+use pliant_contact::touch::{Contact, Contacts};
 use pliant_mechanics::tensor::Vector;
 
 use super::{Own, Touching, over};
@@ -29,10 +29,7 @@ pub struct NodeContact {
 
 /// Triangles of all surfaces of contacts, each once, in places of their nodes among `numbers`.
 pub(super) fn faces(contacts: &Contacts, numbers: &[u32]) -> Vec<[u32; 3]> {
-    let surfaces = contacts.contacts.iter().flat_map(|contact| {
-        let other = if let With::Body(other) = &contact.with { Some(other) } else { None };
-        std::iter::once(&contact.surface).chain(other)
-    });
+    let surfaces = contacts.contacts.iter().flat_map(Contact::surfaces);
     let place = |node: u32| numbers.partition_point(|&known| known < node) as u32;
     let mut faces: Vec<[u32; 3]> =
         surfaces.flat_map(|surface| &surface.faces).map(|face| face.map(place)).collect();
@@ -140,7 +137,7 @@ impl Touching {
     /// Adds the ways [m] that nodes slide in the step whose forces were found last. Where several points bear on a node, their mean counts,
     /// weighted by their impulses. A touch lasts while something bears on the node, or while it is as near as that.
     pub fn slide(&mut self, slip: &mut [Option<f64>]) {
-        let Self { nodes, rows, slips, numbers, .. } = self;
+        let Self { nodes, rows, slips, .. } = self;
         slips.fill([0.0; 2]);
         for row in rows.iter().filter(|row| row.push > 0.0) {
             let place = row.parts().map(|(node, weight)| nodes[node].then * weight).sum::<Vector3<f64>>();
@@ -150,16 +147,14 @@ impl Touching {
                 slips[node] = [slips[node][0] + load, slips[node][1] + load * way];
             }
         }
-        let numbers = std::mem::take(numbers);
-        for (index, &number) in numbers.iter().enumerate() {
-            let slip = &mut slip[number as usize];
+        for index in 0..self.numbers.len() {
+            let slip = &mut slip[self.numbers[index] as usize];
             *slip = match (self.slips[index], *slip) {
                 ([load, ways], before) if load > 0.0 => Some(before.unwrap_or(0.0) + ways / load),
                 (_, Some(before)) => self.hovering(index).map(|way| before + way),
                 _ => None,
             };
         }
-        self.numbers = numbers;
     }
 
     /// The way [m] that a node slides in a step in which nothing bears on it; `None` if it leaves.

@@ -1,7 +1,7 @@
 //! Rows: pairs of points that may touch, with their impulses, and those of a node alone.
 
 use nalgebra::Vector3;
-use pliant_contact::touch::{PASSES, SIDES};
+use pliant_contact::touch::{Contacts, PASSES, SIDES};
 
 use super::Node;
 
@@ -61,7 +61,8 @@ impl Row {
     }
 
     /// Finds its impulse with the others as they are. How far it moves its point [m].
-    pub fn push_apart(&mut self, nodes: &mut [Node], friction: f64) -> f64 {
+    pub fn push_apart(&mut self, nodes: &mut [Node], contacts: &Contacts) -> f64 {
+        let friction = contacts.contacts[self.contact].touch.friction;
         let along = self.mobility.component_mul(&self.normal).dot(&self.normal);
         if along <= 0.0 {
             return 0.0;
@@ -121,7 +122,7 @@ pub(super) fn idle(rows: &mut Vec<Row>, node: &mut Node, new: Row) -> Option<u32
         count += usize::from(is_own);
         (last, next) = (next, row.next);
     }
-    (count < SIDES[1]).then(|| {
+    (count < SIDES).then(|| {
         let number = rows.len() as u32;
         rows.push(new);
         *rows.get_mut(last as usize).map_or(&mut node.first, |row| &mut row.next) = number;
@@ -144,18 +145,11 @@ pub(super) fn take_back(rows: &mut [Row], node: &mut Node, contact: usize) -> Op
 }
 
 /// Impulses of the rows of a node alone, until they move it by no more than a length [m].
-pub(super) fn push_alone(
-    rows: &mut [Row],
-    nodes: &mut [Node],
-    number: u32,
-    found: f64,
-    friction: impl Fn(&Row) -> f64,
-) {
+pub(super) fn push_alone(rows: &mut [Row], nodes: &mut [Node], number: u32, found: f64, contacts: &Contacts) {
     for _ in 0..PASSES {
         let (mut moved, mut next) = (0.0_f64, nodes[number as usize].first);
         while let Some(row) = rows.get_mut(next as usize) {
-            let friction = friction(row);
-            moved = moved.max(row.push_apart(nodes, friction));
+            moved = moved.max(row.push_apart(nodes, contacts));
             next = row.next;
         }
         if moved <= found {

@@ -445,8 +445,7 @@ impl Builder<'_> {
         if found.is_empty() {
             // A thin thing can go through a face between its corners.
             of = "point";
-            let edges = surface.faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-            let longest = edges.map(|[a, b]| (rest(a) - rest(b)).norm()).fold(0.0, f64::max);
+            let longest = surface.longest_edge(rest);
             let samples = lattice(parts_of(longest, &rigid.shape));
             found = inside(&mut surface.faces.iter().flat_map(|face| {
                 let corners = face.map(rest);
@@ -489,10 +488,7 @@ pub(super) fn hang(rigid: &Rigid, edge: f64) -> f64 {
 
 /// Whether a body touches something.
 pub(crate) fn touches(contacts: &Contacts, body: &Body) -> bool {
-    let mut surfaces = contacts.contacts.iter().flat_map(|contact| {
-        let other = if let With::Body(other) = &contact.with { Some(other) } else { None };
-        std::iter::once(&contact.surface).chain(other)
-    });
+    let mut surfaces = contacts.contacts.iter().flat_map(Contact::surfaces);
     surfaces.any(|surface| body.all_nodes().any(|node| surface.nodes.binary_search(&node).is_ok()))
 }
 

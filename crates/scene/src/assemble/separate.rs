@@ -175,10 +175,7 @@ impl Builder<'_> {
     ) -> Vec<[f64; 3]> {
         let model = &self.assembly.model;
         let mut ways: Vec<Vector3> = places.iter().zip(before).map(|(now, then)| now - then).collect();
-        let surfaces = contacts.contacts.iter().flat_map(|contact| {
-            let other = if let With::Body(other) = &contact.with { Some(other) } else { None };
-            std::iter::once(&contact.surface).chain(other)
-        });
+        let surfaces = contacts.contacts.iter().flat_map(Contact::surfaces);
         let mut stays: Vec<bool> = owners.iter().map(|owner| *owner != [FREE; 3]).collect();
         surfaces.flat_map(|surface| &surface.nodes).for_each(|&node| stays[node as usize] = true);
         let mut around = vec![BTreeSet::new(); places.len()];
@@ -257,10 +254,9 @@ fn push_out(rigid: &Rigid, offset: f64, surface: &Surface, is_solid: bool, pushe
         pushed.push_by(&Row { parts, normal, offset: 0.0 }, depth);
     };
     let mut inward = vec![Vector3::zeros(); if is_solid { pushed.places.len() } else { 0 }];
-    let mut longest = 0.0_f64;
+    let longest = surface.longest_edge(|node| pushed.places[node as usize]);
     for face in &surface.faces {
         let [a, b, c] = face.map(|node| pushed.places[node as usize]);
-        longest = longest.max((b - a).norm()).max((c - b).norm()).max((a - c).norm());
         let area = (b - a).cross(&(c - a));
         if is_solid {
             face.iter().for_each(|&node| inward[node as usize] -= area);

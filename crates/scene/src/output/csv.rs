@@ -127,7 +127,7 @@ pub(crate) const ENERGIES: [&str; 6] = ["kinetic", "internal", "damping", "exter
 /// Parts of the internal energy of shells.
 const SHELL_ENERGIES: [&str; 3] = ["membrane", "bending", "drilling"];
 pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
-/// Weights of nodes of a cell that are round-off: the point lies on others.
+/// Weights of a cell's nodes that are only round-off: the point coincides with other nodes.
 const ROUNDING: f64 = 1e-9;
 const TENSOR: [&str; 9] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"];
 

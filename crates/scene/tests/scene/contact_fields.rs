@@ -116,7 +116,7 @@ fn fields_of_contacts_without_a_contact_are_refused_with_their_line() {
     }
 }
 
-/// A body that touches itself is told of a gap that is small for its elements: two legs of one body, half a millimetre apart.
+/// A note reports a gap that is small for the elements of one body: two legs, half a millimetre apart.
 #[test]
 fn a_gap_that_is_small_for_the_elements_is_noted() {
     let legs = |gap: f64| {

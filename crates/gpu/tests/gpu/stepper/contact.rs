@@ -131,7 +131,7 @@ fn nodes_touch_large_things() {
     }
 }
 
-/// Things that come between the nodes. No edge of the box lies on a point of a face, where round-off decides to which side it leaves.
+/// Small things between the nodes. No edge of the box touches a point of a face, since round-off would choose the side there.
 #[test]
 fn points_of_faces_touch_small_things() {
     let Some(device) = support::device() else { return };
@@ -241,7 +241,7 @@ fn a_driven_tool_gives_the_same_bits_however_the_steps_are_divided() {
     assert!(error <= 1e-5, "{error:.1e}");
 }
 
-/// A state in contact goes on on the device, without any read-back, and on the processor from there: it holds nothing of contacts.
+/// A state in contact continues on the device without a read-back, then on the processor: the state holds no contact data.
 #[test]
 fn a_state_in_contact_goes_from_the_processor_to_the_device_and_back() {
     let Some(device) = support::device() else { return };
