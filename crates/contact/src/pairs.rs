@@ -204,7 +204,8 @@ impl Pairs {
             above.is_inner && behind(above.height) || above.distance() < keep
         });
         let crossings = self.crossings.iter().filter(|[first, second]| {
-            let across = Across::of([first, second].map(|&edge| &side.edges[edge as usize]), place);
+            let edges = [first, second].map(|&edge| &side.edges[edge as usize]);
+            let across = Across::of(edges, f64::INFINITY, place);
             across.is_some_and(|across| behind(across.distance))
         });
         let mut apart = [points.copied().collect::<Vec<_>>(), crossings.copied().collect()];
@@ -289,9 +290,10 @@ impl Pairs {
         let other = |side: usize| if alone { &self.sides[0] } else { &self.sides[1 - side] };
         let limit = self.offset + self.skin;
         let wanted = |pair: &Pair| -self.depth < pair.distance && pair.distance < limit;
+        let within = limit.max(self.depth);
         for (number, side) in self.sides.iter().enumerate() {
             for list in self.points[number].chunk_by(|a, b| a[0] == b[0]) {
-                self.find_above(list, side, other(number), &place, |pair| {
+                self.find_above(list, within, side, other(number), &place, |pair| {
                     if wanted(&pair) {
                         found(Pair { in_order: number == 0, ..pair });
                     }
@@ -300,7 +302,7 @@ impl Pairs {
         }
         for &[first, second] in &self.crossings {
             let edges = [&self.sides[0].edges[first as usize], &other(0).edges[second as usize]];
-            let Some(Across { weights: [s, t], normal, distance }) = Across::of(edges, &place) else {
+            let Some(Across { weights: [s, t], normal, distance }) = Across::of(edges, within, &place) else {
                 continue;
             };
             let [[a, b], [c, d]] = edges.map(|edge| edge.ends);
@@ -312,10 +314,11 @@ impl Pairs {
         }
     }
 
-    /// Of a node with the triangles that are near it.
+    /// Of a node with the triangles that are near it, no farther than a distance [m].
     fn find_above(
         &self,
         list: &[[u32; 2]],
+        within: f64,
         side: &Side,
         other: &Side,
         place: &impl Fn(u32) -> Vector3<f64>,
@@ -344,6 +347,9 @@ impl Pairs {
         for [_, face] in list {
             let nodes = other.faces[*face as usize];
             let corners = nodes.map(place);
+            if is_beyond(within, &corners, &point) {
+                continue;
+            }
             let mut here = Above::of(&corners, &point, BESIDE);
             if here.is_beside() && here.normal.dot(&outward) > -FACING {
                 here = Above::of(&corners, &point, 0.0);
@@ -399,6 +405,13 @@ impl Pairs {
     }
 }
 
+/// Whether a point is farther than a distance [m] from the plane of a triangle.
+fn is_beyond(within: f64, [a, b, c]: &[Vector3<f64>; 3], point: &Vector3<f64>) -> bool {
+    let area = (b - a).cross(&(c - a));
+    let height = area.dot(&(point - a));
+    height * height > within * within * area.norm_squared()
+}
+
 /// A point and a triangle.
 struct Above {
     normal: Vector3<f64>,
@@ -450,7 +463,8 @@ struct Across {
 }
 
 impl Across {
-    fn of([first, second]: [&Edge; 2], place: &impl Fn(u32) -> Vector3<f64>) -> Option<Self> {
+    /// If they are no farther than a distance [m].
+    fn of([first, second]: [&Edge; 2], within: f64, place: &impl Fn(u32) -> Vector3<f64>) -> Option<Self> {
         let ([a, b], [c, d]) = (first.ends.map(place), second.ends.map(place));
         let (along, other, between) = (b - a, d - c, a - c);
         let normal = along.cross(&other);
@@ -466,6 +480,9 @@ impl Across {
             return None;
         }
         let normal = normal / crossed.sqrt();
+        if normal.dot(&between).abs() > within {
+            return None;
+        }
         // The normal leads out of the second and into the first, whose triangles are all behind it or before it.
         let normal = if normal.dot(&second.outward(place)) < 0.0 { -normal } else { normal };
         let behind = second.across.iter().all(|&node| normal.dot(&(place(node) - c)) <= 0.0);

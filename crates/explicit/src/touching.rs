@@ -60,6 +60,8 @@ struct Node {
     borne: Vector3<f64>,
     /// Impulses [N] of the last pass on it.
     lifted: Vector3<f64>,
+    /// Length [m] of its way by impulses at most.
+    way: f64,
     /// Whether it may touch something, so that its prediction is known.
     near: bool,
     /// The first of the rows on it alone.
@@ -79,11 +81,18 @@ impl Node {
             own: zero,
             borne: zero,
             lifted: zero,
+            way: 0.0,
             near: false,
             first: NONE,
             depth: 0.0,
         }
     };
+
+    /// Impulses take it along a way [m].
+    fn go(&mut self, way: Vector3<f64>) {
+        self.then += way;
+        self.way += way.x.abs() + way.y.abs() + way.z.abs();
+    }
 }
 
 /// What a contact is about, in numbers of nodes of [`Touching`].
@@ -224,7 +233,7 @@ impl Touching {
             let Free { then, mobility } = free(number);
             (node.free, node.then) = (then.into(), then.into());
             (node.mobility, node.own) = (mobility.into(), mobility.into());
-            (node.borne, node.lifted) = (Vector3::zeros(), Vector3::zeros());
+            (node.borne, node.lifted, node.way) = (Vector3::zeros(), Vector3::zeros(), 0.0);
         }
     }
 
@@ -393,7 +402,7 @@ impl Touching {
                     let Some(side) = side else { break };
                     let row = &mut rows[side as usize];
                     (row.place, row.mobility) = (place, nodes[at].mobility);
-                    (row.normal, row.gap) = (normal, gap);
+                    (row.normal, row.gap, row.idle_to) = (normal, gap, f64::NEG_INFINITY);
                     push_alone(rows, nodes, number, FOUND * depth, contacts);
                 }
                 farthest = farthest.max((nodes[at].then - before).norm());

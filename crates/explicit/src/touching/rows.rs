@@ -5,6 +5,11 @@ use pliant_contact::touch::{Contacts, PASSES, SIDES};
 
 use super::Node;
 
+/// Part of its gap by which its nodes can move before a row is looked at again; the rest is round-off.
+const IDLE: f64 = 0.999;
+/// The change of an impulse, over itself, at which it stays as it is until its nodes move.
+const SETTLED: f64 = 1e-9;
+
 /// No row.
 pub(super) const NONE: u32 = u32::MAX;
 
@@ -29,6 +34,8 @@ pub(super) struct Row {
     pub sign: f64,
     /// Of a row on a node alone: the next one.
     pub next: u32,
+    /// Σ |cᵢ| sᵢ [m] of the ways sᵢ of its nodes up to which its impulse stays as it is.
+    pub idle_to: f64,
 }
 
 impl Row {
@@ -52,6 +59,7 @@ impl Row {
             drag,
             sign: 1.0,
             next: NONE,
+            idle_to: f64::NEG_INFINITY,
         }
     }
 
@@ -60,8 +68,16 @@ impl Row {
         self.nodes.iter().zip(&self.weights).take(self.count).map(|(&node, &weight)| (node as usize, weight))
     }
 
+    /// Σ |cᵢ| sᵢ [m] of the ways sᵢ of its nodes.
+    fn way(&self, nodes: &[Node]) -> f64 {
+        self.parts().map(|(node, weight)| weight.abs() * nodes[node].way).sum()
+    }
+
     /// Finds its impulse with the others as they are. How far it moves its point [m].
     pub fn push_apart(&mut self, nodes: &mut [Node], contacts: &Contacts) -> f64 {
+        if self.way(nodes) <= self.idle_to {
+            return 0.0;
+        }
         let friction = contacts.contacts[self.contact].touch.friction;
         let along = self.mobility.component_mul(&self.normal).dot(&self.normal);
         if along <= 0.0 {
@@ -86,13 +102,12 @@ impl Row {
             more += drag - self.drag;
             self.drag = drag;
         }
-        if more == Vector3::zeros() {
-            return 0.0;
-        }
         for (node, weight) in self.parts() {
-            let node = &mut nodes[node];
-            node.then += node.mobility.component_mul(&more) * weight;
+            nodes[node].go(nodes[node].mobility.component_mul(&more) * weight);
         }
+        let is_found = more.norm_squared() <= SETTLED * SETTLED * self.push * self.push;
+        let room = if self.push == 0.0 { IDLE * gap } else { 0.0 };
+        self.idle_to = if is_found { self.way(nodes) + room } else { f64::NEG_INFINITY };
         self.mobility.component_mul(&more).norm()
     }
 
@@ -135,7 +150,7 @@ pub(super) fn take_back(rows: &mut [Row], node: &mut Node, contact: usize) -> Op
     let (mut next, mut last) = (node.first, None);
     while let Some(row) = rows.get_mut(next as usize) {
         if row.contact == contact && row.push > 0.0 {
-            node.then -= node.mobility.component_mul(&(row.normal * row.push + row.drag));
+            node.go(-node.mobility.component_mul(&(row.normal * row.push + row.drag)));
             (row.push, row.drag) = (0.0, Vector3::zeros());
             last = Some(next);
         }
