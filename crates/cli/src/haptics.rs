@@ -227,7 +227,7 @@ impl Around<'_> {
                 }
                 let friction = contact.touch.friction;
                 most = most.max(friction);
-                let pose = rigid.at(now.time(), now.leg(index));
+                let pose = now.pose(index, rigid);
                 let place = |node: u32| {
                     let node = node as usize;
                     Vector3::from(part.model.rest[node]) + Vector3::from(now.displacement(node))

@@ -18,6 +18,7 @@
 //! ```
 
 pub mod grid;
+pub mod lag;
 pub mod pairs;
 pub mod pose;
 pub mod shader;

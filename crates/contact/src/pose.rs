@@ -13,6 +13,8 @@ pub struct Course {
     /// Where it is at the start.
     start: Pose,
     motion: Motion,
+    /// The force [N] that it pushes with at most.
+    limit: Option<f64>,
 }
 
 #[derive(Clone, Debug)]
@@ -32,27 +34,46 @@ enum Motion {
 }
 
 impl Course {
+    fn of(start: Pose, motion: Motion) -> Self {
+        Self { start, motion, limit: None }
+    }
+
+    /// With a force [N] that the thing pushes with at most: it lags behind its course where it would need more.
+    pub fn limited(self, force: f64) -> Self {
+        Self { limit: Some(force), ..self }
+    }
+
+    /// The force [N] that the thing pushes with at most.
+    pub fn limit(&self) -> Option<f64> {
+        self.limit
+    }
+
     /// At rest.
     pub fn fixed(start: Pose) -> Self {
-        Self { start, motion: Motion::Fixed }
+        Self::of(start, Motion::Fixed)
     }
 
     /// Shifted by a vector [m] as a curve goes from 0 to 1.
     pub fn by(start: Pose, shift: [f64; 3], curve: Curve) -> Self {
-        Self { start, motion: Motion::By(shift.into(), curve) }
+        Self::of(start, Motion::By(shift.into(), curve))
     }
 
     /// Turned about an axis (of length 1) through a point [m] by an angle [rad] as a curve goes from 0 to 1.
     pub fn turn(start: Pose, axis: [f64; 3], centre: [f64; 3], angle: f64, curve: Curve) -> Self {
         let (axis, centre) = (axis.into(), centre.into());
-        Self { start, motion: Motion::Turn { axis, centre, angle, curve } }
+        Self::of(start, Motion::Turn { axis, centre, angle, curve })
     }
 
     /// Poses at increasing times [s], before the start pose: the thing stays at the first one before and at the last one after.
     /// `None` without any, or where times do not increase.
     pub fn table(start: Pose, poses: Vec<(f64, Pose)>) -> Option<Self> {
         let increase = poses.windows(2).all(|pair| pair[0].0 < pair[1].0);
-        (increase && !poses.is_empty()).then_some(Self { start, motion: Motion::Table(poses) })
+        (increase && !poses.is_empty()).then_some(Self::of(start, Motion::Table(poses)))
+    }
+
+    /// Whether it moves at all.
+    pub fn moves(&self) -> bool {
+        !matches!(self.motion, Motion::Fixed)
     }
 
     /// The pose at a time [s].

@@ -1,5 +1,6 @@
 //! The state: everything that changes in a run. `Clone` is a snapshot.
 
+use pliant_contact::lag::Lag;
 use pliant_contact::pose::Leg;
 use pliant_contact::touch::Gripped;
 use pliant_mechanics::model::{self, FREE, Model, placed};
@@ -31,6 +32,8 @@ pub struct State<R> {
     pub reference: Vec<Vector<R>>,
     /// Tools and jaws that were driven from outside, by their place among the rigid things of the contacts.
     pub driven: Vec<(u32, Leg)>,
+    /// Lags of the rigid things whose force is limited; empty before the first evaluation.
+    pub lags: Vec<Lag>,
     /// Nodes that jaws hold.
     pub gripped: Vec<Gripped>,
     /// How far each node has slid on what it touches since its touch began [m]; empty without contacts.
@@ -86,6 +89,7 @@ impl<R: Scalar> State<R> {
             work: Work::default(),
             stability: Stability::default(),
             driven: Vec::new(),
+            lags: Vec::new(),
             gripped: Vec::new(),
             slip: Vec::new(),
         }
@@ -94,6 +98,11 @@ impl<R: Scalar> State<R> {
     /// Where a tool or a jaw goes, if it was driven; counted among the rigid things of the contacts.
     pub fn leg(&self, rigid: usize) -> Option<&Leg> {
         self.driven.iter().find(|(own, _)| *own as usize == rigid).map(|(_, leg)| leg)
+    }
+
+    /// How far a rigid thing lags behind its course, if its force is limited.
+    pub fn lag(&self, rigid: usize) -> Option<&Lag> {
+        self.lags.iter().find(|lag| lag.rigid() == rigid)
     }
 
     /// Drives a tool or a jaw from the step on that follows.

@@ -11,6 +11,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use nalgebra::{Translation3, Vector3};
 use pliant_contact::touch::{Contacts, Rigid};
 use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
@@ -551,6 +552,7 @@ impl<R: Scalar> CentralDifference<R> {
         }
         state.work.advance();
         self.control.count(state);
+        state.lags.iter_mut().for_each(|lag| lag.advance(state.time));
     }
 
     /// Those of some nodes of which a component has an owner.
@@ -618,6 +620,7 @@ impl<R: Scalar> CentralDifference<R> {
     fn touch(&mut self, state: &mut State<R>, part: f64) -> bool {
         let Some(mut touching) = self.touching.take() else { return false };
         let mut gripped = std::mem::take(&mut state.gripped);
+        let mut lags = std::mem::take(&mut state.lags);
         let rest = |node: u32| self.model.rest[node as usize];
         let now = |node: u32| {
             let (moved, way) = (state.displacement[node as usize], state.increment[node as usize]);
@@ -635,13 +638,18 @@ impl<R: Scalar> CentralDifference<R> {
             Free { then: add(rest(node), displacement), mobility: moves }
         };
         let times = [state.time, state.time + self.lengths.next];
+        touching.lag(&mut lags, times, |rigid| state.leg(rigid));
         let postures = |number: usize, rigid: &Rigid| {
             let leg = state.leg(number);
-            Posture { poses: times.map(|time| rigid.at(time, leg)), opening: rigid.posture(times[1], leg).1 }
+            let lag = lags.iter().find(|lag| lag.rigid() == number);
+            let ways = lag.map_or([Vector3::zeros(); 2], |lag| [lag.now(), lag.next()]);
+            let pose = |k: usize| Translation3::from(ways[k]) * rigid.at(times[k], leg);
+            Posture { poses: [pose(0), pose(1)], opening: rigid.posture(times[1], leg).1 }
         };
         touching.find(postures, now, free, &mut gripped);
         touching.nodal_forces().for_each(|(node, force)| self.applied.add(node, force));
-        state.gripped = gripped;
+        touching.bear_on(&mut lags);
+        (state.gripped, state.lags) = (gripped, lags);
         self.touching = Some(touching);
         true
     }

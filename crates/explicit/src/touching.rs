@@ -10,8 +10,9 @@ mod rows;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use pliant_contact::lag::Lag;
 use pliant_contact::pairs::{Pairs, Surface};
-use pliant_contact::pose::Pose;
+use pliant_contact::pose::{Leg, Pose};
 use pliant_contact::shape::Near;
 use pliant_contact::touch::{
     Contact, Contacts, FOUND, Gripped, LIFTED, LIFTS, LOOKED, OFF, PASSES, Passage, ROUNDS, Rigid, With,
@@ -197,6 +198,34 @@ impl Touching {
             self.lift();
             self.bear(gripped);
             self.take(gripped);
+        }
+    }
+
+    /// Finds the lags of things whose force is limited, after the step between two times [s]; `leg` is where a thing is driven to.
+    pub fn lag<'a>(&self, lags: &mut Vec<Lag>, times: [f64; 2], leg: impl Fn(usize) -> Option<&'a Leg>) {
+        let rigids = &self.contacts.rigids;
+        if lags.is_empty() {
+            let limited = rigids.iter().zip(0..).filter(|(rigid, _)| rigid.course.limit().is_some());
+            lags.extend(limited.map(|(_, number)| Lag::new(number)));
+        }
+        for lag in lags {
+            let rigid = &rigids[lag.rigid()];
+            let place = |time| rigid.posture(time, leg(lag.rigid())).0.translation.vector;
+            let way = place(times[1]) - place(times[0]);
+            lag.follow(rigid.course.limit().unwrap_or(f64::INFINITY), way, times[1] - times[0]);
+        }
+    }
+
+    /// Gives each lag the force of its tool in the step.
+    pub fn bear_on(&self, lags: &mut [Lag]) {
+        let Contacts { rigids, contacts } = &*self.contacts;
+        for lag in lags {
+            let tool = rigids[lag.rigid()].tool();
+            let on = |(contact, force): (&Contact, &Vector<f64>)| {
+                let of_tool = matches!(contact.with, With::Rigid(rigid) if rigids[rigid].tool() == tool);
+                of_tool.then(|| Vector3::from(*force))
+            };
+            lag.found(contacts.iter().zip(&self.forces).filter_map(on).sum());
         }
     }
 

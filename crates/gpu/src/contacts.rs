@@ -24,13 +24,14 @@ pub fn processor_only(contacts: &Contacts) -> Option<String> {
     let of_bodies = contacts.contacts.iter().find(|contact| !matches!(contact.with, With::Rigid(_)));
     let gripping =
         contacts.rigids.iter().find(|rigid| rigid.jaw.as_ref().is_some_and(|jaw| jaw.grip.is_some()));
+    let limited = contacts.rigids.iter().find(|rigid| rigid.course.limit().is_some());
     match (of_bodies, gripping) {
         (Some(Contact { name, with: With::Itself, .. }), _) => {
             Some(format!("the contact `{name}` of a body with itself"))
         }
         (Some(Contact { name, .. }), _) => Some(format!("the contact `{name}` of two bodies")),
         (None, Some(rigid)) => Some(format!("the ideal grip of `{}`", rigid.tool())),
-        (None, None) => None,
+        (None, None) => limited.map(|rigid| format!("the force limit of `{}`", rigid.tool())),
     }
 }
 

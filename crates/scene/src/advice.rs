@@ -1,8 +1,9 @@
 //! What to try after a failed step. It depends on what the run does already: nobody is told to switch on what is on, to take a
 //! smaller step where steps are kept below the limit, or to damp more where damping is the trouble.
 
-use pliant_explicit::stability::{OnUnstable, Stability};
-use pliant_sim::{Failure, Precision, number};
+use pliant_explicit::stability::OnUnstable;
+use pliant_sim::contact::touch::{Contact, With};
+use pliant_sim::{Failure, Instant, Precision, number};
 
 use crate::assemble::Built;
 use crate::format::SolverName;
@@ -14,7 +15,7 @@ use crate::world::Part;
 const RESOLVED: f64 = 1.0;
 
 /// The remedy of a failed explicit step, where the run's state says more than the failure itself.
-pub(crate) fn remedy(failure: &Failure, part: &Part, stability: &Stability) -> Option<String> {
+pub(crate) fn remedy(failure: &Failure, part: &Part, now: &dyn Instant) -> Option<String> {
     let Part { scene, built, plan, .. } = part;
     if scene.run.solver != SolverName::Explicit || built.implicit.is_some() {
         return None;
@@ -23,8 +24,9 @@ pub(crate) fn remedy(failure: &Failure, part: &Part, stability: &Stability) -> O
         return Some(told);
     }
     let on_unstable = scene.run.on_unstable.unwrap_or_default();
+    let stability = now.stability();
     let seen = stability.smallest.as_ref().map(|look| look.limit / plan.steps.step);
-    Some(match (failure.kind, on_unstable) {
+    let told = match (failure.kind, on_unstable) {
         ("unstable", OnUnstable::Substep) => "its steps are cut into 100 parts at the most, and that is not enough: try a slower or smaller \
                                               motion, or a coarser mesh there"
             .into(),
@@ -49,7 +51,25 @@ pub(crate) fn remedy(failure: &Failure, part: &Part, stability: &Stability) -> O
             format!("the step is held below the limit already: try a slower motion, a smoother curve or a smaller load{precise}")
         }
         _ => return None,
-    })
+    };
+    Some(told + &pushing(part, now))
+}
+
+/// That moving tools which touch bodies here have no limit of their force.
+fn pushing(part: &Part, now: &dyn Instant) -> String {
+    let Some(all) = &part.built.contacts else { return String::new() };
+    let unlimited = |contact: &Contact| {
+        let With::Rigid(number) = contact.with else { return None };
+        let rigid = &all.rigids[number];
+        let moves = rigid.course.moves() || now.leg(number).is_some();
+        (moves && rigid.course.limit().is_none()).then(|| format!("`{}`", rigid.tool()))
+    };
+    let mut tools: Vec<String> = all.contacts.iter().filter_map(unlimited).collect();
+    tools.dedup();
+    match tools.is_empty() {
+        true => String::new(),
+        false => format!("; where {} pushes too hard, give it a `force-limit`", tools.join(" or ")),
+    }
 }
 
 /// That damping is what the steps are too long for, where it is so.

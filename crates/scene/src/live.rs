@@ -106,7 +106,7 @@ impl Live {
         let moved = self.shown.thing_of(point).and_then(|(part, number)| {
             let rigid = self.world.participants[part].built.contacts.as_ref()?.rigids.get(number)?;
             let now = self.simulation.instants().nth(part)?;
-            let motion = rigid.at(now.time(), now.leg(number)) * rigid.at(0.0, None).inverse();
+            let motion = now.pose(number, rigid) * rigid.at(0.0, None).inverse();
             Some((motion * Point3::from(*start)).coords)
         });
         moved.unwrap_or(*start)

@@ -242,7 +242,7 @@ impl<'a> Run<'a> {
     fn advised(&self, failure: Failure, simulation: &Simulation) -> Failure {
         let mut parts = self.world.participants.iter().zip(simulation.instants());
         let own = parts.find(|(part, _)| failure.body.as_ref().is_none_or(|body| part.scene.has(body)));
-        match own.and_then(|(part, now)| remedy(&failure, part, &now.stability())) {
+        match own.and_then(|(part, now)| remedy(&failure, part, now)) {
             Some(remedy) => failure.advised(&remedy),
             None => failure,
         }

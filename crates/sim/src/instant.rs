@@ -1,6 +1,9 @@
 //! A participant as observers read it. Numbers of any precision come out as `f64`.
 
-use pliant_contact::pose::Leg;
+use nalgebra::Translation3;
+use pliant_contact::lag::Lag;
+use pliant_contact::pose::{Leg, Pose};
+use pliant_contact::touch::Rigid;
 use pliant_explicit::NodeContact;
 use pliant_explicit::recover::CellFields;
 use pliant_explicit::stability::Stability;
@@ -50,6 +53,23 @@ pub trait Instant {
     /// Where a tool or a jaw goes that was driven from outside, by its place among the rigid things of the contacts.
     fn leg(&self, _rigid: usize) -> Option<&Leg> {
         None
+    }
+
+    /// How far a rigid thing lags behind its course since its force is limited, by its place among those of the contacts.
+    fn lag(&self, _rigid: usize) -> Option<&Lag> {
+        None
+    }
+
+    /// The pose of a rigid thing, of a jaw that of its tool, and the angle [rad] between the jaws.
+    fn posture(&self, number: usize, rigid: &Rigid) -> (Pose, f64) {
+        let (pose, opening) = rigid.posture(self.time(), self.leg(number));
+        (Translation3::from(self.lag(number).map(Lag::now).unwrap_or_default()) * pose, opening)
+    }
+
+    /// The pose of a rigid thing, of a jaw its own.
+    fn pose(&self, number: usize, rigid: &Rigid) -> Pose {
+        let lag = self.lag(number).map(Lag::now).unwrap_or_default();
+        Translation3::from(lag) * rigid.at(self.time(), self.leg(number))
     }
 
     /// Energies [J].

@@ -139,13 +139,14 @@ fn fits<R: Scalar>(state: &State<R>, memory: &Memory<R>, part: &Part) -> bool {
     }
     let things = part.method.contacts().map_or(0, |contacts| contacts.rigids.len());
     let led = state.driven.iter().all(|(rigid, leg)| (*rigid as usize) < things && leg.is_finite());
+    let lags = state.lags.iter().all(|lag| lag.rigid() < things && lag.is_finite());
     let grips = |held: &Gripped| {
         (held.rigid as usize) < things
             && (held.node as usize) < model.node_count()
             && held.at.iter().all(|x| x.is_finite())
     };
     let slides = state.slip.is_empty() || state.slip.len() == model.node_count();
-    if !led || !slides || !state.gripped.iter().all(grips) {
+    if !led || !lags || !slides || !state.gripped.iter().all(grips) {
         return false;
     }
     let rest = State::<R>::at_rest(model);

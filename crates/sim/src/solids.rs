@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use pliant_contact::lag::Lag;
 use pliant_contact::pose::Leg;
 use pliant_explicit::recover::{CellFields, Recovery};
 use pliant_explicit::stability::{Stability, cell_limit};
@@ -144,6 +145,10 @@ impl<R: Numeric> Instant for Solids<R> {
 
     fn leg(&self, rigid: usize) -> Option<&Leg> {
         self.state.leg(rigid)
+    }
+
+    fn lag(&self, rigid: usize) -> Option<&Lag> {
+        self.state.lag(rigid)
     }
 
     fn energies(&self) -> Energies {

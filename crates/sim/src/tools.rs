@@ -141,7 +141,7 @@ impl Simulation {
             let Some(all) = part.method.contacts() else { continue };
             let own = |number: usize| all.rigids[number].tool() == name;
             let Some(number) = (0..all.rigids.len()).find(|&number| own(number)) else { continue };
-            let (pose, opening) = all.rigids[number].posture(now.time(), now.leg(number));
+            let (pose, opening) = now.posture(number, &all.rigids[number]);
             let sum = found.get_or_insert(ToolNow { pose, opening, force: [0.0; 3] });
             for (contact, force) in all.contacts.iter().zip(now.contact_forces()) {
                 if matches!(contact.with, With::Rigid(rigid) if own(rigid)) {

@@ -155,6 +155,10 @@ impl Builder<'_> {
         } else {
             Course::fixed(start)
         };
+        let course = match table.force_limit {
+            Some(limit) => course.limited(limit),
+            None => course,
+        };
         let ShapeName::Jaws(of) = &table.shape else {
             return Some(vec![Rigid { name: name.into(), shape, course, inside: table.inside, jaw: None }]);
         };

@@ -33,6 +33,11 @@ pub struct ToolTable {
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub ideal_grip: Option<f64>,
+    /// The force [N] that it pushes with at most. From half of it on it gives way, and lags behind its course; when nothing is in its way any
+    /// more, it catches up.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub force_limit: Option<f64>,
     /// Displacement [m], reached along the curve.
     #[serde(default)]
     pub by: Option<[f64; 3]>,

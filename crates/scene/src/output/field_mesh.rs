@@ -236,9 +236,8 @@ impl Own {
 /// Displacements [m] of the points of obstacles and tools since the start.
 fn moved_things(frame: &Frame<'_>, points: &[Vector3], owners: &[u32]) -> Vec<f64> {
     let Some(contacts) = &frame.built().contacts else { return Vec::new() };
-    let motion = |(rigid, number): (&Rigid, usize)| {
-        rigid.at(frame.now.time(), frame.now.leg(number)) * rigid.at(0.0, None).inverse()
-    };
+    let motion =
+        |(rigid, number): (&Rigid, usize)| frame.now.pose(number, rigid) * rigid.at(0.0, None).inverse();
     let motions: Vec<Pose> = contacts.rigids.iter().zip(0..).map(motion).collect();
     let moved = |(point, &owner): (&Vector3, &u32)| {
         let there = motions[owner as usize] * nalgebra::Point3::from(*point);

@@ -77,6 +77,8 @@ pub(crate) struct PartOutcome {
     /// Residuals of its last iterations, as a table.
     pub convergence: Option<String>,
     pub reactions: Vec<[f64; 3]>,
+    /// The tools that were held back, each with its longest lag [m] and when that was [s].
+    pub held_back: Vec<(String, f64, f64)>,
 }
 
 impl PartOutcome {
@@ -93,8 +95,23 @@ impl PartOutcome {
             effort: participant.effort(),
             convergence: participant.convergence(),
             reactions: frame.reactions().collect(),
+            held_back: held_back(part, participant),
         }
     }
+}
+
+/// Tools that were held back by the limits of their forces.
+fn held_back(part: &Part, now: &dyn Instant) -> Vec<(String, f64, f64)> {
+    let rigids = part.built.contacts.iter().flat_map(|all| &all.rigids).enumerate();
+    let mut held: Vec<(String, f64, f64)> = rigids
+        .filter_map(|(number, rigid)| {
+            let (lag, time) = now.lag(number)?.longest();
+            (lag > 0.0).then(|| (rigid.tool().to_owned(), lag, time))
+        })
+        .collect();
+    // Jaws lag together.
+    held.dedup();
+    held
 }
 
 /// A tie between two participants.

@@ -153,7 +153,16 @@ pub(crate) fn doubts(
         .chain(stability.and_then(StabilitySummary::doubt))
         .chain(equilibria_doubts(outcome))
         .chain(outcome.watched.strains.doubts())
+        .chain(outcome.held_back.iter().map(held_back))
         .collect()
+}
+
+/// That a tool was held back, by how far at most [m] and when [s].
+fn held_back((tool, lag, time): &(String, f64, f64)) -> String {
+    let [lag, time] = [*lag, *time].map(number);
+    format!(
+        "`{tool}` was held back by its `force-limit`: it was up to {lag} m behind its course, at t = {time} s"
+    )
 }
 
 /// Estimated error of displacements, over the largest one, above which equilibria give a warning.

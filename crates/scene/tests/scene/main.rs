@@ -5,6 +5,7 @@ mod collective;
 mod contact;
 mod contact_fields;
 mod corpus;
+mod force_limit;
 mod grasper;
 mod grips;
 mod niftysim;

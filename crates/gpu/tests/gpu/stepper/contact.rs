@@ -375,11 +375,13 @@ fn what_has_no_contact_is_refused_by_name() {
     let place = Pose::identity();
     let gripping =
         Jaw { tool: "grasper".into(), part: 0.5, opening: (0.5, smooth(1.0)), place, grip: Some(0.1) };
+    let limited = Rigid { course: floor.course.clone().limited(2.0), ..floor.clone() };
     let jaw = Rigid { jaw: Some(gripping), ..floor };
     let cases = [
         (among(With::Body(surface(&model))), "the contact `floor` of two bodies"),
         (among(With::Itself), "the contact `floor` of a body with itself"),
         (Contacts { rigids: vec![jaw], ..Contacts::clone(&contacts) }, "the ideal grip of `grasper`"),
+        (Contacts { rigids: vec![limited], ..Contacts::clone(&contacts) }, "the force limit of `floor`"),
     ];
     for (contacts, what) in cases {
         assert_eq!(stepper(contacts, None), Some(GpuError::Unsupported { what: what.into() }));

@@ -1,0 +1,105 @@
+//! Tools that push with no more than a force: how far they lag behind their course.
+//!
+//! A hand that meets something stiffer than it can bear comes to rest there, and goes along again when it is called back. So does a tool with a
+//! limit: of the way that it would go against what it pushes, it goes a part that falls from 1 at half of the limit over 0 at the limit to −1.
+//! What it did not go is its lag, which it makes good over time.
+//!
+//! ```
+//! use nalgebra::Vector3;
+//! use pliant_contact::lag::Lag;
+//!
+//! // Pushed by 0.1 m/s against a spring of 100 N/m with a limit of 2 N, it stops at 20 mm.
+//! let mut lag = Lag::new(0);
+//! for step in 0..10_000 {
+//!     let depth = 0.1 * 1e-3 * f64::from(step) + lag.now().z;
+//!     lag.follow(2.0, Vector3::z() * 1e-4, 1e-3);
+//!     lag.found(Vector3::z() * (100.0 * depth));
+//!     lag.advance(1e-3 * f64::from(step));
+//! }
+//! let depth = 0.1 * 10.0 + lag.now().z;
+//! assert!((depth - 0.02).abs() < 1e-3);
+//! ```
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// Time [s] in which most of a lag is made good where nothing is in the way.
+const CATCHES_UP: f64 = 0.3;
+/// Time [s] over which forces are averaged: those of single steps jump where nodes come and go.
+const FELT: f64 = 0.01;
+
+/// The lag of a rigid thing behind its course.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Lag {
+    rigid: u32,
+    /// From its place on the course to where it is [m], now and after the step.
+    ways: [[f64; 3]; 2],
+    /// The force [N] with which it pushes: on average until the step before, and in this one.
+    forces: [[f64; 3]; 2],
+    /// Length of this step [s].
+    step: f64,
+    /// The longest lag so far [m], and when it was that [s].
+    longest: (f64, f64),
+}
+
+impl Lag {
+    /// Of a thing, by its place among the rigid things of the contacts.
+    pub fn new(rigid: u32) -> Self {
+        Self { rigid, ways: [[0.0; 3]; 2], forces: [[0.0; 3]; 2], step: 0.0, longest: (0.0, 0.0) }
+    }
+
+    /// The thing.
+    pub fn rigid(&self) -> usize {
+        self.rigid as usize
+    }
+
+    /// From its place on the course to where it is [m].
+    pub fn now(&self) -> Vector3<f64> {
+        self.ways[0].into()
+    }
+
+    /// The same after the step.
+    pub fn next(&self) -> Vector3<f64> {
+        self.ways[1].into()
+    }
+
+    /// The longest lag so far [m], and when it was that [s].
+    pub fn longest(&self) -> (f64, f64) {
+        self.longest
+    }
+
+    /// Finds the lag after a step of a length [s], over which the course goes a way [m], under a limit [N].
+    pub fn follow(&mut self, limit: f64, way: Vector3<f64>, step: f64) {
+        let force = Vector3::from(self.forces[0]);
+        let mut wanted = way - self.now() * (step / CATCHES_UP).min(1.0);
+        if let Some((ahead, size)) = nalgebra::Unit::try_new_and_get(force, 0.0) {
+            let into = wanted.dot(&ahead).max(0.0);
+            let part = (2.0 * (1.0 - size / limit)).clamp(-1.0, 1.0);
+            wanted -= ahead.into_inner() * (into * (1.0 - part));
+        }
+        self.ways[1] = (self.now() + wanted - way).into();
+        self.step = step;
+    }
+
+    /// Takes the force [N] with which it pushes in this step.
+    pub fn found(&mut self, force: Vector3<f64>) {
+        self.forces[1] = force.into();
+    }
+
+    /// Goes on to the end of the step, a time [s].
+    pub fn advance(&mut self, time: f64) {
+        self.ways[0] = self.ways[1];
+        let [mean, found] = self.forces.map(Vector3::from);
+        self.forces[0] = mean.lerp(&found, (self.step / FELT).min(1.0)).into();
+        let size = self.now().norm();
+        if size > self.longest.0 {
+            self.longest = (size, time);
+        }
+    }
+
+    /// Whether all of its numbers are finite.
+    pub fn is_finite(&self) -> bool {
+        let numbers = self.ways.iter().chain(&self.forces).flatten();
+        numbers.chain([&self.step, &self.longest.0, &self.longest.1]).all(|x| x.is_finite())
+    }
+}

@@ -1,0 +1,82 @@
+//! Tools that push with no more than a force.
+
+use pliant_scene::OutputFolder;
+
+use super::contact::pressed;
+use super::static_solids::{last_row, resumes, run, world};
+
+/// A finger that goes 60 mm through a block of 50 mm, by these keys.
+fn through(finger: &str, until: f64) -> String {
+    format!(
+        "[scene]\nuntil = {until}\n[run]\n[law.soft]\ntype = 'neo-hookean'\nyoung-modulus = 3e3\npoisson-ratio = 0.45\n\
+         [body.block]\nmesh = {{ block = {{ size = [0.1, 0.1, 0.05], cells = [8, 8, 4] }} }}\nlaw = 'soft'\ndensity = 1000\ndamping = 20\n\
+         [constraint.base]\ntype = 'fix'\nbody = 'block'\nnodes = {{ half-space = {{ point = [0, 0, 1e-4], normal = [0, 0, -1] }} }}\n\
+         [tool.finger]\nshape = {{ capsule = {{ radius = 0.008, length = 0.06 }} }}\nat = [0.05, 0.05, 0.09]\nby = [0, 0, -0.06]\n{finger}\n\
+         [contact.feels]\nbetween = ['block', 'finger']\n\
+         [output.history]\ntype = 'csv'\nevery = {until}\n"
+    )
+}
+
+/// It stops where its force is the limit, and a warning tells how far behind its course.
+#[test]
+fn a_tool_driven_through_a_body_stops_at_its_limit() {
+    for precision in ["", "precision = 'single'"] {
+        let text = through("from = 0.1\nto = 0.6\nforce-limit = 2", 1.2);
+        let text = text.replace("[run]\n", &format!("[run]\n{precision}\n"));
+        let row = last_row(&text);
+        let force = row["contact.feels.z"];
+        println!("{force} N of 2 N");
+        assert!((force / 2.0 - 1.0).abs() < 0.01, "{force} N");
+        let out = tempfile::tempdir().unwrap();
+        let summary = run(&text, out.path());
+        let told = |text: &String| text.contains("`finger` was held back by its `force-limit`");
+        assert!(summary.warnings.iter().any(told), "{:?}", summary.warnings);
+        assert!(summary.energy_balance.unwrap() < 0.01);
+    }
+}
+
+/// Called back, it goes along: it ends where one without a limit would, off the body.
+#[test]
+fn a_tool_that_was_held_back_goes_along_when_it_is_called_back() {
+    let table = "curve = { table = [[0.1, 0], [0.6, 1], [0.8, 1], [1.4, 0]] }\nforce-limit = 2";
+    let row = last_row(&through(table, 3.0));
+    assert_eq!(row["contact.feels.z"], 0.0);
+    let text = through(table, 3.0);
+    let world = world(&text).unwrap();
+    let mut simulation = world.simulation().unwrap();
+    simulation.run(3.0, |_| ()).unwrap();
+    let at = simulation.frame().unwrap().tool("finger").unwrap().pose.translation.z;
+    assert!((at - 0.09).abs() < 1e-3, "at {at} m");
+}
+
+/// A limit that is not reached by half changes no bit.
+#[test]
+fn a_limit_that_is_far_away_changes_nothing() {
+    let limited = |limit| last_row(&pressed("", "").replace("to = 0.2\n", &format!("to = 0.2\n{limit}\n")));
+    assert_eq!(limited("force-limit = 50"), limited(""));
+}
+
+#[test]
+fn a_resumed_run_with_a_limit_ends_in_the_same_bits() {
+    let text = through("from = 0.1\nto = 0.6\nforce-limit = 2", 1.0);
+    resumes(&text.replace("[run]\n", "[run]\nstep = 2e-3\ncheckpoint = { every = 0.35 }\n"));
+}
+
+/// Without a limit a cell is inverted, and the message names the tool.
+#[test]
+fn the_failure_of_a_body_that_a_tool_goes_through_names_the_tool() {
+    let world = world(&through("from = 0.1\nto = 0.6", 1.0)).unwrap();
+    let out = tempfile::tempdir().unwrap();
+    let folder = OutputFolder::prepare(out.path().join("out"), &world.scene, false).unwrap();
+    let summary = pliant_scene::run(&world, &folder, &mut |_| ()).unwrap();
+    let failure = summary.error.unwrap().to_string();
+    assert!(failure.contains("where `finger` pushes too hard, give it a `force-limit`"), "{failure}");
+}
+
+#[test]
+fn a_limit_that_is_none_is_refused() {
+    for limit in ["-1", "0", "'much'"] {
+        let error = world(&through(&format!("force-limit = {limit}"), 1.0)).unwrap_err();
+        assert!(error.contains("force-limit"), "{error}");
+    }
+}
