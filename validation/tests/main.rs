@@ -17,6 +17,7 @@ mod material_points;
 mod momentum;
 mod niftysim;
 mod organ_meshes;
+mod palpation;
 mod quasi_static;
 mod shell_balloon;
 mod shell_fits;
