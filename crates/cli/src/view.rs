@@ -5,7 +5,10 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use pliant_scene::World;
-use pliant_viewer::{Lags, Opening, Recording, SelfTest, WindowError, open, replay, replay_in_real_time};
+use pliant_sim::number;
+use pliant_viewer::{
+    Break, Lags, Opening, Recording, SelfTest, WindowError, open, replay, replay_in_real_time,
+};
 
 use crate::arguments::View;
 use crate::look::look_of;
@@ -79,7 +82,14 @@ fn repeat(world: &World, file: &Path, real_time: bool) -> Result<ExitCode, Failu
                 told["input_lag"] = serde_json::to_value(Lags::of(&played)).map_err(|error| wrong(&error))?;
             }
             say(told)?;
-            Ok(ExitCode::SUCCESS)
+            for Break { times: [broken, back], message } in &replayed.breaks {
+                eprintln!(
+                    "error: at t = {} s a pull broke the run, which then went back to t = {} s: {message}",
+                    number(*broken),
+                    number(*back)
+                );
+            }
+            Ok(if replayed.breaks.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
         }
         Err(message) => {
             eprintln!("error: {message}");

@@ -45,6 +45,19 @@ impl Live {
         Ok(simulation.map(|simulation| Self::of(world, simulation)))
     }
 
+    /// Goes back to a state of this run.
+    ///
+    /// # Errors
+    /// If a stepper can't be made. The run then stays as it was.
+    pub fn restore(&mut self, state: State) -> Result<(), Failure> {
+        self.simulation.restore(state)?;
+        #[cfg(feature = "gpu")]
+        {
+            self.mapping = None;
+        }
+        Ok(())
+    }
+
     fn of(world: &Arc<World>, simulation: Simulation) -> Self {
         Self {
             simulation,
@@ -81,6 +94,11 @@ impl Live {
         }
         on_device.apply(mapping, value);
         Some(Ok(mapping.points().clone()))
+    }
+
+    /// Whether the state lies on a device, so that places of nodes are known only where it was read back.
+    pub fn is_on_device(&self) -> bool {
+        self.world.device().is_some()
     }
 
     /// The point of what is shown, as a combination of nodes, counted over the models of all participants.

@@ -1,7 +1,8 @@
 //! The hand and the pins that hold a body, and tools in the hand.
 //!
 //! A hand has no point: it holds the surface around the one that it took, within two edges of the elements there, with the
-//! weights of a Gaussian whose deviation is one edge. So a pull meets tissue as a grasper does, and not a single element.
+//! weights of a Gaussian whose deviation is one edge. So a pull meets tissue as a grasper does, and not a single element. Its spring gets no
+//! longer than two edges, however far the mouse goes: its force is at most that long times its stiffness.
 
 use std::collections::HashSet;
 
@@ -64,6 +65,8 @@ struct Tool {
     opening: f64,
 }
 
+/// Edges within which a hand holds the surface, and by which its spring gets longer at most.
+const REACH: f64 = 2.0;
 /// Simulated time [s] in which a tool follows the hand: a frame.
 const FOLLOWS: f64 = 1.0 / 60.0;
 /// The widest angle [rad] between jaws.
@@ -107,6 +110,10 @@ struct Taken {
     stiffness: f64,
     /// From the middle of what is held to the point that was taken [m].
     offset: Vector3,
+    /// Where the middle is pulled to [m].
+    goal: Vector3,
+    /// How long its spring can become [m], so that its force has a limit; infinite on a device.
+    longest: f64,
 }
 
 /// A combination of nodes of the model.
@@ -152,14 +159,14 @@ fn around(point: &Point, subject: &Subject, live: &Live) -> Option<Nodes> {
         corners.into_iter().zip(point.weights).map(|(corner, w)| subject.points[corner as usize] * w).sum();
     let edge = edge(corners, live);
     let distance = |corner: u32| (subject.points[corner as usize] - middle).norm();
-    let mut reached: Vec<u32> = corners.into_iter().filter(|&c| distance(c) < 2.0 * edge).collect();
+    let mut reached: Vec<u32> = corners.into_iter().filter(|&c| distance(c) < REACH * edge).collect();
     let mut known: HashSet<u32> = reached.iter().copied().collect();
     let mut before = 0;
     while before < reached.len() {
         before = reached.len();
         for triangle in subject.triangles() {
             if triangle.iter().any(|corner| known.contains(corner)) {
-                let near = triangle.into_iter().filter(|&c| distance(c) < 2.0 * edge);
+                let near = triangle.into_iter().filter(|&c| distance(c) < REACH * edge);
                 near.for_each(|corner| {
                     if known.insert(corner) {
                         reached.push(corner);
@@ -232,7 +239,8 @@ impl Hold {
                 return self.tool.as_mut().is_none_or(lead);
             }
             Hand::Pull(place) if self.by_hand => {
-                self.grips[0].place = (Vector3::from(*place) - self.taken[0].offset).into();
+                self.taken[0].goal = Vector3::from(*place) - self.taken[0].offset;
+                self.stretch(live);
             }
             Hand::Pull(_) => {}
             Hand::Release => self.release(),
@@ -252,6 +260,28 @@ impl Hold {
             }
         }
         self.hold(live) && found
+    }
+
+    /// After a step: pulls on towards the goal. The force stays below its limit while what is held gives way.
+    pub fn follow(&mut self, live: &mut Live) {
+        if self.follows() && self.stretch(live) {
+            self.hold(live);
+        }
+    }
+
+    /// Whether the end of the hand's spring goes along with what is held.
+    pub fn follows(&self) -> bool {
+        self.by_hand && self.taken[0].longest.is_finite()
+    }
+
+    /// Brings the end of the hand's spring as near to the goal as its length allows; whether it moves.
+    fn stretch(&mut self, live: &Live) -> bool {
+        let (grip, Taken { goal, longest, .. }) = (&mut self.grips[0], self.taken[0]);
+        let held = Vector3::from(live.simulation.pulled(grip)[0]);
+        let way = goal - held;
+        let length = way.norm();
+        let place = if length > longest { held + way * (longest / length) } else { goal }.into();
+        std::mem::replace(&mut grip.place, place) != place
     }
 
     /// Holds the same in another run.
@@ -287,8 +317,11 @@ fn grip(point: &Point, stiffness: f64, subject: &Subject, live: &Live) -> Option
     let mut grip = Grip { nodes, ..Grip::default() };
     grip.stiffness = stiffness.min(live.simulation.stiffest(&grip));
     [grip.place, _] = live.simulation.pulled(&grip);
-    let offset = Vector3::from(live.simulation.pulled(&at)[0]) - Vector3::from(grip.place);
-    Some((grip, Taken { stiffness, offset }))
+    let goal = Vector3::from(grip.place);
+    let offset = Vector3::from(live.simulation.pulled(&at)[0]) - goal;
+    let corners = subject.triangles().nth(point.triangle as usize)?;
+    let longest = if live.is_on_device() { f64::INFINITY } else { REACH * edge(corners, live) };
+    Some((grip, Taken { stiffness, offset, goal, longest }))
 }
 
 /// The first triangle that a ray meets, and where: Möller and Trumbore (1997), one triangle after the other. A tree over

@@ -8,13 +8,14 @@ mod recording;
 mod replay;
 mod samples;
 mod session;
+mod sound;
 #[cfg(feature = "window")]
 mod window;
 
 pub use device::INSPECTION;
 pub use hand::{Hand, Hold, Point, pick};
 pub use parameters::{Number, Parameter, parameters, with_numbers};
-pub use recording::{Done, Move, Recording, Surface};
+pub use recording::{Break, Done, Move, Recording, Surface};
 pub use replay::{Lags, Replayed, replay, replay_in_real_time};
 pub use samples::Samples;
 pub use session::{Frame, Order, Session};

@@ -78,6 +78,17 @@ pub struct Recording {
     pub moves: Vec<Move>,
     /// Steps in all.
     pub steps: u64,
+    /// Pulls that broke the run: it went back to a state before them, so that they are not among the moves.
+    pub breaks: Vec<Break>,
+}
+
+/// A pull that broke a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Break {
+    /// When it broke, and where the run went back to [s].
+    pub times: [f64; 2],
+    /// Why.
+    pub message: String,
 }
 
 impl Recording {

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::hand::Hold;
 use crate::parameters::{Number, with_numbers};
-use crate::recording::{Done, Move, Recording, Surface};
+use crate::recording::{Break, Done, Move, Recording, Surface};
 use crate::session::{FRAME, Order, Session};
 use pliant_scene::World;
 
@@ -29,6 +29,8 @@ pub struct Replayed {
     pub held: Option<[[f64; 3]; 2]>,
     /// Force [N] of each constraint in the end.
     pub reactions: Vec<[f64; 3]>,
+    /// Pulls that broke the run when it was recorded.
+    pub breaks: Vec<Break>,
 }
 
 /// How long it took until what a mouse did was felt.
@@ -99,7 +101,7 @@ pub fn replay(world: &World, recording: &Recording) -> Result<Replayed, String> 
     let (mut now, mut before) = (world.clone(), None);
     loop {
         match replay.play(&now, before.take())? {
-            Ended::Whole(replayed) => return Ok(replayed),
+            Ended::Whole(replayed) => return Ok(Replayed { breaks: recording.breaks.clone(), ..replayed }),
             Ended::Change(snapshot, numbers) => {
                 let next = with_numbers(&world.scene, numbers)?;
                 before = Some((std::mem::replace(&mut now, next), snapshot.map(|snapshot| *snapshot)));
@@ -177,7 +179,9 @@ impl<'r> Replay<'r> {
                 return self.end(&mut live).map(Ended::Whole);
             }
             let next = self.moves.first().map_or(self.of, |then| then.steps.min(self.of));
-            self.steps += live.simulation.step(next - self.steps).map_err(|failure| failure.message)?;
+            let steps = if self.hold.follows() { 1 } else { next - self.steps };
+            self.steps += live.simulation.step(steps).map_err(|failure| failure.message)?;
+            self.hold.follow(&mut live);
             if let Some([_, force]) = self.hold.shown(&live).next().filter(|_| self.hold.by_hand()) {
                 self.largest_force = self.largest_force.max(Vector3::from(force).norm());
             }
@@ -194,6 +198,7 @@ impl<'r> Replay<'r> {
             largest_force: self.largest_force,
             held: self.hold.shown(live).next().filter(|_| self.hold.by_hand()),
             reactions: live.reactions(),
+            breaks: Vec::new(),
         })
     }
 }

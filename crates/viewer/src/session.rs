@@ -15,12 +15,13 @@ use pliant_picture::{
 use pliant_scene::format::ViewTable;
 use pliant_scene::{Column, Live, World};
 use pliant_sim::gpu::{DevicePoints, PointValue};
-use pliant_sim::{Failure, State};
+use pliant_sim::{Failure, State, number};
 
 use crate::device::{Seen, point_value};
 use crate::hand::{Hand, Hold, Point, nodes_of};
 use crate::parameters::Number;
-use crate::recording::{Done, Move, Recording, Surface};
+use crate::recording::{Break, Done, Move, Recording, Surface};
+use crate::sound::{Sound, SoundStates};
 
 /// Wall time between frames.
 pub(crate) const FRAME: Duration = Duration::from_micros(16_667);
@@ -104,6 +105,8 @@ pub struct Frame {
     pub possible_factor: f64,
     /// From a hand's move to the first step in which it acted [s], of the last one.
     pub input_lag: Option<f64>,
+    /// How often a pull broke the run, which then went back to a state before it.
+    pub breaks: u64,
     /// Why it cannot go on: what happened, where, and what to try.
     pub failure: Option<String>,
     /// What else to tell.
@@ -223,6 +226,7 @@ struct Playback {
     /// The field that is shown, with its component.
     field: Option<String>,
     steps: u64,
+    breaks: u64,
     failure: Option<String>,
     note: Option<String>,
     pace: Pace,
@@ -280,6 +284,7 @@ struct Player<'s> {
     live: Live,
     /// Whether the state lies on a device.
     on_device: bool,
+    sound: SoundStates,
     playback: Playback,
 }
 
@@ -340,6 +345,7 @@ impl Playback {
             usual: Surface::of(&world.scene.view),
             field: None,
             steps: 0,
+            breaks: 0,
             failure: None,
             note: None,
             pace: Pace::new(0.0),
@@ -442,8 +448,10 @@ impl<'s> Player<'s> {
             hidden: Vec::new(),
             live,
             on_device,
+            sound: SoundStates::default(),
             playback,
         };
+        player.keep_sound();
         player.show_as_viewed();
         if !is_known {
             player.renew_subject()?;
@@ -566,10 +574,17 @@ impl<'s> Player<'s> {
         if !matches!(hand, Hand::Pull(_)) {
             self.playback.seen.at = None;
         }
+        if !matches!(hand, Hand::Release) {
+            self.sound.touch();
+        }
         let evaluated = self.live.simulation.is_evaluated();
         let held = self.playback.hold.take(hand, &self.subject, &mut self.live);
         let playback = &mut self.playback;
-        playback.note = (!held).then(|| "this solver knows no hand: it does not pull".into());
+        if !held {
+            playback.note = Some("this solver knows no hand: it does not pull".into());
+        } else if matches!(hand, Hand::Take(..) | Hand::Pin(_)) {
+            playback.note = None;
+        }
         let number = playback.recording.as_ref().map_or(0, |recording| recording.moves.len());
         playback.record(evaluated, sent, Done::Hand(*hand));
         if held && playback.is_going() {
@@ -648,16 +663,60 @@ impl<'s> Player<'s> {
                 playback.steps += steps;
                 playback.batch = (playback.batch.0 + steps, playback.batch.1 + started.elapsed());
                 playback.feel();
+                self.keep_sound();
+                self.playback.hold.follow(&mut self.live);
             }
-            Err(failure) => playback.failure = Some(failure.message),
+            Err(failure) => self.go_back(failure.message),
         }
+        let playback = &mut self.playback;
         if playback.pace.goal() - self.live.simulation.time() > BEHIND * playback.pace.speed {
             playback.pace.anchor = (Instant::now(), self.live.simulation.time());
         }
     }
 
+    /// Keeps the state where one is due.
+    fn keep_sound(&mut self) {
+        let (playback, simulation) = (&self.playback, &mut self.live.simulation);
+        if !self.sound.is_due(playback.steps, self.world.step()) {
+            return;
+        }
+        // A device that fails tells so in the next step.
+        let Ok(state) = simulation.state() else { return };
+        let moves = playback.recording.as_ref().map_or(0, |recording| recording.moves.len());
+        let sound = Sound { state, steps: playback.steps, hold: playback.hold.clone(), moves };
+        let nodes = self.world.participants.iter().map(|part| part.built.model.node_count()).sum();
+        self.sound.keep(sound, nodes);
+    }
+
+    /// After a step that failed: goes back to a state before it, where hands let go; or stays, where no hand has broken it.
+    fn go_back(&mut self, message: String) {
+        let broken = self.live.simulation.time();
+        let back = self.sound.take().filter(|sound| self.live.restore(sound.state.clone()).is_ok());
+        let Some(Sound { steps, hold, moves, .. }) = back else {
+            self.playback.failure.get_or_insert(message);
+            return;
+        };
+        let playback = &mut self.playback;
+        (playback.hold, playback.steps, playback.owed) = (hold, steps, 0);
+        playback.hold.take(&Hand::Release, &self.subject, &mut self.live);
+        playback.hold.hold_on(&mut self.live);
+        playback.waiting.clear();
+        let time = self.live.simulation.time();
+        if let Some(recording) = &mut playback.recording {
+            recording.moves.truncate(moves);
+            recording.breaks.push(Break { times: [broken, time], message: message.clone() });
+        }
+        playback.record(false, Instant::now(), Done::Hand(Hand::Release));
+        playback.breaks += 1;
+        playback.pace.anchor(time);
+        playback.note =
+            Some(format!("the hand let go, and the run went back to t = {} s: {message}", number(time)));
+        playback.seen.at = None;
+    }
+
     /// Looks at the instant in ordinary memory.
     fn inspect(&mut self) {
+        let mut broken = None;
         let playback = &mut self.playback;
         let seen = &mut playback.seen;
         match self.live.mesh() {
@@ -677,10 +736,13 @@ impl<'s> Player<'s> {
                 seen.energies = self.live.simulation.energies();
             }
             // The last good picture stays.
-            Err(failure) => {
-                playback.failure.get_or_insert(failure.message);
-            }
+            Err(failure) => broken = Some(failure.message),
         }
+        if let Some(message) = broken {
+            self.go_back(message);
+        }
+        let playback = &mut self.playback;
+        let seen = &mut playback.seen;
         seen.held.clear();
         seen.held.extend(playback.hold.shown(&self.live));
         let [x, y, z] =
@@ -757,6 +819,7 @@ impl<'s> Player<'s> {
         let step = if playback.steps > 0 { frame.time / playback.steps as f64 } else { self.world.step() };
         frame.possible_factor = if playback.step_seconds > 0.0 { step / playback.step_seconds } else { 0.0 };
         frame.input_lag = playback.input_lag;
+        frame.breaks = playback.breaks;
         frame.failure.clone_from(&playback.failure);
         frame.note.clone_from(&playback.note);
         playback.prepared = started.elapsed();

@@ -202,6 +202,66 @@ fn a_run_that_breaks_tells_body_and_element_and_keeps_the_last_good_picture() {
     wait(&mut session, |frame| frame.failure.is_none() && frame.steps == 0);
 }
 
+/// A pull that tears the ball does not end the run: it goes back to a state before, where the hand lets go, and goes on; a replay comes to the
+/// same bits, and has the break.
+#[test]
+fn a_pull_that_breaks_a_run_is_undone() {
+    let world = world(BALL);
+    let subject = subject(&world);
+    let mut session = Session::start(world.clone(), || ()).unwrap();
+    session.order(Order::Record);
+    session.order(Order::Step(300));
+    session.order(Order::Hand(Hand::Take(tip(&subject), 1e6)));
+    let taken = wait(&mut session, |frame| !frame.held.is_empty());
+    let place = Vector3::from(taken.held[0][0]);
+    for pull in 1..=200 {
+        let place = place + Vector3::x() * 0.005 * f64::from(pull);
+        session.order(Order::Hand(Hand::Pull(place.into())));
+        session.order(Order::Step(20));
+    }
+    let broken = wait(&mut session, |frame| frame.breaks > 0).clone();
+    session.order(Order::Step(50));
+    let after = wait(&mut session, |frame| !frame.playing && frame.number > broken.number + 2).clone();
+    assert_eq!((&broken.failure, &after.failure), (&None, &None));
+    assert!(after.held.is_empty() && after.points.iter().all(|point| point.iter().all(|x| x.is_finite())));
+    let note = after.note.unwrap();
+    assert!(note.starts_with("the hand let go, and the run went back to t = "), "{note}");
+    let recording = session.end().unwrap();
+    let [once, twice] = [(); 2].map(|()| replay(&world, &recording).unwrap());
+    assert_eq!(once, twice);
+    assert_eq!(once.breaks.len() as u64, after.breaks);
+    let [at, back] = once.breaks[0].times;
+    println!("broke at {at} s, went back to {back} s: {}", once.breaks[0].message);
+    assert!(at > back && at - back < 0.6);
+}
+
+/// However far the mouse goes, the hand pulls with its stiffness times two edges at most, also while the body gives way.
+#[test]
+fn the_force_of_a_hand_has_a_limit() {
+    let world = world(BALL);
+    let subject = subject(&world);
+    let mut session = Session::start(world.clone(), || ()).unwrap();
+    session.order(Order::Record);
+    session.order(Order::Hand(Hand::Take(tip(&subject), 20.0)));
+    let taken = wait(&mut session, |frame| !frame.held.is_empty());
+    let place = Vector3::from(taken.held[0][0]);
+    session.order(Order::Hand(Hand::Pull((place + Vector3::x()).into())));
+    let mut forces = Vec::new();
+    for steps in 1..=40 {
+        session.order(Order::Step(10));
+        let frame = wait(&mut session, |frame| frame.steps >= 10 * steps);
+        forces.push(Vector3::from(frame.held[0][1]).norm());
+    }
+    let (least, most) = forces.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), &f| (a.min(f), b.max(f)));
+    let edge = 0.012;
+    println!("{least} to {most} N, {} edges times 20 N/m", most / 20.0 / edge);
+    assert!(least > 0.97 * most && most < 20.0 * 2.0 * 1.5 * edge, "{least} to {most} N");
+    let recording = session.end().unwrap();
+    let [once, twice] = [(); 2].map(|()| replay(&world, &recording).unwrap());
+    assert_eq!(once, twice);
+    assert!((once.largest_force / most - 1.0).abs() < 1e-2, "{} N", once.largest_force);
+}
+
 fn number(path: &str, value: f64) -> Number {
     Number { path: path.split('.').map(str::to_owned).collect(), value }
 }

@@ -6,6 +6,8 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use pliant_viewer::{Break, Recording};
+
 use crate::support::{BLOCK, Told, Workshop, changed, has_graphics_processor};
 
 /// A screen, closed on drop.
@@ -145,4 +147,18 @@ fn without_a_screen_it_says_what_it_needs() {
     let told = workshop.pliant(&["view", "case", "--replay", "drag"]);
     assert_eq!(told.code, 2);
     assert!(told.err.contains("is not a recording"), "{}", told.err);
+}
+
+/// A replay tells which pulls broke the run when it was recorded.
+#[test]
+fn a_replay_tells_breaks() {
+    let workshop = Workshop::new(BLOCK);
+    let broken = Break { times: [0.5, 0.25], message: "element 3 of `block` is inverted".into() };
+    let recording = Recording { moves: Vec::new(), steps: 3, breaks: vec![broken] };
+    std::fs::write(workshop.path("drag"), recording.to_bytes().unwrap()).unwrap();
+    let told = workshop.pliant(&["view", "case", "--replay", "drag"]);
+    assert_eq!(told.code, 1);
+    let expected = "error: at t = 0.5000 s a pull broke the run, which then went back to t = 0.2500 s: element 3 of `block` is inverted";
+    assert!(told.err.contains(expected), "{}", told.err);
+    assert_eq!(told.json()["breaks"][0]["times"][1], 0.25);
 }
