@@ -42,7 +42,7 @@ impl Kind {
 }
 
 /// Advances at most; where they end is safe, too.
-const ADVANCES: usize = 10_000;
+pub(super) const ADVANCES: usize = 10_000;
 
 /// What is asked of a motion.
 #[derive(Clone, Copy, Debug)]

@@ -132,9 +132,9 @@ pub struct Mollifier {
 const PARALLEL: f64 = 1e-3;
 
 impl Mollifier {
-    /// The threshold e [m⁴] of two edges by their ends at rest [m].
-    pub fn threshold([a, b, c, d]: &[Vector3<f64>; 4]) -> f64 {
-        PARALLEL * (b - a).norm_squared() * (d - c).norm_squared()
+    /// The threshold e [m⁴] of two edges by the squares of their lengths at rest [m²].
+    pub fn threshold([first, second]: [f64; 2]) -> f64 {
+        PARALLEL * first * second
     }
 
     /// That of two edges by their ends [m] and the threshold e [m⁴].
@@ -182,6 +182,10 @@ mod tests {
     fn off(own: [Vector3<f64>; 4], wanted: [Vector3<f64>; 4]) -> f64 {
         let size = wanted.iter().map(|v| v.amax()).fold(0.0, f64::max);
         own.iter().zip(&wanted).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max) / size.max(f64::MIN_POSITIVE)
+    }
+
+    fn threshold([a, b, c, d]: &[Vector3<f64>; 4]) -> f64 {
+        Mollifier::threshold([(b - a).norm_squared(), (d - c).norm_squared()])
     }
 
     fn gradient(nearest: &Nearest) -> [Vector3<f64>; 4] {
@@ -233,7 +237,7 @@ mod tests {
             let off_by = (near.distance - distance).abs();
             assert!(off_by < allowed * distance + ROUNDING, "{name}: {} {distance}", near.distance);
             missed += u32::from(off_by >= allowed * distance);
-            let mollifier = Mollifier::of(&x, Mollifier::threshold(&x));
+            let mollifier = Mollifier::of(&x, threshold(&x));
             let value = case["mollifier"].as_f64().unwrap();
             assert!((mollifier.value - value).abs() < 1e-12, "{name}");
             let slope = vectors(&case["grad_mollifier_fixed_eps"]);
@@ -269,7 +273,7 @@ mod tests {
                 let turn = Vector3::from(random.vector()) * 0.03;
                 x[3] = x[2] + (x[1] - x[0]) * (1.0 + 0.5 * random.number()) + turn;
             }
-            let rest = Mollifier::threshold(&x);
+            let rest = threshold(&x);
             let of = |x: &[Vector3<f64>; 4]| if edges { edge_edge(x) } else { point_triangle(x) };
             let near = of(&x);
             let m = Mollifier::of(&x, rest);
