@@ -55,6 +55,11 @@ impl Slip {
         slip * self.force_over_slip(slip)
     }
 
+    /// f₁' [1/m] at a slip [m] ≥ 0: never negative, zero from ε on.
+    pub fn slope(&self, slip: f64) -> f64 {
+        (2.0 * (1.0 - slip / self.creep) / self.creep).max(0.0)
+    }
+
     /// f₁/u [1/m] at a slip u ≥ 0 [m]: an upper bound of f₁' that is never negative.
     pub fn force_over_slip(&self, slip: f64) -> f64 {
         if slip >= self.creep { 1.0 / slip } else { (2.0 - slip / self.creep) / self.creep }
@@ -105,6 +110,8 @@ mod tests {
             let (slip, at) = (Slip { creep: number("eps") }, number("y"));
             assert!(close(slip.energy(at), &row["f0"], 1e-13), "{row}");
             assert!(close(slip.force(at), &row["f1"], 1e-13), "{row}");
+            let wanted = row["f2"].as_f64().unwrap();
+            assert!((slip.slope(at) - wanted).abs() <= 1e-13 * slip.slope(0.0), "{row}");
             assert!(close(slip.force_over_slip(at), &row["f1_over_y"], 1e-13), "{row}");
         }
     }

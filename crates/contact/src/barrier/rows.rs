@@ -81,6 +81,8 @@ pub struct Held {
     pub slip: Vector3<f64>,
     /// μ λ f₁/|u| [N/m] there.
     pub stiffness: f64,
+    /// μ λ f₁' [N/m] there.
+    pub along: f64,
 }
 
 impl Held {
@@ -89,8 +91,13 @@ impl Held {
         self.slip * (-self.stiffness * self.stencil.coefficients[at])
     }
 
-    /// I − n nᵀ.
-    pub fn across(&self) -> Matrix3<f64> {
-        Matrix3::identity() - self.normal * self.normal.transpose()
+    /// The stiffness [N/m] of a slip: the second derivative of its energy, or, along the slip as across it, an upper bound of that, with which
+    /// no step goes too far.
+    pub fn stiffness(&self, is_exact: bool) -> Matrix3<f64> {
+        let across = (Matrix3::identity() - self.normal * self.normal.transpose()) * self.stiffness;
+        match self.slip.try_normalize(0.0).filter(|_| is_exact) {
+            Some(along) => across + along * along.transpose() * (self.along - self.stiffness),
+            None => across,
+        }
     }
 }

@@ -286,6 +286,7 @@ impl Barriers {
                 wall: group.wall.filter(|_| row.stencil.count == 1),
                 slip: Vector3::zeros(),
                 stiffness: 0.0,
+                along: 0.0,
             });
         }
         self.slide();
@@ -316,6 +317,7 @@ impl Barriers {
             let slip = groups[held.stencil.contact as usize].action.slip;
             let length = held.slip.norm();
             held.stiffness = held.limit * slip.force_over_slip(length);
+            held.along = held.limit * slip.slope(length);
             energy += held.limit * slip.energy(length);
         }
         self.energy[1] = energy;
@@ -372,9 +374,14 @@ impl Barriers {
         self.held.iter().for_each(|held| add(&held.stencil, &|at| held.force_on(at)));
     }
 
-    /// Calls back with the stiffness k c cᵀ ⊗ M of each row: its stencil, k [N/m], M, and k M w for the way w [m] that the rigid things have yet to
-    /// go in the step, from a share on.
-    pub fn stiffness(&self, share: f64, mut add: impl FnMut(&Stencil, f64, &Matrix3<f64>, Vector3<f64>)) {
+    /// Calls back with the stiffness c cᵀ ⊗ M of each row: its stencil, M [N/m], and M w for the way w [m] that the rigid things have yet to
+    /// go in the step, from a share on. That of friction is exact or an upper bound.
+    pub fn stiffness(
+        &self,
+        share: f64,
+        is_exact: bool,
+        mut add: impl FnMut(&Stencil, &Matrix3<f64>, Vector3<f64>),
+    ) {
         let [from, to, now] = &self.poses;
         let goes_on = share < 1.0 && from != to;
         let left = |stencil: &Stencil, wall: Option<u32>| {
@@ -395,15 +402,13 @@ impl Barriers {
             })
         };
         for row in &self.rows {
-            let along = row.normal * row.normal.transpose();
+            let along = row.normal * row.normal.transpose() * row.stiffness;
             let wall = self.groups[row.stencil.contact as usize].wall;
-            let pull = along * left(&row.stencil, wall) * row.stiffness;
-            add(&row.stencil, row.stiffness, &along, pull);
+            add(&row.stencil, &along, along * left(&row.stencil, wall));
         }
         for held in &self.held {
-            let across = held.across();
-            let pull = across * left(&held.stencil, held.wall) * held.stiffness;
-            add(&held.stencil, held.stiffness, &across, pull);
+            let across = held.stiffness(is_exact);
+            add(&held.stencil, &across, across * left(&held.stencil, held.wall));
         }
     }
 
@@ -425,9 +430,15 @@ impl Barriers {
         self.nodes
     }
 
-    /// The part of a motion (six numbers a node) from places [m] at a share of the step that leaves at least half of a part of every gap, while
-    /// rigid things go the same part of the way that is left to them. Pairs are listed anew if need be.
-    pub fn allowed(&mut self, position: &[Vector3<f64>], motion: &[f64], share: f64, keep: f64) -> f64 {
+    /// The part of a motion (six numbers a node), of so much of it at most, from places [m] at a share of the step that leaves at least half of a
+    /// part of every gap, while rigid things go the same part of the way that is left to them. Pairs are listed anew if need be.
+    pub fn allowed(
+        &mut self,
+        position: &[Vector3<f64>],
+        motion: &[f64],
+        share: f64,
+        [keep, most]: [f64; 2],
+    ) -> f64 {
         self.put(position, share);
         self.set_motion(motion, 1.0, 1.0);
         for group in &mut self.groups {
@@ -436,10 +447,11 @@ impl Barriers {
         let within =
             |own: &Self| own.groups.iter().map(|group| group.within_skins(&own.motion)).fold(1.0, f64::min);
         let mut part = within(self);
-        if part < 1.0 {
+        if part < most {
             self.list(motion, share);
             part = within(self);
         }
+        part = part.min(most);
         let [from, to, _] = &self.poses;
         let turns = share < 1.0 && from.iter().zip(to).any(|(from, to)| from.rotation != to.rotation);
         for _ in 0..TURNS {
