@@ -330,6 +330,7 @@ fn search(
     mut part: f64,
     complete: bool,
 ) -> Result<bool, SolveError> {
+    let mut broken = None;
     for _ in 0..=HALVINGS {
         state.clone_from(&before.state);
         let Vectors { increment, .. } = solver.vectors();
@@ -355,12 +356,13 @@ fn search(
                     return Ok(true);
                 }
             }
-            Ok(()) | Err(SolveError::Broken { .. }) => {}
+            Ok(()) => broken = None,
+            Err(error @ SolveError::Broken { .. }) => broken = Some(error),
             Err(error) => return Err(error),
         }
         part *= 0.5;
     }
-    Ok(false)
+    broken.map_or(Ok(false), Err)
 }
 
 /// Takes friction anew if its size has changed by more than counts; whether it has.
