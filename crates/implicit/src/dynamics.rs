@@ -8,9 +8,11 @@
 //! start of the step.
 //! Leaves out: gyroscopic moments (the lumped inertia of a node is the same about every axis) and step control by accuracy.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use pliant_contact::pose::Leg;
 use pliant_mechanics::model::Solid;
 
 use crate::assembly::{Assembly, Spring};
@@ -191,6 +193,16 @@ impl BackwardEuler {
     /// What contacts do at a state that no step led to.
     pub fn touching_at(&mut self, state: &State) -> Option<TouchingNow> {
         self.system.touching.as_mut().map(|touching| touching.at(state))
+    }
+
+    /// Where rigid things go that are driven from outside, by their number; `None` without contacts.
+    pub fn legs_mut(&mut self) -> Option<&mut BTreeMap<u32, Leg>> {
+        self.system.touching.as_mut().map(|touching| touching.barriers.legs_mut())
+    }
+
+    /// The same to look at.
+    pub fn legs(&self) -> Option<&BTreeMap<u32, Leg>> {
+        self.system.touching.as_ref().map(|touching| touching.barriers.legs())
     }
 
     /// Pairs of nodes that contacts added to the pattern of the equations: to go on with the same bits where another solver stood.

@@ -4,9 +4,11 @@
 //! largest residual on them (Levenberg 1944, Marquardt 1963): it bounds what an iteration moves them and vanishes at equilibrium.
 //! Leaves out: branch switching at bifurcations.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::{Matrix6, RowVector6, SymmetricEigen, Vector3};
+use pliant_contact::pose::Leg;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::tie::Tie;
 
@@ -199,6 +201,16 @@ impl Statics {
     /// What contacts do at a state that no step led to.
     pub fn touching_at(&mut self, state: &State) -> Option<TouchingNow> {
         self.system.touching.as_mut().map(|touching| touching.at(state))
+    }
+
+    /// Where rigid things go that are driven from outside, by their number; `None` without contacts.
+    pub fn legs_mut(&mut self) -> Option<&mut BTreeMap<u32, Leg>> {
+        self.system.touching.as_mut().map(|touching| touching.barriers.legs_mut())
+    }
+
+    /// The same to look at.
+    pub fn legs(&self) -> Option<&BTreeMap<u32, Leg>> {
+        self.system.touching.as_ref().map(|touching| touching.barriers.legs())
     }
 
     /// Pairs of nodes that contacts added to the pattern of the equations: to go on with the same bits where another solver stood.

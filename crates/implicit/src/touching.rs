@@ -49,6 +49,8 @@ pub struct TouchingNow {
     pub energy: f64,
     /// The least gap [m], where something touches.
     pub gap: Option<f64>,
+    /// The least gap [m] of each node that touches something, by increasing node.
+    pub gaps: Vec<(u32, f64)>,
 }
 
 /// Contacts in the equations of a solver.
@@ -106,6 +108,7 @@ impl TouchingSystem {
             totals: self.totals.iter().map(|&total| total.into()).collect(),
             energy: self.barriers.barrier_energy(),
             gap: self.barriers.least_gap(),
+            gaps: self.barriers.gaps().into_iter().collect(),
         }
     }
 

@@ -4,6 +4,7 @@
 //! between their poses. Friction of a step is that of the state where [`Barriers::hold`] was called last, with directions and normal forces
 //! as they were there.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
@@ -15,7 +16,7 @@ use super::features::Features;
 use super::law::{Barrier, Slip};
 use super::rows::{Held, Row, Stencil};
 use super::surfaces::Side;
-use crate::pose::{Pose, between};
+use crate::pose::{Leg, Pose, between};
 use crate::shape::Near;
 use crate::touch::{Contacts, Passage, With};
 
@@ -68,6 +69,8 @@ pub struct Barriers {
     motion: Vec<Vector3<f64>>,
     /// Distances [m] of nodes from the wall of each contact when they were listed.
     wall_distances: Vec<Vec<f64>>,
+    /// Where rigid things go that are driven from outside, by their number.
+    legs: BTreeMap<u32, Leg>,
     rows: Vec<Row>,
     held: Vec<Held>,
     energy: [f64; 2],
@@ -128,6 +131,7 @@ impl Barriers {
             listed: places.clone(),
             motion: vec![Vector3::zeros(); places.len()],
             place: places,
+            legs: BTreeMap::new(),
             rows: Vec::new(),
             held: Vec::new(),
             energy: [0.0; 2],
@@ -150,13 +154,23 @@ impl Barriers {
         self.groups.iter().map(Group::listed).sum()
     }
 
+    /// Where rigid things go that are driven from outside, by their number; from the next step on.
+    pub fn legs_mut(&mut self) -> &mut BTreeMap<u32, Leg> {
+        &mut self.legs
+    }
+
+    /// The same to look at.
+    pub fn legs(&self) -> &BTreeMap<u32, Leg> {
+        &self.legs
+    }
+
     /// Begins a step between two times [s], with nodes at places [m], expected to go by a motion (six numbers a node, translations first).
     /// Friction is that of the start.
     pub fn begin(&mut self, position: &[Vector3<f64>], motion: &[f64], times: [f64; 2]) {
         let [from, to] = times;
         for (number, rigid) in self.contacts.rigids.iter().enumerate() {
             for (pose, time) in self.poses.iter_mut().zip([from, to, from]) {
-                pose[number] = rigid.at(time, None);
+                pose[number] = rigid.at(time, self.legs.get(&(number as u32)));
             }
         }
         for group in &mut self.groups {
@@ -350,6 +364,19 @@ impl Barriers {
     /// The least gap [m] at the state last evaluated; none where nothing is within the reach of the barrier.
     pub fn least_gap(&self) -> Option<f64> {
         self.rows.iter().map(|row| row.gap).reduce(f64::min)
+    }
+
+    /// The least gap [m] of each node of the model that is within the reach of a barrier, by increasing node.
+    pub fn gaps(&self) -> BTreeMap<u32, f64> {
+        let mut gaps = BTreeMap::new();
+        for row in &self.rows {
+            let parts = row.stencil.parts().filter(|&(node, c)| (node as usize) < self.nodes && c != 0.0);
+            for (node, _) in parts {
+                let least = gaps.entry(node).or_insert(row.gap);
+                *least = least.min(row.gap);
+            }
+        }
+        gaps
     }
 
     /// Adds the forces [N] at the state last evaluated to those of nodes, six numbers a node, and sets those of each contact on its second
