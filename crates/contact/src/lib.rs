@@ -1,6 +1,7 @@
 //! Contact of soft bodies. With rigid things: [shapes](shape) with their signed distance, [motions](pose) of obstacles and tools, and the
 //! [least correction](touch) of a node that would go into one, with friction. With each other and themselves: [pairs] of points of
-//! their surfaces, found by [trees](tree). Knows no solver: how a contact acts is the stepper's. SI units throughout.
+//! their surfaces, found by [trees](tree). For solvers of equations, a [barrier] between
+//! them that nothing passes. Knows no solver: how a contact acts is the stepper's. SI units throughout.
 //!
 //! A node falls onto a plane:
 //!
@@ -17,6 +18,7 @@
 //! assert!(place[2].abs() < 1e-15 && (place[0] - (0.002 - 0.3 * 0.001)).abs() < 1e-15);
 //! ```
 
+pub mod barrier;
 pub mod grid;
 pub mod lag;
 pub mod pairs;

@@ -15,6 +15,7 @@ use crate::error::ModelError;
 use crate::facet::Facet;
 use crate::patch::Carried;
 use crate::solid::refusal;
+use crate::touching::Touching;
 
 /// The least part of a direction that lies in a triangle.
 const ALONG: f64 = 1e-3;
@@ -39,6 +40,8 @@ pub struct Assembly {
     pub springs: Vec<Spring>,
     /// The points of each surface of the model that shells carry.
     pub carried: BTreeMap<usize, Vec<Carried>>,
+    /// Contacts, which the static and the implicit solver keep.
+    pub touching: Option<Touching>,
 }
 
 /// Triangles that become a shell.

@@ -8,20 +8,24 @@
 //! start of the step.
 //! Leaves out: gyroscopic moments (the lumped inertia of a node is the same about every axis) and step control by accuracy.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use pliant_contact::pose::Leg;
 use pliant_mechanics::model::Solid;
 
 use crate::assembly::{Assembly, Spring};
+use crate::descent::{Contacting, Limits, Vectors, descend};
 use crate::error::SolveError;
 use crate::facet::Tangent;
 use crate::forces::Forces;
-use crate::linear::{LinearReport, LinearSolver};
+use crate::linear::{LinearReport, LinearSolver, dot};
 use crate::rotation::{exponential, logarithm, spin_to_vector};
 use crate::solid::highest_frequency_squared;
 use crate::state::State;
 use crate::system::{Phases, System};
+use crate::touching::TouchingNow;
 
 /// How an implicit step goes on in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -103,8 +107,7 @@ pub struct BackwardEuler {
     increment: Vec<f64>,
     residual: Vec<f64>,
     solution: Vec<f64>,
-    /// Stiffness at the start of the step, for damping, and its product with the motion.
-    damper: Vec<f64>,
+    /// The product of the damping stiffness with the motion.
     product: Vec<f64>,
     start: State,
     /// Where the state was a whole step before, for differences of second order; none after a start or a step that was halved.
@@ -159,7 +162,6 @@ impl BackwardEuler {
         let model = model.into();
         let system = System::new(Arc::clone(&model), settings.linear)?;
         let (all, free) = (6 * model.rest.len(), system.equations.len());
-        let damper = if model.stiffness_damping > 0.0 { system.matrix.value.len() } else { 0 };
         Ok(Self {
             settings,
             length: model.mean_edge(),
@@ -170,7 +172,6 @@ impl BackwardEuler {
             increment: vec![0.0; all],
             residual: vec![0.0; free],
             solution: vec![0.0; free],
-            damper: vec![0.0; damper],
             product: vec![0.0; free],
             start: State::at_rest(&model),
             previous: None,
@@ -182,6 +183,39 @@ impl BackwardEuler {
     /// Time spent in the parts of the solver so far.
     pub fn phases(&self) -> Phases {
         self.system.phases
+    }
+
+    /// What contacts do at the state of the last step; `None` without contacts.
+    pub fn touching(&self) -> Option<TouchingNow> {
+        self.system.touching.as_ref().map(|touching| touching.now())
+    }
+
+    /// What contacts do at a state that no step led to.
+    pub fn touching_at(&mut self, state: &State) -> Option<TouchingNow> {
+        self.system.touching.as_mut().map(|touching| touching.at(state))
+    }
+
+    /// Where rigid things go that are driven from outside, by their number; `None` without contacts.
+    pub fn legs_mut(&mut self) -> Option<&mut BTreeMap<u32, Leg>> {
+        self.system.touching.as_mut().map(|touching| touching.barriers.legs_mut())
+    }
+
+    /// The same to look at.
+    pub fn legs(&self) -> Option<&BTreeMap<u32, Leg>> {
+        self.system.touching.as_ref().map(|touching| touching.barriers.legs())
+    }
+
+    /// Pairs of nodes that contacts added to the pattern of the equations: to go on with the same bits where another solver stood.
+    pub fn contact_pairs(&self) -> &[[u32; 2]] {
+        self.system.touching.as_ref().map_or(&[], |touching| &touching.pairs)
+    }
+
+    /// Takes a pattern of the equations with pairs of nodes that [`contact_pairs`](Self::contact_pairs) told.
+    ///
+    /// # Errors
+    /// If the equations are too many for the solver chosen.
+    pub fn take_contact_pairs(&mut self, pairs: Vec<[u32; 2]>) -> Result<(), SolveError> {
+        self.system.take_pairs(pairs)
     }
 
     /// Takes hold of nodes, as [`Forces::hold`](crate::Forces::hold).
@@ -235,7 +269,7 @@ impl BackwardEuler {
                 }
                 Err(error) => {
                     state.clone_from(&self.start);
-                    if halvings == self.settings.halvings {
+                    if halvings == self.settings.halvings || matches!(error, SolveError::Crossed { .. }) {
                         return Err(error);
                     }
                     halvings += 1;
@@ -247,9 +281,11 @@ impl BackwardEuler {
 
     fn newton(&mut self, state: &mut State, h: f64) -> Result<DynamicStep, SolveError> {
         let time = state.time + h;
-        let model = Arc::clone(&self.system.model);
         self.system.prescribed(state.time, time, &mut self.pending);
         self.moved.fill(0.0);
+        if self.system.touching.is_some() {
+            return self.newton_in_contact(state, h);
+        }
         let mut residuals = Vec::with_capacity(self.settings.iterations + 1);
         for iteration in 0..=self.settings.iterations {
             if iteration == 1 && self.settings.iterations == 1 {
@@ -257,8 +293,7 @@ impl BackwardEuler {
             }
             self.system.evaluate(state, time, Some((self.settings.tangent, &self.pending)))?;
             if iteration == 0 {
-                let kept = self.damper.len();
-                self.damper.copy_from_slice(&self.system.matrix.value[..kept]);
+                self.system.take_damper();
             }
             let (norm, scale) = self.find_residual(state);
             residuals.push(if scale > 0.0 { norm / scale } else { 0.0 });
@@ -289,6 +324,44 @@ impl BackwardEuler {
             state.advance(&self.increment, 1.0);
             self.find_motion(state);
         }
+        self.end(state, time);
+        Ok(DynamicStep { residuals, linear: self.system.last_solution, parts: 0 })
+    }
+
+    /// [`newton`](Self::newton) in contact, from the motion of before.
+    fn newton_in_contact(&mut self, state: &mut State, h: f64) -> Result<DynamicStep, SolveError> {
+        let time = state.time + h;
+        if !self.system.damper.is_empty() {
+            self.system.evaluate(state, time, Some((self.settings.tangent, &self.pending)))?;
+            self.system.take_damper();
+        }
+        let rates = state.velocity.iter().zip(&state.spin);
+        let guess: Vec<f64> =
+            rates.flat_map(|(v, w)| [v, w].map(|rate| rate * h)).flat_map(|x| [x.x, x.y, x.z]).collect();
+        let limits = Limits { iterations: self.settings.iterations, lags: LAGS };
+        let mut residuals = Vec::new();
+        let result = descend(self, state, time, Some(&guess), &limits, &mut |norm, allowed| {
+            residuals.push((norm, allowed));
+        });
+        let tolerance = self.settings.tolerance;
+        let relative =
+            |&(norm, allowed): &(f64, f64)| if allowed > 0.0 { norm / allowed * tolerance } else { 0.0 };
+        let told: Vec<f64> = residuals.iter().map(relative).collect();
+        match result {
+            Ok(()) => {}
+            Err(SolveError::NotConverged { time, node, broken, .. }) => {
+                return Err(SolveError::NotConverged { time, node, residuals: told, broken });
+            }
+            Err(error) => return Err(error),
+        }
+        self.find_motion(state);
+        self.end(state, time);
+        Ok(DynamicStep { residuals: told, linear: self.system.last_solution, parts: 0 })
+    }
+
+    /// Ends a step: velocities and spins of the motion in it.
+    fn end(&self, state: &mut State, time: f64) {
+        let model = &self.system.model;
         let Course { step, shift, .. } = &self.course;
         for (node, moved) in self.moved.chunks_exact(6).enumerate() {
             if model.mass[node] > 0.0 {
@@ -299,7 +372,6 @@ impl BackwardEuler {
             }
         }
         state.time = time;
-        Ok(DynamicStep { residuals, linear: self.system.last_solution, parts: 0 })
     }
 
     /// Solves for the residual, from a motion that goes on for a time [s].
@@ -368,13 +440,13 @@ impl BackwardEuler {
                 }
             }
         }
-        if !self.damper.is_empty() {
+        if !system.damper.is_empty() {
             system.gather(&self.moved, &mut self.solution);
             if !shift.is_empty() {
                 let shifted = system.equations.component.iter().map(|&component| shift[component as usize]);
                 self.solution.iter_mut().zip(shifted).for_each(|(moved, shift)| *moved -= shift);
             }
-            system.matrix.multiply_values(&self.damper, &self.solution, &mut self.product);
+            system.matrix.multiply_values(&system.damper, &self.solution, &mut self.product);
             let factor = model.stiffness_damping / h;
             self.residual.iter_mut().zip(&self.product).for_each(|(r, p)| *r -= factor * p);
         }
@@ -390,7 +462,7 @@ impl BackwardEuler {
     fn add_inertia(&mut self) {
         let (model, h) = (Arc::clone(&self.system.model), self.course.step);
         let factor = model.stiffness_damping / h;
-        self.system.matrix.value.iter_mut().zip(&self.damper).for_each(|(k, d)| *k += factor * d);
+        self.system.matrix.value.iter_mut().zip(&self.system.damper).for_each(|(k, d)| *k += factor * d);
         for (equation, &component) in self.system.equations.component.iter().enumerate() {
             let node = component as usize / 6;
             let rate = 1.0 / (h * h) + self.damping[node] / h;
@@ -403,6 +475,74 @@ impl BackwardEuler {
         let all = self.system.equations.component.iter().zip(&self.residual);
         let largest = all.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         largest.map_or(0, |(component, _)| component / 6)
+    }
+}
+
+/// How often a step takes friction anew.
+const LAGS: usize = 2;
+
+impl Contacting for BackwardEuler {
+    fn system(&mut self) -> &mut System {
+        &mut self.system
+    }
+
+    fn vectors(&mut self) -> Vectors<'_> {
+        let Self { system, pending, increment, residual, solution, .. } = self;
+        Vectors { system, pending, increment, residual, solution }
+    }
+
+    fn evaluate(&mut self, state: &State, time: f64, tangent: bool) -> Result<(), SolveError> {
+        self.find_motion(state);
+        self.system.evaluate(state, time, tangent.then_some((self.settings.tangent, &self.pending[..])))
+    }
+
+    fn find_residual(&mut self, state: &State) -> (f64, f64) {
+        let (norm, scale) = Self::find_residual(self, state);
+        (norm, self.settings.tolerance * scale + self.round_off)
+    }
+
+    /// Σ m |u − s − h v|²/(2 h²) + α m |u − s|²/(2 h), the same of rotation vectors, and β (u − s)ᵀ K (u − s)/(2 h).
+    fn potential(&mut self) -> f64 {
+        let model = Arc::clone(&self.system.model);
+        let Course { step: h, shift, rate } = &self.course;
+        let mut sum = 0.0;
+        for (node, moved) in self.moved.chunks_exact(6).enumerate() {
+            for (first, mass, before) in [
+                (0, model.mass[node], self.start.velocity[node]),
+                (3, model.rotary_inertia[node], self.start.spin[node]),
+            ] {
+                let moved = Course::part(moved, first) - Course::part(shift, 6 * node + first);
+                let before = before + Course::part(rate, 6 * node + first);
+                sum += 0.5 * mass / (h * h) * (moved - *h * before).norm_squared();
+                sum += 0.5 * self.damping[node] * mass / h * moved.norm_squared();
+            }
+        }
+        if !self.system.damper.is_empty() {
+            let mut moved = vec![0.0; self.product.len()];
+            self.system.gather(&self.moved, &mut moved);
+            let shift = |component: &u32| self.course.shift.get(*component as usize).copied().unwrap_or(0.0);
+            let components = &self.system.equations.component;
+            moved.iter_mut().zip(components).for_each(|(moved, component)| *moved -= shift(component));
+            self.system.matrix.multiply_values(&self.system.damper, &moved, &mut self.product);
+            sum += 0.5 * model.stiffness_damping / h * dot(&moved, &self.product);
+        }
+        sum
+    }
+
+    fn complete(&mut self) {
+        self.add_inertia();
+    }
+
+    fn part(&self) -> f64 {
+        1.0
+    }
+
+    fn accepts(&self, _before: f64, _after: f64) -> bool {
+        false
+    }
+
+    fn worst(&self) -> u32 {
+        self.worst_node()
     }
 }
 

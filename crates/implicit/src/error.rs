@@ -199,6 +199,51 @@ pub enum SolveError {
         /// The element that broke in an attempt with a larger step, the last such, and how.
         broken: Option<(usize, Broken)>,
     },
+    /// A tool or a prescribed motion that cannot go on.
+    #[error(
+        "a tool or a prescribed motion is blocked at t = {time:.6}: after {iterations} iterations it has gone {:.1} % of its way in the step, with a gap of \
+         {gap:.1e} m left; nothing is in anything else. Let it go less far or more slowly, or take smaller steps",
+        100.0 * part
+    )]
+    Blocked {
+        /// Time of the step that failed.
+        time: f64,
+        /// Part of the way that it went, from 0 to 1.
+        part: f64,
+        /// The least gap [m].
+        gap: f64,
+        /// Iterations of the last attempt.
+        iterations: usize,
+    },
+    /// No lower energy along a direction that should have one.
+    #[error(
+        "the energy does not fall any more at t = {time:.6} after {iterations} iterations in contact, largest residual at node {node}; try smaller steps"
+    )]
+    Uphill {
+        /// Time of the step that failed.
+        time: f64,
+        /// Node with the largest residual.
+        node: u32,
+        /// Iterations of the last attempt.
+        iterations: usize,
+    },
+    /// An edge in a triangle, found by the check of crossings.
+    #[error(
+        "{count} edges go through triangles at t = {time:.6}, the first that of nodes {} and {} through the triangle of nodes {}, {} and {} in contact \
+         {contact}: a fault of the program, please report it with the scene", edge[0], edge[1], triangle[0], triangle[1], triangle[2]
+    )]
+    Crossed {
+        /// Time of the state.
+        time: f64,
+        /// Edges that go through triangles.
+        count: usize,
+        /// The contact, by its number.
+        contact: u32,
+        /// Ends of the first edge.
+        edge: [u32; 2],
+        /// Corners of the triangle it goes through.
+        triangle: [u32; 3],
+    },
     /// A balloon that is not closed.
     #[error(transparent)]
     Open(#[from] ModelError),

@@ -10,12 +10,14 @@ use crate::system::System;
 /// Forces and moments on the nodes of a model at the state last evaluated.
 pub struct Forces {
     pub(crate) system: System,
+    /// Forces of contacts, six a node; empty for none.
+    touching: Vec<f64>,
 }
 
 impl Forces {
     /// For a model; nothing is known before the first evaluation.
     pub fn new(model: impl Into<Arc<Assembly>>) -> Self {
-        Self { system: System::forces_only(model.into()) }
+        Self { system: System::forces_only(model.into()), touching: Vec::new() }
     }
 
     /// Finds the forces at a state and its time.
@@ -28,6 +30,7 @@ impl Forces {
         for (load, controlled) in system.external.iter_mut().zip(&system.controlled) {
             *load += state.load_factor * controlled;
         }
+        system.external.iter_mut().zip(&self.touching).for_each(|(load, force)| *load += force);
         Ok(())
     }
 
@@ -35,6 +38,12 @@ impl Forces {
     /// loads.
     pub fn hold(&mut self, springs: &[Spring]) {
         self.system.hold(springs);
+    }
+
+    /// Takes the forces of contacts, six numbers a node: they are loads from the next evaluation on.
+    pub fn touch(&mut self, forces: &[f64]) {
+        self.touching.clear();
+        self.touching.extend_from_slice(forces);
     }
 
     /// Force [N] and moment [N m] that elements and springs resist with, six numbers a node.

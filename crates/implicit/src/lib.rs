@@ -35,6 +35,7 @@ mod assembly;
 mod carry;
 mod control;
 mod creases;
+mod descent;
 mod dynamics;
 pub mod element;
 mod error;
@@ -61,6 +62,7 @@ mod system;
 mod testing;
 #[cfg(test)]
 mod tests;
+mod touching;
 
 pub use assembly::{Assembly, Notes, Shell, Spring};
 pub use creases::Normal;
@@ -81,3 +83,4 @@ pub use statics::{Attempted, Control, StaticSettings, Statics, Step, check_held}
 pub use strain::ShellStrain;
 pub use surface::CurvedSurface;
 pub use system::Phases;
+pub use touching::{Touching, TouchingNow};

@@ -159,6 +159,55 @@ impl LowerMatrix {
         }
     }
 
+    /// Whether the pattern couples two nodes, the lower number first, or one of them has no equations.
+    pub(crate) fn couples(&self, equations: &Equations, [low, high]: [u32; 2]) -> bool {
+        let [column, row] = [equations.first(low), equations.first(high)];
+        column == NONE || row == NONE || self.rows(column).binary_search(&row).is_ok()
+    }
+
+    /// Adds to the translations of two nodes that the pattern couples, of which the first has the higher number or is the same.
+    pub(crate) fn add_node_block(
+        &mut self,
+        equations: &Equations,
+        [row_node, column_node]: [u32; 2],
+        entry: impl Fn(usize, usize) -> f64,
+    ) {
+        let first = equations.first(row_node);
+        for j in 0..3 {
+            let column = equations.number[6 * column_node as usize + j];
+            if column == NONE || first == NONE {
+                continue;
+            }
+            let base = self.base(equations, row_node, column);
+            for i in 0..3 {
+                let row = equations.number[6 * row_node as usize + i];
+                if row == NONE || row < column {
+                    continue;
+                }
+                let at = base.wrapping_add(row - first) as usize;
+                self.value[at] += entry(i, j);
+                if !self.mirror.is_empty() {
+                    self.mirror[at] += entry(j, i);
+                }
+            }
+        }
+    }
+
+    /// Values of an older pattern, that this one contains, in this one.
+    pub(crate) fn carried(&self, older: &Self, values: &[f64]) -> Vec<f64> {
+        let mut all = vec![0.0; self.value.len()];
+        for column in 0..older.len() as u32 {
+            let (from, to) = (older.column_start[column as usize], self.column_start[column as usize]);
+            let rows = self.rows(column);
+            for (at, row) in older.rows(column).iter().enumerate() {
+                if let Ok(place) = rows.binary_search(row) {
+                    all[to as usize + place] = values[from as usize + at];
+                }
+            }
+        }
+        all
+    }
+
     /// Adds to a diagonal entry.
     pub(crate) fn add_diagonal(&mut self, equation: usize, value: f64) {
         let at = self.column_start[equation] as usize;

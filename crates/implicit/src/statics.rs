@@ -4,19 +4,23 @@
 //! largest residual on them (Levenberg 1944, Marquardt 1963): it bounds what an iteration moves them and vanishes at equilibrium.
 //! Leaves out: branch switching at bifurcations.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::{Matrix6, RowVector6, SymmetricEigen, Vector3};
+use pliant_contact::pose::Leg;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::tie::Tie;
 
 use crate::assembly::{Assembly, Spring};
+use crate::descent::{Contacting, Limits, Vectors, descend};
 use crate::error::SolveError;
 use crate::facet::Tangent;
 use crate::linear::{LinearSolver, dot};
 use crate::sparse::NONE;
 use crate::state::State;
 use crate::system::{Phases, System};
+use crate::touching::TouchingNow;
 
 /// How equilibria are sought.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -189,6 +193,39 @@ impl Statics {
         self.system.phases
     }
 
+    /// What contacts do at the state of the last step; `None` without contacts.
+    pub fn touching(&self) -> Option<TouchingNow> {
+        self.system.touching.as_ref().map(|touching| touching.now())
+    }
+
+    /// What contacts do at a state that no step led to.
+    pub fn touching_at(&mut self, state: &State) -> Option<TouchingNow> {
+        self.system.touching.as_mut().map(|touching| touching.at(state))
+    }
+
+    /// Where rigid things go that are driven from outside, by their number; `None` without contacts.
+    pub fn legs_mut(&mut self) -> Option<&mut BTreeMap<u32, Leg>> {
+        self.system.touching.as_mut().map(|touching| touching.barriers.legs_mut())
+    }
+
+    /// The same to look at.
+    pub fn legs(&self) -> Option<&BTreeMap<u32, Leg>> {
+        self.system.touching.as_ref().map(|touching| touching.barriers.legs())
+    }
+
+    /// Pairs of nodes that contacts added to the pattern of the equations: to go on with the same bits where another solver stood.
+    pub fn contact_pairs(&self) -> &[[u32; 2]] {
+        self.system.touching.as_ref().map_or(&[], |touching| &touching.pairs)
+    }
+
+    /// Takes a pattern of the equations with pairs of nodes that [`contact_pairs`](Self::contact_pairs) told.
+    ///
+    /// # Errors
+    /// If the equations are too many for the solver chosen.
+    pub fn take_contact_pairs(&mut self, pairs: Vec<[u32; 2]>) -> Result<(), SolveError> {
+        self.system.take_pairs(pairs)
+    }
+
     /// Takes hold of nodes, as [`Forces::hold`](crate::Forces::hold).
     pub fn hold(&mut self, springs: &[Spring]) {
         self.system.hold(springs);
@@ -331,6 +368,9 @@ impl Statics {
         let failed = |error| Attempt { error, retry: true };
         let start = state.clone();
         self.system.prescribed(state.time, time, &mut self.pending);
+        if self.system.touching.is_some() {
+            return self.iterate_in_contact(state, time, control);
+        }
         let mut residuals: Vec<f64> = Vec::new();
         let mut negative_pivots = 0;
         for iteration in 0..=self.settings.iterations {
@@ -380,6 +420,42 @@ impl Statics {
         }
         let node = self.worst_node();
         Err(Attempt { error: SolveError::NotConverged { time, node, residuals, broken: None }, retry: true })
+    }
+
+    /// [`iterate`](Self::iterate) in contact.
+    fn iterate_in_contact(
+        &mut self,
+        state: &mut State,
+        time: f64,
+        control: Option<Control>,
+    ) -> Result<Step, Attempt> {
+        if control.is_some() {
+            let error = SolveError::Impossible(
+                "a controlled load goes with no contact; prescribe the load, or leave the contact out",
+            );
+            return Err(Attempt { error, retry: false });
+        }
+        let mut residuals = Vec::new();
+        let mut last = 0.0;
+        let limits = Limits { iterations: self.settings.iterations, lags: LAGS };
+        let result = descend(self, state, time, None, &limits, &mut |norm, allowed| {
+            residuals.push(norm);
+            last = allowed;
+        });
+        if let Some(attempt) = self.attempts.last_mut() {
+            (attempt.residuals, attempt.allowed) = (residuals.clone(), last);
+        }
+        match result {
+            Ok(()) => {
+                state.time = time;
+                Ok(Step { time, residuals, negative_pivots: 0, parts: 0 })
+            }
+            Err(SolveError::NotConverged { time, node, broken, .. }) => Err(Attempt {
+                error: SolveError::NotConverged { time, node, residuals, broken },
+                retry: true,
+            }),
+            Err(error) => Err(Attempt { retry: !matches!(error, SolveError::Crossed { .. }), error }),
+        }
     }
 
     /// Solves for the residual; the negative pivots of the stiffness.
@@ -544,6 +620,48 @@ impl Statics {
             *solution += factor * response;
         }
         Ok(factor)
+    }
+}
+
+/// How often a load step takes friction anew.
+const LAGS: usize = 20;
+
+impl Contacting for Statics {
+    fn system(&mut self) -> &mut System {
+        &mut self.system
+    }
+
+    fn vectors(&mut self) -> Vectors<'_> {
+        let Self { system, pending, increment, residual, solution, .. } = self;
+        Vectors { system, pending, increment, residual, solution }
+    }
+
+    fn evaluate(&mut self, state: &State, time: f64, tangent: bool) -> Result<(), SolveError> {
+        self.system.evaluate(state, time, tangent.then_some((self.settings.tangent, &self.pending[..])))
+    }
+
+    fn find_residual(&mut self, state: &State) -> (f64, f64) {
+        Self::find_residual(self, state)
+    }
+
+    fn potential(&mut self) -> f64 {
+        0.0
+    }
+
+    fn complete(&mut self) {
+        self.hold_slack();
+    }
+
+    fn part(&self) -> f64 {
+        self.allowed_part()
+    }
+
+    fn accepts(&self, before: f64, after: f64) -> bool {
+        after.abs() <= before.abs()
+    }
+
+    fn worst(&self) -> u32 {
+        self.worst_node()
     }
 }
 

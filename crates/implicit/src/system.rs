@@ -24,6 +24,7 @@ use crate::solid::{Response, Stars};
 use crate::sparse::{Equations, LowerMatrix, NONE};
 use crate::state::State;
 use crate::surface::CurvedSurface;
+use crate::touching::TouchingSystem;
 
 /// Cells computed side by side before they are added up.
 const CHUNK: usize = 256;
@@ -83,6 +84,11 @@ pub(crate) struct System {
     pub(crate) phases: Phases,
     pub(crate) last_solution: LinearReport,
     followers: Option<Followers>,
+    solver: LinearSolver,
+    /// Contacts; a system of forces alone has none.
+    pub(crate) touching: Option<Box<TouchingSystem>>,
+    /// The stiffness at the start of a step that damps it; empty without such damping.
+    pub(crate) damper: Vec<f64>,
 }
 
 /// Pressures on a facet [Pa], each fixed and controlled.
@@ -110,9 +116,24 @@ impl System {
             ));
         }
         let mut system = Self::forces_only(Arc::clone(&model));
+        system.solver = solver;
+        system.touching = model.touching.as_ref().map(|own| Box::new(TouchingSystem::new(own, &model)));
+        system.coupling = vec![0.0; system.equations.len()];
+        system.find_pattern()?;
+        if model.stiffness_damping > 0.0 {
+            system.damper = vec![0.0; system.matrix.value.len()];
+        }
+        Ok(system)
+    }
+
+    /// Finds the pattern of the matrix and the places of cells in it.
+    fn find_pattern(&mut self) -> Result<(), SolveError> {
+        let system = self;
+        let model = Arc::clone(&system.model);
         let matrix = &mut system.matrix;
         let facets = model.facets.iter().map(|facet| &facet.nodes[..]);
         let stars = system.stars.iter().flatten().flat_map(|stars| stars.nodes.iter().map(Vec::as_slice));
+        let pairs = system.touching.iter().flat_map(|touching| touching.pairs.iter().map(|pair| &pair[..]));
         let followers = system.followers.as_ref();
         let expand = |nodes: &[u32], turns: bool| {
             followers.and_then(|followers| followers.expanded(nodes, turns)).unwrap_or_else(|| nodes.to_vec())
@@ -125,10 +146,13 @@ impl System {
             }
         };
         *matrix = match followers {
-            None => LowerMatrix::new(&system.equations, facets.chain(model.solid_cells()).chain(stars)),
-            Some(_) => LowerMatrix::new(&system.equations, expanded.iter().map(Vec::as_slice)),
+            None => {
+                let cells = facets.chain(model.solid_cells()).chain(stars).chain(pairs);
+                LowerMatrix::new(&system.equations, cells)
+            }
+            Some(_) => LowerMatrix::new(&system.equations, expanded.iter().map(Vec::as_slice).chain(pairs)),
         };
-        if solver == LinearSolver::Unsymmetric {
+        if system.solver == LinearSolver::Unsymmetric {
             matrix.keep_mirror();
         }
         let equations = &system.equations;
@@ -145,14 +169,47 @@ impl System {
         };
         system.face_places = pressing(&model).map(of_load).collect();
         system.solid_places = model.solids.iter().zip(&system.stars).map(of_solid).collect();
-        system.coupling = vec![0.0; system.equations.len()];
-        system.workspace = Workspace::new(solver, &system.equations, matrix);
-        if system.workspace.is_none() {
-            return Err(SolveError::Impossible(
+        system.workspace = Workspace::new(system.solver, &system.equations, matrix);
+        match system.workspace {
+            Some(_) => Ok(()),
+            None => Err(SolveError::Impossible(
                 "the equations are too many for the direct solver; use conjugate gradients",
-            ));
+            )),
         }
-        Ok(system)
+    }
+
+    /// Makes room in the pattern for the contacts that act or soon may.
+    pub(crate) fn make_room(&mut self) -> Result<(), SolveError> {
+        let Some(touching) = &mut self.touching else { return Ok(()) };
+        if !touching.grow(&self.equations, &self.matrix) {
+            return Ok(());
+        }
+        self.set_pattern()
+    }
+
+    /// Takes a pattern with these pairs of nodes for contacts.
+    pub(crate) fn take_pairs(&mut self, pairs: Vec<[u32; 2]>) -> Result<(), SolveError> {
+        match &mut self.touching {
+            Some(touching) if touching.pairs != pairs => touching.pairs = pairs,
+            _ => return Ok(()),
+        }
+        self.set_pattern()
+    }
+
+    /// Takes a pattern with the pairs of nodes that contacts have.
+    fn set_pattern(&mut self) -> Result<(), SolveError> {
+        let older = std::mem::take(&mut self.matrix);
+        self.find_pattern()?;
+        if !self.damper.is_empty() {
+            self.damper = self.matrix.carried(&older, &self.damper);
+        }
+        Ok(())
+    }
+
+    /// Keeps the stiffness as it is now for damping, if there is some.
+    pub(crate) fn take_damper(&mut self) {
+        let kept = self.damper.len();
+        self.damper.copy_from_slice(&self.matrix.value[..kept]);
     }
 
     /// A system that has forces, but no stiffness.
@@ -208,6 +265,9 @@ impl System {
             results: vec![FacetResult::none(); CHUNK.min(model.facets.len())],
             phases: Phases::default(),
             last_solution: LinearReport::default(),
+            solver: LinearSolver::Direct,
+            touching: None,
+            damper: Vec::new(),
             model,
         }
     }
@@ -226,6 +286,12 @@ impl System {
         time: f64,
         tangent: Option<(Tangent, &[f64])>,
     ) -> Result<(), SolveError> {
+        if let Some(touching) = &mut self.touching {
+            touching.evaluate(state);
+            if tangent.is_some() {
+                self.make_room()?;
+            }
+        }
         let start = Instant::now();
         self.nodal_loads(state, time);
         self.internal.fill(0.0);
@@ -268,6 +334,12 @@ impl System {
         if let Some(followers) = &self.followers {
             for forces in [&mut self.internal, &mut self.external, &mut self.controlled] {
                 followers.give_back(forces);
+            }
+        }
+        if let Some(touching) = &self.touching {
+            self.external.iter_mut().zip(&touching.forces).for_each(|(load, force)| *load += force);
+            if let Some((_, moved)) = tangent {
+                touching.add_stiffness(&self.equations, &mut self.matrix, moved, &mut self.coupling);
             }
         }
         if tangent.is_some() && !self.matrix.mirror.is_empty() {

@@ -10,6 +10,8 @@ use crate::format::{
 };
 use crate::world::Part;
 
+/// Iterations of Newton's method at most in contact, if none are given.
+const IN_CONTACT: usize = 200;
 /// Iterations from which on a lagged factorisation is made anew.
 const RENEW_AFTER: usize = 10;
 
@@ -59,13 +61,13 @@ fn method_of(bodies: &Arc<ImplicitBodies>, run: &RunTable, step: f64) -> Method 
         SolverName::Static => {
             let mut settings = StaticSettings { linear, ..StaticSettings::default() };
             settings.tolerance = run.tolerance.unwrap_or(settings.tolerance);
-            settings.iterations = run.iterations.map_or(settings.iterations, |n| n as usize);
+            settings.iterations = iterations(&bodies, run, settings.iterations);
             Method::Static(bodies, settings)
         }
         SolverName::Implicit => {
             let mut settings = DynamicSettings { linear, ..DynamicSettings::new(step) };
             settings.tolerance = run.tolerance.unwrap_or(settings.tolerance);
-            settings.iterations = run.iterations.map_or(settings.iterations, |n| n as usize);
+            settings.iterations = iterations(&bodies, run, settings.iterations);
             settings.accept_stalled = table.accept_stalled;
             if settings.iterations == 1 {
                 settings = settings.real_time(linear);
@@ -78,6 +80,12 @@ fn method_of(bodies: &Arc<ImplicitBodies>, run: &RunTable, step: f64) -> Method 
         }
         SolverName::Explicit | SolverName::QuasiStatic => Method::ExplicitShells(bodies),
     }
+}
+
+/// Iterations of Newton's method at most: those that are given, or the usual ones; more in contact.
+fn iterations(bodies: &ImplicitBodies, run: &RunTable, usual: usize) -> usize {
+    let usual = if bodies.model.touching.is_some() { IN_CONTACT } else { usual };
+    run.iterations.map_or(usual, |n| n as usize)
 }
 
 fn linear_solver(table: &LinearTable) -> LinearSolver {

@@ -8,7 +8,7 @@ use serde::Serialize;
 /// A failure, with its place and time.
 #[derive(Clone, Debug, Serialize)]
 pub struct Failure {
-    /// `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `device`, `output`, `input` or `interrupted`.
+    /// `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `intersecting`, `device`, `output`, `input` or `interrupted`.
     pub kind: &'static str,
     /// The body, where it is about one.
     pub body: Option<String>,

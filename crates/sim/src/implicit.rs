@@ -1,13 +1,16 @@
 //! Shells, and solids whose equations are solved, as a participant.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::fmt::Write;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use pliant_explicit::Wanted;
+use pliant_contact::pose::Leg;
+use pliant_contact::touch::Contact;
+use pliant_explicit::{NodeContact, Wanted};
 use pliant_implicit::{
     Assembly, BackwardEuler, DynamicSettings, Explicit, Forces, Phases, SolveError, Spring, State, Statics,
+    TouchingNow,
 };
 use pliant_mechanics::grip::{Grip, ROOM};
 use pliant_mechanics::mapping::Mapping;
@@ -16,7 +19,7 @@ use pliant_mechanics::{Energies, fingerprint};
 use crate::bodies::{ImplicitBodies, RunControl, Stop};
 use crate::failure::Failure;
 use crate::instant::{CellsNow, Effort, Instant};
-use crate::kept::{ImplicitState, Iterated, Kept, PlainState};
+use crate::kept::{ContactState, ImplicitState, Iterated, Kept, PlainState};
 use crate::part::{self, Part};
 use crate::participant::Participant;
 use crate::solids::SolidCells;
@@ -63,6 +66,8 @@ pub(crate) struct Implicit {
     path: Path,
     grips: Vec<Grip>,
     springs: Vec<Spring>,
+    /// What contacts do at the instant; `None` without contacts, and at the start before they are looked at.
+    touching: Option<TouchingNow>,
     /// Displacements of the solids at the instant last evaluated; `None` without solids.
     solids: Option<pliant_explicit::State<f64>>,
 }
@@ -92,6 +97,51 @@ impl Method {
         match self {
             Self::Static(_, forces) | Self::Implicit(_, forces) => forces,
             Self::Explicit(solver) => solver.forces(),
+        }
+    }
+
+    /// What contacts did in the last step; without one, what they do at a state.
+    fn touching(&mut self, state: Option<&State>) -> Option<TouchingNow> {
+        match (self, state) {
+            (Self::Static(solver, _), None) => solver.touching(),
+            (Self::Static(solver, _), Some(state)) => solver.touching_at(state),
+            (Self::Implicit(solver, _), None) => solver.touching(),
+            (Self::Implicit(solver, _), Some(state)) => solver.touching_at(state),
+            (Self::Explicit(_), _) => None,
+        }
+    }
+
+    /// Where tools go that are driven from outside.
+    fn legs(&self) -> Option<&BTreeMap<u32, Leg>> {
+        match self {
+            Self::Static(solver, _) => solver.legs(),
+            Self::Implicit(solver, _) => solver.legs(),
+            Self::Explicit(_) => None,
+        }
+    }
+
+    fn legs_mut(&mut self) -> Option<&mut BTreeMap<u32, Leg>> {
+        match self {
+            Self::Static(solver, _) => solver.legs_mut(),
+            Self::Implicit(solver, _) => solver.legs_mut(),
+            Self::Explicit(_) => None,
+        }
+    }
+
+    /// Pairs of nodes that contacts added to the pattern of the equations.
+    fn contact_pairs(&self) -> &[[u32; 2]] {
+        match self {
+            Self::Static(solver, _) => solver.contact_pairs(),
+            Self::Implicit(solver, _) => solver.contact_pairs(),
+            Self::Explicit(_) => &[],
+        }
+    }
+
+    fn take_contact_pairs(&mut self, pairs: Vec<[u32; 2]>) -> Result<(), SolveError> {
+        match self {
+            Self::Static(solver, _) => solver.take_contact_pairs(pairs),
+            Self::Implicit(solver, _) => solver.take_contact_pairs(pairs),
+            Self::Explicit(_) => Ok(()),
         }
     }
 
@@ -155,6 +205,7 @@ impl Implicit {
             path: Path::default(),
             grips: Vec::new(),
             springs: Vec::new(),
+            touching: None,
             solids: (!own.solids.is_empty()).then(|| pliant_explicit::State::at_rest(own)),
             model: Arc::clone(own),
             bodies: Arc::clone(bodies),
@@ -414,8 +465,12 @@ fn part_of(control: RunControl, number: u64, of: u64) -> pliant_implicit::Contro
 
 impl Implicit {
     /// Goes on from where a run of the same bodies stood.
-    pub(crate) fn resume(&mut self, remembered: ImplicitState) {
-        let ImplicitState { done, time, state, before, previous, energies, effort, convergence } = remembered;
+    ///
+    /// # Errors
+    /// If its equations are too many.
+    pub(crate) fn resume(&mut self, remembered: ImplicitState) -> Result<(), Failure> {
+        let ImplicitState { done, time, state, before, previous, energies, effort, convergence, contact } =
+            remembered;
         (self.done, self.time) = (done, time);
         self.convergence = convergence;
         self.state = state.state();
@@ -426,6 +481,14 @@ impl Implicit {
         self.energies = energies;
         (self.effort, self.effort_before) = (effort.clone(), effort);
         self.evaluated = false;
+        let Some(ContactState { forces, totals, energy, gaps, pairs, legs }) = contact else { return Ok(()) };
+        let gap = gaps.iter().map(|&(_, gap)| gap).reduce(f64::min);
+        self.touching = Some(TouchingNow { forces, totals, energy, gap, gaps });
+        if let Some(own) = self.method.legs_mut() {
+            own.clone_from(&legs.into_iter().collect());
+        }
+        let taken = self.method.take_contact_pairs(pairs);
+        taken.map_err(|error| failure(&error, &self.model, &self.bodies, self.time))
     }
 
     fn snapshot(&self) -> ImplicitState {
@@ -442,6 +505,14 @@ impl Implicit {
             energies: self.energies,
             effort: self.effort.clone(),
             convergence: self.convergence.clone(),
+            contact: self.touching.as_ref().map(|now| ContactState {
+                forces: now.forces.clone(),
+                totals: now.totals.clone(),
+                energy: now.energy,
+                gaps: now.gaps.clone(),
+                pairs: self.method.contact_pairs().to_vec(),
+                legs: self.method.legs().into_iter().flatten().map(|(&rigid, &leg)| (rigid, leg)).collect(),
+            }),
         }
     }
 }
@@ -473,6 +544,31 @@ impl Instant for Implicit {
 
     fn reaction(&self, constraint: usize) -> [f64; 3] {
         self.reactions[constraint]
+    }
+
+    fn contact_forces(&self) -> Vec<[f64; 3]> {
+        self.touching.as_ref().map(|now| now.totals.clone()).unwrap_or_default()
+    }
+
+    fn contact_nodes(&self) -> Vec<NodeContact> {
+        let (Some(now), Some(touching)) = (&self.touching, &self.bodies.model.touching) else {
+            return Vec::new();
+        };
+        let surfaces = touching.contacts.contacts.iter().flat_map(Contact::surfaces);
+        let mut nodes: Vec<u32> = surfaces.flat_map(|surface| surface.nodes.iter().copied()).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let own = |node: u32| {
+            let at = 6 * node as usize;
+            let force = [0, 1, 2].map(|c| now.forces[at + c]);
+            let found = now.gaps.binary_search_by_key(&node, |&(known, _)| known);
+            NodeContact { node, force, pressure: None, gap: found.ok().map(|at| now.gaps[at].1), slip: None }
+        };
+        nodes.into_iter().map(own).collect()
+    }
+
+    fn leg(&self, rigid: usize) -> Option<&Leg> {
+        self.method.legs()?.get(&(rigid as u32))
     }
 
     fn energies(&self) -> Energies {
@@ -525,6 +621,14 @@ impl Participant for Implicit {
             return Ok(());
         }
         self.put_springs();
+        if self.touching.is_none() {
+            self.touching = self.method.touching(Some(&self.state));
+        }
+        if let (Some(now), Method::Static(_, forces) | Method::Implicit(_, forces)) =
+            (&self.touching, &mut self.method)
+        {
+            forces.touch(&now.forces);
+        }
         let found = self.method.evaluate(&self.state);
         found.map_err(|error| failure(&error, &self.model, &self.bodies, self.time))?;
         self.find_energies();
@@ -546,6 +650,7 @@ impl Participant for Implicit {
         self.put_springs();
         self.go(number).map_err(|error| failure(&error, &self.model, &self.bodies, self.state.time))?;
         (self.done, self.time) = (number, self.state.time);
+        self.touching = self.method.touching(None);
         self.evaluated = false;
         Ok(())
     }
@@ -555,6 +660,12 @@ impl Participant for Implicit {
         self.grips.extend_from_slice(grips);
         self.evaluated = false;
         true
+    }
+
+    fn drive(&mut self, rigid: usize, leg: Leg) {
+        if let Some(legs) = self.method.legs_mut() {
+            legs.insert(rigid as u32, leg);
+        }
     }
 
     /// Explicit steps of 0.9 of the stable step stay stable up to it, as those of solids do. Implicit ones are stable with any, and
@@ -596,6 +707,8 @@ impl Participant for Implicit {
         let is_static = matches!(self.method, Method::Static(..));
         if is_static && self.state.time > self.time {
             self.time = self.state.time;
+            // Contacts without friction: that of the part of the step that was found is not known.
+            self.touching = None;
             self.evaluated = false;
         }
         is_static
@@ -612,7 +725,9 @@ fn failure(
     let body_of = |node: u32| model.bodies.iter().find(|body| body.nodes.contains(&node));
     let (kind, node, cell) = match error {
         SolveError::NotConverged { node, .. } => ("not-converged", Some(*node), None),
-        SolveError::Stalled { .. } => ("not-converged", None, None),
+        SolveError::Uphill { node, .. } => ("not-converged", Some(*node), None),
+        SolveError::Stalled { .. } | SolveError::Blocked { .. } => ("not-converged", None, None),
+        SolveError::Crossed { edge, .. } => ("intersecting", Some(edge[0]), None),
         SolveError::Singular { node, .. } | SolveError::FreeBody { node, .. } => {
             ("singular", Some(*node), None)
         }
@@ -650,6 +765,7 @@ fn numbered(
     let mut own = error.clone();
     if let SolveError::NotConverged { node, .. }
     | SolveError::Singular { node, .. }
+    | SolveError::Uphill { node, .. }
     | SolveError::FreeBody { node, .. } = &mut own
     {
         *node = own_node.unwrap_or(*node);

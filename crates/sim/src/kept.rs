@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
+use pliant_contact::pose::Leg;
 use pliant_contact::touch::Gripped;
 use pliant_explicit::{Scalar, State};
 use pliant_mechanics::{Energies, Model};
@@ -61,13 +62,42 @@ pub(crate) struct ImplicitState {
     pub energies: Energies,
     pub effort: Effort,
     pub convergence: VecDeque<Iterated>,
+    pub contact: Option<ContactState>,
+}
+
+/// What a resumed run needs to know of contacts.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct ContactState {
+    /// Forces on nodes, six a node [N], and on the second side of each contact [N].
+    pub forces: Vec<f64>,
+    pub totals: Vec<[f64; 3]>,
+    /// Of the barriers [J].
+    pub energy: f64,
+    /// The least gap [m] of nodes that touch something.
+    pub gaps: Vec<(u32, f64)>,
+    /// Pairs of nodes in the pattern of the equations beside those of cells: the order of sums depends on it.
+    pub pairs: Vec<[u32; 2]>,
+    /// Where tools go that are driven from outside.
+    pub legs: Vec<(u32, Leg)>,
+}
+
+impl ContactState {
+    /// Whether it is of a model with so many nodes.
+    fn fits(&self, nodes: usize) -> bool {
+        let known = |node: u32| (node as usize) < nodes;
+        self.forces.len() == 6 * nodes
+            && self.gaps.iter().all(|&(node, _)| known(node))
+            && self.pairs.iter().flatten().all(|&node| known(node))
+            && self.legs.iter().all(|(_, leg)| leg.is_finite())
+    }
 }
 
 impl ImplicitState {
     /// Whether it is of a model with so many nodes.
     pub(crate) fn fits(&self, nodes: usize) -> bool {
         let before = self.before.iter().all(|(forces, state)| forces.len() == 6 * nodes && state.fits(nodes));
-        before && self.previous.iter().all(|state| state.fits(nodes)) && self.state.fits(nodes)
+        let contact = self.contact.iter().all(|contact| contact.fits(nodes));
+        before && contact && self.previous.iter().all(|state| state.fits(nodes)) && self.state.fits(nodes)
     }
 }
 

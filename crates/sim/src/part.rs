@@ -111,6 +111,9 @@ impl Method {
     pub fn contacts(&self) -> Option<&Arc<Contacts>> {
         match self {
             Self::Explicit(explicit) => explicit.contacts.as_ref(),
+            Self::Static(bodies, _) | Self::Implicit(bodies, _) => {
+                bodies.model.touching.as_ref().map(|touching| &touching.contacts)
+            }
             _ => None,
         }
     }

@@ -63,7 +63,7 @@ pub(crate) fn go_on(
     Ok(match (kept, part.method.bodies(), part.method.precision()) {
         (Kept::Implicit(state), Some(bodies), _) => {
             let mut participant = Implicit::new(part, bodies)?;
-            participant.resume(*state);
+            participant.resume(*state)?;
             Some(Box::new(participant))
         }
         (Kept::Single(state, memory), None, Precision::Single) => Some(resumed(part, state, memory, before)?),

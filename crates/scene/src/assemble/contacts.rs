@@ -14,6 +14,7 @@ use pliant_sim::contact::shape::Shape;
 use pliant_sim::contact::touch::{Contact, Contacts, Jaw, Rigid, Touch, With, lattice, parts_of};
 use pliant_sim::{counted, number};
 
+use super::barriers::BarrierTables;
 use super::{Builder, Target, suggestion};
 use crate::format::{ContactTable, ShapeName, SolverName, ToolTable};
 use crate::reads::{rows_of, table as table_file};
@@ -30,20 +31,35 @@ const UNIT: f64 = 1e-3;
 pub(super) const OVERLAP: f64 = 1e-9;
 
 /// What to do about contact with other solvers.
-const EXPLICIT: &str = "take `solver = \"explicit\"` on the CPU, for solids, membranes and bars";
+const EXPLICIT: &str = "take `solver = \"explicit\"` on the CPU, for solids, membranes and bars, or `\"implicit\"` or `\"static\"`, for solids and shells";
+
+/// The distance [m] that surfaces keep without a barrier.
+fn kept(table: &ContactTable) -> f64 {
+    table.thickness.unwrap_or(0.0)
+}
 
 /// Who touches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Partner {
+pub(super) enum Partner {
     /// A body of the model.
     Body(usize),
     /// An obstacle or tool.
     Rigid(usize),
 }
 
+impl Partner {
+    /// The body, if it is one.
+    pub(super) fn body(self) -> Option<usize> {
+        match self {
+            Self::Body(body) => Some(body),
+            Self::Rigid(_) => None,
+        }
+    }
+}
+
 impl Builder<'_> {
-    /// The contacts of the scene; `None` without any.
-    pub(super) fn contacts(&mut self) -> Option<Arc<Contacts>> {
+    /// The contacts of the scene, and how their barriers act; `None` without any.
+    pub(super) fn contacts(&mut self) -> Option<(Arc<Contacts>, BarrierTables)> {
         let scene = self.scene;
         let mut all = Contacts::default();
         // Things that nothing touches are checked, too.
@@ -56,11 +72,15 @@ impl Builder<'_> {
                 all.rigids.extend(self.rigids(kind, name, table).into_iter().flatten());
             }
         }
+        let mut barriers = BarrierTables::default();
         for (name, table) in &scene.contacts {
-            let contacts = self.contact(name, table, &all.rigids);
+            let contacts = self.contact(name, table, &all.rigids, &mut barriers);
             all.contacts.extend(contacts.into_iter().flatten());
+            if scene.run.solver.solves_equations() {
+                self.check_goes_with_barriers(name, &all);
+            }
         }
-        (!all.contacts.is_empty()).then(|| Arc::new(all))
+        (!all.contacts.is_empty()).then(|| (Arc::new(all), barriers))
     }
 
     /// Takes note of the bodies that touch something, unless a mistake leaves that open.
@@ -190,11 +210,21 @@ impl Builder<'_> {
     }
 
     /// The contacts of a table: one, or with `"all"` one for each pair.
-    fn contact(&mut self, name: &str, table: &ContactTable, rigids: &[Rigid]) -> Option<Vec<Contact>> {
+    fn contact(
+        &mut self,
+        name: &str,
+        table: &ContactTable,
+        rigids: &[Rigid],
+        barriers: &mut BarrierTables,
+    ) -> Option<Vec<Contact>> {
         let run = &self.scene.run;
-        if run.solver != SolverName::Explicit {
+        let is_barrier = run.solver.solves_equations();
+        if !self.check_keys_of_contact(name, table, is_barrier) {
+            return None;
+        }
+        if run.solver != SolverName::Explicit && !is_barrier {
             let message = format!(
-                "contact is for the solver `explicit`, and this scene goes with `{}`",
+                "contact is for the solvers `explicit`, `implicit` and `static`, and this scene goes with `{}`",
                 run.solver.word()
             );
             self.error(&["contact", name, "between"], message, "not for this solver", EXPLICIT);
@@ -234,14 +264,21 @@ impl Builder<'_> {
             let full =
                 if several { format!("{name}.{}-{other}", self.bodies[body].name) } else { name.into() };
             let surface = self.surface_of(name, table, body, 0)?;
-            let touch = Touch { friction: table.friction, offset: table.thickness };
+            let offset = match is_barrier {
+                true => self.barrier(&full, table, [own, with], &surface, barriers)?,
+                false => kept(table),
+            };
+            let touch = Touch { friction: table.friction, offset };
             let with = match with {
+                Partner::Rigid(rigid) if is_barrier => With::Rigid(rigid),
+                Partner::Body(other) if is_barrier && other == body => With::Itself,
+                Partner::Body(other) if is_barrier => With::Body(self.surface_of(name, table, other, 1)?),
                 Partner::Rigid(rigid) => {
                     self.check_apart(name, table, body, &rigids[rigid], &surface);
                     With::Rigid(rigid)
                 }
                 Partner::Body(other) if other == body => {
-                    self.note_apart(&full, &surface, table.thickness);
+                    self.note_apart(&full, &surface, kept(table));
                     With::Itself
                 }
                 Partner::Body(other) => {
@@ -299,7 +336,8 @@ impl Builder<'_> {
     fn surface_of(&mut self, name: &str, table: &ContactTable, body: usize, side: usize) -> Option<Surface> {
         let path = ["contact", name, "between"];
         let own = self.bodies[body].name.clone();
-        if self.shell_cells(body).is_some() {
+        let is_barrier = self.scene.run.solver.solves_equations();
+        if self.shell_cells(body).is_some() && !is_barrier {
             let message = format!("contact is for solids, membranes and bars, and `{own}` is a shell");
             self.error(&path, message, "a shell", EXPLICIT);
             return None;
@@ -406,10 +444,10 @@ impl Builder<'_> {
                 }
             }
         }
-        let mut pairs = Pairs::new(surfaces[0], Some(surfaces[1]), table.thickness, place);
+        let mut pairs = Pairs::new(surfaces[0], Some(surfaces[1]), kept(table), place);
         pairs.update(place, 0.0);
         pairs.find(place, |pair| {
-            inside.push((table.thickness - pair.distance, place(pair.nodes[0])));
+            inside.push((kept(table) - pair.distance, place(pair.nodes[0])));
         });
         inside.retain(|(depth, _)| *depth > OVERLAP * size);
         if !inside.is_empty() && table.separate {
@@ -441,7 +479,7 @@ impl Builder<'_> {
         let rest = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
         let size = self.assembly.rest.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
         let inside = |places: &mut dyn Iterator<Item = Vector3>| -> Vec<(f64, Vector3)> {
-            let gaps = places.map(|place| (rigid.near(&pose, &place).distance - table.thickness, place));
+            let gaps = places.map(|place| (rigid.near(&pose, &place).distance - kept(table), place));
             gaps.filter(|(gap, _)| *gap < -OVERLAP * size).collect()
         };
         let mut of = "node";

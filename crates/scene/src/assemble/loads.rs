@@ -388,6 +388,16 @@ impl Builder<'_> {
     fn refuse_fields_without_contact(&mut self, fields: &[FieldName], body: Option<usize>, path: &[&str]) {
         let Some(touching) = &self.touching else { return };
         let chosen = touching.iter().enumerate().filter(|(index, _)| body.is_none_or(|body| body == *index));
+        if let Some(field) = fields.iter().find(|&&field| self.lacks_field(field)) {
+            let message = format!(
+                "contacts with the solver `{}` have no `{}`",
+                self.scene.run.solver.word(),
+                field.name()
+            );
+            let help = "take `contact-force` or `gap`";
+            self.error(path, message, "not with this solver", help);
+            return;
+        }
         let Some(index) = fields.iter().position(|field| field.is_of_contact()) else { return };
         if chosen.into_iter().any(|(_, touches)| *touches) {
             return;

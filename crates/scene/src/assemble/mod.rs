@@ -1,6 +1,7 @@
 //! From a scene to a model: meshes read or made, laws assigned to cells, selections resolved, references checked.
 //! All mistakes are collected with the user's own lines.
 
+mod barriers;
 mod bars;
 mod bodies;
 mod constraints;
@@ -37,6 +38,7 @@ use crate::nearest::nearest;
 use crate::scene::Scene;
 use crate::source::Source;
 
+use contacts::Partner;
 pub(crate) use contacts::touches;
 pub use mesh_files::SizeDoubt;
 pub(crate) use meshes::MeshOrigin;
@@ -232,7 +234,7 @@ pub fn build_watched(
     builder.add_surfaces();
     builder.add_constraints();
     builder.add_loads();
-    let contacts = builder.contacts();
+    let (contacts, barriers) = builder.contacts().unzip();
     builder.note_touching(contacts.as_deref());
     builder.check_outputs();
     builder.check_view();
@@ -240,6 +242,11 @@ pub fn build_watched(
     builder.check_held();
     let start = if builder.failed() { None } else { builder.start() };
     let pushed = if builder.failed() { None } else { builder.separate(contacts.as_deref()) };
+    if let (Some(contacts), Some(barriers), Some(start), true) =
+        (&contacts, barriers, &start, scene.run.solver.solves_equations())
+    {
+        builder.touch(contacts, barriers, start);
+    }
     if builder.failed() {
         return Err(scene.source.errors(builder.out));
     }

@@ -236,7 +236,8 @@ impl ImageTool {
 }
 
 /// Who touches whom: a body an obstacle or a tool, another body, or itself. No surface goes into the other. With the solver `explicit`, for bodies
-/// without bending; bodies that touch each other are solids, on the CPU. The force on the second is in `csv` outputs as `contact.NAME`.
+/// without bending; bodies that touch each other are solids, on the CPU. With the solvers `implicit` and `static`, for solids and shells: a barrier
+/// keeps surfaces apart, and no state that is accepted has an intersection. The force on the second is in `csv` outputs as `contact.NAME`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ContactTable {
@@ -253,10 +254,29 @@ pub struct ContactTable {
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub friction: f64,
-    /// Distance [m] that the surfaces keep.
+    /// Distance [m] that the surfaces keep; 0 if not given. With the solvers `implicit` and `static`, if not given: half of the thickness of
+    /// each shell that takes part.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
-    pub thickness: f64,
+    pub thickness: Option<f64>,
+    /// The gap [m], in addition to `thickness`, below which surfaces push each other away, with the solvers `implicit` and `static`; a thousandth of
+    /// the diagonal of all bodies if not given.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub barrier_distance: Option<f64>,
+    /// Stiffness κ [Pa] of the barrier: at the gap y times its distance it presses by κ (2 (y − 1) ln y + (y − 1)²/y). A tenth of Young's modulus of
+    /// the softest body of the contact if not given.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub barrier_stiffness: Option<f64>,
+    /// Speed [m/s] below which bodies creep that friction should hold, with the solvers `implicit` and `static`; 0.001 if not given.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub creep_speed: Option<f64>,
+    /// Whether each state is searched for edges that go through triangles, by a way of its own. One would be a fault of the program, and ends the
+    /// run. Holds for all contacts of the solver.
+    #[serde(default)]
+    pub check_intersections: bool,
     /// Whether bodies that overlap at the start are pushed apart before the run, by the least ways of their nodes. The shape at rest stays as it is, so that
     /// the run starts deformed. Without it they are refused.
     #[serde(default)]

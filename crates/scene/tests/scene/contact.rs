@@ -241,8 +241,11 @@ fn contact_that_cannot_be_is_refused_with_its_line() {
         ),
         (table("turn.csv", "0,0,0,0,1,1,0,0\n"), ["the quaternion has length 1.414", ""]),
         (table("back.csv", "1,0,0,0,1,0,0,0\n0,0,0,0,1,0,0,0\n"), ["its times do not increase", ""]),
-        (pressed("solver = 'quasi-static'", ""), ["contact is for the solver `explicit`", "`quasi-static`"]),
-        (pressed("solver = 'implicit'", ""), ["contact is for the solver `explicit`", "`implicit`"]),
+        (pressed("solver = 'quasi-static'", ""), ["contact is for the solvers `explicit`", "`quasi-static`"]),
+        (
+            pressed("solver = 'implicit'\nstep = 0.01", ""),
+            ["contact `below` has no gap at the start", "move one"],
+        ),
         (stacked("device = 'gpu'", ""), ["the contact `above` of two bodies runs on the CPU only", "cpu"]),
         (
             pressed("device = 'gpu'\ndesign = 'blocks'", ""),

@@ -1,5 +1,6 @@
 //! Scenes without the binary. One program for all files here; run those of a file with `cargo test -p pliant-scene --test scene grips::`.
 
+mod barriers;
 mod bars;
 mod collective;
 mod contact;

@@ -1,0 +1,349 @@
+//! Pairs of a contact that may come near before nodes have gone further than their skins.
+
+use nalgebra::Vector3;
+
+use super::advance::{Kind, Query, allowed};
+use super::distance::Mollifier;
+use super::law::{Barrier, Slip};
+use super::rows::{Row, Stencil};
+use super::surfaces::{Side, around};
+
+/// Rest distances, over the reach, up to which parts of one surface never touch each other.
+const AT_REST: f64 = 1.02;
+/// The skin of a node over the motion that it is to make.
+const SKIN: f64 = 2.0;
+/// The least and the largest skin, over the distance of the barrier; and the largest over the mean edge, if that is more.
+const SKINS: [f64; 2] = [0.5, 20.0];
+
+/// A pair that may come near.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    kind: Kind,
+    nodes: [u32; 4],
+    /// The numbers of its primitives in their sides.
+    numbers: [u32; 2],
+    /// The area [m²] that it stands for.
+    area: f64,
+    /// Threshold [m⁴] of the mollifier; zero of a point and a triangle.
+    threshold: f64,
+    /// The distance [m] when it was listed.
+    distance: f64,
+    in_order: bool,
+}
+
+/// How a contact acts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Action {
+    /// The distance ξ [m] that surfaces keep.
+    pub offset: f64,
+    pub law: Barrier,
+    /// κ [Pa].
+    pub stiffness: f64,
+    /// Coulomb's coefficient.
+    pub friction: f64,
+    /// The speed [m/s] below which friction lets bodies creep.
+    pub creep_speed: f64,
+    /// Friction of the present step.
+    pub slip: Slip,
+}
+
+impl Action {
+    /// ξ + ĝ [m].
+    pub fn reach(&self) -> f64 {
+        self.offset + self.law.distance
+    }
+
+    /// What a distance below the reach makes of a pair; `None` if it is none.
+    pub fn row(&self, stencil: Stencil, area: f64, distance: f64, normal: Vector3<f64>) -> Option<Row> {
+        let gap = distance - self.offset;
+        (gap < self.law.distance).then(|| Row {
+            stencil,
+            normal,
+            gap,
+            energy: self.stiffness * area * self.law.energy(gap),
+            force: -self.stiffness * area * self.law.slope(gap),
+            stiffness: self.stiffness * area * self.law.curvature(gap),
+            aside: None,
+        })
+    }
+}
+
+/// A contact with its surfaces and lists.
+#[derive(Clone, Debug)]
+pub(super) struct Group {
+    /// The contact, by its number.
+    pub number: u32,
+    /// Two surfaces, or one that touches itself.
+    pub sides: Vec<Side>,
+    /// The rigid thing whose distance nodes of the first keep, by its number.
+    pub wall: Option<u32>,
+    pub action: Action,
+    /// Of one surface: nodes with triangles, and edges, that are too near at rest to touch.
+    apart: [Vec<[u32; 2]>; 2],
+    candidates: Vec<Candidate>,
+    /// Skins [m] of all nodes, and how far [m] they have gone since pairs were listed.
+    skin: Vec<f64>,
+    moved: Vec<f64>,
+    /// The largest skin [m].
+    largest: f64,
+}
+
+impl Group {
+    pub fn new(
+        number: u32,
+        sides: Vec<Side>,
+        wall: Option<u32>,
+        action: Action,
+        rest: &[Vector3<f64>],
+    ) -> Self {
+        let place = |node: u32| rest[node as usize];
+        let edge = sides[0].mean_edge(place);
+        let largest = (SKINS[1] * action.law.distance).max(edge);
+        let mut group = Self {
+            number,
+            sides,
+            wall,
+            action,
+            apart: Default::default(),
+            candidates: Vec::new(),
+            skin: vec![0.0; rest.len()],
+            moved: vec![0.0; rest.len()],
+            largest,
+        };
+        if group.sides.len() == 1 {
+            let near = AT_REST * group.action.reach();
+            group.find(rest, near);
+            let own = |kind: Kind| {
+                let of = group.candidates.iter().filter(move |one| one.kind == kind && one.distance < near);
+                let mut all: Vec<[u32; 2]> = of.map(|one| one.numbers).collect();
+                all.sort_unstable();
+                all
+            };
+            group.apart = [own(Kind::PointTriangle), own(Kind::EdgeEdge)];
+            group.candidates.clear();
+        }
+        group
+    }
+
+    /// Pairs that never touch, since they are too near at rest.
+    pub fn apart_count(&self) -> usize {
+        self.apart.iter().map(Vec::len).sum()
+    }
+
+    /// How far [m] the whole surface goes that touches itself: what its parts have in common.
+    fn common(&self, motion: impl Fn(u32) -> Vector3<f64>) -> Vector3<f64> {
+        let points = &self.sides[0].points;
+        if self.sides.len() > 1 || points.is_empty() {
+            return Vector3::zeros();
+        }
+        points.iter().map(|&node| motion(node)).sum::<Vector3<f64>>() / points.len() as f64
+    }
+
+    /// Lists what may come near while nodes go by a motion [m] from their places [m].
+    pub fn list(&mut self, place: &[Vector3<f64>], motion: &[Vector3<f64>]) {
+        let common = self.common(|node| motion[node as usize]);
+        let least = SKINS[0] * self.action.law.distance;
+        for side in &self.sides {
+            for &node in &side.points {
+                let way = (motion[node as usize] - common).norm();
+                self.skin[node as usize] = (SKIN * way).clamp(least, self.largest);
+            }
+        }
+        self.moved.fill(0.0);
+        self.find(place, self.action.reach());
+    }
+
+    /// Lists what is within a distance [m] and the skins of both.
+    fn find(&mut self, place: &[Vector3<f64>], within: f64) {
+        let Self { sides, skin, apart, candidates, .. } = self;
+        candidates.clear();
+        let at = |node: u32| place[node as usize];
+        let margin = |node: u32| skin[node as usize] + 0.5 * within;
+        sides.iter_mut().for_each(|side| side.refit(at, margin));
+        let most = |nodes: &[u32]| nodes.iter().map(|&node| skin[node as usize]).fold(0.0, f64::max);
+        let alone = sides.len() == 1;
+        let other = |side: usize| if alone { &sides[0] } else { &sides[1 - side] };
+        let mut met = Vec::new();
+        for (number, side) in sides.iter().enumerate() {
+            let against = other(number);
+            for (point, &node) in side.points.iter().enumerate() {
+                let wanted = around([node], &at, &margin);
+                met.clear();
+                against.face_tree.near(&wanted, |face| met.push(face));
+                met.sort_unstable();
+                for &face in &met {
+                    let corners = against.faces[face as usize];
+                    let [a, b, c] = corners;
+                    let nodes = [node, a, b, c];
+                    let numbers = [point as u32, face];
+                    let apart = alone && apart[0].binary_search(&numbers).is_ok();
+                    if corners.contains(&node) || apart || !around(corners, &at, &margin).touches(&wanted) {
+                        continue;
+                    }
+                    let distance = Kind::PointTriangle.nearest(&nodes.map(at)).distance;
+                    if distance < within + skin[node as usize] + most(&corners) {
+                        let area = match side.is_rigid {
+                            true => against.face_areas[face as usize],
+                            false => 0.25 * side.point_areas[point],
+                        };
+                        let (kind, threshold, in_order) = (Kind::PointTriangle, 0.0, number == 0);
+                        candidates.push(Candidate {
+                            kind,
+                            nodes,
+                            numbers,
+                            area,
+                            threshold,
+                            distance,
+                            in_order,
+                        });
+                    }
+                }
+            }
+        }
+        let (side, against) = (&sides[0], other(0));
+        for (edge, number) in side.edges.iter().zip(0..) {
+            let wanted = around(*edge, &at, &margin);
+            met.clear();
+            against.edge_tree.near(&wanted, |other| met.push(other));
+            met.sort_unstable();
+            for &second in &met {
+                let ends = against.edges[second as usize];
+                let twice = alone && (second <= number || apart[1].binary_search(&[number, second]).is_ok());
+                let shared = edge.iter().any(|end| ends.contains(end));
+                if twice || shared || !around(ends, &at, &margin).touches(&wanted) {
+                    continue;
+                }
+                let nodes = [edge[0], edge[1], ends[0], ends[1]];
+                let distance = Kind::EdgeEdge.nearest(&nodes.map(at)).distance;
+                if distance < within + most(edge) + most(&ends) {
+                    let own = side.edge_areas[number as usize];
+                    let area = match against.is_rigid {
+                        true => own,
+                        false => 0.25 * (own + against.edge_areas[second as usize]),
+                    };
+                    let rest = [side.squares[number as usize], against.squares[second as usize]];
+                    candidates.push(Candidate {
+                        kind: Kind::EdgeEdge,
+                        nodes,
+                        numbers: [number, second],
+                        area,
+                        threshold: Mollifier::threshold(rest),
+                        distance,
+                        in_order: true,
+                    });
+                }
+            }
+        }
+    }
+}
+
+impl Group {
+    /// Takes the places [m] of all nodes; whether no node has left its skin.
+    pub fn take(&mut self, place: &[Vector3<f64>], listed: &[Vector3<f64>]) -> bool {
+        let way = |node: u32| place[node as usize] - listed[node as usize];
+        let common = self.common(way);
+        let Self { sides, skin, moved, .. } = self;
+        let mut holds = true;
+        for &node in sides.iter().flat_map(|side| &side.points) {
+            let own = (way(node) - common).norm();
+            moved[node as usize] = own;
+            holds &= own <= skin[node as usize];
+        }
+        holds
+    }
+
+    /// The part of a motion [m] in which no node leaves its skin.
+    pub fn within_skins(&self, motion: &[Vector3<f64>]) -> f64 {
+        let common = self.common(|node| motion[node as usize]);
+        let nodes = self.sides.iter().flat_map(|side| &side.points);
+        let part = nodes.map(|&node| {
+            let (left, way) = (
+                self.skin[node as usize] - self.moved[node as usize],
+                (motion[node as usize] - common).norm(),
+            );
+            if way > left { (left / way).max(0.0) } else { 1.0 }
+        });
+        part.fold(1.0, f64::min)
+    }
+
+    /// A bound [m] of what both primitives have gone towards each other since they were listed.
+    fn moved(&self, one: &Candidate) -> f64 {
+        one.kind.reach(one.nodes.map(|node| self.moved[node as usize]))
+    }
+
+    /// Adds what acts with nodes at the places [m] last taken; false if there is no gap somewhere.
+    pub fn act(&self, place: &[Vector3<f64>], rows: &mut Vec<Row>) -> bool {
+        let reach = self.action.reach();
+        for one in &self.candidates {
+            if one.distance - self.moved(one) >= reach {
+                continue;
+            }
+            let points = one.nodes.map(|node| place[node as usize]);
+            let near = one.kind.nearest(&points);
+            let stencil = Stencil {
+                nodes: one.nodes,
+                coefficients: near.coefficients,
+                count: 4,
+                contact: self.number,
+                split: one.kind.split() as u8,
+                in_order: one.in_order,
+            };
+            let Some(mut row) = self.action.row(stencil, one.area, near.distance, near.normal) else {
+                continue;
+            };
+            if row.gap <= 0.0 || row.gap.is_nan() {
+                return false;
+            }
+            if one.kind == Kind::EdgeEdge {
+                let mollifier = Mollifier::of(&points, one.threshold);
+                if mollifier.value < 1.0 {
+                    row.aside = Some(mollifier.gradient.map(|gradient| gradient * row.energy));
+                    row.energy *= mollifier.value;
+                    row.force *= mollifier.value;
+                    row.stiffness *= mollifier.value;
+                }
+            }
+            rows.push(row);
+        }
+        true
+    }
+
+    /// The part, `most` or less, of a motion [m] from the places [m] last taken that keeps a part of every gap.
+    pub fn allowed(&self, place: &[Vector3<f64>], motion: &[Vector3<f64>], keep: f64, mut most: f64) -> f64 {
+        let common = self.common(|node| motion[node as usize]);
+        for one in &self.candidates {
+            let gap = one.distance - self.moved(one) - self.action.offset;
+            let way = one.kind.reach(one.nodes.map(|node| (motion[node as usize] - common).norm()));
+            if gap * (1.0 - keep) > way * most {
+                continue;
+            }
+            let [points, ways] = [place, motion].map(|of| one.nodes.map(|node| of[node as usize]));
+            most =
+                most.min(allowed(one.kind, &points, &ways, Query { offset: self.action.offset, keep, most }));
+        }
+        most
+    }
+
+    /// Calls back with the nodes of all pairs that may come within the reach of the barrier and a margin [m] more.
+    pub fn pairs(&self, margin: f64, mut found: impl FnMut(&[u32; 4])) {
+        let reach = self.action.reach() + margin;
+        let near = |one: &&Candidate| one.distance - self.moved(one) < reach;
+        self.candidates.iter().filter(near).for_each(|one| found(&one.nodes));
+    }
+
+    /// Calls back with the nodes and gaps [m] of pairs that have no gap.
+    pub fn too_close(&self, place: &[Vector3<f64>], mut found: impl FnMut([u32; 4], f64)) {
+        for one in &self.candidates {
+            let gap =
+                one.kind.nearest(&one.nodes.map(|node| place[node as usize])).distance - self.action.offset;
+            if gap <= 0.0 {
+                found(one.nodes, gap);
+            }
+        }
+    }
+
+    /// Pairs in the list.
+    pub fn listed(&self) -> usize {
+        self.candidates.len()
+    }
+}

@@ -1,0 +1,59 @@
+//! Whether surfaces are in each other: edges against triangles, without the lists that contacts go by. The slow simple check that fast
+//! ones are held to.
+
+use nalgebra::Vector3;
+
+use super::surfaces::{Side, around};
+use crate::tree::Tree;
+
+/// Edges that go through triangles: calls back with the ends and the corners. Of one side alone those with a node in common count for
+/// nothing.
+pub(super) fn crossings(
+    [edges, faces]: [&Side; 2],
+    place: &impl Fn(u32) -> Vector3<f64>,
+    mut found: impl FnMut([u32; 2], [u32; 3]),
+) {
+    let none = |_| 0.0;
+    let tree = Tree::new(faces.faces.len(), |face| around(faces.faces[face as usize], place, &none));
+    for &ends in &edges.edges {
+        let wanted = around(ends, place, &none);
+        let mut met = Vec::new();
+        tree.near(&wanted, |face| met.push(face));
+        met.sort_unstable();
+        for face in met {
+            let corners = faces.faces[face as usize];
+            let apart = !ends.iter().any(|end| corners.contains(end));
+            if apart && goes_through(ends.map(place), corners.map(place)) {
+                found(ends, corners);
+            }
+        }
+    }
+}
+
+/// Whether an edge goes through a triangle: its ends are on both sides of the plane, and the line goes round all three edges in one sense.
+fn goes_through([p, q]: [Vector3<f64>; 2], [a, b, c]: [Vector3<f64>; 3]) -> bool {
+    // Six times the volume of a tetrahedron.
+    let volume = |x: &Vector3<f64>, y: &Vector3<f64>, z: &Vector3<f64>, of: &Vector3<f64>| {
+        (x - of).dot(&(y - of).cross(&(z - of)))
+    };
+    let [above, below] = [volume(&a, &b, &c, &p), volume(&a, &b, &c, &q)];
+    if above * below >= 0.0 {
+        return false;
+    }
+    let around = [volume(&a, &b, &q, &p), volume(&b, &c, &q, &p), volume(&c, &a, &q, &p)];
+    around.iter().all(|&v| v > 0.0) || around.iter().all(|&v| v < 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edges_go_through_triangles_within_their_borders() {
+        let triangle = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(Vector3::from);
+        let through = |p: [f64; 3], q: [f64; 3]| goes_through([p, q].map(Vector3::from), triangle);
+        assert!(through([0.2, 0.2, 1.0], [0.3, 0.2, -1.0]) && through([0.2, 0.2, -1.0], [0.3, 0.2, 1.0]));
+        assert!(!through([0.2, 0.2, 1.0], [0.3, 0.2, 0.1]) && !through([0.8, 0.8, 1.0], [0.8, 0.8, -1.0]));
+        assert!(!through([-0.1, 0.5, 0.0], [1.0, 0.5, 0.0]));
+    }
+}

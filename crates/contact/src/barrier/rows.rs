@@ -1,0 +1,103 @@
+//! What acts at the present state: pairs within the reach of the barrier, and pairs that friction holds.
+
+use nalgebra::{Matrix3, Vector3};
+
+/// Nodes of a row and their coefficients: four, or one at a wall.
+#[derive(Clone, Copy, Debug)]
+pub struct Stencil {
+    /// The nodes; those of rigid things are numbered after those of the model.
+    pub nodes: [u32; 4],
+    /// Their coefficients c: Σ c x is the way from the second to the first.
+    pub coefficients: [f64; 4],
+    /// How many there are.
+    pub count: u8,
+    /// The contact, by its number.
+    pub contact: u32,
+    /// The nodes from this one on are of the other primitive.
+    pub split: u8,
+    /// Whether the first primitive is of the first side of the contact.
+    pub in_order: bool,
+}
+
+impl Stencil {
+    /// Nodes with their coefficients.
+    pub fn parts(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
+        let count = usize::from(self.count);
+        self.nodes[..count].iter().copied().zip(self.coefficients[..count].iter().copied())
+    }
+
+    /// Σ c x over vectors of the nodes.
+    pub fn combine(&self, of: impl Fn(u32) -> Vector3<f64>) -> Vector3<f64> {
+        self.parts().map(|(node, c)| of(node) * c).sum()
+    }
+
+    /// Whether a node of it, by its place in it, is of the second side of the contact.
+    pub fn is_second(&self, at: usize) -> bool {
+        (at < usize::from(self.split)) != self.in_order
+    }
+}
+
+/// A pair within the reach of the barrier.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    /// Its nodes.
+    pub stencil: Stencil,
+    /// The direction from the second to the first.
+    pub normal: Vector3<f64>,
+    /// The gap [m], above 0.
+    pub gap: f64,
+    /// Its energy [J].
+    pub energy: f64,
+    /// The force [N] along the normal that keeps its sides apart.
+    pub force: f64,
+    /// How it grows as they come nearer [N/m].
+    pub stiffness: f64,
+    /// The gradient [N] of the energy by the mollifier of edges.
+    pub aside: Option<[Vector3<f64>; 4]>,
+}
+
+impl Row {
+    /// The force [N] on a node, by its place in the stencil.
+    pub fn force_on(&self, at: usize) -> Vector3<f64> {
+        let push = self.normal * (self.force * self.stencil.coefficients[at]);
+        self.aside.map_or(push, |aside| push - aside[at])
+    }
+}
+
+/// A pair with friction: normal force, direction and coefficients are those of the last time that it was taken.
+#[derive(Clone, Copy, Debug)]
+pub struct Held {
+    /// Its nodes.
+    pub stencil: Stencil,
+    /// The direction across which it slips.
+    pub normal: Vector3<f64>,
+    /// The largest force μ λ [N].
+    pub limit: f64,
+    /// Σ c x [m] at the start of the step, carried along by a wall.
+    pub start: Vector3<f64>,
+    /// The wall, if it is one: a rigid thing by its number.
+    pub wall: Option<u32>,
+    /// The slip [m] at the state last evaluated.
+    pub slip: Vector3<f64>,
+    /// μ λ f₁/|u| [N/m] there.
+    pub stiffness: f64,
+    /// μ λ f₁' [N/m] there.
+    pub along: f64,
+}
+
+impl Held {
+    /// The force [N] on a node, by its place in the stencil.
+    pub fn force_on(&self, at: usize) -> Vector3<f64> {
+        self.slip * (-self.stiffness * self.stencil.coefficients[at])
+    }
+
+    /// The stiffness [N/m] of a slip: the second derivative of its energy, or, along the slip as across it, an upper bound of that, with which
+    /// no step goes too far.
+    pub fn stiffness(&self, is_exact: bool) -> Matrix3<f64> {
+        let across = (Matrix3::identity() - self.normal * self.normal.transpose()) * self.stiffness;
+        match self.slip.try_normalize(0.0).filter(|_| is_exact) {
+            Some(along) => across + along * along.transpose() * (self.along - self.stiffness),
+            None => across,
+        }
+    }
+}

@@ -1,0 +1,596 @@
+//! The contacts of a model by a barrier: their energy, forces and stiffness at a state, friction over a step, and how far a step may go.
+//!
+//! A step goes from one time to another. How far rigid things have gone in it is its *share*, from 0 to 1: on straight ways and shortest arcs
+//! between their poses. Friction of a step is that of the state where [`Barriers::hold`] was called last, with directions and normal forces
+//! as they were there.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::advance::ADVANCES;
+use super::candidates::{Action, Group};
+use super::crossing::crossings;
+use super::features::Features;
+use super::law::{Barrier, Slip};
+use super::rows::{Held, Row, Stencil};
+use super::surfaces::Side;
+use crate::pose::{Leg, Pose, between};
+use crate::shape::Near;
+use crate::touch::{Contacts, Passage, With};
+
+/// Rigid motions in a step that are looked at anew where things turn.
+const TURNS: usize = 40;
+/// Part of the way to a meeting that is gone where things turn.
+const SHORTER: f64 = 0.9;
+
+/// How a contact acts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BarrierSettings {
+    /// The gap ĝ [m] below which surfaces push each other away, in addition to the distance that they keep.
+    pub distance: f64,
+    /// κ [Pa]: the pressure at a gap y ĝ is κ (2 (y − 1) ln y + (y − 1)²/y).
+    pub stiffness: f64,
+    /// The speed [m/s] below which friction lets bodies creep that should stick.
+    pub creep_speed: f64,
+}
+
+/// Two primitives without a gap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Meeting {
+    /// The contact, by its number.
+    pub contact: u32,
+    /// A node of the model that takes part.
+    pub node: u32,
+    /// Where it is [m].
+    pub place: [f64; 3],
+    /// The gap [m], not above 0; none where an edge goes through a triangle.
+    pub gap: Option<f64>,
+}
+
+/// The contacts of a model.
+#[derive(Clone, Debug)]
+pub struct Barriers {
+    contacts: Arc<Contacts>,
+    groups: Vec<Group>,
+    /// Nodes of the model.
+    nodes: usize,
+    /// Nodes of rigid things, after those: their thing and their place [m] in its frame.
+    rigid_nodes: Vec<(u32, Vector3<f64>)>,
+    /// Poses of rigid things at the start and the end of the step, and now.
+    poses: [Vec<Pose>; 3],
+    /// Poses when pairs were listed.
+    listed_poses: Vec<Pose>,
+    /// Places [m] of all nodes now, at the start of the step, and when pairs were listed; motions [m].
+    place: Vec<Vector3<f64>>,
+    start: Vec<Vector3<f64>>,
+    listed: Vec<Vector3<f64>>,
+    motion: Vec<Vector3<f64>>,
+    /// Distances [m] of nodes from the wall of each contact when they were listed.
+    wall_distances: Vec<Vec<f64>>,
+    /// Where rigid things go that are driven from outside, by their number.
+    legs: BTreeMap<u32, Leg>,
+    rows: Vec<Row>,
+    held: Vec<Held>,
+    energy: [f64; 2],
+}
+
+impl Barriers {
+    /// For contacts, each with its settings, and nodes at rest [m]. The distance that surfaces keep is that of their
+    /// [`Touch`](crate::touch::Touch).
+    pub fn new(contacts: Arc<Contacts>, settings: &[BarrierSettings], rest: &[[f64; 3]]) -> Self {
+        let mut places: Vec<Vector3<f64>> = rest.iter().map(|&x| x.into()).collect();
+        let nodes = places.len();
+        let mut rigid_nodes = Vec::new();
+        let features: Vec<(Features, u32)> = (contacts.rigids.iter().zip(0..))
+            .map(|(rigid, number)| {
+                let features = if rigid.inside { Features::default() } else { Features::of(&rigid.shape) };
+                let first = (nodes + rigid_nodes.len()) as u32;
+                rigid_nodes.extend(features.points.iter().map(|&point| (number, point)));
+                (features, first)
+            })
+            .collect();
+        let poses: Vec<Pose> = contacts.rigids.iter().map(|rigid| rigid.at(0.0, None)).collect();
+        places.extend(
+            rigid_nodes.iter().map(|(thing, x)| (poses[*thing as usize] * nalgebra::Point3::from(*x)).coords),
+        );
+        let at = |node: u32| places[node as usize];
+        let mut groups = Vec::new();
+        for ((contact, settings), number) in contacts.contacts.iter().zip(settings).zip(0..) {
+            let own = Side::of_body(&contact.surface, at);
+            let mut offset = contact.touch.offset;
+            let (sides, wall) = match &contact.with {
+                With::Itself => (vec![own], None),
+                With::Body(other) => (vec![own, Side::of_body(other, at)], None),
+                With::Rigid(rigid) => {
+                    let (features, first) = &features[*rigid];
+                    offset += features.offset;
+                    let wall = (!features.is_all).then_some(*rigid as u32);
+                    (vec![own, Side::of_rigid(features, *first)], wall)
+                }
+            };
+            let action = Action {
+                offset,
+                law: Barrier { distance: settings.distance },
+                stiffness: settings.stiffness,
+                friction: contact.touch.friction,
+                creep_speed: settings.creep_speed,
+                slip: Slip { creep: 0.0 },
+            };
+            groups.push(Group::new(number, sides, wall, action, &places));
+        }
+        Self {
+            wall_distances: groups.iter().map(|group| vec![0.0; group.sides[0].points.len()]).collect(),
+            groups,
+            nodes,
+            rigid_nodes,
+            listed_poses: poses.clone(),
+            poses: [poses.clone(), poses.clone(), poses],
+            start: places.clone(),
+            listed: places.clone(),
+            motion: vec![Vector3::zeros(); places.len()],
+            place: places,
+            legs: BTreeMap::new(),
+            rows: Vec::new(),
+            held: Vec::new(),
+            energy: [0.0; 2],
+            contacts,
+        }
+    }
+
+    /// Who touches whom.
+    pub fn contacts(&self) -> &Contacts {
+        &self.contacts
+    }
+
+    /// Of each contact the pairs that never touch, since they are too near at rest.
+    pub fn apart_counts(&self) -> Vec<usize> {
+        self.groups.iter().map(Group::apart_count).collect()
+    }
+
+    /// Pairs that are watched.
+    pub fn listed(&self) -> usize {
+        self.groups.iter().map(Group::listed).sum()
+    }
+
+    /// Where rigid things go that are driven from outside, by their number; from the next step on.
+    pub fn legs_mut(&mut self) -> &mut BTreeMap<u32, Leg> {
+        &mut self.legs
+    }
+
+    /// The same to look at.
+    pub fn legs(&self) -> &BTreeMap<u32, Leg> {
+        &self.legs
+    }
+
+    /// Begins a step between two times [s], with nodes at places [m], expected to go by a motion (six numbers a node, translations first).
+    /// Friction is that of the start.
+    pub fn begin(&mut self, position: &[Vector3<f64>], motion: &[f64], times: [f64; 2]) {
+        let [from, to] = times;
+        for (number, rigid) in self.contacts.rigids.iter().enumerate() {
+            for (pose, time) in self.poses.iter_mut().zip([from, to, from]) {
+                pose[number] = rigid.at(time, self.legs.get(&(number as u32)));
+            }
+        }
+        for group in &mut self.groups {
+            let action = &mut group.action;
+            action.slip = Slip { creep: action.creep_speed * (to - from) };
+        }
+        self.held.clear();
+        self.put(position, 0.0);
+        self.start.copy_from_slice(&self.place);
+        self.list(motion, 0.0);
+        self.act();
+        self.hold();
+    }
+
+    /// Puts nodes at places [m], and rigid things where they are at a share of the step.
+    fn put(&mut self, position: &[Vector3<f64>], share: f64) {
+        let [from, to, now] = &mut self.poses;
+        for ((now, from), to) in now.iter_mut().zip(from).zip(to) {
+            *now = if share == 1.0 { *to } else { between([from, to], share) };
+        }
+        self.place[..self.nodes].copy_from_slice(position);
+        for (place, (thing, x)) in self.place[self.nodes..].iter_mut().zip(&self.rigid_nodes) {
+            *place = (now[*thing as usize] * nalgebra::Point3::from(*x)).coords;
+        }
+    }
+
+    /// Sets the motions of all nodes: so many parts of one (six numbers a node), and rigid things from the present share to another.
+    fn set_motion(&mut self, motion: &[f64], part: f64, share: f64) {
+        for (own, way) in self.motion.iter_mut().zip(motion.chunks_exact(6)) {
+            *own = Vector3::new(way[0], way[1], way[2]) * part;
+        }
+        let [from, to, _] = &self.poses;
+        for (at, (thing, x)) in self.rigid_nodes.iter().enumerate() {
+            let pose = between([&from[*thing as usize], &to[*thing as usize]], share);
+            let target = (pose * nalgebra::Point3::from(*x)).coords;
+            self.motion[self.nodes + at] = target - self.place[self.nodes + at];
+        }
+    }
+
+    /// Lists what may come near in a motion, and while rigid things go on from a share to the end of the step.
+    fn list(&mut self, motion: &[f64], share: f64) {
+        self.set_motion(motion, 1.0, if share < 1.0 { 1.0 } else { share });
+        self.listed.copy_from_slice(&self.place);
+        self.listed_poses.clone_from(&self.poses[2]);
+        let Self { groups, place, motion, wall_distances, contacts, poses, .. } = self;
+        for (group, distances) in groups.iter_mut().zip(wall_distances) {
+            group.list(place, motion);
+            let Some(wall) = group.wall else { continue };
+            let (rigid, pose) = (&contacts.rigids[wall as usize], &poses[2][wall as usize]);
+            for (distance, &node) in distances.iter_mut().zip(&group.sides[0].points) {
+                *distance = rigid.near(pose, &place[node as usize]).distance;
+            }
+        }
+    }
+
+    /// How far [m] a rigid thing has gone since pairs were listed.
+    fn travel(&self, wall: u32) -> f64 {
+        let (rigid, now) = (&self.contacts.rigids[wall as usize], self.poses[2][wall as usize]);
+        let then = self.listed_poses[wall as usize];
+        if then == now { 0.0 } else { Passage::new(rigid, [then, now]).travel_from(rigid, &then) }
+    }
+
+    /// Finds what acts; infinite energy if there is no gap somewhere.
+    fn act(&mut self) {
+        let mut rows = std::mem::take(&mut self.rows);
+        rows.clear();
+        let mut apart = true;
+        for number in 0..self.groups.len() {
+            let group = &mut self.groups[number];
+            group.take(&self.place, &self.listed);
+            apart = apart
+                && self.groups[number].act(&self.place, &mut rows)
+                && self.act_at_wall(number, &mut rows);
+        }
+        self.rows = rows;
+        let energy: f64 = self.rows.iter().map(|row| row.energy).sum();
+        self.energy = [if apart { energy } else { f64::INFINITY }, 0.0];
+    }
+
+    /// Adds what acts on nodes at the wall of a contact; false if one has no gap.
+    fn act_at_wall(&self, number: usize, rows: &mut Vec<Row>) -> bool {
+        let group = &self.groups[number];
+        let Some(wall) = group.wall else { return true };
+        let (rigid, pose) = (&self.contacts.rigids[wall as usize], &self.poses[2][wall as usize]);
+        let (travel, reach) = (self.travel(wall), group.action.reach());
+        let side = &group.sides[0];
+        let points = side.points.iter().zip(&side.point_areas).zip(&self.wall_distances[number]);
+        for ((&node, &area), then) in points {
+            let place = &self.place[node as usize];
+            let way = (place - self.listed[node as usize]).norm();
+            if then - way - travel >= reach {
+                continue;
+            }
+            let Near { distance, normal } = rigid.near(pose, place);
+            let stencil = Stencil {
+                nodes: [node; 4],
+                coefficients: [1.0, 0.0, 0.0, 0.0],
+                count: 1,
+                contact: group.number,
+                split: 1,
+                in_order: true,
+            };
+            let Some(row) = group.action.row(stencil, area, distance, normal) else { continue };
+            if row.gap <= 0.0 || row.gap.is_nan() {
+                return false;
+            }
+            rows.push(row);
+        }
+        true
+    }
+
+    /// Takes friction from the present state on.
+    pub fn hold(&mut self) {
+        let Self { groups, rows, held, start, .. } = self;
+        held.clear();
+        for row in rows.iter() {
+            let group = &groups[row.stencil.contact as usize];
+            let limit = group.action.friction * row.force;
+            if limit <= 0.0 {
+                continue;
+            }
+            held.push(Held {
+                stencil: row.stencil,
+                normal: row.normal,
+                limit,
+                start: row.stencil.combine(|node| start[node as usize]),
+                wall: group.wall.filter(|_| row.stencil.count == 1),
+                slip: Vector3::zeros(),
+                stiffness: 0.0,
+                along: 0.0,
+            });
+        }
+        self.slide();
+    }
+
+    /// Σ μ λ [N] of the friction that is held, and of what would be held now.
+    pub fn friction_limits(&self) -> [f64; 2] {
+        let now =
+            self.rows.iter().map(|row| self.groups[row.stencil.contact as usize].action.friction * row.force);
+        [self.held.iter().map(|held| held.limit).sum(), now.sum()]
+    }
+
+    /// Finds the slip of all that friction holds.
+    fn slide(&mut self) {
+        let Self { groups, held, place, poses, .. } = self;
+        let [from, _, now] = poses;
+        let mut energy = 0.0;
+        for held in held.iter_mut() {
+            let start = match held.wall {
+                Some(wall) => {
+                    let carried = now[wall as usize] * from[wall as usize].inverse();
+                    (carried * nalgebra::Point3::from(held.start)).coords
+                }
+                None => held.start,
+            };
+            let way = held.stencil.combine(|node| place[node as usize]) - start;
+            held.slip = way - held.normal * held.normal.dot(&way);
+            let slip = groups[held.stencil.contact as usize].action.slip;
+            let length = held.slip.norm();
+            held.stiffness = held.limit * slip.force_over_slip(length);
+            held.along = held.limit * slip.slope(length);
+            energy += held.limit * slip.energy(length);
+        }
+        self.energy[1] = energy;
+    }
+
+    /// The energy [J] with nodes at places [m] and rigid things at a share of the step, that of friction with it; infinite if there is no gap
+    /// somewhere.
+    pub fn evaluate(&mut self, position: &[Vector3<f64>], share: f64) -> f64 {
+        self.put(position, share);
+        self.act();
+        self.slide();
+        self.energy[0] + self.energy[1]
+    }
+
+    /// The energy [J] of the barriers at the state last evaluated.
+    pub fn barrier_energy(&self) -> f64 {
+        self.energy[0]
+    }
+
+    /// What acts at the state last evaluated.
+    pub fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    /// What friction holds.
+    pub fn held(&self) -> &[Held] {
+        &self.held
+    }
+
+    /// The least gap [m] at the state last evaluated; none where nothing is within the reach of the barrier.
+    pub fn least_gap(&self) -> Option<f64> {
+        self.rows.iter().map(|row| row.gap).reduce(f64::min)
+    }
+
+    /// The least gap [m] of each node of the model that is within the reach of a barrier, by increasing node.
+    pub fn gaps(&self) -> BTreeMap<u32, f64> {
+        let mut gaps = BTreeMap::new();
+        for row in &self.rows {
+            let parts = row.stencil.parts().filter(|&(node, c)| (node as usize) < self.nodes && c != 0.0);
+            for (node, _) in parts {
+                let least = gaps.entry(node).or_insert(row.gap);
+                *least = least.min(row.gap);
+            }
+        }
+        gaps
+    }
+
+    /// Adds the forces [N] at the state last evaluated to those of nodes, six numbers a node, and sets those of each contact on its second
+    /// side.
+    pub fn add_forces(&self, forces: &mut [f64], totals: &mut [Vector3<f64>]) {
+        totals.fill(Vector3::zeros());
+        let mut add = |stencil: &Stencil, force_on: &dyn Fn(usize) -> Vector3<f64>| {
+            let total = &mut totals[stencil.contact as usize];
+            for (at, (node, _)) in stencil.parts().enumerate() {
+                let force = force_on(at);
+                if stencil.count == 1 {
+                    *total -= force;
+                } else if stencil.is_second(at) {
+                    *total += force;
+                }
+                if let Some(own) = forces.get_mut(6 * node as usize..6 * node as usize + 3) {
+                    own.iter_mut().zip(force.iter()).for_each(|(own, force)| *own += force);
+                }
+            }
+        };
+        self.rows.iter().for_each(|row| add(&row.stencil, &|at| row.force_on(at)));
+        self.held.iter().for_each(|held| add(&held.stencil, &|at| held.force_on(at)));
+    }
+
+    /// Calls back with the stiffness c cᵀ ⊗ M of each row: its stencil, M [N/m], and M w for the way w [m] that the rigid things have yet to
+    /// go in the step, from a share on. That of friction is exact or an upper bound.
+    pub fn stiffness(
+        &self,
+        share: f64,
+        is_exact: bool,
+        mut add: impl FnMut(&Stencil, &Matrix3<f64>, Vector3<f64>),
+    ) {
+        let [from, to, now] = &self.poses;
+        let goes_on = share < 1.0 && from != to;
+        let left = |stencil: &Stencil, wall: Option<u32>| {
+            if !goes_on {
+                return Vector3::zeros();
+            }
+            if let Some(wall) = wall.filter(|_| stencil.count == 1) {
+                let place = self.place[stencil.nodes[0] as usize];
+                let carried = to[wall as usize] * now[wall as usize].inverse();
+                return place - (carried * nalgebra::Point3::from(place)).coords;
+            }
+            stencil.combine(|node| match (node as usize).checked_sub(self.nodes) {
+                Some(at) => {
+                    let (thing, x) = &self.rigid_nodes[at];
+                    (to[*thing as usize] * nalgebra::Point3::from(*x)).coords - self.place[node as usize]
+                }
+                None => Vector3::zeros(),
+            })
+        };
+        for row in &self.rows {
+            let along = row.normal * row.normal.transpose() * row.stiffness;
+            let wall = self.groups[row.stencil.contact as usize].wall;
+            add(&row.stencil, &along, along * left(&row.stencil, wall));
+        }
+        for held in &self.held {
+            let across = held.stiffness(is_exact);
+            add(&held.stencil, &across, across * left(&held.stencil, held.wall));
+        }
+    }
+
+    /// Calls back with the nodes of the model of each pair that acts or soon may.
+    pub fn pairs(&self, mut found: impl FnMut(&[u32])) {
+        let own = |nodes: &[u32]| -> Vec<u32> {
+            nodes.iter().copied().filter(|&node| (node as usize) < self.nodes).collect()
+        };
+        for group in &self.groups {
+            group.pairs(group.action.law.distance, |nodes| found(&own(nodes)));
+        }
+        let stencils =
+            self.rows.iter().map(|row| &row.stencil).chain(self.held.iter().map(|held| &held.stencil));
+        stencils.filter(|stencil| stencil.count > 1).for_each(|stencil| found(&own(&stencil.nodes)));
+    }
+
+    /// Nodes of the model.
+    pub fn node_count(&self) -> usize {
+        self.nodes
+    }
+
+    /// The part of a motion (six numbers a node), of so much of it at most, from places [m] at a share of the step that leaves at least half of a
+    /// part of every gap, while rigid things go the same part of the way that is left to them. Pairs are listed anew if need be.
+    pub fn allowed(
+        &mut self,
+        position: &[Vector3<f64>],
+        motion: &[f64],
+        share: f64,
+        [keep, most]: [f64; 2],
+    ) -> f64 {
+        self.put(position, share);
+        self.set_motion(motion, 1.0, 1.0);
+        for group in &mut self.groups {
+            group.take(&self.place, &self.listed);
+        }
+        let within =
+            |own: &Self| own.groups.iter().map(|group| group.within_skins(&own.motion)).fold(1.0, f64::min);
+        let mut part = within(self);
+        if part < most {
+            self.list(motion, share);
+            part = within(self);
+        }
+        part = part.min(most);
+        let [from, to, _] = &self.poses;
+        let turns = share < 1.0 && from.iter().zip(to).any(|(from, to)| from.rotation != to.rotation);
+        for _ in 0..TURNS {
+            // Things that turn are not on the straight way to where they end: the way to where they come is looked at.
+            self.set_motion(motion, part, share + part * (1.0 - share));
+            let gone = self.filtered(keep, share, part);
+            part *= gone;
+            if !turns || gone == 1.0 || part == 0.0 {
+                return part;
+            }
+            part *= SHORTER;
+        }
+        0.0
+    }
+
+    /// The part of the motion that is set which leaves at least half of a part of every gap.
+    fn filtered(&self, keep: f64, share: f64, part: f64) -> f64 {
+        let mut most = 1.0;
+        for (number, group) in self.groups.iter().enumerate() {
+            most = group.allowed(&self.place, &self.motion, keep, most);
+            let Some(wall) = group.wall else { continue };
+            most = self.allowed_at_wall(number, wall, [keep, share, part], most);
+        }
+        most
+    }
+
+    /// [`filtered`](Self::filtered) of nodes at a wall: no node comes nearer to it than both go.
+    fn allowed_at_wall(&self, number: usize, wall: u32, [keep, share, part]: [f64; 3], most: f64) -> f64 {
+        let group = &self.groups[number];
+        let rigid = &self.contacts.rigids[wall as usize];
+        let [from, to, now] = [0, 1, 2].map(|k| self.poses[k][wall as usize]);
+        let target = between([&from, &to], share + part * (1.0 - share));
+        let travel =
+            if target == now { 0.0 } else { Passage::new(rigid, [now, target]).travel_from(rigid, &now) };
+        let since = self.travel(wall);
+        let mut most: f64 = most;
+        for (&node, then) in group.sides[0].points.iter().zip(&self.wall_distances[number]) {
+            let (place, motion) = (self.place[node as usize], self.motion[node as usize]);
+            let offset = group.action.offset;
+            let bound = then - (place - self.listed[node as usize]).norm() - since - offset;
+            let way = motion.norm() + travel;
+            if bound * (1.0 - keep) > way * most {
+                continue;
+            }
+            let gap_at = |part: f64| {
+                let pose = if target == now { now } else { between([&now, &target], part) };
+                rigid.near(&pose, &(place + motion * part)).distance - offset
+            };
+            // A plane that turns has no largest way: it is followed where the node is.
+            let way = if way.is_finite() { way } else { motion.norm() + self.swing(wall, &target, &place) };
+            let start = gap_at(0.0);
+            let (mut gone, mut gap) = (0.0, start);
+            if start <= 0.0 {
+                return 0.0;
+            }
+            for _ in 0..ADVANCES {
+                if gap <= keep * start || gone >= most {
+                    break;
+                }
+                gone += (gap - 0.5 * keep * start) / way;
+                gap = gap_at(gone.min(1.0));
+            }
+            most = most.min(gone);
+        }
+        most
+    }
+
+    /// How far [m] a thing that turns goes at most where a node is, from its present pose to another.
+    fn swing(&self, wall: u32, target: &Pose, place: &Vector3<f64>) -> f64 {
+        let now = self.poses[2][wall as usize];
+        let arm = (place - now.translation.vector).norm()
+            + (target.translation.vector - now.translation.vector).norm();
+        (target.translation.vector - now.translation.vector).norm()
+            + now.rotation.angle_to(&target.rotation) * arm
+    }
+
+    /// Whatever has no gap at places [m] and a time [s]: pairs within the distance to keep, nodes in walls, and edges through triangles. With
+    /// no regard to what came before.
+    pub fn meetings(&mut self, position: &[Vector3<f64>], time: f64) -> Vec<Meeting> {
+        let none = vec![0.0; 6 * self.nodes];
+        self.begin(position, &none, [time; 2]);
+        let mut all = Vec::new();
+        let nodes = self.nodes;
+        let of = |contact: u32, at: &[u32], gap: Option<f64>| {
+            let node = at.iter().copied().find(|&node| (node as usize) < nodes)?;
+            Some(Meeting { contact, node, place: position[node as usize].into(), gap })
+        };
+        for (number, group) in self.groups.iter().enumerate() {
+            group.too_close(&self.place, |at, gap| all.extend(of(group.number, &at, Some(gap))));
+            if group.wall.is_some() {
+                let distances = group.sides[0].points.iter().zip(&self.wall_distances[number]);
+                let gaps = distances.map(|(&node, distance)| (node, distance - group.action.offset));
+                all.extend(
+                    gaps.filter(|(_, gap)| *gap <= 0.0)
+                        .filter_map(|(node, gap)| of(group.number, &[node], Some(gap))),
+                );
+            }
+        }
+        self.crossings(|contact, ends, corners| all.extend(of(contact, &[ends[0], corners[0]], None)));
+        all
+    }
+
+    /// Calls back with each edge that goes through a triangle at the state last evaluated, by its contact, ends and corners. Without the lists
+    /// that contacts go by.
+    pub fn crossings(&self, mut found: impl FnMut(u32, [u32; 2], [u32; 3])) {
+        let place = |node: u32| self.place[node as usize];
+        for group in &self.groups {
+            let (first, second) = (&group.sides[0], group.sides.last().unwrap_or(&group.sides[0]));
+            crossings([first, second], &place, |ends, corners| found(group.number, ends, corners));
+            if group.sides.len() > 1 {
+                crossings([second, first], &place, |ends, corners| found(group.number, ends, corners));
+            }
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! Barriers of whole surfaces: forces are gradients of the energy, they balance, and no motion that is allowed goes through anything.
+
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, Vector3};
+use pliant_testing::Random;
+
+use super::{BarrierSettings, Barriers, Stencil};
+use crate::pairs::Surface;
+use crate::pose::{Course, Pose};
+use crate::shape::Shape;
+use crate::touch::{Contact, Contacts, Rigid, Touch, With};
+use pliant_mechanics::curve::{Curve, Shape as CurveShape};
+
+/// A sheet of cells of 0.1 m around the origin, in a plane z = 0; nodes from a number on.
+fn sheet(cells: u32, first: u32) -> (Surface, Vec<Vector3<f64>>) {
+    let node = |i: u32, j: u32| first + j * (cells + 1) + i;
+    let cell = |i: u32, j: u32| {
+        let [a, b, c, d] = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
+        [[a, b, c], [a, c, d]]
+    };
+    let faces = (0..cells).flat_map(|j| (0..cells).flat_map(move |i| cell(i, j))).collect();
+    let count = (cells + 1) * (cells + 1);
+    let half = 0.5 * f64::from(cells);
+    let place = |k: u32| {
+        let [i, j] = [k % (cells + 1), k / (cells + 1)].map(|k| 0.1 * (f64::from(k) - half));
+        Vector3::new(i, j, 0.0)
+    };
+    (Surface { nodes: (first..first + count).collect(), faces }, (0..count).map(place).collect())
+}
+
+fn rigid(shape: Shape, at: [f64; 3], by: [f64; 3]) -> Rigid {
+    let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: 1.0 };
+    let course = Course::by(Pose::translation(at[0], at[1], at[2]), by, curve);
+    Rigid { name: "thing".into(), shape, course, inside: false, jaw: None }
+}
+
+/// Two sheets on top of each other, bumpy, over a thing; the upper one touches itself.
+struct Scene {
+    barriers: Barriers,
+    places: Vec<Vector3<f64>>,
+}
+
+impl Scene {
+    fn new(thing: Rigid, friction: f64) -> Self {
+        let (low, mut places) = sheet(6, 0);
+        let (high, above) = sheet(4, 49);
+        let mut random = Random::new(11);
+        places.iter_mut().for_each(|x| *x += 0.004 * Vector3::from(random.vector()));
+        places.extend(
+            above.iter().map(|x| x + Vector3::new(0.03, 0.02, 0.02) + 0.004 * Vector3::from(random.vector())),
+        );
+        let touch = Touch { friction, offset: 0.005 };
+        let own = |name: &str, surface: &Surface, with: With| Contact {
+            name: name.into(),
+            surface: surface.clone(),
+            with,
+            touch,
+        };
+        let contacts = vec![
+            own("sheets", &low, With::Body(high.clone())),
+            own("itself", &high, With::Itself),
+            own("thing", &low, With::Rigid(0)),
+        ];
+        let settings = BarrierSettings { distance: 0.015, stiffness: 1e4, creep_speed: 1e-3 };
+        let rest: Vec<[f64; 3]> = places.iter().map(|&x| x.into()).collect();
+        let contacts = Arc::new(Contacts { rigids: vec![thing], contacts });
+        Self { barriers: Barriers::new(contacts, &[settings; 3], &rest), places }
+    }
+
+    fn begin(&mut self, motion: &[f64]) {
+        self.barriers.begin(&self.places, motion, [0.0, 1.0]);
+    }
+}
+
+fn things() -> Vec<Rigid> {
+    let by = [0.001, 0.0, 0.002];
+    vec![
+        rigid(Shape::Sphere { radius: 0.3 }, [0.02, 0.03, -0.312], by),
+        rigid(Shape::Capsule { radius: 0.1, length: 0.1 }, [0.01, 0.0, -0.162], by),
+        rigid(Shape::Cuboid { size: [0.25, 0.2, 0.1] }, [0.01, 0.0, -0.062], by),
+        rigid(Shape::Cone { radius: 0.1, height: 0.2 }, [0.01, 0.02, -0.211], by),
+        rigid(Shape::HalfSpace, [0.0, 0.0, -0.012], by),
+    ]
+}
+
+/// Forces are minus the gradient of the energy of barriers and friction together, and those of a contact between bodies add up to nothing
+/// with those on the other side.
+#[test]
+fn forces_are_gradients_and_balance() {
+    let mut random = Random::new(2);
+    for thing in things() {
+        let shape = format!("{:?}", thing.shape);
+        let mut scene = Scene::new(thing, 0.4);
+        let count = scene.places.len();
+        scene.begin(&vec![0.0; 6 * count]);
+        let kinds = [0, 1, 2]
+            .map(|contact| scene.barriers.rows().iter().filter(|row| row.stencil.contact == contact).count());
+        assert!(kinds[0] > 10 && kinds[2] > 0, "{shape}: {kinds:?}");
+        let mut moved = scene.places.clone();
+        moved.iter_mut().for_each(|x| *x += 3e-4 * Vector3::from(random.vector()));
+        let share = 0.4;
+        let energy = scene.barriers.evaluate(&moved, share);
+        assert!(energy.is_finite() && energy > 0.0);
+        let (mut forces, mut totals) = (vec![0.0; 6 * count], vec![Vector3::zeros(); 3]);
+        scene.barriers.add_forces(&mut forces, &mut totals);
+        let size = forces.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
+        let h = 1e-7;
+        for _ in 0..150 {
+            let (node, c) = (random.below(count), random.below(3));
+            let mut at = |by: f64| {
+                let mut moved = moved.clone();
+                moved[node][c] += by;
+                scene.barriers.evaluate(&moved, share)
+            };
+            let slope = (at(h) - at(-h)) / (2.0 * h);
+            let own = -forces[6 * node + c];
+            assert!((slope - own).abs() < 1e-5 * size, "{shape} {node} {c}: {own} {slope}, {size}");
+        }
+        let sum: Vector3<f64> = forces.chunks_exact(6).map(|f| Vector3::new(f[0], f[1], f[2])).sum();
+        assert!((sum + totals[2]).norm() < 1e-10 * size, "{shape}: {sum} {}", totals[2]);
+    }
+}
+
+/// The stiffness is positive semi-definite, and its barriers are all of the second derivative but for what curves pairs.
+#[test]
+fn stiffness_is_that_of_pairs_with_frozen_coefficients() {
+    let mut scene = Scene::new(things().remove(4), 0.4);
+    let count = scene.places.len();
+    scene.begin(&vec![0.0; 6 * count]);
+    scene.barriers.evaluate(&scene.places.clone(), 0.0);
+    let (rows, held) = (scene.barriers.rows().to_vec(), scene.barriers.held().to_vec());
+    let mut number = 0;
+    scene.barriers.stiffness(0.0, true, |stencil: &Stencil, m: &Matrix3<f64>, pull| {
+        let values = m.symmetric_eigenvalues();
+        assert!(values.min() > -1e-12 * values.max());
+        // The plane comes nearer by 2 mm and goes aside by 1 mm.
+        if stencil.count == 1 {
+            let wanted = m * Vector3::new(-0.001, 0.0, -0.002);
+            assert!((pull - wanted).norm() < 1e-9 * values.max(), "{pull} {wanted}");
+        } else {
+            assert_eq!(pull, Vector3::zeros());
+        }
+        number += 1;
+    });
+    assert_eq!(number, rows.len() + held.len());
+}
+
+/// Whatever motion is asked for, what is allowed of it ends with gaps everywhere and no edge in a triangle; it is all of a small motion.
+#[test]
+fn no_motion_that_is_allowed_goes_through() {
+    let mut random = Random::new(9);
+    for thing in things() {
+        let shape = format!("{:?}", thing.shape);
+        for round in 0..12 {
+            let mut scene = Scene::new(thing.clone(), 0.0);
+            let size = if round == 0 { 1e-5 } else { 0.3 };
+            let drift = Vector3::from(random.vector()) * 0.1;
+            let motion: Vec<f64> = (0..scene.places.len())
+                .flat_map(|_| {
+                    let way = Vector3::from(random.vector()) * size + drift * f64::from(round.min(1));
+                    [way.x, way.y, way.z, 0.0, 0.0, 0.0]
+                })
+                .collect();
+            scene.begin(&motion);
+            let (mut share, mut part) = (0.0, 0.0);
+            for _ in 0..4 {
+                part = scene.barriers.allowed(&scene.places, &motion, share, [0.1, 1.0]);
+                for (x, way) in scene.places.iter_mut().zip(motion.chunks_exact(6)) {
+                    *x += Vector3::new(way[0], way[1], way[2]) * part;
+                }
+                share += part * (1.0 - share);
+                let energy = scene.barriers.evaluate(&scene.places, share);
+                assert!(energy.is_finite(), "{shape} {round}");
+                let mut crossed = 0;
+                scene.barriers.crossings(|_, _, _| crossed += 1);
+                assert_eq!(crossed, 0, "{shape} {round}");
+            }
+            assert!(round > 0 || part == 1.0, "{shape}: {part}");
+        }
+    }
+}
+
+/// Things that turn fast are followed on their arcs.
+#[test]
+fn a_turning_thing_goes_through_nothing() {
+    let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: 1.0 };
+    let course = Course::turn(Pose::translation(0.0, 0.0, 0.3), [0.0, 1.0, 0.0], [0.0, 0.0, 0.3], 3.0, curve);
+    let size = [0.5, 0.05, 0.02];
+    let bar = Rigid { name: "bar".into(), shape: Shape::Cuboid { size }, course, inside: false, jaw: None };
+    let mut scene = Scene::new(bar, 0.0);
+    // The upper sheet out of the way.
+    scene.places[49..].iter_mut().for_each(|x| x.z -= 0.2);
+    scene.places[..49].iter_mut().for_each(|x| x.z += 0.1);
+    let still = vec![0.0; 6 * scene.places.len()];
+    scene.begin(&still);
+    let mut share = 0.0;
+    for _ in 0..30 {
+        share += scene.barriers.allowed(&scene.places, &still, share, [0.1, 1.0]) * (1.0 - share);
+        assert!(scene.barriers.evaluate(&scene.places, share).is_finite());
+        let mut crossed = 0;
+        scene.barriers.crossings(|_, _, _| crossed += 1);
+        assert_eq!(crossed, 0, "{share}");
+    }
+    // Its corner comes to the sheet after 0.9 rad or so.
+    assert!(share > 0.1 && share < 0.5, "{share}");
+}
+
+/// Bodies that start within each other are told with their contacts, nodes and gaps.
+#[test]
+fn what_has_no_gap_at_the_start_is_told() {
+    let mut scene = Scene::new(things().remove(0), 0.0);
+    assert!(scene.barriers.meetings(&scene.places, 0.0).is_empty());
+    scene.places[60].z -= 0.2;
+    let met = scene.barriers.meetings(&scene.places, 0.0);
+    assert!(met.iter().any(|one| one.contact == 0 && one.gap.is_none()), "{met:?}");
+}

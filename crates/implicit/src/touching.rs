@@ -1,0 +1,221 @@
+//! Contacts of a model in its equations: their forces are loads and their stiffness is added to that of the cells. The pattern of the matrix grows
+//! with the pairs that may come near, and by more than those, so that it changes seldom.
+
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, Vector3};
+use pliant_contact::barrier::{BarrierSettings, Barriers, Meeting, Stencil};
+use pliant_contact::touch::Contacts;
+use pliant_mechanics::Model;
+
+use crate::error::SolveError;
+use crate::sparse::{Equations, LowerMatrix};
+use crate::state::State;
+
+/// Pairs of nodes kept in the pattern at most, over those that are needed.
+const ROOM: usize = 4;
+
+/// Contacts by a barrier: surfaces never go into each other. Rigid things move as their courses say.
+#[derive(Clone, Debug)]
+pub struct Touching {
+    /// Who touches whom.
+    pub contacts: Arc<Contacts>,
+    /// How each contact acts.
+    pub settings: Vec<BarrierSettings>,
+    /// Whether each state that is accepted is searched for edges that go through triangles, which would be an error of the program.
+    pub check_crossings: bool,
+}
+
+impl Touching {
+    /// The contacts at work, with nodes at rest where those of a model are.
+    pub fn barriers(&self, model: &Model) -> Barriers {
+        Barriers::new(Arc::clone(&self.contacts), &self.settings, &model.rest)
+    }
+
+    /// Whatever has no gap at a state: a run can't start there.
+    pub fn meetings(&self, model: &Model, state: &State) -> Vec<Meeting> {
+        self.barriers(model).meetings(&state.position, state.time)
+    }
+}
+
+/// What contacts do at an instant.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TouchingNow {
+    /// Forces on nodes [N], six numbers a node.
+    pub forces: Vec<f64>,
+    /// Force [N] of each contact on the second of the two that touch.
+    pub totals: Vec<[f64; 3]>,
+    /// Energy of the barriers [J].
+    pub energy: f64,
+    /// The least gap [m], where something touches.
+    pub gap: Option<f64>,
+    /// The least gap [m] of each node that touches something, by increasing node.
+    pub gaps: Vec<(u32, f64)>,
+}
+
+/// Contacts in the equations of a solver.
+pub(crate) struct TouchingSystem {
+    pub(crate) barriers: Barriers,
+    /// How far rigid things have gone in the step, from 0 to 1.
+    pub(crate) share: f64,
+    /// Forces on nodes, six a node, and on the second side of each contact.
+    pub(crate) forces: Vec<f64>,
+    totals: Vec<Vector3<f64>>,
+    /// Of barriers and friction [J]; infinite where there is no gap.
+    pub(crate) energy: f64,
+    /// Pairs of nodes in the pattern beside those of cells, increasing.
+    pub(crate) pairs: Vec<[u32; 2]>,
+    pub(crate) check_crossings: bool,
+    /// Whether the stiffness of friction is exact, which converges fast near the solution, or an upper bound.
+    pub(crate) exact_friction: bool,
+    /// Step of unknowns [m] below which a step is found: it changes gaps by less than counts.
+    pub(crate) close: f64,
+}
+
+/// A change of unknowns that counts for nothing, over the distance of the barrier.
+const CLOSE: f64 = 1e-3;
+
+impl TouchingSystem {
+    pub(crate) fn new(touching: &Touching, model: &Model) -> Self {
+        let nearest =
+            touching.settings.iter().map(|settings| settings.distance).fold(f64::INFINITY, f64::min);
+        Self {
+            barriers: touching.barriers(model),
+            share: 1.0,
+            forces: vec![0.0; 6 * model.rest.len()],
+            totals: vec![Vector3::zeros(); touching.settings.len()],
+            energy: 0.0,
+            pairs: Vec::new(),
+            check_crossings: touching.check_crossings,
+            exact_friction: false,
+            close: CLOSE * nearest,
+        }
+    }
+
+    /// Finds forces and energy at a state.
+    pub(crate) fn evaluate(&mut self, state: &State) {
+        self.energy = self.barriers.evaluate(&state.position, self.share);
+        self.forces.fill(0.0);
+        if self.energy.is_finite() {
+            self.barriers.add_forces(&mut self.forces, &mut self.totals);
+        }
+    }
+
+    /// What acts at the state last evaluated.
+    pub(crate) fn now(&self) -> TouchingNow {
+        TouchingNow {
+            forces: self.forces.clone(),
+            totals: self.totals.iter().map(|&total| total.into()).collect(),
+            energy: self.barriers.barrier_energy(),
+            gap: self.barriers.least_gap(),
+            gaps: self.barriers.gaps().into_iter().collect(),
+        }
+    }
+
+    /// [`now`](Self::now) at a state that no step led to: without friction.
+    pub(crate) fn at(&mut self, state: &State) -> TouchingNow {
+        let still = vec![0.0; self.forces.len()];
+        self.barriers.begin(&state.position, &still, [state.time; 2]);
+        self.share = 1.0;
+        self.evaluate(state);
+        self.now()
+    }
+
+    /// Takes up the pairs of nodes that the pattern lacks; whether there are some.
+    pub(crate) fn grow(&mut self, equations: &Equations, matrix: &LowerMatrix) -> bool {
+        let mut lacking = Vec::new();
+        let mut needed = Vec::new();
+        self.barriers.pairs(|nodes| {
+            for (at, &a) in nodes.iter().enumerate() {
+                for &b in &nodes[..at] {
+                    let pair = [a.min(b), a.max(b)];
+                    if !matrix.couples(equations, pair) {
+                        lacking.push(pair);
+                    }
+                    needed.push(pair);
+                }
+            }
+        });
+        if lacking.is_empty() {
+            return false;
+        }
+        if self.pairs.len() > ROOM * needed.len() {
+            self.pairs = needed;
+        } else {
+            self.pairs.extend(lacking);
+        }
+        self.pairs.sort_unstable();
+        self.pairs.dedup();
+        true
+    }
+
+    /// Adds the stiffness to a matrix, and what the ways of rigid things yet to come make of it to the coupling.
+    pub(crate) fn add_stiffness(
+        &self,
+        equations: &Equations,
+        matrix: &mut LowerMatrix,
+        moved: &[f64],
+        coupling: &mut [f64],
+    ) {
+        let nodes = self.barriers.node_count();
+        self.barriers.stiffness(self.share, self.exact_friction, |stencil, m, pull| {
+            add_row(equations, matrix, stencil, [nodes, usize::from(stencil.count)], m);
+            // The way that nodes which are moved have yet to go counts as that of rigid things.
+            let way: Vector3<f64> = stencil
+                .parts()
+                .filter(|(node, _)| (*node as usize) < nodes)
+                .map(|(node, c)| {
+                    Vector3::from_column_slice(&moved[6 * node as usize..6 * node as usize + 3]) * c
+                })
+                .sum();
+            let pull = pull + m * way;
+            if pull == Vector3::zeros() {
+                return;
+            }
+            for (node, c) in stencil.parts().filter(|(node, _)| (*node as usize) < nodes) {
+                for i in 0..3 {
+                    let equation = equations.number[6 * node as usize + i];
+                    if let Some(own) = coupling.get_mut(equation as usize) {
+                        *own += c * pull[i];
+                    }
+                }
+            }
+        });
+    }
+
+    /// The least gap, if edges go through triangles at the state last evaluated.
+    pub(crate) fn check(&self, time: f64) -> Result<(), SolveError> {
+        if !self.check_crossings {
+            return Ok(());
+        }
+        let (mut count, mut first) = (0, None);
+        self.barriers.crossings(|contact, ends, corners| {
+            count += 1;
+            first.get_or_insert((contact, ends, corners));
+        });
+        match first {
+            Some((contact, edge, triangle)) => {
+                Err(SolveError::Crossed { time, count, contact, edge, triangle })
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// Adds c cᵀ ⊗ M of the nodes of the model.
+fn add_row(
+    equations: &Equations,
+    matrix: &mut LowerMatrix,
+    stencil: &Stencil,
+    [nodes, count]: [usize; 2],
+    m: &Matrix3<f64>,
+) {
+    let own = |at: usize| (stencil.nodes[at], stencil.coefficients[at]);
+    for (row, c) in (0..count).map(own).filter(|(node, c)| (*node as usize) < nodes && *c != 0.0) {
+        for (column, d) in (0..count).map(own).filter(|(node, d)| (*node as usize) < nodes && *d != 0.0) {
+            if row >= column {
+                matrix.add_node_block(equations, [row, column], |i, j| c * d * m[(i, j)]);
+            }
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! Shells and solids in contact by a barrier, held to closed forms; every state that is accepted is searched for crossings.
+
+mod blocks;
+mod cloth;
+mod ring;
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use pliant_contact::barrier::BarrierSettings;
+use pliant_contact::pairs::Surface;
+use pliant_contact::pose::{Course, Pose};
+use pliant_contact::shape::Shape;
+use pliant_contact::touch::{Contact, Contacts, Rigid, Touch, With};
+use pliant_implicit::{Assembly, Touching};
+
+/// A thing of a shape that goes along a course.
+fn rigid(name: &str, shape: Shape, course: Course) -> Rigid {
+    Rigid { name: name.into(), shape, course, inside: false, jaw: None }
+}
+
+/// A thing at rest in a place [m], turned by a rotation vector [rad].
+fn fixed(name: &str, shape: Shape, at: [f64; 3], turn: [f64; 3]) -> Rigid {
+    rigid(name, shape, Course::fixed(Pose::new(at.into(), turn.into())))
+}
+
+/// A surface of these triangles.
+fn surface(faces: Vec<[u32; 3]>) -> Surface {
+    let mut nodes: Vec<u32> = faces.iter().flatten().copied().collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    Surface { nodes, faces }
+}
+
+/// Contacts of a surface with rigid things, each at a distance that is kept [m].
+fn at_rigid(own: &Surface, rigids: Vec<Rigid>, friction: f64, offset: f64) -> Contacts {
+    let contacts = (0..rigids.len()).map(|number| Contact {
+        name: rigids[number].name.clone(),
+        surface: own.clone(),
+        with: With::Rigid(number),
+        touch: Touch { friction, offset },
+    });
+    Contacts { contacts: contacts.collect(), rigids }
+}
+
+/// Gives a model contacts that all act in one way.
+fn touch(model: &mut Assembly, contacts: Contacts, settings: BarrierSettings) {
+    let settings = vec![settings; contacts.contacts.len()];
+    model.touching = Some(Touching { contacts: Arc::new(contacts), settings, check_crossings: true });
+}
+
+/// The sum of vectors of nodes by their masses, over the mass.
+fn mean(model: &Assembly, of: &[Vector3<f64>]) -> Vector3<f64> {
+    let mass: f64 = model.mass.iter().sum();
+    of.iter().zip(&model.mass).map(|(x, m)| x * *m).sum::<Vector3<f64>>() / mass
+}

@@ -1,0 +1,222 @@
+//! Contacts of the solvers `implicit` and `static`: how their barriers act, and whether bodies are apart at the start.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use pliant_geometry::Vector3;
+use pliant_implicit::{State, Touching};
+use pliant_sim::contact::barrier::{BarrierSettings, Meeting};
+use pliant_sim::contact::pairs::Surface;
+use pliant_sim::contact::touch::{Contacts, With};
+use pliant_sim::{counted, number};
+
+use super::{Builder, Partner};
+use crate::format::{ContactTable, FieldName};
+
+/// The distance of a barrier over the diagonal of all bodies, if none is given.
+const DISTANCE: f64 = 1e-3;
+/// Its stiffness over Young's modulus of the softest body of the contact, if none is given.
+const STIFFNESS: f64 = 0.1;
+/// The speed [m/s] below which friction lets bodies creep, if none is given.
+const CREEP: f64 = 1e-3;
+/// The largest part of the least altitude of triangles that the distance to keep and the barrier may take together.
+const ALTITUDE: f64 = 0.98;
+/// Places without a gap that are listed.
+const LISTED: usize = 3;
+
+/// The barriers of a scene, as their contacts are made.
+#[derive(Debug, Default)]
+pub(super) struct BarrierTables {
+    settings: Vec<BarrierSettings>,
+    /// The table of each contact.
+    tables: Vec<String>,
+    check: bool,
+}
+
+impl Builder<'_> {
+    /// Refuses keys that only barriers have, or only contacts without them.
+    pub(super) fn check_keys_of_contact(
+        &mut self,
+        name: &str,
+        table: &ContactTable,
+        is_barrier: bool,
+    ) -> bool {
+        let given = [
+            ("barrier-distance", table.barrier_distance.is_some(), true),
+            ("barrier-stiffness", table.barrier_stiffness.is_some(), true),
+            ("creep-speed", table.creep_speed.is_some(), true),
+            ("check-intersections", table.check_intersections, true),
+            ("separate", table.separate, false),
+        ];
+        let mut fits = true;
+        for (key, _, of_barrier) in given.into_iter().filter(|(_, given, of)| *given && *of != is_barrier) {
+            let solvers =
+                if of_barrier { "the solvers `implicit` and `static`" } else { "the solver `explicit`" };
+            let message = format!(
+                "`{key}` of a contact is for {solvers}, and this scene goes with `{}`",
+                self.scene.run.solver.word()
+            );
+            self.error(&["contact", name, key], message, "not for this solver", "leave it out");
+            fits = false;
+        }
+        fits
+    }
+
+    /// Takes note of how a contact of two partners acts; the distance [m] that its surfaces keep.
+    pub(super) fn barrier(
+        &mut self,
+        name: &str,
+        table: &ContactTable,
+        [own, with]: [Partner; 2],
+        surface: &Surface,
+        barriers: &mut BarrierTables,
+    ) -> Option<f64> {
+        let bodies: Vec<usize> = [own, with].into_iter().filter_map(Partner::body).collect();
+        let distance = table.barrier_distance.unwrap_or_else(|| DISTANCE * self.diagonal());
+        let softest = bodies.iter().filter_map(|&body| self.softest(body)).reduce(f64::min);
+        let Some(stiffness) = table.barrier_stiffness.or_else(|| softest.map(|young| STIFFNESS * young))
+        else {
+            let message =
+                format!("`{name}` needs `barrier-stiffness`: its bodies have no law to take it from");
+            let help = "take a tenth of Young's modulus of the softer body [Pa]";
+            self.error(&["contact", name, "between"], message, "no stiffness", help);
+            return None;
+        };
+        let thick = |body: usize| self.thickest(body);
+        let mut offset = table.thickness.unwrap_or_else(|| match with {
+            Partner::Body(other) => 0.5 * (thick(bodies[0]) + thick(other)),
+            Partner::Rigid(_) => 0.5 * thick(bodies[0]),
+        });
+        if own == with {
+            let altitude = ALTITUDE * self.least_altitude(surface);
+            if offset + distance > altitude {
+                let kept = (altitude - distance).max(0.0);
+                let message = format!(
+                    "contact `{name}`: the surfaces keep {} m instead of {} m, since that and the barrier must be less than the least altitude \
+                     of a triangle; smaller elements make it worse, a smaller `barrier-distance` better",
+                    number(kept),
+                    number(offset)
+                );
+                self.notes.push(message);
+                offset = kept;
+            }
+        }
+        barriers.settings.push(BarrierSettings {
+            distance,
+            stiffness,
+            creep_speed: table.creep_speed.unwrap_or(CREEP),
+        });
+        barriers.tables.push(name.into());
+        barriers.check |= table.check_intersections;
+        Some(offset)
+    }
+
+    /// Gives the contacts to the model, unless bodies have no gap at the start.
+    pub(super) fn touch(&mut self, contacts: &Arc<Contacts>, barriers: BarrierTables, start: &State) {
+        let BarrierTables { settings, tables, check } = barriers;
+        let touching = Touching { contacts: Arc::clone(contacts), settings, check_crossings: check };
+        let met = touching.meetings(&self.assembly, start);
+        let mut of_contacts = BTreeMap::<u32, Vec<Meeting>>::new();
+        met.into_iter().for_each(|one| of_contacts.entry(one.contact).or_default().push(one));
+        for (contact, met) in &of_contacts {
+            self.refuse_meetings(&contacts.contacts[*contact as usize].name, &tables[*contact as usize], met);
+        }
+        for (contact, count) in contacts.contacts.iter().zip(touching.barriers(&self.assembly).apart_counts())
+        {
+            if count > 0 {
+                self.notes.push(format!(
+                    "contact `{}`: {} of nodes with triangles or of edges never touch, since they are too near at rest",
+                    contact.name,
+                    counted(count, "pair")
+                ));
+            }
+        }
+        self.assembly.touching = Some(touching);
+    }
+
+    fn refuse_meetings(&mut self, contact: &str, table: &str, met: &[Meeting]) {
+        let told = |one: &Meeting| {
+            let (body, node) = self.assembly.locate_node(one.node);
+            let [x, y, z] = one.place.map(number);
+            let how = match one.gap {
+                Some(gap) => format!("a gap of {} m", number(gap)),
+                None => "an edge through a triangle".into(),
+            };
+            format!("node {node} of `{}` at ({x}, {y}, {z}) m: {how}", self.bodies[body].name)
+        };
+        let mut sorted = met.to_vec();
+        sorted.sort_by(|a, b| {
+            a.gap.unwrap_or(f64::NEG_INFINITY).total_cmp(&b.gap.unwrap_or(f64::NEG_INFINITY))
+        });
+        let first: Vec<String> = sorted.iter().take(LISTED).map(told).collect();
+        let message = format!(
+            "contact `{contact}` has no gap at the start in {}: {}{}",
+            counted(met.len(), "place"),
+            first.join("; "),
+            if met.len() > LISTED { "; …" } else { "" }
+        );
+        let help =
+            "move one of them (`at`), or make `thickness` smaller: a barrier can't begin within another body";
+        self.error(&["contact", table, "between"], message, "no gap", help);
+    }
+
+    /// Fields that contacts by a barrier don't have.
+    pub(super) fn lacks_field(&self, field: FieldName) -> bool {
+        self.scene.run.solver.solves_equations()
+            && matches!(field, FieldName::ContactPressure | FieldName::Slip)
+    }
+
+    /// The diagonal [m] of all bodies.
+    fn diagonal(&self) -> f64 {
+        let bounds = self.bodies.iter().filter_map(|body| body.mesh.bounds());
+        let all = bounds.reduce(|(a, b), (c, d)| (a.inf(&c), b.sup(&d)));
+        all.map_or(1.0, |(low, high)| (high - low).norm())
+    }
+
+    /// The least Young's modulus [Pa] of the laws of a body at small strain.
+    fn softest(&self, body: usize) -> Option<f64> {
+        let (_, table) = self.scene.bodies.get(body)?;
+        let layers = table.layers.iter().filter_map(|layer| layer.law.as_ref());
+        let names = table.law.values().into_iter().chain(layers);
+        let laws = names.filter_map(|name| self.scene.laws.iter().find(|(known, _)| known == name));
+        laws.map(|(_, law)| law.law.small_strain().young()).reduce(f64::min)
+    }
+
+    /// The largest thickness [m] of a shell; zero of another body.
+    fn thickest(&self, body: usize) -> f64 {
+        let cells = self.shell_cells(body).unwrap_or_default();
+        cells.iter().map(|&cell| self.assembly.facets[cell as usize].thickness).fold(0.0, f64::max)
+    }
+
+    /// The least altitude [m] of triangles of a surface at rest.
+    fn least_altitude(&self, surface: &Surface) -> f64 {
+        let place = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
+        let altitude = |face: &[u32; 3]| {
+            let [a, b, c] = face.map(place);
+            let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
+            (b - a).cross(&(c - a)).norm() / longest
+        };
+        surface.faces.iter().map(altitude).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Refuses what goes with no barrier: a controlled load, and jaws that hold by an ideal grip.
+    pub(super) fn check_goes_with_barriers(&mut self, name: &str, contacts: &Contacts) {
+        if self.scene.run.control.is_some() {
+            let help = "prescribe the load, or move a tool or nodes instead";
+            self.error(&["contact", name, "between"], "contact does not go with `control`", "here", help);
+        }
+        let held = contacts.contacts.iter().find_map(|contact| match contact.with {
+            With::Rigid(rigid) => contacts.rigids[rigid].jaw.as_ref().filter(|jaw| jaw.grip.is_some()),
+            _ => None,
+        });
+        if let Some(jaw) = held {
+            let message = format!(
+                "`{}` has an `ideal-grip`, which the solver `{}` does not know",
+                jaw.tool,
+                self.scene.run.solver.word()
+            );
+            let help = "leave it out, so that the jaws hold by friction, or take `solver = \"explicit\"`";
+            self.error(&["contact", name, "between"], message, "an ideal grip", help);
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! Contact with the solvers `implicit` and `static`: a barrier keeps surfaces apart, from the text of a scene to its outputs, and what is refused.
+
+use super::static_solids::{last_row, resumes, world};
+
+/// A block of 40 × 40 × 20 mm of tissue a little above a floor, and a ball that is pressed into its top; `held` holds its underside.
+fn pressed(run: &str, more: &str) -> String {
+    format!(
+        "[scene]\nuntil = 1\n[run]\n{run}\n\
+         [law.tissue]\ntype = 'neo-hookean'\nyoung-modulus = 5e3\npoisson-ratio = 0.4\n\
+         [body.block]\nmesh = {{ block = {{ size = [0.04, 0.04, 0.02], cells = [6, 6, 3] }}, as = 'hexes' }}\n\
+         law = 'tissue'\ndensity = 1000\ndamping = 40\n\
+         [tool.ball]\nshape = {{ sphere = {{ radius = 0.01 }} }}\nat = [0.02, 0.02, 0.0302]\nby = [0, 0, -0.003]\nto = 0.4\n\
+         [contact.above]\nbetween = ['block', 'ball']\nfriction = 0.2\ncheck-intersections = true\n\
+         [output.history]\ntype = 'csv'\nevery = 0.2\nreactions = 'all'\n\
+         probes.top = {{ on = 'block', at = [0.02, 0.02, 0.02], data = ['displacement', 'contact-force', 'gap'] }}\n{more}"
+    )
+}
+
+const FLOOR: &str = "[obstacle.floor]\nshape = 'half-space'\nat = [0, 0, -2e-5]\n\
+                     [contact.below]\nbetween = ['block', 'floor']\nfriction = 0.5\n";
+const HELD: &str = "[constraint.base]\ntype = 'fix'\nbody = 'block'\nnodes = { set = 'z-min' }\n";
+
+/// What presses on top comes out below: at the floor by a barrier as well, in time, and at the constraint in equilibrium. The gap of the
+/// node under the ball is within the barrier.
+#[test]
+fn a_tool_presses_a_body_onto_an_obstacle_by_barriers() {
+    let reach = 1e-3 * (0.04_f64 * 0.04 + 0.04 * 0.04 + 0.02 * 0.02).sqrt();
+    let mut forces = Vec::new();
+    for (run, more, below) in [
+        ("solver = 'implicit'\nstep = 0.02", FLOOR, "contact.below.z"),
+        ("solver = 'static'\nload-steps = 10", HELD, "reaction.base.z"),
+    ] {
+        let row = last_row(&pressed(run, more));
+        let (up, down) = (row["contact.above.z"], row[below]);
+        println!("{run}: {up} N on the ball, {below} {down} N, {row:?}");
+        assert!(up > 0.03 && (up / down.abs() - 1.0).abs() < 5e-3, "{up} {down}");
+        let gap = row["probe.top.gap"];
+        assert!(gap > 0.0 && gap < reach, "{gap}");
+        assert!(row["probe.top.contact-force.z"] < 0.0);
+        forces.push(up);
+    }
+    assert!((forces[0] / forces[1] - 1.0).abs() < 0.02, "{forces:?}");
+}
+
+/// A piece of cloth that falls onto a ball and itself.
+fn cloth(more: &str) -> String {
+    format!(
+        "[scene]\nuntil = 1\ngravity = [0, 0, -9.81]\n[run]\nsolver = 'implicit'\nstep = 0.02\ntolerance = 1e-4\ncheckpoint = {{ every = 0.4 }}\n\
+         [law.cotton]\ntype = 'neo-hookean'\nyoung-modulus = 1e5\npoisson-ratio = 0.3\n\
+         [body.cloth]\nmodel = 'shell'\nmesh = {{ plate = {{ size = [0.2, 0.2], cells = [6, 6] }} }}\nlaw = 'cotton'\ndensity = 300\n\
+         thickness = 1e-3\ndamping = 5\n\
+         [obstacle.ball]\nshape = {{ sphere = {{ radius = 0.05 }} }}\nat = [0.103, 0.102, -0.052]\n\
+         [contact.drapes]\nbetween = ['cloth', 'ball']\nfriction = 0.5\ncheck-intersections = true\n\
+         [contact.folds]\nbetween = ['cloth', 'cloth']\nfriction = 0.5\n\
+         [output.history]\ntype = 'csv'\nevery = 0.2\n{more}"
+    )
+}
+
+#[test]
+fn a_run_in_contact_resumes_with_the_same_bits() {
+    resumes(&cloth(""));
+}
+
+/// Each mistake is refused with its place and a remedy.
+#[test]
+fn mistakes_are_refused() {
+    let implicit = "solver = 'implicit'\nstep = 0.02";
+    for (text, pieces) in [
+        (
+            pressed(implicit, &FLOOR.replace("-2e-5", "1e-4")),
+            [
+                "contact `below` has no gap at the start in 49 places: node 0 of `block` at (0, 0, 0) m",
+                "move one of them",
+            ],
+        ),
+        (
+            cloth("").replace("-0.052", "-0.04"),
+            ["contact `drapes` has no gap at the start", "move one of them"],
+        ),
+        (
+            pressed(implicit, "").replace("friction = 0.2", "separate = true"),
+            ["`separate` of a contact is for the solver `explicit`", "`implicit`"],
+        ),
+        (
+            pressed("", "").replace("friction = 0.2", "barrier-distance = 1e-4"),
+            ["`barrier-distance` of a contact is for the solvers `implicit` and `static`", "`explicit`"],
+        ),
+        (
+            pressed(implicit, "").replace("'gap'", "'slip'"),
+            ["contacts with the solver `implicit` have no `slip`", "`contact-force` or `gap`"],
+        ),
+        (
+            pressed("solver = 'quasi-static'", ""),
+            ["contact is for the solvers `explicit`, `implicit` and `static`", "`quasi-static`"],
+        ),
+        (pressed(implicit, "").replace("friction = 0.2", "barrier-stiffness = 0"), ["barrier-stiffness", ""]),
+    ] {
+        let told = world(&text).err().unwrap_or_else(|| panic!("accepted:\n{text}"));
+        assert!(pieces.iter().all(|piece| told.contains(piece)), "{told}");
+    }
+}
