@@ -126,7 +126,8 @@ pub(crate) fn descend(
             return check(solver, time);
         }
         if iteration == limits.iterations || !norm.is_finite() {
-            return if iteration == 1 && limits.iterations == 1 && norm.is_finite() {
+            // A single iteration is not checked, but what moves by itself must have come to its end.
+            return if complete && limits.iterations == 1 && norm.is_finite() {
                 check(solver, time)
             } else {
                 Err(not_found(solver, time, iteration))

@@ -102,6 +102,10 @@ impl ImplicitBodies {
             ("springs".into(), fingerprint(&model.springs)),
             ("the control of a load".into(), fingerprint(&self.control)),
             ("creases".into(), fingerprint(&(&model.normals, &model.corner_normals))),
+            (
+                "barriers of contacts".into(),
+                fingerprint(&model.touching.as_ref().map(|touching| &touching.settings)),
+            ),
             ("damping by stiffness".into(), fingerprint(&model.stiffness_damping)),
         ]
     }

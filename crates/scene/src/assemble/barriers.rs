@@ -199,11 +199,20 @@ impl Builder<'_> {
         surface.faces.iter().map(altitude).fold(f64::INFINITY, f64::min)
     }
 
-    /// Refuses what goes with no barrier: a controlled load, and jaws that hold by an ideal grip.
+    /// Refuses what goes with no barrier: a controlled load, tools whose force is limited, and jaws that hold by an ideal grip.
     pub(super) fn check_goes_with_barriers(&mut self, name: &str, contacts: &Contacts) {
         if self.scene.run.control.is_some() {
             let help = "prescribe the load, or move a tool or nodes instead";
             self.error(&["contact", name, "between"], "contact does not go with `control`", "here", help);
+        }
+        if let Some(limited) = contacts.rigids.iter().find(|rigid| rigid.course.limit().is_some()) {
+            let message = format!(
+                "`{}` has a `force-limit`, which the solver `{}` does not know",
+                limited.tool(),
+                self.scene.run.solver.word()
+            );
+            let help = "leave it out, or take `solver = \"explicit\"`";
+            self.error(&["contact", name, "between"], message, "a limited force", help);
         }
         let held = contacts.contacts.iter().find_map(|contact| match contact.with {
             With::Rigid(rigid) => contacts.rigids[rigid].jaw.as_ref().filter(|jaw| jaw.grip.is_some()),

@@ -219,15 +219,15 @@ impl Builder<'_> {
     ) -> Option<Vec<Contact>> {
         let run = &self.scene.run;
         let is_barrier = run.solver.solves_equations();
-        if !self.check_keys_of_contact(name, table, is_barrier) {
-            return None;
-        }
         if run.solver != SolverName::Explicit && !is_barrier {
             let message = format!(
                 "contact is for the solvers `explicit`, `implicit` and `static`, and this scene goes with `{}`",
                 run.solver.word()
             );
             self.error(&["contact", name, "between"], message, "not for this solver", EXPLICIT);
+            return None;
+        }
+        if !self.check_keys_of_contact(name, table, is_barrier) {
             return None;
         }
         let [first, second] = [0, 1].map(|side| self.partners(name, table, side, rigids));

@@ -304,15 +304,19 @@ impl FieldName {
     /// True for fields that bodies of a model have.
     pub fn is_of(self, model: BodyModel) -> bool {
         match self {
-            Self::Displacement | Self::Velocity | Self::Reaction | Self::VonMises | Self::ElementStep => true,
+            Self::Displacement
+            | Self::Velocity
+            | Self::Reaction
+            | Self::VonMises
+            | Self::ElementStep
+            | Self::ContactForce
+            | Self::Gap => true,
             Self::CauchyStress
             | Self::EnergyDensity
             | Self::Pk2Stress
             | Self::GreenStrain
             | Self::DeformationGradient
-            | Self::ContactForce
             | Self::ContactPressure
-            | Self::Gap
             | Self::Slip => model != BodyModel::Shell,
             Self::Pressure | Self::VolumeRatio | Self::CellVolumeRatio | Self::Fibre | Self::FibreStretch => {
                 matches!(model, BodyModel::Solid | BodyModel::Membrane)
