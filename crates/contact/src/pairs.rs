@@ -29,6 +29,9 @@ pub(crate) const FACING: f64 = 0.3;
 pub(crate) const BESIDE: f64 = 0.02;
 /// Overlap, over the deepest one, that is undone though a side that faces away is nearer.
 pub(crate) const SLIGHT: f64 = 0.1;
+/// Distance from a triangle, edge or corner, over the overlap up to which a surface is seen from behind, at which a node lies on it: it is not beneath,
+/// and the way from there tells no direction. Impulses that are found leave less than that, and round-off of single precision is less.
+pub(crate) const ON: f64 = 1e-4;
 /// Relative difference up to which distances are the same.
 const SAME: f64 = 1e-9;
 /// Rest distances, over the distance to keep, up to which parts of a surface never touch each other.
@@ -407,7 +410,7 @@ impl Pairs {
             }
             if here.is_inner {
                 let pair = pair(nodes, here.weights, here.normal, here.height);
-                if here.height >= 0.0 {
+                if here.height >= -ON * self.depth {
                     above = above.min(here.height);
                     rows.push((face, pair));
                 } else if beneath.is_none_or(|known| known.distance < here.height) {
@@ -433,11 +436,11 @@ impl Pairs {
             let nodes = other.faces[face as usize];
             let mut on = nodes.iter().zip(&weights).filter(|(_, weight)| **weight != 0.0);
             let beside = sign < 0.0 && on.all(|(node, _)| other.border.binary_search(node).is_ok());
-            let normal = (way * sign).try_normalize(1e-6 * self.skin).or_else(|| normals.try_normalize(0.0));
+            let normal = (way * sign).try_normalize(ON * self.depth).or_else(|| normals.try_normalize(0.0));
             if let Some(normal) = normal.filter(|_| !beside) {
                 let pair = pair(nodes, weights, normal, sign * distance);
-                if sign > 0.0 {
-                    above = distance;
+                if pair.distance >= -ON * self.depth {
+                    above = pair.distance;
                     rows.insert(rows.partition_point(|&(known, _)| known < face), (face, pair));
                 } else if beneath.is_none_or(|known| known.distance < pair.distance) {
                     beneath = Some(pair);

@@ -4,7 +4,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::grid::FLATTEST;
-use crate::pairs::{BESIDE, FACING, FLAT, PARALLEL, SLIGHT};
+use crate::pairs::{BESIDE, FACING, FLAT, ON, PARALLEL, SLIGHT};
 use crate::shape::Shape;
 use crate::touch::{ALIKE, LEFT, MEETS, MOST_PARTS, Passage, Rigid};
 
@@ -63,8 +63,14 @@ fn constants(numbers: &[(&str, f64)]) -> String {
 ///
 /// The module around it defines where nodes are and what happens with a pair; narrow.wgsl tells how.
 pub fn pairs_shader() -> String {
-    let numbers =
-        [("BESIDE", BESIDE), ("FACING", FACING), ("SLIGHT", SLIGHT), ("PARALLEL", PARALLEL), ("FLAT", FLAT)];
+    let numbers = [
+        ("BESIDE", BESIDE),
+        ("FACING", FACING),
+        ("SLIGHT", SLIGHT),
+        ("PARALLEL", PARALLEL),
+        ("FLAT", FLAT),
+        ("ON", ON),
+    ];
     [&constants(&numbers), include_str!("pairs/narrow.wgsl")].join("\n")
 }
 

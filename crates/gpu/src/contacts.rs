@@ -13,12 +13,12 @@ use pliant_contact::touch::{
 use pliant_mechanics::model::Model;
 use pliant_mechanics::tensor::Vector;
 
-use crate::kernel::{Binding, Bound, Kernel, Memory};
+use crate::kernel::{Binding, Bound, GROUP, Kernel, Memory};
 use crate::loads::DeviceLoads;
 use crate::nodes::{DeviceNodes, MOTION, MOVE, UNTOUCHED, external_forces};
 use crate::pairs::DevicePairs;
 use crate::transfer::Four;
-use crate::{Device, GpuError};
+use crate::{Device, GpuError, Kind};
 
 /// What of contacts runs on the CPU only, in words.
 pub fn processor_only(contacts: &Contacts) -> Option<String> {
@@ -116,6 +116,7 @@ impl DeviceContacts {
             ("SIDES", SIDES),
             ("LIFTS", LIFTS),
             ("ROWS", NODE_ROWS),
+            ("SOLVERS", solvers(device)),
         ];
         let counts = counts.map(|(name, count)| format!("const {name} = {count}u;\n"));
         let parts = [("FOUND", FOUND), ("OFF", OFF), ("LIFTED", LIFTED), ("BAND", BAND)];
@@ -233,6 +234,15 @@ fn bound(
         own.extend([Binding::Read(candidates), Binding::Read(listed), Binding::Write(queue)]);
     }
     nodes.of_contacts(device, &own)
+}
+
+/// Invocations of the group that solves all rows. It waits after each colour and level; software changes from one part of a group to another
+/// there, and has one part only if the group fills one vector.
+fn solvers(device: &Device) -> usize {
+    match device.adapter().kind {
+        Kind::Software => 8,
+        _ => GROUP as usize,
+    }
 }
 
 /// Fours of `rows` of a candidate for a pair; twin of the one in pairs.wgsl.

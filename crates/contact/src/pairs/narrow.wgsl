@@ -102,7 +102,7 @@ fn find_above(node: u32, outward: vec3f, first: u32, end: u32, skin: f32, depth:
         if here.is_inner {
             if faces_away {
                 hidden = min(hidden, abs(here.height));
-            } else if here.height >= 0.0 {
+            } else if here.height >= -ON * depth {
                 over = min(over, here.height);
                 take_pair(row, vec4u(node, corners), vec4f(1.0, -here.weights), here.normal, here.height);
             } else if beneath < here.height {
@@ -134,14 +134,15 @@ fn find_above(node: u32, outward: vec3f, first: u32, end: u32, skin: f32, depth:
         // Who is behind a border is beside the surface.
         if !(is_behind && at_border(nearest_row, nearest_weights != vec3f(0.0))) {
             let sign = select(1.0, -1.0, is_behind);
-            let normal = select(unit(nearest_normals), sign * unit(nearest_way), nearest > 10.0 * ROUNDING * skin);
-            if !is_behind {
-                over = nearest;
+            let normal = select(unit(nearest_normals), sign * unit(nearest_way), nearest > ON * depth);
+            let distance = sign * nearest;
+            if distance >= -ON * depth {
+                over = distance;
                 let corners = corners_of(nearest_row);
-                take_pair(nearest_row, vec4u(node, corners), vec4f(1.0, -nearest_weights), normal, nearest);
-            } else if beneath < -nearest {
+                take_pair(nearest_row, vec4u(node, corners), vec4f(1.0, -nearest_weights), normal, distance);
+            } else if beneath < distance {
                 beneath_row = nearest_row;
-                beneath = -nearest;
+                beneath = distance;
                 beneath_normal = normal;
                 beneath_weights = nearest_weights;
             }

@@ -16,7 +16,7 @@ fn order_pairs(local: u32, deepest: f32) {
     let most = candidates[MOST_ROWS];
     let ordered = QUEUED_PAIRS + most;
     let ends = ordered + most;
-    for (var k = local; k < count; k += GROUP) {
+    for (var k = local; k < count; k += SOLVERS) {
         let row = atomicLoad(&pair_queue[QUEUED_PAIRS + k]);
         if rows[pair_at(row)].w >= BAND * deepest {
             atomicStore(&pair_queue[QUEUED_PAIRS + k], NO_ROW);
@@ -31,7 +31,7 @@ fn order_pairs(local: u32, deepest: f32) {
         }
         before = now;
         // The earliest row claims a node.
-        for (var k = local; k < count; k += GROUP) {
+        for (var k = local; k < count; k += SOLVERS) {
             let row = atomicLoad(&pair_queue[QUEUED_PAIRS + k]);
             if row != NO_ROW {
                 let nodes = pair_nodes(row);
@@ -41,7 +41,7 @@ fn order_pairs(local: u32, deepest: f32) {
             }
         }
         storageBarrier();
-        for (var k = local; k < count; k += GROUP) {
+        for (var k = local; k < count; k += SOLVERS) {
             let row = atomicLoad(&pair_queue[QUEUED_PAIRS + k]);
             if row != NO_ROW {
                 let nodes = pair_nodes(row);
@@ -56,7 +56,7 @@ fn order_pairs(local: u32, deepest: f32) {
             }
         }
         storageBarrier();
-        for (var k = local; k < count; k += GROUP) {
+        for (var k = local; k < count; k += SOLVERS) {
             let row = atomicLoad(&pair_queue[QUEUED_PAIRS + k]);
             if row != NO_ROW && (row & PLACED) != 0u {
                 let nodes = pair_nodes(row & ~PLACED);
@@ -94,7 +94,7 @@ fn solve_pairs(local: u32) -> f32 {
     for (var level = 0u; level < count; level++) {
         storageBarrier();
         let end = atomicLoad(&pair_queue[ends + level]);
-        for (var k = first + local; k < end; k += GROUP) {
+        for (var k = first + local; k < end; k += SOLVERS) {
             let row = atomicLoad(&pair_queue[ordered + k]);
             let at = pair_at(row);
             let friction = contact_number(pair_info(row) >> 4u, FRICTION);

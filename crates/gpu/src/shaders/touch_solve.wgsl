@@ -15,7 +15,7 @@ fn largest(local: u32, own: f32) -> f32 {
     return bitcast<f32>(workgroupUniformLoad(&told));
 }
 
-@compute @workgroup_size(GROUP)
+@compute @workgroup_size(SOLVERS)
 fn main(@builtin(local_invocation_index) local: u32) {
     if local == 0u {
         told = select(0u, atomicLoad(&queue[DEEPEST]), end() > instant.index);
@@ -28,13 +28,13 @@ fn main(@builtin(local_invocation_index) local: u32) {
         var is_relaxed = false;
         for (var done = 0u; done < PASSES && !is_relaxed; done++) {
             var most = 0.0;
-            for (var k = local; k < nodes; k += GROUP) {
+            for (var k = local; k < nodes; k += SOLVERS) {
                 most = max(most, solve_node(atomicLoad(&queue[QUEUED_NODES + k])));
             }
             for (var colour = 0u; colour < COLOURS; colour++) {
                 storageBarrier();
                 let faces = atomicLoad(&queue[FACES_TOLD + colour]);
-                for (var k = local; k < faces; k += GROUP) {
+                for (var k = local; k < faces; k += SOLVERS) {
                     let face = atomicLoad(&queue[QUEUED_FACES + lists[COLOURS_AT + colour] + k]);
                     most = max(most, solve_face(face));
                 }
@@ -43,20 +43,20 @@ fn main(@builtin(local_invocation_index) local: u32) {
             is_relaxed = largest(local, most) < FOUND * deepest;
         }
         var moved = 0.0;
-        for (var k = local; k < nodes; k += GROUP) {
+        for (var k = local; k < nodes; k += SOLVERS) {
             moved = max(moved, settle(atomicLoad(&queue[QUEUED_NODES + k]), FOUND * deepest));
         }
         is_found = largest(local, moved) <= FOUND * deepest;
     }
     for (var colour = 0u; colour < COLOURS; colour++) {
         let faces = atomicLoad(&queue[FACES_TOLD + colour]);
-        for (var k = local; k < faces; k += GROUP) {
+        for (var k = local; k < faces; k += SOLVERS) {
             sum_face(atomicLoad(&queue[QUEUED_FACES + lists[COLOURS_AT + colour] + k]));
         }
     }
     storageBarrier();
     forget_pairs(local);
-    for (var k = local; k < QUEUED_NODES; k += GROUP) {
+    for (var k = local; k < QUEUED_NODES; k += SOLVERS) {
         atomicStore(&queue[k], 0u);
     }
 }

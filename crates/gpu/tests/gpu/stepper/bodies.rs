@@ -13,7 +13,7 @@ use pliant_mechanics::model::{Cells, Constraint, Model, Motion, Solid};
 use pliant_testing::Random;
 
 use super::against::{PLAIN, load, step_of};
-use super::contact::{compare, moving, rigid, surface};
+use super::contact::{compare, moving, rigid, surface, time_of};
 use super::cube::{elastic, neo_hookean, smooth, tet_block};
 use crate::support;
 
@@ -198,4 +198,37 @@ fn cubes_keep_their_momentum_and_their_bits_however_the_steps_are_divided() {
     let off = (whole.3 - before).norm() / before.norm();
     println!("cubes: momentum off by {off:.1e}");
     assert!(off <= 1e-5, "{off:.1e}");
+}
+
+/// A block of 41,472 tetrahedra, its base held, and a lid of 2,304 above it: the time of a step without contact, with the lid out of reach, within the skin of the
+/// lists, and sunk in. `cargo test --release -p pliant-gpu --test gpu the_cost_of_pairs -- --include-ignored --nocapture`.
+#[test]
+#[ignore = "measures time"]
+fn the_cost_of_pairs() {
+    let Some(device) = support::device() else { return };
+    let (edge, cells) = (0.1, 24);
+    let mut alone = None;
+    for (what, gap) in
+        [("alone", None), ("out of reach", Some(0.02)), ("beside", Some(5e-4)), ("in touch", Some(1e-4))]
+    {
+        let mut model = Model::default();
+        add(&mut model, "block", [cells, cells, 12], [edge, edge, 0.5 * edge], &Isometry3::identity(), 0.0);
+        let at = Isometry3::translation(0.013, 0.012, 0.5 * edge + gap.unwrap_or(0.02));
+        add(&mut model, "lid", [12, 16, 2], [0.07, 0.07, 0.01], &at, 0.0);
+        model.fix("base", (0..(cells + 1) * (cells + 1)).collect());
+        let block = model.bodies[0].nodes.end as usize;
+        let falls = gap == Some(1e-4);
+        let velocity = |node| if node < block || !falls { [0.0; 3] } else { [0.01, 0.0, -0.05] };
+        model.initial_velocity = (0..model.node_count()).map(velocity).collect();
+        let step = 0.5 * step_of(&model);
+        let contacts = touching(&model, vec![], 0.3);
+        let mut stepper = match gap {
+            None => GpuStepper::new(&device, model.clone(), step, None),
+            Some(_) => GpuStepper::touching(&device, model.clone(), contacts, step, None),
+        }
+        .unwrap();
+        let spent = time_of(&mut stepper, &model, what);
+        let alone = *alone.get_or_insert(spent);
+        println!("{what}: {:+.1} % of processor time", 100.0 * (spent / alone - 1.0));
+    }
 }
