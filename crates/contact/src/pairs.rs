@@ -7,24 +7,31 @@
 //! A node is compared with each triangle that it lies above or beneath, and with the nearest edge or corner if that is nearer still. Two edges
 //! count where the normal between them is in the cones of normals of both (Gauss map). Surfaces that look the same way do not touch.
 
+mod narrow;
+
 use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
-use pliant_geometry::barycentric_of_closest;
 
 use crate::tree::{Bounds, Tree};
+pub use narrow::Edge;
+use narrow::{Above, Across, is_beyond};
+pub(crate) use narrow::{FLAT, PARALLEL};
 
 /// The skin of the lists, over the mean edge.
 const SKIN: f64 = 0.25;
 /// Overlap, over the mean edge, up to which a surface is seen from behind.
 const DEPTH: f64 = 0.25;
 /// The cosine of the angle between outward normals up to which surfaces face each other.
-const FACING: f64 = 0.3;
+pub(crate) const FACING: f64 = 0.3;
 /// How far beside a triangle, over its height, a node whose surface faces it still counts as above it: bodies with common borders hold each
 /// other there, and do not take hold of each other's sides.
-const BESIDE: f64 = 0.02;
+pub(crate) const BESIDE: f64 = 0.02;
 /// Overlap, over the deepest one, that is undone though a side that faces away is nearer.
-const SLIGHT: f64 = 0.1;
+pub(crate) const SLIGHT: f64 = 0.1;
+/// Distance from a triangle, edge or corner, over the overlap up to which a surface is seen from behind, at which a node lies on it: it is not beneath,
+/// and the way from there tells no direction. Impulses that are found leave less than that, and round-off of single precision is less.
+pub(crate) const ON: f64 = 1e-4;
 /// Relative difference up to which distances are the same.
 const SAME: f64 = 1e-9;
 /// Rest distances, over the distance to keep, up to which parts of a surface never touch each other.
@@ -40,6 +47,12 @@ pub struct Surface {
 }
 
 impl Surface {
+    /// The same with other numbers of its nodes, in the same order.
+    pub fn numbered(&self, number: impl Fn(u32) -> u32) -> Self {
+        let faces = self.faces.iter().map(|face| face.map(&number)).collect();
+        Self { nodes: self.nodes.iter().map(|&node| number(node)).collect(), faces }
+    }
+
     /// Length [m] of its longest edge, with nodes at these places [m].
     pub fn longest_edge(&self, place: impl Fn(u32) -> Vector3<f64>) -> f64 {
         let edges = self.faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
@@ -62,22 +75,24 @@ pub struct Pair {
     pub in_order: bool,
 }
 
-/// An edge with the nodes across it of the triangles that it is part of: of the one that has its ends in this order, and of the other one, or the
-/// same again at a border.
-#[derive(Clone, Copy, Debug)]
-struct Edge {
-    ends: [u32; 2],
-    across: [u32; 2],
+/// A node with the triangles that are candidates.
+pub struct Point<'p> {
+    /// The node.
+    pub node: u32,
+    /// Its outward normal when candidates were listed.
+    pub outward: Vector3<f64>,
+    /// Whether it belongs to the first of two surfaces.
+    pub in_order: bool,
+    list: &'p [[u32; 2]],
+    other: &'p Side,
 }
 
-impl Edge {
-    /// The sum of the outward normals of its triangles.
-    fn outward(&self, place: &impl Fn(u32) -> Vector3<f64>) -> Vector3<f64> {
-        let [a, b] = self.ends.map(place);
-        let [left, right] = self.across.map(place);
-        let normal = |to: Vector3<f64>| (b - a).cross(&to).try_normalize(0.0).unwrap_or_default();
-        let other = if self.across[0] == self.across[1] { Vector3::zeros() } else { normal(a - right) };
-        normal(left - a) + other
+impl Point<'_> {
+    /// The triangles, and which of their corners are at borders of an open surface.
+    pub fn faces(&self) -> impl Iterator<Item = ([u32; 3], [bool; 3])> {
+        let face = |&[_, face]: &[u32; 2]| self.other.faces[face as usize];
+        let is_at_border = |node: u32| self.other.border.binary_search(&node).is_ok();
+        self.list.iter().map(move |own| (face(own), face(own).map(is_at_border)))
     }
 }
 
@@ -114,6 +129,11 @@ impl Side {
         let edge_tree = Tree::new(edges.len(), |edge| around(edges[edge as usize].ends, place));
         let (nodes, faces) = (surface.nodes.clone(), surface.faces.clone());
         Self { nodes, faces, edges, border, face_tree, edge_tree, listed: Vec::new(), normals: Vec::new() }
+    }
+
+    /// The outward normal of a node when candidates were listed.
+    fn outward(&self, node: u32) -> Vector3<f64> {
+        self.normals[self.nodes.partition_point(|&known| known < node)]
     }
 
     /// The square of the longest way [m²] of a node since candidates were listed.
@@ -223,8 +243,15 @@ impl Pairs {
     pub fn update(&mut self, place: impl Fn(u32) -> Vector3<f64>, way: f64) {
         let moved = self.sides.iter().map(|side| side.moved(&place)).fold(0.0, f64::max).sqrt();
         if moved + way > 0.5 * self.skin {
-            self.list(&place, self.offset + self.skin + 2.0 * way);
+            self.list_again(place, way);
         }
+    }
+
+    /// Lists candidates anew, `way` [m] more than the skin around; returns how far [m] nodes may move before the lists miss something.
+    pub fn list_again(&mut self, place: impl Fn(u32) -> Vector3<f64>, way: f64) -> f64 {
+        let room = 0.5 * self.skin + way;
+        self.list(&place, self.offset + 2.0 * room);
+        room
     }
 
     /// Lists what is within a reach [m] by its boxes.
@@ -284,16 +311,44 @@ impl Pairs {
         &self.near
     }
 
+    /// The distance to keep, the skin, and the overlap up to which a surface is seen from behind [m].
+    pub fn lengths(&self) -> [f64; 3] {
+        [self.offset, self.skin, self.depth]
+    }
+
+    fn other(&self, side: usize) -> &Side {
+        if self.sides.len() == 1 { &self.sides[0] } else { &self.sides[1 - side] }
+    }
+
+    /// The nodes with candidates, in the order in which [`find`](Self::find) takes them.
+    pub fn points(&self) -> impl Iterator<Item = Point<'_>> {
+        let of_side = move |(number, side)| {
+            let (side, other): (&Side, _) = (side, self.other(number));
+            self.points[number].chunk_by(|a, b| a[0] == b[0]).map(move |list| Point {
+                node: list[0][0],
+                outward: side.outward(list[0][0]),
+                in_order: number == 0,
+                list,
+                other,
+            })
+        };
+        self.sides.iter().enumerate().flat_map(of_side)
+    }
+
+    /// The pairs of edges that are candidates, in the order in which [`find`](Self::find) takes them.
+    pub fn crossings(&self) -> impl Iterator<Item = [Edge; 2]> {
+        let edge = |side: &Side, edge: u32| side.edges[edge as usize];
+        self.crossings.iter().map(move |&[a, b]| [edge(&self.sides[0], a), edge(self.other(0), b)])
+    }
+
     /// What is nearer than the skin beyond the distance to keep, with nodes at these places [m].
     pub fn find(&self, place: impl Fn(u32) -> Vector3<f64>, mut found: impl FnMut(Pair)) {
-        let alone = self.sides.len() == 1;
-        let other = |side: usize| if alone { &self.sides[0] } else { &self.sides[1 - side] };
         let limit = self.offset + self.skin;
         let wanted = |pair: &Pair| -self.depth < pair.distance && pair.distance < limit;
         let within = limit.max(self.depth);
         for (number, side) in self.sides.iter().enumerate() {
             for list in self.points[number].chunk_by(|a, b| a[0] == b[0]) {
-                self.find_above(list, within, side, other(number), &place, |pair| {
+                self.find_above(list, within, side, self.other(number), &place, |pair| {
                     if wanted(&pair) {
                         found(Pair { in_order: number == 0, ..pair });
                     }
@@ -301,7 +356,7 @@ impl Pairs {
             }
         }
         for &[first, second] in &self.crossings {
-            let edges = [&self.sides[0].edges[first as usize], &other(0).edges[second as usize]];
+            let edges = [&self.sides[0].edges[first as usize], &self.other(0).edges[second as usize]];
             let Some(Across { weights: [s, t], normal, distance }) = Across::of(edges, within, &place) else {
                 continue;
             };
@@ -326,7 +381,7 @@ impl Pairs {
     ) {
         let node = list[0][0];
         let point = place(node);
-        let outward = side.normals[side.nodes.partition_point(|&known| known < node)];
+        let outward = side.outward(node);
         let pair = |[a, b, c]: [u32; 3], [u, v, w]: [f64; 3], normal, distance| Pair {
             nodes: [node, a, b, c],
             weights: [1.0, -u, -v, -w],
@@ -335,7 +390,7 @@ impl Pairs {
             in_order: true,
         };
         // The nearest edge or corner: its distance, the way from there, the normals of its triangles, its triangle and weights.
-        let mut nearest = (f64::INFINITY, Vector3::zeros(), Vector3::zeros(), [0; 3], [0.0; 3]);
+        let mut nearest = (f64::INFINITY, Vector3::zeros(), Vector3::zeros(), 0, [0.0; 3]);
         // Of the triangles that the node lies beneath, the nearest one: whoever is inside leaves by the shortest way.
         let mut beneath: Option<Pair> = None;
         let mut above = f64::INFINITY;
@@ -344,8 +399,8 @@ impl Pairs {
         // Whether the nearest edge or corner is of a triangle that does not.
         let mut faces = false;
         let mut rows = Vec::new();
-        for [_, face] in list {
-            let nodes = other.faces[*face as usize];
+        for &[_, face] in list {
+            let nodes = other.faces[face as usize];
             let corners = nodes.map(place);
             if is_beyond(within, &corners, &point) {
                 continue;
@@ -361,9 +416,9 @@ impl Pairs {
             }
             if here.is_inner {
                 let pair = pair(nodes, here.weights, here.normal, here.height);
-                if here.height >= 0.0 {
+                if here.height >= -ON * self.depth {
                     above = above.min(here.height);
-                    rows.push(pair);
+                    rows.push((face, pair));
                 } else if beneath.is_none_or(|known| known.distance < here.height) {
                     beneath = Some(pair);
                 }
@@ -372,26 +427,27 @@ impl Pairs {
             let distance = here.distance();
             let (known, ..) = nearest;
             if distance < known * (1.0 - SAME) {
-                nearest = (distance, here.way, here.normal, nodes, here.weights);
+                nearest = (distance, here.way, here.normal, face, here.weights);
                 faces = !faces_away;
             } else if distance <= known * (1.0 + SAME) {
                 nearest.2 += here.normal;
                 faces |= !faces_away;
             }
         }
-        let (distance, way, normals, nodes, weights) = nearest;
+        let (distance, way, normals, face, weights) = nearest;
         if faces && distance < above.min(hidden) * (1.0 - SAME) {
             // In one plane with a triangle, beside it, is not beneath it.
             let sign = if way.dot(&normals) < -SAME * distance * normals.norm() { -1.0 } else { 1.0 };
             // Who is behind a border is beside the surface.
+            let nodes = other.faces[face as usize];
             let mut on = nodes.iter().zip(&weights).filter(|(_, weight)| **weight != 0.0);
             let beside = sign < 0.0 && on.all(|(node, _)| other.border.binary_search(node).is_ok());
-            let normal = (way * sign).try_normalize(1e-6 * self.skin).or_else(|| normals.try_normalize(0.0));
+            let normal = (way * sign).try_normalize(ON * self.depth).or_else(|| normals.try_normalize(0.0));
             if let Some(normal) = normal.filter(|_| !beside) {
                 let pair = pair(nodes, weights, normal, sign * distance);
-                if sign > 0.0 {
-                    above = distance;
-                    rows.push(pair);
+                if pair.distance >= -ON * self.depth {
+                    above = pair.distance;
+                    rows.insert(rows.partition_point(|&(known, _)| known < face), (face, pair));
                 } else if beneath.is_none_or(|known| known.distance < pair.distance) {
                     beneath = Some(pair);
                 }
@@ -400,101 +456,8 @@ impl Pairs {
         match beneath {
             Some(Pair { distance, .. }) if -distance > hidden && -distance > SLIGHT * self.depth => {}
             Some(pair) if -pair.distance < above => found(pair),
-            _ => rows.into_iter().for_each(found),
+            _ => rows.into_iter().for_each(|(_, pair)| found(pair)),
         }
-    }
-}
-
-/// Whether a point is farther than a distance [m] from the plane of a triangle.
-fn is_beyond(within: f64, [a, b, c]: &[Vector3<f64>; 3], point: &Vector3<f64>) -> bool {
-    let area = (b - a).cross(&(c - a));
-    let height = area.dot(&(point - a));
-    height * height > within * within * area.norm_squared()
-}
-
-/// A point and a triangle.
-struct Above {
-    normal: Vector3<f64>,
-    /// Height [m] over the plane.
-    height: f64,
-    /// Weights of the point beneath, or of the closest point of the triangle if that is far beside it.
-    weights: [f64; 3],
-    /// The way [m] from there.
-    way: Vector3<f64>,
-    /// Whether the point is above or beneath the triangle.
-    is_inner: bool,
-}
-
-impl Above {
-    /// With points that are so far beside the triangle, over its height, as inner ones.
-    fn of(corners: &[Vector3<f64>; 3], point: &Vector3<f64>, beside: f64) -> Self {
-        let [a, b, c] = corners;
-        let area = (b - a).cross(&(c - a));
-        let normal = area.try_normalize(0.0).unwrap_or_default();
-        let height = normal.dot(&(point - a));
-        let part = |from: &Vector3<f64>, to: &Vector3<f64>| {
-            area.dot(&(from - point).cross(&(to - point))) / area.norm_squared()
-        };
-        let weights = [part(b, c), part(c, a), part(a, b)];
-        if weights.iter().all(|&weight| weight >= -beside) {
-            return Self { normal, height, weights, way: normal * height, is_inner: true };
-        }
-        let weights = barycentric_of_closest(corners, point);
-        let way = point - (a * weights[0] + b * weights[1] + c * weights[2]);
-        Self { normal, height, weights, way, is_inner: false }
-    }
-
-    /// Whether the point counts as inner though it is a little beside.
-    fn is_beside(&self) -> bool {
-        self.is_inner && self.weights.iter().any(|&weight| weight < 0.0)
-    }
-
-    fn distance(&self) -> f64 {
-        self.way.norm()
-    }
-}
-
-/// Two edges whose closest points are within both and touch from outside.
-struct Across {
-    /// How far along each edge the closest points are, from 0 to 1.
-    weights: [f64; 2],
-    normal: Vector3<f64>,
-    distance: f64,
-}
-
-impl Across {
-    /// If they are no farther than a distance [m].
-    fn of([first, second]: [&Edge; 2], within: f64, place: &impl Fn(u32) -> Vector3<f64>) -> Option<Self> {
-        let ([a, b], [c, d]) = (first.ends.map(place), second.ends.map(place));
-        let (along, other, between) = (b - a, d - c, a - c);
-        let normal = along.cross(&other);
-        let [aa, bb, ab] = [along.norm_squared(), other.norm_squared(), along.dot(&other)];
-        let crossed = normal.norm_squared();
-        // Edges that are nearly parallel touch at their ends.
-        if crossed <= 1e-6 * aa * bb {
-            return None;
-        }
-        let [da, db] = [along.dot(&between), other.dot(&between)];
-        let weights = [(ab * db - bb * da) / crossed, (aa * db - ab * da) / crossed];
-        if weights.iter().any(|weight| !(0.0..=1.0).contains(weight)) {
-            return None;
-        }
-        let normal = normal / crossed.sqrt();
-        if normal.dot(&between).abs() > within {
-            return None;
-        }
-        // The normal leads out of the second and into the first, whose triangles are all behind it or before it.
-        let normal = if normal.dot(&second.outward(place)) < 0.0 { -normal } else { normal };
-        let behind = second.across.iter().all(|&node| normal.dot(&(place(node) - c)) <= 0.0);
-        let before = first.across.iter().all(|&node| normal.dot(&(place(node) - a)) >= 0.0);
-        if normal.dot(&first.outward(place)) >= 0.0 || !behind || !before {
-            return None;
-        }
-        let distance = normal.dot(&between);
-        // Edges that overlap by more than one of them goes on beyond the other leave each other past its end.
-        let [s, t] = weights;
-        let beyond = (s.min(1.0 - s) * aa.sqrt()).min(t.min(1.0 - t) * bb.sqrt());
-        (distance > -beyond).then_some(Self { weights, normal, distance })
     }
 }
 

@@ -1,9 +1,10 @@
-//! Rigid things for GPUs: their distances and ways are snippets of WGSL beside their Rust twins. This file joins them, and writes shapes and
-//! passages as they read them.
+//! Rigid things and pairs of surfaces for GPUs: distances and ways are snippets of WGSL beside their Rust twins. This file joins them, and
+//! writes shapes and passages as they read them.
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::grid::FLATTEST;
+use crate::pairs::{BESIDE, FACING, FLAT, ON, PARALLEL, SLIGHT};
 use crate::shape::Shape;
 use crate::touch::{ALIKE, LEFT, MEETS, MOST_PARTS, Passage, Rigid};
 
@@ -44,8 +45,7 @@ pub fn shader(rigids: &[Rigid]) -> String {
         ("ALIKE", ALIKE),
         ("LEFT", LEFT),
     ];
-    let numbers: String =
-        numbers.iter().map(|(name, value)| format!("const {name} = {:e}f;\n", *value as f32)).collect();
+    let numbers = constants(&numbers);
     let kinds: String = (KINDS.iter().enumerate())
         .map(|(own, name)| {
             let is_there = rigids.iter().any(|rigid| kind(&rigid.shape) == own);
@@ -53,6 +53,25 @@ pub fn shader(rigids: &[Rigid]) -> String {
         })
         .collect();
     [&numbers, &kinds, include_str!("shape.wgsl"), include_str!("touch.wgsl")].join("\n")
+}
+
+fn constants(numbers: &[(&str, f64)]) -> String {
+    numbers.iter().map(|(name, value)| format!("const {name} = {:e}f;\n", *value as f32)).collect()
+}
+
+/// What surfaces find at each other, in WGSL: `find_above` of a node with triangles, and `find_crossing` of two edges.
+///
+/// The module around it defines where nodes are and what happens with a pair; narrow.wgsl tells how.
+pub fn pairs_shader() -> String {
+    let numbers = [
+        ("BESIDE", BESIDE),
+        ("FACING", FACING),
+        ("SLIGHT", SLIGHT),
+        ("PARALLEL", PARALLEL),
+        ("FLAT", FLAT),
+        ("ON", ON),
+    ];
+    [&constants(&numbers), include_str!("pairs/narrow.wgsl")].join("\n")
 }
 
 /// Rigid things as `thing_number` gives them: [`THING`] numbers each, in their order, then the values of grids.

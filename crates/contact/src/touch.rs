@@ -9,7 +9,7 @@ use pliant_mechanics::curve::Curve;
 use pliant_mechanics::tensor::Vector;
 use serde::{Deserialize, Serialize};
 
-use crate::pairs::Surface;
+use crate::pairs::{Pairs, Surface};
 use crate::pose::{Course, Leg, Pose, between};
 use crate::shape::{Near, Shape};
 
@@ -38,6 +38,8 @@ pub const OFF: f64 = 1e-3;
 pub const LIFTS: usize = 16;
 /// The gap, over the first one, at which it is out.
 pub const LIFTED: f64 = 1e-4;
+/// Gaps, over the depth of the deepest point, up to which points take part.
+pub const BAND: f64 = 8.0;
 /// Part of the longest edge of a surface that a node may be away from a thing and still count as near, in addition to its way in the step.
 pub const MARGIN: f64 = 0.1;
 
@@ -334,6 +336,37 @@ impl Contact {
     pub fn surfaces(&self) -> impl Iterator<Item = &Surface> {
         let other = if let With::Body(other) = &self.with { Some(other) } else { None };
         std::iter::once(&self.surface).chain(other)
+    }
+
+    /// Its pairs if it is one of bodies, with numbers of nodes that keep their order, and places at rest [m] by these. Bodies are in the order
+    /// of their nodes, with −1 where the contact names them in the other one: results don't depend on that.
+    pub fn pairs(
+        &self,
+        number: impl Fn(u32) -> u32,
+        place: impl Fn(u32) -> Vector3<f64>,
+    ) -> Option<(Pairs, f64)> {
+        let first = self.surface.numbered(&number);
+        let second = match &self.with {
+            With::Rigid(_) => return None,
+            With::Body(second) => Some(second.numbered(&number)),
+            With::Itself => None,
+        };
+        let (first, second, sign) = match second {
+            Some(second) if second.nodes < first.nodes => (second, Some(first), -1.0),
+            second => (first, second, 1.0),
+        };
+        Some((Pairs::new(&first, second.as_ref(), self.touch.offset, place), sign))
+    }
+}
+
+impl Contacts {
+    /// All nodes that may touch something, increasing.
+    pub fn nodes(&self) -> Vec<u32> {
+        let surfaces = self.contacts.iter().flat_map(Contact::surfaces);
+        let mut nodes: Vec<u32> = surfaces.flat_map(|surface| &surface.nodes).copied().collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
     }
 }
 

@@ -11,20 +11,17 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 use pliant_contact::lag::Lag;
-use pliant_contact::pairs::{Pairs, Surface};
+use pliant_contact::pairs::Pairs;
 use pliant_contact::pose::{Leg, Pose};
 use pliant_contact::shape::Near;
 use pliant_contact::touch::{
-    Contact, Contacts, FOUND, Gripped, LIFTED, LIFTS, LOOKED, OFF, PASSES, Passage, ROUNDS, Rigid, With,
+    BAND, Contact, Contacts, FOUND, Gripped, LIFTED, LIFTS, LOOKED, OFF, PASSES, Passage, ROUNDS, Rigid, With,
 };
 use pliant_mechanics::tensor::{Vector, add};
 
 use at_rigid::AtRigid;
 pub use nodal::NodeContact;
 use rows::{NONE, Row, idle, push_alone, take_back};
-
-/// Gaps, over the depth of the deepest point, up to which points take part.
-const BAND: f64 = 8.0;
 
 /// Distance [thinnest part of a jaw] at which a node touches it.
 const TOUCHING: f64 = 1e-6;
@@ -99,7 +96,7 @@ impl Node {
 /// What a contact is about, in numbers of nodes of [`Touching`].
 enum Own {
     Rigid(Box<AtRigid>),
-    /// Bodies in the order of their nodes, with −1 where the contact names them in the other one: results don't depend on that.
+    /// Bodies, with a sign ([`Contact::pairs`](pliant_contact::touch::Contact::pairs)).
     Bodies(Pairs, f64),
 }
 
@@ -123,36 +120,21 @@ pub(crate) struct Touching {
 impl Touching {
     /// Those of a model with these nodes at rest [m].
     pub fn new(contacts: Arc<Contacts>, rest: &[Vector<f64>]) -> Self {
-        let surfaces = contacts.contacts.iter().flat_map(Contact::surfaces);
-        let mut numbers: Vec<u32> = surfaces.flat_map(|surface| &surface.nodes).copied().collect();
-        numbers.sort_unstable();
-        numbers.dedup();
+        let numbers = contacts.nodes();
         // Faces are of nodes that touch.
-        let number = |node: &u32| numbers.partition_point(|known| known < node) as u32;
-        let own = |Surface { nodes, faces }: &Surface| {
-            let faces = faces.iter().map(|face| face.map(|node| number(&node))).collect();
-            Surface { nodes: nodes.iter().map(number).collect(), faces }
-        };
+        let number = |node: u32| numbers.partition_point(|&known| known < node) as u32;
         let place = |node: u32| Vector3::from(rest[numbers[node as usize] as usize]);
-        let pairs = |contact: &Contact, second: Option<&Surface>| {
-            let first = own(&contact.surface);
-            let (first, second, sign) = match second {
-                Some(second) if second.nodes < first.nodes => (second, Some(&first), -1.0),
-                _ => (&first, second, 1.0),
+        let parts = contacts.contacts.iter().map(|contact| {
+            let at_rigid = |rigid: usize| {
+                let surface = contact.surface.numbered(number);
+                Own::Rigid(Box::new(AtRigid::new(&contacts.rigids[rigid], rigid, surface, place)))
             };
-            Own::Bodies(Pairs::new(first, second, contact.touch.offset, place), sign)
-        };
-        let parts = contacts.contacts.iter().map(|contact| match &contact.with {
-            &With::Rigid(rigid) => Own::Rigid(Box::new(AtRigid::new(
-                &contacts.rigids[rigid],
-                rigid,
-                own(&contact.surface),
-                place,
-            ))),
-            With::Body(second) => pairs(contact, Some(&own(second))),
-            With::Itself => pairs(contact, None),
+            match contact.with {
+                With::Rigid(rigid) => Some(at_rigid(rigid)),
+                _ => contact.pairs(number, place).map(|(pairs, sign)| Own::Bodies(pairs, sign)),
+            }
         });
-        let own = parts.collect();
+        let own = parts.flatten().collect();
         Self {
             nodes: vec![Node::NONE; numbers.len()],
             distances: vec![0.0; numbers.len()],

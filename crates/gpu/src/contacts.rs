@@ -1,38 +1,32 @@
-//! Contacts with rigid things on the device: nodes and points between them as rows, found and solved there at every instant. Only the ways of the
-//! things go up, with the factors of loads. Leaves out: contacts of bodies with each other or themselves, ideal grips of jaws.
+//! Contacts on the device: nodes and points between them as rows, found and solved there at every instant. Only the ways of obstacles and tools
+//! go up, with the factors of loads, and lists of candidates for pairs of surfaces when these are to be made anew. Leaves out: ideal grips of jaws.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use pliant_contact::pose::Leg;
-use pliant_contact::shader::{PASSAGE, THING, shader, split, things};
+use pliant_contact::shader::{PASSAGE, THING, pairs_shader, shader, split, things};
 use pliant_contact::touch::{
-    Contact, Contacts, FOUND, LIFTED, LIFTS, LOOKED, MARGIN, OFF, PASSES, Passage, ROUNDS, SIDES, With,
-    lattice, parts_of,
+    BAND, Contact, Contacts, FOUND, LIFTED, LIFTS, LOOKED, MARGIN, OFF, PASSES, Passage, ROUNDS, Rigid,
+    SIDES, With, lattice, parts_of,
 };
 use pliant_mechanics::model::Model;
 use pliant_mechanics::tensor::Vector;
 
-use crate::kernel::{Binding, Bound, Kernel, Memory};
+use crate::kernel::{Binding, Bound, GROUP, Kernel, Memory};
 use crate::loads::DeviceLoads;
 use crate::nodes::{DeviceNodes, MOTION, MOVE, UNTOUCHED, external_forces};
+use crate::pairs::DevicePairs;
 use crate::transfer::Four;
-use crate::{Device, GpuError};
+use crate::{Device, GpuError, Kind};
 
 /// What of contacts runs on the CPU only, in words.
 pub fn processor_only(contacts: &Contacts) -> Option<String> {
-    let of_bodies = contacts.contacts.iter().find(|contact| !matches!(contact.with, With::Rigid(_)));
+    let grips = |rigid: &&Rigid| rigid.jaw.as_ref().is_some_and(|jaw| jaw.grip.is_some());
     let gripping =
-        contacts.rigids.iter().find(|rigid| rigid.jaw.as_ref().is_some_and(|jaw| jaw.grip.is_some()));
+        contacts.rigids.iter().find(grips).map(|rigid| format!("the ideal grip of `{}`", rigid.tool()));
     let limited = contacts.rigids.iter().find(|rigid| rigid.course.limit().is_some());
-    match (of_bodies, gripping) {
-        (Some(Contact { name, with: With::Itself, .. }), _) => {
-            Some(format!("the contact `{name}` of a body with itself"))
-        }
-        (Some(Contact { name, .. }), _) => Some(format!("the contact `{name}` of two bodies")),
-        (None, Some(rigid)) => Some(format!("the ideal grip of `{}`", rigid.tool())),
-        (None, None) => limited.map(|rigid| format!("the force limit of `{}`", rigid.tool())),
-    }
+    gripping.or_else(|| limited.map(|rigid| format!("the force limit of `{}`", rigid.tool())))
 }
 
 /// Adds the ways of all things in the step between two times [s], as touch.wgsl reads them.
@@ -53,6 +47,19 @@ pub(crate) fn passage_numbers(contacts: Option<&Contacts>) -> usize {
     PASSAGE * contacts.map_or(0, |contacts| contacts.rigids.len())
 }
 
+/// The arrays of contacts.
+struct Arrays {
+    surface: wgpu::Buffer,
+    things: wgpu::Buffer,
+    numbers: wgpu::Buffer,
+    states: wgpu::Buffer,
+    rows: wgpu::Buffer,
+    queue: wgpu::Buffer,
+}
+
+/// Which group of bindings contacts have.
+const OWN_GROUP: usize = 2;
+
 /// The contacts of a model.
 pub(crate) struct DeviceContacts {
     /// The things and who touches them.
@@ -61,10 +68,18 @@ pub(crate) struct DeviceContacts {
     pub forces: wgpu::Buffer,
     /// The force [N] of each contact on its surface, four numbers each, once [`sum`](Self::sum) has run.
     pub sums: wgpu::Buffer,
+    /// What runs before the forces of cells are found: stops where candidates for pairs are to be listed anew.
+    pub before: Option<Kernel>,
     /// What finds the forces on nodes, in order.
     pub kernels: Vec<Kernel>,
     /// Sums the forces of each contact.
     pub sum: Kernel,
+    arrays: Arrays,
+    pairs: Option<DevicePairs>,
+    /// Which of the kernels finds pairs.
+    finder: usize,
+    /// Fours of `rows` before those of pairs.
+    other_rows: usize,
 }
 
 impl DeviceContacts {
@@ -82,26 +97,20 @@ impl DeviceContacts {
         constants: &[(&str, usize)],
     ) -> Result<Self, GpuError> {
         let passages = constants.iter().find(|(name, _)| *name == "PASSAGES").map_or(0, |&(_, at)| at);
-        let lists = Lists::new(contacts, &model.rest, passages);
+        let touching = contacts.nodes();
+        let pairs = DevicePairs::new(memory, contacts, &touching, &model.rest)?;
+        let lists = Lists::new(contacts, touching, &model.rest, passages);
         let forces = memory.zeros("the forces of contacts", model.node_count() * size_of::<Four>())?;
         let sums = memory.zeros("the forces of contacts", contacts.contacts.len() * size_of::<Four>())?;
-        let surface = memory.filled("the nodes that touch", &lists.surface)?;
-        let things = memory.filled("obstacles and tools", &lists.things)?;
-        let numbers = memory.filled("the faces that touch", &lists.numbers)?;
-        let states = memory.zeros("the nodes that touch", 2 * lists.nodes * size_of::<Four>())?;
-        let rows = memory.zeros("the points that touch", lists.rows * size_of::<Four>())?;
-        let queue = memory.zeros("the faces that touch", lists.queue() * size_of::<u32>())?;
-        let own = [
-            Binding::Read(&surface),
-            Binding::Read(&things),
-            Binding::Read(&numbers),
-            Binding::Write(&states),
-            Binding::Write(&rows),
-            Binding::Write(&forces),
-            Binding::Write(&queue),
-            Binding::Write(&sums),
-        ];
-        let bound = nodes.of_contacts(device, &own);
+        let arrays = Arrays {
+            surface: memory.filled("the nodes that touch", &lists.surface)?,
+            things: memory.filled("obstacles and tools", &lists.things)?,
+            numbers: memory.filled("the faces that touch", &lists.numbers)?,
+            states: memory.zeros("the nodes that touch", 2 * lists.nodes * size_of::<Four>())?,
+            rows: rows(memory, lists.rows, pairs.as_ref())?,
+            queue: memory.zeros("the faces that touch", lists.queue() * size_of::<u32>())?,
+        };
+        let bound = bound(device, nodes, &arrays, [&forces, &sums], pairs.as_ref());
         let constants = [constants, &lists.constants].concat();
         let counts = [
             ("PASSES", PASSES),
@@ -110,14 +119,31 @@ impl DeviceContacts {
             ("SIDES", SIDES),
             ("LIFTS", LIFTS),
             ("ROWS", NODE_ROWS),
+            ("SOLVERS", solvers(device)),
         ];
         let counts = counts.map(|(name, count)| format!("const {name} = {count}u;\n"));
-        let parts = [("FOUND", FOUND), ("OFF", OFF), ("LIFTED", LIFTED)];
+        let parts = [("FOUND", FOUND), ("OFF", OFF), ("LIFTED", LIFTED), ("BAND", BAND)];
         let parts = parts.map(|(name, part)| format!("const {name} = {:e}f;\n", part as f32));
-        let limits = [counts.concat(), parts.concat()].concat();
+        // Whether several nodes have rows in common.
+        let is_shared = lists.faces > 0 || pairs.is_some();
+        let limits = [counts.concat(), parts.concat(), format!("const IS_SHARED = {is_shared};\n")].concat();
         let things = shader(&contacts.rigids);
-        let touching: [&str; 4] =
-            [include_str!("shaders/instant.wgsl"), &limits, &things, include_str!("shaders/touching.wgsl")];
+        let of_pairs = match pairs {
+            Some(_) => [
+                &pairs_shader(),
+                include_str!("shaders/pairs.wgsl"),
+                include_str!("shaders/pair_levels.wgsl"),
+            ]
+            .concat(),
+            None => include_str!("shaders/no_pairs.wgsl").to_owned(),
+        };
+        let touching = [
+            include_str!("shaders/instant.wgsl"),
+            &limits,
+            &things,
+            include_str!("shaders/touching.wgsl"),
+            &of_pairs,
+        ];
         let loaded = loads.map(|loads| Bound::new(device, &loads.bindings()));
         let groups = [instant, gathered, &bound];
         let with_loads: Vec<&Bound> = groups.into_iter().chain(&loaded).collect();
@@ -138,17 +164,98 @@ impl DeviceContacts {
         };
         if lists.faces > 0 {
             kernels.push(with(include_str!("shaders/touch_faces.wgsl"), lists.faces)?);
+        }
+        let finder = kernels.len();
+        let mut before = None;
+        if let Some(pairs) = &pairs {
+            before = Some(with(include_str!("shaders/touch_moved.wgsl"), lists.nodes)?);
+            kernels.push(with(include_str!("shaders/touch_pairs.wgsl"), pairs.finders)?);
+        }
+        if is_shared {
             kernels.push(with(include_str!("shaders/touch_solve.wgsl"), 1)?);
             kernels.push(with(include_str!("shaders/touch_lift.wgsl"), lists.nodes)?);
         }
         let mut sum = with(include_str!("shaders/touch_sums.wgsl"), 1)?;
         sum.dispatch_groups(contacts.contacts.len() as u32);
-        Ok(Self { contacts: Arc::clone(contacts), forces, sums, kernels, sum })
+        let (contacts, other_rows) = (Arc::clone(contacts), lists.rows);
+        Ok(Self { contacts, forces, sums, before, kernels, sum, arrays, pairs, finder, other_rows })
+    }
+
+    /// Whether bodies touch each other or themselves.
+    pub(crate) fn has_pairs(&self) -> bool {
+        self.pairs.is_some()
+    }
+
+    /// Lists candidates for pairs, with nodes at displacements [m] from where they go by `part` of these increments [m] in the step to come.
+    ///
+    /// # Errors
+    /// If an array is too large.
+    pub(crate) fn list(
+        &mut self,
+        device: &Device,
+        nodes: &DeviceNodes,
+        (displacements, increments): (&[Four], &[Four]),
+        part: f64,
+    ) -> Result<(), GpuError> {
+        let Some(pairs) = &mut self.pairs else { return Ok(()) };
+        if pairs.list(device, displacements, increments, part)? {
+            self.arrays.rows = rows(&Memory::new(device), self.other_rows, Some(pairs))?;
+            let bound = bound(device, nodes, &self.arrays, [&self.forces, &self.sums], Some(pairs));
+            let kernels = self.kernels.iter_mut().chain(&mut self.before).chain([&mut self.sum]);
+            kernels.for_each(|kernel| kernel.rebind(OWN_GROUP, &bound));
+        }
+        self.kernels[self.finder].resize(pairs.finders);
+        Ok(())
     }
 }
 
+/// Rows, with those of pairs.
+fn rows(memory: &Memory<'_>, own: usize, pairs: Option<&DevicePairs>) -> Result<wgpu::Buffer, GpuError> {
+    let of_pairs = pairs.map_or(0, |pairs| PAIR_ROW * pairs.most_rows);
+    memory.zeros("the points that touch", (own + of_pairs) * size_of::<Four>())
+}
+
+/// What kernels of contacts work on, besides the nodes.
+fn bound(
+    device: &Device,
+    nodes: &DeviceNodes,
+    Arrays { surface, things, numbers, states, rows, queue }: &Arrays,
+    [forces, sums]: [&wgpu::Buffer; 2],
+    pairs: Option<&DevicePairs>,
+) -> Bound {
+    let mut own = vec![
+        Binding::Read(surface),
+        Binding::Read(things),
+        Binding::Read(numbers),
+        Binding::Write(states),
+        Binding::Write(rows),
+        Binding::Write(forces),
+        Binding::Write(queue),
+        Binding::Write(sums),
+    ];
+    if let Some(DevicePairs { candidates, listed, queue, .. }) = pairs {
+        own.extend([Binding::Read(candidates), Binding::Read(listed), Binding::Write(queue)]);
+    }
+    nodes.of_contacts(device, &own)
+}
+
+/// Invocations of the group that solves all rows. It waits after each colour and level; software changes from one part of a group to another
+/// there, and has one part only if the group fills one vector.
+fn solvers(device: &Device) -> usize {
+    match device.adapter().kind {
+        Kind::Software => 8,
+        _ => GROUP as usize,
+    }
+}
+
+/// Fours of `rows` of a candidate for a pair; twin of the one in pairs.wgsl.
+const PAIR_ROW: usize = 4;
+
 /// Fours of `rows` of a contact at a node: its force, and three of each side of the thing.
 const NODE_ROWS: usize = 1 + 3 * SIDES;
+
+/// Numbers of a contact in `things`; twin of the one in touching.wgsl.
+const CONTACT: usize = 8;
 
 /// A face with points that touch.
 #[derive(Default)]
@@ -171,12 +278,13 @@ struct Lists {
 }
 
 impl Lists {
-    /// From where the ways of things begin in a row of the table.
-    fn new(Contacts { rigids, contacts }: &Contacts, rest: &[Vector<f64>], passages: usize) -> Self {
-        let mut nodes: Vec<u32> =
-            contacts.iter().flat_map(|contact| &contact.surface.nodes).copied().collect();
-        nodes.sort_unstable();
-        nodes.dedup();
+    /// Of the nodes that touch, and from where the ways of things begin in a row of the table.
+    fn new(
+        Contacts { rigids, contacts }: &Contacts,
+        nodes: Vec<u32>,
+        rest: &[Vector<f64>],
+        passages: usize,
+    ) -> Self {
         let place_of = |node: u32| nodes.partition_point(|&known| known < node);
         let mut at_node = vec![Vec::new(); nodes.len()];
         let mut things = things(rigids);
@@ -185,7 +293,11 @@ impl Lists {
         let mut faces: BTreeMap<[u32; 3], Face> = BTreeMap::new();
         let mut points_of = Vec::new();
         for (index, Contact { surface, with, touch, .. }) in contacts.iter().enumerate() {
-            let &With::Rigid(rigid) = with else { continue };
+            let &With::Rigid(rigid) = with else {
+                things.extend([0.0; CONTACT]);
+                points_of.push(0);
+                continue;
+            };
             surface.nodes.iter().for_each(|&node| at_node[place_of(node)].push(index));
             let longest = surface.longest_edge(|node| rest[node as usize].into());
             let own = lattice(parts_of(longest, &rigids[rigid].shape));
@@ -260,6 +372,7 @@ impl Lists {
             ("FACE_CONTACTS", contacts_of_faces),
             ("COLOURS_AT", first_colour),
             ("SUMS_AT", first_sum),
+            ("PAIR_ROWS", rows),
         ];
         let (nodes, faces) = (nodes.len(), faces.len());
         Self { surface, things, numbers, nodes, faces, colours, rows, constants }

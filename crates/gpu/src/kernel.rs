@@ -272,6 +272,18 @@ impl Kernel {
         self.dispatch = [count, 1];
     }
 
+    /// Works with other arrays of a group, bound alike.
+    pub(crate) fn rebind(&mut self, group: usize, to: &Bound) {
+        for (own, to) in self.bound.iter_mut().zip(&to.groups) {
+            own[group - 1] = to.clone();
+        }
+    }
+
+    /// Runs for so many invocations from now on.
+    pub(crate) fn resize(&mut self, invocations: usize) {
+        self.dispatch = groups(invocations);
+    }
+
     /// Runs for the instant at an offset, with `side` of arrays that have two.
     pub(crate) fn run(&self, pass: &mut wgpu::ComputePass<'_>, instant: &Bound, offset: u32, side: usize) {
         pass.set_pipeline(&self.pipeline);

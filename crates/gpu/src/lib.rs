@@ -72,10 +72,15 @@
 //!
 //! # Contact
 //!
-//! [`GpuStepper::touching`] lets nodes, and points on faces, touch rigid things as `touching.rs` does on the CPU. Where a node would go
+//! [`GpuStepper::touching`] lets nodes, and points on faces, touch rigid things, other bodies and themselves as `touching.rs` does on the CPU. Where a node would go
 //! without contact is found before the node pass, from the forces of cells; a group solves the rows of points that share nodes, colour by
-//! colour; the node pass takes the forces. The ways of tools in a step are numbers of its row of the table. [`processor_only`] names what is
+//! colour and level by level; the node pass takes the forces. The ways of tools in a step are numbers of its row of the table. [`processor_only`] names what is
 //! not there.
+//!
+//! Candidates for pairs of surfaces are listed in ordinary memory (`pairs.rs`). A kernel before the forces of an instant stops the device there if
+//! nodes may leave the skin of the lists: the instant is noted in the findings, as that of a failure, and all later kernels do nothing. The
+//! stepper reads that after its last submission, goes back to this instant, lists anew and submits the rest again. So
+//! [`GpuStepper::advance_without_read_back`] does read back there.
 //!
 //! # Tests
 //!
@@ -94,6 +99,7 @@ mod kernel;
 mod loads;
 mod mapping;
 mod nodes;
+mod pairs;
 mod paths;
 mod rates;
 mod run;

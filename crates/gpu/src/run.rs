@@ -118,7 +118,10 @@ fn bind(
 }
 
 /// What is found at all instants, before any.
-const NOTHING: [u32; 4] = [u32::MAX, u32::MAX, f32::to_bits(1.0), 0];
+const NOTHING: [u32; 5] = [u32::MAX, u32::MAX, f32::to_bits(1.0), 0, u32::MAX];
+
+/// Where in the findings the first instant is that waits for lists of candidates for contact.
+pub(crate) const UNLISTED: usize = 4;
 
 impl Instants {
     /// # Errors
@@ -174,7 +177,13 @@ impl Instants {
 
     /// Forgets how far cells were deformed.
     pub(crate) fn forget_deformation(&self, device: &Device) {
-        device.queue.write_buffer(&self.findings, 8, bytemuck::cast_slice(&NOTHING[2..]));
+        device.queue.write_buffer(&self.findings, 8, bytemuck::cast_slice(&NOTHING[2..UNLISTED]));
+    }
+
+    /// Goes on where candidates for contact were to be listed anew.
+    pub(crate) fn go_on(&self, device: &Device) {
+        let place = (UNLISTED * size_of::<u32>()) as u64;
+        device.queue.write_buffer(&self.findings, place, bytemuck::cast_slice(&NOTHING[UNLISTED..]));
     }
 
     /// Adds an instant at a time [s], `next` seconds before the one after it, with the tools that are driven.

@@ -23,7 +23,7 @@ use crate::loads::DeviceLoads;
 use crate::mapping::{DeviceMapping, PointValue};
 use crate::nodes::{DeviceNodes, NodeKernels, SUMS, fours};
 use crate::paths::Paths;
-use crate::run::{Instant, Instants, MOST, StepFailure, flags, table_constants};
+use crate::run::{Instant, Instants, MOST, StepFailure, UNLISTED, flags, table_constants};
 use crate::solids::DeviceSolid;
 use crate::transfer::Four;
 use crate::transfer::Transfer;
@@ -61,6 +61,8 @@ struct Results {
     /// The first instant at which a cell is broken, and the first at which a force is out of range.
     broken: Option<u32>,
     overflown: Option<u32>,
+    /// The first instant that waits for lists of candidates for contact.
+    unlisted: Option<u32>,
     deformed: Deformed,
     reactions: Vec<Four>,
     contact_forces: Vec<Four>,
@@ -91,8 +93,9 @@ pub struct GpuStepper {
     relaxing: Option<f64>,
     /// Which side of arrays with two is now.
     side: usize,
-    /// Whether a state was taken up.
+    /// Whether a state was taken up, and whether candidates for contact are listed.
     loaded: bool,
+    listed: bool,
     /// Whether its instant is evaluated.
     evaluated: bool,
     /// The last evaluated instant, the instants since then and the length of their steps [s].
@@ -157,7 +160,7 @@ impl GpuStepper {
         Self::with(device, model.into(), None, step, design)
     }
 
-    /// A stepper of bodies that touch rigid things; else as [`new`](Self::new).
+    /// A stepper of bodies that touch rigid things, each other or themselves; else as [`new`](Self::new).
     ///
     /// # Errors
     /// As [`new`](Self::new), and if something of the contacts, or of contact in the design, runs [on the CPU only](processor_only).
@@ -255,6 +258,7 @@ impl GpuStepper {
             relaxing: None,
             side: 0,
             loaded: false,
+            listed: false,
             evaluated: false,
             origin: None,
             since: 0,
@@ -326,6 +330,7 @@ impl GpuStepper {
         self.instants.forget(&self.device);
         self.entered = true;
         (self.loaded, self.evaluated, self.origin, self.since) = (true, false, None, 0);
+        self.listed = false;
     }
 
     /// Forces, coming increments, reactions and energies at the state's instant.
@@ -352,7 +357,10 @@ impl GpuStepper {
         self.relax(self.control.relaxing(state));
         self.instants.forget_deformation(&self.device);
         let starts = if state.is_at_start() { flags::STARTS } else { 0 };
-        let mut results = self.submit_evaluation(state, flags::MEASURES | starts, true)?;
+        if !self.listed {
+            self.list(state, self.lengths)?;
+        }
+        let mut results = self.evaluate_listed(state, flags::MEASURES | starts, true)?;
         self.check(state, &results)?;
         self.enter_passed(state, &results, self.lengths.before);
         let below = if state.is_between_steps() { self.watch(state, &results.deformed)? } else { Ok(()) };
@@ -362,7 +370,7 @@ impl GpuStepper {
         if self.lengths != self.control.lengths(state) {
             self.lengths = self.control.lengths(state);
             let shock = results.shock;
-            results = self.submit_evaluation(state, flags::MEASURES, false)?;
+            results = self.evaluate_listed(state, flags::MEASURES, false)?;
             results.shock = shock;
         }
         if !results.sums.is_finite() {
@@ -410,7 +418,7 @@ impl GpuStepper {
         Ok(())
     }
 
-    /// Goes up to `steps` whole steps on, as many as take about `within`, and waits for them without any read-back.
+    /// Goes up to `steps` whole steps on, as many as take about `within`, and waits for them without any read-back, unless bodies touch each other.
     /// Returns how many. After a failure the device stops, and the next evaluation reports it. The first instant is
     /// evaluated where that is not done yet.
     ///
@@ -495,9 +503,51 @@ impl GpuStepper {
         Ok(())
     }
 
-    /// Goes whole steps on without looking; the last submission, which may not be done yet.
+    /// Goes whole steps on without looking; the last submission, which may not be done yet. Where bodies touch each other, one number is
+    /// read back to see whether the device has stopped for lists of candidates.
     fn go(&mut self, state: &mut State<f32>, steps: u64) -> Result<Option<wgpu::SubmissionIndex>, GpuError> {
         let end = state.steps + steps;
+        let mut last = self.go_to(state, end)?;
+        while let Some(at) = self.unlisted()? {
+            self.go_back(state, at);
+            let Lengths { next, .. } = self.lengths;
+            self.list(state, Lengths { before: next, next })?;
+            last = self.go_to(state, end)?;
+        }
+        Ok(last)
+    }
+
+    /// The instant at which the device waits for lists of candidates, unless it has failed before.
+    fn unlisted(&mut self) -> Result<Option<u32>, GpuError> {
+        if !self.contacts.as_ref().is_some_and(DeviceContacts::has_pairs) {
+            return Ok(None);
+        }
+        let mut found = u32::MAX;
+        let findings = &self.instants.findings;
+        self.transfer.read::<u32>(&self.device, findings, UNLISTED + 1, |all| found = all[UNLISTED])?;
+        Ok((found != u32::MAX).then_some(found))
+    }
+
+    /// Lists candidates for contact anew, of an instant between steps of these lengths [s].
+    fn list(&mut self, state: &State<f32>, lengths: Lengths) -> Result<(), GpuError> {
+        self.listed = true;
+        let Some(contacts) = self.contacts.as_mut().filter(|own| own.has_pairs()) else { return Ok(()) };
+        let (nodes, side) = (&self.nodes, self.side);
+        let bytes = (nodes.count * size_of::<Four>()) as u64;
+        // The start has velocities in place of increments.
+        let part = if state.is_at_start() { lengths.before } else { lengths.ratio() };
+        let arrays = [&nodes.displacement, &nodes.increment].map(|of| (&of[side], bytes));
+        let (mut listed, device) = (Ok(()), &self.device);
+        self.transfer.read_all(device, &arrays, |parts| {
+            let [displacements, increments] = [0, 1].map(|k| bytemuck::cast_slice(parts[k]));
+            listed = contacts.list(device, nodes, (displacements, increments), part);
+        })?;
+        self.instants.go_on(device);
+        listed
+    }
+
+    /// Goes on to a number of whole steps without looking.
+    fn go_to(&mut self, state: &mut State<f32>, end: u64) -> Result<Option<wgpu::SubmissionIndex>, GpuError> {
         let mut from_look = std::mem::take(&mut self.evaluated);
         if from_look {
             state.work.advance();
@@ -596,6 +646,17 @@ impl GpuStepper {
         }
     }
 
+    /// Evaluates an instant once candidates for contact are listed for it, with the forces of cells found anew or as they stand.
+    fn evaluate_listed(&mut self, state: &State<f32>, flags: u32, anew: bool) -> Result<Results, GpuError> {
+        loop {
+            let results = self.submit_evaluation(state, flags, anew)?;
+            if results.unlisted.is_none() {
+                return Ok(results);
+            }
+            self.list(state, self.lengths)?;
+        }
+    }
+
     /// Evaluates an instant, with the forces of cells found anew or as they stand.
     fn submit_evaluation(&mut self, state: &State<f32>, flags: u32, anew: bool) -> Result<Results, GpuError> {
         let instant = Instant::new(self.since, flags, self.lengths);
@@ -603,6 +664,8 @@ impl GpuStepper {
         let (nodes, side, contacts) = (&self.kernels, self.side, &self.contacts);
         let forces = || force_kernels(&self.loads, &self.grips, &self.solids);
         self.instants.submit(&self.device, |pass, bound, _, offset| {
+            let before = contacts.iter().filter_map(|contacts| contacts.before.as_ref());
+            before.for_each(|kernel| kernel.run(pass, bound, offset, side));
             if anew {
                 forces().for_each(|kernel| kernel.run(pass, bound, offset, side));
             }
@@ -625,6 +688,8 @@ impl GpuStepper {
                 nodes.advance.run(pass, bound, offset, side);
                 return;
             }
+            let before = contacts.iter().filter_map(|contacts| contacts.before.as_ref());
+            before.for_each(|kernel| kernel.run(pass, bound, offset, side));
             forces().for_each(|kernel| kernel.run(pass, bound, offset, side));
             let touching = contacts.iter().flat_map(|contacts| &contacts.kernels);
             touching.for_each(|kernel| kernel.run(pass, bound, offset, side));
@@ -641,7 +706,7 @@ impl GpuStepper {
         let bytes = |count: usize| (count * size_of::<f32>()) as u64;
         let mut arrays = vec![
             (&nodes.sums, bytes(nodes.groups * SUMS)),
-            (findings, bytes(4)),
+            (findings, bytes(UNLISTED + 1)),
             (&nodes.reactions, bytes(nodes.held.len() * 4)),
         ];
         arrays.extend(self.contacts.iter().map(|own| (&own.sums, bytes(self.contact_forces.len() * 4))));
@@ -654,12 +719,13 @@ impl GpuStepper {
             let found: &[u32] = bytemuck::cast_slice(parts[1]);
             read = Some((
                 sums,
-                [found[0], found[1], found[2], found[3]],
+                [found[0], found[1], found[2], found[3], found[UNLISTED]],
                 bytemuck::cast_slice(parts[2]).to_vec(),
                 parts.get(3).map_or_else(Vec::new, |forces| bytemuck::cast_slice(forces).to_vec()),
             ));
         })?;
-        let (sums, [broken, overflown, least, largest], reactions, contact_forces) = read.unwrap_or_default();
+        let (sums, [broken, overflown, least, largest, unlisted], reactions, contact_forces) =
+            read.unwrap_or_default();
         Ok(Results {
             sums: Sums {
                 kinetic: sums[0],
@@ -674,6 +740,7 @@ impl GpuStepper {
             passed: [sums[8], sums[9], sums[10]],
             broken: (broken != u32::MAX).then_some(broken),
             overflown: (overflown != u32::MAX).then_some(overflown),
+            unlisted: (unlisted != u32::MAX).then_some(unlisted),
             deformed: Deformed {
                 least_volume_ratio: f64::from(f32::from_bits(least)),
                 largest_strain: f64::from(f32::from_bits(largest)),

@@ -33,10 +33,12 @@ const BROKEN = 0u;
 const OVERFLOWN = 1u;
 const LEAST_VOLUME_RATIO = 2u;
 const LARGEST_STRAIN = 3u;
+const UNLISTED = 4u;
 
 @group(0) @binding(0) var<uniform> instant: Instant;
-// The first instants at which a cell is broken and a sum overflows; bits of the least J and of the largest |C − I|².
-@group(0) @binding(1) var<storage, read_write> findings: array<atomic<u32>, 4>;
+// The first instants at which a cell is broken and a sum overflows; bits of the least J and of the largest |C − I|²; the first instant for which
+// candidates for contact are to be listed anew.
+@group(0) @binding(1) var<storage, read_write> findings: array<atomic<u32>, 5>;
 // For each instant of a submission the factors of constraints, those of loads, and the gravity of bodies.
 @group(0) @binding(2) var<storage, read> table: array<f32>;
 
@@ -52,9 +54,11 @@ fn grip_entries() -> u32 {
     return bitcast<u32>(grips[0].y);
 }
 
-// The first instant that is not sound; all stands still there.
+// The first instant that is not sound, or waits for lists; all stands still there.
 fn end() -> u32 {
-    return min(atomicLoad(&findings[BROKEN]), atomicLoad(&findings[OVERFLOWN]));
+    let sound = min(atomicLoad(&findings[BROKEN]), atomicLoad(&findings[OVERFLOWN]));
+    // What waits for lists has not begun: not even forces are found there. The first instant has lists.
+    return min(sound, max(atomicLoad(&findings[UNLISTED]), 1u) - 1u);
 }
 
 fn does(flag: u32) -> bool {

@@ -1,4 +1,4 @@
-// Predicts where nodes go that may touch something in the step, and measures their gaps. Where no points between nodes touch, finds their forces.
+// Predicts where nodes go that may touch something in the step, and measures their gaps. Where only nodes touch rigid things, finds their forces.
 
 @group(2) @binding(1) var<storage, read> increment: array<vec4f>;
 
@@ -15,7 +15,7 @@ fn main(
     if may_touch(n) {
         predict(n);
         let deepest = measure_node(n);
-        if FACES == 0u {
+        if !IS_SHARED {
             var is_found = deepest <= 0.0;
             for (var round = 0u; round < ROUNDS && !is_found; round++) {
                 push_alone(n, FOUND * deepest);
@@ -35,7 +35,7 @@ fn main(
 
 // Whether a node may touch something in the step: a way can double in a step.
 fn may_touch(n: u32) -> bool {
-    if does(STARTS) {
+    if does(STARTS) || is_listed(n) {
         return true;
     }
     let way = length(increment[node_of(n)].xyz) * instant.ratio;
@@ -86,7 +86,7 @@ fn measure_node(n: u32) -> f32 {
             takes_part = true;
         }
     }
-    if FACES > 0u && takes_part {
+    if IS_SHARED && takes_part {
         atomicMax(&queue[DEEPEST], bitcast<u32>(deepest));
         atomicStore(&queue[QUEUED_NODES + atomicAdd(&queue[NODES_TOLD], 1u)], n);
     }

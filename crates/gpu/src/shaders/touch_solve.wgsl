@@ -1,5 +1,5 @@
 // Finds the impulses of all rows, by projected Gauss–Seidel: those of nodes at once, then those on faces of a colour at once, since
-// such faces share no node. So the order within a colour changes no bit. Then nodes find the sides of things beside them. One group works, since all wait for each other.
+// such faces share no node, then those of pairs. So the order within a colour changes no bit. Then nodes find the sides of things beside them. One group works, since all wait for each other.
 
 var<workgroup> change: atomic<u32>;
 var<workgroup> told: u32;
@@ -15,45 +15,48 @@ fn largest(local: u32, own: f32) -> f32 {
     return bitcast<f32>(workgroupUniformLoad(&told));
 }
 
-@compute @workgroup_size(GROUP)
+@compute @workgroup_size(SOLVERS)
 fn main(@builtin(local_invocation_index) local: u32) {
     if local == 0u {
         told = select(0u, atomicLoad(&queue[DEEPEST]), end() > instant.index);
     }
     let deepest = bitcast<f32>(workgroupUniformLoad(&told));
     let nodes = atomicLoad(&queue[NODES_TOLD]);
+    order_pairs(local, deepest);
     var is_found = deepest <= 0.0;
     for (var round = 0u; round < ROUNDS && !is_found; round++) {
         var is_relaxed = false;
         for (var done = 0u; done < PASSES && !is_relaxed; done++) {
             var most = 0.0;
-            for (var k = local; k < nodes; k += GROUP) {
+            for (var k = local; k < nodes; k += SOLVERS) {
                 most = max(most, solve_node(atomicLoad(&queue[QUEUED_NODES + k])));
             }
             for (var colour = 0u; colour < COLOURS; colour++) {
                 storageBarrier();
                 let faces = atomicLoad(&queue[FACES_TOLD + colour]);
-                for (var k = local; k < faces; k += GROUP) {
+                for (var k = local; k < faces; k += SOLVERS) {
                     let face = atomicLoad(&queue[QUEUED_FACES + lists[COLOURS_AT + colour] + k]);
                     most = max(most, solve_face(face));
                 }
             }
+            most = max(most, solve_pairs(local));
             is_relaxed = largest(local, most) < FOUND * deepest;
         }
         var moved = 0.0;
-        for (var k = local; k < nodes; k += GROUP) {
+        for (var k = local; k < nodes; k += SOLVERS) {
             moved = max(moved, settle(atomicLoad(&queue[QUEUED_NODES + k]), FOUND * deepest));
         }
         is_found = largest(local, moved) <= FOUND * deepest;
     }
     for (var colour = 0u; colour < COLOURS; colour++) {
         let faces = atomicLoad(&queue[FACES_TOLD + colour]);
-        for (var k = local; k < faces; k += GROUP) {
+        for (var k = local; k < faces; k += SOLVERS) {
             sum_face(atomicLoad(&queue[QUEUED_FACES + lists[COLOURS_AT + colour] + k]));
         }
     }
     storageBarrier();
-    for (var k = local; k < QUEUED_NODES; k += GROUP) {
+    forget_pairs(local);
+    for (var k = local; k < QUEUED_NODES; k += SOLVERS) {
         atomicStore(&queue[k], 0u);
     }
 }
@@ -68,7 +71,8 @@ fn solve_face(face: u32) -> f32 {
         let at = lists[FACE_CONTACTS + 2u * entry + 1u];
         let end = at + 1u + 3u * u32(rows[at].w);
         for (var row = at + 1u; row < end; row += 3u) {
-            most = max(most, solve_row(row, corners, weights_of(u32(rows[row + 2u].w)), 3u, friction));
+            let weights = vec4f(weights_of(u32(rows[row + 2u].w)), 0.0);
+            most = max(most, solve_row(row, vec4u(corners, 0u), weights, 3u, friction));
         }
     }
     return most;

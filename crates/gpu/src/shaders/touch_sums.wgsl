@@ -11,7 +11,7 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lo
     for (var k = lists[SUMS_AT + contact] + local; k < lists[SUMS_AT + contact + 1u]; k += GROUP) {
         sum += rows[lists[k]].xyz;
     }
-    parts[local] = sum;
+    parts[local] = sum + force_of_pairs(contact, local);
     for (var half = GROUP / 2u; half > 0u; half /= 2u) {
         workgroupBarrier();
         if local < half {

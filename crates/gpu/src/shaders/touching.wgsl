@@ -1,4 +1,4 @@
-// Contacts with rigid things: where nodes would go, rows of nodes and of points between them, and their impulses; twin of touching.rs. Ways in
+// Contacts: where nodes would go, rows of nodes and of points between them, and their impulses; twin of touching.rs. Ways in
 // the step are kept apart from places, so that gaps and slips lose no digits.
 
 @group(2) @binding(0) var<storage, read> displacement: array<vec4f>;
@@ -14,7 +14,7 @@
 @group(2) @binding(11) var<storage, read_write> states: array<vec4f>;
 // Of a contact at a node its gap as predicted [m], then the force on it [N]; of one on a face the force and how many of its points take part; then three of each side of the thing at the
 // node, or of each point of the face: its normal and gap without contact [m]; its slip without contact [m] and its impulse [N]; the force
-// against its slip [N], and whether it takes part, or its place among the points of a face.
+// against its slip [N], and whether it takes part, or its place among the points of a face. Then candidates for pairs: the same with their weights.
 @group(2) @binding(12) var<storage, read_write> rows: array<vec4f>;
 // The force of contacts on each node of the model [N].
 @group(2) @binding(13) var<storage, read_write> contact_forces: array<vec4f>;
@@ -108,7 +108,7 @@ fn measure(at: u32, touch: Touch, place: vec3f, moved: vec3f, tag: f32) -> f32 {
 }
 
 // Finds the impulse of a row as others stand now. By how much its point has moved [m].
-fn solve_row(at: u32, nodes: vec3u, weights: vec3f, count: u32, friction: f32) -> f32 {
+fn solve_row(at: u32, nodes: vec4u, weights: vec4f, count: u32, friction: f32) -> f32 {
     var place = vec3f(0.0);
     var mobility = vec3f(0.0);
     for (var k = 0u; k < count; k++) {
@@ -181,7 +181,7 @@ fn solve_node(n: u32) -> f32 {
         for (var side = 0u; side < SIDES; side++) {
             let at = side_at(entry, side);
             if rows[at + 2u].w > 0.0 {
-                most = max(most, solve_row(at, vec3u(n), vec3f(1.0, 0.0, 0.0), 1u, friction_of(lists[entry])));
+                most = max(most, solve_row(at, vec4u(n), vec4f(1.0, 0.0, 0.0, 0.0), 1u, friction_of(lists[entry])));
             }
         }
     }

@@ -236,7 +236,7 @@ impl ImageTool {
 }
 
 /// Who touches whom: a body an obstacle or a tool, another body, or itself. No surface goes into the other. With the solver `explicit`, for bodies
-/// without bending; bodies that touch each other are solids, on the CPU. With the solvers `implicit` and `static`, for solids and shells: a barrier
+/// without bending; bodies that touch each other are solids. With the solvers `implicit` and `static`, for solids and shells: a barrier
 /// keeps surfaces apart, and no state that is accepted has an intersection. The force on the second is in `csv` outputs as `contact.NAME`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]

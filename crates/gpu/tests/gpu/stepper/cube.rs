@@ -91,6 +91,24 @@ fn tets_of(hexes: &[[u32; 8]]) -> Vec<[u32; 4]> {
     hexes.iter().flat_map(|hex| KUHN.map(|tet| tet.map(|corner| hex[corner]))).collect()
 }
 
+/// A block of so many cells of six tetrahedra along each edge, of a size [m] from the origin on.
+pub fn tet_block(cells: [u32; 3], size: [f64; 3]) -> (Vec<Vector<f64>>, Vec<[u32; 4]>) {
+    let [nx, ny, nz] = cells;
+    let all = |[nx, ny, nz]: [u32; 3]| {
+        (0..nz).flat_map(move |z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])))
+    };
+    let point = |at: [u32; 3]| [0, 1, 2].map(|c| size[c] * f64::from(at[c]) / f64::from(cells[c]));
+    let node = |[x, y, z]: [u32; 3]| (z * (ny + 1) + y) * (nx + 1) + x;
+    let hex = |[x, y, z]: [u32; 3]| {
+        let low = [[x, y, z], [x + 1, y, z], [x + 1, y + 1, z], [x, y + 1, z]];
+        let [a, b, c, d] = low.map(|[x, y, z]| node([x, y, z + 1]));
+        let [e, f, g, h] = low.map(node);
+        [e, f, g, h, a, b, c, d]
+    };
+    let hexes: Vec<[u32; 8]> = all([nx, ny, nz]).map(hex).collect();
+    (all([nx + 1, ny + 1, nz + 1]).map(point).collect(), tets_of(&hexes))
+}
+
 /// One body of an element.
 fn body(
     element: &str,

@@ -1,6 +1,7 @@
 //! The stepper on a device against the one of the processor.
 
 mod against;
+mod bodies;
 mod contact;
 mod cube;
 mod failures;

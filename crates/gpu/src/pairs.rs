@@ -1,0 +1,209 @@
+//! Candidates for pairs of points of surfaces: listed in ordinary memory from places that are read back, whenever the device stops because nodes may
+//! leave the skin of the lists. They hold at that instant and change nothing before, so that results don't depend on when the device was looked at.
+
+use nalgebra::Vector3;
+use pliant_contact::pairs::Pairs;
+use pliant_contact::touch::{Contacts, Touch};
+use pliant_mechanics::tensor::Vector;
+
+use crate::kernel::Memory;
+use crate::transfer::Four;
+use crate::{Device, GpuError};
+
+/// Numbers in the head of the candidates, and of each contact there; twin of the one in pairs.wgsl.
+const OF_CONTACT: usize = 8;
+
+/// Longer arrays than needed are made, so that few lists ask for others.
+const SPARE: usize = 2;
+
+/// What a node may go where nothing can be listed [m].
+const ANYWHERE: f32 = 1e30;
+
+/// The pairs of bodies of a model.
+pub(crate) struct DevicePairs {
+    /// The contact of each, its lists, and the sign of its forces.
+    own: Vec<(usize, Pairs, f64)>,
+    touches: Vec<Touch>,
+    /// Where the nodes that touch are at rest [m], by their own numbers, and their numbers in the model.
+    rest: Vec<Vector3<f64>>,
+    nodes: Vec<u32>,
+    /// Which of them have pairs.
+    watched: Vec<bool>,
+    /// What pairs.wgsl reads.
+    pub candidates: wgpu::Buffer,
+    pub listed: wgpu::Buffer,
+    /// What kernels need to order them.
+    pub queue: wgpu::Buffer,
+    /// Rows that `queue` has room for.
+    pub most_rows: usize,
+    /// Invocations that find pairs.
+    pub finders: usize,
+    numbers: Vec<u32>,
+    places: Vec<Four>,
+}
+
+impl DevicePairs {
+    /// Those of contacts of bodies, if there are any; `nodes` touch something, and `rest` is where all nodes of the model are at rest [m].
+    ///
+    /// # Errors
+    /// If an array is too large.
+    pub(crate) fn new(
+        memory: &Memory<'_>,
+        contacts: &Contacts,
+        nodes: &[u32],
+        rest: &[Vector<f64>],
+    ) -> Result<Option<Self>, GpuError> {
+        let number = |node: u32| nodes.partition_point(|&known| known < node) as u32;
+        let rest: Vec<Vector3<f64>> = nodes.iter().map(|&node| rest[node as usize].into()).collect();
+        let mut watched = vec![false; nodes.len()];
+        let mut own = Vec::new();
+        for (index, contact) in contacts.contacts.iter().enumerate() {
+            let Some((pairs, sign)) = contact.pairs(number, |node| rest[node as usize]) else { continue };
+            let surfaces = contact.surfaces().flat_map(|surface| &surface.nodes);
+            surfaces.for_each(|&node| watched[number(node) as usize] = true);
+            own.push((index, pairs, sign));
+        }
+        if own.is_empty() {
+            return Ok(None);
+        }
+        let empty = memory.zeros("the pairs that touch", 0)?;
+        let mut all = Self {
+            own,
+            touches: contacts.contacts.iter().map(|contact| contact.touch).collect(),
+            rest,
+            nodes: nodes.to_vec(),
+            watched,
+            listed: memory.zeros("the pairs that touch", nodes.len() * size_of::<Four>())?,
+            candidates: empty.clone(),
+            queue: empty,
+            most_rows: 0,
+            finders: 0,
+            numbers: Vec::new(),
+            places: Vec::new(),
+        };
+        all.find(&vec![Four::default(); nodes.len()], 0.0);
+        all.grow(memory)?;
+        Ok(Some(all))
+    }
+
+    /// Lists candidates with nodes of the model at displacements [m], from where they go by `part` of these increments [m] in the step to come; uploads them.
+    /// Whether arrays are others than before.
+    ///
+    /// # Errors
+    /// If an array is too large.
+    pub(crate) fn list(
+        &mut self,
+        device: &Device,
+        displacements: &[Four],
+        increments: &[Four],
+        part: f64,
+    ) -> Result<bool, GpuError> {
+        let of_node = |of: &[Four], node: u32| of[node as usize];
+        let moved: Vec<Four> = self.nodes.iter().map(|&node| of_node(displacements, node)).collect();
+        let way = |&node: &u32| {
+            let [x, y, z, _] = of_node(increments, node).map(f64::from);
+            Vector3::new(x, y, z).norm() * part
+        };
+        let farthest = self.nodes.iter().map(way).fold(0.0, f64::max);
+        self.find(&moved, farthest);
+        let grows = self.grow(&Memory::new(device))?;
+        device.queue.write_buffer(&self.candidates, 0, bytemuck::cast_slice(&self.numbers));
+        device.queue.write_buffer(&self.listed, 0, bytemuck::cast_slice(&self.places));
+        Ok(grows)
+    }
+
+    /// Lists candidates with these displacements [m] of the nodes that touch, of which none goes farther in the step than a length [m].
+    fn find(&mut self, moved: &[Four], farthest: f64) {
+        let Self { own, touches, rest, watched, numbers, places, .. } = self;
+        places.clear();
+        let is_sound = farthest.is_finite() && moved.iter().flatten().all(|x| x.is_finite());
+        if !is_sound {
+            // The device finds what is wrong.
+            let free =
+                |(&[x, y, z, _], &watched): (&Four, &bool)| [x, y, z, if watched { ANYWHERE } else { 0.0 }];
+            places.extend(moved.iter().zip(watched.iter()).map(free));
+            return;
+        }
+        let place = |node: u32| {
+            let [x, y, z, _] = moved[node as usize].map(f64::from);
+            rest[node as usize] + Vector3::new(x, y, z)
+        };
+        let float = |number: f64| (number as f32).to_bits();
+        numbers.clear();
+        numbers.resize(OF_CONTACT * (1 + touches.len()), 0);
+        let (mut points, mut crossings, mut rows) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut point_count, mut crossing_count) = (0, 0);
+        let mut room = f64::INFINITY;
+        let row_count = |rows: &[u32]| (rows.len() / 5) as u32;
+        for (contact, pairs, sign) in own.iter_mut() {
+            // A way can double in a step; twice of that leaves some steps to the list.
+            room = room.min(pairs.list_again(place, 4.0 * farthest));
+            let [offset, skin, depth] = pairs.lengths();
+            let friction = touches[*contact].friction;
+            let info = (*contact as u32) << 4;
+            let against = |in_order: bool| if in_order == (*sign > 0.0) { 0 } else { 8 };
+            let mut ranges = [row_count(&rows); 4];
+            for point in pairs.points() {
+                let first = row_count(&rows);
+                for ([a, b, c], at_border) in point.faces() {
+                    let border = (0..3).map(|k| u32::from(at_border[k]) << k).sum::<u32>();
+                    rows.extend([point.node, a, b, c, info | against(point.in_order) | border]);
+                }
+                points.extend([point.node, *contact as u32, first, row_count(&rows)]);
+                points.extend(point.outward.iter().map(|&x| float(x)));
+                point_count += 1;
+            }
+            ranges[1..3].fill(row_count(&rows));
+            for [first, second] in pairs.crossings() {
+                let (across, ends) = ([first.across, second.across], [first.ends, second.ends]);
+                crossings.extend(across.as_flattened());
+                crossings.push(row_count(&rows));
+                rows.extend(ends.as_flattened());
+                rows.push(info | against(true));
+                crossing_count += 1;
+            }
+            ranges[3] = row_count(&rows);
+            let at = OF_CONTACT * (1 + *contact);
+            let lengths = [offset, offset + skin, depth, friction].map(float);
+            numbers[at..at + OF_CONTACT].copy_from_slice([lengths, ranges].as_flattened());
+        }
+        let points_at = numbers.len();
+        let crossings_at = points_at + points.len();
+        let rows_at = crossings_at + crossings.len();
+        let head = [point_count, crossing_count, points_at, crossings_at, rows_at];
+        numbers[..head.len()].copy_from_slice(&head.map(|number| number as u32));
+        for part in [&points, &crossings, &rows] {
+            numbers.extend(part);
+        }
+        self.finders = point_count + crossing_count;
+        places.extend(
+            moved
+                .iter()
+                .zip(watched.iter())
+                .map(|(&[x, y, z, _], &watched)| [x, y, z, if watched { -room as f32 } else { 0.0 }]),
+        );
+        for &node in own.iter().flat_map(|(_, pairs, _)| pairs.near()) {
+            places[node as usize][3] = room as f32;
+        }
+    }
+
+    /// Rows of the lists.
+    fn rows(&self) -> usize {
+        (self.numbers.len() - self.numbers[4] as usize) / 5
+    }
+
+    /// Makes larger arrays if these are too small for the lists; whether it did. Tells kernels how many rows there can be.
+    fn grow(&mut self, memory: &Memory<'_>) -> Result<bool, GpuError> {
+        let bytes = size_of_val(&self.numbers[..]);
+        let rows = self.rows();
+        let grows = self.candidates.size() < bytes as u64 || self.most_rows < rows;
+        if grows {
+            self.most_rows = SPARE * rows.max(64);
+            self.candidates = memory.zeros("the pairs that touch", SPARE * bytes)?;
+            let words = 1 + self.nodes.len() + 3 * self.most_rows;
+            self.queue = memory.zeros("the pairs that touch", words * size_of::<u32>())?;
+        }
+        self.numbers[5] = self.most_rows as u32;
+        Ok(grows)
+    }
+}
