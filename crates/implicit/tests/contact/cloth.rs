@@ -39,7 +39,7 @@ fn sheet(cells: [u32; 2], size: [f64; 2], thickness: f64, young: f64) -> (Assemb
 
 /// Cloth of 0.3 m above a sphere of 80 mm, which touches it and itself.
 fn cloth(cells: u32, friction: f64) -> Assembly {
-    let (thickness, young) = (1e-3, 1e5);
+    let (thickness, young) = (1e-3, 1e6);
     let (mut model, faces) = sheet([cells; 2], [0.3; 2], thickness, young);
     let curve = Curve { shape: CurveShape::Hold, from: 0.0, to: 1.0 };
     let kind = LoadKind::Gravity { body: 0, acceleration: [0.0, 0.0, -9.81] };
