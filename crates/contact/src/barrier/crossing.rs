@@ -23,25 +23,32 @@ pub(super) fn crossings(
         for face in met {
             let corners = faces.faces[face as usize];
             let apart = !ends.iter().any(|end| corners.contains(end));
-            if apart && goes_through(ends.map(place), corners.map(place)) {
+            let near = apart && around(corners, place, &none).touches(&wanted);
+            if near && goes_through(ends.map(place), corners.map(place)) {
                 found(ends, corners);
             }
         }
     }
 }
 
-/// Whether an edge goes through a triangle: its ends are on both sides of the plane, and the line goes round all three edges in one sense.
+/// Volumes over the cube of the largest extent that are none but for round-off: of points in a plane.
+const FLAT: f64 = 1e-14;
+
+/// Whether an edge goes through a triangle: its ends are on both sides of the plane, and the line goes round all three edges in one sense. In
+/// one plane nothing goes through anything.
 fn goes_through([p, q]: [Vector3<f64>; 2], [a, b, c]: [Vector3<f64>; 3]) -> bool {
     // Six times the volume of a tetrahedron.
     let volume = |x: &Vector3<f64>, y: &Vector3<f64>, z: &Vector3<f64>, of: &Vector3<f64>| {
         (x - of).dot(&(y - of).cross(&(z - of)))
     };
+    let largest = [q, a, b, c].iter().map(|x| (x - p).amax()).fold(0.0, f64::max);
+    let none = FLAT * largest.powi(3);
     let [above, below] = [volume(&a, &b, &c, &p), volume(&a, &b, &c, &q)];
-    if above * below >= 0.0 {
+    if above * below >= 0.0 || above.abs() < none || below.abs() < none {
         return false;
     }
     let around = [volume(&a, &b, &q, &p), volume(&b, &c, &q, &p), volume(&c, &a, &q, &p)];
-    around.iter().all(|&v| v > 0.0) || around.iter().all(|&v| v < 0.0)
+    around.iter().all(|&v| v > none) || around.iter().all(|&v| v < -none)
 }
 
 #[cfg(test)]
@@ -55,5 +62,10 @@ mod tests {
         assert!(through([0.2, 0.2, 1.0], [0.3, 0.2, -1.0]) && through([0.2, 0.2, -1.0], [0.3, 0.2, 1.0]));
         assert!(!through([0.2, 0.2, 1.0], [0.3, 0.2, 0.1]) && !through([0.8, 0.8, 1.0], [0.8, 0.8, -1.0]));
         assert!(!through([-0.1, 0.5, 0.0], [1.0, 0.5, 0.0]));
+        // In a line with a side, beside it, in one plane but for round-off.
+        let sheet = |x: f64, y: f64| Vector3::new(0.1 * x, 0.1 * y, 1e-17 * x);
+        let corners = [sheet(4.0, 1.0), sheet(4.0, 2.0), sheet(3.0, 2.0)];
+        assert!(!goes_through([sheet(2.0, 3.0), sheet(1.0, 4.0)], corners));
+        assert!(through([0.2, 0.2, 1e-9], [0.3, 0.2, -1e-9]));
     }
 }
