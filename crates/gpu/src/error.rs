@@ -90,6 +90,12 @@ pub enum GpuError {
         /// The design.
         design: String,
     },
+    /// A design without ties.
+    #[error("the design `{design}` has no ties")]
+    NoTies {
+        /// The design.
+        design: String,
+    },
     /// A force is too large for a design that adds forces up as whole numbers.
     #[error("a force at t = {time:.6} s is out of the range of the design `{design}`")]
     Overflow {
@@ -121,6 +127,7 @@ impl GpuError {
                 | Self::Crowded { .. }
                 | Self::Unsupported { .. }
                 | Self::NoContact { .. }
+                | Self::NoTies { .. }
         )
     }
 
@@ -147,7 +154,9 @@ impl GpuError {
             }
             Self::Crowded { .. } => "take the design `gather`, which shares no memory",
             Self::Unsupported { .. } => "take `device = \"cpu\"`",
-            Self::NoContact { .. } => "take the design `gather` or `fast`, or leave `design` out",
+            Self::NoContact { .. } | Self::NoTies { .. } => {
+                "take the design `gather` or `fast`, or leave `design` out"
+            }
             Self::Overflow { .. } => "take the design `gather`, whose forces are floating-point numbers",
             Self::Contradiction(_) => "leave the node out of one of the two, or give both the same motion",
             Self::Internal { .. } => {

@@ -35,7 +35,8 @@ impl DeviceGrips {
         let number = |n: usize| f32::from_bits(n as u32);
         self.kernel.dispatch_groups(grips.len() as u32);
         let of_grip = |(index, grip): (usize, &'_ Grip)| {
-            grip.nodes.iter().map(|&(node, weight)| (node, weight, index)).collect::<Vec<_>>()
+            let nodes = model.resolved(&grip.nodes).into_iter();
+            nodes.map(|(node, weight)| (node, weight, index)).collect::<Vec<_>>()
         };
         let mut entries: Vec<_> = grips.iter().enumerate().flat_map(of_grip).collect();
         entries.sort_by_key(|&(node, ..)| node);

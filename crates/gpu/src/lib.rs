@@ -82,6 +82,12 @@
 //! stepper reads that after its last submission, goes back to this instant, lists anew and submits the rest again. So
 //! [`GpuStepper::advance_without_read_back`] does read back there.
 //!
+//! # Ties
+//!
+//! Nodes that follow others have no cells in the pass over the nodes. A kernel before it sums the forces on each of them and writes a part for each node that
+//! it follows into a slot of its own, which that node gathers like those of its cells; with atomic additions it adds the part. Another kernel after
+//! each motion places them, u = Σ w u. `blocks` moves nodes while it finds forces, and refuses ties.
+//!
 //! # Tests
 //!
 //! `tests/gpu/stepper/` compares with double precision on the CPU: displacements differ by at most 1e-5 after 200 steps, with every law, element
@@ -106,6 +112,7 @@ mod run;
 mod solid_kernels;
 mod solids;
 mod stepper;
+mod ties;
 mod transfer;
 
 pub use contacts::processor_only;

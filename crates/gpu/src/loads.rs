@@ -3,6 +3,7 @@
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE};
 use pliant_mechanics::model::Model;
 use pliant_mechanics::tensor::{Vector, scale, sub};
+use pliant_mechanics::tie::Tie;
 
 use crate::kernel::{Binding, Bound, Kernel, Memory, Sides};
 use crate::transfer::Four;
@@ -24,6 +25,14 @@ fn weights(model: &Model, load: &Load, point: u32) -> Vec<(u32, f64)> {
     match load.surface {
         None => vec![(point, 1.0)],
         Some(surface) => model.surfaces[surface].mapping.row(point as usize).collect(),
+    }
+}
+
+/// A part of an entry, for a node that its node follows.
+fn part_of([x, y, z, w]: Four, weight: f32) -> Four {
+    match w.to_bits() {
+        CORNER => [x, weight * y, z, w],
+        _ => [weight * x, weight * y, weight * z, w],
     }
 }
 
@@ -94,6 +103,12 @@ impl DeviceLoads {
                     }
                 }
                 LoadKind::Gravity { .. } | LoadKind::Moments(_) | LoadKind::ShellPressure { .. } => {}
+            }
+        }
+        for (node, row) in model.ties.iter().flat_map(Tie::rows) {
+            let own = std::mem::take(&mut entries[node as usize]);
+            for (followed, weight) in row {
+                entries[followed as usize].extend(own.iter().map(|&entry| part_of(entry, weight as f32)));
             }
         }
         let mut offsets = vec![0];

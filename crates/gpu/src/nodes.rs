@@ -6,6 +6,7 @@ use pliant_mechanics::tensor::Vector;
 
 use crate::kernel::{Binding, Bound, GROUP, Kernel, Memory, Sides, groups};
 use crate::loads::DeviceLoads;
+use crate::ties::Followers;
 use crate::transfer::Four;
 use crate::{Device, GpuError};
 
@@ -32,6 +33,8 @@ pub(crate) struct DeviceNodes {
     holds: wgpu::Buffer,
     /// The nodes that are held, in the order of `reactions`.
     pub held: Vec<u32>,
+    /// Those that follow others.
+    pub followers: Option<Followers>,
     /// How many nodes there are.
     pub count: usize,
     /// Groups that leave sums: of the pass over them, or of blocks.
@@ -59,6 +62,7 @@ impl DeviceNodes {
     ) -> Result<Self, GpuError> {
         let count = model.node_count();
         let amplitudes = model.amplitudes(owners);
+        let followers = Followers::new(memory, model)?;
         let mut held = Vec::new();
         let mut holds = Vec::new();
         let mut constants = Vec::new();
@@ -76,7 +80,10 @@ impl DeviceNodes {
                         amplitudes: amplitudes[node as usize].map(four),
                     });
                 }
-                let (inertia, mass) = (model.inertia(node as usize), model.mass[node as usize]);
+                // Nodes that follow others have no mass, and no force.
+                let follows = followers.as_ref().is_some_and(|followers| followers.number(node).is_some());
+                let inertia = if follows { 1.0 } else { model.inertia(node as usize) };
+                let mass = model.mass[node as usize];
                 constants.push([inertia as f32, body.damping as f32, mass as f32, f32::from_bits(tag)]);
             }
         }
@@ -97,6 +104,7 @@ impl DeviceNodes {
             constants: memory.filled("the nodes", &constants)?,
             holds: memory.filled("the nodes that are held", &holds)?,
             held,
+            followers,
             count,
             groups,
         })

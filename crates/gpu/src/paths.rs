@@ -13,12 +13,14 @@
 
 use pliant_mechanics::model::{CellBlock, Cells, Model, Solid};
 use pliant_mechanics::tensor::dot;
+use pliant_mechanics::tie::Tie;
 
 use crate::blocks::{DeviceBlocks, NodeBlocks};
 use crate::kernel::{Binding, Bound, Memory};
 use crate::loads::DeviceLoads;
 use crate::nodes::{DeviceNodes, MOTION, MOVE, UNTOUCHED, external_forces};
 use crate::run::table_constants;
+use crate::ties::{Followers, Giving};
 use crate::transfer::Four;
 use crate::{Design, Device, GpuError};
 
@@ -39,6 +41,8 @@ pub(crate) struct Paths {
     pub nodes: Bound,
     /// Their snippet: `internal_force` and `clear`.
     pub node_snippet: String,
+    /// How forces on nodes that follow others go on, if there are any.
+    pub giving: Option<Giving>,
     /// First slot of each solid.
     pub first_slot: Vec<usize>,
     /// Blocks of each solid, if the design has some.
@@ -77,14 +81,14 @@ impl Paths {
                 }
                 let cells = include_str!("shaders/float_cells.wgsl").to_owned();
                 let gather = include_str!("shaders/float_nodes.wgsl").to_owned();
-                Self::atomics(memory, device, model, nodes, [cells, gather])
+                Self::atomics(memory, device, model, nodes, (design, [cells, gather]))
             }
             Design::FixedAtomics => {
                 let scale = Scale::new(model).constants();
                 let snippets =
                     [include_str!("shaders/fixed_cells.wgsl"), include_str!("shaders/fixed_nodes.wgsl")];
                 let snippets = snippets.map(|snippet| [&scale, FIXED, snippet].join("\n"));
-                Self::atomics(memory, device, model, nodes, snippets)
+                Self::atomics(memory, device, model, nodes, (design, snippets))
             }
         }
     }
@@ -116,6 +120,7 @@ impl Paths {
             cell_snippet: snippets.join("\n"),
             nodes: Bound::new(device, &[Binding::Read(&left)]),
             node_snippet: [&scale, FIXED, include_str!("shaders/left_nodes.wgsl")].join("\n"),
+            giving: None,
             first_slot: vec![0; model.solids.len()],
             blocks,
             finds_shapes: false,
@@ -144,21 +149,12 @@ impl Paths {
                 cells.nodes(cell).iter().enumerate().map(move |(a, &node)| (slot(a), node))
             })
         });
-        let (offsets, of_node) = by_node(model, slots);
-        let forces = memory.zeros("the forces of cells", of_node.len() * size_of::<Four>())?;
-        let offsets = memory.filled("the cells at nodes", &offsets)?;
-        let of_node = memory.filled("the cells at nodes", &of_node)?;
+        let what = ("the forces of cells", "the cells at nodes");
+        let paths = Self::of_slots(memory, device, nodes, what, slots)?;
         Ok(Self {
-            cells: Bound::new(device, &[Binding::ReadNow(&nodes.displacement), Binding::Write(&forces)]),
             cell_snippet: [CORNERS, include_str!("shaders/gather_cells.wgsl"), EACH_CELL].join("\n"),
-            nodes: Bound::new(device, &[&forces, &offsets, &of_node].map(Binding::Read)),
-            node_snippet: include_str!("shaders/gather_nodes.wgsl").to_owned(),
             first_slot,
-            blocks: vec![],
-            finds_shapes: false,
-            moves: false,
-            constants: vec![],
-            sums: None,
+            ..paths
         })
     }
 
@@ -175,19 +171,54 @@ impl Paths {
         for blocks in &blocks {
             first_slot.push(first_slot[first_slot.len() - 1] + blocks.nodes.len());
         }
-        let of_slots = blocks.iter().flat_map(|blocks| blocks.nodes.iter().copied()).enumerate();
-        let (offsets, of_node) = by_node(model, of_slots.map(|(slot, node)| (slot as u32, node)));
-        let forces = memory.zeros("the forces of blocks", of_node.len() * size_of::<Four>())?;
-        let offsets = memory.filled("the blocks at nodes", &offsets)?;
-        let of_node = memory.filled("the blocks at nodes", &of_node)?;
+        let slots = (0..).zip(blocks.iter().flat_map(|blocks| blocks.nodes.iter().copied()));
+        let what = ("the forces of blocks", "the blocks at nodes");
+        let paths = Self::of_slots(memory, device, nodes, what, slots)?;
         Ok(Self {
-            cells: Bound::new(device, &[Binding::ReadNow(&nodes.displacement), Binding::Write(&forces)]),
             cell_snippet: include_str!("shaders/block_cells.wgsl").to_owned(),
-            nodes: Bound::new(device, &[&forces, &offsets, &of_node].map(Binding::Read)),
-            node_snippet: include_str!("shaders/gather_nodes.wgsl").to_owned(),
             first_slot,
             blocks,
             finds_shapes: true,
+            ..paths
+        })
+    }
+
+    /// From slots with their nodes, which gather them; what the slots and their lists are in words.
+    fn of_slots(
+        memory: &Memory<'_>,
+        device: &Device,
+        nodes: &DeviceNodes,
+        (what, lists): (&'static str, &'static str),
+        slots: impl Iterator<Item = (u32, u32)> + Clone,
+    ) -> Result<Self, GpuError> {
+        let first_given = slots.clone().count();
+        let followers = nodes.followers.as_ref();
+        let number = |node: u32| followers.and_then(|followers| followers.number(node));
+        let followed = followers.into_iter().flat_map(Followers::followed);
+        let own = slots.clone().filter(|&(_, node)| number(node).is_none());
+        let taken = own.chain((first_given as u32..).zip(followed.clone()));
+        let forces = memory.zeros(what, (first_given + followed.count()) * size_of::<Four>())?;
+        let listed = |(offsets, slots): (Vec<u32>, Vec<u32>)| -> Result<[wgpu::Buffer; 2], GpuError> {
+            Ok([memory.filled(lists, &offsets)?, memory.filled(lists, &slots)?])
+        };
+        let [offsets, of_node] = listed(by_node(nodes.count, taken))?;
+        let giving = match followers {
+            Some(followers) => {
+                let own = slots.filter_map(|(slot, node)| Some((slot, number(node)?)));
+                let lists = listed(by_node(followers.count, own))?;
+                Some(followers.among_slots(device, &forces, &lists, first_given))
+            }
+            None => None,
+        };
+        Ok(Self {
+            cells: Bound::new(device, &[Binding::ReadNow(&nodes.displacement), Binding::Write(&forces)]),
+            cell_snippet: String::new(),
+            nodes: Bound::new(device, &[&forces, &offsets, &of_node].map(Binding::Read)),
+            node_snippet: include_str!("shaders/gather_nodes.wgsl").to_owned(),
+            giving,
+            first_slot: vec![],
+            blocks: vec![],
+            finds_shapes: false,
             moves: false,
             constants: vec![],
             sums: None,
@@ -199,7 +230,7 @@ impl Paths {
         device: &Device,
         model: &Model,
         nodes: &DeviceNodes,
-        [cells, gather]: [String; 2],
+        (design, [cells, gather]): (Design, [String; 2]),
     ) -> Result<Self, GpuError> {
         let forces = memory.zeros("the forces on nodes", model.node_count() * size_of::<Four>())?;
         Ok(Self {
@@ -207,6 +238,8 @@ impl Paths {
             cell_snippet: [CORNERS, &cells, EACH_CELL].join("\n"),
             nodes: Bound::new(device, &[Binding::Write(&forces)]),
             node_snippet: gather,
+            giving: (nodes.followers.as_ref())
+                .map(|followers| followers.among_sums(device, &forces, design == Design::FixedAtomics)),
             first_slot: vec![0; model.solids.len()],
             blocks: vec![],
             finds_shapes: false,
@@ -227,7 +260,7 @@ impl Paths {
 }
 
 /// The units of forces and energies that are added up as whole numbers of 32 bits. A cell gives at most 2³¹ over the most
-/// cells at a node, so that no sum leaves the range; that much is the force of the stiffest cell at a strain of 1,
+/// cells at a node, with its share of those at nodes that follow it, so that no sum leaves the range; that much is the force of the stiffest cell at a strain of 1,
 /// V (λ+2μ) |B|. What is more is cut off and reported.
 struct Scale {
     limit: f32,
@@ -237,18 +270,22 @@ struct Scale {
 
 impl Scale {
     fn new(model: &Model) -> Self {
-        let mut cells_at = vec![0_u32; model.node_count()];
+        let mut cells_at = vec![0.0; model.node_count()];
         let (mut force, mut length) = (0.0_f64, 0.0_f64);
         for solid in &model.solids {
             for cell in 0..solid.cells.len() {
-                solid.cells.nodes(cell).iter().for_each(|&node| cells_at[node as usize] += 1);
+                solid.cells.nodes(cell).iter().for_each(|&node| cells_at[node as usize] += 1.0);
                 force = force.max(force_at_unit_strain(solid, cell));
                 length = length.max(solid.cells.volume(cell).cbrt());
             }
         }
-        let most = cells_at.into_iter().max().unwrap_or(1).max(1);
+        for (node, row) in model.ties.iter().flat_map(Tie::rows) {
+            let own = cells_at[node as usize];
+            row.for_each(|(followed, weight)| cells_at[followed as usize] += weight.abs() * own);
+        }
+        let most = cells_at.into_iter().fold(1.0, f64::max);
         // A little less: a limit that is rounded must not be above.
-        let limit = 0.999 * 2.0_f64.powi(31) / f64::from(most);
+        let limit = 0.999 * 2.0_f64.powi(31) / most;
         let per_force = limit / force.max(f64::MIN_POSITIVE);
         Self { limit: limit as f32, per_force: per_force as f32, per_energy: (per_force / length) as f32 }
     }
@@ -276,15 +313,15 @@ fn force_at_unit_strain(solid: &Solid, cell: usize) -> f64 {
     area * solid.longitudinal_modulus()
 }
 
-/// First entry of each node, and the slots there in their order, from slots with their nodes.
-fn by_node(model: &Model, slots: impl Iterator<Item = (u32, u32)> + Clone) -> (Vec<u32>, Vec<u32>) {
-    let mut offsets = vec![0_u32; model.node_count() + 1];
+/// First entry of each of so many nodes, and the slots there in their order, from slots with their nodes.
+fn by_node(count: usize, slots: impl Iterator<Item = (u32, u32)> + Clone) -> (Vec<u32>, Vec<u32>) {
+    let mut offsets = vec![0_u32; count + 1];
     slots.clone().for_each(|(_, node)| offsets[node as usize + 1] += 1);
-    for node in 0..model.node_count() {
+    for node in 0..count {
         offsets[node + 1] += offsets[node];
     }
     let mut next = offsets.clone();
-    let mut of_node = vec![0; offsets[model.node_count()] as usize];
+    let mut of_node = vec![0; offsets[count] as usize];
     for (slot, node) in slots {
         let place = &mut next[node as usize];
         of_node[*place as usize] = slot;

@@ -12,6 +12,7 @@ use pliant_explicit::{
 };
 use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
+use pliant_mechanics::mapping::weighted;
 use pliant_mechanics::model::{FREE, Model};
 use pliant_mechanics::tensor::Vector;
 
@@ -25,6 +26,7 @@ use crate::nodes::{DeviceNodes, NodeKernels, SUMS, fours};
 use crate::paths::Paths;
 use crate::run::{Instant, Instants, MOST, StepFailure, UNLISTED, flags, table_constants};
 use crate::solids::DeviceSolid;
+use crate::ties::DeviceTies;
 use crate::transfer::Four;
 use crate::transfer::Transfer;
 use crate::{Design, Device, GpuError};
@@ -86,6 +88,7 @@ pub struct GpuStepper {
     kernels: NodeKernels,
     loads: Option<DeviceLoads>,
     grips: DeviceGrips,
+    ties: Option<DeviceTies>,
     contacts: Option<DeviceContacts>,
     instants: Instants,
     transfer: Transfer,
@@ -140,9 +143,16 @@ impl Observable<f32> for GpuStepper {
 
     /// The mean of the increments before and after; belongs to the last instant of which everything was wanted.
     fn velocity(&self, state: &State<f32>, node: usize) -> Vector<f64> {
-        let (before, after) = (state.increment[node], self.next[node]);
         let Lengths { next, .. } = self.lengths;
-        [0, 1, 2].map(|c| (f64::from(before[c]) * self.lengths.ratio() + f64::from(after[c])) / (2.0 * next))
+        let own = |node: u32| {
+            let (before, after) = (state.increment[node as usize], self.next[node as usize]);
+            [0, 1, 2]
+                .map(|c| (f64::from(before[c]) * self.lengths.ratio() + f64::from(after[c])) / (2.0 * next))
+        };
+        match self.ties {
+            None => own(node as u32),
+            Some(_) => weighted(self.model.resolved(&[(node as u32, 1.0)]), own),
+        }
     }
 }
 
@@ -185,9 +195,6 @@ impl GpuStepper {
         design: Option<Design>,
     ) -> Result<Self, GpuError> {
         let owners = model.constrained_components()?;
-        if let Some(tie) = model.ties.first() {
-            return Err(GpuError::Unsupported { what: format!("the tie `{}`", tie.name) });
-        }
         if let Some(constraint) = model.collective() {
             let what = format!("the constraint `{}`, which binds nodes to each other", constraint.name);
             return Err(GpuError::Unsupported { what });
@@ -196,6 +203,9 @@ impl GpuStepper {
         let design = design.unwrap_or(Design::usual(device.adapter().kind));
         if contacts.is_some() && design == Design::Blocks {
             return Err(GpuError::NoContact { design: design.to_string() });
+        }
+        if !model.ties.is_empty() && design == Design::Blocks {
+            return Err(GpuError::NoTies { design: design.to_string() });
         }
         let of = (&model, contacts);
         device.fill(|| memory.bytes(), || Self::on_device(device, &memory, of, step, design, owners))
@@ -235,6 +245,9 @@ impl GpuStepper {
         let forces = contacts.as_ref().map(|contacts| &contacts.forces);
         let kernels = nodes.kernels(device, &instants.bound, gather, loads.as_ref(), forces, &constants)?;
         let grips = DeviceGrips::new(device, &instants.bound, &nodes.displacement)?;
+        let ties = nodes.followers.as_ref().zip(paths.giving.as_ref()).map(|(followers, giving)| {
+            DeviceTies::new(device, &instants.bound, followers, giving, &nodes.displacement)
+        });
         let control = StepControl::new(step);
         Ok(Self {
             device: device.clone(),
@@ -248,6 +261,7 @@ impl GpuStepper {
             kernels,
             loads,
             grips,
+            ties: ties.transpose()?,
             contact_forces: vec![
                 Four::default();
                 contacts.as_ref().map_or(0, |own| own.contacts.contacts.len())
@@ -662,7 +676,7 @@ impl GpuStepper {
         let instant = Instant::new(self.since, flags, self.lengths);
         self.instants.push((&self.model, &state.driven), state.time, self.lengths.next, instant);
         let (nodes, side, contacts) = (&self.kernels, self.side, &self.contacts);
-        let forces = || force_kernels(&self.loads, &self.grips, &self.solids);
+        let forces = || force_kernels(&self.loads, &self.grips, &self.solids, &self.ties);
         self.instants.submit(&self.device, |pass, bound, _, offset| {
             let before = contacts.iter().filter_map(|contacts| contacts.before.as_ref());
             before.for_each(|kernel| kernel.run(pass, bound, offset, side));
@@ -681,11 +695,13 @@ impl GpuStepper {
     /// Goes on from the instants that are pushed, at first with a side; the first of them may be an evaluated one.
     fn submit_steps(&mut self, from_look: bool, mut side: usize) -> wgpu::SubmissionIndex {
         let nodes = &self.kernels;
-        let forces = || force_kernels(&self.loads, &self.grips, &self.solids);
+        let forces = || force_kernels(&self.loads, &self.grips, &self.solids, &self.ties);
         let (moves, contacts) = (self.paths.moves, &self.contacts);
+        let follow = self.ties.as_ref().map(|ties| &ties.follow);
         self.instants.submit(&self.device, |pass, bound, place, offset| {
             if from_look && place == 0 {
                 nodes.advance.run(pass, bound, offset, side);
+                follow.iter().for_each(|kernel| kernel.run(pass, bound, offset, side));
                 return;
             }
             let before = contacts.iter().filter_map(|contacts| contacts.before.as_ref());
@@ -695,6 +711,7 @@ impl GpuStepper {
             touching.for_each(|kernel| kernel.run(pass, bound, offset, side));
             if !moves {
                 nodes.pass.run(pass, bound, offset, side);
+                follow.iter().for_each(|kernel| kernel.run(pass, bound, offset, side));
             }
             side = 1 - side;
         })
@@ -847,7 +864,9 @@ fn force_kernels<'a>(
     loads: &'a Option<DeviceLoads>,
     grips: &'a DeviceGrips,
     solids: &'a [DeviceSolid],
+    ties: &'a Option<DeviceTies>,
 ) -> impl Iterator<Item = &'a Kernel> {
     let pressure = loads.iter().filter_map(|loads| loads.pressure.as_ref());
-    pressure.chain(grips.kernel()).chain(solids.iter().flat_map(DeviceSolid::kernels))
+    let give = ties.iter().map(|ties| &ties.give);
+    pressure.chain(grips.kernel()).chain(solids.iter().flat_map(DeviceSolid::kernels)).chain(give)
 }

@@ -155,14 +155,14 @@ fn key_of_gpu(run: &RunTable) -> Option<&'static str> {
 /// Whether the design that the scene asks for, if it does, has what the scene needs.
 #[cfg(feature = "gpu")]
 fn with_design(scene: &Scene, built: &Built) -> Result<(), Box<Diagnostic>> {
-    match scene.run.design {
-        Some(design @ Design::Blocks) if built.contacts.is_some() => {
-            let error = GpuError::NoContact { design: design.to_string() };
-            let place = scene.source.span(&scene.run_at("design"));
-            Err(Box::new(Diagnostic::error(error.to_string()).at(place, "").help(error.remedy())))
-        }
-        _ => Ok(()),
-    }
+    let Some(design @ Design::Blocks) = scene.run.design else { return Ok(()) };
+    let error = match (&built.contacts, built.model.ties.is_empty()) {
+        (Some(_), _) => GpuError::NoContact { design: design.to_string() },
+        (None, false) => GpuError::NoTies { design: design.to_string() },
+        (None, true) => return Ok(()),
+    };
+    let place = scene.source.span(&scene.run_at("design"));
+    Err(Box::new(Diagnostic::error(error.to_string()).at(place, "").help(error.remedy())))
 }
 
 /// What of its contacts a GPU can't support, in words.

@@ -43,7 +43,7 @@ fn a_tool_presses_a_body_onto_an_obstacle() {
 #[cfg(feature = "gpu")]
 #[test]
 fn a_tool_presses_a_body_on_a_device() {
-    if !has_device() {
+    if !crate::has_gpu() {
         return;
     }
     let [cpu, gpu] = ["device = 'cpu'", "device = 'gpu'"].map(|run| last_row(&pressed(run, "")));
@@ -54,19 +54,6 @@ fn a_tool_presses_a_body_on_a_device() {
     }
     let [a, b] = [&cpu, &gpu].map(|row| row["probe.top.displacement.z"]);
     assert!((b / a - 1.0).abs() < 4e-3, "top moved by {a} m and {b} m");
-}
-
-/// Whether there is a GPU, or one is required.
-#[cfg(feature = "gpu")]
-fn has_device() -> bool {
-    use std::io::Write;
-    let required = std::env::var("PLIANT_REQUIRE_GPU").as_deref() == Ok("1");
-    let has = required || !pliant_sim::gpu::adapters().is_empty();
-    if !has {
-        // Past the capture of what passing tests print. A notice that can't be written is none.
-        let _ = writeln!(std::io::stderr(), "skipped: no GPU was found");
-    }
-    has
 }
 
 /// A block on a floor with a smaller lid of other cells that falls onto it and is pulled along by gravity.
@@ -110,7 +97,7 @@ fn a_body_lies_on_another_one() {
 #[cfg(feature = "gpu")]
 #[test]
 fn a_body_lies_on_another_one_on_a_device() {
-    if !has_device() {
+    if !crate::has_gpu() {
         return;
     }
     let [cpu, gpu] = ["device = 'cpu'", "device = 'gpu'"].map(|run| last_row(&stacked(run, "")));

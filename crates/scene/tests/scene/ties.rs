@@ -1,5 +1,8 @@
 //! Bodies tied to others whose meshes do not match, with every solver, and what is refused.
 
+#[cfg(feature = "gpu")]
+use pliant_scene::{Scene, World};
+
 use super::static_solids::{MATRIX, block, last_row, resumes, world};
 
 /// A block of 40 × 20 × 10 mm of tissue, its width held, stretched along x, and a coat on its top on another mesh.
@@ -260,4 +263,68 @@ fn a_uniform_strain_passes_through_ties() {
             }
         }
     }
+}
+
+/// Runs a scene on the CPU in double precision and on a GPU until a time [s]: displacements of all bodies differ by at most 1e-5, energies and the
+/// reaction of a constraint by 1e-4.
+#[cfg(feature = "gpu")]
+fn agrees_on_a_device([cpu, gpu]: [&World; 2], until: f64, constraint: &str) {
+    let mut runs = [cpu, gpu].map(|world| world.simulation().unwrap());
+    runs.iter_mut().for_each(|run| run.run(until, |_| ()).unwrap());
+    let [a, b] = runs.each_mut().map(|run| {
+        let frame = run.frame().unwrap();
+        let bodies = cpu.participants[0].built.model.bodies.iter();
+        let moved = bodies.flat_map(|body| frame.displacements(&body.name).unwrap_or_default());
+        (moved.collect::<Vec<_>>(), frame.reaction(constraint).unwrap(), frame.energies(), frame.time())
+    });
+    assert_eq!(a.3, b.3);
+    let norm = |v: &[[f64; 3]]| v.as_flattened().iter().map(|x| x * x).sum::<f64>().sqrt();
+    let apart = |a: &[[f64; 3]], b: &[[f64; 3]]| {
+        let off: Vec<_> = a.iter().zip(b).map(|(a, b)| [0, 1, 2].map(|c| a[c] - b[c])).collect();
+        norm(&off) / norm(a)
+    };
+    let (moved, force) = (apart(&a.0, &b.0), apart(&[a.1], &[b.1]));
+    let energy = ((a.2.internal - b.2.internal) / a.2.internal).abs();
+    println!(
+        "{} steps: displacements {moved:.1e}, reaction {force:.1e}, energy {energy:.1e}",
+        runs[0].steps()
+    );
+    assert!(runs[0].steps() >= 200 && !a.0.is_empty());
+    assert!(moved <= 1e-5, "displacements are off by {moved:.1e}");
+    assert!(force <= 1e-4, "the reaction is off by {force:.1e}");
+    assert!(energy <= 1e-4, "the internal energy is off by {energy:.1e}");
+}
+
+#[cfg(feature = "gpu")]
+#[test]
+fn tied_bodies_move_on_a_device_as_on_the_processor() {
+    if !crate::has_gpu() {
+        return;
+    }
+    let vessel_text = |run: &str| vessel(run, "", "model = 'membrane'");
+    let vessel = |run: &str| world(&vessel_text(run)).unwrap();
+    agrees_on_a_device([&vessel("precision = 'double'"), &vessel("device = 'gpu'")], 0.3, "end");
+    let coat = |run: &str| world(&coated(run, "cells = [7, 5]", "")).unwrap();
+    agrees_on_a_device([&coat("precision = 'double'"), &coat("device = 'gpu'")], 0.3, "end");
+    // A checkpoint of a GPU is continued there.
+    resumes(&vessel_text("device = 'gpu'\nstep = 1e-4\ncheckpoint = { every = 0.4 }"));
+    let refused = world(&vessel_text("device = 'gpu'\ndesign = 'blocks'")).err().unwrap();
+    assert!(refused.contains("`blocks` has no ties") && refused.contains("`gather`"), "{refused}");
+}
+
+#[cfg(feature = "gpu")]
+#[test]
+fn a_liver_in_its_capsule_with_its_vessels_moves_on_a_device_as_on_the_processor() {
+    if !crate::has_gpu() {
+        return;
+    }
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/liver-with-capsule");
+    let text = std::fs::read_to_string(folder.join("scene.toml")).unwrap();
+    assert!(text.contains("precision = \"single\""));
+    let worlds = ["precision = \"double\"", "device = \"gpu\""].map(|run| {
+        let text = text.replace("precision = \"single\"", run);
+        let source = pliant_scene::source::Source::parse("scene.toml", text).unwrap();
+        World::new(&Scene::from_source(source, folder.clone()).unwrap()).unwrap()
+    });
+    agrees_on_a_device(worlds.each_ref(), 0.1, "pull");
 }

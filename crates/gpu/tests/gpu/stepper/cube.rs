@@ -85,7 +85,7 @@ fn grid(jitter: f64, random: &mut Random) -> (Vec<Vector<f64>>, Vec<[u32; 8]>) {
 }
 
 /// Kuhn's split: all six tets around the diagonal 0–6.
-fn tets_of(hexes: &[[u32; 8]]) -> Vec<[u32; 4]> {
+pub fn tets_of(hexes: &[[u32; 8]]) -> Vec<[u32; 4]> {
     const KUHN: [[usize; 4]; 6] =
         [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]];
     hexes.iter().flat_map(|hex| KUHN.map(|tet| tet.map(|corner| hex[corner]))).collect()

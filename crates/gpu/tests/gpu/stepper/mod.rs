@@ -7,6 +7,7 @@ mod cube;
 mod failures;
 mod jumble;
 mod playing;
+mod ties;
 
 use crate::support;
 use against::{PLAIN, compare, designs, distance, double, load, numbers, step_of, stepper};

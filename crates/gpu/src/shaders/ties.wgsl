@@ -1,0 +1,23 @@
+// Nodes that follow others, with the rows of their ties.
+
+@group(1) @binding(1) var<storage, read> followers: array<u32>;
+// First entry of each …
+@group(1) @binding(2) var<storage, read> row_offsets: array<u32>;
+// … in these: a followed node, and bits of its weight.
+@group(1) @binding(3) var<storage, read> rows: array<vec2u>;
+
+fn weight(entry: u32) -> f32 {
+    return bitcast<f32>(rows[entry].y);
+}
+
+@compute @workgroup_size(GROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let follower = number(group, groups, local);
+    if follower < FOLLOWERS {
+        each(follower);
+    }
+}
