@@ -48,7 +48,8 @@ fn surface(model: &Model) -> Surface {
     Surface { nodes, faces }
 }
 
-fn rigid(name: &str, shape: Shape, course: Course) -> Rigid {
+/// An obstacle or a tool.
+pub(super) fn rigid(name: &str, shape: Shape, course: Course) -> Rigid {
     Rigid { name: name.into(), shape, course, inside: false, jaw: None }
 }
 
@@ -58,7 +59,7 @@ fn moving(from: Pose, way: [f64; 3]) -> Course {
 }
 
 /// All of a body with each of some things.
-fn with(model: &Model, rigids: Vec<Rigid>, friction: f64) -> Arc<Contacts> {
+pub(super) fn with(model: &Model, rigids: Vec<Rigid>, friction: f64) -> Arc<Contacts> {
     let surface = surface(model);
     let contact = |(index, rigid): (usize, &Rigid)| Contact {
         name: rigid.name.clone(),
@@ -71,7 +72,13 @@ fn with(model: &Model, rigids: Vec<Rigid>, friction: f64) -> Arc<Contacts> {
 }
 
 /// Displacements, velocities, energies and reactions as `compare` has them; forces differ by a thousandth of the largest one.
-fn compare(device: &Device, what: &str, model: &Model, contacts: &Arc<Contacts>, designs: &[Design]) {
+pub(super) fn compare(
+    device: &Device,
+    what: &str,
+    model: &Model,
+    contacts: &Arc<Contacts>,
+    designs: &[Design],
+) {
     for forces in compare_touching(device, what, (model, contacts), 0.5 * step_of(model), designs) {
         let largest = forces.iter().map(|[a, _]| Vector3::from(*a).norm()).fold(0.0, f64::max);
         let off =

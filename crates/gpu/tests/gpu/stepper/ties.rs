@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use pliant_contact::pose::{Course, Pose};
+use pliant_contact::shape::Shape;
 use pliant_explicit::Wanted;
 use pliant_explicit::stability::{Monitor, OnUnstable};
 use pliant_explicit::{CentralDifference, Observable, State, StepError, critical_step};
@@ -18,7 +20,10 @@ use serde_json::json;
 use super::against::{
     PLAIN, compare, compare_from, designs, distance, double, load, numbers, step_of, stepper,
 };
-use super::cube::{CELLS, EDGE, elastic, held_cube, law, layer, moved_cube, neo_hookean, smooth, tets_of};
+use super::contact::{self, rigid, with};
+use super::cube::{
+    CELLS, EDGE, elastic, free_cube, held_cube, law, layer, moved_cube, neo_hookean, smooth, tets_of,
+};
 use super::failures::{failure_of, failure_on};
 use crate::support;
 
@@ -228,6 +233,23 @@ fn loads_and_grips_on_followers() {
         println!("grips, {design}: {off:.1e}");
         assert!(off <= 1e-5, "{design}: {off:.1e}");
     }
+}
+
+/// The contact finds the forces of bars at the nodes that touch.
+#[test]
+fn a_cube_with_bars_falls_onto_a_slope() {
+    let Some(device) = support::device() else { return };
+    let cube = free_cube("tet4", elastic(neo_hookean()));
+    let velocity = vec![[0.0, 0.0, -0.1]; cube.node_count()];
+    let mut model = Model { initial_velocity: velocity, ..barred(cube) };
+    model.bodies[0].damping = 5.0;
+    let acceleration = [1.0, 0.5, -9.81];
+    for body in 0..2 {
+        model.loads.push(load("gravity", LoadKind::Gravity { body, acceleration }, None));
+    }
+    let floor = rigid("floor", Shape::HalfSpace, Course::fixed(Pose::translation(0.0, 0.0, -1e-3)));
+    let contacts = with(&model, vec![floor], 0.3);
+    contact::compare(&device, "bars on a slope", &model, &contacts, &[Design::Gather, Design::Fast]);
 }
 
 fn relaxing() -> Model {
