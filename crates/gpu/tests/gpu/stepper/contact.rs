@@ -48,6 +48,7 @@ pub(super) fn surface(solid: &Solid) -> Surface {
     Surface { nodes, faces }
 }
 
+/// An obstacle or a tool.
 pub(super) fn rigid(name: &str, shape: Shape, course: Course) -> Rigid {
     Rigid { name: name.into(), shape, course, inside: false, jaw: None }
 }
@@ -58,7 +59,7 @@ pub(super) fn moving(from: Pose, way: [f64; 3]) -> Course {
 }
 
 /// All of a body with each of some things.
-fn with(model: &Model, rigids: Vec<Rigid>, friction: f64) -> Arc<Contacts> {
+pub(super) fn with(model: &Model, rigids: Vec<Rigid>, friction: f64) -> Arc<Contacts> {
     let surface = surface(&model.solids[0]);
     let contact = |(index, rigid): (usize, &Rigid)| Contact {
         name: rigid.name.clone(),

@@ -31,7 +31,7 @@ fn a_force_out_of_the_range_of_whole_numbers_is_told_and_never_wraps() {
 }
 
 /// Runs on the processor until it fails.
-fn failure_of(model: &Model, step: f64) -> StepError {
+pub(super) fn failure_of(model: &Model, step: f64) -> StepError {
     let mut state = State::<f32>::at_rest(model);
     let mut stepper = CentralDifference::new(model.clone(), step).unwrap();
     for _ in 0..2000 {
@@ -43,7 +43,13 @@ fn failure_of(model: &Model, step: f64) -> StepError {
     panic!("it does not fail")
 }
 
-fn failure_on(device: &Device, model: &Model, step: f64, design: Design) -> (StepFailure, State<f32>) {
+/// Runs on a device until it fails; the state then.
+pub(super) fn failure_on(
+    device: &Device,
+    model: &Model,
+    step: f64,
+    design: Design,
+) -> (StepFailure, State<f32>) {
     let mut state = State::<f32>::at_rest(model);
     let mut stepper = stepper(device, model, step, design);
     let error = stepper.advance(&mut state, 2000).expect_err("it fails");

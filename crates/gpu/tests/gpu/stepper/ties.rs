@@ -2,10 +2,12 @@
 
 use std::time::Duration;
 
+use pliant_contact::pose::{Course, Pose};
+use pliant_contact::shape::Shape;
 use pliant_explicit::Wanted;
 use pliant_explicit::stability::{Monitor, OnUnstable};
-use pliant_explicit::{CentralDifference, Observable, State, critical_step};
-use pliant_gpu::{Design, GpuError, GpuStepper};
+use pliant_explicit::{CentralDifference, Observable, State, StepError, critical_step};
+use pliant_gpu::{Design, GpuError, GpuStepper, StepFailure};
 use pliant_mechanics::element::Cord;
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::load::LoadKind;
@@ -18,7 +20,11 @@ use serde_json::json;
 use super::against::{
     PLAIN, compare, compare_from, designs, distance, double, load, numbers, step_of, stepper,
 };
-use super::cube::{CELLS, EDGE, elastic, held_cube, law, layer, moved_cube, neo_hookean, smooth, tets_of};
+use super::contact::{self, rigid, with};
+use super::cube::{
+    CELLS, EDGE, elastic, free_cube, held_cube, law, layer, moved_cube, neo_hookean, smooth, tets_of,
+};
+use super::failures::{failure_of, failure_on};
 use crate::support;
 
 /// Those that have ties, on this device.
@@ -140,11 +146,15 @@ fn barred(mut model: Model) -> Model {
 #[test]
 fn tied_blocks_of_other_meshes_are_pulled() {
     let Some(device) = support::device() else { return };
-    for (lower, upper) in
-        [("tet4", "hex8"), ("hex8", "tet4"), ("tet4-anp", "tet4-anp"), ("hex8-full", "tet4")]
-    {
+    let all = with_ties(&device);
+    for (lower, upper, designs) in [
+        ("tet4", "hex8", &all[..]),
+        ("hex8", "tet4", PLAIN),
+        ("tet4-anp", "tet4-anp", PLAIN),
+        ("hex8-full", "tet4", PLAIN),
+    ] {
         let model = tied_blocks(lower, upper, elastic(neo_hookean()));
-        compare(&device, &format!("{upper} on {lower}"), &model, &with_ties(&device));
+        compare(&device, &format!("{upper} on {lower}"), &model, designs);
     }
 }
 
@@ -225,6 +235,23 @@ fn loads_and_grips_on_followers() {
     }
 }
 
+/// The contact finds the forces of bars at the nodes that touch.
+#[test]
+fn a_cube_with_bars_falls_onto_a_slope() {
+    let Some(device) = support::device() else { return };
+    let cube = free_cube("tet4", elastic(neo_hookean()));
+    let velocity = vec![[0.0, 0.0, -0.1]; cube.node_count()];
+    let mut model = Model { initial_velocity: velocity, ..barred(cube) };
+    model.bodies[0].damping = 5.0;
+    let acceleration = [1.0, 0.5, -9.81];
+    for body in 0..2 {
+        model.loads.push(load("gravity", LoadKind::Gravity { body, acceleration }, None));
+    }
+    let floor = rigid("floor", Shape::HalfSpace, Course::fixed(Pose::translation(0.0, 0.0, -1e-3)));
+    let contacts = with(&model, vec![floor], 0.3);
+    contact::compare(&device, "bars on a slope", &model, &contacts, &[Design::Gather, Design::Fast]);
+}
+
 fn relaxing() -> Model {
     let mut material = elastic(neo_hookean());
     let terms = [Part::Isochoric, Part::Volumetric].map(|part| PronyTerm { part, weight: 0.3, time: 0.1 });
@@ -273,9 +300,15 @@ fn steps_of_tied_bodies_give_the_same_bits_divided_and_resumed() {
     }
 }
 
-/// A monitor sees followers where they are, and a run that fails stands where it fails on the processor.
+/// How far followers are from where their ties place them, over the size of all displacements.
+fn out_of_place(model: &Model, state: &State<f32>) -> f64 {
+    let mut placed = state.displacement.clone();
+    model.follow(&mut placed);
+    distance(&double(&placed), &double(&state.displacement))
+}
+
 #[test]
-fn a_monitored_run_of_tied_bodies_ends_as_on_the_processor() {
+fn followers_stay_in_place_in_a_monitored_run_and_in_one_that_fails() {
     let Some(device) = support::device() else { return };
     let model = relaxing();
     let limit = critical_step::assembled(&model).unwrap().step;
@@ -284,9 +317,22 @@ fn a_monitored_run_of_tied_bodies_ends_as_on_the_processor() {
     let mut watched = stepper(&device, &model, 0.9 * limit, Design::Gather).watched(monitor);
     watched.advance(&mut state, 300).unwrap_or_else(|error| panic!("{error}"));
     watched.evaluate(&mut state, Wanted::Everything).unwrap();
-    let mut placed = state.displacement.clone();
-    model.follow(&mut placed);
-    let off = distance(&double(&placed), &double(&state.displacement));
+    let off = out_of_place(&model, &state);
+    assert!(off < 1e-7, "followers are off their places by {off:.1e}");
+    let mut crushed = tied_blocks("tet4", "tet4", elastic(neo_hookean()));
+    crushed.constraints[1].motion = Motion::Displacement([0.0, 0.0, -1.2 * EDGE], smooth(0.3));
+    let step = 0.5 * step_of(&crushed);
+    let expected = failure_of(&crushed, step);
+    let (error, state) = failure_on(&device, &crushed, step, Design::Gather);
+    let (
+        StepError::Inverted { element: a, time, .. },
+        StepFailure::Step(StepError::Inverted { element: b, .. }),
+    ) = (&expected, &error)
+    else {
+        panic!("{expected:?}, {error:?}")
+    };
+    assert_eq!((a, *time), (b, state.time), "{error}");
+    let off = out_of_place(&crushed, &state);
     assert!(off < 1e-7, "followers are off their places by {off:.1e}");
 }
 
