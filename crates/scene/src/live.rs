@@ -97,6 +97,7 @@ impl Live {
     }
 
     /// Whether the state lies on a device, so that places of nodes are known only where it was read back.
+    #[cfg(feature = "gpu")]
     pub fn is_on_device(&self) -> bool {
         self.world.device().is_some()
     }
