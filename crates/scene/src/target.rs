@@ -6,7 +6,8 @@ use pliant_sim::gpu::{Design, Device, GpuError, Kind};
 
 use crate::assemble::Built;
 use crate::diagnostic::Diagnostic;
-use crate::format::{DeviceName, RunTable, SolverName};
+use crate::format::{DeviceName, FieldName, RunTable, SolverName};
+use crate::registry::OutputTable;
 use crate::scene::Scene;
 
 /// The device of a run, and its number type.
@@ -28,7 +29,7 @@ impl Target {
     /// If a GPU is requested, and there is none or it can't run the scene.
     pub(crate) fn choose(scene: &Scene, built: &Built) -> Result<Self, Box<Diagnostic>> {
         let run = &scene.run;
-        let only = processor_only(run, built);
+        let only = processor_only(scene, built);
         match run.device {
             DeviceName::Cpu => match key_of_gpu(run) {
                 None => Ok(Self::processor(run, None)),
@@ -173,8 +174,21 @@ fn contact_only(built: &Built) -> Option<String> {
     return built.contacts.as_ref().map(|_| "contact".to_owned());
 }
 
+/// A field of contacts that an output has.
+fn contact_field(scene: &Scene) -> Option<FieldName> {
+    let fields = |output: &OutputTable| -> Vec<FieldName> {
+        match output {
+            OutputTable::Vtu(table) => table.data.clone(),
+            OutputTable::Csv(table) => table.probes.values().flat_map(|probe| probe.data.clone()).collect(),
+        }
+    };
+    let all = scene.outputs.iter().flat_map(|(_, output)| fields(output));
+    all.into_iter().find(|field| field.is_of_contact())
+}
+
 /// The key that a GPU can't support, in words, and a remedy.
-fn processor_only(run: &RunTable, built: &Built) -> Option<(&'static str, String, &'static str)> {
+fn processor_only(scene: &Scene, built: &Built) -> Option<(&'static str, String, &'static str)> {
+    let run = &scene.run;
     let leave_out = "set `device = \"cpu\"`, or leave it out";
     if built.implicit.is_some() {
         let what = "the model of shells, `implicit` and `static`";
@@ -182,6 +196,10 @@ fn processor_only(run: &RunTable, built: &Built) -> Option<(&'static str, String
     }
     if let Some(what) = contact_only(built) {
         return Some(("device", what, leave_out));
+    }
+    if let Some(field) = contact_field(scene) {
+        let help = "set `device = \"cpu\"`, or leave the field out";
+        return Some(("device", format!("the field `{}` of contacts", field.name()), help));
     }
     if run.solver == SolverName::QuasiStatic {
         let help = "set `device = \"cpu\"`, or `solver = \"explicit\"`";

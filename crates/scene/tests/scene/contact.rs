@@ -252,6 +252,10 @@ fn contact_that_cannot_be_is_refused_with_its_line() {
         ),
         (table("turn.csv", "0,0,0,0,1,1,0,0\n"), ["the quaternion has length 1.414", ""]),
         (table("back.csv", "1,0,0,0,1,0,0,0\n0,0,0,0,1,0,0,0\n"), ["its times do not increase", ""]),
+        (
+            pressed("device = 'gpu'", "").replace("['displacement']", "['gap']"),
+            ["the field `gap` of contacts runs on the CPU only", "leave the field out"],
+        ),
         (pressed("solver = 'quasi-static'", ""), ["contact is for the solvers `explicit`", "`quasi-static`"]),
         (
             pressed("solver = 'implicit'\nstep = 0.01", ""),
