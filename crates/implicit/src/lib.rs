@@ -83,4 +83,4 @@ pub use statics::{Attempted, Control, StaticSettings, Statics, Step, check_held}
 pub use strain::ShellStrain;
 pub use surface::CurvedSurface;
 pub use system::Phases;
-pub use touching::{Touching, TouchingNow};
+pub use touching::{Touching, TouchingNow, TouchingSystem};

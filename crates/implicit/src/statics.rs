@@ -4,11 +4,9 @@
 //! largest residual on them (Levenberg 1944, Marquardt 1963): it bounds what an iteration moves them and vanishes at equilibrium.
 //! Leaves out: branch switching at bifurcations.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::{Matrix6, RowVector6, SymmetricEigen, Vector3};
-use pliant_contact::pose::Leg;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::tie::Tie;
 
@@ -20,7 +18,7 @@ use crate::linear::{LinearSolver, dot};
 use crate::sparse::NONE;
 use crate::state::State;
 use crate::system::{Phases, System};
-use crate::touching::TouchingNow;
+use crate::touching::TouchingSystem;
 
 /// How equilibria are sought.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -193,32 +191,18 @@ impl Statics {
         self.system.phases
     }
 
-    /// What contacts do at the state of the last step; `None` without contacts.
-    pub fn touching(&self) -> Option<TouchingNow> {
-        self.system.touching.as_ref().map(|touching| touching.now())
+    /// Contacts, at the state of the last step; `None` without any.
+    pub fn touching(&self) -> Option<&TouchingSystem> {
+        self.system.touching.as_deref()
     }
 
-    /// What contacts do at a state that no step led to.
-    pub fn touching_at(&mut self, state: &State) -> Option<TouchingNow> {
-        self.system.touching.as_mut().map(|touching| touching.at(state))
+    /// The same to change.
+    pub fn touching_mut(&mut self) -> Option<&mut TouchingSystem> {
+        self.system.touching.as_deref_mut()
     }
 
-    /// Where rigid things go that are driven from outside, by their number; `None` without contacts.
-    pub fn legs_mut(&mut self) -> Option<&mut BTreeMap<u32, Leg>> {
-        self.system.touching.as_mut().map(|touching| touching.barriers.legs_mut())
-    }
-
-    /// The same to look at.
-    pub fn legs(&self) -> Option<&BTreeMap<u32, Leg>> {
-        self.system.touching.as_ref().map(|touching| touching.barriers.legs())
-    }
-
-    /// Pairs of nodes that contacts added to the pattern of the equations: to go on with the same bits where another solver stood.
-    pub fn contact_pairs(&self) -> &[[u32; 2]] {
-        self.system.touching.as_ref().map_or(&[], |touching| &touching.pairs)
-    }
-
-    /// Takes a pattern of the equations with pairs of nodes that [`contact_pairs`](Self::contact_pairs) told.
+    /// Takes a pattern of the equations with [`pairs`](TouchingSystem::pairs) of nodes that contacts added where another solver stood: so this one goes on with
+    /// the same bits.
     ///
     /// # Errors
     /// If the equations are too many for the solver chosen.

@@ -1,10 +1,12 @@
 //! Contacts of a model in its equations: their forces are loads and their stiffness is added to that of the cells. The pattern of the matrix grows
 //! with the pairs that may come near, and by more than those, so that it changes seldom.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 use pliant_contact::barrier::{BarrierSettings, Barriers, Meeting, Stencil};
+use pliant_contact::pose::Leg;
 use pliant_contact::touch::Contacts;
 use pliant_mechanics::Model;
 
@@ -54,7 +56,7 @@ pub struct TouchingNow {
 }
 
 /// Contacts in the equations of a solver.
-pub(crate) struct TouchingSystem {
+pub struct TouchingSystem {
     pub(crate) barriers: Barriers,
     /// How far rigid things have gone in the step, from 0 to 1.
     pub(crate) share: f64,
@@ -102,7 +104,7 @@ impl TouchingSystem {
     }
 
     /// What acts at the state last evaluated.
-    pub(crate) fn now(&self) -> TouchingNow {
+    pub fn now(&self) -> TouchingNow {
         TouchingNow {
             forces: self.forces.clone(),
             totals: self.totals.iter().map(|&total| total.into()).collect(),
@@ -113,12 +115,27 @@ impl TouchingSystem {
     }
 
     /// [`now`](Self::now) at a state that no step led to: without friction.
-    pub(crate) fn at(&mut self, state: &State) -> TouchingNow {
+    pub fn at(&mut self, state: &State) -> TouchingNow {
         let still = vec![0.0; self.forces.len()];
         self.barriers.begin(&state.position, &still, [state.time; 2]);
         self.share = 1.0;
         self.evaluate(state);
         self.now()
+    }
+
+    /// Where rigid things go that are driven from outside, by their number.
+    pub fn legs(&self) -> &BTreeMap<u32, Leg> {
+        self.barriers.legs()
+    }
+
+    /// The same to change.
+    pub fn legs_mut(&mut self) -> &mut BTreeMap<u32, Leg> {
+        self.barriers.legs_mut()
+    }
+
+    /// Pairs of nodes that contacts added to the pattern of the equations, increasing.
+    pub fn pairs(&self) -> &[[u32; 2]] {
+        &self.pairs
     }
 
     /// Takes up the pairs of nodes that the pattern lacks; whether there are some.

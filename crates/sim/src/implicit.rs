@@ -1,16 +1,15 @@
 //! Shells, and solids whose equations are solved, as a participant.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::fmt::Write;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 use pliant_contact::pose::Leg;
-use pliant_contact::touch::Contact;
 use pliant_explicit::{NodeContact, Wanted};
 use pliant_implicit::{
     Assembly, BackwardEuler, DynamicSettings, Explicit, Forces, Phases, SolveError, Spring, State, Statics,
-    TouchingNow,
+    TouchingNow, TouchingSystem,
 };
 use pliant_mechanics::grip::{Grip, ROOM};
 use pliant_mechanics::mapping::Mapping;
@@ -100,40 +99,20 @@ impl Method {
         }
     }
 
-    /// What contacts did in the last step; without one, what they do at a state.
-    fn touching(&mut self, state: Option<&State>) -> Option<TouchingNow> {
-        match (self, state) {
-            (Self::Static(solver, _), None) => solver.touching(),
-            (Self::Static(solver, _), Some(state)) => solver.touching_at(state),
-            (Self::Implicit(solver, _), None) => solver.touching(),
-            (Self::Implicit(solver, _), Some(state)) => solver.touching_at(state),
-            (Self::Explicit(_), _) => None,
-        }
-    }
-
-    /// Where tools go that are driven from outside.
-    fn legs(&self) -> Option<&BTreeMap<u32, Leg>> {
+    /// Contacts; `None` without any.
+    fn touching(&self) -> Option<&TouchingSystem> {
         match self {
-            Self::Static(solver, _) => solver.legs(),
-            Self::Implicit(solver, _) => solver.legs(),
+            Self::Static(solver, _) => solver.touching(),
+            Self::Implicit(solver, _) => solver.touching(),
             Self::Explicit(_) => None,
         }
     }
 
-    fn legs_mut(&mut self) -> Option<&mut BTreeMap<u32, Leg>> {
+    fn touching_mut(&mut self) -> Option<&mut TouchingSystem> {
         match self {
-            Self::Static(solver, _) => solver.legs_mut(),
-            Self::Implicit(solver, _) => solver.legs_mut(),
+            Self::Static(solver, _) => solver.touching_mut(),
+            Self::Implicit(solver, _) => solver.touching_mut(),
             Self::Explicit(_) => None,
-        }
-    }
-
-    /// Pairs of nodes that contacts added to the pattern of the equations.
-    fn contact_pairs(&self) -> &[[u32; 2]] {
-        match self {
-            Self::Static(solver, _) => solver.contact_pairs(),
-            Self::Implicit(solver, _) => solver.contact_pairs(),
-            Self::Explicit(_) => &[],
         }
     }
 
@@ -484,8 +463,8 @@ impl Implicit {
         let Some(ContactState { forces, totals, energy, gaps, pairs, legs }) = contact else { return Ok(()) };
         let gap = gaps.iter().map(|&(_, gap)| gap).reduce(f64::min);
         self.touching = Some(TouchingNow { forces, totals, energy, gap, gaps });
-        if let Some(own) = self.method.legs_mut() {
-            own.clone_from(&legs.into_iter().collect());
+        if let Some(own) = self.method.touching_mut() {
+            *own.legs_mut() = legs.into_iter().collect();
         }
         let taken = self.method.take_contact_pairs(pairs);
         taken.map_err(|error| failure(&error, &self.model, &self.bodies, self.time))
@@ -505,13 +484,13 @@ impl Implicit {
             energies: self.energies,
             effort: self.effort.clone(),
             convergence: self.convergence.clone(),
-            contact: self.touching.as_ref().map(|now| ContactState {
+            contact: self.touching.as_ref().zip(self.method.touching()).map(|(now, own)| ContactState {
                 forces: now.forces.clone(),
                 totals: now.totals.clone(),
                 energy: now.energy,
                 gaps: now.gaps.clone(),
-                pairs: self.method.contact_pairs().to_vec(),
-                legs: self.method.legs().into_iter().flatten().map(|(&rigid, &leg)| (rigid, leg)).collect(),
+                pairs: own.pairs().to_vec(),
+                legs: own.legs().iter().map(|(&rigid, &leg)| (rigid, leg)).collect(),
             }),
         }
     }
@@ -554,21 +533,17 @@ impl Instant for Implicit {
         let (Some(now), Some(touching)) = (&self.touching, &self.bodies.model.touching) else {
             return Vec::new();
         };
-        let surfaces = touching.contacts.contacts.iter().flat_map(Contact::surfaces);
-        let mut nodes: Vec<u32> = surfaces.flat_map(|surface| surface.nodes.iter().copied()).collect();
-        nodes.sort_unstable();
-        nodes.dedup();
         let own = |node: u32| {
             let at = 6 * node as usize;
             let force = [0, 1, 2].map(|c| now.forces[at + c]);
             let found = now.gaps.binary_search_by_key(&node, |&(known, _)| known);
             NodeContact { node, force, pressure: None, gap: found.ok().map(|at| now.gaps[at].1), slip: None }
         };
-        nodes.into_iter().map(own).collect()
+        touching.contacts.nodes().into_iter().map(own).collect()
     }
 
     fn leg(&self, rigid: usize) -> Option<&Leg> {
-        self.method.legs()?.get(&(rigid as u32))
+        self.method.touching()?.legs().get(&(rigid as u32))
     }
 
     fn energies(&self) -> Energies {
@@ -622,7 +597,7 @@ impl Participant for Implicit {
         }
         self.put_springs();
         if self.touching.is_none() {
-            self.touching = self.method.touching(Some(&self.state));
+            self.touching = self.method.touching_mut().map(|own| own.at(&self.state));
         }
         if let (Some(now), Method::Static(_, forces) | Method::Implicit(_, forces)) =
             (&self.touching, &mut self.method)
@@ -650,7 +625,7 @@ impl Participant for Implicit {
         self.put_springs();
         self.go(number).map_err(|error| failure(&error, &self.model, &self.bodies, self.state.time))?;
         (self.done, self.time) = (number, self.state.time);
-        self.touching = self.method.touching(None);
+        self.touching = self.method.touching().map(TouchingSystem::now);
         self.evaluated = false;
         Ok(())
     }
@@ -663,8 +638,8 @@ impl Participant for Implicit {
     }
 
     fn drive(&mut self, rigid: usize, leg: Leg) {
-        if let Some(legs) = self.method.legs_mut() {
-            legs.insert(rigid as u32, leg);
+        if let Some(own) = self.method.touching_mut() {
+            own.legs_mut().insert(rigid as u32, leg);
         }
     }
 

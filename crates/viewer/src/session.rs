@@ -691,15 +691,16 @@ impl<'s> Player<'s> {
     /// After a step that failed: goes back to a state before it, where hands let go; or stays, where no hand has broken it.
     fn go_back(&mut self, message: String) {
         let broken = self.live.simulation.time();
-        let back = self.sound.take().filter(|sound| self.live.restore(sound.state.clone()).is_ok());
-        let Some(Sound { steps, hold, moves, .. }) = back else {
+        let back = self.sound.take().and_then(|Sound { state, steps, hold, moves }| {
+            self.live.restore(state).is_ok().then_some((steps, hold, moves))
+        });
+        let Some((steps, hold, moves)) = back else {
             self.playback.failure.get_or_insert(message);
             return;
         };
         let playback = &mut self.playback;
         (playback.hold, playback.steps, playback.owed) = (hold, steps, 0);
         playback.hold.take(&Hand::Release, &self.subject, &mut self.live);
-        playback.hold.hold_on(&mut self.live);
         playback.waiting.clear();
         let time = self.live.simulation.time();
         if let Some(recording) = &mut playback.recording {

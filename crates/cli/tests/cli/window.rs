@@ -149,7 +149,7 @@ fn without_a_screen_it_says_what_it_needs() {
     assert!(told.err.contains("is not a recording"), "{}", told.err);
 }
 
-/// A replay tells which pulls broke the run when it was recorded.
+/// A replay reports the pulls that broke the run when it was recorded.
 #[test]
 fn a_replay_tells_breaks() {
     let workshop = Workshop::new(BLOCK);

@@ -20,7 +20,7 @@ use crate::pose::{Leg, Pose, between};
 use crate::shape::Near;
 use crate::touch::{Contacts, Passage, With};
 
-/// Rigid motions in a step that are looked at anew where things turn.
+/// How often the motion of a rigid thing that turns is followed anew in a step.
 const TURNS: usize = 40;
 /// Part of the way to a meeting that is gone where things turn.
 const SHORTER: f64 = 0.9;
@@ -482,7 +482,7 @@ impl Barriers {
         let [from, to, _] = &self.poses;
         let turns = share < 1.0 && from.iter().zip(to).any(|(from, to)| from.rotation != to.rotation);
         for _ in 0..TURNS {
-            // Things that turn are not on the straight way to where they end: the way to where they come is looked at.
+            // Things that turn do not move on a straight way: the way to where they really come is searched.
             self.set_motion(motion, part, share + part * (1.0 - share));
             let gone = self.filtered(keep, share, part);
             part *= gone;

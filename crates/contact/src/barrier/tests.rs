@@ -206,7 +206,7 @@ fn a_turning_thing_goes_through_nothing() {
     assert!(share > 0.1 && share < 0.5, "{share}");
 }
 
-/// Bodies that start within each other are told with their contacts, nodes and gaps.
+/// Bodies that start within each other are reported with contact, node and gap.
 #[test]
 fn what_has_no_gap_at_the_start_is_told() {
     let mut scene = Scene::new(things().remove(0), 0.0);

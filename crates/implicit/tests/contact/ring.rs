@@ -82,7 +82,7 @@ fn pressed(edges: u32, thickness: f64, approach: f64, steps: u32) -> Vec<[f64; 2
     for step in 1..=steps {
         let done = solver.solve(&mut state, f64::from(step) / f64::from(steps)).unwrap();
         iterations += done.residuals.len();
-        let now = solver.touching().unwrap();
+        let now = solver.touching().unwrap().now();
         let [upper, lower] = [0, 1].map(|plate| now.totals[plate][2]);
         assert!((upper + lower).abs() < 1e-6 * upper.abs(), "{upper} {lower}");
         // At the top, or where a flat part has its ends.
@@ -168,7 +168,7 @@ fn a_dropped_ring_gains_no_energy() {
     let (mut grown, mut fastest, mut touched, mut iterations) = (0.0_f64, 0.0_f64, 0, 0);
     while state.time < 0.1 {
         iterations += solver.advance(&mut state).unwrap().residuals.len();
-        let now = solver.touching().unwrap();
+        let now = solver.touching().unwrap().now();
         let next = energy(&state, now.energy);
         grown = grown.max((next - last) / start);
         last = next;
