@@ -3,7 +3,8 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use pliant_scene::{OutputFolder, Scene, World, open};
+use pliant_run::OutputFolder;
+use pliant_scene::{Scene, World, open};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1).map_or_else(|| PathBuf::from("scenes/cube"), PathBuf::from);
@@ -14,7 +15,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let world = World::new(&scene)?;
     let place = tempfile::tempdir()?;
     let out = OutputFolder::prepare(place.path().join("out"), &scene, false)?;
-    let summary = pliant_scene::run(&world, &out, &mut |_| ())?;
+    let summary = pliant_run::run(&world, &out, &mut |_| ())?;
     println!("{}: {} steps of {:.3} ms", summary.status, summary.steps, 1e3 * summary.step);
     for (constraint, force) in &summary.reactions {
         println!("`{constraint}` holds with {force:.3?} N");

@@ -7,7 +7,7 @@
 use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
-use pliant_scene::Checkpoint;
+use pliant_run::Checkpoint;
 
 fuzz_target!(|bytes: &[u8]| {
     let _ = Checkpoint::from_bytes(Path::new("any"), bytes);

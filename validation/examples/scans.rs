@@ -15,8 +15,9 @@ use std::time::Instant;
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3};
 use pliant_imaging::{Cleaning, Image, LabelImage, ReadOptions, Region, read};
 use pliant_meshing::{Hausdorff, TriangleMesh};
+use pliant_run::{OutputFolder, run};
 use pliant_scene::source::Source;
-use pliant_scene::{OutputFolder, Scene, World, build, plan, run};
+use pliant_scene::{Scene, World, build, plan};
 
 /// Density of all tissue [kg/m³].
 const DENSITY: f64 = 1060.0;

@@ -474,8 +474,8 @@ fn a_segmented_liver_is_pulled_with_and_without_its_capsule() {
         scene.outputs.clear();
         let world = pliant_scene::World::new(&scene).unwrap_or_else(|errors| panic!("{}", errors.plain()));
         let out = tempfile::tempdir().unwrap();
-        let folder = pliant_scene::OutputFolder::prepare(out.path().to_owned(), &world.scene, false).unwrap();
-        let summary = pliant_scene::run(&world, &folder, &mut |_| ()).unwrap();
+        let folder = pliant_run::OutputFolder::prepare(out.path().to_owned(), &world.scene, false).unwrap();
+        let summary = pliant_run::run(&world, &folder, &mut |_| ()).unwrap();
         assert_eq!(summary.status, "done", "{:?}", summary.error);
         let balance = summary.energy_balance.unwrap().abs();
         let force = summary.reactions.iter().find(|(name, _)| name == "pull").unwrap().1;

@@ -3,7 +3,8 @@
 
 use std::path::Path;
 
-use pliant_scene::{OutputFolder, Scene, World, open, run};
+use pliant_run::{OutputFolder, run};
+use pliant_scene::{Scene, World, open};
 use pliant_validation::{claim, numbers, reference};
 
 /// The table over time that a scene wrote.

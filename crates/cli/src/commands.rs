@@ -6,10 +6,9 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use pliant_gpu::{Adapter, GpuError};
+use pliant_run::{Checkpoint, Draw, Options, OutputFolder, Sweep, SweepOptions};
 use pliant_scene::diagnostic::Diagnostic;
-use pliant_scene::{
-    Checkpoint, Draw, Options, OutputFolder, Reads, Scene, Sweep, SweepOptions, World, reference, registry,
-};
+use pliant_scene::{Reads, Scene, World, reference, registry};
 use pliant_sim::number;
 use serde_json::{Value as Json, json};
 
@@ -87,7 +86,7 @@ fn run(arguments: &Run) -> Result<ExitCode, Failure> {
         picture: picture.as_ref().map(|picture| picture as &dyn Draw),
     };
     let mut report = |progress| bar.update(progress);
-    let result = pliant_scene::run_with(&world, &folder, options, &mut report);
+    let result = pliant_run::run_with(&world, &folder, options, &mut report);
     bar.finish();
     let interrupted = matches!(&result, Ok(summary) if summary.status == "interrupted");
     let (words, failure, json) = match result {
@@ -97,7 +96,7 @@ fn run(arguments: &Run) -> Result<ExitCode, Failure> {
             (report::result(&summary), message, json!(summary))
         }
         Err(error) => {
-            (String::new(), Some(format!("{error}; {}", error.remedy)), pliant_scene::failed_output(&error))
+            (String::new(), Some(format!("{error}; {}", error.remedy)), pliant_run::failed_output(&error))
         }
     };
     let told = match arguments.json {
@@ -245,7 +244,7 @@ fn refuse_mistakes(sweep: &Sweep, threads: usize) -> Result<(), Failure> {
 
 fn check(arguments: &Check) -> Result<ExitCode, Failure> {
     let world = prepare(&arguments.scene, &arguments.overrides)?;
-    say(pliant_scene::overview(&world).trim_end())?;
+    say(pliant_run::overview(&world).trim_end())?;
     Ok(ExitCode::SUCCESS)
 }
 

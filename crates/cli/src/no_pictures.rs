@@ -3,7 +3,8 @@
 use std::process::ExitCode;
 
 use pliant_geometry::Mesh;
-use pliant_scene::{Draw, World};
+use pliant_run::Draw;
+use pliant_scene::World;
 
 use crate::arguments::{Render, View};
 use crate::report::Failure;

@@ -8,9 +8,10 @@ use pliant_picture::{
     AnimatedPng, Axis, Film, Graphics, Legend, Look, Picture, PictureError, Plane, Projection, Series,
     SeriesError, ffmpeg,
 };
+use pliant_run::{Draw, Options, OutputFolder};
 use pliant_scene::format::VtuTable;
 use pliant_scene::registry::OutputTable;
-use pliant_scene::{Draw, Options, OutputFolder, Scene, World};
+use pliant_scene::{Scene, World};
 
 use crate::arguments::{Frames, Overrides, Render};
 use crate::look::{background_of, colour_by_name, look_of, map_of, texture_of};
@@ -205,7 +206,7 @@ fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>, Failure> 
         .map_err(|error| Failure::plain(&error, error.remedy))?;
     let bar = Bar::new();
     let options = Options { stop: Some(signals::stop()), ..Options::default() };
-    let result = pliant_scene::run_with(&world, &run, options, &mut |progress| bar.update(progress));
+    let result = pliant_run::run_with(&world, &run, options, &mut |progress| bar.update(progress));
     bar.finish();
     let summary = result.map_err(|error| Failure::plain(&error, error.remedy))?;
     for warning in &summary.warnings {

@@ -10,8 +10,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use miette::Diagnostic;
 use pliant_geometry::io::MeshFileError;
 use pliant_gpu::Adapter;
+use pliant_run::{Progress, ResumeError, Summary, SweepProgress, failed_input};
 use pliant_scene::diagnostic::SceneErrors;
-use pliant_scene::{Progress, ReadError, ResumeError, Summary, SweepProgress, failed_input, printable};
+use pliant_scene::{ReadError, printable};
 use pliant_sim::{LoadStepProgress, number};
 use serde_json::json;
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use pliant_reproduce::{CASES, Case, Report, find, is_own_file};
-use pliant_scene::OutputFolder;
+use pliant_run::OutputFolder;
 
 use crate::arguments::Reproduce;
 use crate::page::Page;

@@ -1,4 +1,4 @@
-//! Scene files and what runs them: a text is read into a [`Scene`], built into a model, and run with its outputs.
+//! Scene files: a text is read into a [`Scene`] and built into a [`World`], which `pliant-run` runs with its outputs.
 //!
 //! ```
 //! use pliant_scene::{Scene, source::Source};
@@ -32,22 +32,17 @@
 //! # Ok::<(), pliant_scene::diagnostic::SceneErrors>(())
 //! ```
 
-mod advice;
 mod assemble;
 mod bound;
 mod cache;
 pub mod checker;
-mod checkpoint;
 pub mod diagnostic;
 pub mod format;
-mod live;
 mod method;
 mod nearest;
 pub mod niftysim;
 mod of_mesh;
 mod organ_scene;
-mod output;
-mod overview;
 mod participants;
 mod penalty;
 mod plan;
@@ -56,36 +51,26 @@ mod printable;
 mod reads;
 pub mod reference;
 pub mod registry;
-mod run;
 mod scene;
 pub mod source;
 mod starter;
-mod sweep;
 mod target;
 #[cfg(test)]
 mod testing;
 mod view;
 mod world;
 
-pub use assemble::{Built, BuiltBody, Meshing, SizeDoubt, build, build_watched, build_with};
+pub use assemble::{
+    BodyLocator, Built, BuiltBody, Located, Meshing, SizeDoubt, build, build_watched, build_with,
+};
 pub use bound::element_bound;
 pub use cache::MeshCache;
-pub use checkpoint::{Checkpoint, ResumeError};
-pub use live::Live;
 pub use of_mesh::{SceneOfMesh, is_mesh, scene_of_mesh};
 pub use organ_scene::OrganScene;
-pub use output::{
-    AddedMass, BodySummary, Column, OutputError, OutputFolder, ParticipantSummary, StabilitySummary, Summary,
-    TieSummary, failed_input, failed_output,
-};
-pub use overview::overview;
 pub use plan::{LimitingElement, Limits, Plan, plan};
 pub use printable::printable;
 pub use reads::Reads;
-pub use run::{Options, Progress, run, run_with};
 pub use scene::{ReadError, Scene, open, open_within, scene_file};
 pub use starter::starter;
-pub use sweep::{Sweep, SweepOptions, SweepProgress, SweepSummary};
 pub use target::Target;
-pub use view::Draw;
 pub use world::{Part, World};

@@ -398,7 +398,7 @@ impl Scene {
     }
 
     /// Whether a body or a surface of it has a name.
-    pub(crate) fn has(&self, name: &str) -> bool {
+    pub fn has(&self, name: &str) -> bool {
         self.bodies.iter().any(|(own, _)| own == name) || self.surfaces.iter().any(|(own, _)| own == name)
     }
 }

@@ -29,7 +29,7 @@ pub struct Source {
 }
 
 /// What the user types before an assignment.
-pub(crate) const SET: &str = "--set ";
+pub const SET: &str = "--set ";
 
 /// Kinds of tables that hold tables with names of the user's choice.
 const NAMED: [&str; 8] = ["participant", "law", "body", "tie", "surface", "constraint", "load", "output"];

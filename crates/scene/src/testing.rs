@@ -4,29 +4,12 @@ use std::path::Path;
 
 use pliant_geometry::DataArray;
 use pliant_meshing::{Block, Resolution, VolumeCell};
+pub(crate) use pliant_testing::CUBE;
 
 use crate::assemble::{Built, build};
 use crate::diagnostic::SceneErrors;
 use crate::scene::Scene;
 use crate::source::Source;
-
-/// A cube of eight hexes, held below.
-pub(crate) const CUBE: &str = r#"
-[scene]
-until = 0.1
-[law.tissue]
-type = "neo-hookean"
-young-modulus = 10e3
-poisson-ratio = 0.3
-[body.cube]
-mesh = { block = { size = [0.2, 0.1, 0.1], cells = [2, 2, 2] }, as = "hexes" }
-law = "tissue"
-density = 1000
-[constraint.base]
-type = "fix"
-body = "cube"
-nodes = { set = "z-min" }
-"#;
 
 /// The scene of [`CUBE`] with more tables.
 pub(crate) fn scene(more: &str) -> Scene {

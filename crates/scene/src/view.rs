@@ -1,23 +1,13 @@
 //! What of a scene is shown, as its table `[view]` asks.
 
 use std::collections::BTreeMap;
-use std::fmt;
 
-use pliant_geometry::{Labels, Mesh};
+use pliant_geometry::Labels;
 
 use crate::assemble::{Built, labels_of, touches};
 use crate::format::{At, BodyModel, ColourBy, CsvTable, FieldName, ViewTable, VtuTable};
 use crate::registry::OutputTable;
 use crate::scene::Scene;
-
-/// Draws an instant of a run.
-pub trait Draw: fmt::Debug + Sync {
-    /// A PNG file of a mesh at rest with the fields of an instant, at a time [s].
-    ///
-    /// # Errors
-    /// Why there is no picture.
-    fn draw(&self, mesh: &Mesh, time: f64) -> Result<Vec<u8>, String>;
-}
 
 impl ViewTable {
     /// Whether the colours are those of labels.
@@ -79,7 +69,7 @@ impl Scene {
 
     /// All that tables of the scene sample, in one: energies, all reactions, and the probes, under the name of their table too where
     /// another one has a probe of that name.
-    pub(crate) fn sampled(&self) -> CsvTable {
+    pub fn sampled(&self) -> CsvTable {
         let mut probes = BTreeMap::new();
         for (name, output) in &self.outputs {
             let OutputTable::Csv(table) = output else { continue };

@@ -111,7 +111,7 @@ impl World {
     }
 
     /// The same of another duration [s].
-    pub(crate) fn lasting(&self, until: f64) -> Self {
+    pub fn lasting(&self, until: f64) -> Self {
         let mut world = self.clone();
         world.scene.scene.until = until;
         for part in &mut world.participants {
@@ -137,7 +137,7 @@ impl World {
     }
 
     /// The participant that has the least steps, and so the common instants of all.
-    pub(crate) fn slowest(&self) -> &Part {
+    pub fn slowest(&self) -> &Part {
         let steps = |part: &&Part| part.plan.steps.number;
         // A world has a participant: a scene without bodies is refused when it is read.
         self.participants.iter().min_by_key(steps).unwrap_or(&self.participants[0])
@@ -149,7 +149,7 @@ impl World {
     }
 
     /// The time [s] from one common instant to the next, at a time.
-    pub(crate) fn step_from(&self, time: f64) -> f64 {
+    pub fn step_from(&self, time: f64) -> f64 {
         self.slowest().plan.steps.step_from(time)
     }
 
@@ -167,7 +167,7 @@ impl World {
     }
 
     /// Its participants without their tables.
-    pub(crate) fn simulated(&self) -> pliant_sim::World {
+    pub fn simulated(&self) -> pliant_sim::World {
         let parts = self.participants.iter().map(Part::simulated).collect();
         pliant_sim::World { parts, ties: self.ties.clone() }
     }
@@ -239,12 +239,12 @@ impl World {
 
 impl Part {
     /// Whether it has the body or the surface of a name, or all are meant.
-    pub(crate) fn shows(&self, on: Option<&str>) -> bool {
+    pub fn shows(&self, on: Option<&str>) -> bool {
         on.is_none_or(|on| self.scene.has(on))
     }
 
     /// The fields of some that its bodies have.
-    pub(crate) fn fields(&self, fields: &[FieldName]) -> Vec<FieldName> {
+    pub fn fields(&self, fields: &[FieldName]) -> Vec<FieldName> {
         let has = |field: &FieldName| {
             let is_of_bodies = self.scene.bodies.iter().any(|(_, body)| field.is_of(body.model));
             is_of_bodies && (self.built.contacts.is_some() || !field.is_of_contact())
@@ -253,7 +253,7 @@ impl Part {
     }
 
     /// What it is called in messages and columns.
-    pub(crate) fn prefix(&self) -> Option<&str> {
+    pub fn prefix(&self) -> Option<&str> {
         (!self.name.is_empty()).then_some(self.name.as_str())
     }
 }

@@ -89,6 +89,24 @@ impl Random {
     }
 }
 
+/// A scene: a cube of eight hexes, held below.
+pub const CUBE: &str = r#"
+[scene]
+until = 0.1
+[law.tissue]
+type = "neo-hookean"
+young-modulus = 10e3
+poisson-ratio = 0.3
+[body.cube]
+mesh = { block = { size = [0.2, 0.1, 0.1], cells = [2, 2, 2] }, as = "hexes" }
+law = "tissue"
+density = 1000
+[constraint.base]
+type = "fix"
+body = "cube"
+nodes = { set = "z-min" }
+"#;
+
 /// Peak memory of this process [KiB] at an instant, on Linux.
 #[derive(Clone, Copy, Debug)]
 pub struct PeakMemory(Option<u64>);

@@ -10,7 +10,7 @@ use nalgebra::Point3;
 use pliant_geometry::Vector3;
 use pliant_mechanics::grip::Grip;
 use pliant_picture::Subject;
-use pliant_scene::Live;
+use pliant_run::Live;
 use pliant_sim::ToolNow;
 use pliant_sim::contact::pose::Pose;
 use serde::{Deserialize, Serialize};

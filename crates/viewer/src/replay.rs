@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use pliant_geometry::Vector3;
 use pliant_picture::{Subject, visible};
-use pliant_scene::Live;
+use pliant_run::Live;
 use pliant_scene::format::ViewTable;
 use pliant_sim::State;
 use serde::Serialize;

@@ -5,7 +5,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use pliant_scene::Column;
+use pliant_run::Column;
 
 use crate::session::Frame;
 

@@ -12,8 +12,9 @@ use pliant_mechanics::grip::Grip;
 use pliant_picture::{
     PointForce, Subject, contact_forces, critical_cell, drawn_value, nodal_values, visible,
 };
+use pliant_run::{Column, Live};
+use pliant_scene::World;
 use pliant_scene::format::ViewTable;
-use pliant_scene::{Column, Live, World};
 use pliant_sim::gpu::{DevicePoints, PointValue};
 use pliant_sim::{Failure, State, number};
 

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use pliant_geometry::Vector3;
 use pliant_picture::{Camera, Drawn, Plane, Renderer, Section, Style, Subject, Target};
-use pliant_scene::Live;
+use pliant_run::Live;
 use pliant_scene::World;
 use pliant_scene::format::{ColourBy, FieldName, ViewTable};
 use pliant_sim::gpu::{Device, DevicePoints, PointValue};

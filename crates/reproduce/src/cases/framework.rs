@@ -4,8 +4,9 @@
 
 use pliant_bench::{Clocked, Spread, Timed};
 use pliant_explicit::State;
+use pliant_run::OutputFolder;
 use pliant_scene::source::Source;
-use pliant_scene::{OutputFolder, Scene, World};
+use pliant_scene::{Scene, World};
 use pliant_sim::SAFETY;
 use rayon::ThreadPoolBuilder;
 
@@ -72,7 +73,7 @@ impl Program {
         let place = tempfile::tempdir().map_err(|error| unwritable(&error))?;
         let folder = OutputFolder::prepare(place.path().join("run"), &self.0.scene, false)
             .map_err(|error| unwritable(&error))?;
-        let summary = pliant_scene::run(&self.0, &folder, &mut |_| ()).map_err(|error| unwritable(&error))?;
+        let summary = pliant_run::run(&self.0, &folder, &mut |_| ()).map_err(|error| unwritable(&error))?;
         match summary.error {
             None => Ok(summary.wall_seconds / summary.steps as f64),
             Some(failure) => Err(CaseError::Run(failure.message)),

@@ -6,8 +6,9 @@ use std::time::{Duration, Instant};
 
 use pliant_geometry::Mesh;
 use pliant_gpu::{Device, GpuError, PointValue};
+use pliant_run::Live;
 use pliant_scene::source::{Source, Value};
-use pliant_scene::{Live, Scene, World};
+use pliant_scene::{Scene, World};
 
 use crate::CaseError;
 use crate::case::{Case, Findings, Row};

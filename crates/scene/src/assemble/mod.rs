@@ -89,7 +89,7 @@ impl BuiltBody {
     }
 
     /// Finds points of its body.
-    pub(crate) fn locator(&self) -> BodyLocator<'_> {
+    pub fn locator(&self) -> BodyLocator<'_> {
         if self.mesh.volume_blocks().any(|block| !block.is_empty()) {
             return BodyLocator::Cells(&self.mesh, Locator::new(&self.mesh));
         }
@@ -107,7 +107,7 @@ impl BuiltBody {
 }
 
 /// Finds the cell of a solid, the triangle of a thin wall, or the bar that is nearest to a point.
-pub(crate) enum BodyLocator<'b> {
+pub enum BodyLocator<'b> {
     /// In the cells of a solid.
     Cells(&'b Mesh, Locator),
     /// On triangles.
@@ -117,7 +117,7 @@ pub(crate) enum BodyLocator<'b> {
 }
 
 /// The place of a point in a body.
-pub(crate) struct Located {
+pub struct Located {
     /// The kind of the cell that is nearest.
     pub kind: CellKind,
     /// Its number in its block.

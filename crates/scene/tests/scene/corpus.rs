@@ -5,9 +5,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use pliant_run::{Checkpoint, OutputFolder};
 use pliant_scene::niftysim::import_bytes;
 use pliant_scene::source::Source;
-use pliant_scene::{Checkpoint, OutputFolder, Scene, World};
+use pliant_scene::{Scene, World};
 
 use pliant_testing::{PeakMemory, Random};
 
@@ -102,7 +103,7 @@ fn broken_checkpoints_give_errors() {
     let out = tempfile::tempdir().unwrap();
     let world = World::new(&scene).unwrap();
     let folder = OutputFolder::prepare(out.path().join("out"), &scene, false).unwrap();
-    pliant_scene::run(&world, &folder, &mut |_| {}).unwrap();
+    pliant_run::run(&world, &folder, &mut |_| {}).unwrap();
     let path = Checkpoint::read(folder.path()).unwrap().path().to_owned();
     let whole = fs::read(&path).unwrap();
     let body = &whole[20..whole.len() - 4];

@@ -1,6 +1,6 @@
 //! Tools that push with no more than a force.
 
-use pliant_scene::OutputFolder;
+use pliant_run::OutputFolder;
 
 use super::contact::pressed;
 use super::static_solids::{last_row, resumes, run, world};
@@ -68,7 +68,7 @@ fn the_failure_of_a_body_that_a_tool_goes_through_names_the_tool() {
     let world = world(&through("from = 0.1\nto = 0.6", 1.0)).unwrap();
     let out = tempfile::tempdir().unwrap();
     let folder = OutputFolder::prepare(out.path().join("out"), &world.scene, false).unwrap();
-    let summary = pliant_scene::run(&world, &folder, &mut |_| ()).unwrap();
+    let summary = pliant_run::run(&world, &folder, &mut |_| ()).unwrap();
     let failure = summary.error.unwrap().to_string();
     assert!(failure.contains("where `finger` pushes too hard, give it a `force-limit`"), "{failure}");
 }

@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 use pliant_mechanics::grip::Grip;
+use pliant_run::Live;
 use pliant_scene::source::Source;
-use pliant_scene::{Live, Scene, World};
+use pliant_scene::{Scene, World};
 
 const STRIP: &str = r#"
 [scene]

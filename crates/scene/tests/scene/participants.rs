@@ -8,8 +8,9 @@ use std::sync::Arc;
 use super::static_solids::taken_up;
 use pliant_geometry::CellKind;
 use pliant_geometry::io;
+use pliant_run::{Live, OutputFolder, Summary};
 use pliant_scene::source::Source;
-use pliant_scene::{Live, OutputFolder, Scene, Summary, World};
+use pliant_scene::{Scene, World};
 
 const LAWS: &str = r#"
 [law.tissue]
@@ -68,7 +69,7 @@ fn both(more: &str) -> String {
 
 fn run(world: &World, folder: &Path) -> Summary {
     let folder = OutputFolder::prepare(folder.to_owned(), &world.scene, false).unwrap();
-    let summary = pliant_scene::run(world, &folder, &mut |_| ()).unwrap();
+    let summary = pliant_run::run(world, &folder, &mut |_| ()).unwrap();
     assert_eq!(summary.status, "done", "{:?}", summary.error);
     summary
 }

@@ -6,8 +6,9 @@ use std::fs;
 use std::path::Path;
 
 use pliant_geometry::{CellKind, io};
+use pliant_run::{Checkpoint, Options, OutputFolder, Summary};
 use pliant_scene::source::Source;
-use pliant_scene::{Checkpoint, Options, OutputFolder, Scene, Summary, World};
+use pliant_scene::{Scene, World};
 
 /// A block of 100 × 50 × 50 mm, held at one end, turned and pulled at the other, pressed from above, under its weight.
 pub(super) fn block(solver: &str, element: &str, law: &str, more: &str) -> String {
@@ -40,7 +41,7 @@ pub(super) fn world(text: &str) -> Result<World, String> {
 pub(super) fn run(text: &str, folder: &Path) -> Summary {
     let world = world(text).unwrap_or_else(|errors| panic!("{errors}"));
     let folder = OutputFolder::prepare(folder.to_owned(), &world.scene, false).unwrap();
-    let summary = pliant_scene::run(&world, &folder, &mut |_| ()).unwrap();
+    let summary = pliant_run::run(&world, &folder, &mut |_| ()).unwrap();
     assert_eq!(summary.status, "done", "{:?}", summary.error);
     summary
 }
@@ -187,14 +188,14 @@ pub(super) fn resumes(text: &str) {
 pub(super) fn taken_up(whole: &World, half: &World, place: &Path) -> (Checkpoint, [String; 2]) {
     for (world, name) in [(whole, "whole"), (half, "half")] {
         let folder = OutputFolder::prepare(place.join(name), &world.scene, false).unwrap();
-        let summary = pliant_scene::run(world, &folder, &mut |_| ()).unwrap();
+        let summary = pliant_run::run(world, &folder, &mut |_| ()).unwrap();
         assert_eq!(summary.status, "done", "{:?}", summary.error);
     }
     let checkpoint = Checkpoint::read(&place.join("half")).unwrap();
     let onward = checkpoint.continues(whole).unwrap();
     let folder = OutputFolder::reopen(place.join("half"), &onward.scene, &checkpoint).unwrap();
     let options = Options { resume: Some(&checkpoint), ..Options::default() };
-    let summary = pliant_scene::run_with(&onward, &folder, options, &mut |_| ()).unwrap();
+    let summary = pliant_run::run_with(&onward, &folder, options, &mut |_| ()).unwrap();
     assert_eq!(summary.status, "done", "{:?}", summary.error);
     let table = |name: &str| fs::read_to_string(place.join(name).join("history.csv")).unwrap();
     (checkpoint, ["whole", "half"].map(table))

@@ -115,8 +115,8 @@ fn energies_of_tied_bodies_balance_and_the_critical_step_is_that_of_the_whole() 
         Err(told) => told.contains("stable"),
         Ok(world) => {
             let folder =
-                pliant_scene::OutputFolder::prepare(out.path().join("again"), &world.scene, false).unwrap();
-            pliant_scene::run(&world, &folder, &mut |_| ()).unwrap().status == "failed"
+                pliant_run::OutputFolder::prepare(out.path().join("again"), &world.scene, false).unwrap();
+            pliant_run::run(&world, &folder, &mut |_| ()).unwrap().status == "failed"
         }
     };
     assert!(failed);

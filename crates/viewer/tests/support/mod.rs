@@ -76,7 +76,7 @@ pub fn staged(source: Source, folder: PathBuf) -> World {
 }
 
 pub fn subject(world: &World) -> Subject {
-    let mut live = pliant_scene::Live::new(&std::sync::Arc::new(world.clone())).unwrap();
+    let mut live = pliant_run::Live::new(&std::sync::Arc::new(world.clone())).unwrap();
     Subject::new(live.mesh().unwrap())
 }
 

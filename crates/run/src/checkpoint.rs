@@ -13,9 +13,9 @@ use pliant_mechanics::fingerprint;
 use pliant_sim::{Precision, Schedule, State, counted, number};
 use serde::{Deserialize, Serialize};
 
-use crate::format::{LoadSteps, SolverName};
 use crate::output::{History, OutputError, OutputFolder, Watched, Written, replace};
-use crate::world::{Part, World};
+use pliant_scene::format::{LoadSteps, SolverName};
+use pliant_scene::{Part, World};
 
 /// The first bytes of every checkpoint.
 const MAGIC: [u8; 8] = *b"\x89PLIANT\n";

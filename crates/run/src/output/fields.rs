@@ -8,7 +8,7 @@ use pliant_mechanics::tensor::Symmetric;
 use rayon::prelude::*;
 
 use super::Frame;
-use crate::format::FieldName;
+use pliant_scene::format::FieldName;
 
 /// A value of up to nine numbers.
 pub(super) type Value = [f64; 9];

@@ -11,10 +11,10 @@ use serde_json::{Value as Json, json};
 use super::stability::{AddedMass, StabilitySummary, doubts};
 use super::{History, Outcome, PartOutcome, TieSummary};
 use super::{OutputError, StrainSummary, constraints};
-use crate::assemble::Built;
-use crate::plan::{LimitingElement, Limits};
-use crate::printable::printable;
-use crate::world::{Part, World};
+use pliant_scene::Built;
+use pliant_scene::printable;
+use pliant_scene::{LimitingElement, Limits};
+use pliant_scene::{Part, World};
 
 /// The status of a stopped run.
 pub(crate) const INTERRUPTED: &str = "interrupted";

@@ -9,12 +9,12 @@ use pliant_mechanics::model::Motion;
 use pliant_sim::contact::touch::With;
 use pliant_sim::{BodyCells, Critical, ImplicitBodies, counted, number};
 
-use crate::assemble::Built;
 use crate::output::{AddedMass, bodies, told_limit};
-use crate::plan::{Limits, Plan};
-use crate::registry::OutputTable;
-use crate::scene::Scene;
-use crate::world::World;
+use pliant_scene::Built;
+use pliant_scene::Scene;
+use pliant_scene::World;
+use pliant_scene::registry::OutputTable;
+use pliant_scene::{Limits, Plan};
 
 /// The model in words: bodies, quality, constraints, loads, critical step, expected cost.
 pub fn overview(world: &World) -> String {

@@ -10,17 +10,17 @@ use std::sync::{Arc, Mutex};
 use pliant_mechanics::Energies;
 use pliant_sim::number;
 
-use crate::cache::MeshCache;
-use crate::diagnostic::{Diagnostic, Place, SceneErrors};
 use crate::output::{
     AXES, ENERGIES, MOST_CURVES, OutputError, OutputFolder, Reactions, Summary, check_own_folder,
     plot_of_sweep,
 };
-use crate::registry::OutputTable;
 use crate::run::{Options, run_with};
-use crate::scene::Scene;
-use crate::source::{SET, Source};
-use crate::world::World;
+use pliant_scene::MeshCache;
+use pliant_scene::Scene;
+use pliant_scene::World;
+use pliant_scene::diagnostic::{Diagnostic, Place, SceneErrors};
+use pliant_scene::registry::OutputTable;
+use pliant_scene::source::{SET, Source};
 
 /// The table of a sweep.
 pub const SWEEP: &str = "sweep.csv";

@@ -35,9 +35,9 @@ pub(crate) use field_mesh::FieldMesh;
 pub(crate) use plot::{MOST_CURVES, Reactions, constraints, plot, plot_of_sweep};
 pub(crate) use summary::{bodies, interrupted, markdown, output_failure, summarise, told_limit};
 
-use crate::assemble::Built;
-use crate::registry::OutputTable;
-use crate::world::{Part, World};
+use pliant_scene::Built;
+use pliant_scene::registry::OutputTable;
+use pliant_scene::{Part, World};
 
 /// An output that could not be written.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -77,11 +77,9 @@ impl Frame<'_> {
     }
 }
 
-impl World {
-    /// All participants of a simulation of it as outputs read them.
-    pub(crate) fn frames<'a>(&'a self, simulation: &'a Simulation) -> Vec<Frame<'a>> {
-        self.participants.iter().zip(simulation.instants()).map(|(part, now)| Frame { part, now }).collect()
-    }
+/// All participants of a simulation of a world as outputs read them.
+pub(crate) fn frames<'a>(world: &'a World, simulation: &'a Simulation) -> Vec<Frame<'a>> {
+    world.participants.iter().zip(simulation.instants()).map(|(part, now)| Frame { part, now }).collect()
 }
 
 /// Time of the instant of frames [s].

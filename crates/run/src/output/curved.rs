@@ -5,8 +5,8 @@ use pliant_implicit::{CurvedSurface, EdgeRule, Picture, PictureFields};
 use pliant_sim::{BodyCells, ImplicitBodies};
 
 use super::{Frame, fields};
-use crate::assemble::Built;
-use crate::format::FieldName;
+use pliant_scene::Built;
+use pliant_scene::format::FieldName;
 
 /// The curved surface of one shell or of all.
 pub(super) struct Curved {

@@ -4,7 +4,7 @@ use pliant_implicit::State;
 use pliant_sim::{BodyCells, number};
 use serde::{Deserialize, Serialize};
 
-use crate::assemble::Built;
+use pliant_scene::Built;
 
 /// Strain above which a run of shells gives a warning.
 const MUCH: f64 = 0.1;

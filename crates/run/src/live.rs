@@ -10,9 +10,9 @@ use pliant_sim::contact::touch::Rigid;
 use pliant_sim::gpu::{DeviceMapping, DevicePoints, PointValue};
 use pliant_sim::{Failure, Simulation, State};
 
-use crate::format::VtuTable;
-use crate::output::{Column, FieldMesh, Frame, Samples};
-use crate::world::World;
+use crate::output::{Column, FieldMesh, Frame, Samples, frames};
+use pliant_scene::World;
+use pliant_scene::format::VtuTable;
 
 /// A world under way, and what is shown and sampled of it.
 pub struct Live {
@@ -146,13 +146,13 @@ impl Live {
     /// If forces at the instant can't be found.
     pub fn mesh(&mut self) -> Result<&Mesh, Failure> {
         self.simulation.evaluate(Wanted::Everything)?;
-        self.shown.fill(&self.world.frames(&self.simulation));
+        self.shown.fill(&frames(&self.world, &self.simulation));
         Ok(self.shown.mesh())
     }
 
     /// Forces [N] that hold or move the nodes of each constraint of all participants, at the instant last evaluated.
     pub fn reactions(&self) -> Vec<[f64; 3]> {
-        self.world.frames(&self.simulation).iter().flat_map(Frame::reactions).collect()
+        frames(&self.world, &self.simulation).iter().flat_map(Frame::reactions).collect()
     }
 
     /// What is sampled: reactions, energies and the probes of all tables of the scene, with units.
@@ -162,7 +162,7 @@ impl Live {
 
     /// Adds the sample of the instant last shown to a row.
     pub fn sample(&mut self, row: &mut Vec<f64>) {
-        self.samples.read(&self.world.frames(&self.simulation), row);
+        self.samples.read(&frames(&self.world, &self.simulation), row);
     }
 }
 

@@ -9,8 +9,8 @@ use pliant_sim::{counted, number};
 use serde::Serialize;
 
 use super::PartOutcome;
-use crate::assemble::Built;
-use crate::world::Part;
+use pliant_scene::Built;
+use pliant_scene::Part;
 
 /// Hourglass energy, as a fraction of the internal one, above which a run gives a warning.
 const MUCH_HOURGLASS: f64 = 0.05;

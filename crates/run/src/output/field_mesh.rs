@@ -9,9 +9,9 @@ use rayon::prelude::*;
 
 use super::merged::merged;
 use super::{Frame, fields};
-use crate::assemble::Built;
-use crate::format::{At, BodyModel, FieldName, VtuTable};
-use crate::world::World;
+use pliant_scene::Built;
+use pliant_scene::World;
+use pliant_scene::format::{At, BodyModel, FieldName, VtuTable};
 
 /// A mesh that takes the fields of instants: of a body, a carried surface or all bodies, of any participants.
 pub(crate) struct FieldMesh {
@@ -535,8 +535,8 @@ mod tests {
     use pliant_geometry::io;
 
     use super::*;
-    use crate::scene::Scene;
-    use crate::source::Source;
+    use pliant_scene::Scene;
+    use pliant_scene::source::Source;
 
     /// A square of two labels as a shell, and as a surface that it carries.
     const WALL: &str = r#"
@@ -575,7 +575,7 @@ nodes = { label = "left" }
         io::write(&folder.path().join("wall.vtu"), &wall).unwrap();
         let source = Source::parse("wall.toml", WALL).unwrap();
         let scene = Scene::from_source(source, folder.path().to_owned()).unwrap();
-        let built = crate::build(&scene).unwrap_or_else(|errors| panic!("{}", errors.plain()));
+        let built = pliant_scene::build(&scene).unwrap_or_else(|errors| panic!("{}", errors.plain()));
         let model = &built.implicit.as_ref().unwrap().model;
         assert_eq!([0, 1].map(|facet| model.facets[facet].thickness), [1e-3, 2e-3]);
         let labels = |on: Option<&str>, curved: Option<u32>| {

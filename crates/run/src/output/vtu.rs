@@ -10,8 +10,8 @@ use pliant_geometry::io::{MeshFileError, VtuOptions, read_pvd, write_pvd, write_
 use super::field_mesh::FieldMesh;
 use super::file::{check_own_folder, replace};
 use super::{Frame, Output, OutputError, Written, time_of};
-use crate::format::VtuTable;
-use crate::world::World;
+use pliant_scene::World;
+use pliant_scene::format::VtuTable;
 
 pub(super) struct Series {
     folder: PathBuf,

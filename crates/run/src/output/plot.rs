@@ -6,7 +6,7 @@ use plotters::prelude::*;
 use pliant_mechanics::model::Constraint;
 
 use super::History;
-use crate::world::World;
+use pliant_scene::World;
 
 const SIZE: (u32, u32) = (900, 760);
 

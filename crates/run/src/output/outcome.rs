@@ -8,8 +8,8 @@ use pliant_sim::{Effort, Equilibria, Failure, Instant, TieNow};
 use serde::{Deserialize, Serialize};
 
 use super::{Frame, ShellStrains, time_of};
-use crate::format::SolverName;
-use crate::world::{Part, World};
+use pliant_scene::format::SolverName;
+use pliant_scene::{Part, World};
 
 /// The result of a run.
 #[derive(Clone, Debug)]

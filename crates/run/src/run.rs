@@ -1,20 +1,31 @@
 //! What a run writes and keeps while it goes: outputs, samples, checkpoints, reports of progress.
 
+use std::fmt;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use pliant_explicit::Wanted;
+use pliant_geometry::Mesh;
 use pliant_sim::{Failure, LoadStepProgress, Observer, Schedule, Simulation};
 
 use crate::advice::remedy;
 use crate::checkpoint::{Checkpoint, Checkpoints, Progressed};
 use crate::output::{
     CONVERGENCE, FieldMesh, History, Outcome, OutputError, OutputFolder, PICTURE, PLOT, PartOutcome, SUMMARY,
-    Scheduled, Summary, TieSummary, Watched, interrupted, markdown, output_failure, outputs, plot, summarise,
+    Scheduled, Summary, TieSummary, Watched, frames, interrupted, markdown, output_failure, outputs, plot,
+    summarise,
 };
-use crate::view::Draw;
-use crate::world::World;
+use pliant_scene::World;
+
+/// Draws an instant of a run.
+pub trait Draw: fmt::Debug + Sync {
+    /// A PNG file of a mesh at rest with the fields of an instant, at a time [s].
+    ///
+    /// # Errors
+    /// Why there is no picture.
+    fn draw(&self, mesh: &Mesh, time: f64) -> Result<Vec<u8>, String>;
+}
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug)]
@@ -257,7 +268,7 @@ impl<'a> Run<'a> {
     ) -> Result<PathBuf, OutputError> {
         let world = self.world;
         let mut shown = FieldMesh::new(world, &world.scene.shown(world.scene.scene.until));
-        shown.fill(&world.frames(simulation));
+        shown.fill(&frames(world, simulation));
         let drawn = picture.draw(shown.mesh(), simulation.time());
         let png = drawn.map_err(|reason| OutputError::new(&folder.path().join(PICTURE), reason))?;
         folder.write(PICTURE, &png)
@@ -286,15 +297,15 @@ impl Observer for Run<'_> {
         let (time, step) = (simulation.time(), simulation.step_length());
         self.watched.iter_mut().zip(simulation.instants()).for_each(|(own, now)| own.see(now));
         if self.sampling.is_due(time, step, last) {
-            self.history.sample(&self.world.frames(simulation));
+            self.history.sample(&frames(self.world, simulation));
             self.look_at_strains(simulation);
         }
         let failed = |error| output_failure(&error, Some(time));
         // Frames are made where an output is due, once for all.
-        let (world, mut frames) = (self.world, None);
+        let (world, mut shown) = (self.world, None);
         for (schedule, output) in &mut self.outputs {
             if schedule.is_due(time, step, last) {
-                output.see(frames.get_or_insert_with(|| world.frames(simulation))).map_err(failed)?;
+                output.see(shown.get_or_insert_with(|| frames(world, simulation))).map_err(failed)?;
             }
         }
         self.tell(time, None, last);
@@ -339,14 +350,14 @@ impl Observer for Run<'_> {
         }
         let time = simulation.time();
         self.look_at_strains(simulation);
-        let frames = self.world.frames(simulation);
+        let now = frames(self.world, simulation);
         if time > seen {
-            self.history.sample(&frames);
+            self.history.sample(&now);
         }
         for (schedule, output) in &mut self.outputs {
             if (time > seen || !schedule.has_seen(time)) && schedule.is_due(time, step, true) {
                 // The failure of the step is reported.
-                let _ = output.see(&frames);
+                let _ = output.see(&now);
             }
         }
     }

@@ -1,0 +1,56 @@
+//! Runs of scenes: a [`World`](pliant_scene::World) is stepped, and its outputs, checkpoints, plot and summary go to a folder.
+//! [`run`] does one run, [`Sweep`] many with different values, [`Live`] is what a window steps at its own pace.
+//! Outputs read instants and fields of [`pliant_sim`] and never change a state.
+//!
+//! ```
+//! use pliant_run::{OutputFolder, run};
+//! use pliant_scene::{Scene, World, source::Source};
+//!
+//! let text = r#"
+//!     [scene]
+//!     until = 0.01
+//!     gravity = [0, 0, -9.81]
+//!
+//!     [law.tissue]
+//!     type = "neo-hookean"
+//!     young-modulus = 3000
+//!     poisson-ratio = 0.45
+//!
+//!     [body.block]
+//!     mesh = { block = { size = [0.1, 0.1, 0.1] }, edge = 0.05 }
+//!     law = "tissue"
+//!     density = 1000
+//!
+//!     [constraint.base]
+//!     type = "fix"
+//!     body = "block"
+//!     nodes = { set = "z-min" }
+//! "#;
+//! let scene = Scene::from_source(Source::parse("block.toml", text)?, ".".into())?;
+//! let place = tempfile::tempdir()?;
+//! let folder = OutputFolder::prepare(place.path().join("block"), &scene, false)?;
+//! let summary = run(&World::new(&scene)?, &folder, &mut |_| ())?;
+//! // Two thirds of the weight of a kilogram hang on the base by then.
+//! assert_eq!(summary.status, "done");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod advice;
+mod checkpoint;
+mod live;
+mod output;
+mod overview;
+mod run;
+mod sweep;
+#[cfg(test)]
+mod testing;
+
+pub use checkpoint::{Checkpoint, ResumeError};
+pub use live::Live;
+pub use output::{
+    AddedMass, BodySummary, Column, OutputError, OutputFolder, ParticipantSummary, StabilitySummary, Summary,
+    TieSummary, failed_input, failed_output,
+};
+pub use overview::overview;
+pub use run::{Draw, Options, Progress, run, run_with};
+pub use sweep::{Sweep, SweepOptions, SweepProgress, SweepSummary};
