@@ -9,8 +9,8 @@ pub mod shells;
 pub use pliant_reproduce::cases::brain_shift;
 pub use pliant_reproduce::{
     Equilibrium, HOURGLASS, Hexes, Specimen, Tets, deformation, elastic, largest, law, liver,
-    liver_relaxation, numbers, run_on, smooth_step, soft_tissue,
+    liver_relaxation, numbers, smooth_step, soft_tissue,
 };
 pub use pliant_testing::Random;
 pub use reference::{claim, data_file, reference};
-pub use run::{relax, run, run_watched, settle, watched};
+pub use run::{relax, run, run_on, run_watched, settle, watched};

@@ -1,12 +1,14 @@
-//! Running a model, as a test does it: what fails, panics.
+//! Running a model, as a test does it: what fails, panics. Tests that read the explicit stepper's own state, errors and cut steps
+//! step it themselves; equilibria come from a simulation.
 
 use pliant_explicit::critical_step::assembled;
 use pliant_explicit::stability::{Monitor, OnUnstable};
-use pliant_explicit::{CentralDifference, DynamicRelaxation, Scalar, State, StepError};
+use pliant_explicit::{CentralDifference, Scalar, State, StepError};
 use pliant_mechanics::Model;
-use pliant_reproduce::{CaseError, Equilibrium, run_on};
+use pliant_reproduce::Equilibrium;
 
-/// See [`pliant_reproduce::run`].
+/// Steps a model from rest to a time [s], both ends included. `observe` sees every instant once its forces, reactions
+/// and energies are known. Returns the last instant.
 ///
 /// # Errors
 /// If a step fails.
@@ -19,13 +21,34 @@ pub fn run<R: Scalar>(
     until: f64,
     observe: impl FnMut(&CentralDifference<R>, &State<R>),
 ) -> Result<(CentralDifference<R>, State<R>), StepError> {
-    pliant_reproduce::run(model, step, until, observe).map_err(|error| match error {
-        CaseError::Step(error) => error,
-        other => panic!("{other}"),
-    })
+    run_on(stepper(model, step), State::at_rest(model), until, observe)
 }
 
-/// The same with a monitor of the stable step, whose limit at rest is the true one.
+/// Steps a state to a time [s], both ends included.
+///
+/// # Errors
+/// If a step fails.
+pub fn run_on<R: Scalar>(
+    mut stepper: CentralDifference<R>,
+    mut state: State<R>,
+    until: f64,
+    mut observe: impl FnMut(&CentralDifference<R>, &State<R>),
+) -> Result<(CentralDifference<R>, State<R>), StepError> {
+    loop {
+        stepper.evaluate(&mut state)?;
+        observe(&stepper, &state);
+        if state.time >= until {
+            return Ok((stepper, state));
+        }
+        stepper.advance(&mut state);
+    }
+}
+
+fn stepper<R: Scalar>(model: &Model, step: f64) -> CentralDifference<R> {
+    CentralDifference::new(model.clone(), step).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// [`run`] with a monitor of the stable step, whose limit at rest is the true one.
 ///
 /// # Errors
 /// If a step fails.
@@ -48,8 +71,7 @@ pub fn run_watched<R: Scalar>(
 /// If constraints contradict each other.
 pub fn watched<R: Scalar>(model: &Model, step: f64, on_unstable: OnUnstable) -> CentralDifference<R> {
     let limit = assembled(model).unwrap_or_else(|error| panic!("{error}")).step;
-    let stepper = CentralDifference::new(model.clone(), step).unwrap_or_else(|error| panic!("{error}"));
-    stepper.watched(Monitor::new(model, limit, on_unstable))
+    stepper(model, step).watched(Monitor::new(model, limit, on_unstable))
 }
 
 /// See [`pliant_reproduce::settle`].
@@ -64,6 +86,6 @@ pub fn settle(model: &Model, step: f64, until: f64) -> Equilibrium {
 ///
 /// # Panics
 /// If there is no equilibrium.
-pub fn relax(model: &Model) -> (DynamicRelaxation<f64>, State<f64>) {
+pub fn relax(model: &Model) -> Equilibrium {
     pliant_reproduce::relax(model).unwrap_or_else(|error| panic!("{error}"))
 }

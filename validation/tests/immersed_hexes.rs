@@ -67,13 +67,13 @@ impl Hanging {
 
     /// Displacements [m] in equilibrium at some points.
     fn displacements(&self, points: &[Vector3]) -> Vec<Vector3> {
-        let (_, state) = relax(&self.specimen.model);
+        let rest = relax(&self.specimen.model);
         let block = &self.specimen.mesh.blocks[0];
         let at = |point: &Vector3| {
             let found = self.locator.locate(*point).expect("the mesh has cells");
             let nodes = block.cell(found.cell as usize);
             let terms = nodes.iter().zip(found.weights());
-            terms.map(|(&node, &w)| Vector3::from(state.displacement[node as usize]) * w).sum()
+            terms.map(|(&node, &w)| Vector3::from(rest.displacement[node as usize]) * w).sum()
         };
         points.iter().map(at).collect()
     }

@@ -188,15 +188,6 @@ impl Specimen {
             .collect()
     }
 
-    /// The number of a constraint by its name.
-    ///
-    /// # Panics
-    /// If the constraint does not exist.
-    pub fn constraint(&self, name: &str) -> usize {
-        let found = self.model.constraints.iter().position(|constraint| constraint.name == name);
-        found.unwrap_or_else(|| panic!("no constraint is called `{name}`"))
-    }
-
     /// The element bound of the step at rest [s].
     ///
     /// # Panics

@@ -1,11 +1,12 @@
 //! One result of the literature: its content, corrections to the source, and the result here.
 
-use pliant_explicit::{RelaxationError, StepError};
+use pliant_explicit::StepError;
 use pliant_gpu::{GpuError, StepFailure};
 use pliant_implicit::{ModelError, SolveError};
 use pliant_mechanics::model::Contradiction;
 use pliant_meshing::MeshingError;
 use pliant_scene::diagnostic::SceneErrors;
+use pliant_sim::Failure;
 use serde::Serialize;
 
 /// A result of the literature.
@@ -141,18 +142,15 @@ impl Row {
 /// The error of a case.
 #[derive(Debug, thiserror::Error)]
 pub enum CaseError {
-    /// A step failed.
+    /// A simulation can't be made, or a step failed.
+    #[error(transparent)]
+    Simulated(#[from] Failure),
+    /// A bare step under the clock failed.
     #[error(transparent)]
     Step(#[from] StepError),
-    /// No equilibrium was found.
-    #[error(transparent)]
-    Relaxation(#[from] RelaxationError),
-    /// Constraints contradict each other.
+    /// A limit was asked of a model whose constraints contradict each other.
     #[error(transparent)]
     Contradiction(#[from] Contradiction),
-    /// A model has no dynamic relaxation.
-    #[error(transparent)]
-    Unrelaxed(#[from] pliant_explicit::Unrelaxed),
     /// A body could not be meshed.
     #[error(transparent)]
     Mesh(#[from] MeshingError),

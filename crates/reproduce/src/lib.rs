@@ -24,4 +24,5 @@ pub use pliant_bench::{
 };
 pub use reference::{largest, mesh, numbers, reference};
 pub use report::Report;
-pub use run::{Equilibrium, relax, run, run_on, settle, smooth_step};
+pub use run::{Equilibrium, relax, settle, smooth_step};
+pub(crate) use run::{relaxed, run};

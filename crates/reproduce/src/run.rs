@@ -1,56 +1,75 @@
-//! Running a model from rest, through its history or to its equilibrium.
+//! Running a model from rest, through its history or to its equilibrium, by a [`Simulation`].
 
-use pliant_explicit::{
-    CentralDifference, DynamicRelaxation, Observable, RelaxationSettings, Scalar, State, StepError,
-};
+use std::sync::Arc;
+
 use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::tensor::{Vector, dot};
+use pliant_sim::{Frame, Method, Part, Precision, Simulation, Steps, World};
 
 use crate::CaseError;
 
-/// Steps a model from rest to a time [s], both ends included. `observe` sees every instant once its forces, reactions
-/// and energies are known. Returns the last instant.
+/// The name of the only participant.
+const NAME: &str = "model";
+
+/// Steps a model from rest to a time [s] by central differences of a given length [s], which nothing cuts. `look` sees every
+/// instant, both ends included.
 ///
 /// # Errors
 /// If a step fails or constraints contradict each other.
-pub fn run<R: Scalar>(
+pub fn run(
     model: &Model,
+    precision: Precision,
     step: f64,
     until: f64,
-    observe: impl FnMut(&CentralDifference<R>, &State<R>),
-) -> Result<(CentralDifference<R>, State<R>), CaseError> {
-    Ok(run_on(CentralDifference::new(model.clone(), step)?, State::at_rest(model), until, observe)?)
-}
-
-/// Steps a state to a time [s], both ends included.
-///
-/// # Errors
-/// If a step fails.
-pub fn run_on<R: Scalar>(
-    mut stepper: CentralDifference<R>,
-    mut state: State<R>,
-    until: f64,
-    mut observe: impl FnMut(&CentralDifference<R>, &State<R>),
-) -> Result<(CentralDifference<R>, State<R>), StepError> {
-    loop {
-        stepper.evaluate(&mut state)?;
-        observe(&stepper, &state);
-        if state.time >= until {
-            return Ok((stepper, state));
-        }
-        stepper.advance(&mut state);
+    look: impl FnMut(&Frame<'_>),
+) -> Result<Simulation, CaseError> {
+    let mut part = Part::explicit(NAME, model.clone(), until)?;
+    if let Method::Explicit(settings) = &mut part.method {
+        settings.precision = precision;
+        settings.critical_step = f64::INFINITY;
     }
+    // A time that is a whole number of steps but for round-off takes no step more.
+    part.steps = Steps { step, number: (until / step - 1e-9).ceil() as u64, ends: None };
+    let end = part.steps.end_of(part.steps.number);
+    let mut simulation = Simulation::new(World::new(vec![part]))?;
+    simulation.run(end, look)?;
+    Ok(simulation)
 }
 
-/// A state that has come to rest.
+/// A model that has come to rest.
 pub struct Equilibrium {
-    /// The stepper, for its reactions.
-    pub stepper: CentralDifference<f64>,
-    /// The state.
-    pub state: State<f64>,
-    /// The largest displacement of a node [m].
+    /// Nodal displacements [m].
+    pub displacement: Vec<Vector<f64>>,
+    /// The largest of them [m].
     pub largest: f64,
+    /// The largest speed of a node [m/s].
+    speed: f64,
+    model: Arc<Model>,
+    reactions: Vec<Vector<f64>>,
+}
+
+impl Equilibrium {
+    fn of(simulation: &mut Simulation) -> Result<Self, CaseError> {
+        let model = Arc::clone(&simulation.world().parts[0].model);
+        let frame = simulation.frame()?;
+        let (_, now) = frame.parts().next().ok_or_else(|| CaseError::Run("nothing was simulated".into()))?;
+        let length = |v: Vector<f64>| dot(v, v).sqrt();
+        let displacement: Vec<_> = (0..model.node_count()).map(|node| now.displacement(node)).collect();
+        Ok(Self {
+            largest: displacement.iter().map(|&u| length(u)).fold(0.0, f64::max),
+            displacement,
+            speed: (0..model.node_count()).map(|node| length(now.velocity(node))).fold(0.0, f64::max),
+            reactions: (0..model.constraints.len()).map(|constraint| now.reaction(constraint)).collect(),
+            model,
+        })
+    }
+
+    /// Force [N] that holds or moves the nodes of a constraint; not a number without one of this name.
+    pub fn reaction(&self, constraint: &str) -> Vector<f64> {
+        let at = self.model.constraints.iter().position(|own| own.name == constraint);
+        at.map_or([f64::NAN; 3], |at| self.reactions[at])
+    }
 }
 
 /// Applies the loads and motions of a damped model within `until` seconds and checks that it has come to rest. At its
@@ -60,17 +79,9 @@ pub struct Equilibrium {
 /// # Errors
 /// If a step fails or the model still moves.
 pub fn settle(model: &Model, step: f64, until: f64) -> Result<Equilibrium, CaseError> {
-    let (stepper, state) = run(model, step, until, |_, _| ())?;
-    let length = |v: Vector<f64>| dot(v, v).sqrt();
-    let largest = state.displacement.iter().map(|&u| length(u)).fold(0.0, f64::max);
-    let speed =
-        (0..model.node_count()).map(|node| length(stepper.velocity(&state, node))).fold(0.0, f64::max);
-    let creep = 0.1 * speed / largest;
-    if creep < 1e-7 {
-        Ok(Equilibrium { stepper, state, largest })
-    } else {
-        Err(CaseError::Moving { until, creep })
-    }
+    let rest = Equilibrium::of(&mut run(model, Precision::Double, step, until, |_| ())?)?;
+    let creep = 0.1 * rest.speed / rest.largest;
+    if creep < 1e-7 { Ok(rest) } else { Err(CaseError::Moving { until, creep }) }
 }
 
 /// The equilibrium at 1 s, computed in one load step by dynamic relaxation to a residual of 1e-8 of the largest
@@ -78,12 +89,17 @@ pub fn settle(model: &Model, step: f64, until: f64) -> Result<Equilibrium, CaseE
 ///
 /// # Errors
 /// If none exists.
-pub fn relax(model: &Model) -> Result<(DynamicRelaxation<f64>, State<f64>), CaseError> {
-    let settings = RelaxationSettings { tolerance: 1e-8, ..RelaxationSettings::default() };
-    let mut solver = DynamicRelaxation::new(model.clone(), settings)?;
-    let mut state = State::at_rest(model);
-    solver.solve(&mut state, 1.0)?;
-    Ok((solver, state))
+pub fn relax(model: &Model) -> Result<Equilibrium, CaseError> {
+    Equilibrium::of(&mut relaxed(model, 1.0, Some(1e-8))?)
+}
+
+/// The same at a time [s], to a relative residual, that of double precision if not given.
+pub(crate) fn relaxed(model: &Model, until: f64, tolerance: Option<f64>) -> Result<Simulation, CaseError> {
+    let mut part = Part::quasi_static(NAME, model.clone(), until, 1);
+    part.method = Method::QuasiStatic { precision: Precision::Double, tolerance };
+    let mut simulation = Simulation::new(World::new(vec![part]))?;
+    simulation.run(until, |_| ())?;
+    Ok(simulation)
 }
 
 /// From 0 at the start to 1 at a time [s], with a continuous velocity.

@@ -4,19 +4,18 @@
 //! The source has no numbers. Instead: after relaxation, the tissue must equal an elastic one of modulus (1 − α) μ,
 //! (1 − α) η and the same κ in equilibrium, which another solver computes.
 
-use pliant_explicit::recover::Recovery;
-use pliant_explicit::{DynamicRelaxation, Observable, RelaxationSettings, Scalar, State};
 use pliant_mechanics::law::AnyLaw;
-use pliant_mechanics::model::{Cells, Model};
+use pliant_mechanics::model::Cells;
 use pliant_mechanics::prony::Prony;
 use pliant_scene::source::Source;
 use pliant_scene::{Built, Scene};
+use pliant_sim::{Precision, Simulation};
 use serde_json::json;
 
 use super::FIBRE_FACTOR;
 use crate::case::{Case, CaseError, Findings, Row};
 use crate::picture::{Body, View, figure};
-use crate::{largest, law, run};
+use crate::{largest, law, relaxed, run};
 
 /// Figure 6.10.
 pub const CASE: Case = Case {
@@ -47,15 +46,17 @@ struct Stretched {
 }
 
 impl Stretched {
-    fn new<R: Scalar>(model: &Model, state: &State<R>, observable: &dyn Observable<R>) -> Self {
-        let recovery = Recovery::new(model, state);
-        let cells = model.solids[0].cells.len();
-        let pull = model.constraints.iter().position(|constraint| constraint.name == "pull").unwrap_or(0);
-        Self {
-            displacement: state.displacement.iter().map(|u| u.map(R::to_f64)).collect(),
-            stress: (0..cells).map(|cell| recovery.cell(0, cell).von_mises()).collect(),
-            force: observable.reaction(pull).iter().map(|f| f * f).sum::<f64>().sqrt(),
-        }
+    fn new(simulation: &mut Simulation) -> Result<Self, CaseError> {
+        let frame = simulation.frame()?;
+        let none = || CaseError::Run("there is no liver".into());
+        let (part, now) = frame.parts().next().ok_or_else(none)?;
+        let cells = now.cells(false).ok_or_else(none)?;
+        let force = frame.reaction("pull").ok_or_else(none)?;
+        Ok(Self {
+            displacement: (0..part.model.node_count()).map(|node| now.displacement(node)).collect(),
+            stress: (0..part.model.cell_count()).map(|cell| cells.at(0, cell).0.von_mises()).collect(),
+            force: force.iter().map(|f| f * f).sum::<f64>().sqrt(),
+        })
     }
 
     /// The elastic equilibrium with a part of the moduli left.
@@ -63,10 +64,7 @@ impl Stretched {
         let mut model = pliant_mechanics::Model::clone(&built.model);
         model.solids[0].material.prony = Prony::default();
         model.solids[0].material.law = tissue(part);
-        let mut solver = DynamicRelaxation::<f64>::new(model.clone(), RelaxationSettings::default())?;
-        let mut state = State::at_rest(&model);
-        solver.solve(&mut state, until)?;
-        Ok(Self::new(&model, &state, &solver))
+        Self::new(&mut relaxed(&model, until, None)?)
     }
 }
 
@@ -96,8 +94,8 @@ fn compute() -> Result<Findings, CaseError> {
 
     let elastic = Stretched::elastic(&built, 1.0, until)?;
     let long_after = Stretched::elastic(&built, 0.5, until)?;
-    let (stepper, state) = run::<f32>(&built.model, plan.steps.step, until, |_, _| ())?;
-    let relaxed = Stretched::new(&built.model, &state, &stepper);
+    let mut run = run(&built.model, Precision::Single, plan.steps.step, until, |_| ())?;
+    let relaxed = Stretched::new(&mut run)?;
 
     let mut findings = Findings::default();
     let cells = &built.model.solids[0].cells;

@@ -2,12 +2,12 @@
 //! relaxes with τ = 0.58 s. The reference is quasi-static, of quadratic hexahedra without inertia, so the comparison
 //! uses the shape of the decay, F(t)/F(5 s), after the waves of the ramp.
 
-use pliant_explicit::Observable;
 use pliant_mechanics::curve::{Curve as Course, Shape};
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::Material;
 use pliant_mechanics::prony::PronyUpdate;
 use pliant_meshing::VolumeCell;
+use pliant_sim::Precision;
 use serde_json::Value;
 
 use super::{FIBRE_FACTOR, cube};
@@ -68,10 +68,9 @@ fn ramp() -> Course {
 /// The force [N] on the platen at given times [s], by linear interpolation between the steps.
 fn force_at(times: &[f64], (part, factor): (Specimen, f64)) -> Result<Vec<f64>, CaseError> {
     let part = part.damped(100.0);
-    let platen = part.constraint(cube::PLATEN);
     let (mut forces, mut before) = (Vec::new(), (0.0, 0.0));
-    run::<f64>(&part.model, 0.5 * part.element_bound(), 5.0, |stepper, state| {
-        let now = (state.time, factor * stepper.reaction(platen)[0]);
+    run(&part.model, Precision::Double, 0.5 * part.element_bound(), 5.0, |frame| {
+        let now = (frame.time(), factor * frame.reaction(cube::PLATEN).map_or(f64::NAN, |force| force[0]));
         while let Some(&time) = times.get(forces.len()).filter(|&&time| time <= now.0) {
             let share = (time - before.0) / (now.0 - before.0);
             forces.push(before.1 + share * (now.1 - before.1));

@@ -2,13 +2,13 @@
 //! *A*: F = I + γ e₂⊗e₁, which stretches the fibres; *B*: F = I + γ e₁⊗e₂, which does not.
 //! References: closed forms with fifty digits (Taylor et al. 2009 with the factor 2 put right).
 
-use pliant_explicit::recover::Recovery;
 use pliant_mechanics::curve::{Curve as Course, Shape};
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::Material;
 use pliant_mechanics::prony::{Prony, PronyUpdate};
 use pliant_mechanics::tensor::Symmetric;
 use pliant_meshing::VolumeCell;
+use pliant_sim::Precision;
 use serde_json::{Value, json};
 
 use super::{FIBRE_FACTOR, RELAXATION_SIGN};
@@ -139,9 +139,9 @@ fn sheared(fibres: &str, prony: Prony, rate: Rate) -> Result<Vec<Symmetric<f64>>
         .carry("x-max", [0.0, 1.0, 0.0], ramp)
         .fix("x-min", [true; 3]);
     let (step, mut stresses) = (SHEAR / (rate * steps), Vec::new());
-    run::<f64>(&element.model, step, (1.0 + 1e-9) / rate - step, |_, state| {
-        if state.steps % steps as u64 == 0 {
-            stresses.push(Recovery::new(&element.model, state).cell(0, 0).pk2_stress);
+    run(&element.model, Precision::Double, step, 1.0 / rate, |frame| {
+        for now in frame.parts().map(|(_, now)| now).filter(|now| now.steps() % steps as u64 == 0) {
+            stresses.extend(now.cells(false).map(|cells| cells.at(0, 0).0.pk2_stress));
         }
     })?;
     Ok(stresses)
