@@ -150,9 +150,6 @@ pub enum CaseError {
     /// Constraints contradict each other.
     #[error(transparent)]
     Contradiction(#[from] Contradiction),
-    /// A model has no dynamic relaxation.
-    #[error(transparent)]
-    Unrelaxed(#[from] pliant_explicit::Unrelaxed),
     /// A body could not be meshed.
     #[error(transparent)]
     Mesh(#[from] MeshingError),
