@@ -22,13 +22,14 @@ use std::sync::Arc;
 
 use pliant_mechanics::Energies;
 use pliant_mechanics::load::Load;
-use pliant_mechanics::model::{Contradiction, FREE, Model};
-use pliant_mechanics::tensor::{Vector, cast, scale, sub};
+use pliant_mechanics::model::{Contradiction, FREE, Model, Motion};
+use pliant_mechanics::tensor::{Vector, add, cast, scale, sub};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
 use crate::applied::AppliedForces;
+use crate::collective::{Collective, Predicted};
 use crate::forces::InternalForces;
 use crate::history::History;
 use crate::recover::Recovery;
@@ -302,6 +303,9 @@ pub struct DynamicRelaxation<R> {
     /// Factor on them.
     slowness: f64,
     applied: AppliedForces,
+    collectives: Vec<Collective>,
+    /// Forces [N] of the constraints that bind nodes to each other, on every node; empty without any.
+    bound: Vec<Vector<R>>,
     trial_history: Vec<History<R>>,
     /// u − u one iteration before.
     increment: Vec<Vector<R>>,
@@ -352,7 +356,12 @@ impl<R: Scalar> Observable<R> for DynamicRelaxation<R> {
     }
 
     fn reaction(&self, constraint: usize) -> Vector<f64> {
-        sum_owned(&self.model, &self.owners, constraint, &self.residual)
+        match &self.model.constraints[constraint] {
+            own if own.motion.is_collective() => {
+                own.mean_force(|node| self.residual[node as usize].map(R::to_f64))
+            }
+            _ => sum_owned(&self.model, &self.owners, constraint, &self.residual),
+        }
     }
 
     fn nodal_reaction(&self, node: usize) -> Vector<f64> {
@@ -364,27 +373,13 @@ impl<R: Scalar> Observable<R> for DynamicRelaxation<R> {
     }
 }
 
-/// Why a model has no dynamic relaxation.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Unrelaxed {
-    /// Constraints contradict each other.
-    #[error(transparent)]
-    Contradiction(#[from] Contradiction),
-    /// A constraint binds nodes to each other.
-    #[error("the constraint `{0}` binds nodes to each other: take central differences")]
-    Collective(String),
-}
-
 impl<R: Scalar> DynamicRelaxation<R> {
     /// A solver for a model.
     ///
     /// # Errors
-    /// If constraints contradict each other, or bind nodes to each other.
-    pub fn new(model: impl Into<Arc<Model>>, settings: RelaxationSettings) -> Result<Self, Unrelaxed> {
+    /// If constraints contradict each other.
+    pub fn new(model: impl Into<Arc<Model>>, settings: RelaxationSettings) -> Result<Self, Contradiction> {
         let model = model.into();
-        if let Some(constraint) = model.collective() {
-            return Err(Unrelaxed::Collective(constraint.name.clone()));
-        }
         let nodes = model.node_count();
         Ok(Self {
             settings,
@@ -392,6 +387,8 @@ impl<R: Scalar> DynamicRelaxation<R> {
             mass: fictitious_masses(&model).into_iter().map(R::of).collect(),
             slowness: 1.0,
             applied: AppliedForces::new(Arc::clone(&model)),
+            collectives: Collective::all(&model),
+            bound: vec![[R::ZERO; 3]; if model.collective().is_some() { nodes } else { 0 }],
             trial_history: vec![History::default(); model.solids.len()],
             increment: vec![[R::ZERO; 3]; nodes],
             residual: vec![[R::ZERO; 3]; nodes],
@@ -509,6 +506,7 @@ impl<R: Scalar> DynamicRelaxation<R> {
         let mut forces = InternalForces::new(&self.model, duration);
         let start = self.start(state, course.instant(from));
         self.increment.fill([R::ZERO; 3]);
+        self.bound.fill([R::ZERO; 3]);
         let (mut slowest, mut least) = (0.0, f64::INFINITY);
         let mut accuracy = Accuracy::default();
         let (mut greatest, mut reached) = (0.0_f64, f64::INFINITY);
@@ -561,7 +559,7 @@ impl<R: Scalar> DynamicRelaxation<R> {
             } else {
                 RAMP_DAMPING
             };
-            self.advance(state, damping);
+            self.advance(state, damping, instant);
         }
         let (body, node) = self.model.locate_node(self.total().residual_node as u32);
         Err(RelaxationError::NotConverged {
@@ -666,7 +664,7 @@ impl<R: Scalar> DynamicRelaxation<R> {
         std::mem::swap(&mut self.residual, &mut self.residual_before);
         let (residual, before) = (&mut self.residual, &self.residual_before);
         let (increment, owners, mass, slowness) = (&self.increment, &self.owners, &self.mass, self.slowness);
-        let (applied, forces, part) = (&self.applied, &*forces, R::of(part));
+        let (applied, bound, forces, part) = (&self.applied, &self.bound, &*forces, R::of(part));
         (residual.par_chunks_mut(CHUNK).zip(&mut self.sums)).enumerate().for_each(
             |(task, (residual, sums))| {
                 *sums = Sums { finite: true, ..Sums::default() };
@@ -674,6 +672,9 @@ impl<R: Scalar> DynamicRelaxation<R> {
                     let node = task * CHUNK + offset;
                     let internal = forces.at(node);
                     *r = sub(internal, scale(applied.at(node), part));
+                    if let Some(bound) = bound.get(node) {
+                        *r = sub(*r, *bound);
+                    }
                     for c in 0..3 {
                         let (force, out) = (internal[c].to_f64().abs(), r[c].to_f64().abs());
                         sums.finite &= force.is_finite() && out.is_finite();
@@ -710,9 +711,10 @@ impl<R: Scalar> DynamicRelaxation<R> {
         self.sums.iter().fold(Sums { finite: true, ..Sums::default() }, Sums::merge)
     }
 
-    fn advance(&mut self, state: &mut State<R>, damping: f64) {
+    fn advance(&mut self, state: &mut State<R>, damping: f64, instant: Instant) {
         let alpha = R::of(2.0 / (2.0 + damping) / self.slowness);
         let beta = R::of((2.0 - damping) / (2.0 + damping));
+        self.bind(state, [alpha, beta], instant);
         let (residual, mass, owners) = (&self.residual, &self.mass, &self.owners);
         (state.displacement.par_iter_mut().zip(&mut self.increment))
             .enumerate()
@@ -728,6 +730,50 @@ impl<R: Scalar> DynamicRelaxation<R> {
         self.model.follow(&mut state.displacement);
     }
 
+    /// Adds to the residual the forces of collective constraints, from where their nodes would go without more of them.
+    fn bind(&mut self, state: &State<R>, [alpha, beta]: [R; 2], Instant { time, part }: Instant) {
+        let Self { model, collectives, bound, residual, increment, mass, .. } = self;
+        for own in collectives {
+            let predicted = |node: u32| {
+                let (at, mobility) = (node as usize, alpha / mass[node as usize]);
+                let now = state.displacement[at];
+                let then = |c: usize| now[c] + (beta * increment[at][c] - mobility * residual[at][c]);
+                Predicted {
+                    now: cast(now),
+                    displacement: [0, 1, 2].map(then).map(R::to_f64),
+                    mobility: mobility.to_f64(),
+                }
+            };
+            let [factor, _] = model.constraints[own.constraint].motion.factors(time);
+            own.find(model, predicted, part * factor);
+            for (node, force) in own.forces(model) {
+                for c in 0..3 {
+                    bound[node as usize][c] += R::of(force[c]);
+                    residual[node as usize][c] -= R::of(force[c]);
+                }
+            }
+        }
+    }
+
+    /// Takes the forces of collective constraints out of the residual: it is internal minus applied force again.
+    fn unbind(&mut self) {
+        for (residual, bound) in self.residual.iter_mut().zip(&self.bound) {
+            (0..3).for_each(|c| residual[c] += bound[c]);
+        }
+    }
+
+    /// What the means of faces bear [N], of what each node resists with beyond what is applied: work from outside.
+    fn means(&self, resisting: impl Fn(usize) -> Vector<R>) -> Vec<(u32, Vector<R>)> {
+        let mut all = Vec::new();
+        for constraint in &self.model.constraints {
+            let Motion::Mean { weights, .. } = &constraint.motion else { continue };
+            let force = constraint.mean_force(|node| resisting(node as usize).map(R::to_f64));
+            let nodes = constraint.nodes.iter().zip(weights);
+            all.extend(nodes.map(|(&node, &weight)| (node, scale(force, weight).map(R::of))));
+        }
+        all
+    }
+
     /// Takes a converged trial as the new state.
     fn commit(
         &mut self,
@@ -740,6 +786,11 @@ impl<R: Scalar> DynamicRelaxation<R> {
         let given_up = self.given_up(forces, state, start, duration);
         let hourglass = forces.evaluate(&state.displacement, &mut state.history).hourglass;
         let stored = Recovery::new(&self.model, state).stored_energy();
+        self.unbind();
+        let mut borne = vec![[R::ZERO; 3]; self.bound.len()];
+        self.means(|node| self.residual[node])
+            .into_iter()
+            .for_each(|(node, force)| borne[node as usize] = force);
         let work = &mut state.work;
         let mut way = Vec::with_capacity(state.displacement.len());
         for (node, (u, u0)) in state.displacement.iter().zip(&start.displacement).enumerate() {
@@ -747,6 +798,9 @@ impl<R: Scalar> DynamicRelaxation<R> {
             let mut outside = forces.at(node);
             for c in (0..3).filter(|&c| self.owners[node][c] == FREE) {
                 outside[c] -= residual[c];
+            }
+            if let Some(force) = borne.get(node) {
+                outside = add(outside, *force);
             }
             let motion = sub(*u, *u0);
             for c in 0..3 {
@@ -827,9 +881,14 @@ impl<R: Scalar> DynamicRelaxation<R> {
             let (internal, applied) = (forces.at(node), scale(self.applied.at(node), R::of(part)));
             [0, 1, 2].map(|c| if self.owners[node][c] == FREE { applied[c] } else { internal[c] })
         };
+        let mut all: Vec<Vector<R>> = (0..self.model.node_count()).map(outside).collect();
+        let resisting = |node: usize| sub(forces.at(node), scale(self.applied.at(node), R::of(part)));
+        for (node, force) in self.means(resisting) {
+            all[node as usize] = add(all[node as usize], force);
+        }
         Start {
             displacement: state.displacement.clone(),
-            outside: (0..self.model.node_count()).map(outside).collect(),
+            outside: all,
             missing,
             stored: Recovery::new(&self.model, state).stored_energy() + hourglass,
         }

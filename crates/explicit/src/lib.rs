@@ -50,8 +50,7 @@ mod tangent;
 mod touching;
 
 pub use dynamic_relaxation::{
-    Convergence, DynamicRelaxation, Equilibrium, Iteration, RelaxationError, RelaxationSettings, Unrelaxed,
-    Way,
+    Convergence, DynamicRelaxation, Equilibrium, Iteration, RelaxationError, RelaxationSettings, Way,
 };
 pub use energies::{BALANCE_LIMIT, BALANCE_STEPS, Sums, balance_floor, model_balance_floor};
 pub use forces::{Deformed, Scalar};

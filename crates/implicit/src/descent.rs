@@ -214,7 +214,7 @@ fn start_from(
     }
     let Some(touching) = &mut system.touching else { return Ok(()) };
     let part = touching.barriers.allowed(&state.position, increment, 0.0, [KEEP[1], 1.0]);
-    state.advance(increment, part);
+    system.advance(state, increment, part);
     put(solver, part);
     let lower = match solver.evaluate(state, time, false) {
         Ok(()) => {
@@ -251,7 +251,7 @@ fn close(solver: &mut impl Contacting) -> f64 {
 /// Whether all that moves by itself has gone its way.
 fn is_complete(solver: &mut impl Contacting) -> bool {
     let Vectors { system, pending, .. } = solver.vectors();
-    share(system) == 1.0 && pending.iter().all(|&p| p == 0.0)
+    share(system) == 1.0 && pending.iter().all(|&p| p == 0.0) && system.means.are_closed()
 }
 
 /// Loads but for the forces of contacts, six a node.
@@ -334,8 +334,8 @@ fn search(
     let mut broken = None;
     for _ in 0..=HALVINGS {
         state.clone_from(&before.state);
-        let Vectors { increment, .. } = solver.vectors();
-        state.advance(increment, part);
+        let Vectors { system, increment, .. } = solver.vectors();
+        system.advance(state, increment, part);
         let gone = if before.share + part * (1.0 - before.share) >= 1.0 || part == 1.0 {
             1.0
         } else {

@@ -151,6 +151,33 @@ impl Course {
     }
 }
 
+/// What inertia and mass-proportional damping resist with in a step.
+struct Momentum<'a> {
+    model: &'a Assembly,
+    course: &'a Course,
+    start: &'a State,
+    moved: &'a [f64],
+    damping: &'a [f64],
+}
+
+impl Momentum<'_> {
+    /// Force [N] on a node (from component 0 on) or moment [N m] (from 3 on).
+    fn of(&self, node: usize, first: usize) -> Vector3<f64> {
+        let at = 6 * node + first;
+        let Course { step: h, shift, rate } = self.course;
+        let vector = Vector3::from_column_slice(&self.moved[at..at + 3]);
+        let moved = vector - Course::part(shift, at);
+        let (mass, before) = if first == 0 {
+            (self.model.mass[node], self.start.velocity[node])
+        } else {
+            (self.model.rotary_inertia[node], self.start.spin[node])
+        };
+        let before = before + Course::part(rate, at);
+        let momentum = (mass / (h * h)) * (moved - *h * before) + (self.damping[node] * mass / h) * moved;
+        if first == 0 { momentum } else { spin_to_vector(&vector).tr_mul(&momentum) }
+    }
+}
+
 impl BackwardEuler {
     /// A solver for a model.
     ///
@@ -281,7 +308,7 @@ impl BackwardEuler {
             }
             let (norm, scale) = self.find_residual(state);
             residuals.push(if scale > 0.0 { norm / scale } else { 0.0 });
-            let moving = self.pending.iter().any(|&p| p != 0.0);
+            let moving = self.pending.iter().any(|&p| p != 0.0) || !self.system.means.are_closed();
             if iteration > 0 && !moving && norm <= self.settings.tolerance * scale + self.round_off {
                 break;
             }
@@ -305,7 +332,7 @@ impl BackwardEuler {
             self.increment.copy_from_slice(&self.pending);
             self.system.spread(&self.solution, &mut self.increment);
             self.pending.fill(0.0);
-            state.advance(&self.increment, 1.0);
+            self.system.advance(state, &self.increment, 1.0);
             self.find_motion(state);
         }
         self.end(state, time);
@@ -385,9 +412,10 @@ impl BackwardEuler {
     /// Loads less internal, inertial and damping forces on the free components; its norm and that of the largest of them.
     fn find_residual(&mut self, state: &State) -> (f64, f64) {
         let model = Arc::clone(&self.system.model);
-        let Course { step: h, shift, rate } = &self.course;
+        let Self { system, course, start, moved, damping, .. } = self;
+        let momentum = Momentum { model: &model, course, start, moved, damping };
+        let Course { step: h, shift, .. } = &*course;
         let h = *h;
-        let system = &mut self.system;
         let arm = 1.0 / (self.length * self.length);
         let (mut loads, mut resistance, mut inertia) = (0.0, 0.0, 0.0);
         for node in 0..model.rest.len() {
@@ -400,18 +428,7 @@ impl BackwardEuler {
                 let load =
                     part(&system.external, first) + state.load_factor * part(&system.controlled, first);
                 let internal = part(&system.internal, first);
-                let moved = part(&self.moved, first) - Course::part(shift, at + first);
-                let (mass, before) = if first == 0 {
-                    (model.mass[node], self.start.velocity[node])
-                } else {
-                    (model.rotary_inertia[node], self.start.spin[node])
-                };
-                let before = before + Course::part(rate, at + first);
-                let mut momentum =
-                    (mass / (h * h)) * (moved - h * before) + (self.damping[node] * mass / h) * moved;
-                if first == 3 {
-                    momentum = spin_to_vector(&part(&self.moved, first)).tr_mul(&momentum);
-                }
+                let momentum = momentum.of(node, first);
                 loads += weight * load.norm_squared();
                 resistance += weight * internal.norm_squared();
                 inertia += weight * momentum.norm_squared();
@@ -425,7 +442,7 @@ impl BackwardEuler {
             }
         }
         if !system.damper.is_empty() {
-            system.gather(&self.moved, &mut self.solution);
+            system.gather(moved, &mut self.solution);
             if !shift.is_empty() {
                 let shifted = system.equations.component.iter().map(|&component| shift[component as usize]);
                 self.solution.iter_mut().zip(shifted).for_each(|(moved, shift)| *moved -= shift);
@@ -434,6 +451,8 @@ impl BackwardEuler {
             let factor = model.stiffness_damping / h;
             self.residual.iter_mut().zip(&self.product).for_each(|(r, p)| *r -= factor * p);
         }
+        system.give_inertia_back(|node| momentum.of(node as usize, 0), &mut self.residual);
+        system.means.relieve(&mut self.residual);
         let mut norm = 0.0;
         for (&component, residual) in system.equations.component.iter().zip(&self.residual) {
             norm += residual * residual * if component % 6 < 3 { 1.0 } else { arm };
@@ -453,6 +472,12 @@ impl BackwardEuler {
             let mass = if component % 6 < 3 { model.mass[node] } else { model.rotary_inertia[node] };
             self.system.matrix.add_diagonal(equation, rate * mass);
         }
+        let Self { system, course, start, moved, damping, .. } = self;
+        let momentum = Momentum { model: &model, course, start, moved, damping };
+        system.add_bound_masses(|node| {
+            let rate = 1.0 / (h * h) + damping[node as usize] / h;
+            (rate * model.mass[node as usize], momentum.of(node as usize, 0))
+        });
     }
 
     fn worst_node(&self) -> u32 {
@@ -567,6 +592,11 @@ impl Explicit {
         if !(step > 0.0 && step <= Self::stable_step(&model)) {
             return Err(SolveError::Impossible(
                 "the step is longer than the stable one (`Explicit::stable_step`); shorten it or use the implicit solver",
+            ));
+        }
+        if model.collective().is_some() {
+            return Err(SolveError::Impossible(
+                "explicit shells have no mean and no rigid part; use the implicit solver",
             ));
         }
         if model.stiffness_damping > 0.0 {

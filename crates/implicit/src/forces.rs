@@ -56,6 +56,12 @@ impl Forces {
         &self.system.external
     }
 
+    /// What a node resists with beyond its loads [N].
+    pub fn resisting(&self, node: u32) -> [f64; 3] {
+        let at = 6 * node as usize;
+        [at, at + 1, at + 2].map(|at| self.system.internal[at] - self.system.external[at])
+    }
+
     /// Energy stored in elements and springs [J].
     pub fn strain_energy(&self) -> f64 {
         self.system.energy

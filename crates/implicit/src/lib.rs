@@ -45,6 +45,7 @@ mod forces;
 mod initial;
 mod linear;
 mod mapping;
+mod means;
 mod patch;
 mod picture;
 mod pressure;

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix6, RowVector6, SymmetricEigen, Vector3};
 use pliant_mechanics::load::{Load, LoadKind};
+use pliant_mechanics::model::Motion;
 use pliant_mechanics::tie::Tie;
 
 use crate::assembly::{Assembly, Spring};
@@ -368,7 +369,7 @@ impl Statics {
                 attempt.allowed = allowed;
             }
             let gap = control.map_or(0.0, |control| self.constraint(control, state, &start));
-            let complete = self.pending.iter().all(|&p| p == 0.0);
+            let complete = self.pending.iter().all(|&p| p == 0.0) && self.system.means.are_closed();
             let controlled = gap.abs() <= self.allowed_gap(control);
             if iteration > 0 && complete && controlled && norm <= allowed {
                 state.time = time;
@@ -395,7 +396,7 @@ impl Statics {
             self.increment.copy_from_slice(&self.pending);
             self.system.spread(&self.solution, &mut self.increment);
             let part = self.allowed_part();
-            state.advance(&self.increment, part);
+            self.system.advance(state, &self.increment, part);
             state.load_factor += part * factor;
             self.pending.iter_mut().for_each(|p| *p *= 1.0 - part);
             if self.settings.line_search && iteration > 1 && control.is_none() && part == 1.0 {
@@ -465,6 +466,7 @@ impl Statics {
         for (&component, residual) in system.equations.component.iter().zip(&mut self.residual) {
             *residual = system.external[component as usize] - system.internal[component as usize];
         }
+        system.means.relieve(&mut self.residual);
         let free = norm(
             &mut system.equations.component.iter().map(|&c| c as usize).zip(self.residual.iter().copied()),
         );
@@ -519,7 +521,7 @@ impl Statics {
                 break;
             }
             left *= 0.5;
-            state.advance(&self.increment, -left);
+            self.system.advance(state, &self.increment, -left);
         }
         Ok(())
     }
@@ -577,7 +579,7 @@ impl Statics {
         let system = &mut self.system;
         let fatal = |error| Attempt { error, retry: false };
         system.gather(&system.controlled, &mut self.controlled);
-        system.solve(&self.controlled, &mut self.response).map_err(fatal)?;
+        system.respond(&self.controlled, &mut self.response).map_err(fatal)?;
         let components = &system.equations.component;
         let along = |x: &[f64], all: &[f64]| -> f64 {
             components.iter().zip(x).map(|(&c, x)| all[c as usize] * x).sum()
@@ -697,6 +699,12 @@ pub fn check_held(model: &Assembly) -> Result<(), SolveError> {
             part[x.max(y)] = x.min(y);
         }
     }
+    for constraint in model.constraints.iter().filter(|own| matches!(own.motion, Motion::Rigid)) {
+        for &node in &constraint.nodes {
+            let (x, y) = (root(&mut part, constraint.nodes[0] as usize), root(&mut part, node as usize));
+            part[x.max(y)] = x.min(y);
+        }
+    }
     for (node, row) in model.ties.iter().flat_map(Tie::rows) {
         for (followed, _) in row {
             let (x, y) = (root(&mut part, node as usize), root(&mut part, followed as usize));
@@ -707,19 +715,32 @@ pub fn check_held(model: &Assembly) -> Result<(), SolveError> {
     // Per part: Σ of the squares of what its rigid motions (about the first node, in mean edges) do to what holds it.
     let length = model.mean_edge();
     let mut held = vec![Matrix6::zeros(); nodes];
-    let mut hold = |node: usize, component: usize, held: &mut Vec<Matrix6<f64>>| {
-        let first = root(&mut part, node);
+    let row_of = |node: usize, component: usize, first: usize| {
         let arm = (model.place(node) - model.place(first)) / length;
-        let row = if component < 3 {
+        if component < 3 {
             let along = Vector3::ith(component, 1.0);
             let turning = arm.cross(&along);
             RowVector6::new(along.x, along.y, along.z, turning.x, turning.y, turning.z)
         } else {
             RowVector6::from_fn(|_, c| f64::from(u8::from(c == component)))
-        };
+        }
+    };
+    // The mean of a face holds what its nodes together do.
+    for constraint in &model.constraints {
+        let Motion::Mean { weights, .. } = &constraint.motion else { continue };
+        let first = root(&mut part, constraint.nodes[0] as usize);
+        for component in (0..3).filter(|&c| constraint.components[c]) {
+            let rows = constraint.nodes.iter().map(|&node| row_of(node as usize, component, first));
+            let row = rows.zip(weights).fold(RowVector6::zeros(), |sum, (row, w)| sum + row * *w);
+            held[first] += row.transpose() * row;
+        }
+    }
+    let mut hold = |node: usize, component: usize, held: &mut Vec<Matrix6<f64>>| {
+        let first = root(&mut part, node);
+        let row = row_of(node, component, first);
         held[first] += row.transpose() * row;
     };
-    for constraint in &model.constraints {
+    for constraint in model.constraints.iter().filter(|own| !own.motion.is_collective()) {
         for &node in &constraint.nodes {
             let components = if turning[node as usize] { 6 } else { 3 };
             let own = (0..components).filter(|&c| constraint.components[c]);

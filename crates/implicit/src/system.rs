@@ -17,6 +17,7 @@ use crate::facet::{Broken, Facet, Matrix18, Tangent, symmetrise};
 use crate::followers::Followers;
 use crate::linear::{LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT};
 use crate::mapping::CarriedPoints;
+use crate::means::Means;
 use crate::patch::Vector18;
 use crate::patch::{EdgeRule, Patch};
 use crate::rotation::skew;
@@ -83,7 +84,9 @@ pub(crate) struct System {
     solid_results: Vec<Response>,
     pub(crate) phases: Phases,
     pub(crate) last_solution: LinearReport,
+    /// Nodes that follow others; in a system of forces alone those of ties.
     followers: Option<Followers>,
+    pub(crate) means: Means,
     solver: LinearSolver,
     /// Contacts; a system of forces alone has none.
     pub(crate) touching: Option<Box<TouchingSystem>>,
@@ -110,12 +113,16 @@ struct FacetResult {
 
 impl System {
     pub(crate) fn new(model: Arc<Assembly>, solver: LinearSolver) -> Result<Self, SolveError> {
-        if model.collective().is_some() {
+        let turning = model.turning();
+        let bound = model.constraints.iter().filter(|constraint| constraint.motion.is_collective());
+        if bound.flat_map(|constraint| &constraint.nodes).any(|&node| turning[node as usize]) {
             return Err(SolveError::Impossible(
-                "a constraint binds nodes to each other (a mean, a rigid part): take central differences",
+                "a mean or a rigid part has nodes of a shell, which turn by themselves",
             ));
         }
         let mut system = Self::forces_only(Arc::clone(&model));
+        system.followers = Followers::of(&model, true);
+        system.means = Means::of(&model, &system.equations);
         system.solver = solver;
         system.touching = model.touching.as_ref().map(|own| Box::new(TouchingSystem::new(own, &model)));
         system.coupling = vec![0.0; system.equations.len()];
@@ -136,9 +143,10 @@ impl System {
         let pairs = system.touching.iter().flat_map(|touching| touching.pairs.iter().map(|pair| &pair[..]));
         let followers = system.followers.as_ref();
         let expand = |nodes: &[u32], turns: bool| {
-            followers.and_then(|followers| followers.expanded(nodes, turns)).unwrap_or_else(|| nodes.to_vec())
+            let own = || (nodes.to_vec(), if turns { 6 } else { 3 });
+            followers.and_then(|followers| followers.expanded(nodes, turns)).unwrap_or_else(own)
         };
-        let expanded: Vec<Vec<u32>> = match followers {
+        let expanded: Vec<(Vec<u32>, usize)> = match followers {
             None => Vec::new(),
             Some(_) => {
                 let solids = model.solid_cells().chain(stars.clone()).map(|nodes| expand(nodes, false));
@@ -150,15 +158,21 @@ impl System {
                 let cells = facets.chain(model.solid_cells()).chain(stars).chain(pairs);
                 LowerMatrix::new(&system.equations, cells)
             }
-            Some(_) => LowerMatrix::new(&system.equations, expanded.iter().map(Vec::as_slice).chain(pairs)),
+            Some(_) => {
+                let cells = expanded.iter().map(|(nodes, _)| nodes.as_slice());
+                LowerMatrix::new(&system.equations, cells.chain(pairs))
+            }
         };
         if system.solver == LinearSolver::Unsymmetric {
             matrix.keep_mirror();
         }
         let equations = &system.equations;
-        system.places =
-            model.facets.iter().map(|f| matrix.places(equations, &expand(&f.nodes, true), 6)).collect();
-        let places = |nodes: &[u32]| matrix.places(equations, &expand(nodes, false), 3);
+        let placed = |nodes: &[u32], turns: bool| {
+            let (nodes, components) = expand(nodes, turns);
+            matrix.places(equations, &nodes, components)
+        };
+        system.places = model.facets.iter().map(|facet| placed(&facet.nodes, true)).collect();
+        let places = |nodes: &[u32]| placed(nodes, false);
         let of_solid = |(solid, stars): (&Solid, &Option<Stars>)| {
             let cells = (0..solid.cells.len()).map(|cell| places(solid.cells.nodes(cell)));
             let stars = stars.iter().flat_map(|stars| &stars.nodes).map(|nodes| places(nodes));
@@ -226,7 +240,12 @@ impl System {
             free[6 * node as usize..6 * node as usize + 3].fill(true);
         }
         for constraint in &model.constraints {
-            for &node in &constraint.nodes {
+            if let Motion::Rigid = constraint.motion {
+                let nodes = constraint.nodes.iter().map(|&node| 6 * node as usize);
+                nodes.for_each(|at| free[at..at + 3].fill(false));
+                free[6 * constraint.nodes[0] as usize..][..6].fill(true);
+            }
+            for &node in constraint.nodes.iter().filter(|_| !constraint.motion.is_collective()) {
                 for (c, &held) in constraint.components.iter().enumerate() {
                     free[6 * node as usize + c] &= !held;
                 }
@@ -236,7 +255,8 @@ impl System {
             free[6 * node as usize..6 * node as usize + 3].fill(false);
         }
         Self {
-            followers: Followers::of(&model),
+            followers: Followers::of(&model, false),
+            means: Means::default(),
             equations: Equations::new(&free),
             matrix: LowerMatrix::default(),
             places: Vec::new(),
@@ -293,6 +313,11 @@ impl System {
             }
         }
         let start = Instant::now();
+        if let Some(followers) = &mut self.followers {
+            followers.turn(state);
+        }
+        let model = Arc::clone(&self.model);
+        self.means.find_gaps(&model, state, time);
         self.nodal_loads(state, time);
         self.internal.fill(0.0);
         self.energy = 0.0;
@@ -310,15 +335,12 @@ impl System {
         if let Some((_, moved)) = tangent {
             self.press_faces(state, time, moved);
         }
-        for spring in &self.model.springs {
+        for spring in &model.springs {
             let at = 6 * spring.node as usize;
             let stretch = state.position[spring.node as usize] - spring.anchor;
             self.energy += 0.5 * spring.stiffness * stretch.norm_squared();
             for c in 0..3 {
                 self.internal[at + c] += spring.stiffness * stretch[c];
-                if tangent.is_some() && self.equations.number[at + c] != NONE {
-                    self.matrix.add_diagonal(self.equations.number[at + c] as usize, spring.stiffness);
-                }
             }
         }
         for spring in &self.held {
@@ -326,10 +348,19 @@ impl System {
             let stretch = state.position[spring.node as usize] - spring.anchor;
             for c in 0..3 {
                 self.external[at + c] -= spring.stiffness * stretch[c];
-                if tangent.is_some() && self.equations.number[at + c] != NONE {
-                    self.matrix.add_diagonal(self.equations.number[at + c] as usize, spring.stiffness);
-                }
             }
+        }
+        if tangent.is_some() {
+            let held = std::mem::take(&mut self.held);
+            model.springs.iter().chain(&held).for_each(|spring| self.add_spring(spring));
+            self.held = held;
+        }
+        if let (Some(followers), true) = (&self.followers, tangent.is_some()) {
+            let force =
+                |at: usize| self.internal[at] - self.external[at] - state.load_factor * self.controlled[at];
+            followers.add_parts(&self.equations, &mut self.matrix, |node| {
+                (0.0, Vector3::from_fn(|c, _| force(6 * node as usize + c)))
+            });
         }
         if let Some(followers) = &self.followers {
             for forces in [&mut self.internal, &mut self.external, &mut self.controlled] {
@@ -347,6 +378,21 @@ impl System {
         }
         self.phases.cells += start.elapsed();
         Ok(())
+    }
+
+    /// Adds the stiffness of a spring.
+    fn add_spring(&mut self, spring: &Spring) {
+        let own = self.followers.as_ref().and_then(|own| own.spring(spring.node, spring.stiffness));
+        if let Some(((nodes, components), stiffness)) = own {
+            let places = self.matrix.places(&self.equations, &nodes, components);
+            self.matrix.add(&self.equations, &nodes, components, &places, &stiffness);
+            return;
+        }
+        for &equation in &self.equations.number[6 * spring.node as usize..][..3] {
+            if equation != NONE {
+                self.matrix.add_diagonal(equation as usize, spring.stiffness);
+            }
+        }
     }
 
     /// Subtracts S(m)/2 for the moments m on nodes, whose axes stay in space: their covariant derivative.
@@ -476,10 +522,10 @@ impl System {
         }
         let Some(moved) = moved else { return };
         let expanded = self.followers.as_ref().and_then(|followers| followers.expanded(&facet.nodes, true));
-        if let (Some(nodes), Some(followers)) = (expanded, &self.followers) {
-            let whole = followers.condensed(&facet.nodes, &nodes, 6, result.tangent.as_slice());
+        if let (Some(expanded), Some(followers)) = (expanded, &self.followers) {
+            let whole = followers.condensed(&facet.nodes, 6, &expanded, result.tangent.as_slice());
             let places = std::mem::take(&mut self.places[number]);
-            self.add_block(&nodes, 6, &places, &whole, moved);
+            self.add_block(&expanded.0, 6, &places, &whole, moved);
             self.places[number] = places;
             return;
         }
@@ -594,8 +640,8 @@ impl System {
         let expanded = self.followers.as_ref().and_then(|followers| followers.expanded(nodes, false));
         match (expanded, &self.followers) {
             (Some(own), Some(followers)) => {
-                let whole = followers.condensed(nodes, &own, 3, tangent);
-                self.add_block(&own, 3, places, &whole, moved);
+                let whole = followers.condensed(nodes, 3, &own, tangent);
+                self.add_block(&own.0, own.1, places, &whole, moved);
             }
             _ => self.add_block(nodes, 3, places, tangent, moved),
         }
@@ -630,6 +676,7 @@ impl System {
     /// Takes the matrix as it now is for the coming solutions; returns its negative pivots.
     pub(crate) fn prepare(&mut self) -> Result<usize, SolveError> {
         let start = Instant::now();
+        self.means.pin(&mut self.matrix);
         let Some(workspace) = &mut self.workspace else { return Ok(0) };
         let pivots = workspace.prepare(&self.matrix).map_err(linear_error)?;
         self.phases.preparation += start.elapsed();
@@ -642,6 +689,12 @@ impl System {
                 component: NAMES[component % 6],
                 pivot: pivots.smallest,
             });
+        }
+        if !self.means.is_empty() {
+            let mut means = std::mem::take(&mut self.means);
+            let prepared = means.prepare(|right, solution| self.solve_pinned(right, solution));
+            self.means = means;
+            prepared?;
         }
         Ok(pivots.negative)
     }
@@ -660,9 +713,24 @@ impl System {
         self.solve_from(right, solution)
     }
 
+    /// The same with means that stay where they are.
+    pub(crate) fn respond(&mut self, right: &[f64], solution: &mut [f64]) -> Result<(), SolveError> {
+        solution.fill(0.0);
+        self.solve_pinned(right, solution)?;
+        self.means.correct(solution, false);
+        Ok(())
+    }
+
     /// Solves with the matrix prepared; conjugate gradients start from the solution given, and leave what they reached there if
     /// iterations run out.
     pub(crate) fn solve_from(&mut self, right: &[f64], solution: &mut [f64]) -> Result<(), SolveError> {
+        let result = self.solve_pinned(right, solution);
+        self.means.correct(solution, true);
+        result
+    }
+
+    /// Solves with the matrix as it is, with the springs that hold means.
+    fn solve_pinned(&mut self, right: &[f64], solution: &mut [f64]) -> Result<(), SolveError> {
         let start = Instant::now();
         let Some(workspace) = &mut self.workspace else { return Ok(()) };
         let result = workspace.solve(&self.matrix, right, solution);
@@ -679,7 +747,7 @@ impl System {
     pub(crate) fn prescribed(&self, from: f64, to: f64, increments: &mut [f64]) {
         increments.fill(0.0);
         for constraint in &self.model.constraints {
-            let moving = !matches!(constraint.motion, Motion::Fixed);
+            let moving = !matches!(constraint.motion, Motion::Fixed) && !constraint.motion.is_collective();
             for (index, &node) in constraint.nodes.iter().enumerate().filter(|_| moving) {
                 let by = constraint.motion.increment(index, from, to);
                 for c in (0..6).filter(|&c| constraint.components[c]) {
@@ -700,6 +768,32 @@ impl System {
         if let Some(followers) = &self.followers {
             followers.follow(components);
         }
+    }
+
+    /// Moves a state by a part of an increment, six components a node.
+    pub(crate) fn advance(&self, state: &mut State, increment: &[f64], part: f64) {
+        state.advance(increment, part);
+        if let Some(followers) = &self.followers {
+            followers.place(&self.model, state);
+        }
+    }
+
+    /// Adds to the stiffness what masses of rigid parts resist with: their rate [kg/s²] and the force [N] of each node.
+    pub(crate) fn add_bound_masses(&mut self, of: impl Fn(u32) -> (f64, Vector3<f64>)) {
+        if let Some(followers) = &self.followers {
+            followers.add_parts(&self.equations, &mut self.matrix, of);
+        }
+    }
+
+    /// Takes forces [N] of inertia on the nodes of rigid parts from a residual.
+    pub(crate) fn give_inertia_back(&self, force: impl Fn(u32) -> Vector3<f64>, residual: &mut [f64]) {
+        let Some(followers) = &self.followers else { return };
+        followers.pull_parts(force, |component, force| {
+            let equation = self.equations.number[component];
+            if equation != NONE {
+                residual[equation as usize] -= force;
+            }
+        });
     }
 
     /// The values of the free components.

@@ -538,6 +538,18 @@ pub struct Constraint {
 }
 
 impl Constraint {
+    /// The force λ [N] with which a mean is held, w λ on each node, of the forces [N] that its nodes resist with: by least squares, exact in
+    /// equilibrium. None for other motions.
+    pub fn mean_force(&self, resisting: impl Fn(u32) -> Vector<f64>) -> Vector<f64> {
+        let Motion::Mean { weights, .. } = &self.motion else { return [0.0; 3] };
+        let squared: f64 = weights.iter().map(|w| w * w).sum();
+        let sum = self.nodes.iter().zip(weights).fold([0.0; 3], |sum, (&node, &w)| {
+            let force = resisting(node);
+            [0, 1, 2].map(|c| if self.components[c] { sum[c] + w * force[c] } else { 0.0 })
+        });
+        scale(sum, 1.0 / squared)
+    }
+
     /// The amplitudes of each node's motion.
     fn amplitudes(&self) -> impl Iterator<Item = Amplitudes> + '_ {
         (0..self.nodes.len()).map(|index| self.motion.amplitudes(index))
@@ -894,7 +906,7 @@ impl Model {
         Ok(owners)
     }
 
-    /// The first constraint that binds nodes to each other: central differences on the CPU alone hold them.
+    /// The first constraint that binds nodes to each other: no GPU and no explicit shell holds them.
     pub fn collective(&self) -> Option<&Constraint> {
         self.constraints.iter().find(|constraint| constraint.motion.is_collective())
     }

@@ -13,6 +13,7 @@ use pliant_implicit::{
 };
 use pliant_mechanics::grip::{Grip, ROOM};
 use pliant_mechanics::mapping::Mapping;
+use pliant_mechanics::model::Motion;
 use pliant_mechanics::{Energies, fingerprint};
 
 use crate::bodies::{ImplicitBodies, RunControl, Stop};
@@ -156,7 +157,7 @@ impl Implicit {
             }
         };
         let mut prescribed = vec![false; 6 * model.rest.len()];
-        for constraint in &model.constraints {
+        for constraint in model.constraints.iter().filter(|own| !own.motion.is_collective()) {
             for &node in &constraint.nodes {
                 for (own, held) in prescribed[6 * node as usize..].iter_mut().zip(constraint.components) {
                     *own |= held;
@@ -197,6 +198,14 @@ impl Implicit {
         let all = forces.loads().iter().zip(forces.internal()).zip(&self.prescribed);
         for (own, ((load, internal), held)) in self.outside.iter_mut().zip(all) {
             *own = if *held { *internal } else { *load };
+        }
+        for constraint in &self.model.constraints {
+            let Motion::Mean { weights, .. } = &constraint.motion else { continue };
+            let force = constraint.mean_force(|node| forces.resisting(node));
+            for (&node, weight) in constraint.nodes.iter().zip(weights) {
+                let own = self.outside[6 * node as usize..].iter_mut().zip(force);
+                own.for_each(|(outside, force)| *outside += weight * force);
+            }
         }
     }
 
@@ -250,7 +259,7 @@ impl Implicit {
         let [internal, loads] = [forces.internal(), forces.loads()];
         let constraints = self.model.constraints.iter().enumerate();
         for (reaction, (index, constraint)) in self.reactions.iter_mut().zip(constraints) {
-            *reaction = [0.0; 3];
+            *reaction = constraint.mean_force(|node| forces.resisting(node));
             for &node in &constraint.nodes {
                 for c in (0..3).filter(|&c| self.owners[node as usize][c] == index as u32) {
                     let at = 6 * node as usize + c;

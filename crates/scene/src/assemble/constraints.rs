@@ -73,13 +73,6 @@ impl Builder<'_> {
         path: &[&str; 2],
     ) -> Option<Motion> {
         let name = path[1];
-        let solver = self.scene.run.solver;
-        if solver != SolverName::Explicit {
-            let message = format!("`{name}` binds nodes to each other, which `{}` does not", solver.word());
-            let help = "take `solver = \"explicit\"`, or `fix` and `move`";
-            self.error(&[path[0], name, "type"], message, "for `explicit` only", help);
-            return None;
-        }
         let (body, nodes) = nodes?;
         if self.shell_cells(body).is_some() {
             let message = format!("`{name}` binds nodes of a shell, which turn by themselves");
