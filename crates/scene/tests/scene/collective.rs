@@ -1,4 +1,4 @@
-//! Constraints that bind nodes to each other: a plate that tilts, rigid parts of a body, and what is refused.
+//! Constraints that bind nodes to each other, with every solver: a plate that tilts, rigid parts of a body, and what is refused.
 
 use super::static_solids::{last_row, resumes, run, world};
 
@@ -73,13 +73,83 @@ fn a_rigid_part_turns_and_keeps_its_size() {
     resumes(&text);
 }
 
+/// A plate on one half of the top and a bone in the other, a load that tilts both, a vessel wall that is tied into the bone: the same
+/// equilibrium by every solver and every way to solve its equations, to 1e-5 of the largest displacement and reaction.
+#[test]
+fn bound_nodes_stand_where_every_solver_puts_them() {
+    let plate = "type = 'mean'\nbody = 'block'\nby = [0, 0, -0.002]\ncomponents = ['z']\nto = 0.5\n\
+                 nodes = { intersection = [{ set = 'z-max' }, { half-space = { point = [0.029, 0, 0], normal = [1, 0, 0] } }] }";
+    let more = "probes.below = { on = 'block', at = [0, 0.01, 0.015] }\nprobes.cord = { on = 'cord', at = [0.015, 0.01, 0.0125] }\n\
+        [constraint.bone]\ntype = 'rigid'\nbody = 'block'\n\
+        nodes = { intersection = [{ half-space = { point = [0, 0, 0.0149], normal = [0, 0, 1] } }, { half-space = { point = [0.011, 0, 0], normal = [-1, 0, 0] } }] }\n\
+        [law.thread]\ntype = 'neo-hookean'\nyoung-modulus = 1e6\npoisson-ratio = 0.4\n\
+        [body.cord]\nmodel = 'bar'\nmesh = { lines = [[[0.005, 0.01, 0.0175], [0.015, 0.01, 0.0125], [0.025, 0.01, 0.0075]]] }\n\
+        law = 'thread'\narea = 1e-6\ndensity = 1000\n[tie.cord]\nbetween = ['cord', 'block']\n\
+        [load.side]\ntype = 'force'\non = 'block'\nnodes = { set = 'x-min' }\ntotal = [0.1, 0.1, 0.3]\nto = 0.5\n";
+    let text = |solver: &str| block(solver, plate, more);
+    let newton = last_row(&text("solver = 'static'\nload-steps = 4\ntolerance = 1e-11"));
+    assert!((newton["probe.left.displacement.z"] - newton["probe.below.displacement.z"]).abs() < 0.005 * 0.5);
+    let gradients = |preconditioner: &str| {
+        format!(
+            "solver = 'static'\nload-steps = 4\ntolerance = 1e-10\n\
+             linear = {{ by = 'conjugate-gradients', tolerance = 1e-8, preconditioner = '{preconditioner}' }}"
+        )
+    };
+    let mut others = vec![
+        text("solver = 'quasi-static'\nload-steps = 4\ntolerance = 1e-9"),
+        text("solver = 'static'\nload-steps = 4\ntolerance = 1e-10\nlinear = 'unsymmetric'"),
+    ];
+    others.extend(["block-jacobi", "aggregates", "lagged-factors"].map(|name| text(&gradients(name))));
+    for solver in ["solver = 'explicit'", "solver = 'implicit'\nstep = 0.05\ntolerance = 1e-10"] {
+        others.push(
+            text(solver)
+                .replace("until = 1", "until = 4")
+                .replace("density = 1000\n[tie", "density = 1000\ndamping = 40\n[tie"),
+        );
+    }
+    for other in others {
+        let row = last_row(&other);
+        for field in ["displacement", "reaction."] {
+            let of_field = || newton.iter().filter(|(name, _)| name.contains(field));
+            let largest = of_field().map(|(_, value)| value.abs()).fold(0.0, f64::max);
+            let off = of_field().map(|(name, value)| (value - row[name]).abs()).fold(0.0, f64::max);
+            let solver = other.lines().nth(3).unwrap();
+            println!("{solver}: {field} {:.1e}", off / largest);
+            assert!(largest > 0.0 && off < 1e-5 * largest, "{solver}: {field} {off:e} of {largest:e}");
+        }
+    }
+}
+
+/// A run of each solver that is taken up in the middle has the same bits; its energies balance. External work is a sum of trapezia
+/// between load steps, which miss 2.4e-4 of it (rigid part, static) with 10 of them, 6e-5 with 20: a work left out would be far more.
+#[test]
+fn runs_with_bound_nodes_are_taken_up_with_the_same_bits() {
+    let rigid = "type = 'rigid'\nbody = 'block'\nnodes = { half-space = { point = [0, 0, 0.0149], normal = [0, 0, 1] } }";
+    let load = "[load.side]\ntype = 'force'\non = 'block'\nnodes = { set = 'x-max' }\ntotal = [0, 0, -0.6]\nto = 1\n";
+    for (solver, limit) in [
+        ("solver = 'static'\nstep = 0.05", 1e-3),
+        ("solver = 'quasi-static'\nstep = 0.05", 1e-3),
+        ("solver = 'implicit'\nstep = 0.05\nintegrator = 'bdf2'", f64::INFINITY),
+        ("solver = 'implicit'\nstep = 0.05", f64::INFINITY),
+    ] {
+        for constraint in [rigid, &MEAN.replace("to = 0.5", "to = 1")] {
+            let text = block(&format!("{solver}\ncheckpoint = {{ every = 0.4 }}"), constraint, load);
+            resumes(&text);
+            let row = last_row(&text);
+            let [internal, hourglass, external] =
+                ["internal", "hourglass", "external"].map(|name| row[&format!("energy.{name}")]);
+            let internal = internal + hourglass;
+            let off = (internal - external).abs() / external.abs();
+            println!("{solver}: energy {off:.1e}");
+            assert!(off < limit, "{solver}: {internal} {external}");
+        }
+    }
+}
+
 #[test]
 fn what_cannot_be_bound_is_refused_by_name() {
     let rigid = "type = 'rigid'\nbody = 'block'\nnodes = { set = 'z-max' }";
     for (solver, constraint, more, pieces) in [
-        ("solver = 'static'", MEAN, "", vec!["`plate` binds nodes", "`static` does not"]),
-        ("solver = 'quasi-static'", rigid, "", vec!["`quasi-static` does not", "explicit"]),
-        ("solver = 'implicit'", rigid, "", vec!["`implicit` does not"]),
         (
             "solver = 'explicit'",
             "type = 'rigid'\nbody = 'block'\nnodes = { set = 'z-min' }",
