@@ -73,8 +73,8 @@ pub struct FixTable {
 }
 
 /// Nodes whose mean displacement is prescribed, each of them free by itself: a face under a plate that tilts. Weighted by the area of the
-/// boundary at each node where the nodes have whole faces, else equally. Its reaction is the force of the plate. With the solver `explicit`
-/// on the CPU.
+/// boundary at each node where the nodes have whole faces, else equally. Its reaction is the force of the plate. With every solver on
+/// the CPU.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct MeanTable {
@@ -92,8 +92,8 @@ pub struct MeanTable {
     pub timing: Timing,
 }
 
-/// A rigid part of a body, such as bone or an implant: its nodes keep their distances, and move and turn together, free in space. With the
-/// solver `explicit` on the CPU.
+/// A rigid part of a body, such as bone or an implant: its nodes keep their distances, and move and turn together, free in space. With every
+/// solver on the CPU.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RigidTable {
