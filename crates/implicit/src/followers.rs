@@ -15,6 +15,9 @@ use crate::rotation::skew;
 use crate::sparse::{Equations, LowerMatrix, NONE};
 use crate::state::State;
 
+/// The nodes whose unknowns move a cell, and how many components of each.
+pub(crate) type Expanded = (Vec<u32>, usize);
+
 /// The nodes of a model that follow others.
 pub(crate) struct Followers {
     /// The row of each node; [`NONE`] of the others.
@@ -121,7 +124,7 @@ impl Followers {
 
     /// The nodes whose unknowns move a cell, and how many components of each; `None` if they are its own. Where nodes turn they keep their
     /// place for that.
-    pub(crate) fn expanded(&self, nodes: &[u32], turns: bool) -> Option<(Vec<u32>, usize)> {
+    pub(crate) fn expanded(&self, nodes: &[u32], turns: bool) -> Option<Expanded> {
         let first = |node: &u32| self.parts.iter().any(|part| part.first == *node);
         if !nodes.iter().any(|node| self.follows(*node) || first(node)) {
             return None;
@@ -141,7 +144,7 @@ impl Followers {
         &self,
         nodes: &[u32],
         components: usize,
-        (expanded, wide): &(Vec<u32>, usize),
+        (expanded, wide): &Expanded,
         tangent: &[f64],
     ) -> Vec<f64> {
         let place = |node: u32| wide * expanded.iter().position(|&known| known == node).unwrap_or(0);
@@ -242,7 +245,7 @@ impl Followers {
     }
 
     /// The places of the translations of a node that may follow others, and its stiffness there, equal along all axes.
-    pub(crate) fn spring(&self, node: u32, stiffness: f64) -> Option<((Vec<u32>, usize), Vec<f64>)> {
+    pub(crate) fn spring(&self, node: u32, stiffness: f64) -> Option<(Expanded, Vec<f64>)> {
         let expanded = self.expanded(&[node], false)?;
         let own = Matrix3::from_diagonal_element(stiffness);
         let whole = self.condensed(&[node], 3, &expanded, own.as_slice());
