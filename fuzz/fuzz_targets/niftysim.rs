@@ -1,5 +1,5 @@
 //! Any bytes as a NiftySim model: a scene that can be read or an error, never a panic.
-//! `cargo +nightly fuzz run niftysim -- -rss_limit_mb=512` (seeds: `crates/scene/tests/corpus`).
+//! `cargo +nightly fuzz run niftysim -- -rss_limit_mb=512` (seeds: `crates/run/tests/corpus`).
 
 #![no_main]
 

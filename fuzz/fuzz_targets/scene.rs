@@ -1,5 +1,5 @@
 //! Any bytes as a scene file: a scene or mistakes that can be shown, never a panic.
-//! `cargo +nightly fuzz run scene -- -rss_limit_mb=512` (seeds: `crates/scene/tests/corpus`, `scenes/*/scene.toml`).
+//! `cargo +nightly fuzz run scene -- -rss_limit_mb=512` (seeds: `crates/run/tests/corpus`, `scenes/*/scene.toml`).
 
 #![no_main]
 

@@ -399,7 +399,7 @@ mod tests {
         assert!((own - wanted).abs() < 1e-6 * wanted.abs(), "{own} {wanted}");
     }
 
-    /// A bar whose other end is turned once around and carried away costs nothing, and goes on as one body.
+    /// A bar whose free end is turned by 2.5 rad follows as one body without stress; a free one keeps its shape and its velocity.
     #[test]
     fn a_rigid_motion_costs_nothing() {
         let mut model = model();
@@ -441,7 +441,7 @@ mod tests {
         assert!(off < 1e-12 && slower < 1e-12, "{off:e} {slower:e}");
     }
 
-    /// Nodes on a line have no turn about it; a part of them and one of two nodes go their way.
+    /// Three nodes on a line keep their distances: a turn about the line, which moves none of them, does not make the stiffness singular.
     #[test]
     fn nodes_on_a_line_are_bound() {
         let mut model = model();

@@ -1,6 +1,6 @@
 //! Running a model from rest, through its history or to its equilibrium, by a [`Simulation`].
 
-use std::sync::Arc;
+use std::collections::BTreeMap;
 
 use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
@@ -45,30 +45,32 @@ pub struct Equilibrium {
     pub largest: f64,
     /// The largest speed of a node [m/s].
     speed: f64,
-    model: Arc<Model>,
-    reactions: Vec<Vector<f64>>,
+    /// Force [N] that holds or moves the nodes of each constraint.
+    reactions: BTreeMap<String, Vector<f64>>,
 }
 
 impl Equilibrium {
     fn of(simulation: &mut Simulation) -> Result<Self, CaseError> {
-        let model = Arc::clone(&simulation.world().parts[0].model);
         let frame = simulation.frame()?;
-        let (_, now) = frame.parts().next().ok_or_else(|| CaseError::Run("nothing was simulated".into()))?;
+        let (part, now) =
+            frame.parts().next().ok_or_else(|| CaseError::Run("nothing was simulated".into()))?;
+        let (model, constraints) = (&part.model, part.model.constraints.iter());
         let length = |v: Vector<f64>| dot(v, v).sqrt();
         let displacement: Vec<_> = (0..model.node_count()).map(|node| now.displacement(node)).collect();
         Ok(Self {
             largest: displacement.iter().map(|&u| length(u)).fold(0.0, f64::max),
             displacement,
             speed: (0..model.node_count()).map(|node| length(now.velocity(node))).fold(0.0, f64::max),
-            reactions: (0..model.constraints.len()).map(|constraint| now.reaction(constraint)).collect(),
-            model,
+            reactions: constraints
+                .enumerate()
+                .map(|(at, own)| (own.name.clone(), now.reaction(at)))
+                .collect(),
         })
     }
 
     /// Force [N] that holds or moves the nodes of a constraint; not a number without one of this name.
     pub fn reaction(&self, constraint: &str) -> Vector<f64> {
-        let at = self.model.constraints.iter().position(|own| own.name == constraint);
-        at.map_or([f64::NAN; 3], |at| self.reactions[at])
+        self.reactions.get(constraint).copied().unwrap_or([f64::NAN; 3])
     }
 }
 

@@ -5,10 +5,8 @@ use pliant_explicit::stability::OnUnstable;
 use pliant_sim::contact::touch::{Contact, With};
 use pliant_sim::{Failure, Instant, Precision, number};
 
-use pliant_scene::Built;
-use pliant_scene::Part;
-use pliant_scene::Plan;
 use pliant_scene::format::SolverName;
+use pliant_scene::{Built, Part, Plan};
 
 /// Damping [1/s] times step [s] from which on a step does not resolve the damping: central differences take
 /// (1 − a) / (1 + a) of a velocity over a step, a = ½ damping × step, and 2 turns it round.

@@ -10,11 +10,8 @@ use pliant_sim::contact::touch::With;
 use pliant_sim::{BodyCells, Critical, ImplicitBodies, counted, number};
 
 use crate::output::{AddedMass, bodies, told_limit};
-use pliant_scene::Built;
-use pliant_scene::Scene;
-use pliant_scene::World;
 use pliant_scene::registry::OutputTable;
-use pliant_scene::{Limits, Plan};
+use pliant_scene::{Built, Limits, Plan, Scene, World};
 
 /// The model in words: bodies, quality, constraints, loads, critical step, expected cost.
 pub fn overview(world: &World) -> String {

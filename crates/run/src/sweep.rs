@@ -15,12 +15,10 @@ use crate::output::{
     plot_of_sweep,
 };
 use crate::run::{Options, run_with};
-use pliant_scene::MeshCache;
-use pliant_scene::Scene;
-use pliant_scene::World;
 use pliant_scene::diagnostic::{Diagnostic, Place, SceneErrors};
 use pliant_scene::registry::OutputTable;
 use pliant_scene::source::{SET, Source};
+use pliant_scene::{MeshCache, Scene, World};
 
 /// The table of a sweep.
 pub const SWEEP: &str = "sweep.csv";

@@ -15,9 +15,8 @@ use pliant_sim::{BodyCells, CellsNow};
 
 use super::file::{create, reopen};
 use super::{Frame, Output, OutputError, Written, fields, time_of};
-use pliant_scene::Built;
 use pliant_scene::format::{CsvTable, FieldName, ProbeTable};
-use pliant_scene::{Part, World};
+use pliant_scene::{Built, Part, World};
 
 pub(super) struct Rows {
     path: PathBuf,

@@ -9,9 +9,8 @@ use rayon::prelude::*;
 
 use super::merged::merged;
 use super::{Frame, fields};
-use pliant_scene::Built;
-use pliant_scene::World;
 use pliant_scene::format::{At, BodyModel, FieldName, VtuTable};
+use pliant_scene::{Built, World};
 
 /// A mesh that takes the fields of instants: of a body, a carried surface or all bodies, of any participants.
 pub(crate) struct FieldMesh {

@@ -35,9 +35,8 @@ pub(crate) use field_mesh::FieldMesh;
 pub(crate) use plot::{MOST_CURVES, Reactions, constraints, plot, plot_of_sweep};
 pub(crate) use summary::{bodies, interrupted, markdown, output_failure, summarise, told_limit};
 
-use pliant_scene::Built;
 use pliant_scene::registry::OutputTable;
-use pliant_scene::{Part, World};
+use pliant_scene::{Built, Part, World};
 
 /// An output that could not be written.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

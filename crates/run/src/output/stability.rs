@@ -9,8 +9,7 @@ use pliant_sim::{counted, number};
 use serde::Serialize;
 
 use super::PartOutcome;
-use pliant_scene::Built;
-use pliant_scene::Part;
+use pliant_scene::{Built, Part};
 
 /// Hourglass energy, as a fraction of the internal one, above which a run gives a warning.
 const MUCH_HOURGLASS: f64 = 0.05;

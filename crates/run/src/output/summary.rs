@@ -11,10 +11,7 @@ use serde_json::{Value as Json, json};
 use super::stability::{AddedMass, StabilitySummary, doubts};
 use super::{History, Outcome, PartOutcome, TieSummary};
 use super::{OutputError, StrainSummary, constraints};
-use pliant_scene::Built;
-use pliant_scene::printable;
-use pliant_scene::{LimitingElement, Limits};
-use pliant_scene::{Part, World};
+use pliant_scene::{Built, LimitingElement, Limits, Part, World, printable};
 
 /// The status of a stopped run.
 pub(crate) const INTERRUPTED: &str = "interrupted";
