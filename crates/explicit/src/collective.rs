@@ -1,4 +1,4 @@
-//! Constraints that bind nodes to each other: a mean displacement that is prescribed, and rigid parts of a body. A step predicts where the
+//! Constraints that bind nodes to each other: a mean displacement that is prescribed, rigid parts of a body, an enclosed volume. A step predicts where the
 //! nodes go without them and corrects it by the least change in the metric of the masses, so that momentum and angular momentum are
 //! kept, and no wave becomes faster: the critical time step stays. The corrections enter the step as forces, hence the energies too.
 //!
@@ -8,14 +8,21 @@
 //! Σ mᵢ rᵢ × (R (Xᵢ − X̄) − rᵢ*) = 0 with arms rᵢ now and rᵢ* predicted. This is the discrete rigid body of Moser and Veselov (1991), which
 //! keeps Σ m xⁿ × xⁿ⁺¹ exactly. Newton's method finds R, from the rotation of the polar decomposition of Σ mᵢ rᵢ* ⊗ (Xᵢ − X̄) (Kabsch 1976)
 //! on; nodes on a line keep that one.
+//!
+//! *Volume.* V(x* + y g p) = V₀ + ΔV with forces p gᵢ, gᵢ = ∂V/∂xᵢ where the nodes are now; V is of third order in p, which Newton's method
+//! finds. The forces of a pressure on a closed surface have no resultant and no moment.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
-use pliant_mechanics::model::{Constraint, Model, Motion};
+use pliant_mechanics::model::{Constraint, Enclosed, Enclosure, Model, Motion};
 use pliant_mechanics::rotation::nearest_rotation;
-use pliant_mechanics::tensor::{Vector, add, scale, sub};
+use pliant_mechanics::tensor::{Vector, add, dot, scale, sub};
 
 /// Steps of Newton's method for a rotation; three are usual.
 const MOST_TURNS: usize = 8;
+/// Steps of Newton's method for a pressure; two or three are usual.
+const MOST_PRESSURES: usize = 20;
+/// A part of a volume that counts as none.
+const FILLED: f64 = 1e-14;
 
 /// Where a node goes without a constraint.
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +33,8 @@ pub(crate) struct Predicted {
     pub displacement: Vector<f64>,
     /// By how much a force moves it over the step [m/N].
     pub mobility: f64,
+    /// The components that another constraint prescribes; forces do not move them.
+    pub held: [bool; 3],
 }
 
 /// The nodes of such a constraint.
@@ -34,25 +43,41 @@ pub(crate) struct Collective {
     pub constraint: usize,
     /// The force [N] of all of them together at the last evaluation.
     pub force: Vector<f64>,
+    /// The volume and its pressure at the last evaluation; zero of other constraints.
+    pub enclosed: Enclosed,
     /// Of each node.
     own: Vec<Vector<f64>>,
     predicted: Vec<Predicted>,
+    /// Volume [m³] at rest, the gradient [m²] now and that after the step.
+    rest_volume: f64,
+    gradients: [Vec<Vector<f64>>; 2],
 }
 
 impl Collective {
     /// Those of a model.
     pub fn all(model: &Model) -> Vec<Self> {
         let collective = model.constraints.iter().enumerate().filter(|(_, own)| own.motion.is_collective());
-        let new = |(constraint, own): (usize, &Constraint)| Self {
-            constraint,
-            force: [0.0; 3],
-            own: vec![[0.0; 3]; own.nodes.len()],
-            predicted: Vec::with_capacity(own.nodes.len()),
+        let new = |(constraint, own): (usize, &Constraint)| {
+            let mut gradient = vec![[0.0; 3]; own.nodes.len()];
+            let rest = |at: u32| model.rest[own.nodes[at as usize] as usize];
+            let rest_volume = match &own.motion {
+                Motion::Volume { enclosure, .. } => enclosure.add_gradient(rest, &mut gradient),
+                _ => 0.0,
+            };
+            Self {
+                constraint,
+                force: [0.0; 3],
+                enclosed: Enclosed { volume: rest_volume, pressure: 0.0 },
+                own: vec![[0.0; 3]; own.nodes.len()],
+                predicted: Vec::with_capacity(own.nodes.len()),
+                rest_volume,
+                gradients: [gradient.clone(), gradient],
+            }
         };
         collective.map(new).collect()
     }
 
-    /// Finds the forces; `factor` is that of a mean's displacement after the step.
+    /// Finds the forces; `factor` is that of a mean's displacement or of a volume's growth after the step. A pressure is added to the one there is.
     pub fn find(&mut self, model: &Model, predicted: impl Fn(u32) -> Predicted, factor: f64) {
         let constraint = &model.constraints[self.constraint];
         self.predicted.clear();
@@ -67,9 +92,68 @@ impl Collective {
                     self.own.iter_mut().zip(weights).for_each(|(own, w)| own[c] = w * force);
                 }
             }
+            Motion::Volume { enclosure, by, .. } => {
+                self.find_pressure(model, enclosure, self.rest_volume + by * factor);
+            }
             _ => self.find_rigid(model),
         }
         self.force = self.own.iter().fold([0.0; 3], |sum, &force| add(sum, force));
+    }
+
+    /// Finds the forces of the pressure that fills an enclosure to a volume [m³].
+    fn find_pressure(&mut self, model: &Model, enclosure: &Enclosure, volume: f64) {
+        let nodes = &model.constraints[self.constraint].nodes;
+        let [now, then] = &mut self.gradients;
+        let predicted = &self.predicted;
+        let rest = |at: u32| model.rest[nodes[at as usize] as usize];
+        now.fill([0.0; 3]);
+        let held = |at: u32| add(rest(at), predicted[at as usize].now);
+        self.enclosed.volume = enclosure.add_gradient(held, now);
+        let way = |at: usize, c: usize| {
+            let Predicted { mobility, held, .. } = predicted[at];
+            if held[c] { 0.0 } else { mobility * now[at][c] }
+        };
+        let mut pressure = 0.0;
+        for _ in 0..MOST_PRESSURES {
+            then.fill([0.0; 3]);
+            let place = |at: u32| {
+                let own = predicted[at as usize].displacement;
+                let moved = [0, 1, 2].map(|c| own[c] + pressure * way(at as usize, c));
+                add(rest(at), moved)
+            };
+            let found = enclosure.add_gradient(place, then);
+            let slope: f64 =
+                then.iter().enumerate().map(|(at, g)| dot(*g, [0, 1, 2].map(|c| way(at, c)))).sum();
+            let more = (volume - found) / slope;
+            if !more.is_finite() {
+                break;
+            }
+            pressure += more;
+            if (volume - found).abs() <= FILLED * found.abs() {
+                break;
+            }
+        }
+        self.own.iter_mut().zip(&*now).for_each(|(own, g)| *own = scale(*g, pressure));
+        self.enclosed.pressure += pressure;
+    }
+
+    /// The force [N] of the pressure there is on each node, where the nodes are displaced by so much [m]; none of other constraints.
+    pub fn pressed(
+        &mut self,
+        model: &Model,
+        displacement: impl Fn(u32) -> Vector<f64>,
+    ) -> Option<impl Iterator<Item = (u32, Vector<f64>)>> {
+        let constraint = &model.constraints[self.constraint];
+        let Motion::Volume { enclosure, .. } = &constraint.motion else { return None };
+        let [now, _] = &mut self.gradients;
+        now.fill([0.0; 3]);
+        let place = |at: u32| {
+            let node = constraint.nodes[at as usize];
+            add(model.rest[node as usize], displacement(node))
+        };
+        self.enclosed.volume = enclosure.add_gradient(place, now);
+        let pressure = self.enclosed.pressure;
+        Some(constraint.nodes.iter().zip(&*now).map(move |(&node, g)| (node, scale(*g, pressure))))
     }
 
     fn find_rigid(&mut self, model: &Model) {
@@ -117,6 +201,12 @@ impl Collective {
     pub fn forces(&self, model: &Model) -> impl Iterator<Item = (u32, Vector<f64>)> {
         model.constraints[self.constraint].nodes.iter().copied().zip(self.own.iter().copied())
     }
+}
+
+/// Volume and pressure of a constraint of volume; `None` of others.
+pub(crate) fn enclosed(model: &Model, all: &[Collective], constraint: usize) -> Option<Enclosed> {
+    let own = all.iter().find(|own| own.constraint == constraint)?;
+    matches!(model.constraints[constraint].motion, Motion::Volume { .. }).then_some(own.enclosed)
 }
 
 #[cfg(test)]

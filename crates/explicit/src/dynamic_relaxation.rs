@@ -22,14 +22,14 @@ use std::sync::Arc;
 
 use pliant_mechanics::Energies;
 use pliant_mechanics::load::Load;
-use pliant_mechanics::model::{Contradiction, FREE, Model, Motion};
-use pliant_mechanics::tensor::{Vector, add, cast, scale, sub};
+use pliant_mechanics::model::{Contradiction, Enclosed, FREE, Model, Motion};
+use pliant_mechanics::tensor::{Vector, add, cast, dot, scale, sub};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
 use crate::applied::AppliedForces;
-use crate::collective::{Collective, Predicted};
+use crate::collective::{Collective, Predicted, enclosed};
 use crate::forces::InternalForces;
 use crate::history::History;
 use crate::recover::Recovery;
@@ -364,6 +364,10 @@ impl<R: Scalar> Observable<R> for DynamicRelaxation<R> {
         }
     }
 
+    fn enclosed(&self, constraint: usize) -> Option<Enclosed> {
+        enclosed(&self.model, &self.collectives, constraint)
+    }
+
     fn nodal_reaction(&self, node: usize) -> Vector<f64> {
         owned_only(&self.owners[node], self.residual[node])
     }
@@ -507,6 +511,7 @@ impl<R: Scalar> DynamicRelaxation<R> {
         let start = self.start(state, course.instant(from));
         self.increment.fill([R::ZERO; 3]);
         self.bound.fill([R::ZERO; 3]);
+        self.collectives.iter_mut().for_each(|own| own.enclosed.pressure = 0.0);
         let (mut slowest, mut least) = (0.0, f64::INFINITY);
         let mut accuracy = Accuracy::default();
         let (mut greatest, mut reached) = (0.0_f64, f64::INFINITY);
@@ -661,6 +666,12 @@ impl<R: Scalar> DynamicRelaxation<R> {
         }
         self.folded = found.folded;
         self.applied.update(time, &state.displacement);
+        for own in &mut self.collectives {
+            let displacement = |node: u32| state.displacement[node as usize].map(R::to_f64);
+            for (node, force) in own.pressed(&self.model, displacement).into_iter().flatten() {
+                self.bound[node as usize] = force.map(R::of);
+            }
+        }
         std::mem::swap(&mut self.residual, &mut self.residual_before);
         let (residual, before) = (&mut self.residual, &self.residual_before);
         let (increment, owners, mass, slowness) = (&self.increment, &self.owners, &self.mass, self.slowness);
@@ -732,16 +743,21 @@ impl<R: Scalar> DynamicRelaxation<R> {
 
     /// Adds to the residual the forces of collective constraints, from where their nodes would go without more of them.
     fn bind(&mut self, state: &State<R>, [alpha, beta]: [R; 2], Instant { time, part }: Instant) {
-        let Self { model, collectives, bound, residual, increment, mass, .. } = self;
+        let Self { model, collectives, bound, residual, increment, mass, owners, .. } = self;
         for own in collectives {
             let predicted = |node: u32| {
                 let (at, mobility) = (node as usize, alpha / mass[node as usize]);
                 let now = state.displacement[at];
-                let then = |c: usize| now[c] + (beta * increment[at][c] - mobility * residual[at][c]);
+                let held = owners[at].map(|owner| owner != FREE);
+                let then = |c: usize| {
+                    let way = beta * increment[at][c] - mobility * residual[at][c];
+                    if held[c] { now[c] } else { now[c] + way }
+                };
                 Predicted {
                     now: cast(now),
                     displacement: [0, 1, 2].map(then).map(R::to_f64),
                     mobility: mobility.to_f64(),
+                    held,
                 }
             };
             let [factor, _] = model.constraints[own.constraint].motion.factors(time);
@@ -762,14 +778,38 @@ impl<R: Scalar> DynamicRelaxation<R> {
         }
     }
 
-    /// What the means of faces bear [N], of what each node resists with beyond what is applied: work from outside.
-    fn means(&self, resisting: impl Fn(usize) -> Vector<R>) -> Vec<(u32, Vector<R>)> {
+    /// What means of faces and enclosed volumes bear [N], of what each node resists with beyond what is applied: work from outside.
+    fn borne(&self, state: &State<R>, resisting: impl Fn(usize) -> Vector<R>) -> Vec<(u32, Vector<R>)> {
         let mut all = Vec::new();
         for constraint in &self.model.constraints {
-            let Motion::Mean { weights, .. } = &constraint.motion else { continue };
-            let force = constraint.mean_force(|node| resisting(node as usize).map(R::to_f64));
-            let nodes = constraint.nodes.iter().zip(weights);
-            all.extend(nodes.map(|(&node, &weight)| (node, scale(force, weight).map(R::of))));
+            match &constraint.motion {
+                Motion::Mean { weights, .. } => {
+                    let force = constraint.mean_force(|node| resisting(node as usize).map(R::to_f64));
+                    let nodes = constraint.nodes.iter().zip(weights);
+                    all.extend(nodes.map(|(&node, &weight)| (node, scale(force, weight).map(R::of))));
+                }
+                Motion::Volume { enclosure, .. } => {
+                    let mut gradient = vec![[0.0; 3]; constraint.nodes.len()];
+                    enclosure.add_gradient(
+                        |at| {
+                            let node = constraint.nodes[at as usize] as usize;
+                            add(self.model.rest[node], state.displacement[node].map(R::to_f64))
+                        },
+                        &mut gradient,
+                    );
+                    // The pressure by least squares, of what is free.
+                    let (mut along, mut squared) = (0.0, 0.0);
+                    for (g, &node) in gradient.iter_mut().zip(&constraint.nodes) {
+                        let owner = self.owners[node as usize];
+                        *g = [0, 1, 2].map(|c| if owner[c] == FREE { g[c] } else { 0.0 });
+                        along += dot(*g, resisting(node as usize).map(R::to_f64));
+                        squared += dot(*g, *g);
+                    }
+                    let nodes = gradient.iter().zip(&constraint.nodes);
+                    all.extend(nodes.map(|(g, &node)| (node, scale(*g, along / squared).map(R::of))));
+                }
+                _ => {}
+            }
         }
         all
     }
@@ -788,7 +828,7 @@ impl<R: Scalar> DynamicRelaxation<R> {
         let stored = Recovery::new(&self.model, state).stored_energy();
         self.unbind();
         let mut borne = vec![[R::ZERO; 3]; self.bound.len()];
-        self.means(|node| self.residual[node])
+        self.borne(state, |node| self.residual[node])
             .into_iter()
             .for_each(|(node, force)| borne[node as usize] = force);
         let work = &mut state.work;
@@ -883,7 +923,7 @@ impl<R: Scalar> DynamicRelaxation<R> {
         };
         let mut all: Vec<Vector<R>> = (0..self.model.node_count()).map(outside).collect();
         let resisting = |node: usize| sub(forces.at(node), scale(self.applied.at(node), R::of(part)));
-        for (node, force) in self.means(resisting) {
+        for (node, force) in self.borne(state, resisting) {
             all[node as usize] = add(all[node as usize], force);
         }
         Start {

@@ -16,13 +16,13 @@ use pliant_contact::touch::{Contacts, Rigid};
 use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::mapping::weighted;
-use pliant_mechanics::model::{Amplitudes, Contradiction, FREE, Model, component, placed};
+use pliant_mechanics::model::{Amplitudes, Contradiction, Enclosed, FREE, Model, component, placed};
 use pliant_mechanics::tensor::{Vector, add};
 use rayon::prelude::*;
 
 use crate::Scalar;
 use crate::applied::AppliedForces;
-use crate::collective::{Collective, Predicted};
+use crate::collective::{Collective, Predicted, enclosed};
 use crate::energies::{Sums, model_balance_floor};
 use crate::forces::{Deformed, Found, InternalForces};
 use crate::lanes::{Instructions, Lanes, MissingInstructions, Processor, Work};
@@ -52,6 +52,11 @@ pub trait Observable<R> {
 
     /// Force [N] that holds or moves the nodes of a constraint, summed.
     fn reaction(&self, constraint: usize) -> Vector<f64>;
+
+    /// Volume and pressure of a constraint of volume; `None` of others.
+    fn enclosed(&self, _constraint: usize) -> Option<Enclosed> {
+        None
+    }
 
     /// Force [N] by which constraints hold or move a node; zero along components that are free.
     fn nodal_reaction(&self, node: usize) -> Vector<f64>;
@@ -177,6 +182,10 @@ impl<R: Scalar> Observable<R> for CentralDifference<R> {
             Some(own) => own.force,
             None => sum_owned(&self.model, &self.owners, constraint, &self.reaction),
         }
+    }
+
+    fn enclosed(&self, constraint: usize) -> Option<Enclosed> {
+        enclosed(&self.model, &self.collectives, constraint)
     }
 
     fn nodal_reaction(&self, node: usize) -> Vector<f64> {
@@ -613,7 +622,8 @@ impl<R: Scalar> CentralDifference<R> {
             state.displacement[at][c].to_f64() + ((1.0 - a) * before * m + step_squared * force) / inertia
         });
         let now = state.displacement[at].map(|u| u.to_f64());
-        Predicted { now, displacement: place, mobility: step_squared / inertia }
+        let held = self.owners[at].map(|owner| owner != FREE);
+        Predicted { now, displacement: place, mobility: step_squared / inertia, held }
     }
 
     /// Adds the forces of contacts, from where nodes would go without them; of their mobility this part counts. Whether there are contacts.
@@ -659,7 +669,17 @@ impl<R: Scalar> CentralDifference<R> {
         let mut collectives = std::mem::take(&mut self.collectives);
         for own in &mut collectives {
             let then = self.factors[own.constraint][1][0];
-            own.find(&self.model, |node| self.predicted(state, node), then);
+            own.enclosed.pressure = 0.0;
+            let predicted = |node: u32| {
+                let mut own = self.predicted(state, node);
+                if let Ok(at) = self.held.binary_search_by_key(&node, |held| held.node) {
+                    for (c, constraint) in self.held[at].components() {
+                        own.displacement[c] = self.held[at].place(c, self.factors[constraint][1]);
+                    }
+                }
+                own
+            };
+            own.find(&self.model, predicted, then);
             for (node, force) in own.forces(&self.model) {
                 self.applied.add(node, force);
             }

@@ -251,7 +251,7 @@ fn close(solver: &mut impl Contacting) -> f64 {
 /// Whether all that moves by itself has gone its way.
 fn is_complete(solver: &mut impl Contacting) -> bool {
     let Vectors { system, pending, .. } = solver.vectors();
-    share(system) == 1.0 && pending.iter().all(|&p| p == 0.0) && system.means.are_closed()
+    share(system) == 1.0 && pending.iter().all(|&p| p == 0.0) && system.conditions.are_closed()
 }
 
 /// Loads but for the forces of contacts, six a node.

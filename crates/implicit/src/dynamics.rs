@@ -308,7 +308,7 @@ impl BackwardEuler {
             }
             let (norm, scale) = self.find_residual(state);
             residuals.push(if scale > 0.0 { norm / scale } else { 0.0 });
-            let moving = self.pending.iter().any(|&p| p != 0.0) || !self.system.means.are_closed();
+            let moving = self.pending.iter().any(|&p| p != 0.0) || !self.system.conditions.are_closed();
             if iteration > 0 && !moving && norm <= self.settings.tolerance * scale + self.round_off {
                 break;
             }
@@ -452,7 +452,7 @@ impl BackwardEuler {
             self.residual.iter_mut().zip(&self.product).for_each(|(r, p)| *r -= factor * p);
         }
         system.give_inertia_back(|node| momentum.of(node as usize, 0), &mut self.residual);
-        system.means.relieve(&mut self.residual);
+        system.conditions.relieve(&mut self.residual);
         let mut norm = 0.0;
         for (&component, residual) in system.equations.component.iter().zip(&self.residual) {
             norm += residual * residual * if component % 6 < 3 { 1.0 } else { arm };
@@ -596,7 +596,7 @@ impl Explicit {
         }
         if model.collective().is_some() {
             return Err(SolveError::Impossible(
-                "explicit shells have no mean and no rigid part; use the implicit solver",
+                "explicit shells have no mean, no rigid part and no volume; use the implicit solver",
             ));
         }
         if model.stiffness_damping > 0.0 {

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use pliant_mechanics::model::Enclosed;
+
 use crate::assembly::{Assembly, Spring};
 use crate::error::SolveError;
 use crate::state::State;
@@ -60,6 +62,13 @@ impl Forces {
     pub fn resisting(&self, node: u32) -> [f64; 3] {
         let at = 6 * node as usize;
         [at, at + 1, at + 2].map(|at| self.system.internal[at] - self.system.external[at])
+    }
+
+    /// What a constraint of volume encloses at the state last evaluated, which is given, and the force [N] and moment [N m] of its pressure by components,
+    /// six a node; `None` of other constraints. The pressure is the one that balances what its nodes resist with, by least squares: exact
+    /// in equilibrium.
+    pub fn enclosed(&self, constraint: usize, state: &State) -> Option<(Enclosed, Vec<(usize, f64)>)> {
+        self.system.enclosed(constraint, state)
     }
 
     /// Energy stored in elements and springs [J].

@@ -33,6 +33,7 @@
 
 mod assembly;
 mod carry;
+mod conditions;
 mod control;
 mod creases;
 mod descent;
@@ -45,7 +46,6 @@ mod forces;
 mod initial;
 mod linear;
 mod mapping;
-mod means;
 mod patch;
 mod picture;
 mod pressure;

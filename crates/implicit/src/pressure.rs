@@ -39,6 +39,12 @@ impl Patch {
         back(&self.control_forces(), &self.control_maps())
     }
 
+    /// ⅓ ∫ x·n dA [m³]: over a closed surface the volume in it.
+    pub fn volume(&self) -> f64 {
+        let forces = self.control_forces();
+        self.controls().iter().zip(&forces).map(|(place, force)| place.dot(force)).sum::<f64>() / 3.0
+    }
+
     /// ∫ F_a n dA on each control point [m²].
     fn control_forces(&self) -> [Vector3<f64>; 9] {
         let place = self.centred();

@@ -369,7 +369,7 @@ impl Statics {
                 attempt.allowed = allowed;
             }
             let gap = control.map_or(0.0, |control| self.constraint(control, state, &start));
-            let complete = self.pending.iter().all(|&p| p == 0.0) && self.system.means.are_closed();
+            let complete = self.pending.iter().all(|&p| p == 0.0) && self.system.conditions.are_closed();
             let controlled = gap.abs() <= self.allowed_gap(control);
             if iteration > 0 && complete && controlled && norm <= allowed {
                 state.time = time;
@@ -466,7 +466,7 @@ impl Statics {
         for (&component, residual) in system.equations.component.iter().zip(&mut self.residual) {
             *residual = system.external[component as usize] - system.internal[component as usize];
         }
-        system.means.relieve(&mut self.residual);
+        system.conditions.relieve(&mut self.residual);
         let free = norm(
             &mut system.equations.component.iter().map(|&c| c as usize).zip(self.residual.iter().copied()),
         );

@@ -7,17 +7,17 @@ use std::time::{Duration, Instant};
 use nalgebra::{SMatrix, SVector, Vector3};
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE, Spread, face_areas};
 use pliant_mechanics::mapping::{Configuration, Mapping};
-use pliant_mechanics::model::{Motion, Solid};
+use pliant_mechanics::model::{Constraint, Enclosed, Motion, Solid};
 use pliant_mechanics::tensor::scale;
 use rayon::prelude::*;
 
 use crate::assembly::{Assembly, Spring};
+use crate::conditions::{Conditions, add_gradient};
 use crate::error::SolveError;
 use crate::facet::{Broken, Facet, Matrix18, Tangent, symmetrise};
 use crate::followers::Followers;
 use crate::linear::{LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT};
 use crate::mapping::CarriedPoints;
-use crate::means::Means;
 use crate::patch::Vector18;
 use crate::patch::{EdgeRule, Patch};
 use crate::rotation::skew;
@@ -86,7 +86,7 @@ pub(crate) struct System {
     pub(crate) last_solution: LinearReport,
     /// Nodes that follow others; in a system of forces alone those of ties.
     followers: Option<Followers>,
-    pub(crate) means: Means,
+    pub(crate) conditions: Conditions,
     solver: LinearSolver,
     /// Contacts; a system of forces alone has none.
     pub(crate) touching: Option<Box<TouchingSystem>>,
@@ -114,7 +114,8 @@ struct FacetResult {
 impl System {
     pub(crate) fn new(model: Arc<Assembly>, solver: LinearSolver) -> Result<Self, SolveError> {
         let turning = model.turning();
-        let bound = model.constraints.iter().filter(|constraint| constraint.motion.is_collective());
+        let binds = |own: &&Constraint| matches!(own.motion, Motion::Mean { .. } | Motion::Rigid);
+        let bound = model.constraints.iter().filter(binds);
         if bound.flat_map(|constraint| &constraint.nodes).any(|&node| turning[node as usize]) {
             return Err(SolveError::Impossible(
                 "a mean or a rigid part has nodes of a shell, which turn by themselves",
@@ -122,7 +123,7 @@ impl System {
         }
         let mut system = Self::forces_only(Arc::clone(&model));
         system.followers = Followers::of(&model, true);
-        system.means = Means::of(&model, &system.equations);
+        system.conditions = Conditions::of(&model, &system.equations, system.surface.as_ref());
         system.solver = solver;
         system.touching = model.touching.as_ref().map(|own| Box::new(TouchingSystem::new(own, &model)));
         system.coupling = vec![0.0; system.equations.len()];
@@ -256,7 +257,7 @@ impl System {
         }
         Self {
             followers: Followers::of(&model, false),
-            means: Means::default(),
+            conditions: Conditions::default(),
             equations: Equations::new(&free),
             matrix: LowerMatrix::default(),
             places: Vec::new(),
@@ -272,14 +273,7 @@ impl System {
             held: Vec::new(),
             pressure: vec![Pressure::default(); model.facets.len()],
             exact_pressure: true,
-            surface: model
-                .loads
-                .iter()
-                .any(|load| {
-                    let curved = matches!(load.kind, LoadKind::ShellPressure { spread: Spread::Curved, .. });
-                    curved || load.surface.is_some_and(|surface| model.carried.contains_key(&surface))
-                })
-                .then(|| CurvedSurface::new(&model, EdgeRule::Arc)),
+            surface: needs_surface(&model).then(|| CurvedSurface::new(&model, EdgeRule::Arc)),
             energy: 0.0,
             largest: 0.0,
             results: vec![FacetResult::none(); CHUNK.min(model.facets.len())],
@@ -317,7 +311,7 @@ impl System {
             followers.turn(state);
         }
         let model = Arc::clone(&self.model);
-        self.means.find_gaps(&model, state, time);
+        self.conditions.find_gaps(&model, &self.equations, self.surface.as_ref(), state, time);
         self.nodal_loads(state, time);
         self.internal.fill(0.0);
         self.energy = 0.0;
@@ -372,6 +366,9 @@ impl System {
             if let Some((_, moved)) = tangent {
                 touching.add_stiffness(&self.equations, &mut self.matrix, moved, &mut self.coupling);
             }
+        }
+        if let Some((_, moved)) = tangent {
+            self.press_enclosures(state, moved);
         }
         if tangent.is_some() && !self.matrix.mirror.is_empty() {
             self.turn_moments(state.load_factor);
@@ -599,18 +596,80 @@ impl System {
             let factor = if load.controlled { state.load_factor } else { 1.0 } * load.curve.value(time);
             for (face, places) in faces.iter().zip(&places) {
                 let nodes = corners(face);
-                let mut tangent = pressure_change(face, nodes.len(), state, factor * pressure);
-                if self.matrix.mirror.is_empty() {
-                    let size = 3 * nodes.len();
-                    for (i, j) in (0..size).flat_map(|j| (0..j).map(move |i| (i, j))) {
-                        let mean = 0.5 * (tangent[j * size + i] + tangent[i * size + j]);
-                        (tangent[j * size + i], tangent[i * size + j]) = (mean, mean);
-                    }
-                }
+                let symmetric = self.matrix.mirror.is_empty();
+                let tangent = pressure_change(face, nodes.len(), state, factor * pressure, symmetric);
                 self.add_at(nodes, places, &tangent, moved);
             }
             self.face_places[number] = places;
         }
+    }
+
+    /// Adds how the pressures in enclosures change with their nodes.
+    fn press_enclosures(&mut self, state: &State, moved: &[f64]) {
+        if self.conditions.is_empty() {
+            return;
+        }
+        let model = Arc::clone(&self.model);
+        let conditions = std::mem::take(&mut self.conditions);
+        let resisting =
+            |at: usize| self.internal[at] - self.external[at] - state.load_factor * self.controlled[at];
+        let all = conditions.pressures(&model, &self.equations, resisting);
+        let symmetric = self.matrix.mirror.is_empty();
+        for (own, enclosure, pressure) in all {
+            for face in &enclosure.faces {
+                let face = face.map(|at| if at == NO_NODE { at } else { own.nodes[at as usize] });
+                let nodes = corners(&face);
+                let tangent = pressure_change(&face, nodes.len(), state, -pressure, symmetric);
+                let places = self.matrix.places(&self.equations, nodes, 3);
+                self.add_block(nodes, 3, &places, &tangent, moved);
+            }
+            for &facet in &enclosure.facets {
+                let Some(surface) = &self.surface else { break };
+                let patch = surface.patch(&model, state, facet);
+                let mut tangent = patch.pressure_change() * -pressure;
+                if symmetric {
+                    symmetrise(&mut tangent);
+                } else {
+                    // The covariant derivative of the moments.
+                    let forces = patch.pressure_forces() * pressure;
+                    for first in [3, 9, 15] {
+                        let moment = Vector3::new(forces[first], forces[first + 1], forces[first + 2]);
+                        let mut own = tangent.fixed_view_mut::<3, 3>(first, first);
+                        own -= skew(&moment) * 0.5;
+                    }
+                }
+                let nodes = model.facets[facet as usize].nodes;
+                let places = self.matrix.places(&self.equations, &nodes, 6);
+                self.add_block(&nodes, 6, &places, tangent.as_slice(), moved);
+            }
+        }
+        self.conditions = conditions;
+    }
+
+    /// What a constraint of volume encloses at the state last evaluated, with the pressure that balances what its nodes resist with, and the
+    /// forces of that, component by component; `None` of other constraints.
+    pub(crate) fn enclosed(&self, constraint: usize, state: &State) -> Option<(Enclosed, Vec<(usize, f64)>)> {
+        let own = &self.model.constraints[constraint];
+        let Motion::Volume { enclosure, .. } = &own.motion else { return None };
+        let mut all: Vec<(usize, f64)> = Vec::new();
+        let surface = self.surface.as_ref();
+        let volume = add_gradient(&self.model, surface, own, enclosure, state, &mut |component, value| {
+            if self.equations.number[component] != NONE {
+                all.push((component, value));
+            }
+        });
+        // Entries of one component together.
+        all.sort_by_key(|&(component, _)| component);
+        all.dedup_by(|next, own| {
+            let same = next.0 == own.0;
+            own.1 += if same { next.1 } else { 0.0 };
+            same
+        });
+        let along = |&(at, g): &(usize, f64)| g * (self.internal[at] - self.external[at]);
+        let squared: f64 = all.iter().map(|(_, g)| g * g).sum();
+        let pressure = all.iter().map(along).sum::<f64>() / squared;
+        all.iter_mut().for_each(|(_, g)| *g *= pressure);
+        Some((Enclosed { volume, pressure }, all))
     }
 
     fn add_forces(&mut self, nodes: &[u32], forces: &[f64]) {
@@ -676,7 +735,7 @@ impl System {
     /// Takes the matrix as it now is for the coming solutions; returns its negative pivots.
     pub(crate) fn prepare(&mut self) -> Result<usize, SolveError> {
         let start = Instant::now();
-        self.means.pin(&mut self.matrix);
+        self.conditions.pin(&mut self.matrix);
         let Some(workspace) = &mut self.workspace else { return Ok(0) };
         let pivots = workspace.prepare(&self.matrix).map_err(linear_error)?;
         self.phases.preparation += start.elapsed();
@@ -690,10 +749,10 @@ impl System {
                 pivot: pivots.smallest,
             });
         }
-        if !self.means.is_empty() {
-            let mut means = std::mem::take(&mut self.means);
-            let prepared = means.prepare(|right, solution| self.solve_pinned(right, solution));
-            self.means = means;
+        if !self.conditions.is_empty() {
+            let mut conditions = std::mem::take(&mut self.conditions);
+            let prepared = conditions.prepare(|right, solution| self.solve_pinned(right, solution));
+            self.conditions = conditions;
             prepared?;
         }
         Ok(pivots.negative)
@@ -713,11 +772,11 @@ impl System {
         self.solve_from(right, solution)
     }
 
-    /// The same with means that stay where they are.
+    /// The same with means and volumes that stay as they are.
     pub(crate) fn respond(&mut self, right: &[f64], solution: &mut [f64]) -> Result<(), SolveError> {
         solution.fill(0.0);
         self.solve_pinned(right, solution)?;
-        self.means.correct(solution, false);
+        self.conditions.correct(solution, false);
         Ok(())
     }
 
@@ -725,11 +784,11 @@ impl System {
     /// iterations run out.
     pub(crate) fn solve_from(&mut self, right: &[f64], solution: &mut [f64]) -> Result<(), SolveError> {
         let result = self.solve_pinned(right, solution);
-        self.means.correct(solution, true);
+        self.conditions.correct(solution, true);
         result
     }
 
-    /// Solves with the matrix as it is, with the springs that hold means.
+    /// Solves with the matrix as it is, with the springs that hold means and volumes.
     fn solve_pinned(&mut self, right: &[f64], solution: &mut [f64]) -> Result<(), SolveError> {
         let start = Instant::now();
         let Some(workspace) = &mut self.workspace else { return Ok(()) };
@@ -804,6 +863,16 @@ impl System {
     }
 }
 
+/// Whether something acts on the curved surface of shells.
+fn needs_surface(model: &Assembly) -> bool {
+    let loads = |load: &Load| {
+        let curved = matches!(load.kind, LoadKind::ShellPressure { spread: Spread::Curved, .. });
+        curved || load.surface.is_some_and(|surface| model.carried.contains_key(&surface))
+    };
+    let encloses = |own: &Constraint| matches!(&own.motion, Motion::Volume { enclosure, .. } if !enclosure.facets.is_empty());
+    model.loads.iter().any(loads) || model.constraints.iter().any(encloses)
+}
+
 /// The pressures on faces of solids. How those on carried surfaces change with the state is left out of the stiffness.
 fn pressing(model: &Assembly) -> impl Iterator<Item = (&Load, &Vec<Face>, f64)> {
     model.loads.iter().filter_map(|load| match &load.kind {
@@ -828,8 +897,8 @@ fn linear_error(error: LinearError) -> SolveError {
 }
 
 /// The derivative of p ∫ N_a n dA of a face by the places of its nodes, column by column: what the pressure pushes against the
-/// outward normal. By differences, exact: the areas are of second order in each place.
-fn pressure_change(face: &Face, count: usize, state: &State, pressure: f64) -> Vec<f64> {
+/// outward normal; its symmetric part alone if that is wanted. By differences, exact: the areas are of second order in each place.
+fn pressure_change(face: &Face, count: usize, state: &State, pressure: f64, symmetric: bool) -> Vec<f64> {
     let size = 3 * count;
     let mut tangent = vec![0.0; size * size];
     let place = |node: u32| -> [f64; 3] { state.position[node as usize].into() };
@@ -852,6 +921,10 @@ fn pressure_change(face: &Face, count: usize, state: &State, pressure: f64) -> V
                 }
             }
         }
+    }
+    for (i, j) in (0..size).flat_map(|j| (0..j).map(move |i| (i, j))).filter(|_| symmetric) {
+        let mean = 0.5 * (tangent[j * size + i] + tangent[i * size + j]);
+        (tangent[j * size + i], tangent[i * size + j]) = (mean, mean);
     }
     tangent
 }

@@ -9,7 +9,7 @@ use crate::element::{
     Cord, GaussPoints, HEX_EDGES, Hex8, Rest, Sheet, bar, gauss_points, hex8, membrane, tet4,
 };
 use crate::law::AnyLaw;
-use crate::load::Load;
+use crate::load::{Face, Load, face_areas};
 use crate::mapping::Weights;
 use crate::order::order;
 use crate::prony::Prony;
@@ -602,12 +602,52 @@ pub enum Motion {
     },
     /// Together they move as a rigid body, free in space.
     Rigid,
+    /// The volume that faces enclose grows by so much [m³] × curve from what it is at rest; a uniform pressure on them does it.
+    Volume {
+        /// What encloses it.
+        enclosure: Enclosure,
+        /// The growth [m³].
+        by: f64,
+        /// Its course.
+        curve: Curve,
+    },
+}
+
+/// A closed surface, made of faces of solids and membranes or of facets of shells.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Enclosure {
+    /// Faces, numbered by the nodes of their constraint; normals outwards from what is enclosed.
+    pub faces: Vec<Face>,
+    /// Facets of shells, numbered in the model; normals outwards, too.
+    pub facets: Vec<u32>,
+}
+
+impl Enclosure {
+    /// The volume [m³] within the faces and its gradient [m²], which is added to one entry a node; `place` gives the places [m] of nodes. Facets of
+    /// shells do not count here.
+    pub fn add_gradient(&self, place: impl Fn(u32) -> Vector<f64>, gradient: &mut [Vector<f64>]) -> f64 {
+        let mut sum = 0.0;
+        for (node, area) in self.faces.iter().flat_map(|face| face_areas(face, &place)) {
+            gradient[node as usize] = add(gradient[node as usize], area);
+            sum += dot(place(node), area);
+        }
+        sum / 3.0
+    }
+}
+
+/// What a constraint of volume has at an instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Enclosed {
+    /// The volume [m³].
+    pub volume: f64,
+    /// The pressure within [Pa], above that outside.
+    pub pressure: f64,
 }
 
 impl Motion {
     /// Whether it binds nodes to each other and prescribes none by itself.
     pub fn is_collective(&self) -> bool {
-        matches!(self, Self::Mean { .. } | Self::Rigid)
+        matches!(self, Self::Mean { .. } | Self::Rigid | Self::Volume { .. })
     }
 
     /// Rotation of nodes about an axis through a centre [m], by an angle [rad] × curve, by Rodrigues' formula
@@ -636,7 +676,7 @@ impl Motion {
     pub fn amplitudes(&self, index: usize) -> Amplitudes {
         let one = |amplitude| [amplitude, [0.0; 3]];
         match self {
-            Self::Fixed | Self::Rigid => one([0.0; 3]),
+            Self::Fixed | Self::Rigid | Self::Volume { .. } => one([0.0; 3]),
             Self::Displacement(by, _) | Self::Mean { by, .. } => one(*by),
             Self::Displacements(by, _) | Self::Turn { by, .. } => one(by[index]),
             Self::Velocity(velocity, _) => one(*velocity),
@@ -656,7 +696,8 @@ impl Motion {
             Self::Displacement(_, curve)
             | Self::Displacements(_, curve)
             | Self::Turn { curve, .. }
-            | Self::Mean { curve, .. } => [part * curve.value(time), 0.0],
+            | Self::Mean { curve, .. }
+            | Self::Volume { curve, .. } => [part * curve.value(time), 0.0],
             Self::Velocity(_, curve) => [part * curve.integral(time), 0.0],
             Self::Rotation { angle, curve, .. } => {
                 let angle = part * angle * curve.value(time);
@@ -675,7 +716,7 @@ impl Motion {
     /// How far the constraint's node at `index` goes between two times [s]: its displacement [m] and its rotation vector [rad].
     pub fn increment(&self, index: usize, from: f64, to: f64) -> [f64; 6] {
         let shift = match self {
-            Self::Fixed | Self::Rigid => [0.0; 3],
+            Self::Fixed | Self::Rigid | Self::Volume { .. } => [0.0; 3],
             // The difference of the factors first: it is exact to more digits than that of places.
             Self::Displacement(_, curve)
             | Self::Displacements(_, curve)
@@ -701,7 +742,8 @@ impl Motion {
             Self::Displacement(_, curve)
             | Self::Displacements(_, curve)
             | Self::Turn { curve, .. }
-            | Self::Mean { curve, .. } => Some((0, 0.0, curve.clone())),
+            | Self::Mean { curve, .. }
+            | Self::Volume { curve, .. } => Some((0, 0.0, curve.clone())),
             Self::Velocity(_, curve) => Some((1, 0.0, curve.clone())),
             Self::Rotation { angle, curve, .. } => Some((2, *angle, curve.clone())),
         };

@@ -116,6 +116,7 @@ fn write_model(page: &mut String, built: &Built) -> fmt::Result {
             Motion::Rotation { .. } => "rotates",
             Motion::Mean { .. } => "moves the mean",
             Motion::Rigid => "keeps the shape,",
+            Motion::Volume { .. } => "fills the volume within",
         };
         let turns = &constraint.components[3..];
         let rotations: Vec<&str> =

@@ -19,6 +19,7 @@ impl ConstraintTable {
             Self::Spring(table) => &table.body,
             Self::Mean(table) => &table.body,
             Self::Rigid(table) => &table.body,
+            Self::Volume(table) => &table.body,
         }
     }
 }

@@ -13,7 +13,7 @@ use crate::diagnostic::Diagnostic;
 use crate::format::{
     BodyTable, ContactTable, CsvTable, EdgeLoadTable, FixTable, ForceTable, GravityTable, LawExtras,
     MeanTable, MomentTable, MoveTable, ParticipantTable, PressureTable, RigidTable, RunTable, SceneTable,
-    SpringTable, SurfaceTable, TieTable, ToolTable, TractionTable, ViewTable, VtuTable,
+    SpringTable, SurfaceTable, TieTable, ToolTable, TractionTable, ViewTable, VolumeTable, VtuTable,
 };
 use crate::nearest::nearest;
 use crate::source::{Source, Value};
@@ -69,6 +69,7 @@ typed! {
     "spring" => Spring(SpringTable),
     "mean" => Mean(MeanTable),
     "rigid" => Rigid(RigidTable),
+    "volume" => Volume(VolumeTable),
 }
 
 typed! {

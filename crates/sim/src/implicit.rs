@@ -13,7 +13,7 @@ use pliant_implicit::{
 };
 use pliant_mechanics::grip::{Grip, ROOM};
 use pliant_mechanics::mapping::Mapping;
-use pliant_mechanics::model::Motion;
+use pliant_mechanics::model::{Enclosed, Motion};
 use pliant_mechanics::{Energies, fingerprint};
 
 use crate::bodies::{ImplicitBodies, RunControl, Stop};
@@ -56,6 +56,8 @@ pub(crate) struct Implicit {
     outside: Vec<f64>,
     energies: Energies,
     reactions: Vec<[f64; 3]>,
+    /// What constraints of volume enclose.
+    enclosed: Vec<Option<Enclosed>>,
     evaluated: bool,
     effort: Effort,
     /// What was taken before the run was resumed.
@@ -178,6 +180,7 @@ impl Implicit {
             before: None,
             energies: Energies::default(),
             reactions: vec![[0.0; 3]; own.constraints.len()],
+            enclosed: vec![None; own.constraints.len()],
             evaluated: false,
             effort: Effort::default(),
             effort_before: Effort::default(),
@@ -206,6 +209,11 @@ impl Implicit {
                 let own = self.outside[6 * node as usize..].iter_mut().zip(force);
                 own.for_each(|(outside, force)| *outside += weight * force);
             }
+        }
+        for (index, enclosed) in self.enclosed.iter_mut().enumerate() {
+            let Some((own, pressed)) = forces.enclosed(index, &self.state) else { continue };
+            pressed.into_iter().for_each(|(component, force)| self.outside[component] += force);
+            *enclosed = Some(own);
         }
     }
 
@@ -532,6 +540,10 @@ impl Instant for Implicit {
 
     fn reaction(&self, constraint: usize) -> [f64; 3] {
         self.reactions[constraint]
+    }
+
+    fn enclosed(&self, constraint: usize) -> Option<Enclosed> {
+        self.enclosed[constraint]
     }
 
     fn contact_forces(&self) -> Vec<[f64; 3]> {

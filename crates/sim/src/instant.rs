@@ -8,6 +8,7 @@ use pliant_explicit::NodeContact;
 use pliant_explicit::recover::CellFields;
 use pliant_explicit::stability::Stability;
 use pliant_mechanics::Energies;
+use pliant_mechanics::model::Enclosed;
 use serde::{Deserialize, Serialize};
 
 use crate::solver::Equilibria;
@@ -39,6 +40,11 @@ pub trait Instant {
 
     /// Force [N] that holds or moves the nodes of a constraint, summed.
     fn reaction(&self, constraint: usize) -> [f64; 3];
+
+    /// What a constraint of volume encloses; `None` of others.
+    fn enclosed(&self, _constraint: usize) -> Option<Enclosed> {
+        None
+    }
 
     /// Force [N] of each contact on the rigid thing that it is with, in the order of the contacts.
     fn contact_forces(&self) -> Vec<[f64; 3]> {

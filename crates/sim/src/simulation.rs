@@ -5,6 +5,7 @@ use std::sync::Arc;
 use pliant_contact::pose::Leg;
 use pliant_explicit::{Clock, Wanted};
 use pliant_mechanics::grip::Grip;
+use pliant_mechanics::model::Enclosed;
 use pliant_mechanics::{Energies, Model, fingerprint};
 
 #[cfg(feature = "gpu")]
@@ -715,6 +716,14 @@ impl<'a> Frame<'a> {
             own.map(|(index, _)| now.reaction(index))
         });
         forces.reduce(|a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]])
+    }
+
+    /// The volume that a constraint of volume encloses, and its pressure; `None` without one of this name.
+    pub fn enclosed(&self, constraint: &str) -> Option<Enclosed> {
+        self.parts().find_map(|(part, now)| {
+            let index = part.model.constraints.iter().position(|own| own.name == constraint)?;
+            now.enclosed(index)
+        })
     }
 
     /// Force [N] of a contact on the obstacle or tool that it is with; `None` without one of this name.

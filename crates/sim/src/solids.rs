@@ -11,6 +11,7 @@ use pliant_explicit::{Clock, NodeContact, Scalar, State, Wanted};
 use pliant_gpu::GpuStepper;
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::mapping::{Displaced, Mapping};
+use pliant_mechanics::model::Enclosed;
 use pliant_mechanics::{Energies, Model, fingerprint};
 
 use crate::failure::Failure;
@@ -133,6 +134,10 @@ impl<R: Numeric> Instant for Solids<R> {
 
     fn reaction(&self, constraint: usize) -> [f64; 3] {
         self.solver.observable().reaction(constraint)
+    }
+
+    fn enclosed(&self, constraint: usize) -> Option<Enclosed> {
+        self.solver.observable().enclosed(constraint)
     }
 
     fn contact_forces(&self) -> Vec<[f64; 3]> {

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use pliant_geometry::Vector3;
 use pliant_implicit::Carried;
 use pliant_mechanics::Energies;
+use pliant_mechanics::model::{Enclosed, Motion};
 use pliant_mechanics::tensor::add;
 
 use crc32fast::Hasher;
@@ -93,6 +94,8 @@ impl Column {
 /// Those of one participant.
 struct Own {
     reactions: Vec<usize>,
+    /// Constraints of volume.
+    volumes: Vec<usize>,
     /// Contacts whose forces are columns: all but those of a body with itself, whose forces have no sum.
     contacts: Vec<usize>,
     /// Contacts of each tool and obstacle that has several.
@@ -136,12 +139,19 @@ impl Own {
         let built = &*part.built;
         let wanted = |name: &String| table.reactions.as_ref().is_none_or(|list| list.contains(name));
         let constraints = built.model.constraints.iter();
-        let reactions: Vec<usize> =
-            constraints.enumerate().filter(|(_, c)| wanted(&c.name)).map(|(i, _)| i).collect();
+        let wanted = constraints.enumerate().filter(|(_, c)| wanted(&c.name)).map(|(i, _)| i);
+        let encloses =
+            |&index: &usize| matches!(built.model.constraints[index].motion, Motion::Volume { .. });
+        let (volumes, reactions): (Vec<usize>, Vec<usize>) = wanted.partition(encloses);
         let mut add = |name: String, unit| columns.push(Column { name, unit });
         for &constraint in &reactions {
             let name = &built.model.constraints[constraint].name;
             AXES.iter().for_each(|axis| add(format!("reaction.{name}.{axis}"), "N"));
+        }
+        for &constraint in &volumes {
+            let name = &built.model.constraints[constraint].name;
+            add(format!("volume.{name}"), "m³");
+            add(format!("pressure.{name}"), "Pa");
         }
         let contacts = built.contacts.as_ref().map_or(&[][..], |all| &all.contacts);
         let paired: Vec<usize> =
@@ -184,13 +194,17 @@ impl Own {
         }
         let probes = probes().map(|(_, probe)| Probe::new(built, probe)).collect();
         let shells = fields::OfShells::default();
-        Self { reactions, contacts: paired, things, moments, energy: table.energy, probes, shells }
+        Self { reactions, volumes, contacts: paired, things, moments, energy: table.energy, probes, shells }
     }
 
     /// Adds the sample of an instant to a row.
     fn read(&mut self, frame: &Frame<'_>, row: &mut Vec<f64>) {
         for &constraint in &self.reactions {
             row.extend(frame.now.reaction(constraint));
+        }
+        for &constraint in &self.volumes {
+            let Enclosed { volume, pressure } = frame.now.enclosed(constraint).unwrap_or_default();
+            row.extend([volume, pressure]);
         }
         if !self.contacts.is_empty() {
             let forces = frame.now.contact_forces();

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use pliant_explicit::stability::Stability;
 use pliant_mechanics::Energies;
+use pliant_mechanics::model::Enclosed;
 use pliant_sim::{Effort, Equilibria, Failure, Instant, TieNow};
 use serde::{Deserialize, Serialize};
 
@@ -77,6 +78,8 @@ pub(crate) struct PartOutcome {
     /// Residuals of its last iterations, as a table.
     pub convergence: Option<String>,
     pub reactions: Vec<[f64; 3]>,
+    /// What constraints of volume enclose.
+    pub enclosed: Vec<Option<Enclosed>>,
     /// The tools that were held back, each with its longest lag [m] and when that was [s].
     pub held_back: Vec<(String, f64, f64)>,
 }
@@ -95,6 +98,9 @@ impl PartOutcome {
             effort: participant.effort(),
             convergence: participant.convergence(),
             reactions: frame.reactions().collect(),
+            enclosed: (0..part.built.model.constraints.len())
+                .map(|index| participant.enclosed(index))
+                .collect(),
             held_back: held_back(part, participant),
         }
     }

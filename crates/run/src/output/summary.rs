@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use pliant_mechanics::Energies;
+use pliant_mechanics::model::{Constraint, Enclosed, Motion};
 use pliant_sim::{Critical, Effort, Equilibria, Failure, number};
 use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
@@ -70,6 +71,9 @@ pub struct Summary {
     /// Force [N] of each constraint at the end, by name.
     #[serde(serialize_with = "as_map")]
     pub reactions: Vec<(String, [f64; 3])>,
+    /// Volume [m³] and pressure [Pa] of each constraint of volume at the end, by name.
+    #[serde(serialize_with = "as_map")]
+    pub volumes: Vec<(String, [f64; 2])>,
     /// What to know before trusting the result.
     pub warnings: Vec<String>,
     /// Files written, as paths.
@@ -143,7 +147,7 @@ pub struct BodySummary {
     pub mass: f64,
 }
 
-fn as_map<S: Serializer>(pairs: &[(String, [f64; 3])], serializer: S) -> Result<S::Ok, S::Error> {
+fn as_map<S: Serializer, T: Serialize>(pairs: &[(String, T)], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_map(pairs.iter().map(|(name, force)| (name, force)))
 }
 
@@ -163,7 +167,7 @@ fn empty(status: &str, error: Failure) -> Json {
         "error": error,
         "bodies": [], "nodes": null, "elements": null, "mass": null, "step": null, "element_bound": null,
         "critical_step": null, "limiting_element": null, "participants": [], "ties": [], "solver": null, "equilibria": null, "ended": null, "shell_strains": [], "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
-        "stability": null, "added_mass": null, "energy_balance": null, "reactions": {}, "warnings": [], "files": [],
+        "stability": null, "added_mass": null, "energy_balance": null, "reactions": {}, "volumes": {}, "warnings": [], "files": [],
     })
 }
 
@@ -220,7 +224,10 @@ pub(crate) fn summarise(world: &World, outcome: &Outcome) -> Summary {
     let doubts = |((part, own), seen): ((&Part, &PartOutcome), Option<StabilitySummary>)| {
         doubts(&part.built, own, seen.as_ref())
     };
-    let reactions = parts().flat_map(|(part, own)| part.built.model.constraints.iter().zip(&own.reactions));
+    let reactions = parts()
+        .flat_map(|(part, own)| part.built.model.constraints.iter().zip(&own.reactions))
+        .filter(|(constraint, _)| !matches!(constraint.motion, Motion::Volume { .. }));
+    let volumes = parts().flat_map(|(part, own)| part.built.model.constraints.iter().zip(&own.enclosed));
     let target = &world.participants[0].plan.target;
     let balances = parts().filter_map(|(_, own)| own.balance());
     Summary {
@@ -257,6 +264,10 @@ pub(crate) fn summarise(world: &World, outcome: &Outcome) -> Summary {
         added_mass: parts().find_map(|(part, _)| AddedMass::new(&part.built)),
         energy_balance: balances.reduce(f64::max),
         reactions: reactions.map(|(constraint, force)| (constraint.name.clone(), *force)).collect(),
+        volumes: volumes
+            .filter_map(|(constraint, own)| Some((constraint.name.clone(), (*own)?)))
+            .map(|(name, Enclosed { volume, pressure })| (name, [volume, pressure]))
+            .collect(),
         files: outcome.files.iter().map(|file| file.display().to_string()).collect(),
         time: outcome.time,
         energies: outcome.energies,
@@ -324,6 +335,7 @@ fn write_page(page: &mut String, world: &World, outcome: &Outcome, summary: &Sum
         write_energy_rows(page, &outcome.energies)?;
     }
     write_reactions(page, world, outcome)?;
+    write_volumes(page, &summary.volumes)?;
     write_ties(page, &outcome.ties)?;
     writeln!(page, "\n## Cost\n\n| | |\n|---|---|")?;
     writeln!(page, "| wall time | {} s |", number(summary.wall_seconds))?;
@@ -478,7 +490,8 @@ fn write_energies(page: &mut String, of: &str, outcome: &PartOutcome) -> std::fm
 }
 
 fn write_reactions(page: &mut String, world: &World, outcome: &Outcome) -> std::fmt::Result {
-    if constraints(world).next().is_none() {
+    let binds = |constraint: &Constraint| !matches!(constraint.motion, Motion::Volume { .. });
+    if !constraints(world).any(binds) {
         return Ok(());
     }
     writeln!(
@@ -486,11 +499,26 @@ fn write_reactions(page: &mut String, world: &World, outcome: &Outcome) -> std::
         "\n## Reactions\n\n| constraint | nodes | at the end [N] | largest [N] |\n|---|---|---|---|"
     )?;
     let forces = outcome.parts.iter().flat_map(|own| &own.reactions);
-    for (index, (constraint, force)) in constraints(world).zip(forces).enumerate() {
+    let all = constraints(world).zip(forces).enumerate();
+    for (index, (constraint, force)) in all.filter(|(_, (constraint, _))| binds(constraint)) {
         let [x, y, z] = force.map(number);
         let nodes = constraint.nodes.len();
         let largest = number(outcome.history.largest_reaction(index));
         writeln!(page, "| {} | {nodes} | ({x}, {y}, {z}) | {largest} |", constraint.name)?;
+    }
+    Ok(())
+}
+
+fn write_volumes(page: &mut String, volumes: &[(String, [f64; 2])]) -> std::fmt::Result {
+    if volumes.is_empty() {
+        return Ok(());
+    }
+    writeln!(
+        page,
+        "\n## Enclosed volumes\n\n| constraint | volume at the end [m³] | pressure at the end [Pa] |\n|---|---|---|"
+    )?;
+    for (name, [volume, pressure]) in volumes {
+        writeln!(page, "| {name} | {} | {} |", number(*volume), number(*pressure))?;
     }
     Ok(())
 }

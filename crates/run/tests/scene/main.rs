@@ -16,6 +16,7 @@ mod participants;
 mod penalty;
 mod static_solids;
 mod ties;
+mod volumes;
 mod walls;
 
 /// Whether there is a GPU. Without any a test is skipped with a notice, or fails where `PLIANT_REQUIRE_GPU=1`.

@@ -1,15 +1,17 @@
 //! Constraints: which nodes are held or moved, and that no two contradict each other.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use pliant_geometry::{Mesh, Selection, Vector3};
+use pliant_implicit::element::Membrane;
 use pliant_mechanics::curve::Curve;
-use pliant_mechanics::model::{Constraint, Motion};
+use pliant_mechanics::load::{Face, NO_NODE};
+use pliant_mechanics::model::{Constraint, Enclosure, Motion};
 use pliant_sim::number;
 
-use super::Builder;
+use super::{Builder, Target};
 use crate::diagnostic::Diagnostic;
-use crate::format::{MoveTable, RotateTable, SolverName, Vectors};
+use crate::format::{MoveTable, RotateTable, SolverName, Vectors, VolumeTable};
 use crate::registry::{ConstraintTable, LoadTable};
 
 impl Builder<'_> {
@@ -28,6 +30,10 @@ impl Builder<'_> {
                 }
                 ConstraintTable::Mean(mean) => (&mean.body, &mean.nodes, &mean.components, false),
                 ConstraintTable::Rigid(rigid) => (&rigid.body, &rigid.nodes, &None, false),
+                ConstraintTable::Volume(volume) => {
+                    self.add_volume(name, volume);
+                    continue;
+                }
             };
             let body = self.find_body(body, &[path[0], path[1], "body"]);
             let components = self.components(axes.as_deref(), body, turns, &path);
@@ -63,6 +69,83 @@ impl Builder<'_> {
                 .help(help);
             self.out.push(diagnostic);
         }
+    }
+
+    /// Adds a volume that faces of a body enclose.
+    fn add_volume(&mut self, name: &str, table: &VolumeTable) {
+        let path = ["constraint", name];
+        let at = |key| [path[0], path[1], key];
+        let Some(body) = self.find_body(&table.body, &at("body")) else { return };
+        let explicit = !self.scene.run.solver.solves_equations();
+        if explicit && self.shell_cells(body).is_some() {
+            let message = format!("explicit shells fill no volume, and `{}` is a shell", table.body);
+            let help = "take the solver `implicit` or `static`, or a body of model `membrane`";
+            self.error(&at("body"), message, "a shell in an explicit run", help);
+            return;
+        }
+        let (selection, key) = match &table.faces {
+            Some(selection) => (selection, "faces"),
+            None => (&Selection::All, "body"),
+        };
+        let faces = self.faces(Target::Body(body), selection, &at(key));
+        let (Some(mut faces), Some(curve)) = (faces, self.curve(&table.timing, &path)) else { return };
+        if faces.is_empty() {
+            let message = format!("`{name}` has no faces, which would enclose a volume");
+            let help = "take a body of model `solid`, `membrane` or `shell`";
+            self.error(&at(key), message, "no faces", help);
+            return;
+        }
+        if let Some([from, to]) = open_edge(&faces) {
+            let place = |node: u32| self.assembly.rest[node as usize];
+            let middle: [f64; 3] = std::array::from_fn(|c| 0.5 * (place(from)[c] + place(to)[c]));
+            let message = format!("the faces of `{name}` leave an opening at {}", shown(middle));
+            let help = "choose faces that close, or add a membrane over the opening";
+            self.error(&at(key), message, "an open surface encloses no volume", help);
+            return;
+        }
+        let facets = match self.shell_cells(body) {
+            Some(_) => self.facets(body, selection, &at(key)).unwrap_or_default(),
+            None => Vec::new(),
+        };
+        let mut nodes: Vec<u32> = faces.iter().flatten().copied().filter(|&node| node != NO_NODE).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        for corner in faces.iter_mut().flatten().filter(|corner| **corner != NO_NODE) {
+            *corner = nodes.partition_point(|node| node < corner) as u32;
+        }
+        let mut enclosure = Enclosure { faces, facets: Vec::new() };
+        let rest = |at: u32| self.assembly.rest[nodes[at as usize] as usize];
+        let volume = enclosure.add_gradient(rest, &mut vec![[0.0; 3]; nodes.len()]);
+        let curved = facets.first().map(|&cell| self.assembly.facets[cell as usize].membrane());
+        if matches!(curved, Some(Membrane::Curved { .. })) {
+            if volume < 0.0 {
+                let message = format!("the triangles of `{}` face inwards", self.bodies[body].name);
+                let help = "turn the triangles of the mesh round, so that they face outwards";
+                self.error(&at(key), message, "an inside-out surface", help);
+                return;
+            }
+            enclosure = Enclosure { faces: Vec::new(), facets };
+        } else if volume < 0.0 {
+            // Those of a cavity face into it.
+            enclosure.faces.iter_mut().for_each(turn_round);
+        }
+        if table.by <= -volume.abs() {
+            let message =
+                format!("`{name}` encloses {} m³ at rest, and is to lose more", number(volume.abs()));
+            self.error(
+                &at("by"),
+                message,
+                "less than nothing is left",
+                "take a change above minus that volume",
+            );
+            return;
+        }
+        self.assembly.model_mut().constraints.push(Constraint {
+            name: name.to_owned(),
+            nodes,
+            components: [false; 6],
+            motion: Motion::Volume { enclosure, by: table.by, curve },
+        });
     }
 
     /// How a constraint binds some nodes of a body to each other.
@@ -255,6 +338,32 @@ impl Builder<'_> {
             self.notes.push(format!("`{name}` is held by no constraint: {fate}"));
         }
     }
+}
+
+/// An edge of faces without a face across it; `None` if they close.
+fn open_edge(faces: &[Face]) -> Option<[u32; 2]> {
+    let edges = faces.iter().flat_map(|face| {
+        let count = if face[3] == NO_NODE { 3 } else { 4 };
+        (0..count).map(move |k| [face[k], face[(k + 1) % count]])
+    });
+    let mut open: BTreeMap<[u32; 2], i32> = BTreeMap::new();
+    for [from, to] in edges {
+        *open.entry([from.min(to), from.max(to)]).or_default() += if from < to { 1 } else { -1 };
+    }
+    open.into_iter().find(|(_, sides)| *sides != 0).map(|(edge, _)| edge)
+}
+
+fn turn_round(face: &mut Face) {
+    if face[3] == NO_NODE {
+        face.swap(1, 2);
+    } else {
+        face.swap(1, 3);
+    }
+}
+
+fn shown(place: [f64; 3]) -> String {
+    let [x, y, z] = place.map(number);
+    format!("({x}, {y}, {z}) m")
 }
 
 /// A nearest node farther from its point than this many body sizes gives a warning.

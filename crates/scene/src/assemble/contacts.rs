@@ -7,7 +7,7 @@ use std::sync::Arc;
 use pliant_geometry::{Locator, Selection, SurfaceLocator, Vector3};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::load::NO_NODE;
-use pliant_mechanics::model::Body;
+use pliant_mechanics::model::{Body, Constraint, Motion};
 use pliant_sim::contact::pairs::{Pairs, Surface};
 use pliant_sim::contact::pose::{Course, Pose};
 use pliant_sim::contact::shape::Shape;
@@ -362,13 +362,18 @@ impl Builder<'_> {
         nodes.sort_unstable();
         nodes.dedup();
         let follows = self.assembly.followers();
-        let bound = self.assembly.constraints.iter().filter(|constraint| constraint.motion.is_collective());
+        // Barriers act on what a pressure fills, too.
+        let binds = |constraint: &&Constraint| match constraint.motion {
+            Motion::Volume { .. } => !is_barrier,
+            _ => constraint.motion.is_collective(),
+        };
+        let bound = self.assembly.constraints.iter().filter(binds);
         let mut bound: Vec<u32> = bound.flat_map(|constraint| constraint.nodes.iter().copied()).collect();
         bound.sort_unstable();
         let moved = |node: &&u32| follows[**node as usize] || bound.binary_search(node).is_ok();
         if let Some(&node) = nodes.iter().find(moved) {
             let message = format!(
-                "node {} of `{own}` follows others by a tie, a rigid part or a mean",
+                "node {} of `{own}` follows others by a tie, a rigid part, a mean or a volume",
                 self.assembly.locate_node(node).1
             );
             let help = format!("choose `{key}` without such nodes");

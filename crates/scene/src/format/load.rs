@@ -103,6 +103,23 @@ pub struct RigidTable {
     pub nodes: Selection,
 }
 
+/// A closed surface whose volume is prescribed by a uniform pressure within, however large: a balloon, an eye, a full bladder. Columns
+/// `volume.NAME` [m³] and `pressure.NAME` [Pa] of tables tell both. With every solver on the CPU but explicit shells.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct VolumeTable {
+    /// The body, a solid, a membrane or a shell.
+    pub body: String,
+    /// Which of its faces; if not given, all of its boundary. They close, and may be those of a cavity.
+    #[serde(default)]
+    pub faces: Option<Selection>,
+    /// By how much the enclosed volume grows from that at rest [m³], along the curve; 0 keeps it, less than 0 empties it.
+    pub by: f64,
+    /// Its course.
+    #[serde(flatten)]
+    pub timing: Timing,
+}
+
 /// Springs without rest length that pull nodes to points: of shells, and of solids with the solvers `implicit` and `static`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]

@@ -27,7 +27,7 @@ pub use linear::{
 pub use load::{
     Axis, CurveShape, EdgeLoadTable, FixTable, ForceTable, GravityTable, MeanTable, MomentTable, MoveTable,
     NodeVectorSource, NodeVectors, PressureTable, RigidTable, RotateTable, SpreadName, SpringTable, Timing,
-    TractionTable, Vectors,
+    TractionTable, Vectors, VolumeTable,
 };
 pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
 pub use participant::ParticipantTable;

@@ -272,7 +272,7 @@ impl Builder<'_> {
     }
 
     /// The selected facets of a shell, numbered in the model.
-    fn facets(
+    pub(in crate::assemble) fn facets(
         &mut self,
         body: usize,
         selection: &pliant_geometry::Selection,
