@@ -451,7 +451,11 @@ impl BackwardEuler {
             let factor = model.stiffness_damping / h;
             self.residual.iter_mut().zip(&self.product).for_each(|(r, p)| *r -= factor * p);
         }
-        system.give_inertia_back(|node| momentum.of(node as usize, 0), &mut self.residual);
+        let [force, moment] = [0, 3].map(|first| {
+            let momentum = &momentum;
+            move |node: u32| momentum.of(node as usize, first)
+        });
+        system.give_inertia_back(force, moment, &mut self.residual);
         system.conditions.relieve(&mut self.residual);
         let mut norm = 0.0;
         for (&component, residual) in system.equations.component.iter().zip(&self.residual) {
@@ -474,10 +478,11 @@ impl BackwardEuler {
         }
         let Self { system, course, start, moved, damping, .. } = self;
         let momentum = Momentum { model: &model, course, start, moved, damping };
-        system.add_bound_masses(|node| {
-            let rate = 1.0 / (h * h) + damping[node as usize] / h;
-            (rate * model.mass[node as usize], momentum.of(node as usize, 0))
-        });
+        let rate = |node: u32| 1.0 / (h * h) + damping[node as usize] / h;
+        system.add_bound_masses(
+            |node| (rate(node) * model.mass[node as usize], momentum.of(node as usize, 0)),
+            |node| rate(node) * model.rotary_inertia[node as usize],
+        );
     }
 
     fn worst_node(&self) -> u32 {

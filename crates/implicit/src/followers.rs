@@ -1,6 +1,6 @@
 //! Nodes whose translations are no unknowns of a system of equations, since others move them: tied nodes, and the nodes of rigid parts,
 //! which go with six unknowns at the first of them. A cell at such nodes becomes a cell at the nodes that they follow, K ← Tᵀ K T; its
-//! forces go there by Tᵀ. Other rotations stay with the node itself.
+//! forces go there by Tᵀ. Nodes of shells in a rigid part turn with it; other rotations stay with the node itself.
 //!
 //! In an increment a node goes by Σ w (d + θ × a): d and θ those of the nodes that it follows, a the arm from a first node of a rigid part,
 //! 0 for a tie. Then it stands at x = X + Σ (w u + (R − 1) A), exactly. The second derivative of x by θ, exp(θ) a ≈ a + θ × a + θ × (θ × a)/2,
@@ -25,6 +25,8 @@ pub(crate) struct Followers {
     /// Each node with those that it follows.
     rows: Vec<(u32, Vec<Followed>)>,
     parts: Vec<RigidPart>,
+    /// Nodes that turn as the first one of their rigid part, with that.
+    turned: Vec<[u32; 2]>,
 }
 
 /// A node that is followed.
@@ -50,13 +52,15 @@ struct RigidPart {
 }
 
 impl RigidPart {
-    fn of(model: &Assembly, nodes: &[u32]) -> Self {
+    fn of(model: &Assembly, nodes: &[u32], turning: &[bool]) -> Self {
         let arms = nodes.iter().map(|&node| model.place(node as usize) - model.place(nodes[0] as usize));
         let inertia = arms.fold(Matrix3::zeros(), |sum, arm| {
             sum + Matrix3::from_diagonal_element(arm.norm_squared()) - arm * arm.transpose()
         });
         let SymmetricEigen { eigenvalues, eigenvectors } = SymmetricEigen::new(inertia);
-        let limit = 1e-12 * eigenvalues.max();
+        // Nodes that turn feel every turn.
+        let turns = nodes.iter().any(|&node| turning[node as usize]);
+        let limit = if turns { f64::NEG_INFINITY } else { 1e-12 * eigenvalues.max() };
         let axes = eigenvalues.iter().zip(eigenvectors.column_iter());
         let idle: Vec<_> =
             axes.filter(|(value, _)| **value <= limit).map(|(_, axis)| axis.into_owned()).collect();
@@ -69,11 +73,15 @@ impl Followers {
     pub(crate) fn of(model: &Assembly, rigid: bool) -> Option<Self> {
         let mut parts = Vec::new();
         let mut part_of = vec![None; model.rest.len()];
+        let turning = model.turning();
+        let mut turned = Vec::new();
         let mut rows: Vec<(u32, Vec<Followed>)> = Vec::new();
         let bound = model.constraints.iter().filter(|own| rigid && matches!(own.motion, Motion::Rigid));
         for constraint in bound {
             let part = parts.len();
-            parts.push(RigidPart::of(model, &constraint.nodes));
+            parts.push(RigidPart::of(model, &constraint.nodes, &turning));
+            let with_first = constraint.nodes[1..].iter().filter(|&&node| turning[node as usize]);
+            turned.extend(with_first.map(|&node| [node, constraint.nodes[0]]));
             constraint.nodes.iter().for_each(|&node| part_of[node as usize] = Some(part));
         }
         let followed = |node: u32, weight: f64| match part_of[node as usize] {
@@ -107,11 +115,20 @@ impl Followers {
         for ((node, _), number) in rows.iter().zip(0..) {
             row_of[*node as usize] = number;
         }
-        (!rows.is_empty()).then_some(Self { row_of, rows, parts })
+        turned.sort_unstable();
+        (!rows.is_empty()).then_some(Self { row_of, rows, parts, turned })
     }
 
     pub(crate) fn follows(&self, node: u32) -> bool {
         self.row_of[node as usize] != NONE
+    }
+
+    /// The node that a node turns with, itself if with no other.
+    fn turns_with(&self, node: u32) -> u32 {
+        match self.turned.binary_search_by_key(&node, |[own, _]| *own) {
+            Ok(at) => self.turned[at][1],
+            Err(_) => node,
+        }
     }
 
     /// What a node follows; nothing, if it follows no other.
@@ -152,7 +169,10 @@ impl Followers {
         let moves = |i: usize| -> Vec<(usize, f64)> {
             let (node, c) = (nodes[i / components], i % components);
             let followed = self.followed(node);
-            if c >= 3 || followed.is_empty() {
+            if c >= 3 {
+                return vec![(place(self.turns_with(node)) + c, 1.0)];
+            }
+            if followed.is_empty() {
                 return vec![(place(node) + c, 1.0)];
             }
             let mut all = Vec::with_capacity(followed.len());
@@ -181,8 +201,11 @@ impl Followers {
         whole
     }
 
-    /// Takes translations along with an increment, six components a node.
+    /// Takes translations and turns along with an increment, six components a node.
     pub(crate) fn follow(&self, components: &mut [f64]) {
+        for [node, first] in self.turned.iter().map(|pair| pair.map(|node| node as usize)) {
+            components.copy_within(6 * first + 3..6 * first + 6, 6 * node + 3);
+        }
         for (node, row) in &self.rows {
             let along = |c: usize| {
                 let of = |followed: &Followed| {
@@ -205,6 +228,11 @@ impl Followers {
 
     /// Gives forces to the nodes that are followed, six components a node.
     pub(crate) fn give_back(&self, components: &mut [f64]) {
+        for [node, first] in self.turned.iter().map(|pair| pair.map(|node| node as usize)) {
+            for c in 3..6 {
+                components[6 * first + c] += std::mem::take(&mut components[6 * node + c]);
+            }
+        }
         for (node, row) in &self.rows {
             let own = &mut components[6 * *node as usize..][..3];
             let force = Vector3::from_column_slice(own);
@@ -229,6 +257,9 @@ impl Followers {
             })
             .collect();
         places.into_iter().for_each(|(node, place)| state.position[node as usize] = place);
+        for [node, first] in self.turned.iter().map(|pair| pair.map(|node| node as usize)) {
+            state.rotation[node] = state.rotation[first];
+        }
     }
 
     /// Takes the arms at a state.
@@ -252,21 +283,31 @@ impl Followers {
         Some((expanded, whole))
     }
 
-    /// What forces [N] on the nodes of rigid parts are at the unknowns of these, component by component.
-    pub(crate) fn pull_parts(&self, force: impl Fn(u32) -> Vector3<f64>, mut add: impl FnMut(usize, f64)) {
+    /// What forces [N] and moments [N m] on the nodes of rigid parts are at the unknowns of these, component by component.
+    pub(crate) fn pull_parts(
+        &self,
+        force: impl Fn(u32) -> Vector3<f64>,
+        moment: impl Fn(u32) -> Vector3<f64>,
+        mut add: impl FnMut(usize, f64),
+    ) {
+        for &[node, first] in &self.turned {
+            let moment = moment(node);
+            (0..3).for_each(|c| add(6 * first as usize + 3 + c, moment[c]));
+        }
         for (node, row) in &self.rows {
             let parts = row.iter().filter(|followed| followed.part.is_some());
             parts.for_each(|own| own.pull(&force(*node), |c, f| add(6 * own.node as usize + c, f)));
         }
     }
 
-    /// Adds to a stiffness what masses [kg/s²] of nodes that go with rigid parts resist with, and how the forces [N] that they resist with now
-    /// turn with them; `of` gives both.
+    /// Adds to a stiffness what masses [kg/s²] and rotary inertias [N m] of nodes that go with rigid parts resist with, and how the forces [N] that
+    /// they resist with now turn with them; `of` gives the masses with the forces, `rotary` the inertias.
     pub(crate) fn add_parts(
         &self,
         equations: &Equations,
         matrix: &mut LowerMatrix,
         of: impl Fn(u32) -> (f64, Vector3<f64>),
+        rotary: impl Fn(u32) -> f64,
     ) {
         if self.parts.is_empty() {
             return;
@@ -284,6 +325,11 @@ impl Followers {
                 let turned = half + half.transpose() - Matrix3::from_diagonal_element(force.dot(arm));
                 let mut turns = blocks[*part].fixed_view_mut::<3, 3>(3, 3);
                 turns += turned;
+            }
+        }
+        for &[node, first] in &self.turned {
+            if let Some(part) = self.parts.iter().position(|part| part.first == first) {
+                (3..6).for_each(|c| blocks[part][(c, c)] += rotary(node));
             }
         }
         for (RigidPart { first, idle, size, .. }, mut block) in self.parts.iter().zip(blocks) {

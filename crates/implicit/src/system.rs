@@ -113,14 +113,6 @@ struct FacetResult {
 
 impl System {
     pub(crate) fn new(model: Arc<Assembly>, solver: LinearSolver) -> Result<Self, SolveError> {
-        let turning = model.turning();
-        let binds = |own: &&Constraint| matches!(own.motion, Motion::Mean { .. } | Motion::Rigid);
-        let bound = model.constraints.iter().filter(binds);
-        if bound.flat_map(|constraint| &constraint.nodes).any(|&node| turning[node as usize]) {
-            return Err(SolveError::Impossible(
-                "a mean or a rigid part has nodes of a shell, which turn by themselves",
-            ));
-        }
         let mut system = Self::forces_only(Arc::clone(&model));
         system.followers = Followers::of(&model, true);
         system.conditions = Conditions::of(&model, &system.equations, system.surface.as_ref());
@@ -243,7 +235,7 @@ impl System {
         for constraint in &model.constraints {
             if let Motion::Rigid = constraint.motion {
                 let nodes = constraint.nodes.iter().map(|&node| 6 * node as usize);
-                nodes.for_each(|at| free[at..at + 3].fill(false));
+                nodes.for_each(|at| free[at..at + 6].fill(false));
                 free[6 * constraint.nodes[0] as usize..][..6].fill(true);
             }
             for &node in constraint.nodes.iter().filter(|_| !constraint.motion.is_collective()) {
@@ -354,7 +346,7 @@ impl System {
                 |at: usize| self.internal[at] - self.external[at] - state.load_factor * self.controlled[at];
             followers.add_parts(&self.equations, &mut self.matrix, |node| {
                 (0.0, Vector3::from_fn(|c, _| force(6 * node as usize + c)))
-            });
+            }, |_| 0.0);
         }
         if let Some(followers) = &self.followers {
             for forces in [&mut self.internal, &mut self.external, &mut self.controlled] {
@@ -837,17 +829,27 @@ impl System {
         }
     }
 
-    /// Adds to the stiffness what masses of rigid parts resist with: their rate [kg/s²] and the force [N] of each node.
-    pub(crate) fn add_bound_masses(&mut self, of: impl Fn(u32) -> (f64, Vector3<f64>)) {
+    /// Adds to the stiffness what masses of rigid parts resist with: their rate [kg/s²] and the force [N] of each node, and the rate [N m] of its
+    /// rotary inertia.
+    pub(crate) fn add_bound_masses(
+        &mut self,
+        of: impl Fn(u32) -> (f64, Vector3<f64>),
+        rotary: impl Fn(u32) -> f64,
+    ) {
         if let Some(followers) = &self.followers {
-            followers.add_parts(&self.equations, &mut self.matrix, of);
+            followers.add_parts(&self.equations, &mut self.matrix, of, rotary);
         }
     }
 
-    /// Takes forces [N] of inertia on the nodes of rigid parts from a residual.
-    pub(crate) fn give_inertia_back(&self, force: impl Fn(u32) -> Vector3<f64>, residual: &mut [f64]) {
+    /// Takes forces [N] and moments [N m] of inertia on the nodes of rigid parts from a residual.
+    pub(crate) fn give_inertia_back(
+        &self,
+        force: impl Fn(u32) -> Vector3<f64>,
+        moment: impl Fn(u32) -> Vector3<f64>,
+        residual: &mut [f64],
+    ) {
         let Some(followers) = &self.followers else { return };
-        followers.pull_parts(force, |component, force| {
+        followers.pull_parts(force, moment, |component, force| {
             let equation = self.equations.number[component];
             if equation != NONE {
                 residual[equation as usize] -= force;

@@ -146,6 +146,69 @@ fn runs_with_bound_nodes_are_taken_up_with_the_same_bits() {
     }
 }
 
+/// A plate of shells that is clamped at one side, with a rigid strip at the other, which keeps its size and turns as one: the same equilibrium by
+/// every way to solve, and at rest after `implicit`. A mean of its nodes is where it was sent.
+#[test]
+fn a_rigid_end_of_a_shell_turns_with_its_nodes() {
+    let plate = |solver: &str, more: &str| {
+        format!(
+            "[scene]\nuntil = 1\n[run]\n{solver}\n\
+             [law.wall]\ntype = 'neo-hookean'\nyoung-modulus = 1e6\npoisson-ratio = 0.3\n\
+             [body.plate]\nmodel = 'shell'\nmesh = {{ plate = {{ size = [0.1, 0.04], cells = [10, 4] }} }}\nlaw = 'wall'\n\
+             density = 1000\nthickness = 0.002\ndamping = 40\n\
+             [constraint.base]\ntype = 'fix'\nbody = 'plate'\nnodes = {{ half-space = {{ point = [1e-4, 0, 0], normal = [-1, 0, 0] }} }}\n\
+             [output.history]\ntype = 'csv'\nevery = 0.1\n\
+             probes.left = {{ on = 'plate', at = [0.1, 0, 0], data = ['displacement', 'rotation'] }}\n\
+             probes.right = {{ on = 'plate', at = [0.1, 0.04, 0], data = ['displacement', 'rotation'] }}\n\
+             probes.inner = {{ on = 'plate', at = [0.09, 0.04, 0], data = ['displacement', 'rotation'] }}\n\
+             probes.free = {{ on = 'plate', at = [0.05, 0.04, 0], data = ['displacement', 'rotation'] }}\n{more}"
+        )
+    };
+    let end = "nodes = { half-space = { point = [0.0899, 0, 0], normal = [1, 0, 0] } }\n";
+    let rigid = format!("[constraint.ring]\ntype = 'rigid'\nbody = 'plate'\n{end}");
+    let load = "[load.side]\ntype = 'force'\non = 'plate'\nnodes = { nearest = { point = [0.1, 0, 0] } }\ntotal = [0, 0, 0.02]\nto = 0.5\n";
+    let text = |solver: &str| plate(solver, &format!("{rigid}{load}"));
+    let first = last_row(&text("solver = 'static'\nload-steps = 4\ntolerance = 1e-11"));
+    let of = |row: &std::collections::BTreeMap<String, f64>, probe: &str, what: &str| {
+        ["x", "y", "z"].map(|axis| row[&format!("probe.{probe}.{what}.{axis}")])
+    };
+    // One rotation, about two axes, and the distances of the ring.
+    let turn = of(&first, "left", "rotation");
+    assert!(turn[0].abs() > 0.01 && turn[1].abs() > 0.1, "{turn:?}");
+    for probe in ["right", "inner"] {
+        let own = of(&first, probe, "rotation");
+        assert!((0..3).all(|c| (own[c] - turn[c]).abs() < 1e-13), "{probe}: {own:?} {turn:?}");
+    }
+    let place = |probe: &str, rest: [f64; 3]| {
+        let moved = of(&first, probe, "displacement");
+        [0, 1, 2].map(|c| rest[c] + moved[c])
+    };
+    let [left, right, inner] =
+        [place("left", [0.1, 0.0, 0.0]), place("right", [0.1, 0.04, 0.0]), place("inner", [0.09, 0.04, 0.0])];
+    let length = |a: [f64; 3], b: [f64; 3]| (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>().sqrt();
+    assert!((length(left, right) - 0.04).abs() < 1e-15 && (length(right, inner) - 0.01).abs() < 1e-15);
+    // What holds the ring at its corner has the moment of the load and no more: the base bears it.
+    assert!((first["reaction.base.z"] + 0.02).abs() < 1e-9, "{}", first["reaction.base.z"]);
+    let gradients = "solver = 'static'\nload-steps = 4\ntolerance = 1e-10\nlinear = { by = 'conjugate-gradients', tolerance = 1e-9 }";
+    let others = [
+        text(gradients),
+        text("solver = 'static'\nload-steps = 4\ntolerance = 1e-10\nlinear = 'unsymmetric'"),
+        text("solver = 'implicit'\nstep = 0.05\ntolerance = 1e-10").replace("until = 1", "until = 6"),
+    ];
+    for other in others {
+        let row = last_row(&other);
+        let off = first.iter().filter(|(name, _)| name.starts_with("probe"));
+        let off = off.map(|(name, value)| (value - row[name]).abs()).fold(0.0, f64::max);
+        println!("{}: {off:.1e}", other.lines().nth(3).unwrap());
+        assert!(off < 1e-7, "{other}: {off:e}");
+    }
+    let mean = format!("[constraint.end]\ntype = 'mean'\nbody = 'plate'\nby = [0, 0, 0.01]\ncomponents = ['z']\nto = 0.5\n{end}");
+    let row = last_row(&plate("solver = 'static'\nload-steps = 4", &format!("{mean}{load}")));
+    let [left, right] = ["left", "right"].map(|probe| row[&format!("probe.{probe}.displacement.z")]);
+    assert!(left > right + 1e-4 && (row["reaction.base.z"] + row["reaction.end.z"] + 0.02).abs() < 1e-6, "{row:?}");
+    resumes(&text("solver = 'implicit'\nstep = 0.05\ncheckpoint = { every = 0.4 }"));
+}
+
 #[test]
 fn what_cannot_be_bound_is_refused_by_name() {
     let rigid = "type = 'rigid'\nbody = 'block'\nnodes = { set = 'z-max' }";

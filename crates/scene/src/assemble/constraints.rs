@@ -157,10 +157,10 @@ impl Builder<'_> {
     ) -> Option<Motion> {
         let name = path[1];
         let (body, nodes) = nodes?;
-        if self.shell_cells(body).is_some() {
-            let message = format!("`{name}` binds nodes of a shell, which turn by themselves");
-            let help = "take a body of model `solid`, `membrane` or `bar`";
-            self.error(&[path[0], name, "body"], message, "a shell", help);
+        if self.shell_cells(body).is_some() && !self.scene.run.solver.solves_equations() {
+            let message = format!("`{name}` binds nodes of an explicit shell");
+            let help = "take the solver `implicit` or `static`, or a body of another model";
+            self.error(&[path[0], name, "body"], message, "a shell in an explicit run", help);
             return None;
         }
         match table {

@@ -74,11 +74,11 @@ pub struct FixTable {
 
 /// Nodes whose mean displacement is prescribed, each of them free by itself: a face under a plate that tilts. Weighted by the area of the
 /// boundary at each node where the nodes have whole faces, else equally. Its reaction is the force of the plate. With every solver on
-/// the CPU.
+/// the CPU but explicit shells.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct MeanTable {
-    /// The body, a solid, a membrane or bars.
+    /// The body.
     pub body: String,
     /// Which nodes.
     pub nodes: Selection,
@@ -92,12 +92,12 @@ pub struct MeanTable {
     pub timing: Timing,
 }
 
-/// A rigid part of a body, such as bone or an implant: its nodes keep their distances, and move and turn together, free in space. With every
-/// solver on the CPU.
+/// A rigid part of a body, such as bone or an implant: its nodes keep their distances, and move and turn together, free in space; those of shells
+/// turn with it. With every solver on the CPU but explicit shells.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RigidTable {
-    /// The body, a solid, a membrane or bars.
+    /// The body.
     pub body: String,
     /// Which nodes.
     pub nodes: Selection,
