@@ -15,7 +15,9 @@
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use pliant_mechanics::model::{Constraint, Enclosed, Enclosure, Model, Motion};
 use pliant_mechanics::rotation::nearest_rotation;
-use pliant_mechanics::tensor::{Vector, add, dot, scale, sub};
+use pliant_mechanics::tensor::{Vector, add, cast, dot, scale, sub};
+
+use crate::Scalar;
 
 /// Steps of Newton's method for a rotation; three are usual.
 const MOST_TURNS: usize = 8;
@@ -137,23 +139,49 @@ impl Collective {
         self.enclosed.pressure += pressure;
     }
 
-    /// The force [N] of the pressure there is on each node, where the nodes are displaced by so much [m]; none of other constraints.
-    pub fn pressed(
-        &mut self,
-        model: &Model,
-        displacement: impl Fn(u32) -> Vector<f64>,
-    ) -> Option<impl Iterator<Item = (u32, Vector<f64>)>> {
+    /// Makes forces [N] that were found step by step, one a node of the model, those of the constraint where the nodes are displaced by so much [m] now:
+    /// of a volume those of its pressure, of a rigid part without resultant and moment. Those of a mean stay.
+    pub fn renew<R: Scalar>(&mut self, model: &Model, displacement: &[Vector<R>], forces: &mut [Vector<R>]) {
         let constraint = &model.constraints[self.constraint];
-        let Motion::Volume { enclosure, .. } = &constraint.motion else { return None };
-        let [now, _] = &mut self.gradients;
-        now.fill([0.0; 3]);
         let place = |at: u32| {
-            let node = constraint.nodes[at as usize];
-            add(model.rest[node as usize], displacement(node))
+            let node = constraint.nodes[at as usize] as usize;
+            add(model.rest[node], cast(displacement[node]))
         };
-        self.enclosed.volume = enclosure.add_gradient(place, now);
-        let pressure = self.enclosed.pressure;
-        Some(constraint.nodes.iter().zip(&*now).map(move |(&node, g)| (node, scale(*g, pressure))))
+        match &constraint.motion {
+            Motion::Volume { enclosure, .. } => {
+                let [now, _] = &mut self.gradients;
+                now.fill([0.0; 3]);
+                self.enclosed.volume = enclosure.add_gradient(place, now);
+                for (&node, g) in constraint.nodes.iter().zip(&*now) {
+                    forces[node as usize] = cast(scale(*g, self.enclosed.pressure));
+                }
+            }
+            Motion::Rigid => {
+                let nodes = || constraint.nodes.iter().map(|&node| node as usize).zip(0..);
+                let part = 1.0 / constraint.nodes.len() as f64;
+                let centre = scale(nodes().fold([0.0; 3], |sum, (_, at)| add(sum, place(at))), part);
+                let (mut force, mut moment, mut inertia) =
+                    (Vector3::zeros(), Vector3::zeros(), Matrix3::zeros());
+                for (node, at) in nodes() {
+                    let (arm, own) =
+                        (Vector3::from(sub(place(at), centre)), Vector3::from(cast(forces[node])));
+                    force += own * part;
+                    moment += arm.cross(&own);
+                    inertia += Matrix3::from_diagonal_element(arm.norm_squared()) - arm * arm.transpose();
+                }
+                // Nodes on a line have no inertia about it, and no moment.
+                let spin = inertia
+                    .svd(true, true)
+                    .solve(&moment, 1e-12 * inertia.norm())
+                    .unwrap_or_else(|_| Vector3::zeros());
+                for (node, at) in nodes() {
+                    let arm = Vector3::from(sub(place(at), centre));
+                    let excess: Vector<f64> = (force + spin.cross(&arm)).into();
+                    forces[node] = cast(sub(cast(forces[node]), excess));
+                }
+            }
+            _ => {}
+        }
     }
 
     fn find_rigid(&mut self, model: &Model) {

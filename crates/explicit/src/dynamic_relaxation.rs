@@ -667,10 +667,7 @@ impl<R: Scalar> DynamicRelaxation<R> {
         self.folded = found.folded;
         self.applied.update(time, &state.displacement);
         for own in &mut self.collectives {
-            let displacement = |node: u32| state.displacement[node as usize].map(R::to_f64);
-            for (node, force) in own.pressed(&self.model, displacement).into_iter().flatten() {
-                self.bound[node as usize] = force.map(R::of);
-            }
+            own.renew(&self.model, &state.displacement, &mut self.bound);
         }
         std::mem::swap(&mut self.residual, &mut self.residual_before);
         let (residual, before) = (&mut self.residual, &self.residual_before);

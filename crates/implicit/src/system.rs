@@ -344,9 +344,12 @@ impl System {
         if let (Some(followers), true) = (&self.followers, tangent.is_some()) {
             let force =
                 |at: usize| self.internal[at] - self.external[at] - state.load_factor * self.controlled[at];
-            followers.add_parts(&self.equations, &mut self.matrix, |node| {
-                (0.0, Vector3::from_fn(|c, _| force(6 * node as usize + c)))
-            }, |_| 0.0);
+            followers.add_parts(
+                &self.equations,
+                &mut self.matrix,
+                |node| (0.0, Vector3::from_fn(|c, _| force(6 * node as usize + c))),
+                |_| 0.0,
+            );
         }
         if let Some(followers) = &self.followers {
             for forces in [&mut self.internal, &mut self.external, &mut self.controlled] {
