@@ -1,5 +1,6 @@
 //! Helpers of tests: numbers at random that are the same in every run, files damaged by them, hexahedra of simple bodies, and the memory of
-//! the process; with the features `images` and `organs` image files, and label images and meshes of analytic organs.
+//! the process; with the features `images`, `organs` and `scenes` image files, label images and meshes of analytic organs, and scenes that
+//! are checked and run.
 //!
 //! ```
 //! let mut random = pliant_testing::Random::new(1);
@@ -13,6 +14,8 @@ pub mod image_files;
 pub mod mesh_checks;
 #[cfg(feature = "organs")]
 pub mod organs;
+#[cfg(feature = "scenes")]
+pub mod scenes;
 
 use std::fs;
 

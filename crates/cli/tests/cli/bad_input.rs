@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{BLOCK, CUBE, FROM_FILE, TETS, Told, Workshop, changed, fibres, labels, series, vtk};
+use crate::support::{BLOCK, CORNERS, FROM_FILE, TETS, Told, Workshop, changed, fibres, labels, series, vtk};
 
 /// Asserts that a scene is rejected with these words and with one of these lines underlined, and that the folder does
 /// not change.
@@ -73,7 +73,7 @@ fn repaired(mesh: &str, fix: &str, note: &str) {
 #[test]
 fn the_good_scenes_run() {
     Workshop::new(BLOCK).run(&[]).done();
-    with_mesh(vtk(&CUBE, &TETS, ""), FROM_FILE).run(&[]).done();
+    with_mesh(vtk(&CORNERS, &TETS, ""), FROM_FILE).run(&[]).done();
 }
 
 #[test]
@@ -213,7 +213,7 @@ fn a_missing_scene_or_mesh_is_told_with_its_path() {
 
 #[test]
 fn unreadable_and_truncated_meshes_tell_the_line() {
-    let whole = vtk(&CUBE, &TETS, "");
+    let whole = vtk(&CORNERS, &TETS, "");
     bad_mesh("", &["cannot read `case/organ.vtk`, line 1"]);
     bad_mesh("hello world\n", &["line 1", "`hello world`", "# vtk DataFile"]);
     bad_mesh(&whole[..whole.len() / 2], &["truncated", "export it again"]);
@@ -228,11 +228,11 @@ fn unreadable_and_truncated_meshes_tell_the_line() {
 
 #[test]
 fn an_organ_a_thousand_times_too_large_is_refused_and_one_too_small_doubted() {
-    let large = CUBE.map(|point| point.map(|x| 1000.0 * x));
+    let large = CORNERS.map(|point| point.map(|x| 1000.0 * x));
     let says = ["the mesh measures 173.2 m across", "`scale = 0.001` brings millimetres to metres"];
     assert_refused(&with_mesh(vtk(&large, &TETS, ""), FROM_FILE), &[MESH_LINE], &says);
     let scene = changed(FROM_FILE, "\"organ.vtk\"", "\"organ.vtk\", scale = 0.001");
-    let told = with_mesh(vtk(&CUBE, &TETS, ""), &scene).pliant(&["check", "case"]);
+    let told = with_mesh(vtk(&CORNERS, &TETS, ""), &scene).pliant(&["check", "case"]);
     assert_eq!(told.code, 0);
     assert!(told.words().contains("`organ` measures 1.732e-4 m across"), "{}", told.err);
 }
@@ -337,17 +337,17 @@ fn fibre_scene() -> String {
 fn a_zero_or_not_finite_fibre_of_a_cell_is_told_by_its_number() {
     let line = "fibre = { cell-data = \"fibre\" }";
     for bad in ["0 0 0", "nan 0 1", "inf 0 0"] {
-        let mesh = vtk(&CUBE, &TETS, &fibres(&["0 1 0", "1 0 0", bad, "1 1 0", "0 0 1", bad]));
+        let mesh = vtk(&CORNERS, &TETS, &fibres(&["0 1 0", "1 0 0", bad, "1 1 0", "0 0 1", bad]));
         let says = "whose fibre is zero or not finite: tet 2, tet 5 (counted from 0)";
         assert_refused(&with_mesh(mesh, &fibre_scene()), &[line], &[says]);
     }
-    let mesh = vtk(&CUBE, &TETS, &fibres(&["0 1 0"; 6]).replace("fibre", "fiber"));
+    let mesh = vtk(&CORNERS, &TETS, &fibres(&["0 1 0"; 6]).replace("fibre", "fiber"));
     assert_refused(
         &with_mesh(mesh, &fibre_scene()),
         &[line],
         &["no cell data `fibre`", "did you mean `fiber`?"],
     );
-    let mesh = vtk(&CUBE, &TETS, &labels(&[1; 6]).replace("label", "fibre"));
+    let mesh = vtk(&CORNERS, &TETS, &labels(&[1; 6]).replace("label", "fibre"));
     assert_refused(
         &with_mesh(mesh, &fibre_scene()),
         &[line],
@@ -359,16 +359,16 @@ fn a_zero_or_not_finite_fibre_of_a_cell_is_told_by_its_number() {
 fn inverted_elements_are_listed_and_reordered_on_request() {
     let mut tets = TETS;
     (tets[0], tets[4]) = (&[0, 3, 1, 7], &[0, 5, 4, 7]);
-    let mesh = vtk(&CUBE, &tets, "");
+    let mesh = vtk(&CORNERS, &tets, "");
     bad_mesh(&mesh, &["inverted elements at rest: tet 0, tet 4 (counted from 0)", "add `fix = \"reorder\"`"]);
     repaired(&mesh, "reorder", "2 inverted elements reordered");
     let hex: &[u32] = &[4, 5, 7, 6, 0, 1, 3, 2];
-    bad_mesh(vtk(&CUBE, &[hex], ""), &["inverted elements at rest: hex 0", "fix = \"reorder\""]);
-    repaired(&vtk(&CUBE, &[hex], ""), "reorder", "1 inverted element reordered");
+    bad_mesh(vtk(&CORNERS, &[hex], ""), &["inverted elements at rest: hex 0", "fix = \"reorder\""]);
+    repaired(&vtk(&CORNERS, &[hex], ""), "reorder", "1 inverted element reordered");
     // A bow tie stays one in any order of its layers.
     let twisted: &[u32] = &[0, 1, 2, 3, 4, 5, 7, 6];
     let scene = changed(FROM_FILE, "\"organ.vtk\"", "\"organ.vtk\", fix = \"reorder\"");
-    let told = with_mesh(vtk(&CUBE, &[twisted], ""), &scene).run(&[]);
+    let told = with_mesh(vtk(&CORNERS, &[twisted], ""), &scene).run(&[]);
     assert_invalid(&told, &["inverted elements at rest: hex 0", "does not help: remesh"]);
 }
 
@@ -376,17 +376,20 @@ fn inverted_elements_are_listed_and_reordered_on_request() {
 fn degenerate_elements_are_listed() {
     let flat: &[u32] = &[0, 1, 2, 3];
     let cells: Vec<&[u32]> = TETS.into_iter().chain([flat]).collect();
-    bad_mesh(vtk(&CUBE, &cells, ""), &["elements without volume at rest: tet 6 (counted from 0)", "remesh"]);
+    bad_mesh(
+        vtk(&CORNERS, &cells, ""),
+        &["elements without volume at rest: tet 6 (counted from 0)", "remesh"],
+    );
     let cells: Vec<&[u32]> = TETS.into_iter().chain([TETS[1]]).collect();
     bad_mesh(
-        vtk(&CUBE, &cells, ""),
+        vtk(&CORNERS, &cells, ""),
         &["elements that repeat another: tet 6", "faces of more than two elements"],
     );
 }
 
 #[test]
 fn unused_nodes_are_listed_and_dropped_on_request() {
-    let points: Vec<[f64; 3]> = CUBE.into_iter().chain([[0.2, 0.0, 0.0]]).collect();
+    let points: Vec<[f64; 3]> = CORNERS.into_iter().chain([[0.2, 0.0, 0.0]]).collect();
     let mesh = vtk(&points, &TETS, "");
     bad_mesh(&mesh, &["nodes that no element uses: 8 (counted from 0)", "add `fix = \"drop-unused\"`"]);
     repaired(&mesh, "drop-unused", "1 unused node dropped");
@@ -400,7 +403,7 @@ fn unused_nodes_are_listed_and_dropped_on_request() {
 
 #[test]
 fn duplicate_nodes_are_listed_and_merged_on_request() {
-    let points: Vec<[f64; 3]> = CUBE.into_iter().chain([CUBE[7]]).collect();
+    let points: Vec<[f64; 3]> = CORNERS.into_iter().chain([CORNERS[7]]).collect();
     let mut tets = TETS;
     tets[5] = &[0, 5, 1, 8];
     let mesh = vtk(&points, &tets, "");
@@ -410,7 +413,7 @@ fn duplicate_nodes_are_listed_and_merged_on_request() {
 
 #[test]
 fn several_repairs_go_in_order() {
-    let points: Vec<[f64; 3]> = CUBE.into_iter().chain([CUBE[7], [0.3, 0.0, 0.0]]).collect();
+    let points: Vec<[f64; 3]> = CORNERS.into_iter().chain([CORNERS[7], [0.3, 0.0, 0.0]]).collect();
     let mut tets = TETS;
     (tets[0], tets[5]) = (&[0, 3, 1, 7], &[0, 5, 1, 8]);
     let fixes = "\"organ.vtk\", fix = [\"merge\", \"reorder\", \"drop-unused\"]";
@@ -421,10 +424,10 @@ fn several_repairs_go_in_order() {
 #[test]
 fn a_body_without_elements_is_refused() {
     let triangles: [&[u32]; 2] = [&[0, 1, 3], &[0, 3, 2]];
-    bad_mesh(vtk(&CUBE, &triangles, ""), &["`organ` has no volume elements", "needs tets or hexes"]);
-    bad_mesh(vtk(&CUBE, &[], ""), &["points but no cells", "export the elements too"]);
+    bad_mesh(vtk(&CORNERS, &triangles, ""), &["`organ` has no volume elements", "needs tets or hexes"]);
+    bad_mesh(vtk(&CORNERS, &[], ""), &["points but no cells", "export the elements too"]);
     let scene = changed(FROM_FILE, "density", "element = \"hex8\"\ndensity");
-    let workshop = with_mesh(vtk(&CUBE, &TETS, ""), &scene);
+    let workshop = with_mesh(vtk(&CORNERS, &TETS, ""), &scene);
     assert_refused(&workshop, &["element = \"hex8\""], &["the mesh of `organ` has tets", "tets: `tet4`"]);
 }
 
@@ -433,14 +436,14 @@ fn an_averaged_pressure_needs_an_energy_of_the_volume() {
     let scene = changed(FROM_FILE, "density", "element = \"tet4-anp\"\ndensity");
     let scene = changed(&scene, "\"neo-hookean\"", "\"st-venant-kirchhoff\"");
     let told = ["`st-venant-kirchhoff` has no energy of the volume alone", "take `tet4` or `hex8`"];
-    assert_refused(&with_mesh(vtk(&CUBE, &TETS, ""), &scene), &["element = \"tet4-anp\""], &told);
+    assert_refused(&with_mesh(vtk(&CORNERS, &TETS, ""), &scene), &["element = \"tet4-anp\""], &told);
     let plain = changed(&scene, "tet4-anp", "tet4");
-    assert_eq!(with_mesh(vtk(&CUBE, &TETS, ""), &plain).run(&[]).code, 0);
+    assert_eq!(with_mesh(vtk(&CORNERS, &TETS, ""), &plain).run(&[]).code, 0);
 }
 
 #[test]
 fn laws_by_label_must_fit_the_labels_of_the_mesh() {
-    let mesh = |data: &str| vtk(&CUBE, &TETS, data);
+    let mesh = |data: &str| vtk(&CORNERS, &TETS, data);
     let with_law = |law: &str| changed(FROM_FILE, "law = \"tissue\"", law);
     let two = labels(&[1, 1, 1, 2, 2, 2]);
     let law = "law = { 1 = \"tissue\" }";
@@ -463,7 +466,7 @@ fn laws_by_label_must_fit_the_labels_of_the_mesh() {
 fn a_body_that_nothing_holds_is_allowed_and_told() {
     let constraint = FROM_FILE.find("[constraint").unwrap();
     let free = &FROM_FILE[..constraint];
-    let mesh = vtk(&CUBE, &TETS, "");
+    let mesh = vtk(&CORNERS, &TETS, "");
     let falling = with_mesh(&mesh, free);
     falling.run(&[]).done();
     let check = falling.pliant(&["check", "case"]);
@@ -512,7 +515,7 @@ fn nan_and_infinity_are_refused_wherever_a_number_can_be() {
 #[test]
 fn nan_and_infinity_in_a_mesh_file_are_refused() {
     for bad in ["nan", "inf"] {
-        let mesh = vtk(&CUBE, &TETS, "").replacen("0.1 0 0", &format!("0.1 {bad} 0"), 1);
+        let mesh = vtk(&CORNERS, &TETS, "").replacen("0.1 0 0", &format!("0.1 {bad} 0"), 1);
         bad_mesh(mesh, &["point 1 is not finite", "repair the mesh"]);
     }
 }
@@ -813,10 +816,10 @@ fn moved_scene(by: &str) -> String {
 fn a_motion_from_point_data_needs_an_array_of_finite_vectors() {
     let line = "by = { point-data = \"shift\" }";
     let scene = moved_scene("{ point-data = \"shift\" }");
-    let of = |data: &str| with_mesh(vtk(&CUBE, &TETS, &format!("POINT_DATA 8\n{data}\n")), &scene);
+    let of = |data: &str| with_mesh(vtk(&CORNERS, &TETS, &format!("POINT_DATA 8\n{data}\n")), &scene);
     let numbers = |n: usize| "0 ".repeat(n);
     assert_refused(
-        &with_mesh(vtk(&CUBE, &TETS, ""), &scene),
+        &with_mesh(vtk(&CORNERS, &TETS, ""), &scene),
         &[line],
         &["the mesh of `organ` has no point data `shift`", "the mesh has no point data"],
     );
@@ -843,7 +846,7 @@ fn a_motion_from_point_data_needs_an_array_of_finite_vectors() {
 #[test]
 fn a_table_of_motions_is_refused_with_its_line() {
     let line = "by = { csv = \"motion.csv\" }";
-    let mesh = vtk(&CUBE, &TETS, "");
+    let mesh = vtk(&CORNERS, &TETS, "");
     let refused = |table: Option<&str>, says: &[&str]| {
         let workshop = with_mesh(&mesh, &moved_scene("{ csv = \"motion.csv\" }"));
         if let Some(table) = table {
@@ -891,7 +894,7 @@ fn a_velocity_at_the_start_needs_inertia() {
 
 #[test]
 fn densities_by_label_must_fit_the_mesh_and_be_positive() {
-    let mesh = vtk(&CUBE, &TETS, &labels(&[1, 1, 1, 2, 2, 2]));
+    let mesh = vtk(&CORNERS, &TETS, &labels(&[1, 1, 1, 2, 2, 2]));
     for (key, says) in [
         ("density = { 1 = 900 }", "labels without density: 2 (3 cells)"),
         ("density = { 1 = 900, 2 = 900, 3 = 900 }", "no cell of `organ` has label `3`"),

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use crate::support::{BLOCK, CUBE, FROM_FILE, TETS, Told, Workshop, changed, fibres, labels, series, vtk};
+use crate::support::{BLOCK, CORNERS, FROM_FILE, TETS, Told, Workshop, changed, fibres, labels, series, vtk};
 use pliant_geometry::{CellKind, Mesh};
 use serde_json::Value;
 
@@ -658,8 +658,8 @@ fn laws_go_by_label_in_the_built_in_brain() {
 
 #[test]
 fn laws_go_by_label_over_tets_and_hexes_of_one_body() {
-    let hex = CUBE.map(|[x, y, z]| [x + 0.3, y, z]);
-    let points: Vec<[f64; 3]> = CUBE.into_iter().chain(hex).collect();
+    let hex = CORNERS.map(|[x, y, z]| [x + 0.3, y, z]);
+    let points: Vec<[f64; 3]> = CORNERS.into_iter().chain(hex).collect();
     let hex: &[u32] = &[8, 9, 11, 10, 12, 13, 15, 14];
     let cells: Vec<&[u32]> = TETS.into_iter().chain([hex]).collect();
     let scene =
@@ -702,7 +702,7 @@ data = ["fibre-stretch", "J"]
 "#;
     let workshop = Workshop::new(scene);
     let directions = ["1 0 0", "0 0 2", "0 -3 0", "0 0 -1", "1 0 1", "0 1 0"];
-    workshop.write("case/organ.vtk", vtk(&CUBE, &TETS, &fibres(&directions)));
+    workshop.write("case/organ.vtk", vtk(&CORNERS, &TETS, &fibres(&directions)));
     workshop.run(&[]).done();
     let mesh = workshop.series("out/case/fields.pvd").pop().unwrap().1.mesh;
     let tets = mesh.block(CellKind::Tet).unwrap();
@@ -716,7 +716,7 @@ data = ["fibre-stretch", "J"]
 
 #[test]
 fn every_selection_finds_its_nodes_in_a_scene() {
-    let mesh = vtk(&CUBE, &TETS, &labels(&[1, 1, 1, 2, 2, 2]));
+    let mesh = vtk(&CORNERS, &TETS, &labels(&[1, 1, 1, 2, 2, 2]));
     let block = Workshop::new(BLOCK);
     let organ = Workshop::new(FROM_FILE);
     organ.write("case/organ.vtk", mesh);
@@ -984,7 +984,7 @@ fn mesh_files_of_every_volume_format_become_bodies() {
     }
     // Converted, a mesh is the same body in every format.
     let workshop = Workshop::new(FROM_FILE);
-    workshop.write("case/organ.vtk", vtk(&CUBE, &TETS, &labels(&[1, 1, 1, 2, 2, 2])));
+    workshop.write("case/organ.vtk", vtk(&CORNERS, &TETS, &labels(&[1, 1, 1, 2, 2, 2])));
     let reaction = workshop.run(&[]).done()["reactions"]["base"].clone();
     for ending in ["msh", "vtu"] {
         let told = workshop.pliant(&["info", "case/organ.vtk", "--convert", &format!("case/organ.{ending}")]);
@@ -997,7 +997,7 @@ fn mesh_files_of_every_volume_format_become_bodies() {
 #[test]
 fn info_asks_whether_a_large_mesh_is_in_millimetres() {
     let workshop = Workshop::new("");
-    workshop.write("organ.vtk", vtk(&CUBE.map(|p| p.map(|x| 1000.0 * x)), &TETS, ""));
+    workshop.write("organ.vtk", vtk(&CORNERS.map(|p| p.map(|x| 1000.0 * x)), &TETS, ""));
     let hint = "`--scale 0.001` brings millimetres to metres";
     assert!(workshop.pliant(&["info", "organ.vtk"]).out.contains(hint));
     assert!(!workshop.pliant(&["info", "organ.vtk", "--scale", "0.001"]).out.contains(hint));
@@ -1007,7 +1007,7 @@ fn info_asks_whether_a_large_mesh_is_in_millimetres() {
 fn mesh_files_of_every_surface_format_become_surfaces() {
     let workshop = Workshop::new(BLOCK);
     let quads = "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
-    let corners: String = CUBE.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
+    let corners: String = CORNERS.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
     workshop.write("case/skin.obj", corners + quads);
     for ending in ["stl", "ply"] {
         let told = workshop.pliant(&["info", "case/skin.obj", "--convert", &format!("case/skin.{ending}")]);
@@ -1026,7 +1026,7 @@ fn mesh_files_of_every_surface_format_become_surfaces() {
 
 #[test]
 fn scale_and_at_bring_a_mesh_to_metres_and_in_place() {
-    let millimetres = CUBE.map(|point| point.map(|x| 1000.0 * x));
+    let millimetres = CORNERS.map(|point| point.map(|x| 1000.0 * x));
     let scene = changed(FROM_FILE, "\"organ.vtk\"", "\"organ.vtk\", scale = 0.001, at = [0.5, 0, 0]");
     let workshop = Workshop::new(&scene);
     workshop.write("case/organ.vtk", vtk(&millimetres, &TETS, ""));
@@ -1093,7 +1093,7 @@ fn check_prints_the_model_and_writes_nothing() {
 #[test]
 fn info_tells_what_a_mesh_holds_and_what_is_wrong() {
     let workshop = Workshop::new(BLOCK);
-    workshop.write("good.vtk", vtk(&CUBE, &TETS, &labels(&[1; 6])));
+    workshop.write("good.vtk", vtk(&CORNERS, &TETS, &labels(&[1; 6])));
     let told = workshop.pliant(&["info", "good.vtk", "--scale", "0.5"]);
     assert_eq!(told.code, 0, "{}", told.err);
     for piece in [
@@ -1108,7 +1108,7 @@ fn info_tells_what_a_mesh_holds_and_what_is_wrong() {
     }
     let mut tets = TETS;
     tets[2] = &[0, 6, 2, 7];
-    workshop.write("bad.vtk", vtk(&CUBE, &tets, ""));
+    workshop.write("bad.vtk", vtk(&CORNERS, &tets, ""));
     let told = workshop.pliant(&["info", "bad.vtk"]);
     assert_eq!(told.code, 0);
     assert!(told.out.contains("inverted cells: 1 (tet 2)"), "{}", told.out);
@@ -1269,7 +1269,7 @@ fn every_node_goes_its_own_way_from_point_data_or_a_table_with_every_solver() {
         for motion in ["{ point-data = \"shift\" }", "{ csv = \"motion.csv\", scale = 0.001 }"] {
             let run = format!("[run]\nsolver = \"{solver}\"");
             let workshop = Workshop::new(&changed(&moved_node_by_node(motion), "[run]", &run));
-            workshop.write("case/organ.vtk", vtk(&CUBE, &TETS, &data));
+            workshop.write("case/organ.vtk", vtk(&CORNERS, &TETS, &data));
             workshop.write("case/motion.csv", format!("node,x,y,z\n{}", table.concat()));
             workshop.run(&[]).done();
             let frames = workshop.series("out/case/fields.pvd");
@@ -1293,7 +1293,7 @@ fn every_node_goes_its_own_way_from_point_data_or_a_table_with_every_solver() {
 #[test]
 fn a_table_of_motions_names_nodes_as_the_mesh_file_does() {
     let mut points = vec![[9.0; 3]];
-    points.extend(CUBE);
+    points.extend(CORNERS);
     let tets: Vec<Vec<u32>> = TETS.iter().map(|tet| tet.iter().map(|node| node + 1).collect()).collect();
     let tets: Vec<&[u32]> = tets.iter().map(Vec::as_slice).collect();
     let scene = changed(

@@ -1,0 +1,5 @@
+//! Runs of scenes with their files and words, in this process. One program for all files here; run those of a file with
+//! `cargo test -p pliant-run --test run resuming::`.
+
+mod resuming;
+mod shells;
