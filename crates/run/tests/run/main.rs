@@ -1,5 +1,10 @@
 //! Runs of scenes with their files and words, in this process. One program for all files here; run those of a file with
 //! `cargo test -p pliant-run --test run resuming::`.
 
+mod meshes;
+mod motions;
+mod outputs;
 mod resuming;
 mod shells;
+mod steps;
+mod support;
