@@ -2,6 +2,7 @@
 //! `cargo test -p pliant-run --test run resuming::`.
 
 mod meshes;
+mod mistakes;
 mod motions;
 mod outputs;
 mod resuming;
