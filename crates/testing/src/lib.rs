@@ -18,6 +18,7 @@ pub mod organs;
 pub mod scenes;
 
 use std::fs;
+use std::io::Write;
 
 pub use grown::{Hexes, ball_of_hexes, grown_hexes};
 
@@ -109,6 +110,28 @@ type = "fix"
 body = "cube"
 nodes = { set = "z-min" }
 "#;
+
+/// Whether a test that needs a GPU, or a screen, goes on. Where there is none it prints that the test is skipped.
+///
+/// # Panics
+/// Where there is none and `PLIANT_REQUIRE_GPU=1` requires one.
+#[track_caller]
+pub fn found_or_skipped<T, E: std::fmt::Display>(found: Result<T, E>) -> Option<T> {
+    let missing = match found {
+        Ok(found) => return Some(found),
+        Err(missing) => missing,
+    };
+    assert!(std::env::var("PLIANT_REQUIRE_GPU").as_deref() != Ok("1"), "required: {missing}");
+    // Past the capture of what passing tests print. A notice that can't be written is none.
+    let _ = writeln!(std::io::stderr(), "skipped: {missing}");
+    None
+}
+
+/// As [`found_or_skipped`], of the number of GPUs.
+#[track_caller]
+pub fn has_gpu(adapters: usize) -> bool {
+    found_or_skipped((adapters > 0).then_some(()).ok_or("no GPU was found")).is_some()
+}
 
 /// Peak memory of this process [KiB] at an instant, on Linux.
 #[derive(Clone, Copy, Debug)]

@@ -342,6 +342,22 @@ impl Workshop {
         (header, rows)
     }
 
+    /// The cells of a CSV file row by row; commas in quotes separate none.
+    pub fn cells(&self, name: &str) -> Vec<Vec<String>> {
+        let cells = |line: &str| {
+            let (mut all, mut quoted) = (vec![String::new()], false);
+            for c in line.chars() {
+                match c {
+                    '"' => quoted = !quoted,
+                    ',' if !quoted => all.push(String::new()),
+                    c => all.last_mut().expect("a cell").push(c),
+                }
+            }
+            all
+        };
+        self.read(name).lines().map(cells).collect()
+    }
+
     /// The checkpoints in a folder, in order.
     pub fn checkpoints(&self, folder: &str) -> Vec<PathBuf> {
         let paths =

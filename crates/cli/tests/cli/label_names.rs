@@ -141,7 +141,7 @@ mod with_pictures {
     use pliant_picture::{Picture, label_colour};
 
     use super::*;
-    use crate::support::has_graphics_processor;
+    use crate::support::has_gpu;
 
     /// Pixels with the exact colour of a label: those of its swatch.
     fn swatches(workshop: &Workshop, file: &str) -> [usize; 4] {
@@ -156,7 +156,7 @@ mod with_pictures {
 
     #[test]
     fn labels_of_scenes_runs_and_meshes_are_drawn_and_hidden() {
-        if !has_graphics_processor() {
+        if !has_gpu() {
             return;
         }
         let view = "[view]\ncolour = \"label\"\nhide = [\"spleen\"]\n\n[scene]";
@@ -188,7 +188,7 @@ mod with_pictures {
 
     #[test]
     fn what_cannot_be_hidden_is_refused() {
-        if !has_graphics_processor() {
+        if !has_gpu() {
             return;
         }
         let workshop = workshop(&[]);

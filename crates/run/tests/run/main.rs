@@ -1,6 +1,8 @@
 //! Runs of scenes with their files and words, in this process. One program for all files here; run those of a file with
 //! `cargo test -p pliant-run --test run resuming::`.
 
+#[cfg(feature = "gpu")]
+mod devices;
 mod meshes;
 mod mistakes;
 mod motions;
@@ -9,3 +11,4 @@ mod resuming;
 mod shells;
 mod steps;
 mod support;
+mod sweeping;

@@ -1,6 +1,5 @@
 //! A folder with a scene, the real binary run in it, and its output.
 
-use std::io::Write;
 use std::ops::Deref;
 use std::process::{Command, Output};
 
@@ -48,16 +47,8 @@ impl Workshop {
     }
 }
 
-/// Whether a GPU exists. Without one, prints a notice, or fails the test with `PLIANT_REQUIRE_GPU=1`.
-pub fn has_graphics_processor() -> bool {
-    let found = !pliant_gpu::adapters().is_empty();
-    let required = std::env::var("PLIANT_REQUIRE_GPU").as_deref() == Ok("1");
-    assert!(found || !required, "no GPU was found, but PLIANT_REQUIRE_GPU=1 requires one");
-    if !found {
-        // Bypasses the capture of passing tests. A notice that can't be written is dropped.
-        let _ = writeln!(std::io::stderr(), "skipped: no GPU was found");
-    }
-    found
+pub fn has_gpu() -> bool {
+    pliant_testing::has_gpu(pliant_gpu::adapters().len())
 }
 
 /// The output of the binary.
