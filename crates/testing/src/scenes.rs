@@ -12,7 +12,7 @@ use pliant_run::{
 };
 use pliant_scene::diagnostic::{Diagnostic, MOST_SHOWN, SceneErrors};
 use pliant_scene::source::Source;
-use pliant_scene::{Scene, World};
+use pliant_scene::{MeshCache, Scene, World};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -118,6 +118,68 @@ nodes = { nearest = { point = [0, 0, 0], count = 4 } }
 [output.fields]
 type = "vtu"
 every = 0.005
+"#;
+
+/// A scene with a body of a label of an image.
+pub const FROM_IMAGE: &str = r#"[scene]
+until = 0.01
+gravity = [0, 0, -9.81]
+
+[law.tissue]
+type = "neo-hookean"
+young-modulus = 3e3
+poisson-ratio = 0.45
+
+[law.core]
+type = "neo-hookean"
+young-modulus = 9e3
+poisson-ratio = 0.45
+
+[body.organ]
+mesh = { image = "seg.nii.gz", label = 5, edge = 0.006 }
+law = "tissue"
+density = 1000
+
+[constraint.base]
+type = "fix"
+body = "organ"
+nodes = { box = [[-1, -1, -1], [1, 1, -0.008]] }
+"#;
+
+/// A scene of [`layered_segmentation`](crate::image_files::layered_segmentation) by the names of its labels.
+pub const FROM_NAMES: &str = r#"[scene]
+until = 0.004
+
+[law.soft]
+type = "neo-hookean"
+young-modulus = 3e3
+poisson-ratio = 0.45
+
+[law.stiff]
+type = "neo-hookean"
+young-modulus = 9e3
+poisson-ratio = 0.45
+
+[body.organs]
+mesh = { image = "organs.seg.nrrd", labels = ["liver", "spleen", "tumour"], edge = 0.006, protect = ["tumour"] }
+law = { liver = "soft", spleen = "soft", Tumour = "stiff" }
+density = { liver = 1060, 2 = 1050, tumour = 1100 }
+
+[constraint.held]
+type = "fix"
+body = "organs"
+nodes = { intersection = [{ label = "liver" }, { half-space = { point = [-0.006, 0, 0], normal = [1, 0, 0] } }] }
+
+[load.pull]
+type = "force"
+on = "organs"
+nodes = { label-boundary = ["spleen", "tumour"] }
+total = [0, 0, 1e-3]
+
+[output.fields]
+type = "vtu"
+every = 0.002
+data = ["displacement"]
 "#;
 
 /// A bent block with an output of every kind and a checkpoint every 0.02 s, of an element, with or without history.
@@ -510,7 +572,8 @@ impl Workshop {
             if !mistakes.is_empty() {
                 return Err(source.errors(mistakes));
             }
-            World::new(&Scene::from_source(source, self.case.clone())?)
+            let scene = Scene::from_source(source, self.case.clone())?;
+            World::assemble(&scene, &MeshCache::in_folder(self.path("cache")), &|_| ())
         })();
         match &world {
             Ok(world) => {

@@ -3,6 +3,7 @@
 
 #[cfg(feature = "gpu")]
 mod devices;
+mod images;
 mod meshes;
 mod mistakes;
 mod motions;

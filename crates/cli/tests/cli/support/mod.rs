@@ -6,7 +6,9 @@ use std::process::{Command, Output};
 use pliant_testing::scenes;
 use serde_json::Value;
 
-pub use pliant_testing::scenes::{BLOCK, CORNERS, FROM_FILE, TETS, changed, labels, resumable, series, vtk};
+pub use pliant_testing::scenes::{
+    BLOCK, CORNERS, FROM_FILE, FROM_IMAGE, FROM_NAMES, TETS, changed, labels, resumable, series, vtk,
+};
 
 /// A temporary folder with a scene in `case/scene.toml`, in which the binary runs.
 pub struct Workshop(scenes::Workshop);
