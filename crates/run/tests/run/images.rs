@@ -5,17 +5,14 @@ use std::fs;
 use pliant_geometry::Labels;
 use pliant_testing::image_files::{Volume, layered_segmentation};
 use pliant_testing::scenes::{FROM_IMAGE, FROM_NAMES, Workshop, changed};
-use serde_json::Value;
+
+use crate::support::close;
 
 fn workshop(mesh: &str, law: &str) -> Workshop {
     let scene = changed(FROM_IMAGE, "{ image = \"seg.nii.gz\", label = 5, edge = 0.006 }", mesh);
     let workshop = Workshop::new(&changed(&scene, "law = \"tissue\"", &format!("law = {law}")));
     workshop.write("case/seg.nii.gz", Volume::ball_with_a_core().packed());
     workshop
-}
-
-fn close(value: &Value, expected: f64, within: f64) -> bool {
-    value.as_f64().is_some_and(|value| (value - expected).abs() <= within * expected.abs())
 }
 
 #[test]

@@ -12,4 +12,5 @@ mod resuming;
 mod shells;
 mod steps;
 mod support;
+mod surfaces;
 mod sweeping;

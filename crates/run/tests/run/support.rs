@@ -10,6 +10,11 @@ pub fn assert_close(found: f64, expected: f64, tolerance: f64, what: &str) {
     );
 }
 
+/// Whether a number is another one within a part of it.
+pub fn close(value: &Value, expected: f64, within: f64) -> bool {
+    value.as_f64().is_some_and(|value| (value - expected).abs() <= within * expected.abs())
+}
+
 /// The keys of an object, in their order.
 pub fn keys(object: &Value) -> Vec<&str> {
     object.as_object().expect("an object").keys().map(String::as_str).collect()
