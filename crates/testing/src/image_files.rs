@@ -35,6 +35,52 @@ impl Volume {
         }
     }
 
+    /// 40³ voxels of 1 mm about the origin, each with the label of its place [mm].
+    pub fn of_labels(label: impl Fn([f64; 3]) -> i16) -> Self {
+        const SIDE: usize = 40;
+        let at = |i: usize| i as f64 - (SIDE as f64 - 1.0) / 2.0;
+        let place = |n: usize| [at(n % SIDE), at(n / SIDE % SIDE), at(n / SIDE / SIDE)];
+        Self {
+            dims: [SIDE; 3],
+            origin: Vector3::repeat(at(0)),
+            axes: Matrix3::identity(),
+            values: (0..SIDE.pow(3)).map(|n| label(place(n))).collect(),
+        }
+    }
+
+    /// A ball of label 5 and radius 15 mm around one of label 8 and 7 mm, with a loose voxel of label 5, a hole, and a single voxel of
+    /// label 9.
+    pub fn ball_with_a_core() -> Self {
+        Self::of_labels(|[x, y, z]| {
+            let r = (x * x + y * y + z * z).sqrt();
+            match [x, y, z] {
+                [-18.5, -18.5, -18.5] => 5,
+                [18.5, 18.5, 18.5] => 9,
+                [0.5, 0.5, 11.5] => 0,
+                _ if r < 7.0 => 8,
+                _ if r < 15.0 => 5,
+                _ => 0,
+            }
+        })
+    }
+
+    /// A ball on the left with a rod of 4 mm that sticks out to x = 18 mm.
+    pub fn ball_with_a_rod(label: i16) -> Self {
+        let ball = |[x, y, z]: [f64; 3]| (x + 8.0).powi(2) + y * y + z * z < 100.0;
+        let rod = |[x, y, z]: [f64; 3]| (-8.0..18.0).contains(&x) && y.abs() < 2.0 && z.abs() < 2.0;
+        Self::of_labels(|point| if ball(point) || rod(point) { label } else { 0 })
+    }
+
+    /// As a NIfTI-1 file.
+    pub fn nifti(&self) -> Vec<u8> {
+        nifti1(self, Form::Sform, false)
+    }
+
+    /// As a packed NIfTI-1 file.
+    pub fn packed(&self) -> Vec<u8> {
+        gzip(&self.nifti())
+    }
+
     fn bytes(&self, big: bool) -> Vec<u8> {
         self.values.iter().flat_map(|x| if big { x.to_be_bytes() } else { x.to_le_bytes() }).collect()
     }
@@ -472,6 +518,25 @@ fn element(out: &mut Vec<u8>, number: u32, vr: &[u8; 2], value: &[u8], syntax: S
         }
     }
     out.extend(value);
+}
+
+/// A block of 24 × 12 × 12 voxels of 1 mm as 3D Slicer writes it: the left half is liver, the right one spleen, and a tumour lies in the
+/// middle on a separate layer.
+pub fn layered_segmentation() -> Vec<u8> {
+    let mut bytes =
+        b"NRRD0004\ntype: unsigned char\ndimension: 4\nspace: left-posterior-superior\nsizes: 2 32 20 20\n\
+        space directions: none (1,0,0) (0,1,0) (0,0,1)\nkinds: list domain domain domain\nencoding: raw\n\
+        space origin: (0,0,0)\n\
+        Segment0_Name:=liver\nSegment0_LabelValue:=1\nSegment0_Layer:=0\n\
+        Segment1_Name:=spleen\nSegment1_LabelValue:=2\nSegment1_Layer:=0\n\
+        Segment2_Name:=tumour\nSegment2_LabelValue:=1\nSegment2_Layer:=1\n\n"
+            .to_vec();
+    for (k, j, i) in (0..20 * 20 * 32).map(|n| (n / 640, n / 32 % 20, n % 32)) {
+        let inside = [(i, 4..28), (j, 4..16), (k, 4..16)].into_iter().all(|(at, range)| range.contains(&at));
+        let core = [(i, 12..20), (j, 6..14), (k, 6..14)].into_iter().all(|(at, range)| range.contains(&at));
+        bytes.extend([if inside { 1 + u8::from(i >= 16) } else { 0 }, u8::from(core)]);
+    }
+    bytes
 }
 
 /// Bytes as gzip compresses them.

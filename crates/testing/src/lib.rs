@@ -1,5 +1,6 @@
 //! Helpers of tests: numbers at random that are the same in every run, files damaged by them, hexahedra of simple bodies, and the memory of
-//! the process; with the features `images` and `organs` image files, and label images and meshes of analytic organs.
+//! the process; with the features `images`, `organs` and `scenes` image files, label images and meshes of analytic organs, and scenes that
+//! are checked and run.
 //!
 //! ```
 //! let mut random = pliant_testing::Random::new(1);
@@ -13,8 +14,11 @@ pub mod image_files;
 pub mod mesh_checks;
 #[cfg(feature = "organs")]
 pub mod organs;
+#[cfg(feature = "scenes")]
+pub mod scenes;
 
 use std::fs;
+use std::io::Write;
 
 pub use grown::{Hexes, ball_of_hexes, grown_hexes};
 
@@ -106,6 +110,28 @@ type = "fix"
 body = "cube"
 nodes = { set = "z-min" }
 "#;
+
+/// Whether a test that needs a GPU, or a screen, goes on. Where there is none it prints that the test is skipped.
+///
+/// # Panics
+/// Where there is none and `PLIANT_REQUIRE_GPU=1` requires one.
+#[track_caller]
+pub fn found_or_skipped<T, E: std::fmt::Display>(found: Result<T, E>) -> Option<T> {
+    let missing = match found {
+        Ok(found) => return Some(found),
+        Err(missing) => missing,
+    };
+    assert!(std::env::var("PLIANT_REQUIRE_GPU").as_deref() != Ok("1"), "required: {missing}");
+    // Past the capture of what passing tests print. A notice that can't be written is none.
+    let _ = writeln!(std::io::stderr(), "skipped: {missing}");
+    None
+}
+
+/// As [`found_or_skipped`], of the number of GPUs.
+#[track_caller]
+pub fn has_gpu(adapters: usize) -> bool {
+    found_or_skipped((adapters > 0).then_some(()).ok_or("no GPU was found")).is_some()
+}
 
 /// Peak memory of this process [KiB] at an instant, on Linux.
 #[derive(Clone, Copy, Debug)]

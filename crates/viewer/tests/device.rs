@@ -11,18 +11,13 @@ use pliant_run::Live;
 use pliant_scene::World;
 use pliant_scene::format::{ColourBy, FieldName, ViewTable};
 use pliant_sim::gpu::{Device, DevicePoints, PointValue};
+use pliant_testing::found_or_skipped;
 use pliant_viewer::{Frame, Hand, Order, Point, Session};
 use support::{BALL, subject, wait, world};
 
 /// The ball on a GPU, pulled down, if there is one.
 fn on_device() -> Option<World> {
-    let required = std::env::var("PLIANT_REQUIRE_GPU").as_deref() == Ok("1");
-    if let Err(error) = Device::open(None) {
-        assert!(!required, "{error}");
-        eprintln!("skipped: {error}");
-        return None;
-    }
-    Some(world(&scene("gpu")))
+    found_or_skipped(Device::open(None)).map(|_| world(&scene("gpu")))
 }
 
 fn scene(device: &str) -> String {

@@ -1,6 +1,6 @@
 //! `pliant bench` through the real binary.
 
-use crate::support::{Workshop, has_graphics_processor};
+use crate::support::{Workshop, has_gpu};
 use serde_json::Value;
 
 const KEYS: [&str; 16] = [
@@ -62,7 +62,7 @@ fn a_row_has_the_promised_keys_with_numbers_that_agree() {
 
 #[test]
 fn a_design_is_measured_on_the_device_and_named_with_it() {
-    if !has_graphics_processor() {
+    if !has_gpu() {
         return;
     }
     let best = pliant_gpu::adapters().remove(0);

@@ -1,5 +1,5 @@
-//! The real binary: words, exit codes, files. One program for all files here, so that they are linked once; run those of a file with
-//! `cargo test -p pliant --test cli running::`.
+//! The real binary: words, exit codes, files. Tests that need a simulation alone are in `crates/run/tests`. One program for all files
+//! here, so that they are linked once; run those of a file with `cargo test -p pliant --test cli running::`.
 
 mod bad_images;
 mod bad_input;
@@ -14,7 +14,6 @@ mod reproduce;
 mod resuming;
 mod running;
 mod setting;
-mod shells;
 mod shells_of_surfaces;
 mod support;
 #[cfg(unix)]

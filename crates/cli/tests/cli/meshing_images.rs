@@ -1,118 +1,18 @@
-//! Labels and meshes of segmented images, from the command line and from scenes, through the real binary. The images are
+//! Labels and meshes of segmented images, through the real binary. The images are
 //! small and written here; one of a patient is used where `PLIANT_DATA` names a folder that has it.
 
-use std::io::Write;
 use std::path::Path;
 
-use crate::support::{Told, Workshop};
 use pliant_geometry::io;
+use pliant_testing::image_files::{Form, Volume, nifti1};
 use serde_json::Value;
 
-/// Voxels along each side, of 1 mm.
-const SIDE: usize = 40;
-
-/// An image of 1 mm voxels whose centre is the origin of the world.
-struct Picture {
-    voxels: Vec<i16>,
-}
-
-impl Picture {
-    fn new(label: impl Fn([f64; 3]) -> i16) -> Self {
-        let at = |i: usize| i as f64 - (SIDE as f64 - 1.0) / 2.0;
-        let place = |n: usize| [at(n % SIDE), at(n / SIDE % SIDE), at(n / SIDE / SIDE)];
-        Self { voxels: (0..SIDE.pow(3)).map(|n| label(place(n))).collect() }
-    }
-
-    /// A ball of label 5 and radius 15 mm around one of label 8 and 7 mm, with a loose voxel of label 5, a hole, and a
-    /// single voxel of label 9.
-    fn organ() -> Self {
-        Self::new(|[x, y, z]| {
-            let r = (x * x + y * y + z * z).sqrt();
-            match [x, y, z] {
-                [-18.5, -18.5, -18.5] => 5,
-                [18.5, 18.5, 18.5] => 9,
-                [0.5, 0.5, 11.5] => 0,
-                _ if r < 7.0 => 8,
-                _ if r < 15.0 => 5,
-                _ => 0,
-            }
-        })
-    }
-
-    /// A ball on the left with a rod of 4 mm that sticks out to x = 18 mm.
-    fn ball_with_a_rod(label: i16) -> Self {
-        let ball = |[x, y, z]: [f64; 3]| (x + 8.0).powi(2) + y * y + z * z < 100.0;
-        let rod = |[x, y, z]: [f64; 3]| (-8.0..18.0).contains(&x) && y.abs() < 2.0 && z.abs() < 2.0;
-        Self::new(|point| if ball(point) || rod(point) { label } else { 0 })
-    }
-
-    /// As NIfTI-1 (the published layout), packed.
-    fn packed(&self) -> Vec<u8> {
-        let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
-        packer.write_all(&self.nifti()).expect("memory takes it");
-        packer.finish().expect("memory takes it")
-    }
-
-    fn nifti(&self) -> Vec<u8> {
-        let mut bytes = vec![0; 352];
-        let mut put = |at: usize, number: &[u8]| bytes[at..at + number.len()].copy_from_slice(number);
-        put(0, &348_i32.to_le_bytes());
-        for (at, n) in [3, SIDE, SIDE, SIDE, 1, 1, 1, 1].into_iter().enumerate() {
-            put(40 + 2 * at, &(n as i16).to_le_bytes());
-        }
-        put(70, &4_i16.to_le_bytes());
-        put(72, &16_i16.to_le_bytes());
-        for at in 0..4 {
-            put(76 + 4 * at, &1_f32.to_le_bytes());
-        }
-        put(108, &352_f32.to_le_bytes());
-        put(123, &[2]);
-        put(254, &2_i16.to_le_bytes());
-        let corner = -(SIDE as f32 - 1.0) / 2.0;
-        for row in 0..3 {
-            put(280 + 20 * row, &1_f32.to_le_bytes());
-            put(292 + 16 * row, &corner.to_le_bytes());
-        }
-        put(344, b"n+1\0");
-        bytes.extend(self.voxels.iter().flat_map(|voxel| voxel.to_le_bytes()));
-        bytes
-    }
-}
-
-/// A scene that names the image; `MESH` stands for the table of its mesh.
-const SCENE: &str = r#"[scene]
-until = 0.01
-gravity = [0, 0, -9.81]
-
-[law.tissue]
-type = "neo-hookean"
-young-modulus = 3e3
-poisson-ratio = 0.45
-
-[law.core]
-type = "neo-hookean"
-young-modulus = 9e3
-poisson-ratio = 0.45
-
-[body.organ]
-mesh = MESH
-law = LAW
-density = 1000
-
-[constraint.base]
-type = "fix"
-body = "organ"
-nodes = { box = [[-1, -1, -1], [1, 1, -0.008]] }
-"#;
-
-fn workshop(mesh: &str, law: &str) -> Workshop {
-    let workshop = Workshop::new(&SCENE.replace("MESH", mesh).replace("LAW", law));
-    workshop.write("case/seg.nii.gz", Picture::organ().packed());
-    workshop
-}
+use crate::support::{FROM_IMAGE, Told, Workshop};
 
 fn with_image() -> Workshop {
-    workshop("{ image = \"seg.nii.gz\", label = 5, edge = 0.006 }", "\"tissue\"")
+    let workshop = Workshop::new(FROM_IMAGE);
+    workshop.write("case/seg.nii.gz", Volume::ball_with_a_core().packed());
+    workshop
 }
 
 /// Runs `pliant mesh case/seg.nii.gz …`.
@@ -150,7 +50,7 @@ fn an_image_becomes_a_scene_with_walls_and_ties() {
     assert!(told.out.contains("follow `organ`"), "{}", told.out);
     // Masks stand for themselves, and are named after their files.
     let ball =
-        |radius: f64| Picture::new(move |[x, y, z]| i16::from(x * x + y * y + z * z < radius * radius));
+        |radius: f64| Volume::of_labels(move |[x, y, z]| i16::from(x * x + y * y + z * z < radius * radius));
     workshop.write("shell.nii", ball(15.0).nifti());
     workshop.write("core.nii", ball(7.0).nifti());
     let masks =
@@ -329,15 +229,14 @@ fn hexes_and_thresholds_work_and_go_to_gmsh() {
 #[test]
 fn what_is_wrong_is_refused_with_a_remedy_and_nothing_is_written() {
     let workshop = with_image();
-    let packed = Picture::organ().packed();
+    let packed = Volume::ball_with_a_core().packed();
     workshop.write("cut.nii.gz", &packed[..packed.len() / 2]);
     workshop.write("text.txt", "no image\n");
-    let mut negative = Picture::organ().nifti();
-    // Without the matrix, whose code is at 254, the spacings count.
-    negative[254] = 0;
+    // Without an orientation the spacings count.
+    let mut negative = nifti1(&Volume::ball_with_a_core(), Form::Neither, false);
     negative[84..88].copy_from_slice(&(-1_f32).to_le_bytes());
     workshop.write("negative.nii", &negative);
-    workshop.write("empty.nii", Picture::new(|_| 0).nifti());
+    workshop.write("empty.nii", Volume::of_labels(|_| 0).nifti());
     let seg = "case/seg.nii.gz";
     let chosen = ["--label", "5", "--edge", "0.006"];
     let cases: [(&str, &[&str], &[&str]); 16] = [
@@ -386,7 +285,7 @@ fn what_is_wrong_is_refused_with_a_remedy_and_nothing_is_written() {
 #[test]
 fn a_part_thinner_than_the_cells_is_told_with_its_place() {
     let workshop = with_image();
-    workshop.write("rod.nii", Picture::ball_with_a_rod(1).nifti());
+    workshop.write("rod.nii", Volume::ball_with_a_rod(1).nifti());
     let told =
         workshop.pliant(&["mesh", "rod.nii", "--label", "1", "--edge", "0.008", "-o", "rod.vtu", "--json"]);
     assert_eq!(told.code, 0, "{}", told.err);
@@ -422,36 +321,9 @@ fn a_full_disk_is_a_failure_of_the_output() {
 }
 
 #[test]
-fn a_scene_names_an_image_and_laws_by_label() {
-    let mesh = "{ image = \"seg.nii.gz\", labels = [5, 8], edge = 0.006, as = \"tets\", clean = { keep-largest = true } }";
-    let workshop = workshop(mesh, "{ 5 = \"tissue\", 8 = \"core\" }");
-    let told = workshop.pliant(&["check", "case"]);
-    assert_eq!(told.code, 0, "{}", told.err);
-    assert!(told.out.contains("seg.nii.gz (NIfTI-1), label 5, 8, tets of 0.006 m"), "{}", told.out);
-    let ran = workshop.run(&[]);
-    let json = ran.done();
-    assert!(ran.words().contains("1 voxels removed in 1 smaller pieces"), "{}", ran.err);
-    // 14.137 ml of water's density, with facets.
-    assert!(close(&json["mass"], 14.1e-3, 0.05), "{json}");
-}
-
-#[test]
-fn a_scene_with_hexes_of_an_image_runs() {
-    let workshop = workshop(
-        "{ image = \"seg.nii.gz\", threshold = 5, edge = 0.006, as = \"hexes\", clean = { keep-largest = true } }",
-        "\"tissue\"",
-    );
-    workshop.run(&[]).done();
-}
-
-#[test]
-fn immersed_hexes_weigh_what_the_organ_weighs_and_carry_its_smooth_surface() {
+fn immersed_hexes_weigh_what_the_organ_weighs() {
+    let workshop = with_image();
     let labels = ["--label", "5", "--label", "8", "--keep-largest", "--fill-holes"];
-    let workshop = workshop(
-        "{ image = \"seg.nii.gz\", labels = [5, 8], edge = 0.004, as = \"immersed-hexes\", \
-         clean = { keep-largest = true, fill-holes = true } }",
-        "\"tissue\"",
-    );
     let more = ["--edge", "0.004", "--as", "immersed-hexes", "-o", "cubes.vtu", "--json"];
     let json = mesh(&workshop, &[&labels[..], &more].concat()).json();
     assert_eq!(json["as"], "immersed-hexes");
@@ -460,106 +332,22 @@ fn immersed_hexes_weigh_what_the_organ_weighs_and_carry_its_smooth_surface() {
     assert!((volume / 14.137e-6 - 1.0).abs() < 0.01, "{json}");
     let fractions = io::read(&workshop.path("cubes.vtu")).unwrap().mesh.blocks[0].data["fraction"].clone();
     assert_eq!(fractions.len() as u64, json["cells"].as_u64().unwrap());
-
-    let skin = "[surface.skin]\non = \"organ\"\nmesh = { image = \"seg.nii.gz\", labels = [5, 8], as = \"surface\", \
-                edge = 0.002, clean = { keep-largest = true, fill-holes = true } }\n\
-                [output.skin]\ntype = \"vtu\"\non = \"skin\"\nevery = 0.01\ndata = [\"displacement\"]\n";
-    workshop.write("case/scene.toml", format!("{}{skin}", workshop.read("case/scene.toml")));
-    let json = workshop.run(&["--out", "out"]).done();
-    assert!(close(&json["mass"], 14.137e-3, 0.015), "{json}");
-    // At rest the skin is the ball of 15 mm, not its cubes.
-    let first = &workshop.series("out/skin.pvd")[0].1.mesh;
-    assert!(first.points.len() > 500);
-    let off = first.points.iter().map(|x| (x.norm() - 0.015).abs()).fold(0.0, f64::max);
-    assert!(off < 0.5e-3, "{off}");
 }
 
 #[test]
-fn shells_of_an_image_become_a_wall() {
-    let mesh = "{ image = \"seg.nii.gz\", labels = [5, 8], as = \"shells\", shells = 80, \
-                clean = { keep-largest = true, fill-holes = true } }\nmodel = \"shell\"\nthickness = 1e-3";
-    let workshop = workshop(mesh, "\"tissue\"");
-    let text = workshop
-        .read("case/scene.toml")
-        .replace("[law.tissue]", "[run]\nsolver = \"static\"\n\n[law.tissue]");
-    workshop.write("case/scene.toml", text);
-    let told = workshop.pliant(&["check", "case"]);
-    assert_eq!(told.code, 0, "{}", told.err);
-    assert!(told.out.contains("label 5, 8, 80 shells"), "{}", told.out);
-}
-
-/// The messages of a run about the cache of meshes.
-fn cached(workshop: &Workshop, more: &[&str]) -> Option<bool> {
-    let told = workshop.run(&[&["--force"], more].concat());
-    assert_eq!(told.code, 0, "{}", told.err);
-    match (told.err.contains("seg.nii.gz: from the cache"), told.err.contains("stored in the cache")) {
-        (false, false) => None,
-        (hit, _) => Some(hit),
-    }
-}
-
-#[test]
-fn the_mesh_of_an_image_is_kept_and_made_anew_where_anything_changes() {
+fn the_cache_of_meshes_is_used_unless_it_is_off() {
     let workshop = with_image();
-    assert_eq!(cached(&workshop, &[]), Some(false));
-    let whole = workshop.run(&["--force"]).done();
-    assert_eq!(cached(&workshop, &[]), Some(true));
-    assert_eq!(cached(&workshop, &["--no-cache"]), None);
+    let told = |more: &[&str]| {
+        let told = workshop.run(&[&["--force", "--until", "1e-3"], more].concat());
+        told.done();
+        told.err
+    };
+    assert!(told(&[]).contains("stored in the cache"));
+    assert!(told(&[]).contains("seg.nii.gz: from the cache"));
+    assert!(!told(&["--no-cache"]).contains("cache"));
     let told =
         workshop.command(&["run", "case", "--force"]).env("PLIANT_CACHE", "off").output().expect("it starts");
-    assert!(!String::from_utf8_lossy(&told.stderr).contains("cache"));
-    for change in ["body.organ.mesh.edge=0.007", "body.organ.mesh.clean.keep-largest=true"] {
-        assert_eq!(cached(&workshop, &["--set", change]), Some(false), "{change}");
-        assert_eq!(cached(&workshop, &["--set", change]), Some(true), "{change}");
-    }
-    // The cached mesh gives the same bits.
-    assert_eq!(workshop.run(&["--force"]).done()["energies"], whole["energies"]);
-    for entry in std::fs::read_dir(workshop.path("cache")).unwrap() {
-        let path = entry.unwrap().path();
-        let bytes = std::fs::read(&path).unwrap();
-        std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
-    }
-    assert_eq!(cached(&workshop, &[]), Some(false));
-    assert_eq!(cached(&workshop, &[]), Some(true));
-    let mut other = Picture::organ();
-    other.voxels[0] = 5;
-    workshop.write("case/seg.nii.gz", other.packed());
-    assert_eq!(cached(&workshop, &[]), Some(false));
-}
-
-#[test]
-fn a_kept_mesh_still_warns() {
-    let workshop = workshop("{ image = \"seg.nii.gz\", label = 5, edge = 0.008 }", "\"tissue\"");
-    workshop.write("case/seg.nii.gz", Picture::ball_with_a_rod(5).packed());
-    for kept in ["stored in the cache", "from the cache"] {
-        let told = workshop.run(&["--force"]);
-        assert!(
-            told.words().contains(kept) && told.words().contains("the mesh misses a part of the body"),
-            "{}",
-            told.err
-        );
-    }
-}
-
-#[test]
-fn mistakes_about_images_are_underlined_in_the_scene() {
-    for (mesh, says) in [
-        ("{ image = \"seg.nii.gz\", label = 6, edge = 0.006 }", "the image has 5, 8, 9"),
-        ("{ image = \"seg.nii.gz\", labels = [5, 0], edge = 0.006 }", "label 0 is the background"),
-        ("{ image = \"seg.nii.gz\", labels = [], edge = 0.006 }", "no label was chosen"),
-        ("{ image = \"seg.nii.gz\", edge = 0.006 }", "add `label = 1`"),
-        ("{ image = \"other.nii.gz\", label = 5, edge = 0.006 }", "relative to the scene file"),
-        ("{ image = \"scene.toml\", label = 5, edge = 0.006 }", "not a supported image"),
-        ("{ image = \"seg.nii.gz\", label = 5, edge = 5e-5 }", "exceed"),
-        ("{ image = \"seg.nii.gz\", threshold = 50, edge = 0.006 }", "lower threshold"),
-        ("{ image = \"seg.nii.gz\", label = 5, edge = 0.006, clean = { close-gaps = -1 } }", "close-gaps"),
-        ("{ image = \"seg.nii.gz\", label = 5, edge = 0.006, fix = \"merge\" }", "`clean` cleans"),
-    ] {
-        let told = workshop(mesh, "\"tissue\"").pliant(&["check", "case"]);
-        assert_eq!(told.code, 2, "{mesh}: {}", told.err);
-        assert!(told.underlines(&format!("mesh = {mesh}")), "{mesh}: {}", told.err);
-        assert!(told.words().contains(says), "{mesh}: no `{says}` in {}", told.err);
-    }
+    assert!(told.status.success() && !String::from_utf8_lossy(&told.stderr).contains("cache"));
 }
 
 /// The liver of a patient, where `PLIANT_DATA` has it: meshed by one command.

@@ -23,7 +23,7 @@ mod with_pictures {
 
     use pliant_picture::Picture;
 
-    use crate::support::{BLOCK, Told, Workshop, changed, has_graphics_processor};
+    use crate::support::{BLOCK, Told, Workshop, changed, has_gpu};
 
     /// The sizes of a PNG file, and the number of its frames if it is animated.
     fn png(workshop: &Workshop, name: &str) -> ([u32; 2], Option<u32>) {
@@ -51,7 +51,7 @@ mod with_pictures {
 
     #[test]
     fn a_run_leaves_a_picture_in_its_folder_and_summary() {
-        if !has_graphics_processor() {
+        if !has_gpu() {
             return;
         }
         let workshop = short("");
@@ -68,7 +68,7 @@ mod with_pictures {
 
     #[test]
     fn a_finished_run_becomes_pictures_and_a_film() {
-        if !has_graphics_processor() {
+        if !has_gpu() {
             return;
         }
         let workshop = short("");
@@ -98,7 +98,7 @@ mod with_pictures {
 
     #[test]
     fn a_film_is_made_by_ffmpeg_or_else_an_animated_png() {
-        if !has_graphics_processor() {
+        if !has_gpu() {
             return;
         }
         let workshop = short("");
@@ -117,7 +117,7 @@ mod with_pictures {
 
     #[test]
     fn a_scene_is_seen_as_its_table_and_then_the_options_say() {
-        if !has_graphics_processor() {
+        if !has_gpu() {
             return;
         }
         let workshop = short("colour = 'displacement'\nedges = true\ncamera = { azimuth = 20, up = 'y' }\n");
@@ -149,7 +149,7 @@ mod with_pictures {
 
     #[test]
     fn every_colour_and_mark_changes_what_is_seen_of_fibrous_tissue() {
-        if !has_graphics_processor() {
+        if !has_gpu() {
             return;
         }
         let workshop = short("");
@@ -183,7 +183,7 @@ mod with_pictures {
 
     #[test]
     fn a_folder_of_scenes_becomes_a_gallery() {
-        if !has_graphics_processor() {
+        if !has_gpu() {
             return;
         }
         let workshop = short("");
@@ -214,7 +214,7 @@ mod with_pictures {
 
     #[test]
     fn what_cannot_be_shown_is_refused_with_a_remedy() {
-        if !has_graphics_processor() {
+        if !has_gpu() {
             return;
         }
         let workshop = short("");

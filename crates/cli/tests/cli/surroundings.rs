@@ -254,7 +254,8 @@ fn pipes_and_devices_are_no_files() {
     let moved =
         crate::support::FROM_FILE.replace("type = \"fix\"", "type = \"move\"\nby = { csv = \"pipe.csv\" }");
     let workshop = Workshop::new(&moved);
-    workshop.write("case/organ.vtk", crate::support::vtk(&crate::support::CUBE, &crate::support::TETS, ""));
+    workshop
+        .write("case/organ.vtk", crate::support::vtk(&crate::support::CORNERS, &crate::support::TETS, ""));
     for pipe in ["pipe.toml", "model.xml", "case/pipe.csv", "checkpoint-0000000001.pliant"] {
         assert!(Command::new("mkfifo").arg(workshop.path(pipe)).status().unwrap().success());
     }
@@ -282,7 +283,7 @@ fn naming(mesh: &str, table: &str) -> String {
 #[test]
 fn a_sandbox_keeps_a_scene_in_its_folder() {
     let workshop = Workshop::new("");
-    let mesh = crate::support::vtk(&crate::support::CUBE, &crate::support::TETS, "");
+    let mesh = crate::support::vtk(&crate::support::CORNERS, &crate::support::TETS, "");
     let table: String = (0..8).map(|node| format!("{node},0,0,0\n")).collect();
     for folder in ["case", "case/deep", "elsewhere"] {
         workshop.write(&format!("{folder}/organ.vtk"), &mesh);
@@ -347,8 +348,10 @@ fn a_sandbox_keeps_images_and_models_in_their_folder() {
     let model = "<Model><SystemParams><TimeStep>0.001</TimeStep><TotalTime>0.1</TotalTime><DampingCoeff>5</DampingCoeff>\
                  <Density>1000</Density></SystemParams><VTKMesh Type=\"T4\">../elsewhere/organ.vtk</VTKMesh></Model>";
     workshop.write("model/model.xml", model);
-    workshop
-        .write("elsewhere/organ.vtk", crate::support::vtk(&crate::support::CUBE, &crate::support::TETS, ""));
+    workshop.write(
+        "elsewhere/organ.vtk",
+        crate::support::vtk(&crate::support::CORNERS, &crate::support::TETS, ""),
+    );
     let words = |more: &[&str]| workshop.pliant(&[&["check", "model/model.xml"], more].concat()).words();
     assert!(!words(&[]).contains("outside the scene's folder"), "{}", words(&[]));
     assert!(words(&["--sandbox"]).contains("outside the scene's folder"), "{}", words(&["--sandbox"]));

@@ -6,9 +6,10 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use pliant_testing::found_or_skipped;
 use pliant_viewer::{Break, Recording};
 
-use crate::support::{BLOCK, Told, Workshop, changed, has_graphics_processor};
+use crate::support::{BLOCK, Told, Workshop, changed, has_gpu};
 
 /// A screen, closed on drop.
 struct Screen {
@@ -27,11 +28,7 @@ impl Screen {
         let mut command = Command::new("Xvfb");
         command.args(["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp"]);
         let started = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
-        let Ok(mut server) = started else {
-            assert!(std::env::var("PLIANT_REQUIRE_GPU").as_deref() != Ok("1"), "there is no Xvfb");
-            eprintln!("skipped: there is no Xvfb");
-            return None;
-        };
+        let mut server = found_or_skipped(started.map_err(|_| "there is no Xvfb"))?;
         let mut number = String::new();
         BufReader::new(server.stdout.take()?).read_line(&mut number).ok()?;
         Some(Self { server, display: format!(":{}", number.trim()), _alone })
@@ -57,7 +54,7 @@ const BALL: &str = include_str!("../../../viewer/tests/support/ball.toml");
 
 #[test]
 fn the_window_draws_picks_pins_and_pulls_and_what_holds_the_body_holds_against_the_hand() {
-    if !has_graphics_processor() {
+    if !has_gpu() {
         return;
     }
     let Some(screen) = Screen::start() else { return };
@@ -87,7 +84,7 @@ fn the_window_draws_picks_pins_and_pulls_and_what_holds_the_body_holds_against_t
 
 #[test]
 fn the_window_is_on_the_device_of_a_scene_that_runs_on_one() {
-    if !has_graphics_processor() {
+    if !has_gpu() {
         return;
     }
     let Some(screen) = Screen::start() else { return };
@@ -102,7 +99,7 @@ fn the_window_is_on_the_device_of_a_scene_that_runs_on_one() {
 
 #[test]
 fn the_window_takes_a_picture_of_itself_and_reads_a_scene_that_changed_while_it_is_open() {
-    if !has_graphics_processor() {
+    if !has_gpu() {
         return;
     }
     let Some(screen) = Screen::start() else { return };

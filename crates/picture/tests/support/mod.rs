@@ -4,12 +4,5 @@ use pliant_picture::Graphics;
 
 /// `None` without an adapter, which is a failure if the gate requires one.
 pub fn graphics() -> Option<Graphics> {
-    match Graphics::open() {
-        Ok(graphics) => Some(graphics),
-        Err(error) => {
-            assert!(std::env::var_os("PLIANT_REQUIRE_GPU").is_none(), "{error}; {}", error.remedy());
-            eprintln!("skipped: {error}");
-            None
-        }
-    }
+    pliant_testing::found_or_skipped(Graphics::open().map_err(|error| format!("{error}; {}", error.remedy())))
 }

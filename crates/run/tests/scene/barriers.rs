@@ -1,6 +1,6 @@
 //! Contact with the solvers `implicit` and `static`: a barrier keeps surfaces apart, from the text of a scene to its outputs, and what is refused.
 
-use super::static_solids::{last_row, resumes, world};
+use pliant_testing::scenes::{last_row, resumes, world};
 
 /// A block of 40 × 40 × 20 mm of tissue a little above a floor, and a ball that is pressed into its top; `held` holds its underside.
 fn pressed(run: &str, more: &str) -> String {

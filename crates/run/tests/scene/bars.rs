@@ -1,6 +1,6 @@
 //! Bars and threads: ligaments between bodies, with every solver, and what is refused.
 
-use super::static_solids::{last_row, resumes, run, world};
+use pliant_testing::scenes::{last_row, resumes, run, world};
 
 const LAW: &str = "[law.collagen]\ntype = 'neo-hookean'\nyoung-modulus = 1e6\npoisson-ratio = 0.3\n";
 

@@ -1,6 +1,6 @@
 //! Constraints that bind nodes to each other, with every solver: a plate that tilts, rigid parts of a body, and what is refused.
 
-use super::static_solids::{last_row, resumes, run, world};
+use pliant_testing::scenes::{last_row, resumes, run, world};
 
 /// A block of 40 × 20 × 20 mm, held below, with a constraint on its top.
 fn block(solver: &str, constraint: &str, more: &str) -> String {

@@ -1,6 +1,6 @@
 //! Bodies that touch obstacles and tools, from the text of a scene to its outputs, and what is refused.
 
-use super::static_solids::{last_row, resumes, run, world};
+use pliant_testing::scenes::{last_row, resumes, run, world};
 
 /// A block of 40 × 40 × 20 mm of tissue on a floor, a ball that is pressed into its top.
 pub(super) fn pressed(run: &str, more: &str) -> String {

@@ -4,9 +4,9 @@ use std::fs;
 
 use pliant_geometry::{CellKind, io};
 use pliant_scene::World;
+use pliant_testing::scenes::{last_row, resumes, run, world};
 
 use super::contact::{pressed, stacked};
-use super::static_solids::{last_row, resumes, run, world};
 
 /// Fields of all bodies in a series; of a node in a table.
 const FIELDS: &str = "[output.all]\ntype = 'vtu'\nevery = 0.25\n\

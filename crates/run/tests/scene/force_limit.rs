@@ -1,9 +1,9 @@
 //! Tools that push with no more than a force.
 
 use pliant_run::OutputFolder;
+use pliant_testing::scenes::{last_row, resumes, run, world};
 
 use super::contact::pressed;
-use super::static_solids::{last_row, resumes, run, world};
 
 /// A finger that goes 60 mm through a block of 50 mm, by these keys.
 fn through(finger: &str, until: f64) -> String {

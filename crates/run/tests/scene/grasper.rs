@@ -2,8 +2,7 @@
 
 use pliant_sim::Simulation;
 use pliant_sim::contact::pose::Pose;
-
-use super::static_solids::{last_row, resumes, run, scene, world};
+use pliant_testing::scenes::{last_row, resumes, run, scene, world};
 
 /// A flap of 30 × 6 × 20 mm on a floor, and jaws around it that close in 0.3 s and go up by 30 mm until 0.8 s.
 fn flap(run: &str, tool: &str, friction: f64, until: f64) -> String {
@@ -133,7 +132,7 @@ fn impossible_goals_are_told() {
 #[test]
 fn jaws_that_cannot_be_are_refused_with_their_line() {
     for (tool, pieces) in [
-        ("inside = true", ["no body is inside of a jaw", "block.toml:22:"]),
+        ("inside = true", ["no body is inside of a jaw", "scene.toml:22:"]),
         ("opening = { angle = -1 }", ["angle", "opening"]),
         ("ideal-grip = -1", ["ideal-grip", "-1"]),
     ] {

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use pliant_mechanics::grip::Grip;
 use pliant_run::Live;
-use pliant_scene::source::Source;
-use pliant_scene::{Scene, World};
+use pliant_scene::World;
+use pliant_testing::scenes;
 
 const STRIP: &str = r#"
 [scene]
@@ -36,10 +36,7 @@ const SOLID: &str = "mesh = { block = { size = [0.1, 0.02, 0.002], cells = [10, 
 const WEIGHT: f64 = 9.81 * 1000.0 * 0.1 * 0.02 * 0.002;
 
 fn world(body: &str, solver: &str) -> Arc<World> {
-    let text = STRIP.replace("BODY", body) + "[run]\n" + solver;
-    let source = Source::parse("strip.toml", text).unwrap();
-    let scene = Scene::from_source(source, ".".into()).unwrap_or_else(|error| panic!("{}", error.plain()));
-    Arc::new(World::new(&scene).unwrap_or_else(|error| panic!("{}", error.plain())))
+    Arc::new(scenes::world(&(STRIP.replace("BODY", body) + "[run]\n" + solver)).unwrap())
 }
 
 /// The free end of the strip, lifted by a spring from where it is.

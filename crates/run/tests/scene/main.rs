@@ -19,15 +19,7 @@ mod ties;
 mod volumes;
 mod walls;
 
-/// Whether there is a GPU. Without any a test is skipped with a notice, or fails where `PLIANT_REQUIRE_GPU=1`.
 #[cfg(feature = "gpu")]
 fn has_gpu() -> bool {
-    use std::io::Write;
-    let required = std::env::var("PLIANT_REQUIRE_GPU").as_deref() == Ok("1");
-    if required || !pliant_sim::gpu::adapters().is_empty() {
-        return true;
-    }
-    // Past the capture of what passing tests print. A notice that can't be written is none.
-    let _ = writeln!(std::io::stderr(), "skipped: no GPU was found");
-    false
+    pliant_testing::has_gpu(pliant_sim::gpu::adapters().len())
 }

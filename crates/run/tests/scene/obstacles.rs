@@ -6,8 +6,7 @@ use pliant_geometry::{CellKind, Mesh, Vector3, io};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, sphere};
 use pliant_scene::{MeshCache, World};
 use pliant_testing::Random;
-
-use super::static_solids::{last_row, resumes, scene, world};
+use pliant_testing::scenes::{last_row, resumes, scene, world};
 
 /// A soft ball of radius 20 mm that falls into a bowl, which is the inside of a ball of radius 50 mm.
 fn bowl(shape: &str, more: &str) -> String {

@@ -5,12 +5,11 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::static_solids::taken_up;
 use pliant_geometry::CellKind;
 use pliant_geometry::io;
-use pliant_run::{Live, OutputFolder, Summary};
-use pliant_scene::source::Source;
-use pliant_scene::{Scene, World};
+use pliant_run::Live;
+use pliant_scene::World;
+use pliant_testing::scenes::{self, run_world, taken_up};
 
 const LAWS: &str = r#"
 [law.tissue]
@@ -58,20 +57,11 @@ const OUTPUTS: &str =
     "[output.history]\ntype = 'csv'\nevery = 0.02\n[output.fields]\ntype = 'vtu'\nevery = 0.1\n";
 
 fn world(text: &str) -> World {
-    let source = Source::parse("two.toml", text).unwrap_or_else(|error| panic!("{}", error.plain()));
-    let scene = Scene::from_source(source, ".".into()).unwrap_or_else(|error| panic!("{}", error.plain()));
-    World::new(&scene).unwrap_or_else(|error| panic!("{}", error.plain()))
+    scenes::world(text).unwrap()
 }
 
 fn both(more: &str) -> String {
     format!("{HEAD}[participant.walls]\nbodies = ['strip']\n{IMPLICIT}{LAWS}{SOLID}{SHELL}{OUTPUTS}{more}")
-}
-
-fn run(world: &World, folder: &Path) -> Summary {
-    let folder = OutputFolder::prepare(folder.to_owned(), &world.scene, false).unwrap();
-    let summary = pliant_run::run(world, &folder, &mut |_| ()).unwrap();
-    assert_eq!(summary.status, "done", "{:?}", summary.error);
-    summary
 }
 
 /// The last values of the columns of a table, by name.
@@ -92,7 +82,7 @@ fn each_participant_comes_out_as_it_does_alone() {
     let two = world(&both(""));
     let names: Vec<&str> = two.participants.iter().map(|part| part.name.as_str()).collect();
     assert_eq!(names, ["walls", "solids"]);
-    let together = run(&two, &place.path().join("two"));
+    let together = run_world(&two, &place.path().join("two"));
     assert_eq!((together.participants.len(), together.bodies.len(), together.steps), (2, 2, 20));
     let [walls, solids] = &together.participants[..] else { panic!("two participants") };
     assert_eq!((walls.solver, solids.solver, walls.steps), ("implicit", "explicit", 20));
@@ -101,8 +91,8 @@ fn each_participant_comes_out_as_it_does_alone() {
 
     // Alone at the same steps.
     let run_table = format!("[run]\nstep = {:e}\n", solids.step);
-    run(&world(&format!("{HEAD}{run_table}{LAWS}{SOLID}{OUTPUTS}")), &place.path().join("solid"));
-    run(&world(&format!("{HEAD}[run]\n{IMPLICIT}{LAWS}{SHELL}{OUTPUTS}")), &place.path().join("shell"));
+    run_world(&world(&format!("{HEAD}{run_table}{LAWS}{SOLID}{OUTPUTS}")), &place.path().join("solid"));
+    run_world(&world(&format!("{HEAD}[run]\n{IMPLICIT}{LAWS}{SHELL}{OUTPUTS}")), &place.path().join("shell"));
     let [both, solid, shell] = ["two", "solid", "shell"].map(|name| last_row(&place.path().join(name)));
     for axis in ["x", "y", "z"] {
         let base = format!("reaction.base.{axis}");
@@ -127,7 +117,7 @@ fn each_participant_comes_out_as_it_does_alone() {
 fn outputs_show_all_bodies_together() {
     let place = tempfile::tempdir().unwrap();
     let world = world(&both(""));
-    run(&world, place.path().join("two").as_path());
+    run_world(&world, place.path().join("two").as_path());
     let mesh = io::read(&place.path().join("two/fields/000002.vtu")).unwrap().mesh;
     let [hexes, triangles] = [CellKind::Hex, CellKind::Triangle].map(|kind| mesh.block(kind).unwrap());
     let nodes: usize = world.participants.iter().map(|part| part.built.model.node_count()).sum();
@@ -167,12 +157,7 @@ fn without_tables_solids_and_shells_are_participants_of_the_run() {
 
 #[test]
 fn mistakes_of_participants_are_underlined() {
-    let told = |text: &str| {
-        let source = Source::parse("two.toml", text).unwrap();
-        let scene =
-            Scene::from_source(source, ".".into()).unwrap_or_else(|error| panic!("{}", error.plain()));
-        World::new(&scene).err().map_or("no mistake".into(), |errors| errors.plain().to_string())
-    };
+    let told = |text: &str| scenes::world(text).err().unwrap_or_else(|| "no mistake".into());
     let table = |bodies: &str, more: &str| {
         format!("{HEAD}[participant.walls]\nbodies = {bodies}\n{more}{LAWS}{SOLID}{SHELL}{OUTPUTS}")
     };
@@ -208,12 +193,12 @@ fn solids_of_different_steps_and_precisions_go_together() {
                density = 1000\n[constraint.end]\ntype = 'fix'\nbody = 'bar'\nnodes = { set = 'x-min' }\n";
     let table = "[participant.slow]\nbodies = ['bar']\nprecision = 'single'\n";
     let two = world(&format!("{HEAD}{table}{LAWS}{soft}{SOLID}{bar}{OUTPUTS}"));
-    let summary = run(&two, &place.path().join("two"));
+    let summary = run_world(&two, &place.path().join("two"));
     let [slow, fast] = &summary.participants[..] else { panic!("two participants") };
     assert_eq!((slow.precision, fast.precision), ("single", "double"));
     assert!(fast.steps >= 8 * slow.steps, "{} {}", fast.steps, slow.steps);
     let alone = format!("{HEAD}[run]\nprecision = 'single'\nstep = {:e}\n{soft}{bar}{OUTPUTS}", slow.step);
-    run(&world(&alone), &place.path().join("bar"));
+    run_world(&world(&alone), &place.path().join("bar"));
     let [both, bar] = ["two", "bar"].map(|name| last_row(&place.path().join(name)));
     for axis in ["x", "y", "z"] {
         let column = format!("reaction.end.{axis}");

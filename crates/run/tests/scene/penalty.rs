@@ -1,6 +1,7 @@
 //! Ties between participants: each side at its own step.
 
-use super::static_solids::{last_row, resumes, run, world};
+use pliant_testing::scenes::{last_row, resumes, run, world};
+
 use super::ties::{coated, vessel};
 
 const SHELL: &str = "model = 'shell'\nelement = 'dkt-cst'";

@@ -1,14 +1,10 @@
 //! Solids of any law with the solvers `static` and `implicit`: the same equilibria as by dynamic relaxation, shells beside them in one
 //! system of equations, a resumed run with the same bits, and what is refused.
 
-use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
 
 use pliant_geometry::{CellKind, io};
-use pliant_run::{Checkpoint, Options, OutputFolder, Summary};
-use pliant_scene::source::Source;
-use pliant_scene::{Scene, World};
+use pliant_testing::scenes::{last_row, resumes, run, world};
 
 /// A block of 100 × 50 × 50 mm, held at one end, turned and pulled at the other, pressed from above, under its weight.
 pub(super) fn block(solver: &str, element: &str, law: &str, more: &str) -> String {
@@ -27,32 +23,6 @@ pub(super) fn block(solver: &str, element: &str, law: &str, more: &str) -> Strin
          probes.b = {{ on = 'block', at = [0.075, 0.05, 0.025], data = ['displacement', 'cauchy-stress'] }}\n\
          probes.c = {{ on = 'block', at = [0.025, 0.025, 0.05], data = ['displacement', 'energy-density'] }}\n"
     )
-}
-
-pub(super) fn scene(text: &str) -> Result<Scene, String> {
-    let source = Source::parse("block.toml", text.to_owned()).map_err(|errors| errors.plain().to_string())?;
-    Scene::from_source(source, ".".into()).map_err(|errors| errors.plain().to_string())
-}
-
-pub(super) fn world(text: &str) -> Result<World, String> {
-    World::new(&scene(text)?).map_err(|errors| errors.plain().to_string())
-}
-
-pub(super) fn run(text: &str, folder: &Path) -> Summary {
-    let world = world(text).unwrap_or_else(|errors| panic!("{errors}"));
-    let folder = OutputFolder::prepare(folder.to_owned(), &world.scene, false).unwrap();
-    let summary = pliant_run::run(&world, &folder, &mut |_| ()).unwrap();
-    assert_eq!(summary.status, "done", "{:?}", summary.error);
-    summary
-}
-
-/// The last row of the table of a run, by the names of its columns.
-pub(super) fn last_row(text: &str) -> BTreeMap<String, f64> {
-    let out = tempfile::tempdir().unwrap();
-    run(text, &out.path().join("out"));
-    let table = fs::read_to_string(out.path().join("out/history.csv")).unwrap();
-    let names = table.lines().next().unwrap().split(',').map(str::to_owned);
-    names.zip(table.lines().last().unwrap().split(',').map(|value| value.parse().unwrap())).collect()
 }
 
 pub(super) const MATRIX: &str = "young-modulus = 1e4\npoisson-ratio = 0.45";
@@ -173,32 +143,6 @@ fn a_resumed_run_of_solids_ends_in_the_same_bits() {
             block(&format!("{solver}\ncheckpoint = {{ every = 0.4 }}"), "tet4-anp", &law, "damping = 5");
         resumes(&text);
     }
-}
-
-/// A run of 1 s that is cut off at 0.4 s and taken up again writes the same last row as one without a stop.
-pub(super) fn resumes(text: &str) {
-    let whole = world(text).unwrap();
-    let half = world(&text.replace("until = 1", "until = 0.4")).unwrap();
-    let place = tempfile::tempdir().unwrap();
-    let [a, b] = taken_up(&whole, &half, place.path()).1;
-    assert_eq!(a.lines().last(), b.lines().last(), "{text}");
-}
-
-/// Runs a world without a stop, and after a shorter one from its checkpoint on: that checkpoint, and the table of each.
-pub(super) fn taken_up(whole: &World, half: &World, place: &Path) -> (Checkpoint, [String; 2]) {
-    for (world, name) in [(whole, "whole"), (half, "half")] {
-        let folder = OutputFolder::prepare(place.join(name), &world.scene, false).unwrap();
-        let summary = pliant_run::run(world, &folder, &mut |_| ()).unwrap();
-        assert_eq!(summary.status, "done", "{:?}", summary.error);
-    }
-    let checkpoint = Checkpoint::read(&place.join("half")).unwrap();
-    let onward = checkpoint.continues(whole).unwrap();
-    let folder = OutputFolder::reopen(place.join("half"), &onward.scene, &checkpoint).unwrap();
-    let options = Options { resume: Some(&checkpoint), ..Options::default() };
-    let summary = pliant_run::run_with(&onward, &folder, options, &mut |_| ()).unwrap();
-    assert_eq!(summary.status, "done", "{:?}", summary.error);
-    let table = |name: &str| fs::read_to_string(place.join(name).join("history.csv")).unwrap();
-    (checkpoint, ["whole", "half"].map(table))
 }
 
 #[test]

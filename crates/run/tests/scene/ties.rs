@@ -2,10 +2,11 @@
 
 #[cfg(feature = "gpu")]
 use pliant_scene::{Scene, World};
-
 #[cfg(feature = "gpu")]
-use super::static_solids::taken_up;
-use super::static_solids::{MATRIX, block, last_row, resumes, world};
+use pliant_testing::scenes::taken_up;
+use pliant_testing::scenes::{last_row, resumes, world};
+
+use super::static_solids::{MATRIX, block};
 
 /// A block of 40 × 20 × 10 mm of tissue, its width held, stretched along x, and a coat on its top on another mesh.
 pub fn coated(solver: &str, coat: &str, more: &str) -> String {
@@ -102,7 +103,7 @@ fn a_vessel_in_a_solid_stands_where_every_solver_puts_it() {
 fn energies_of_tied_bodies_balance_and_the_critical_step_is_that_of_the_whole() {
     let out = tempfile::tempdir().unwrap();
     let text = vessel("solver = 'explicit'", "", "model = 'membrane'").replace("until = 1", "until = 0.3");
-    let summary = super::static_solids::run(&text, out.path());
+    let summary = pliant_testing::scenes::run(&text, out.path());
     assert!(summary.energy_balance.unwrap().abs() < 0.01, "{:?}", summary.energy_balance);
     let critical = summary.critical_step.unwrap();
     assert!((summary.step / critical - 0.9).abs() < 0.01);
@@ -242,7 +243,7 @@ fn a_uniform_strain_passes_through_ties() {
                         "'block'\nnodes = { half-space = { point = [0, 1e-6, 0], normal = [0, -1, 0] } }",
                     );
             let out = tempfile::tempdir().unwrap();
-            super::static_solids::run(&text, out.path());
+            pliant_testing::scenes::run(&text, out.path());
             let files = std::fs::read_dir(out.path().join("all")).unwrap().map(|entry| entry.unwrap().path());
             let frame = pliant_geometry::io::read(&files.max().unwrap()).unwrap().mesh;
             let moved = &frame.point_data["displacement"];

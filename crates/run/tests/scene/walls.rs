@@ -3,8 +3,9 @@
 use std::fs;
 
 use pliant_geometry::{CellKind, io};
+use pliant_testing::scenes::{last_row, resumes, run, world};
 
-use super::static_solids::{MATRIX, block, last_row, resumes, run, world};
+use super::static_solids::{MATRIX, block};
 
 /// A capsule on the block, one law for all solvers.
 const CAPSULE: &str = "[law.capsule]\ntype = 'neo-hookean'\nyoung-modulus = 2e5\npoisson-ratio = 0.5\n\

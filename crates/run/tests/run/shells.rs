@@ -1,11 +1,11 @@
-//! Shells through the real binary: what is refused and in which words, what a failed run keeps, and what
-//! a run that went well leaves.
+//! Shells: what is refused and in which words, what a failed run keeps, and what a run that went well leaves.
 
 use std::collections::BTreeMap;
 use std::fs;
 
-use crate::support::{Told, Workshop, changed};
 use pliant_geometry::Mesh;
+use pliant_run::SweepOptions;
+use pliant_testing::scenes::{Told, Workshop, changed};
 
 /// A cantilever of 16 triangles.
 const WALL: &str = r#"[scene]
@@ -69,7 +69,7 @@ fn says(told: &Told, pieces: &[&str]) {
 fn refused(changes: &[(&str, &str)], pieces: &[&str]) {
     let workshop = wall(changes);
     let told = workshop.run(&[]);
-    assert_eq!(told.code, 2, "{}\n{}", told.err, told.out);
+    assert_eq!(told.status(), "invalid", "{}", told.err);
     says(&told, pieces);
     assert_eq!(told.json()["error"]["kind"], "input");
     assert!(!workshop.path("out").exists(), "something was written");
@@ -111,7 +111,7 @@ fn off(points: &[[f64; 3]], cells: &[&[u32]]) -> String {
     format!("OFF\n{} {} 0\n", points.len(), cells.len()) + &points_text.chain(cells_text).collect::<String>()
 }
 
-/// What the binary tells of a scene with a shell from a file.
+/// What is told of a scene with a shell from a file.
 fn from_file(points: &[[f64; 3]], cells: &[&[u32]], changes: &[(&str, &str)]) -> Told {
     let own = [
         (PLATE, "mesh = { file = \"wall.off\" }"),
@@ -136,12 +136,12 @@ fn meshes_that_are_no_shells_are_refused_or_repaired() {
     says(&told, &["`wall`: 1 triangle turned over, so that all face one side"]);
 
     let told = from_file(&with([0.05, 0.05, 0.0]), &[&[0, 1, 2], &[0, 2, 3], &[0, 4, 2]], &[]);
-    assert_eq!(told.code, 2);
+    assert_eq!(told.status(), "invalid");
     says(&told, &["`wall` has triangles without area at rest: triangle 2", "remesh there"]);
 
     let fin: [&[u32]; 3] = [&[0, 1, 2], &[0, 2, 3], &[0, 2, 4]];
     let told = from_file(&with([0.05, 0.05, 0.1]), &fin, &[]);
-    assert_eq!(told.code, 2);
+    assert_eq!(told.status(), "invalid");
     says(&told, &["3 triangles of `wall` meet in the edge of nodes 0 and 2", "set `branches = true`"]);
     from_file(&with([0.05, 0.05, 0.1]), &fin, &[(THICK, "thickness = 0.002\nbranches = true")]).done();
 
@@ -149,7 +149,7 @@ fn meshes_that_are_no_shells_are_refused_or_repaired() {
     let points: Vec<[f64; 3]> = strip.iter().flat_map(|&[x, y]| [[x, y, -0.02], [x, y, 0.02]]).collect();
     let moebius: [&[u32]; 6] = [&[0, 2, 1], &[1, 2, 3], &[2, 4, 3], &[3, 4, 5], &[4, 1, 5], &[5, 1, 0]];
     let told = from_file(&points, &moebius, &[]);
-    assert_eq!(told.code, 2);
+    assert_eq!(told.status(), "invalid");
     says(&told, &["shell `wall` has no two sides", "nodes 3 and 4; cut it there"]);
 }
 
@@ -189,11 +189,11 @@ fn doubtful_shells_are_warned_about() {
         ],
     );
     let distorted = PLATE.replace("[4, 2]", "[32, 32], distortion = 0.3, seed = 3");
-    let told = wall(&[(PLATE, &distorted)]).pliant(&["check", "case"]);
-    assert_eq!(told.code, 0, "{}", told.err);
+    let told = wall(&[(PLATE, &distorted)]).check(&[]);
+    assert_eq!(told.status(), "checked", "{}", told.err);
     says(&told, &["of `wall` folded back onto all neighbours, as inverted ones are", "smooth or remesh"]);
-    let told = wall(&[(THICK, "thickness = 0.002\nelement = \"comas-2010\"")]).pliant(&["check", "case"]);
-    assert_eq!(told.code, 0, "{}", told.err);
+    let told = wall(&[(THICK, "thickness = 0.002\nelement = \"comas-2010\"")]).check(&[]);
+    assert_eq!(told.status(), "checked", "{}", told.err);
     says(&told, &["`wall` has the element of Comas (2010)", "6 to 26 % too soft", "take `dkt-curved`"]);
 }
 
@@ -205,8 +205,8 @@ fn pressures_and_membranes_go_in_pairs() {
             (THICK, &format!("{THICK}\n{element}")),
             ("pressure = 1", &format!("pressure = 1\n{spread}")),
         ]);
-        let told = scene.pliant(&["check", "case"]);
-        assert_eq!(told.code, 0, "{}", told.err);
+        let told = scene.check(&[]);
+        assert_eq!(told.status(), "checked", "{}", told.err);
         told
     };
     let (flat, lumped, curved) = ("element = \"dkt-opt\"", "spread = \"lumped\"", "spread = \"curved\"");
@@ -236,8 +236,8 @@ fn coarse_meshes_of_curved_walls_under_pressure_are_warned_about() {
             ("{ set = \"x-min\" }", "{ set = \"z-min\" }"),
             (THICK, "thickness = 5e-4"),
         ])
-        .pliant(&["check", "case"]);
-        assert_eq!(told.code, 0, "{}", told.err);
+        .check(&[]);
+        assert_eq!(told.status(), "checked", "{}", told.err);
         told
     };
     let told = cylinder(", distortion = 0.2");
@@ -270,7 +270,7 @@ fn coarse_meshes_of_curved_walls_under_pressure_are_warned_about() {
 fn singular_stiffness_names_the_node_and_what_to_try() {
     let workshop = wall(&[(THICK, "thickness = 0.002\nelement = \"plate\"")]);
     let told = workshop.run(&[]);
-    assert_eq!(told.code, 1, "{}", told.err);
+    assert_eq!(told.status(), "failed", "{}", told.err);
     let json = told.json();
     assert_eq!((&json["error"]["kind"], &json["error"]["body"]), (&"singular".into(), &"wall".into()));
     let node = json["error"]["node"].as_u64().expect("a node");
@@ -314,7 +314,7 @@ fn a_slack_membrane_is_told_and_starts() {
     assert!(slack > 2e-5 && taut > 0.0 && taut < 0.1 * slack, "{slack} {taut}");
 
     let told = wall(&[(THICK, "thickness = 0.002\nelement = \"membrane\"")]).run(&[]);
-    assert_eq!(told.code, 1, "{}", told.err);
+    assert_eq!(told.status(), "failed", "{}", told.err);
     says(&told, &["in `wall`", "a membrane resists bending and compression across by nothing"]);
     assert!(!told.words().contains("inf"), "{}", told.err);
     let plate = "thickness = 0.002\nelement = \"plate\"\npre-tension = 1";
@@ -430,7 +430,7 @@ const CRUSHING: &str = "pressure = 1e6\ncurve = { table = [[0, 0], [0.5, 1e-6], 
 fn a_run_without_equilibrium_keeps_what_it_found() {
     let workshop = wall(&[("pressure = 1", CRUSHING)]);
     let told = workshop.run(&[]);
-    assert_eq!(told.code, 1, "{}", told.err);
+    assert_eq!(told.status(), "failed", "{}", told.err);
     says(&told, &["after t = 0.5000 s", "in `wall`", "what was written before stays readable"]);
     let kept = |workshop: &Workshop| {
         let (_, rows) = workshop.table("out/case/history.csv");
@@ -445,7 +445,7 @@ fn a_run_without_equilibrium_keeps_what_it_found() {
     let strong = CRUSHING.replace("1e6", "1e3").replace("1e-6", "1e-9");
     let workshop = wall(&[("pressure = 1", &strong), (STEPS, "load-steps = 2\niterations = 2")]);
     let told = workshop.run(&[]);
-    assert_eq!(told.code, 1, "{}", told.err);
+    assert_eq!(told.status(), "failed", "{}", told.err);
     let json = told.json();
     assert_eq!(
         (&json["error"]["kind"], &json["error"]["time"]),
@@ -469,7 +469,7 @@ fn a_run_without_equilibrium_keeps_what_it_found() {
 
     let stalled = "load-steps = 2\nlinear = { by = \"conjugate-gradients\", iterations = 2, preconditioner = \"block-jacobi\" }";
     let told = wall(&[(STEPS, stalled)]).run(&[]);
-    assert_eq!(told.code, 1);
+    assert_eq!(told.status(), "failed");
     says(
         &told,
         &["conjugate gradients stand at a residual of", "after 2 iterations", "use the direct solver"],
@@ -561,7 +561,8 @@ fn the_number_of_threads_changes_no_bit() {
             ("cells = [4, 2]", "cells = [16, 8]"),
         ]);
         for threads in ["1", "2"] {
-            workshop.run(&["--threads", threads, "--out", &format!("out/{threads}")]).done();
+            let told = workshop.run_into(&format!("out/{threads}"), &[&format!("run.threads={threads}")]);
+            told.done();
         }
         for file in ["history.csv", "fields/000000.vtu", "fields/000002.vtu"] {
             let [one, two] =
@@ -591,9 +592,10 @@ fn json_tells_a_run_of_shells() {
 #[test]
 fn a_sweep_over_the_thickness_finds_the_cubes() {
     let workshop = wall(&[("pressure = 1", "pressure = 1e-3")]);
-    let told = workshop.pliant(&["sweep", "case", "--set", "body.wall.thickness=0.001,0.002,0.004"]);
-    assert_eq!(told.code, 0, "{}", told.err);
-    let text = workshop.read("out/case-sweep/sweep.csv");
+    let summary =
+        workshop.sweep("out/sweep", &["body.wall.thickness=0.001,0.002,0.004"], SweepOptions::default());
+    assert!(summary.failures.is_empty(), "{summary:?}");
+    let text = workshop.read("out/sweep/sweep.csv");
     let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
     let column = rows[0].iter().position(|name| name.ends_with("probe.end.displacement.z")).unwrap();
     let deflection = |row: usize| rows[row][column].parse::<f64>().unwrap();

@@ -1,0 +1,16 @@
+//! Runs of scenes with their files and words, in this process. One program for all files here; run those of a file with
+//! `cargo test -p pliant-run --test run resuming::`.
+
+#[cfg(feature = "gpu")]
+mod devices;
+mod images;
+mod meshes;
+mod mistakes;
+mod motions;
+mod outputs;
+mod resuming;
+mod shells;
+mod steps;
+mod support;
+mod surfaces;
+mod sweeping;

@@ -1,0 +1,399 @@
+//! Steps of a run: how they are cut and told, load steps, elements and laws in a run, and the errors that end one.
+
+use std::fs;
+
+use pliant_testing::scenes::{BLOCK, Workshop, changed};
+use serde_json::Value;
+
+use crate::support::{assert_close, keys, squeezed};
+
+#[test]
+fn a_state_that_is_no_longer_finite_ends_the_run() {
+    let told = Workshop::block("acceleration = [1, 0, 0]", "acceleration = [1e308, 0, 0]").run(&[]);
+    assert_eq!(told.status(), "failed", "{}", told.err);
+    let error = &told.json()["error"];
+    assert_eq!(error["kind"], "not-finite");
+    assert_eq!(error["body"], "block");
+    assert!(error["node"].is_u64() && error["time"].is_f64() && error["element"].is_null(), "{error}");
+}
+
+#[test]
+fn every_law_runs_by_its_name() {
+    let elastic = "young-modulus = 10e3\npoisson-ratio = 0.45\n";
+    let laws = [
+        ("coupled-neo-hookean", elastic, ""),
+        ("logarithmic-neo-hookean", elastic, ""),
+        ("st-venant-kirchhoff", elastic, ""),
+        ("corotational", elastic, ""),
+        ("mooney-rivlin", "", "c10 = 1e3\nc01 = 700\npoisson-ratio = 0.45"),
+        ("polynomial", "", "c10 = 1e3\nc01 = 700\nc20 = 100\npoisson-ratio = 0.45"),
+        ("yeoh", "", "c1 = 1.7e3\nc2 = 100\nc3 = 50\npoisson-ratio = 0.45"),
+        ("arruda-boyce", "shear-modulus = 3e3\nbulk-modulus = 30e3\n", "locking-stretch = 3"),
+        ("gent", elastic, "limit = 2"),
+        ("demiray", elastic, "exponent = 2"),
+        ("veronda-westmann", "", "c1 = 300\nc2 = 3\npoisson-ratio = 0.45"),
+        ("ogden", "", "terms = [{ shear-modulus = 3.4e3, exponent = 2 }]\npoisson-ratio = 0.45"),
+        ("orthotropic", elastic, "e4 = 5e3\ne6 = 2e3\nsecond-fibre = [1, 0, 0]"),
+        (
+            "holzapfel-gasser-ogden",
+            elastic,
+            "fibre-modulus = 2e3\nfibre-exponent = 1\nfamilies = 2\nsecond-fibre = [1, 0, 0]",
+        ),
+        (
+            "fung-orthotropic",
+            "bulk-modulus = 30e3\n",
+            "modulus = 3e3\nnormal = [[1, 0.2, 0.2], [0.2, 1, 0.2], [0.2, 0.2, 1]]\nshear = [1, 1, 1]",
+        ),
+    ];
+    for (name, matrix, own) in laws {
+        let mut scene = changed(BLOCK, "\"transversely-isotropic\"", &format!("\"{name}\""));
+        scene = scene.replace(elastic, matrix).replace("fibre-modulus = 5e3", own);
+        let workshop = Workshop::new(&scene);
+        let told = workshop.run(&[]);
+        assert_eq!(told.status(), "done", "{name}: {}", told.err);
+    }
+}
+
+#[test]
+fn a_law_beyond_its_locking_strain_ends_the_run_with_an_error() {
+    let scene = changed(BLOCK, "\"transversely-isotropic\"", "\"gent\"")
+        .replace("fibre-modulus = 5e3", "limit = 0.05")
+        .replace("by = [0, 0, 0.001]", "by = [0, 0, 0.1]");
+    let told = Workshop::new(&scene).run(&[]);
+    assert_eq!(told.status(), "failed", "{}", told.err);
+    assert_eq!(told.json()["status"], "failed");
+    assert!(told.err.contains("of `block`") && told.err.contains("t = "), "{}", told.err);
+}
+
+/// A block of soft tissue that gravity, set in at once, stretches by 38 %.
+const SOFT: &str = r#"[scene]
+until = 0.4
+gravity = [9.81, 0, 0]
+
+[run]
+step = "auto"
+on-unstable = "substep"
+
+[law.tissue]
+type = "neo-hookean"
+young-modulus = 3000
+poisson-ratio = 0.45
+
+[body.block]
+mesh = { block = { size = [0.1, 0.05, 0.05], cells = [8, 4, 4] }, as = "hexes" }
+law = "tissue"
+density = 1000
+
+[constraint.wall]
+type = "fix"
+body = "block"
+nodes = { set = "x-min" }
+
+[output.history]
+type = "csv"
+every = 0.05
+probes.tip = { on = "block", at = [0.1, 0.025, 0.025] }
+"#;
+
+#[test]
+fn steps_are_cut_where_the_stable_one_falls_below_them_and_it_is_told() {
+    let workshop = Workshop::new(SOFT);
+    let done = workshop.run(&[]).done();
+    let seen = &done["stability"];
+    assert_eq!((&seen["on_unstable"], &seen["most_substeps"]), (&"substep".into(), &2.into()), "{seen}");
+    assert!(seen["cuts"].as_u64() > Some(0) && seen["extra_steps"].as_u64() > Some(0), "{seen}");
+    assert!(seen["limit_over_step"].as_f64().unwrap() < 1.0 && seen["first_cut"].is_f64(), "{seen}");
+    assert!(!done["warnings"].to_string().contains("stable step"), "{done}");
+    let page = workshop.read("out/case/summary.md");
+    assert!(
+        page.contains("During the run: smallest stable step seen: ")
+            && page.contains("steps were cut")
+            && page.contains("into at most 2 parts"),
+        "{page}"
+    );
+    // `substep` is the default, and gives the result of a small step.
+    let tip = |workshop: &Workshop| workshop.table("out/case/history.csv").1;
+    let fine = Workshop::new(&changed(SOFT, "on-unstable = \"substep\"\n", ""));
+    fine.run(&["run.step=3e-4"]).done();
+    for (row, fine) in tip(&workshop).iter().zip(tip(&fine)) {
+        let (tip, time) = (row.len() - 3, row[0]);
+        // Rows are of the nearest instants, up to half a step of 3 ms apart at 0.5 m/s.
+        assert_close(row[tip], fine[tip], 1e-3, &format!("the tip at {time} s"));
+    }
+    let default = Workshop::new(&changed(SOFT, "on-unstable = \"substep\"\n", "")).run(&[]).done();
+    assert_eq!(default["stability"], *seen);
+}
+
+#[test]
+fn below_the_stable_step_a_run_can_stop_or_only_report() {
+    let told = Workshop::new(&changed(SOFT, "\"substep\"", "\"stop\"")).run(&[]);
+    assert_eq!(told.status(), "failed");
+    let error = &told.json()["error"];
+    assert_eq!((&error["kind"], &error["body"]), (&"unstable".into(), &"block".into()));
+    assert!(error["element"].is_u64() && error["node"].is_u64() && error["time"].is_f64(), "{error}");
+    for piece in ["the largest stable step has fallen to", "smaller `step`", "on-unstable"] {
+        assert!(told.err.contains(piece), "no `{piece}` in {}", told.err);
+    }
+    let told = Workshop::new(&changed(SOFT, "\"substep\"", "\"report\"")).run(&["scene.until=0.11"]);
+    let seen = &told.json()["stability"];
+    assert!(seen["steps_below"].as_u64() > Some(0) && seen["extra_steps"] == 0, "{seen}");
+    assert!(
+        told.err.contains("warning: smallest stable step seen") && told.err.contains("below the step"),
+        "{}",
+        told.err
+    );
+}
+
+#[test]
+fn mass_scaling_enlarges_the_step_tells_the_added_mass_and_leaves_forces_at_rest() {
+    let scene = SOFT
+        .replace("until = 0.4", "until = 3.0")
+        .replace("[9.81, 0, 0]", "[0, 0, -1.0]")
+        .replace("density = 1000", "density = 1000\ndamping = 10");
+    let plain = Workshop::new(&scene).run(&[]).done();
+    let bound = plain["element_bound"].as_f64().unwrap();
+    assert!(plain["added_mass"].is_null());
+    let scaled = |factor: f64| {
+        let line = format!("step = \"auto\"\nmass-scaling = {{ target-step = {:e} }}", factor * bound);
+        Workshop::new(&changed(&scene, "step = \"auto\"", &line))
+    };
+    let workshop = scaled(1.02);
+    let told = workshop.run(&[]);
+    let done = told.done();
+    let added = &done["added_mass"];
+    // All elements are alike: each becomes heavier by 1.02² − 1.
+    assert_close(added["percent"].as_f64().unwrap(), 4.04, 1e-9, "added mass in percent");
+    assert_eq!(added["elements"], 128);
+    assert_close(
+        done["mass"].as_f64().unwrap(),
+        plain["mass"].as_f64().unwrap(),
+        0.0,
+        "mass of the material",
+    );
+    assert_close(
+        done["critical_step"].as_f64().unwrap() / plain["critical_step"].as_f64().unwrap(),
+        1.02,
+        1e-4,
+        "limit",
+    );
+    for axis in 0..3 {
+        let force = |run: &Value| run["reactions"]["wall"][axis].as_f64().unwrap();
+        // 0.25 N hang there; e^(−10 · 3/2) of the vibration is left.
+        assert_close(force(&done), force(&plain), 1e-6, "reaction at rest [N]");
+    }
+    assert!(
+        told.err.contains("note: mass scaling to") && told.err.contains("4.04 % of the mass"),
+        "{}",
+        told.err
+    );
+    assert!(workshop.read("out/case/summary.md").contains("| mass added by scaling |"));
+    let check = workshop.check(&[]);
+    assert!(
+        check.out.contains("mass scaling  adds") && check.out.contains("4.04 %, to 128 elements"),
+        "{}",
+        check.out
+    );
+    let much = scaled(1.1).run(&["scene.until=0.01"]);
+    much.done();
+    assert!(
+        much.words().contains("21.00 % of the mass is added") && much.words().contains("more than 5 %"),
+        "{}",
+        much.err
+    );
+    let none = scaled(0.5).run(&["scene.until=0.01"]).done();
+    assert_eq!(none["added_mass"]["elements"], 0);
+}
+
+#[test]
+fn hourglass_energy_above_5_percent_is_warned_about() {
+    // Hexes one deep, pulled at one corner.
+    let pulled = "[load.pull]\ntype = \"force\"\non = \"block\"\n\
+                  nodes = { nearest = { point = [0.1, 0, 0] } }\ntotal = [0, 0.2, 0]\n\n[output.history]";
+    let coarse = changed(SOFT, "cells = [8, 4, 4]", "cells = [2, 1, 1]");
+    let coarse = changed(&changed(&coarse, "[output.history]", pulled), "gravity = [9.81, 0, 0]", "");
+    let workshop = Workshop::new(&coarse);
+    let told = workshop.run(&[]);
+    let done = told.done();
+    let warning = done["warnings"][0].as_str().unwrap();
+    for piece in [
+        "hourglass control holds",
+        "% of the internal energy",
+        "`block`",
+        "finer mesh",
+        "hex8-full",
+        "`hourglass`",
+    ] {
+        assert!(warning.contains(piece), "no `{piece}` in {warning}");
+    }
+    assert!(told.err.contains(&format!("warning: {warning}")), "{}", told.err);
+    assert!(workshop.read("out/case/summary.md").contains(&format!("**Warning:** {warning}")));
+    let full = changed(&coarse, "density = 1000", "density = 1000\nelement = \"hex8-full\"");
+    assert_eq!(Workshop::new(&full).run(&[]).done()["warnings"], serde_json::json!([]));
+}
+
+/// A block of nearly incompressible tissue whose end is moved sideways, of an element, by a solver.
+fn bent(element: &str, run: &str) -> String {
+    let cells = if element.starts_with("tet") { "tets" } else { "hexes" };
+    format!(
+        r#"
+[scene]
+until = 1.0
+[run]
+{run}
+[law.tissue]
+type = "neo-hookean"
+young-modulus = 10e3
+poisson-ratio = 0.45
+[body.block]
+mesh = {{ block = {{ size = [0.1, 0.05, 0.05] }}, edge = 0.025, as = "{cells}" }}
+element = "{element}"
+law = "tissue"
+density = 1000
+damping = 60
+[constraint.wall]
+type = "fix"
+body = "block"
+nodes = {{ set = "x-min" }}
+[constraint.hand]
+type = "move"
+body = "block"
+nodes = {{ set = "x-max" }}
+by = [0, 0, 0.01]
+to = 0.4
+[output.fields]
+type = "vtu"
+every = 1.0
+data = ["displacement", "von-mises", "pressure"]
+"#
+    )
+}
+
+fn hand(text: &str) -> f64 {
+    Workshop::new(text).run(&[]).done()["reactions"]["hand"][2].as_f64().unwrap()
+}
+
+#[test]
+fn every_element_reaches_the_same_rest_by_dynamics_and_without() {
+    let mut forces = Vec::new();
+    for element in ["tet4", "tet4-anp", "tet4-ianp", "tet4-ianp-niftysim", "hex8", "hex8-full"] {
+        let [dynamic, still] =
+            ["", "solver = \"quasi-static\"\nload-steps = 2"].map(|run| hand(&bent(element, run)));
+        // The explicit run still moves a little after 0.6 s of hold.
+        assert_close(dynamic, still, 2e-3 * still, element);
+        forces.push(still);
+    }
+    // Averaging the pressure loosens tets.
+    assert!(forces[1] < 0.98 * forces[0], "{forces:?}");
+}
+
+#[test]
+fn a_quasi_static_body_that_nothing_holds_is_refused_while_it_runs() {
+    let free = bent("hex8", "solver = \"quasi-static\"\ntolerance = 1e-9")
+        .replace("[constraint.wall]", "[constraint.unused]")
+        .replace("until = 1.0", "until = 1.0\ngravity = [0, 0, -9.81]")
+        .replace("nodes = { set = \"x-min\" }", "nodes = { set = \"x-min\" }\ncomponents = [\"y\"]")
+        .replace("by = [0, 0, 0.01]", "by = [0, 0, 0.01]\ncomponents = [\"y\"]");
+    let told = Workshop::new(&free).run(&[]);
+    assert_eq!(told.status(), "failed", "{}", told.err);
+    let error = &told.json()["error"];
+    assert_eq!(error["kind"], "not-converged");
+    assert_eq!(keys(&error["load_step"]), ["number", "of", "iterations", "residual"]);
+    assert_eq!(
+        (error["load_step"]["number"].as_u64(), error["load_step"]["of"].as_u64()),
+        (Some(0), Some(10))
+    );
+    assert!(error["load_step"]["residual"].as_f64().unwrap() > 1e-9 && error["node"].is_number(), "{error}");
+    // Gravity acts from the start: its equilibrium comes before the first load step.
+    for piece in ["the loads at t = 0: no equilibrium", "largest at node", "iterations", "nothing holds"] {
+        assert!(told.err.contains(piece), "{}", told.err);
+    }
+}
+
+#[test]
+fn load_steps_that_are_not_as_asked_or_not_equal_are_told() {
+    let run = |lines: &str| {
+        let workshop = Workshop::new(&bent("hex8", &format!("solver = \"quasi-static\"\n{lines}")));
+        let told = workshop.run(&[]);
+        (told.err.clone(), workshop.read("out/case/summary.md"), told.done())
+    };
+    let (said, page, json) = run("step = 0.3");
+    let note = "a step of 0.3000 s does not divide the 1.000 s of the scene: it takes 4 steps of 0.2500 s";
+    assert!(said.contains(note) && page.contains(note), "{said}\n{page}");
+    assert_eq!((&json["step"], &json["steps"]), (&0.25.into(), &4.into()));
+    let (said, page, unequal) = run("load-steps = { times = [0.1, 0.4] }");
+    let note = "the load steps end at t = 0.1000, 0.4000, 1.000 s";
+    assert!(said.contains(note) && page.contains(note), "{said}\n{page}");
+    assert_eq!(unequal["steps"], 3);
+    assert_close(
+        unequal["reactions"]["hand"][2].as_f64().unwrap(),
+        json["reactions"]["hand"][2].as_f64().unwrap(),
+        1e-6,
+        "the same equilibrium at the end",
+    );
+    let equilibria = &unequal["equilibria"];
+    assert_eq!(keys(equilibria), ["found", "external_error", "displacement_error"]);
+    assert!(equilibria["displacement_error"].as_f64().unwrap() < 1e-3, "{equilibria}");
+    for (lines, pieces) in [
+        ("load-steps = { times = [0.4, 0.1] }", ["increase", "out of order"]),
+        ("step = 0.5\nload-steps = { times = [0.4] }", ["in two ways", "leave one of them out"]),
+    ] {
+        let scene = bent("hex8", &format!("solver = \"quasi-static\"\n{lines}"));
+        let told = Workshop::new(&scene).run(&[]);
+        assert!(
+            told.status() == "invalid" && pieces.iter().all(|piece| told.err.contains(piece)),
+            "{}",
+            told.err
+        );
+    }
+}
+
+#[test]
+fn a_flattened_cube_ends_with_the_corner_that_turns_inside_out() {
+    for by in ["-0.095", "-0.099"] {
+        let told = Workshop::new(&squeezed("hex8-full", "", &format!("by = [0, 0, {by}]"))).run(&[]);
+        assert_eq!(told.status(), "failed", "{by}: {}", told.err);
+        let error = &told.json()["error"];
+        assert_eq!(error["kind"], "inverted", "{by}: {error}");
+        for piece in ["at its corner at node", "(det F = ", "slower or smaller motion"] {
+            assert!(told.err.contains(piece), "{by}: no `{piece}` in {}", told.err);
+        }
+        assert!(error["element"].is_number() && error["node"].is_number() && error["time"].is_number());
+    }
+    // One point a cell: hourglass control holds the corners apart for longer.
+    for by in ["-0.095", "-0.099"] {
+        let told = Workshop::new(&squeezed("hex8", "", &format!("by = [0, 0, {by}]"))).run(&[]);
+        assert_eq!(
+            (told.status(), &told.json()["error"]["kind"]),
+            ("failed", &"inverted".into()),
+            "{by}: {}",
+            told.err
+        );
+        assert!(told.err.contains("at its corner at node"), "{by}: {}", told.err);
+    }
+    let run = "solver = \"quasi-static\"\nload-steps = 2";
+    for element in ["hex8", "hex8-full"] {
+        let scene = squeezed(element, run, "by = [0, 0, -0.099]\ncurve = \"hold\"");
+        let told = Workshop::new(&scene).run(&[]);
+        assert_eq!(told.status(), "failed", "{element}: {}", told.err);
+        let advice = told.err.contains("inverted") && told.err.contains("let it grow over time");
+        assert!(advice && !told.err.contains("more load steps"), "{element}: {}", told.err);
+    }
+}
+
+/// If every node is fixed, the model has no critical time step, and the output says so.
+#[test]
+fn a_body_whose_nodes_are_all_prescribed_has_no_limit_and_a_page_without_inf() {
+    let scene = squeezed("hex8", "", "by = [0, 0, 0.001]")
+        .replace("nodes = { set = \"z-max\" }", "nodes = \"all\"\ncomponents = [\"x\", \"y\", \"z\"]")
+        .replace("[constraint.base]\ntype = \"fix\"\nbody = \"cube\"\nnodes = { set = \"z-min\" }\n", "");
+    let workshop = Workshop::new(&scene);
+    workshop.run(&[]).done();
+    let page = fs::read_to_string(workshop.path("out/case/summary.md")).unwrap();
+    assert!(page.contains("none: every node is held or moved as prescribed"), "{page}");
+    assert!(page.contains("any step is stable, as no node is free to move"), "{page}");
+    let checked = workshop.check(&[]).words();
+    for text in [page, checked] {
+        let words: Vec<&str> = text.split(|c: char| !c.is_alphanumeric()).collect();
+        assert!(!words.iter().any(|word| ["inf", "NaN", "nan"].contains(word)), "{text}");
+    }
+}

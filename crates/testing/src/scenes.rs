@@ -1,0 +1,693 @@
+//! Scenes of tests: texts and mesh files to start from, a temporary folder for them, and what a check or a run of one finds. All of it
+//! happens in this process and in the words of the libraries, so only the tests of the binary itself need the binary.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use pliant_geometry::io::{self, MeshFile};
+use pliant_run::{
+    Checkpoint, Options, OutputFolder, Summary, Sweep, SweepOptions, SweepSummary, failed_input,
+    failed_output, overview,
+};
+use pliant_scene::diagnostic::{Diagnostic, MOST_SHOWN, SceneErrors};
+use pliant_scene::source::Source;
+use pliant_scene::{MeshCache, Scene, World};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+/// The repository.
+pub const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+
+/// A scene with one table of every kind.
+pub const BLOCK: &str = r#"[scene]
+until = 0.02
+gravity = [0, 0, -9.81]
+
+[run]
+precision = "double"
+step = "auto"
+threads = 1
+
+[law.tissue]
+type = "transversely-isotropic"
+young-modulus = 10e3
+poisson-ratio = 0.45
+fibre-modulus = 5e3
+fibre = [0, 1, 0]
+prony = [{ part = "isochoric", weight = 0.3, time = 0.5 }]
+
+[body.block]
+mesh = { block = { size = [0.1, 0.1, 0.1] }, edge = 0.05 }
+law = "tissue"
+density = 1000
+damping = 5
+
+[surface.skin]
+on = "block"
+mesh = { block = { size = [0.1, 0.1, 0.1] }, edge = 0.04 }
+
+[constraint.base]
+type = "fix"
+body = "block"
+nodes = { set = "z-min" }
+
+[constraint.hand]
+type = "move"
+body = "block"
+nodes = { set = "z-max" }
+by = [0, 0, 0.001]
+curve = "smooth-step"
+
+[load.push]
+type = "force"
+on = "block"
+nodes = { nearest = { point = [0.1, 0.05, 0.05] } }
+total = [0.1, 0, 0]
+
+[load.wind]
+type = "traction"
+on = "skin"
+faces = { normal = { direction = [1, 0, 0], within = 10 } }
+traction = [0, 10, 0]
+
+[load.squeeze]
+type = "pressure"
+on = "block"
+faces = { set = "x-min" }
+pressure = 20
+
+[load.tilt]
+type = "gravity"
+acceleration = [1, 0, 0]
+
+[output.fields]
+type = "vtu"
+every = 0.004
+data = ["displacement", "von-mises"]
+
+[output.history]
+type = "csv"
+every = 0.004
+probes.middle = { on = "block", at = [0.05, 0.05, 0.05] }
+"#;
+
+/// A scene with a body from a mesh file.
+pub const FROM_FILE: &str = r#"[scene]
+until = 0.01
+gravity = [0, 0, -9.81]
+
+[run]
+threads = 1
+
+[law.tissue]
+type = "neo-hookean"
+young-modulus = 10e3
+poisson-ratio = 0.45
+
+[body.organ]
+mesh = { file = "organ.vtk" }
+law = "tissue"
+density = 1000
+
+[constraint.base]
+type = "fix"
+body = "organ"
+nodes = { nearest = { point = [0, 0, 0], count = 4 } }
+
+[output.fields]
+type = "vtu"
+every = 0.005
+"#;
+
+/// A scene with a body of a label of an image.
+pub const FROM_IMAGE: &str = r#"[scene]
+until = 0.01
+gravity = [0, 0, -9.81]
+
+[law.tissue]
+type = "neo-hookean"
+young-modulus = 3e3
+poisson-ratio = 0.45
+
+[law.core]
+type = "neo-hookean"
+young-modulus = 9e3
+poisson-ratio = 0.45
+
+[body.organ]
+mesh = { image = "seg.nii.gz", label = 5, edge = 0.006 }
+law = "tissue"
+density = 1000
+
+[constraint.base]
+type = "fix"
+body = "organ"
+nodes = { box = [[-1, -1, -1], [1, 1, -0.008]] }
+"#;
+
+/// A scene of [`layered_segmentation`](crate::image_files::layered_segmentation) by the names of its labels.
+pub const FROM_NAMES: &str = r#"[scene]
+until = 0.004
+
+[law.soft]
+type = "neo-hookean"
+young-modulus = 3e3
+poisson-ratio = 0.45
+
+[law.stiff]
+type = "neo-hookean"
+young-modulus = 9e3
+poisson-ratio = 0.45
+
+[body.organs]
+mesh = { image = "organs.seg.nrrd", labels = ["liver", "spleen", "tumour"], edge = 0.006, protect = ["tumour"] }
+law = { liver = "soft", spleen = "soft", Tumour = "stiff" }
+density = { liver = 1060, 2 = 1050, tumour = 1100 }
+
+[constraint.held]
+type = "fix"
+body = "organs"
+nodes = { intersection = [{ label = "liver" }, { half-space = { point = [-0.006, 0, 0], normal = [1, 0, 0] } }] }
+
+[load.pull]
+type = "force"
+on = "organs"
+nodes = { label-boundary = ["spleen", "tumour"] }
+total = [0, 0, 1e-3]
+
+[output.fields]
+type = "vtu"
+every = 0.002
+data = ["displacement"]
+"#;
+
+/// A bent block with an output of every kind and a checkpoint every 0.02 s, of an element, with or without history.
+pub fn resumable(element: &str, run: &str, relaxing: bool) -> String {
+    let cells = if element.starts_with("tet") { "tets" } else { "hexes" };
+    let prony = "prony = [{ part = \"isochoric\", weight = 0.3, time = 0.05 }, \
+                 { part = \"volumetric\", weight = 0.2, time = 0.02 }]";
+    format!(
+        r#"[scene]
+until = 0.1
+gravity = [0, 0, -9.81]
+[run]
+checkpoint = {{ every = 0.02 }}
+{run}
+[law.tissue]
+type = "neo-hookean"
+young-modulus = 10e3
+poisson-ratio = 0.45
+{}
+[body.block]
+mesh = {{ block = {{ size = [0.1, 0.05, 0.05] }}, edge = 0.025, as = "{cells}" }}
+element = "{element}"
+law = "tissue"
+density = 1000
+damping = 10
+[constraint.wall]
+type = "fix"
+body = "block"
+nodes = {{ set = "x-min" }}
+[constraint.hand]
+type = "move"
+body = "block"
+nodes = {{ set = "x-max" }}
+by = [0, 0, 0.005]
+to = 0.08
+[output.fields]
+type = "vtu"
+every = 0.013
+data = ["displacement", "von-mises", "pressure"]
+[output.history]
+type = "csv"
+every = 0.003
+probes.middle = {{ on = "block", at = [0.05, 0.025, 0.025], data = ["displacement", "velocity", "pressure"] }}
+"#,
+        if relaxing { prony } else { "" }
+    )
+}
+
+/// Corners of a cube of 0.1 m; x runs fastest.
+pub const CORNERS: [[f64; 3]; 8] = [
+    [0.0, 0.0, 0.0],
+    [0.1, 0.0, 0.0],
+    [0.0, 0.1, 0.0],
+    [0.1, 0.1, 0.0],
+    [0.0, 0.0, 0.1],
+    [0.1, 0.0, 0.1],
+    [0.0, 0.1, 0.1],
+    [0.1, 0.1, 0.1],
+];
+
+/// Six tets that fill it.
+pub const TETS: [&[u32]; 6] =
+    [&[0, 1, 3, 7], &[0, 3, 2, 7], &[0, 2, 6, 7], &[0, 6, 4, 7], &[0, 4, 5, 7], &[0, 5, 1, 7]];
+
+/// A legacy VTK file of triangles, tets and hexes; `more` is what follows the cells.
+pub fn vtk(points: &[[f64; 3]], cells: &[&[u32]], more: &str) -> String {
+    let lines = |items: &mut dyn Iterator<Item = String>| items.map(|item| item + "\n").collect::<String>();
+    let joined = |cell: &[u32]| cell.iter().map(u32::to_string).collect::<Vec<_>>().join(" ");
+    let kind = |cell: &&[u32]| match cell.len() {
+        3 => "5",
+        4 => "10",
+        _ => "12",
+    };
+    let numbers: usize = cells.iter().map(|cell| cell.len() + 1).sum();
+    let points_text = lines(&mut points.iter().map(|[x, y, z]| format!("{x} {y} {z}")));
+    let cells_text = lines(&mut cells.iter().map(|cell| format!("{} {}", cell.len(), joined(cell))));
+    let kinds = lines(&mut cells.iter().map(kind).map(str::to_owned));
+    format!(
+        "# vtk DataFile Version 3.0\norgan\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS {} double\n{points_text}\
+         CELLS {} {numbers}\n{cells_text}CELL_TYPES {}\n{kinds}{more}",
+        points.len(),
+        cells.len(),
+        cells.len()
+    )
+}
+
+/// Cell data of a legacy VTK file: one direction for each cell.
+pub fn fibres(directions: &[&str]) -> String {
+    format!("CELL_DATA {}\nVECTORS fibre double\n{}\n", directions.len(), directions.join("\n"))
+}
+
+/// Cell data of a legacy VTK file: one label for each cell.
+pub fn labels(labels: &[i32]) -> String {
+    let lines = labels.iter().map(i32::to_string).collect::<Vec<_>>().join("\n");
+    format!("CELL_DATA {}\nSCALARS label int 1\nLOOKUP_TABLE default\n{lines}\n", labels.len())
+}
+
+/// The scene of a text, or its mistakes.
+///
+/// # Errors
+/// The mistakes in words.
+pub fn scene(text: &str) -> Result<Scene, String> {
+    let source = Source::parse("scene.toml", text.to_owned()).map_err(|errors| errors.plain().to_string())?;
+    Scene::from_source(source, ".".into()).map_err(|errors| errors.plain().to_string())
+}
+
+/// The world of a text.
+///
+/// # Errors
+/// The mistakes in words.
+pub fn world(text: &str) -> Result<World, String> {
+    World::new(&scene(text)?).map_err(|errors| errors.plain().to_string())
+}
+
+/// Runs a text into a folder.
+#[track_caller]
+pub fn run(text: &str, folder: &Path) -> Summary {
+    run_world(&world(text).unwrap_or_else(|errors| panic!("{errors}")), folder)
+}
+
+/// Runs a world into a folder.
+#[track_caller]
+pub fn run_world(world: &World, folder: &Path) -> Summary {
+    let folder = OutputFolder::prepare(folder.to_owned(), &world.scene, false).unwrap();
+    let summary = pliant_run::run(world, &folder, &mut |_| ()).unwrap();
+    assert_eq!(summary.status, "done", "{:?}", summary.error);
+    summary
+}
+
+/// The last row of the table of a run, by the names of its columns.
+pub fn last_row(text: &str) -> BTreeMap<String, f64> {
+    let out = tempfile::tempdir().unwrap();
+    run(text, &out.path().join("out"));
+    let table = fs::read_to_string(out.path().join("out/history.csv")).unwrap();
+    let names = table.lines().next().unwrap().split(',').map(str::to_owned);
+    names.zip(table.lines().last().unwrap().split(',').map(|value| value.parse().unwrap())).collect()
+}
+
+/// A run of 1 s that is cut off at 0.4 s and taken up again writes the same last row as one without a stop.
+pub fn resumes(text: &str) {
+    let whole = world(text).unwrap();
+    let half = world(&text.replace("until = 1", "until = 0.4")).unwrap();
+    let place = tempfile::tempdir().unwrap();
+    let [a, b] = taken_up(&whole, &half, place.path()).1;
+    assert_eq!(a.lines().last(), b.lines().last(), "{text}");
+}
+
+/// Runs a world without a stop, and after a shorter one from its checkpoint on: that checkpoint, and the table of each.
+pub fn taken_up(whole: &World, half: &World, place: &Path) -> (Checkpoint, [String; 2]) {
+    for (world, name) in [(whole, "whole"), (half, "half")] {
+        run_world(world, &place.join(name));
+    }
+    let checkpoint = Checkpoint::read(&place.join("half")).unwrap();
+    let onward = checkpoint.continues(whole).unwrap();
+    let folder = OutputFolder::reopen(place.join("half"), &onward.scene, &checkpoint).unwrap();
+    let options = Options { resume: Some(&checkpoint), ..Options::default() };
+    let summary = pliant_run::run_with(&onward, &folder, options, &mut |_| ()).unwrap();
+    assert_eq!(summary.status, "done", "{:?}", summary.error);
+    let table = |name: &str| fs::read_to_string(place.join(name).join("history.csv")).unwrap();
+    (checkpoint, ["whole", "half"].map(table))
+}
+
+/// A temporary folder with a scene in `case/scene.toml`.
+#[derive(Debug)]
+pub struct Workshop {
+    folder: TempDir,
+    /// The folder of the scene.
+    case: PathBuf,
+}
+
+impl Workshop {
+    /// A folder with this scene.
+    pub fn new(scene: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let workshop = Self { case: folder.path().join("case"), folder };
+        workshop.write("case/scene.toml", scene);
+        workshop
+    }
+
+    /// A folder for the outputs of a scene of the project, which stays where it is.
+    pub fn shipped(name: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        Self { case: Path::new(ROOT).join("scenes").join(name), folder }
+    }
+
+    /// [`BLOCK`] with one place changed.
+    pub fn block(good: &str, other: &str) -> Self {
+        Self::new(&changed(BLOCK, good, other))
+    }
+
+    /// The path of a file in the folder.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Writes a file; the folders to it are made.
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        let path = self.path(name);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("a folder is made");
+        fs::write(path, content).expect("a file is written");
+    }
+
+    /// The text of a file.
+    pub fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+
+    /// The times of a series, after all its frames were read.
+    pub fn series(&self, name: &str) -> Vec<(f64, MeshFile)> {
+        series(&self.path(name))
+    }
+
+    /// The header of a CSV file and its rows; all have the same number of columns, all values are numbers.
+    pub fn table(&self, name: &str) -> (Vec<String>, Vec<Vec<f64>>) {
+        let text = self.read(name);
+        assert!(text.ends_with('\n'), "the last row of {name} is not whole");
+        let mut lines = text.lines();
+        let header: Vec<String> = lines.next().expect("a header").split(',').map(str::to_owned).collect();
+        let number = |text: &str| text.parse::<f64>().unwrap_or_else(|_| panic!("{name}: {text}"));
+        let rows: Vec<Vec<f64>> = lines.map(|line| line.split(',').map(number).collect()).collect();
+        assert!(rows.iter().all(|row| row.len() == header.len()), "{name}");
+        (header, rows)
+    }
+
+    /// The cells of a CSV file row by row; commas in quotes separate none.
+    pub fn cells(&self, name: &str) -> Vec<Vec<String>> {
+        let cells = |line: &str| {
+            let (mut all, mut quoted) = (vec![String::new()], false);
+            for c in line.chars() {
+                match c {
+                    '"' => quoted = !quoted,
+                    ',' if !quoted => all.push(String::new()),
+                    c => all.last_mut().expect("a cell").push(c),
+                }
+            }
+            all
+        };
+        self.read(name).lines().map(cells).collect()
+    }
+
+    /// The checkpoints in a folder, in order.
+    pub fn checkpoints(&self, folder: &str) -> Vec<PathBuf> {
+        let paths =
+            fs::read_dir(self.path(folder)).expect("a folder").map(|entry| entry.expect("an entry").path());
+        let mut all: Vec<PathBuf> =
+            paths.filter(|path| path.extension().is_some_and(|ending| ending == "pliant")).collect();
+        all.sort();
+        all
+    }
+
+    /// All files in a folder with their contents, except checkpoints and the page with the wall time.
+    pub fn files(&self, folder: &str) -> Vec<(PathBuf, Vec<u8>)> {
+        let folder = self.path(folder);
+        let (mut all, mut open) = (Vec::new(), vec![folder.clone()]);
+        while let Some(next) = open.pop() {
+            for entry in fs::read_dir(next).expect("a folder") {
+                let path = entry.expect("an entry").path();
+                let kept = path.file_name().is_some_and(|name| name == "summary.md")
+                    || path.extension().is_some_and(|ending| ending == "pliant");
+                if path.is_dir() {
+                    open.push(path);
+                } else if !kept {
+                    let name = path.strip_prefix(&folder).expect("a path below").to_owned();
+                    all.push((name, fs::read(&path).expect("a file")));
+                }
+            }
+        }
+        all.sort();
+        all
+    }
+
+    /// Panics unless two folders have the same [files](Self::files).
+    #[track_caller]
+    pub fn assert_same_files(&self, one: &str, other: &str, what: &str) {
+        let [one, other] = [one, other].map(|folder| self.files(folder));
+        let names =
+            |files: &[(PathBuf, Vec<u8>)]| files.iter().map(|file| file.0.clone()).collect::<Vec<_>>();
+        assert_eq!(names(&one), names(&other), "{what}");
+        for (one, other) in one.iter().zip(&other) {
+            assert!(one.1 == other.1, "{what}: {} differs", one.0.display());
+        }
+    }
+
+    /// Builds the scene with the values of some keys set, as `pliant check` does, and describes it.
+    pub fn check(&self, set: &[&str]) -> Told {
+        let mut told = Told::default();
+        match self.world(set, &mut told) {
+            Ok(world) => told.out = overview(&world),
+            Err(message) => told.result = failed_input(&message),
+        }
+        self.relative(told)
+    }
+
+    /// Runs the scene with the values of some keys set, as `pliant run` does. The outputs are in `out/case`; those of an earlier run
+    /// there are replaced.
+    pub fn run(&self, set: &[&str]) -> Told {
+        self.run_into("out/case", set)
+    }
+
+    /// As [`run`](Self::run), with the outputs in another folder.
+    pub fn run_into(&self, out: &str, set: &[&str]) -> Told {
+        self.go(None, out, set)
+    }
+
+    /// Resumes a run from a checkpoint, or from the last one of a folder, with the outputs in the folder of the checkpoint.
+    pub fn resume(&self, checkpoint: &str, set: &[&str]) -> Told {
+        let path = Path::new(checkpoint);
+        let is_file = path.extension().is_some_and(|ending| ending == "pliant");
+        let out = if is_file { path.parent().unwrap_or(Path::new("")) } else { path };
+        self.go(Some(checkpoint), out.to_str().expect("a path in UTF-8"), set)
+    }
+
+    /// As [`resume`](Self::resume), with the outputs in another folder.
+    pub fn resume_in(&self, checkpoint: &str, out: &str) -> Told {
+        self.go(Some(checkpoint), out, &[])
+    }
+
+    /// The combinations of some values of keys.
+    ///
+    /// # Errors
+    /// The mistakes of the values.
+    pub fn combinations(&self, set: &[&str]) -> Result<Sweep, SceneErrors> {
+        let set: Vec<String> = set.iter().map(|set| (*set).to_owned()).collect();
+        Sweep::new(self.source()?, self.case.clone(), &set)
+    }
+
+    /// Runs the scene for all combinations of some values of keys, as `pliant sweep` does; what an earlier sweep left there is removed.
+    #[track_caller]
+    pub fn sweep(&self, out: &str, set: &[&str], options: SweepOptions<'_>) -> SweepSummary {
+        let sweep = self.combinations(set).unwrap_or_else(|errors| panic!("{}", errors.plain()));
+        let folder = sweep.open_folder(self.path(out), true).expect("a folder");
+        sweep.run(&folder, options, &|_| ()).expect("a table")
+    }
+
+    fn source(&self) -> Result<Source, SceneErrors> {
+        let text = fs::read_to_string(self.case.join("scene.toml")).expect("a scene");
+        Source::parse("case/scene.toml", text)
+    }
+
+    fn go(&self, checkpoint: Option<&str>, out: &str, set: &[&str]) -> Told {
+        let mut told = Told::default();
+        told.result = match self.attempt(checkpoint, out, set, &mut told) {
+            Ok(result) => result,
+            Err(message) => failed_input(&message),
+        };
+        self.relative(told)
+    }
+
+    /// The result of a run as an object, or the message of why there is no run.
+    fn attempt(
+        &self,
+        checkpoint: Option<&str>,
+        out: &str,
+        set: &[&str],
+        told: &mut Told,
+    ) -> Result<Value, String> {
+        let checkpoint = checkpoint.map(|name| Checkpoint::read(&self.path(name))).transpose();
+        let checkpoint = checkpoint.map_err(|error| told.refuse(&error, &error.remedy()))?;
+        let mut world = self.world(set, told)?;
+        if let Some(checkpoint) = &checkpoint {
+            world = checkpoint.continues(&world).map_err(|error| told.refuse(&error, &error.remedy()))?;
+        }
+        let folder = match &checkpoint {
+            Some(checkpoint) => OutputFolder::reopen(self.path(out), &world.scene, checkpoint)
+                .map_err(|error| told.refuse(&error, &error.remedy())),
+            None => OutputFolder::prepare(self.path(out), &world.scene, true)
+                .map_err(|error| told.refuse(&error, error.remedy)),
+        }?;
+        told.err.extend(world.notes().map(|note| format!("note: {note}\n")));
+        let options = Options { resume: checkpoint.as_ref(), ..Options::default() };
+        Ok(match pliant_run::run_with(&world, &folder, options, &mut |_| ()) {
+            Ok(summary) => {
+                told.err.extend(summary.warnings.iter().map(|warning| format!("warning: {warning}\n")));
+                told.err.extend(summary.error.iter().map(|error| format!("error: {}\n", error.message)));
+                json!(summary)
+            }
+            Err(error) => {
+                told.err += &format!("error: {error}; {}\n", error.remedy);
+                failed_output(&error)
+            }
+        })
+    }
+
+    /// The world of the scene with the values of some keys set, or its mistakes.
+    fn world(&self, set: &[&str], told: &mut Told) -> Result<World, String> {
+        let world = (|| {
+            let mut source = self.source()?;
+            let mistakes: Vec<Diagnostic> =
+                set.iter().filter_map(|set| source.assign(set).err()).map(|mistake| *mistake).collect();
+            if !mistakes.is_empty() {
+                return Err(source.errors(mistakes));
+            }
+            let scene = Scene::from_source(source, self.case.clone())?;
+            World::assemble(&scene, &MeshCache::in_folder(self.path("cache")), &|_| ())
+        })();
+        match &world {
+            Ok(world) => {
+                told.show(&world.scene.source.errors(world.warnings().cloned().collect()));
+            }
+            Err(errors) => told.show(errors),
+        }
+        world.map_err(|errors| errors.plain().to_string())
+    }
+
+    /// What was told, with paths relative to the folder.
+    fn relative(&self, mut told: Told) -> Told {
+        let folder = format!("{}/", self.folder.path().display());
+        told.out = told.out.replace(&folder, "");
+        told.err = told.err.replace(&folder, "");
+        told.result = serde_json::from_str(&told.result.to_string().replace(&folder, "")).expect("an object");
+        told
+    }
+}
+
+/// What a check or a run of a scene found.
+#[derive(Debug, Default)]
+pub struct Told {
+    /// The description of a scene that was checked.
+    pub out: String,
+    /// Notes, warnings and mistakes, each with its label and its remedy.
+    pub err: String,
+    /// The lines of the scene, and the options, in which something is underlined.
+    underlined: Vec<String>,
+    /// The object that `pliant run --json` prints; none of a check without mistakes.
+    result: Value,
+}
+
+impl Told {
+    /// Adds what is shown of mistakes or warnings.
+    fn show(&mut self, errors: &SceneErrors) {
+        let all = errors.diagnostics();
+        if all.len() > 1 {
+            self.err += &format!("{errors}\n");
+        }
+        for diagnostic in &all[..all.len().min(MOST_SHOWN)] {
+            let Diagnostic { message, span, option, label, help, also, .. } = diagnostic;
+            let also_labels = also.iter().map(|(_, label)| label.as_str());
+            let pieces = [message.as_str(), label].into_iter().chain(also_labels).chain(help.as_deref());
+            self.err.extend(pieces.map(|piece| format!("{piece}\n")));
+            let text = errors.text();
+            let line = |at: usize| {
+                let start = text[..at].rfind('\n').map_or(0, |end| end + 1);
+                text[start..].lines().next().unwrap_or_default().to_owned()
+            };
+            match option {
+                Some(option) => self.underlined.push(option.to_string()),
+                None => self.underlined.extend(span.iter().map(|span| line(span.start))),
+            }
+            self.underlined.extend(also.iter().map(|(span, _)| line(span.start)));
+        }
+    }
+
+    /// Adds an error with its remedy; returns both as the message of a result.
+    fn refuse(&mut self, error: &dyn std::error::Error, remedy: &str) -> String {
+        self.err += &format!("error: {error}\n  help: {remedy}\n");
+        format!("{error} (help: {remedy})")
+    }
+
+    /// `done`, `failed`, `interrupted` or `invalid`; `checked` for a check without mistakes.
+    pub fn status(&self) -> &str {
+        self.result["status"].as_str().unwrap_or("checked")
+    }
+
+    /// The object that `pliant run --json` prints.
+    pub fn json(&self) -> Value {
+        self.result.clone()
+    }
+
+    /// The object of a run that went well.
+    #[track_caller]
+    pub fn done(&self) -> Value {
+        assert_eq!(self.status(), "done", "{}", self.err);
+        self.json()
+    }
+
+    /// What was told as running text.
+    pub fn words(&self) -> String {
+        self.err.split_whitespace().collect::<Vec<_>>().join(" ")
+    }
+
+    /// Whether something is underlined in this line of the scene.
+    pub fn underlines(&self, line: &str) -> bool {
+        self.underlined.iter().any(|own| own.trim_end() == line)
+    }
+}
+
+/// A text with the first place that reads `good` changed.
+pub fn changed(text: &str, good: &str, other: &str) -> String {
+    assert!(text.contains(good), "`{good}` is not in the scene");
+    text.replacen(good, other, 1)
+}
+
+/// Reads a ParaView series: the times, and each frame it lists.
+pub fn series(index: &Path) -> Vec<(f64, MeshFile)> {
+    let text = fs::read_to_string(index).unwrap_or_else(|error| panic!("{}: {error}", index.display()));
+    assert!(text.trim_end().ends_with("</VTKFile>"), "{} is not whole", index.display());
+    let quoted = |line: &str, key: &str| {
+        let value = line.split_once(&format!("{key}=\"")).expect(key).1;
+        value.split_once('"').expect("a quote").0.to_owned()
+    };
+    let frames = text.lines().filter(|line| line.contains("<DataSet"));
+    frames
+        .map(|line| {
+            let time: f64 = quoted(line, "timestep").parse().expect("a time");
+            let path = index.with_file_name(quoted(line, "file"));
+            let frame = io::read(&path).unwrap_or_else(|error| panic!("{error}"));
+            assert_eq!(frame.time, Some(time), "TimeValue of {}", path.display());
+            (time, frame)
+        })
+        .collect()
+}
