@@ -331,10 +331,13 @@ impl Group {
         most
     }
 
-    /// Calls back with the nodes of all pairs that may come within the reach of the barrier and a margin [m] more.
-    pub fn pairs(&self, margin: f64, mut found: impl FnMut(&[u32; 4])) {
+    /// Calls back with the nodes of all pairs within the reach of the barrier and a margin [m] more, at the places [m] last taken.
+    pub fn pairs(&self, place: &[Vector3<f64>], margin: f64, mut found: impl FnMut(&[u32; 4])) {
         let reach = self.action.reach() + margin;
-        let near = |one: &&Candidate| one.distance - self.moved(one) < reach;
+        let near = |one: &&Candidate| {
+            one.distance - self.moved(one) < reach
+                && one.kind.nearest(&one.nodes.map(|node| place[node as usize])).distance < reach
+        };
         self.candidates.iter().filter(near).for_each(|one| found(&one.nodes));
     }
 

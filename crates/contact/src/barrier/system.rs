@@ -488,7 +488,7 @@ impl Barriers {
             nodes.iter().copied().filter(|&node| (node as usize) < self.nodes).collect()
         };
         for group in &self.groups {
-            group.pairs(group.action.law.distance, |nodes| found(&own(nodes)));
+            group.pairs(&self.place, group.action.law.distance, |nodes| found(&own(nodes)));
         }
         let stencils =
             self.rows.iter().map(|row| &row.stencil).chain(self.held.iter().map(|held| &held.stencil));
