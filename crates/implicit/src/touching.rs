@@ -15,7 +15,9 @@ use crate::sparse::{Equations, LowerMatrix};
 use crate::state::State;
 
 /// Pairs of nodes kept in the pattern at most, over those that are needed.
-const ROOM: usize = 4;
+const ROOM: usize = 2;
+/// How near pairs are, beyond the reach of their barrier and over its distance, that are taken into the pattern when it lacks some.
+const SOON: f64 = 1.0;
 
 /// Contacts by a barrier: surfaces never go into each other. Rigid things move as their courses say.
 #[derive(Clone, Debug)]
@@ -138,31 +140,27 @@ impl TouchingSystem {
         &self.pairs
     }
 
-    /// Takes up the pairs of nodes that the pattern lacks; whether there are some.
+    /// Takes up the pairs of nodes that may act soon if the pattern lacks one that acts; whether it does.
     pub(crate) fn grow(&mut self, equations: &Equations, matrix: &LowerMatrix) -> bool {
-        let mut lacking = Vec::new();
-        let mut needed = Vec::new();
-        self.barriers.pairs(|nodes| {
-            for (at, &a) in nodes.iter().enumerate() {
-                for &b in &nodes[..at] {
-                    let pair = [a.min(b), a.max(b)];
-                    if !matrix.couples(equations, pair) {
-                        lacking.push(pair);
-                    }
-                    needed.push(pair);
-                }
-            }
+        let mut lacks = false;
+        self.barriers.acting(|nodes| {
+            each_pair(nodes, |pair| lacks = lacks || !matrix.couples(equations, pair));
         });
-        if lacking.is_empty() {
+        if !lacks {
             return false;
         }
+        let mut needed = Vec::new();
+        self.barriers.acting(|nodes| each_pair(nodes, |pair| needed.push(pair)));
+        self.barriers.near(SOON, |nodes| each_pair(nodes, |pair| needed.push(pair)));
+        needed.sort_unstable();
+        needed.dedup();
         if self.pairs.len() > ROOM * needed.len() {
             self.pairs = needed;
         } else {
-            self.pairs.extend(lacking);
+            self.pairs.extend(needed);
+            self.pairs.sort_unstable();
+            self.pairs.dedup();
         }
-        self.pairs.sort_unstable();
-        self.pairs.dedup();
         true
     }
 
@@ -224,6 +222,13 @@ impl TouchingSystem {
             }
             None => Ok(()),
         }
+    }
+}
+
+/// Calls back with each pair of these nodes, the lower number first.
+fn each_pair(nodes: &[u32], mut found: impl FnMut([u32; 2])) {
+    for (at, &a) in nodes.iter().enumerate() {
+        nodes[..at].iter().for_each(|&b| found([a.min(b), a.max(b)]));
     }
 }
 

@@ -482,17 +482,24 @@ impl Barriers {
         of_wall(normals, h)
     }
 
-    /// Calls back with the nodes of the model of each pair that acts or soon may.
-    pub fn pairs(&self, mut found: impl FnMut(&[u32])) {
-        let own = |nodes: &[u32]| -> Vec<u32> {
-            nodes.iter().copied().filter(|&node| (node as usize) < self.nodes).collect()
-        };
-        for group in &self.groups {
-            group.pairs(&self.place, group.action.law.distance, |nodes| found(&own(nodes)));
-        }
+    /// Calls back with the nodes of the model of each pair that acts or is held.
+    pub fn acting(&self, mut found: impl FnMut(&[u32])) {
         let stencils =
             self.rows.iter().map(|row| &row.stencil).chain(self.held.iter().map(|held| &held.stencil));
-        stencils.filter(|stencil| stencil.count > 1).for_each(|stencil| found(&own(&stencil.nodes)));
+        stencils.filter(|stencil| stencil.count > 1).for_each(|stencil| found(&self.own(&stencil.nodes)));
+    }
+
+    /// Calls back with the nodes of the model of each pair that may act soon: within so many distances of its barrier more than the reach.
+    pub fn near(&self, distances: f64, mut found: impl FnMut(&[u32])) {
+        for group in &self.groups {
+            let margin = distances * group.action.law.distance;
+            group.pairs(&self.place, margin, |nodes| found(&self.own(nodes)));
+        }
+    }
+
+    /// Those nodes that are of the model.
+    fn own(&self, nodes: &[u32]) -> Vec<u32> {
+        nodes.iter().copied().filter(|&node| (node as usize) < self.nodes).collect()
     }
 
     /// Nodes of the model.
