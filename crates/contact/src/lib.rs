@@ -23,6 +23,7 @@ pub mod grid;
 pub mod lag;
 pub mod pairs;
 pub mod pose;
+pub mod profile;
 pub mod shader;
 pub mod shape;
 pub mod touch;

@@ -28,7 +28,8 @@ fn kind(shape: &Shape) -> usize {
         Shape::Cuboid { .. } => 3,
         Shape::Cone { .. } => 4,
         Shape::Grid(_) => 5,
-        Shape::HalfSpace => KINDS.len(),
+        // Contacts with bodies of revolution run on the CPU only.
+        Shape::HalfSpace | Shape::Revolved(_) => KINDS.len(),
     }
 }
 
@@ -87,7 +88,7 @@ pub fn things(rigids: &[Rigid]) -> Vec<f32> {
             Shape::Capsule { radius, length } | Shape::Cylinder { radius, length } => vec![*radius, *length],
             Shape::Cuboid { size } => size.to_vec(),
             Shape::Cone { radius, height } => vec![*radius, *height],
-            Shape::HalfSpace => vec![],
+            Shape::HalfSpace | Shape::Revolved(_) => vec![],
             Shape::Grid(grid) => {
                 let origin = grid.origin().iter().copied();
                 let counts = grid.counts().map(|count| count as f64);

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Vector2, Vector3};
 
 use crate::grid::Grid;
+use crate::profile::Profile;
 
 /// A rigid shape.
 #[derive(Clone, Debug)]
@@ -42,6 +43,8 @@ pub enum Shape {
     },
     /// All below the plane z = 0.
     HalfSpace,
+    /// A body of revolution about the z axis.
+    Revolved(Arc<Profile>),
     /// Distances of a closed surface, sampled.
     Grid(Arc<Grid>),
 }
@@ -68,6 +71,13 @@ impl Shape {
             Self::Cuboid { size } => cuboid(point, &(0.5 * Vector3::from(*size))),
             Self::Cone { radius, height } => cone(point, *radius, *height),
             Self::HalfSpace => Near { distance: point.z, normal: Vector3::z() },
+            Self::Revolved(profile) => {
+                let from_axis = Vector2::new(point.x, point.y);
+                let r = from_axis.norm();
+                let radial = if r > 0.0 { from_axis / r } else { Vector2::x() };
+                let (distance, flat) = profile.near(Vector2::new(point.z, r));
+                Near { distance, normal: Vector3::new(radial.x * flat.y, radial.y * flat.y, flat.x) }
+            }
             Self::Grid(grid) => grid.near(point),
         }
     }
@@ -80,6 +90,7 @@ impl Shape {
             Self::Cuboid { size } => 0.5 * size.iter().copied().fold(f64::INFINITY, f64::min),
             Self::Cone { radius, height } => 0.5 * radius.min(*height),
             Self::HalfSpace => f64::INFINITY,
+            Self::Revolved(profile) => profile.least_radius(),
             Self::Grid(grid) => grid.thinnest(),
         }
     }
@@ -93,6 +104,7 @@ impl Shape {
             Self::Cuboid { size } => 0.5 * Vector3::from(*size).norm(),
             Self::Cone { radius, height } => radius.max(*height),
             Self::HalfSpace => 0.0,
+            Self::Revolved(profile) => profile.reach(),
             Self::Grid(grid) => grid.reach(),
         }
     }
@@ -137,6 +149,7 @@ impl Shape {
                 let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
                 (corners.map(corner).to_vec(), vec![[0, 1, 2], [0, 2, 3]])
             }
+            Self::Revolved(ref profile) => revolved(&profile.drawn(AROUND / 4)),
             Self::Grid(ref grid) => grid.surface().clone(),
         }
     }
@@ -231,7 +244,21 @@ fn cone(point: &Vector3<f64>, radius: f64, height: f64) -> Near {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::profile::Corner;
     use pliant_testing::Random;
+
+    /// A body of revolution with flat ends, its edges rounded.
+    fn barrel() -> Shape {
+        let corner = |z: f64, r: f64, rounding: f64| Corner { at: [z, r], rounding };
+        let corners = vec![
+            corner(-0.4, 0.0, 0.0),
+            corner(-0.4, 0.3, 0.1),
+            corner(0.0, 0.5, 0.3),
+            corner(0.5, 0.3, 0.1),
+            corner(0.5, 0.0, 0.0),
+        ];
+        Shape::Revolved(Arc::new(Profile::new(corners).unwrap()))
+    }
 
     /// Normals are the gradients of the distance, by central differences, and the distance along them changes as fast as they say.
     #[test]
@@ -243,6 +270,7 @@ mod tests {
             Shape::Cuboid { size: [0.5, 0.9, 0.4] },
             Shape::Cone { radius: 0.4, height: 0.6 },
             Shape::HalfSpace,
+            barrel(),
         ];
         let mut random = Random::new(3);
         for shape in &shapes {
@@ -281,6 +309,7 @@ mod tests {
             Shape::Cuboid { size: [0.5, 0.9, 0.4] },
             Shape::Cone { radius: 0.4, height: 0.6 },
             Shape::HalfSpace,
+            barrel(),
         ] {
             let (points, triangles) = shape.surface(1.0);
             assert!(!triangles.is_empty() && points.iter().all(|x| shape.near(x).distance.abs() < 1e-12));

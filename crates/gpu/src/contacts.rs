@@ -1,11 +1,12 @@
 //! Contacts on the device: nodes and points between them as rows, found and solved there at every instant. Only the ways of obstacles and tools
-//! go up, with the factors of loads, and lists of candidates for pairs of surfaces when these are to be made anew. Leaves out: ideal grips of jaws.
+//! go up, with the factors of loads, and lists of candidates for pairs of surfaces when these are to be made anew. Leaves out: ideal grips of jaws, bodies of revolution.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use pliant_contact::pose::Leg;
 use pliant_contact::shader::{PASSAGE, THING, pairs_shader, shader, split, things};
+use pliant_contact::shape::Shape;
 use pliant_contact::touch::{
     BAND, Contact, Contacts, FOUND, LIFTED, LIFTS, LOOKED, MARGIN, OFF, PASSES, Passage, ROUNDS, Rigid,
     SIDES, With, lattice, parts_of,
@@ -26,7 +27,10 @@ pub fn processor_only(contacts: &Contacts) -> Option<String> {
     let gripping =
         contacts.rigids.iter().find(grips).map(|rigid| format!("the ideal grip of `{}`", rigid.tool()));
     let limited = contacts.rigids.iter().find(|rigid| rigid.course.limit().is_some());
-    gripping.or_else(|| limited.map(|rigid| format!("the force limit of `{}`", rigid.tool())))
+    let revolved = contacts.rigids.iter().find(|rigid| matches!(rigid.shape, Shape::Revolved(_)));
+    gripping
+        .or_else(|| limited.map(|rigid| format!("the force limit of `{}`", rigid.tool())))
+        .or_else(|| revolved.map(|rigid| format!("the outline of `{}`", rigid.tool())))
 }
 
 /// Adds the ways of all things in the step between two times [s], as touch.wgsl reads them.

@@ -6,7 +6,7 @@
 //!   know what is left of it. Until it is there, energy may grow.
 //! * A direction of a stiffness that is not positive definite is none: its diagonal is raised (Levenberg 1944) until it is.
 //! * A step is found where the residual is below its tolerance, or where the unfiltered Newton step with fresh factors moves nothing by more than
-//!   counts for a gap and the residual is not far above its tolerance; that step is still made.
+//!   counts for a gap and the residual is not far above its tolerance, or by less than is asked for; that step is still made.
 //! * Friction is then taken anew from the state found, while its size changes by more than a tenth.
 
 use crate::error::SolveError;
@@ -74,6 +74,8 @@ pub(crate) struct Limits {
     pub iterations: usize,
     /// How often friction is taken anew.
     pub lags: usize,
+    /// A Newton step [m] that is the last one, whatever the residual.
+    pub close: Option<f64>,
 }
 
 /// What an iteration started from.
@@ -134,7 +136,11 @@ pub(crate) fn descend(
             };
         }
         let (largest, is_newton) = find_direction(solver, &mut raised)?;
-        let last = complete && is_newton && largest <= close(solver) && norm <= LOOSE * allowed;
+        let is_close = match limits.close {
+            Some(close) => largest <= close,
+            None => largest <= close(solver) && norm <= LOOSE * allowed,
+        };
+        let last = complete && is_newton && is_close;
         let Vectors { system, pending, increment, residual, solution } = solver.vectors();
         increment.copy_from_slice(pending);
         system.spread(solution, increment);

@@ -47,6 +47,9 @@ pub struct DynamicSettings {
     pub iterations: usize,
     /// Residual allowed, as a part of loads, internal or inertial forces, whichever are larger.
     pub tolerance: f64,
+    /// Speed [m/s] of all nodes below which a Newton step in contact is the last one; if not given, it must move nothing by more than
+    /// counts for a gap.
+    pub speed_tolerance: Option<f64>,
     /// How often a step that fails is halved.
     pub halvings: usize,
     /// Which stiffness.
@@ -66,6 +69,7 @@ impl DynamicSettings {
             integrator: Integrator::default(),
             iterations: 20,
             tolerance: 1e-6,
+            speed_tolerance: None,
             halvings: 6,
             tangent: Tangent::Full,
             linear: LinearSolver::Direct,
@@ -349,7 +353,11 @@ impl BackwardEuler {
         let rates = state.velocity.iter().zip(&state.spin);
         let guess: Vec<f64> =
             rates.flat_map(|(v, w)| [v, w].map(|rate| rate * h)).flat_map(|x| [x.x, x.y, x.z]).collect();
-        let limits = Limits { iterations: self.settings.iterations, lags: LAGS };
+        let limits = Limits {
+            iterations: self.settings.iterations,
+            lags: LAGS,
+            close: self.settings.speed_tolerance.map(|speed| speed * h),
+        };
         let mut residuals = Vec::new();
         let result = descend(self, state, time, Some(&guess), &limits, &mut |norm, allowed| {
             residuals.push((norm, allowed));

@@ -422,7 +422,7 @@ impl Statics {
         }
         let mut residuals = Vec::new();
         let mut last = 0.0;
-        let limits = Limits { iterations: self.settings.iterations, lags: LAGS };
+        let limits = Limits { iterations: self.settings.iterations, lags: LAGS, close: None };
         let result = descend(self, state, time, None, &limits, &mut |norm, allowed| {
             residuals.push(norm);
             last = allowed;

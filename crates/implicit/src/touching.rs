@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, Vector3};
-use pliant_contact::barrier::{BarrierSettings, Barriers, Meeting, Stencil};
+use nalgebra::Vector3;
+use pliant_contact::barrier::{BarrierSettings, Barriers, Matrix12, Meeting};
 use pliant_contact::pose::Leg;
 use pliant_contact::touch::Contacts;
 use pliant_mechanics::Model;
@@ -15,7 +15,9 @@ use crate::sparse::{Equations, LowerMatrix};
 use crate::state::State;
 
 /// Pairs of nodes kept in the pattern at most, over those that are needed.
-const ROOM: usize = 4;
+const ROOM: usize = 2;
+/// How near pairs are, beyond the reach of their barrier and over its distance, that are taken into the pattern when it lacks some.
+const SOON: f64 = 1.0;
 
 /// Contacts by a barrier: surfaces never go into each other. Rigid things move as their courses say.
 #[derive(Clone, Debug)]
@@ -138,31 +140,27 @@ impl TouchingSystem {
         &self.pairs
     }
 
-    /// Takes up the pairs of nodes that the pattern lacks; whether there are some.
+    /// Takes up the pairs of nodes that may act soon if the pattern lacks one that acts; whether it does.
     pub(crate) fn grow(&mut self, equations: &Equations, matrix: &LowerMatrix) -> bool {
-        let mut lacking = Vec::new();
-        let mut needed = Vec::new();
-        self.barriers.pairs(|nodes| {
-            for (at, &a) in nodes.iter().enumerate() {
-                for &b in &nodes[..at] {
-                    let pair = [a.min(b), a.max(b)];
-                    if !matrix.couples(equations, pair) {
-                        lacking.push(pair);
-                    }
-                    needed.push(pair);
-                }
-            }
+        let mut lacks = false;
+        self.barriers.acting(|nodes| {
+            each_pair(nodes, |pair| lacks = lacks || !matrix.couples(equations, pair));
         });
-        if lacking.is_empty() {
+        if !lacks {
             return false;
         }
+        let mut needed = Vec::new();
+        self.barriers.acting(|nodes| each_pair(nodes, |pair| needed.push(pair)));
+        self.barriers.near(SOON, |nodes| each_pair(nodes, |pair| needed.push(pair)));
+        needed.sort_unstable();
+        needed.dedup();
         if self.pairs.len() > ROOM * needed.len() {
             self.pairs = needed;
         } else {
-            self.pairs.extend(lacking);
+            self.pairs.extend(needed);
+            self.pairs.sort_unstable();
+            self.pairs.dedup();
         }
-        self.pairs.sort_unstable();
-        self.pairs.dedup();
         true
     }
 
@@ -175,25 +173,33 @@ impl TouchingSystem {
         coupling: &mut [f64],
     ) {
         let nodes = self.barriers.node_count();
-        self.barriers.stiffness(self.share, self.exact_friction, |stencil, m, pull| {
-            add_row(equations, matrix, stencil, [nodes, usize::from(stencil.count)], m);
+        self.barriers.stiffness(self.share, self.exact_friction, |stencil, block, mut ways| {
+            let own = |at: usize| stencil.nodes[at] as usize;
+            let count = usize::from(stencil.count);
+            for row in (0..count).filter(|&at| own(at) < nodes && acts(block, at)) {
+                for column in (0..count).filter(|&at| own(at) < nodes && acts(block, at)) {
+                    let pair = [row, column].map(|at| stencil.nodes[at]);
+                    if pair[0] >= pair[1] {
+                        let entry = |i, j| block[(3 * row + i, 3 * column + j)];
+                        matrix.add_node_block(equations, pair, entry);
+                    }
+                }
+            }
             // The way that nodes which are moved have yet to go counts as that of rigid things.
-            let way: Vector3<f64> = stencil
-                .parts()
-                .filter(|(node, _)| (*node as usize) < nodes)
-                .map(|(node, c)| {
-                    Vector3::from_column_slice(&moved[6 * node as usize..6 * node as usize + 3]) * c
-                })
-                .sum();
-            let pull = pull + m * way;
-            if pull == Vector3::zeros() {
+            for (at, way) in ways.iter_mut().enumerate().take(count).filter(|(at, _)| own(*at) < nodes) {
+                *way += Vector3::from_column_slice(&moved[6 * own(at)..6 * own(at) + 3]);
+            }
+            if ways == [Vector3::zeros(); 4] {
                 return;
             }
-            for (node, c) in stencil.parts().filter(|(node, _)| (*node as usize) < nodes) {
+            for row in (0..count).filter(|&at| own(at) < nodes && acts(block, at)) {
+                let pull: Vector3<f64> = (0..count)
+                    .map(|column| block.fixed_view::<3, 3>(3 * row, 3 * column) * ways[column])
+                    .sum();
                 for i in 0..3 {
-                    let equation = equations.number[6 * node as usize + i];
+                    let equation = equations.number[6 * own(row) + i];
                     if let Some(own) = coupling.get_mut(equation as usize) {
-                        *own += c * pull[i];
+                        *own += pull[i];
                     }
                 }
             }
@@ -219,20 +225,14 @@ impl TouchingSystem {
     }
 }
 
-/// Adds c cᵀ ⊗ M of the nodes of the model.
-fn add_row(
-    equations: &Equations,
-    matrix: &mut LowerMatrix,
-    stencil: &Stencil,
-    [nodes, count]: [usize; 2],
-    m: &Matrix3<f64>,
-) {
-    let own = |at: usize| (stencil.nodes[at], stencil.coefficients[at]);
-    for (row, c) in (0..count).map(own).filter(|(node, c)| (*node as usize) < nodes && *c != 0.0) {
-        for (column, d) in (0..count).map(own).filter(|(node, d)| (*node as usize) < nodes && *d != 0.0) {
-            if row >= column {
-                matrix.add_node_block(equations, [row, column], |i, j| c * d * m[(i, j)]);
-            }
-        }
+/// Calls back with each pair of these nodes, the lower number first.
+fn each_pair(nodes: &[u32], mut found: impl FnMut([u32; 2])) {
+    for (at, &a) in nodes.iter().enumerate() {
+        nodes[..at].iter().for_each(|&b| found([a.min(b), a.max(b)]));
     }
+}
+
+/// Whether the part of a node in a stiffness that is never negative is not zero.
+fn acts(block: &Matrix12, at: usize) -> bool {
+    (3 * at..3 * at + 3).any(|k| block[(k, k)] != 0.0)
 }

@@ -68,6 +68,7 @@ fn method_of(bodies: &Arc<ImplicitBodies>, run: &RunTable, step: f64) -> Method 
             let mut settings = DynamicSettings { linear, ..DynamicSettings::new(step) };
             settings.tolerance = run.tolerance.unwrap_or(settings.tolerance);
             settings.iterations = iterations(&bodies, run, settings.iterations);
+            settings.speed_tolerance = run.speed_tolerance;
             settings.accept_stalled = table.accept_stalled;
             if settings.iterations == 1 {
                 settings = settings.real_time(linear);

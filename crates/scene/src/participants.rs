@@ -364,8 +364,14 @@ impl Scene {
             }
         }
         if !solver.solves_equations() {
-            run =
-                RunTable { iterations: None, integrator: None, control: None, linear: usual().linear, ..run };
+            run = RunTable {
+                iterations: None,
+                speed_tolerance: None,
+                integrator: None,
+                control: None,
+                linear: usual().linear,
+                ..run
+            };
         }
         match table {
             Some(table) => table.over(&run),

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::advance::{Kind, Query, allowed};
 use super::distance::Mollifier;
 use super::law::{Barrier, Slip};
-use super::rows::{Row, Stencil};
+use super::rows::{Mollified, Row, Stencil};
 use super::surfaces::{Side, around};
 
 /// Rest distances, over the reach, up to which parts of one surface never touch each other.
@@ -63,7 +63,8 @@ impl Action {
             energy: self.stiffness * area * self.law.energy(gap),
             force: -self.stiffness * area * self.law.slope(gap),
             stiffness: self.stiffness * area * self.law.curvature(gap),
-            aside: None,
+            region: None,
+            mollified: None,
         })
     }
 }
@@ -294,10 +295,16 @@ impl Group {
             if row.gap <= 0.0 || row.gap.is_nan() {
                 return false;
             }
+            row.region = Some(near.region);
             if one.kind == Kind::EdgeEdge {
                 let mollifier = Mollifier::of(&points, one.threshold);
                 if mollifier.value < 1.0 {
-                    row.aside = Some(mollifier.gradient.map(|gradient| gradient * row.energy));
+                    row.mollified = Some(Mollified {
+                        threshold: one.threshold,
+                        gradient: mollifier.gradient,
+                        energy: row.energy,
+                        force: row.force,
+                    });
                     row.energy *= mollifier.value;
                     row.force *= mollifier.value;
                     row.stiffness *= mollifier.value;
@@ -324,10 +331,13 @@ impl Group {
         most
     }
 
-    /// Calls back with the nodes of all pairs that may come within the reach of the barrier and a margin [m] more.
-    pub fn pairs(&self, margin: f64, mut found: impl FnMut(&[u32; 4])) {
+    /// Calls back with the nodes of all pairs within the reach of the barrier and a margin [m] more, at the places [m] last taken.
+    pub fn pairs(&self, place: &[Vector3<f64>], margin: f64, mut found: impl FnMut(&[u32; 4])) {
         let reach = self.action.reach() + margin;
-        let near = |one: &&Candidate| one.distance - self.moved(one) < reach;
+        let near = |one: &&Candidate| {
+            one.distance - self.moved(one) < reach
+                && one.kind.nearest(&one.nodes.map(|node| place[node as usize])).distance < reach
+        };
         self.candidates.iter().filter(near).for_each(|one| found(&one.nodes));
     }
 

@@ -32,9 +32,11 @@ impl Features {
                 Self { points, edges: vec![[0, 1]], offset: radius, is_all: true }
             }
             Shape::HalfSpace => Self::default(),
-            Shape::Cylinder { .. } | Shape::Cuboid { .. } | Shape::Cone { .. } | Shape::Grid(_) => {
-                Self::sharp(&shape.surface(0.0))
-            }
+            Shape::Cylinder { .. }
+            | Shape::Cuboid { .. }
+            | Shape::Cone { .. }
+            | Shape::Revolved(_)
+            | Shape::Grid(_) => Self::sharp(&shape.surface(0.0)),
         }
     }
 

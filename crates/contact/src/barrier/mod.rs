@@ -9,6 +9,7 @@
 pub mod advance;
 mod candidates;
 mod crossing;
+mod curvature;
 pub mod distance;
 mod features;
 pub mod law;
@@ -18,5 +19,6 @@ mod system;
 #[cfg(test)]
 mod tests;
 
-pub use rows::{Held, Row, Stencil};
+pub use curvature::Matrix12;
+pub use rows::{Held, Mollified, Row, Stencil};
 pub use system::{BarrierSettings, Barriers, Meeting};

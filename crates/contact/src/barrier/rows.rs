@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::distance::Region;
+
 /// Nodes of a row and their coefficients: four, or one at a wall.
 #[derive(Clone, Copy, Debug)]
 pub struct Stencil {
@@ -52,16 +54,31 @@ pub struct Row {
     pub force: f64,
     /// How it grows as they come nearer [N/m].
     pub stiffness: f64,
-    /// The gradient [N] of the energy by the mollifier of edges.
-    pub aside: Option<[Vector3<f64>; 4]>,
+    /// Which parts of the primitives are nearest; none at a wall.
+    pub region: Option<Region>,
+    /// What nearly parallel edges have beside.
+    pub mollified: Option<Mollified>,
 }
 
 impl Row {
     /// The force [N] on a node, by its place in the stencil.
     pub fn force_on(&self, at: usize) -> Vector3<f64> {
         let push = self.normal * (self.force * self.stencil.coefficients[at]);
-        self.aside.map_or(push, |aside| push - aside[at])
+        self.mollified.map_or(push, |with| push - with.gradient[at] * with.energy)
     }
+}
+
+/// Of edges that are nearly parallel: their mollifier m, and what they would have without it.
+#[derive(Clone, Copy, Debug)]
+pub struct Mollified {
+    /// Its threshold [m⁴].
+    pub threshold: f64,
+    /// ∂m/∂xᵢ [1/m] of the four points.
+    pub gradient: [Vector3<f64>; 4],
+    /// The energy [J] without it.
+    pub energy: f64,
+    /// The force [N] without it.
+    pub force: f64,
 }
 
 /// A pair with friction: normal force, direction and coefficients are those of the last time that it was taken.

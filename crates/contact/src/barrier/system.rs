@@ -12,6 +12,8 @@ use nalgebra::{Matrix3, Vector3};
 use super::advance::ADVANCES;
 use super::candidates::{Action, Group};
 use super::crossing::crossings;
+use super::curvature::{Matrix12, bent, block, of_parallel, of_wall};
+use super::distance::Nearest;
 use super::features::Features;
 use super::law::{Barrier, Slip};
 use super::rows::{Held, Row, Stencil};
@@ -22,6 +24,8 @@ use crate::touch::{Contacts, Passage, With};
 
 /// How often the motion of a rigid thing that turns is followed anew in a step.
 const TURNS: usize = 40;
+/// The step of differences of the normal of a wall, over the distance of the barrier.
+const DIFFERENCE: f64 = 0.01;
 /// Part of the way to a meeting that is gone where things turn.
 const SHORTER: f64 = 0.9;
 
@@ -401,55 +405,101 @@ impl Barriers {
         self.held.iter().for_each(|held| add(&held.stencil, &|at| held.force_on(at)));
     }
 
-    /// Calls back with the stiffness c cᵀ ⊗ M of each row: its stencil, M [N/m], and M w for the way w [m] that the rigid things have yet to
-    /// go in the step, from a share on. That of friction is exact or an upper bound.
+    /// Calls back with the stiffness [N/m] of each row, never negative: its stencil, three rows and columns a node, and the ways [m] that the
+    /// rigid things among its nodes have yet to go in the step from a share on; of one node at a wall the way from the wall. That of barriers
+    /// is κ A b″ ∇d ∇dᵀ and the positive part of κ A b′ ∂²d/∂x²; that of friction is exact or an upper bound.
     pub fn stiffness(
         &self,
         share: f64,
         is_exact: bool,
-        mut add: impl FnMut(&Stencil, &Matrix3<f64>, Vector3<f64>),
+        mut add: impl FnMut(&Stencil, &Matrix12, [Vector3<f64>; 4]),
     ) {
         let [from, to, now] = &self.poses;
         let goes_on = share < 1.0 && from != to;
         let left = |stencil: &Stencil, wall: Option<u32>| {
+            let mut ways = [Vector3::zeros(); 4];
             if !goes_on {
-                return Vector3::zeros();
+                return ways;
             }
             if let Some(wall) = wall.filter(|_| stencil.count == 1) {
                 let place = self.place[stencil.nodes[0] as usize];
                 let carried = to[wall as usize] * now[wall as usize].inverse();
-                return place - (carried * nalgebra::Point3::from(place)).coords;
+                ways[0] = place - (carried * nalgebra::Point3::from(place)).coords;
+                return ways;
             }
-            stencil.combine(|node| match (node as usize).checked_sub(self.nodes) {
-                Some(at) => {
-                    let (thing, x) = &self.rigid_nodes[at];
-                    (to[*thing as usize] * nalgebra::Point3::from(*x)).coords - self.place[node as usize]
+            for (way, (node, _)) in ways.iter_mut().zip(stencil.parts()) {
+                if let Some((thing, x)) = self.rigid_node(node) {
+                    let target = (to[*thing as usize] * nalgebra::Point3::from(*x)).coords;
+                    *way = target - self.place[node as usize];
                 }
-                None => Vector3::zeros(),
-            })
+            }
+            ways
         };
         for row in &self.rows {
-            let along = row.normal * row.normal.transpose() * row.stiffness;
             let wall = self.groups[row.stencil.contact as usize].wall;
-            add(&row.stencil, &along, along * left(&row.stencil, wall));
+            add(&row.stencil, &self.stiffness_of(row), left(&row.stencil, wall));
         }
         for held in &self.held {
-            let across = held.stiffness(is_exact);
-            add(&held.stencil, &across, across * left(&held.stencil, held.wall));
+            let across = block(&held.stencil.coefficients, &held.stiffness(is_exact));
+            add(&held.stencil, &across, left(&held.stencil, held.wall));
         }
     }
 
-    /// Calls back with the nodes of the model of each pair that acts or soon may.
-    pub fn pairs(&self, mut found: impl FnMut(&[u32])) {
-        let own = |nodes: &[u32]| -> Vec<u32> {
-            nodes.iter().copied().filter(|&node| (node as usize) < self.nodes).collect()
+    /// A node of a rigid thing: the thing and its place [m] in its frame.
+    fn rigid_node(&self, node: u32) -> Option<&(u32, Vector3<f64>)> {
+        (node as usize).checked_sub(self.nodes).map(|at| &self.rigid_nodes[at])
+    }
+
+    /// The stiffness [N/m] of the barrier of a row.
+    fn stiffness_of(&self, row: &Row) -> Matrix12 {
+        let group = &self.groups[row.stencil.contact as usize];
+        let Stencil { nodes, coefficients, .. } = row.stencil;
+        let along = row.normal * row.normal.transpose() * row.stiffness;
+        let Some(region) = row.region else {
+            let curved = group.wall.map(|wall| self.curved_wall(wall, nodes[0], group.action.law.distance));
+            return block(&coefficients, &(along + curved.unwrap_or_default() * row.force));
         };
-        for group in &self.groups {
-            group.pairs(group.action.law.distance, |nodes| found(&own(nodes)));
+        let points = nodes.map(|node| self.place[node as usize]);
+        let distance = row.gap + group.action.offset;
+        let near = Nearest { distance, coefficients, normal: row.normal, region };
+        match &row.mollified {
+            Some(with) => of_parallel(&points, &near, row.stiffness, with),
+            None => block(&coefficients, &along) + bent(&points, &near) * row.force,
         }
+    }
+
+    /// The positive part [1/m] of −∂²d/∂x² of a node at a wall, by differences over a part of the distance [m] of its barrier.
+    fn curved_wall(&self, wall: u32, node: u32, distance: f64) -> Matrix3<f64> {
+        let (rigid, pose) = (&self.contacts.rigids[wall as usize], &self.poses[2][wall as usize]);
+        let h = DIFFERENCE * distance;
+        let normals = [0, 1, 2].map(|axis| {
+            [h, -h].map(|by| {
+                let mut place = self.place[node as usize];
+                place[axis] += by;
+                rigid.near(pose, &place).normal
+            })
+        });
+        of_wall(normals, h)
+    }
+
+    /// Calls back with the nodes of the model of each pair that acts or is held.
+    pub fn acting(&self, mut found: impl FnMut(&[u32])) {
         let stencils =
             self.rows.iter().map(|row| &row.stencil).chain(self.held.iter().map(|held| &held.stencil));
-        stencils.filter(|stencil| stencil.count > 1).for_each(|stencil| found(&own(&stencil.nodes)));
+        stencils.filter(|stencil| stencil.count > 1).for_each(|stencil| found(&self.own(&stencil.nodes)));
+    }
+
+    /// Calls back with the nodes of the model of each pair that may act soon: within so many distances of its barrier more than the reach.
+    pub fn near(&self, distances: f64, mut found: impl FnMut(&[u32])) {
+        for group in &self.groups {
+            let margin = distances * group.action.law.distance;
+            group.pairs(&self.place, margin, |nodes| found(&self.own(nodes)));
+        }
+    }
+
+    /// Those nodes that are of the model.
+    fn own(&self, nodes: &[u32]) -> Vec<u32> {
+        nodes.iter().copied().filter(|&node| (node as usize) < self.nodes).collect()
     }
 
     /// Nodes of the model.

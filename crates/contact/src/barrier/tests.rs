@@ -122,28 +122,44 @@ fn forces_are_gradients_and_balance() {
     }
 }
 
-/// The stiffness is positive semi-definite, and its barriers are all of the second derivative but for what curves pairs.
+/// The stiffness is positive semi-definite, and along a thing of any shape that bodies are in or out of, that of the wall by differences.
 #[test]
-fn stiffness_is_that_of_pairs_with_frozen_coefficients() {
-    let mut scene = Scene::new(things().remove(4), 0.4);
-    let count = scene.places.len();
-    scene.begin(&vec![0.0; 6 * count]);
-    scene.barriers.evaluate(&scene.places.clone(), 0.0);
-    let (rows, held) = (scene.barriers.rows().to_vec(), scene.barriers.held().to_vec());
-    let mut number = 0;
-    scene.barriers.stiffness(0.0, true, |stencil: &Stencil, m: &Matrix3<f64>, pull| {
-        let values = m.symmetric_eigenvalues();
-        assert!(values.min() > -1e-12 * values.max());
-        // The plane comes nearer by 2 mm and goes aside by 1 mm.
-        if stencil.count == 1 {
-            let wanted = m * Vector3::new(-0.001, 0.0, -0.002);
-            assert!((pull - wanted).norm() < 1e-9 * values.max(), "{pull} {wanted}");
-        } else {
-            assert_eq!(pull, Vector3::zeros());
-        }
-        number += 1;
-    });
-    assert_eq!(number, rows.len() + held.len());
+fn stiffness_is_never_negative() {
+    let mut hollow = rigid(Shape::Sphere { radius: 0.6 }, [0.0, 0.0, 0.407], [0.001, 0.0, 0.002]);
+    hollow.inside = true;
+    for thing in [things().remove(4), hollow] {
+        let (shape, inside) = (format!("{:?}", thing.shape), thing.inside);
+        let mut scene = Scene::new(thing, 0.4);
+        let count = scene.places.len();
+        scene.begin(&vec![0.0; 6 * count]);
+        scene.barriers.evaluate(&scene.places.clone(), 0.0);
+        let (rows, held) = (scene.barriers.rows().to_vec(), scene.barriers.held().to_vec());
+        let (mut number, mut at_wall) = (0, 0);
+        scene.barriers.stiffness(0.0, true, |stencil: &Stencil, block, ways| {
+            let values = block.symmetric_eigenvalues();
+            assert!(values.min() > -1e-12 * values.max(), "{shape}");
+            if stencil.count > 1 {
+                assert_eq!(ways, [Vector3::zeros(); 4]);
+            } else {
+                // The thing comes nearer by 2 mm and goes aside by 1 mm.
+                assert!((ways[0] + Vector3::new(0.001, 0.0, 0.002)).norm() < 1e-12, "{shape}: {ways:?}");
+                if let Some(row) = rows.get(number).filter(|row| row.region.is_none()) {
+                    // From within, a sphere bends away from the normal everywhere: (I − n nᵀ)/r.
+                    let centre = Vector3::new(0.0, 0.0, 0.407);
+                    let r = (scene.places[stencil.nodes[0] as usize] - centre).norm();
+                    let along = row.normal * row.normal.transpose();
+                    let across =
+                        (Matrix3::identity() - along) * (f64::from(u8::from(inside)) * row.force / r);
+                    let wanted = along * row.stiffness + across;
+                    let off = (block.fixed_view::<3, 3>(0, 0) - wanted).amax();
+                    assert!(off < 1e-5 * wanted.amax(), "{shape}: {off:e} of {:e}", wanted.amax());
+                    at_wall += 1;
+                }
+            }
+            number += 1;
+        });
+        assert!(number == rows.len() + held.len() && at_wall > 3, "{shape}: {at_wall}");
+    }
 }
 
 /// Whatever motion is asked for, what is allowed of it ends with gaps everywhere and no edge in a triangle; it is all of a small motion.

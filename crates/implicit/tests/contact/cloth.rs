@@ -135,6 +135,13 @@ fn cloth_drapes_over_a_sphere() {
     }
 }
 
+/// The iterations and the time of a step of `scenes/cloth-on-sphere`.
+#[test]
+#[ignore = "prints times: a quarter of a minute"]
+fn cloth_of_20_cells() {
+    draped(20, 0.5, 0.5);
+}
+
 /// S7: a strip whose ends are turned against each other by two turns.
 #[test]
 fn a_twisted_strip_does_not_go_through_itself() {

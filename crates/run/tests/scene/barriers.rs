@@ -63,6 +63,33 @@ fn a_run_in_contact_resumes_with_the_same_bits() {
     resumes(&cloth(""));
 }
 
+/// A sheet that hangs in a funnel of revolution bends to its wall, which carries its weight; iterations end by a speed.
+#[test]
+fn a_sheet_hangs_in_a_funnel() {
+    let sheet = |more: &str| {
+        format!(
+            "[scene]\nuntil = 2\ngravity = [0, 0, -9.81]\n[run]\nsolver = 'implicit'\nstep = 0.02\n{more}\n\
+             [law.cotton]\ntype = 'neo-hookean'\nyoung-modulus = 1e5\npoisson-ratio = 0.3\n\
+             [body.sheet]\nmodel = 'shell'\nmesh = {{ plate = {{ size = [0.1, 0.04], cells = [10, 4] }}, at = [-0.05, -0.02, 0.02] }}\n\
+             law = 'cotton'\ndensity = 300\nthickness = 2e-3\ndamping = 20\n\
+             [obstacle.funnel]\ninside = true\n\
+             shape = {{ revolved = {{ outline = [[-0.1, 0.02, 0], [-0.02, 0.03, 0.02], [0.1, 0.15, 0]] }} }}\n\
+             [contact.wall]\nbetween = ['sheet', 'funnel']\nfriction = 0.3\ncheck-intersections = true\n\
+             [output.history]\ntype = 'csv'\nevery = 0.2\n\
+             probes.end = {{ on = 'sheet', at = [0.05, 0, 0.02], data = ['displacement'] }}\n"
+        )
+    };
+    let weight = 0.1 * 0.04 * 2e-3 * 300.0 * 9.81;
+    let ends = ["tolerance = 1e-5", "speed-tolerance = 1e-4"].map(|more| {
+        let row = last_row(&sheet(more));
+        println!("{more}: {} N of {weight} N, {row:?}", row["contact.wall.z"]);
+        assert!((row["contact.wall.z"] / weight + 1.0).abs() < 1e-2, "{row:?}");
+        assert!(row["probe.end.displacement.x"] < -1e-2, "{row:?}");
+        row["probe.end.displacement.z"]
+    });
+    assert!((ends[0] - ends[1]).abs() < 2e-4, "{ends:?}");
+}
+
 /// Each mistake is refused with its place and a remedy.
 #[test]
 fn mistakes_are_refused() {
@@ -103,6 +130,20 @@ fn mistakes_are_refused() {
             ],
         ),
         (pressed(implicit, "").replace("friction = 0.2", "barrier-stiffness = 0"), ["barrier-stiffness", ""]),
+        (
+            pressed(implicit, "").replace(
+                "sphere = { radius = 0.01 }",
+                "revolved = { outline = [[0, 0, 0], [0, 0.01, 0], [0.1, 0.02, 0]] }",
+            ),
+            [
+                "point 1 of the outline needs a rounding above 0",
+                "`[height, distance from the axis, radius of the arc]`",
+            ],
+        ),
+        (
+            pressed("solver = 'static'\nspeed-tolerance = 1e-3", ""),
+            ["`speed-tolerance` is for `solver = \"implicit\"`", "remove it"],
+        ),
     ] {
         let told = world(&text).err().unwrap_or_else(|| panic!("accepted:\n{text}"));
         assert!(pieces.iter().all(|piece| told.contains(piece)), "{told}");

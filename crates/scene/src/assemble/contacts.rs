@@ -10,6 +10,7 @@ use pliant_mechanics::load::NO_NODE;
 use pliant_mechanics::model::{Body, Constraint, Motion};
 use pliant_sim::contact::pairs::{Pairs, Surface};
 use pliant_sim::contact::pose::{Course, Pose};
+use pliant_sim::contact::profile::{Corner, Profile};
 use pliant_sim::contact::shape::Shape;
 use pliant_sim::contact::touch::{Contact, Contacts, Jaw, Rigid, Touch, With, lattice, parts_of};
 use pliant_sim::{counted, number};
@@ -117,6 +118,17 @@ impl Builder<'_> {
             ShapeName::Box(of) => Shape::Cuboid { size: of.size },
             ShapeName::Cone(of) => Shape::Cone { radius: of.radius, height: of.height },
             ShapeName::HalfSpace => Shape::HalfSpace,
+            ShapeName::Revolved(of) => {
+                let corners = of.outline.iter().map(|&[z, r, rounding]| Corner { at: [z, r], rounding });
+                match Profile::new(corners.collect()) {
+                    Ok(profile) => Shape::Revolved(Arc::new(profile)),
+                    Err(error) => {
+                        let help = "points are `[height, distance from the axis, radius of the arc]`, counted from 0";
+                        self.error(&at("shape"), error.to_string(), "this outline", help);
+                        return None;
+                    }
+                }
+            }
             ShapeName::Jaws(of) => Shape::Cuboid { size: [of.width, of.thickness, of.length] },
             ShapeName::Mesh(of) => self.shape_of_mesh(of, &[kind, name, "shape", "mesh"])?,
             ShapeName::Image(of) => self.shape_of_image(of, &[kind, name, "shape", "image"])?,

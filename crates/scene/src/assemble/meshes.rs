@@ -46,13 +46,14 @@ impl Builder<'_> {
             ("hemisphere", table.hemisphere.is_some()),
             ("annulus", table.annulus.is_some()),
             ("twisted-strip", table.twisted_strip.is_some()),
+            ("lens", table.lens.is_some()),
             ("lines", table.lines.is_some()),
         ];
         let sources: Vec<&str> = given.iter().filter(|(_, given)| *given).map(|(key, _)| *key).collect();
         let [source] = sources[..] else {
             let message = format!("a mesh comes from exactly one source, found {}", sources.len());
             let help = "give one of `file`, `image`, `masks`, `block`, `ellipsoid`, `tube`, `organ`, for shells `plate`, `cylinder`, \
-                        `sphere`, `hemisphere`, `annulus`, `twisted-strip`, or for bars `lines`";
+                        `sphere`, `hemisphere`, `annulus`, `twisted-strip`, `lens`, or for bars `lines`";
             self.error(path, message, "this mesh", help);
             return None;
         };

@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use pliant_geometry::Mesh;
-use pliant_meshing::{DEFAULT_CELL_LIMIT, Distortion, Pattern, Sheet, sphere};
+use pliant_meshing::{DEFAULT_CELL_LIMIT, Distortion, Lens, Pattern, Sheet, sphere};
 use pliant_sim::number;
 
 use super::Builder;
@@ -20,7 +20,7 @@ struct OnGrid<'t> {
 impl MeshTable {
     /// Whether it is a built-in shape of triangles.
     pub(in crate::assemble) fn is_sheet(&self) -> bool {
-        self.sphere.is_some() || self.sheet().is_some()
+        self.sphere.is_some() || self.lens.is_some() || self.sheet().is_some()
     }
 
     /// The shape on a grid that it names.
@@ -67,8 +67,8 @@ impl Builder<'_> {
                 return None;
             }
         }
-        let made = match &table.sphere {
-            Some(shape) => {
+        let made = match (&table.sphere, &table.lens) {
+            (Some(shape), _) => {
                 let levels = match (shape.levels, table.edge) {
                     (Some(levels), None) => Some(levels),
                     // The edge of an icosahedron is 1.0515 times the radius of the sphere round it.
@@ -77,7 +77,18 @@ impl Builder<'_> {
                 };
                 levels.map(|levels| sphere(shape.radius, levels, DEFAULT_CELL_LIMIT))
             }
-            None => table.sheet().and_then(|shape| {
+            (None, Some(shape)) => table.edge.map(|edge| {
+                let (transition, sweep) = (shape.transition.to_radians(), shape.sweep.to_radians());
+                let lens = Lens {
+                    optic: shape.optic,
+                    overall: shape.overall,
+                    width: shape.width,
+                    transition,
+                    sweep,
+                };
+                lens.mesh(edge, DEFAULT_CELL_LIMIT)
+            }),
+            (None, None) => table.sheet().and_then(|shape| {
                 let counts = match (shape.grid.cells, table.edge) {
                     (Some(cells), None) => cells.map(|n| n as usize),
                     (None, Some(edge)) => {
@@ -95,6 +106,11 @@ impl Builder<'_> {
             Some(Ok(mesh)) => Some(MeshOrigin { origin: described(source, &mesh), mesh }),
             Some(Err(error)) => {
                 self.error(&at(source), error.to_string(), "this shape", "");
+                None
+            }
+            None if table.lens.is_some() => {
+                let help = "give the size of a triangle in metres";
+                self.error(&at(source), "`lens` needs `edge`", "this shape", help);
                 None
             }
             None => {
@@ -161,6 +177,14 @@ mod tests {
             ("{ plate = { size = [1, 1] } }", "`plate` needs either `edge` or `cells`, found neither"),
             ("{ plate = { size = [1, 1], cells = [2, 2] }, edge = 0.1 }", "found both"),
             ("{ sphere = { radius = 1 } }", "`sphere` needs either `edge` or `levels`"),
+            (
+                "{ lens = { optic = 6e-3, overall = 12e-3, width = 5e-4, transition = 60, sweep = 140 } }",
+                "`lens` needs `edge`",
+            ),
+            (
+                "{ lens = { optic = 6e-3, overall = 5e-3, width = 5e-4, transition = 60, sweep = 140 }, edge = 3e-4 }",
+                "overall diameter beyond the optic is -0.001",
+            ),
             ("{ plate = { size = [1, 1], cells = [0, 2] } }", "0 cells asked for along x"),
             ("{ plate = { size = [1, 1], cells = [2, 2] }, as = 'hexes' }", "made of triangles"),
             ("{ plate = { size = [1, -1], cells = [2, 2] } }", "size along y is -1"),

@@ -358,7 +358,7 @@ impl Element {
 }
 
 /// A mesh: exactly one of `file`, `image`, `block`, `ellipsoid`, `tube`, `organ`, for shells `plate`, `cylinder`, `sphere`,
-/// `hemisphere`, `annulus`, `twisted-strip`, or for bars `lines`.
+/// `hemisphere`, `annulus`, `twisted-strip`, `lens`, or for bars `lines`.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct MeshTable {
@@ -425,6 +425,10 @@ pub struct MeshTable {
     /// A strip of triangles along x that turns about the x axis. Point sets: `x-min`, `x-max`, `low`, `high`.
     #[serde(default)]
     pub twisted_strip: Option<TwistedStripShape>,
+    /// A flat intra-ocular lens of triangles in the plane z = 0 about the origin, facing +z, with edges of about `edge`. Point sets: `optic`,
+    /// `haptics`.
+    #[serde(default)]
+    pub lens: Option<LensShape>,
     /// Paths of bars from point to point [m]: `lines = [[[0, 0, 0], [0, 0, 0.02]]]`. They meet where they have a point in common; with
     /// `edge` each piece is cut into bars of about that length.
     #[serde(default)]
@@ -774,6 +778,28 @@ pub struct TwistedStripShape {
     /// Its triangles.
     #[serde(flatten)]
     pub grid: SheetGrid,
+}
+
+/// An intra-ocular lens: a disc, the optic, and two loops half a turn apart, the haptics. From the x axis on a haptic leaves the optic, and goes on at
+/// the overall diameter.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct LensShape {
+    /// Diameter of the optic [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub optic: f64,
+    /// Diameter of the circle around all of it [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub overall: f64,
+    /// Width of a haptic [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub width: f64,
+    /// Angle over which a haptic leaves the optic [degrees].
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 180.0))]
+    pub transition: f64,
+    /// Angle over which a haptic goes in all [degrees].
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 180.0))]
+    pub sweep: f64,
 }
 
 fn whole_turn() -> f64 {

@@ -69,6 +69,8 @@ pub enum ShapeName {
     Cone(ConeTool),
     /// All below the plane z = 0: `shape = "half-space"`.
     HalfSpace,
+    /// A body of revolution about the z axis, such as a funnel with its tube when `inside = true`. Not on GPUs.
+    Revolved(RevolvedTool),
     /// Two jaws of a grasper: boxes along z from a hinge at the origin, which open about the x axis. They are `NAME.upper` and `NAME.lower`.
     Jaws(JawsTool),
     /// What the closed surface of a mesh file encloses.
@@ -128,6 +130,15 @@ pub struct ConeTool {
     /// Height [m].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub height: f64,
+}
+
+/// A body of revolution.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct RevolvedTool {
+    /// Its outline from below upwards: heights, distances from the axis, and radii of the arcs in place of corners [m]. All between it and
+    /// the axis is in it. Beyond an end off the axis the outline goes straight on.
+    pub outline: Vec<[f64; 3]>,
 }
 
 /// Two jaws.

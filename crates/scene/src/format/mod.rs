@@ -13,12 +13,12 @@ mod view;
 pub use body::{
     AnnulusShape, BlockShape, BodyModel, BodyTable, ByLabel, Cells, CleanTable, CylinderShape, Density,
     Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, Label, LayerTable,
-    MeshTable, Normals, Organ, PatternName, PlateShape, Protected, SheetGrid, SphereShape, SurfaceTable,
-    Thickness, ThicknessRule, TubeShape, TwistedStripShape,
+    LensShape, MeshTable, Normals, Organ, PatternName, PlateShape, Protected, SheetGrid, SphereShape,
+    SurfaceTable, Thickness, ThicknessRule, TubeShape, TwistedStripShape,
 };
 pub use contact::{
-    BoxTool, CapsuleTool, ConeTool, ContactTable, ImageTool, JawsTool, MeshTool, OpeningTable, Sampling,
-    ShapeName, SphereTool, ToolTable,
+    BoxTool, CapsuleTool, ConeTool, ContactTable, ImageTool, JawsTool, MeshTool, OpeningTable, RevolvedTool,
+    Sampling, ShapeName, SphereTool, ToolTable,
 };
 pub use linear::{
     ControlTable, ControlledNode, IntegratorName, LinearName, LinearTable, LinearWay, PreconditionerName,
@@ -106,6 +106,11 @@ pub struct RunTable {
     #[serde(default)]
     #[schemars(range(min = 1, max = 10_000))]
     pub iterations: Option<u32>,
+    /// Speed [m/s] of all nodes below which a Newton step of `implicit` in contact is the last one; it is still made. If not given, a step must
+    /// move nothing by more than a thousandth of `barrier-distance`.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub speed_tolerance: Option<f64>,
     /// How `implicit` goes on in time; `backward-euler` if not given.
     #[serde(default)]
     pub integrator: Option<IntegratorName>,

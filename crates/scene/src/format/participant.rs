@@ -43,6 +43,10 @@ pub struct ParticipantTable {
     #[serde(default)]
     #[schemars(range(min = 1, max = 10_000))]
     pub iterations: Option<u32>,
+    /// Speed [m/s] below which a Newton step in contact is the last one, as in `[run]`.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub speed_tolerance: Option<f64>,
     /// As in `[run]`.
     #[serde(default)]
     pub integrator: Option<IntegratorName>,
@@ -79,6 +83,7 @@ impl ParticipantTable {
             load_steps: self.load_steps.clone().unwrap_or(run.load_steps),
             tolerance: self.tolerance.or(run.tolerance),
             iterations: self.iterations.or(run.iterations),
+            speed_tolerance: self.speed_tolerance.or(run.speed_tolerance),
             integrator: self.integrator.or(run.integrator),
             linear: self.linear.clone().unwrap_or(run.linear),
             control: self.control.clone().or(run.control),

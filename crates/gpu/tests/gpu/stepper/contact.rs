@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 use pliant_contact::grid::Grid;
 use pliant_contact::pairs::Surface;
 use pliant_contact::pose::{Course, Leg, Pose};
+use pliant_contact::profile::{Corner, Profile};
 use pliant_contact::shape::Shape;
 use pliant_contact::touch::{Contact, Contacts, Jaw, Rigid, Touch, With};
 use pliant_explicit::{CentralDifference, Observable, State, Wanted};
@@ -368,8 +369,15 @@ fn what_has_no_contact_is_refused_by_name() {
     let gripping =
         Jaw { tool: "grasper".into(), part: 0.5, opening: (0.5, smooth(1.0)), place, grip: Some(0.1) };
     let limited = Rigid { course: floor.course.clone().limited(2.0), ..floor.clone() };
+    let corner = |z: f64| Corner { at: [z, 0.1], rounding: 0.0 };
+    let profile = Profile::new(vec![corner(0.0), corner(1.0)]).unwrap();
+    let revolved = Rigid { shape: Shape::Revolved(Arc::new(profile)), ..floor.clone() };
     let jaw = Rigid { jaw: Some(gripping), ..floor };
-    for (rigid, what) in [(jaw, "the ideal grip of `grasper`"), (limited, "the force limit of `floor`")] {
+    for (rigid, what) in [
+        (jaw, "the ideal grip of `grasper`"),
+        (limited, "the force limit of `floor`"),
+        (revolved, "the outline of `floor`"),
+    ] {
         let contacts = Contacts { rigids: vec![rigid], ..Contacts::clone(&contacts) };
         assert_eq!(stepper(contacts, None), Some(GpuError::Unsupported { what: what.into() }));
     }

@@ -107,6 +107,7 @@ impl Builder<'_> {
             ("iterations", newton, "`solver = \"implicit\"` and `\"static\"`"),
             ("linear", newton, "`solver = \"implicit\"` and `\"static\"`"),
             ("control", newton && run.solver == SolverName::Static, "`solver = \"static\"`"),
+            ("speed-tolerance", newton && run.solver == SolverName::Implicit, "`solver = \"implicit\"`"),
             ("integrator", newton && run.solver == SolverName::Implicit, "`solver = \"implicit\"`"),
         ] {
             if scene.gives(key) && !wanted {
