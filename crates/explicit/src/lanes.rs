@@ -140,7 +140,7 @@ impl Instructions {
 
     /// The widest that this processor has and this build knows.
     pub fn widest() -> Self {
-        Self::ALL.into_iter().find(|&known| Processor::with(known).is_ok()).unwrap_or(Self::Plain)
+        Self::ALL.into_iter().find(|&known| Processor::having(known).is_some()).unwrap_or(Self::Plain)
     }
 }
 
@@ -179,7 +179,7 @@ pub enum Processor {
 impl Processor {
     /// The widest lanes that this processor has.
     pub(crate) fn detect() -> Self {
-        Self::with(Instructions::widest()).unwrap_or(Self::Plain)
+        Self::having(Instructions::widest()).unwrap_or(Self::Plain)
     }
 
     /// The lanes of certain instructions.
@@ -187,7 +187,12 @@ impl Processor {
     /// # Errors
     /// If the processor does not have them.
     pub(crate) fn with(wanted: Instructions) -> Result<Self, MissingInstructions> {
-        let found = match wanted {
+        Self::having(wanted).ok_or_else(|| MissingInstructions { wanted, widest: Instructions::widest() })
+    }
+
+    /// The lanes of certain instructions, if the processor has them.
+    fn having(wanted: Instructions) -> Option<Self> {
+        match wanted {
             #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
             Instructions::Avx512 => pulp::x86::V4::try_new().map(Self::Avx512),
             #[cfg(target_arch = "x86_64")]
@@ -199,8 +204,7 @@ impl Processor {
             Instructions::Plain => Some(Self::Plain),
             #[allow(unreachable_patterns)]
             _ => None,
-        };
-        found.ok_or_else(|| MissingInstructions { wanted, widest: Instructions::widest() })
+        }
     }
 
     /// Does the work in these lanes.
