@@ -99,7 +99,7 @@ fn surface_with_itself(bencher: Bencher<'_, '_>) {
     bencher.bench_local(|| {
         let points = ball.swing();
         let place = |node: u32| points[node as usize];
-        pairs.update(place, 1e-5);
+        pairs.update(place);
         let mut count = 0;
         pairs.find(place, |_| count += 1);
         count

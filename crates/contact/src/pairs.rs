@@ -1,8 +1,8 @@
 //! Where two deformable surfaces, or parts of a surface, come near each other: a node above a triangle, and two edges that cross. Distances are
 //! signed by the outward side of the surfaces, so that a small overlap is seen as such.
 //!
-//! Trees of triangles and edges give lists of candidates. These hold until a node has moved by half of a margin, the skin. A step looks at
-//! the candidates alone. Lists and results do not depend on the order in which bodies or threads come.
+//! Trees of triangles and edges give lists of candidates. These hold until a node has moved by half of a margin, the skin: till then they have
+//! all that a step looks at, so that results do not depend on when they were made. They do not depend on the order of bodies or threads either.
 //!
 //! A node is compared with each triangle that it lies above or beneath, and with the nearest edge or corner if that is nearer still. Two edges
 //! count where the normal between them is in the cones of normals of both (Gauss map). Surfaces that look the same way do not touch.
@@ -18,8 +18,12 @@ pub use narrow::Edge;
 use narrow::{Above, Across, is_beyond};
 pub(crate) use narrow::{FLAT, PARALLEL};
 
+/// How far beyond the distance to keep pairs are found, over the mean edge.
+const REACH: f64 = 0.25;
 /// The skin of the lists, over the mean edge.
 const SKIN: f64 = 0.25;
+/// What lists hold, over the skin: the rest is round-off of single precision.
+const HELD: f64 = 1.01;
 /// Overlap, over the mean edge, up to which a surface is seen from behind.
 const DEPTH: f64 = 0.25;
 /// The cosine of the angle between outward normals up to which surfaces face each other.
@@ -79,8 +83,8 @@ pub struct Pair {
 pub struct Point<'p> {
     /// The node.
     pub node: u32,
-    /// Its outward normal when candidates were listed.
-    pub outward: Vector3<f64>,
+    /// The triangles of its own surface around it: each by its other corners, in order.
+    pub ring: &'p [[u32; 2]],
     /// Whether it belongs to the first of two surfaces.
     pub in_order: bool,
     list: &'p [[u32; 2]],
@@ -103,11 +107,13 @@ struct Side {
     edges: Vec<Edge>,
     /// Nodes at borders of an open surface, increasing.
     border: Vec<u32>,
+    /// Triangles around the nodes, one node after the other: each by its other corners, in order. Where those of each node end.
+    rings: Vec<[u32; 2]>,
+    ring_ends: Vec<usize>,
     face_tree: Tree,
     edge_tree: Tree,
-    /// Places [m] and outward normals of the nodes when candidates were listed.
+    /// Places [m] of the nodes when candidates were listed.
     listed: Vec<Vector3<f64>>,
-    normals: Vec<Vector3<f64>>,
 }
 
 impl Side {
@@ -127,13 +133,34 @@ impl Side {
         border.dedup();
         let face_tree = Tree::new(surface.faces.len(), |face| around(surface.faces[face as usize], place));
         let edge_tree = Tree::new(edges.len(), |edge| around(edges[edge as usize].ends, place));
-        let (nodes, faces) = (surface.nodes.clone(), surface.faces.clone());
-        Self { nodes, faces, edges, border, face_tree, edge_tree, listed: Vec::new(), normals: Vec::new() }
+        let turned = surface.faces.iter().flat_map(|&[a, b, c]| [(a, [b, c]), (b, [c, a]), (c, [a, b])]);
+        let mut around_nodes: Vec<(u32, [u32; 2])> = turned.collect();
+        around_nodes.sort_by_key(|&(node, _)| node);
+        let end = |&node: &u32| around_nodes.partition_point(|&(known, _)| known <= node);
+        Self {
+            nodes: surface.nodes.clone(),
+            faces: surface.faces.clone(),
+            edges,
+            border,
+            ring_ends: surface.nodes.iter().map(end).collect(),
+            rings: around_nodes.into_iter().map(|(_, others)| others).collect(),
+            face_tree,
+            edge_tree,
+            listed: Vec::new(),
+        }
     }
 
-    /// The outward normal of a node when candidates were listed.
-    fn outward(&self, node: u32) -> Vector3<f64> {
-        self.normals[self.nodes.partition_point(|&known| known < node)]
+    /// The triangles around a node, by its place among the nodes.
+    fn ring(&self, own: usize) -> &[[u32; 2]] {
+        let first = own.checked_sub(1).map_or(0, |before| self.ring_ends[before]);
+        &self.rings[first..self.ring_ends[own]]
+    }
+
+    /// The outward normal of a node, by its place among the nodes.
+    fn outward(&self, own: usize, place: &impl Fn(u32) -> Vector3<f64>) -> Vector3<f64> {
+        let at = place(self.nodes[own]);
+        let area = |&[b, c]: &[u32; 2]| (place(b) - at).cross(&(place(c) - at));
+        self.ring(own).iter().map(area).sum::<Vector3<f64>>().try_normalize(0.0).unwrap_or_default()
     }
 
     /// The square of the longest way [m²] of a node since candidates were listed.
@@ -146,19 +173,6 @@ impl Side {
     fn take_places(&mut self, place: &impl Fn(u32) -> Vector3<f64>) {
         self.listed.clear();
         self.listed.extend(self.nodes.iter().map(|&node| place(node)));
-        self.normals.clear();
-        self.normals.resize(self.nodes.len(), Vector3::zeros());
-        for &face in &self.faces {
-            let [a, b, c] = face.map(place);
-            let area = (b - a).cross(&(c - a));
-            for node in face {
-                // Triangles are of nodes of the surface.
-                self.normals[self.nodes.partition_point(|&known| known < node)] += area;
-            }
-        }
-        for normal in &mut self.normals {
-            *normal = normal.try_normalize(0.0).unwrap_or_default();
-        }
         let Self { faces, edges, face_tree, edge_tree, .. } = self;
         face_tree.refit(|face| around(faces[face as usize], place));
         edge_tree.refit(|edge| around(edges[edge as usize].ends, place));
@@ -174,9 +188,11 @@ pub struct Pairs {
     sides: Vec<Side>,
     /// Distance [m] that they keep.
     offset: f64,
+    /// How far [m] beyond that pairs are found.
+    reach: f64,
     skin: f64,
     depth: f64,
-    /// Nodes with triangles of the other surface, by the surface of the node.
+    /// Nodes, by their place in the surface, with triangles of the other surface.
     points: [Vec<[u32; 2]>; 2],
     /// Edges of the first with edges of the second.
     crossings: Vec<[u32; 2]>,
@@ -202,10 +218,9 @@ impl Pairs {
             (sum + (b - a).norm(), count + 1.0)
         });
         let mean = sum / count.max(1.0);
-        let (skin, depth) = (SKIN * mean, DEPTH * mean);
-        let (points, apart) = Default::default();
-        let mut own =
-            Self { sides, offset, skin, depth, points, crossings: Vec::new(), apart, near: Vec::new() };
+        let [reach, skin, depth] = [REACH, SKIN, DEPTH].map(|part| part * mean);
+        let (points, crossings, apart, near) = Default::default();
+        let mut own = Self { sides, offset, reach, skin, depth, points, crossings, apart, near };
         if second.is_none() {
             own.set_apart(&place);
         }
@@ -214,13 +229,13 @@ impl Pairs {
 
     /// Finds the parts of a surface that are too near each other at rest: beside each other, or on both sides of a thin part.
     fn set_apart(&mut self, place: &impl Fn(u32) -> Vector3<f64>) {
-        self.list(place, 2.0 * self.depth + self.skin);
         let keep = AT_REST * self.offset;
+        self.list(place, keep.max(2.0 * self.depth) + self.skin);
         let side = &self.sides[0];
         let behind = |distance: f64| -2.0 * self.depth < distance && distance < keep;
         let points = self.points[0].iter().filter(|[node, face]| {
             let corners = side.faces[*face as usize].map(place);
-            let above = Above::of(&corners, &place(*node), BESIDE);
+            let above = Above::of(&corners, &place(side.nodes[*node as usize]), BESIDE);
             above.is_inner && behind(above.height) || above.distance() < keep
         });
         let crossings = self.crossings.iter().filter(|[first, second]| {
@@ -239,19 +254,23 @@ impl Pairs {
         self.apart.iter().map(Vec::len).sum()
     }
 
-    /// Lists candidates anew if nodes have moved too far for the lists, or may in a step that takes each by at most `way` [m].
-    pub fn update(&mut self, place: impl Fn(u32) -> Vector3<f64>, way: f64) {
-        let moved = self.sides.iter().map(|side| side.moved(&place)).fold(0.0, f64::max).sqrt();
-        if moved + way > 0.5 * self.skin {
-            self.list_again(place, way);
+    /// How far [m] away, by its box, what a node or an edge is compared with can be.
+    fn within(&self) -> f64 {
+        (self.offset + self.reach).max(self.depth)
+    }
+
+    /// Lists candidates anew if nodes have moved too far for the lists.
+    pub fn update(&mut self, place: impl Fn(u32) -> Vector3<f64>) {
+        let moved = self.sides.iter().map(|side| side.moved(&place)).fold(0.0, f64::max);
+        if moved > (0.5 * self.skin).powi(2) {
+            self.list_again(place);
         }
     }
 
-    /// Lists candidates anew, `way` [m] more than the skin around; returns how far [m] nodes may move before the lists miss something.
-    pub fn list_again(&mut self, place: impl Fn(u32) -> Vector3<f64>, way: f64) -> f64 {
-        let room = 0.5 * self.skin + way;
-        self.list(&place, self.offset + 2.0 * room);
-        room
+    /// Lists candidates anew; returns how far [m] nodes may move before the lists miss something.
+    pub fn list_again(&mut self, place: impl Fn(u32) -> Vector3<f64>) -> f64 {
+        self.list(&place, self.within() + HELD * self.skin);
+        0.5 * self.skin
     }
 
     /// Lists what is within a reach [m] by its boxes.
@@ -264,14 +283,14 @@ impl Pairs {
         for (number, side) in sides.iter().enumerate() {
             let (list, other) = (&mut points[number], other(number));
             list.clear();
-            for (&node, at) in side.nodes.iter().zip(&side.listed) {
+            for ((&node, at), own) in side.nodes.iter().zip(&side.listed).zip(0..) {
                 let wanted = Bounds::of([*at]).grown(reach);
                 let first = list.len();
                 other.face_tree.near(&wanted, |face| {
                     let corners = other.faces[face as usize];
                     let meets = !corners.contains(&node) && around(corners, place).touches(&wanted);
-                    if meets && apart[0].binary_search(&[node, face]).is_err() {
-                        list.push([node, face]);
+                    if meets && apart[0].binary_search(&[own, face]).is_err() {
+                        list.push([own, face]);
                     }
                 });
                 list[first..].sort_unstable();
@@ -311,9 +330,9 @@ impl Pairs {
         &self.near
     }
 
-    /// The distance to keep, the skin, and the overlap up to which a surface is seen from behind [m].
+    /// The distance to keep, how far beyond that pairs are found, and the overlap up to which a surface is seen from behind [m].
     pub fn lengths(&self) -> [f64; 3] {
-        [self.offset, self.skin, self.depth]
+        [self.offset, self.reach, self.depth]
     }
 
     fn other(&self, side: usize) -> &Side {
@@ -325,8 +344,8 @@ impl Pairs {
         let of_side = move |(number, side)| {
             let (side, other): (&Side, _) = (side, self.other(number));
             self.points[number].chunk_by(|a, b| a[0] == b[0]).map(move |list| Point {
-                node: list[0][0],
-                outward: side.outward(list[0][0]),
+                node: side.nodes[list[0][0] as usize],
+                ring: side.ring(list[0][0] as usize),
                 in_order: number == 0,
                 list,
                 other,
@@ -341,14 +360,15 @@ impl Pairs {
         self.crossings.iter().map(move |&[a, b]| [edge(&self.sides[0], a), edge(self.other(0), b)])
     }
 
-    /// What is nearer than the skin beyond the distance to keep, with nodes at these places [m].
+    /// What is nearer than the reach beyond the distance to keep, with nodes at these places [m]. These alone decide what is found, as long as
+    /// the lists hold.
     pub fn find(&self, place: impl Fn(u32) -> Vector3<f64>, mut found: impl FnMut(Pair)) {
-        let limit = self.offset + self.skin;
+        let (limit, within) = (self.offset + self.reach, self.within());
         let wanted = |pair: &Pair| -self.depth < pair.distance && pair.distance < limit;
-        let within = limit.max(self.depth);
+        let mut rows = Vec::new();
         for (number, side) in self.sides.iter().enumerate() {
             for list in self.points[number].chunk_by(|a, b| a[0] == b[0]) {
-                self.find_above(list, within, side, self.other(number), &place, |pair| {
+                self.find_above(list, side, self.other(number), &place, &mut rows, |pair| {
                     if wanted(&pair) {
                         found(Pair { in_order: number == 0, ..pair });
                     }
@@ -369,19 +389,22 @@ impl Pairs {
         }
     }
 
-    /// Of a node with the triangles that are near it, no farther than a distance [m].
+    /// Of a node with the triangles that are near it; `rows` is room for pairs.
     fn find_above(
         &self,
         list: &[[u32; 2]],
-        within: f64,
         side: &Side,
         other: &Side,
         place: &impl Fn(u32) -> Vector3<f64>,
+        rows: &mut Vec<(u32, Pair)>,
         mut found: impl FnMut(Pair),
     ) {
-        let node = list[0][0];
+        let own = list[0][0] as usize;
+        let node = side.nodes[own];
         let point = place(node);
-        let outward = side.outward(node);
+        let within = self.within();
+        let wanted = Bounds::of([point]).grown(within);
+        let mut outward = None;
         let pair = |[a, b, c]: [u32; 3], [u, v, w]: [f64; 3], normal, distance| Pair {
             nodes: [node, a, b, c],
             weights: [1.0, -u, -v, -w],
@@ -398,13 +421,14 @@ impl Pairs {
         let mut hidden = f64::INFINITY;
         // Whether the nearest edge or corner is of a triangle that does not.
         let mut faces = false;
-        let mut rows = Vec::new();
+        rows.clear();
         for &[_, face] in list {
             let nodes = other.faces[face as usize];
             let corners = nodes.map(place);
-            if is_beyond(within, &corners, &point) {
+            if !Bounds::of(corners).touches(&wanted) || is_beyond(within, &corners, &point) {
                 continue;
             }
+            let outward = *outward.get_or_insert_with(|| side.outward(own, place));
             let mut here = Above::of(&corners, &point, BESIDE);
             if here.is_beside() && here.normal.dot(&outward) > -FACING {
                 here = Above::of(&corners, &point, 0.0);
@@ -456,7 +480,7 @@ impl Pairs {
         match beneath {
             Some(Pair { distance, .. }) if -distance > hidden && -distance > SLIGHT * self.depth => {}
             Some(pair) if -pair.distance < above => found(pair),
-            _ => rows.into_iter().for_each(|(_, pair)| found(pair)),
+            _ => rows.drain(..).for_each(|(_, pair)| found(pair)),
         }
     }
 }
@@ -492,10 +516,10 @@ mod tests {
         let (high, above) = square(3, false, 16);
         places.extend(above.iter().map(|x| x + Vector3::new(0.3, 0.2, 0.1)));
         let mut pairs = Pairs::new(&low, Some(&high), 0.0, |node| places[node as usize]);
-        pairs.update(|node| places[node as usize], 0.0);
+        pairs.update(|node| places[node as usize]);
         for height in [0.1, 0.05, -0.02] {
             places[16..].iter_mut().for_each(|place| place.z = height);
-            pairs.update(|node| places[node as usize], 0.0);
+            pairs.update(|node| places[node as usize]);
             let all = found(&pairs, &places);
             let [points, edges] =
                 [true, false].map(|of| all.iter().filter(|p| (p.weights[0] == 1.0) == of).count());
@@ -518,8 +542,61 @@ mod tests {
         }
         // Looked at from behind, there is nothing to touch.
         places[16..].iter_mut().for_each(|place| place.z = -0.9);
-        pairs.update(|node| places[node as usize], 0.0);
+        pairs.update(|node| places[node as usize]);
         assert!(found(&pairs, &places).is_empty());
+    }
+
+    /// Pairs at some places are those of lists made at these places, and of lists with a larger skin, to the last bit.
+    #[test]
+    fn pairs_do_not_depend_on_when_lists_are_made() {
+        let (low, mut rest) = square(6, true, 0);
+        let (high, above) = square(5, false, 49);
+        rest.extend(above.iter().map(|x| x + Vector3::new(0.3, 0.4, 0.1)));
+        let mut random = pliant_testing::Random::new(3);
+        rest.iter_mut().for_each(|x| *x += 0.3 * Vector3::from_fn(|_, _| random.half()));
+        let faces = [&low, &high].iter().flat_map(|one| one.faces.clone()).collect();
+        let both = Surface { nodes: (0..rest.len() as u32).collect(), faces };
+        for (first, second) in [(&low, Some(&high)), (&both, None)] {
+            let apart = |node: u32| rest[node as usize] + Vector3::z() * if node < 49 { 0.0 } else { 3.0 };
+            let fresh = || Pairs::new(first, second, 0.01, apart);
+            let (mut held, mut wide) = (fresh(), fresh());
+            wide.skin *= 4.0;
+            let (mut lists, mut all) = (0, 0);
+            for step in 0..300 {
+                let time = 0.01 * f64::from(step);
+                let wave = |x: &Vector3<f64>| {
+                    Vector3::new(0.5 * time, 0.2 * (2.0 * time).sin(), 0.3 * (3.0 * time + x.x).cos() - 0.1)
+                };
+                let now = |node: u32| {
+                    let x = &rest[node as usize];
+                    if node < 49 { *x } else { x + wave(x) }
+                };
+                let bits = |pairs: &Pairs| {
+                    let mut found = Vec::new();
+                    pairs.find(now, |pair| {
+                        let numbers = pair.weights.iter().chain(&pair.normal).chain([&pair.distance]);
+                        found.push((
+                            pair.nodes,
+                            pair.in_order,
+                            numbers.map(|x| x.to_bits()).collect::<Vec<_>>(),
+                        ));
+                    });
+                    found
+                };
+                let before = held.sides[0].listed.clone();
+                held.update(now);
+                lists += u32::from(held.sides[0].listed != before);
+                wide.update(now);
+                let mut anew = fresh();
+                anew.list_again(now);
+                let wanted = bits(&anew);
+                assert_eq!(bits(&held), wanted, "step {step}");
+                assert_eq!(bits(&wide), wanted, "step {step}");
+                all += wanted.len();
+            }
+            println!("{all} pairs in 300 steps, listed anew in {lists}");
+            assert!(all > 3000 && lists < 150, "{all} {lists}");
+        }
     }
 
     /// A corner that comes down on the border of a square is above that; of the wall beneath, in one plane with the corner's own wall, it is none.
@@ -540,7 +617,7 @@ mod tests {
             let mut places = places.clone();
             places[6..].iter_mut().for_each(|place| *place += Vector3::new(shift, 0.0, height));
             let mut pairs = Pairs::new(&block, Some(&corner), 1.0, |node| places[node as usize]);
-            pairs.update(|node| places[node as usize], 0.0);
+            pairs.update(|node| places[node as usize]);
             let all = found(&pairs, &places);
             let of_corner: Vec<&Pair> = all.iter().filter(|pair| pair.nodes[0] == 6).collect();
             assert!(!of_corner.is_empty());
@@ -561,10 +638,10 @@ mod tests {
         };
         let mut pairs = Pairs::new(&sheet, None, 0.0, |node| flat[node as usize]);
         assert_eq!(pairs.set_apart_count(), 0);
-        pairs.update(|node| flat[node as usize], 0.0);
+        pairs.update(|node| flat[node as usize]);
         assert!(found(&pairs, &flat).is_empty());
         let folded: Vec<Vector3<f64>> = flat.iter().map(fold).collect();
-        pairs.update(|node| folded[node as usize], 0.0);
+        pairs.update(|node| folded[node as usize]);
         let all = found(&pairs, &folded);
         let across = all.iter().filter(|pair| (pair.distance - 0.1).abs() < 1e-12).count();
         assert!(across > 40, "{across} of {}", all.len());

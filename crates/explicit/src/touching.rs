@@ -62,6 +62,8 @@ struct Node {
     way: f64,
     /// Whether it may touch something, so that its prediction is known.
     near: bool,
+    /// Whether it is in a pair of bodies.
+    paired: bool,
     /// The first of the rows on it alone.
     first: u32,
     /// Its depth [m] in things at the predicted place.
@@ -81,6 +83,7 @@ impl Node {
             lifted: zero,
             way: 0.0,
             near: false,
+            paired: false,
             first: NONE,
             depth: 0.0,
         }
@@ -161,7 +164,7 @@ impl Touching {
         let mut farthest = 0.0_f64;
         for (node, &number) in self.nodes.iter_mut().zip(&self.numbers) {
             let (place, way) = now(number);
-            (node.now, node.near) = (place.into(), false);
+            (node.now, node.near, node.paired) = (place.into(), false, false);
             farthest = farthest.max(way);
         }
         for own in &mut self.own {
@@ -231,8 +234,7 @@ impl Touching {
                     });
                 }
                 Own::Bodies(pairs, _) => {
-                    // A way can double in a step.
-                    pairs.update(|node| nodes[node as usize].now, 2.0 * farthest);
+                    pairs.update(|node| nodes[node as usize].now);
                     pairs.near().iter().for_each(|&node| nodes[node as usize].near = true);
                 }
             }
@@ -319,6 +321,7 @@ impl Touching {
         for (index, own) in own.iter().enumerate() {
             let Own::Bodies(pairs, sign) = own else { continue };
             let offset = contacts.contacts[index].touch.offset;
+            let first = rows.len();
             // Impulses along the way between two points before the step have no moment.
             pairs.find(
                 |node| nodes[node as usize].now,
@@ -331,6 +334,8 @@ impl Touching {
                     rows.push(row);
                 },
             );
+            let parts = rows[first..].iter().flat_map(Row::parts);
+            parts.filter(|(_, weight)| *weight != 0.0).for_each(|(node, _)| nodes[node].paired = true);
         }
         // No impulse moves a point farther than a few times the deepest one.
         rows.retain(|row| row.gap < BAND * deepest);
@@ -392,9 +397,9 @@ impl Touching {
         for (index, own) in own.iter().enumerate() {
             let Own::Rigid(own) = own else { continue };
             let (rigid, touch) = (&contacts.rigids[own.rigid], &contacts.contacts[index].touch);
-            for &number in &own.listed.nodes {
+            for &number in &own.near {
                 let at = number as usize;
-                if !nodes[at].near || nodes[at].then == nodes[at].free {
+                if nodes[at].then == nodes[at].free {
                     continue;
                 }
                 let depth = nodes[at].depth.max(FOUND * deepest);
@@ -427,11 +432,8 @@ impl Touching {
         for ((contact, own), force) in self.contacts.contacts.iter().zip(&self.own).zip(&mut self.forces) {
             let Own::Rigid(own) = own else { continue };
             let rigid = &self.contacts.rigids[own.rigid];
-            for &node in &own.listed.nodes {
+            for &node in &own.near {
                 let node = &mut self.nodes[node as usize];
-                if !node.near {
-                    continue;
-                }
                 let mut first = None;
                 for _ in 0..LIFTS {
                     let (gap, normal) = own.gap(rigid, contact.touch.offset, node);

@@ -190,7 +190,7 @@ impl DeviceContacts {
         self.pairs.is_some()
     }
 
-    /// Lists candidates for pairs, with nodes at displacements [m] from where they go by `part` of these increments [m] in the step to come.
+    /// Lists candidates for pairs, with nodes at displacements [m].
     ///
     /// # Errors
     /// If an array is too large.
@@ -198,11 +198,10 @@ impl DeviceContacts {
         &mut self,
         device: &Device,
         nodes: &DeviceNodes,
-        (displacements, increments): (&[Four], &[Four]),
-        part: f64,
+        displacements: &[Four],
     ) -> Result<(), GpuError> {
         let Some(pairs) = &mut self.pairs else { return Ok(()) };
-        if pairs.list(device, displacements, increments, part)? {
+        if pairs.list(device, displacements)? {
             self.arrays.rows = rows(&Memory::new(device), self.other_rows, Some(pairs))?;
             let bound = bound(device, nodes, &self.arrays, [&self.forces, &self.sums], Some(pairs));
             let kernels = self.kernels.iter_mut().chain(&mut self.before).chain([&mut self.sum]);

@@ -1,5 +1,5 @@
-//! Candidates for pairs of points of surfaces: listed in ordinary memory from places that are read back, whenever the device stops because nodes may
-//! leave the skin of the lists. They hold at that instant and change nothing before, so that results don't depend on when the device was looked at.
+//! Candidates for pairs of points of surfaces: listed in ordinary memory from places that are read back, whenever the device stops because nodes have
+//! left the skin of the lists. Results depend neither on when they are made nor on when the device was looked at.
 
 use nalgebra::Vector3;
 use pliant_contact::pairs::Pairs;
@@ -81,43 +81,29 @@ impl DevicePairs {
             numbers: Vec::new(),
             places: Vec::new(),
         };
-        all.find(&vec![Four::default(); nodes.len()], 0.0);
+        all.find(&vec![Four::default(); nodes.len()]);
         all.grow(memory)?;
         Ok(Some(all))
     }
 
-    /// Lists candidates with nodes of the model at displacements [m], from where they go by `part` of these increments [m] in the step to come; uploads them.
-    /// Whether arrays are others than before.
+    /// Lists candidates with nodes of the model at displacements [m]; uploads them. Whether arrays are others than before.
     ///
     /// # Errors
     /// If an array is too large.
-    pub(crate) fn list(
-        &mut self,
-        device: &Device,
-        displacements: &[Four],
-        increments: &[Four],
-        part: f64,
-    ) -> Result<bool, GpuError> {
-        let of_node = |of: &[Four], node: u32| of[node as usize];
-        let moved: Vec<Four> = self.nodes.iter().map(|&node| of_node(displacements, node)).collect();
-        let way = |&node: &u32| {
-            let [x, y, z, _] = of_node(increments, node).map(f64::from);
-            Vector3::new(x, y, z).norm() * part
-        };
-        let farthest = self.nodes.iter().map(way).fold(0.0, f64::max);
-        self.find(&moved, farthest);
+    pub(crate) fn list(&mut self, device: &Device, displacements: &[Four]) -> Result<bool, GpuError> {
+        let moved: Vec<Four> = self.nodes.iter().map(|&node| displacements[node as usize]).collect();
+        self.find(&moved);
         let grows = self.grow(&Memory::new(device))?;
         device.queue.write_buffer(&self.candidates, 0, bytemuck::cast_slice(&self.numbers));
         device.queue.write_buffer(&self.listed, 0, bytemuck::cast_slice(&self.places));
         Ok(grows)
     }
 
-    /// Lists candidates with these displacements [m] of the nodes that touch, of which none goes farther in the step than a length [m].
-    fn find(&mut self, moved: &[Four], farthest: f64) {
+    /// Lists candidates with these displacements [m] of the nodes that touch.
+    fn find(&mut self, moved: &[Four]) {
         let Self { own, touches, rest, watched, numbers, places, .. } = self;
         places.clear();
-        let is_sound = farthest.is_finite() && moved.iter().flatten().all(|x| x.is_finite());
-        if !is_sound {
+        if !moved.iter().flatten().all(|x| x.is_finite()) {
             // The device finds what is wrong.
             let free =
                 |(&[x, y, z, _], &watched): (&Four, &bool)| [x, y, z, if watched { ANYWHERE } else { 0.0 }];
@@ -136,9 +122,8 @@ impl DevicePairs {
         let mut room = f64::INFINITY;
         let row_count = |rows: &[u32]| (rows.len() / 5) as u32;
         for (contact, pairs, sign) in own.iter_mut() {
-            // A way can double in a step; twice of that leaves some steps to the list.
-            room = room.min(pairs.list_again(place, 4.0 * farthest));
-            let [offset, skin, depth] = pairs.lengths();
+            room = room.min(pairs.list_again(place));
+            let [offset, reach, depth] = pairs.lengths();
             let friction = touches[*contact].friction;
             let info = (*contact as u32) << 4;
             let against = |in_order: bool| if in_order == (*sign > 0.0) { 0 } else { 8 };
@@ -150,7 +135,9 @@ impl DevicePairs {
                     rows.extend([point.node, a, b, c, info | against(point.in_order) | border]);
                 }
                 points.extend([point.node, *contact as u32, first, row_count(&rows)]);
-                points.extend(point.outward.iter().map(|&x| float(x)));
+                points.push(numbers.len() as u32);
+                numbers.extend(point.ring.as_flattened());
+                points.push(numbers.len() as u32);
                 point_count += 1;
             }
             ranges[1..3].fill(row_count(&rows));
@@ -164,7 +151,7 @@ impl DevicePairs {
             }
             ranges[3] = row_count(&rows);
             let at = OF_CONTACT * (1 + *contact);
-            let lengths = [offset, offset + skin, depth, friction].map(float);
+            let lengths = [offset, offset + reach, depth, friction].map(float);
             numbers[at..at + OF_CONTACT].copy_from_slice([lengths, ranges].as_flattened());
         }
         let points_at = numbers.len();

@@ -372,7 +372,7 @@ impl GpuStepper {
         self.instants.forget_deformation(&self.device);
         let starts = if state.is_at_start() { flags::STARTS } else { 0 };
         if !self.listed {
-            self.list(state, self.lengths)?;
+            self.list()?;
         }
         let mut results = self.evaluate_listed(state, flags::MEASURES | starts, true)?;
         self.check(state, &results)?;
@@ -524,8 +524,7 @@ impl GpuStepper {
         let mut last = self.go_to(state, end)?;
         while let Some(at) = self.unlisted()? {
             self.go_back(state, at);
-            let Lengths { next, .. } = self.lengths;
-            self.list(state, Lengths { before: next, next })?;
+            self.list()?;
             last = self.go_to(state, end)?;
         }
         Ok(last)
@@ -542,20 +541,14 @@ impl GpuStepper {
         Ok((found != u32::MAX).then_some(found))
     }
 
-    /// Lists candidates for contact anew, of an instant between steps of these lengths [s].
-    fn list(&mut self, state: &State<f32>, lengths: Lengths) -> Result<(), GpuError> {
+    /// Lists candidates for contact anew.
+    fn list(&mut self) -> Result<(), GpuError> {
         self.listed = true;
         let Some(contacts) = self.contacts.as_mut().filter(|own| own.has_pairs()) else { return Ok(()) };
-        let (nodes, side) = (&self.nodes, self.side);
-        let bytes = (nodes.count * size_of::<Four>()) as u64;
-        // The start has velocities in place of increments.
-        let part = if state.is_at_start() { lengths.before } else { lengths.ratio() };
-        let arrays = [&nodes.displacement, &nodes.increment].map(|of| (&of[side], bytes));
-        let (mut listed, device) = (Ok(()), &self.device);
-        self.transfer.read_all(device, &arrays, |parts| {
-            let [displacements, increments] = [0, 1].map(|k| bytemuck::cast_slice(parts[k]));
-            listed = contacts.list(device, nodes, (displacements, increments), part);
-        })?;
+        let (nodes, device) = (&self.nodes, &self.device);
+        let (from, mut listed) = (&nodes.displacement[self.side], Ok(()));
+        self.transfer
+            .read::<Four>(device, from, nodes.count, |all| listed = contacts.list(device, nodes, all))?;
         self.instants.go_on(device);
         listed
     }
@@ -667,7 +660,7 @@ impl GpuStepper {
             if results.unlisted.is_none() {
                 return Ok(results);
             }
-            self.list(state, self.lengths)?;
+            self.list()?;
         }
     }
 

@@ -1,5 +1,6 @@
 // Where points lie by triangles, and where edges cross; twin of narrow.rs and of `Pairs::find`. The module around it gives
-// `between(a, b)`, the way [m] from node b to node a before the step; `corners_of(row)`, the triangle of a candidate; `at_border(row, corners)`,
+// `between(a, b)`, the way [m] from node b to node a before the step; `ring_of(k)`, the other corners, in order, of a triangle around a node, for every second k;
+// `corners_of(row)`, the triangle of a candidate; `at_border(row, corners)`,
 // whether those of its corners that are told are all at borders; `take_pair(row, nodes, weights, normal, distance)`, which notes a pair that is
 // found in the place of its candidate, and `leave_pair(row)`, which notes that there is none.
 //
@@ -73,9 +74,21 @@ fn is_beside(here: Above) -> bool {
     return here.is_inner && any(here.weights < vec3f(0.0));
 }
 
-// Finds what a node touches among the triangles of its candidates, from one row to another: `outward` is its normal, `skin` and `depth` [m] are
-// those of the lists.
-fn find_above(node: u32, outward: vec3f, first: u32, end: u32, skin: f32, depth: f32) {
+// The outward normal of a node, from the triangles around it, from one to another.
+fn node_outward(node: u32, first: u32, end: u32) -> vec3f {
+    var area = vec3f(0.0);
+    for (var k = first; k < end; k += 2u) {
+        let others = ring_of(k);
+        area += cross(between(others.x, node), between(others.y, node));
+    }
+    return unit(area);
+}
+
+// Finds what a node touches among the triangles of its candidates, from one row to another: `ring` tells those around it; no farther than `within`
+// [m]. `reach` and `depth` [m] are those of the lists.
+fn find_above(node: u32, ring: vec2u, first: u32, end: u32, within: f32, reach: f32, depth: f32) {
+    var outward = vec3f(0.0);
+    var is_oriented = false;
     var nearest = FAR;
     var nearest_row = NO_ROW;
     var nearest_way = vec3f(0.0);
@@ -94,7 +107,17 @@ fn find_above(node: u32, outward: vec3f, first: u32, end: u32, skin: f32, depth:
         let a = between(corners.x, node);
         let b = between(corners.y, node);
         let c = between(corners.z, node);
+        if any(min(min(a, b), c) > vec3f(within)) || any(max(max(a, b), c) < vec3f(-within)) {
+            continue;
+        }
         var here = above(a, b, c, BESIDE);
+        if abs(here.height) > within {
+            continue;
+        }
+        if !is_oriented {
+            outward = node_outward(node, ring.x, ring.y);
+            is_oriented = true;
+        }
         if is_beside(here) && dot(here.normal, outward) > -FACING {
             here = above(a, b, c, 0.0);
         }
@@ -114,7 +137,7 @@ fn find_above(node: u32, outward: vec3f, first: u32, end: u32, skin: f32, depth:
             continue;
         }
         let distance = length(here.way);
-        let same = SAME * nearest + ROUNDING * skin;
+        let same = SAME * nearest + ROUNDING * reach;
         if nearest == FAR || distance < nearest - same {
             nearest = distance;
             nearest_row = row;
@@ -127,9 +150,9 @@ fn find_above(node: u32, outward: vec3f, first: u32, end: u32, skin: f32, depth:
             faces = faces || !faces_away;
         }
     }
-    if faces && nearest < min(over, hidden) * (1.0 - SAME) - ROUNDING * skin {
+    if faces && nearest < min(over, hidden) * (1.0 - SAME) - ROUNDING * reach {
         // In one plane with a triangle, beside it, is not beneath it.
-        let least = (SAME * nearest + ROUNDING * skin) * length(nearest_normals);
+        let least = (SAME * nearest + ROUNDING * reach) * length(nearest_normals);
         let is_behind = dot(nearest_way, nearest_normals) < -least;
         // Who is behind a border is beside the surface.
         if !(is_behind && at_border(nearest_row, nearest_weights != vec3f(0.0))) {

@@ -19,26 +19,26 @@ pub(super) struct AtRigid {
     pub surface: Surface,
     /// Points of each face.
     samples: Vec<[f64; 3]>,
-    /// How far [m] a point of a face can be from its nearest corner.
-    reach: f64,
     /// Distance [m] at which a node at rest still counts as near.
     pub margin: f64,
     pub passage: Passage,
     /// Whether it is a jaw that holds what touches it.
     pub grips: bool,
-    pub listed: Listed,
+    /// Nodes that may touch the thing in the step, and those of faces that may; increasing.
+    pub near: Vec<u32>,
+    listed: Listed,
 }
 
 /// What may come near a rigid thing, until the surface and the thing have moved too far.
 #[derive(Default)]
-pub(super) struct Listed {
+struct Listed {
     /// Distance [m] up to which nodes and faces are listed.
     reach: f64,
     /// The pose of the thing then, and the places [m] of the nodes of the surface.
     pose: Pose,
     places: Vec<Vector3<f64>>,
     /// Nodes of the surface with the corners of the faces, and faces by their place; increasing.
-    pub nodes: Vec<u32>,
+    nodes: Vec<u32>,
     faces: Vec<u32>,
 }
 
@@ -48,10 +48,10 @@ impl AtRigid {
         Self {
             rigid: number,
             samples: lattice(parts_of(longest, &rigid.shape)),
-            reach: longest,
             margin: MARGIN * longest,
             passage: Passage::new(rigid, [Pose::identity(); 2]),
             grips: false,
+            near: Vec::new(),
             listed: Listed::default(),
             surface,
         }
@@ -111,18 +111,14 @@ impl AtRigid {
     ) {
         let room = room + self.margin + self.passage.travel();
         self.list(rigid, room, nodes);
-        let mut nearest = f64::INFINITY;
+        self.near.clear();
         for &node in &self.listed.nodes {
             let distance = self.passage.near(rigid, &nodes[node as usize].now).distance;
             distances[node as usize] = distance;
-            nearest = nearest.min(distance);
             if distance < room {
-                nodes[node as usize].near = true;
+                self.near.push(node);
                 found(Row::new(0, [node], [1.0]));
             }
-        }
-        if nearest > room + self.reach {
-            return;
         }
         for &face in &self.listed.faces {
             let face = self.surface.faces[face as usize];
@@ -150,9 +146,12 @@ impl AtRigid {
                 }
             }
             if is_near {
-                face.iter().for_each(|&node| nodes[node as usize].near = true);
+                self.near.extend(face);
             }
         }
+        self.near.sort_unstable();
+        self.near.dedup();
+        self.near.iter().for_each(|&node| nodes[node as usize].near = true);
     }
 }
 

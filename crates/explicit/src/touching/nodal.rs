@@ -160,18 +160,15 @@ impl Touching {
     /// The way [m] that a node slides in a step in which nothing bears on it; `None` if it leaves.
     fn hovering(&self, index: usize) -> Option<f64> {
         let node = Some(&self.nodes[index]).filter(|node| node.near)?;
-        let number = index as u32;
-        self.contacts.contacts.iter().zip(&self.own).find_map(|(contact, own)| match own {
-            Own::Rigid(own) => {
-                own.surface.nodes.binary_search(&number).ok()?;
-                let Near { distance, normal } =
-                    own.passage.near(&self.contacts.rigids[own.rigid], &node.then);
-                let near = distance - contact.touch.offset < LASTS * own.margin;
-                near.then(|| across(&(node.then - own.passage.carry(&node.now)), &normal))
-            }
-            // Its own part there is not known without a pair.
-            Own::Bodies(pairs, _) => pairs.near().binary_search(&number).ok().map(|_| 0.0),
-        })
+        let at_rigid = self.contacts.contacts.iter().zip(&self.own).find_map(|(contact, own)| {
+            let Own::Rigid(own) = own else { return None };
+            own.surface.nodes.binary_search(&(index as u32)).ok()?;
+            let Near { distance, normal } = own.passage.near(&self.contacts.rigids[own.rigid], &node.then);
+            let near = distance - contact.touch.offset < LASTS * own.margin;
+            near.then(|| across(&(node.then - own.passage.carry(&node.now)), &normal))
+        });
+        // Its own part in a pair that bears nothing is not known.
+        at_rigid.or(node.paired.then_some(0.0))
     }
 }
 

@@ -1,6 +1,6 @@
 // Pairs of points of surfaces: candidates, and rows of those that are found.
 
-// A head; four numbers of each contact and its rows; nodes with triangles; edges; all candidates.
+// A head; four numbers of each contact and its rows; triangles around nodes, by their other corners; nodes with triangles; edges; all candidates.
 @group(2) @binding(16) var<storage, read> candidates: array<u32>;
 // Where each node that touches was when candidates were listed [m], and how far it may go until they are again [m]: negative if it is in
 // none, zero without pairs.
@@ -56,6 +56,10 @@ fn pair_at(row: u32) -> u32 {
 
 fn is_listed(n: u32) -> bool {
     return listed[n].w > 0.0;
+}
+
+fn ring_of(k: u32) -> vec2u {
+    return vec2u(candidates[k], candidates[k + 1u]);
 }
 
 fn corners_of(row: u32) -> vec3u {

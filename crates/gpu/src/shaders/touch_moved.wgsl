@@ -1,7 +1,5 @@
-// Stops at an instant from which nodes may go farther than the lists of candidates allow: these are made anew before anything happens. A way can
-// double in a step.
-
-@group(2) @binding(1) var<storage, read> increment: array<vec4f>;
+// Stops at an instant at which nodes are farther from their places in the lists of candidates than these allow: they are made anew before anything
+// happens.
 
 @compute @workgroup_size(GROUP)
 fn main(
@@ -14,8 +12,7 @@ fn main(
         return;
     }
     let node = node_of(n);
-    let way = length(increment[node].xyz) * select(instant.ratio, instant.before, does(STARTS));
-    if distance(displacement[node].xyz, listed[n].xyz) + 2.0 * way > abs(listed[n].w) {
+    if distance(displacement[node].xyz, listed[n].xyz) > abs(listed[n].w) {
         atomicMin(&findings[UNLISTED], instant.index);
     }
 }

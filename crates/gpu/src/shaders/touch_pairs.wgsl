@@ -14,13 +14,15 @@ fn main(
     var first = 0u;
     var after = 0u;
     if index < points {
-        let at = candidates[POINTS_LISTED] + 7u * index;
+        let at = candidates[POINTS_LISTED] + 6u * index;
         let contact = candidates[at + 1u];
         first = candidates[at + 2u];
         after = candidates[at + 3u];
-        let outward = bitcast<vec3f>(vec3u(candidates[at + 4u], candidates[at + 5u], candidates[at + 6u]));
-        let skin = contact_number(contact, LIMIT) - contact_number(contact, OFFSET);
-        find_above(candidates[at], outward, first, after, skin, contact_number(contact, DEPTH));
+        let ring = vec2u(candidates[at + 4u], candidates[at + 5u]);
+        let limit = contact_number(contact, LIMIT);
+        let depth = contact_number(contact, DEPTH);
+        let reach = limit - contact_number(contact, OFFSET);
+        find_above(candidates[at], ring, first, after, max(limit, depth), reach, depth);
     } else {
         let at = candidates[CROSSINGS_LISTED] + 5u * (index - points);
         first = candidates[at + 4u];

@@ -76,6 +76,24 @@ fn fields_of_contacts_go_on_with_the_same_bits_in_a_resumed_run() {
     resumes(&text);
 }
 
+/// A lid that slides on a block, taken up with lists of its own: to the same bits, with its slip.
+#[test]
+fn bodies_that_slide_on_each_other_go_on_with_the_same_bits_in_a_resumed_run() {
+    for precision in ["double", "single"] {
+        let run = format!("step = 2e-4\nprecision = '{precision}'\ncheckpoint = {{ every = 0.4 }}");
+        let data = "data = ['displacement', 'slip', 'contact-force', 'gap']";
+        let foot =
+            format!("probes.foot = {{ on = 'lid', at = [0.0125, 0.0125, 0.0205], {data} }}\nprobes.top");
+        let text = stacked(&run, "")
+            .replace("until = 1.0", "until = 1")
+            .replace("friction = 0.3", "friction = 0.05")
+            .replace("probes.top", &foot);
+        resumes(&text);
+        let row = last_row(&text);
+        assert!(row["probe.foot.slip"] > 3e-3, "{}", row["probe.foot.slip"]);
+    }
+}
+
 #[test]
 fn fields_of_contacts_without_a_contact_are_refused_with_their_line() {
     let text = pressed("", "");

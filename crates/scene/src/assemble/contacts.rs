@@ -401,7 +401,7 @@ impl Builder<'_> {
         let mut pairs = Pairs::new(surface, None, thickness, place);
         let count = pairs.set_apart_count();
         let mut narrow: Option<(f64, Vector3)> = None;
-        pairs.update(place, 0.0);
+        pairs.update(place);
         pairs.find(place, |pair| {
             if pair.distance > 0.0 && narrow.is_none_or(|(least, _)| pair.distance < least) {
                 narrow = Some((pair.distance, place(pair.nodes[0])));
@@ -462,7 +462,7 @@ impl Builder<'_> {
             }
         }
         let mut pairs = Pairs::new(surfaces[0], Some(surfaces[1]), kept(table), place);
-        pairs.update(place, 0.0);
+        pairs.update(place);
         pairs.find(place, |pair| {
             inside.push((kept(table) - pair.distance, place(pair.nodes[0])));
         });

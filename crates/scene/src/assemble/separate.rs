@@ -297,7 +297,7 @@ fn push_pairs(first: &Surface, second: Option<&Surface>, offset: f64, pushed: &m
     {
         let place = |node: u32| pushed.places[node as usize];
         let mut pairs = Pairs::new(first, second, offset, place);
-        pairs.update(place, 0.0);
+        pairs.update(place);
         pairs.find(place, |pair| {
             if pair.distance < offset {
                 let parts = pair.nodes.into_iter().zip(pair.weights).collect();
