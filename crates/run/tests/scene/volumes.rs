@@ -1,6 +1,8 @@
 //! Enclosed volumes with every solver: a balloon of a membrane, one of a shell, a cavity in a solid, and what is refused.
 
-use super::static_solids::{last_row, resumes, run, world};
+use std::collections::BTreeMap;
+
+use pliant_testing::scenes::{last_row, resumes, run, world};
 
 /// A balloon of 30 mm that is held at its neck, with a constraint on its volume; at rest it encloses 1.07e-4 m³.
 fn balloon(model: &str, solver: &str, volume: &str, more: &str) -> String {
@@ -168,7 +170,7 @@ fn a_cavity_keeps_its_volume() {
     let stiffer = row["reaction.top.z"] / empty["reaction.top.z"] - 1.0;
     println!("water makes it stiffer by {stiffer:.3}");
     assert!(stiffer > 0.0);
-    let height = |row: &std::collections::BTreeMap<String, f64>| {
+    let height = |row: &BTreeMap<String, f64>| {
         row["probe.high.displacement.z"] - row["probe.low.displacement.z"]
     };
     assert!(height(&empty) < height(&row) - 1e-4, "{} {}", height(&empty), height(&row));
