@@ -7,6 +7,7 @@
 //! * A direction of a stiffness that is not positive definite is none: its diagonal is raised (Levenberg 1944) until it is.
 //! * A step is found where the residual is below its tolerance, or where the unfiltered Newton step with fresh factors moves nothing by more than
 //!   counts for a gap and the residual is not far above its tolerance, or by less than is asked for; that step is still made.
+//! * A full Newton step that is hardly shorter than the one before is made longer while the energy falls.
 //! * Friction is then taken anew from the state found, while its size changes by more than a tenth.
 
 use crate::error::SolveError;
@@ -22,10 +23,12 @@ const HALVINGS: usize = 16;
 const RAISED: (f64, f64, usize) = (1e-5, 10.0, 8);
 /// Change of the friction that is held, over it, above which it is taken anew.
 const LAGGED: f64 = 0.1;
-/// Iterations with an upper bound for the stiffness of friction, before it is exact: at once it takes more of them.
-const BOUNDED: usize = 6;
 /// Residual over what is allowed below which the size of a Newton step tells that a step is found.
 const LOOSE: f64 = 100.0;
+/// A Newton step over the one before from which on it is made longer.
+const SLOW: f64 = 0.6;
+/// How often it is doubled at most.
+const DOUBLINGS: usize = 3;
 /// Round-off of an energy, over the sizes of its parts.
 const ROUND_OFF: f64 = 1e-12;
 
@@ -111,11 +114,8 @@ pub(crate) fn descend(
         loads: vec![0.0; 6 * state.position.len()],
         along: 0.0,
     };
-    let (mut raised, mut lags) = (0.0, 0);
+    let (mut raised, mut lags, mut previous) = (0.0, 0, f64::INFINITY);
     for iteration in 0..=limits.iterations {
-        if let Some(touching) = &mut solver.system().touching {
-            touching.exact_friction = iteration >= BOUNDED;
-        }
         solver.evaluate(state, time, true)?;
         let (norm, allowed) = solver.find_residual(state);
         found(norm, allowed);
@@ -159,6 +159,10 @@ pub(crate) fn descend(
         (before.energy, before.size) = energy(solver);
         if search(solver, state, time, &before, part, complete)? {
             if !last {
+                let is_slow = is_newton && largest > SLOW * std::mem::replace(&mut previous, largest);
+                if is_slow && complete && part == 1.0 && iteration > 1 {
+                    expand(solver, state, time, &mut before)?;
+                }
                 continue;
             }
             if lags < limits.lags && lag(solver) {
@@ -370,6 +374,39 @@ fn search(
         part *= 0.5;
     }
     broken.map_or(Ok(false), Err)
+}
+
+/// Goes on along an increment that was made in full, two, four and eight times as far while the energy falls and nothing is in the way.
+fn expand(
+    solver: &mut impl Contacting,
+    state: &mut State,
+    time: f64,
+    before: &mut Before,
+) -> Result<(), SolveError> {
+    for doubling in 0..DOUBLINGS {
+        before.state.clone_from(state);
+        (before.energy, before.size) = energy(solver);
+        before.loads.copy_from_slice(&own_loads(solver.system()));
+        let Vectors { system, increment, .. } = solver.vectors();
+        if doubling > 0 {
+            increment.iter_mut().for_each(|way| *way *= 2.0);
+        }
+        let Some(touching) = &mut system.touching else { return Ok(()) };
+        let part = touching.barriers.allowed(&state.position, increment, touching.share, [KEEP[0], 1.0]);
+        let falls = part == 1.0 && {
+            system.advance(state, increment, 1.0);
+            match solver.evaluate(state, time, false) {
+                Ok(()) => energy(solver).0 - work(solver, &before.loads) < before.energy,
+                Err(SolveError::Broken { .. }) => false,
+                Err(error) => return Err(error),
+            }
+        };
+        if !falls {
+            state.clone_from(&before.state);
+            return Ok(());
+        }
+    }
+    Ok(())
 }
 
 /// Takes friction anew if its size has changed by more than counts; whether it has.

@@ -45,8 +45,12 @@ impl Equations {
 }
 
 impl LowerMatrix {
-    /// The pattern of cells that couple all equations of their nodes.
-    pub(crate) fn new<'a>(equations: &Equations, cells: impl Iterator<Item = &'a [u32]>) -> Self {
+    /// The pattern of cells that couple all equations of their nodes, and of pairs of nodes, the lower first, whose translations are coupled.
+    pub(crate) fn new<'a>(
+        equations: &Equations,
+        cells: impl Iterator<Item = &'a [u32]>,
+        pairs: &[[u32; 2]],
+    ) -> Self {
         let nodes = equations.number.len() / 6;
         // Of each node, itself and the neighbours with higher numbers.
         let mut above: Vec<Vec<u32>> = (0..nodes as u32).map(|node| vec![node]).collect();
@@ -57,12 +61,23 @@ impl LowerMatrix {
         }
         let mut matrix =
             Self { column_start: vec![0], row: Vec::new(), value: Vec::new(), mirror: Vec::new() };
-        for (node, above) in above.iter_mut().enumerate() {
+        // Neighbours by translations only.
+        let mut aside: Vec<Vec<u32>> = vec![Vec::new(); nodes];
+        for &[low, high] in pairs {
+            aside[low as usize].push(high);
+        }
+        for (node, (above, aside)) in above.iter_mut().zip(&mut aside).enumerate() {
             above.sort_unstable();
             above.dedup();
-            for &column in equations.number[6 * node..6 * node + 6].iter().filter(|&&e| e != NONE) {
-                for &other in above.iter() {
-                    let rows = &equations.number[6 * other as usize..6 * other as usize + 6];
+            aside.retain(|other| above.binary_search(other).is_err());
+            let mut all: Vec<(u32, usize)> = above.iter().map(|&other| (other, 6)).collect();
+            all.extend(aside.iter().map(|&other| (other, 3)));
+            all.sort_unstable();
+            all.dedup();
+            let own = equations.number[6 * node..6 * node + 6].iter().enumerate();
+            for (component, &column) in own.filter(|(_, e)| **e != NONE) {
+                for &(other, count) in all.iter().filter(|(_, count)| component < *count) {
+                    let rows = &equations.number[6 * other as usize..6 * other as usize + count];
                     matrix.row.extend(rows.iter().filter(|&&row| row != NONE && row >= column));
                 }
                 matrix.column_start.push(matrix.row.len() as u32);
@@ -159,9 +174,12 @@ impl LowerMatrix {
         }
     }
 
-    /// Whether the pattern couples two nodes, the lower number first, or one of them has no equations.
+    /// Whether the pattern couples the translations of two nodes, the lower number first, or one of them has none that is free.
     pub(crate) fn couples(&self, equations: &Equations, [low, high]: [u32; 2]) -> bool {
-        let [column, row] = [equations.first(low), equations.first(high)];
+        let [column, row] = [low, high].map(|node| {
+            let translations = &equations.number[6 * node as usize..6 * node as usize + 3];
+            translations.iter().copied().min().unwrap_or(NONE)
+        });
         column == NONE || row == NONE || self.rows(column).binary_search(&row).is_ok()
     }
 

@@ -133,7 +133,7 @@ impl System {
         let matrix = &mut system.matrix;
         let facets = model.facets.iter().map(|facet| &facet.nodes[..]);
         let stars = system.stars.iter().flatten().flat_map(|stars| stars.nodes.iter().map(Vec::as_slice));
-        let pairs = system.touching.iter().flat_map(|touching| touching.pairs.iter().map(|pair| &pair[..]));
+        let pairs = system.touching.as_ref().map_or(&[][..], |touching| touching.pairs());
         let followers = system.followers.as_ref();
         let expand = |nodes: &[u32], turns: bool| {
             let own = || (nodes.to_vec(), if turns { 6 } else { 3 });
@@ -148,12 +148,12 @@ impl System {
         };
         *matrix = match followers {
             None => {
-                let cells = facets.chain(model.solid_cells()).chain(stars).chain(pairs);
-                LowerMatrix::new(&system.equations, cells)
+                let cells = facets.chain(model.solid_cells()).chain(stars);
+                LowerMatrix::new(&system.equations, cells, pairs)
             }
             Some(_) => {
                 let cells = expanded.iter().map(|(nodes, _)| nodes.as_slice());
-                LowerMatrix::new(&system.equations, cells.chain(pairs))
+                LowerMatrix::new(&system.equations, cells, pairs)
             }
         };
         if system.solver == LinearSolver::Unsymmetric {

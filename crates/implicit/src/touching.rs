@@ -70,8 +70,6 @@ pub struct TouchingSystem {
     /// Pairs of nodes in the pattern beside those of cells, increasing.
     pub(crate) pairs: Vec<[u32; 2]>,
     pub(crate) check_crossings: bool,
-    /// Whether the stiffness of friction is exact, which converges fast near the solution, or an upper bound.
-    pub(crate) exact_friction: bool,
     /// Step of unknowns [m] below which a step is found: it changes gaps by less than counts.
     pub(crate) close: f64,
 }
@@ -91,7 +89,6 @@ impl TouchingSystem {
             energy: 0.0,
             pairs: Vec::new(),
             check_crossings: touching.check_crossings,
-            exact_friction: false,
             close: CLOSE * nearest,
         }
     }
@@ -173,7 +170,7 @@ impl TouchingSystem {
         coupling: &mut [f64],
     ) {
         let nodes = self.barriers.node_count();
-        self.barriers.stiffness(self.share, self.exact_friction, |stencil, block, mut ways| {
+        self.barriers.stiffness(self.share, |stencil, block, mut ways| {
             let own = |at: usize| stencil.nodes[at] as usize;
             let count = usize::from(stencil.count);
             for row in (0..count).filter(|&at| own(at) < nodes && acts(block, at)) {

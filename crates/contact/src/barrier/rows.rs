@@ -108,11 +108,10 @@ impl Held {
         self.slip * (-self.stiffness * self.stencil.coefficients[at])
     }
 
-    /// The stiffness [N/m] of a slip: the second derivative of its energy, or, along the slip as across it, an upper bound of that, with which
-    /// no step goes too far.
-    pub fn stiffness(&self, is_exact: bool) -> Matrix3<f64> {
+    /// The stiffness [N/m] of a slip: the second derivative of its energy, never negative.
+    pub fn stiffness(&self) -> Matrix3<f64> {
         let across = (Matrix3::identity() - self.normal * self.normal.transpose()) * self.stiffness;
-        match self.slip.try_normalize(0.0).filter(|_| is_exact) {
+        match self.slip.try_normalize(0.0) {
             Some(along) => across + along * along.transpose() * (self.along - self.stiffness),
             None => across,
         }

@@ -407,13 +407,8 @@ impl Barriers {
 
     /// Calls back with the stiffness [N/m] of each row, never negative: its stencil, three rows and columns a node, and the ways [m] that the
     /// rigid things among its nodes have yet to go in the step from a share on; of one node at a wall the way from the wall. That of barriers
-    /// is κ A b″ ∇d ∇dᵀ and the positive part of κ A b′ ∂²d/∂x²; that of friction is exact or an upper bound.
-    pub fn stiffness(
-        &self,
-        share: f64,
-        is_exact: bool,
-        mut add: impl FnMut(&Stencil, &Matrix12, [Vector3<f64>; 4]),
-    ) {
+    /// is κ A b″ ∇d ∇dᵀ and the positive part of κ A b′ ∂²d/∂x²; that of friction is exact.
+    pub fn stiffness(&self, share: f64, mut add: impl FnMut(&Stencil, &Matrix12, [Vector3<f64>; 4])) {
         let [from, to, now] = &self.poses;
         let goes_on = share < 1.0 && from != to;
         let left = |stencil: &Stencil, wall: Option<u32>| {
@@ -440,7 +435,7 @@ impl Barriers {
             add(&row.stencil, &self.stiffness_of(row), left(&row.stencil, wall));
         }
         for held in &self.held {
-            let across = block(&held.stencil.coefficients, &held.stiffness(is_exact));
+            let across = block(&held.stencil.coefficients, &held.stiffness());
             add(&held.stencil, &across, left(&held.stencil, held.wall));
         }
     }

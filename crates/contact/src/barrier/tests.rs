@@ -135,7 +135,7 @@ fn stiffness_is_never_negative() {
         scene.barriers.evaluate(&scene.places.clone(), 0.0);
         let (rows, held) = (scene.barriers.rows().to_vec(), scene.barriers.held().to_vec());
         let (mut number, mut at_wall) = (0, 0);
-        scene.barriers.stiffness(0.0, true, |stencil: &Stencil, block, ways| {
+        scene.barriers.stiffness(0.0, |stencil: &Stencil, block, ways| {
             let values = block.symmetric_eigenvalues();
             assert!(values.min() > -1e-12 * values.max(), "{shape}");
             if stencil.count > 1 {

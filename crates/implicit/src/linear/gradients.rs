@@ -260,7 +260,7 @@ impl Coarse {
             touching.into_iter().map(|((column, row), blocks)| (row, column, blocks)).collect();
         let equations = Equations::new(&vec![true; 6 * count]);
         let ends: Vec<[u32; 2]> = pairs.iter().map(|(row, column, _)| [*row, *column]).collect();
-        let matrix = LowerMatrix::new(&equations, ends.iter().map(|pair| &pair[..]));
+        let matrix = LowerMatrix::new(&equations, ends.iter().map(|pair| &pair[..]), &[]);
         Some(Self {
             arm: vec![Vector3::zeros(); fine.nodes()],
             aggregate,
