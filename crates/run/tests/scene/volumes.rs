@@ -170,9 +170,8 @@ fn a_cavity_keeps_its_volume() {
     let stiffer = row["reaction.top.z"] / empty["reaction.top.z"] - 1.0;
     println!("water makes it stiffer by {stiffer:.3}");
     assert!(stiffer > 0.0);
-    let height = |row: &BTreeMap<String, f64>| {
-        row["probe.high.displacement.z"] - row["probe.low.displacement.z"]
-    };
+    let height =
+        |row: &BTreeMap<String, f64>| row["probe.high.displacement.z"] - row["probe.low.displacement.z"];
     assert!(height(&empty) < height(&row) - 1e-4, "{} {}", height(&empty), height(&row));
 }
 
