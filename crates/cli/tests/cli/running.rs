@@ -23,7 +23,7 @@ fn keys(object: &Value) -> Vec<&str> {
 }
 
 /// The keys of `--json`, in their order.
-const KEYS: [&str; 27] = [
+const KEYS: [&str; 28] = [
     "status",
     "error",
     "bodies",
@@ -49,6 +49,7 @@ const KEYS: [&str; 27] = [
     "added_mass",
     "energy_balance",
     "reactions",
+    "volumes",
     "warnings",
     "files",
 ];
