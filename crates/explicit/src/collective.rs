@@ -234,7 +234,7 @@ impl Collective {
 /// Volume and pressure of a constraint of volume; `None` of others.
 pub(crate) fn enclosed(model: &Model, all: &[Collective], constraint: usize) -> Option<Enclosed> {
     let own = all.iter().find(|own| own.constraint == constraint)?;
-    matches!(model.constraints[constraint].motion, Motion::Volume { .. }).then_some(own.enclosed)
+    model.constraints[constraint].motion.encloses().then_some(own.enclosed)
 }
 
 #[cfg(test)]

@@ -22,8 +22,8 @@ use std::sync::Arc;
 
 use pliant_mechanics::Energies;
 use pliant_mechanics::load::Load;
-use pliant_mechanics::model::{Contradiction, Enclosed, FREE, Model, Motion};
-use pliant_mechanics::tensor::{Vector, add, cast, dot, scale, sub};
+use pliant_mechanics::model::{Constraint, Contradiction, Enclosed, FREE, Model};
+use pliant_mechanics::tensor::{Vector, add, cast, scale, sub};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -777,38 +777,17 @@ impl<R: Scalar> DynamicRelaxation<R> {
 
     /// What means of faces and enclosed volumes bear [N], of what each node resists with beyond what is applied: work from outside.
     fn borne(&self, state: &State<R>, resisting: impl Fn(usize) -> Vector<R>) -> Vec<(u32, Vector<R>)> {
-        let mut all = Vec::new();
-        for constraint in &self.model.constraints {
-            match &constraint.motion {
-                Motion::Mean { weights, .. } => {
-                    let force = constraint.mean_force(|node| resisting(node as usize).map(R::to_f64));
-                    let nodes = constraint.nodes.iter().zip(weights);
-                    all.extend(nodes.map(|(&node, &weight)| (node, scale(force, weight).map(R::of))));
-                }
-                Motion::Volume { enclosure, .. } => {
-                    let mut gradient = vec![[0.0; 3]; constraint.nodes.len()];
-                    enclosure.add_gradient(
-                        |at| {
-                            let node = constraint.nodes[at as usize] as usize;
-                            add(self.model.rest[node], state.displacement[node].map(R::to_f64))
-                        },
-                        &mut gradient,
-                    );
-                    // The pressure by least squares, of what is free.
-                    let (mut along, mut squared) = (0.0, 0.0);
-                    for (g, &node) in gradient.iter_mut().zip(&constraint.nodes) {
-                        let owner = self.owners[node as usize];
-                        *g = [0, 1, 2].map(|c| if owner[c] == FREE { g[c] } else { 0.0 });
-                        along += dot(*g, resisting(node as usize).map(R::to_f64));
-                        squared += dot(*g, *g);
-                    }
-                    let nodes = gradient.iter().zip(&constraint.nodes);
-                    all.extend(nodes.map(|(g, &node)| (node, scale(*g, along / squared).map(R::of))));
-                }
-                _ => {}
-            }
-        }
-        all
+        let place = |node: u32| {
+            let node = node as usize;
+            add(self.model.rest[node], cast(state.displacement[node]))
+        };
+        let of = |constraint: &Constraint| {
+            let resisting = |node: u32| cast(resisting(node as usize));
+            let is_free = |node: u32, c: usize| self.owners[node as usize][c] == FREE;
+            let forces = constraint.borne(place, resisting, is_free).into_iter().map(cast);
+            constraint.nodes.iter().copied().zip(forces).collect::<Vec<_>>()
+        };
+        self.model.constraints.iter().flat_map(of).collect()
     }
 
     /// Takes a converged trial as the new state.

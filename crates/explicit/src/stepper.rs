@@ -672,6 +672,9 @@ impl<R: Scalar> CentralDifference<R> {
             own.enclosed.pressure = 0.0;
             let predicted = |node: u32| {
                 let mut own = self.predicted(state, node);
+                if own.held == [false; 3] {
+                    return own;
+                }
                 if let Ok(at) = self.held.binary_search_by_key(&node, |held| held.node) {
                     for (c, constraint) in self.held[at].components() {
                         own.displacement[c] = self.held[at].place(c, self.factors[constraint][1]);

@@ -123,6 +123,11 @@ impl Followers {
         self.row_of[node as usize] != NONE
     }
 
+    /// Nodes that turn with another one, each with that.
+    fn turned(&self) -> impl Iterator<Item = [usize; 2]> {
+        self.turned.iter().map(|pair| pair.map(|node| node as usize))
+    }
+
     /// The node that a node turns with, itself if with no other.
     fn turns_with(&self, node: u32) -> u32 {
         match self.turned.binary_search_by_key(&node, |[own, _]| *own) {
@@ -203,7 +208,7 @@ impl Followers {
 
     /// Takes translations and turns along with an increment, six components a node.
     pub(crate) fn follow(&self, components: &mut [f64]) {
-        for [node, first] in self.turned.iter().map(|pair| pair.map(|node| node as usize)) {
+        for [node, first] in self.turned() {
             components.copy_within(6 * first + 3..6 * first + 6, 6 * node + 3);
         }
         for (node, row) in &self.rows {
@@ -228,7 +233,7 @@ impl Followers {
 
     /// Gives forces to the nodes that are followed, six components a node.
     pub(crate) fn give_back(&self, components: &mut [f64]) {
-        for [node, first] in self.turned.iter().map(|pair| pair.map(|node| node as usize)) {
+        for [node, first] in self.turned() {
             for c in 3..6 {
                 components[6 * first + c] += std::mem::take(&mut components[6 * node + c]);
             }
@@ -257,7 +262,7 @@ impl Followers {
             })
             .collect();
         places.into_iter().for_each(|(node, place)| state.position[node as usize] = place);
-        for [node, first] in self.turned.iter().map(|pair| pair.map(|node| node as usize)) {
+        for [node, first] in self.turned() {
             state.rotation[node] = state.rotation[first];
         }
     }

@@ -590,13 +590,18 @@ impl System {
             let places = std::mem::take(&mut self.face_places[number]);
             let factor = if load.controlled { state.load_factor } else { 1.0 } * load.curve.value(time);
             for (face, places) in faces.iter().zip(&places) {
-                let nodes = corners(face);
-                let symmetric = self.matrix.mirror.is_empty();
-                let tangent = pressure_change(face, nodes.len(), state, factor * pressure, symmetric);
-                self.add_at(nodes, places, &tangent, moved);
+                self.press_face(face, places, factor * pressure, state, moved);
             }
             self.face_places[number] = places;
         }
+    }
+
+    /// The same for one face, at its places.
+    fn press_face(&mut self, face: &Face, places: &[u32], pressure: f64, state: &State, moved: &[f64]) {
+        let nodes = corners(face);
+        let symmetric = self.matrix.mirror.is_empty();
+        let tangent = pressure_change(face, nodes.len(), state, pressure, symmetric);
+        self.add_at(nodes, places, &tangent, moved);
     }
 
     /// Adds how the pressures in enclosures change with their nodes.
@@ -613,10 +618,8 @@ impl System {
         for (own, enclosure, pressure) in all {
             for face in &enclosure.faces {
                 let face = face.map(|at| if at == NO_NODE { at } else { own.nodes[at as usize] });
-                let nodes = corners(&face);
-                let tangent = pressure_change(&face, nodes.len(), state, -pressure, symmetric);
-                let places = self.matrix.places(&self.equations, nodes, 3);
-                self.add_block(nodes, 3, &places, &tangent, moved);
+                let places = self.matrix.places(&self.equations, corners(&face), 3);
+                self.press_face(&face, &places, -pressure, state, moved);
             }
             for &facet in &enclosure.facets {
                 let Some(surface) = &self.surface else { break };
@@ -633,9 +636,9 @@ impl System {
                         own -= skew(&moment) * 0.5;
                     }
                 }
-                let nodes = model.facets[facet as usize].nodes;
-                let places = self.matrix.places(&self.equations, &nodes, 6);
-                self.add_block(&nodes, 6, &places, tangent.as_slice(), moved);
+                let places = std::mem::take(&mut self.places[facet as usize]);
+                self.add_block(&model.facets[facet as usize].nodes, 6, &places, tangent.as_slice(), moved);
+                self.places[facet as usize] = places;
             }
         }
         self.conditions = conditions;

@@ -550,6 +550,33 @@ impl Constraint {
         scale(sum, 1.0 / squared)
     }
 
+    /// The forces [N] with which a mean or an enclosed volume is held, node by node, of the forces [N] that its nodes resist with at some places [m]:
+    /// by least squares over the components that are free, exact in equilibrium. None for other motions and on facets of shells.
+    pub fn borne(
+        &self,
+        place: impl Fn(u32) -> Vector<f64>,
+        resisting: impl Fn(u32) -> Vector<f64>,
+        is_free: impl Fn(u32, usize) -> bool,
+    ) -> Vec<Vector<f64>> {
+        match &self.motion {
+            Motion::Mean { weights, .. } => {
+                let force = self.mean_force(resisting);
+                weights.iter().map(|&weight| scale(force, weight)).collect()
+            }
+            Motion::Volume { enclosure, .. } => {
+                let mut gradient = vec![[0.0; 3]; self.nodes.len()];
+                enclosure.add_gradient(|at| place(self.nodes[at as usize]), &mut gradient);
+                for (g, &node) in gradient.iter_mut().zip(&self.nodes) {
+                    *g = [0, 1, 2].map(|c| if is_free(node, c) { g[c] } else { 0.0 });
+                }
+                let along = gradient.iter().zip(&self.nodes).map(|(g, &node)| dot(*g, resisting(node)));
+                let pressure = along.sum::<f64>() / gradient.iter().map(|g| dot(*g, *g)).sum::<f64>();
+                gradient.into_iter().map(|g| scale(g, pressure)).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
     /// The amplitudes of each node's motion.
     fn amplitudes(&self) -> impl Iterator<Item = Amplitudes> + '_ {
         (0..self.nodes.len()).map(|index| self.motion.amplitudes(index))
@@ -648,6 +675,11 @@ impl Motion {
     /// Whether it binds nodes to each other and prescribes none by itself.
     pub fn is_collective(&self) -> bool {
         matches!(self, Self::Mean { .. } | Self::Rigid | Self::Volume { .. })
+    }
+
+    /// Whether it fills a volume.
+    pub fn encloses(&self) -> bool {
+        matches!(self, Self::Volume { .. })
     }
 
     /// Rotation of nodes about an axis through a centre [m], by an angle [rad] × curve, by Rodrigues' formula

@@ -146,8 +146,8 @@ body = "organ"
 nodes = { box = [[-1, -1, -1], [1, 1, -0.008]] }
 "#;
 
-/// A scene of [`layered_segmentation`](crate::image_files::layered_segmentation) by the names of its labels.
-pub const FROM_NAMES: &str = r#"[scene]
+/// The scene of [`from_names`].
+const FROM_NAMES: &str = r#"[scene]
 until = 0.004
 
 [law.soft]
@@ -313,7 +313,12 @@ pub fn run_world(world: &World, folder: &Path) -> Summary {
 pub fn last_row(text: &str) -> BTreeMap<String, f64> {
     let out = tempfile::tempdir().unwrap();
     run(text, &out.path().join("out"));
-    let table = fs::read_to_string(out.path().join("out/history.csv")).unwrap();
+    last_row_in(&out.path().join("out"))
+}
+
+/// The last row of the table in the folder of a run, by the names of its columns.
+pub fn last_row_in(folder: &Path) -> BTreeMap<String, f64> {
+    let table = fs::read_to_string(folder.join("history.csv")).unwrap();
     let names = table.lines().next().unwrap().split(',').map(str::to_owned);
     names.zip(table.lines().last().unwrap().split(',').map(|value| value.parse().unwrap())).collect()
 }
@@ -584,7 +589,7 @@ impl Workshop {
         world.map_err(|errors| errors.plain().to_string())
     }
 
-    /// What was told, with paths relative to the folder.
+    /// The messages, with paths relative to the folder.
     fn relative(&self, mut told: Told) -> Told {
         let folder = format!("{}/", self.folder.path().display());
         told.out = told.out.replace(&folder, "");
@@ -655,7 +660,7 @@ impl Told {
         self.json()
     }
 
-    /// What was told as running text.
+    /// The messages as running text.
     pub fn words(&self) -> String {
         self.err.split_whitespace().collect::<Vec<_>>().join(" ")
     }
@@ -670,6 +675,12 @@ impl Told {
 pub fn changed(text: &str, good: &str, other: &str) -> String {
     assert!(text.contains(good), "`{good}` is not in the scene");
     text.replacen(good, other, 1)
+}
+
+/// A scene of [`layered_segmentation`](crate::image_files::layered_segmentation) by the names of its labels, with some replacements, each of which
+/// is found in it.
+pub fn from_names(changes: &[[&str; 2]]) -> String {
+    changes.iter().fold(FROM_NAMES.to_owned(), |text, [good, other]| changed(&text, good, other))
 }
 
 /// Reads a ParaView series: the times, and each frame it lists.

@@ -4,14 +4,10 @@
 use pliant_geometry::{Labels, io};
 use pliant_testing::image_files::layered_segmentation;
 
-use crate::support::{FROM_NAMES, Told, Workshop};
+use crate::support::{Told, Workshop, from_names};
 
 fn workshop(changes: &[[&str; 2]]) -> Workshop {
-    let text = changes.iter().fold(FROM_NAMES.to_owned(), |text, [from, to]| {
-        assert!(text.contains(from), "`{from}` is not in the scene");
-        text.replace(from, to)
-    });
-    let workshop = Workshop::new(&text);
+    let workshop = Workshop::new(&from_names(changes));
     workshop.write("case/organs.seg.nrrd", layered_segmentation());
     workshop
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use pliant_geometry::Vector3;
 use pliant_implicit::Carried;
 use pliant_mechanics::Energies;
-use pliant_mechanics::model::{Enclosed, Motion};
+use pliant_mechanics::model::Enclosed;
 use pliant_mechanics::tensor::add;
 
 use crc32fast::Hasher;
@@ -140,8 +140,7 @@ impl Own {
         let wanted = |name: &String| table.reactions.as_ref().is_none_or(|list| list.contains(name));
         let constraints = built.model.constraints.iter();
         let wanted = constraints.enumerate().filter(|(_, c)| wanted(&c.name)).map(|(i, _)| i);
-        let encloses =
-            |&index: &usize| matches!(built.model.constraints[index].motion, Motion::Volume { .. });
+        let encloses = |&index: &usize| built.model.constraints[index].motion.encloses();
         let (volumes, reactions): (Vec<usize>, Vec<usize>) = wanted.partition(encloses);
         let mut add = |name: String, unit| columns.push(Column { name, unit });
         for &constraint in &reactions {

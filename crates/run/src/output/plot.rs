@@ -3,7 +3,7 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use pliant_mechanics::model::{Constraint, Motion};
+use pliant_mechanics::model::Constraint;
 
 use super::History;
 use pliant_scene::World;
@@ -56,7 +56,7 @@ pub(crate) fn plot(world: &World, history: &History) -> Result<String, String> {
         root.fill(&WHITE).map_err(|error| error.to_string())?;
         let (upper, lower) = root.split_vertically(SIZE.1 / 2);
         let reactions: Vec<Curve<'_>> = (constraints(world).enumerate())
-            .filter(|(_, constraint)| !matches!(constraint.motion, Motion::Volume { .. }))
+            .filter(|(_, constraint)| !constraint.motion.encloses())
             .map(|(index, constraint)| {
                 Curve::new(&constraint.name, &history.times, history.reactions.iter().map(|row| row[index]))
             })

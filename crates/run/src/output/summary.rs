@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use pliant_mechanics::Energies;
-use pliant_mechanics::model::{Constraint, Enclosed, Motion};
+use pliant_mechanics::model::{Constraint, Enclosed};
 use pliant_sim::{Critical, Effort, Equilibria, Failure, number};
 use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
@@ -226,7 +226,7 @@ pub(crate) fn summarise(world: &World, outcome: &Outcome) -> Summary {
     };
     let reactions = parts()
         .flat_map(|(part, own)| part.built.model.constraints.iter().zip(&own.reactions))
-        .filter(|(constraint, _)| !matches!(constraint.motion, Motion::Volume { .. }));
+        .filter(|(constraint, _)| !constraint.motion.encloses());
     let volumes = parts().flat_map(|(part, own)| part.built.model.constraints.iter().zip(&own.enclosed));
     let target = &world.participants[0].plan.target;
     let balances = parts().filter_map(|(_, own)| own.balance());
@@ -490,7 +490,7 @@ fn write_energies(page: &mut String, of: &str, outcome: &PartOutcome) -> std::fm
 }
 
 fn write_reactions(page: &mut String, world: &World, outcome: &Outcome) -> std::fmt::Result {
-    let binds = |constraint: &Constraint| !matches!(constraint.motion, Motion::Volume { .. });
+    let binds = |constraint: &Constraint| !constraint.motion.encloses();
     if !constraints(world).any(binds) {
         return Ok(());
     }

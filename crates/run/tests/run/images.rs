@@ -4,7 +4,7 @@ use std::fs;
 
 use pliant_geometry::Labels;
 use pliant_testing::image_files::{Volume, layered_segmentation};
-use pliant_testing::scenes::{FROM_IMAGE, FROM_NAMES, Workshop, changed};
+use pliant_testing::scenes::{FROM_IMAGE, Workshop, changed, from_names};
 
 use crate::support::close;
 
@@ -143,11 +143,7 @@ fn mistakes_about_images_are_underlined_in_the_scene() {
 }
 
 fn by_names(changes: &[[&str; 2]]) -> Workshop {
-    let text = changes.iter().fold(FROM_NAMES.to_owned(), |text, [from, to]| {
-        assert!(text.contains(from), "`{from}` is not in the scene");
-        text.replace(from, to)
-    });
-    let workshop = Workshop::new(&text);
+    let workshop = Workshop::new(&from_names(changes));
     workshop.write("case/organs.seg.nrrd", layered_segmentation());
     workshop
 }

@@ -111,7 +111,7 @@ fn off(points: &[[f64; 3]], cells: &[&[u32]]) -> String {
     format!("OFF\n{} {} 0\n", points.len(), cells.len()) + &points_text.chain(cells_text).collect::<String>()
 }
 
-/// What is told of a scene with a shell from a file.
+/// The messages of a scene with a shell from a file.
 fn from_file(points: &[[f64; 3]], cells: &[&[u32]], changes: &[(&str, &str)]) -> Told {
     let own = [
         (PLATE, "mesh = { file = \"wall.off\" }"),

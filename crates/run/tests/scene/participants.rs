@@ -2,14 +2,13 @@
 //! and a run that was interrupted goes on with the same bits.
 
 use std::fs;
-use std::path::Path;
 use std::sync::Arc;
 
 use pliant_geometry::CellKind;
 use pliant_geometry::io;
 use pliant_run::Live;
 use pliant_scene::World;
-use pliant_testing::scenes::{self, run_world, taken_up};
+use pliant_testing::scenes::{self, last_row_in, run_world, taken_up};
 
 const LAWS: &str = r#"
 [law.tissue]
@@ -64,18 +63,6 @@ fn both(more: &str) -> String {
     format!("{HEAD}[participant.walls]\nbodies = ['strip']\n{IMPLICIT}{LAWS}{SOLID}{SHELL}{OUTPUTS}{more}")
 }
 
-/// The last values of the columns of a table, by name.
-fn last_row(folder: &Path) -> Vec<(String, f64)> {
-    let text = fs::read_to_string(folder.join("history.csv")).unwrap();
-    let names = text.lines().next().unwrap().split(',');
-    let values = text.lines().last().unwrap().split(',').map(|value| value.parse().unwrap());
-    names.map(str::to_owned).zip(values).collect()
-}
-
-fn value(row: &[(String, f64)], name: &str) -> f64 {
-    row.iter().find(|(known, _)| known == name).unwrap_or_else(|| panic!("no column `{name}`")).1
-}
-
 #[test]
 fn each_participant_comes_out_as_it_does_alone() {
     let place = tempfile::tempdir().unwrap();
@@ -93,19 +80,19 @@ fn each_participant_comes_out_as_it_does_alone() {
     let run_table = format!("[run]\nstep = {:e}\n", solids.step);
     run_world(&world(&format!("{HEAD}{run_table}{LAWS}{SOLID}{OUTPUTS}")), &place.path().join("solid"));
     run_world(&world(&format!("{HEAD}[run]\n{IMPLICIT}{LAWS}{SHELL}{OUTPUTS}")), &place.path().join("shell"));
-    let [both, solid, shell] = ["two", "solid", "shell"].map(|name| last_row(&place.path().join(name)));
+    let [both, solid, shell] = ["two", "solid", "shell"].map(|name| last_row_in(&place.path().join(name)));
     for axis in ["x", "y", "z"] {
         let base = format!("reaction.base.{axis}");
-        assert_eq!(value(&both, &base), value(&solid, &base));
+        assert_eq!(both[&base], solid[&base]);
         let end = format!("reaction.end.{axis}");
-        assert_eq!(value(&both, &end), value(&shell, &end));
+        assert_eq!(both[&end], shell[&end]);
     }
     for energy in ["kinetic", "internal", "external", "damping"] {
         let column = format!("energy.{energy}");
-        let [a, b] = [value(&solid, &column), value(&shell, &column)];
-        assert_eq!(value(&both, &format!("energy.solids.{energy}")), a);
-        assert_eq!(value(&both, &format!("energy.walls.{energy}")), b);
-        assert!((value(&both, &column) - (a + b)).abs() <= 1e-15 * (a.abs() + b.abs()), "{energy}");
+        let [a, b] = [solid[&column], shell[&column]];
+        assert_eq!(both[&format!("energy.solids.{energy}")], a);
+        assert_eq!(both[&format!("energy.walls.{energy}")], b);
+        assert!((both[&column] - (a + b)).abs() <= 1e-15 * (a.abs() + b.abs()), "{energy}");
     }
     let page = fs::read_to_string(place.path().join("two/summary.md")).unwrap();
     for piece in ["## Time step of `walls`", "## Time step of `solids`", "## Energy of all at the end"] {
@@ -199,9 +186,9 @@ fn solids_of_different_steps_and_precisions_go_together() {
     assert!(fast.steps >= 8 * slow.steps, "{} {}", fast.steps, slow.steps);
     let alone = format!("{HEAD}[run]\nprecision = 'single'\nstep = {:e}\n{soft}{bar}{OUTPUTS}", slow.step);
     run_world(&world(&alone), &place.path().join("bar"));
-    let [both, bar] = ["two", "bar"].map(|name| last_row(&place.path().join(name)));
+    let [both, bar] = ["two", "bar"].map(|name| last_row_in(&place.path().join(name)));
     for axis in ["x", "y", "z"] {
         let column = format!("reaction.end.{axis}");
-        assert_eq!(value(&both, &column), value(&bar, &column));
+        assert_eq!(both[&column], bar[&column]);
     }
 }

@@ -10,7 +10,7 @@ use pliant_sim::contact::pairs::Surface;
 use pliant_sim::contact::touch::{Contacts, With};
 use pliant_sim::{counted, number};
 
-use super::{Builder, Partner};
+use super::{Builder, Partner, in_metres};
 use crate::format::{ContactTable, FieldName};
 
 /// The distance of a barrier over the diagonal of all bodies, if none is given.
@@ -137,12 +137,11 @@ impl Builder<'_> {
     fn refuse_meetings(&mut self, contact: &str, table: &str, met: &[Meeting]) {
         let told = |one: &Meeting| {
             let (body, node) = self.assembly.locate_node(one.node);
-            let [x, y, z] = one.place.map(number);
             let how = match one.gap {
                 Some(gap) => format!("a gap of {} m", number(gap)),
                 None => "an edge through a triangle".into(),
             };
-            format!("node {node} of `{}` at ({x}, {y}, {z}) m: {how}", self.bodies[body].name)
+            format!("node {node} of `{}` at {}: {how}", self.bodies[body].name, in_metres(one.place))
         };
         let mut sorted = met.to_vec();
         sorted.sort_by(|a, b| {

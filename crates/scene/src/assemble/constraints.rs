@@ -9,7 +9,7 @@ use pliant_mechanics::load::{Face, NO_NODE};
 use pliant_mechanics::model::{Constraint, Enclosure, Motion};
 use pliant_sim::number;
 
-use super::{Builder, Target};
+use super::{Builder, Target, in_metres};
 use crate::diagnostic::Diagnostic;
 use crate::format::{MoveTable, RotateTable, SolverName, Vectors, VolumeTable};
 use crate::registry::{ConstraintTable, LoadTable};
@@ -98,7 +98,7 @@ impl Builder<'_> {
         if let Some([from, to]) = open_edge(&faces) {
             let place = |node: u32| self.assembly.rest[node as usize];
             let middle: [f64; 3] = std::array::from_fn(|c| 0.5 * (place(from)[c] + place(to)[c]));
-            let message = format!("the faces of `{name}` leave an opening at {}", shown(middle));
+            let message = format!("the faces of `{name}` leave an opening at {}", in_metres(middle));
             let help = "choose faces that close, or add a membrane over the opening";
             self.error(&at(key), message, "an open surface encloses no volume", help);
             return;
@@ -359,11 +359,6 @@ fn turn_round(face: &mut Face) {
     } else {
         face.swap(1, 3);
     }
-}
-
-fn shown(place: [f64; 3]) -> String {
-    let [x, y, z] = place.map(number);
-    format!("({x}, {y}, {z}) m")
 }
 
 /// A nearest node farther from its point than this many body sizes gives a warning.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use pliant_geometry::{Locator, Selection, SurfaceLocator, Vector3};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::load::NO_NODE;
-use pliant_mechanics::model::{Body, Constraint, Motion};
+use pliant_mechanics::model::{Body, Constraint};
 use pliant_sim::contact::pairs::{Pairs, Surface};
 use pliant_sim::contact::pose::{Course, Pose};
 use pliant_sim::contact::profile::{Corner, Profile};
@@ -16,7 +16,7 @@ use pliant_sim::contact::touch::{Contact, Contacts, Jaw, Rigid, Touch, With, lat
 use pliant_sim::{counted, number};
 
 use super::barriers::BarrierTables;
-use super::{Builder, Target, suggestion};
+use super::{Builder, Target, in_metres, suggestion};
 use crate::format::{ContactTable, ShapeName, SolverName, ToolTable};
 use crate::reads::{rows_of, table as table_file};
 
@@ -375,9 +375,9 @@ impl Builder<'_> {
         nodes.dedup();
         let follows = self.assembly.followers();
         // Barriers act on what a pressure fills, too.
-        let binds = |constraint: &&Constraint| match constraint.motion {
-            Motion::Volume { .. } => !is_barrier,
-            _ => constraint.motion.is_collective(),
+        let binds = |constraint: &&Constraint| {
+            let motion = &constraint.motion;
+            motion.is_collective() && !(is_barrier && motion.encloses())
         };
         let bound = self.assembly.constraints.iter().filter(binds);
         let mut bound: Vec<u32> = bound.flat_map(|constraint| constraint.nodes.iter().copied()).collect();
@@ -414,11 +414,11 @@ impl Builder<'_> {
             ));
         }
         if let Some((gap, at)) = narrow {
-            let [x, y, z] = [at.x, at.y, at.z].map(number);
             self.notes.push(format!(
-                "contact `{name}`: a gap of {} m at ({x}, {y}, {z}) m is less than a quarter of the edges there are on average; smaller \
+                "contact `{name}`: a gap of {} m at {} is less than a quarter of the edges there are on average; smaller \
                  elements resolve it better",
-                number(gap)
+                number(gap),
+                in_metres(at)
             ));
         }
     }
@@ -472,12 +472,12 @@ impl Builder<'_> {
             return;
         }
         let Some((depth, at)) = inside.iter().max_by(|a, b| a.0.total_cmp(&b.0)) else { return };
-        let [x, y, z] = [at.x, at.y, at.z].map(number);
         let [first, second] = &names;
         let message = format!(
-            "`{first}` and `{second}` overlap at the start in {}, up to {} m deep at ({x}, {y}, {z}) m",
+            "`{first}` and `{second}` overlap at the start in {}, up to {} m deep at {}",
             counted(inside.len(), "place"),
-            number(*depth)
+            number(*depth),
+            in_metres(*at)
         );
         let help = "move one of them (`at` of its mesh), make `thickness` smaller, or let `separate = true` push them apart";
         self.error(&path, message, "overlapping", help);
@@ -518,14 +518,14 @@ impl Builder<'_> {
             return;
         }
         let Some((gap, place)) = found.iter().min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
-        let [x, y, z] = [place.x, place.y, place.z].map(number);
         let message = format!(
-            "{} of `{}` {} in `{}` at the start, up to {} m deep at ({x}, {y}, {z}) m",
+            "{} of `{}` {} in `{}` at the start, up to {} m deep at {}",
             counted(found.len(), of),
             self.bodies[body].name,
             if found.len() == 1 { "lies" } else { "lie" },
             rigid.name,
-            number(-gap)
+            number(-gap),
+            in_metres(*place)
         );
         let help = "move one of them (`at`), make `thickness` smaller, or let `separate = true` push them apart; \
                     `inside = true` is for bodies within an obstacle";

@@ -413,6 +413,12 @@ impl<'s> Builder<'s> {
 /// Whose names are meant, in suggestions.
 pub(crate) const SCENE: &str = "the scene";
 
+/// A place [m] in messages.
+fn in_metres(place: impl Into<[f64; 3]>) -> String {
+    let [x, y, z] = place.into().map(pliant_sim::number);
+    format!("({x}, {y}, {z}) m")
+}
+
 /// "did you mean …?" or a list of what there is; `owner` is `the scene` or another that has such names.
 pub(crate) fn suggestion(word: &str, known: &[&str], owner: &str, what: &str) -> String {
     match nearest(word, known.iter().copied()) {

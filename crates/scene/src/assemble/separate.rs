@@ -14,8 +14,8 @@ use pliant_sim::contact::pairs::{Pairs, Surface};
 use pliant_sim::contact::touch::{Contact, Contacts, Rigid, With, lattice, parts_of};
 use pliant_sim::{counted, number};
 
-use super::Builder;
 use super::contacts::{OVERLAP, hang};
+use super::{Builder, in_metres};
 
 /// Passes at most.
 const PASSES: usize = 400;
@@ -107,10 +107,10 @@ impl Builder<'_> {
     }
 
     fn refuse_overlap(&mut self, name: &str, depth: f64, at: &Vector3) {
-        let [x, y, z] = [at.x, at.y, at.z].map(number);
         let message = format!(
-            "bodies cannot be pushed apart: an overlap of {} m at ({x}, {y}, {z}) m is left after {PASSES} passes",
-            number(depth)
+            "bodies cannot be pushed apart: an overlap of {} m at {} is left after {PASSES} passes",
+            number(depth),
+            in_metres(*at)
         );
         let help = "move one of them (`at`), or release nodes that constraints hold there";
         self.error(&["contact", name, "separate"], message, "still overlapping", help);
@@ -224,13 +224,13 @@ impl Builder<'_> {
         let ways = before.iter().zip(places).map(|(then, now)| (now - then).norm()).enumerate();
         let moved: Vec<(usize, f64)> = ways.filter(|(_, way)| *way > least).collect();
         let Some(&(node, way)) = moved.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else { return };
-        let [x, y, z] = [before[node].x, before[node].y, before[node].z].map(number);
         let (body, _) = self.assembly.locate_node(node as u32);
         self.notes.push(format!(
-            "{} that overlapped {} pushed apart before the run, by up to {} m at ({x}, {y}, {z}) m of `{}`",
+            "{} that overlapped {} pushed apart before the run, by up to {} m at {} of `{}`",
             counted(moved.len(), "node"),
             if moved.len() == 1 { "was" } else { "were" },
             number(way),
+            in_metres(before[node]),
             self.assembly.bodies[body].name
         ));
     }

@@ -6,7 +6,7 @@ use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::Cells;
 use pliant_sim::{counted, number};
 
-use super::{Builder, BuiltBody};
+use super::{Builder, BuiltBody, in_metres};
 use crate::diagnostic::Diagnostic;
 use crate::format::TieTable;
 use crate::source::Source;
@@ -82,15 +82,15 @@ pub(crate) fn attach(
         return None;
     }
     if left > 0 {
-        let [x, y, z] = farthest.1.map(number);
         let message = format!(
-            "{} of {} of `{}` {} farther than {gap} from `{}`, up to {} m at ({x}, {y}, {z}) m",
+            "{} of {} of `{}` {} farther than {gap} from `{}`, up to {} m at {}",
             left,
             counted(nodes.len(), "node"),
             names[0],
             if left == 1 { "lies" } else { "lie" },
             names[1],
-            number(farthest.0)
+            number(farthest.0),
+            in_metres(farthest.1)
         );
         if table.nodes.is_some() {
             error(&["tie", name, "nodes"], message, "beyond the tolerance");

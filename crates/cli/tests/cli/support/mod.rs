@@ -7,7 +7,7 @@ use pliant_testing::scenes;
 use serde_json::Value;
 
 pub use pliant_testing::scenes::{
-    BLOCK, CORNERS, FROM_FILE, FROM_IMAGE, FROM_NAMES, TETS, changed, labels, resumable, series, vtk,
+    BLOCK, CORNERS, FROM_FILE, FROM_IMAGE, TETS, changed, from_names, labels, resumable, series, vtk,
 };
 
 /// A temporary folder with a scene in `case/scene.toml`, in which the binary runs.
