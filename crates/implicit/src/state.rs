@@ -1,14 +1,10 @@
 //! Everything that changes, as arrays over the nodes. A clone is a snapshot.
 
 use nalgebra::{UnitQuaternion, Vector3};
-use rayon::prelude::*;
 
 use pliant_mechanics::Model;
 
-use crate::assembly::Assembly;
-use crate::facet::{Broken, Facet, Resultants, ShellEnergy};
 use crate::rotation::exponential;
-use crate::strain::ShellStrain;
 
 /// Where a model is.
 #[derive(Debug, Default, PartialEq)]
@@ -64,11 +60,6 @@ impl State {
         }
     }
 
-    /// Displacement of a node [m].
-    pub fn displacement(&self, model: &Assembly, node: usize) -> Vector3<f64> {
-        self.position[node] - model.place(node)
-    }
-
     /// Moves and turns all nodes by a part of (translation, spin) increments, six a node.
     pub(crate) fn advance(&mut self, increment: &[f64], part: f64) {
         let nodes = self.position.iter_mut().zip(&mut self.rotation).zip(increment.chunks_exact(6));
@@ -84,46 +75,5 @@ impl State {
     /// The nodes of a facet: positions and rotations.
     pub(crate) fn corners(&self, nodes: [u32; 3]) -> ([Vector3<f64>; 3], [UnitQuaternion<f64>; 3]) {
         (nodes.map(|node| self.position[node as usize]), nodes.map(|node| self.rotation[node as usize]))
-    }
-
-    /// The current direction of a nodal normal.
-    pub fn normal(&self, model: &Assembly, number: usize) -> Vector3<f64> {
-        let normal = model.normals[number];
-        self.rotation[normal.node as usize] * normal.direction
-    }
-
-    /// Energy of all facets [J].
-    ///
-    /// # Errors
-    /// If a facet is collapsed or folded over.
-    pub fn shell_energy(&self, model: &Assembly) -> Result<ShellEnergy, Broken> {
-        let mut sum = ShellEnergy::default();
-        for facet in &model.facets {
-            let (x, rotation) = self.corners(facet.nodes);
-            let part = facet.energy(&facet.place(&x, &rotation)?);
-            sum.membrane += part.membrane;
-            sum.bending += part.bending;
-            sum.drilling += part.drilling;
-        }
-        Ok(sum)
-    }
-
-    /// Forces and moments per length in a facet.
-    ///
-    /// # Errors
-    /// If the facet is collapsed or folded over.
-    pub fn resultants(&self, model: &Assembly, facet: usize) -> Result<Resultants, Broken> {
-        let facet = &model.facets[facet];
-        let (x, rotation) = self.corners(facet.nodes);
-        Ok(facet.resultants(&facet.place(&x, &rotation)?))
-    }
-
-    /// The strains of all facets, side by side; none of one that is collapsed or folded over.
-    pub fn shell_strains(&self, model: &Assembly) -> Vec<ShellStrain> {
-        let strain = |facet: &Facet| {
-            let (x, rotation) = self.corners(facet.nodes);
-            facet.place(&x, &rotation).map(|placed| facet.strain(&placed)).unwrap_or_default()
-        };
-        model.facets.par_iter().with_min_len(64).map(strain).collect()
     }
 }
