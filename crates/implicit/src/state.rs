@@ -4,6 +4,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use pliant_mechanics::Model;
 
+use crate::relaxation::History;
 use crate::rotation::exponential;
 
 /// Where a model is.
@@ -21,6 +22,8 @@ pub struct State {
     pub velocity: Vec<Vector3<f64>>,
     /// Spins [rad/s].
     pub spin: Vec<Vector3<f64>>,
+    /// What relaxing laws remember.
+    pub history: History,
 }
 
 impl Clone for State {
@@ -32,17 +35,19 @@ impl Clone for State {
             rotation: self.rotation.clone(),
             velocity: self.velocity.clone(),
             spin: self.spin.clone(),
+            history: self.history.clone(),
         }
     }
 
     /// Into the arrays that are there: solvers do so in every step.
     fn clone_from(&mut self, source: &Self) {
-        let Self { time, load_factor, position, rotation, velocity, spin } = source;
+        let Self { time, load_factor, position, rotation, velocity, spin, history } = source;
         (self.time, self.load_factor) = (*time, *load_factor);
         self.position.clone_from(position);
         self.rotation.clone_from(rotation);
         self.velocity.clone_from(velocity);
         self.spin.clone_from(spin);
+        self.history.copy_from(history);
     }
 }
 
@@ -57,6 +62,7 @@ impl State {
             rotation: vec![UnitQuaternion::identity(); nodes],
             velocity: vec![Vector3::zeros(); nodes],
             spin: vec![Vector3::zeros(); nodes],
+            history: History::at_rest(model),
         }
     }
 
