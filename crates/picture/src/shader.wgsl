@@ -28,7 +28,8 @@ struct View {
 
 // Position [m] and value of each point.
 @group(1) @binding(0) var<storage, read> points: array<vec4<f32>>;
-// Three vertices, and a word: bits 0 to 2 tell which edges are drawn, bit 3 that the cell has a label, bits 8 to 31 its colour.
+// Three vertices, and a word: bits 0 to 2 tell which edges are drawn, bit 3 that the cell has a label, bits 8 to 31 its colour; bit 4 that it
+// is of an obstacle or tool, bit 5 of one that holds bodies inside.
 @group(1) @binding(1) var<storage, read> triangles: array<vec4<u32>>;
 // The point of each vertex.
 @group(1) @binding(2) var<storage, read> vertices: array<u32>;
@@ -101,7 +102,19 @@ fn colour_of(value: f32) -> vec3<f32> {
     return mix(colours[low].rgb, colours[high].rgb, part - f32(low));
 }
 
+fn is_thing(at: Corner) -> bool {
+    return (at.edges & 16u) != 0u;
+}
+
+// Of a thing that holds bodies inside the near side is left out.
+fn is_before(at: Corner) -> bool {
+    return (at.edges & 32u) != 0u && dot(at.normal, towards_eye(at.position)) > 0.0;
+}
+
 fn no_colour(at: Corner) -> bool {
+    if is_thing(at) {
+        return false;
+    }
     if view.range.z > 1.5 {
         return (at.edges & 8u) == 0u;
     }
@@ -110,6 +123,9 @@ fn no_colour(at: Corner) -> bool {
 
 // Light of the label where labels have colours, else of the value.
 fn colour_at(at: Corner) -> vec3<f32> {
+    if is_thing(at) {
+        return vec3(0.36, 0.39, 0.43);
+    }
     if view.range.z < 1.5 {
         return colour_of(at.value);
     }
@@ -167,7 +183,7 @@ fn shade(at: Corner) -> vec4<f32> {
     var colour = lit(albedo, normal, eye);
     // Derivatives over pixels are taken where all pixels pass.
     let bumpy = uneven(at, normal);
-    if view.skin.y > 0.0 {
+    if view.skin.y > 0.0 && !is_thing(at) {
         colour = moist(albedo * mottled(at.rest), bumpy, eye);
     }
     let edges = edge_cover(at.corner, at.edges) * view.edge.a;
@@ -261,13 +277,17 @@ fn uneven(at: Corner, normal: vec3<f32>) -> vec3<f32> {
 
 @fragment
 fn opaque(at: Corner) -> @location(0) vec4<f32> {
-    return shade(at);
+    let colour = shade(at);
+    if is_before(at) {
+        discard;
+    }
+    return colour;
 }
 
 @fragment
 fn clipped(at: Corner) -> @location(0) vec4<f32> {
     let colour = shade(at);
-    if dot(view.plane.xyz, at.position) > view.plane.w {
+    if is_before(at) || dot(view.plane.xyz, at.position) > view.plane.w {
         discard;
     }
     return colour;

@@ -339,7 +339,8 @@ pub fn pick(
         let (ab, ac) = (b - a, c - a);
         let across = along.cross(&ac);
         let determinant = ab.dot(&across);
-        if determinant == 0.0 {
+        // The near side of a thing that holds bodies inside is not drawn.
+        if determinant == 0.0 || (determinant > 0.0 && subject.is_hollow(triangle as usize)) {
             continue;
         }
         let from_a = (from - a) / determinant;
