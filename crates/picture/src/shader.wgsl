@@ -106,9 +106,11 @@ fn is_thing(at: Corner) -> bool {
     return (at.edges & 16u) != 0u;
 }
 
-// Of a thing that holds bodies inside the near side is left out.
-fn is_before(at: Corner) -> bool {
-    return (at.edges & 32u) != 0u && dot(at.normal, towards_eye(at.position)) > 0.0;
+// Things are drawn from outside, so that one sees through a half-space from its back; those that hold bodies inside from there. The
+// margin keeps outlines of round things whole.
+fn is_behind(at: Corner) -> bool {
+    let facing = dot(normalize(at.normal), towards_eye(at.position));
+    return is_thing(at) && select((facing < -0.2), (facing > 0.0), (at.edges & 32u) != 0u);
 }
 
 fn no_colour(at: Corner) -> bool {
@@ -278,7 +280,7 @@ fn uneven(at: Corner, normal: vec3<f32>) -> vec3<f32> {
 @fragment
 fn opaque(at: Corner) -> @location(0) vec4<f32> {
     let colour = shade(at);
-    if is_before(at) {
+    if is_behind(at) {
         discard;
     }
     return colour;
@@ -287,7 +289,7 @@ fn opaque(at: Corner) -> @location(0) vec4<f32> {
 @fragment
 fn clipped(at: Corner) -> @location(0) vec4<f32> {
     let colour = shade(at);
-    if is_before(at) || dot(view.plane.xyz, at.position) > view.plane.w {
+    if is_behind(at) || dot(view.plane.xyz, at.position) > view.plane.w {
         discard;
     }
     return colour;

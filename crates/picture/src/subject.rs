@@ -44,10 +44,10 @@ struct Patch {
 /// Cell data: 1 of obstacles and tools, 2 of those whose inside bodies touch, 0 of bodies.
 pub(crate) const THING: &str = "thing";
 
-/// Marks the faces of things that bodies touch.
+/// Marks the faces of things that bodies touch: they are drawn from the front.
 const STEEL: u32 = 0b1_0000;
 
-/// Marks those of things that hold bodies inside: they are drawn where they face away.
+/// Marks those of things that hold bodies inside: they are drawn from the back.
 const HOLLOW: u32 = 0b10_0000;
 
 /// What the shader takes of a cell beside the bits of edges: the colour of its label, or the mark of a thing; 0 without both.
@@ -140,9 +140,10 @@ impl Subject {
         self.triangles.len()
     }
 
-    /// Whether a triangle is seen from its back only, as those of things that hold bodies inside.
-    pub fn is_hollow(&self, triangle: usize) -> bool {
-        self.triangles[triangle][3] & HOLLOW != 0
+    /// Whether a triangle is drawn as seen from its front, or its back: of things only one side is.
+    pub fn is_drawn(&self, triangle: usize, from_front: bool) -> bool {
+        let mark = self.triangles[triangle][3] & (STEEL | HOLLOW);
+        mark == 0 || (mark == STEEL) == from_front
     }
 
     /// The points of each triangle, in the order in which they are drawn.
@@ -426,6 +427,9 @@ pub(crate) mod tests {
         mesh.point_data.insert("displacement".into(), DataArray { components: 3, values: vec![2.0; 21] });
         let marks = Subject::new(&mesh).triangles.iter().map(|t| t[3] & !0b111).collect::<Vec<_>>();
         assert_eq!(marks, [0, STEEL, STEEL | HOLLOW]);
+        let subject = Subject::new(&mesh);
+        assert_eq!([0, 1, 2].map(|triangle| subject.is_drawn(triangle, true)), [true, true, false]);
+        assert_eq!([0, 1, 2].map(|triangle| subject.is_drawn(triangle, false)), [true, false, true]);
         let values = nodal_values(&mesh, "displacement:x").unwrap();
         assert_eq!(values[..3], [2.0; 3]);
         assert!(values[3..].iter().all(|value| value.is_nan()), "{values:?}");

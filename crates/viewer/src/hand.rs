@@ -339,8 +339,7 @@ pub fn pick(
         let (ab, ac) = (b - a, c - a);
         let across = along.cross(&ac);
         let determinant = ab.dot(&across);
-        // The near side of a thing that holds bodies inside is not drawn.
-        if determinant == 0.0 || (determinant > 0.0 && subject.is_hollow(triangle as usize)) {
+        if determinant == 0.0 || !subject.is_drawn(triangle as usize, determinant > 0.0) {
             continue;
         }
         let from_a = (from - a) / determinant;
