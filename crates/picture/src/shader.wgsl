@@ -48,6 +48,8 @@ struct Corner {
     @location(4) @interpolate(flat) edges: u32,
     // At rest, over the size of the body.
     @location(5) rest: vec3<f32>,
+    // The position within the triangle, also where the middle of a pixel is not: there the other one lies beyond it, on outlines far.
+    @location(6) @interpolate(perspective, centroid) place: vec3<f32>,
 }
 
 @vertex
@@ -78,6 +80,7 @@ fn corner_at(point: vec4<f32>, normal: vec3<f32>, index: u32, edges: u32, rest: 
     var result: Corner;
     result.clip = view.projection_view * vec4(point.xyz, 1.0);
     result.position = point.xyz;
+    result.place = point.xyz;
     result.normal = normal;
     result.value = point.w;
     let own = index % 3u;
@@ -289,7 +292,7 @@ fn opaque(at: Corner) -> @location(0) vec4<f32> {
 @fragment
 fn clipped(at: Corner) -> @location(0) vec4<f32> {
     let colour = shade(at);
-    if is_behind(at) || dot(view.plane.xyz, at.position) > view.plane.w {
+    if is_behind(at) || dot(view.plane.xyz, at.place) > view.plane.w {
         discard;
     }
     return colour;
