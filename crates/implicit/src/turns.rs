@@ -99,8 +99,7 @@ impl Turn {
                 let grown = Matrix3::from_diagonal_element(stretched.trace()) - stretched;
                 let turned = -self.inverse * grown * y;
                 for (row, ((_, _, r), own)) in self.rows.iter().zip(&blocks).enumerate() {
-                    let change =
-                        turned.cross(r) + y.cross(&spin.cross(r)) + rotary * own.tr_mul(&spin);
+                    let change = turned.cross(r) + y.cross(&spin.cross(r)) + rotary * own.tr_mul(&spin);
                     for k in 0..3 {
                         whole[(3 * column + axis) * size + 3 * row + k] = change[k];
                     }
@@ -191,7 +190,9 @@ mod tests {
     fn a_rigid_motion_is_followed() {
         let (carried, _) = placed();
         let rest: Vec<Vector3<f64>> =
-            [[0.0; 3], [0.01, 0.001, 0.0], [0.002, 0.012, 0.001], [-0.001, 0.001, 0.009]].map(Vector3::from).into();
+            [[0.0; 3], [0.01, 0.001, 0.0], [0.002, 0.012, 0.001], [-0.001, 0.001, 0.009]]
+                .map(Vector3::from)
+                .into();
         for angle in [0.0, 1e-6, 1.0, 3.1] {
             let turn = exponential(&(Vector3::new(0.3, -0.8, 0.5).normalize() * angle));
             let mut state = State::at_rest(&Assembly::new("tet", rest.clone()));

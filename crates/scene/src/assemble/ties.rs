@@ -169,7 +169,8 @@ impl Builder<'_> {
         let found = attach(source, (name, table), (placed(guest), &nodes), placed(host), out)?;
         self.notes.push(found.note);
         if follow {
-            let turns = found.nodes.iter().zip(&found.cells).map(|(&node, &cell)| self.turn(host, node, &[cell]));
+            let turns =
+                found.nodes.iter().zip(&found.cells).map(|(&node, &cell)| self.turn(host, node, &[cell]));
             let turns: Vec<CarriedTurn> = turns.collect();
             self.assembly.turns.extend(turns);
         }

@@ -40,7 +40,9 @@ impl Builder<'_> {
         for (name, node, encloses) in met {
             let (body, node) = self.assembly.locate_node(node);
             let body = &self.bodies[body].name;
-            let message = format!("the rotation of node {node} of `{body}` follows a solid, and `{name}` acts on it, too");
+            let message = format!(
+                "the rotation of node {node} of `{body}` follows a solid, and `{name}` acts on it, too"
+            );
             let help = match encloses {
                 true => "leave `rotations` free, or fill a body of model `membrane`",
                 false => "limit it to translations: `components = [\"x\", \"y\", \"z\"]`",
