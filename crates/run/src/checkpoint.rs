@@ -20,7 +20,7 @@ use pliant_scene::{Part, World};
 /// The first bytes of every checkpoint.
 const MAGIC: [u8; 8] = *b"\x89PLIANT\n";
 /// The version of what follows. Any change of what is in a body needs the next number.
-const FORMAT: u32 = 10;
+const FORMAT: u32 = 11;
 /// Bytes before the body: magic, format, length.
 const HEAD: usize = 20;
 /// Bytes after it.
@@ -443,7 +443,11 @@ impl Checkpoint {
     pub(crate) fn state(&self, world: &World, simulated: &pliant_sim::World) -> Option<State> {
         let parts = &world.participants;
         let constraints: usize = parts.iter().map(|part| part.built.model.constraints.len()).sum();
-        let whole = self.progressed.history.reactions.iter().all(|row| row.len() == constraints)
+        let history = &self.progressed.history;
+        let all = parts.iter().flat_map(|part| &part.built.model.constraints);
+        let filled = all.filter(|own| own.motion.encloses()).count();
+        let whole = history.reactions.iter().all(|row| row.len() == constraints)
+            && history.enclosed.len() == filled * history.times.len()
             && self.progressed.watched.len() == parts.len()
             && self.origin.participants.len() == parts.len();
         if whole { State::decode(simulated, &self.participants) } else { None }
@@ -607,6 +611,6 @@ mod tests {
         let shell = shell.simulation().unwrap().encode().unwrap()[0].len();
         let explicit = bytes("[run]\nprecision = 'single'\n");
         let quasi_static = bytes("[run]\nprecision = 'single'\nsolver = 'quasi-static'\n");
-        assert_eq!((FORMAT, explicit, quasi_static, shell), (10, 1088, 1472, 1055));
+        assert_eq!((FORMAT, explicit, quasi_static, shell), (11, 1089, 1473, 1056));
     }
 }

@@ -196,7 +196,7 @@ fn a_balloon_is_pressed_onto_a_floor() {
     }
 }
 
-/// The work of the pressure is counted, and the summary tells volume and pressure.
+/// The work of the pressure is counted, and summary and plot tell volume and pressure.
 #[test]
 fn the_pressure_works() {
     for solver in
@@ -215,6 +215,12 @@ fn the_pressure_works() {
     assert!(summary.energy_balance.unwrap().abs() < 0.01, "{:?}", summary.energy_balance);
     let [(name, [volume, pressure])] = &summary.volumes[..] else { panic!("{:?}", summary.volumes) };
     assert!(name == "air" && *volume > 1.4e-4 && *pressure > 1000.0, "{volume} {pressure}");
+    let plot = std::fs::read_to_string(out.path().join("plot.svg")).unwrap();
+    assert!(
+        ["Pressure [Pa]", "Volume [m³]", "Reaction [N]", "Energy [J]"]
+            .iter()
+            .all(|title| plot.contains(title))
+    );
 }
 
 #[test]
