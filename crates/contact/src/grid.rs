@@ -4,7 +4,7 @@ use std::fmt;
 
 use nalgebra::Vector3;
 
-use crate::shape::{Near, Triangles};
+use crate::near::{Near, Triangles};
 
 /// Signed distances [m] at the points of a regular grid, linear in between along each axis. Beyond the grid the distance is that to the
 /// point of the surface that is nearest to the rim of the grid.

@@ -21,6 +21,7 @@
 pub mod barrier;
 pub mod grid;
 pub mod lag;
+mod near;
 pub mod pairs;
 pub mod pose;
 pub mod profile;

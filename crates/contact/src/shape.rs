@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Vector2, Vector3};
 
 use crate::grid::Grid;
+pub use crate::near::{Near, Triangles};
 use crate::profile::Profile;
 
 /// A rigid shape.
@@ -47,15 +48,6 @@ pub enum Shape {
     Revolved(Arc<Profile>),
     /// Distances of a closed surface, sampled.
     Grid(Arc<Grid>),
-}
-
-/// What a shape is at a point.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Near {
-    /// Distance [m] to its surface, negative inside.
-    pub distance: f64,
-    /// The direction, of length 1, in which the distance grows.
-    pub normal: Vector3<f64>,
 }
 
 impl Shape {
@@ -109,9 +101,6 @@ impl Shape {
         }
     }
 }
-
-/// Points [m] and triangles of a surface, outward.
-pub type Triangles = (Vec<Vector3<f64>>, Vec<[u32; 3]>);
 
 /// Points around a circle of a surface that is drawn.
 const AROUND: u32 = 32;

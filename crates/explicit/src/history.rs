@@ -34,6 +34,15 @@ impl<R: Scalar> History<R> {
         (0..slots).map(|slot| Symmetric([0, 1, 2, 3, 4, 5].map(|k| number(slot, k)))).collect()
     }
 
+    /// Takes on the tensors of a cell.
+    pub fn set_cell(&mut self, cell: usize, tensors: &[Symmetric<f64>]) {
+        for (slot, tensor) in tensors.iter().enumerate() {
+            for (k, &entry) in tensor.0.iter().enumerate() {
+                self.cells[(cell / PACK * tensors.len() + slot) * 6 + k].0[cell % PACK] = R::of(entry);
+            }
+        }
+    }
+
     /// What an averaged pressure remembers [Pa].
     pub(crate) fn of_pressure(&self, solid: &Solid, index: usize) -> Vec<f64> {
         let slots = solid.material.prony.volumetric_slots();
@@ -42,8 +51,6 @@ impl<R: Scalar> History<R> {
 
     /// Tensors of history per cell.
     pub fn slots(solid: &Solid) -> usize {
-        let prony = &solid.material.prony;
-        let point = if solid.cells.averages_pressure() { prony.isochoric_slots() } else { prony.slots() };
-        solid.cells.points() * point
+        solid.cells.points() * solid.material.prony.point_slots(solid.cells.averages_pressure())
     }
 }

@@ -34,18 +34,8 @@ impl<R: Scalar> Series<R> {
     }
 
     fn set_step(&mut self, terms: &[(f64, f64)], update: PronyUpdate, step: f64) {
-        for ((decay, gain), &(weight, time)) in self.terms.iter_mut().zip(terms) {
-            let (d, g) = match update {
-                PronyUpdate::Exact if step == 0.0 => (1.0, weight),
-                PronyUpdate::Exact => {
-                    let x = step / time;
-                    ((-x).exp(), weight * -(-x).exp_m1() / x)
-                }
-                PronyUpdate::BackwardEuler => {
-                    let decay = time / (step + time);
-                    (decay, weight * decay)
-                }
-            };
+        for ((decay, gain), &term) in self.terms.iter_mut().zip(terms) {
+            let (d, g) = update.coefficients(term, step);
             (*decay, *gain) = (R::of(d), R::of(g));
         }
     }

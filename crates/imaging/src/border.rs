@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
-use crate::grid::Grid;
+use pliant_geometry::Grid;
 
 /// Voxels of a region at the six sides of its image.
 #[derive(Clone, Debug, PartialEq, Eq)]

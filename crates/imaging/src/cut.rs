@@ -203,9 +203,9 @@ mod tests {
     use nalgebra::Matrix3;
 
     use super::*;
-    use crate::grid::Grid;
     use crate::image::{Numbers, Order, Scalar};
     use crate::names::LabelNames;
+    use pliant_geometry::Grid;
 
     fn image(dims: [usize; 3], label: impl Fn([usize; 3]) -> u8) -> Image {
         let grid = Grid::along_axes(dims, Vector3::new(0.1, 0.2, 0.3), [1e-3, 1e-3, 2e-3]).unwrap();

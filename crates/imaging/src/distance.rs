@@ -4,11 +4,10 @@
 //! voxel of the other side, measured along the way to it.
 //! Distances use only the step lengths: in a sheared grid they are distances before shearing.
 
-use pliant_geometry::Vector3;
+use pliant_geometry::{DistanceField, Grid, Vector3};
 use rayon::prelude::*;
 
 use crate::error::LabelError;
-use crate::grid::Grid;
 use crate::region::Region;
 
 /// No voxel.
@@ -37,136 +36,57 @@ impl Smoothing {
     }
 }
 
-/// A smooth signed distance, positive inside [m].
-#[derive(Clone, Debug, PartialEq)]
-pub struct DistanceField {
-    grid: Grid,
-    values: Vec<f32>,
-    /// Box in which the field may be positive [m].
-    bounds: [Vector3; 2],
-}
-
-impl DistanceField {
-    /// Of a region in a box with the margin of the smoothing. `progress` hears fractions from 0 to 1.
-    pub fn new(region: &Region, smoothing: &Smoothing, progress: &dyn Fn(f64)) -> Result<Self, LabelError> {
-        let outside: Vec<bool> = region.inside.iter().map(|inside| !inside).collect();
-        Self::between(region, &outside, smoothing, progress)
+impl Region {
+    /// The smooth signed distance to the surface of the region, whose box has the margin of the smoothing. `progress` hears
+    /// fractions from 0 to 1.
+    pub fn distance_field(
+        &self,
+        smoothing: &Smoothing,
+        progress: &dyn Fn(f64),
+    ) -> Result<DistanceField, LabelError> {
+        let outside: Vec<bool> = self.inside.iter().map(|inside| !inside).collect();
+        self.distance_field_beside(&outside, smoothing, progress)
     }
 
-    /// Of a part of a whole in the same box: positive where the part is nearer than the rest of the whole, also outside
-    /// both. Its zero surface continues beyond the surface of the whole.
-    pub fn within(
-        part: &Region,
+    /// The smooth signed distance of the region as a part of a whole in the same box: positive where the part is nearer than
+    /// the rest of the whole, also outside both. Its zero surface continues beyond the surface of the whole.
+    pub fn distance_field_within(
+        &self,
         whole: &Region,
         smoothing: &Smoothing,
         progress: &dyn Fn(f64),
-    ) -> Result<Self, LabelError> {
+    ) -> Result<DistanceField, LabelError> {
         let rest: Vec<bool> =
-            part.inside.iter().zip(&whole.inside).map(|(&part, &whole)| whole && !part).collect();
-        Self::between(part, &rest, smoothing, progress)
+            self.inside.iter().zip(&whole.inside).map(|(&part, &whole)| whole && !part).collect();
+        self.distance_field_beside(&rest, smoothing, progress)
     }
 
-    /// Of values [m] at the points of a grid, positive inside, i fastest. `None` if no value is positive, their number does not
-    /// match the grid, or the grid has fewer than two points along an axis.
-    pub fn of_values(grid: Grid, values: Vec<f32>) -> Option<Self> {
-        let fits = values.len() == grid.len() && grid.dims.iter().all(|&n| n > 1);
-        let bounds = fits.then(|| positive_box(&grid, &values)).flatten()?;
-        Some(Self { grid, values, bounds })
-    }
-
-    /// Volume of the inside [m³]. Each voxel counts with its part, one mean step thick, on the inner side of a plane at the
-    /// distance of its centre.
-    pub fn volume(&self) -> f64 {
-        let step = self.grid.voxel_volume().cbrt();
-        let parts = self.values.par_iter().map(|&f| (0.5 + f64::from(f) / step).clamp(0.0, 1.0));
-        // In chunks of a fixed length, so the sum does not depend on threads.
-        let sums: Vec<f64> = parts.chunks(1 << 16).map(|chunk| chunk.iter().sum()).collect();
-        sums.iter().sum::<f64>() * self.grid.voxel_volume()
-    }
-
-    fn between(
-        region: &Region,
+    fn distance_field_beside(
+        &self,
         other: &[bool],
         smoothing: &Smoothing,
         progress: &dyn Fn(f64),
-    ) -> Result<Self, LabelError> {
+    ) -> Result<DistanceField, LabelError> {
         for (what, value) in [("sigma", smoothing.sigma), ("clip", smoothing.clip)] {
             if !(0.0..=100.0).contains(&value) {
                 return Err(LabelError::BadLength { what, value });
             }
         }
-        let grid = region.grid;
-        let mut values = signed_distances(region, other, smoothing.clip * largest(grid.spacing()), progress);
+        let grid = self.grid;
+        let mut values = signed_distances(self, other, smoothing.clip * largest(grid.spacing()), progress);
         progress(0.7);
         for axis in 0..3 {
             values = smoothed(&grid, values, axis, smoothing.sigma);
         }
         progress(0.9);
         let counted =
-            values.iter().enumerate().filter(|&(at, _)| region.inside[at] || other[at]).map(|(_, f)| *f);
-        let shift = matching_shift(counted, region.volume(), &grid);
+            values.iter().enumerate().filter(|&(at, _)| self.inside[at] || other[at]).map(|(_, f)| *f);
+        let shift = matching_shift(counted, self.volume(), &grid);
         values.par_iter_mut().for_each(|value| *value -= shift as f32);
-        let bounds = positive_box(&grid, &values)
-            .ok_or(LabelError::Emptied { label: region.label, operation: "smoothing" })?;
+        let field = DistanceField::of_values(grid, values)
+            .ok_or(LabelError::Emptied { label: self.label, operation: "smoothing" })?;
         progress(1.0);
-        Ok(Self { grid, values, bounds })
-    }
-
-    /// The field at a point [m], positive inside.
-    pub fn value(&self, point: &Vector3) -> f64 {
-        let index = self.grid.index(point);
-        let within = self.clamped(&index);
-        let [first, part] = self.cell(&within);
-        let value = |at: usize| f64::from(self.values[self.corner(&first, at)]);
-        let along = |at: usize, t: f64| value(at) * (1.0 - t) + value(at + 1) * t;
-        let plane = |at: usize| along(at, part.x) * (1.0 - part.y) + along(at + 2, part.x) * part.y;
-        let inner = plane(0) * (1.0 - part.z) + plane(4) * part.z;
-        // Beyond the box the field falls with the distance from it.
-        if index == within { inner } else { inner - (self.grid.position(&within) - point).norm() }
-    }
-
-    /// Gradient of the field at a point, dimensionless; of length 1 except for smoothing.
-    pub fn gradient(&self, point: &Vector3) -> Vector3 {
-        let [first, part] = self.cell(&self.clamped(&self.grid.index(point)));
-        let mut gradient = Vector3::zeros();
-        for at in 0..8 {
-            let value = f64::from(self.values[self.corner(&first, at)]);
-            let side = [at & 1, at >> 1 & 1, at >> 2 & 1];
-            let weight = |axis: usize| if side[axis] == 1 { part[axis] } else { 1.0 - part[axis] };
-            let slope = |axis: usize| if side[axis] == 1 { 1.0 } else { -1.0 };
-            gradient.x += value * slope(0) * weight(1) * weight(2);
-            gradient.y += value * weight(0) * slope(1) * weight(2);
-            gradient.z += value * weight(0) * weight(1) * slope(2);
-        }
-        self.grid.gradient(&gradient)
-    }
-
-    /// Smallest and largest corner of a box round all that is inside [m].
-    pub fn bounds(&self) -> [Vector3; 2] {
-        self.bounds
-    }
-
-    /// Lengths of the steps of the grid [m].
-    pub fn spacing(&self) -> [f64; 3] {
-        self.grid.spacing()
-    }
-
-    fn clamped(&self, index: &Vector3) -> Vector3 {
-        let last = self.grid.dims.map(|n| n as f64 - 1.0);
-        Vector3::new(index.x.clamp(0.0, last[0]), index.y.clamp(0.0, last[1]), index.z.clamp(0.0, last[2]))
-    }
-
-    /// The first corner of the cell that holds a place, and how far the place is from it (0 to 1 along each axis).
-    fn cell(&self, index: &Vector3) -> [Vector3; 2] {
-        let first = Vector3::from_fn(|axis, _| index[axis].floor().min(self.grid.dims[axis] as f64 - 2.0));
-        [first, index - first]
-    }
-
-    /// Place in memory of a corner of a cell; bits of `at` are steps along i, j and k.
-    fn corner(&self, first: &Vector3, at: usize) -> usize {
-        let [nx, ny, _] = self.grid.dims;
-        let [i, j, k] = [0, 1, 2].map(|axis| first[axis] as usize + (at >> axis & 1));
-        i + nx * (j + ny * k)
+        Ok(field)
     }
 }
 
@@ -342,19 +262,4 @@ fn matching_shift(values: impl Iterator<Item = f32> + Clone, volume: f64, grid: 
         if enclosed(middle) > volume { low = middle } else { high = middle }
     }
     (low + high) / 2.0
-}
-
-/// Box in world coordinates round all cells with a positive corner.
-fn positive_box(grid: &Grid, values: &[f32]) -> Option<[Vector3; 2]> {
-    let mut first = [usize::MAX; 3];
-    let mut last = [0; 3];
-    for at in (0..values.len()).filter(|&at| values[at] > 0.0) {
-        for (axis, i) in grid.triple(at).into_iter().enumerate() {
-            first[axis] = first[axis].min(i);
-            last[axis] = last[axis].max(i);
-        }
-    }
-    // Half a voxel more than the faces of the voxels: linear values reach zero before the next centre.
-    let round = |i: usize| i.saturating_sub(1);
-    (first[0] != usize::MAX).then(|| grid.world_box(first.map(round), last.map(|i| i + 1)))
 }

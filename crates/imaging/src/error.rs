@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use pliant_geometry::Vector3;
 use pliant_geometry::io::Place;
+use pliant_geometry::{FlatGrid, Vector3};
 
 /// An image that could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -371,6 +371,18 @@ fn list(labels: &[i32]) -> String {
 pub(crate) struct Fault {
     pub(crate) place: Place,
     pub(crate) problem: ImageProblem,
+}
+
+impl From<FlatGrid> for ImageProblem {
+    fn from(FlatGrid { steps }: FlatGrid) -> Self {
+        Self::Singular { steps }
+    }
+}
+
+impl From<FlatGrid> for Fault {
+    fn from(flat: FlatGrid) -> Self {
+        ImageProblem::from(flat).into()
+    }
 }
 
 impl From<ImageProblem> for Fault {

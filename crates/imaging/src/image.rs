@@ -7,8 +7,8 @@ use std::path::PathBuf;
 use rayon::prelude::*;
 
 use crate::error::LabelError;
-use crate::grid::Grid;
 use crate::names::LabelNames;
+use pliant_geometry::Grid;
 
 /// Type of the numbers of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -9,8 +9,8 @@ use serde::Serialize;
 
 use crate::border::Border;
 use crate::error::LabelError;
-use crate::grid::Grid;
 use crate::image::{Image, LabelImage};
+use pliant_geometry::Grid;
 
 /// The voxels of one label.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -297,7 +297,7 @@ impl Assembly {
     ///
     /// # Errors
     /// If the density is out of range, a cell is degenerate or inverted, or the element or the law has no stiffness here: averages over
-    /// two rings of neighbours, laws that relax.
+    /// two rings of neighbours, averaged pressures and bars that relax.
     pub fn check_solid(&self, name: &str, solid: &Solid) -> Result<(), ModelError> {
         if let Some(why) = refusal(solid) {
             return Err(ModelError::NoStiffness { solid: name.into(), why });

@@ -263,6 +263,7 @@ impl BackwardEuler {
         let (mut parts, mut halvings) = (0, 0);
         // Of a state that was moved in between nothing is known of the step before.
         let previous = self.previous.take().filter(|before| before.time < state.time);
+        self.system.begin_history(state);
         loop {
             let rest = until - state.time;
             let last = size >= rest * (1.0 - 1e-9);
@@ -297,6 +298,7 @@ impl BackwardEuler {
     fn newton(&mut self, state: &mut State, h: f64) -> Result<DynamicStep, SolveError> {
         let time = state.time + h;
         self.system.prescribed(state.time, time, &mut self.pending);
+        self.system.begin_step(&state.history, h);
         self.moved.fill(0.0);
         if self.system.touching.is_some() {
             return self.newton_in_contact(state, h);
@@ -379,7 +381,8 @@ impl BackwardEuler {
     }
 
     /// Ends a step: velocities and spins of the motion in it.
-    fn end(&self, state: &mut State, time: f64) {
+    fn end(&mut self, state: &mut State, time: f64) {
+        self.system.end_step(Some(&self.start), state, time - self.start.time);
         let Course { step, shift, .. } = &self.course;
         for (node, moved) in self.moved.chunks_exact(6).enumerate() {
             let rate =

@@ -27,6 +27,7 @@ impl Forces {
     /// # Errors
     /// If an element collapses or folds over.
     pub fn evaluate(&mut self, state: &State) -> Result<(), SolveError> {
+        self.system.stand(&state.history);
         self.system.evaluate(state, state.time, None)?;
         let system = &mut self.system;
         for (load, controlled) in system.external.iter_mut().zip(&system.controlled) {
@@ -72,7 +73,7 @@ impl Forces {
         self.system.enclosed(constraint, state)
     }
 
-    /// Energy stored in elements and springs [J].
+    /// Energy stored in elements and springs [J], and the work of stresses that relax.
     pub fn strain_energy(&self) -> f64 {
         self.system.energy
     }

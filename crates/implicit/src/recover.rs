@@ -11,9 +11,57 @@ use rayon::prelude::*;
 
 use crate::assembly::Assembly;
 use crate::error::SolveError;
-use crate::facet::{Resultants, ShellEnergy};
+use crate::facet::{Broken, Facet, Resultants, ShellEnergy};
 use crate::state::State;
 use crate::strain::ShellStrain;
+
+impl State {
+    /// Displacement of a node [m].
+    pub fn displacement(&self, model: &Assembly, node: usize) -> Vector3<f64> {
+        self.position[node] - model.place(node)
+    }
+
+    /// The current direction of a nodal normal.
+    pub fn normal(&self, model: &Assembly, number: usize) -> Vector3<f64> {
+        let normal = model.normals[number];
+        self.rotation[normal.node as usize] * normal.direction
+    }
+
+    /// Energy of all facets [J].
+    ///
+    /// # Errors
+    /// If a facet is collapsed or folded over.
+    pub fn shell_energy(&self, model: &Assembly) -> Result<ShellEnergy, Broken> {
+        let mut sum = ShellEnergy::default();
+        for facet in &model.facets {
+            let (x, rotation) = self.corners(facet.nodes);
+            let part = facet.energy(&facet.place(&x, &rotation)?);
+            sum.membrane += part.membrane;
+            sum.bending += part.bending;
+            sum.drilling += part.drilling;
+        }
+        Ok(sum)
+    }
+
+    /// Forces and moments per length in a facet.
+    ///
+    /// # Errors
+    /// If the facet is collapsed or folded over.
+    pub fn resultants(&self, model: &Assembly, facet: usize) -> Result<Resultants, Broken> {
+        let facet = &model.facets[facet];
+        let (x, rotation) = self.corners(facet.nodes);
+        Ok(facet.resultants(&facet.place(&x, &rotation)?))
+    }
+
+    /// The strains of all facets, side by side; none of one that is collapsed or folded over.
+    pub fn shell_strains(&self, model: &Assembly) -> Vec<ShellStrain> {
+        let strain = |facet: &Facet| {
+            let (x, rotation) = self.corners(facet.nodes);
+            facet.place(&x, &rotation).map(|placed| facet.strain(&placed)).unwrap_or_default()
+        };
+        model.facets.par_iter().with_min_len(64).map(strain).collect()
+    }
+}
 
 /// Fields of all facets, one entry a facet. Its arrays are made at the first use and kept.
 #[derive(Clone, Debug, Default, PartialEq)]

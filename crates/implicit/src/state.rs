@@ -1,14 +1,11 @@
 //! Everything that changes, as arrays over the nodes. A clone is a snapshot.
 
 use nalgebra::{UnitQuaternion, Vector3};
-use rayon::prelude::*;
 
 use pliant_mechanics::Model;
 
-use crate::assembly::Assembly;
-use crate::facet::{Broken, Facet, Resultants, ShellEnergy};
+use crate::relaxation::History;
 use crate::rotation::exponential;
-use crate::strain::ShellStrain;
 
 /// Where a model is.
 #[derive(Debug, Default, PartialEq)]
@@ -25,6 +22,8 @@ pub struct State {
     pub velocity: Vec<Vector3<f64>>,
     /// Spins [rad/s].
     pub spin: Vec<Vector3<f64>>,
+    /// What relaxing laws remember.
+    pub history: History,
 }
 
 impl Clone for State {
@@ -36,17 +35,19 @@ impl Clone for State {
             rotation: self.rotation.clone(),
             velocity: self.velocity.clone(),
             spin: self.spin.clone(),
+            history: self.history.clone(),
         }
     }
 
     /// Into the arrays that are there: solvers do so in every step.
     fn clone_from(&mut self, source: &Self) {
-        let Self { time, load_factor, position, rotation, velocity, spin } = source;
+        let Self { time, load_factor, position, rotation, velocity, spin, history } = source;
         (self.time, self.load_factor) = (*time, *load_factor);
         self.position.clone_from(position);
         self.rotation.clone_from(rotation);
         self.velocity.clone_from(velocity);
         self.spin.clone_from(spin);
+        self.history.copy_from(history);
     }
 }
 
@@ -61,12 +62,8 @@ impl State {
             rotation: vec![UnitQuaternion::identity(); nodes],
             velocity: vec![Vector3::zeros(); nodes],
             spin: vec![Vector3::zeros(); nodes],
+            history: History::at_rest(model),
         }
-    }
-
-    /// Displacement of a node [m].
-    pub fn displacement(&self, model: &Assembly, node: usize) -> Vector3<f64> {
-        self.position[node] - model.place(node)
     }
 
     /// Moves and turns all nodes by a part of (translation, spin) increments, six a node.
@@ -84,46 +81,5 @@ impl State {
     /// The nodes of a facet: positions and rotations.
     pub(crate) fn corners(&self, nodes: [u32; 3]) -> ([Vector3<f64>; 3], [UnitQuaternion<f64>; 3]) {
         (nodes.map(|node| self.position[node as usize]), nodes.map(|node| self.rotation[node as usize]))
-    }
-
-    /// The current direction of a nodal normal.
-    pub fn normal(&self, model: &Assembly, number: usize) -> Vector3<f64> {
-        let normal = model.normals[number];
-        self.rotation[normal.node as usize] * normal.direction
-    }
-
-    /// Energy of all facets [J].
-    ///
-    /// # Errors
-    /// If a facet is collapsed or folded over.
-    pub fn shell_energy(&self, model: &Assembly) -> Result<ShellEnergy, Broken> {
-        let mut sum = ShellEnergy::default();
-        for facet in &model.facets {
-            let (x, rotation) = self.corners(facet.nodes);
-            let part = facet.energy(&facet.place(&x, &rotation)?);
-            sum.membrane += part.membrane;
-            sum.bending += part.bending;
-            sum.drilling += part.drilling;
-        }
-        Ok(sum)
-    }
-
-    /// Forces and moments per length in a facet.
-    ///
-    /// # Errors
-    /// If the facet is collapsed or folded over.
-    pub fn resultants(&self, model: &Assembly, facet: usize) -> Result<Resultants, Broken> {
-        let facet = &model.facets[facet];
-        let (x, rotation) = self.corners(facet.nodes);
-        Ok(facet.resultants(&facet.place(&x, &rotation)?))
-    }
-
-    /// The strains of all facets, side by side; none of one that is collapsed or folded over.
-    pub fn shell_strains(&self, model: &Assembly) -> Vec<ShellStrain> {
-        let strain = |facet: &Facet| {
-            let (x, rotation) = self.corners(facet.nodes);
-            facet.place(&x, &rotation).map(|placed| facet.strain(&placed)).unwrap_or_default()
-        };
-        model.facets.par_iter().with_min_len(64).map(strain).collect()
     }
 }

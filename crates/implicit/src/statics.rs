@@ -234,6 +234,7 @@ impl Statics {
     /// If the stiffness is singular or conjugate gradients fail.
     pub fn linear(&mut self, state: &State, time: f64) -> Result<Vec<[f64; 6]>, SolveError> {
         self.system.prescribed(state.time, time, &mut self.pending);
+        self.system.begin_step(&state.history, time - state.time);
         self.system.evaluate(state, time, Some((self.settings.tangent, &self.pending)))?;
         self.find_residual(state);
         self.system.prepare()?;
@@ -253,6 +254,7 @@ impl Statics {
         let mut size = until - state.time;
         let mut halvings = 0;
         let mut broken = None;
+        self.system.begin_history(state);
         loop {
             let rest = until - state.time;
             let target = if size >= rest * (1.0 - 1e-12) { until } else { state.time + size };
@@ -294,6 +296,7 @@ impl Statics {
                 }
             }
         }
+        self.system.begin_history(state);
         let before = state.clone();
         self.halved(state, control, self.settings.halvings).map_err(|attempt| {
             *state = before;
@@ -353,8 +356,11 @@ impl Statics {
         let failed = |error| Attempt { error, retry: true };
         let start = state.clone();
         self.system.prescribed(state.time, time, &mut self.pending);
+        self.system.begin_step(&start.history, time - start.time);
         if self.system.touching.is_some() {
-            return self.iterate_in_contact(state, time, control);
+            let step = self.iterate_in_contact(state, time, control)?;
+            self.system.end_step(Some(&start), state, time - start.time);
+            return Ok(step);
         }
         let mut residuals: Vec<f64> = Vec::new();
         let mut negative_pivots = 0;
@@ -372,6 +378,7 @@ impl Statics {
             let complete = self.pending.iter().all(|&p| p == 0.0) && self.system.conditions.are_closed();
             let controlled = gap.abs() <= self.allowed_gap(control);
             if iteration > 0 && complete && controlled && norm <= allowed {
+                self.system.end_step(Some(&start), state, time - start.time);
                 state.time = time;
                 return Ok(Step { time, residuals, negative_pivots, parts: 0 });
             }

@@ -20,6 +20,7 @@ use crate::linear::{LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIV
 use crate::mapping::CarriedPoints;
 use crate::patch::Vector18;
 use crate::patch::{EdgeRule, Patch};
+use crate::relaxation::{History, Relaxation};
 use crate::rotation::skew;
 use crate::solid::{Response, Stars};
 use crate::sparse::{Equations, LowerMatrix, NONE};
@@ -57,6 +58,8 @@ pub(crate) struct System {
     face_places: Vec<Vec<Vec<u32>>>,
     /// The averages of each solid that has some.
     stars: Vec<Option<Stars>>,
+    /// How stresses relax in the step or at the instant.
+    relaxation: Relaxation,
     /// None in a system of forces alone.
     workspace: Option<Workspace>,
     /// Internal forces and moments, six a node [N, N m].
@@ -275,6 +278,7 @@ impl System {
             solid_places: Vec::new(),
             face_places: Vec::new(),
             stars: model.solids.iter().map(Stars::of).collect(),
+            relaxation: Relaxation::of(&model),
             solid_results: vec![Response::none(); CHUNK],
             workspace: None,
             internal: vec![0.0; 6 * nodes],
@@ -302,6 +306,40 @@ impl System {
     pub(crate) fn hold(&mut self, springs: &[Spring]) {
         self.held.clear();
         self.held.extend_from_slice(springs);
+    }
+
+    /// Whether any law relaxes.
+    pub(crate) fn relaxes(&self) -> bool {
+        self.relaxation.is_there()
+    }
+
+    /// Evaluates ends of a step [s] from the instant of a history on, from now on.
+    pub(crate) fn begin_step(&mut self, history: &History, step: f64) {
+        self.relaxation.begin(&self.model, history, step);
+    }
+
+    /// Evaluates the instant of a history itself, from now on.
+    pub(crate) fn stand(&mut self, history: &History) {
+        self.relaxation.stand(&self.model, history);
+    }
+
+    /// Ends a step [s]: the history of a state goes on to it from the state before, or from rest.
+    pub(crate) fn end_step(&mut self, before: Option<&State>, state: &mut State, step: f64) {
+        if !self.relaxes() {
+            return;
+        }
+        let mut history = std::mem::take(&mut state.history);
+        let place = |state: &State, node: u32| self.model.displacement(&state.position, node);
+        let from = |node: u32| before.map_or([0.0; 3], |before| place(before, node));
+        self.relaxation.end(&self.model, from, |node| place(state, node), step, &mut history);
+        state.history = history;
+    }
+
+    /// Begins the history of a state, if it has not begun: how it is strained loads the instantaneous laws.
+    pub(crate) fn begin_history(&mut self, state: &mut State) {
+        if !state.history.begun {
+            self.end_step(None, state, 0.0);
+        }
     }
 
     /// Forces at a state and time; with a tangent also the stiffness, and what prescribed increments (six a node) make of it.
@@ -578,6 +616,8 @@ impl System {
         let displacement = |node: u32| model.displacement(&state.position, node);
         let mut results = std::mem::take(&mut self.solid_results);
         let mut all_stars = std::mem::take(&mut self.stars);
+        let relaxation = std::mem::take(&mut self.relaxation);
+        self.energy += relaxation.work(&state.history);
         let mut first_cell = model.facets.len();
         let mut broken = None;
         for (index, (solid, stars)) in model.solids.iter().zip(&mut all_stars).enumerate() {
@@ -590,7 +630,8 @@ impl System {
                 results[..last - first].par_iter_mut().with_min_len(16).enumerate().for_each(
                     |(at, result)| {
                         let pressure = stars.as_ref().map(|stars| stars.pressure(first + at));
-                        result.fill(solid, first + at, pressure, displacement, moved.is_some());
+                        let lag = relaxation.of_cell(index, solid, first + at);
+                        result.fill(solid, first + at, pressure, lag, displacement, moved.is_some());
                     },
                 );
                 broken = (first..last).zip(&results).find_map(|(cell, result)| Some((cell, result.broken?)));
@@ -617,7 +658,7 @@ impl System {
             }
             first_cell += count;
         }
-        (self.solid_results, self.stars) = (results, all_stars);
+        (self.solid_results, self.stars, self.relaxation) = (results, all_stars, relaxation);
         broken.map_or(Ok(()), |(cell, why)| Err(SolveError::Broken { cell: first_cell + cell, why }))
     }
 

@@ -57,6 +57,23 @@ pub enum PronyUpdate {
     BackwardEuler,
 }
 
+impl PronyUpdate {
+    /// d and g of a term (a, τ) for a step [s]: hⁿ = d hⁿ⁻¹ + g (Φⁿ − Φⁿ⁻¹).
+    pub fn coefficients(self, (weight, time): (f64, f64), step: f64) -> (f64, f64) {
+        match self {
+            Self::Exact if step == 0.0 => (1.0, weight),
+            Self::Exact => {
+                let x = step / time;
+                ((-x).exp(), weight * -(-x).exp_m1() / x)
+            }
+            Self::BackwardEuler => {
+                let decay = time / (step + time);
+                (decay, weight * decay)
+            }
+        }
+    }
+}
+
 /// The series of both parts.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Prony {
@@ -142,6 +159,11 @@ impl Prony {
     /// Symmetric tensors of history per cell: for each part that relaxes, Φⁿ⁻¹ and one h per term.
     pub fn slots(&self) -> usize {
         self.isochoric_slots() + self.volumetric_slots()
+    }
+
+    /// Tensors of history per evaluation point, where `averages` says that the pressure is averaged over cells and remembered there.
+    pub fn point_slots(&self, averages: bool) -> usize {
+        if averages { self.isochoric_slots() } else { self.slots() }
     }
 
     /// Those of the isochoric part.

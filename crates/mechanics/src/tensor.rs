@@ -229,6 +229,14 @@ impl<R: Number> Symmetric<R> {
         sum
     }
 
+    /// A : B.
+    #[inline(always)]
+    pub fn double_dot(&self, b: &Self) -> R {
+        let [xx, yy, zz, xy, yz, xz] = self.0;
+        let shear = dot([xy, yz, xz], [b.0[3], b.0[4], b.0[5]]);
+        dot([xx, yy, zz], [b.0[0], b.0[1], b.0[2]]) + shear + shear
+    }
+
     /// As a full tensor.
     #[inline(always)]
     pub fn full(&self) -> Tensor<R> {

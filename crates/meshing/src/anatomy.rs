@@ -1,10 +1,8 @@
 //! Input of an organ mesher: the field of the whole body, and fields of its materials if there are several. A point
 //! belongs to the material with the largest field. Fields come from the regions of an image, or from functions.
 
-use pliant_geometry::{DataArray, Mesh, Vector3};
-use pliant_imaging::{Cleaned, Cleaning, DistanceField, LabelError, LabelImage, Smoothing};
+use pliant_geometry::{DataArray, DistanceField, Grid, Mesh, Vector3};
 
-use crate::complex::MOST_MATERIALS;
 use crate::field::ImplicitField;
 use crate::given::{Given, Patches};
 use crate::triangles::TriangleMesh;
@@ -28,9 +26,9 @@ impl ImplicitField for DistanceField {
 pub struct Anatomy<'a> {
     whole: Box<dyn ImplicitField + 'a>,
     /// Labels and fields of the materials; one material has the field of the whole body.
-    materials: Vec<(i32, Option<Box<dyn ImplicitField + 'a>>)>,
+    pub(crate) materials: Vec<(i32, Option<Box<dyn ImplicitField + 'a>>)>,
     /// Volume of each material in the image [m³], if it comes from an image.
-    volumes: Vec<Option<f64>>,
+    pub(crate) volumes: Vec<Option<f64>>,
     /// What its fields were made of, if they were.
     given: Option<Given>,
 }
@@ -48,53 +46,25 @@ impl<'a> Anatomy<'a> {
         self
     }
 
+    /// Distances of its meshes are measured to the faces of these voxels: the material of each point of `grid`, numbered from 1 in
+    /// the order of their addition, 0 outside.
+    ///
+    /// # Panics
+    /// If the numbers of materials and of points of the grid differ, or a material has no field.
+    pub fn measured_to_voxels(mut self, grid: Grid, materials: Vec<u8>) -> Self {
+        assert_eq!(materials.len(), grid.len(), "a material for each point of the grid");
+        let largest = materials.iter().copied().max().unwrap_or(0);
+        assert!(usize::from(largest) <= self.materials.len(), "material {largest} has no field");
+        self.given = Some(Given::Voxels { grid, materials });
+        self
+    }
+
     /// Adds a material: the part of the body inside `field` and not deeper inside another material. The rest belongs to
-    /// the first material.
+    /// the first material. Meshes bear [`MOST_MATERIALS`](crate::MOST_MATERIALS).
     pub fn with_inner(mut self, label: i32, field: impl ImplicitField + 'a) -> Self {
         self.materials.push((label, Some(Box::new(field))));
         self.volumes.push(None);
         self
-    }
-
-    /// The regions of some labels of an image as one body, each a material: cleaned together (gaps and holes are filled
-    /// with the first label), smoothed one by one. `progress` hears fractions from 0 to 1.
-    pub fn from_image(
-        image: &LabelImage,
-        labels: &[i32],
-        cleaning: &Cleaning,
-        smoothing: &Smoothing,
-        progress: &dyn Fn(f64),
-    ) -> Result<(Anatomy<'static>, Cleaned), LabelError> {
-        require_choice(image, labels)?;
-        let share = 1.0 / (labels.len() + 1) as f64;
-        let part = |number: usize| move |done: f64| progress(share * (number as f64 + done));
-        let (whole, done) = image.region(labels, smoothing.margin())?.clean(cleaning)?;
-        let field = DistanceField::new(&whole, smoothing, &part(0))?;
-        let (mut materials, mut volumes, mut others) = (vec![(labels[0], None)], vec![None], 0.0);
-        let mut of_voxels: Vec<u8> = whole.inside.iter().map(|&inside| u8::from(inside)).collect();
-        for (number, &label) in labels.iter().enumerate().skip(1) {
-            let region = whole.part(image, label)?;
-            let own = of_voxels.iter_mut().zip(&region.inside).filter(|(_, inside)| **inside);
-            own.for_each(|(material, _)| *material = number as u8 + 1);
-            others += region.volume();
-            volumes.push(Some(region.volume()));
-            let inner = DistanceField::within(&region, &whole, smoothing, &part(number))?;
-            materials.push((label, Some(Box::new(inner) as Box<dyn ImplicitField>)));
-        }
-        volumes[0] = Some(whole.volume() - others);
-        if labels.len() > 2 {
-            // The remainder of several others is a poor measure of the first one: where two of them meet, it is as near as they
-            // are.
-            let first = DistanceField::within(
-                &whole.part(image, labels[0])?,
-                &whole,
-                smoothing,
-                &part(labels.len()),
-            )?;
-            materials[0].1 = Some(Box::new(first));
-        }
-        let given = Some(Given::Voxels { grid: whole.grid, materials: of_voxels });
-        Ok((Anatomy { whole: Box::new(field), materials, volumes, given }, done))
     }
 
     /// Field of a material from 2 on.
@@ -157,21 +127,6 @@ impl<'a> Anatomy<'a> {
     /// Volumes of the materials in the image [m³], where known.
     pub fn volumes(&self) -> &[Option<f64>] {
         &self.volumes
-    }
-}
-
-/// Checks that labels can be meshed together: at least one, each once, without the background, not
-/// too many.
-fn require_choice(image: &LabelImage, labels: &[i32]) -> Result<(), LabelError> {
-    let repeated = (1..labels.len()).find(|&at| labels[..at].contains(&labels[at]));
-    match repeated {
-        _ if labels.is_empty() => Err(LabelError::NoneChosen { present: image.present() }),
-        _ if labels.contains(&0) => Err(LabelError::Background { present: image.present() }),
-        Some(at) => Err(LabelError::Repeated { label: labels[at] }),
-        None if labels.len() > MOST_MATERIALS => {
-            Err(LabelError::TooManyLabels { labels: labels.len(), limit: MOST_MATERIALS })
-        }
-        None => Ok(()),
     }
 }
 

@@ -20,7 +20,7 @@ pub(crate) type Sides = u64;
 pub(crate) const OUTSIDE: Sides = 1;
 
 /// Most materials in a mesh.
-pub(crate) const MOST_MATERIALS: usize = 63;
+pub const MOST_MATERIALS: usize = 63;
 
 /// No step makes an edge longer than this many lattice constants.
 pub(crate) const LONGEST: f64 = 1.6;

@@ -6,8 +6,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use pliant_geometry::{Mesh, SurfaceLocator, Vector3};
-use pliant_imaging::{DistanceField, Grid};
+use pliant_geometry::{DistanceField, Grid, Mesh, SurfaceLocator, Vector3};
 use rayon::prelude::*;
 use serde::Serialize;
 

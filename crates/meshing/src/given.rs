@@ -3,8 +3,7 @@
 
 use std::fmt;
 
-use pliant_geometry::{CellKind, Mesh, SurfaceLocator, Vector3, boundary};
-use pliant_imaging::Grid;
+use pliant_geometry::{CellKind, Grid, Mesh, SurfaceLocator, Vector3, boundary};
 use serde::Serialize;
 
 use crate::hausdorff::{Sample, lattice};

@@ -46,6 +46,8 @@ mod manifold;
 mod missed;
 mod nesting;
 mod octree;
+#[cfg(feature = "imaging")]
+mod of_image;
 mod optimise;
 mod percentiles;
 mod phantom;
@@ -71,6 +73,7 @@ use pliant_geometry::Mesh;
 
 pub use anatomy::Anatomy;
 pub use assessment::Assessment;
+pub use complex::MOST_MATERIALS;
 pub use curvature::Curvature;
 pub use decimate::Fewer;
 pub use deviation::Deviation;
@@ -82,6 +85,8 @@ pub use given::MeasuredTo;
 pub use hausdorff::Hausdorff;
 pub use lens::Lens;
 pub use missed::Missed;
+#[cfg(feature = "imaging")]
+pub use of_image::{SURFACE_PAIRS, SURFACE_SMOOTHING};
 pub use percentiles::Percentiles;
 pub use phantom::{Organ, Phantom, brain_label};
 pub use regions::{InterfaceReport, LabelReport, Regions};
@@ -91,7 +96,6 @@ pub use sheets::{Distortion, Pattern, Sheet, sphere};
 pub use shells::{FitProgress, FittedShells, Flaw, ShellGoal, ShellReport};
 pub use structured::{Block, Resolution, Tube, VolumeCell};
 pub use stuffing::Stuffing;
-pub use taubin::{SURFACE_PAIRS, SURFACE_SMOOTHING};
 pub use tets::{DistanceReport, EdgeLengths, MaterialReport, OrganMesh, Repairs, Steps, TetReport};
 pub use thickness::Thickness;
 pub use triangles::{SurfaceRepairs, TriangleMesh};

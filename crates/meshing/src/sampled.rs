@@ -2,8 +2,7 @@
 //! outward by an offset, may be near. Far from it they are exact at every fourth point along each axis and linear in between. Leaves out:
 //! sharp edges of the moved surface, which is rounded where it goes outward round an edge.
 
-use pliant_geometry::{SurfaceLocator, Vector3};
-use pliant_imaging::{DistanceField, Grid};
+use pliant_geometry::{DistanceField, Grid, SurfaceLocator, Vector3};
 use rayon::prelude::*;
 
 use crate::enclosed::{Enclosed, MOST_POINTS, sign};

@@ -2,18 +2,9 @@
 //! then away from it by a slightly larger fraction μ. Together they damp changes from point to point and preserve longer ones.
 
 use pliant_geometry::Vector3;
-use pliant_imaging::Smoothing;
 use rayon::prelude::*;
 
 use crate::triangles::TriangleMesh;
-
-/// Best smoothing of the field of an image if [`SURFACE_PAIRS`] smooth its surface afterwards. Of the settings tested on labels
-/// of the analytic liver and brain, this one stays closest to them. With sigma 1 and no pairs, which suits tetrahedra, the
-/// largest distance is half as large again on the liver and twice on the brain; without sigma the steps of the voxels remain.
-pub const SURFACE_SMOOTHING: Smoothing = Smoothing { sigma: 0.55, clip: 6.0 };
-
-/// Pairs of moves for [`TriangleMesh::smooth`] after that.
-pub const SURFACE_PAIRS: usize = 50;
 
 /// Part of the way to the mean, there and back.
 const PARTS: [f64; 2] = [0.5, -0.53];

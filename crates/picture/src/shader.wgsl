@@ -28,7 +28,8 @@ struct View {
 
 // Position [m] and value of each point.
 @group(1) @binding(0) var<storage, read> points: array<vec4<f32>>;
-// Three vertices, and a word: bits 0 to 2 tell which edges are drawn, bit 3 that the cell has a label, bits 8 to 31 its colour.
+// Three vertices, and a word: bits 0 to 2 tell which edges are drawn, bit 3 that the cell has a label, bits 8 to 31 its colour; bit 4 that it
+// is of an obstacle or tool, bit 5 of one that holds bodies inside.
 @group(1) @binding(1) var<storage, read> triangles: array<vec4<u32>>;
 // The point of each vertex.
 @group(1) @binding(2) var<storage, read> vertices: array<u32>;
@@ -47,6 +48,8 @@ struct Corner {
     @location(4) @interpolate(flat) edges: u32,
     // At rest, over the size of the body.
     @location(5) rest: vec3<f32>,
+    // The position within the triangle, also where the middle of a pixel is not: there the other one lies beyond it, on outlines far.
+    @location(6) @interpolate(perspective, centroid) place: vec3<f32>,
 }
 
 @vertex
@@ -77,6 +80,7 @@ fn corner_at(point: vec4<f32>, normal: vec3<f32>, index: u32, edges: u32, rest: 
     var result: Corner;
     result.clip = view.projection_view * vec4(point.xyz, 1.0);
     result.position = point.xyz;
+    result.place = point.xyz;
     result.normal = normal;
     result.value = point.w;
     let own = index % 3u;
@@ -101,7 +105,21 @@ fn colour_of(value: f32) -> vec3<f32> {
     return mix(colours[low].rgb, colours[high].rgb, part - f32(low));
 }
 
+fn is_thing(at: Corner) -> bool {
+    return (at.edges & 16u) != 0u;
+}
+
+// Things are drawn from outside, so that one sees through a half-space from its back; those that hold bodies inside from there. The
+// margin keeps outlines of round things whole.
+fn is_behind(at: Corner) -> bool {
+    let facing = dot(normalize(at.normal), towards_eye(at.position));
+    return is_thing(at) && select((facing < -0.2), (facing > 0.0), (at.edges & 32u) != 0u);
+}
+
 fn no_colour(at: Corner) -> bool {
+    if is_thing(at) {
+        return false;
+    }
     if view.range.z > 1.5 {
         return (at.edges & 8u) == 0u;
     }
@@ -110,6 +128,9 @@ fn no_colour(at: Corner) -> bool {
 
 // Light of the label where labels have colours, else of the value.
 fn colour_at(at: Corner) -> vec3<f32> {
+    if is_thing(at) {
+        return vec3(0.36, 0.39, 0.43);
+    }
     if view.range.z < 1.5 {
         return colour_of(at.value);
     }
@@ -167,7 +188,7 @@ fn shade(at: Corner) -> vec4<f32> {
     var colour = lit(albedo, normal, eye);
     // Derivatives over pixels are taken where all pixels pass.
     let bumpy = uneven(at, normal);
-    if view.skin.y > 0.0 {
+    if view.skin.y > 0.0 && !is_thing(at) {
         colour = moist(albedo * mottled(at.rest), bumpy, eye);
     }
     let edges = edge_cover(at.corner, at.edges) * view.edge.a;
@@ -261,13 +282,17 @@ fn uneven(at: Corner, normal: vec3<f32>) -> vec3<f32> {
 
 @fragment
 fn opaque(at: Corner) -> @location(0) vec4<f32> {
-    return shade(at);
+    let colour = shade(at);
+    if is_behind(at) {
+        discard;
+    }
+    return colour;
 }
 
 @fragment
 fn clipped(at: Corner) -> @location(0) vec4<f32> {
     let colour = shade(at);
-    if dot(view.plane.xyz, at.position) > view.plane.w {
+    if is_behind(at) || dot(view.plane.xyz, at.place) > view.plane.w {
         discard;
     }
     return colour;

@@ -41,9 +41,23 @@ struct Patch {
     paint: u32,
 }
 
-/// The colour of the label of a cell as the shader takes it, beside the bits of edges; 0 without a label.
+/// Cell data: 1 of obstacles and tools, 2 of those whose inside bodies touch, 0 of bodies.
+pub(crate) const THING: &str = "thing";
+
+/// Marks the faces of things that bodies touch: they are drawn from the front.
+const STEEL: u32 = 0b1_0000;
+
+/// Marks those of things that hold bodies inside: they are drawn from the back.
+const HOLLOW: u32 = 0b10_0000;
+
+/// What the shader takes of a cell beside the bits of edges: the colour of its label, or the mark of a thing; 0 without both.
 fn paint(block: Option<&CellBlock>, cell: u32) -> u32 {
-    block.and_then(|block| cell_label(block, cell)).map_or(0, |label| paint_of(label_colour(label)))
+    let Some(block) = block else { return 0 };
+    match block.data.get(THING).and_then(|things| things.values.get(cell as usize)) {
+        Some(1.0) => STEEL,
+        Some(2.0) => STEEL | HOLLOW,
+        _ => cell_label(block, cell).map_or(0, |label| paint_of(label_colour(label))),
+    }
 }
 
 fn paint_of(colour: [u8; 3]) -> u32 {
@@ -124,6 +138,12 @@ impl Subject {
     /// Triangles drawn.
     pub fn triangle_count(&self) -> usize {
         self.triangles.len()
+    }
+
+    /// Whether a triangle is drawn as seen from its front, or its back: of things only one side is.
+    pub fn is_drawn(&self, triangle: usize, from_front: bool) -> bool {
+        let mark = self.triangles[triangle][3] & (STEEL | HOLLOW);
+        mark == 0 || (mark == STEEL) == from_front
     }
 
     /// The points of each triangle, in the order in which they are drawn.
@@ -281,7 +301,14 @@ pub fn nodal_values(mesh: &Mesh, field: &str) -> Option<Vec<f64>> {
         }
     };
     if let Some(array) = mesh.point_data.get(name) {
-        return (0..array.len()).map(|index| number(array.item(index))).collect();
+        let mut values: Vec<f64> =
+            (0..array.len()).map(|index| number(array.item(index))).collect::<Option<_>>()?;
+        for block in &mesh.blocks {
+            let Some(things) = block.data.get(THING) else { continue };
+            let of_things = block.cells().zip(&things.values).filter(|(_, thing)| **thing > 0.0);
+            of_things.flat_map(|(nodes, _)| nodes).for_each(|&node| values[node as usize] = f64::NAN);
+        }
+        return Some(values);
     }
     let mut sums = vec![0.0; mesh.points.len()];
     let mut weights = vec![0.0; mesh.points.len()];
@@ -386,6 +413,26 @@ pub(crate) mod tests {
         let rest = Subject::new(&mesh);
         assert!(rest.triangles.iter().all(|t| t[3] & !0b111 == two) && rest.triangle_count() > 6);
         assert_eq!(Subject::new(&tets(1)).triangles[0][3], 0b111, "without labels");
+    }
+
+    /// A tool beside a wall: its faces are marked, and what its points moved is no value of the field.
+    #[test]
+    fn things_are_marked_and_have_no_values() {
+        let mut mesh = Mesh { points: vec![Vector3::zeros(); 7], ..Mesh::default() };
+        mesh.points[1].x = 1.0;
+        mesh.points[2].y = 1.0;
+        let block = mesh.block_mut(CellKind::Triangle);
+        block.nodes.extend([0, 1, 2, 3, 4, 5, 3, 4, 6]);
+        block.data.insert(THING.into(), DataArray::scalar(vec![0.0, 1.0, 2.0]));
+        mesh.point_data.insert("displacement".into(), DataArray { components: 3, values: vec![2.0; 21] });
+        let marks = Subject::new(&mesh).triangles.iter().map(|t| t[3] & !0b111).collect::<Vec<_>>();
+        assert_eq!(marks, [0, STEEL, STEEL | HOLLOW]);
+        let subject = Subject::new(&mesh);
+        assert_eq!([0, 1, 2].map(|triangle| subject.is_drawn(triangle, true)), [true, true, false]);
+        assert_eq!([0, 1, 2].map(|triangle| subject.is_drawn(triangle, false)), [true, false, true]);
+        let values = nodal_values(&mesh, "displacement:x").unwrap();
+        assert_eq!(values[..3], [2.0; 3]);
+        assert!(values[3..].iter().all(|value| value.is_nan()), "{values:?}");
     }
 
     #[test]

@@ -636,6 +636,14 @@ impl Participant for Implicit {
             {
                 *own = (now - rest).into();
             }
+            for ((own, solid), tensors) in
+                solids.history.iter_mut().zip(&self.model.solids).zip(&self.state.history.tensors)
+            {
+                let slots = tensors.len() / solid.cells.len();
+                for (cell, tensors) in tensors.chunks_exact(slots.max(1)).enumerate() {
+                    own.set_cell(cell, tensors);
+                }
+            }
         }
         self.evaluated = true;
         Ok(())

@@ -6,6 +6,8 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
 use pliant_contact::pose::Leg;
 use pliant_contact::touch::Gripped;
 use pliant_explicit::{Scalar, State};
+use pliant_implicit::History;
+use pliant_mechanics::tensor::Symmetric;
 use pliant_mechanics::{Energies, Model};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -44,7 +46,7 @@ impl Kept {
         match self {
             Self::Single(state, memory) => fits(state, memory, part),
             Self::Double(state, memory) => fits(state, memory, part),
-            Self::Implicit(state) => state.fits(part.model.node_count()),
+            Self::Implicit(state) => state.fits(&part.model),
         }
     }
 }
@@ -93,11 +95,12 @@ impl ContactState {
 }
 
 impl ImplicitState {
-    /// Whether it is of a model with so many nodes.
-    pub(crate) fn fits(&self, nodes: usize) -> bool {
-        let before = self.before.iter().all(|(forces, state)| forces.len() == 6 * nodes && state.fits(nodes));
+    /// Whether it has the sizes of a model.
+    pub(crate) fn fits(&self, model: &Model) -> bool {
+        let nodes = model.node_count();
+        let before = self.before.iter().all(|(forces, state)| forces.len() == 6 * nodes && state.fits(model));
         let contact = self.contact.iter().all(|contact| contact.fits(nodes));
-        before && contact && self.previous.iter().all(|state| state.fits(nodes)) && self.state.fits(nodes)
+        before && contact && self.previous.iter().all(|state| state.fits(model)) && self.state.fits(model)
     }
 }
 
@@ -111,6 +114,8 @@ pub(crate) struct PlainState {
     pub rotation: Vec<[f64; 4]>,
     pub velocity: Vec<[f64; 3]>,
     pub spin: Vec<[f64; 3]>,
+    /// What relaxing laws remember: whether it has begun, the tensors of each solid [Pa], and their work [J].
+    pub history: (bool, Vec<Vec<Symmetric<f64>>>, Vec<f64>),
 }
 
 impl PlainState {
@@ -123,11 +128,20 @@ impl PlainState {
             rotation: state.rotation.iter().map(|q| q.coords.into()).collect(),
             velocity: plain(&state.velocity),
             spin: plain(&state.spin),
+            history: {
+                let History { begun, tensors, work } = state.history.clone();
+                (begun, tensors, work)
+            },
         }
     }
 
-    pub fn fits(&self, nodes: usize) -> bool {
-        [self.position.len(), self.rotation.len(), self.velocity.len(), self.spin.len()] == [nodes; 4]
+    pub fn fits(&self, model: &Model) -> bool {
+        let nodes = [self.position.len(), self.rotation.len(), self.velocity.len(), self.spin.len()];
+        let sizes = |tensors: &[Vec<Symmetric<f64>>]| tensors.iter().map(Vec::len).collect::<Vec<_>>();
+        let (rest, (_, tensors, work)) = (History::at_rest(model), &self.history);
+        nodes == [model.node_count(); 4]
+            && sizes(tensors) == sizes(&rest.tensors)
+            && work.len() == rest.work.len()
     }
 
     pub fn state(&self) -> pliant_implicit::State {
@@ -140,6 +154,10 @@ impl PlainState {
             rotation: self.rotation.iter().map(rotation).collect(),
             velocity: vectors(&self.velocity),
             spin: vectors(&self.spin),
+            history: {
+                let (begun, tensors, work) = self.history.clone();
+                History { begun, tensors, work }
+            },
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Label images of the analytic organs as their definition gives them, and the truth to measure meshes against.
 
-use pliant_geometry::{CellKind, Mesh, SurfaceLocator, Vector3, boundary};
-use pliant_imaging::{Grid, LabelImage};
+use pliant_geometry::{CellKind, Grid, Mesh, SurfaceLocator, Vector3, boundary};
+use pliant_imaging::LabelImage;
 use pliant_meshing::{ImplicitField, Organ, Phantom, Stuffing, brain_label};
 
 /// 128³ voxels of 205/128 mm, centres at (i + ½) h − 102.5 mm.

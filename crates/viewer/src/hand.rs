@@ -339,7 +339,7 @@ pub fn pick(
         let (ab, ac) = (b - a, c - a);
         let across = along.cross(&ac);
         let determinant = ab.dot(&across);
-        if determinant == 0.0 {
+        if determinant == 0.0 || !subject.is_drawn(triangle as usize, determinant > 0.0) {
             continue;
         }
         let from_a = (from - a) / determinant;

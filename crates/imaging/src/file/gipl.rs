@@ -8,9 +8,9 @@ use super::input::Input;
 use super::text::ToWorld;
 use super::{ReadOptions, checked_size};
 use crate::error::{Fault, ImageProblem};
-use crate::grid::Grid;
 use crate::image::{Image, Order, Scalar};
 use crate::names::LabelNames;
+use pliant_geometry::Grid;
 
 const HEADER: usize = 256;
 

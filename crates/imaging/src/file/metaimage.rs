@@ -10,9 +10,9 @@ use super::input::Input;
 use super::text::{Field, ToWorld};
 use super::{ReadOptions, checked_size};
 use crate::error::{Fault, ImageProblem};
-use crate::grid::Grid;
 use crate::image::{Image, Order, Scalar};
 use crate::names::LabelNames;
+use pliant_geometry::Grid;
 
 /// Keys that are read, each with its synonyms; all others are passed over.
 const KEYS: [&[&str]; 15] = [
@@ -188,7 +188,8 @@ impl Header {
         let world = ToWorld { unit: self.unit()?, ..ToWorld::LPS_MILLIMETRES };
         let steps = [0, 1, 2].map(|axis| direction.column(axis) * spacing[axis]);
         let line = self.get("TransformMatrix").map_or(1, |field| field.line);
-        Grid::new(dims, world.vector(origin), world.axes(steps)).map_err(|problem| problem.at_line(line))
+        Grid::new(dims, world.vector(origin), world.axes(steps))
+            .map_err(|flat| ImageProblem::from(flat).at_line(line))
     }
 
     /// Metres a unit of length.

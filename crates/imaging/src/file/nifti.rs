@@ -9,9 +9,9 @@ use pliant_geometry::Vector3;
 use super::input::Input;
 use super::{ReadOptions, checked_size};
 use crate::error::{Fault, ImageProblem};
-use crate::grid::Grid;
 use crate::image::{Image, Order, Scalar};
 use crate::names::{self, LabelNames};
+use pliant_geometry::Grid;
 
 /// Bytes of the extensions that are searched for label names.
 const EXTENSIONS: u64 = 1 << 22;
@@ -248,7 +248,7 @@ impl Header {
             };
             let rows = [row(0), row(1), row(2)];
             let axes = Matrix3::from_fn(|i, j| rows[i][j]);
-            return Grid::new(dims, Vector3::from(rows.map(|row| row[3])), axes);
+            return Ok(Grid::new(dims, Vector3::from(rows.map(|row| row[3])), axes)?);
         }
         let spacing = [1, 2, 3].map(|at| self.pixdim(at));
         if spacing.iter().any(|&h| !(h.is_finite() && h > 0.0)) {
@@ -262,13 +262,13 @@ impl Header {
                 1.0,
                 if self.pixdim(0) < 0.0 { -1.0 } else { 1.0 },
             ));
-            return Grid::new(dims, offset.into(), self.rotation()? * mirror * spacing);
+            return Ok(Grid::new(dims, offset.into(), self.rotation()? * mirror * spacing)?);
         }
         notes.push(
             "no orientation (sform and qform codes are 0): assuming axes x, y and z from the origin"
                 .to_owned(),
         );
-        Grid::new(dims, Vector3::zeros(), spacing)
+        Ok(Grid::new(dims, Vector3::zeros(), spacing)?)
     }
 
     /// Rotation of the quaternion (a, b, c, d); the file contains b, c and d.

@@ -12,9 +12,9 @@ use super::layers;
 use super::text::{Field, ToWorld};
 use super::{ReadOptions, checked_size};
 use crate::error::{Fault, ImageProblem};
-use crate::grid::Grid;
 use crate::image::{Image, Numbers, Order, Scalar};
 use crate::names::LabelNames;
+use pliant_geometry::Grid;
 
 /// Fields that are read, each with its synonyms; all others are passed over.
 const FIELDS: [&[&str]; 16] = [
@@ -47,7 +47,7 @@ pub(super) fn read(input: &mut Input<'_>, options: &ReadOptions) -> Result<Image
     let line =
         header.get("space directions").or(header.get("spacings")).map_or(dims.line, |field| field.line);
     let grid = Grid::new(size, world.vector(header.origin(&axes)?), world.axes(axes.steps))
-        .map_err(|problem| problem.at_line(line))?;
+        .map_err(|flat| ImageProblem::from(flat).at_line(line))?;
     let (numbers, names) = if axes.layers > 1 {
         let voxels = (grid.len() as u64).saturating_mul(axes.layers);
         if voxels > options.voxel_limit {

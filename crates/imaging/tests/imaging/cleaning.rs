@@ -1,6 +1,7 @@
 //! Regions of labels, and their cleaning.
 
-use pliant_imaging::{Cleaning, Grid, LabelError, LabelImage};
+use pliant_geometry::Grid;
+use pliant_imaging::{Cleaning, LabelError, LabelImage};
 
 fn image(dims: [usize; 3], spacing: [f64; 3], label: impl Fn([usize; 3]) -> i32) -> LabelImage {
     let grid = Grid::along_axes(dims, [0.0; 3].into(), spacing).unwrap();

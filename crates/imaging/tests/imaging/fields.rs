@@ -1,7 +1,8 @@
 //! Smooth fields of voxel bodies.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
-use pliant_imaging::{DistanceField, Grid, LabelImage, Smoothing};
+use pliant_geometry::{DistanceField, Grid};
+use pliant_imaging::{LabelImage, Smoothing};
 
 const RADIUS: f64 = 0.02;
 
@@ -19,7 +20,7 @@ fn ball(axes: Matrix3<f64>) -> LabelImage {
 
 fn field(image: &LabelImage, smoothing: &Smoothing) -> DistanceField {
     let region = image.region(&[1], smoothing.margin()).unwrap();
-    DistanceField::new(&region, smoothing, &|_| {}).unwrap()
+    region.distance_field(smoothing, &|_| {}).unwrap()
 }
 
 #[test]
@@ -78,7 +79,7 @@ fn without_smoothing_the_field_of_a_half_space_is_exact() {
         let image = LabelImage { labels, grid };
         let smoothing = Smoothing { sigma: 0.0, clip: 6.0 };
         let region = image.region(&[1], 4).unwrap();
-        let field = DistanceField::new(&region, &smoothing, &|_| {}).unwrap();
+        let field = region.distance_field(&smoothing, &|_| {}).unwrap();
         let h = grid.spacing()[axis];
         let mut place = Vector3::new(9.0e-3, 18.0e-3, 13.5e-3);
         for i in [7.0, 8.3, 9.5, 10.0, 11.6] {

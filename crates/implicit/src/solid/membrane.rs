@@ -7,8 +7,18 @@ use pliant_mechanics::element::{Axes, Rest};
 use pliant_mechanics::law::plane_stress::{FLAT_WALL, InPlane};
 use pliant_mechanics::tensor::{Vector, add, dot, scale};
 
-use super::{Own, Response, add_to};
+use super::{Own, Response, Strained, add_to};
 use crate::facet::Broken;
+
+/// Gradients of the shape functions in the frame of a triangle [1/m].
+pub(super) fn in_frame(rest: &Rest<3>, axes: &Axes) -> [[f64; 2]; 3] {
+    rest.gradient.map(|b| axes.map(|axis| dot(b, axis)))
+}
+
+/// ∂u/∂X₁ and ∂u/∂X₂.
+pub(super) fn changes(u: &[Vector<f64>; 3], shape: &[[f64; 2]; 3]) -> [Vector<f64>; 2] {
+    [0, 1].map(|i| u.iter().zip(shape).fold([0.0; 3], |sum, (&u, g)| add(sum, scale(u, g[i]))))
+}
 
 impl Response {
     /// Adds a triangle; the fibres of `own` are in its frame.
@@ -19,17 +29,27 @@ impl Response {
         rest: &Rest<3>,
         axes: &Axes,
     ) -> Result<(), Broken> {
-        let shape = rest.gradient.map(|b| axes.map(|axis| dot(b, axis)));
-        let change = |i: usize| u.iter().zip(&shape).fold([0.0; 3], |sum, (&u, g)| add(sum, scale(u, g[i])));
-        let changes = [change(0), change(1)];
+        let shape = in_frame(rest, axes);
+        let changes = changes(u, &shape);
         let plane = InPlane::from_changes(axes, &changes);
         let area = 1.0 + plane.area_change();
         if area.is_nan() || area < FLAT_WALL {
             return Err(Broken::Inverted(0.0));
         }
         let found = own.law.plane_stress(plane.strain_twice, own.fibres);
-        let ([xx, yy, xy], w) = (found.stress, rest.volume);
-        self.energy += w * found.energy;
+        let ([factor, _], [remembered, counts, _]) = (own.lag.factors, own.lag.counts);
+        let w = rest.volume;
+        if counts {
+            self.energy += w * (factor * found.energy);
+        }
+        let [mut xx, mut yy, mut xy] = found.stress.map(|stress| factor * stress);
+        if let Some(kept) = own.lag.kept.first() {
+            let [own_xx, own_yy, _, own_xy, _, _] = kept.0;
+            (xx, yy, xy) = (xx + own_xx, yy + own_yy, xy + own_xy);
+            if remembered {
+                self.energy += 0.5 * w * kept.double_dot(&Strained::Wall(plane.strain_twice).twice());
+            }
+        }
         let [t, s] = [add(axes[0], changes[0]), add(axes[1], changes[1])];
         let pulled = [add(scale(t, xx), scale(s, xy)), add(scale(t, xy), scale(s, yy))];
         for (a, &[g, h]) in shape.iter().enumerate() {
@@ -38,7 +58,7 @@ impl Response {
         if !own.stiffness {
             return Ok(());
         }
-        let d = own.law.plane_tangent(plane.strain_twice, own.fibres);
+        let d = own.law.plane_tangent(plane.strain_twice, own.fibres).map(|row| row.map(|d| factor * d));
         // Of each node its three columns of 𝔹: the changes of E₁₁, E₂₂ and 2E₁₂ with its place.
         let strains = shape.map(|[g, h]| [0, 1, 2].map(|c| [t[c] * g, s[c] * h, t[c] * h + s[c] * g]));
         for (b, own) in strains.iter().enumerate() {

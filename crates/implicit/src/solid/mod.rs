@@ -14,16 +14,21 @@ mod star;
 mod tests;
 
 use pliant_mechanics::element::FLAT_HEX;
+use pliant_mechanics::law::plane_stress::InPlane;
 use pliant_mechanics::law::{AnyLaw, Deformation, Split};
 use pliant_mechanics::model::{Averaging, CellBlock, Cells, Hourglass, Solid};
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cross, dot, scale, sub};
 
 use crate::facet::Broken;
 
+use crate::relaxation::Lag;
 pub(crate) use star::Stars;
 
 /// The most components of a cell: three a node of a hexahedron.
 pub(crate) const MOST: usize = 24;
+
+/// The most evaluation points of a cell: those of a hexahedron.
+pub(crate) const MOST_POINTS: usize = 8;
 
 /// What a cell makes at a state.
 #[derive(Clone)]
@@ -42,12 +47,14 @@ impl Response {
         Self { energy: 0.0, force: [0.0; MOST], tangent: Vec::new(), broken: None }
     }
 
-    /// Finds what a cell makes. `pressure` is the averaged one of a tetrahedron, whose energy is counted at its nodes.
+    /// Finds what a cell makes. `pressure` is the averaged one of a tetrahedron, whose energy is counted at its nodes; `lag` says how its
+    /// stresses relax.
     pub(crate) fn fill(
         &mut self,
         solid: &Solid,
         cell: usize,
         pressure: Option<f64>,
+        lag: Lag<'_>,
         displacement: impl Fn(u32) -> Vector<f64>,
         stiffness: bool,
     ) {
@@ -61,7 +68,7 @@ impl Response {
             return;
         }
         let fibres = solid.law_fibres(cell);
-        let own = Own { law: &solid.material.law, fibres: &fibres, stiffness };
+        let own = Own { law: &solid.material.law, fibres: &fibres, lag, stiffness };
         let found = match &solid.cells {
             Cells::Tet4(block) => self.fill_plain(own, block, cell, displacement),
             Cells::Hex8(block) => self.fill_plain(own, block, cell, displacement),
@@ -79,8 +86,9 @@ impl Response {
                 let change = weighted().map(share).sum::<f64>() / volume;
                 let [pressure, second] = own.law.volume_pressures(change);
                 self.energy += volume * own.law.volume_energy(change);
-                let each =
-                    weighted().try_for_each(|(b, w)| self.add_point(own, &u, b, w, Part::Shape(pressure)));
+                let each = weighted().enumerate().try_for_each(|(point, (b, w))| {
+                    self.add_point(own.at(point), &u, b, w, Part::Shape(pressure))
+                });
                 if stiffness {
                     let mut changes = [[0.0; 3]; 8];
                     for (b, w) in weighted() {
@@ -164,25 +172,34 @@ impl Response {
         if is_inverted(ratio) {
             return Err(Broken::Inverted(ratio));
         }
-        if let (AnyLaw::Corotational(law), Part::Whole) = (own.law, part) {
+        if let (AnyLaw::Corotational(law), Part::Whole, []) = (own.law, part, own.lag.kept) {
             let tangent = own.stiffness.then_some(&mut self.tangent[..]);
             self.energy += w * closed::add_point(law, &h, shape, w, &mut self.force, tangent)?;
             return Ok(());
         }
         let deformation = Deformation::from_displacement_gradient(&h);
         let energy = own.law.energy(&deformation, own.fibres);
-        let stress = part.of(own.law.stress(&deformation, own.fibres));
-        self.energy += w * energy.isochoric;
+        let kept = own.lag.kept.first().copied();
+        let stress =
+            own.taken(own.law.stress(&deformation, own.fibres), part) + kept.unwrap_or(Symmetric::ZERO);
+        let ([shares, volume], [remembered, shape_counts, volume_counts]) = (own.lag.factors, own.lag.counts);
+        if shape_counts {
+            self.energy += w * (shares * energy.isochoric);
+        }
+        if let (Some(kept), true) = (kept, remembered) {
+            self.energy += 0.5 * w * kept.double_dot(&Symmetric::green_lagrange_twice(&h));
+        }
         let mut piola = deformation.gradient.times_symmetric(&stress);
         match part {
-            Part::Whole => self.energy += w * energy.volumetric,
+            Part::Whole if volume_counts => self.energy += w * (volume * energy.volumetric),
+            Part::Whole => {}
             Part::Shape(pressure) => piola = piola.plus_scaled(&deformation.gradient.cofactor(), pressure),
         }
         for (a, &b) in shape.iter().enumerate() {
             add_to(&mut self.force, a, scale(piola.apply(b), w));
         }
         if own.stiffness {
-            let tangent = own.law.tangent(&h, own.fibres, |stress| part.of(stress));
+            let tangent = own.law.tangent(&h, own.fibres, |stress| own.taken(stress, part));
             add_material(&mut self.tangent, &deformation.gradient, &tangent, &stress, shape, w);
             if let Part::Shape(pressure) = part {
                 add_pressure(&mut self.tangent, &deformation.gradient, shape, w * pressure);
@@ -197,8 +214,24 @@ impl Response {
 struct Own<'a> {
     law: &'a AnyLaw,
     fibres: &'a [Vector<f64>],
+    /// How its stresses relax, from the point at hand on.
+    lag: Lag<'a>,
     /// Whether the stiffness is wanted.
     stiffness: bool,
+}
+
+impl Own<'_> {
+    /// The same at a later point.
+    fn at(self, point: usize) -> Self {
+        let kept = self.lag.kept.get(point..).unwrap_or_default();
+        Self { lag: Lag { kept, ..self.lag }, ..self }
+    }
+
+    /// What a point takes of an elastic stress.
+    fn taken(&self, elastic: Split<Symmetric<f64>>, part: Part) -> Symmetric<f64> {
+        let [shape, volume] = self.lag.factors;
+        part.of(Split { isochoric: elastic.isochoric * shape, volumetric: elastic.volumetric * volume })
+    }
 }
 
 /// What of a law a point takes.
@@ -254,6 +287,67 @@ fn moved<const N: usize>(
 ) -> [Vector<f64>; N] {
     let u = block.nodes[cell].map(displacement);
     u.map(|own| sub(own, u[0]))
+}
+
+/// How a point is strained.
+pub(crate) enum Strained {
+    /// A point of a solid, with ∂u/∂X.
+    Solid(Tensor<f64>),
+    /// A point of a wall, with C₁₁ − 1, C₂₂ − 1 and C₁₂ in its frame.
+    Wall([f64; 3]),
+}
+
+impl Strained {
+    /// 2 E.
+    pub(crate) fn twice(&self) -> Symmetric<f64> {
+        match self {
+            Self::Solid(h) => Symmetric::green_lagrange_twice(h),
+            &Self::Wall([xx, yy, xy]) => Symmetric([xx, yy, 0.0, xy, 0.0, 0.0]),
+        }
+    }
+
+    /// The elastic stress of a law [Pa]; that of a wall is isochoric.
+    pub(crate) fn stress(&self, law: &AnyLaw, fibres: &[Vector<f64>]) -> Split<Symmetric<f64>> {
+        match self {
+            Self::Solid(h) => law.stress(&Deformation::from_displacement_gradient(h), fibres),
+            &Self::Wall(strain_twice) => {
+                let [xx, yy, xy] = law.plane_stress(strain_twice, fibres).stress;
+                Split { isochoric: Symmetric([xx, yy, 0.0, xy, 0.0, 0.0]), volumetric: Symmetric::ZERO }
+            }
+        }
+    }
+}
+
+/// Visits the points of a cell with their weights [m³]. Bars have none.
+pub(crate) fn visit_points(
+    solid: &Solid,
+    cell: usize,
+    displacement: impl Fn(u32) -> Vector<f64>,
+    mut visit: impl FnMut(usize, f64, Strained),
+) {
+    match &solid.cells {
+        Cells::Tet4(block) | Cells::AveragedTet4(block, _) => {
+            let (u, rest) = (moved(block, cell, displacement), &block.rest[cell]);
+            visit(0, rest.volume, Strained::Solid(gradient(&u, &rest.gradient)));
+        }
+        Cells::Hex8(block) => {
+            let (u, rest) = (moved(block, cell, displacement), &block.rest[cell]);
+            visit(0, rest.volume, Strained::Solid(gradient(&u, &rest.gradient)));
+        }
+        Cells::FullHex8(block, points) => {
+            let u = moved(block, cell, displacement);
+            for (point, (b, w)) in points[cell].gradient.iter().zip(points[cell].weight).enumerate() {
+                visit(point, w, Strained::Solid(gradient(&u, b)));
+            }
+        }
+        Cells::Membrane(block, sheets) => {
+            let (u, rest) = (moved(block, cell, displacement), &block.rest[cell]);
+            let changes = membrane::changes(&u, &membrane::in_frame(rest, &sheets[cell].axes));
+            let plane = InPlane::from_changes(&sheets[cell].axes, &changes);
+            visit(0, rest.volume, Strained::Wall(plane.strain_twice));
+        }
+        Cells::Bar(..) => {}
+    }
 }
 
 /// ∂u/∂X.
@@ -361,8 +455,11 @@ pub(crate) fn refusal(solid: &Solid) -> Option<&'static str> {
             "`tet4-ianp` couples each tetrahedron with two rings of neighbours, which no stiffness is made for; take `tet4-anp`",
         ),
         Some(Averaging::NiftySim) => Some("this average is not the gradient of an energy; take `tet4-anp`"),
-        _ if !solid.material.prony.is_elastic() => {
-            Some("its law relaxes; take a law without `prony`, or the solver `quasi-static` or `explicit`")
+        _ if solid.cells.averages_pressure() && !solid.material.prony.volumetric.is_empty() => Some(
+            "its element averages the pressure, and that relaxes; take `tet4` or `hex8`, or the solver `quasi-static` or `explicit`",
+        ),
+        _ if matches!(solid.cells, Cells::Bar(..)) && !solid.material.prony.is_elastic() => {
+            Some("a bar that relaxes has no stiffness yet; take the solver `quasi-static` or `explicit`")
         }
         _ if solid.cells.averages_pressure() && !solid.material.law.has_volumetric_energy() => Some(
             "its element averages the pressure, and its law has no energy of the volume alone; take `tet4` or `hex8`",

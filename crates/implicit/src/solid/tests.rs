@@ -7,7 +7,7 @@ use pliant_mechanics::law::{AnyLaw, samples};
 use pliant_mechanics::load::{Load, LoadKind, NO_NODE};
 use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::{Averaging, Cells, Constraint, Material, Motion, Solid, Surface};
-use pliant_mechanics::prony::{Prony, PronyTerm, PronyUpdate};
+use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
 use pliant_testing::Random;
 use serde_json::json;
 
@@ -103,42 +103,44 @@ fn force_and_stiffness_are_derivatives() {
     let bars = ["bar", "thread"].map(|element| (element, "neo-hookean", law("neo-hookean")));
     for (element, name, law) in solids.chain(membranes).chain(bars) {
         let model = block(element, law, [2, 1, 2], [0.2, 0.1, 0.2]);
-        let mut random = Random::new(1);
-        let mut state = State::at_rest(&model);
-        let turn = crate::rotation::exponential(&Vector3::new(1.0, -2.0, 0.5));
-        for x in &mut state.position {
-            *x = turn * (*x + 0.008 * Vector3::from(random.vector()));
-        }
+        let state = strained(&model, 1);
         let mut system = System::new(model.clone().into(), LinearSolver::Direct).unwrap();
-        let still = vec![0.0; 6 * model.rest.len()];
-        system.evaluate(&state, 0.0, Some((Tangent::Full, &still))).unwrap();
-        let (force, size) = (system.internal.clone(), system.equations.len());
-        let along: Vec<f64> = (0..size).map(|_| random.number()).collect();
-        let mut predicted = vec![0.0; size];
-        system.matrix.multiply_values(&system.matrix.value, &along, &mut predicted);
-        let h = 1e-7;
-        let mut at = |by: f64| {
-            let mut moved = vec![0.0; 6 * model.rest.len()];
-            system.spread(&along, &mut moved);
-            let mut state = state.clone();
-            state.advance(&moved, by);
-            system.evaluate(&state, 0.0, None).unwrap();
-            (system.energy, system.internal.clone())
-        };
-        let (ahead, behind) = (at(h), at(-h));
-        let gather = |all: &[f64]| {
-            let mut own = vec![0.0; size];
-            system.gather(all, &mut own);
-            own
-        };
-        let work: f64 = gather(&force).iter().zip(&along).map(|(f, d)| f * d).sum();
-        let slope = (ahead.0 - behind.0) / (2.0 * h);
-        assert!((slope - work).abs() < 1e-6 * work.abs(), "{element} {name}: {slope} for {work}");
-        let largest = predicted.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
-        let found = gather(&ahead.1).into_iter().zip(gather(&behind.1)).map(|(a, b)| (a - b) / (2.0 * h));
-        for (found, predicted) in found.zip(&predicted) {
-            assert!((found - predicted).abs() < 1e-7 * largest, "{element} {name}: {found} for {predicted}");
-        }
+        assert_derivatives(&format!("{element} {name}"), &mut system, &state);
+    }
+}
+
+/// Central differences at a state: force from energy and stiffness from force to 1e-7 of their largest.
+fn assert_derivatives(what: &str, system: &mut System, state: &State) {
+    let nodes = state.position.len();
+    let mut random = Random::new(5);
+    let still = vec![0.0; 6 * nodes];
+    system.evaluate(state, 0.0, Some((Tangent::Full, &still))).unwrap();
+    let (force, size) = (system.internal.clone(), system.equations.len());
+    let along: Vec<f64> = (0..size).map(|_| random.number()).collect();
+    let mut predicted = vec![0.0; size];
+    system.matrix.multiply_values(&system.matrix.value, &along, &mut predicted);
+    let h = 1e-7;
+    let mut at = |by: f64| {
+        let mut moved = vec![0.0; 6 * nodes];
+        system.spread(&along, &mut moved);
+        let mut state = state.clone();
+        state.advance(&moved, by);
+        system.evaluate(&state, 0.0, None).unwrap();
+        (system.energy, system.internal.clone())
+    };
+    let (ahead, behind) = (at(h), at(-h));
+    let gather = |all: &[f64]| {
+        let mut own = vec![0.0; size];
+        system.gather(all, &mut own);
+        own
+    };
+    let work: f64 = gather(&force).iter().zip(&along).map(|(f, d)| f * d).sum();
+    let slope = (ahead.0 - behind.0) / (2.0 * h);
+    assert!((slope - work).abs() < 1e-6 * work.abs(), "{what}: {slope} for {work}");
+    let largest = predicted.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+    let found = gather(&ahead.1).into_iter().zip(gather(&behind.1)).map(|(a, b)| (a - b) / (2.0 * h));
+    for (found, predicted) in found.zip(&predicted) {
+        assert!((found - predicted).abs() < 1e-7 * largest, "{what}: {found} for {predicted}");
     }
 }
 
@@ -281,6 +283,91 @@ fn newtons_method_converges_quadratically() {
     }
 }
 
+/// A block whose law relaxes in both parts, or in the change of shape alone where pressures are averaged.
+fn relaxing(element: &str, update: PronyUpdate) -> Assembly {
+    let mut model = block(element, law("neo-hookean"), [2, 1, 2], [0.2, 0.1, 0.2]);
+    let parts: &[Part] = match element {
+        "tet4" | "hex8" => &[Part::Isochoric, Part::Volumetric],
+        _ => &[Part::Isochoric],
+    };
+    let term = |&part| PronyTerm { part, weight: 0.6, time: 0.5 };
+    let terms: Vec<PronyTerm> = parts.iter().map(term).collect();
+    model.model_mut().solids[0].material.prony = Prony::new(&terms, update).unwrap();
+    model
+}
+
+/// A state of strains up to 20 %, turned far.
+fn strained(model: &Assembly, seed: u64) -> State {
+    let mut random = Random::new(seed);
+    let mut state = State::at_rest(model);
+    let turn = crate::rotation::exponential(&Vector3::new(1.0, -2.0, 0.5));
+    for x in &mut state.position {
+        *x = turn * (*x + 0.008 * Vector3::from(random.vector()));
+    }
+    state
+}
+
+const RELAXING: [&str; 5] = ["tet4", "tet4-anp", "hex8", "hex8-full", "membrane"];
+
+/// In a step from a strained state with its history to another one, force and stiffness are derivatives.
+#[test]
+fn relaxing_steps_have_their_energy_and_stiffness() {
+    for element in RELAXING {
+        let model = relaxing(element, PronyUpdate::Exact);
+        let mut system = System::new(model.clone().into(), LinearSolver::Direct).unwrap();
+        let mut before = strained(&model, 1);
+        system.begin_history(&mut before);
+        let mut state = State { history: before.history.clone(), ..strained(&model, 2) };
+        system.end_step(Some(&before), &mut state, 0.3);
+        system.begin_step(&state.history, 0.2);
+        let next = State { history: state.history.clone(), ..strained(&model, 3) };
+        assert_derivatives(element, &mut system, &next);
+    }
+}
+
+/// A strain that is held relaxes by e^(−t/τ), however its steps are cut; with backward Euler by 1/(1 + h/τ) a step. What holds it does no
+/// work.
+#[test]
+fn a_held_strain_relaxes_by_its_series() {
+    for element in RELAXING {
+        for update in [PronyUpdate::Exact, PronyUpdate::BackwardEuler] {
+            let model = relaxing(element, update);
+            let mut system = System::forces_only(model.clone().into());
+            let mut state = strained(&model, 1);
+            system.begin_history(&mut state);
+            let loaded = state.history.work[0];
+            let mut after = |steps: &[f64]| {
+                let mut state = state.clone();
+                for &step in steps {
+                    let before = state.clone();
+                    system.begin_step(&state.history, step);
+                    system.evaluate(&state, 0.0, None).unwrap();
+                    let within = system.internal.clone();
+                    system.end_step(Some(&before), &mut state, step);
+                    system.stand(&state.history);
+                    system.evaluate(&state, 0.0, None).unwrap();
+                    let largest = within.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+                    let off = within.iter().zip(&system.internal).map(|(a, b)| (a - b).abs());
+                    assert!(off.fold(0.0, f64::max) < 1e-12 * largest, "{element}");
+                }
+                assert!((state.history.work[0] - loaded).abs() < 1e-14 * loaded);
+                system.internal.clone()
+            };
+            let (first, last) = (after(&[0.0]), after(&[1e12]));
+            let expected = match update {
+                PronyUpdate::Exact => (-0.3_f64 / 0.5).exp(),
+                PronyUpdate::BackwardEuler => 1.0 / ((1.0 + 0.1 / 0.5) * (1.0 + 0.2 / 0.5)),
+            };
+            let largest = first.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+            for ((found, first), last) in after(&[0.1, 0.2]).iter().zip(&first).zip(&last) {
+                let wanted = last + expected * (first - last);
+                assert!((found - wanted).abs() < 1e-11 * largest, "{element}: {found} for {wanted}");
+            }
+            assert!(first.iter().zip(&last).any(|(a, b)| (a - b).abs() > 1e-2 * largest), "{element}");
+        }
+    }
+}
+
 /// A push that grows with time, backward Euler: half the step, half the error.
 #[test]
 fn steps_of_backward_euler_are_of_first_order() {
@@ -317,11 +404,15 @@ fn solids_without_stiffness_and_broken_ones_are_refused() {
     let wide = Cells::averaged_tet4(tets.clone(), &rest, Averaging::Variational);
     let refused = with(wide, Material::elastic(plain, 1000.0)).unwrap_err();
     assert!(refused.to_string().contains("`block`: `tet4-ianp` couples"), "{refused}");
-    let term = PronyTerm { part: pliant_mechanics::prony::Part::Isochoric, weight: 0.5, time: 1.0 };
+    let term = PronyTerm { part: Part::Volumetric, weight: 0.5, time: 1.0 };
     let prony = Prony::new(&[term], PronyUpdate::Exact).unwrap();
     let relaxing = Material { prony, ..Material::elastic(plain, 1000.0) };
-    let refused = with(Cells::tet4(tets.clone(), &rest), relaxing).unwrap_err();
-    assert!(refused.to_string().contains("its law relaxes"), "{refused}");
+    let averaged = Cells::averaged_tet4(tets.clone(), &rest, Averaging::Nodal);
+    let refused = with(averaged, relaxing.clone()).unwrap_err();
+    assert!(refused.to_string().contains("averages the pressure, and that relaxes"), "{refused}");
+    let bars = Cells::bar(vec![[0, 1]], &rest, 1e-4, Cord { slack: 1.0, tension_only: false });
+    let refused = with(bars, relaxing).unwrap_err();
+    assert!(refused.to_string().contains("a bar that relaxes"), "{refused}");
     let anp = Cells::averaged_tet4(tets.clone(), &rest, Averaging::Nodal);
     let refused = with(anp, Material::elastic(law("corotational"), 1000.0)).unwrap_err();
     assert!(refused.to_string().contains("no energy of the volume alone"), "{refused}");

@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use pliant_geometry::Vector3;
-use pliant_imaging::{Cleaning, Grid, LabelError, LabelImage, Smoothing};
+use pliant_geometry::{Grid, Vector3};
+use pliant_imaging::{Cleaning, LabelError, LabelImage, Smoothing};
 use pliant_meshing::{Anatomy, Ellipsoid, MeshingError, OrganMesh, OrganTets};
 use pliant_testing::Random;
 

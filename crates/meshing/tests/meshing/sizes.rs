@@ -1,7 +1,7 @@
 //! Distances to the input, wrong labels, cells of several sizes, and distance bounds.
 
-use pliant_geometry::{CellKind, Mesh, Vector3};
-use pliant_imaging::{Grid, LabelImage};
+use pliant_geometry::{CellKind, Grid, Mesh, Vector3};
+use pliant_imaging::LabelImage;
 use pliant_meshing::{
     Anatomy, Assessment, Closing, DEFAULT_CELL_LIMIT, Ellipsoid, Enclosed, Hausdorff, MeasuredTo,
     MeshingError, Missed, OrganMesh, OrganTets, TriangleMesh, sphere,

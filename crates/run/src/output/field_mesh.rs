@@ -154,16 +154,18 @@ impl Own {
         let (low, high) = bounds.reduce(|(a, b), (c, d)| (a.inf(&c), b.sup(&d)))?;
         let mut mesh = Mesh::default();
         let mut block = CellBlock::new(CellKind::Triangle, Vec::new());
-        let mut owners = Vec::new();
+        let (mut owners, mut things) = (Vec::new(), Vec::new());
         for (rigid, index) in contacts.rigids.iter().zip(0..) {
             let (points, triangles) = rigid.shape.surface(1.3 * (high - low).norm());
             let (first, pose) = (mesh.points.len() as u32, rigid.at(0.0, None));
             mesh.points.extend(points.iter().map(|point| (pose * nalgebra::Point3::from(*point)).coords));
             owners.resize(mesh.points.len(), index);
             block.nodes.extend(triangles.iter().flatten().map(|node| first + node));
+            things.resize(block.len(), if rigid.inside { 2.0 } else { 1.0 });
         }
         let cells = block.len();
         block.data.insert("body".into(), DataArray::scalar(vec![0.0; cells]));
+        block.data.insert("thing".into(), DataArray::scalar(things));
         mesh.blocks.push(block);
         let fields = fields.iter().copied().filter(|&field| field == FieldName::Displacement).collect();
         let content = Content::Things(owners);

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh};
 
 /// Meshes with their data as one mesh, each with the number of its first `body`, from which its cells count. Data that a mesh lacks are
-/// not a number there; labels are 0.
+/// not a number there; labels and marks of things are 0.
 pub(super) fn merged(numbered: &[(&Mesh, usize)]) -> Mesh {
     let meshes: Vec<&Mesh> = numbered.iter().map(|(mesh, _)| *mesh).collect();
     let mut all = Mesh::default();
@@ -33,8 +33,9 @@ pub(super) fn merged(numbered: &[(&Mesh, usize)]) -> Mesh {
             (0..block.len()).map(move |cell| first + own.map_or(0.0, |own| own.values[cell]))
         });
         whole.data.insert("body".into(), DataArray::scalar(body.collect()));
-        if let Some(labels) = whole.data.get_mut("label") {
-            labels.values.iter_mut().filter(|label| label.is_nan()).for_each(|label| *label = 0.0);
+        for name in ["label", "thing"] {
+            let Some(numbers) = whole.data.get_mut(name) else { continue };
+            numbers.values.iter_mut().filter(|number| number.is_nan()).for_each(|number| *number = 0.0);
         }
         all.blocks.push(whole);
     }

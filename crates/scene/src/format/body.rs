@@ -37,7 +37,7 @@ pub struct BodyTable {
     pub element: Option<Element>,
     /// The name of its law, or a law for each cell label, by number or by the name of the label: `{ 1 = "soft", tumour = "stiff" }`. Shells
     /// and bars take the moduli of an isotropic law at small strain; a shell whose `layers` all have their own elasticity
-    /// needs none. With the solvers `implicit` and `static` a law of a solid must not relax.
+    /// needs none.
     #[serde(default = "no_law")]
     pub law: ByLabel<String>,
     /// Mass per volume [kg/m³], or one for each cell label, as of `law`. Elements with averaged pressure average it apart on parts of

@@ -198,9 +198,9 @@ pub enum SolverName {
     Explicit,
     /// Equilibria without inertia, by dynamic relaxation.
     QuasiStatic,
-    /// Dynamics with inertia in long steps, by backward Euler: shells and solids whose law does not relax.
+    /// Dynamics with inertia in long steps, by backward Euler: shells and solids.
     Implicit,
-    /// Equilibria without inertia, by Newton's method: shells and solids whose law does not relax.
+    /// Equilibria without inertia, by Newton's method: shells and solids.
     Static,
 }
 

@@ -13,8 +13,8 @@ use super::Files;
 use super::conditions::Remarks;
 use super::error::{Fault, ImportProblem};
 use super::geometry::positive;
-use super::parts::System;
 use super::rigid_surface;
+use super::system::System;
 use super::xml::{
     Element, child, children, count, fault, indices, is_on, line, needed, number, numbers_of, run_of_indices,
 };

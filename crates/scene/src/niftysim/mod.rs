@@ -13,8 +13,10 @@ mod material;
 mod parts;
 mod rigid_surface;
 mod shells;
+mod system;
 mod touching;
 mod write;
+mod writer;
 mod xml;
 
 use std::path::Path;

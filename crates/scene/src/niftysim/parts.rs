@@ -6,9 +6,10 @@ use super::Files;
 use super::conditions::{self, Condition, Remarks, settle, sorted};
 use super::contact::{self, Contact};
 use super::error::{Fault, ImportProblem};
-use super::geometry::{self, Geometry, join, positive};
+use super::geometry::{self, Geometry, join};
 use super::material::Material;
 use super::shells::{self, Membrane};
+use super::system::{SYSTEM, System};
 use super::xml::{
     Element, attribute, child, children, count, fault, indices, is_on, line, needed, number, run_of_indices,
     text,
@@ -36,21 +37,6 @@ pub(super) struct Part {
     pub density: Vec<f64>,
     pub conditions: Vec<Condition>,
     pub membranes: Vec<Membrane>,
-}
-
-/// `<SystemParams>`.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct System {
-    /// Time step [s].
-    pub step: f64,
-    /// Total time [s], on which load shapes are stretched.
-    pub total: f64,
-    /// Damping [1/s].
-    pub damping: f64,
-    /// Density of materials without one [kg/m³].
-    pub density: Option<f64>,
-    /// Hourglass stiffness as a multiple of λ + 2μ.
-    pub hourglass: Option<f64>,
 }
 
 /// `<Output>`.
@@ -305,47 +291,6 @@ impl Sets {
             return Err(fault(of, ImportProblem::Contradiction { what, remedy }));
         }
         Ok(self.0.into_iter().flatten().unzip())
-    }
-}
-
-/// More steps than anyone takes.
-const MOST_STEPS: f64 = 1e12;
-const SYSTEM: &str = "<SystemParams> with <TimeStep>, <TotalTime> and <DampingCoeff>";
-
-impl System {
-    fn read(root: Element<'_>) -> Result<Self, Fault> {
-        let of = needed(root, "SystemParams", SYSTEM)?;
-        let at_least_0 = |element, what| {
-            let value = number(element)?;
-            let problem = ImportProblem::OutOfRange { what, value, range: "at least 0" };
-            if value >= 0.0 { Ok(value) } else { Err(fault(element, problem)) }
-        };
-        let step = needed(of, "TimeStep", "<TimeStep>1e-4</TimeStep> (seconds)")?;
-        let until = needed(of, "TotalTime", "<TotalTime>1</TotalTime> (seconds)")?;
-        let damping = needed(of, "DampingCoeff", "<DampingCoeff>0.5</DampingCoeff>")?;
-        let steps = positive(until, "the total time")? / positive(step, "the time step")?;
-        if steps > MOST_STEPS {
-            let (what, range) = ("the total time over the time step", "at most 1e12");
-            return Err(fault(of, ImportProblem::OutOfRange { what, value: steps, range }));
-        }
-        Ok(Self {
-            step: number(step)?,
-            total: number(until)?,
-            damping: at_least_0(damping, "the damping")?,
-            density: child(of, "Density").map(|of| positive(of, "the density")).transpose()?,
-            hourglass: child(of, "HGKappa")
-                .map(|of| at_least_0(of, "the hourglass stiffness"))
-                .transpose()?,
-        })
-    }
-}
-
-impl System {
-    /// The end of NiftySim's last step [s]: it takes one more than the total time holds, and its outputs come after it.
-    pub fn end(&self) -> f64 {
-        let end = ((self.total / self.step).round() + 1.0) * self.step;
-        // Rid of the product's round-off, which would be read as intention.
-        format!("{end:.12e}").parse().unwrap_or(end)
     }
 }
 

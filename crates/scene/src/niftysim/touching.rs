@@ -8,7 +8,7 @@ use pliant_geometry::{Mesh, boundary};
 use super::conditions::Shape;
 use super::contact::{Bodies, Contact, Form, Motion, Thing};
 use super::geometry::Solid;
-use super::write::{Writer, add_faces};
+use super::writer::{Writer, add_faces};
 
 /// The contact of a model, and the tables of contacts so far.
 pub(super) struct Touching {

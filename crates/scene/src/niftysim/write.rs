@@ -3,27 +3,20 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
-use pliant_geometry::{DataArray, Mesh, boundary};
+use pliant_geometry::{DataArray, Mesh};
 
 use super::Imported;
-use super::conditions::{Action, Condition, Shape, sorted};
+use super::conditions::{Action, Condition};
 use super::error::Fault;
 use super::geometry::Solid;
 use super::material::{Elastic, Material};
-use super::parts::{Model, Output, Part, System};
+use super::parts::{Model, Output, Part};
 use super::shells::{Membrane, MembraneLaw};
 use super::touching::Touching;
+use super::writer::{Faces, Writer, add_faces};
 
 /// Greatest multiple of the shear modulus that a scene takes as hourglass stiffness.
 const MOST_HOURGLASS: f64 = 10.0;
-/// Most pairs by which the curve HILLY is written: one for each step, or straight lines between them that are off by 1e-5 at
-/// the most.
-const HILLY_POINTS: f64 = 2000.0;
-/// π as NiftySim has it, in the curve HILLY.
-#[expect(clippy::approx_constant, reason = "NiftySim's")]
-const PI: f64 = 3.14159_f32 as f64;
-/// From this excess over 1 on, in NiftySim's step after the total time, POLY345 continues there.
-const TOLD_EXCESS: f64 = 1e-5;
 /// Frames of a model that requests no output.
 const FRAMES: f64 = 20.0;
 
@@ -102,19 +95,6 @@ fn by_label(regions: &[Region], value: impl Fn(&Region) -> String) -> String {
     format!("{{ {} }}", entries.join(", "))
 }
 
-pub(super) struct Writer {
-    pub system: System,
-    laws: Vec<Material>,
-    /// Tables of bodies and what acts on them.
-    tables: String,
-    pub notes: Vec<String>,
-    pub missing: Vec<String>,
-    /// How many tables of each name there are.
-    numbers: BTreeMap<&'static str, usize>,
-    /// Tables of poses, with their file names.
-    pub files: Vec<(String, String)>,
-}
-
 impl Writer {
     /// The mesh of a part, whose nodes begin at a number of the whole model; its tables are written.
     fn part(&mut self, part: Part, body: &str, file: &str, (touching, first): (&mut Touching, u32)) -> Mesh {
@@ -184,13 +164,6 @@ impl Writer {
             ));
         }
         Some(written)
-    }
-
-    /// A name with the next number of its kind.
-    pub fn numbered(&mut self, kind: &'static str) -> String {
-        let number = self.numbers.entry(kind).or_insert(0);
-        *number += 1;
-        format!("{kind}-{}", *number - 1)
     }
 
     /// A wall on the boundary of a body.
@@ -330,68 +303,6 @@ impl Writer {
         }
     }
 
-    /// The course of a load, or of what moves.
-    pub fn curve(&mut self, shape: Shape, moves: bool) {
-        let total = self.system.total;
-        match shape {
-            Shape::Polynomial => {
-                let s = self.system.end() / total;
-                let excess = s * s * s * (10.0 - s * (15.0 - 6.0 * s)) - 1.0;
-                if excess > TOLD_EXCESS {
-                    self.note(&format!(
-                        "POLY345: in the one step after the total time NiftySim's load grows on by {excess:.1e} of it, the \
-                         scene's holds"
-                    ));
-                }
-                self.line("curve = \"polynomial-10-15-6\"".into());
-                self.line(format!("to = {total:?}"));
-            }
-            Shape::Ramp => {
-                let end = self.system.end();
-                self.line(format!(
-                    "curve = {{ table = [[0.0, 0.0], [{end:?}, {:?}]] }}  # t / {total:?} s, also in the step after the total time",
-                    end / total
-                ));
-            }
-            Shape::RampHold => {
-                self.line("curve = \"ramp\"".into());
-                self.line(format!("to = {:?}  # a tenth of the total time", 0.1 * total));
-            }
-            Shape::Step => {
-                self.line("curve = \"hold\"".into());
-                // Nodes that jump while the run goes on would throw its energies off balance.
-                if moves {
-                    self.note("STEP of a Disp: the nodes start displaced; NiftySim displaces them in its first step");
-                    return;
-                }
-                self.line(format!(
-                    "from = {:?}  # half a step: NiftySim's is there after the first one",
-                    0.5 * self.system.step
-                ));
-            }
-            Shape::Hilly => self.hilly(),
-        }
-    }
-
-    fn hilly(&mut self) {
-        let System { total, step, .. } = self.system;
-        self.line(format!("# s exp(cos 4πs − 1), s = t / {total:?} s"));
-        self.line("curve = { table = [".into());
-        let steps = (self.system.end() / step).round();
-        let count = steps.min(HILLY_POINTS);
-        let point = |i: u32| {
-            let time = self.system.end() * (f64::from(i) / count);
-            let s = time / total;
-            let factor = s * ((4.0 * PI * s).cos() - 1.0).exp();
-            format!("[{time:?}, {factor:.9}]")
-        };
-        let points: Vec<String> = (0..=count as u32).map(point).collect();
-        for row in points.chunks(4) {
-            self.line(format!("    {},", row.join(", ")));
-        }
-        self.line("] }".into());
-    }
-
     fn note_laws(&mut self) {
         if self.laws.iter().any(|law| matches!(law.elastic, Elastic::TransverselyIsotropic(..))) {
             self.note("TI, TIV: η is the published modulus, half of which is in the energy: `convention = \"taylor\"`");
@@ -446,18 +357,6 @@ impl Writer {
         }
     }
 
-    pub fn line(&mut self, line: String) {
-        self.tables.push_str(&line);
-        self.tables.push('\n');
-    }
-
-    /// Notes something once.
-    pub fn note(&mut self, note: &str) {
-        if !self.notes.iter().any(|known| known == note) {
-            self.notes.push(note.to_owned());
-        }
-    }
-
     fn finish(mut self, stem: &str, meshes: Vec<(String, Mesh)>) -> Imported {
         if !self.missing.is_empty() {
             self.notes.push(format!("left out, as it is not supported: {}", self.missing.join("; ")));
@@ -481,33 +380,6 @@ impl Writer {
         scene.push('\n');
         Imported { scene, meshes, tables: self.files, notes: self.notes, missing: self.missing }
     }
-}
-
-/// How faces became a set of a mesh.
-pub(super) struct Faces {
-    /// How many of them are on the boundary.
-    pub outside: usize,
-    /// How many are not.
-    pub inside: usize,
-    /// True if they are the whole boundary, which needs no set.
-    pub all: bool,
-}
-
-/// Adds faces as cells of a named set; those that are not on the boundary stay out.
-pub(super) fn add_faces(mesh: &mut Mesh, solid: Solid, set: &str, faces: &[Vec<u32>]) -> Faces {
-    let surface = boundary(mesh);
-    let key = |nodes: &[u32]| sorted(nodes.to_vec());
-    let outer: BTreeSet<Vec<u32>> = surface.faces.iter().map(|face| key(face.nodes())).collect();
-    let given: BTreeMap<Vec<u32>, &Vec<u32>> = faces.iter().map(|face| (key(face), face)).collect();
-    let (on, off): (Vec<_>, Vec<_>) = given.into_iter().partition(|(key, _)| outer.contains(key));
-    let all = on.len() == outer.len();
-    if !all && !on.is_empty() {
-        let block = mesh.block_mut(solid.face());
-        let first = block.len() as u32;
-        block.nodes.extend(on.iter().flat_map(|(_, face)| face.iter()));
-        block.sets.insert(set.to_owned(), (first..first + on.len() as u32).collect());
-    }
-    Faces { outside: on.len(), inside: off.len(), all }
 }
 
 /// A file name's stem as letters, digits, `-` and `_`.

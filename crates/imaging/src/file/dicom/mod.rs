@@ -15,10 +15,10 @@ use pliant_geometry::Vector3;
 use super::text::ToWorld;
 use super::{ReadOptions, check_within, checked_size};
 use crate::error::{Fault, ImageError, ImageProblem};
-use crate::grid::Grid;
 use crate::image::{Image, Numbers, Order, Scalar};
 use crate::names::LabelNames;
 use elements::{DataSet, Elements, PIXELS};
+use pliant_geometry::Grid;
 
 /// Distances between slices may differ by this part of their median.
 const UNEVEN: f64 = 0.01;

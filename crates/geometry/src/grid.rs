@@ -1,19 +1,27 @@
-//! Where the voxels of an image are: world = origin + axes · (i, j, k), in metres and RAS, whichever way the image
-//! lies, also mirrored (det < 0) or sheared (tilted gantry).
+//! Regular grids of points, as the voxel centres of an image: world = origin + axes · (i, j, k), in metres. A grid may be
+//! mirrored (det < 0) or sheared (tilted gantry).
 
 use nalgebra::Matrix3;
-use pliant_geometry::Vector3;
+use thiserror::Error;
 
-use crate::error::ImageProblem;
+use crate::Vector3;
 
-/// The regular grid of an image.
+/// The steps of a grid are not finite, have no length or lie in a plane.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error("the steps of the grid ({:?}, {:?} and {:?} m) span no volume", steps[0].as_slice(), steps[1].as_slice(), steps[2].as_slice())]
+pub struct FlatGrid {
+    /// Steps along i, j and k [m].
+    pub steps: [Vector3; 3],
+}
+
+/// A regular grid; its points are the centres of voxels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
-    /// Voxels along i, j and k; i runs fastest in memory.
+    /// Points along i, j and k; i runs fastest in memory.
     pub dims: [usize; 3],
-    /// Centre of the voxel (0, 0, 0) [m].
+    /// The point (0, 0, 0) [m].
     pub origin: Vector3,
-    /// Columns: the steps [m] from a voxel to the next along i, j and k.
+    /// Columns: the steps [m] from a point to the next along i, j and k.
     pub axes: Matrix3<f64>,
     /// Inverse of `axes` [1/m].
     inverse: Matrix3<f64>,
@@ -22,7 +30,7 @@ pub struct Grid {
 impl Grid {
     /// A grid from its size, origin [m] and steps [m]. An error if a number is not finite, a step has no length, or
     /// the steps lie (nearly) in a plane.
-    pub fn new(dims: [usize; 3], origin: Vector3, axes: Matrix3<f64>) -> Result<Self, ImageProblem> {
+    pub fn new(dims: [usize; 3], origin: Vector3, axes: Matrix3<f64>) -> Result<Self, FlatGrid> {
         let finite = origin.iter().chain(axes.iter()).all(|x| x.is_finite());
         let lengths = [0, 1, 2].map(|a| axes.column(a).norm());
         let volume = axes.determinant();
@@ -32,21 +40,21 @@ impl Grid {
             Some(inverse) if finite && !flat && inverse.iter().all(|x| x.is_finite()) => {
                 Ok(Self { dims, origin, axes, inverse })
             }
-            _ => Err(ImageProblem::Singular { steps: [0, 1, 2].map(|a| axes.column(a).into()) }),
+            _ => Err(FlatGrid { steps: [0, 1, 2].map(|a| axes.column(a).into()) }),
         }
     }
 
     /// A grid along the world axes.
-    pub fn along_axes(dims: [usize; 3], origin: Vector3, spacing: [f64; 3]) -> Result<Self, ImageProblem> {
+    pub fn along_axes(dims: [usize; 3], origin: Vector3, spacing: [f64; 3]) -> Result<Self, FlatGrid> {
         Self::new(dims, origin, Matrix3::from_diagonal(&spacing.into()))
     }
 
-    /// Number of voxels.
+    /// Number of points.
     pub fn len(&self) -> usize {
         self.dims.iter().product()
     }
 
-    /// True without any voxel.
+    /// True without any point.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -76,20 +84,20 @@ impl Grid {
         self.inverse.transpose() * along_index
     }
 
-    /// The voxel (i, j, k) of a place in memory.
+    /// The point (i, j, k) of a place in memory.
     pub fn triple(&self, at: usize) -> [usize; 3] {
         let [nx, ny, _] = self.dims;
         [at % nx, at / nx % ny, at / nx / ny]
     }
 
-    /// The part of the grid from voxel `first` on, `dims` long; it may reach beyond the image.
-    pub(crate) fn part(&self, first: [i64; 3], dims: [usize; 3]) -> Self {
+    /// The part of the grid from point `first` on, `dims` long; it may reach beyond the grid.
+    pub fn part(&self, first: [i64; 3], dims: [usize; 3]) -> Self {
         let origin = self.position(&Vector3::from(first.map(|i| i as f64)));
         Self { dims, origin, ..*self }
     }
 
-    /// Other voxels from another origin [m] on, with multiples of these steps.
-    pub(crate) fn coarser(&self, dims: [usize; 3], origin: Vector3, factors: [usize; 3]) -> Self {
+    /// A grid from another origin [m] on, with multiples of these steps.
+    pub fn coarser(&self, dims: [usize; 3], origin: Vector3, factors: [usize; 3]) -> Self {
         let factors = Vector3::from(factors.map(|n| n as f64));
         let axes = self.axes * Matrix3::from_diagonal(&factors);
         let inverse = Matrix3::from_diagonal(&factors.map(f64::recip)) * self.inverse;
@@ -97,7 +105,7 @@ impl Grid {
     }
 
     /// Box [m] in world coordinates round the voxels `first` to `last`, faces included.
-    pub(crate) fn world_box(&self, first: [usize; 3], last: [usize; 3]) -> [Vector3; 2] {
+    pub fn world_box(&self, first: [usize; 3], last: [usize; 3]) -> [Vector3; 2] {
         let low = Vector3::from(first.map(|i| i as f64 - 0.5));
         let high = Vector3::from(last.map(|i| i as f64 + 0.5));
         let corners = (0..8).map(|at| {
@@ -127,8 +135,8 @@ mod tests {
     #[test]
     fn steps_in_a_plane_are_refused() {
         let axes = Matrix3::new(1.0, 2.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 1.0);
-        assert!(matches!(Grid::new([1; 3], Vector3::zeros(), axes), Err(ImageProblem::Singular { .. })));
+        assert!(matches!(Grid::new([1; 3], Vector3::zeros(), axes), Err(FlatGrid { .. })));
         let nan = Matrix3::repeat(f64::NAN);
-        assert!(matches!(Grid::new([1; 3], Vector3::zeros(), nan), Err(ImageProblem::Singular { .. })));
+        assert!(matches!(Grid::new([1; 3], Vector3::zeros(), nan), Err(FlatGrid { .. })));
     }
 }
