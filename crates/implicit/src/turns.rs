@@ -1,7 +1,7 @@
 //! Rotations of nodes that follow the translations of others, as those of a wall in or on a solid: R is the rotation nearest to the
 //! gradient of the solid there, F = Σ x gᵀ over the nodes of the solid, F = V R (polar decomposition). With r = R g and W = (tr V I − V)⁻¹
 //!
-//!     δω = W Σ r × δx,   so that a moment M gives the forces y × r with y = W M:   Jᵀ,
+//! δω = W Σ r × δx,   so that a moment M gives the forces y × r with y = W M:   Jᵀ,
 //!
 //! and these change by δy × r + y × δr with δr = δω × r, δy = −W (tr δV I − δV) y and δV = Σ δx rᵀ − V S(δω).
 
