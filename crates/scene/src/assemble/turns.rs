@@ -1,5 +1,7 @@
 //! Rotations of shells that follow the solid that they are tied to or on.
 
+use std::collections::HashSet;
+
 use pliant_geometry::{CellId, Face, Vector3, gradient_integrals};
 use pliant_implicit::CarriedTurn;
 use pliant_mechanics::model::Constraint;
@@ -82,11 +84,12 @@ impl Builder<'_> {
         }
         behind.sort_unstable();
         behind.dedup();
+        // Where two walls meet, the first one says.
+        let known: HashSet<u32> = self.assembly.turns.iter().map(|turn| turn.node).collect();
         for of_node in behind.chunk_by(|a, b| a.0 == b.0) {
             let cells: Vec<CellId> = of_node.iter().map(|&(_, cell)| cell).collect();
             let node = self.assembly.bodies[host].node(of_node[0].0);
-            // Where two walls meet, the first one says.
-            if self.assembly.turns.iter().all(|known| known.node != node) {
+            if !known.contains(&node) {
                 let turn = self.turn(host, node, &cells);
                 self.assembly.turns.push(turn);
             }
