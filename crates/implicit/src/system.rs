@@ -323,7 +323,7 @@ impl System {
         self.relaxation.stand(&self.model, history);
     }
 
-    /// Ends a step [s]: the history of a state goes on to it from the state before, or from rest.
+    /// Ends a step [s]: the history of a state is advanced from the state before, or from rest.
     pub(crate) fn end_step(&mut self, before: Option<&State>, state: &mut State, step: f64) {
         if !self.relaxes() {
             return;

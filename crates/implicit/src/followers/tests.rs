@@ -43,7 +43,7 @@ fn model() -> Assembly {
     model
 }
 
-/// The same with a strip of shell: two of its edges lie in the bar, the second one in a hex with nodes of the rigid end, and turn with it.
+/// The bar with a strip of shell. Two edges of the strip lie in the bar and turn with it, the second one in a hex at the rigid end.
 fn with_strip() -> Assembly {
     let mut model = model();
     let across = [0.002, 0.008];
