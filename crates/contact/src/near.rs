@@ -1,4 +1,4 @@
-//! What a rigid surface tells of a point near it, and its triangles.
+//! Distance and normal of a rigid surface at a point near it, and the triangles of the surface.
 
 use nalgebra::Vector3;
 

@@ -16,6 +16,7 @@ use crate::facet::Facet;
 use crate::patch::Carried;
 use crate::solid::refusal;
 use crate::touching::Touching;
+use crate::turns::CarriedTurn;
 
 /// The least part of a direction that lies in a triangle.
 const ALONG: f64 = 1e-3;
@@ -42,6 +43,8 @@ pub struct Assembly {
     pub carried: BTreeMap<usize, Vec<Carried>>,
     /// Contacts, which the static and the implicit solver keep.
     pub touching: Option<Touching>,
+    /// Nodes of shells that turn with the solid that they are in or on. Those of rigid parts turn with these instead.
+    pub turns: Vec<CarriedTurn>,
 }
 
 /// Triangles that become a shell.

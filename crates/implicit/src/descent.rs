@@ -196,6 +196,7 @@ fn begin(solver: &mut impl Contacting, state: &State, times: [f64; 2], guess: Op
             *own = pending;
         }
     }
+    system.follow(increment);
     if let Some(touching) = &mut system.touching {
         touching.barriers.begin(&state.position, increment, times);
         touching.share = 0.0;
@@ -222,6 +223,7 @@ fn start_from(
             *own = pending;
         }
     }
+    system.follow(increment);
     let Some(touching) = &mut system.touching else { return Ok(()) };
     let part = touching.barriers.allowed(&state.position, increment, 0.0, [KEEP[1], 1.0]);
     system.advance(state, increment, part);
@@ -268,7 +270,7 @@ fn is_complete(solver: &mut impl Contacting) -> bool {
 fn own_loads(system: &System) -> Vec<f64> {
     match &system.touching {
         Some(touching) => {
-            system.external.iter().zip(&touching.forces).map(|(load, force)| load - force).collect()
+            system.external.iter().zip(&touching.given).map(|(load, force)| load - force).collect()
         }
         None => system.external.clone(),
     }

@@ -383,15 +383,11 @@ impl BackwardEuler {
     /// Ends a step: velocities and spins of the motion in it.
     fn end(&mut self, state: &mut State, time: f64) {
         self.system.end_step(Some(&self.start), state, time - self.start.time);
-        let model = &self.system.model;
         let Course { step, shift, .. } = &self.course;
         for (node, moved) in self.moved.chunks_exact(6).enumerate() {
-            if model.mass[node] > 0.0 {
-                let rate = |first: usize| {
-                    (Course::part(moved, first) - Course::part(shift, 6 * node + first)) / *step
-                };
-                (state.velocity[node], state.spin[node]) = (rate(0), rate(3));
-            }
+            let rate =
+                |first: usize| (Course::part(moved, first) - Course::part(shift, 6 * node + first)) / *step;
+            (state.velocity[node], state.spin[node]) = (rate(0), rate(3));
         }
         state.time = time;
     }
@@ -493,6 +489,7 @@ impl BackwardEuler {
         system.add_bound_masses(
             |node| (rate(node) * model.mass[node as usize], momentum.of(node as usize, 0)),
             |node| rate(node) * model.rotary_inertia[node as usize],
+            |node| momentum.of(node as usize, 3),
         );
     }
 
@@ -613,6 +610,11 @@ impl Explicit {
         if model.collective().is_some() {
             return Err(SolveError::Impossible(
                 "explicit shells have no mean, no rigid part and no volume; use the implicit solver",
+            ));
+        }
+        if !model.turns.is_empty() {
+            return Err(SolveError::Impossible(
+                "rotations of explicit shells follow no solid; use the implicit solver",
             ));
         }
         if model.stiffness_damping > 0.0 {

@@ -1,19 +1,21 @@
 //! Nodes whose translations are no unknowns of a system of equations, since others move them: tied nodes, and the nodes of rigid parts,
 //! which go with six unknowns at the first of them. A cell at such nodes becomes a cell at the nodes that they follow, K ← Tᵀ K T; its
-//! forces go there by Tᵀ. Nodes of shells in a rigid part turn with it; other rotations stay with the node itself.
+//! forces go there by Tᵀ. Nodes of shells in a rigid part turn with it, others with the gradient of a solid ([`Turn`]); all other rotations stay
+//! with the node itself.
 //!
 //! In an increment a node goes by Σ w (d + θ × a): d and θ those of the nodes that it follows, a the arm from a first node of a rigid part,
 //! 0 for a tie. Then it stands at x = X + Σ (w u + (R − 1) A), exactly. The second derivative of x by θ, exp(θ) a ≈ a + θ × a + θ × (θ × a)/2,
 //! adds (f aᵀ + a fᵀ)/2 − (f·a) to the stiffness of θ, with f what cells resist with less what loads pull with.
 
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, SymmetricEigen, Vector3};
-use pliant_mechanics::model::Motion;
+use pliant_mechanics::model::{Constraint, Motion};
 use pliant_mechanics::tie::Tie;
 
 use crate::Assembly;
 use crate::rotation::skew;
 use crate::sparse::{Equations, LowerMatrix, NONE};
 use crate::state::State;
+use crate::turns::{CarriedTurn, Turn};
 
 /// The nodes whose unknowns move a cell, and how many components of each.
 pub(crate) type Expanded = (Vec<u32>, usize);
@@ -27,6 +29,8 @@ pub(crate) struct Followers {
     parts: Vec<RigidPart>,
     /// Nodes that turn as the first one of their rigid part, with that.
     turned: Vec<[u32; 2]>,
+    /// Nodes that turn with a solid, by increasing node.
+    turns: Vec<Turn>,
 }
 
 /// A node that is followed.
@@ -116,7 +120,10 @@ impl Followers {
             row_of[*node as usize] = number;
         }
         turned.sort_unstable();
-        (!rows.is_empty()).then_some(Self { row_of, rows, parts, turned })
+        let mut turns: Vec<Turn> = carried_turns(model).map(Turn::new).collect();
+        turns.sort_by_key(|turn| turn.node);
+        let some = !rows.is_empty() || !turns.is_empty();
+        some.then_some(Self { row_of, rows, parts, turned, turns })
     }
 
     pub(crate) fn follows(&self, node: u32) -> bool {
@@ -136,6 +143,12 @@ impl Followers {
         }
     }
 
+    /// How a node turns with a solid, if it does.
+    fn carried(&self, node: u32) -> Option<&Turn> {
+        let at = self.turns.binary_search_by_key(&node, |turn| turn.node).ok()?;
+        Some(&self.turns[at])
+    }
+
     /// What a node follows; nothing, if it follows no other.
     fn followed(&self, node: u32) -> &[Followed] {
         match self.row_of[node as usize] {
@@ -148,17 +161,34 @@ impl Followers {
     /// place for that.
     pub(crate) fn expanded(&self, nodes: &[u32], turns: bool) -> Option<Expanded> {
         let first = |node: &u32| self.parts.iter().any(|part| part.first == *node);
-        if !nodes.iter().any(|node| self.follows(*node) || first(node)) {
+        let carried = |node: &u32| turns && self.carried(*node).is_some();
+        if !nodes.iter().any(|node| self.follows(*node) || first(node) || carried(node)) {
             return None;
         }
-        let mut all: Vec<u32> = nodes.iter().copied().filter(|&node| turns || !self.follows(node)).collect();
-        for followed in nodes.iter().flat_map(|&node| self.followed(node)) {
-            if !all.contains(&followed.node) {
-                all.push(followed.node);
+        let turn = |node: &u32| turns && !carried(node);
+        let mut all: Vec<u32> =
+            nodes.iter().copied().filter(|node| turn(node) || !self.follows(*node)).collect();
+        let solids = nodes.iter().filter(|node| carried(node)).filter_map(|&node| self.carried(node));
+        for moving in nodes.iter().copied().chain(solids.flat_map(Turn::nodes)) {
+            for node in self.movers(moving) {
+                if !all.contains(&node) {
+                    all.push(node);
+                }
             }
         }
-        let turns = turns || all.iter().any(first);
+        let turns = nodes.iter().any(turn) || all.iter().any(first);
         Some((all, if turns { 6 } else { 3 }))
+    }
+
+    /// The nodes that a node follows, with their weights; nothing, if it follows no other.
+    pub(crate) fn weights(&self, node: u32) -> impl Iterator<Item = (u32, f64)> + '_ {
+        self.followed(node).iter().map(|followed| (followed.node, followed.weight))
+    }
+
+    /// The nodes whose unknowns move a node: itself, or those that it follows.
+    fn movers(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
+        let own = (!self.follows(node)).then_some(node);
+        own.into_iter().chain(self.followed(node).iter().map(|followed| followed.node))
     }
 
     /// Tᵀ K T of a cell of so many components a node, on its [`expanded`](Self::expanded) nodes, column by column.
@@ -170,37 +200,51 @@ impl Followers {
         tangent: &[f64],
     ) -> Vec<f64> {
         let place = |node: u32| wide * expanded.iter().position(|&known| known == node).unwrap_or(0);
+        let shift = |node: u32, c: usize, by: f64, all: &mut Vec<(usize, f64)>| {
+            let followed = self.followed(node);
+            if followed.is_empty() {
+                all.push((place(node) + c, by));
+            }
+            for Followed { node, weight, part, arm, .. } in followed {
+                let at = place(*node);
+                all.push((at + c, by * weight));
+                if part.is_some() {
+                    let [next, last] = [(c + 1) % 3, (c + 2) % 3];
+                    all.extend([(at + 3 + next, by * arm[last]), (at + 3 + last, -by * arm[next])]);
+                }
+            }
+        };
         // Of each component the unknowns that move it.
         let moves = |i: usize| -> Vec<(usize, f64)> {
             let (node, c) = (nodes[i / components], i % components);
-            let followed = self.followed(node);
-            if c >= 3 {
-                return vec![(place(self.turns_with(node)) + c, 1.0)];
-            }
-            if followed.is_empty() {
-                return vec![(place(node) + c, 1.0)];
-            }
-            let mut all = Vec::with_capacity(followed.len());
-            for Followed { node, weight, part, arm, .. } in followed {
-                let at = place(*node);
-                all.push((at + c, *weight));
-                if part.is_some() {
-                    let [next, last] = [(c + 1) % 3, (c + 2) % 3];
-                    all.extend([(at + 3 + next, arm[last]), (at + 3 + last, -arm[next])]);
+            let mut all = Vec::new();
+            match self.carried(node).filter(|_| c >= 3) {
+                _ if c < 3 => shift(node, c, 1.0, &mut all),
+                None => all.push((place(self.turns_with(node)) + c, 1.0)),
+                Some(turn) => {
+                    for (node, block) in turn.blocks() {
+                        (0..3).for_each(|k| shift(node, k, block[(c - 3, k)], &mut all));
+                    }
                 }
             }
             all
         };
         let all: Vec<_> = (0..components * nodes.len()).map(moves).collect();
-        let size = wide * expanded.len();
+        let (count, size) = (all.len(), wide * expanded.len());
+        // K T, then Tᵀ of it: a component of a carried turn has some thirty entries.
+        let mut moved = vec![0.0; count * size];
+        for (column, entries) in all.iter().zip(tangent.chunks_exact(count)) {
+            for &(q, w) in column {
+                moved[q * count..][..count]
+                    .iter_mut()
+                    .zip(entries)
+                    .for_each(|(sum, entry)| *sum += w * entry);
+            }
+        }
         let mut whole = vec![0.0; size * size];
-        for (column, entries) in all.iter().zip(tangent.chunks_exact(all.len())) {
-            for &(q, wq) in column {
-                for (row, entry) in all.iter().zip(entries) {
-                    for &(p, wp) in row {
-                        whole[q * size + p] += wq * wp * entry;
-                    }
-                }
+        for (column, entries) in whole.chunks_exact_mut(size).zip(moved.chunks_exact(count)) {
+            for (row, entry) in all.iter().zip(entries) {
+                row.iter().for_each(|&(p, w)| column[p] += w * entry);
             }
         }
         whole
@@ -229,9 +273,26 @@ impl Followers {
             let along = [0, 1, 2].map(along);
             components[6 * *node as usize..][..3].copy_from_slice(&along);
         }
+        for turn in &self.turns {
+            let moved = |node: u32| Vector3::from_column_slice(&components[6 * node as usize..][..3]);
+            let spin = turn.spin(moved);
+            components[6 * turn.node as usize + 3..][..3].copy_from_slice(spin.as_slice());
+        }
     }
 
-    /// Gives forces to the nodes that are followed, six components a node.
+    /// Gives the moments on nodes that turn with a solid to that, six components a node.
+    pub(crate) fn give_moments_back(&self, components: &mut [f64]) {
+        for turn in &self.turns {
+            let own = &mut components[6 * turn.node as usize + 3..][..3];
+            let moment = Vector3::from_column_slice(own);
+            own.fill(0.0);
+            for (node, force) in turn.forces(&moment) {
+                (0..3).for_each(|c| components[6 * node as usize + c] += force[c]);
+            }
+        }
+    }
+
+    /// Gives forces to the nodes that are followed, six components a node; moments on nodes that turn with a solid are given already.
     pub(crate) fn give_back(&self, components: &mut [f64]) {
         for [node, first] in self.turned() {
             for c in 3..6 {
@@ -265,10 +326,14 @@ impl Followers {
         for [node, first] in self.turned() {
             state.rotation[node] = state.rotation[first];
         }
+        for turn in &self.turns {
+            state.rotation[turn.node as usize] = turn.rotation(state);
+        }
     }
 
-    /// Takes the arms at a state.
+    /// Takes the arms at a state, and how nodes turn with solids.
     pub(crate) fn turn(&mut self, state: &State) {
+        self.turns.iter_mut().for_each(|turn| turn.turn(state));
         for followed in
             self.rows.iter_mut().flat_map(|(_, row)| row).filter(|followed| followed.part.is_some())
         {
@@ -288,13 +353,23 @@ impl Followers {
         Some((expanded, whole))
     }
 
-    /// What forces [N] and moments [N m] on the nodes of rigid parts are at the unknowns of these, component by component.
-    pub(crate) fn pull_parts(
+    /// What forces [N] and moments [N m] on nodes of rigid parts, and moments on nodes that turn with a solid, are at the unknowns of these,
+    /// component by component.
+    pub(crate) fn pull(
         &self,
         force: impl Fn(u32) -> Vector3<f64>,
         moment: impl Fn(u32) -> Vector3<f64>,
         mut add: impl FnMut(usize, f64),
     ) {
+        for turn in &self.turns {
+            for (node, force) in turn.forces(&moment(turn.node)) {
+                if !self.follows(node) {
+                    (0..3).for_each(|c| add(6 * node as usize + c, force[c]));
+                }
+                let followed = self.followed(node).iter();
+                followed.for_each(|own| own.pull(&force, |c, f| add(6 * own.node as usize + c, f)));
+            }
+        }
         for &[node, first] in &self.turned {
             let moment = moment(node);
             (0..3).for_each(|c| add(6 * first as usize + 3 + c, moment[c]));
@@ -303,6 +378,35 @@ impl Followers {
             let parts = row.iter().filter(|followed| followed.part.is_some());
             parts.for_each(|own| own.pull(&force(*node), |c, f| add(6 * own.node as usize + c, f)));
         }
+    }
+
+    /// Adds to a stiffness how forces of moments [N m] on nodes that turn with a solid change with that, and what their rotary inertias [N m]
+    /// resist with.
+    pub(crate) fn add_turns(
+        &self,
+        equations: &Equations,
+        matrix: &mut LowerMatrix,
+        moment: impl Fn(u32) -> Vector3<f64>,
+        rotary: impl Fn(u32) -> f64,
+    ) {
+        for turn in &self.turns {
+            let nodes: Vec<u32> = turn.nodes().collect();
+            let change = turn.change(&moment(turn.node), rotary(turn.node));
+            let (own, components, whole) = match self.expanded(&nodes, false) {
+                Some(expanded) => {
+                    let whole = self.condensed(&nodes, 3, &expanded, &change);
+                    (expanded.0, expanded.1, whole)
+                }
+                None => (nodes, 3, change),
+            };
+            let places = matrix.places(equations, &own, components);
+            matrix.add(equations, &own, components, &places, &whole);
+        }
+    }
+
+    /// The nodes of the solid of each node that turns with one.
+    pub(crate) fn turning_nodes(&self) -> impl Iterator<Item = Vec<u32>> + '_ {
+        self.turns.iter().map(|turn| turn.nodes().collect())
     }
 
     /// Adds to a stiffness what masses [kg/s²] and rotary inertias [N m] of nodes that go with rigid parts resist with, and how the forces [N] that
@@ -350,6 +454,13 @@ impl Followers {
     }
 }
 
+/// The nodes of a model that turn with a solid: not those of rigid parts, which turn with these.
+pub(crate) fn carried_turns(model: &Assembly) -> impl Iterator<Item = &CarriedTurn> {
+    let rigid = |constraint: &Constraint| matches!(constraint.motion, Motion::Rigid);
+    let bound = move |node: u32| model.constraints.iter().any(|own| rigid(own) && own.nodes.contains(&node));
+    model.turns.iter().filter(move |turn| !bound(turn.node))
+}
+
 impl Followed {
     /// What a force [N] on the node that follows is here: a force and, with an arm, a moment, component by component.
     fn pull(&self, force: &Vector3<f64>, mut add: impl FnMut(usize, f64)) {
@@ -362,147 +473,4 @@ impl Followed {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::sync::Arc;
-
-    use pliant_mechanics::curve::{Curve, Shape};
-    use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
-    use pliant_mechanics::mapping::Weights;
-    use pliant_mechanics::model::{Cells, Constraint, Material, Solid};
-    use pliant_testing::Random;
-
-    use super::*;
-    use crate::facet::Tangent;
-    use crate::linear::{LinearSolver, dot};
-    use crate::system::System;
-    use crate::{BackwardEuler, DynamicSettings, Spring, StaticSettings, Statics};
-
-    /// A bar of 4 × 1 × 1 cubes of 1 cm with a rigid end, to which two free nodes are tied with a spring each.
-    fn model() -> Assembly {
-        let points = (0..5).flat_map(|x| {
-            [(0, 0), (1, 0), (0, 1), (1, 1)]
-                .map(|(y, z)| Vector3::new(f64::from(x), f64::from(y), f64::from(z)) * 0.01)
-        });
-        let mut model = Assembly::new("bar", points);
-        let hexes = (0..4).map(|x| [0, 4, 5, 1, 2, 6, 7, 3].map(|node| 4 * x + node)).collect();
-        let law = AnyLaw::NeoHookean(NeoHookean { shear: 2e3, volumetric: Volumetric::quadratic(1e4) });
-        let cells = Cells::hex8(hexes, &model.rest, 0.2, 2e3);
-        model.add_solid("bar", Solid::new(0, Material::elastic(law, 1000.0), cells)).unwrap();
-        model.add_body("beads", [Vector3::new(0.025, 0.005, 0.005), Vector3::new(0.035, 0.002, 0.007)]);
-        let rows: [&[(u32, f64)]; 2] =
-            [&[(8, 0.3), (13, 0.2), (15, 0.5)], &[(12, 0.5), (16, 0.2), (19, 0.3)]];
-        model.model_mut().tie("thread", vec![20, 21], Weights::from_rows(rows)).unwrap();
-        for node in [20, 21, 17] {
-            let anchor = model.place(node as usize) + Vector3::new(0.0, 0.01, 0.005);
-            model.springs.push(Spring { node, anchor, stiffness: 30.0 });
-        }
-        let nodes = (12..20).collect();
-        model.model_mut().constraints.push(Constraint {
-            name: "end".into(),
-            nodes,
-            components: [true; 6],
-            motion: Motion::Rigid,
-        });
-        model
-    }
-
-    /// The stiffness along any direction is what the forces change by, far from equilibrium.
-    #[test]
-    fn the_stiffness_of_rigid_parts_is_the_change_of_their_forces() {
-        let model = Arc::new(model());
-        let mut system = System::new(Arc::clone(&model), LinearSolver::Direct).unwrap();
-        let mut random = Random::new(3);
-        let mut state = State::at_rest(&model);
-        let still = vec![0.0; 6 * model.rest.len()];
-        system.evaluate(&state, 0.0, Some((Tangent::Full, &still))).unwrap();
-        let count = system.equations.len();
-        assert_eq!(count, 3 * 12 + 6);
-        let mut direction = |size: f64| -> Vec<f64> {
-            let turning = |e: usize| system.equations.component[e] % 6 >= 3;
-            (0..count).map(|e| size * if turning(e) { 100.0 } else { 1.0 } * random.vector()[0]).collect()
-        };
-        let (first, way) = (direction(3e-3), direction(1e-3));
-        let spread = |system: &System, values: &[f64]| {
-            let mut all = vec![0.0; 6 * model.rest.len()];
-            system.spread(values, &mut all);
-            all
-        };
-        system.advance(&mut state, &spread(&system, &first), 1.0);
-        let forces = |system: &mut System, part: f64| {
-            let mut moved = state.clone();
-            system.evaluate(&state, 0.0, None).unwrap();
-            let all = spread(system, &way);
-            system.advance(&mut moved, &all, part);
-            system.evaluate(&moved, 0.0, None).unwrap();
-            let mut own = vec![0.0; count];
-            system.gather(&system.internal, &mut own);
-            (dot(&own, &way), system.energy)
-        };
-        let h = 1e-4;
-        let [(ahead, above), (behind, below)] = [h, -h].map(|part| forces(&mut system, part));
-        let (here, _) = forces(&mut system, 0.0);
-        assert!(((above - below) / (2.0 * h) - here).abs() < 1e-6 * here.abs(), "force");
-        system.evaluate(&state, 0.0, Some((Tangent::Full, &still))).unwrap();
-        let mut product = vec![0.0; count];
-        system.matrix.multiply_values(&system.matrix.value, &way, &mut product);
-        let (own, wanted) = (dot(&product, &way), (ahead - behind) / (2.0 * h));
-        println!("{own} {wanted}");
-        assert!((own - wanted).abs() < 1e-6 * wanted.abs(), "{own} {wanted}");
-    }
-
-    /// A bar whose free end is turned by 2.5 rad follows as one body without stress; a free one keeps its shape and its velocity.
-    #[test]
-    fn a_rigid_motion_costs_nothing() {
-        let mut model = model();
-        model.springs.clear();
-        let curve = Curve { shape: Shape::Ramp, from: 0.0, to: 1.0 };
-        let rest = (0..4).map(|node| model.rest[node]);
-        let motion = Motion::rotation([0.3, -0.2, 0.9], [0.0; 3], 2.5, curve, rest);
-        model.model_mut().constrain("hand", vec![0, 1, 2, 3], motion);
-        let mut state = State::at_rest(&model);
-        let settings = StaticSettings { tolerance: 1e-12, ..StaticSettings::default() };
-        let mut solver = Statics::new(model.clone(), settings).unwrap();
-        for step in 1..=10 {
-            solver.solve(&mut state, f64::from(step) / 10.0).unwrap();
-        }
-        let turn = crate::rotation::exponential(&(Vector3::new(0.3, -0.2, 0.9).normalize() * 2.5));
-        // The beads follow with an offset that does not turn.
-        let off =
-            (0..20).map(|node| (state.position[node] - turn * model.place(node)).norm()).fold(0.0, f64::max);
-        let mut forces = crate::Forces::new(model.clone());
-        forces.evaluate(&state).unwrap();
-        println!("static: {off:.1e} m, {:.1e} J", forces.strain_energy());
-        assert!(off < 1e-12 && forces.strain_energy() < 1e-12, "{off:e} {:e}", forces.strain_energy());
-
-        // Free in space it keeps its shape and its momentum.
-        model.model_mut().constraints.pop();
-        let velocity = Vector3::new(0.2, -0.1, 0.3);
-        let mut state = State::at_rest(&model);
-        state.velocity.fill(velocity);
-        let mut solver = BackwardEuler::new(
-            model.clone(),
-            DynamicSettings { tolerance: 1e-12, ..DynamicSettings::new(0.01) },
-        )
-        .unwrap();
-        (0..50).for_each(|_| drop(solver.advance(&mut state).unwrap()));
-        let off = (0..22).map(|node| (state.position[node] - model.place(node) - 0.5 * velocity).norm());
-        let slower = (0..20).map(|node| (state.velocity[node] - velocity).norm());
-        let (off, slower) = (off.fold(0.0, f64::max), slower.fold(0.0, f64::max));
-        println!("implicit: {off:.1e} m, {slower:.1e} m/s");
-        assert!(off < 1e-12 && slower < 1e-12, "{off:e} {slower:e}");
-    }
-
-    /// Three nodes on a line keep their distances: a turn about the line, which moves none of them, does not make the stiffness singular.
-    #[test]
-    fn nodes_on_a_line_are_bound() {
-        let mut model = model();
-        model.model_mut().constraints[0].nodes = vec![4, 8, 12];
-        model.model_mut().fix("base", vec![0, 1, 2, 3]);
-        let mut state = State::at_rest(&model);
-        let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
-        let step = solver.solve(&mut state, 1.0).unwrap();
-        let length = |a: usize, b: usize| (state.position[a] - state.position[b]).norm();
-        assert!((length(4, 12) - 0.02).abs() < 1e-15 && (length(4, 8) - 0.01).abs() < 1e-15);
-        assert!((state.position[8] - model.place(8)).norm() > 1e-4, "{:?}", step.residuals);
-    }
-}
+mod tests;

@@ -47,6 +47,7 @@ impl Forces {
     pub fn touch(&mut self, forces: &[f64]) {
         self.touching.clear();
         self.touching.extend_from_slice(forces);
+        self.system.give_back(&mut self.touching);
     }
 
     /// Force [N] and moment [N m] that elements and springs resist with, six numbers a node.

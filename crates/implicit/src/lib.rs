@@ -65,6 +65,7 @@ mod testing;
 #[cfg(test)]
 mod tests;
 mod touching;
+mod turns;
 
 pub use assembly::{Assembly, Notes, Shell, Spring};
 pub use creases::Normal;
@@ -87,3 +88,4 @@ pub use strain::ShellStrain;
 pub use surface::CurvedSurface;
 pub use system::Phases;
 pub use touching::{Touching, TouchingNow, TouchingSystem};
+pub use turns::CarriedTurn;

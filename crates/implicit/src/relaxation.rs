@@ -7,7 +7,7 @@
 
 use pliant_mechanics::Model;
 use pliant_mechanics::model::Solid;
-use pliant_mechanics::prony::{Prony, PronyUpdate};
+use pliant_mechanics::prony::Prony;
 use pliant_mechanics::tensor::{Symmetric, Vector};
 use rayon::prelude::*;
 
@@ -76,6 +76,19 @@ impl Lag<'static> {
 struct Own {
     factors: [f64; 2],
     kept: Vec<Symmetric<f64>>,
+    /// d and g of each term of the isochoric and the volumetric part.
+    coefficients: [Vec<(f64, f64)>; 2],
+}
+
+impl Own {
+    /// Takes the coefficients of a step [s]; without one those of an instant, which leaves h as it is.
+    fn set_step(&mut self, Prony { isochoric, volumetric, update }: &Prony, step: Option<f64>) {
+        let of_term = |&term: &(f64, f64)| step.map_or((1.0, 0.0), |step| update.coefficients(term, step));
+        for (own, terms) in self.coefficients.iter_mut().zip([isochoric, volumetric]) {
+            own.clear();
+            own.extend(terms.iter().map(of_term));
+        }
+    }
 }
 
 /// Relaxation of all solids, as a step or an instant takes it. Empty where none relaxes.
@@ -117,12 +130,14 @@ impl Relaxation {
         self.steps = step.is_some();
         for ((own, solid), tensors) in self.solids.iter_mut().zip(&model.solids).zip(&history.tensors) {
             let (prony, averages) = (&solid.material.prony, solid.cells.averages_pressure());
-            own.factors =
-                [&prony.isochoric, &prony.volumetric].map(|terms| factor(terms, prony.update, step));
-            own.kept.clear();
+            own.set_step(prony, step);
+            let Own { factors, kept: all, coefficients } = own;
+            let [shape, volume] = &*coefficients;
+            *factors = [factor(&prony.isochoric, shape), factor(&prony.volumetric, volume)];
+            all.clear();
             let slots = prony.point_slots(averages);
             if slots > 0 {
-                own.kept.extend(tensors.chunks_exact(slots).map(|point| kept(prony, point, step)));
+                all.extend(tensors.chunks_exact(slots).map(|point| kept(prony, coefficients, point)));
             }
         }
     }
@@ -142,7 +157,7 @@ impl Relaxation {
         if self.steps { 0.0 } else { history.work.iter().sum() }
     }
 
-    /// Ends a step [s] between two displacements [m] of the nodes: the history goes on to its end.
+    /// Ends a step [s]: the history is advanced from one displacement [m] of the nodes to another.
     pub(crate) fn end(
         &mut self,
         model: &Model,
@@ -152,14 +167,19 @@ impl Relaxation {
         history: &mut History,
     ) {
         history.begun = true;
-        for ((solid, tensors), work) in model.solids.iter().zip(&mut history.tensors).zip(&mut history.work) {
+        let solids = self.solids.iter_mut().zip(&model.solids);
+        for (((own, solid), tensors), work) in solids.zip(&mut history.tensors).zip(&mut history.work) {
+            own.set_step(&solid.material.prony, Some(step));
+            let coefficients = &own.coefficients;
             let slots = slots_of_cell(solid);
             if slots == 0 {
                 continue;
             }
             let chunk = |(number, own): (usize, &mut [Symmetric<f64>])| {
                 let cells = own.chunks_exact_mut(slots).enumerate();
-                cells.map(|(at, own)| advance(solid, number * CHUNK + at, (&before, &now), step, own)).sum()
+                cells
+                    .map(|(at, own)| advance(solid, number * CHUNK + at, (&before, &now), coefficients, own))
+                    .sum()
             };
             tensors.par_chunks_mut(CHUNK * slots).enumerate().map(chunk).collect_into_vec(&mut self.sums);
             *work += self.sums.iter().sum::<f64>();
@@ -167,26 +187,20 @@ impl Relaxation {
     }
 }
 
-/// f of one part.
-fn factor(terms: &[(f64, f64)], update: PronyUpdate, step: Option<f64>) -> f64 {
-    let gain = |term: &(f64, f64)| step.map_or(0.0, |step| update.coefficients(*term, step).1);
-    terms.iter().fold(1.0, |sum, term| sum - term.0 + gain(term))
+/// f of one part, 1 − Σ a + Σ g.
+fn factor(terms: &[(f64, f64)], coefficients: &[(f64, f64)]) -> f64 {
+    terms.iter().zip(coefficients).fold(1.0, |sum, (term, own)| sum - term.0 + own.1)
 }
 
-/// k of a point with its tensors.
-fn kept(prony: &Prony, tensors: &[Symmetric<f64>], step: Option<f64>) -> Symmetric<f64> {
-    let part = |terms: &[(f64, f64)], tensors: &[Symmetric<f64>]| {
+/// k of a point with its tensors, Σ (d h − g Φ).
+fn kept(prony: &Prony, [shape, volume]: &[Vec<(f64, f64)>; 2], tensors: &[Symmetric<f64>]) -> Symmetric<f64> {
+    let part = |coefficients: &[(f64, f64)], tensors: &[Symmetric<f64>]| {
         let Some((elastic, own)) = tensors.split_first() else { return Symmetric::ZERO };
-        terms.iter().zip(own).fold(Symmetric::ZERO, |sum, (term, h)| match step {
-            None => sum + *h,
-            Some(step) => {
-                let (decay, gain) = prony.update.coefficients(*term, step);
-                sum + *h * decay - *elastic * gain
-            }
-        })
+        let of_terms = coefficients.iter().zip(own);
+        of_terms.fold(Symmetric::ZERO, |sum, (&(decay, gain), h)| sum + *h * decay - *elastic * gain)
     };
     let (isochoric, volumetric) = tensors.split_at(prony.isochoric_slots());
-    part(&prony.isochoric, isochoric) + part(&prony.volumetric, volumetric)
+    part(shape, isochoric) + part(volume, volumetric)
 }
 
 /// Advances the tensors of a cell over a step [s]; the work of its relaxing stress [J].
@@ -194,10 +208,10 @@ fn advance(
     solid: &Solid,
     cell: usize,
     (before, now): (impl Fn(u32) -> Vector<f64>, impl Fn(u32) -> Vector<f64>),
-    step: f64,
+    [shape, volume]: &[Vec<(f64, f64)>; 2],
     tensors: &mut [Symmetric<f64>],
 ) -> f64 {
-    let Prony { isochoric, volumetric, update } = &solid.material.prony;
+    let Prony { isochoric, volumetric, .. } = &solid.material.prony;
     let slots = tensors.len() / solid.cells.points();
     let fibres = solid.law_fibres(cell);
     let mut from = [Symmetric::ZERO; MOST_POINTS];
@@ -208,15 +222,14 @@ fn advance(
         let elastic = strained.stress(&solid.material.law, &fibres);
         let (first, second) = own.split_at_mut(solid.material.prony.isochoric_slots());
         let mut sum = Symmetric::ZERO;
-        for (terms, elastic, own) in
-            [(isochoric, elastic.isochoric, first), (volumetric, elastic.volumetric, second)]
+        for (terms, coefficients, elastic, own) in
+            [(isochoric, shape, elastic.isochoric, first), (volumetric, volume, elastic.volumetric, second)]
         {
             let Some((last, own)) = own.split_first_mut() else { continue };
             let remaining = terms.iter().fold(1.0, |sum, (weight, _)| sum - weight);
             sum = sum + (*last + elastic) * remaining;
             let change = elastic - *last;
-            for (term, h) in terms.iter().zip(own) {
-                let (decay, gain) = update.coefficients(*term, step);
+            for (&(decay, gain), h) in coefficients.iter().zip(own) {
                 sum = sum + *h;
                 *h = *h * decay + change * gain;
                 sum = sum + *h;

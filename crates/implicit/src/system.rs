@@ -15,7 +15,7 @@ use crate::assembly::{Assembly, Spring};
 use crate::conditions::{Conditions, add_gradient};
 use crate::error::SolveError;
 use crate::facet::{Broken, Facet, Matrix18, Tangent, symmetrise};
-use crate::followers::Followers;
+use crate::followers::{Followers, carried_turns};
 use crate::linear::{LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT};
 use crate::mapping::CarriedPoints;
 use crate::patch::Vector18;
@@ -146,7 +146,9 @@ impl System {
             None => Vec::new(),
             Some(_) => {
                 let solids = model.solid_cells().chain(stars.clone()).map(|nodes| expand(nodes, false));
-                facets.clone().map(|nodes| expand(nodes, true)).chain(solids).collect()
+                let turns = followers.into_iter().flat_map(Followers::turning_nodes);
+                let turns = turns.map(|nodes| expand(&nodes, false));
+                facets.clone().map(|nodes| expand(nodes, true)).chain(solids).chain(turns).collect()
             }
         };
         *matrix = match followers {
@@ -191,10 +193,24 @@ impl System {
     /// Makes room in the pattern for the contacts that act or soon may.
     pub(crate) fn make_room(&mut self) -> Result<(), SolveError> {
         let Some(touching) = &mut self.touching else { return Ok(()) };
-        if !touching.grow(&self.equations, &self.matrix) {
+        if !touching.grow(&self.equations, &self.matrix, self.followers.as_ref()) {
             return Ok(());
         }
         self.set_pattern()
+    }
+
+    /// Takes nodes that follow others along with a motion, six components a node.
+    pub(crate) fn follow(&self, motion: &mut [f64]) {
+        if let Some(followers) = &self.followers {
+            followers.follow(motion);
+        }
+    }
+
+    /// Gives forces on tied nodes to those that they follow, six components a node.
+    pub(crate) fn give_back(&self, forces: &mut [f64]) {
+        if let Some(followers) = &self.followers {
+            followers.give_back(forces);
+        }
     }
 
     /// Takes a pattern with these pairs of nodes for contacts.
@@ -250,6 +266,9 @@ impl System {
         for &node in model.ties.iter().flat_map(|tie| &tie.nodes) {
             free[6 * node as usize..6 * node as usize + 3].fill(false);
         }
+        for turn in carried_turns(&model) {
+            free[6 * turn.node as usize + 3..6 * turn.node as usize + 6].fill(false);
+        }
         Self {
             followers: Followers::of(&model, false),
             conditions: Conditions::default(),
@@ -304,7 +323,7 @@ impl System {
         self.relaxation.stand(&self.model, history);
     }
 
-    /// Ends a step [s]: the history of a state goes on to it from the state before, or from rest.
+    /// Ends a step [s]: the history of a state is advanced from the state before, or from rest.
     pub(crate) fn end_step(&mut self, before: Option<&State>, state: &mut State, step: f64) {
         if !self.relaxes() {
             return;
@@ -331,7 +350,7 @@ impl System {
         tangent: Option<(Tangent, &[f64])>,
     ) -> Result<(), SolveError> {
         if let Some(touching) = &mut self.touching {
-            touching.evaluate(state);
+            touching.evaluate(state, self.followers.as_ref());
             if tangent.is_some() {
                 self.make_room()?;
             }
@@ -379,6 +398,19 @@ impl System {
             model.springs.iter().chain(&held).for_each(|spring| self.add_spring(spring));
             self.held = held;
         }
+        if let Some(followers) = &self.followers {
+            if tangent.is_some() {
+                let moment = |node: u32| {
+                    let at = |c: usize| 6 * node as usize + 3 + c;
+                    let of = |forces: &[f64]| Vector3::from_fn(|c, _| forces[at(c)]);
+                    of(&self.internal) - of(&self.external) - of(&self.controlled) * state.load_factor
+                };
+                followers.add_turns(&self.equations, &mut self.matrix, moment, |_| 0.0);
+            }
+            for forces in [&mut self.internal, &mut self.external, &mut self.controlled] {
+                followers.give_moments_back(forces);
+            }
+        }
         if let (Some(followers), true) = (&self.followers, tangent.is_some()) {
             let force =
                 |at: usize| self.internal[at] - self.external[at] - state.load_factor * self.controlled[at];
@@ -395,9 +427,16 @@ impl System {
             }
         }
         if let Some(touching) = &self.touching {
-            self.external.iter_mut().zip(&touching.forces).for_each(|(load, force)| *load += force);
+            self.external.iter_mut().zip(&touching.given).for_each(|(load, force)| *load += force);
             if let Some((_, moved)) = tangent {
-                touching.add_stiffness(&self.equations, &mut self.matrix, moved, &mut self.coupling);
+                let followers = self.followers.as_ref();
+                touching.add_stiffness(
+                    &self.equations,
+                    &mut self.matrix,
+                    followers,
+                    moved,
+                    &mut self.coupling,
+                );
             }
         }
         if let Some((_, moved)) = tangent {
@@ -555,7 +594,7 @@ impl System {
         if let (Some(expanded), Some(followers)) = (expanded, &self.followers) {
             let whole = followers.condensed(&facet.nodes, 6, &expanded, result.tangent.as_slice());
             let places = std::mem::take(&mut self.places[number]);
-            self.add_block(&expanded.0, 6, &places, &whole, moved);
+            self.add_block(&expanded.0, expanded.1, &places, &whole, moved);
             self.places[number] = places;
             return;
         }
@@ -853,9 +892,7 @@ impl System {
                 }
             }
         }
-        if let Some(followers) = &self.followers {
-            followers.follow(increments);
-        }
+        self.follow(increments);
     }
 
     /// A vector of equations spread over all components; the others stay as they are.
@@ -863,9 +900,7 @@ impl System {
         for (&component, &value) in self.equations.component.iter().zip(equations) {
             components[component as usize] = value;
         }
-        if let Some(followers) = &self.followers {
-            followers.follow(components);
-        }
+        self.follow(components);
     }
 
     /// Moves a state by a part of an increment, six components a node.
@@ -876,19 +911,21 @@ impl System {
         }
     }
 
-    /// Adds to the stiffness what masses of rigid parts resist with: their rate [kg/s²] and the force [N] of each node, and the rate [N m] of its
-    /// rotary inertia.
+    /// Adds to the stiffness what masses of rigid parts and of nodes that turn with a solid resist with: the rate [kg/s²] of each node and its
+    /// force [N], the rate [N m] of its rotary inertia and its moment [N m].
     pub(crate) fn add_bound_masses(
         &mut self,
         of: impl Fn(u32) -> (f64, Vector3<f64>),
         rotary: impl Fn(u32) -> f64,
+        moment: impl Fn(u32) -> Vector3<f64>,
     ) {
         if let Some(followers) = &self.followers {
-            followers.add_parts(&self.equations, &mut self.matrix, of, rotary);
+            followers.add_parts(&self.equations, &mut self.matrix, of, &rotary);
+            followers.add_turns(&self.equations, &mut self.matrix, moment, rotary);
         }
     }
 
-    /// Takes forces [N] and moments [N m] of inertia on the nodes of rigid parts from a residual.
+    /// Takes forces [N] and moments [N m] of inertia on nodes of rigid parts, and moments on nodes that turn with a solid, from a residual.
     pub(crate) fn give_inertia_back(
         &self,
         force: impl Fn(u32) -> Vector3<f64>,
@@ -896,7 +933,7 @@ impl System {
         residual: &mut [f64],
     ) {
         let Some(followers) = &self.followers else { return };
-        followers.pull_parts(force, moment, |component, force| {
+        followers.pull(force, moment, |component, force| {
             let equation = self.equations.number[component];
             if equation != NONE {
                 residual[equation as usize] -= force;

@@ -1,5 +1,6 @@
 //! Contacts of a model in its equations: their forces are loads and their stiffness is added to that of the cells. The pattern of the matrix grows
-//! with the pairs that may come near, and by more than those, so that it changes seldom.
+//! with the pairs that may come near, and by more than those, so that it changes seldom. What pushes a tied node pushes those that it
+//! follows.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,6 +12,7 @@ use pliant_contact::touch::Contacts;
 use pliant_mechanics::Model;
 
 use crate::error::SolveError;
+use crate::followers::Followers;
 use crate::sparse::{Equations, LowerMatrix};
 use crate::state::State;
 
@@ -63,7 +65,9 @@ pub struct TouchingSystem {
     /// How far rigid things have gone in the step, from 0 to 1.
     pub(crate) share: f64,
     /// Forces on nodes, six a node, and on the second side of each contact.
-    pub(crate) forces: Vec<f64>,
+    forces: Vec<f64>,
+    /// Those forces where the unknowns are: on the nodes that tied ones follow.
+    pub(crate) given: Vec<f64>,
     totals: Vec<Vector3<f64>>,
     /// Of barriers and friction [J]; infinite where there is no gap.
     pub(crate) energy: f64,
@@ -85,6 +89,7 @@ impl TouchingSystem {
             barriers: touching.barriers(model),
             share: 1.0,
             forces: vec![0.0; 6 * model.rest.len()],
+            given: vec![0.0; 6 * model.rest.len()],
             totals: vec![Vector3::zeros(); touching.settings.len()],
             energy: 0.0,
             pairs: Vec::new(),
@@ -94,11 +99,15 @@ impl TouchingSystem {
     }
 
     /// Finds forces and energy at a state.
-    pub(crate) fn evaluate(&mut self, state: &State) {
+    pub(crate) fn evaluate(&mut self, state: &State, followers: Option<&Followers>) {
         self.energy = self.barriers.evaluate(&state.position, self.share);
         self.forces.fill(0.0);
         if self.energy.is_finite() {
             self.barriers.add_forces(&mut self.forces, &mut self.totals);
+        }
+        self.given.copy_from_slice(&self.forces);
+        if let Some(followers) = followers {
+            followers.give_back(&mut self.given);
         }
     }
 
@@ -118,7 +127,7 @@ impl TouchingSystem {
         let still = vec![0.0; self.forces.len()];
         self.barriers.begin(&state.position, &still, [state.time; 2]);
         self.share = 1.0;
-        self.evaluate(state);
+        self.evaluate(state, None);
         self.now()
     }
 
@@ -138,17 +147,22 @@ impl TouchingSystem {
     }
 
     /// Takes up the pairs of nodes that may act soon if the pattern lacks one that acts; whether it does.
-    pub(crate) fn grow(&mut self, equations: &Equations, matrix: &LowerMatrix) -> bool {
+    pub(crate) fn grow(
+        &mut self,
+        equations: &Equations,
+        matrix: &LowerMatrix,
+        followers: Option<&Followers>,
+    ) -> bool {
         let mut lacks = false;
         self.barriers.acting(|nodes| {
-            each_pair(nodes, |pair| lacks = lacks || !matrix.couples(equations, pair));
+            each_pair(nodes, followers, |pair| lacks = lacks || !matrix.couples(equations, pair));
         });
         if !lacks {
             return false;
         }
         let mut needed = Vec::new();
-        self.barriers.acting(|nodes| each_pair(nodes, |pair| needed.push(pair)));
-        self.barriers.near(SOON, |nodes| each_pair(nodes, |pair| needed.push(pair)));
+        self.barriers.acting(|nodes| each_pair(nodes, followers, |pair| needed.push(pair)));
+        self.barriers.near(SOON, |nodes| each_pair(nodes, followers, |pair| needed.push(pair)));
         needed.sort_unstable();
         needed.dedup();
         if self.pairs.len() > ROOM * needed.len() {
@@ -166,19 +180,25 @@ impl TouchingSystem {
         &self,
         equations: &Equations,
         matrix: &mut LowerMatrix,
+        followers: Option<&Followers>,
         moved: &[f64],
         coupling: &mut [f64],
     ) {
         let nodes = self.barriers.node_count();
+        // Nodes that move those of a row: their number, its place in the row, and their weight.
+        let mut movers: Vec<(u32, usize, f64)> = Vec::new();
         self.barriers.stiffness(self.share, |stencil, block, mut ways| {
             let own = |at: usize| stencil.nodes[at] as usize;
             let count = usize::from(stencil.count);
-            for row in (0..count).filter(|&at| own(at) < nodes && acts(block, at)) {
-                for column in (0..count).filter(|&at| own(at) < nodes && acts(block, at)) {
-                    let pair = [row, column].map(|at| stencil.nodes[at]);
-                    if pair[0] >= pair[1] {
-                        let entry = |i, j| block[(3 * row + i, 3 * column + j)];
-                        matrix.add_node_block(equations, pair, entry);
+            movers.clear();
+            for at in (0..count).filter(|&at| own(at) < nodes && acts(block, at)) {
+                movers_of(stencil.nodes[at], followers, |node, weight| movers.push((node, at, weight)));
+            }
+            for &(row_node, row, w) in &movers {
+                for &(column_node, column, v) in &movers {
+                    if row_node >= column_node {
+                        let entry = |i, j| w * v * block[(3 * row + i, 3 * column + j)];
+                        matrix.add_node_block(equations, [row_node, column_node], entry);
                     }
                 }
             }
@@ -189,14 +209,14 @@ impl TouchingSystem {
             if ways == [Vector3::zeros(); 4] {
                 return;
             }
-            for row in (0..count).filter(|&at| own(at) < nodes && acts(block, at)) {
+            for &(node, row, weight) in &movers {
                 let pull: Vector3<f64> = (0..count)
                     .map(|column| block.fixed_view::<3, 3>(3 * row, 3 * column) * ways[column])
                     .sum();
                 for i in 0..3 {
-                    let equation = equations.number[6 * own(row) + i];
+                    let equation = equations.number[6 * node as usize + i];
                     if let Some(own) = coupling.get_mut(equation as usize) {
-                        *own += pull[i];
+                        *own += weight * pull[i];
                     }
                 }
             }
@@ -222,10 +242,26 @@ impl TouchingSystem {
     }
 }
 
-/// Calls back with each pair of these nodes, the lower number first.
-fn each_pair(nodes: &[u32], mut found: impl FnMut([u32; 2])) {
+/// Calls back with each pair of the nodes that move these, the lower number first.
+fn each_pair(nodes: &[u32], followers: Option<&Followers>, mut found: impl FnMut([u32; 2])) {
     for (at, &a) in nodes.iter().enumerate() {
-        nodes[..at].iter().for_each(|&b| found([a.min(b), a.max(b)]));
+        for &b in &nodes[..at] {
+            movers_of(a, followers, |a, _| {
+                movers_of(b, followers, |b, _| {
+                    if a != b {
+                        found([a.min(b), a.max(b)]);
+                    }
+                });
+            });
+        }
+    }
+}
+
+/// Calls back with the nodes that move a node, and their weights: itself, or those that it is tied to.
+fn movers_of(node: u32, followers: Option<&Followers>, mut found: impl FnMut(u32, f64)) {
+    match followers.filter(|followers| followers.follows(node)) {
+        None => found(node, 1.0),
+        Some(followers) => followers.weights(node).for_each(|(node, weight)| found(node, weight)),
     }
 }
 

@@ -118,15 +118,6 @@ struct Decimation<'m> {
 impl TriangleMesh {
     /// Reduces the number of triangles and returns it. It exceeds the requested number if nothing more can collapse.
     pub fn decimate(&mut self, until: Fewer) -> Result<usize, MeshingError> {
-        self.decimate_with(until, false)
-    }
-
-    /// The same without making triangles cross each other, from [`UNCROSSED`] down.
-    pub(crate) fn decimate_uncrossed(&mut self, until: Fewer) -> Result<usize, MeshingError> {
-        self.decimate_with(until, true)
-    }
-
-    fn decimate_with(&mut self, until: Fewer, uncrossed: bool) -> Result<usize, MeshingError> {
         let (least, limit) = match until {
             Fewer::Triangles(number) => {
                 require_positive("the number of triangles", number as f64)?;
@@ -137,15 +128,26 @@ impl TriangleMesh {
                 (0, distance)
             }
         };
-        let origin = self.alive().next().map_or(Vector3::zeros(), |t| self.corners(t)[0]);
-        let mut work = Decimation::new(self, origin);
-        work.uncrossed = uncrossed;
-        Ok(work.run(least, limit))
+        Ok(Decimation::new(self).run(least, limit))
+    }
+
+    /// The surface in each of some numbers of triangles, decreasing, or in a few more where nothing more can collapse. From [`UNCROSSED`]
+    /// down collapses do not make triangles cross each other.
+    pub(crate) fn decimated_to_each(mut self, numbers: &[usize]) -> Vec<Self> {
+        let mut work = Decimation::new(&mut self);
+        work.uncrossed = true;
+        let at = |&number: &usize| {
+            work.run(number, f64::INFINITY);
+            let (points, triangles) = work.mesh.compact();
+            Self::new(points, triangles)
+        };
+        numbers.iter().map(at).collect()
     }
 }
 
 impl<'m> Decimation<'m> {
-    fn new(mesh: &'m mut TriangleMesh, origin: Vector3) -> Self {
+    fn new(mesh: &'m mut TriangleMesh) -> Self {
+        let origin = mesh.alive().next().map_or(Vector3::zeros(), |t| mesh.corners(t)[0]);
         let mut quadrics = vec![[Quadric::default(); 2]; mesh.points.len()];
         for t in mesh.alive() {
             let x = mesh.corners(t).map(|x| x - origin);
@@ -311,12 +313,12 @@ mod tests {
             let (points, triangles) = mesh.compact();
             crossings(&points, &triangles).0.len()
         };
-        let (mut plain, mut uncrossed) = (fine.clone(), fine);
+        let mut plain = fine.clone();
         plain.decimate(Fewer::Triangles(120)).unwrap();
-        let number = uncrossed.decimate_uncrossed(Fewer::Triangles(120)).unwrap();
         assert!(crossing(&plain) > 0);
-        assert_eq!(crossing(&uncrossed), 0);
-        assert!(number < 500, "{number}");
+        let stages = fine.decimated_to_each(&[1000, 120]);
+        assert!(stages.iter().all(|stage| crossing(stage) == 0));
+        assert!(stages[0].len() <= 1000 && stages[1].len() < 500, "{}", stages[1].len());
     }
 
     /// A square needs two triangles, and its border doesn't move.

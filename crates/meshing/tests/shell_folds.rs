@@ -106,24 +106,22 @@ impl ImplicitField for Vessels {
     }
 }
 
-/// 145,000 triangles. 0.35 % of the diagonal is out of reach of the work allowed, which ends the fit; vessels are not lost on the way.
-/// The report says where shells cross.
+/// 145,000 triangles: few flat ones have lost vessels, so the fit starts from more, reaches the goal within the work allowed, and no shells
+/// cross.
 #[test]
 #[ignore = "about a minute"]
-fn the_work_for_a_large_organ_with_vessels_is_bounded() {
+fn a_large_organ_with_vessels_is_fitted_without_crossings() {
     let surface = TriangleMesh::of_field(&Vessels, 0.0012, DEFAULT_CELL_LIMIT).unwrap();
     let rounds = std::cell::Cell::new(0);
     let told = |progress: pliant_meshing::FitProgress| rounds.set(progress.round);
     let report = FittedShells::new(&surface, ShellGoal::Error(0.0035), &told).unwrap().report;
     println!("{report}");
-    assert!(rounds.get() <= 10 && report.rounds == rounds.get());
-    assert!(!report.reached && report.stopped);
-    assert!(report.distances.largest() <= 0.018 * report.diagonal, "{report}");
-    let warnings = report.warnings();
-    assert!(warnings[0].contains("the best so far is"), "{report}");
-    let count = report.crossings.count;
-    assert_eq!(report.crossings.place.is_some(), count > 0);
-    assert!(count == 0 || warnings[1].starts_with(&format!("{count} shell")), "{report}");
+    assert_eq!(report.rounds, rounds.get());
+    assert!(
+        report.reached && !report.stopped && report.distances.largest() <= 0.0035 * report.diagonal,
+        "{report}"
+    );
+    assert_eq!(report.crossings, Flaw::default(), "{report}");
 }
 
 const FEW: ShellGoal = ShellGoal::Shells(120);

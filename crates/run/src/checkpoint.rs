@@ -443,7 +443,11 @@ impl Checkpoint {
     pub(crate) fn state(&self, world: &World, simulated: &pliant_sim::World) -> Option<State> {
         let parts = &world.participants;
         let constraints: usize = parts.iter().map(|part| part.built.model.constraints.len()).sum();
-        let whole = self.progressed.history.reactions.iter().all(|row| row.len() == constraints)
+        let history = &self.progressed.history;
+        let all = parts.iter().flat_map(|part| &part.built.model.constraints);
+        let filled = all.filter(|own| own.motion.encloses()).count();
+        let whole = history.reactions.iter().all(|row| row.len() == constraints)
+            && history.enclosed.len() == filled * history.times.len()
             && self.progressed.watched.len() == parts.len()
             && self.origin.participants.len() == parts.len();
         if whole { State::decode(simulated, &self.participants) } else { None }
@@ -590,7 +594,7 @@ mod tests {
     /// The layout of [`State`] and [`Progressed`] decides what a checkpoint can be read with: whoever changes it gives
     /// [`FORMAT`] the next number, and this test the new bytes.
     #[test]
-    fn the_layout_of_format_11_is_as_it_was() {
+    fn the_layout_of_format_12_is_as_it_was() {
         let bytes = |run: &str| {
             let world = World::new(&scene(run)).unwrap();
             world.simulation().unwrap().encode().unwrap()[0].len()

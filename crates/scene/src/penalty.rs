@@ -4,7 +4,7 @@ use pliant_sim::PenaltyTie;
 
 use crate::assemble::{Placed, attach, holds_nothing};
 use crate::diagnostic::Diagnostic;
-use crate::format::{SolverName, StepChoice, TieTable};
+use crate::format::{Rotations, SolverName, StepChoice, TieTable};
 use crate::world::{Part, World};
 
 /// Steps in an automatic one of explicit participants that are tied to others. A body at half of its usual step leaves ties more of the
@@ -30,6 +30,13 @@ impl World {
             let source = &self.scene.source;
             if at(1, host).body.is_of_bars() {
                 out.push(holds_nothing(source, &["tie", name, "between"], &table.between[1]));
+                continue;
+            }
+            if table.rotations == Rotations::Follow {
+                let message = format!("the springs of `{name}`, between participants, hold places alone");
+                let help = "leave `rotations` out, or put both bodies into one participant with the solver `implicit` or `static`";
+                let place = source.span(&["tie", name, "rotations"]);
+                out.push(Diagnostic::error(message).at(place, "two participants").help(help));
                 continue;
             }
             let guest = at(0, guest);

@@ -97,6 +97,7 @@ impl ImplicitBodies {
     /// Each part of the model in words, with its [`fingerprint`].
     pub fn fingerprints(&self) -> Vec<(String, u64)> {
         let model = &self.model;
+        let turns: Vec<_> = model.turns.iter().map(|turn| (turn.node, &turn.gradient)).collect();
         vec![
             ("the mesh, thickness or material of shells".into(), fingerprint(&model.facets)),
             ("springs".into(), fingerprint(&model.springs)),
@@ -106,6 +107,7 @@ impl ImplicitBodies {
                 "barriers of contacts".into(),
                 fingerprint(&model.touching.as_ref().map(|touching| &touching.settings)),
             ),
+            ("rotations that follow solids".into(), fingerprint(&turns)),
             ("damping by stiffness".into(), fingerprint(&model.stiffness_damping)),
         ]
     }

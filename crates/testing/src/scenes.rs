@@ -316,6 +316,18 @@ pub fn last_row(text: &str) -> BTreeMap<String, f64> {
     last_row_in(&out.path().join("out"))
 }
 
+/// Compares two rows: the columns whose names have a word differ by less than its limit, as a part of the largest of them in the first.
+#[track_caller]
+pub fn assert_rows_agree(what: &str, [one, other]: [&BTreeMap<String, f64>; 2], limits: &[(&str, f64)]) {
+    for (word, limit) in limits {
+        let of_word = || one.iter().filter(|(name, _)| name.contains(word));
+        let largest = of_word().map(|(_, value)| value.abs()).fold(0.0, f64::max);
+        let off = of_word().map(|(name, value)| (value - other[name]).abs()).fold(0.0, f64::max);
+        println!("{what}: {word} {:.1e} of {largest:e}", off / largest);
+        assert!(largest > 0.0 && off < limit * largest, "{what}: {word} {off:e} of {largest:e}");
+    }
+}
+
 /// The last row of the table in the folder of a run, by the names of its columns.
 pub fn last_row_in(folder: &Path) -> BTreeMap<String, f64> {
     let table = fs::read_to_string(folder.join("history.csv")).unwrap();

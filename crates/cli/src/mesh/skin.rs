@@ -55,7 +55,8 @@ pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
     if arguments.json {
         let mut object = made.object;
         object["input"] = found.object;
-        object["warnings"] = json!(found.warnings);
+        made.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+        object["warnings"] = json!(found.warnings.iter().chain(&made.warnings).collect::<Vec<_>>());
         object["files"] = json!(files.iter().map(|(path, _)| path).collect::<Vec<_>>());
         say(object)?;
     }
@@ -132,6 +133,8 @@ struct Made {
     error_map: Option<Mesh>,
     lines: Vec<String>,
     object: Json,
+    /// Those that its lines have.
+    warnings: Vec<String>,
 }
 
 fn make(arguments: &MeshImage, found: &TriangleMesh, goal: Goal, bar: &Bar) -> Result<Made, Failure> {
@@ -169,7 +172,7 @@ fn shells(fitted: FittedShells) -> Made {
     let FittedShells { mesh, error_map, report } = fitted;
     let lines = vec![report.to_string()];
     let object = json!({ "status": "done", "as": "shells", "report": report });
-    Made { mesh, error_map: Some(error_map), lines, object }
+    Made { mesh, error_map: Some(error_map), lines, object, warnings: report.warnings() }
 }
 
 fn triangles(surface: &TriangleMesh, distances: &Hausdorff, diagonal: f64) -> Made {
@@ -200,7 +203,7 @@ fn triangles(surface: &TriangleMesh, distances: &Hausdorff, diagonal: f64) -> Ma
         "volume": volume, "least_angle": angle, "components": pieces, "border_edges": borders,
         "distances": distances, "diagonal": diagonal,
     });
-    Made { mesh, error_map: None, lines, object }
+    Made { mesh, error_map: None, lines, object, warnings: Vec::new() }
 }
 
 /// The smallest angle of a triangle [rad].

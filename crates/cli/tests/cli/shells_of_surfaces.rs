@@ -100,7 +100,13 @@ fn pressed(body: Body, goal: [&str; 2]) -> (serde_json::Value, Mesh, Told) {
 fn pressed_file(workshop: &Workshop, file: &str, more: &[&str]) -> (serde_json::Value, Mesh, Told) {
     let words = ["mesh", file, "--as", "shells", "-o", "shells.vtu", "--json"];
     let told = workshop.pliant(&[&words, more].concat());
-    let report = told.done()["report"].clone();
+    let done = told.done();
+    let report = done["report"].clone();
+    let warned =
+        |words| done["warnings"].as_array().unwrap().iter().any(|w| w.as_str().unwrap().contains(words));
+    assert_eq!(warned("without a normal"), report["creases"]["count"] != 0, "{done}");
+    assert_eq!(warned("through"), report["crossings"]["count"] != 0, "{done}");
+    assert_eq!(warned("not reached"), report["reached"] == false, "{done}");
     println!("{report}");
     let mesh = io::read(&workshop.path("shells.vtu")).unwrap().mesh;
     let run = workshop.run(&[]);

@@ -1,5 +1,6 @@
 //! How much work a fit may take, counted in searches for the nearest point of the target: the same count, and the same shells, on every
-//! machine with any number of threads.
+//! machine with any number of threads. It does not grow with the number of triangles of the target: points of the target that are looked
+//! at have a largest number (`target`), so that a round costs what its shells cost.
 
 /// A search for the nearest place of the shells weighs as much as this many for the nearest point of the target.
 pub(super) const LANDING: usize = 4;
@@ -23,6 +24,11 @@ impl Effort {
 
     pub(super) fn new(most: usize) -> Self {
         Self { done: 0, most }
+    }
+
+    /// The same with at least a part of the whole left.
+    pub(super) fn with_left(self, part: f64) -> Self {
+        Self { done: self.done.min(((1.0 - part) * self.most as f64) as usize), ..self }
     }
 
     /// Adds a number of searches of a weight.

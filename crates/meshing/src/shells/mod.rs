@@ -2,8 +2,8 @@
 //! A decimated surface starts; then, round by round, the shells that are too far off, either way, are halved at their longest edges, and
 //! round them triangles are evened out and fitted again, while the others rest. What is reached is looked at more closely before it counts.
 //! Normals stand within 60° of their triangles and shells do not pass through each other: where they would, they are halved, too.
-//! What crosses in the end is repaired (`repair`). The work is bounded, by a count that is the same on every machine; what was closest by
-//! then is the result.
+//! What crosses in the end is repaired (`repair`). Where a fit fails, it starts again from finer triangles (`start`). The work is bounded,
+//! by a count that is the same on every machine; what was closest by then is the result.
 //! Leaves out: creases of the target, but where it folds too sharply for one normal; edges that bend more than their end normals tell.
 
 mod crossing;
@@ -14,21 +14,19 @@ mod refine;
 mod repair;
 mod report;
 mod solve;
+mod start;
 mod target;
 mod upright;
 
 use pliant_geometry::{CurvedTriangle, EdgeRule, Mesh, Vector3};
 
-use crate::decimate::Fewer;
 use crate::error::{MeshingError, require_positive};
 use crate::triangles::TriangleMesh;
 use effort::Effort;
 use measure::Distances;
 pub use report::{Flaw, ShellReport};
+use start::Starts;
 use target::Target;
-
-/// Shells to start from where an error is asked for.
-const START: usize = 100;
 
 /// Rounds after the goal is reached, where distances can fall or triangles are poor.
 const LAST_ROUNDS: usize = 4;
@@ -57,8 +55,14 @@ const MENDING_ROUNDS: usize = 4;
 /// Shells with creases or crossings are halved down to edges of this part of the diagonal, or of the error asked for.
 const LEAST_EDGE: f64 = 1e-3;
 
-/// A target of more triangles is not started from [`START`] shells but from half as many flat triangles as it takes to come as close.
-const LARGE: usize = 50_000;
+/// Part of the work allowed after which a fit is given up that is not [`UPRIGHT_FROM`] of the way and has not come this much nearer in so
+/// many rounds, if there are finer triangles to start from.
+const GIVEN_UP: f64 = 0.5;
+const NEARER: f64 = 1.05;
+const STUCK: usize = 3;
+
+/// Part of the work allowed that a second fit has at least.
+const AGAIN: f64 = 0.5;
 
 /// So many shells are fitted once a round, fewer up to four times.
 const MANY: usize = 3000;
@@ -120,24 +124,38 @@ impl FittedShells {
         goal: ShellGoal,
         progress: &dyn Fn(FitProgress),
     ) -> Result<Self, MeshingError> {
-        let mut mesh = target.clone();
-        let (start, most) = match goal {
+        let most = match goal {
             ShellGoal::Error(error) => {
                 require_positive("the error", error)?;
-                let start = if mesh.len() > LARGE {
-                    mesh.decimate_uncrossed(Fewer::Distance(error * target.diagonal()))? / 2
-                } else {
-                    0
-                };
-                (start.max(START), Effort::MOST)
+                Effort::MOST
             }
             ShellGoal::Shells(number) => {
                 require_positive("the number of shells", number as f64)?;
-                (number.div_ceil(2), Effort::MOST_TO_A_NUMBER)
+                Effort::MOST_TO_A_NUMBER
             }
         };
-        mesh.decimate_uncrossed(Fewer::Triangles(start))?;
-        Ok(Fit::new(&Target::new(target), &mesh, goal, most).run(progress))
+        let surface = target;
+        let target = Target::new(surface);
+        let Starts { first, finer, is_lost } = Starts::new(surface, goal, &target);
+        if is_lost {
+            return Ok(Fit::new(&target, &first, goal, Effort::new(most), true).unfitted());
+        }
+        let (mut fitted, effort) =
+            Fit::new(&target, &first, goal, Effort::new(most), finer.is_none()).run(progress);
+        let last = finer.as_ref().unwrap_or(&first);
+        if fitted.report.fails() && finer.is_some() {
+            let again = Fit::new(&target, last, goal, effort.with_left(AGAIN), true).run(progress).0;
+            fitted = fitted.better(again);
+        }
+        if fitted.report.crossings.count > 0 {
+            fitted = fitted.better(Fit::new(&target, last, goal, effort, true).unfitted());
+        }
+        Ok(fitted)
+    }
+
+    /// The one that crosses less, reaches its goal, or is closer.
+    fn better(self, other: Self) -> Self {
+        if other.report.standing() < self.report.standing() { other } else { self }
     }
 
     /// Fits the shells of given triangles to a surface, without changing which points they join.
@@ -166,6 +184,8 @@ struct Fit<'t> {
     /// Whether distances are looked at closely.
     closely: bool,
     best: Option<(Standing, Shells)>,
+    /// Whether nothing else is tried if it fails.
+    is_last: bool,
 }
 
 /// How good shells are; the least is best. Whether the goal is missed, how many shells cross or have creases, whether triangles are poor,
@@ -173,22 +193,32 @@ struct Fit<'t> {
 type Standing = (bool, usize, bool, f64);
 
 impl<'t> Fit<'t> {
-    fn new(target: &'t Target, mesh: &TriangleMesh, goal: ShellGoal, most: usize) -> Self {
+    fn new(target: &'t Target, mesh: &TriangleMesh, goal: ShellGoal, effort: Effort, is_last: bool) -> Self {
         let aim = match goal {
             ShellGoal::Error(error) => error * target.diagonal,
             ShellGoal::Shells(_) => 0.0,
         };
         let mut shells = Shells::new(mesh, target);
         shells.place_border(target);
-        Self { target, goal, aim, shells, rounds: 0, effort: Effort::new(most), closely: false, best: None }
+        Self { target, goal, aim, shells, rounds: 0, effort, closely: false, best: None, is_last }
     }
 
-    fn run(mut self, progress: &dyn Fn(FitProgress)) -> FittedShells {
+    /// The shells of the triangles that it starts from, which do not cross, with the normals of the target.
+    fn unfitted(mut self) -> FittedShells {
+        self.shells.require_upright();
+        self.shells.uncross(&mut self.effort);
+        self.shells.crease_crossing();
+        self.shells.finished(self.target, 0, self.goal, false)
+    }
+
+    /// Fits as long as it helps. Returns the shells, and the work done so far.
+    fn run(mut self, progress: &dyn Fn(FitProgress)) -> (FittedShells, Effort) {
         let target = self.target;
         self.shells.even_out(target, 10, &mut self.effort);
         let mut now = self.shells.distances(&target.coarse, target);
         let (mut left, mut mending) = (LAST_ROUNDS, MENDING_ROUNDS);
-        let mut ended = false;
+        let (mut ended, mut nearest, mut nearest_in) = (false, 0.0, 0);
+        let mut given_up = false;
         while self.rounds < MOST_ROUNDS && !self.effort.is_spent() {
             self.rounds += 1;
             let times = if self.shells.moving() > MANY { 1 } else { 4 };
@@ -196,6 +226,14 @@ impl<'t> Fit<'t> {
             let far = now.far();
             let (part, bound, room) = self.bounds(&far);
             progress(self.progress(&far, part));
+            if part > NEARER * nearest {
+                (nearest, nearest_in) = (part, self.rounds);
+            }
+            let stays = nearest < UPRIGHT_FROM && self.rounds >= nearest_in + STUCK;
+            given_up = !self.is_last && stays && self.effort.part() > GIVEN_UP;
+            if given_up {
+                break;
+            }
             if !self.shells.strict && (part >= UPRIGHT_FROM || self.effort.part() >= UPRIGHT_AFTER) {
                 // Those before may cross.
                 self.best = None;
@@ -252,8 +290,11 @@ impl<'t> Fit<'t> {
         shells.require_upright();
         shells.activate((0..shells.mesh.points.len() as u32).collect());
         shells.uncross(&mut self.effort);
-        shells.repair(target);
-        shells.finished(target, self.rounds, self.goal, !ended)
+        if !given_up {
+            shells.repair(target);
+            shells.crease_crossing();
+        }
+        (shells.finished(target, self.rounds, self.goal, !ended), self.effort)
     }
 
     /// How much of the goal is reached, the distance above which shells are halved [m], and how many may be.

@@ -33,7 +33,8 @@ pub struct ShellReport {
     pub reached: bool,
     /// Whether the bound on work or on rounds ended the fit short of its goal.
     pub stopped: bool,
-    /// Vertices where the surface folds too sharply for a normal within 60° of all triangles: they have none, `normal` is zero there.
+    /// Vertices where the surface folds too sharply for a normal within 60° of all triangles, or for curved shells that do not cross: they
+    /// have none, `normal` is zero there.
     pub creases: Flaw,
     /// Shells that pass through themselves or each other.
     pub crossings: Flaw,
@@ -77,13 +78,23 @@ impl ShellReport {
         });
         let creases = (self.creases.count > 0).then(|| {
             format!(
-                "{} without a normal, at {} and elsewhere: the surface folds too sharply there for one within 60° of all triangles; \
-                 in a scene they are creases",
+                "{} without a normal, at {} and elsewhere: the surface folds too sharply there for one within 60° of all triangles, \
+                 or for curved shells that do not cross; in a scene they are creases",
                 counted(self.creases.count, "node is", "nodes are"),
                 self.creases.place(),
             )
         });
         missed.into_iter().chain(crossings).chain(creases).collect()
+    }
+
+    /// Whether they cross or miss the goal.
+    pub(super) fn fails(&self) -> bool {
+        self.crossings.count > 0 || !self.reached
+    }
+
+    /// How bad they are; the least is best. How many cross, whether they miss the goal, and how far off they are [m].
+    pub(super) fn standing(&self) -> (usize, bool, f64) {
+        (self.crossings.count, !self.reached, self.distances.largest())
     }
 
     fn missed(&self) -> String {

@@ -153,6 +153,8 @@ pub(crate) struct History {
     pub energies: Vec<Energies>,
     /// Size of each constraint's reaction [N].
     pub reactions: Vec<Vec<f64>>,
+    /// Volume [m³] and pressure [Pa] of each constraint of volume, one instant after the other.
+    pub enclosed: Vec<[f64; 2]>,
 }
 
 impl History {
@@ -161,6 +163,13 @@ impl History {
         self.energies.push(Energies::total(frames.iter().map(|frame| frame.now.energies())));
         let size = |force: [f64; 3]| force.iter().map(|f| f * f).sum::<f64>().sqrt();
         self.reactions.push(frames.iter().flat_map(Frame::reactions).map(size).collect());
+        for frame in frames {
+            let constraints = frame.part.built.model.constraints.iter().enumerate();
+            for (index, _) in constraints.filter(|(_, own)| own.motion.encloses()) {
+                let Enclosed { volume, pressure } = frame.now.enclosed(index).unwrap_or_default();
+                self.enclosed.push([volume, pressure]);
+            }
+        }
     }
 }
 

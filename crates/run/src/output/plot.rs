@@ -1,4 +1,5 @@
-//! SVG plots: of a run the size of each reaction, and the energies, over time; of a sweep each reaction in all runs.
+//! SVG plots: of a run the size of each reaction, the energies, and pressure and volume of what constraints fill, over time; of a sweep each
+//! reaction in all runs.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -7,8 +8,6 @@ use pliant_mechanics::model::Constraint;
 
 use super::History;
 use pliant_scene::World;
-
-const SIZE: (u32, u32) = (900, 760);
 
 /// Colours that colour-blind eyes tell apart (Okabe and Ito 2008).
 const COLOURS: [RGBColor; 7] = [
@@ -25,7 +24,8 @@ const COLOURS: [RGBColor; 7] = [
 pub(crate) const MOST_CURVES: usize = 14;
 /// Panels in it.
 const MOST_PANELS: usize = 6;
-/// Height of such a panel.
+/// Width of a plot, and height of a panel.
+const WIDTH: u32 = 900;
 const HEIGHT: u32 = 380;
 
 /// A named curve of values over time [s].
@@ -52,16 +52,19 @@ pub(crate) fn constraints(world: &World) -> impl Iterator<Item = &Constraint> {
 pub(crate) fn plot(world: &World, history: &History) -> Result<String, String> {
     let mut svg = String::new();
     {
-        let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+        let filled: Vec<&str> =
+            constraints(world).filter(|own| own.motion.encloses()).map(|own| own.name.as_str()).collect();
+        let panels = if filled.is_empty() { 2 } else { 4 };
+        let root = SVGBackend::with_string(&mut svg, (WIDTH, HEIGHT * panels)).into_drawing_area();
         root.fill(&WHITE).map_err(|error| error.to_string())?;
-        let (upper, lower) = root.split_vertically(SIZE.1 / 2);
+        let areas = root.split_evenly((panels as usize, 1));
         let reactions: Vec<Curve<'_>> = (constraints(world).enumerate())
             .filter(|(_, constraint)| !constraint.motion.encloses())
             .map(|(index, constraint)| {
                 Curve::new(&constraint.name, &history.times, history.reactions.iter().map(|row| row[index]))
             })
             .collect();
-        panel(&upper, "Reaction", "N", &reactions)?;
+        panel(&areas[0], "Reaction", "N", &reactions)?;
         let energy = |name, of: fn(&pliant_mechanics::Energies) -> f64| {
             Curve::new(name, &history.times, history.energies.iter().map(of))
         };
@@ -72,7 +75,15 @@ pub(crate) fn plot(world: &World, history: &History) -> Result<String, String> {
             energy("damping", |e| e.damping),
             energy("hourglass", |e| e.hourglass),
         ];
-        panel(&lower, "Energy", "J", &energies)?;
+        panel(&areas[1], "Energy", "J", &energies)?;
+        for (area, (kind, title, unit)) in areas[2..].iter().zip([(1, "Pressure", "Pa"), (0, "Volume", "m³")])
+        {
+            let values = |at: usize| history.enclosed.iter().skip(at).step_by(filled.len());
+            let curves: Vec<Curve<'_>> = (filled.iter().enumerate())
+                .map(|(at, name)| Curve::new(name, &history.times, values(at).map(|own| own[kind])))
+                .collect();
+            panel(area, title, unit, &curves)?;
+        }
         root.present().map_err(|error| error.to_string())?;
     }
     Ok(svg)
@@ -93,7 +104,7 @@ pub(crate) fn plot_of_sweep(runs: &[(String, Reactions)]) -> Result<Option<Strin
     }
     let mut svg = String::new();
     {
-        let size = (SIZE.0, HEIGHT * names.len() as u32);
+        let size = (WIDTH, HEIGHT * names.len() as u32);
         let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
         root.fill(&WHITE).map_err(|error| error.to_string())?;
         for (area, name) in root.split_evenly((names.len(), 1)).iter().zip(&names) {

@@ -90,6 +90,51 @@ fn a_sheet_hangs_in_a_funnel() {
     assert!((ends[0] - ends[1]).abs() < 2e-4, "{ends:?}");
 }
 
+/// The block with a coat of a model on its top, on the nodes of the block or on a mesh of its own that is tied, which the ball presses.
+fn coated(run: &str, model: &str, mesh: &str, more: &str) -> String {
+    let (mesh, tie) = match mesh {
+        "on" => ("on = 'block'\nfaces = { set = 'z-max' }".to_owned(), ""),
+        cells => (
+            format!("mesh = {{ plate = {{ size = [0.04, 0.04], cells = {cells} }}, at = [0, 0, 0.02] }}"),
+            "[tie.glue]\nbetween = ['coat', 'block']\n",
+        ),
+    };
+    let coat = format!(
+        "[law.coat]\ntype = 'neo-hookean'\nyoung-modulus = 1e5\npoisson-ratio = 0.4\n\
+         [body.coat]\nmodel = '{model}'\n{mesh}\nlaw = 'coat'\ndensity = 1000\nthickness = 5e-4\n{tie}{more}"
+    );
+    pressed(run, &format!("{HELD}{coat}"))
+        .replace("['block', 'ball']\n", "['coat', 'ball']\nthickness = 0\n")
+        .replace("on = 'block', at = [0.02, 0.02, 0.02]", "on = 'coat', at = [0.02, 0.02, 0.02]")
+}
+
+/// What presses a tied coat presses the block below: on the same triangles as on a coat with the nodes of the block, on another mesh in balance
+/// with what holds the block.
+#[test]
+fn a_tied_coat_is_pressed_as_one_on_the_nodes_of_its_block() {
+    for (run, model, balanced) in [
+        ("solver = 'static'\nload-steps = 10", "membrane", 1e-6),
+        ("solver = 'static'\nload-steps = 10", "shell", 1e-6),
+        // Not quite at rest in the end.
+        ("solver = 'implicit'\nstep = 0.02", "shell", 5e-3),
+    ] {
+        let [on, same, _] = ["on", "[6, 6]", "[7, 9]"].map(|mesh| {
+            let row = last_row(&coated(run, model, mesh, ""));
+            let (up, down) = (row["contact.above.z"], row["reaction.base.z"]);
+            println!("{run}, {model} {mesh}: {up} N on the ball, {down} N below");
+            assert!(up > 0.03 && (up / down.abs() - 1.0).abs() < balanced, "{up} {down}");
+            assert!(row["probe.top.gap"] > 0.0 && row["probe.top.contact-force.z"] < 0.0);
+            up
+        });
+        assert!((same / on - 1.0).abs() < 1e-6, "{on} {same}");
+    }
+    let run = "solver = 'implicit'\nstep = 0.05\ncheckpoint = { every = 0.4 }";
+    resumes(&coated(run, "shell", "[7, 9]", "rotations = 'follow'\n"));
+    let rigid = "[constraint.bone]\ntype = 'rigid'\nbody = 'block'\nnodes = { set = 'z-max' }\n";
+    let told = world(&coated(run, "shell", "[7, 9]", rigid)).err().unwrap();
+    assert!(told.contains("follows others by a rigid part or a mean"), "{told}");
+}
+
 /// Each mistake is refused with its place and a remedy.
 #[test]
 fn mistakes_are_refused() {

@@ -16,6 +16,7 @@ mod participants;
 mod penalty;
 mod static_solids;
 mod ties;
+mod turns;
 mod volumes;
 mod walls;
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use pliant_testing::scenes::{last_row, resumes, run, world};
+use pliant_testing::scenes::{assert_rows_agree, last_row, resumes, run, world};
 
 /// A balloon of 30 mm that is held at its neck, with a constraint on its volume; at rest it encloses 1.07e-4 m³.
 fn balloon(model: &str, solver: &str, volume: &str, more: &str) -> String {
@@ -26,13 +26,11 @@ fn agree(first: &str, others: &[String]) {
     for other in others {
         let row = last_row(other);
         let solver = other.lines().nth(3).unwrap();
-        for (field, limit) in [("displacement", 1e-5), ("pressure.", 1e-5), ("volume.", 1e-9)] {
-            let of_field = || newton.iter().filter(|(name, _)| name.contains(field));
-            let largest = of_field().map(|(_, value)| value.abs()).fold(0.0, f64::max);
-            let off = of_field().map(|(name, value)| (value - row[name]).abs()).fold(0.0, f64::max);
-            println!("{solver}: {field} {:.1e}", off / largest);
-            assert!(largest > 0.0 && off < limit * largest, "{solver}: {field} {off:e} of {largest:e}");
-        }
+        assert_rows_agree(
+            solver,
+            [&newton, &row],
+            &[("displacement", 1e-5), ("pressure.", 1e-5), ("volume.", 1e-9)],
+        );
     }
 }
 
@@ -196,7 +194,7 @@ fn a_balloon_is_pressed_onto_a_floor() {
     }
 }
 
-/// The work of the pressure is counted, and the summary tells volume and pressure.
+/// The work of the pressure is counted, and summary and plot tell volume and pressure.
 #[test]
 fn the_pressure_works() {
     for solver in
@@ -215,6 +213,12 @@ fn the_pressure_works() {
     assert!(summary.energy_balance.unwrap().abs() < 0.01, "{:?}", summary.energy_balance);
     let [(name, [volume, pressure])] = &summary.volumes[..] else { panic!("{:?}", summary.volumes) };
     assert!(name == "air" && *volume > 1.4e-4 && *pressure > 1000.0, "{volume} {pressure}");
+    let plot = std::fs::read_to_string(out.path().join("plot.svg")).unwrap();
+    assert!(
+        ["Pressure [Pa]", "Volume [m³]", "Reaction [N]", "Energy [J]"]
+            .iter()
+            .all(|title| plot.contains(title))
+    );
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::fs;
 
 use pliant_geometry::{CellKind, io};
-use pliant_testing::scenes::{last_row, resumes, run, world};
+use pliant_testing::scenes::{assert_rows_agree, last_row, resumes, run, world};
 
 use super::static_solids::{MATRIX, block};
 
@@ -23,13 +23,7 @@ fn coated(solver: &str, element: &str, more: &str, capsule: &str) -> String {
 
 fn compare(one: &str, other: &str, limits: &[(&str, f64)]) {
     let (one, other) = (last_row(one), last_row(other));
-    for (field, limit) in limits {
-        let of_field = || one.iter().filter(|(name, _)| name.contains(field));
-        let largest = of_field().map(|(_, value)| value.abs()).fold(0.0, f64::max);
-        let off = of_field().map(|(name, value)| (value - other[name]).abs()).fold(0.0, f64::max);
-        println!("{field} {:.1e}", off / largest);
-        assert!(largest > 0.0 && off < limit * largest, "{field}: {off:e} of {largest:e}");
-    }
+    assert_rows_agree("walls", [&one, &other], limits);
 }
 
 /// The same coated block by Newton's method, dynamic relaxation, and at rest after a damped motion.

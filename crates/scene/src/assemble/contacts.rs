@@ -1,5 +1,6 @@
 //! Obstacles and tools, and who touches whom.
 
+use std::collections::HashSet;
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
@@ -8,6 +9,7 @@ use pliant_geometry::{Locator, Selection, SurfaceLocator, Vector3};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::load::NO_NODE;
 use pliant_mechanics::model::{Body, Constraint};
+use pliant_mechanics::tie::Tie;
 use pliant_sim::contact::pairs::{Pairs, Surface};
 use pliant_sim::contact::pose::{Course, Pose};
 use pliant_sim::contact::profile::{Corner, Profile};
@@ -373,7 +375,9 @@ impl Builder<'_> {
         }
         nodes.sort_unstable();
         nodes.dedup();
+        // Barriers act on tied nodes, which move with others by weights.
         let follows = self.assembly.followers();
+        let tied = self.assembly.ties.iter().flat_map(Tie::rows);
         // Barriers act on what a pressure fills, too.
         let binds = |constraint: &&Constraint| {
             let motion = &constraint.motion;
@@ -382,11 +386,17 @@ impl Builder<'_> {
         let bound = self.assembly.constraints.iter().filter(binds);
         let mut bound: Vec<u32> = bound.flat_map(|constraint| constraint.nodes.iter().copied()).collect();
         bound.sort_unstable();
-        let moved = |node: &&u32| follows[**node as usize] || bound.binary_search(node).is_ok();
+        let is_bound = |node: u32| bound.binary_search(&node).is_ok();
+        let with_bound = tied.filter_map(|(node, mut row)| row.any(|(own, _)| is_bound(own)).then_some(node));
+        let with_bound: HashSet<u32> = with_bound.collect();
+        let moved = |&&node: &&u32| {
+            is_bound(node) || with_bound.contains(&node) || (follows[node as usize] && !is_barrier)
+        };
         if let Some(&node) = nodes.iter().find(moved) {
             let message = format!(
-                "node {} of `{own}` follows others by a tie, a rigid part, a mean or a volume",
-                self.assembly.locate_node(node).1
+                "node {} of `{own}` follows others by {}",
+                self.assembly.locate_node(node).1,
+                if is_barrier { "a rigid part or a mean" } else { "a tie, a rigid part, a mean or a volume" }
             );
             let help = format!("choose `{key}` without such nodes");
             self.error(&path, message, "bound to others", help);

@@ -20,6 +20,7 @@ mod separate;
 mod sheets;
 mod surfaces;
 mod ties;
+mod turns;
 mod walls;
 
 use std::sync::Arc;
@@ -233,6 +234,7 @@ pub fn build_watched(
     builder.scale_mass();
     builder.add_surfaces();
     builder.add_constraints();
+    builder.check_turns();
     builder.add_loads();
     let (contacts, barriers) = builder.contacts().unzip();
     builder.note_touching(contacts.as_deref());

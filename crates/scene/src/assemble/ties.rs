@@ -1,6 +1,7 @@
 //! Ties: nodes of one body that follow the cells of another.
 
-use pliant_geometry::QualityReport;
+use pliant_geometry::{CellId, QualityReport};
+use pliant_implicit::CarriedTurn;
 use pliant_mechanics::Model;
 use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::Cells;
@@ -8,7 +9,7 @@ use pliant_sim::{counted, number};
 
 use super::{Builder, BuiltBody, in_metres};
 use crate::diagnostic::Diagnostic;
-use crate::format::TieTable;
+use crate::format::{Rotations, TieTable};
 use crate::source::Source;
 
 /// Part of the median edge of the followed body that a gap may have.
@@ -22,6 +23,8 @@ pub(crate) struct Attached {
     pub nodes: Vec<u32>,
     /// Nodes of the second model with their weights, for each of them.
     pub mapping: Weights,
+    /// The cell that holds each of them.
+    cells: Vec<CellId>,
     /// A remark on how many there are, and the widest gap.
     pub note: String,
 }
@@ -49,7 +52,7 @@ pub(crate) fn attach(
     let tolerance = table.tolerance.unwrap_or(GAP * median);
     let locator = host.body.locator();
     let own = &host.model.bodies[host.index];
-    let (mut tied, mut rows, mut left) = (Vec::new(), Vec::new(), 0);
+    let (mut tied, mut rows, mut cells, mut left) = (Vec::new(), Vec::new(), Vec::new(), 0);
     let (mut widest, mut farthest, mut nearest) = (0.0_f64, (0.0_f64, [0.0; 3]), f64::INFINITY);
     for &node in nodes {
         let place = guest.model.rest[node as usize];
@@ -64,6 +67,7 @@ pub(crate) fn attach(
         }
         widest = widest.max(found.distance);
         tied.push(node);
+        cells.push(CellId { kind: found.kind, index: found.cell });
         rows.push(found.weights.iter().map(|&(node, w)| (own.node(node), w)).collect::<Vec<_>>());
     }
     let gap = format!("{} m", number(tolerance));
@@ -106,7 +110,7 @@ pub(crate) fn attach(
         names[1],
         number(widest)
     );
-    Some(Attached { nodes: tied, mapping: Weights::from_rows(rows.iter().map(Vec::as_slice)), note })
+    Some(Attached { nodes: tied, mapping: Weights::from_rows(rows.iter().map(Vec::as_slice)), cells, note })
 }
 
 /// The complaint about a bar that shall hold another body.
@@ -156,10 +160,20 @@ impl Builder<'_> {
             Some(selection) => self.body_nodes(guest, selection, &["tie", name, "nodes"])?,
             None => self.assembly.bodies[guest].all_nodes().collect(),
         };
+        let follow = table.rotations == Rotations::Follow;
+        if follow && !self.can_turn(name, [guest, host], names) {
+            return None;
+        }
         let placed = |index: usize| Placed { body: &self.bodies[index], model: &self.assembly.model, index };
         let (source, out) = (&self.scene.source, &mut self.out);
         let found = attach(source, (name, table), (placed(guest), &nodes), placed(host), out)?;
         self.notes.push(found.note);
+        if follow {
+            let turns =
+                found.nodes.iter().zip(&found.cells).map(|(&node, &cell)| self.turn(host, node, &[cell]));
+            let turns: Vec<CarriedTurn> = turns.collect();
+            self.assembly.turns.extend(turns);
+        }
         if let Err(error) = self.assembly.model_mut().tie(name, found.nodes, found.mapping) {
             self.error(
                 &path,
@@ -169,9 +183,9 @@ impl Builder<'_> {
             );
             return None;
         }
-        if self.shell_cells(guest).is_some() {
+        if self.shell_cells(guest).is_some() && !follow {
             self.notes.push(format!(
-                "`{name}` holds places, not rotations: `{}` is hinged where it is tied",
+                "`{name}` holds places, not rotations: `{}` is hinged where it is tied (`rotations = \"follow\"` turns it with a solid)",
                 names[0]
             ));
         }

@@ -7,7 +7,7 @@ use pliant_mechanics::tensor::{cross, dot, sub};
 
 use super::Builder;
 use super::bodies::{Draft, Shape, nodes};
-use crate::format::{BodyModel, BodyTable};
+use crate::format::{BodyModel, BodyTable, Rotations};
 use crate::registry::LawTable;
 
 /// A fibre whose part in the plane of its triangle is shorter than this has no direction there.
@@ -75,6 +75,9 @@ impl Builder<'_> {
             }
         }
         let label_names = built.mesh.label_names.clone();
+        if table.rotations == Rotations::Follow {
+            self.turn_wall(index, &faces);
+        }
         let shared = parents.iter().map(|&node| self.assembly.bodies[index].node(node)).collect();
         let mesh = self.triangles(mesh, &path)?;
         let origin = match &table.faces {

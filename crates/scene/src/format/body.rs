@@ -8,7 +8,7 @@ use pliant_imaging::LabelChoice;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::NodeVectors;
+use super::{NodeVectors, Rotations};
 
 /// A body.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -28,6 +28,9 @@ pub struct BodyTable {
     /// The faces of that boundary that are the wall; if not given, all of it.
     #[serde(default)]
     pub faces: Option<Selection>,
+    /// What the rotations of a shell do that is a wall with `on`.
+    #[serde(default)]
+    pub rotations: Rotations,
     /// The element; if not given, `tet4` for tets, `hex8` for hexes and `dkt-curved` for shells; `model = "membrane"` has one only. For
     /// soft tissue prefer `tet4-anp` to `tet4`.
     #[serde(default)]

@@ -31,7 +31,7 @@ pub use load::{
 };
 pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
 pub use participant::ParticipantTable;
-pub use tie::TieTable;
+pub use tie::{Rotations, TieTable};
 pub use view::{
     BackgroundName, CameraTable, Choice, ClipTable, ColourBy, Component, Labels, MapName, Nothing,
     TextureName, UpName, ViewTable,

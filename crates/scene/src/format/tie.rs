@@ -2,7 +2,7 @@
 
 use pliant_geometry::Selection;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// Ties the nodes of one body to another body, whose mesh need not match: each follows the cell of the other in which it lies, or on
 /// whose surface, and its forces and its mass go there. For vessels inside an organ, walls on a surface, parts that are glued. Bodies of
@@ -20,4 +20,19 @@ pub struct TieTable {
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub tolerance: Option<f64>,
+    /// What the rotations of tied nodes of a shell do, with the solvers `implicit` and `static`.
+    #[serde(default)]
+    pub rotations: Rotations,
+}
+
+/// What rotations of nodes of a shell do whose places go with a solid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rotations {
+    /// They are unknowns of their own: a hinge.
+    #[default]
+    Free,
+    /// They follow the solid: the rotation of its deformation gradient there, that of the element that holds the node, or the mean of those behind the
+    /// faces of a wall round it. Moments go to the solid as couples.
+    Follow,
 }

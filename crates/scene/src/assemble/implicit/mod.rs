@@ -141,6 +141,7 @@ impl Builder<'_> {
                 ("slack", bar, "`model = \"bar\"`"),
                 ("tension-only", bar, "`model = \"bar\"`"),
                 ("faces", !own, "a wall with `on`"),
+                ("rotations", !own && shell, "a shell with `on`"),
                 ("damping", own, "a body with nodes of its own"),
                 ("stiffness-damping", own, "a body with nodes of its own"),
                 ("velocity", own, "a body with nodes of its own"),
@@ -231,6 +232,7 @@ impl Builder<'_> {
         for (own, given) in start.velocity.iter_mut().zip(&assembly.initial_velocity) {
             *own = Vector3::from(*given);
         }
+        assembly.take_along(&mut start);
         Some(start)
     }
 }
