@@ -26,7 +26,7 @@ fn check(name: &str, text: &str, folder: &Path, grow: f64) {
     let part = &world.participants[0].built;
     let contacts = part.contacts.as_ref().unwrap();
     let (rigid, nodes) = (&contacts.rigids[0], &contacts.contacts[0].surface.nodes);
-    let pose = rigid.course.at(0.0);
+    let pose = rigid.trajectory.at(0.0);
     let mesh = &part.bodies[0].mesh;
     let surface = boundary(mesh);
     let faces: Vec<u32> = (0..surface.faces.len() as u32).collect();

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use pliant_contact::pairs::Surface;
-use pliant_contact::pose::{Course, Pose};
+use pliant_contact::pose::{Pose, Trajectory};
 use pliant_contact::shape::Shape;
 use pliant_contact::touch::{Contact, Contacts, Rigid, Touch, With};
 use pliant_explicit::critical_step::assembled;
@@ -129,8 +129,8 @@ fn pressed(
         points.extend([MOVES, MOVES + STAYS].map(|steps| ((from + steps) * step, *depth)));
     }
     let curve = Curve { shape: CurveShape::Table(points), from: 0.0, to: 1.0 };
-    let course = Course::by(start, [0.0, 0.0, along], curve);
-    let tool = Rigid { name: "tool".into(), shape, course, inside: false, jaw: None };
+    let trajectory = Trajectory::by(start, [0.0, 0.0, along], curve);
+    let tool = Rigid { name: "tool".into(), shape, trajectory, inside: false, jaw: None };
     let triangles: Vec<[u32; 3]> =
         quarter.faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
     let mut nodes: Vec<u32> = triangles.iter().flatten().copied().collect();
@@ -169,7 +169,7 @@ fn pressed(
         }
         stepper.evaluate(&mut state).unwrap();
         let [outer, inner] = [0, 1].map(|which| force(&stepper, which));
-        let pose = tool.course.at(state.time);
+        let pose = tool.trajectory.at(state.time);
         let mut radii = [0.0_f64, f64::INFINITY];
         for &node in nodes.iter().filter(|&&node| model.rest[node as usize][1].abs() < 1e-9) {
             let (x, u) = (model.rest[node as usize], state.displacement[node as usize]);

@@ -1,4 +1,4 @@
-//! Tools that push with no more than a force: how far they lag behind their course.
+//! Tools that push with no more than a force: how far they lag behind their trajectory.
 //!
 //! A hand that meets something stiffer than it can bear comes to rest there, and goes along again when it is called back. So does a tool with a
 //! limit: of the way that it would go against what it pushes, it goes a part that falls from 1 at half of the limit over 0 at the limit to −1.
@@ -28,11 +28,11 @@ const CATCHES_UP: f64 = 0.3;
 /// Time [s] over which forces are averaged: those of single steps jump where nodes come and go.
 const FELT: f64 = 0.01;
 
-/// The lag of a rigid thing behind its course.
+/// The lag of a rigid thing behind its trajectory.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Lag {
     rigid: u32,
-    /// From its place on the course to where it is [m], now and after the step.
+    /// From its place on the trajectory to where it is [m], now and after the step.
     ways: [[f64; 3]; 2],
     /// The force [N] with which it pushes: on average until the step before, and in this one.
     forces: [[f64; 3]; 2],
@@ -53,7 +53,7 @@ impl Lag {
         self.rigid as usize
     }
 
-    /// From its place on the course to where it is [m].
+    /// From its place on the trajectory to where it is [m].
     pub fn now(&self) -> Vector3<f64> {
         self.ways[0].into()
     }
@@ -68,7 +68,7 @@ impl Lag {
         self.longest
     }
 
-    /// Finds the lag after a step of a length [s], over which the course goes a way [m], under a limit [N].
+    /// Finds the lag after a step of a length [s], over which the trajectory goes a way [m], under a limit [N].
     pub fn follow(&mut self, limit: f64, way: Vector3<f64>, step: f64) {
         let force = Vector3::from(self.forces[0]);
         let mut wanted = way - self.now() * (step / CATCHES_UP).min(1.0);

@@ -9,7 +9,7 @@ pub type Pose = Isometry3<f64>;
 
 /// How a rigid thing moves.
 #[derive(Clone, Debug)]
-pub struct Course {
+pub struct Trajectory {
     /// Where it is at the start.
     start: Pose,
     motion: Motion,
@@ -33,12 +33,12 @@ enum Motion {
     Table(Vec<(f64, Pose)>),
 }
 
-impl Course {
+impl Trajectory {
     fn of(start: Pose, motion: Motion) -> Self {
         Self { start, motion, limit: None }
     }
 
-    /// With a force [N] that the thing pushes with at most: it lags behind its course where it would need more.
+    /// With a force [N] that the thing pushes with at most: it lags behind its trajectory where it would need more.
     pub fn limited(self, force: f64) -> Self {
         Self { limit: Some(force), ..self }
     }
@@ -107,7 +107,7 @@ pub fn between([from, to]: [&Pose; 2], part: f64) -> Pose {
     Pose::from_parts(place.into(), turn)
 }
 
-/// Where a tool goes that is driven from outside: on a straight way and the shortest arc to a pose, where it stays. Its course is left.
+/// Where a tool goes that is driven from outside: on a straight way and the shortest arc to a pose, where it stays. Its trajectory is left.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Leg {
     /// When it begins and ends [s].
@@ -149,8 +149,8 @@ mod tests {
     use super::*;
     use pliant_mechanics::curve::Shape;
 
-    fn place(course: &Course, time: f64) -> Vector3<f64> {
-        course.at(time).translation.vector
+    fn place(trajectory: &Trajectory, time: f64) -> Vector3<f64> {
+        trajectory.at(time).translation.vector
     }
 
     #[test]
@@ -158,22 +158,22 @@ mod tests {
         let start = Pose::translation(1.0, 0.0, 0.0);
         let curve = Curve { shape: Shape::Ramp, from: 0.0, to: 2.0 };
         assert_eq!(
-            place(&Course::by(start, [0.0, 4.0, 0.0], curve.clone()), 1.0),
+            place(&Trajectory::by(start, [0.0, 4.0, 0.0], curve.clone()), 1.0),
             Vector3::new(1.0, 2.0, 0.0)
         );
-        let quarter = Course::turn(start, [0.0, 0.0, 1.0], [0.0; 3], std::f64::consts::PI, curve);
+        let quarter = Trajectory::turn(start, [0.0, 0.0, 1.0], [0.0; 3], std::f64::consts::PI, curve);
         assert!((place(&quarter, 1.0) - Vector3::y()).norm() < 1e-15);
         let turned = Pose::rotation(Vector3::z() * 1.0);
         let table = vec![(1.0, Pose::identity()), (3.0, Pose::translation(0.0, 0.0, 2.0) * turned)];
-        let course = Course::table(start, table.clone()).unwrap();
-        assert_eq!(place(&course, 0.0), Vector3::x());
-        assert!((place(&course, 2.0) - Vector3::new(0.5_f64.cos(), 0.5_f64.sin(), 1.0)).norm() < 1e-15);
-        assert_eq!(place(&course, 9.0), place(&course, 3.0));
+        let trajectory = Trajectory::table(start, table.clone()).unwrap();
+        assert_eq!(place(&trajectory, 0.0), Vector3::x());
+        assert!((place(&trajectory, 2.0) - Vector3::new(0.5_f64.cos(), 0.5_f64.sin(), 1.0)).norm() < 1e-15);
+        assert_eq!(place(&trajectory, 9.0), place(&trajectory, 3.0));
         let leg = Leg::new([1.0, 3.0], [(table[0].1, 0.5), (table[1].1, 0.1)]);
         let (pose, opening) = leg.at(2.0);
-        assert!((pose.inverse() * course.at(2.0) * start.inverse()).translation.vector.norm() < 1e-15);
+        assert!((pose.inverse() * trajectory.at(2.0) * start.inverse()).translation.vector.norm() < 1e-15);
         assert!((opening - 0.3).abs() < 1e-15 && leg.at(0.0) == leg.at(1.0) && leg.at(9.0) == leg.at(3.0));
-        assert!(Course::table(start, Vec::new()).is_none());
-        assert!(Course::table(start, table.into_iter().rev().collect()).is_none());
+        assert!(Trajectory::table(start, Vec::new()).is_none());
+        assert!(Trajectory::table(start, table.into_iter().rev().collect()).is_none());
     }
 }

@@ -10,7 +10,7 @@ use pliant_mechanics::tensor::Vector;
 use serde::{Deserialize, Serialize};
 
 use crate::pairs::{Pairs, Surface};
-use crate::pose::{Course, Leg, Pose, between};
+use crate::pose::{Leg, Pose, Trajectory, between};
 use crate::shape::{Near, Shape};
 
 /// Parts of a step at most in which a node is followed along a thing.
@@ -51,7 +51,7 @@ pub struct Rigid {
     /// Its shape.
     pub shape: Shape,
     /// How it moves; of a jaw, how the tool does.
-    pub course: Course,
+    pub trajectory: Trajectory,
     /// Whether bodies are inside of it, as a brain in its skull.
     pub inside: bool,
     /// How it turns in the frame of the tool that it is a jaw of.
@@ -93,7 +93,10 @@ impl Rigid {
     /// The pose of the tool or obstacle at a time [s], and the angle [rad] between its jaws; driven if there is a leg.
     pub fn posture(&self, time: f64, leg: Option<&Leg>) -> (Pose, f64) {
         let opening = |jaw: &Jaw| jaw.opening.0 * jaw.opening.1.value(time);
-        leg.map_or_else(|| (self.course.at(time), self.jaw.as_ref().map_or(0.0, opening)), |leg| leg.at(time))
+        leg.map_or_else(
+            || (self.trajectory.at(time), self.jaw.as_ref().map_or(0.0, opening)),
+            |leg| leg.at(time),
+        )
     }
 
     /// Its pose at a time [s]; driven if there is a leg.
@@ -410,8 +413,14 @@ mod tests {
 
     fn tool(shift: [f64; 3]) -> Rigid {
         let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: 1.0 };
-        let course = Course::by(Pose::identity(), shift, curve);
-        Rigid { name: "tool".into(), shape: Shape::Sphere { radius: 0.01 }, course, inside: false, jaw: None }
+        let trajectory = Trajectory::by(Pose::identity(), shift, curve);
+        Rigid {
+            name: "tool".into(),
+            shape: Shape::Sphere { radius: 0.01 },
+            trajectory,
+            inside: false,
+            jaw: None,
+        }
     }
 
     /// A ball that passes over a node in one step takes it along, as it does in many.
@@ -446,7 +455,7 @@ mod tests {
         let floor = Rigid {
             name: "floor".into(),
             shape: Shape::HalfSpace,
-            course: Course::fixed(Pose::identity()),
+            trajectory: Trajectory::fixed(Pose::identity()),
             inside: false,
             jaw: None,
         };

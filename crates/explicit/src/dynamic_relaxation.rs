@@ -206,7 +206,7 @@ pub struct Iteration {
 
 /// Sums and extremes over the nodes of one task.
 #[derive(Clone, Copy, Debug, Default)]
-struct Sums {
+struct Extremes {
     stiffness: f64,
     mass: f64,
     largest_residual: f64,
@@ -215,7 +215,7 @@ struct Sums {
     finite: bool,
 }
 
-impl Sums {
+impl Extremes {
     fn merge(self, b: &Self) -> Self {
         let worse = b.largest_residual > self.largest_residual;
         Self {
@@ -312,7 +312,7 @@ pub struct DynamicRelaxation<R> {
     /// Internal minus applied force now and one iteration before.
     residual: Vec<Vector<R>>,
     residual_before: Vec<Vector<R>>,
-    sums: Vec<Sums>,
+    sums: Vec<Extremes>,
     /// The first hexahedron of the last trial of which a corner is turned inside out, as (solid, cell).
     folded: Option<(usize, usize)>,
     energies: Energies,
@@ -328,14 +328,14 @@ struct Instant {
 
 /// What grows on the way to the next equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Course {
+enum LoadPath {
     /// The part of what acts at time 0, from 0 to 1.
     Start,
     /// Time.
     Time,
 }
 
-impl Course {
+impl LoadPath {
     fn instant(self, reached: f64) -> Instant {
         match self {
             Self::Start => Instant { time: 0.0, part: reached },
@@ -397,7 +397,7 @@ impl<R: Scalar> DynamicRelaxation<R> {
             increment: vec![[R::ZERO; 3]; nodes],
             residual: vec![[R::ZERO; 3]; nodes],
             residual_before: vec![[R::ZERO; 3]; nodes],
-            sums: vec![Sums::default(); nodes.div_ceil(CHUNK)],
+            sums: vec![Extremes::default(); nodes.div_ceil(CHUNK)],
             folded: None,
             energies: Energies::default(),
             way: Way::default(),
@@ -434,7 +434,7 @@ impl<R: Scalar> DynamicRelaxation<R> {
         }
         let before = state.displacement.clone();
         state.displacement.fill([R::ZERO; 3]);
-        self.approach(state, Course::Start, [0.0, 1.0], &mut Convergence::default(), &mut |_| ())
+        self.approach(state, LoadPath::Start, [0.0, 1.0], &mut Convergence::default(), &mut |_| ())
             .inspect_err(|_| state.displacement = before)
     }
 
@@ -458,15 +458,15 @@ impl<R: Scalar> DynamicRelaxation<R> {
     ) -> Result<Convergence, RelaxationError> {
         let mut convergence = Convergence::default();
         self.begin(state)?;
-        self.approach(state, Course::Time, [state.time, time], &mut convergence, watch)?;
+        self.approach(state, LoadPath::Time, [state.time, time], &mut convergence, watch)?;
         Ok(convergence)
     }
 
-    /// Goes from one place of a course to another, in as many parts as it takes.
+    /// Goes from one place of a path to another, in as many parts as it takes.
     fn approach(
         &mut self,
         state: &mut State<R>,
-        course: Course,
+        path: LoadPath,
         [mut reached, goal]: [f64; 2],
         convergence: &mut Convergence,
         watch: &mut dyn FnMut(Iteration),
@@ -479,7 +479,7 @@ impl<R: Scalar> DynamicRelaxation<R> {
             let left = goal - reached;
             let end = if size >= left * (1.0 - 1e-9) { goal } else { reached + size };
             let before = state.displacement.clone();
-            match self.load_step(state, course, [reached, end], convergence, watch) {
+            match self.load_step(state, path, [reached, end], convergence, watch) {
                 Ok(()) => {
                     convergence.parts += 1;
                     reached = end;
@@ -500,15 +500,15 @@ impl<R: Scalar> DynamicRelaxation<R> {
     fn load_step(
         &mut self,
         state: &mut State<R>,
-        course: Course,
+        path: LoadPath,
         [from, to]: [f64; 2],
         convergence: &mut Convergence,
         watch: &mut dyn FnMut(Iteration),
     ) -> Result<(), RelaxationError> {
-        let duration = course.duration(from, to);
-        let end = course.instant(to);
+        let duration = path.duration(from, to);
+        let end = path.instant(to);
         let mut forces = InternalForces::new(&self.model, duration);
-        let start = self.start(state, course.instant(from));
+        let start = self.start(state, path.instant(from));
         self.increment.fill([R::ZERO; 3]);
         self.bound.fill([R::ZERO; 3]);
         self.collectives.iter_mut().for_each(|own| own.enclosed.pressure = 0.0);
@@ -519,7 +519,7 @@ impl<R: Scalar> DynamicRelaxation<R> {
             let s = ((iteration + 1) as f64 / RAMP as f64).min(1.0);
             let ramped = iteration >= RAMP;
             let instant =
-                if ramped { end } else { course.instant(from + (to - from) * s * s * (3.0 - 2.0 * s)) };
+                if ramped { end } else { path.instant(from + (to - from) * s * s * (3.0 - 2.0 * s)) };
             self.prescribe(state, instant);
             let sums = self.evaluate(&mut forces, state, instant, iteration)?;
             convergence.iterations += 1;
@@ -647,7 +647,7 @@ impl<R: Scalar> DynamicRelaxation<R> {
         state: &State<R>,
         Instant { time, part }: Instant,
         iterations: usize,
-    ) -> Result<Sums, RelaxationError> {
+    ) -> Result<Extremes, RelaxationError> {
         self.take_committed_history(state);
         let found = forces.evaluate(&state.displacement, &mut self.trial_history);
         if let Some((solid, cell, determinant)) = found.inverted
@@ -675,7 +675,7 @@ impl<R: Scalar> DynamicRelaxation<R> {
         let (applied, bound, forces, part) = (&self.applied, &self.bound, &*forces, R::of(part));
         (residual.par_chunks_mut(CHUNK).zip(&mut self.sums)).enumerate().for_each(
             |(task, (residual, sums))| {
-                *sums = Sums { finite: true, ..Sums::default() };
+                *sums = Extremes { finite: true, ..Extremes::default() };
                 for (offset, r) in residual.iter_mut().enumerate() {
                     let node = task * CHUNK + offset;
                     let internal = forces.at(node);
@@ -715,8 +715,8 @@ impl<R: Scalar> DynamicRelaxation<R> {
         Ok(total)
     }
 
-    fn total(&self) -> Sums {
-        self.sums.iter().fold(Sums { finite: true, ..Sums::default() }, Sums::merge)
+    fn total(&self) -> Extremes {
+        self.sums.iter().fold(Extremes { finite: true, ..Extremes::default() }, Extremes::merge)
     }
 
     fn advance(&mut self, state: &mut State<R>, damping: f64, instant: Instant) {
@@ -964,7 +964,7 @@ impl Accuracy {
 }
 
 /// The next estimate of the slowest mode's squared frequency.
-fn follow(slowest: f64, sums: &Sums) -> f64 {
+fn follow(slowest: f64, sums: &Extremes) -> f64 {
     let estimate = sums.stiffness / sums.mass;
     if !(estimate.is_finite() && estimate > 0.0) {
         return slowest;
@@ -1001,7 +1001,7 @@ mod tests {
 
     #[test]
     fn the_estimate_of_the_slowest_mode_moves_slowly() {
-        let sums = |ratio| Sums { stiffness: ratio, mass: 1.0, ..Sums::default() };
+        let sums = |ratio| Extremes { stiffness: ratio, mass: 1.0, ..Extremes::default() };
         assert_eq!(follow(0.0, &sums(0.3)), 0.3);
         assert_eq!(follow(1.0, &sums(0.3)), 0.9);
         assert_eq!(follow(1.0, &sums(3.0)), 1.02);

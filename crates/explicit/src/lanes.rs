@@ -66,7 +66,7 @@ pub trait Lanes<R>: Number {
     /// Where the vector of a lane of a pack is written: the order in which registers hold them.
     fn row_of_lane(lane: usize) -> usize;
     /// Does the work in a function of its own, compiled for these lanes.
-    fn call<W: Work<R>>(work: W) -> W::Output;
+    fn call<W: LaneWork<R>>(work: W) -> W::Output;
 }
 
 /// The lanes' part of a vector of packs.
@@ -101,7 +101,7 @@ pub(crate) fn load_symmetric<R: Scalar, L: Lanes<R>>(from: &Symmetric<Pack<R>>, 
 }
 
 /// Work that is written for any lanes. Every function that it calls must be `#[inline(always)]`, or it is not compiled for these instructions.
-pub trait Work<R> {
+pub trait LaneWork<R> {
     /// What comes out.
     type Output;
     /// Does it.
@@ -209,7 +209,7 @@ impl Processor {
 
     /// Does the work in these lanes.
     #[inline]
-    pub(crate) fn run<R: Scalar, W: Work<R>>(self, work: W) -> W::Output {
+    pub(crate) fn run<R: Scalar, W: LaneWork<R>>(self, work: W) -> W::Output {
         match self {
             #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
             Self::Avx512(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
@@ -227,7 +227,7 @@ impl Processor {
 /// Work on its way into a function compiled for `S`.
 struct InLanes<R, W>(W, std::marker::PhantomData<R>);
 
-impl<R: Scalar, W: Work<R>> WithSimd for InLanes<R, W> {
+impl<R: Scalar, W: LaneWork<R>> WithSimd for InLanes<R, W> {
     type Output = W::Output;
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> W::Output {
@@ -416,7 +416,7 @@ macro_rules! wide {
                 at + $row_of_lane(Self::WIDTH.div_ceil(4), lane)
             }
             #[inline(always)]
-            fn call<W: Work<$type>>(work: W) -> W::Output {
+            fn call<W: LaneWork<$type>>(work: W) -> W::Output {
                 Self::simd().vectorize(InLanes(work, std::marker::PhantomData::<$type>))
             }
         }
@@ -548,7 +548,7 @@ macro_rules! wide {
                 lane
             }
             #[inline(never)]
-            fn call<W: Work<$type>>(work: W) -> W::Output {
+            fn call<W: LaneWork<$type>>(work: W) -> W::Output {
                 work.run::<Self>()
             }
         }

@@ -100,7 +100,7 @@ impl<R: Scalar> State<R> {
         self.driven.iter().find(|(own, _)| *own as usize == rigid).map(|(_, leg)| leg)
     }
 
-    /// How far a rigid thing lags behind its course, if its force is limited.
+    /// How far a rigid thing lags behind its trajectory, if its force is limited.
     pub fn lag(&self, rigid: usize) -> Option<&Lag> {
         self.lags.iter().find(|lag| lag.rigid() == rigid)
     }

@@ -25,7 +25,7 @@ use crate::applied::{AppliedForces, BLOCK};
 use crate::collective::{Collective, Predicted, enclosed};
 use crate::energies::{Sums, model_balance_floor};
 use crate::forces::{Deformed, Found, InternalForces};
-use crate::lanes::{Instructions, Lanes, MissingInstructions, Processor, Work};
+use crate::lanes::{Instructions, LaneWork, Lanes, MissingInstructions, Processor};
 use crate::recover::stored_at_start;
 use crate::stability::{CHECK_EVERY, Monitor};
 use crate::state::State;
@@ -245,7 +245,7 @@ struct NodePass<'a, R> {
     reaction: &'a mut [Vector<R>],
 }
 
-impl<R: Scalar> Work<R> for NodePass<'_, R> {
+impl<R: Scalar> LaneWork<R> for NodePass<'_, R> {
     type Output = Sums;
 
     /// Plain loops over a block of components, which the compiler makes wide.
@@ -301,7 +301,7 @@ struct Add<'a, R> {
     to: &'a mut [Vector<R>],
 }
 
-impl<R: Scalar> Work<R> for Add<'_, R> {
+impl<R: Scalar> LaneWork<R> for Add<'_, R> {
     type Output = ();
 
     #[inline(always)]

@@ -204,14 +204,14 @@ impl Touching {
     pub fn lag<'a>(&self, lags: &mut Vec<Lag>, times: [f64; 2], leg: impl Fn(usize) -> Option<&'a Leg>) {
         let rigids = &self.contacts.rigids;
         if lags.is_empty() {
-            let limited = rigids.iter().zip(0..).filter(|(rigid, _)| rigid.course.limit().is_some());
+            let limited = rigids.iter().zip(0..).filter(|(rigid, _)| rigid.trajectory.limit().is_some());
             lags.extend(limited.map(|(_, number)| Lag::new(number)));
         }
         for lag in lags {
             let rigid = &rigids[lag.rigid()];
             let place = |time| rigid.posture(time, leg(lag.rigid())).0.translation.vector;
             let way = place(times[1]) - place(times[0]);
-            lag.follow(rigid.course.limit().unwrap_or(f64::INFINITY), way, times[1] - times[0]);
+            lag.follow(rigid.trajectory.limit().unwrap_or(f64::INFINITY), way, times[1] - times[0]);
         }
     }
 

@@ -84,7 +84,7 @@ pub fn reorder(mesh: &mut Mesh) -> usize {
     for block in mesh.blocks.iter_mut().filter(|block| block.kind.dimension() == 3) {
         let kind = block.kind;
         for nodes in block.nodes.chunks_exact_mut(kind.node_count()) {
-            if fault_of(kind, nodes, &mesh.points) == Some(Fault::Inverted) {
+            if fault_of(kind, nodes, &mesh.points) == Some(CellFault::Inverted) {
                 let before: Vec<u32> = nodes.to_vec();
                 match kind {
                     CellKind::Tet => nodes.swap(1, 2),
@@ -102,7 +102,7 @@ pub fn reorder(mesh: &mut Mesh) -> usize {
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Fault {
+enum CellFault {
     OutOfRange,
     NonFinite,
     Degenerate,
@@ -110,12 +110,12 @@ enum Fault {
 }
 
 /// The first fault of a cell.
-fn fault_of(kind: CellKind, nodes: &[u32], points: &[Vector3]) -> Option<Fault> {
+fn fault_of(kind: CellKind, nodes: &[u32], points: &[Vector3]) -> Option<CellFault> {
     if nodes.iter().any(|&node| node as usize >= points.len()) {
-        return Some(Fault::OutOfRange);
+        return Some(CellFault::OutOfRange);
     }
     let mut buffer = [Vector3::zeros(); 8];
-    let Some(x) = corners(points, nodes, &mut buffer) else { return Some(Fault::NonFinite) };
+    let Some(x) = corners(points, nodes, &mut buffer) else { return Some(CellFault::NonFinite) };
     let longest = edges(kind).iter().map(|&[a, b]| (x[b] - x[a]).norm()).fold(0.0, f64::max);
     let volume = volume(kind, x);
     let flat = match kind.dimension() {
@@ -123,13 +123,13 @@ fn fault_of(kind: CellKind, nodes: &[u32], points: &[Vector3]) -> Option<Fault> 
         dimension => volume.abs() <= FLAT * longest.powi(dimension as i32),
     };
     if flat || !nodes_differ(nodes) {
-        return Some(Fault::Degenerate);
+        return Some(CellFault::Degenerate);
     }
     let inverted = match <&[Vector3; 8]>::try_from(x) {
         Ok(hex) => scaled_jacobian(hex) <= 0.0,
         Err(_) => volume < 0.0,
     };
-    inverted.then_some(Fault::Inverted)
+    inverted.then_some(CellFault::Inverted)
 }
 
 fn inspect_nodes(mesh: &Mesh, found: &mut Diagnosis) {
@@ -175,10 +175,10 @@ fn inspect_cells(mesh: &Mesh, found: &mut Diagnosis) {
         for (index, nodes) in (0u32..).zip(block.cells()) {
             let cell = CellId { kind, index };
             match fault_of(kind, nodes, &mesh.points) {
-                Some(Fault::OutOfRange) => found.out_of_range_cells.push(cell),
-                Some(Fault::Degenerate) => found.degenerate_cells.push(cell),
-                Some(Fault::Inverted) => found.inverted_cells.push(cell),
-                Some(Fault::NonFinite) | None => {}
+                Some(CellFault::OutOfRange) => found.out_of_range_cells.push(cell),
+                Some(CellFault::Degenerate) => found.degenerate_cells.push(cell),
+                Some(CellFault::Inverted) => found.inverted_cells.push(cell),
+                Some(CellFault::NonFinite) | None => {}
             }
         }
     }
@@ -213,7 +213,7 @@ fn inspect_volume(mesh: &Mesh, found: &mut Diagnosis) {
         mesh.volume_blocks().flat_map(|block| valid_cells(mesh, block)).map(|(cell, _)| cell).collect();
     cells.sort_unstable();
     let place = |cell: CellId| cells.partition_point(|&other| other < cell);
-    let mut parts = Parts::new(cells.len());
+    let mut parts = DisjointSets::new(cells.len());
     for group in groups.iter() {
         for pair in group.windows(2) {
             parts.join(place(pair[0].1.parent), place(pair[1].1.parent));
@@ -237,7 +237,7 @@ fn inspect_surface(mesh: &Mesh, found: &mut Diagnosis) {
     found.open_edges = uses.edges_where(|uses| uses.len() == 1);
     found.non_manifold_edges = uses.edges_where(|uses| uses.len() > 2);
     found.inconsistent_edges = uses.edges_where(|uses| uses.len() == 2 && uses[0].forward == uses[1].forward);
-    let mut parts = Parts::new(surface.faces.len());
+    let mut parts = DisjointSets::new(surface.faces.len());
     for group in uses.iter() {
         for pair in group.windows(2) {
             parts.join(pair[0].face, pair[1].face);
@@ -280,9 +280,9 @@ impl EdgeUses {
 }
 
 /// Disjoint sets (union by smaller root, paths halved).
-struct Parts(Vec<usize>);
+struct DisjointSets(Vec<usize>);
 
-impl Parts {
+impl DisjointSets {
     fn new(count: usize) -> Self {
         Self((0..count).collect())
     }

@@ -26,7 +26,7 @@ pub fn processor_only(contacts: &Contacts) -> Option<String> {
     let grips = |rigid: &&Rigid| rigid.jaw.as_ref().is_some_and(|jaw| jaw.grip.is_some());
     let gripping =
         contacts.rigids.iter().find(grips).map(|rigid| format!("the ideal grip of `{}`", rigid.tool()));
-    let limited = contacts.rigids.iter().find(|rigid| rigid.course.limit().is_some());
+    let limited = contacts.rigids.iter().find(|rigid| rigid.trajectory.limit().is_some());
     let revolved = contacts.rigids.iter().find(|rigid| matches!(rigid.shape, Shape::Revolved(_)));
     gripping
         .or_else(|| limited.map(|rigid| format!("the force limit of `{}`", rigid.tool())))

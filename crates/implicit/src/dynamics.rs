@@ -114,13 +114,13 @@ pub struct BackwardEuler {
     start: State,
     /// Where the state was a whole step before, for differences of second order; none after a start or a step that was halved.
     previous: Option<Box<State>>,
-    course: Course,
+    differences: Differences,
 }
 
 /// The equation of a step: positions are `shift` further on plus `step` times the new velocities, these `rate` further on plus `step`
 /// times accelerations.
 #[derive(Clone, Debug, Default)]
-struct Course {
+struct Differences {
     /// h* [s].
     step: f64,
     /// a (x₀ − x₋) and the same of rotation vectors, six a node; empty for none.
@@ -129,7 +129,7 @@ struct Course {
     rate: Vec<f64>,
 }
 
-impl Course {
+impl Differences {
     /// Three numbers of a vector that may be empty.
     fn part(of: &[f64], at: usize) -> Vector3<f64> {
         of.get(at..at + 3).map_or_else(Vector3::zeros, Vector3::from_column_slice)
@@ -158,7 +158,7 @@ impl Course {
 /// What inertia and mass-proportional damping resist with in a step.
 struct Momentum<'a> {
     model: &'a Assembly,
-    course: &'a Course,
+    differences: &'a Differences,
     start: &'a State,
     moved: &'a [f64],
     damping: &'a [f64],
@@ -168,15 +168,15 @@ impl Momentum<'_> {
     /// Force [N] on a node (from component 0 on) or moment [N m] (from 3 on).
     fn of(&self, node: usize, first: usize) -> Vector3<f64> {
         let at = 6 * node + first;
-        let Course { step: h, shift, rate } = self.course;
+        let Differences { step: h, shift, rate } = self.differences;
         let vector = Vector3::from_column_slice(&self.moved[at..at + 3]);
-        let moved = vector - Course::part(shift, at);
+        let moved = vector - Differences::part(shift, at);
         let (mass, before) = if first == 0 {
             (self.model.mass[node], self.start.velocity[node])
         } else {
             (self.model.rotary_inertia[node], self.start.spin[node])
         };
-        let before = before + Course::part(rate, at);
+        let before = before + Differences::part(rate, at);
         let momentum = (mass / (h * h)) * (moved - *h * before) + (self.damping[node] * mass / h) * moved;
         if first == 0 { momentum } else { spin_to_vector(&vector).tr_mul(&momentum) }
     }
@@ -204,7 +204,7 @@ impl BackwardEuler {
             product: vec![0.0; free],
             start: State::at_rest(&model),
             previous: None,
-            course: Course::default(),
+            differences: Differences::default(),
             system,
         })
     }
@@ -269,7 +269,7 @@ impl BackwardEuler {
             let last = size >= rest * (1.0 - 1e-9);
             self.start.clone_from(state);
             let h = if last { rest } else { size };
-            self.course.set(h, &self.start, previous.as_deref().filter(|_| halvings == 0));
+            self.differences.set(h, &self.start, previous.as_deref().filter(|_| halvings == 0));
             match self.newton(state, h) {
                 Ok(step) => {
                     parts += 1;
@@ -383,10 +383,11 @@ impl BackwardEuler {
     /// Ends a step: velocities and spins of the motion in it.
     fn end(&mut self, state: &mut State, time: f64) {
         self.system.end_step(Some(&self.start), state, time - self.start.time);
-        let Course { step, shift, .. } = &self.course;
+        let Differences { step, shift, .. } = &self.differences;
         for (node, moved) in self.moved.chunks_exact(6).enumerate() {
-            let rate =
-                |first: usize| (Course::part(moved, first) - Course::part(shift, 6 * node + first)) / *step;
+            let rate = |first: usize| {
+                (Differences::part(moved, first) - Differences::part(shift, 6 * node + first)) / *step
+            };
             (state.velocity[node], state.spin[node]) = (rate(0), rate(3));
         }
         state.time = time;
@@ -419,9 +420,9 @@ impl BackwardEuler {
     /// Loads less internal, inertial and damping forces on the free components; its norm and that of the largest of them.
     fn find_residual(&mut self, state: &State) -> (f64, f64) {
         let model = Arc::clone(&self.system.model);
-        let Self { system, course, start, moved, damping, .. } = self;
-        let momentum = Momentum { model: &model, course, start, moved, damping };
-        let Course { step: h, shift, .. } = &*course;
+        let Self { system, differences, start, moved, damping, .. } = self;
+        let momentum = Momentum { model: &model, differences, start, moved, damping };
+        let Differences { step: h, shift, .. } = &*differences;
         let h = *h;
         let arm = 1.0 / (self.length * self.length);
         let (mut loads, mut resistance, mut inertia) = (0.0, 0.0, 0.0);
@@ -474,7 +475,7 @@ impl BackwardEuler {
 
     /// K + (1/h*² + α/h*) M + β/h* K.
     fn add_inertia(&mut self) {
-        let (model, h) = (Arc::clone(&self.system.model), self.course.step);
+        let (model, h) = (Arc::clone(&self.system.model), self.differences.step);
         let factor = model.stiffness_damping / h;
         self.system.matrix.value.iter_mut().zip(&self.system.damper).for_each(|(k, d)| *k += factor * d);
         for (equation, &component) in self.system.equations.component.iter().enumerate() {
@@ -483,8 +484,8 @@ impl BackwardEuler {
             let mass = if component % 6 < 3 { model.mass[node] } else { model.rotary_inertia[node] };
             self.system.matrix.add_diagonal(equation, rate * mass);
         }
-        let Self { system, course, start, moved, damping, .. } = self;
-        let momentum = Momentum { model: &model, course, start, moved, damping };
+        let Self { system, differences, start, moved, damping, .. } = self;
+        let momentum = Momentum { model: &model, differences, start, moved, damping };
         let rate = |node: u32| 1.0 / (h * h) + damping[node as usize] / h;
         system.add_bound_masses(
             |node| (rate(node) * model.mass[node as usize], momentum.of(node as usize, 0)),
@@ -526,15 +527,15 @@ impl Contacting for BackwardEuler {
     /// Σ m |u − s − h v|²/(2 h²) + α m |u − s|²/(2 h), the same of rotation vectors, and β (u − s)ᵀ K (u − s)/(2 h).
     fn potential(&mut self) -> f64 {
         let model = Arc::clone(&self.system.model);
-        let Course { step: h, shift, rate } = &self.course;
+        let Differences { step: h, shift, rate } = &self.differences;
         let mut sum = 0.0;
         for (node, moved) in self.moved.chunks_exact(6).enumerate() {
             for (first, mass, before) in [
                 (0, model.mass[node], self.start.velocity[node]),
                 (3, model.rotary_inertia[node], self.start.spin[node]),
             ] {
-                let moved = Course::part(moved, first) - Course::part(shift, 6 * node + first);
-                let before = before + Course::part(rate, 6 * node + first);
+                let moved = Differences::part(moved, first) - Differences::part(shift, 6 * node + first);
+                let before = before + Differences::part(rate, 6 * node + first);
                 sum += 0.5 * mass / (h * h) * (moved - *h * before).norm_squared();
                 sum += 0.5 * self.damping[node] * mass / h * moved.norm_squared();
             }
@@ -542,7 +543,8 @@ impl Contacting for BackwardEuler {
         if !self.system.damper.is_empty() {
             let mut moved = vec![0.0; self.product.len()];
             self.system.gather(&self.moved, &mut moved);
-            let shift = |component: &u32| self.course.shift.get(*component as usize).copied().unwrap_or(0.0);
+            let shift =
+                |component: &u32| self.differences.shift.get(*component as usize).copied().unwrap_or(0.0);
             let components = &self.system.equations.component;
             moved.iter_mut().zip(components).for_each(|(moved, component)| *moved -= shift(component));
             self.system.matrix.multiply_values(&self.system.damper, &moved, &mut self.product);

@@ -73,14 +73,14 @@ impl Lag<'static> {
 
 /// The two parts of the stress of a relaxing solid, as a step or an instant takes them.
 #[derive(Default)]
-struct Own {
+struct StressParts {
     factors: [f64; 2],
     kept: Vec<Symmetric<f64>>,
     /// d and g of each term of the isochoric and the volumetric part.
     coefficients: [Vec<(f64, f64)>; 2],
 }
 
-impl Own {
+impl StressParts {
     /// Takes the coefficients of a step [s]; without one those of an instant, which leaves h as it is.
     fn set_step(&mut self, Prony { isochoric, volumetric, update }: &Prony, step: Option<f64>) {
         let of_term = |&term: &(f64, f64)| step.map_or((1.0, 0.0), |step| update.coefficients(term, step));
@@ -94,7 +94,7 @@ impl Own {
 /// Relaxation of all solids, as a step or an instant takes it. Empty where none relaxes.
 #[derive(Default)]
 pub(crate) struct Relaxation {
-    solids: Vec<Own>,
+    solids: Vec<StressParts>,
     /// Whether it is that of a step.
     steps: bool,
     /// Work of each chunk of cells [J].
@@ -105,8 +105,10 @@ impl Relaxation {
     /// For a model; at first nothing is remembered.
     pub(crate) fn of(model: &Model) -> Self {
         let history = History::at_rest(model);
-        let mut new =
-            Self { solids: history.tensors.iter().map(|_| Own::default()).collect(), ..Self::default() };
+        let mut new = Self {
+            solids: history.tensors.iter().map(|_| StressParts::default()).collect(),
+            ..Self::default()
+        };
         new.stand(model, &history);
         new
     }
@@ -131,7 +133,7 @@ impl Relaxation {
         for ((own, solid), tensors) in self.solids.iter_mut().zip(&model.solids).zip(&history.tensors) {
             let (prony, averages) = (&solid.material.prony, solid.cells.averages_pressure());
             own.set_step(prony, step);
-            let Own { factors, kept: all, coefficients } = own;
+            let StressParts { factors, kept: all, coefficients } = own;
             let [shape, volume] = &*coefficients;
             *factors = [factor(&prony.isochoric, shape), factor(&prony.volumetric, volume)];
             all.clear();

@@ -10,7 +10,7 @@ use crate::rotation::exponential;
 /// Where a model is.
 #[derive(Debug, Default, PartialEq)]
 pub struct State {
-    /// Time [s], or the course of a quasi-static load.
+    /// Time [s], or the curve parameter of a static load.
     pub time: f64,
     /// Factor of controlled loads.
     pub load_factor: f64,

@@ -10,7 +10,7 @@ pub type Face = [u32; 4];
 /// The fourth entry of a triangular [`Face`].
 pub const NO_NODE: u32 = u32::MAX;
 
-/// A load with its course over time.
+/// A load with its curve over time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Load {
     /// Its name in messages.

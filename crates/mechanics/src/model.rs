@@ -586,7 +586,7 @@ impl Constraint {
 /// What the two factors of a motion multiply. All but rotations have one, the other is zero.
 pub type Amplitudes = [Vector<f64>; 2];
 
-/// The course of a prescribed motion.
+/// How a prescribed motion goes over time.
 #[derive(Clone, Debug)]
 pub enum Motion {
     /// They stay where they are at rest.
@@ -603,7 +603,7 @@ pub enum Motion {
         by: Vec<Vector<f64>>,
         /// The rotation vector [rad].
         turn: Vector<f64>,
-        /// Their course.
+        /// Their curve over time.
         curve: Curve,
     },
     /// Velocity [m/s] × curve; the displacement is its integral.
@@ -614,7 +614,7 @@ pub enum Motion {
         arms: Vec<Amplitudes>,
         /// The angle [rad].
         angle: f64,
-        /// Its course.
+        /// Its curve over time.
         curve: Curve,
     },
     /// The mean of their displacements goes by so much [m] × curve, with weights that sum to 1; each by itself is free, as under a plate
@@ -624,7 +624,7 @@ pub enum Motion {
         weights: Vec<f64>,
         /// Displacement [m].
         by: Vector<f64>,
-        /// Its course.
+        /// Its curve over time.
         curve: Curve,
     },
     /// Together they move as a rigid body, free in space.
@@ -635,7 +635,7 @@ pub enum Motion {
         enclosure: Enclosure,
         /// The growth [m³].
         by: f64,
-        /// Its course.
+        /// Its curve over time.
         curve: Curve,
     },
 }
@@ -769,7 +769,7 @@ impl Motion {
 
     /// Whether two motions of the same amplitudes are the same at all times.
     fn follows(&self, other: &Self) -> bool {
-        let course = |motion: &Self| match motion {
+        let curve = |motion: &Self| match motion {
             Self::Fixed | Self::Rigid => None,
             Self::Displacement(_, curve)
             | Self::Displacements(_, curve)
@@ -779,18 +779,18 @@ impl Motion {
             Self::Velocity(_, curve) => Some((1, 0.0, curve.clone())),
             Self::Rotation { angle, curve, .. } => Some((2, *angle, curve.clone())),
         };
-        course(self) == course(other)
+        curve(self) == curve(other)
     }
 }
 
 impl Motion {
     /// Whether two motions turn nodes in the same way at all times.
     fn turns_as(&self, other: &Self) -> bool {
-        let course = |motion: &Self| match motion {
+        let curve = |motion: &Self| match motion {
             Self::Turn { turn, curve, .. } if *turn != [0.0; 3] => Some((*turn, curve.clone())),
             _ => None,
         };
-        course(self) == course(other)
+        curve(self) == curve(other)
     }
 }
 

@@ -25,7 +25,7 @@ const LEAST_AFTER_MOVE: f64 = 0.2;
 const GAP: f64 = 0.1;
 
 /// Where a surface crosses an edge.
-struct Crossing {
+struct EdgeCrossing {
     edge: [u32; 2],
     /// Fraction of the way from the first end.
     at: f64,
@@ -120,7 +120,7 @@ impl Surface<'_> {
         }
         crossings.retain(|crossing| crossing.edge.iter().all(|&end| values[end as usize] != 0.0));
         crossings.sort_by(|a, b| b.length.total_cmp(&a.length).then(a.edge.cmp(&b.edge)));
-        for Crossing { edge: [p, q], at, .. } in crossings {
+        for EdgeCrossing { edge: [p, q], at, .. } in crossings {
             let position = complex.points[p as usize].lerp(&complex.points[q as usize], at);
             complex.bisect([p, q], position);
             values.push(0.0);
@@ -137,13 +137,13 @@ impl Surface<'_> {
     }
 
     /// Edges that cross the surface, and their intersections.
-    fn crossings(&self, complex: &Complex, values: &[f64]) -> Vec<Crossing> {
+    fn crossings(&self, complex: &Complex, values: &[f64]) -> Vec<EdgeCrossing> {
         let crossed = |[p, q]: &[u32; 2]| values[*p as usize] * values[*q as usize] < 0.0;
         let edges = complex.edges().into_iter().filter(crossed);
         edges.map(|edge| self.crossing(complex, edge, values)).collect()
     }
 
-    fn crossing(&self, complex: &Complex, edge: [u32; 2], values: &[f64]) -> Crossing {
+    fn crossing(&self, complex: &Complex, edge: [u32; 2], values: &[f64]) -> EdgeCrossing {
         let [start, end] = edge.map(|point| complex.points[point as usize]);
         let begins_inside = values[edge[0] as usize] > 0.0;
         let (mut low, mut high) = (0.0, 1.0);
@@ -155,7 +155,7 @@ impl Surface<'_> {
                 high = middle;
             }
         }
-        Crossing { edge, at: 0.5 * (low + high), length: (end - start).norm() }
+        EdgeCrossing { edge, at: 0.5 * (low + high), length: (end - start).norm() }
     }
 
     /// Moves each free point that is near a crossing to its nearest one, where its tets bear it.
@@ -187,7 +187,7 @@ impl Surface<'_> {
     }
 }
 
-impl Crossing {
+impl EdgeCrossing {
     /// The end that the crossing is near to.
     fn near_end(&self, part: f64) -> Option<usize> {
         if self.at < part {

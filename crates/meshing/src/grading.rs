@@ -12,7 +12,7 @@ use crate::complex::Complex;
 use crate::cut::cut_outside;
 use crate::error::{MeshingError, require_at_most, require_finite, require_positive};
 use crate::extent::{allowed, checked_box};
-use crate::octree::{Cube, Lattice, Octree};
+use crate::octree::{Cube, GradedLattice, Octree};
 use crate::request::{OrganTets, SMALLEST_PART};
 use crate::surfaces::Surfaces;
 use crate::topology::in_large_components;
@@ -205,10 +205,10 @@ pub(crate) fn fill(
 
 /// Points, sizes and tets of a lattice that touch a tet with a point in the body.
 fn near_body(
-    lattice: Lattice,
+    lattice: GradedLattice,
     depth: &(dyn Fn(&Vector3) -> f64 + Sync),
 ) -> (Vec<Vector3>, Vec<f64>, Vec<[u32; 4]>) {
-    let Lattice { points, sizes, tets } = lattice;
+    let GradedLattice { points, sizes, tets } = lattice;
     let mut near: Vec<bool> = points.par_iter().map(|point| depth(point) > 0.0).collect();
     let touching = |near: &[bool]| -> Vec<[u32; 4]> {
         tets.iter().filter(|tet| tet.iter().any(|&node| near[node as usize])).copied().collect()

@@ -36,16 +36,16 @@ impl TriangleMesh {
         if cubes > limit.min(u32::MAX as usize) as f64 {
             return Err(MeshingError::LatticeTooLarge { cubes: cubes as u64, limit });
         }
-        let grid = Grid { low: low.add_scalar(-step), step, counts: counts.map(|n| n as usize) };
+        let grid = SampleGrid { low: low.add_scalar(-step), step, counts: counts.map(|n| n as usize) };
         let values: Vec<f64> =
             (0..grid.len()).into_par_iter().map(|at| field.value(&grid.point(at))).collect();
         if let Some(at) = values.iter().position(|value| !value.is_finite()) {
             return Err(MeshingError::FieldNotFinite { value: values[at], point: grid.point(at) });
         }
-        let layers: Vec<Vec<[Cut; 3]>> =
+        let layers: Vec<Vec<[CutEdge; 3]>> =
             (0..grid.counts[2] - 1).into_par_iter().map(|k| grid.layer(k, &values)).collect();
         require_at_most(layers.iter().map(Vec::len).sum::<usize>() as f64, cell_limit)?;
-        let mut numbers: BTreeMap<Cut, u32> = BTreeMap::new();
+        let mut numbers: BTreeMap<CutEdge, u32> = BTreeMap::new();
         let mut triangles = Vec::new();
         for cuts in layers.into_iter().flatten() {
             triangles.push(cuts.map(|cut| {
@@ -65,15 +65,15 @@ impl TriangleMesh {
 }
 
 /// An edge of the tetrahedra: two points of the grid, the first inside.
-type Cut = [u32; 2];
+type CutEdge = [u32; 2];
 
-struct Grid {
+struct SampleGrid {
     low: Vector3,
     step: f64,
     counts: [usize; 3],
 }
 
-impl Grid {
+impl SampleGrid {
     fn len(&self) -> usize {
         self.counts.iter().product()
     }
@@ -85,7 +85,7 @@ impl Grid {
     }
 
     /// The triangles between two layers of points.
-    fn layer(&self, k: usize, values: &[f64]) -> Vec<[Cut; 3]> {
+    fn layer(&self, k: usize, values: &[f64]) -> Vec<[CutEdge; 3]> {
         let [nx, ny, _] = self.counts;
         let strides = [1, nx, nx * ny];
         let mut found = Vec::new();
@@ -115,7 +115,7 @@ impl Grid {
     }
 
     /// Where the field is zero between a point inside and one outside.
-    fn crossing(&self, field: &(impl ImplicitField + ?Sized), [a, b]: Cut, values: &[f64]) -> Vector3 {
+    fn crossing(&self, field: &(impl ImplicitField + ?Sized), [a, b]: CutEdge, values: &[f64]) -> Vector3 {
         let (mut p, mut q) = (self.point(a as usize), self.point(b as usize));
         let (mut u, mut v) = (values[a as usize], values[b as usize]);
         let mut at = p + (q - p) * (u / (u - v));
@@ -138,7 +138,7 @@ impl Grid {
 }
 
 /// The triangles of a right-handed tetrahedron, seen from outside counter-clockwise.
-fn cut_tet(tet: [usize; 4], inside: impl Fn(usize) -> bool, found: &mut Vec<[Cut; 3]>) {
+fn cut_tet(tet: [usize; 4], inside: impl Fn(usize) -> bool, found: &mut Vec<[CutEdge; 3]>) {
     // Even permutations that bring the corners inside to the front.
     const EVEN: [[usize; 4]; 12] = [
         [0, 1, 2, 3],

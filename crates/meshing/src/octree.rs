@@ -25,7 +25,7 @@ pub(crate) struct Octree {
 }
 
 /// Points and tets of the lattice, with the edge of the smallest cube round each point [m].
-pub(crate) struct Lattice {
+pub(crate) struct GradedLattice {
     pub(crate) points: Vec<Vector3>,
     pub(crate) sizes: Vec<f64>,
     pub(crate) tets: Vec<[u32; 4]>,
@@ -136,7 +136,7 @@ impl Octree {
     }
 
     /// The tets of the lattice. The tree must be balanced.
-    pub(crate) fn lattice(&self) -> Lattice {
+    pub(crate) fn lattice(&self) -> GradedLattice {
         let mut nodes = Nodes { numbers: HashMap::new(), places: Vec::new(), sizes: Vec::new() };
         let leaves = self.leaves();
         for &(level, cube) in &leaves {
@@ -174,7 +174,7 @@ impl Octree {
                 tet.swap(2, 3);
             }
         }
-        Lattice { points, sizes: nodes.sizes, tets }
+        GradedLattice { points, sizes: nodes.sizes, tets }
     }
 
     /// Four tets round the way between the centres of two equal cubes, or up to eight where edges of the square between are halved.
@@ -299,7 +299,7 @@ mod tests {
             tree.demand(0, cube);
         }
         tree.balance();
-        let Lattice { points, sizes, tets } = tree.lattice();
+        let GradedLattice { points, sizes, tets } = tree.lattice();
         let mut faces: BTreeMap<[u32; 3], usize> = BTreeMap::new();
         let (mut volume, mut least) = (0.0, f64::INFINITY);
         for tet in &tets {

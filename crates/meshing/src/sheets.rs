@@ -111,7 +111,7 @@ impl Sheet {
         }
         let triangles = if pattern == Pattern::Crossed { 4.0 } else { 2.0 };
         require_at_most(counts[0] as f64 * counts[1] as f64 * triangles, allowed(cell_limit))?;
-        let grid = Grid { counts, wraps: self.closes() };
+        let grid = CellSheet { counts, wraps: self.closes() };
         let place = || grid.parameters(pattern, distortion);
         let mut mesh = Mesh {
             points: place().map(|[s, t]| self.point(s, t)).collect(),
@@ -235,12 +235,12 @@ fn add_normals(mesh: &mut Mesh, normals: Vec<Vector3>) {
 }
 
 /// Cells along two axes; points are numbered along the first, then the second; middles of crossed cells follow.
-struct Grid {
+struct CellSheet {
     counts: [usize; 2],
     wraps: bool,
 }
 
-impl Grid {
+impl CellSheet {
     fn points_along(&self) -> [usize; 2] {
         [self.counts[0] + usize::from(!self.wraps), self.counts[1] + 1]
     }

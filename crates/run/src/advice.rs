@@ -59,8 +59,8 @@ fn pushing(part: &Part, now: &dyn Instant) -> String {
     let unlimited = |contact: &Contact| {
         let With::Rigid(number) = contact.with else { return None };
         let rigid = &all.rigids[number];
-        let moves = rigid.course.moves() || now.leg(number).is_some();
-        (moves && rigid.course.limit().is_none()).then(|| format!("`{}`", rigid.tool()))
+        let moves = rigid.trajectory.moves() || now.leg(number).is_some();
+        (moves && rigid.trajectory.limit().is_none()).then(|| format!("`{}`", rigid.tool()))
     };
     let mut tools: Vec<String> = all.contacts.iter().filter_map(unlimited).collect();
     tools.dedup();

@@ -205,14 +205,14 @@ impl ResumeError {
                  from the start"
             ),
             Self::OtherScene { until, .. } => {
-                let course = until.map_or(String::new(), |until| {
+                let curve = until.map_or(String::new(), |until| {
                     format!(
-                        "; a course without `to` ends with the scene: write `to = {until}` where it ended so far"
+                        "; a curve without `to` ends with the scene: write `to = {until}` where it ended so far"
                     )
                 });
                 format!(
                     "resume with the scene as it was; a mesh, material, constraint, load or output that changed needs a run \
-                     from the start{course}"
+                     from the start{curve}"
                 )
             }
             Self::AtTheEnd { .. } => {

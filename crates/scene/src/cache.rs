@@ -17,9 +17,9 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 /// A kind of file: its first bytes, and its ending.
-type Kind = ([u8; 8], &'static str);
-const MESH: Kind = (*b"\x89PLMESH\n", "pliant-mesh");
-const GRID: Kind = (*b"\x89PLGRID\n", "pliant-grid");
+type FileKind = ([u8; 8], &'static str);
+const MESH: FileKind = (*b"\x89PLMESH\n", "pliant-mesh");
+const GRID: FileKind = (*b"\x89PLGRID\n", "pliant-grid");
 /// Ending of files under way.
 const PART: &str = "pliant-mesh-part";
 /// Bytes that all files may take together unless the caller says otherwise.
@@ -184,7 +184,7 @@ impl MeshCache {
         self.write(key, GRID, kept)
     }
 
-    fn read<T: DeserializeOwned>(&self, key: &Key, kind: Kind) -> Option<T> {
+    fn read<T: DeserializeOwned>(&self, key: &Key, kind: FileKind) -> Option<T> {
         let path = self.path(key, kind)?;
         let bytes = fs::read(&path).ok()?;
         let (crc, body) = bytes.strip_prefix(&kind.0)?.split_first_chunk()?;
@@ -198,7 +198,7 @@ impl MeshCache {
         Some(body)
     }
 
-    fn write(&self, key: &Key, kind: Kind, body: &impl Serialize) -> io::Result<()> {
+    fn write(&self, key: &Key, kind: FileKind, body: &impl Serialize) -> io::Result<()> {
         let (Some(path), Some(folder)) = (self.path(key, kind), &self.folder) else { return Ok(()) };
         let body = postcard::to_stdvec(body).map_err(io::Error::other)?;
         fs::create_dir_all(folder)?;
@@ -210,7 +210,7 @@ impl MeshCache {
         self.drop_oldest(folder, &path)
     }
 
-    fn path(&self, key: &Key, kind: Kind) -> Option<PathBuf> {
+    fn path(&self, key: &Key, kind: FileKind) -> Option<PathBuf> {
         Some(self.folder.as_ref()?.join(&key.0).with_extension(kind.1))
     }
 

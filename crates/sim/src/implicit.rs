@@ -37,7 +37,7 @@ pub(crate) struct Implicit {
     /// Bodies, and the constraints whose reactions are asked for.
     model: Arc<pliant_mechanics::Model>,
     bodies: Arc<ImplicitBodies>,
-    method: Method,
+    method: SolverMethod,
     /// Step [s].
     step: f64,
     /// Steps of the whole run.
@@ -87,13 +87,13 @@ struct Path {
 }
 
 /// A solver, and the forces at an instant: an explicit one finds them anyway.
-enum Method {
+enum SolverMethod {
     Static(Box<Statics>, Forces),
     Implicit(Box<BackwardEuler>, Forces),
     Explicit(Box<Explicit>),
 }
 
-impl Method {
+impl SolverMethod {
     /// The forces last found.
     fn forces(&self) -> &Forces {
         match self {
@@ -146,17 +146,16 @@ impl Implicit {
         let forces = || Forces::new(model.clone());
         let method = match &part.method {
             part::Method::Static(_, settings) => Statics::new(model.clone(), *settings)
-                .map(|solver| Method::Static(Box::new(solver), forces())),
+                .map(|solver| SolverMethod::Static(Box::new(solver), forces())),
             part::Method::Implicit(_, settings) => {
                 let settings = DynamicSettings { step: part.steps.step, ..*settings };
                 BackwardEuler::new(model.clone(), settings)
-                    .map(|solver| Method::Implicit(Box::new(solver), forces()))
+                    .map(|solver| SolverMethod::Implicit(Box::new(solver), forces()))
             }
             part::Method::Explicit(_)
             | part::Method::QuasiStatic { .. }
-            | part::Method::ExplicitShells(_) => {
-                Explicit::new(model.clone(), part.steps.step).map(|solver| Method::Explicit(Box::new(solver)))
-            }
+            | part::Method::ExplicitShells(_) => Explicit::new(model.clone(), part.steps.step)
+                .map(|solver| SolverMethod::Explicit(Box::new(solver))),
         };
         let mut prescribed = vec![false; 6 * model.rest.len()];
         for constraint in model.constraints.iter().filter(|own| !own.motion.is_collective()) {
@@ -249,7 +248,7 @@ impl Implicit {
         };
         // Backward Euler takes energy like a damper; a static path has no inertia to compare with.
         let damping = match self.method {
-            Method::Implicit(..) => external - kinetic - internal,
+            SolverMethod::Implicit(..) => external - kinetic - internal,
             _ => 0.0,
         };
         self.energies = Energies { kinetic, internal, damping, external, ..Energies::default() };
@@ -299,29 +298,29 @@ impl Implicit {
             }));
         }
         match &mut self.method {
-            Method::Static(solver, forces) => {
+            SolverMethod::Static(solver, forces) => {
                 solver.hold(&self.springs);
                 forces.hold(&self.springs);
             }
-            Method::Implicit(solver, forces) => {
+            SolverMethod::Implicit(solver, forces) => {
                 solver.hold(&self.springs);
                 forces.hold(&self.springs);
             }
-            Method::Explicit(solver) => solver.hold(&self.springs),
+            SolverMethod::Explicit(solver) => solver.hold(&self.springs),
         }
     }
 
     /// One step of the method, to the time of its number.
     fn go(&mut self, number: u64) -> Result<(), SolveError> {
         match self.method {
-            Method::Explicit(_) => self.go_explicitly(),
-            Method::Implicit(..) => self.go_implicitly(number),
-            Method::Static(..) => self.go_statically(number),
+            SolverMethod::Explicit(_) => self.go_explicitly(),
+            SolverMethod::Implicit(..) => self.go_implicitly(number),
+            SolverMethod::Static(..) => self.go_statically(number),
         }
     }
 
     fn go_explicitly(&mut self) -> Result<(), SolveError> {
-        let Method::Explicit(solver) = &mut self.method else { return Ok(()) };
+        let SolverMethod::Explicit(solver) = &mut self.method else { return Ok(()) };
         if self.evaluated {
             solver.go(&mut self.state);
             return Ok(());
@@ -330,7 +329,7 @@ impl Implicit {
     }
 
     fn go_implicitly(&mut self, number: u64) -> Result<(), SolveError> {
-        let Method::Implicit(solver, _) = &mut self.method else { return Ok(()) };
+        let SolverMethod::Implicit(solver, _) = &mut self.method else { return Ok(()) };
         let allowed = solver.settings().tolerance;
         let result = solver.advance(&mut self.state);
         let (residuals, found) = match &result {
@@ -366,7 +365,7 @@ impl Implicit {
     fn go_statically(&mut self, number: u64) -> Result<(), SolveError> {
         let until = number as f64 * self.step;
         let control = self.bodies.control.map(|control| part_of(control, number, self.planned));
-        let Method::Static(solver, _) = &mut self.method else { return Ok(()) };
+        let SolverMethod::Static(solver, _) = &mut self.method else { return Ok(()) };
         let result = match control {
             Some(control) => solver.control(&mut self.state, control),
             None => solver.solve(&mut self.state, until),
@@ -470,7 +469,7 @@ impl Implicit {
         (self.done, self.time) = (done, time);
         self.convergence = convergence;
         self.state = state.state();
-        if let Method::Implicit(solver, _) = &mut self.method {
+        if let SolverMethod::Implicit(solver, _) = &mut self.method {
             solver.go_on_from(previous.map(|previous| previous.state()));
         }
         self.before = before.map(|(forces, state)| (forces, state.state()));
@@ -489,7 +488,7 @@ impl Implicit {
 
     fn snapshot(&self) -> ImplicitState {
         let previous = match &self.method {
-            Method::Implicit(solver, _) => solver.previous().map(PlainState::of),
+            SolverMethod::Implicit(solver, _) => solver.previous().map(PlainState::of),
             _ => None,
         };
         ImplicitState {
@@ -593,7 +592,7 @@ impl Instant for Implicit {
     }
 
     fn effort(&self) -> Option<Effort> {
-        (!matches!(self.method, Method::Explicit(_))).then(|| self.effort.clone())
+        (!matches!(self.method, SolverMethod::Explicit(_))).then(|| self.effort.clone())
     }
 
     fn convergence(&self) -> Option<String> {
@@ -620,7 +619,7 @@ impl Participant for Implicit {
         if self.touching.is_none() {
             self.touching = self.method.touching_mut().map(|own| own.at(&self.state));
         }
-        if let (Some(now), Method::Static(_, forces) | Method::Implicit(_, forces)) =
+        if let (Some(now), SolverMethod::Static(_, forces) | SolverMethod::Implicit(_, forces)) =
             (&self.touching, &mut self.method)
         {
             forces.touch(&now.forces);
@@ -675,7 +674,7 @@ impl Participant for Implicit {
     /// Explicit steps of 0.9 of the stable step stay stable up to it, as those of solids do. Implicit ones are stable with any, and
     /// their equations stay well conditioned.
     fn stiffest(&self, grip: &Grip) -> f64 {
-        if !matches!(self.method, Method::Explicit(_)) {
+        if !matches!(self.method, SolverMethod::Explicit(_)) {
             return FIRM * self.bodies.model.stiffest();
         }
         let mass = |&(node, weight): &(u32, f64)| self.bodies.model.mass[node as usize] / weight;
@@ -708,7 +707,7 @@ impl Participant for Implicit {
 
     /// A static state stands at the last equilibrium found, which may lie within the step that failed.
     fn keeps_what_it_found(&mut self) -> bool {
-        let is_static = matches!(self.method, Method::Static(..));
+        let is_static = matches!(self.method, SolverMethod::Static(..));
         if is_static && self.state.time > self.time {
             self.time = self.state.time;
             // Contacts without friction: that of the part of the step that was found is not known.

@@ -61,7 +61,7 @@ pub trait Instant {
         None
     }
 
-    /// How far a rigid thing lags behind its course since its force is limited, by its place among those of the contacts.
+    /// How far a rigid thing lags behind its trajectory since its force is limited, by its place among those of the contacts.
     fn lag(&self, _rigid: usize) -> Option<&Lag> {
         None
     }

@@ -56,14 +56,14 @@ pub struct TieNow<'a> {
 
 /// What a restart needs of the ties of a world.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(crate) struct Memory {
+pub(crate) struct TieMemory {
     /// Of each point, the force on its slower and its faster side [N], and the impulse that the slower one is still to feel [N s].
     points: Vec<[Vector<f64>; 3]>,
     /// The widest gap [m] of each tie.
     widest: Vec<f64>,
 }
 
-impl Memory {
+impl TieMemory {
     /// Whether it is of these ties, or of none.
     pub(crate) fn fits(&self, ties: &[PenaltyTie]) -> bool {
         let points: usize = ties.iter().map(|tie| tie.points[0].len()).sum();
@@ -132,7 +132,7 @@ impl Point {
 pub(crate) struct Springs {
     ties: Vec<PenaltyTie>,
     points: Vec<Point>,
-    memory: Memory,
+    memory: TieMemory,
 }
 
 impl Springs {
@@ -140,7 +140,7 @@ impl Springs {
     ///
     /// # Errors
     /// If a participant takes part in no ties.
-    pub(crate) fn new(ties: &[PenaltyTie], parts: &[Part], memory: Memory) -> Result<Self, Failure> {
+    pub(crate) fn new(ties: &[PenaltyTie], parts: &[Part], memory: TieMemory) -> Result<Self, Failure> {
         let mut points = Vec::new();
         // Sum of the weights of all points at each node.
         let mut shares: Vec<Vec<f64>> = parts.iter().map(|part| vec![0.0; part.model.node_count()]).collect();
@@ -185,7 +185,7 @@ impl Springs {
             point.fast.grip.stiffness = point.spring + own;
         }
         let memory = match memory.points.is_empty() {
-            true => Memory { points: vec![[[0.0; 3]; 3]; points.len()], widest: vec![0.0; ties.len()] },
+            true => TieMemory { points: vec![[[0.0; 3]; 3]; points.len()], widest: vec![0.0; ties.len()] },
             false => memory,
         };
         Ok(Self { ties: ties.to_vec(), points, memory })
@@ -195,7 +195,7 @@ impl Springs {
         self.points.is_empty()
     }
 
-    pub(crate) fn memory(&self) -> &Memory {
+    pub(crate) fn memory(&self) -> &TieMemory {
         &self.memory
     }
 

@@ -15,7 +15,7 @@ use crate::instant::Instant;
 use crate::kept::Kept;
 use crate::part::Part;
 use crate::participant::Participant;
-use crate::penalty::{Memory, PenaltyTie, Springs, TieNow};
+use crate::penalty::{PenaltyTie, Springs, TieMemory, TieNow};
 use crate::schedule::steps_to;
 use crate::solver::LoadStepProgress;
 use crate::start::{Before, begin, go_on};
@@ -69,7 +69,7 @@ impl From<Part> for Arc<World> {
 
 /// The state of a simulation between two steps: a snapshot of all that another one needs to go on from there.
 #[derive(Clone, Debug)]
-pub struct State(Vec<OwnState>, Memory);
+pub struct State(Vec<OwnState>, TieMemory);
 
 /// That of a participant.
 #[derive(Clone, Debug)]
@@ -84,8 +84,8 @@ impl State {
     /// The state whose participants were [encoded](Simulation::encode); `None` where these bytes are none of this world.
     pub fn decode<B: AsRef<[u8]>>(world: &World, bytes: &[B]) -> Option<Self> {
         let (participants, ties) = bytes.split_at_checked(world.parts.len())?;
-        let ties: Memory = match ties {
-            [] => Memory::default(),
+        let ties: TieMemory = match ties {
+            [] => TieMemory::default(),
             [ties] => postcard::from_bytes(ties.as_ref()).ok()?,
             _ => return None,
         };
@@ -155,7 +155,7 @@ impl Simulation {
         if participants.is_empty() {
             return Err(Failure::input(&"the world has no participants"));
         }
-        Self::of(world, participants, Memory::default())
+        Self::of(world, participants, TieMemory::default())
     }
 
     /// From a state of this world on.
@@ -204,7 +204,11 @@ impl Simulation {
         Self::of(world, participants, ties).map(Some)
     }
 
-    fn of(world: Arc<World>, participants: Vec<Box<dyn Participant>>, ties: Memory) -> Result<Self, Failure> {
+    fn of(
+        world: Arc<World>,
+        participants: Vec<Box<dyn Participant>>,
+        ties: TieMemory,
+    ) -> Result<Self, Failure> {
         let ratios = world.ratios();
         let nodes = world.parts.iter().map(|part| part.model.node_count() as u32);
         let first_nodes = nodes.scan(0, |next, nodes| Some(std::mem::replace(next, *next + nodes))).collect();

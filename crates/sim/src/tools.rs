@@ -28,7 +28,7 @@ pub struct ToolNow {
 /// use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 /// use pliant_mechanics::model::{Cells, Material, Solid};
 /// use pliant_sim::contact::pairs::Surface;
-/// use pliant_sim::contact::pose::{Course, Pose};
+/// use pliant_sim::contact::pose::{Trajectory, Pose};
 /// use pliant_sim::contact::shape::Shape;
 /// use pliant_sim::contact::touch::{Contact, Contacts, Rigid, Touch, With};
 /// use pliant_sim::{Method, Part, Simulation};
@@ -45,7 +45,7 @@ pub struct ToolNow {
 /// let ball = Rigid {
 ///     name: "ball".into(),
 ///     shape: Shape::Sphere { radius: 0.02 },
-///     course: Course::fixed(above),
+///     trajectory: Trajectory::fixed(above),
 ///     inside: false,
 ///     jaw: None,
 /// };
@@ -64,7 +64,7 @@ pub struct ToolNow {
 /// ```
 impl Simulation {
     /// Drives a tool or an obstacle to a pose within a time [s], on a straight way and the shortest arc from where it is. There it stays; the
-    /// course that it has in the scene is left. When it arrives [s]: later than asked for where nodes would be passed over on the way, and
+    /// trajectory that it has in the scene is left. When it arrives [s]: later than asked for where nodes would be passed over on the way, and
     /// after one step at the earliest. The step under way, if its forces are found, is the last one of the motion before.
     ///
     /// # Errors

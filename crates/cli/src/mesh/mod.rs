@@ -143,7 +143,7 @@ fn require_volume_format(arguments: &MeshImage) -> Result<(), Failure> {
     }
 }
 
-fn make(arguments: &MeshImage, bar: &Bar) -> Result<Made, Failure> {
+fn make(arguments: &MeshImage, bar: &Bar) -> Result<MadeMesh, Failure> {
     if arguments.edge.is_none() && arguments.distance.is_none() {
         let help = "for example `--edge 8mm`, or 0.008 in metres; for tets `--distance 1mm` selects it";
         return Err(Failure::plain("the edge of the cells is missing", help));
@@ -176,7 +176,7 @@ fn make(arguments: &MeshImage, bar: &Bar) -> Result<Made, Failure> {
     if let Cells::Tets(report) = &cells {
         warnings.extend(report.doubts());
     }
-    Ok(Made {
+    Ok(MadeMesh {
         quality: QualityReport::new(&mesh),
         components: diagnose(&mesh).components,
         steps: steps(arguments, &mesh),
@@ -229,7 +229,7 @@ fn steps(arguments: &MeshImage, mesh: &Mesh) -> Vec<(String, f64)> {
 }
 
 /// A body to fill, with notes on its source.
-struct Found {
+struct Input {
     anatomy: Anatomy<'static>,
     names: BTreeMap<i32, String>,
     protect: Vec<(i32, Option<f64>)>,
@@ -241,7 +241,7 @@ struct Found {
 }
 
 /// The body of the chosen labels of an image.
-fn segmented(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
+fn segmented(arguments: &MeshImage, bar: &Bar) -> Result<Input, Failure> {
     let found = regions(arguments, bar)?;
     if let Some(edge) = arguments.edge {
         let voxels = found.labels.labels.iter().filter(|&&label| label != 0).count();
@@ -252,11 +252,11 @@ fn segmented(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
     lines.push(format!("cleaned          {cleaned}"));
     let edge = edge_of(arguments, anatomy.field().bounds().into());
     let object = json!({ "image": object, "cleaned": cleaned });
-    Ok(Found { anatomy, names, protect, edge, lines, object, warnings })
+    Ok(Input { anatomy, names, protect, edge, lines, object, warnings })
 }
 
 /// The body inside a closed surface.
-fn enclosed(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
+fn enclosed(arguments: &MeshImage, bar: &Bar) -> Result<Input, Failure> {
     let refused = |error| meshing_failure(&error, arguments.force);
     let closing = Closing {
         holes: arguments.close_gaps,
@@ -299,7 +299,7 @@ fn enclosed(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
         lines.push(format!("surface          {} pieces, of which {cavities} {word}", report.shells));
     }
     let object = json!({ "surface": { "format": file.format, "notes": file.notes }, "mended": report });
-    Ok(Found { anatomy, names, protect, edge, lines, object, warnings })
+    Ok(Input { anatomy, names, protect, edge, lines, object, warnings })
 }
 
 /// Rejects too many cells for a volume [m³], before meshing.
@@ -320,7 +320,7 @@ enum Cells {
 }
 
 /// A mesh with its report.
-struct Made {
+struct MadeMesh {
     mesh: Mesh,
     cells: Cells,
     /// The source of the body, as text and as JSON.
@@ -334,7 +334,7 @@ struct Made {
     warnings: Vec<String>,
 }
 
-impl Made {
+impl MadeMesh {
     fn page(&self) -> String {
         let mut lines = self.lines.clone();
         match &self.cells {

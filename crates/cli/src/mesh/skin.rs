@@ -22,7 +22,7 @@ const CREASE: f64 = std::f64::consts::FRAC_PI_3;
 const SAMPLES: f64 = 400.0;
 
 /// The input surface with notes on its source.
-struct Found {
+struct InputSurface {
     surface: TriangleMesh,
     lines: Vec<String>,
     object: Json,
@@ -100,7 +100,7 @@ fn require_surface_format(path: &Path) -> Result<(), Failure> {
 }
 
 /// The surface of a mesh file or of regions of an image.
-fn found(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
+fn found(arguments: &MeshImage, bar: &Bar) -> Result<InputSurface, Failure> {
     let refused = |error| meshing_failure(&error, arguments.force);
     if is_mesh_file(arguments) {
         let mut warnings = Vec::new();
@@ -110,7 +110,7 @@ fn found(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
             vec![format!("{}: {}, {} triangles", arguments.image.display(), file.format, surface.len())];
         lines.extend(file.notes.iter().map(|note| format!("note: {note}")));
         lines.push(format!("mended           {repairs}"));
-        return Ok(Found { surface, lines, object: file_object(&file.format, &repairs), warnings });
+        return Ok(InputSurface { surface, lines, object: file_object(&file.format, &repairs), warnings });
     }
     let found = regions(arguments, bar)?;
     let (anatomy, cleaned) = anatomy(arguments, &found, &SURFACE_SMOOTHING, bar)?;
@@ -120,7 +120,7 @@ fn found(arguments: &MeshImage, bar: &Bar) -> Result<Found, Failure> {
     let Segmented { mut lines, mut object, warnings, .. } = found;
     lines.push(format!("cleaned          {cleaned}"));
     object["cleaned"] = json!(cleaned);
-    Ok(Found { surface, lines, object, warnings })
+    Ok(InputSurface { surface, lines, object, warnings })
 }
 
 fn file_object(format: &str, repairs: &SurfaceRepairs) -> Json {
@@ -128,7 +128,7 @@ fn file_object(format: &str, repairs: &SurfaceRepairs) -> Json {
 }
 
 /// The resulting surface with its report.
-struct Made {
+struct MadeSurface {
     mesh: Mesh,
     error_map: Option<Mesh>,
     lines: Vec<String>,
@@ -137,7 +137,7 @@ struct Made {
     warnings: Vec<String>,
 }
 
-fn make(arguments: &MeshImage, found: &TriangleMesh, goal: Goal, bar: &Bar) -> Result<Made, Failure> {
+fn make(arguments: &MeshImage, found: &TriangleMesh, goal: Goal, bar: &Bar) -> Result<MadeSurface, Failure> {
     let refused = |error| meshing_failure(&error, arguments.force);
     let mut surface = found.clone();
     bar.update_mesh(0.5, "making triangles");
@@ -168,14 +168,14 @@ fn make(arguments: &MeshImage, found: &TriangleMesh, goal: Goal, bar: &Bar) -> R
     Ok(triangles(&surface, &Hausdorff::between(&surface, found, diagonal / SAMPLES), diagonal))
 }
 
-fn shells(fitted: FittedShells) -> Made {
+fn shells(fitted: FittedShells) -> MadeSurface {
     let FittedShells { mesh, error_map, report } = fitted;
     let lines = vec![report.to_string()];
     let object = json!({ "status": "done", "as": "shells", "report": report });
-    Made { mesh, error_map: Some(error_map), lines, object, warnings: report.warnings() }
+    MadeSurface { mesh, error_map: Some(error_map), lines, object, warnings: report.warnings() }
 }
 
-fn triangles(surface: &TriangleMesh, distances: &Hausdorff, diagonal: f64) -> Made {
+fn triangles(surface: &TriangleMesh, distances: &Hausdorff, diagonal: f64) -> MadeSurface {
     let mesh = surface.to_mesh();
     let of = |nodes: &[u32]| [0, 1, 2].map(|k| mesh.points[nodes[k] as usize]);
     let block = mesh.block(CellKind::Triangle);
@@ -203,7 +203,7 @@ fn triangles(surface: &TriangleMesh, distances: &Hausdorff, diagonal: f64) -> Ma
         "volume": volume, "least_angle": angle, "components": pieces, "border_edges": borders,
         "distances": distances, "diagonal": diagonal,
     });
-    Made { mesh, error_map: None, lines, object, warnings: Vec::new() }
+    MadeSurface { mesh, error_map: None, lines, object, warnings: Vec::new() }
 }
 
 /// The smallest angle of a triangle [rad].

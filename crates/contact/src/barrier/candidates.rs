@@ -6,7 +6,7 @@ use super::advance::{Kind, Query, allowed};
 use super::distance::Mollifier;
 use super::law::{Barrier, Slip};
 use super::rows::{Mollified, Row, Stencil};
-use super::surfaces::{Side, around};
+use super::surfaces::{BarrierSide, around};
 
 /// Rest distances, over the reach, up to which parts of one surface never touch each other.
 const AT_REST: f64 = 1.02;
@@ -75,7 +75,7 @@ pub(super) struct Group {
     /// The contact, by its number.
     pub number: u32,
     /// Two surfaces, or one that touches itself.
-    pub sides: Vec<Side>,
+    pub sides: Vec<BarrierSide>,
     /// The rigid thing whose distance nodes of the first keep, by its number.
     pub wall: Option<u32>,
     pub action: Action,
@@ -92,7 +92,7 @@ pub(super) struct Group {
 impl Group {
     pub fn new(
         number: u32,
-        sides: Vec<Side>,
+        sides: Vec<BarrierSide>,
         wall: Option<u32>,
         action: Action,
         rest: &[Vector3<f64>],

@@ -3,13 +3,13 @@
 
 use nalgebra::Vector3;
 
-use super::surfaces::{Side, around};
+use super::surfaces::{BarrierSide, around};
 use crate::tree::Tree;
 
 /// Edges that go through triangles: calls back with the ends and the corners. Of one side alone those with a node in common count for
 /// nothing.
 pub(super) fn crossings(
-    [edges, faces]: [&Side; 2],
+    [edges, faces]: [&BarrierSide; 2],
     place: &impl Fn(u32) -> Vector3<f64>,
     mut found: impl FnMut([u32; 2], [u32; 3]),
 ) {

@@ -9,7 +9,7 @@ use crate::tree::{Bounds, Tree};
 
 /// Points, edges and triangles of one side of a contact. Nodes of rigid things are numbered after those of the model.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Side {
+pub(super) struct BarrierSide {
     /// Nodes, increasing.
     pub points: Vec<u32>,
     /// Edges by their ends.
@@ -28,7 +28,7 @@ pub(super) struct Side {
     pub(super) edge_tree: Tree,
 }
 
-impl Side {
+impl BarrierSide {
     /// That of a surface of a body, by the places at rest [m].
     pub(super) fn of_body(surface: &Surface, place: impl Fn(u32) -> Point) -> Self {
         let faces = surface.faces.clone();

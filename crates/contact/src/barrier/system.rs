@@ -17,7 +17,7 @@ use super::distance::Nearest;
 use super::features::Features;
 use super::law::{Barrier, Slip};
 use super::rows::{Held, Row, Stencil};
-use super::surfaces::Side;
+use super::surfaces::BarrierSide;
 use crate::pose::{Leg, Pose, between};
 use crate::shape::Near;
 use crate::touch::{Contacts, Passage, With};
@@ -102,16 +102,16 @@ impl Barriers {
         let at = |node: u32| places[node as usize];
         let mut groups = Vec::new();
         for ((contact, settings), number) in contacts.contacts.iter().zip(settings).zip(0..) {
-            let own = Side::of_body(&contact.surface, at);
+            let own = BarrierSide::of_body(&contact.surface, at);
             let mut offset = contact.touch.offset;
             let (sides, wall) = match &contact.with {
                 With::Itself => (vec![own], None),
-                With::Body(other) => (vec![own, Side::of_body(other, at)], None),
+                With::Body(other) => (vec![own, BarrierSide::of_body(other, at)], None),
                 With::Rigid(rigid) => {
                     let (features, first) = &features[*rigid];
                     offset += features.offset;
                     let wall = (!features.is_all).then_some(*rigid as u32);
-                    (vec![own, Side::of_rigid(features, *first)], wall)
+                    (vec![own, BarrierSide::of_rigid(features, *first)], wall)
                 }
             };
             let action = Action {

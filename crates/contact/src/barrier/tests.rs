@@ -7,7 +7,7 @@ use pliant_testing::Random;
 
 use super::{BarrierSettings, Barriers, Stencil};
 use crate::pairs::Surface;
-use crate::pose::{Course, Pose};
+use crate::pose::{Pose, Trajectory};
 use crate::shape::Shape;
 use crate::touch::{Contact, Contacts, Rigid, Touch, With};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
@@ -31,8 +31,8 @@ fn sheet(cells: u32, first: u32) -> (Surface, Vec<Vector3<f64>>) {
 
 fn rigid(shape: Shape, at: [f64; 3], by: [f64; 3]) -> Rigid {
     let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: 1.0 };
-    let course = Course::by(Pose::translation(at[0], at[1], at[2]), by, curve);
-    Rigid { name: "thing".into(), shape, course, inside: false, jaw: None }
+    let trajectory = Trajectory::by(Pose::translation(at[0], at[1], at[2]), by, curve);
+    Rigid { name: "thing".into(), shape, trajectory, inside: false, jaw: None }
 }
 
 /// Two sheets on top of each other, bumpy, over a thing; the upper one touches itself.
@@ -201,9 +201,11 @@ fn no_motion_that_is_allowed_goes_through() {
 #[test]
 fn a_turning_thing_goes_through_nothing() {
     let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: 1.0 };
-    let course = Course::turn(Pose::translation(0.0, 0.0, 0.3), [0.0, 1.0, 0.0], [0.0, 0.0, 0.3], 3.0, curve);
+    let trajectory =
+        Trajectory::turn(Pose::translation(0.0, 0.0, 0.3), [0.0, 1.0, 0.0], [0.0, 0.0, 0.3], 3.0, curve);
     let size = [0.5, 0.05, 0.02];
-    let bar = Rigid { name: "bar".into(), shape: Shape::Cuboid { size }, course, inside: false, jaw: None };
+    let bar =
+        Rigid { name: "bar".into(), shape: Shape::Cuboid { size }, trajectory, inside: false, jaw: None };
     let mut scene = Scene::new(bar, 0.0);
     // The upper sheet out of the way.
     scene.places[49..].iter_mut().for_each(|x| x.z -= 0.2);

@@ -23,20 +23,20 @@ use super::{
 };
 use crate::Scalar;
 use crate::history::History;
-use crate::lanes::{Lanes, Local, PACK, Pack, Processor, Work, entry, load_tensor};
+use crate::lanes::{LaneWork, Lanes, Local, PACK, Pack, Processor, entry, load_tensor};
 use crate::relaxation::Relaxation;
 
 pub(super) struct AveragedTets<R> {
     processor: Processor,
     /// Displacements of the nodes of each block, and their average beside them.
     moved: Moved<R>,
-    constants: Constants<R>,
+    constants: AveragedConstants<R>,
     /// J_n − 1, then p_n [Pa].
     node_value: Vec<Pack<R>>,
 }
 
 /// What does not change from step to step.
-struct Constants<R> {
+struct AveragedConstants<R> {
     law: AnyLaw,
     averaging: Averaging,
     cells: PackedCells<R, 4>,
@@ -64,7 +64,7 @@ impl<R: Scalar> AveragedTets<R> {
         let number = |node: u32| known.partition_point(|&other| other < node) as u32;
         Self {
             processor: Processor::detect(),
-            constants: Constants {
+            constants: AveragedConstants {
                 law: solid.material.law,
                 averaging,
                 rest: PackedRest::of(&packed, cells),
@@ -87,7 +87,7 @@ impl<R: Scalar> AveragedTets<R> {
 
     /// The mean of the cells' values at each node, weighted by volume, from the sums of the blocks.
     fn average_to_nodes(&mut self, sums: &[Quad<R>]) {
-        let Constants { shares, inverse_volume, .. } = &self.constants;
+        let AveragedConstants { shares, inverse_volume, .. } = &self.constants;
         self.node_value.par_iter_mut().enumerate().with_min_len(32).for_each(|(pack, nodes)| {
             let own = pack * PACK..inverse_volume.len().min((pack + 1) * PACK);
             let part = |place: usize| sums[place][0];
@@ -114,7 +114,7 @@ impl<R: Scalar> AveragedTets<R> {
     }
 }
 
-impl<R: Scalar> Constants<R> {
+impl<R: Scalar> AveragedConstants<R> {
     /// Tensors of history per cell.
     fn cell_slots(&self) -> usize {
         self.isochoric_slots + if self.averaging == Averaging::NiftySim { self.volumetric_slots } else { 0 }
@@ -131,17 +131,17 @@ impl<R: Scalar> Constants<R> {
 
 /// The shares of the cells of a block in Σ V_e (J_e − 1)/4 of its nodes.
 struct VolumeChanges<'a, R> {
-    constants: &'a Constants<R>,
+    constants: &'a AveragedConstants<R>,
     displacement: &'a [Vector<R>],
     task: Task<'a, R>,
 }
 
-impl<R: Scalar> Work<R> for VolumeChanges<'_, R> {
+impl<R: Scalar> LaneWork<R> for VolumeChanges<'_, R> {
     type Output = Findings<R>;
 
     #[inline(always)]
     fn run<L: Lanes<R>>(self) -> Findings<R> {
-        let Self { constants: Constants { cells, rest, .. }, displacement, mut task } = self;
+        let Self { constants: AveragedConstants { cells, rest, .. }, displacement, mut task } = self;
         task.copy_in(displacement);
         task.forces.fill([R::ZERO; 4]);
         let packs = cells.packs_of(task.block);
@@ -161,17 +161,17 @@ impl<R: Scalar> Work<R> for VolumeChanges<'_, R> {
 
 /// The shares of the cells of a block in Σ V_e p_e/4 of its nodes, with p_e = U'(J̄_e).
 struct CellPressures<'a, R> {
-    constants: &'a Constants<R>,
+    constants: &'a AveragedConstants<R>,
     task: Task<'a, R>,
 }
 
-impl<R: Scalar> Work<R> for CellPressures<'_, R> {
+impl<R: Scalar> LaneWork<R> for CellPressures<'_, R> {
     type Output = Findings<R>;
 
     #[inline(always)]
     fn run<L: Lanes<R>>(self) -> Findings<R> {
         let Self { constants, task } = self;
-        let Constants { law, cells, rest, relaxation, volumetric_slots: slots, .. } = constants;
+        let AveragedConstants { law, cells, rest, relaxation, volumetric_slots: slots, .. } = constants;
         let Task { block, moved, forces: sums, pressures: history, .. } = task;
         sums.fill([R::ZERO; 4]);
         let mut batch = Batch::new();
@@ -211,17 +211,18 @@ fn average<R: Scalar, L: Lanes<R>>(local: &Local<'_, R, 4>, pack: usize, at: usi
 
 /// Up to [`PACKS`] packs of J − 1 at nodes become pressures [Pa].
 struct NodePressures<'a, R> {
-    constants: &'a Constants<R>,
+    constants: &'a AveragedConstants<R>,
     values: &'a mut [Pack<R>],
     history: &'a mut [Pack<R>],
 }
 
-impl<R: Scalar> Work<R> for NodePressures<'_, R> {
+impl<R: Scalar> LaneWork<R> for NodePressures<'_, R> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes<R>>(self) {
-        let Self { constants: Constants { law, relaxation, volumetric_slots, .. }, values, history } = self;
+        let Self { constants: AveragedConstants { law, relaxation, volumetric_slots, .. }, values, history } =
+            self;
         relaxed_pressures::<R, L>(law, relaxation, *volumetric_slots, values, history, &mut Batch::new());
     }
 }
@@ -248,18 +249,18 @@ pub(super) fn relaxed_pressures<R: Scalar, L: Lanes<R>>(
 }
 
 /// A pass over the cells of a block.
-struct Pass<'a, R> {
-    constants: &'a Constants<R>,
+struct AveragedPass<'a, R> {
+    constants: &'a AveragedConstants<R>,
     task: Task<'a, R>,
 }
 
-impl<R: Scalar> Work<R> for Pass<'_, R> {
+impl<R: Scalar> LaneWork<R> for AveragedPass<'_, R> {
     type Output = Findings<R>;
 
     #[inline(always)]
     fn run<L: Lanes<R>>(self) -> Findings<R> {
         let Self { constants, task } = self;
-        let Constants { law, cells, rest, .. } = constants;
+        let AveragedConstants { law, cells, rest, .. } = constants;
         let Task { block, moved, forces: sums, history, .. } = task;
         let per_pack = 6 * constants.cell_slots();
         let of_deformation = constants.averaging == Averaging::NiftySim;
@@ -328,7 +329,7 @@ fn dilated<L: pliant_mechanics::Number>(h: &Tensor<L>, volume_ratio: L, change: 
     scaled
 }
 
-impl<R: Scalar> Constants<R> {
+impl<R: Scalar> AveragedConstants<R> {
     /// The first Piola–Kirchhoff stress: of the law where the deformation is averaged, else of its isochoric part and the
     /// pressure of the nodes, F S_iso + p cof F.
     #[inline(always)]
@@ -381,7 +382,7 @@ impl<R: Scalar> ForceField<R> for AveragedTets<R> {
         let history = (history.cells.as_mut_slice(), 6 * constants.cell_slots());
         self.moved.for_each(forces, history, (&mut [], 0), findings, |blocks, mut task| {
             constants.copy_in(blocks, values, &mut task);
-            processor.run(Pass { constants, task })
+            processor.run(AveragedPass { constants, task })
         });
     }
     fn set_step(&mut self, prony: &Prony, step: f64) {

@@ -15,10 +15,10 @@ use crate::lanes::{Lanes, Local, PACK, Pack, load_vector};
 use crate::relaxation::Relaxation;
 
 /// Bars of one solid.
-pub(super) type Bars<R> = OnePass<R, Constants<R>>;
+pub(super) type Bars<R> = OnePass<R, BarConstants<R>>;
 
 /// What does not change from step to step.
-pub(super) struct Constants<R> {
+pub(super) struct BarConstants<R> {
     cells: PackedCells<R, 2>,
     rest: Vec<PackedBar<R>>,
     tension_only: bool,
@@ -56,7 +56,7 @@ impl<R: Scalar> Bars<R> {
                 area: packed.pack(pack, |cell| R::of(cells.rest[cell].area())),
             }
         };
-        let constants = Constants {
+        let constants = BarConstants {
             rest: packed.packs().map(rest).collect(),
             cells: packed,
             tension_only: cord.tension_only,
@@ -67,7 +67,7 @@ impl<R: Scalar> Bars<R> {
     }
 }
 
-impl<R: Scalar> Element<R> for Constants<R> {
+impl<R: Scalar> Element<R> for BarConstants<R> {
     fn slots(&self) -> [usize; 2] {
         [self.history, 0]
     }
@@ -77,7 +77,7 @@ impl<R: Scalar> Element<R> for Constants<R> {
 
     #[inline(always)]
     fn pass<L: Lanes<R>>(&self, displacement: &[Vector<R>], mut task: Task<'_, R>) -> Findings<R> {
-        let Constants { cells, rest, tension_only, relaxation, history: per_pack } = self;
+        let BarConstants { cells, rest, tension_only, relaxation, history: per_pack } = self;
         task.copy_in(displacement);
         let Task { block, moved, forces: sums, history, .. } = task;
         sums.fill([R::ZERO; 4]);

@@ -9,7 +9,7 @@ use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, dot};
 use super::Findings;
 use crate::Scalar;
 use crate::lanes::{
-    Lanes, PACK, Pack, Processor, Work, load_symmetric, load_tensor, load_vector, store_vector,
+    LaneWork, Lanes, PACK, Pack, Processor, load_symmetric, load_tensor, load_vector, store_vector,
 };
 
 /// Packs of points in a batch: few enough for the first cache.
@@ -127,7 +127,7 @@ struct Stresses<'a, R, T> {
     fibres: &'a [Vector<Pack<R>>],
 }
 
-impl<R: Scalar, T: Law> Work<R> for Stresses<'_, R, T> {
+impl<R: Scalar, T: Law> LaneWork<R> for Stresses<'_, R, T> {
     type Output = ();
 
     #[inline(always)]
@@ -183,7 +183,7 @@ pub(super) fn pressures<R: Scalar, L: Lanes<R>>(law: &AnyLaw, values: &mut [Pack
 /// U'(J) [Pa] at one J − 1.
 pub(crate) fn pressure(law: &AnyLaw, volume_change: f64) -> f64 {
     struct One<'a>(&'a AnyLaw, Pack<f64>);
-    impl Work<f64> for One<'_> {
+    impl LaneWork<f64> for One<'_> {
         type Output = f64;
         #[inline(always)]
         fn run<L: Lanes<f64>>(mut self) -> f64 {

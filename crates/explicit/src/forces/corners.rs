@@ -12,7 +12,7 @@ use pliant_mechanics::tensor::{Vector, add, cross, dot, sub};
 
 use super::{PackedCells, relative};
 use crate::Scalar;
-use crate::lanes::{Lanes, Local, PACK, Pack, Work, load_vector};
+use crate::lanes::{LaneWork, Lanes, Local, PACK, Pack, load_vector};
 
 /// Nodes of packs of hexahedra at rest, relative to their first ones [m].
 pub(super) struct PackedCorners<R>([Vector<Pack<R>>; 7]);
@@ -98,7 +98,7 @@ pub(super) struct CornerCheck<'a, 'l, R, const N: usize, const M: usize> {
     pub pack: usize,
 }
 
-impl<R: Scalar, const N: usize, const M: usize> Work<R> for CornerCheck<'_, '_, R, N, M> {
+impl<R: Scalar, const N: usize, const M: usize> LaneWork<R> for CornerCheck<'_, '_, R, N, M> {
     /// The first lane with an inverted corner.
     type Output = Option<usize>;
 

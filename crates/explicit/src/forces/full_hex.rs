@@ -16,10 +16,10 @@ use crate::Scalar;
 use crate::lanes::{Lanes, Local, PACK, Pack, load_vector, store_vector};
 use crate::relaxation::Relaxation;
 
-pub(super) type FullHexes<R> = OnePass<R, Constants<R>>;
+pub(super) type FullHexes<R> = OnePass<R, FullHexConstants<R>>;
 
 /// What does not change from step to step.
-pub(super) struct Constants<R> {
+pub(super) struct FullHexConstants<R> {
     law: AnyLaw,
     cells: PackedCells<R, 8>,
     points: Vec<[Point<R>; 8]>,
@@ -49,7 +49,7 @@ impl<R: Scalar> FullHexes<R> {
             }),
             weight: packed.pack(pack, |cell| R::of(points[cell].weight[g])),
         };
-        let constants = Constants {
+        let constants = FullHexConstants {
             law: solid.material.law,
             points: packed.packs().map(|pack| std::array::from_fn(|g| point(pack, g))).collect(),
             inverse_volume: (packed.packs())
@@ -65,7 +65,7 @@ impl<R: Scalar> FullHexes<R> {
     }
 }
 
-impl<R: Scalar> Element<R> for Constants<R> {
+impl<R: Scalar> Element<R> for FullHexConstants<R> {
     fn slots(&self) -> [usize; 2] {
         [8 * 6 * self.isochoric_slots, self.volumetric_slots]
     }
@@ -75,7 +75,7 @@ impl<R: Scalar> Element<R> for Constants<R> {
 
     #[inline(always)]
     fn pass<L: Lanes<R>>(&self, displacement: &[Vector<R>], mut task: Task<'_, R>) -> Findings<R> {
-        let Constants { law, cells, points, corners, inverse_volume, relaxation, .. } = self;
+        let FullHexConstants { law, cells, points, corners, inverse_volume, relaxation, .. } = self;
         task.copy_in(displacement);
         let Task { block, moved, forces: sums, history, pressures, .. } = task;
         sums.fill([R::ZERO; 4]);

@@ -25,10 +25,10 @@ use crate::relaxation::Relaxation;
 const SEARCHED: f64 = 64.0;
 
 /// The triangles of a membrane.
-pub(super) type Membranes<R> = OnePass<R, Constants<R>>;
+pub(super) type Membranes<R> = OnePass<R, MembraneConstants<R>>;
 
 /// What does not change from step to step.
-pub(super) struct Constants<R> {
+pub(super) struct MembraneConstants<R> {
     law: AnyLaw,
     across: Across,
     cells: PackedCells<R, 3>,
@@ -59,7 +59,7 @@ impl<R: Scalar> Membranes<R> {
             }),
             volume: packed.pack(pack, |cell| R::of(cells.rest[cell].volume)),
         };
-        let constants = Constants {
+        let constants = MembraneConstants {
             law: solid.material.law,
             across: solid.material.law.across(),
             rest: packed.packs().map(rest).collect(),
@@ -132,7 +132,7 @@ impl<R: Scalar> Walls<R> {
     #[inline(always)]
     fn evaluate<L: Lanes<R>>(
         &mut self,
-        constants: &Constants<R>,
+        constants: &MembraneConstants<R>,
         batch: &mut Batch<R>,
         packs: usize,
         fibres: &[Vector<Pack<R>>],
@@ -197,7 +197,7 @@ impl<R: Scalar> Walls<R> {
     #[inline(always)]
     fn stress<L: Lanes<R>>(
         &self,
-        constants: &Constants<R>,
+        constants: &MembraneConstants<R>,
         batch: &Batch<R>,
         pack: usize,
         at: usize,
@@ -209,7 +209,7 @@ impl<R: Scalar> Walls<R> {
     }
 }
 
-impl<R: Scalar> Element<R> for Constants<R> {
+impl<R: Scalar> Element<R> for MembraneConstants<R> {
     fn slots(&self) -> [usize; 2] {
         [self.history, 0]
     }
@@ -219,7 +219,7 @@ impl<R: Scalar> Element<R> for Constants<R> {
 
     #[inline(always)]
     fn pass<L: Lanes<R>>(&self, displacement: &[Vector<R>], mut task: Task<'_, R>) -> Findings<R> {
-        let Constants { cells, rest, relaxation, history: per_pack, .. } = self;
+        let MembraneConstants { cells, rest, relaxation, history: per_pack, .. } = self;
         task.copy_in(displacement);
         let Task { block, moved, forces: sums, history, .. } = task;
         sums.fill([R::ZERO; 4]);

@@ -7,7 +7,7 @@ use super::blocks::{Blocks, Moved, Quad, Task};
 use super::{Findings, ForceField};
 use crate::Scalar;
 use crate::history::History;
-use crate::lanes::{Lanes, Processor, Work};
+use crate::lanes::{LaneWork, Lanes, Processor};
 use crate::relaxation::Relaxation;
 
 /// What an element knows of its cells that does not change from step to step.
@@ -42,7 +42,7 @@ struct Pass<'a, R, E> {
     task: Task<'a, R>,
 }
 
-impl<R: Scalar, E: Element<R>> Work<R> for Pass<'_, R, E> {
+impl<R: Scalar, E: Element<R>> LaneWork<R> for Pass<'_, R, E> {
     type Output = Findings<R>;
 
     #[inline(always)]

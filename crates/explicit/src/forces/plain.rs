@@ -17,10 +17,10 @@ use crate::lanes::{Lanes, Local, PACK, Pack};
 use crate::relaxation::Relaxation;
 
 /// Cells of `N` nodes with one evaluation point; `M` is one less.
-pub(super) type SolidForces<R, const N: usize, const M: usize> = OnePass<R, Constants<R, N, M>>;
+pub(super) type SolidForces<R, const N: usize, const M: usize> = OnePass<R, PlainConstants<R, N, M>>;
 
 /// What does not change from step to step.
-pub(super) struct Constants<R, const N: usize, const M: usize> {
+pub(super) struct PlainConstants<R, const N: usize, const M: usize> {
     law: AnyLaw,
     cells: PackedCells<R, N>,
     rest: Vec<PackedRest<R, M>>,
@@ -40,7 +40,7 @@ impl<R: Scalar, const N: usize, const M: usize> SolidForces<R, N, M> {
             Some(_) => PackedCorners::of(&packed, &cells.offsets),
             None => Vec::new(),
         };
-        let constants = Constants {
+        let constants = PlainConstants {
             law: solid.material.law,
             rest: PackedRest::of(&packed, cells),
             cells: packed,
@@ -53,7 +53,7 @@ impl<R: Scalar, const N: usize, const M: usize> SolidForces<R, N, M> {
     }
 }
 
-impl<R: Scalar, const N: usize, const M: usize> Element<R> for Constants<R, N, M> {
+impl<R: Scalar, const N: usize, const M: usize> Element<R> for PlainConstants<R, N, M> {
     fn slots(&self) -> [usize; 2] {
         [self.history, 0]
     }
@@ -63,7 +63,7 @@ impl<R: Scalar, const N: usize, const M: usize> Element<R> for Constants<R, N, M
 
     #[inline(always)]
     fn pass<L: Lanes<R>>(&self, displacement: &[Vector<R>], mut task: Task<'_, R>) -> Findings<R> {
-        let Constants { law, cells, rest, hourglass, corners, relaxation, history: per_pack } = self;
+        let PlainConstants { law, cells, rest, hourglass, corners, relaxation, history: per_pack } = self;
         task.copy_in(displacement);
         let Task { block, moved, forces: sums, history, .. } = task;
         sums.fill([R::ZERO; 4]);

@@ -170,7 +170,7 @@ fn middle(face: &[u32; 3], places: &[Vector3<f64>]) -> (Vector3<f64>, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pliant_contact::pose::Course;
+    use pliant_contact::pose::Trajectory;
     use pliant_testing::Random;
 
     const CELLS: u32 = 12;
@@ -203,7 +203,7 @@ mod tests {
             let rigid = Rigid {
                 name: "thing".into(),
                 shape,
-                course: Course::fixed(Pose::identity()),
+                trajectory: Trajectory::fixed(Pose::identity()),
                 inside: false,
                 jaw: None,
             };

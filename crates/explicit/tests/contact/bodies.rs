@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use pliant_contact::pairs::Surface;
-use pliant_contact::pose::{Course, Pose};
+use pliant_contact::pose::{Pose, Trajectory};
 use pliant_contact::shape::Shape;
 use pliant_contact::touch::{Contact, Contacts, Rigid, Touch, With};
 use pliant_explicit::{CentralDifference, Observable, State};
@@ -137,9 +137,9 @@ fn results_do_not_depend_on_when_lists_are_made() {
     let model = Arc::new(tumbling());
     let mut contacts = Contacts::clone(&between(&model, 0.4, 0.0));
     let ramp = Curve { shape: CurveShape::Ramp, from: 0.0, to: 0.1 };
-    let course = Course::by(Pose::translation(0.0, -0.045, 0.04), [0.0, 0.02, 0.0], ramp);
+    let trajectory = Trajectory::by(Pose::translation(0.0, -0.045, 0.04), [0.0, 0.02, 0.0], ramp);
     let shape = Shape::Sphere { radius: 0.02 };
-    contacts.rigids.push(Rigid { name: "ball".into(), shape, course, inside: false, jaw: None });
+    contacts.rigids.push(Rigid { name: "ball".into(), shape, trajectory, inside: false, jaw: None });
     for solid in &model.solids {
         let touch = Touch { friction: 0.2, offset: 0.0 };
         let (name, surface, with) = ("beside".into(), surface(solid), With::Rigid(0));

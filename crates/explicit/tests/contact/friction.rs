@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use pliant_contact::pose::{Course, Pose};
+use pliant_contact::pose::{Pose, Trajectory};
 use pliant_contact::shape::Shape;
 use pliant_contact::touch::Rigid;
 use pliant_explicit::{Observable, State};
@@ -41,9 +41,9 @@ fn friction_of_a_dragged_block_is_mu_times_the_load_along_the_slip() {
             hold([true, true, false], Motion::Velocity(drawn.into(), drag));
             let way = if floor_moves { -along * speed } else { Vector3::zeros() };
             let curve = Curve { shape: CurveShape::Ramp, from: 0.2, to: 1.2 };
-            let course = Course::by(Pose::identity(), way.into(), curve);
+            let trajectory = Trajectory::by(Pose::identity(), way.into(), curve);
             let floor =
-                Rigid { name: "floor".into(), shape: Shape::HalfSpace, course, inside: false, jaw: None };
+                Rigid { name: "floor".into(), shape: Shape::HalfSpace, trajectory, inside: false, jaw: None };
             let contacts = at(floor, &model, friction);
             let model = Arc::new(model);
             let mut stepper = stepper(&model, &contacts, 0.8);

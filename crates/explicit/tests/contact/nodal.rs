@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use pliant_contact::pose::{Course, Pose};
+use pliant_contact::pose::{Pose, Trajectory};
 use pliant_contact::shape::Shape;
 use pliant_contact::touch::{Contacts, Rigid};
 use pliant_explicit::{CentralDifference, NodeContact, Observable, State};
@@ -109,11 +109,11 @@ fn a_block_presses_on_its_floor_by_its_height() {
 fn gaps_are_distances_from_tools() {
     let model = block([2, 2, 2], 0.01, 3e3, Prony::default());
     let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: 1.0 };
-    let course = Course::by(Pose::translation(0.01, 0.01, 0.031), [0.02, 0.0, 0.0], curve);
+    let trajectory = Trajectory::by(Pose::translation(0.01, 0.01, 0.031), [0.02, 0.0, 0.0], curve);
     let ball = Rigid {
         name: "ball".into(),
         shape: Shape::Sphere { radius: 0.01 },
-        course,
+        trajectory,
         inside: false,
         jaw: None,
     };
@@ -151,8 +151,8 @@ fn slip_on_an_incline_is_the_way_that_nodes_go() {
             model.loads.push(Load { curve, ..Load::gravity(0, pull) });
         }
         let curve = Curve { shape: CurveShape::Ramp, from: 1.45, to: 1.55 };
-        let course = Course::by(Pose::identity(), [0.0, 0.0, -0.5], curve);
-        let contacts = at(Rigid { course, ..floor() }, &model, friction);
+        let trajectory = Trajectory::by(Pose::identity(), [0.0, 0.0, -0.5], curve);
+        let contacts = at(Rigid { trajectory, ..floor() }, &model, friction);
         let model = Arc::new(model);
         let mut stepper = stepper(&model, &contacts, 0.9);
         let mut state = State::at_rest(&model);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use pliant_contact::pairs::Surface;
-use pliant_contact::pose::{Course, Pose};
+use pliant_contact::pose::{Pose, Trajectory};
 use pliant_contact::shape::Shape;
 use pliant_contact::touch::{Contact, Contacts, Rigid, Touch, With};
 use pliant_explicit::{Observable, State};
@@ -30,7 +30,7 @@ pub fn floor() -> Rigid {
     Rigid {
         name: "floor".into(),
         shape: Shape::HalfSpace,
-        course: Course::fixed(Pose::identity()),
+        trajectory: Trajectory::fixed(Pose::identity()),
         inside: false,
         jaw: None,
     }
@@ -134,8 +134,8 @@ fn a_tool_presses_no_node_into_itself() {
         let over = |z: f64| Pose::translation(0.04, 0.04, z) * Pose::rotation([0.0, 1.6, 0.0].into());
         let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: 0.3 / fast };
         let shape = Shape::Capsule { radius, length: 0.03 };
-        let course = Course::by(over(0.04 + radius + 0.001), [0.0, 0.0, -depth - 0.001], curve);
-        let tool = Rigid { name: "tool".into(), shape, course, inside: false, jaw: None };
+        let trajectory = Trajectory::by(over(0.04 + radius + 0.001), [0.0, 0.0, -depth - 0.001], curve);
+        let tool = Rigid { name: "tool".into(), shape, trajectory, inside: false, jaw: None };
         let contacts = at(tool.clone(), &model, 0.2);
         let model = Arc::new(model);
         let mut stepper = stepper(&model, &contacts, 0.6);
@@ -145,7 +145,7 @@ fn a_tool_presses_no_node_into_itself() {
             stepper.evaluate(&mut state).unwrap();
             force = stepper.contact_forces()[0];
             stepper.advance(&mut state);
-            let pose = tool.course.at(state.time);
+            let pose = tool.trajectory.at(state.time);
             let place = |node: u32| {
                 let (u, x) = (state.displacement[node as usize], model.rest[node as usize]);
                 nalgebra::Vector3::from([0, 1, 2].map(|c| x[c] + u[c]))
@@ -176,11 +176,11 @@ fn a_tool_presses_no_node_into_itself() {
 fn the_force_of_a_fast_tool_is_the_change_of_momentum() {
     let model = Arc::new(block([2, 2, 2], 0.01, 2e3, Prony::default()));
     let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: 0.00105 };
-    let course = Course::by(Pose::translation(0.01, 0.01, 0.03), [0.0, 0.0, -0.0105], curve);
+    let trajectory = Trajectory::by(Pose::translation(0.01, 0.01, 0.03), [0.0, 0.0, -0.0105], curve);
     let tool = Rigid {
         name: "tool".into(),
         shape: Shape::Sphere { radius: 0.002 },
-        course,
+        trajectory,
         inside: false,
         jaw: None,
     };

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use pliant_contact::pose::{Course, Pose};
+use pliant_contact::pose::{Pose, Trajectory};
 use pliant_contact::shape::Shape;
 use pliant_contact::touch::Rigid;
 use pliant_explicit::{Observable, State};
@@ -19,8 +19,8 @@ fn a_fast_body_does_not_pass_through_a_thin_sheet() {
         let mut model = block([3, 3, 3], 0.01, 2e3, Prony::default());
         model.initial_velocity = vec![[0.0, 0.0, -speed]; model.node_count()];
         let shape = Shape::Cuboid { size: [0.2, 0.2, thickness] };
-        let course = Course::fixed(Pose::translation(0.015, 0.015, -0.0002 - 0.5 * thickness));
-        let sheet = Rigid { name: "sheet".into(), shape, course, inside: false, jaw: None };
+        let trajectory = Trajectory::fixed(Pose::translation(0.015, 0.015, -0.0002 - 0.5 * thickness));
+        let sheet = Rigid { name: "sheet".into(), shape, trajectory, inside: false, jaw: None };
         let contacts = at(sheet, &model, 0.0);
         let model = Arc::new(model);
         let mut stepper = stepper(&model, &contacts, 0.5);
@@ -52,14 +52,15 @@ fn a_fast_thin_tool_passes_over_no_node() {
     for speed in [10.0, 100.0, 400.0] {
         let time = 0.02 / speed + 2e-4;
         let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: time };
-        let course = Course::by(Pose::translation(0.01, 0.01, 0.0115), [0.0, 0.0, -speed * time], curve);
+        let trajectory =
+            Trajectory::by(Pose::translation(0.01, 0.01, 0.0115), [0.0, 0.0, -speed * time], curve);
         let (radius, name) = (1e-3, "tool".into());
-        let tool = Rigid { name, shape: Shape::Sphere { radius }, course, inside: false, jaw: None };
+        let tool = Rigid { name, shape: Shape::Sphere { radius }, trajectory, inside: false, jaw: None };
         let mut stepper = stepper(&model, &at(tool.clone(), &model, 0.0), 0.1);
         let mut state = State::at_rest(&model);
         stepper.evaluate(&mut state).unwrap();
         stepper.advance(&mut state);
-        let tip = tool.course.at(state.time).translation.vector.z - radius;
+        let tip = tool.trajectory.at(state.time).translation.vector.z - radius;
         let height = middle[2] + state.displacement[in_the_way][2];
         let way = speed * stepper.step();
         println!("{speed} m/s, {way:.3} m in a step: tip at {tip:.4} m, node at {height:.4} m");

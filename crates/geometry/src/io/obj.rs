@@ -16,7 +16,7 @@ use crate::{CellKind, Vector3};
 const MOST_GROUPS: usize = 64;
 
 #[derive(Default)]
-struct Reader {
+struct ObjReader {
     points: Vec<Vector3>,
     cells: Cells,
     /// Sets that the next faces belong to: of `g`, `o` and `usemtl`.
@@ -31,7 +31,7 @@ struct Reader {
 
 /// Reads an OBJ file.
 pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
-    let mut reader = Reader::default();
+    let mut reader = ObjReader::default();
     let mut cursor = Cursor::new(bytes);
     let mut joined = Vec::new();
     loop {
@@ -53,7 +53,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
     reader.finish()
 }
 
-impl Reader {
+impl ObjReader {
     fn read_line(&mut self, line: &[u8], place: Place) -> Result<(), Fault> {
         let line = line.split(|&byte| byte == b'#').next().unwrap_or_default();
         let mut words = Cursor::of_line(line, place);

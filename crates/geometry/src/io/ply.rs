@@ -21,22 +21,22 @@ struct Property {
 }
 
 /// A list of vertices, faces, ….
-struct Element {
+struct PlyElement {
     name: String,
     count: usize,
     properties: Vec<Property>,
 }
 
 #[derive(Clone, Copy)]
-enum Encoding {
+enum PlyEncoding {
     Text,
     Binary(Order),
 }
 
-struct Reader<'a> {
+struct PlyReader<'a> {
     cursor: Cursor<'a>,
     file_size: usize,
-    encoding: Encoding,
+    encoding: PlyEncoding,
     points: Vec<Vector3>,
     cells: Cells,
     point_data: BTreeMap<String, Vec<f64>>,
@@ -48,7 +48,7 @@ struct Reader<'a> {
 pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
     let mut cursor = Cursor::new(bytes);
     let (encoding, elements) = read_head(&mut cursor)?;
-    let mut reader = Reader {
+    let mut reader = PlyReader {
         cursor,
         file_size: bytes.len(),
         encoding,
@@ -66,11 +66,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
         }
     }
     let encoding = match encoding {
-        Encoding::Text => "ASCII",
-        Encoding::Binary(Order::Little) => "binary little-endian",
-        Encoding::Binary(Order::Big) => "binary big-endian",
+        PlyEncoding::Text => "ASCII",
+        PlyEncoding::Binary(Order::Little) => "binary little-endian",
+        PlyEncoding::Binary(Order::Big) => "binary big-endian",
     };
-    let Reader { points, mut cells, point_data, mut cell_data, mut notes, .. } = reader;
+    let PlyReader { points, mut cells, point_data, mut cell_data, mut notes, .. } = reader;
     check_filled(cell_data.len().saturating_mul(cells.len()), bytes.len())?;
     for values in cell_data.values_mut() {
         values.resize(cells.len(), f64::NAN);
@@ -82,9 +82,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
     Ok(MeshFile { mesh, format: format!("{} {encoding}", Format::Ply.name()), notes, time: None })
 }
 
-fn read_head(cursor: &mut Cursor<'_>) -> Result<(Encoding, Vec<Element>), Fault> {
+fn read_head(cursor: &mut Cursor<'_>) -> Result<(PlyEncoding, Vec<PlyElement>), Fault> {
     let mut encoding = None;
-    let mut elements: Vec<Element> = Vec::new();
+    let mut elements: Vec<PlyElement> = Vec::new();
     if cursor.line().is_none_or(|line| line.trim_ascii() != b"ply") {
         return Err(cursor.malformed("the first line is not `ply`"));
     }
@@ -95,9 +95,9 @@ fn read_head(cursor: &mut Cursor<'_>) -> Result<(Encoding, Vec<Element>), Fault>
         match words.word() {
             Some(b"format") => {
                 encoding = Some(match words.need_word("the format")? {
-                    b"ascii" => Encoding::Text,
-                    b"binary_little_endian" => Encoding::Binary(Order::Little),
-                    b"binary_big_endian" => Encoding::Binary(Order::Big),
+                    b"ascii" => PlyEncoding::Text,
+                    b"binary_little_endian" => PlyEncoding::Binary(Order::Little),
+                    b"binary_big_endian" => PlyEncoding::Binary(Order::Big),
                     other => return Err(words.malformed(format!("`{}` is not a PLY format", shown(other)))),
                 });
             }
@@ -108,7 +108,7 @@ fn read_head(cursor: &mut Cursor<'_>) -> Result<(Encoding, Vec<Element>), Fault>
                 if elements.iter().any(|element| element.name == name) {
                     return Err(words.malformed(format!("there are two lists of `{name}`")));
                 }
-                elements.push(Element { name, count, properties: Vec::new() });
+                elements.push(PlyElement { name, count, properties: Vec::new() });
             }
             Some(b"property") => {
                 let property = read_property(&mut words)?;
@@ -183,22 +183,22 @@ fn joined(mut columns: BTreeMap<String, Vec<f64>>) -> BTreeMap<String, DataArray
     arrays
 }
 
-impl Reader<'_> {
+impl PlyReader<'_> {
     /// Whether the items of an element can be there, by the least they take.
-    fn room(&self, element: &Element) -> Result<(), Fault> {
+    fn room(&self, element: &PlyElement) -> Result<(), Fault> {
         let each = |property: &Property| match self.encoding {
-            Encoding::Text => 2,
-            Encoding::Binary(_) => property.length.unwrap_or(property.scalar).size(),
+            PlyEncoding::Text => 2,
+            PlyEncoding::Binary(_) => property.length.unwrap_or(property.scalar).size(),
         };
         let each = element.properties.iter().map(each).sum();
         self.cursor.room(element.count, each, format_args!("{} of `{}`", element.count, element.name))
     }
 
-    fn number(&mut self, scalar: Scalar, element: &Element, item: usize) -> Result<f64, Fault> {
+    fn number(&mut self, scalar: Scalar, element: &PlyElement, item: usize) -> Result<f64, Fault> {
         let what = format_args!("item {item} of `{}`", element.name);
         match self.encoding {
-            Encoding::Text => self.cursor.real(what),
-            Encoding::Binary(order) => Ok(scalar.decode(self.cursor.take(scalar.size(), what)?, order)[0]),
+            PlyEncoding::Text => self.cursor.real(what),
+            PlyEncoding::Binary(order) => Ok(scalar.decode(self.cursor.take(scalar.size(), what)?, order)[0]),
         }
     }
 
@@ -207,7 +207,7 @@ impl Reader<'_> {
         &mut self,
         scalar: Scalar,
         length: Scalar,
-        element: &Element,
+        element: &PlyElement,
         item: usize,
         list: &mut Vec<i64>,
     ) -> Result<(), Fault> {
@@ -220,14 +220,14 @@ impl Reader<'_> {
         let what = format_args!("a list of item {item} of `{}`", element.name);
         let count = count as usize;
         match self.encoding {
-            Encoding::Text => {
+            PlyEncoding::Text => {
                 self.cursor.room(count, 2, what)?;
                 for _ in 0..count {
                     // Lists other than the corners may hold fractions.
                     list.push(self.cursor.real(what)? as i64);
                 }
             }
-            Encoding::Binary(order) => {
+            PlyEncoding::Binary(order) => {
                 let bytes = self.cursor.take_numbers(count, scalar, what)?;
                 list.extend(scalar.decode_integers(bytes, order));
             }
@@ -235,7 +235,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn read_points(&mut self, element: &Element) -> Result<(), Fault> {
+    fn read_points(&mut self, element: &PlyElement) -> Result<(), Fault> {
         self.room(element)?;
         index_limit(element.count, self.cursor.place())?;
         let at = |wanted: &str| element.properties.iter().position(|property| property.name == wanted);
@@ -269,12 +269,12 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn note_list(&mut self, element: &Element, property: &Property) {
+    fn note_list(&mut self, element: &PlyElement, property: &Property) {
         self.notes.push(format!("the list `{}` of `{}` was ignored", property.name, element.name));
     }
 
     /// Faces, by their list of corners, or edges, by two vertices.
-    fn read_cells(&mut self, element: &Element) -> Result<(), Fault> {
+    fn read_cells(&mut self, element: &PlyElement) -> Result<(), Fault> {
         self.room(element)?;
         index_limit(element.count, self.cursor.place())?;
         let at = |wanted: &str| element.properties.iter().position(|property| property.name == wanted);
@@ -336,7 +336,7 @@ impl Reader<'_> {
     }
 
     /// Passes over an element that is not used.
-    fn skip(&mut self, element: &Element) -> Result<(), Fault> {
+    fn skip(&mut self, element: &PlyElement) -> Result<(), Fault> {
         self.notes.push(format!("{} `{}` were ignored", element.count, element.name));
         if element.properties.is_empty() {
             return Ok(());

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 use pliant_contact::grid::Grid;
-use pliant_contact::pose::{Course, Pose};
+use pliant_contact::pose::{Pose, Trajectory};
 use pliant_contact::shader::{shader, things};
 use pliant_contact::shape::{Near, Shape};
 use pliant_contact::touch::{Passage, Rigid};
@@ -75,8 +75,8 @@ fn shapes_and_ways_follow_double_precision() {
     let before = Pose::translation(0.1, -0.2, 0.15) * Pose::rotation(Vector3::new(0.3, -0.5, 0.9));
     let after = Pose::translation(0.13, -0.18, 0.11) * Pose::rotation(Vector3::new(0.32, -0.52, 0.95));
     for (shape, inside) in shapes.into_iter().flat_map(|shape| [(shape.clone(), false), (shape, true)]) {
-        let (name, course, jaw) = ("thing".into(), Course::fixed(before), None);
-        let rigid = Rigid { name, shape, course, inside, jaw };
+        let (name, trajectory, jaw) = ("thing".into(), Trajectory::fixed(before), None);
+        let rigid = Rigid { name, shape, trajectory, inside, jaw };
         let passage = Passage::new(&rigid, [before, after]);
         let source = [&shader(std::slice::from_ref(&rigid)), MAIN].concat();
         let mut random = Random::new(5);

@@ -36,7 +36,7 @@ const KEYS: [&[&str]; 15] = [
 const DATA: &str = "ElementDataFile";
 
 pub(super) fn read(input: &mut Input<'_>, options: &ReadOptions) -> Result<Image, Fault> {
-    let header = Header::read(input)?;
+    let header = MetaImageHeader::read(input)?;
     let rank: usize = header.need("NDims")?.one("it must be 2 or 3")?;
     if !(2..=3).contains(&rank) {
         return Err(header.need("NDims")?.bad("it must be 2 or 3; extract one volume"));
@@ -59,11 +59,11 @@ pub(super) fn read(input: &mut Input<'_>, options: &ReadOptions) -> Result<Image
     Ok(Image { grid, format: "MetaImage".to_owned(), notes, names: LabelNames::default(), numbers, scale })
 }
 
-struct Header {
+struct MetaImageHeader {
     fields: Vec<Field>,
 }
 
-impl Header {
+impl MetaImageHeader {
     /// The lines up to `ElementDataFile`.
     fn read(input: &mut Input<'_>) -> Result<Self, Fault> {
         let mut fields: Vec<Field> = Vec::new();

@@ -30,7 +30,7 @@ pub(super) fn has_magic(head: &[u8]) -> bool {
 }
 
 pub(super) fn read(input: &mut Input<'_>, options: &ReadOptions) -> Result<Image, Fault> {
-    let header = Header::read(input)?;
+    let header = NiftiHeader::read(input)?;
     let dims = header.dims(options)?;
     let scalar = header.scalar()?;
     let mut notes = Vec::new();
@@ -53,7 +53,7 @@ pub(super) fn read(input: &mut Input<'_>, options: &ReadOptions) -> Result<Image
 }
 
 /// The header as bytes, and how to read them.
-struct Header {
+struct NiftiHeader {
     bytes: Vec<u8>,
     order: Order,
     version: usize,
@@ -61,7 +61,7 @@ struct Header {
     single: bool,
 }
 
-impl Header {
+impl NiftiHeader {
     fn read(input: &mut Input<'_>) -> Result<Self, Fault> {
         let mut bytes = input.exact(HEADER[0] as u64, "the header")?;
         let size = [bytes[0], bytes[1], bytes[2], bytes[3]];

@@ -37,7 +37,7 @@ const FIELDS: [&[&str]; 16] = [
 ];
 
 pub(super) fn read(input: &mut Input<'_>, options: &ReadOptions) -> Result<Image, Fault> {
-    let header = Header::read(input)?;
+    let header = NrrdHeader::read(input)?;
     let axes = header.axes()?;
     let dims = header.need("sizes")?;
     let size = checked_size(axes.dims, "sizes", options).map_err(|problem| problem.at_line(dims.line))?;
@@ -62,7 +62,7 @@ pub(super) fn read(input: &mut Input<'_>, options: &ReadOptions) -> Result<Image
     Ok(Image { grid, format: "NRRD".to_owned(), notes, names, numbers, scale: [1.0, 0.0] })
 }
 
-struct Header {
+struct NrrdHeader {
     fields: Vec<Field>,
     /// `key:=value`.
     pairs: Vec<(String, String)>,
@@ -78,7 +78,7 @@ struct Axes {
     layers: u64,
 }
 
-impl Header {
+impl NrrdHeader {
     fn read(input: &mut Input<'_>) -> Result<Self, Fault> {
         let magic = input.line()?.unwrap_or_default();
         if !(magic.starts_with("NRRD000") && magic.len() == 8) {

@@ -357,7 +357,7 @@ pub(crate) enum Approximation<'a> {
 
 /// Vectors of the method.
 #[derive(Default)]
-pub(crate) struct Vectors {
+pub(crate) struct KrylovVectors {
     x: Vec<Node>,
     r: Vec<Node>,
     z: Vec<Node>,
@@ -369,7 +369,7 @@ pub(crate) struct Vectors {
     equations: Vec<f64>,
 }
 
-impl Vectors {
+impl KrylovVectors {
     pub(crate) fn new(matrix: &BlockMatrix, equations: usize) -> Self {
         let nodes = || vec![[0.0; 6]; matrix.nodes()];
         Self {

@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 
 use self::factors::LuFactors;
 pub(crate) use self::factors::{Factors, Pivots, ZERO_PIVOT};
-use self::gradients::{Approximation, BlockMatrix, Coarse, Vectors};
+use self::gradients::{Approximation, BlockMatrix, Coarse, KrylovVectors};
 pub(crate) use self::report::LinearError;
 pub use self::report::LinearReport;
 use crate::sparse::{Equations, LowerMatrix};
@@ -59,7 +59,7 @@ pub(crate) struct Workspace {
     /// For conjugate gradients.
     blocks: Option<BlockMatrix>,
     coarse: Option<Coarse>,
-    vectors: Vectors,
+    vectors: KrylovVectors,
     pivots: Pivots,
 }
 
@@ -87,7 +87,10 @@ impl Workspace {
                 Some(blocks) => Some(Coarse::new(blocks)?),
                 None => None,
             },
-            vectors: blocks.as_ref().map(|blocks| Vectors::new(blocks, matrix.len())).unwrap_or_default(),
+            vectors: blocks
+                .as_ref()
+                .map(|blocks| KrylovVectors::new(blocks, matrix.len()))
+                .unwrap_or_default(),
             blocks,
             pivots: Pivots { smallest: 1.0, ..Pivots::default() },
         })

@@ -5,11 +5,17 @@
 use pliant_mechanics::element::{Cord, Pull, Rest};
 use pliant_mechanics::tensor::{Vector, scale, sub};
 
-use super::{Own, Response, add_to};
+use super::{CellMaterial, Response, add_to};
 
 impl Response {
     /// Adds a bar.
-    pub(super) fn add_bar(&mut self, own: Own<'_>, u: &[Vector<f64>; 2], rest: &Rest<2>, cord: &Cord) {
+    pub(super) fn add_bar(
+        &mut self,
+        own: CellMaterial<'_>,
+        u: &[Vector<f64>; 2],
+        rest: &Rest<2>,
+        cord: &Cord,
+    ) {
         let pull = cord.pull(rest, sub(u[1], u[0]), own.law.small_strain().young());
         let Pull { along, length, stress: [stress, slope], .. } = pull;
         self.energy += cord.energy(rest, &pull);

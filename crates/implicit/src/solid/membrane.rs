@@ -7,7 +7,7 @@ use pliant_mechanics::element::{Axes, Rest};
 use pliant_mechanics::law::plane_stress::{FLAT_WALL, InPlane};
 use pliant_mechanics::tensor::{Vector, add, dot, scale};
 
-use super::{Own, Response, Strained, add_to};
+use super::{CellMaterial, Response, Strained, add_to};
 use crate::facet::Broken;
 
 /// Gradients of the shape functions in the frame of a triangle [1/m].
@@ -24,7 +24,7 @@ impl Response {
     /// Adds a triangle; the fibres of `own` are in its frame.
     pub(super) fn add_triangle(
         &mut self,
-        own: Own<'_>,
+        own: CellMaterial<'_>,
         u: &[Vector<f64>; 3],
         rest: &Rest<3>,
         axes: &Axes,

@@ -68,7 +68,7 @@ impl Response {
             return;
         }
         let fibres = solid.law_fibres(cell);
-        let own = Own { law: &solid.material.law, fibres: &fibres, lag, stiffness };
+        let own = CellMaterial { law: &solid.material.law, fibres: &fibres, lag, stiffness };
         let found = match &solid.cells {
             Cells::Tet4(block) => self.fill_plain(own, block, cell, displacement),
             Cells::Hex8(block) => self.fill_plain(own, block, cell, displacement),
@@ -114,7 +114,7 @@ impl Response {
     /// One evaluation point, with hourglass control where there is some.
     fn fill_plain<const N: usize>(
         &mut self,
-        own: Own<'_>,
+        own: CellMaterial<'_>,
         block: &CellBlock<N>,
         cell: usize,
         displacement: impl Fn(u32) -> Vector<f64>,
@@ -161,7 +161,7 @@ impl Response {
     /// Adds a point of weight `w` [m³] with the gradients `shape` [1/m].
     fn add_point<const N: usize>(
         &mut self,
-        own: Own<'_>,
+        own: CellMaterial<'_>,
         u: &[Vector<f64>; N],
         shape: &[Vector<f64>; N],
         w: f64,
@@ -211,7 +211,7 @@ impl Response {
 
 /// What a cell is made of.
 #[derive(Clone, Copy)]
-struct Own<'a> {
+struct CellMaterial<'a> {
     law: &'a AnyLaw,
     fibres: &'a [Vector<f64>],
     /// How its stresses relax, from the point at hand on.
@@ -220,7 +220,7 @@ struct Own<'a> {
     stiffness: bool,
 }
 
-impl Own<'_> {
+impl CellMaterial<'_> {
     /// The same at a later point.
     fn at(self, point: usize) -> Self {
         let kept = self.lag.kept.get(point..).unwrap_or_default();

@@ -9,19 +9,19 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use pliant_contact::barrier::BarrierSettings;
 use pliant_contact::pairs::Surface;
-use pliant_contact::pose::{Course, Pose};
+use pliant_contact::pose::{Pose, Trajectory};
 use pliant_contact::shape::Shape;
 use pliant_contact::touch::{Contact, Contacts, Rigid, Touch, With};
 use pliant_implicit::{Assembly, Touching};
 
-/// A thing of a shape that goes along a course.
-fn rigid(name: &str, shape: Shape, course: Course) -> Rigid {
-    Rigid { name: name.into(), shape, course, inside: false, jaw: None }
+/// A thing of a shape that goes along a trajectory.
+fn rigid(name: &str, shape: Shape, trajectory: Trajectory) -> Rigid {
+    Rigid { name: name.into(), shape, trajectory, inside: false, jaw: None }
 }
 
 /// A thing at rest in a place [m], turned by a rotation vector [rad].
 fn fixed(name: &str, shape: Shape, at: [f64; 3], turn: [f64; 3]) -> Rigid {
-    rigid(name, shape, Course::fixed(Pose::new(at.into(), turn.into())))
+    rigid(name, shape, Trajectory::fixed(Pose::new(at.into(), turn.into())))
 }
 
 /// A surface of these triangles.

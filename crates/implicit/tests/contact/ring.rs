@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::Vector3;
 use pliant_contact::barrier::BarrierSettings;
 use pliant_contact::pairs::Surface;
-use pliant_contact::pose::{Course, Pose};
+use pliant_contact::pose::{Pose, Trajectory};
 use pliant_contact::shape::Shape;
 use pliant_implicit::element::Elasticity;
 use pliant_implicit::{
@@ -65,7 +65,7 @@ fn pressed(edges: u32, thickness: f64, approach: f64, steps: u32) -> Vec<[f64; 2
         // A half-space below its plane, turned over for the upper one.
         let turn = if up > 0.0 { Vector3::x() * std::f64::consts::PI } else { Vector3::zeros() };
         let start = Pose::new(Vector3::z() * (up * reach), turn);
-        rigid(name, Shape::HalfSpace, Course::by(start, [0.0, 0.0, -up * way], ramp.clone()))
+        rigid(name, Shape::HalfSpace, Trajectory::by(start, [0.0, 0.0, -up * way], ramp.clone()))
     };
     let contacts = at_rigid(&own, vec![plate("upper", 1.0), plate("lower", -1.0)], 0.0, 0.5 * thickness);
     touch(

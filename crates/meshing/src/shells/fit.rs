@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::crossing::COARSE;
 use super::effort::{Effort, ROW};
 use super::measure::Landing;
-use super::solve::{Block, POWER, Row, UNKNOWNS, solve};
+use super::solve::{POWER, Row, ShellBlock, UNKNOWNS, solve};
 use super::target::Target;
 use super::{LEAST_SHAPE, Shells};
 use crate::hausdorff::lattice;
@@ -73,7 +73,7 @@ impl Shells {
             let rows = self.rows(moving, &patch, target, &sizes);
             let power = rows.iter().map(|row| (row.off / scale).powi(POWER)).sum::<f64>();
             let nodes = self.mesh.triangles[moving.shell as usize];
-            (Block::new(nodes, rows.into_iter(), scale), (patch, power))
+            (ShellBlock::new(nodes, rows.into_iter(), scale), (patch, power))
         };
         let (blocks, mut sums): (Vec<_>, Vec<_>) = moving.par_iter().map(summed).unzip();
         let count: usize = moving.iter().map(probes).sum();

@@ -155,7 +155,7 @@ impl FittedShells {
 
     /// The one that crosses less, reaches its goal, or is closer.
     fn better(self, other: Self) -> Self {
-        if other.report.standing() < self.report.standing() { other } else { self }
+        if other.report.rank() < self.report.rank() { other } else { self }
     }
 
     /// Fits the shells of given triangles to a surface, without changing which points they join.
@@ -183,14 +183,14 @@ struct Fit<'t> {
     effort: Effort,
     /// Whether distances are looked at closely.
     closely: bool,
-    best: Option<(Standing, Shells)>,
+    best: Option<(Rank, Shells)>,
     /// Whether nothing else is tried if it fails.
     is_last: bool,
 }
 
 /// How good shells are; the least is best. Whether the goal is missed, how many shells cross or have creases, whether triangles are poor,
 /// and what is to be small.
-type Standing = (bool, usize, bool, f64);
+type Rank = (bool, usize, bool, f64);
 
 impl<'t> Fit<'t> {
     fn new(target: &'t Target, mesh: &TriangleMesh, goal: ShellGoal, effort: Effort, is_last: bool) -> Self {
@@ -252,17 +252,17 @@ impl<'t> Fit<'t> {
                 continue;
             }
             let [creased, crossing] = if self.shells.strict { self.flaws() } else { Default::default() };
-            let standing = self.standing(&far, part, creased.len() + crossing.len());
+            let rank = self.rank(&far, part, creased.len() + crossing.len());
             // Halving what has a crease helps where a fold is wide enough for smaller shells, and not where it is sharp.
-            let fewer = self.best.as_ref().is_none_or(|(best, _)| best.0 || standing.1 < best.1);
+            let fewer = self.best.as_ref().is_none_or(|(best, _)| best.0 || rank.1 < best.1);
             let mut flawed = crossing;
             flawed.extend(creased.into_iter().filter(|_| fewer && part >= 1.0));
-            if self.best.as_ref().is_none_or(|(best, _)| standing < *best) {
-                self.best = Some((standing, self.shells.clone()));
+            if self.best.as_ref().is_none_or(|(best, _)| rank < *best) {
+                self.best = Some((rank, self.shells.clone()));
             }
             if part >= 1.0 {
                 let mends = !flawed.is_empty() && mending > 0;
-                if !mends && (left == 0 || !standing.2 && standing.3 <= self.aim) {
+                if !mends && (left == 0 || !rank.2 && rank.3 <= self.aim) {
                     ended = true;
                     break;
                 }
@@ -317,7 +317,7 @@ impl<'t> Fit<'t> {
         }
     }
 
-    fn standing(&self, far: &[f64], part: f64, flaws: usize) -> Standing {
+    fn rank(&self, far: &[f64], part: f64, flaws: usize) -> Rank {
         let reached = part >= 1.0;
         let poor = reached && self.shells.worth_of_all().into_iter().any(|worth| worth < POOR);
         match self.goal {

@@ -93,7 +93,7 @@ impl ShellReport {
     }
 
     /// How bad they are; the least is best. How many cross, whether they miss the goal, and how far off they are [m].
-    pub(super) fn standing(&self) -> (usize, bool, f64) {
+    pub(super) fn rank(&self) -> (usize, bool, f64) {
         (self.crossings.count, !self.reached, self.distances.largest())
     }
 

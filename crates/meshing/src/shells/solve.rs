@@ -19,13 +19,13 @@ pub(super) struct Row {
 }
 
 /// The sums of one shell's rows: the lower half of Jᵀ W J, and −Jᵀ W r.
-pub(super) struct Block {
+pub(super) struct ShellBlock {
     nodes: [u32; 3],
     matrix: [[f64; ALL]; ALL],
     right: [f64; ALL],
 }
 
-impl Block {
+impl ShellBlock {
     /// Sums rows with weights that make the sum of squares one of powers of distances over `scale` [m].
     pub(super) fn new(nodes: [u32; 3], rows: impl Iterator<Item = Row>, scale: f64) -> Self {
         let mut block = Self { nodes, matrix: [[0.0; ALL]; ALL], right: [0.0; ALL] };
@@ -71,7 +71,7 @@ impl Block {
 }
 
 /// The step of each of a number of points.
-pub(super) fn solve(blocks: &[Block], points: usize) -> Vec<[f64; UNKNOWNS]> {
+pub(super) fn solve(blocks: &[ShellBlock], points: usize) -> Vec<[f64; UNKNOWNS]> {
     let mut diagonal = vec![0.0; UNKNOWNS * points];
     let mut r = vec![0.0; UNKNOWNS * points];
     for block in blocks {

@@ -2,7 +2,7 @@
 //! inwards at an opening around the axis n, free elsewhere. E = 3000 Pa, ν = 0.49.
 
 use pliant_geometry::{CellKind, DataArray, Locator, Mesh, Vector3, boundary, relative_acoustic_length};
-use pliant_mechanics::curve::{Curve as Course, Shape};
+use pliant_mechanics::curve::{Curve as LoadCurve, Shape};
 use pliant_mechanics::model::{Averaging, Constraint, Motion};
 use pliant_mechanics::tensor::{Vector, dot, sub};
 use pliant_meshing::{Ellipsoid, Stuffing};
@@ -139,7 +139,7 @@ pub fn brain(mesh: Mesh, tets: Tets) -> Specimen {
     let shift = &brain.mesh.point_data["shift"];
     let opening = &brain.mesh.point_sets["opening"];
     let by = opening.iter().map(|&node| [0, 1, 2].map(|c| shift.item(node as usize)[c])).collect();
-    let motion = Motion::Displacements(by, Course { shape: Shape::SmoothStep, from: 0.0, to: 1.0 });
+    let motion = Motion::Displacements(by, LoadCurve { shape: Shape::SmoothStep, from: 0.0, to: 1.0 });
     for (name, motion) in [("skull", Motion::Fixed), ("opening", motion)] {
         let nodes = brain.mesh.point_sets[name].clone();
         brain.model.constraints.push(Constraint { name: name.into(), nodes, components: [true; 6], motion });

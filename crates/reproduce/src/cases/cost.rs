@@ -5,7 +5,7 @@
 use pliant_bench::{Clocked, ClockedOnDevice, Spread, Timed};
 use pliant_explicit::State;
 use pliant_gpu::{Design, Device, GpuError};
-use pliant_mechanics::curve::{Curve as Course, Shape};
+use pliant_mechanics::curve::{Curve as LoadCurve, Shape};
 use pliant_mechanics::model::Material;
 use pliant_mechanics::prony::{Prony, PronyUpdate};
 use pliant_meshing::VolumeCell;
@@ -48,7 +48,7 @@ pub const CASE: Case = Case {
 fn cube(cells: usize, material: &Material) -> Specimen {
     Specimen::block([0.1; 3], [cells; 3], VolumeCell::Hex, material, [0.0, 1.0, 0.0])
         .fix("x-min", [true; 3])
-        .shift("x-max", -0.01, Course { shape: Shape::Ramp, from: 0.0, to: 1.0 })
+        .shift("x-max", -0.01, LoadCurve { shape: Shape::Ramp, from: 0.0, to: 1.0 })
 }
 
 fn materials() -> [Material; 4] {

@@ -2,7 +2,7 @@
 //! relaxes with τ = 0.58 s. The reference is quasi-static, of quadratic hexahedra without inertia, so the comparison
 //! uses the shape of the decay, F(t)/F(5 s), after the waves of the ramp.
 
-use pliant_mechanics::curve::{Curve as Course, Shape};
+use pliant_mechanics::curve::{Curve as LoadCurve, Shape};
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::Material;
 use pliant_mechanics::prony::PronyUpdate;
@@ -61,8 +61,8 @@ fn half(material: &Material) -> (Specimen, f64) {
     (block, 1.0)
 }
 
-fn ramp() -> Course {
-    Course { shape: Shape::Ramp, from: 0.0, to: 0.5 }
+fn ramp() -> LoadCurve {
+    LoadCurve { shape: Shape::Ramp, from: 0.0, to: 0.5 }
 }
 
 /// The force [N] on the platen at given times [s], by linear interpolation between the steps.

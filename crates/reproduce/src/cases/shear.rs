@@ -2,7 +2,7 @@
 //! *A*: F = I + γ e₂⊗e₁, which stretches the fibres; *B*: F = I + γ e₁⊗e₂, which does not.
 //! References: closed forms with fifty digits (Taylor et al. 2009 with the factor 2 put right).
 
-use pliant_mechanics::curve::{Curve as Course, Shape};
+use pliant_mechanics::curve::{Curve as LoadCurve, Shape};
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::Material;
 use pliant_mechanics::prony::{Prony, PronyUpdate};
@@ -134,7 +134,7 @@ fn sheared(fibres: &str, prony: Prony, rate: Rate) -> Result<Vec<Symmetric<f64>>
         Rate::At(rate) => (rate, (SHEAR / (rate * STEP)).round()),
         Rate::Vanishing => (1e-12, 1.0),
     };
-    let ramp = Course { shape: Shape::Ramp, from: 0.0, to: 1.0 / rate };
+    let ramp = LoadCurve { shape: Shape::Ramp, from: 0.0, to: 1.0 / rate };
     let element = Specimen::block([1.0; 3], [1; 3], VolumeCell::Hex, &material, [1.0, 0.0, 0.0])
         .carry("x-max", [0.0, 1.0, 0.0], ramp)
         .fix("x-min", [true; 3]);

@@ -11,7 +11,7 @@ use pliant_implicit::{
     Assembly, BackwardEuler, DynamicSettings, LinearSolver, Preconditioner, Shell, State, StaticSettings,
     Statics, Wall,
 };
-use pliant_mechanics::curve::{Curve as Course, Shape};
+use pliant_mechanics::curve::{Curve as LoadCurve, Shape};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_mechanics::model::{Constraint, Motion};
 
@@ -74,7 +74,7 @@ fn tube(shells: usize) -> Result<Assembly, CaseError> {
         spread: Spread::Lumped,
     };
     let pulse = (0..40).map(|i| (0.25 * f64::from(i), f64::from(i % 2))).collect();
-    let curve = Course { shape: Shape::Table(pulse), from: 0.0, to: 1.0 };
+    let curve = LoadCurve { shape: Shape::Table(pulse), from: 0.0, to: 1.0 };
     model.model_mut().loads.push(Load::new("pressure", kind, curve));
     model.model_mut().bodies[0].damping = 1.0;
     Ok(model)

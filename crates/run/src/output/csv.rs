@@ -46,7 +46,7 @@ pub(crate) struct Samples {
     columns: Vec<Column>,
     /// Whether energies of all participants together come first.
     total: bool,
-    parts: Vec<Own>,
+    parts: Vec<Columns>,
 }
 
 impl Samples {
@@ -58,7 +58,7 @@ impl Samples {
         }
         let mut parts = Vec::new();
         for part in &world.participants {
-            parts.push(Own::new(part, table, &mut columns));
+            parts.push(Columns::new(part, table, &mut columns));
         }
         Self { columns, total, parts }
     }
@@ -92,7 +92,7 @@ impl Column {
 }
 
 /// Those of one participant.
-struct Own {
+struct Columns {
     reactions: Vec<usize>,
     /// Constraints of volume.
     volumes: Vec<usize>,
@@ -133,7 +133,7 @@ pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];
 const ROUNDING: f64 = 1e-9;
 const TENSOR: [&str; 9] = ["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"];
 
-impl Own {
+impl Columns {
     /// Its columns go to `columns`.
     fn new(part: &Part, table: &CsvTable, columns: &mut Vec<Column>) -> Self {
         let built = &*part.built;

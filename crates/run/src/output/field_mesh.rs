@@ -15,7 +15,7 @@ use pliant_scene::{Built, World};
 /// A mesh that takes the fields of instants: of a body, a carried surface or all bodies, of any participants.
 pub(crate) struct FieldMesh {
     /// Participants that are shown, by number.
-    parts: Vec<(usize, Own)>,
+    parts: Vec<(usize, ParticipantMesh)>,
     /// Those of several together.
     merged: Option<Mesh>,
 }
@@ -28,16 +28,17 @@ impl FieldMesh {
         let mut parts = Vec::new();
         let mut first_body = 0;
         for (index, part) in shown {
-            let all = Own::all(&part.built, on, &part.fields(&table.data), table.at, table.curved);
-            parts.extend(all.into_iter().map(|own| (index, Own { first_body, ..own })));
+            let all =
+                ParticipantMesh::all(&part.built, on, &part.fields(&table.data), table.at, table.curved);
+            parts.extend(all.into_iter().map(|own| (index, ParticipantMesh { first_body, ..own })));
             first_body += part.built.bodies.len();
         }
         if on.is_none() {
             let things = world.participants.iter().enumerate();
             parts.extend(things.filter_map(|(index, part)| {
-                let own = Own::of_things(&part.built, &table.data)?;
+                let own = ParticipantMesh::of_things(&part.built, &table.data)?;
                 first_body += 1;
-                Some((index, Own { first_body: first_body - 1, ..own }))
+                Some((index, ParticipantMesh { first_body: first_body - 1, ..own }))
             }));
         }
         let mut mesh = Self { parts, merged: None };
@@ -93,7 +94,7 @@ impl FieldMesh {
 }
 
 /// That of the solids or the shells of one participant.
-struct Own {
+struct ParticipantMesh {
     mesh: Mesh,
     /// Bodies of the participants before it.
     first_body: usize,
@@ -116,7 +117,7 @@ enum Content {
     Things(Vec<u32>),
 }
 
-impl Own {
+impl ParticipantMesh {
     /// Of a body or surface by name, or of all bodies, solids before shells; with `curved`, of the curved surface of shells.
     fn all(built: &Built, on: Option<&str>, fields: &[FieldName], at: At, curved: Option<u32>) -> Vec<Self> {
         let own = |(mesh, content), fields| Self::new(built, on, mesh, content, fields, at);
@@ -580,7 +581,7 @@ nodes = { label = "left" }
         let model = &built.implicit.as_ref().unwrap().model;
         assert_eq!([0, 1].map(|facet| model.facets[facet].thickness), [1e-3, 2e-3]);
         let labels = |on: Option<&str>, curved: Option<u32>| {
-            let own = Own::all(&built, on, &[], At::Cells, curved).remove(0);
+            let own = ParticipantMesh::all(&built, on, &[], At::Cells, curved).remove(0);
             assert_eq!(own.mesh.label_names, wall.label_names);
             own.mesh.blocks[0].data["label"].values.clone()
         };

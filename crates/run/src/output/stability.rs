@@ -160,7 +160,7 @@ pub(crate) fn doubts(
 fn held_back((tool, lag, time): &(String, f64, f64)) -> String {
     let [lag, time] = [*lag, *time].map(number);
     format!(
-        "`{tool}` was held back by its `force-limit`: it was up to {lag} m behind its course, at t = {time} s"
+        "`{tool}` was held back by its `force-limit`: it was up to {lag} m behind its trajectory, at t = {time} s"
     )
 }
 

@@ -331,7 +331,7 @@ fn a_checkpoint_that_does_not_fit_is_refused_with_a_reason() {
         workshop.write("case/scene.toml", changed(&scene, good, other));
         refused(&workshop.resume("out/case", &[]), &pieces);
     }
-    // A course that ends with the scene is another one in a longer scene.
+    // A curve that ends with the scene is another one in a longer scene.
     workshop.write("case/scene.toml", changed(&scene, "to = 0.08\n", ""));
     workshop.run_into("out/open", &[]).done();
     let told = workshop.resume("out/open", &["scene.until=0.2"]);

@@ -17,7 +17,7 @@ fn through(finger: &str, until: f64) -> String {
     )
 }
 
-/// It stops where its force is the limit, and a warning tells how far behind its course.
+/// It stops where its force is the limit, and a warning tells how far behind its trajectory.
 #[test]
 fn a_tool_driven_through_a_body_stops_at_its_limit() {
     for precision in ["", "precision = 'single'"] {

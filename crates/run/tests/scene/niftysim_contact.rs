@@ -142,7 +142,7 @@ fn world(model: &str, folder: &Path) -> World {
 
 /// What a run came to.
 #[derive(Debug, Default)]
-struct Course {
+struct Trajectory {
     /// The deepest that a node lay in a rigid thing [m], after any step.
     in_things: f64,
     /// The deepest that a node of a body lay in another body [m], after any step looked at.
@@ -157,7 +157,7 @@ struct Course {
 }
 
 /// Plays a model to its end.
-fn played(model: &str) -> Course {
+fn played(model: &str) -> Trajectory {
     let folder = tempfile::tempdir().unwrap();
     let world = world(model, folder.path());
     let until = world.scene.scene.until;
@@ -170,7 +170,7 @@ fn played(model: &str) -> Course {
     let contacts = part.contacts.clone().unwrap_or_default();
     let constraints: Vec<String> = part.model.constraints.iter().map(|own| own.name.clone()).collect();
     let mut simulation = world.simulation().unwrap();
-    let mut course = Course::default();
+    let mut trajectory = Trajectory::default();
     let mut looks = 0;
     let run = simulation.run(until, |frame| {
         let time = frame.time();
@@ -188,11 +188,11 @@ fn played(model: &str) -> Course {
                 whole += Vector3::from(*v).norm() * mass[node];
             }
             if last {
-                course.displacements.insert(name.clone(), moved);
+                trajectory.displacements.insert(name.clone(), moved);
             }
         }
         if whole > 0.0 {
-            course.momentum = course.momentum.max(sum.norm() / whole);
+            trajectory.momentum = trajectory.momentum.max(sum.norm() / whole);
         }
         for contact in &contacts.contacts {
             if let With::Rigid(rigid) = contact.with {
@@ -200,26 +200,26 @@ fn played(model: &str) -> Course {
                 let pose = rigid.at(time, None);
                 for &node in &contact.surface.nodes {
                     let depth = contact.touch.offset - rigid.near(&pose, &places[node as usize]).distance;
-                    course.in_things = course.in_things.max(depth);
+                    trajectory.in_things = trajectory.in_things.max(depth);
                 }
             }
             let force = Vector3::from(frame.contact_force(&contact.name).unwrap());
-            let most = course.largest.entry(contact.name.clone()).or_default();
+            let most = trajectory.largest.entry(contact.name.clone()).or_default();
             *most = most.max(force.norm());
             if !last {
-                course.forces.insert(contact.name.clone(), force);
+                trajectory.forces.insert(contact.name.clone(), force);
             }
         }
         for name in constraints.iter().filter(|_| !last) {
-            course.forces.insert(name.clone(), frame.reaction(name).unwrap().into());
+            trajectory.forces.insert(name.clone(), frame.reaction(name).unwrap().into());
         }
         looks += 1;
         if looks % 50 == 0 || last {
-            course.in_bodies = course.in_bodies.max(deepest(&meshes, &firsts, &places));
+            trajectory.in_bodies = trajectory.in_bodies.max(deepest(&meshes, &firsts, &places));
         }
     });
     run.unwrap_or_else(|failure| panic!("{}", failure.message));
-    course
+    trajectory
 }
 
 /// How deep a node of a body lies in another body [m].
@@ -340,11 +340,11 @@ fn round_things_are_pressed_into_a_block() {
             slaves("SlvNodes", &top),
             system(5e-4, 1.0, 60.0, "")
         );
-        let course = played(&model);
+        let trajectory = played(&model);
         let name = if tag == "ContactCylinder" { "cylinder-0" } else { "probe-0" };
-        let (up, down) = (course.forces[name], course.forces["fix-0"]);
-        println!("{tag}: {:.1e} m in it, {up:?} N on it, {down:?} N from the base", course.in_things);
-        assert!(course.in_things < 1e-12, "{:e}", course.in_things);
+        let (up, down) = (trajectory.forces[name], trajectory.forces["fix-0"]);
+        println!("{tag}: {:.1e} m in it, {up:?} N on it, {down:?} N from the base", trajectory.in_things);
+        assert!(trajectory.in_things < 1e-12, "{:e}", trajectory.in_things);
         assert!(up.z > 0.01 && (up.z / down.z - 1.0).abs() < 1e-3, "{up:?} and {down:?}");
     }
 }
@@ -373,15 +373,15 @@ fn a_moving_rigid_sheet_presses_a_cube() {
             system(1e-3, 4.0, 60.0, "")
         )
     };
-    let course =
+    let trajectory =
         played(&model(&slaves("SlaveNodes", &bottom), "<Motion Type=\"Translation\">0 0 0.02</Motion>"));
-    let (sheet, ceiling) = (course.forces["surface-0"].z, course.forces["fix-0"].z);
+    let (sheet, ceiling) = (trajectory.forces["surface-0"].z, trajectory.forces["fix-0"].z);
     let exact = uniaxial(0.8, 0.01);
     println!(
         "{:.1e} m in the sheet, {sheet} N on it, {ceiling} N from above, exact {exact} N",
-        course.in_things
+        trajectory.in_things
     );
-    assert!(course.in_things < 1e-8, "{:e}", course.in_things);
+    assert!(trajectory.in_things < 1e-8, "{:e}", trajectory.in_things);
     // It still moves at the end, at 5 mm/s: damping of 60/s takes its part of the force, of a mass of 1 kg at half of this speed.
     let damped = 0.5 * 60.0 * 0.005;
     assert!((sheet / (exact - damped) - 1.0).abs() < 5e-3, "{sheet} N of {exact} N");
@@ -423,16 +423,16 @@ fn two_cubes_touch() {
             system(5e-4, 2.0, 40.0, more)
         )
     };
-    let course = played(&model(
+    let trajectory = played(&model(
         "<DoDeformableCollision>1</DoDeformableCollision><DeformableFrictionCoefficient>0.3</DeformableFrictionCoefficient>",
     ));
     let (between, base, top) =
-        (course.forces["part-0-part-1"].z, course.forces["fix-0"].z, course.forces["move-0"].z);
+        (trajectory.forces["part-0-part-1"].z, trajectory.forces["fix-0"].z, trajectory.forces["move-0"].z);
     println!(
         "{:.1e} m in each other, {between} N between, {base} N from below, {top} N from above",
-        course.in_bodies
+        trajectory.in_bodies
     );
-    assert!(course.in_bodies < ACROSS_EDGES, "{:e}", course.in_bodies);
+    assert!(trajectory.in_bodies < ACROSS_EDGES, "{:e}", trajectory.in_bodies);
     assert!(between > 1.0 && (base / between - 1.0).abs() < 2e-3, "{between} N, {base} N");
     assert!((top / between + 1.0).abs() < 2e-3, "{between} N, {top} N");
 }
@@ -465,10 +465,10 @@ fn pieces_of_one_mesh_touch() {
     let scene = imported(&model, folder.path());
     assert!(scene.scene.contains("inside = true"), "{}", scene.scene);
     assert!(scene.notes.iter().any(|note| note.contains("`model` has 2 pieces")), "{:?}", scene.notes);
-    let course = played(&model);
+    let trajectory = played(&model);
     let weight = 2000.0 * (0.1_f64.powi(3) + 0.08_f64.powi(3));
-    let (base, walls) = (course.forces["fix-0"], course.forces["surface-0"]);
-    let fallen = course.displacements["model"][first][2];
+    let (base, walls) = (trajectory.forces["fix-0"], trajectory.forces["surface-0"]);
+    let fallen = trajectory.displacements["model"][first][2];
     println!("{base:?} N from the base for {weight} N, {walls:?} N on the walls, fallen by {fallen} m");
     assert!((base.z / weight - 1.0).abs() < 1e-3 && walls.norm() == 0.0, "{base:?} of {weight}");
     assert!((-0.02..-0.001).contains(&fallen), "{fallen}");
@@ -495,14 +495,14 @@ fn free_cubes_keep_their_momentum() {
             part(&right, push(&right, 0, 0.101 + 0.09, -2.0) + &push(&right, 2, 0.007, -0.2)),
             system(5e-4, 0.3, 5.0, &more)
         );
-        let course = played(&model);
+        let trajectory = played(&model);
         println!(
             "friction {friction}: momentum {:.1e} of that of all nodes, {} N at most, {:.1e} m in each other",
-            course.momentum, course.largest["part-0-part-1"], course.in_bodies
+            trajectory.momentum, trajectory.largest["part-0-part-1"], trajectory.in_bodies
         );
-        assert!(course.largest["part-0-part-1"] > 0.5);
-        assert!(course.momentum < 1e-10, "{:e}", course.momentum);
-        assert!(course.in_bodies < ACROSS_EDGES, "{:e}", course.in_bodies);
+        assert!(trajectory.largest["part-0-part-1"] > 0.5);
+        assert!(trajectory.momentum < 1e-10, "{:e}", trajectory.momentum);
+        assert!(trajectory.in_bodies < ACROSS_EDGES, "{:e}", trajectory.in_bodies);
     }
 }
 
@@ -528,8 +528,8 @@ fn a_fork_touches_itself() {
         )
     };
     // The arms are straight and thin, and lower nodes have upper ones at their side: their heights tell who is above.
-    let gap = |course: &Course| {
-        let height = |node: usize| grid.nodes[node][2] + course.displacements["model"][node][2];
+    let gap = |trajectory: &Trajectory| {
+        let height = |node: usize| grid.nodes[node][2] + trajectory.displacements["model"][node][2];
         arm(0.02)
             .iter()
             .zip(arm(0.03))
@@ -540,9 +540,9 @@ fn a_fork_touches_itself() {
     let free = imported(&model(""), folder.path());
     assert!(!free.scene.contains("[contact"));
     let crossed = gap(&played(&model("")));
-    let course = played(&model("<DoSelfCollision>1</DoSelfCollision>"));
-    let gap = gap(&course);
-    let base = course.forces["fix-0"];
+    let trajectory = played(&model("<DoSelfCollision>1</DoSelfCollision>"));
+    let gap = gap(&trajectory);
+    let base = trajectory.forces["fix-0"];
     println!(
         "free arms cross by {crossed} m, with contact they are {gap:.2e} m apart; {base:?} N from the base"
     );
@@ -584,8 +584,8 @@ fn membranes_carry_their_part_of_a_force() {
             list(&faces),
             system(2e-4, 0.6, 60.0, "")
         );
-        let course = played(&model);
-        let force = course.forces["move-0"].x;
+        let trajectory = played(&model);
+        let force = trajectory.forces["move-0"].x;
         let exact = 0.1 * 1e-3 * (young * 0.1 + 2.0 * its * 0.001);
         println!("{kind}: {force} N of {exact} N");
         let limit = if kind == "Linear" { 3e-3 } else { 0.04 };

@@ -204,7 +204,7 @@ impl Builder<'_> {
             let help = "prescribe the load, or move a tool or nodes instead";
             self.error(&["contact", name, "between"], "contact does not go with `control`", "here", help);
         }
-        if let Some(limited) = contacts.rigids.iter().find(|rigid| rigid.course.limit().is_some()) {
+        if let Some(limited) = contacts.rigids.iter().find(|rigid| rigid.trajectory.limit().is_some()) {
             let message = format!(
                 "`{}` has a `force-limit`, which the solver `{}` does not know",
                 limited.tool(),

@@ -35,7 +35,7 @@ pub(super) struct Shape {
 }
 
 /// Some cells of a block, of one material.
-struct Part {
+struct MaterialCells {
     law: String,
     density: Density,
     hourglass: Hourglass,
@@ -273,8 +273,8 @@ impl Builder<'_> {
         }
     }
 
-    fn add_solid(&mut self, draft: &Draft<'_>, body: usize, block: &CellBlock, part: Part) {
-        let Part { law: law_name, density, hourglass, cells } = part;
+    fn add_solid(&mut self, draft: &Draft<'_>, body: usize, block: &CellBlock, part: MaterialCells) {
+        let MaterialCells { law: law_name, density, hourglass, cells } = part;
         let (scene, &Draft { name, table, given, .. }) = (self.scene, draft);
         let Some((_, law)) = scene.laws.iter().find(|(known, _)| *known == law_name) else {
             let known: Vec<&str> = scene.laws.iter().map(|(name, _)| name.as_str()).collect();
@@ -394,10 +394,10 @@ fn number_of(labels: &Labels, name: &str) -> Result<String, UnknownLabel> {
 }
 
 /// The cells of a block by material, laws in the order of their names.
-fn parts(table: &BodyTable, block: &CellBlock) -> Vec<Part> {
+fn parts(table: &BodyTable, block: &CellBlock) -> Vec<MaterialCells> {
     let labels = block.data.get("label");
     let has_hourglass = block.kind == CellKind::Hex && table.element != Some(Element::Hex8Full);
-    let mut parts: BTreeMap<(&str, u64, u64), Part> = BTreeMap::new();
+    let mut parts: BTreeMap<(&str, u64, u64), MaterialCells> = BTreeMap::new();
     for cell in 0..block.len() as u32 {
         let label = labels.map(|labels| labels.item(cell as usize)[0].to_string());
         let label = label.as_deref();
@@ -407,7 +407,7 @@ fn parts(table: &BodyTable, block: &CellBlock) -> Vec<Part> {
             table.hourglass.of(label).copied().filter(|_| has_hourglass).unwrap_or(Hourglass(0.0));
         parts
             .entry((law, density.0.to_bits(), hourglass.0.to_bits()))
-            .or_insert_with(|| Part { law: law.clone(), density, hourglass, cells: Vec::new() })
+            .or_insert_with(|| MaterialCells { law: law.clone(), density, hourglass, cells: Vec::new() })
             .cells
             .push(cell);
     }

@@ -9,7 +9,7 @@ use pliant_mechanics::load::{Face, NO_NODE};
 use pliant_mechanics::model::{Constraint, Enclosure, Motion};
 use pliant_sim::number;
 
-use super::{Builder, Target, in_metres};
+use super::{Builder, Subject, in_metres};
 use crate::diagnostic::Diagnostic;
 use crate::format::{MoveTable, RotateTable, SolverName, Vectors, VolumeTable};
 use crate::registry::{ConstraintTable, LoadTable};
@@ -87,7 +87,7 @@ impl Builder<'_> {
             Some(selection) => (selection, "faces"),
             None => (&Selection::All, "body"),
         };
-        let faces = self.faces(Target::Body(body), selection, &at(key));
+        let faces = self.faces(Subject::Body(body), selection, &at(key));
         let (Some(mut faces), Some(curve)) = (faces, self.curve(&table.timing, &path)) else { return };
         if faces.is_empty() {
             let message = format!("`{name}` has no faces, which would enclose a volume");

@@ -11,14 +11,14 @@ use pliant_mechanics::load::NO_NODE;
 use pliant_mechanics::model::{Body, Constraint};
 use pliant_mechanics::tie::Tie;
 use pliant_sim::contact::pairs::{Pairs, Surface};
-use pliant_sim::contact::pose::{Course, Pose};
+use pliant_sim::contact::pose::{Pose, Trajectory};
 use pliant_sim::contact::profile::{Corner, Profile};
 use pliant_sim::contact::shape::Shape;
 use pliant_sim::contact::touch::{Contact, Contacts, Jaw, Rigid, Touch, With, lattice, parts_of};
 use pliant_sim::{counted, number};
 
 use super::barriers::BarrierTables;
-use super::{Builder, Target, in_metres, suggestion};
+use super::{Builder, Subject, in_metres, suggestion};
 use crate::format::{ContactTable, ShapeName, SolverName, ToolTable};
 use crate::reads::{rows_of, table as table_file};
 
@@ -142,8 +142,8 @@ impl Builder<'_> {
             self.error(&path, "it moves by one of `by`, `rotate` and `poses`", "several", help);
             return None;
         }
-        let course = if let Some(shift) = table.by {
-            Course::by(start, shift, self.curve(&table.timing, &path)?)
+        let trajectory = if let Some(shift) = table.by {
+            Trajectory::by(start, shift, self.curve(&table.timing, &path)?)
         } else if let Some(rotate) = table.rotate {
             let axis = Vector3::from(rotate.axis);
             let Some(axis) = axis.try_normalize(0.0) else {
@@ -155,16 +155,22 @@ impl Builder<'_> {
                 );
                 return None;
             };
-            Course::turn(start, axis.into(), rotate.centre, rotate.angle, self.curve(&table.timing, &path)?)
+            Trajectory::turn(
+                start,
+                axis.into(),
+                rotate.centre,
+                rotate.angle,
+                self.curve(&table.timing, &path)?,
+            )
         } else if let Some(file) = &table.poses {
             let text = self.scene.file(file).and_then(|found| table_file(&found));
             let reach = shape.reach();
-            let course = poses(file, text).map(|poses| {
+            let trajectory = poses(file, text).map(|poses| {
                 let (poses, jump) = slowed(poses, reach);
-                Course::table(start, poses).map(|course| (course, jump))
+                Trajectory::table(start, poses).map(|trajectory| (trajectory, jump))
             });
-            match course {
-                Ok(Some((course, jump))) => {
+            match trajectory {
+                Ok(Some((trajectory, jump))) => {
                     if let Some(Jump { time, speed, late }) = jump {
                         self.notes.push(format!(
                             "{kind} `{name}`: by its table of poses it goes at {} m/s from t = {} s on; it goes at {FASTEST} m/s and is late by up to \
@@ -174,7 +180,7 @@ impl Builder<'_> {
                             number(late)
                         ));
                     }
-                    course
+                    trajectory
                 }
                 Ok(None) => {
                     let message = format!("`{}` has no poses, or its times do not increase", file.display());
@@ -187,14 +193,20 @@ impl Builder<'_> {
                 }
             }
         } else {
-            Course::fixed(start)
+            Trajectory::fixed(start)
         };
-        let course = match table.force_limit {
-            Some(limit) => course.limited(limit),
-            None => course,
+        let trajectory = match table.force_limit {
+            Some(limit) => trajectory.limited(limit),
+            None => trajectory,
         };
         let ShapeName::Jaws(of) = &table.shape else {
-            return Some(vec![Rigid { name: name.into(), shape, course, inside: table.inside, jaw: None }]);
+            return Some(vec![Rigid {
+                name: name.into(),
+                shape,
+                trajectory,
+                inside: table.inside,
+                jaw: None,
+            }]);
         };
         if table.inside {
             let help = "bodies are between the jaws, and outside of each";
@@ -210,7 +222,7 @@ impl Builder<'_> {
         let rigids = sides.map(|(side, sign)| Rigid {
             name: format!("{name}.{side}"),
             shape: shape.clone(),
-            course: course.clone(),
+            trajectory: trajectory.clone(),
             inside: false,
             jaw: Some(Jaw {
                 tool: name.into(),
@@ -361,8 +373,8 @@ impl Builder<'_> {
             _ => (&table.other_faces, "other-faces"),
         };
         let faces = match selection {
-            Some(selection) => self.faces(Target::Body(body), selection, &["contact", name, key])?,
-            None => self.faces(Target::Body(body), &Selection::All, &path)?,
+            Some(selection) => self.faces(Subject::Body(body), selection, &["contact", name, key])?,
+            None => self.faces(Subject::Body(body), &Selection::All, &path)?,
         };
         let halves = faces.iter().flat_map(|&[a, b, c, d]| {
             let second = (d != NO_NODE).then_some([a, c, d]);

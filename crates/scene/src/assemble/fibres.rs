@@ -19,14 +19,14 @@ const ZERO: f64 = 1e-12;
 const LOST: f64 = 1e-6;
 
 /// What is wrong with a rule: the keys below it, the message and what to do.
-struct Fault {
+struct RuleFault {
     at: Vec<&'static str>,
     message: String,
     help: String,
 }
 
-fn fault(at: &[&'static str], message: impl Into<String>, help: impl Into<String>) -> Fault {
-    Fault { at: at.to_vec(), message: message.into(), help: help.into() }
+fn fault(at: &[&'static str], message: impl Into<String>, help: impl Into<String>) -> RuleFault {
+    RuleFault { at: at.to_vec(), message: message.into(), help: help.into() }
 }
 
 /// Where a rule gives no direction, and what to do about it.
@@ -141,7 +141,7 @@ fn directions(
     draft: &Draft<'_>,
     block: &CellBlock,
     cells: &[u32],
-) -> Result<Directions, Fault> {
+) -> Result<Directions, RuleFault> {
     let centre = |&cell: &u32| {
         let nodes = block.cell(cell as usize);
         nodes.iter().map(|&node| draft.mesh.points[node as usize]).sum::<Vector3>() / nodes.len() as f64
@@ -197,19 +197,24 @@ fn directions(
 }
 
 /// The same direction for some cells.
-fn along(direction: &[f64; 3], count: usize, at: &[&'static str]) -> Result<Directions, Fault> {
+fn along(direction: &[f64; 3], count: usize, at: &[&'static str]) -> Result<Directions, RuleFault> {
     let unit = axis_of(direction, "the fibre direction", at)?.into();
     Ok((vec![Some(unit); count], Lost { cells: "", help: "" }))
 }
 
-fn axis_of(direction: &[f64; 3], what: &str, at: &[&'static str]) -> Result<Vector3, Fault> {
+fn axis_of(direction: &[f64; 3], what: &str, at: &[&'static str]) -> Result<Vector3, RuleFault> {
     let help = "a direction, for example [0, 1, 0]; its length does not matter";
     unit(Vector3::from(*direction), ZERO)
         .map(Vector3::from)
         .ok_or_else(|| fault(at, format!("{what} is zero"), help))
 }
 
-fn cell_data(field: &str, draft: &Draft<'_>, block: &CellBlock, cells: &[u32]) -> Result<Directions, Fault> {
+fn cell_data(
+    field: &str,
+    draft: &Draft<'_>,
+    block: &CellBlock,
+    cells: &[u32],
+) -> Result<Directions, RuleFault> {
     let Some(data) = block.data.get(field) else {
         let known: Vec<&str> = block.data.keys().map(String::as_str).collect();
         let help = suggestion(field, &known, "the mesh", "cell data");
@@ -234,7 +239,7 @@ fn laplace(
     draft: &Draft<'_>,
     block: &CellBlock,
     cells: &[u32],
-) -> Result<Directions, Fault> {
+) -> Result<Directions, RuleFault> {
     let keys = [["laplace", "from"], ["laplace", "to"]];
     let nodes_of = |side: usize| {
         let chosen = selections[side].nodes(draft.mesh, draft.boundary);

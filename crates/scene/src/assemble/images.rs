@@ -77,7 +77,7 @@ enum Goal {
 }
 
 /// Why no mesh could be made: the key to point at, the message and what to do.
-struct Fault {
+struct MeshFault {
     key: &'static str,
     message: String,
     help: String,
@@ -119,7 +119,7 @@ impl Builder<'_> {
         });
         let (scan, recipe, (kept, how)) = match made {
             Ok(made) => made,
-            Err(Fault { key, message, help }) => {
+            Err(MeshFault { key, message, help }) => {
                 self.error(&[path, &[key]].concat(), message, "here", help);
                 return None;
             }
@@ -145,7 +145,7 @@ impl Builder<'_> {
         Some(MeshOrigin { mesh, origin })
     }
 
-    fn scan(&self, table: &MeshTable, watch: Watch<'_>) -> Result<Scan, Fault> {
+    fn scan(&self, table: &MeshTable, watch: Watch<'_>) -> Result<Scan, MeshFault> {
         let Some(file) = &table.file else {
             require_one_cut(table)?;
             let image = self.read_images(table, watch)?;
@@ -159,22 +159,22 @@ impl Builder<'_> {
                 MeshFileError::Open { .. } => "file names are relative to the scene file",
                 _ => "`pliant info` reads a mesh file on its own",
             };
-            Fault { key: "file", message: error.to_string(), help: help.into() }
+            MeshFault { key: "file", message: error.to_string(), help: help.into() }
         })?;
         match unscaled(&mut read.mesh, table) {
-            Some((message, help)) => Err(Fault { key: "file", message, help }),
+            Some((message, help)) => Err(MeshFault { key: "file", message, help }),
             None => Ok(Scan::Surface(read)),
         }
     }
 
     /// The image, with the one that is added to it, or several masks as one; with the names of its labels.
-    fn read_images(&self, table: &MeshTable, watch: Watch<'_>) -> Result<Image, Fault> {
+    fn read_images(&self, table: &MeshTable, watch: Watch<'_>) -> Result<Image, MeshFault> {
         let failed = |key, error: ImageError| {
             let help = match error {
                 ImageError::Open { .. } => "file names are relative to the scene file",
                 _ => "`pliant labels` reads an image on its own",
             };
-            Fault { key, message: error.to_string(), help: help.into() }
+            MeshFault { key, message: error.to_string(), help: help.into() }
         };
         let within = self.scene.source.reads().folder().map(Path::to_owned);
         let options = ReadOptions { within, ..ReadOptions::default() };
@@ -195,7 +195,7 @@ impl Builder<'_> {
             (Some(image), _) => read("image", image)?,
             (None, masks) => {
                 let one = |mask: &PathBuf| Ok((mask.clone(), read("masks", mask)?));
-                let masks = masks.iter().flatten().map(one).collect::<Result<Vec<_>, Fault>>()?;
+                let masks = masks.iter().flatten().map(one).collect::<Result<Vec<_>, MeshFault>>()?;
                 Image::of_masks(&masks, table.threshold)
                     .map_err(|error| label_fault("masks", table, &error))?
             }
@@ -214,7 +214,7 @@ impl Builder<'_> {
 }
 
 /// The labels that a table requests, as far as the image has them, or the threshold above which voxels are inside.
-fn choice(image: &Image, table: &MeshTable) -> Result<Choice, Fault> {
+fn choice(image: &Image, table: &MeshTable) -> Result<Choice, MeshFault> {
     if let (Some(threshold), None) = (table.threshold, &table.masks) {
         return Ok(Choice::From(threshold));
     }
@@ -230,7 +230,7 @@ fn choice(image: &Image, table: &MeshTable) -> Result<Choice, Fault> {
     })
 }
 
-fn label_fault(key: &'static str, table: &MeshTable, error: &LabelError) -> Fault {
+fn label_fault(key: &'static str, table: &MeshTable, error: &LabelError) -> MeshFault {
     let help = match error {
         LabelError::NoneChosen { .. } => "add `label = 1`, `labels = [1, 2]`, or `threshold = 0.5`",
         LabelError::NotWhole { .. } => "`threshold = 0.5` takes a map of probabilities",
@@ -246,7 +246,7 @@ fn label_fault(key: &'static str, table: &MeshTable, error: &LabelError) -> Faul
         _ => "`pliant labels` lists the labels of an image",
     };
     let key = if matches!(error, LabelError::BadLength { .. }) { "clean" } else { key };
-    Fault { key, message: error.to_string(), help: help.into() }
+    MeshFault { key, message: error.to_string(), help: help.into() }
 }
 
 impl Scan {
@@ -303,9 +303,9 @@ pub(super) fn content_of(mesh: &Mesh, sink: &mut dyn FnMut(&[u8])) {
 }
 
 /// The request of a table.
-fn recipe(table: &MeshTable) -> Result<Recipe, Fault> {
+fn recipe(table: &MeshTable) -> Result<Recipe, MeshFault> {
     let refuse =
-        |key, message: &str, help: &str| Err(Fault { key, message: message.into(), help: help.into() });
+        |key, message: &str, help: &str| Err(MeshFault { key, message: message.into(), help: help.into() });
     let CleanTable { close_gaps, fill_holes, keep_largest } = table.clean.unwrap_or_default();
     let cleaning = Cleaning { close_gaps, fill_holes, keep_largest };
     let cells = goal(table)?;
@@ -330,9 +330,9 @@ fn recipe(table: &MeshTable) -> Result<Recipe, Fault> {
 }
 
 /// Whether a table says in one way only what of an image the body is.
-fn require_one_cut(table: &MeshTable) -> Result<(), Fault> {
+fn require_one_cut(table: &MeshTable) -> Result<(), MeshFault> {
     let refuse =
-        |key, message: &str, help: &str| Err(Fault { key, message: message.into(), help: help.into() });
+        |key, message: &str, help: &str| Err(MeshFault { key, message: message.into(), help: help.into() });
     let ways =
         [table.label.is_some(), table.labels.is_some(), table.threshold.is_some() && table.masks.is_none()];
     match &table.masks {
@@ -366,7 +366,7 @@ fn require_one_cut(table: &MeshTable) -> Result<(), Fault> {
 }
 
 /// The cells that a table requests, with exactly one size that fits them.
-fn goal(table: &MeshTable) -> Result<Goal, Fault> {
+fn goal(table: &MeshTable) -> Result<Goal, MeshFault> {
     let cells = table.made_of();
     let sizes = [
         ("edge", table.edge.is_some()),
@@ -389,7 +389,7 @@ fn goal(table: &MeshTable) -> Result<Goal, Fault> {
     ];
     if let Some((key, _)) = of_tets.into_iter().find(|(_, given)| *given && cells != Cells::Tets) {
         let message = format!("`{key}` does not go with {words}");
-        return Err(Fault { key, message, help: "it is for tets".into() });
+        return Err(MeshFault { key, message, help: "it is for tets".into() });
     }
     let source = match (&table.file, &table.masks) {
         (Some(_), _) => "file",
@@ -402,7 +402,11 @@ fn goal(table: &MeshTable) -> Result<Goal, Fault> {
             Cells::Surface => "a surface has even triangles of `edge`, or as few as `triangles`",
             _ => "their size is `edge`, in metres",
         };
-        return Err(Fault { key, message: format!("`{key}` does not go with {words}"), help: help.into() });
+        return Err(MeshFault {
+            key,
+            message: format!("`{key}` does not go with {words}"),
+            help: help.into(),
+        });
     }
     match (cells, table.edge, table.triangles, table.shells, table.error) {
         (Cells::Surface, Some(edge), None, ..) => Ok(Goal::Even(edge)),
@@ -416,12 +420,12 @@ fn goal(table: &MeshTable) -> Result<Goal, Fault> {
             let MeshTable { inner_edge, distance, .. } = *table;
             Ok(Goal::Volume(cells, Fineness { edge, inner_edge, protect: Vec::new(), distance }))
         }
-        (Cells::Tets | Cells::Hexes | Cells::ImmersedHexes, None, ..) => Err(Fault {
+        (Cells::Tets | Cells::Hexes | Cells::ImmersedHexes, None, ..) => Err(MeshFault {
             key: source,
             message: format!("{words} of an image or a surface need `edge`"),
             help: "add `edge`, the size of a cell in metres, for example `edge = 0.008`".into(),
         }),
-        _ => Err(Fault {
+        _ => Err(MeshFault {
             key: source,
             message: format!(
                 "{words} of an image or a surface need exactly one of {}",
@@ -465,7 +469,7 @@ impl Fineness {
 
 impl Recipe {
     /// Takes the labels with smaller tets, by their numbers.
-    fn protect(&mut self, scan: &Scan, table: &MeshTable) -> Result<(), Fault> {
+    fn protect(&mut self, scan: &Scan, table: &MeshTable) -> Result<(), MeshFault> {
         let Goal::Volume(_, fineness) = &mut self.cells else { return Ok(()) };
         let named = |label: i32| (label, scan.name(label));
         let known: Labels = scan.labels().iter().copied().map(named).collect();
@@ -477,7 +481,7 @@ impl Recipe {
                 CellLabel::Name(_) => known.find(label).map_err(|error| {
                     let help =
                         "`names = \"table.txt\"` gives the labels of an image names; `pliant labels` lists them";
-                    Fault { key: "protect", message: error.to_string(), help: help.into() }
+                    MeshFault { key: "protect", message: error.to_string(), help: help.into() }
                 })?,
             };
             fineness.protect.push((number, edge));
@@ -506,7 +510,7 @@ impl Recipe {
     }
 
     /// Cuts the body out, cleans it and makes its cells.
-    fn make(&self, scan: &Scan, watch: Watch<'_>) -> Result<Kept, Fault> {
+    fn make(&self, scan: &Scan, watch: Watch<'_>) -> Result<Kept, MeshFault> {
         let key = match (&self.cells, scan) {
             (Goal::Volume(_, Fineness { edge: None, .. }), _) => "distance",
             (Goal::Volume(..) | Goal::Even(_), _) => "edge",
@@ -518,7 +522,7 @@ impl Recipe {
         };
         let fault = |error: MeshingError| {
             let key = if matches!(error, MeshingError::NoSuchLabel { .. }) { "protect" } else { key };
-            Fault { key, message: error.to_string(), help: String::new() }
+            MeshFault { key, message: error.to_string(), help: String::new() }
         };
         let mut notes = Vec::new();
         let (mesh, doubts) = match (scan, &self.cells) {
@@ -539,7 +543,7 @@ impl Recipe {
                 let edge = fineness.edge_in(file.mesh.bounds().unwrap_or_default().into());
                 let request = fineness.tets(edge);
                 self.enclosed(&file.mesh, &request, &mut notes, watch)
-                    .map_err(|error| Fault { key: "file", ..fault(error) })
+                    .map_err(|error| MeshFault { key: "file", ..fault(error) })
                     .map(|anatomy| fill(&anatomy, *cells, &request, &mut notes, watch))?
             }
             (Scan::Surface(file), goal) => {
@@ -584,7 +588,7 @@ impl Recipe {
         choice: &Choice,
         notes: &mut Vec<String>,
         watch: Watch<'_>,
-    ) -> Result<(Anatomy<'static>, pliant_imaging::Cleaned, f64), Fault> {
+    ) -> Result<(Anatomy<'static>, pliant_imaging::Cleaned, f64), MeshFault> {
         let key = match choice {
             Choice::From(_) => "threshold",
             Choice::Labels(labels) => ["image", "label", "labels"][labels.len().min(2)],

@@ -4,7 +4,7 @@ use pliant_geometry::{Mesh, Selection, Surface, Vector3, boundary};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE, face_areas};
 
-use super::{Builder, SCENE, Target, labels_of, suggestion};
+use super::{Builder, SCENE, Subject, labels_of, suggestion};
 use crate::format::{
     At, BodyModel, ColourBy, Component, CsvTable, FieldName, ForceTable, ProbeTable, Timing, Vectors,
     VtuTable,
@@ -98,8 +98,8 @@ impl Builder<'_> {
             LoadTable::Gravity(_) | LoadTable::Moment(_) | LoadTable::Edge(_) => None,
         };
         let surface = match target {
-            Target::Body(_) => None,
-            Target::Surface(index) => Some(index),
+            Subject::Body(_) => None,
+            Subject::Surface(index) => Some(index),
         };
         Some(vec![(kind?, curve?, surface)])
     }
@@ -107,13 +107,13 @@ impl Builder<'_> {
     pub(super) fn nodal_forces(
         &mut self,
         table: &ForceTable,
-        target: Target,
+        target: Subject,
         path: &[&str],
     ) -> Option<LoadKind> {
         let at = [path, &["nodes"]].concat();
         let nodes = match target {
-            Target::Body(body) => self.body_nodes(body, &table.nodes, &at)?,
-            Target::Surface(index) => {
+            Subject::Body(body) => self.body_nodes(body, &table.nodes, &at)?,
+            Subject::Surface(index) => {
                 let (mesh, boundary) = self.surface_mesh(index);
                 match table.nodes.nodes(&mesh, &boundary) {
                     Ok(nodes) => nodes,
@@ -129,7 +129,7 @@ impl Builder<'_> {
             (Some(Vectors::Uniform(each)), None) => vec![*each; count],
             (Some(Vectors::PerNode(each)), None) => {
                 let at = [path, &["each"]].concat();
-                let Target::Body(body) = target else {
+                let Subject::Body(body) = target else {
                     let help = "load the body itself, or give one vector for all nodes";
                     self.error(&at, "the nodes of a carried surface have no data", "not on a surface", help);
                     return None;
@@ -151,16 +151,16 @@ impl Builder<'_> {
     /// The selected faces of a body (numbered in the model) or of a carried surface (numbered in it).
     pub(super) fn faces(
         &mut self,
-        target: Target,
+        target: Subject,
         selection: &Selection,
         path: &[&str],
     ) -> Option<Vec<Face>> {
         let result = match target {
-            Target::Body(body) => {
+            Subject::Body(body) => {
                 let (built, own) = (&self.bodies[body], &self.assembly.bodies[body]);
                 select_faces(selection, &built.mesh, &built.boundary, |node| own.node(node))
             }
-            Target::Surface(index) => {
+            Subject::Surface(index) => {
                 let (mesh, boundary) = self.surface_mesh(index);
                 select_faces(selection, &mesh, &boundary, |node| node)
             }
@@ -176,13 +176,13 @@ impl Builder<'_> {
 
     pub(super) fn traction_forces(
         &self,
-        target: Target,
+        target: Subject,
         faces: &[Face],
         traction: [f64; 3],
     ) -> Vec<(u32, [f64; 3])> {
         let rest = match target {
-            Target::Body(_) => &self.assembly.rest,
-            Target::Surface(index) => &self.assembly.surfaces[index].rest,
+            Subject::Body(_) => &self.assembly.rest,
+            Subject::Surface(index) => &self.assembly.surfaces[index].rest,
         };
         let share = |(node, area): (u32, [f64; 3])| {
             let size = Vector3::from(area).norm();
@@ -230,7 +230,7 @@ impl Builder<'_> {
         let Some(ColourBy::Field(field)) = view.colour else { return };
         match target {
             Some(None) => return,
-            Some(Some(Target::Surface(surface))) => {
+            Some(Some(Subject::Surface(surface))) => {
                 let body = self.assembly.surfaces[surface].body;
                 let model = self.scene.bodies[body].1.model;
                 if model == BodyModel::Shell && field != FieldName::Displacement {
@@ -249,7 +249,7 @@ impl Builder<'_> {
                     self.refuse_other_fields(&[field], Some(body), &["view", "colour"]);
                 }
             }
-            Some(Some(Target::Body(body))) => {
+            Some(Some(Subject::Body(body))) => {
                 self.refuse_other_fields(&[field], Some(body), &["view", "colour"]);
             }
             None => self.refuse_other_fields(&[field], None, &["view", "colour"]),
@@ -273,15 +273,15 @@ impl Builder<'_> {
     }
 
     /// Refuses forces of contacts where there are none.
-    fn check_contacts_of_view(&mut self, target: Option<Option<Target>>) {
+    fn check_contacts_of_view(&mut self, target: Option<Option<Subject>>) {
         let path = ["view", "contacts"];
         match target {
             Some(None) => {}
-            Some(Some(Target::Surface(_))) => {
+            Some(Some(Subject::Surface(_))) => {
                 let help = "leave `on` out, to see the body itself";
                 self.error(&path, "surfaces have no contacts", "not on a surface", help);
             }
-            Some(Some(Target::Body(body))) => {
+            Some(Some(Subject::Body(body))) => {
                 self.refuse_other_fields(&[FieldName::ContactForce], Some(body), &path);
             }
             None => self.refuse_other_fields(&[FieldName::ContactForce], None, &path),
@@ -325,13 +325,13 @@ impl Builder<'_> {
     fn check_vtu(&mut self, table: &VtuTable, path: &[&str]) {
         let at = |key| [path, &[key]].concat();
         let target = table.on.as_ref().map(|on| self.find_target(on, &at("on")));
-        if let Some(Some(Target::Surface(surface))) = target {
+        if let Some(Some(Subject::Surface(surface))) = target {
             let help = "write displacement and velocity on surfaces, stresses on the body";
             self.refuse_cell_fields(&table.data, surface, &at("data"), help);
         }
         let body = match target {
             None => None,
-            Some(Some(Target::Body(body))) => Some(body),
+            Some(Some(Subject::Body(body))) => Some(body),
             Some(_) => return,
         };
         self.refuse_other_fields(&table.data, body, &at("data"));
@@ -436,10 +436,10 @@ impl Builder<'_> {
     fn check_probe(&mut self, name: &str, probe: &ProbeTable, path: &[&str]) {
         let at = |key| [path, &[key]].concat();
         match self.find_target(&probe.on, &at("on")) {
-            Some(Target::Surface(surface)) => {
+            Some(Subject::Surface(surface)) => {
                 self.refuse_cell_fields(&probe.data, surface, &at("data"), "probe the body for stresses");
             }
-            Some(Target::Body(body)) => {
+            Some(Subject::Body(body)) => {
                 self.refuse_other_fields(&probe.data, Some(body), &at("data"));
                 let place = Vector3::from(probe.at);
                 let distance = self.bodies[body].locator().locate(&place).map(|found| found.distance);
@@ -474,7 +474,7 @@ impl Builder<'_> {
 }
 
 impl LoadTable {
-    /// Its course over time.
+    /// Its curve over time.
     pub(super) fn timing(&self) -> &Timing {
         match self {
             Self::Force(load) => &load.timing,

@@ -296,7 +296,7 @@ struct Builder<'s> {
 
 /// What a load or an output acts on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Target {
+pub(crate) enum Subject {
     /// A body, by index.
     Body(usize),
     /// A carried surface, by index.
@@ -329,12 +329,12 @@ impl<'s> Builder<'s> {
     }
 
     /// The body or surface of a name; a diagnostic at `path` if there is none.
-    fn find_target(&mut self, name: &str, path: &[&str]) -> Option<Target> {
+    fn find_target(&mut self, name: &str, path: &[&str]) -> Option<Subject> {
         if let Some(index) = self.assembly.surfaces.iter().position(|surface| surface.name == name) {
-            return Some(Target::Surface(index));
+            return Some(Subject::Surface(index));
         }
         if self.bodies.iter().any(|body| body.name == name) {
-            return self.find_body(name, path).map(Target::Body);
+            return self.find_body(name, path).map(Subject::Body);
         }
         let bodies = self.bodies.iter().map(|body| body.name.as_str());
         let known: Vec<&str> = bodies.chain(self.assembly.surfaces.iter().map(|s| s.name.as_str())).collect();

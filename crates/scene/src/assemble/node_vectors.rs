@@ -13,13 +13,13 @@ use crate::reads::{rows_of, table};
 
 /// What is wrong with a table of vectors, and what to do about it.
 #[derive(Debug)]
-struct Fault {
+struct VectorFault {
     message: String,
     help: String,
 }
 
-fn fault(message: String, help: impl Into<String>) -> Fault {
-    Fault { message, help: help.into() }
+fn fault(message: String, help: impl Into<String>) -> VectorFault {
+    VectorFault { message, help: help.into() }
 }
 
 impl Builder<'_> {
@@ -47,7 +47,7 @@ impl Builder<'_> {
         };
         match found {
             Ok(vectors) => Some(vectors.into_iter().map(|v| v.map(|x| x * table.scale)).collect()),
-            Err(Fault { message, help }) => {
+            Err(VectorFault { message, help }) => {
                 self.error(&[path, &[key]].concat(), message, "here", help);
                 None
             }
@@ -55,7 +55,7 @@ impl Builder<'_> {
     }
 }
 
-fn point_data<'m>(name: &str, body: &str, mesh: &'m Mesh) -> Result<&'m DataArray, Fault> {
+fn point_data<'m>(name: &str, body: &str, mesh: &'m Mesh) -> Result<&'m DataArray, VectorFault> {
     mesh.point_data.get(name).ok_or_else(|| {
         let known: Vec<&str> = mesh.point_data.keys().map(String::as_str).collect();
         let help = suggestion(name, &known, "the mesh", "point data");
@@ -63,7 +63,7 @@ fn point_data<'m>(name: &str, body: &str, mesh: &'m Mesh) -> Result<&'m DataArra
     })
 }
 
-fn of_data(name: &str, data: &DataArray, nodes: &[u32]) -> Result<Vec<[f64; 3]>, Fault> {
+fn of_data(name: &str, data: &DataArray, nodes: &[u32]) -> Result<Vec<[f64; 3]>, VectorFault> {
     if data.components != 3 {
         let message =
             format!("point data `{name}` has {}, a vector has 3", counted(data.components, "component"));
@@ -86,7 +86,7 @@ fn read_rows(
     found: io::Result<PathBuf>,
     path: &Path,
     count: usize,
-) -> Result<BTreeMap<u32, [f64; 3]>, Fault> {
+) -> Result<BTreeMap<u32, [f64; 3]>, VectorFault> {
     const FORM: &str =
         "each row is `node,x,y,z`: a node counted from 0 and three numbers in metres (or newtons)";
     let text = found.and_then(|found| table(&found)).map_err(|error| {
@@ -130,7 +130,7 @@ fn of_rows(
     file: &Path,
     rows: &BTreeMap<u32, [f64; 3]>,
     nodes: impl Iterator<Item = u32> + Clone,
-) -> Result<Vec<[f64; 3]>, Fault> {
+) -> Result<Vec<[f64; 3]>, VectorFault> {
     let mut missing = nodes.clone().filter(|node| !rows.contains_key(node));
     if let Some(first) = missing.next() {
         let others = match missing.count() {

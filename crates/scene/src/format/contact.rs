@@ -33,7 +33,7 @@ pub struct ToolTable {
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub ideal_grip: Option<f64>,
-    /// The force [N] that it pushes with at most. From half of it on it gives way, and lags behind its course; when nothing is in its way any
+    /// The force [N] that it pushes with at most. From half of it on it gives way, and lags behind its trajectory; when nothing is in its way any
     /// more, it catches up.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
@@ -48,7 +48,7 @@ pub struct ToolTable {
     /// moves on straight ways and shortest arcs; before the first and after the last row it rests.
     #[serde(default)]
     pub poses: Option<PathBuf>,
-    /// Its course.
+    /// Its curve over time.
     #[serde(flatten)]
     pub timing: Timing,
 }
@@ -164,7 +164,7 @@ pub struct OpeningTable {
     /// The angle [rad].
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 3.0))]
     pub angle: f64,
-    /// Its course.
+    /// Its curve over time.
     #[serde(flatten)]
     pub timing: Timing,
 }

@@ -96,7 +96,7 @@ pub enum PreconditionerName {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ControlTable {
-    /// The load whose factor is found; it has no course of its own.
+    /// The load whose factor is found; it has no curve of its own.
     pub load: String,
     /// How a node moves over the whole run, in equal parts.
     #[serde(default)]

@@ -43,7 +43,7 @@ pub enum CurveShape {
     Table(Vec<[f64; 2]>),
 }
 
-/// The course over time: the factor goes from 0 at `from` to 1 at `to`.
+/// The curve over time: the factor goes from 0 at `from` to 1 at `to`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct Timing {
@@ -87,7 +87,7 @@ pub struct MeanTable {
     /// Components of it that are prescribed; if not given, all three.
     #[serde(default)]
     pub components: Option<Vec<Axis>>,
-    /// Its course.
+    /// Its curve over time.
     #[serde(flatten)]
     pub timing: Timing,
 }
@@ -115,7 +115,7 @@ pub struct VolumeTable {
     pub faces: Option<Selection>,
     /// By how much the enclosed volume grows from that at rest [m³], along the curve; 0 keeps it, less than 0 empties it.
     pub by: f64,
-    /// Its course.
+    /// Its curve over time.
     #[serde(flatten)]
     pub timing: Timing,
 }
@@ -160,7 +160,7 @@ pub struct MoveTable {
     /// Components prescribed; if not given, all three of the displacement, and with `turn` the rotations. A rotation takes all three.
     #[serde(default)]
     pub components: Option<Vec<Axis>>,
-    /// Its course.
+    /// Its curve over time.
     #[serde(flatten)]
     pub timing: Timing,
 }
@@ -228,7 +228,7 @@ pub struct ForceTable {
     /// Force [N] shared equally among the nodes.
     #[serde(default)]
     pub total: Option<[f64; 3]>,
-    /// Its course.
+    /// Its curve over time.
     #[serde(flatten)]
     pub timing: Timing,
 }
@@ -247,7 +247,7 @@ pub struct MomentTable {
     /// Moment [N m] shared equally among the nodes.
     #[serde(default)]
     pub total: Option<[f64; 3]>,
-    /// Its course.
+    /// Its curve over time.
     #[serde(flatten)]
     pub timing: Timing,
 }
@@ -263,7 +263,7 @@ pub struct EdgeLoadTable {
     pub nodes: Selection,
     /// Force per length at rest [N/m]; its direction stays.
     pub traction: [f64; 3],
-    /// Its course.
+    /// Its curve over time.
     #[serde(flatten)]
     pub timing: Timing,
 }
@@ -278,7 +278,7 @@ pub struct TractionTable {
     pub faces: Selection,
     /// Force per area at rest [Pa]; its direction stays.
     pub traction: [f64; 3],
-    /// Its course.
+    /// Its curve over time.
     #[serde(flatten)]
     pub timing: Timing,
 }
@@ -298,7 +298,7 @@ pub struct PressureTable {
     /// pairs go together.
     #[serde(default)]
     pub spread: Option<SpreadName>,
-    /// Its course.
+    /// Its curve over time.
     #[serde(flatten)]
     pub timing: Timing,
 }
@@ -315,7 +315,7 @@ pub struct GravityTable {
     pub nodes: Option<Selection>,
     /// Acceleration [m/s²].
     pub acceleration: [f64; 3],
-    /// Its course.
+    /// Its curve over time.
     #[serde(flatten)]
     pub timing: Timing,
 }

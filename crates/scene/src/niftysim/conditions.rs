@@ -8,13 +8,13 @@ use pliant_geometry::{Selection, Surface, Vector3, boundary, vector_area};
 use super::error::{Fault, ImportProblem};
 use super::geometry::Geometry;
 use super::xml::{
-    Element, attribute, attribute_number, child, children, count, fault, indices, line, needed, number,
+    XmlElement, attribute, attribute_number, child, children, count, fault, indices, line, needed, number,
     numbers, numbers_of, run_of_indices,
 };
 
 /// How a load grows with t/T, T the total time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Shape {
+pub(super) enum LoadShape {
     /// 10s³ − 15s⁴ + 6s⁵.
     Polynomial,
     /// s.
@@ -50,7 +50,7 @@ pub(super) struct Condition {
     /// Its line in the XML.
     pub line: u32,
     pub action: Action,
-    pub shape: Shape,
+    pub shape: LoadShape,
     /// Its nodes, increasing; empty for faces.
     pub nodes: Vec<u32>,
     /// The vector of each node where they differ; `action` then says which components act.
@@ -69,7 +69,7 @@ pub(super) struct Remarks {
 
 /// Reads all `<Constraint>` of a model or submodel.
 pub(super) fn read(
-    of: Element<'_>,
+    of: XmlElement<'_>,
     geometry: &Geometry,
     remarks: &mut Remarks,
 ) -> Result<Vec<Condition>, Fault> {
@@ -77,7 +77,7 @@ pub(super) fn read(
         return Ok(Vec::new());
     }
     let surface = boundary(&geometry.mesh);
-    let mut reader = Reader { geometry, surface, remarks };
+    let mut reader = ConditionReader { geometry, surface, remarks };
     let mut all = Vec::new();
     for constraint in children(of, "Constraint") {
         all.extend(reader.constraint(constraint)?);
@@ -85,7 +85,7 @@ pub(super) fn read(
     Ok(all)
 }
 
-struct Reader<'r> {
+struct ConditionReader<'r> {
     geometry: &'r Geometry,
     surface: Surface,
     remarks: &'r mut Remarks,
@@ -93,13 +93,13 @@ struct Reader<'r> {
 
 const TYPES: &str = "Type=\"Fix\", \"Disp\", \"Force\", \"Gravity\", \"Pressure\" or \"Traction\"";
 
-impl Reader<'_> {
-    fn constraint(&mut self, of: Element<'_>) -> Result<Vec<Condition>, Fault> {
+impl ConditionReader<'_> {
+    fn constraint(&mut self, of: XmlElement<'_>) -> Result<Vec<Condition>, Fault> {
         match attribute(of, "Type", TYPES)? {
             "Fix" => {
                 let components = components(of)?;
                 let action = Action::Fix(components);
-                Ok(self.on_nodes(of, action, Shape::Step, sorted(self.nodes(of)?)))
+                Ok(self.on_nodes(of, action, LoadShape::Step, sorted(self.nodes(of)?)))
             }
             "Disp" => self.valued(of, |value, components| {
                 Action::Move(components.map(|component| component.then_some(value)))
@@ -117,7 +117,13 @@ impl Reader<'_> {
         }
     }
 
-    fn on_nodes(&self, of: Element<'_>, action: Action, shape: Shape, nodes: Vec<u32>) -> Vec<Condition> {
+    fn on_nodes(
+        &self,
+        of: XmlElement<'_>,
+        action: Action,
+        shape: LoadShape,
+        nodes: Vec<u32>,
+    ) -> Vec<Condition> {
         if nodes.is_empty() {
             return Vec::new();
         }
@@ -127,7 +133,7 @@ impl Reader<'_> {
     /// A displacement or force: one condition for each different magnitude.
     fn valued(
         &mut self,
-        of: Element<'_>,
+        of: XmlElement<'_>,
         action: impl Fn(f64, [bool; 3]) -> Action,
     ) -> Result<Vec<Condition>, Fault> {
         let components = components(of)?;
@@ -165,7 +171,7 @@ impl Reader<'_> {
         Ok(conditions.collect())
     }
 
-    fn gravity(&mut self, of: Element<'_>) -> Result<Vec<Condition>, Fault> {
+    fn gravity(&mut self, of: XmlElement<'_>) -> Result<Vec<Condition>, Fault> {
         let shape = self.shape(of)?;
         let nodes = sorted(self.nodes(of)?);
         let magnitude =
@@ -181,7 +187,7 @@ impl Reader<'_> {
         Ok(self.on_nodes(of, Action::Gravity((direction * magnitude).into()), shape, nodes))
     }
 
-    fn pressure(&mut self, of: Element<'_>) -> Result<Vec<Condition>, Fault> {
+    fn pressure(&mut self, of: XmlElement<'_>) -> Result<Vec<Condition>, Fault> {
         let shape = self.shape(of)?;
         let pressure = number(needed(of, "Magnitude", "<Magnitude>100</Magnitude>")?)?;
         let [outward, inward] = self.faces(of)?;
@@ -194,7 +200,7 @@ impl Reader<'_> {
         Ok(both.into_iter().filter_map(condition).collect())
     }
 
-    fn traction(&mut self, of: Element<'_>) -> Result<Vec<Condition>, Fault> {
+    fn traction(&mut self, of: XmlElement<'_>) -> Result<Vec<Condition>, Fault> {
         let shape = self.shape(of)?;
         let magnitudes = needed(of, "Magnitudes", "<Magnitudes Type=\"UNIFORM\">0 0 100</Magnitudes>")?;
         match attribute(magnitudes, "Type", "Type=\"UNIFORM\"")? {
@@ -219,9 +225,9 @@ impl Reader<'_> {
     /// The forces on the nodes of faces that each have a traction of their own.
     fn traction_of_each_face(
         &mut self,
-        of: Element<'_>,
-        magnitudes: Element<'_>,
-        shape: Shape,
+        of: XmlElement<'_>,
+        magnitudes: XmlElement<'_>,
+        shape: LoadShape,
     ) -> Result<Vec<Condition>, Fault> {
         let faces = self.listed_faces(of)?;
         let tractions = numbers(magnitudes)?;
@@ -249,30 +255,30 @@ impl Reader<'_> {
         Ok(forces.into_iter().flat_map(force).collect())
     }
 
-    fn leave_out(&mut self, of: Element<'_>, what: &str) {
+    fn leave_out(&mut self, of: XmlElement<'_>, what: &str) {
         let kind = of.attribute("Type").unwrap_or_default();
         self.remarks.missing.push(format!("the {kind} of line {} ({what})", line(of)));
     }
 
-    fn shape(&mut self, of: Element<'_>) -> Result<Shape, Fault> {
+    fn shape(&mut self, of: XmlElement<'_>) -> Result<LoadShape, Fault> {
         Ok(match of.attribute("LoadShape").map(str::trim) {
-            Some("POLY345") => Shape::Polynomial,
-            Some("RAMP") => Shape::Ramp,
-            Some("RAMPHOLD") => Shape::RampHold,
-            Some("STEP") => Shape::Step,
-            Some("HILLY") => Shape::Hilly,
+            Some("POLY345") => LoadShape::Polynomial,
+            Some("RAMP") => LoadShape::Ramp,
+            Some("RAMPHOLD") => LoadShape::RampHold,
+            Some("STEP") => LoadShape::Step,
+            Some("HILLY") => LoadShape::Hilly,
             other => {
                 let found =
                     other.map_or("has no load shape".into(), |word| format!("has load shape `{word}`"));
                 let note = format!("the constraint of line {} {found}: treated as POLY345", line(of));
                 self.remarks.notes.push(note);
-                Shape::Polynomial
+                LoadShape::Polynomial
             }
         })
     }
 
     /// The nodes of a constraint in the order in which they are listed.
-    fn nodes(&self, of: Element<'_>) -> Result<Vec<u32>, Fault> {
+    fn nodes(&self, of: XmlElement<'_>) -> Result<Vec<u32>, Fault> {
         let limit = self.geometry.node_count();
         if of.attribute("SpecType").map(str::trim) == Some("NORMAL") {
             let mut selection = self.normal(of)?;
@@ -296,7 +302,7 @@ impl Reader<'_> {
         run_of_indices(nodes, listed, size, "node", "nodes", limit)
     }
 
-    fn normal(&self, of: Element<'_>) -> Result<Selection, Fault> {
+    fn normal(&self, of: XmlElement<'_>) -> Result<Selection, Fault> {
         let normal = needed(of, "Normal", "<Normal ToleranceAngle=\"5\">0 0 1</Normal>")?;
         let within = attribute(normal, "ToleranceAngle", "ToleranceAngle=\"5\" (degrees)")?;
         let within = attribute_number(normal, within)?;
@@ -305,13 +311,13 @@ impl Reader<'_> {
 
     /// The faces of a constraint that lie on the boundary, each turned outwards: those given so, and those given the
     /// other way round.
-    fn faces(&mut self, of: Element<'_>) -> Result<[Vec<Vec<u32>>; 2], Fault> {
+    fn faces(&mut self, of: XmlElement<'_>) -> Result<[Vec<Vec<u32>>; 2], Fault> {
         let listed = self.listed_faces(of)?;
         Ok(self.turn_outwards(of, &listed))
     }
 
     /// The nodes of the faces of a constraint, in their order.
-    fn listed_faces(&mut self, of: Element<'_>) -> Result<Vec<Vec<u32>>, Fault> {
+    fn listed_faces(&mut self, of: XmlElement<'_>) -> Result<Vec<Vec<u32>>, Fault> {
         let all = |faces: &mut dyn Iterator<Item = usize>| -> Vec<Vec<u32>> {
             faces.map(|face| self.surface.faces[face].nodes().to_vec()).collect()
         };
@@ -350,7 +356,7 @@ impl Reader<'_> {
         Ok(listed.chunks_exact(corners).map(<[u32]>::to_vec).collect())
     }
 
-    fn turn_outwards(&mut self, of: Element<'_>, listed: &[Vec<u32>]) -> [Vec<Vec<u32>>; 2] {
+    fn turn_outwards(&mut self, of: XmlElement<'_>, listed: &[Vec<u32>]) -> [Vec<Vec<u32>>; 2] {
         let points = &self.geometry.mesh.points;
         let faces = &self.surface.faces;
         let known: BTreeMap<Vec<u32>, usize> =
@@ -378,7 +384,7 @@ fn against(traction: [f64; 3]) -> [f64; 3] {
     traction.map(|t| if t == 0.0 { 0.0 } else { -t })
 }
 
-fn components(of: Element<'_>) -> Result<[bool; 3], Fault> {
+fn components(of: XmlElement<'_>) -> Result<[bool; 3], Fault> {
     match of.attribute("DOF").map(str::trim) {
         None | Some("all") => Ok([true; 3]),
         Some("0") => Ok([true, false, false]),
@@ -392,7 +398,7 @@ fn components(of: Element<'_>) -> Result<[bool; 3], Fault> {
 }
 
 /// What nodes chosen by their normals are restricted to.
-fn region(of: Element<'_>) -> Result<Selection, Fault> {
+fn region(of: XmlElement<'_>) -> Result<Selection, Fault> {
     match attribute(of, "Type", "Type=\"Box\" or \"Sphere\"")? {
         "Box" => {
             let [x, to_x, y, to_y, z, to_z] = numbers_of::<6>(of, "bounds of a box")?;

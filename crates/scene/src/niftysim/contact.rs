@@ -16,7 +16,8 @@ use super::geometry::positive;
 use super::rigid_surface;
 use super::system::System;
 use super::xml::{
-    Element, child, children, count, fault, indices, is_on, line, needed, number, numbers_of, run_of_indices,
+    XmlElement, child, children, count, fault, indices, is_on, line, needed, number, numbers_of,
+    run_of_indices,
 };
 
 /// Cosine of the angle between the edges of a plate from which on it is no rectangle.
@@ -50,12 +51,12 @@ pub(super) struct Thing {
     pub line: u32,
     /// `plate`, `cylinder`, `probe` or `surface`.
     pub kind: &'static str,
-    pub form: Form,
+    pub form: RigidForm,
     /// Where the origin of its frame is [m].
     pub at: [f64; 3],
     /// How its frame is turned [rad]: about this vector by its length.
     pub turn: [f64; 3],
-    pub motion: Motion,
+    pub motion: RigidMotion,
     /// The nodes of the model that touch it; all if not given.
     pub nodes: Option<BTreeSet<u32>>,
     pub friction: f64,
@@ -65,7 +66,7 @@ pub(super) struct Thing {
 
 /// The form of a rigid thing, as a scene has it.
 #[derive(Debug)]
-pub(super) enum Form {
+pub(super) enum RigidForm {
     /// Edges [m].
     Box([f64; 3]),
     /// Radius and length [m].
@@ -78,7 +79,7 @@ pub(super) enum Form {
 
 /// How a rigid thing moves.
 #[derive(Debug)]
-pub(super) enum Motion {
+pub(super) enum RigidMotion {
     Rest,
     /// By a vector [m] along POLY345.
     Smooth([f64; 3]),
@@ -96,13 +97,13 @@ pub(super) enum Motion {
 
 /// Reads the contacts of a model of so many nodes.
 pub(super) fn read(
-    root: Element<'_>,
+    root: XmlElement<'_>,
     nodes: usize,
     system: &System,
     files: &Files<'_>,
     remarks: &mut Remarks,
 ) -> Result<Contact, Fault> {
-    let mut reader = Reader { nodes, system, files, remarks };
+    let mut reader = ContactReader { nodes, system, files, remarks };
     let (margin, bodies) = reader.system(root)?;
     let mut things = Vec::new();
     for of in root.children().filter(|of| of.is_element()) {
@@ -125,7 +126,7 @@ pub(super) fn read(
     Ok(Contact { things, bodies, margin })
 }
 
-struct Reader<'r> {
+struct ContactReader<'r> {
     /// Nodes of the model.
     nodes: usize,
     system: &'r System,
@@ -135,9 +136,9 @@ struct Reader<'r> {
 
 const NODES: &str = "<SlvNodes NumNodes=\"3\">0 1 2</SlvNodes>: NiftySim lets no other nodes touch";
 
-impl Reader<'_> {
+impl ContactReader<'_> {
     /// The margin [m] of surfaces, and how bodies touch each other.
-    fn system(&mut self, root: Element<'_>) -> Result<(f64, Option<Bodies>), Fault> {
+    fn system(&mut self, root: XmlElement<'_>) -> Result<(f64, Option<Bodies>), Fault> {
         let Some(of) = child(root, "SystemParams") else { return Ok((0.0, None)) };
         let margin = at_least_0(of, "ContactSafetyMargin", "the safety margin of contact")?;
         let friction = at_least_0(of, "DeformableFrictionCoefficient", "the coefficient of friction")?;
@@ -152,7 +153,7 @@ impl Reader<'_> {
         Ok((margin, bodies))
     }
 
-    fn leave_out(&mut self, of: Element<'_>, what: &str) {
+    fn leave_out(&mut self, of: XmlElement<'_>, what: &str) {
         let name = of.tag_name().name();
         self.remarks.missing.push(format!("contact ({name} of line {}: {what})", line(of)));
     }
@@ -164,7 +165,7 @@ impl Reader<'_> {
     }
 
     /// A plate from its corner a along the edges to b and c. Nodes are on the side of the normal (b − a) × (c − a).
-    fn plate(&mut self, of: Element<'_>) -> Result<Option<Thing>, Fault> {
+    fn plate(&mut self, of: XmlElement<'_>) -> Result<Option<Thing>, Fault> {
         let corner =
             |name, example| numbers_of::<3>(needed(of, name, example)?, "coordinates").map(Vector3::from);
         let a = corner("a", "<a>0 0 0</a>, a corner of the plate")?;
@@ -197,12 +198,12 @@ impl Reader<'_> {
         let frame = Matrix3::from_columns(&[x, z.cross(&x), z]);
         let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(frame));
         let at = a + 0.5 * (edges[0] + edges[1]) - 0.5 * depth * z;
-        let form = Form::Box([lengths[0], lengths[1], depth]);
+        let form = RigidForm::Box([lengths[0], lengths[1], depth]);
         thing(of, "plate", form, (at, turn), motion, Some(nodes)).map(Some)
     }
 
     /// A cylinder from its origin along its axis, or a probe, which has a round tip there.
-    fn round(&mut self, of: Element<'_>, kind: &'static str) -> Result<Option<Thing>, Fault> {
+    fn round(&mut self, of: XmlElement<'_>, kind: &'static str) -> Result<Option<Thing>, Fault> {
         let vector =
             |name, example| numbers_of::<3>(needed(of, name, example)?, "coordinates").map(Vector3::from);
         let origin = vector("Origin", "<Origin>0 0 0</Origin>, the middle of its end")?;
@@ -234,13 +235,13 @@ impl Reader<'_> {
                     "ContactUSProbe: a shaft with a round tip; the scene's is round at its other end, too, by a radius \
                      behind `Origin`",
                 );
-                Form::Capsule([radius, length])
+                RigidForm::Capsule([radius, length])
             }
             _ => {
                 self.note(
                     "ContactCylinder: NiftySim's has no ends, and nodes in it leave by its side; the scene's has flat ones",
                 );
-                Form::Cylinder([radius, length])
+                RigidForm::Cylinder([radius, length])
             }
         };
         let turn = UnitQuaternion::rotation_between(&Vector3::z(), &along)
@@ -250,7 +251,7 @@ impl Reader<'_> {
     }
 
     /// A rigid surface of triangles.
-    fn surface(&mut self, of: Element<'_>, margin: f64) -> Result<Option<Thing>, Fault> {
+    fn surface(&mut self, of: XmlElement<'_>, margin: f64) -> Result<Option<Thing>, Fault> {
         let surface = rigid_surface::read(of, self.files, &mut self.remarks.notes)?;
         let friction = at_least_0(of, "FrictionCoefficient", "the coefficient of friction")?;
         if child(of, "SlvNodes").is_some() {
@@ -267,7 +268,7 @@ impl Reader<'_> {
                          triangles turn"
                     ));
                 }
-                Form::Mesh { mesh, inside }
+                RigidForm::Mesh { mesh, inside }
             }
             Err(what) => {
                 self.leave_out(of, &what);
@@ -279,10 +280,10 @@ impl Reader<'_> {
     }
 
     /// The motion of a surface, which grows in proportion to time. NiftySim's code reads angles in radians, then the centre.
-    fn motion(&mut self, of: Element<'_>) -> Result<Motion, Fault> {
+    fn motion(&mut self, of: XmlElement<'_>) -> Result<RigidMotion, Fault> {
         let mut shift = Vector3::zeros();
         let mut turn: Option<([f64; 3], [f64; 3])> = None;
-        for motion in children(of, "Motion") {
+        for motion in children(of, "RigidMotion") {
             match motion.attribute("Type").map(str::trim) {
                 Some("Translation") => {
                     shift = Vector3::from(numbers_of::<3>(motion, "numbers of a translation")?);
@@ -297,7 +298,7 @@ impl Reader<'_> {
                         return Err(fault(motion, ImportProblem::Contradiction { what, remedy }));
                     }
                     self.note(
-                        "Motion of type Rotation: three angles [rad] about x, then y, then z, and then the centre, as \
+                        "RigidMotion of type Rotation: three angles [rad] about x, then y, then z, and then the centre, as \
                          NiftySim's code reads them; its guide may have the centre first",
                     );
                     turn = Some(([x, y, z], centre));
@@ -311,13 +312,13 @@ impl Reader<'_> {
         }
         let axes = turn.map_or(0, |(angles, _)| angles.iter().filter(|&&angle| angle != 0.0).count());
         Ok(match turn {
-            None if shift == Vector3::zeros() => Motion::Rest,
-            None => Motion::Steady(shift.into()),
+            None if shift == Vector3::zeros() => RigidMotion::Rest,
+            None => RigidMotion::Steady(shift.into()),
             Some((angles, centre)) if axes == 1 && shift == Vector3::zeros() => {
                 let axis = angles.map(|angle| if angle == 0.0 { 0.0 } else { 1.0 });
-                Motion::Turn { axis, centre, angle: angles.iter().sum() }
+                RigidMotion::Turn { axis, centre, angle: angles.iter().sum() }
             }
-            Some((angles, centre)) => Motion::Poses(self.poses(angles, centre.into(), &shift)),
+            Some((angles, centre)) => RigidMotion::Poses(self.poses(angles, centre.into(), &shift)),
         })
     }
 
@@ -338,11 +339,11 @@ impl Reader<'_> {
         (0..=POSES + 1).map(row).collect()
     }
 
-    fn slave_nodes(&self, of: Element<'_>) -> Result<BTreeSet<u32>, Fault> {
+    fn slave_nodes(&self, of: XmlElement<'_>) -> Result<BTreeSet<u32>, Fault> {
         self.listed(needed(of, "SlvNodes", NODES)?)
     }
 
-    fn listed(&self, list: Element<'_>) -> Result<BTreeSet<u32>, Fault> {
+    fn listed(&self, list: XmlElement<'_>) -> Result<BTreeSet<u32>, Fault> {
         let size = list.attribute("NumNodes").map(str::trim);
         if size == Some("all") {
             return Ok((0..self.nodes as u32).collect());
@@ -354,11 +355,11 @@ impl Reader<'_> {
 }
 
 fn thing(
-    of: Element<'_>,
+    of: XmlElement<'_>,
     kind: &'static str,
-    form: Form,
+    form: RigidForm,
     (at, turn): (Vector3, UnitQuaternion<f64>),
-    motion: Motion,
+    motion: RigidMotion,
     nodes: Option<BTreeSet<u32>>,
 ) -> Result<Thing, Fault> {
     let (at, turn): ([f64; 3], [f64; 3]) = (at.into(), turn.scaled_axis().into());
@@ -370,14 +371,14 @@ fn thing(
 }
 
 /// The displacement of a plate, a cylinder or a probe.
-fn shift(of: Element<'_>, name: &'static str) -> Result<Motion, Fault> {
-    let Some(by) = child(of, name) else { return Ok(Motion::Rest) };
+fn shift(of: XmlElement<'_>, name: &'static str) -> Result<RigidMotion, Fault> {
+    let Some(by) = child(of, name) else { return Ok(RigidMotion::Rest) };
     let by = numbers_of::<3>(by, "components of the displacement")?;
-    Ok(if by == [0.0; 3] { Motion::Rest } else { Motion::Smooth(by) })
+    Ok(if by == [0.0; 3] { RigidMotion::Rest } else { RigidMotion::Smooth(by) })
 }
 
 /// A number of at least 0, which is 0 if it is not given.
-fn at_least_0(of: Element<'_>, name: &'static str, what: &'static str) -> Result<f64, Fault> {
+fn at_least_0(of: XmlElement<'_>, name: &'static str, what: &'static str) -> Result<f64, Fault> {
     let Some(of) = child(of, name) else { return Ok(0.0) };
     let value = number(of)?;
     let problem = ImportProblem::OutOfRange { what, value, range: "at least 0" };

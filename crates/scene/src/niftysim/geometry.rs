@@ -7,7 +7,7 @@ use pliant_geometry::{CellKind, Mesh, Vector3};
 use super::Files;
 use super::error::{Fault, ImportProblem};
 use super::xml::{
-    Element, attribute, child, count, fault, indices, needed, number, numbers, numbers_of, text,
+    XmlElement, attribute, child, count, fault, indices, needed, number, numbers, numbers_of, text,
 };
 
 /// A solid element of NiftySim.
@@ -19,7 +19,7 @@ pub(super) enum Solid {
 }
 
 impl Solid {
-    fn read(of: Element<'_>) -> Result<Self, Fault> {
+    fn read(of: XmlElement<'_>) -> Result<Self, Fault> {
         match attribute(of, "Type", "Type=\"T4\", \"T4ANP\" or \"H8\"")? {
             "T4" => Ok(Self::T4),
             "T4ANP" => Ok(Self::T4Anp),
@@ -118,7 +118,11 @@ fn root(parent: &mut [u32], mut node: u32) -> u32 {
 }
 
 /// Reads the geometry of a model or submodel.
-pub(super) fn read(of: Element<'_>, files: &Files<'_>, notes: &mut Vec<String>) -> Result<Geometry, Fault> {
+pub(super) fn read(
+    of: XmlElement<'_>,
+    files: &Files<'_>,
+    notes: &mut Vec<String>,
+) -> Result<Geometry, Fault> {
     let geometry = match child(of, "VTKMesh").or_else(|| child(of, "MSHMesh")) {
         Some(file) => from_file(file, files, notes)?,
         None => listed(of)?,
@@ -129,7 +133,7 @@ pub(super) fn read(of: Element<'_>, files: &Files<'_>, notes: &mut Vec<String>) 
     Ok(geometry)
 }
 
-fn listed(of: Element<'_>) -> Result<Geometry, Fault> {
+fn listed(of: XmlElement<'_>) -> Result<Geometry, Fault> {
     let nodes = needed(of, "Nodes", "<Nodes> and <Elements>, an <MSHMesh> or a <VTKMesh>")?;
     let coordinates = numbers(nodes)?;
     check_listed(nodes, "NumNodes", "coordinates", coordinates.len(), 3)?;
@@ -143,7 +147,7 @@ fn listed(of: Element<'_>) -> Result<Geometry, Fault> {
 
 /// Whether as many numbers are listed as the attribute says, or whole items where it is missing.
 pub(super) fn check_listed(
-    of: Element<'_>,
+    of: XmlElement<'_>,
     name: &str,
     what: &'static str,
     found: usize,
@@ -160,7 +164,7 @@ pub(super) fn check_listed(
     Err(fault(of, ImportProblem::Count { what, found, wanted }))
 }
 
-fn from_file(of: Element<'_>, files: &Files<'_>, notes: &mut Vec<String>) -> Result<Geometry, Fault> {
+fn from_file(of: XmlElement<'_>, files: &Files<'_>, notes: &mut Vec<String>) -> Result<Geometry, Fault> {
     let solid = Solid::read(of)?;
     let name = text(of);
     if name.is_empty() {
@@ -178,7 +182,7 @@ fn from_file(of: Element<'_>, files: &Files<'_>, notes: &mut Vec<String>) -> Res
 }
 
 /// Turns about a centre, then scales about the origin, then shifts: NiftySim's order, wherever they stand.
-pub(super) fn place(of: Element<'_>, points: &mut [Vector3]) -> Result<(), Fault> {
+pub(super) fn place(of: XmlElement<'_>, points: &mut [Vector3]) -> Result<(), Fault> {
     if let Some(rotation) = child(of, "Rotation") {
         let [x, y, z, angles @ ..] = numbers_of::<6>(rotation, "numbers of a rotation")?;
         let centre = Vector3::new(x, y, z);
@@ -199,7 +203,7 @@ pub(super) fn place(of: Element<'_>, points: &mut [Vector3]) -> Result<(), Fault
 }
 
 /// The only number of an element, greater than 0.
-pub(super) fn positive(of: Element<'_>, what: &'static str) -> Result<f64, Fault> {
+pub(super) fn positive(of: XmlElement<'_>, what: &'static str) -> Result<f64, Fault> {
     let value = number(of)?;
     let problem = ImportProblem::OutOfRange { what, value, range: "greater than 0" };
     if value > 0.0 { Ok(value) } else { Err(fault(of, problem)) }

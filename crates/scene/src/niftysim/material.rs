@@ -2,7 +2,7 @@
 
 use super::error::{Fault, ImportProblem};
 use super::geometry::positive;
-use super::xml::{Element, attribute, child, count, fault, needed, numbers};
+use super::xml::{XmlElement, attribute, child, count, fault, needed, numbers};
 
 /// An elastic law with NiftySim's parameters.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,7 +36,7 @@ const PARAMETERS: &str = "<ElasticParams NumParams=\"2\">mu kappa</ElasticParams
 
 impl Material {
     /// Reads `<Material>`, and its density [kg/m³] if it has its own.
-    pub fn read(of: Element<'_>) -> Result<(Self, Option<f64>), Fault> {
+    pub fn read(of: XmlElement<'_>) -> Result<(Self, Option<f64>), Fault> {
         let found = attribute(of, "Type", "Type=\"NH\", \"AB\", \"PY\", \"TI\", \"NHV\", \"TIV\" or \"LE\"")?;
         let Some(name) = TYPES.into_iter().find(|name| *name == found) else {
             let (what, known) = ("type of material", "NH, AB, PY, TI, NHV, TIV, LE");
@@ -74,7 +74,7 @@ impl Material {
 }
 
 impl Elastic {
-    fn read(name: &str, of: Element<'_>) -> Result<Self, Fault> {
+    fn read(name: &str, of: XmlElement<'_>) -> Result<Self, Fault> {
         let found = numbers(of)?;
         if let Some(word) = of.attribute("NumParams") {
             let wanted = count(of, word.trim())?;
@@ -204,7 +204,7 @@ impl Elastic {
 type Terms = Vec<[f64; 2]>;
 
 /// Terms on the change of shape and on the change of volume.
-fn prony(of: Element<'_>) -> Result<(Terms, Terms), Fault> {
+fn prony(of: XmlElement<'_>) -> Result<(Terms, Terms), Fault> {
     let example = "<ViscoParams NumIsoTerms=\"1\" NumVolTerms=\"0\">a tau</ViscoParams>";
     let of = needed(of, "ViscoParams", example)?;
     let isochoric = count(of, attribute(of, "NumIsoTerms", "NumIsoTerms=\"1\"")?)?;

@@ -11,15 +11,15 @@ use super::material::Material;
 use super::shells::{self, Membrane};
 use super::system::{SYSTEM, System};
 use super::xml::{
-    Element, attribute, child, children, count, fault, indices, is_on, line, needed, number, run_of_indices,
-    text,
+    XmlElement, attribute, child, children, count, fault, indices, is_on, line, needed, number,
+    run_of_indices, text,
 };
 
 /// A model.
 #[derive(Debug)]
 pub(super) struct Model {
     /// What becomes bodies: submodels, or one for all.
-    pub parts: Vec<Part>,
+    pub parts: Vec<SubModel>,
     pub materials: Vec<Material>,
     pub contact: Contact,
     pub system: System,
@@ -29,7 +29,7 @@ pub(super) struct Model {
 
 /// A mesh with its materials and conditions.
 #[derive(Debug)]
-pub(super) struct Part {
+pub(super) struct SubModel {
     pub geometry: Geometry,
     /// Material of each cell.
     pub material: Vec<u32>,
@@ -49,7 +49,7 @@ pub(super) struct Output {
 }
 
 /// Reads a model.
-pub(super) fn read(root: Element<'_>, files: &Files<'_>) -> Result<Model, Fault> {
+pub(super) fn read(root: XmlElement<'_>, files: &Files<'_>) -> Result<Model, Fault> {
     if !root.has_tag_name("Model") {
         return Err(fault(root, ImportProblem::NotAModel));
     }
@@ -81,19 +81,19 @@ pub(super) fn read(root: Element<'_>, files: &Files<'_>) -> Result<Model, Fault>
 }
 
 impl Model {
-    fn read_whole(&mut self, root: Element<'_>, files: &Files<'_>) -> Result<(), Fault> {
+    fn read_whole(&mut self, root: XmlElement<'_>, files: &Files<'_>) -> Result<(), Fault> {
         let geometry = geometry::read(root, files, &mut self.remarks.notes)?;
         let mut sets = Sets::new(&geometry);
         sets.read(root, self)?;
         let (material, density) = sets.finish(root)?;
         let conditions = conditions::read(root, &geometry, &mut self.remarks)?;
         let membranes = shells::read(root, &geometry, &mut self.remarks)?;
-        self.parts.push(Part { geometry, material, density, conditions, membranes });
+        self.parts.push(SubModel { geometry, material, density, conditions, membranes });
         Ok(())
     }
 
     /// Submodels stay bodies of their own, unless nodes merge or the model itself has constraints, materials or shells.
-    fn read_submodels(&mut self, root: Element<'_>, files: &Files<'_>) -> Result<(), Fault> {
+    fn read_submodels(&mut self, root: XmlElement<'_>, files: &Files<'_>) -> Result<(), Fault> {
         let distance = child(root, "SubModelNodeMergerDistance").map(number).transpose()?;
         let whole = distance.is_some_and(|d| d >= 0.0)
             || ["Constraint", "ElementSet", "ShellElements", "ShellElementSet"]
@@ -135,11 +135,11 @@ impl Model {
         }
         conditions.extend(conditions::read(root, &geometry, &mut self.remarks)?);
         membranes.extend(shells::read(root, &geometry, &mut self.remarks)?);
-        self.parts.push(Part { geometry, material, density, conditions, membranes });
+        self.parts.push(SubModel { geometry, material, density, conditions, membranes });
         Ok(())
     }
 
-    fn check_solid(&self, of: Element<'_>) -> Result<(), Fault> {
+    fn check_solid(&self, of: XmlElement<'_>) -> Result<(), Fault> {
         let solids: Vec<_> = self.parts.iter().map(|part| part.geometry.solid).collect();
         match solids.iter().find(|&&solid| solid != solids[0]) {
             Some(&other) => Err(mixed(of, solids[0], other)),
@@ -149,7 +149,7 @@ impl Model {
 
     fn weld(
         &mut self,
-        root: Element<'_>,
+        root: XmlElement<'_>,
         parts: &[Geometry],
         distance: Option<f64>,
     ) -> Result<(Geometry, Vec<Vec<u32>>), Fault> {
@@ -177,10 +177,10 @@ impl Model {
     }
 
     /// What of the model a scene has no words for yet.
-    fn name_what_is_missing(&mut self, root: Element<'_>) {
+    fn name_what_is_missing(&mut self, root: XmlElement<'_>) {
         let missing = &mut self.remarks.missing;
         for submodel in children(root, "SubModel") {
-            let ignored = |of: &Element<'_>| CONTACT.contains(&of.tag_name().name());
+            let ignored = |of: &XmlElement<'_>| CONTACT.contains(&of.tag_name().name());
             for of in submodel.children().filter(ignored) {
                 let (name, line) = (of.tag_name().name(), line(of));
                 missing.push(format!(
@@ -220,7 +220,7 @@ impl Model {
 const CONTACT: [&str; 5] =
     ["ContactPlate", "ContactCylinder", "ContactUSProbe", "KinematicContact", "ContactSurface"];
 
-fn mixed(of: Element<'_>, first: geometry::Solid, other: geometry::Solid) -> Fault {
+fn mixed(of: XmlElement<'_>, first: geometry::Solid, other: geometry::Solid) -> Fault {
     let what = format!("this submodel has elements {}, an earlier one {}", other.name(), first.name());
     let problem = ImportProblem::Contradiction { what, remedy: "NiftySim takes one type for all" };
     fault(of, problem)
@@ -246,7 +246,7 @@ impl Sets {
     }
 
     /// Reads all `<ElementSet>` of a model or submodel.
-    fn read(&mut self, of: Element<'_>, model: &mut Model) -> Result<(), Fault> {
+    fn read(&mut self, of: XmlElement<'_>, model: &mut Model) -> Result<(), Fault> {
         let limit = self.0.len();
         for set in children(of, "ElementSet") {
             let members = match attribute(set, "Size", "Size=\"all\" or a number")? {
@@ -282,7 +282,7 @@ impl Sets {
         Ok(())
     }
 
-    fn finish(self, of: Element<'_>) -> Result<(Vec<u32>, Vec<f64>), Fault> {
+    fn finish(self, of: XmlElement<'_>) -> Result<(Vec<u32>, Vec<f64>), Fault> {
         let without = self.0.iter().filter(|cell| cell.is_none()).count();
         if let Some(first) = self.0.iter().position(Option::is_none) {
             let what =
@@ -295,7 +295,7 @@ impl Sets {
 }
 
 impl Output {
-    fn read(root: Element<'_>) -> Result<Option<Self>, Fault> {
+    fn read(root: XmlElement<'_>) -> Result<Option<Self>, Fault> {
         let Some(of) = child(root, "Output") else { return Ok(None) };
         let every = count(of, attribute(of, "Freq", "Freq=\"100\" (steps)")?)?;
         let variables: Vec<String> = children(of, "Variable").map(text).collect();

@@ -7,7 +7,7 @@ use pliant_geometry::{CellKind, Mesh, Vector3};
 use super::Files;
 use super::error::{Fault, ImportProblem};
 use super::geometry::{check_listed, place};
-use super::xml::{Element, attribute, child, fault, indices, needed, numbers, text};
+use super::xml::{XmlElement, attribute, child, fault, indices, needed, numbers, text};
 
 /// Thickness of a sheet over the diagonal of its box: eight points of the grid of its distances.
 const THICKNESS: f64 = 1.0 / 32.0;
@@ -21,7 +21,7 @@ pub(super) struct RigidSurface {
 
 /// Reads the surface of a `<ContactSurface>`: listed, or from a file. Quads become two triangles each.
 pub(super) fn read(
-    of: Element<'_>,
+    of: XmlElement<'_>,
     files: &Files<'_>,
     notes: &mut Vec<String>,
 ) -> Result<RigidSurface, Fault> {
@@ -31,7 +31,7 @@ pub(super) fn read(
     }
 }
 
-fn corners(of: Element<'_>) -> Result<usize, Fault> {
+fn corners(of: XmlElement<'_>) -> Result<usize, Fault> {
     match attribute(of, "Type", "Type=\"T3\"")? {
         "T3" => Ok(3),
         "Q4" => Ok(4),
@@ -42,7 +42,7 @@ fn corners(of: Element<'_>) -> Result<usize, Fault> {
     }
 }
 
-fn listed(of: Element<'_>) -> Result<RigidSurface, Fault> {
+fn listed(of: XmlElement<'_>) -> Result<RigidSurface, Fault> {
     let nodes = needed(of, "Nodes", "<Nodes> and <Elements>, or a <VTKSurface>")?;
     let coordinates = numbers(nodes)?;
     check_listed(nodes, "NumNodes", "coordinates", coordinates.len(), 3)?;
@@ -54,7 +54,7 @@ fn listed(of: Element<'_>) -> Result<RigidSurface, Fault> {
     some(of, RigidSurface { points, triangles: split(&cells, corners) })
 }
 
-fn from_file(of: Element<'_>, files: &Files<'_>, notes: &mut Vec<String>) -> Result<RigidSurface, Fault> {
+fn from_file(of: XmlElement<'_>, files: &Files<'_>, notes: &mut Vec<String>) -> Result<RigidSurface, Fault> {
     corners(of)?;
     let name = text(of);
     if name.is_empty() {
@@ -71,7 +71,7 @@ fn from_file(of: Element<'_>, files: &Files<'_>, notes: &mut Vec<String>) -> Res
     some(of, RigidSurface { points, triangles })
 }
 
-fn some(of: Element<'_>, surface: RigidSurface) -> Result<RigidSurface, Fault> {
+fn some(of: XmlElement<'_>, surface: RigidSurface) -> Result<RigidSurface, Fault> {
     match surface.triangles.is_empty() {
         true => {
             let problem = ImportProblem::Count { what: "triangles", found: 0, wanted: "some".into() };

@@ -10,7 +10,7 @@ use super::conditions::Remarks;
 use super::error::{Fault, ImportProblem};
 use super::geometry::{Geometry, Solid, check_listed, positive};
 use super::xml::{
-    Element, attribute, child, children, count, fault, indices, line, needed, numbers, run_of_indices,
+    XmlElement, attribute, child, children, count, fault, indices, line, needed, numbers, run_of_indices,
 };
 
 /// A membrane.
@@ -58,7 +58,7 @@ const MATERIAL: &str =
 
 /// Reads the membranes of a model or submodel.
 pub(super) fn read(
-    of: Element<'_>,
+    of: XmlElement<'_>,
     geometry: &Geometry,
     remarks: &mut Remarks,
 ) -> Result<Vec<Membrane>, Fault> {
@@ -143,7 +143,7 @@ pub(super) fn read(
 }
 
 /// The law of a material; `None` of one that bends.
-fn law(of: Element<'_>) -> Result<Option<MembraneLaw>, Fault> {
+fn law(of: XmlElement<'_>) -> Result<Option<MembraneLaw>, Fault> {
     let known = "Linear, NeoHookean, LinearShell, LinearThickShell";
     let name = attribute(of, "Type", "Type=\"Linear\" or \"NeoHookean\"")?;
     let values = numbers(of)?;

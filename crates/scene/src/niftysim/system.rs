@@ -2,7 +2,7 @@
 
 use super::error::{Fault, ImportProblem};
 use super::geometry::positive;
-use super::xml::{Element, child, fault, needed, number};
+use super::xml::{XmlElement, child, fault, needed, number};
 
 /// `<SystemParams>`.
 #[derive(Clone, Copy, Debug)]
@@ -26,7 +26,7 @@ pub(super) const SYSTEM: &str = "<SystemParams> with <TimeStep>, <TotalTime> and
 
 impl System {
     /// Reads the settings of a model.
-    pub fn read(root: Element<'_>) -> Result<Self, Fault> {
+    pub fn read(root: XmlElement<'_>) -> Result<Self, Fault> {
         let of = needed(root, "SystemParams", SYSTEM)?;
         let at_least_0 = |element, what| {
             let value = number(element)?;

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 
 use pliant_geometry::{Mesh, boundary};
 
-use super::conditions::Shape;
-use super::contact::{Bodies, Contact, Form, Motion, Thing};
+use super::conditions::LoadShape;
+use super::contact::{Bodies, Contact, RigidForm, RigidMotion, Thing};
 use super::geometry::Solid;
 use super::writer::{Writer, add_faces};
 
@@ -156,15 +156,15 @@ impl Writer {
 
     /// Writes an obstacle, or a tool if it moves; returns the mesh of a surface.
     fn thing(&mut self, thing: Thing, name: &str, stem: &str) -> Option<(String, Mesh)> {
-        let kind = if matches!(thing.motion, Motion::Rest) { "obstacle" } else { "tool" };
+        let kind = if matches!(thing.motion, RigidMotion::Rest) { "obstacle" } else { "tool" };
         self.line(format!("[{kind}.{name}]"));
         let mut file = None;
         let round = |[radius, length]: [f64; 2]| format!("{{ radius = {radius:?}, length = {length:?} }}");
         let shape = match thing.form {
-            Form::Box(size) => format!("box = {{ size = {size:?} }}"),
-            Form::Cylinder(size) => format!("cylinder = {}", round(size)),
-            Form::Capsule(size) => format!("capsule = {}", round(size)),
-            Form::Mesh { mesh, inside } => {
+            RigidForm::Box(size) => format!("box = {{ size = {size:?} }}"),
+            RigidForm::Cylinder(size) => format!("cylinder = {}", round(size)),
+            RigidForm::Capsule(size) => format!("capsule = {}", round(size)),
+            RigidForm::Mesh { mesh, inside } => {
                 let path = format!("{stem}-{name}.vtu");
                 let shape = format!("mesh = {{ file = \"{path}\", scale = 1 }}");
                 file = Some((path, mesh));
@@ -181,20 +181,20 @@ impl Writer {
             }
         }
         match thing.motion {
-            Motion::Rest => {}
-            Motion::Smooth(shift) => {
+            RigidMotion::Rest => {}
+            RigidMotion::Smooth(shift) => {
                 self.line(format!("by = {shift:?}"));
-                self.curve(Shape::Polynomial, true);
+                self.curve(LoadShape::Polynomial, true);
             }
-            Motion::Steady(shift) => {
+            RigidMotion::Steady(shift) => {
                 self.line(format!("by = {shift:?}"));
                 self.onward();
             }
-            Motion::Turn { axis, centre, angle } => {
+            RigidMotion::Turn { axis, centre, angle } => {
                 self.line(format!("rotate = {{ axis = {axis:?}, centre = {centre:?}, angle = {angle:?} }}"));
                 self.onward();
             }
-            Motion::Poses(rows) => {
+            RigidMotion::Poses(rows) => {
                 let path = format!("{stem}-{name}.csv");
                 let mut text = "t,x,y,z,qw,qx,qy,qz\n".to_owned();
                 for row in rows {
@@ -210,7 +210,7 @@ impl Writer {
         file
     }
 
-    /// A course in proportion to time, which does not stop at the end.
+    /// A curve in proportion to time, which does not stop at the end.
     fn onward(&mut self) {
         let (end, total) = (2.0 * self.system.end(), self.system.total);
         self.line(format!(

@@ -10,7 +10,7 @@ use super::conditions::{Action, Condition};
 use super::error::Fault;
 use super::geometry::Solid;
 use super::material::{Elastic, Material};
-use super::parts::{Model, Output, Part};
+use super::parts::{Model, Output, SubModel};
 use super::shells::{Membrane, MembraneLaw};
 use super::touching::Touching;
 use super::writer::{Faces, Writer, add_faces};
@@ -66,7 +66,7 @@ impl Region {
 }
 
 /// The regions of a part. Their labels are the numbers of the materials, unless one has several densities.
-fn regions(part: &Part) -> Vec<Region> {
+fn regions(part: &SubModel) -> Vec<Region> {
     // Densities are positive: their bits are in the order of their values.
     let pairs: BTreeSet<(u32, u64)> = part
         .material
@@ -97,7 +97,13 @@ fn by_label(regions: &[Region], value: impl Fn(&Region) -> String) -> String {
 
 impl Writer {
     /// The mesh of a part, whose nodes begin at a number of the whole model; its tables are written.
-    fn part(&mut self, part: Part, body: &str, file: &str, (touching, first): (&mut Touching, u32)) -> Mesh {
+    fn part(
+        &mut self,
+        part: SubModel,
+        body: &str,
+        file: &str,
+        (touching, first): (&mut Touching, u32),
+    ) -> Mesh {
         let regions = regions(&part);
         let hourglass = self.hourglass(&part, &regions, body);
         let pieces = if touching.asks_for_pieces() { part.geometry.piece_count() } else { 1 };
@@ -146,7 +152,7 @@ impl Writer {
     }
 
     /// The multiple of the shear modulus by which hexahedra resist hourglass patterns, as written in the scene.
-    fn hourglass(&mut self, part: &Part, regions: &[Region], body: &str) -> Option<String> {
+    fn hourglass(&mut self, part: &SubModel, regions: &[Region], body: &str) -> Option<String> {
         let coefficient = self.system.hourglass.filter(|_| part.geometry.solid == Solid::H8)?;
         let of = |region: &Region| self.laws[region.material as usize].elastic.hourglass(coefficient);
         let values: Vec<f64> = regions.iter().map(of).collect();

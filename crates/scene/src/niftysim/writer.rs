@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use pliant_geometry::{Mesh, boundary};
 
-use super::conditions::{Shape, sorted};
+use super::conditions::{LoadShape, sorted};
 use super::geometry::Solid;
 use super::material::Material;
 use super::system::System;
@@ -40,11 +40,11 @@ impl Writer {
         format!("{kind}-{}", *number - 1)
     }
 
-    /// The course of a load, or of what moves.
-    pub fn curve(&mut self, shape: Shape, moves: bool) {
+    /// The curve of a load, or of a motion.
+    pub fn curve(&mut self, shape: LoadShape, moves: bool) {
         let total = self.system.total;
         match shape {
-            Shape::Polynomial => {
+            LoadShape::Polynomial => {
                 let s = self.system.end() / total;
                 let excess = s * s * s * (10.0 - s * (15.0 - 6.0 * s)) - 1.0;
                 if excess > TOLD_EXCESS {
@@ -56,18 +56,18 @@ impl Writer {
                 self.line("curve = \"polynomial-10-15-6\"".into());
                 self.line(format!("to = {total:?}"));
             }
-            Shape::Ramp => {
+            LoadShape::Ramp => {
                 let end = self.system.end();
                 self.line(format!(
                     "curve = {{ table = [[0.0, 0.0], [{end:?}, {:?}]] }}  # t / {total:?} s, also in the step after the total time",
                     end / total
                 ));
             }
-            Shape::RampHold => {
+            LoadShape::RampHold => {
                 self.line("curve = \"ramp\"".into());
                 self.line(format!("to = {:?}  # a tenth of the total time", 0.1 * total));
             }
-            Shape::Step => {
+            LoadShape::Step => {
                 self.line("curve = \"hold\"".into());
                 // Nodes that jump while the run goes on would throw its energies off balance.
                 if moves {
@@ -79,7 +79,7 @@ impl Writer {
                     0.5 * self.system.step
                 ));
             }
-            Shape::Hilly => self.hilly(),
+            LoadShape::Hilly => self.hilly(),
         }
     }
 

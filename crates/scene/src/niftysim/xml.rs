@@ -3,40 +3,40 @@
 use super::error::{Fault, ImportProblem};
 
 /// An element of the XML.
-pub(super) type Element<'a> = roxmltree::Node<'a, 'a>;
+pub(super) type XmlElement<'a> = roxmltree::Node<'a, 'a>;
 
 /// A mistake in an element.
-pub(super) fn fault(element: Element<'_>, problem: ImportProblem) -> Fault {
+pub(super) fn fault(element: XmlElement<'_>, problem: ImportProblem) -> Fault {
     Fault { line: line(element), element: element.tag_name().name().to_owned(), problem }
 }
 
 /// The line at which an element begins, from 1.
-pub(super) fn line(of: Element<'_>) -> u32 {
+pub(super) fn line(of: XmlElement<'_>) -> u32 {
     of.document().text_pos_at(of.range().start).row
 }
 
 /// The children of a name, in order.
-pub(super) fn children<'a>(of: Element<'a>, name: &'static str) -> impl Iterator<Item = Element<'a>> {
+pub(super) fn children<'a>(of: XmlElement<'a>, name: &'static str) -> impl Iterator<Item = XmlElement<'a>> {
     of.children().filter(move |child| child.has_tag_name(name))
 }
 
 /// The first child of a name.
-pub(super) fn child<'a>(of: Element<'a>, name: &'static str) -> Option<Element<'a>> {
+pub(super) fn child<'a>(of: XmlElement<'a>, name: &'static str) -> Option<XmlElement<'a>> {
     children(of, name).next()
 }
 
 /// The first child of a name, which must be there.
 pub(super) fn needed<'a>(
-    of: Element<'a>,
+    of: XmlElement<'a>,
     name: &'static str,
     example: &'static str,
-) -> Result<Element<'a>, Fault> {
+) -> Result<XmlElement<'a>, Fault> {
     child(of, name).ok_or_else(|| fault(of, ImportProblem::MissingElement { wanted: name, example }))
 }
 
 /// An attribute, which must be there.
 pub(super) fn attribute<'a>(
-    of: Element<'a>,
+    of: XmlElement<'a>,
     name: &'static str,
     example: &'static str,
 ) -> Result<&'a str, Fault> {
@@ -45,35 +45,35 @@ pub(super) fn attribute<'a>(
 }
 
 /// The words of an element's own text: that of its children does not count.
-fn words(of: Element<'_>) -> impl Iterator<Item = &str> {
+fn words(of: XmlElement<'_>) -> impl Iterator<Item = &str> {
     let texts = of.children().filter(|child| child.is_text());
     texts.filter_map(|text| text.text()).flat_map(str::split_ascii_whitespace)
 }
 
 /// An element's own text in one line.
-pub(super) fn text(of: Element<'_>) -> String {
+pub(super) fn text(of: XmlElement<'_>) -> String {
     words(of).collect::<Vec<_>>().join(" ")
 }
 
 /// A finite number.
-fn real(of: Element<'_>, word: &str) -> Result<f64, Fault> {
+fn real(of: XmlElement<'_>, word: &str) -> Result<f64, Fault> {
     let number = word.parse::<f64>().ok().filter(|number| number.is_finite());
     let problem = || ImportProblem::NotANumber { text: word.to_owned(), wanted: "a number" };
     number.ok_or_else(|| fault(of, problem()))
 }
 
 /// The numbers in an element's own text.
-pub(super) fn numbers(of: Element<'_>) -> Result<Vec<f64>, Fault> {
+pub(super) fn numbers(of: XmlElement<'_>) -> Result<Vec<f64>, Fault> {
     words(of).map(|word| real(of, word)).collect()
 }
 
 /// The only number in an element's own text.
-pub(super) fn number(of: Element<'_>) -> Result<f64, Fault> {
+pub(super) fn number(of: XmlElement<'_>) -> Result<f64, Fault> {
     numbers_of::<1>(of, "numbers").map(|[number]| number)
 }
 
 /// The numbers in an element's own text, which must be `N`.
-pub(super) fn numbers_of<const N: usize>(of: Element<'_>, what: &'static str) -> Result<[f64; N], Fault> {
+pub(super) fn numbers_of<const N: usize>(of: XmlElement<'_>, what: &'static str) -> Result<[f64; N], Fault> {
     let found = numbers(of)?;
     let count = found.len();
     let problem = ImportProblem::Count { what, found: count, wanted: N.to_string() };
@@ -81,18 +81,18 @@ pub(super) fn numbers_of<const N: usize>(of: Element<'_>, what: &'static str) ->
 }
 
 /// A number of an attribute.
-pub(super) fn attribute_number(of: Element<'_>, word: &str) -> Result<f64, Fault> {
+pub(super) fn attribute_number(of: XmlElement<'_>, word: &str) -> Result<f64, Fault> {
     real(of, word)
 }
 
 /// A count in an attribute.
-pub(super) fn count(of: Element<'_>, word: &str) -> Result<usize, Fault> {
+pub(super) fn count(of: XmlElement<'_>, word: &str) -> Result<usize, Fault> {
     let problem = || ImportProblem::NotANumber { text: word.to_owned(), wanted: "a count" };
     word.parse().map_err(|_| fault(of, problem()))
 }
 
 /// The indices in an element's own text, each below `limit`.
-pub(super) fn indices(of: Element<'_>, kind: &'static str, limit: usize) -> Result<Vec<u32>, Fault> {
+pub(super) fn indices(of: XmlElement<'_>, kind: &'static str, limit: usize) -> Result<Vec<u32>, Fault> {
     let index = |word: &str| {
         let problem = || ImportProblem::NotANumber { text: word.to_owned(), wanted: "an index" };
         let index: i64 = word.parse().map_err(|_| fault(of, problem()))?;
@@ -104,7 +104,7 @@ pub(super) fn indices(of: Element<'_>, kind: &'static str, limit: usize) -> Resu
 
 /// `size` indices listed one by one, or as the first of consecutive ones.
 pub(super) fn run_of_indices(
-    of: Element<'_>,
+    of: XmlElement<'_>,
     listed: Vec<u32>,
     size: usize,
     kind: &'static str,
@@ -126,6 +126,6 @@ pub(super) fn run_of_indices(
 }
 
 /// Whether a child is a switch that is on.
-pub(super) fn is_on(of: Element<'_>, name: &'static str) -> bool {
+pub(super) fn is_on(of: XmlElement<'_>, name: &'static str) -> bool {
     child(of, name).is_some_and(|switch| !matches!(text(switch).as_str(), "" | "0"))
 }

@@ -55,7 +55,7 @@ struct Field {
 
 /// The content of the sections so far.
 #[derive(Default)]
-struct Model {
+struct Sections {
     /// Names of physical groups by dimension and number.
     names: BTreeMap<(i64, i64), String>,
     /// Physical groups of the geometrical entities (version 4) by dimension and number.
@@ -81,7 +81,7 @@ struct Model {
 /// Reads a Gmsh file.
 pub(crate) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
     let mut numbers = Numbers { cursor: Cursor::new(bytes), encoding: Encoding::Text };
-    let mut model = Model::default();
+    let mut model = Sections::default();
     let mut notes = Vec::new();
     let mut version = "1".to_owned();
     let mut time = None;
@@ -219,7 +219,7 @@ fn unquoted(line: &[u8]) -> &[u8] {
 }
 
 /// `$Entities` and `$PartitionedEntities` of version 4; only their physical groups are used.
-fn read_entities(numbers: &mut Numbers<'_>, model: &mut Model, partitioned: bool) -> Result<(), Fault> {
+fn read_entities(numbers: &mut Numbers<'_>, model: &mut Sections, partitioned: bool) -> Result<(), Fault> {
     start_binary(numbers);
     if partitioned {
         numbers.tag(format_args!("the number of partitions"))?;
@@ -268,7 +268,7 @@ fn skip_ints(numbers: &mut Numbers<'_>, what: std::fmt::Arguments<'_>) -> Result
 }
 
 /// `$Nodes` of versions 1 and 2.
-fn read_nodes(numbers: &mut Numbers<'_>, model: &mut Model) -> Result<(), Fault> {
+fn read_nodes(numbers: &mut Numbers<'_>, model: &mut Sections) -> Result<(), Fault> {
     // The line with the count is text even in binary files.
     let count = numbers.cursor.count(8, format_args!("the number of nodes"))?;
     start_binary(numbers);
@@ -286,7 +286,7 @@ fn start_binary(numbers: &mut Numbers<'_>) {
     }
 }
 
-fn read_point(numbers: &mut Numbers<'_>, model: &mut Model, number: i64) -> Result<(), Fault> {
+fn read_point(numbers: &mut Numbers<'_>, model: &mut Sections, number: i64) -> Result<(), Fault> {
     let what = format_args!("the coordinates of node {number}");
     let (x, y, z) = (numbers.real(what)?, numbers.real(what)?, numbers.real(what)?);
     model.points.push(finite(x, y, z, number.unsigned_abs(), numbers.place())?);
@@ -294,7 +294,7 @@ fn read_point(numbers: &mut Numbers<'_>, model: &mut Model, number: i64) -> Resu
     Ok(())
 }
 
-fn finish_nodes(numbers: &Numbers<'_>, model: &mut Model) -> Result<(), Fault> {
+fn finish_nodes(numbers: &Numbers<'_>, model: &mut Sections) -> Result<(), Fault> {
     index_limit(model.points.len(), numbers.place())?;
     match model.nodes.sort() {
         Some(number) => Err(numbers.cursor.malformed(format!("node {number} is defined twice"))),
@@ -303,7 +303,7 @@ fn finish_nodes(numbers: &Numbers<'_>, model: &mut Model) -> Result<(), Fault> {
 }
 
 /// `$Nodes` of version 4.1: blocks of numbers, then of coordinates.
-fn read_nodes_4(numbers: &mut Numbers<'_>, model: &mut Model) -> Result<(), Fault> {
+fn read_nodes_4(numbers: &mut Numbers<'_>, model: &mut Sections) -> Result<(), Fault> {
     start_binary(numbers);
     let blocks = numbers.count(8, 16, format_args!("the number of node blocks"))?;
     numbers.count(8, 28, format_args!("the number of nodes"))?;
@@ -329,7 +329,7 @@ fn read_nodes_4(numbers: &mut Numbers<'_>, model: &mut Model) -> Result<(), Faul
 }
 
 /// `$ELM` of version 1: number, type, physical group, entity, count of nodes, nodes.
-fn read_elements_1(numbers: &mut Numbers<'_>, model: &mut Model) -> Result<(), Fault> {
+fn read_elements_1(numbers: &mut Numbers<'_>, model: &mut Sections) -> Result<(), Fault> {
     let count = numbers.cursor.count(12, format_args!("the number of elements"))?;
     for i in 1..=count {
         let what = format_args!("element {i} of {count}");
@@ -355,7 +355,7 @@ fn read_elements_1(numbers: &mut Numbers<'_>, model: &mut Model) -> Result<(), F
 }
 
 /// `$Elements` of version 2 as text: number, type, count of tags, tags (physical group, entity, …), nodes.
-fn read_elements_2(numbers: &mut Numbers<'_>, model: &mut Model) -> Result<(), Fault> {
+fn read_elements_2(numbers: &mut Numbers<'_>, model: &mut Sections) -> Result<(), Fault> {
     let count = numbers.cursor.count(8, format_args!("the number of elements"))?;
     for i in 1..=count {
         let what = format_args!("element {i} of {count}");
@@ -390,7 +390,7 @@ fn read_tags(numbers: &mut Numbers<'_>, what: std::fmt::Arguments<'_>) -> Result
 }
 
 /// `$Elements` of version 2 in binary: runs of elements of one type with one count of tags.
-fn read_elements_2_binary(numbers: &mut Numbers<'_>, model: &mut Model) -> Result<(), Fault> {
+fn read_elements_2_binary(numbers: &mut Numbers<'_>, model: &mut Sections) -> Result<(), Fault> {
     let count = numbers.cursor.count(8, format_args!("the number of elements"))?;
     start_binary(numbers);
     let mut done = 0;
@@ -440,7 +440,7 @@ fn unknown_type(numbers: &Numbers<'_>, element: i64) -> Fault {
 }
 
 /// An element of version 4.1.
-struct Element {
+struct ElementRecord {
     number: i64,
     element: i64,
     nodes: [u32; 8],
@@ -449,7 +449,7 @@ struct Element {
 
 /// `$Elements` of version 4.1: blocks of elements of one entity and one type. The cells are put in the order
 /// of their numbers, because the blocks tear apart what belongs to several entities.
-fn read_elements_4(numbers: &mut Numbers<'_>, model: &mut Model) -> Result<(), Fault> {
+fn read_elements_4(numbers: &mut Numbers<'_>, model: &mut Sections) -> Result<(), Fault> {
     start_binary(numbers);
     let blocks = numbers.count(8, 16, format_args!("the number of element blocks"))?;
     numbers.count(4, 8, format_args!("the number of elements"))?;
@@ -476,11 +476,11 @@ fn read_elements_4(numbers: &mut Numbers<'_>, model: &mut Model) -> Result<(), F
                     }
                 }
             }
-            elements.push(Element { number, element, nodes, entity: (dimension, entity) });
+            elements.push(ElementRecord { number, element, nodes, entity: (dimension, entity) });
         }
     }
     elements.sort_by_key(|element| element.number);
-    for Element { number, element, nodes, entity } in elements {
+    for ElementRecord { number, element, nodes, entity } in elements {
         let Some((Some(kind), ..)) = element_type(element) else {
             model.skip(element, number);
             continue;
@@ -500,7 +500,7 @@ fn read_elements_4(numbers: &mut Numbers<'_>, model: &mut Model) -> Result<(), F
 /// The nodes of a cell as indices of points.
 fn read_cell(
     numbers: &mut Numbers<'_>,
-    model: &Model,
+    model: &Sections,
     kind: CellKind,
     number: i64,
 ) -> Result<[u32; 8], Fault> {
@@ -572,7 +572,7 @@ fn read_field(
     Ok(())
 }
 
-impl Model {
+impl Sections {
     /// Adds a cell of versions 1 and 2, or a further physical group to a cell that is there already.
     fn add_tagged(&mut self, kind: CellKind, nodes: [u32; 8], number: i64, physical: i64, entity: i64) {
         let group = (kind.dimension() as i64, physical.saturating_abs());

@@ -11,7 +11,7 @@ use crate::{CellBlock, CellKind, Mesh};
 type Groups = Vec<i64>;
 
 /// The entry of one cell.
-struct Element<'a> {
+struct ElementEntry<'a> {
     kind: CellKind,
     nodes: &'a [u32],
     number: usize,
@@ -27,7 +27,7 @@ struct Physical {
 /// Writes a mesh that was checked before.
 pub(crate) fn write(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
     let physical: Vec<Physical> = (0..4).map(|dimension| Physical::new(mesh, dimension)).collect();
-    let mut entities: [BTreeMap<Groups, Vec<Element<'_>>>; 4] = Default::default();
+    let mut entities: [BTreeMap<Groups, Vec<ElementEntry<'_>>>; 4] = Default::default();
     let mut number = 0;
     let mut of_point = point_groups(mesh, &physical[0]);
     let points: Vec<u32> = (0..mesh.points.len() as u32).collect();
@@ -40,14 +40,14 @@ pub(crate) fn write(out: &mut dyn Write, mesh: &Mesh) -> io::Result<()> {
             {
                 groups.extend(more.into_iter().filter(|group| !groups.contains(group)).collect::<Vec<_>>());
             }
-            let element = Element { kind: block.kind, nodes, number };
+            let element = ElementEntry { kind: block.kind, nodes, number };
             entities[dimension].entry(groups).or_default().push(element);
         }
     }
     for (point, groups) in of_point {
         number += 1;
         let nodes = std::slice::from_ref(&points[point as usize]);
-        entities[0].entry(groups).or_default().push(Element { kind: CellKind::Vertex, nodes, number });
+        entities[0].entry(groups).or_default().push(ElementEntry { kind: CellKind::Vertex, nodes, number });
     }
 
     writeln!(out, "$MeshFormat\n4.1 0 8\n$EndMeshFormat")?;
@@ -174,7 +174,7 @@ fn write_names(out: &mut dyn Write, physical: &[Physical]) -> io::Result<()> {
     writeln!(out, "$EndPhysicalNames")
 }
 
-type Entities<'a> = [BTreeMap<Groups, Vec<Element<'a>>>; 4];
+type Entities<'a> = [BTreeMap<Groups, Vec<ElementEntry<'a>>>; 4];
 
 fn write_entities(out: &mut dyn Write, mesh: &Mesh, entities: &Entities<'_>) -> io::Result<()> {
     let (low, high) = mesh.bounds().unwrap_or_default();
@@ -217,7 +217,7 @@ fn write_nodes(out: &mut dyn Write, mesh: &Mesh, entities: &Entities<'_>) -> io:
 
 fn write_elements(out: &mut dyn Write, entities: &Entities<'_>) -> io::Result<()> {
     // Elements of an entity are sorted by kind; blocks hold one kind each.
-    let mut blocks: Vec<(usize, usize, &[Element<'_>])> = Vec::new();
+    let mut blocks: Vec<(usize, usize, &[ElementEntry<'_>])> = Vec::new();
     for (dimension, of_dimension) in entities.iter().enumerate() {
         for (tag, elements) in (1..).zip(of_dimension.values()) {
             for run in elements.chunk_by(|a, b| a.kind == b.kind) {

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use nalgebra::Vector3;
 use pliant_contact::grid::Grid;
 use pliant_contact::pairs::Surface;
-use pliant_contact::pose::{Course, Leg, Pose};
+use pliant_contact::pose::{Leg, Pose, Trajectory};
 use pliant_contact::profile::{Corner, Profile};
 use pliant_contact::shape::Shape;
 use pliant_contact::touch::{Contact, Contacts, Jaw, Rigid, Touch, With};
@@ -50,13 +50,13 @@ pub(super) fn surface(solid: &Solid) -> Surface {
 }
 
 /// An obstacle or a tool.
-pub(super) fn rigid(name: &str, shape: Shape, course: Course) -> Rigid {
-    Rigid { name: name.into(), shape, course, inside: false, jaw: None }
+pub(super) fn rigid(name: &str, shape: Shape, trajectory: Trajectory) -> Rigid {
+    Rigid { name: name.into(), shape, trajectory, inside: false, jaw: None }
 }
 
 /// Goes from a place by a way in 0.3 s.
-pub(super) fn moving(from: Pose, way: [f64; 3]) -> Course {
-    Course::by(from, way, smooth(0.3))
+pub(super) fn moving(from: Pose, way: [f64; 3]) -> Trajectory {
+    Trajectory::by(from, way, smooth(0.3))
 }
 
 /// All of a body with each of some things.
@@ -107,7 +107,7 @@ fn a_cube_falls_onto_a_slope() {
     model.initial_velocity = vec![[0.0, 0.0, -0.1]; model.node_count()];
     let kind = LoadKind::Gravity { body: 0, acceleration: [1.0, 0.5, -9.81] };
     model.loads.push(load("gravity", kind, None));
-    let floor = rigid("floor", Shape::HalfSpace, Course::fixed(Pose::translation(0.0, 0.0, -1e-3)));
+    let floor = rigid("floor", Shape::HalfSpace, Trajectory::fixed(Pose::translation(0.0, 0.0, -1e-3)));
     let designs: Vec<_> = designs(&device).filter(|design| *design != Design::Blocks).collect();
     for friction in [0.0, 0.3] {
         let what = format!("slope, friction {friction}");
@@ -175,8 +175,8 @@ fn a_body_stays_within_a_shape_that_turns() {
     for (what, shape) in
         [("hollow grid", Shape::Grid(Arc::new(grid))), ("hollow", Shape::Sphere { radius: 0.09 })]
     {
-        let course = Course::turn(start, [0.0, 0.6, 0.8], centre, 0.5, smooth(0.3));
-        let skull = Rigid { inside: true, ..rigid("skull", shape, course) };
+        let trajectory = Trajectory::turn(start, [0.0, 0.6, 0.8], centre, 0.5, smooth(0.3));
+        let skull = Rigid { inside: true, ..rigid("skull", shape, trajectory) };
         compare(&device, what, &model, &with(&model, vec![skull], 0.2), PLAIN);
     }
 }
@@ -307,7 +307,7 @@ fn the_cost_of_contact() {
         let mut stepper = match tool {
             None => GpuStepper::new(&device, model.clone(), step, None),
             Some((radius, pose)) => {
-                let tool = rigid("tool", Shape::Sphere { radius }, Course::fixed(pose));
+                let tool = rigid("tool", Shape::Sphere { radius }, Trajectory::fixed(pose));
                 let contacts = with(&model, vec![tool], 0.3);
                 GpuStepper::touching(&device, model.clone(), contacts, step, None)
             }
@@ -357,7 +357,7 @@ fn large_cube(cells: u32) -> Model {
 fn what_has_no_contact_is_refused_by_name() {
     let Some(device) = support::device() else { return };
     let model = tissue();
-    let floor = rigid("floor", Shape::HalfSpace, Course::fixed(Pose::identity()));
+    let floor = rigid("floor", Shape::HalfSpace, Trajectory::fixed(Pose::identity()));
     let contacts = with(&model, vec![floor.clone()], 0.0);
     assert_eq!(processor_only(&contacts), None);
     let stepper = |contacts: Contacts, design| {
@@ -368,7 +368,7 @@ fn what_has_no_contact_is_refused_by_name() {
     let place = Pose::identity();
     let gripping =
         Jaw { tool: "grasper".into(), part: 0.5, opening: (0.5, smooth(1.0)), place, grip: Some(0.1) };
-    let limited = Rigid { course: floor.course.clone().limited(2.0), ..floor.clone() };
+    let limited = Rigid { trajectory: floor.trajectory.clone().limited(2.0), ..floor.clone() };
     let corner = |z: f64| Corner { at: [z, 0.1], rounding: 0.0 };
     let profile = Profile::new(vec![corner(0.0), corner(1.0)]).unwrap();
     let revolved = Rigid { shape: Shape::Revolved(Arc::new(profile)), ..floor.clone() };

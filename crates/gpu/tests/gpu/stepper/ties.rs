@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use pliant_contact::pose::{Course, Pose};
+use pliant_contact::pose::{Pose, Trajectory};
 use pliant_contact::shape::Shape;
 use pliant_explicit::Wanted;
 use pliant_explicit::stability::{Monitor, OnUnstable};
@@ -247,7 +247,7 @@ fn a_cube_with_bars_falls_onto_a_slope() {
     for body in 0..2 {
         model.loads.push(load("gravity", LoadKind::Gravity { body, acceleration }, None));
     }
-    let floor = rigid("floor", Shape::HalfSpace, Course::fixed(Pose::translation(0.0, 0.0, -1e-3)));
+    let floor = rigid("floor", Shape::HalfSpace, Trajectory::fixed(Pose::translation(0.0, 0.0, -1e-3)));
     let contacts = with(&model, vec![floor], 0.3);
     contact::compare(&device, "bars on a slope", &model, &contacts, &[Design::Gather, Design::Fast]);
 }

@@ -9,7 +9,7 @@ use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_sim::{BodyCells, RunControl, Stop, counted, number};
 
-use crate::assemble::{Builder, SCENE, Target, suggestion};
+use crate::assemble::{Builder, SCENE, Subject, suggestion};
 use crate::diagnostic::Diagnostic;
 use crate::format::{
     Axis, ControlTable, ControlledNode, GravityTable, MomentTable, PressureTable, SolverName, SpreadName,
@@ -63,7 +63,7 @@ impl Builder<'_> {
         self.assembly.model_mut().loads.extend(kinds.into_iter().map(load));
     }
 
-    /// A controlled load has no course of its own.
+    /// A controlled load has no curve of its own.
     fn no_timing(&mut self, table: &LoadTable, path: &[&str]) -> Option<Curve> {
         let timing = table.timing();
         if timing.curve.is_some() || timing.from != 0.0 || timing.to.is_some() {
@@ -80,24 +80,24 @@ impl Builder<'_> {
             return self.implicit_gravity(gravity, path);
         }
         let body = match self.find_target(table.on()?, &at("on"))? {
-            Target::Body(body) => body,
-            Target::Surface(surface) => return self.load_on_surface(table, surface, path),
+            Subject::Body(body) => body,
+            Subject::Surface(surface) => return self.load_on_surface(table, surface, path),
         };
         let shell = self.has_rotations(body);
         let kind = match table {
-            LoadTable::Force(force) => self.nodal_forces(force, Target::Body(body), path)?,
+            LoadTable::Force(force) => self.nodal_forces(force, Subject::Body(body), path)?,
             LoadTable::Moment(moment) => self.moment(moment, body, shell, path)?,
             LoadTable::Traction(traction) if shell => {
                 let facets = self.facets(body, &traction.faces, &at("faces"))?;
                 self.assembly.area_load(&facets, Vector3::from(traction.traction))
             }
             LoadTable::Traction(traction) => {
-                let faces = self.faces(Target::Body(body), &traction.faces, &at("faces"))?;
-                LoadKind::Forces(self.traction_forces(Target::Body(body), &faces, traction.traction))
+                let faces = self.faces(Subject::Body(body), &traction.faces, &at("faces"))?;
+                LoadKind::Forces(self.traction_forces(Subject::Body(body), &faces, traction.traction))
             }
             LoadTable::Pressure(pressure) if shell => self.shell_pressure(pressure, body, path)?,
             LoadTable::Pressure(pressure) => {
-                let faces = self.faces(Target::Body(body), &pressure.faces, &at("faces"))?;
+                let faces = self.faces(Subject::Body(body), &pressure.faces, &at("faces"))?;
                 LoadKind::Pressure { faces, pressure: pressure.pressure }
             }
             LoadTable::Edge(edge) => {
@@ -124,7 +124,7 @@ impl Builder<'_> {
     /// A load on a surface that a body carries.
     fn load_on_surface(&mut self, table: &LoadTable, surface: usize, path: &[&str]) -> Option<Vec<Acting>> {
         let at = |key| [path, &[key]].concat();
-        let target = Target::Surface(surface);
+        let target = Subject::Surface(surface);
         let kind = match table {
             LoadTable::Force(force) => self.nodal_forces(force, target, path)?,
             LoadTable::Traction(traction) => {
