@@ -220,7 +220,7 @@ mod tests {
                 }
                 let turn = Vector3::new(0.2 * time.sin(), 0.0, 0.1 * time);
                 let after = Pose::new(Vector3::new(0.1 + 0.2 * time, 0.5, 0.08 + 0.05 * time.cos()), turn);
-                let mut rows = |own: &mut AtRigid| {
+                let rows = |own: &mut AtRigid| {
                     own.passage = Passage::new(&rigid, [before, after]);
                     let mut rows = Vec::new();
                     let mut distances = vec![0.0; rest.len()];
