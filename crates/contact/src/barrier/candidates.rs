@@ -12,6 +12,8 @@ use super::surfaces::{BarrierSide, around};
 const AT_REST: f64 = 1.02;
 /// The skin of a node over the motion that it is to make.
 const SKIN: f64 = 2.0;
+/// Width of the bins that pairs are sorted into by their distance, over the distance of the barrier.
+const BIN: f64 = 0.2;
 /// The least and the largest skin, over the distance of the barrier; and the largest over the mean edge, if that is more.
 const SKINS: [f64; 2] = [0.5, 20.0];
 
@@ -69,6 +71,29 @@ impl Action {
     }
 }
 
+/// Pairs of numbers, by the first.
+#[derive(Clone, Debug, Default)]
+struct Apart {
+    /// Where those of each first number begin.
+    start: Vec<u32>,
+    /// Second numbers, increasing for each first one.
+    second: Vec<u32>,
+}
+
+impl Apart {
+    /// Of pairs whose first numbers are below a count.
+    fn new(mut pairs: Vec<[u32; 2]>, count: usize) -> Self {
+        pairs.sort_unstable();
+        let start = (0..=count as u32).map(|first| pairs.partition_point(|pair| pair[0] < first) as u32);
+        Self { start: start.collect(), second: pairs.iter().map(|pair| pair[1]).collect() }
+    }
+
+    fn contains(&self, first: u32, second: u32) -> bool {
+        let Some(&[from, to]) = self.start.get(first as usize..first as usize + 2) else { return false };
+        self.second[from as usize..to as usize].binary_search(&second).is_ok()
+    }
+}
+
 /// A contact with its surfaces and lists.
 #[derive(Clone, Debug)]
 pub(super) struct Group {
@@ -80,11 +105,18 @@ pub(super) struct Group {
     pub wall: Option<u32>,
     pub action: Action,
     /// Of one surface: nodes with triangles, and edges, that are too near at rest to touch.
-    apart: [Vec<[u32; 2]>; 2],
+    apart: [Apart; 2],
+    /// In bins by their distance, in the order of their numbers within one.
     candidates: Vec<Candidate>,
-    /// Skins [m] of all nodes, and how far [m] they have gone since pairs were listed.
+    /// Where the candidates of each bin begin; memory to sort them in.
+    bins: Vec<u32>,
+    unsorted: Vec<Candidate>,
+    /// Skins [m] of all nodes, how far [m] they have gone since pairs were listed, and how far [m] they go in a motion.
     skin: Vec<f64>,
     moved: Vec<f64>,
+    way: Vec<f64>,
+    /// How far [m] two primitives have come nearer at most since pairs were listed.
+    nearer: f64,
     /// The largest skin [m].
     largest: f64,
 }
@@ -107,20 +139,24 @@ impl Group {
             action,
             apart: Default::default(),
             candidates: Vec::new(),
+            bins: Vec::new(),
+            unsorted: Vec::new(),
             skin: vec![0.0; rest.len()],
             moved: vec![0.0; rest.len()],
+            way: vec![0.0; rest.len()],
+            nearer: 0.0,
             largest,
         };
         if group.sides.len() == 1 {
             let near = AT_REST * group.action.reach();
             group.find(rest, near);
-            let own = |kind: Kind| {
+            let own = |kind: Kind, count: usize| {
                 let of = group.candidates.iter().filter(move |one| one.kind == kind && one.distance < near);
-                let mut all: Vec<[u32; 2]> = of.map(|one| one.numbers).collect();
-                all.sort_unstable();
-                all
+                Apart::new(of.map(|one| one.numbers).collect(), count)
             };
-            group.apart = [own(Kind::PointTriangle), own(Kind::EdgeEdge)];
+            let side = &group.sides[0];
+            group.apart =
+                [own(Kind::PointTriangle, side.points.len()), own(Kind::EdgeEdge, side.edges.len())];
             group.candidates.clear();
         }
         group
@@ -128,7 +164,7 @@ impl Group {
 
     /// Pairs that never touch, since they are too near at rest.
     pub fn apart_count(&self) -> usize {
-        self.apart.iter().map(Vec::len).sum()
+        self.apart.iter().map(|apart| apart.second.len()).sum()
     }
 
     /// How far [m] the whole surface goes that touches itself: what its parts have in common.
@@ -151,13 +187,14 @@ impl Group {
             }
         }
         self.moved.fill(0.0);
+        self.nearer = 0.0;
         self.find(place, self.action.reach());
     }
 
     /// Lists what is within a distance [m] and the skins of both.
     fn find(&mut self, place: &[Vector3<f64>], within: f64) {
-        let Self { sides, skin, apart, candidates, .. } = self;
-        candidates.clear();
+        let Self { sides, skin, apart, unsorted, .. } = self;
+        unsorted.clear();
         let at = |node: u32| place[node as usize];
         let margin = |node: u32| skin[node as usize] + 0.5 * within;
         sides.iter_mut().for_each(|side| side.refit(at, margin));
@@ -167,35 +204,35 @@ impl Group {
         let mut met = Vec::new();
         for (number, side) in sides.iter().enumerate() {
             let against = other(number);
-            for (point, &node) in side.points.iter().enumerate() {
+            for (&node, point) in side.points.iter().zip(0..) {
                 let wanted = around([node], &at, &margin);
                 met.clear();
-                against.face_tree.near(&wanted, |face| met.push(face));
+                against.face_tree.near(&wanted, |face| {
+                    if against.face_boxes[face as usize].touches(&wanted) {
+                        met.push(face);
+                    }
+                });
                 met.sort_unstable();
                 for &face in &met {
                     let corners = against.faces[face as usize];
-                    let [a, b, c] = corners;
-                    let nodes = [node, a, b, c];
-                    let numbers = [point as u32, face];
-                    let apart = alone && apart[0].binary_search(&numbers).is_ok();
-                    if corners.contains(&node) || apart || !around(corners, &at, &margin).touches(&wanted) {
+                    if corners.contains(&node) || alone && apart[0].contains(point, face) {
                         continue;
                     }
+                    let [a, b, c] = corners;
+                    let nodes = [node, a, b, c];
                     let distance = Kind::PointTriangle.nearest(&nodes.map(at)).distance;
                     if distance < within + skin[node as usize] + most(&corners) {
-                        let area = match side.is_rigid {
-                            true => against.face_areas[face as usize],
-                            false => 0.25 * side.point_areas[point],
-                        };
-                        let (kind, threshold, in_order) = (Kind::PointTriangle, 0.0, number == 0);
-                        candidates.push(Candidate {
-                            kind,
+                        unsorted.push(Candidate {
+                            kind: Kind::PointTriangle,
                             nodes,
-                            numbers,
-                            area,
-                            threshold,
+                            numbers: [point, face],
+                            area: match side.is_rigid {
+                                true => against.face_areas[face as usize],
+                                false => 0.25 * side.point_areas[point as usize],
+                            },
+                            threshold: 0.0,
                             distance,
-                            in_order,
+                            in_order: number == 0,
                         });
                     }
                 }
@@ -203,31 +240,37 @@ impl Group {
         }
         let (side, against) = (&sides[0], other(0));
         for (edge, number) in side.edges.iter().zip(0..) {
-            let wanted = around(*edge, &at, &margin);
+            let wanted = side.edge_boxes[number as usize];
             met.clear();
-            against.edge_tree.near(&wanted, |other| met.push(other));
+            against.edge_tree.near(&wanted, |other| {
+                if (!alone || other > number) && against.edge_boxes[other as usize].touches(&wanted) {
+                    met.push(other);
+                }
+            });
             met.sort_unstable();
             for &second in &met {
                 let ends = against.edges[second as usize];
-                let twice = alone && (second <= number || apart[1].binary_search(&[number, second]).is_ok());
-                let shared = edge.iter().any(|end| ends.contains(end));
-                if twice || shared || !around(ends, &at, &margin).touches(&wanted) {
+                if edge.iter().any(|end| ends.contains(end)) || alone && apart[1].contains(number, second) {
                     continue;
                 }
                 let nodes = [edge[0], edge[1], ends[0], ends[1]];
-                let distance = Kind::EdgeEdge.nearest(&nodes.map(at)).distance;
-                if distance < within + most(edge) + most(&ends) {
+                let limit = within + most(edge) + most(&ends);
+                let points = nodes.map(at);
+                if are_apart(&points, limit) {
+                    continue;
+                }
+                let distance = Kind::EdgeEdge.nearest(&points).distance;
+                if distance < limit {
                     let own = side.edge_areas[number as usize];
-                    let area = match against.is_rigid {
-                        true => own,
-                        false => 0.25 * (own + against.edge_areas[second as usize]),
-                    };
                     let rest = [side.squares[number as usize], against.squares[second as usize]];
-                    candidates.push(Candidate {
+                    unsorted.push(Candidate {
                         kind: Kind::EdgeEdge,
                         nodes,
                         numbers: [number, second],
-                        area,
+                        area: match against.is_rigid {
+                            true => own,
+                            false => 0.25 * (own + against.edge_areas[second as usize]),
+                        },
                         threshold: Mollifier::threshold(rest),
                         distance,
                         in_order: true,
@@ -235,7 +278,58 @@ impl Group {
                 }
             }
         }
+        self.sort();
     }
+
+    /// The bin of a distance [m].
+    fn bin(&self, distance: f64) -> usize {
+        (distance / (BIN * self.action.law.distance)) as usize
+    }
+
+    /// Puts candidates into their bins.
+    fn sort(&mut self) {
+        let unsorted = std::mem::take(&mut self.unsorted);
+        self.bins.clear();
+        for one in &unsorted {
+            let after = self.bin(one.distance) + 2;
+            self.bins.resize(self.bins.len().max(after + 1), 0);
+            self.bins[after] += 1;
+        }
+        for bin in 1..self.bins.len() {
+            self.bins[bin] += self.bins[bin - 1];
+        }
+        // Each start is one place late until its bin is filled.
+        self.candidates.clone_from(&unsorted);
+        for one in &unsorted {
+            let place = self.bin(one.distance) + 1;
+            self.candidates[self.bins[place] as usize] = *one;
+            self.bins[place] += 1;
+        }
+        self.unsorted = unsorted;
+    }
+
+    /// The candidates that may be nearer than a distance [m] now, and some more.
+    fn nearer_than(&self, distance: f64) -> &[Candidate] {
+        let after = self.bin(distance + self.nearer).saturating_add(1);
+        let end = self.bins.get(after).map_or(self.candidates.len(), |&end| end as usize);
+        &self.candidates[..end]
+    }
+
+    /// The sum [m] of the largest of some lengths on either side.
+    fn largest_of(&self, lengths: &[f64]) -> f64 {
+        let of =
+            |side: &BarrierSide| side.points.iter().map(|&node| lengths[node as usize]).fold(0.0, f64::max);
+        match &self.sides[..] {
+            [side] => 2.0 * of(side),
+            sides => sides.iter().map(of).sum(),
+        }
+    }
+}
+
+/// Whether two edges are farther from each other than a distance [m], by the balls around them.
+fn are_apart([a, b, c, d]: &[Vector3<f64>; 4], distance: f64) -> bool {
+    let between = 0.5 * ((a + b) - (c + d)).norm();
+    between > distance + 0.5 * ((b - a).norm() + (d - c).norm())
 }
 
 impl Group {
@@ -250,6 +344,7 @@ impl Group {
             moved[node as usize] = own;
             holds &= own <= skin[node as usize];
         }
+        self.nearer = self.largest_of(&self.moved);
         holds
     }
 
@@ -275,7 +370,7 @@ impl Group {
     /// Adds what acts with nodes at the places [m] last taken; false if there is no gap somewhere.
     pub fn act(&self, place: &[Vector3<f64>], rows: &mut Vec<Row>) -> bool {
         let reach = self.action.reach();
-        for one in &self.candidates {
+        for one in self.nearer_than(reach) {
             if one.distance - self.moved(one) >= reach {
                 continue;
             }
@@ -316,11 +411,22 @@ impl Group {
     }
 
     /// The part, `most` or less, of a motion [m] from the places [m] last taken that keeps a part of every gap.
-    pub fn allowed(&self, place: &[Vector3<f64>], motion: &[Vector3<f64>], keep: f64, mut most: f64) -> f64 {
+    pub fn allowed(
+        &mut self,
+        place: &[Vector3<f64>],
+        motion: &[Vector3<f64>],
+        keep: f64,
+        mut most: f64,
+    ) -> f64 {
         let common = self.common(|node| motion[node as usize]);
-        for one in &self.candidates {
+        let Self { sides, way, .. } = self;
+        for &node in sides.iter().flat_map(|side| &side.points) {
+            way[node as usize] = (motion[node as usize] - common).norm();
+        }
+        let widest = self.largest_of(&self.way) * most / (1.0 - keep);
+        for one in self.nearer_than(self.action.offset + widest) {
             let gap = one.distance - self.moved(one) - self.action.offset;
-            let way = one.kind.reach(one.nodes.map(|node| (motion[node as usize] - common).norm()));
+            let way = one.kind.reach(one.nodes.map(|node| self.way[node as usize]));
             if gap * (1.0 - keep) > way * most {
                 continue;
             }
@@ -338,7 +444,7 @@ impl Group {
             one.distance - self.moved(one) < reach
                 && one.kind.nearest(&one.nodes.map(|node| place[node as usize])).distance < reach
         };
-        self.candidates.iter().filter(near).for_each(|one| found(&one.nodes));
+        self.nearer_than(reach).iter().filter(near).for_each(|one| found(&one.nodes));
     }
 
     /// Calls back with the nodes and gaps [m] of pairs that have no gap.

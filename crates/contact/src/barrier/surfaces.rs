@@ -26,6 +26,9 @@ pub(super) struct BarrierSide {
     pub(super) is_rigid: bool,
     pub(super) face_tree: Tree,
     pub(super) edge_tree: Tree,
+    /// Boxes of faces and edges with the margins of their nodes, when they were last taken.
+    pub(super) face_boxes: Vec<Bounds>,
+    pub(super) edge_boxes: Vec<Bounds>,
 }
 
 impl BarrierSide {
@@ -47,6 +50,8 @@ impl BarrierSide {
             squares: edges.iter().map(|&[a, b]| (place(a) - place(b)).norm_squared()).collect(),
             face_tree: Tree::new(faces.len(), |face| Bounds::of(faces[face as usize].map(&place))),
             edge_tree: Tree::new(edges.len(), |edge| Bounds::of(edges[edge as usize].map(&place))),
+            face_boxes: Vec::with_capacity(faces.len()),
+            edge_boxes: Vec::with_capacity(edges.len()),
             points,
             edges,
             faces,
@@ -91,9 +96,13 @@ impl BarrierSide {
 
     /// Takes new places [m] of the nodes.
     pub(super) fn refit(&mut self, place: impl Fn(u32) -> Vector3<f64>, skin: impl Fn(u32) -> f64) {
-        let Self { faces, edges, face_tree, edge_tree, .. } = self;
-        face_tree.refit(|face| around(faces[face as usize], &place, &skin));
-        edge_tree.refit(|edge| around(edges[edge as usize], &place, &skin));
+        let Self { faces, edges, face_tree, edge_tree, face_boxes, edge_boxes, .. } = self;
+        face_boxes.clear();
+        face_boxes.extend(faces.iter().map(|&corners| around(corners, &place, &skin)));
+        edge_boxes.clear();
+        edge_boxes.extend(edges.iter().map(|&ends| around(ends, &place, &skin)));
+        face_tree.refit(|face| face_boxes[face as usize]);
+        edge_tree.refit(|edge| edge_boxes[edge as usize]);
     }
 
     /// The mean length of its edges [m]; zero without any.

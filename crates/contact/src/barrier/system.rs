@@ -78,6 +78,8 @@ pub struct Barriers {
     rows: Vec<Row>,
     held: Vec<Held>,
     energy: [f64; 2],
+    /// Whether rows are those of the present places.
+    is_current: bool,
 }
 
 impl Barriers {
@@ -139,6 +141,7 @@ impl Barriers {
             rows: Vec::new(),
             held: Vec::new(),
             energy: [0.0; 2],
+            is_current: false,
             contacts,
         }
     }
@@ -182,6 +185,7 @@ impl Barriers {
             action.slip = Slip { creep: action.creep_speed * (to - from) };
         }
         self.held.clear();
+        self.is_current = false;
         self.put(position, 0.0);
         self.start.copy_from_slice(&self.place);
         self.list(motion, 0.0);
@@ -192,8 +196,15 @@ impl Barriers {
     /// Puts nodes at places [m], and rigid things where they are at a share of the step.
     fn put(&mut self, position: &[Vector3<f64>], share: f64) {
         let [from, to, now] = &mut self.poses;
+        let mut is_current = self.is_current && self.place[..self.nodes] == *position;
         for ((now, from), to) in now.iter_mut().zip(from).zip(to) {
-            *now = if share == 1.0 { *to } else { between([from, to], share) };
+            let pose = if share == 1.0 { *to } else { between([from, to], share) };
+            is_current &= *now == pose;
+            *now = pose;
+        }
+        self.is_current = is_current;
+        if is_current {
+            return;
         }
         self.place[..self.nodes].copy_from_slice(position);
         for (place, (thing, x)) in self.place[self.nodes..].iter_mut().zip(&self.rigid_nodes) {
@@ -237,8 +248,11 @@ impl Barriers {
         if then == now { 0.0 } else { Passage::new(rigid, [then, now]).travel_from(rigid, &then) }
     }
 
-    /// Finds what acts; infinite energy if there is no gap somewhere.
+    /// Finds what acts, if that is not known; infinite energy if there is no gap somewhere.
     fn act(&mut self) {
+        if std::mem::replace(&mut self.is_current, true) {
+            return;
+        }
         let mut rows = std::mem::take(&mut self.rows);
         rows.clear();
         let mut apart = true;
@@ -251,7 +265,7 @@ impl Barriers {
         }
         self.rows = rows;
         let energy: f64 = self.rows.iter().map(|row| row.energy).sum();
-        self.energy = [if apart { energy } else { f64::INFINITY }, 0.0];
+        self.energy[0] = if apart { energy } else { f64::INFINITY };
     }
 
     /// Adds what acts on nodes at the wall of a contact; false if one has no gap.
@@ -540,11 +554,11 @@ impl Barriers {
     }
 
     /// The part of the motion that is set which leaves at least half of a part of every gap.
-    fn filtered(&self, keep: f64, share: f64, part: f64) -> f64 {
+    fn filtered(&mut self, keep: f64, share: f64, part: f64) -> f64 {
         let mut most = 1.0;
-        for (number, group) in self.groups.iter().enumerate() {
-            most = group.allowed(&self.place, &self.motion, keep, most);
-            let Some(wall) = group.wall else { continue };
+        for number in 0..self.groups.len() {
+            most = self.groups[number].allowed(&self.place, &self.motion, keep, most);
+            let Some(wall) = self.groups[number].wall else { continue };
             most = self.allowed_at_wall(number, wall, [keep, share, part], most);
         }
         most

@@ -2,6 +2,7 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
+use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LdltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky, supernodal::SupernodalLdltRef,
@@ -26,6 +27,10 @@ pub(crate) struct Pivots {
 /// Pivots below this part of the diagonal are zero but for round-off.
 pub(crate) const ZERO_PIVOT: f64 = 1e-14;
 
+/// Operations for each entry of the factors, over the library's own measure, above which columns are taken together. Nodes have up to six
+/// equations with the same pattern, so it pays from the start.
+const SUPERNODES: f64 = 0.0;
+
 /// L D Lᵀ of a matrix scaled to a unit diagonal.
 pub(crate) struct Factors {
     symbolic: SymbolicCholesky<u32>,
@@ -41,7 +46,10 @@ impl Factors {
             pattern(matrix),
             Side::Lower,
             SymmetricOrdering::Amd,
-            CholeskySymbolicParams::default(),
+            CholeskySymbolicParams {
+                supernodal_flop_ratio_threshold: SupernodalThreshold(SUPERNODES),
+                ..Default::default()
+            },
         )?;
         let memory = MemBuffer::new(StackReq::any_of(&[
             symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Spec::default()),
