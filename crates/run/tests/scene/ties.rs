@@ -129,6 +129,10 @@ fn a_resumed_run_of_tied_bodies_ends_in_the_same_bits() {
     }
 }
 
+/// Another coat, and the start of a tie of it.
+const SECOND: &str = "[body.second]\nmodel = 'membrane'\nmesh = { plate = { size = [0.04, 0.02], cells = [3, 2] }, at = [0, 0, 0.01] }\n\
+                      law = 'coat'\ndensity = 1000\nthickness = 1e-4\n[tie.more]\n";
+
 #[test]
 fn ties_that_cannot_be_are_refused_by_name_and_gaps_are_told() {
     let explicit = "solver = 'explicit'";
@@ -150,13 +154,27 @@ fn ties_that_cannot_be_are_refused_by_name_and_gaps_are_told() {
             plain.clone() + "[tie.again]\nbetween = ['coat', 'block']\n",
             ["is tied already, by `glue`", "leave those nodes out"],
         ),
-        (plain.clone() + "[tie.back]\nbetween = ['block', 'coat']\n", ["no chains and no circles", ""]),
+        (
+            plain.clone() + "[tie.back]\nbetween = ['block', 'coat']\n",
+            ["follow others by `back`: ties make no chains and no circles", "leave one of the two ties out"],
+        ),
+        (
+            plain.clone() + SECOND + "between = ['second', 'coat']\n",
+            [
+                "node 0 of `second` would follow nodes that follow others by `glue`",
+                "tie `second` to `block`, as `coat` is",
+            ],
+        ),
+        (
+            format!("{SECOND}between = ['second', 'coat']\n{plain}"),
+            ["follow others by `glue`", "tie `second` to `block`, as `coat` is"],
+        ),
         (
             with(
                 "[constraint.start]\ntype = 'fix'\nbody = 'block'",
                 "[constraint.start]\ntype = 'fix'\nbody = 'coat'",
             ),
-            ["`start` and `glue`", ""],
+            ["`start` and `glue`", "constrain `block`, which the node follows"],
         ),
         (
             with(
