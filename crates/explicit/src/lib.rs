@@ -36,6 +36,7 @@ pub mod critical_step;
 mod dynamic_relaxation;
 mod energies;
 mod forces;
+mod foresight;
 mod history;
 mod lanes;
 pub mod recover;

@@ -12,7 +12,7 @@
 //! `validation/tests/stability.rs`.
 //!
 //! *When.* Every [`CHECK_EVERY`] steps, and at once where the least J or the largest stretch √(1 + |C − I|) has changed by [`CHANGE`]. The
-//! force pass finds both at no cost.
+//! force pass finds both at no cost. A GPU passes over checks that leave the parts as they are (`foresight.rs`).
 //!
 //! *Which cells.* Stiffness is computed for the first cells of two cheap orders, one by an isotropic guess of their speed
 //! and one by stretch: 18 stresses and the eigenvalue problems cost far more than a step of a cell.
@@ -80,6 +80,14 @@ pub(crate) fn substeps(step: f64, limit: f64, now: u32) -> Option<u32> {
     let enough = (enough as u32).max(1);
     let stable = step / f64::from(now) <= KEEP * limit;
     Some(if stable { now.min(enough) } else { enough })
+}
+
+/// By which factor the limit may change before [`substeps`] chooses other parts than these, as a logarithm; zero where it does so now.
+pub(crate) fn margin(step: f64, limit: f64, parts: u32) -> f64 {
+    let more = f64::from(parts) * KEEP * limit / step;
+    // One part cannot become fewer.
+    let fewer = step / (RESERVE * limit * f64::from(parts - 1));
+    more.min(fewer).ln().max(0.0)
 }
 
 /// Watches the largest stable step of a model. Holds constants and scratch, and what follows from the reference.

@@ -95,6 +95,11 @@ impl Stability {
         }
     }
 
+    /// Records a check that was passed over: the last limit stands.
+    pub(crate) fn pass(&mut self, deformed: Deformed, steps: u64) {
+        (self.deformed, self.checked_at) = (deformed, steps);
+    }
+
     /// Records into how many parts the step that begins now is cut.
     pub(crate) fn note_substeps(&mut self, substeps: u32, time: f64) {
         if substeps > 1 {

@@ -6,7 +6,8 @@ use pliant_mechanics::tensor::{Vector, cast};
 use crate::Scalar;
 use crate::critical_step::limit_about;
 use crate::forces::Deformed;
-use crate::stability::{CHANGE, Monitor, OnUnstable, StepLimit, substeps};
+use crate::foresight::Foresight;
+use crate::stability::{CHANGE, CHECK_EVERY, Monitor, OnUnstable, StepLimit, substeps};
 use crate::state::State;
 use crate::step_error::StepError;
 
@@ -50,6 +51,8 @@ pub struct StepControl {
     /// The length [s] of the (sub)step before, where it was no part of such a step.
     before: Option<f64>,
     monitor: Option<Monitor>,
+    /// Of a control that passes over checks.
+    foresight: Option<Foresight>,
     /// Parts of the step to come.
     substeps: u32,
 }
@@ -57,7 +60,7 @@ pub struct StepControl {
 impl StepControl {
     /// Steps of `step` seconds, not watched.
     pub fn new(step: f64) -> Self {
-        Self { step, since: (0.0, 0), before: None, monitor: None, substeps: 1 }
+        Self { step, since: (0.0, 0), before: None, monitor: None, foresight: None, substeps: 1 }
     }
 
     /// How another control goes on from a state.
@@ -75,6 +78,26 @@ impl StepControl {
     /// Watches the limit from now on.
     pub fn watch(&mut self, monitor: Monitor) {
         self.monitor = Some(monitor);
+    }
+
+    /// Passes over checks from now on, where [`pass`](Self::pass) is asked.
+    #[must_use]
+    pub fn sparing(self) -> Self {
+        Self { foresight: Some(Foresight::default()), ..self }
+    }
+
+    /// Passes over a check that is due, if it would leave the steps as they are.
+    pub fn pass<R>(&self, state: &mut State<R>, deformed: &Deformed) -> bool {
+        let (Some(monitor), Some(foresight)) = (&self.monitor, &self.foresight) else { return false };
+        let plain = foresight.covers(state.steps, deformed, self.step, self.substeps)
+            && state
+                .stability
+                .last
+                .is_some_and(|look| !monitor.doubts(state, look.limit, self.step, self.substeps));
+        if plain {
+            state.stability.pass(*deformed, state.steps);
+        }
+        plain
     }
 
     /// The length [s] of a whole step.
@@ -104,13 +127,32 @@ impl StepControl {
         if state.is_at_start() { 0.0 } else { self.lengths(state).before }
     }
 
-    /// Whether a check of the limit is due: the first one, `every` steps after the last, or where the deformation differs.
-    pub fn is_due<R>(&self, state: &State<R>, deformed: &Deformed, every: u64) -> bool {
+    /// Whether a check of the limit is due: the first one, [`CHECK_EVERY`] steps after the last, or where the deformation differs.
+    pub fn is_due<R>(&self, state: &State<R>, deformed: &Deformed) -> bool {
         let seen = &state.stability;
         self.monitor.is_some()
             && (seen.checks == 0
-                || state.steps >= seen.checked_at.saturating_add(every)
+                || state.steps >= seen.checked_at.saturating_add(CHECK_EVERY)
                 || deformed.differs(&seen.deformed, CHANGE))
+    }
+
+    /// Steps that pass over no check of the limit, at least one, if the deformation goes on to change as it did within the last `steps`
+    /// steps: half of those to the check that it asks for, so that a change that grows faster is not missed either.
+    pub fn steps_to_check<R>(
+        &self,
+        state: &State<R>,
+        now: &Deformed,
+        (before, steps): (&Deformed, u64),
+    ) -> u64 {
+        if self.monitor.is_none() {
+            return u64::MAX;
+        }
+        let seen = &state.stability;
+        let counted = seen.checked_at.saturating_add(CHECK_EVERY).saturating_sub(state.steps);
+        let left = (CHANGE / now.change(&seen.deformed)).ln();
+        let rate = now.change(before).ln() / steps.max(1) as f64;
+        let deformed = if rate > 0.0 { (0.5 * left / rate) as u64 } else { u64::MAX };
+        counted.min(deformed).max(1)
     }
 
     /// Looks at the limit of a state.
@@ -129,6 +171,9 @@ impl StepControl {
             }
             let look = StepLimit { time: state.time, limit, solid, cell };
             state.stability.note(look, *deformed, state.steps);
+            if let Some(foresight) = &mut self.foresight {
+                foresight.note(limit, state.steps, *deformed);
+            }
         }
     }
 

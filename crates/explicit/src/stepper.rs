@@ -27,7 +27,7 @@ use crate::energies::{Sums, model_balance_floor};
 use crate::forces::{Deformed, Found, InternalForces};
 use crate::lanes::{Instructions, LaneWork, Lanes, MissingInstructions, Processor};
 use crate::recover::stored_at_start;
-use crate::stability::{CHECK_EVERY, Monitor};
+use crate::stability::Monitor;
 use crate::state::State;
 use crate::step_control::{Clock, Lengths, StepControl};
 use crate::step_error::StepError;
@@ -525,7 +525,7 @@ impl<R: Scalar> CentralDifference<R> {
 
     /// Looks at the limit where one is due, and chooses the parts of the step to come.
     fn watch(&mut self, state: &mut State<R>, deformed: &Deformed) -> Result<(), StepError> {
-        if self.control.is_due(state, deformed, CHECK_EVERY) {
+        if self.control.is_due(state, deformed) {
             self.control.look(&self.model, &self.owners, state, deformed);
         }
         let below = self.control.choose(&self.model, state);

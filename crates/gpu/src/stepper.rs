@@ -37,10 +37,6 @@ const EVALUATE_EVERY: u64 = 100;
 /// Evaluations are more frequent where the deformation changes by more than this factor from one to the next.
 const CALM: f64 = 1.02;
 
-/// Steps between two checks of the critical time step, unless the deformation has changed. Each check reads the displacements back,
-/// and the CPU ranks all cells.
-const LIMIT_EVERY: u64 = 1000;
-
 /// A submission takes at most this long [s]: systems reset a device that a program occupies for seconds.
 const LONGEST_SUBMISSION: f64 = 0.2;
 
@@ -106,9 +102,11 @@ pub struct GpuStepper {
     since: u32,
     /// Whether the work of the instants since then is entered.
     entered: bool,
-    /// How far cells were deformed at the last look, and steps to the next one.
+    /// How far cells were deformed at the last look, and steps to the next one: those after which energies are to be known, and those to the
+    /// next check of the critical time step.
     deformed: Deformed,
     stride: u64,
+    to_check: u64,
     /// Time an instant takes [s], once known.
     pace: Option<f64>,
     energies: Energies,
@@ -248,7 +246,7 @@ impl GpuStepper {
         let ties = nodes.followers.as_ref().zip(paths.giving.as_ref()).map(|(followers, giving)| {
             DeviceTies::new(device, &instants.bound, followers, giving, &nodes.displacement)
         });
-        let control = StepControl::new(step);
+        let control = StepControl::new(step).sparing();
         Ok(Self {
             device: device.clone(),
             model: Arc::clone(model),
@@ -279,6 +277,7 @@ impl GpuStepper {
             entered: true,
             deformed: Deformed::default(),
             stride: 1,
+            to_check: 1,
             pace: None,
             energies: Energies::default(),
             reactions: vec![[0.0; 3]; model.constraints.len()],
@@ -380,6 +379,8 @@ impl GpuStepper {
         let below = if state.is_between_steps() { self.watch(state, &results.deformed)? } else { Ok(()) };
         let calm = !results.deformed.differs(&self.deformed, CALM);
         self.stride = if calm { (2 * self.stride).min(EVALUATE_EVERY) } else { (self.stride / 2).max(1) };
+        let passed = self.origin.map_or(1, |origin| state.steps - origin.steps);
+        self.to_check = self.control.steps_to_check(state, &results.deformed, (&self.deformed, passed));
         self.deformed = results.deformed;
         if self.lengths != self.control.lengths(state) {
             self.lengths = self.control.lengths(state);
@@ -425,7 +426,8 @@ impl GpuStepper {
         while left > 0 {
             self.evaluate(state, Wanted::Energies)?;
             // While energies are off balance, every step is evaluated.
-            let stride = if state.work.is_off_balance() { 1 } else { left.min(self.stride) };
+            let stride =
+                if state.work.is_off_balance() { 1 } else { left.min(self.stride).min(self.to_check) };
             self.go(state, stride)?;
             left -= stride;
         }
@@ -626,7 +628,7 @@ impl GpuStepper {
         state: &mut State<f32>,
         deformed: &Deformed,
     ) -> Result<Result<(), StepError>, GpuError> {
-        if self.control.is_due(state, deformed, LIMIT_EVERY) {
+        if self.control.is_due(state, deformed) && !self.control.pass(state, deformed) {
             let displacement = &mut state.displacement;
             self.transfer.read::<Four>(
                 &self.device,

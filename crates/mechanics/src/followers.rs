@@ -29,11 +29,11 @@ impl Model {
         }
         let all = || self.ties.iter().chain([&tie]);
         let chained = all().flat_map(Tie::rows).find_map(|(node, mut row)| {
-            row.any(|(followed, _)| owner[followed as usize].is_some()).then_some(node)
+            row.find_map(|(followed, _)| owner[followed as usize]).map(|other| (node, other))
         });
-        if let Some(node) = chained {
+        if let Some((node, other)) = chained {
             let (body, node) = placed(node);
-            return Err(TieError::Chain { node, body });
+            return Err(TieError::Chain { node, body, other: other.into() });
         }
         for (node, _) in tie.rows() {
             if let Some(velocity) = self.initial_velocity.get_mut(node as usize) {

@@ -37,12 +37,14 @@ pub enum TieError {
     },
     /// What it follows follows others, or itself.
     #[error(
-        "node {node} of `{body}` would follow a node that follows others: ties make no chains and no circles"
+        "node {node} of `{body}` would follow nodes that follow others by `{other}`: ties make no chains and no circles"
     )]
     Chain {
         /// The node, numbered in its body.
         node: u32,
         /// The body.
         body: String,
+        /// The tie of what it would follow.
+        other: String,
     },
 }

@@ -97,9 +97,14 @@ impl Deformed {
 
     /// Whether the least J or the largest stretch, taken as √(1 + |C − I|), differ by more than a factor.
     pub fn differs(&self, other: &Self, factor: f64) -> bool {
+        self.change(other) > factor
+    }
+
+    /// The factor, 1 or more, by which one of these two differs.
+    pub fn change(&self, other: &Self) -> f64 {
         let stretch = |d: &Self| (1.0 + d.largest_strain.sqrt()).sqrt();
-        let apart = |a: f64, b: f64| a > factor * b || b > factor * a;
-        apart(self.least_volume_ratio, other.least_volume_ratio) || apart(stretch(self), stretch(other))
+        let apart = |a: f64, b: f64| (a / b).max(b / a);
+        apart(self.least_volume_ratio, other.least_volume_ratio).max(apart(stretch(self), stretch(other)))
     }
 }
 

@@ -108,8 +108,9 @@ fn coated(run: &str, model: &str, mesh: &str, more: &str) -> String {
         .replace("on = 'block', at = [0.02, 0.02, 0.02]", "on = 'coat', at = [0.02, 0.02, 0.02]")
 }
 
-/// What presses a tied coat presses the block below: on the same triangles as on a coat with the nodes of the block, on another mesh in balance
-/// with what holds the block.
+/// What presses a tied coat presses the block below: on the same triangles as on a coat with the nodes of the block, on other meshes in balance
+/// with what holds the block. Nodes touch, so the force depends on where they are: a mesh with a node under the ball, too, gives the same to
+/// 1 %; one without, whose first four nodes touch 3.6 mm beside, 28 % more, with a coat of no stiffness as well.
 #[test]
 fn a_tied_coat_is_pressed_as_one_on_the_nodes_of_its_block() {
     for (run, model, balanced) in [
@@ -118,7 +119,7 @@ fn a_tied_coat_is_pressed_as_one_on_the_nodes_of_its_block() {
         // Not quite at rest in the end.
         ("solver = 'implicit'\nstep = 0.02", "shell", 5e-3),
     ] {
-        let [on, same, _] = ["on", "[6, 6]", "[7, 9]"].map(|mesh| {
+        let [on, same, under, _] = ["on", "[6, 6]", "[8, 10]", "[7, 9]"].map(|mesh| {
             let row = last_row(&coated(run, model, mesh, ""));
             let (up, down) = (row["contact.above.z"], row["reaction.base.z"]);
             println!("{run}, {model} {mesh}: {up} N on the ball, {down} N below");
@@ -127,6 +128,7 @@ fn a_tied_coat_is_pressed_as_one_on_the_nodes_of_its_block() {
             up
         });
         assert!((same / on - 1.0).abs() < 1e-6, "{on} {same}");
+        assert!((under / on - 1.0).abs() < 0.01, "{on} {under}");
     }
     let run = "solver = 'implicit'\nstep = 0.05\ncheckpoint = { every = 0.4 }";
     resumes(&coated(run, "shell", "[7, 9]", "rotations = 'follow'\n"));

@@ -171,6 +171,7 @@ fn walls_that_cannot_be_are_refused_by_name() {
     let on = "on = 'block'";
     for (text, pieces) in [
         (with(explicit, on, "on = 'blok'"), ["there is no body `blok`", "did you mean `block`?"]),
+        (with(explicit, on, "on = 'capsule'"), ["`capsule` would be a wall on itself", "name a solid"]),
         (with(explicit, on, "on = 'block'\nfaces = { set = 'top' }"), ["top", "x-max"]),
         (
             with(explicit, on, "on = 'block'\nmesh = { plate = { size = [1, 1] }, edge = 1 }"),

@@ -58,13 +58,26 @@ impl Builder<'_> {
             }
         }
         if let Err(contradiction) = self.assembly.constrained_components() {
-            let tied = self.scene.ties.iter().any(|(name, _)| *name == contradiction.second);
+            let tie = self.scene.ties.iter().find(|(name, _)| *name == contradiction.second);
             let first = self.source().key_span(&["constraint", &contradiction.first]);
-            let second =
-                self.source().key_span(&[if tied { "tie" } else { "constraint" }, &contradiction.second]);
-            let help = "take the shared nodes out of one of them with `{ difference = [ …, … ] }`, or limit `components`";
+            let second = self
+                .source()
+                .key_span(&[if tie.is_some() { "tie" } else { "constraint" }, &contradiction.second]);
+            let (label, help) = match tie {
+                Some((_, table)) => (
+                    "moves it already",
+                    format!(
+                        "constrain `{}`, which the node follows, or leave the node out of the tie (`nodes`)",
+                        table.between[1]
+                    ),
+                ),
+                None => (
+                    "contradicts the other",
+                    "take the shared nodes out of one of them with `{ difference = [ …, … ] }`, or limit `components`".to_owned(),
+                ),
+            };
             let diagnostic = Diagnostic::error(contradiction.to_string())
-                .at(second, "contradicts the other")
+                .at(second, label)
                 .also(first, "contradicts the other")
                 .help(help);
             self.out.push(diagnostic);

@@ -5,6 +5,7 @@ use pliant_implicit::CarriedTurn;
 use pliant_mechanics::Model;
 use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::Cells;
+use pliant_mechanics::tie::TieError;
 use pliant_sim::{counted, number};
 
 use super::{Builder, BuiltBody, in_metres};
@@ -175,22 +176,47 @@ impl Builder<'_> {
             self.assembly.turns.extend(turns);
         }
         if let Err(error) = self.assembly.model_mut().tie(name, found.nodes, found.mapping) {
-            self.error(
-                &path,
-                error.to_string(),
-                "this tie",
-                "leave those nodes out of one of the ties (`nodes`)",
-            );
+            let help = self.instead_of(names, &error);
+            self.error(&path, error.to_string(), "this tie", &help);
             return None;
         }
         if self.shell_cells(guest).is_some() && !follow {
+            let remedy = match self.shell_cells(host) {
+                Some(_) => "shells that shall keep their angle have common nodes, in one mesh",
+                None => "`rotations = \"follow\"` turns it with a solid",
+            };
             self.notes.push(format!(
-                "`{name}` holds places, not rotations: `{}` is hinged where it is tied (`rotations = \"follow\"` turns it with a solid)",
+                "`{name}` holds places, not rotations: `{}` is hinged where it is tied ({remedy})",
                 names[0]
             ));
         }
         self.tell_crowding([guest, host], names);
         Some(())
+    }
+
+    /// What to do instead of a tie of two bodies that cannot be.
+    fn instead_of(&self, [guest, host]: &[String; 2], error: &TieError) -> String {
+        let ties = || self.scene.ties.iter().map(|(_, table)| &table.between);
+        match error {
+            TieError::Chain { .. } if ties().any(|[a, b]| [a, b] == [host, guest]) => {
+                "leave one of the two ties out".to_owned()
+            }
+            TieError::Chain { .. } => {
+                // What follows the guest, or what the host follows.
+                let chain = ties().find_map(|[a, b]| match () {
+                    () if b == guest => Some((a, guest, host)),
+                    () if a == host => Some((guest, host, b)),
+                    () => None,
+                });
+                match chain {
+                    Some((last, middle, first)) => format!(
+                        "tie `{last}` to `{first}`, as `{middle}` is, or leave those nodes out of one of the ties (`nodes`)"
+                    ),
+                    None => "leave those nodes out of one of the ties (`nodes`)".to_owned(),
+                }
+            }
+            TieError::Twice { .. } => "leave those nodes out of one of the ties (`nodes`)".to_owned(),
+        }
     }
 
     /// Says how much of a solid a wall inside it takes: the solid is not removed there.

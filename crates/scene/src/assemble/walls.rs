@@ -36,12 +36,15 @@ impl Builder<'_> {
             && given.model != BodyModel::Solid
         {
             let word = given.model.word();
-            let message = format!("`{host}` is of model `{word}`, and a wall needs the boundary of a solid");
+            let message = match host == name {
+                true => format!("`{name}` would be a wall on itself"),
+                false => format!("`{host}` is of model `{word}`, and a wall needs the boundary of a solid"),
+            };
             let help = match given.on {
-                Some(_) => {
+                Some(_) if host != name => {
                     "walls do not lie on walls: give their thicknesses to one, or put both on the solid"
                 }
-                None => "name a solid",
+                _ => "name a solid",
             };
             self.error(&path, message, "not a solid", help);
             return None;
