@@ -73,7 +73,8 @@ impl ShellStrains {
             Some(format!(
                 "`{body}` is strained by {} in triangle {element} (counted from 0) at t = {} s, by {} of it in its middle \
                  surface, and by more than 10 % from t = {} s on: shells are linearly elastic for small strain, so forces \
-                 and stresses are questionable there; take smaller loads, or a solid with a hyperelastic law",
+                 and stresses are questionable there; take smaller loads, `model = \"membrane\"` if bending does not matter, or a \
+                 solid, both with a hyperelastic law",
                 percent(largest),
                 number(*time),
                 percent(membrane),

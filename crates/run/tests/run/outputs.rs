@@ -361,6 +361,24 @@ fn moments_of_reactions_balance_and_a_rotation_twists() {
         "{x} {y} {z}"
     );
     assert!(vector("probe.corner.reaction").iter().any(|force| force.abs() > 1e-3));
+    // Nodes of a plate carry its reaction, those between carry nothing.
+    let (_, frame) = workshop.series("out/case/fields.pvd").pop().unwrap();
+    let nodal = &frame.mesh.point_data["reaction"];
+    let of = |z: f64, c: usize| -> f64 {
+        let nodes = (0..).zip(&frame.mesh.points).filter(|(_, x)| (x.z - z).abs() < 1e-9);
+        nodes.map(|(node, _)| nodal.item(node)[c]).sum()
+    };
+    let scale = vector("reaction.top")[2].abs();
+    assert!(scale > 1e-4, "{scale}");
+    for c in 0..3 {
+        for (name, z) in [("reaction.base", 0.0), ("reaction.top", 0.1)] {
+            let whole = vector(name)[c];
+            assert!((of(z, c) - whole).abs() < 1e-6 * scale, "{name}, {c}: {} for {whole}", of(z, c));
+        }
+    }
+    for (node, x) in (0..).zip(&frame.mesh.points).filter(|(_, x)| x.z > 1e-9 && x.z < 0.1 - 1e-9) {
+        assert!(nodal.item(node).iter().all(|force| *force == 0.0), "{x:?}");
+    }
     // E = (FᵀF − I)/2 of the same cell.
     let entry = |field: &str, i: usize, j: usize| {
         row[format!("probe.corner.{field}.{}{}", ["x", "y", "z"][i], ["x", "y", "z"][j]).as_str()]

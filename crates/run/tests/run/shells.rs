@@ -352,11 +352,138 @@ fn large_strains_are_told() {
         assert!(warning.contains(piece), "no `{piece}` in {warning}");
         assert!(page.contains(piece), "no `{piece}` in {page}");
     }
-    says(&told, &["`wall` is strained by", "for small strain", "a solid with a hyperelastic law"]);
+    says(
+        &told,
+        &[
+            "`wall` is strained by",
+            "for small strain",
+            "`model = \"membrane\"`",
+            "a solid, both with a hyper",
+        ],
+    );
     let (json, _, page) = pulled(0.002);
     assert!(json["warnings"].as_array().unwrap().is_empty(), "{json}");
     assert!(json["shell_strains"][0]["above_from"].is_null(), "{json}");
     assert!(page.contains("| wall | 1."), "{page}");
+}
+
+/// What the warning advises: as a membrane of rubber the wall may be stretched by half, without a warning, and keeps its volume.
+#[test]
+fn a_membrane_takes_the_strain_that_is_too_large_for_a_shell() {
+    let workshop = wall(&[
+        ("model = \"shell\"", "model = \"membrane\""),
+        ("\"st-venant-kirchhoff\"", "\"neo-hookean\""),
+        ("poisson-ratio = 0.3", "poisson-ratio = 0.5"),
+        ("nodes = { set = \"x-min\" }", "nodes = { set = \"x-min\" }\ncomponents = [\"x\"]"),
+        (
+            "[load.push]",
+            "[constraint.flat]\ntype = \"fix\"\nbody = \"wall\"\nnodes = \"all\"\ncomponents = [\"z\"]\n\n\
+             [constraint.side]\ntype = \"fix\"\nbody = \"wall\"\nnodes = { set = \"y-min\" }\ncomponents = [\"y\"]\n\n\
+             [constraint.pull]\ntype = \"move\"\nbody = \"wall\"\nnodes = { set = \"x-max\" }\ncomponents = [\"x\"]\n\
+             by = [0.1, 0, 0]\n\n[load.push]",
+        ),
+        ("pressure = 1", "pressure = 0"),
+        ("at = [0.2, 0.05, 0] }", "at = [0.1, 0.05, 0], data = [\"current-thickness\"] }"),
+    ]);
+    let json = workshop.run(&[]).done();
+    assert_eq!(json["warnings"], serde_json::json!([]), "{json}");
+    let (_, rows) = workshop.table("out/case/history.csv");
+    let thickness = rows.last().unwrap().last().unwrap() / 0.002;
+    assert!((thickness / 1.5_f64.powf(-0.5) - 1.0).abs() < 1e-4, "{thickness}");
+}
+
+/// A wall that is pulled by 1 % between straight ends and free to narrow is thinner by ν times that, and strained by that at its faces.
+#[test]
+fn a_pulled_shell_tells_how_thin_it_is() {
+    let workshop = wall(&[
+        (
+            "nodes = { set = \"x-min\" }",
+            "nodes = { set = \"x-min\" }\ncomponents = [\"x\", \"z\", \"rx\", \"ry\", \"rz\"]",
+        ),
+        (
+            "[load.push]",
+            "[constraint.side]\ntype = \"fix\"\nbody = \"wall\"\nnodes = { set = \"y-min\" }\ncomponents = [\"y\", \"rx\", \"rz\"]\n\n\
+             [constraint.pull]\ntype = \"move\"\nbody = \"wall\"\nnodes = { set = \"x-max\" }\ncomponents = [\"x\", \"rz\"]\n\
+             by = [0.002, 0, 0]\n\n[load.push]",
+        ),
+        ("pressure = 1", "pressure = 0"),
+        (
+            "at = [0.2, 0.05, 0] }",
+            "at = [0.1, 0.05, 0], data = [\"thickness\", \"current-thickness\", \"surface-strain\"] }",
+        ),
+    ]);
+    workshop.run(&[]).done();
+    let (header, rows) = workshop.table("out/case/history.csv");
+    let of = |field: &str| {
+        let column = header.iter().position(|name| *name == format!("probe.end.{field}")).unwrap();
+        [0, rows.len() - 1].map(|row| rows[row][column])
+    };
+    assert_eq!(of("thickness"), [0.002; 2]);
+    let [before, after] = of("current-thickness");
+    assert!((before - 0.002).abs() < 1e-15, "{before}");
+    // To second order in the strain.
+    assert!((after / (0.002 * (1.0 - 0.3 * 0.01)) - 1.0).abs() < 1e-4, "{after}");
+    let [before, after] = of("surface-strain");
+    assert!(before.abs() < 1e-12 && (after / 0.01 - 1.0).abs() < 1e-4, "{before} {after}");
+}
+
+/// M = F L at the clamp of a cantilever with a force F at its end: in the field of its nodes and about a point; force and moment balance.
+#[test]
+fn a_clamp_resists_the_moment_of_a_force_at_the_end() {
+    let force = 1e-6;
+    let workshop = wall(&[
+        ("type = \"pressure\"", "type = \"force\""),
+        ("faces = \"all\"\npressure = 1", &format!("nodes = {{ set = \"x-max\" }}\ntotal = [0, 0, {force}]")),
+        ("type = \"vtu\"\n", "type = \"vtu\"\ndata = [\"reaction\", \"reaction-moment\"]\n"),
+        ("probes.end", "moments-about = [0, 0.05, 0]\nprobes.end"),
+    ]);
+    workshop.run(&[]).done();
+    let (header, rows) = workshop.table("out/case/history.csv");
+    let last = |name: &str| rows.last().unwrap()[header.iter().position(|column| column == name).unwrap()];
+    let (_, frame) = workshop.series("out/case/fields.pvd").pop().unwrap();
+    let sum = |field: &str, c: usize| -> f64 {
+        let data = &frame.mesh.point_data[field];
+        (0..15).map(|node| data.item(node)[c]).sum()
+    };
+    // Of the clamp, at x = 0; other nodes have none. A force along z there has no moment about y.
+    let moment = force * 0.2;
+    for (what, found, expected) in [
+        ("force", last("reaction.base.z"), -force),
+        ("sum of nodal forces", sum("reaction", 2), -force),
+        ("moment about the clamp", last("moment.base.y"), moment),
+        ("sum of nodal moments", sum("reaction-moment", 1), moment),
+    ] {
+        // Deflected by 40 µm; linear to 1e-6.
+        assert!((found / expected - 1.0).abs() < 1e-5, "{what}: {found} for {expected}");
+    }
+    for (node, x) in frame.mesh.points.iter().enumerate() {
+        let clamped = x.x < 1e-9;
+        let turned = frame.mesh.point_data["reaction-moment"].item(node)[1] != 0.0;
+        assert_eq!(clamped, turned, "node {node}");
+    }
+}
+
+/// Twice the area over the border of 0.2 × 0.1 m is 67 mm: 10 mm are 0.15 of it and 9 % too stiff in torsion, 2 mm are not spoken of.
+#[test]
+fn a_stout_strip_is_noted() {
+    let told = |thickness: &str| {
+        let told = wall(&[(THICK, &format!("thickness = {thickness}")), ("pressure = 1", "pressure = 1e-3")])
+            .run(&[]);
+        told.done();
+        told
+    };
+    says(
+        &told("0.01"),
+        &[
+            "`wall` is 0.15 times as thick as wide",
+            "transverse shear is neglected",
+            "about 9 % too stiff in torsion",
+        ],
+    );
+    for thin in ["0.002", "0.0033"] {
+        let told = told(thin);
+        assert!(!told.words().contains("as thick as wide"), "{}", told.err);
+    }
 }
 
 /// A path by arc length ends where the load is as written, or where it is told to; what it says nothing about goes on.
