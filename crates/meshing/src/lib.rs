@@ -42,6 +42,7 @@ mod hausdorff;
 mod isosurface;
 mod lattice;
 mod lens;
+mod long_edges;
 mod manifold;
 mod missed;
 mod nesting;

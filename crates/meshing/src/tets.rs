@@ -15,6 +15,7 @@ use crate::deviation::Measured;
 use crate::error::{MeshingError, require_positive};
 use crate::given::MeasuredTo;
 use crate::grading::{Filled, Levels, Wanted, fill, tree};
+use crate::long_edges::halve_long_edges;
 use crate::manifold::{crowded_edges, mend, pinched_points};
 use crate::octree::{Octree, around};
 use crate::optimise::Optimiser;
@@ -131,6 +132,7 @@ impl OrganTets {
         cut_materials(&mut complex, &surfaces);
         let crowded = crowded_edges(&complex).len();
         let mended = mend(&mut complex);
+        let long_edges = halve_long_edges(&mut complex, &surfaces);
         progress(0.1);
         let optimised = if self.target > 0.0 {
             let onward = |done: f64| progress(0.1 + 0.85 * done);
@@ -147,6 +149,7 @@ impl OrganTets {
             doubled_points: mended.doubled,
             halved_edges: mended.halved,
             parted_points: mended.parted,
+            long_edges,
         };
         let steps = Steps {
             rounds: optimised.rounds,
@@ -227,6 +230,8 @@ pub struct Repairs {
     pub halved_edges: usize,
     /// Points where the boundary met itself, each doubled.
     pub parted_points: usize,
+    /// Edges halved because they were too long for the size requested at their location.
+    pub long_edges: usize,
 }
 
 /// The steps of the optimiser.
@@ -458,6 +463,7 @@ impl fmt::Display for TetReport {
             doubled_points,
             halved_edges,
             parted_points,
+            long_edges,
         } = self.repairs;
         if dropped_pieces > 0 {
             writeln!(f, "left out         {dropped_cells} cells in {dropped_pieces} small pieces")?;
@@ -474,6 +480,12 @@ impl fmt::Display for TetReport {
         }
         if parted_points > 0 {
             writeln!(f, "parted           {parted_points} points where the boundary touched itself")?;
+        }
+        if long_edges > 0 {
+            writeln!(
+                f,
+                "halved           {long_edges} edges too long for the size requested at their location"
+            )?;
         }
         if self.crowded_edges_left > 0 {
             writeln!(f, "still touching   {} edges", self.crowded_edges_left)?;
