@@ -223,6 +223,29 @@ impl CurvedTriangle {
         (g * by_e + slope * t * c_e, g * by_n + slope * t * c_n)
     }
 
+    /// A force on an edge's control point as forces on the edge's vector and on the normal at its start: the transposes of
+    /// [`edge_derivative`](Self::edge_derivative) times the force.
+    pub fn edge_forces(&self, k: usize, force: &Vector3) -> [Vector3; 2] {
+        if self.straight[k] {
+            return [force / 3.0, Vector3::zeros()];
+        }
+        let [i, j] = EDGES[k];
+        let (e, n) = (self.corners[j] - self.corners[i], self.normals[i]);
+        let (s, up) = (e.dot(&n), force.dot(&n));
+        let t = e - s * n;
+        let (length, size) = (e.norm(), t.norm());
+        let c = size / length;
+        let [g, slope, _] = reach(self.rule, c);
+        let (by_e, by_n) = (g * (force - up * n), -g * (up * e + s * force));
+        if slope == 0.0 {
+            return [by_e, by_n];
+        }
+        // t and n are at right angles.
+        let pull = slope * t.dot(force);
+        let c_e = t / (size * length) - e * (c / (length * length));
+        [by_e + pull * c_e, by_n - t * (pull * s / (size * length))]
+    }
+
     /// Second derivatives of w·b of an edge's control point b, for a vector w that stays: ∂²/∂e², ∂²/∂e∂n (rows e) and ∂²/∂n².
     pub fn edge_second_derivative(&self, k: usize, w: &Vector3) -> [Matrix3<f64>; 3] {
         if self.straight[k] {

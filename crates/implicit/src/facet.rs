@@ -61,6 +61,8 @@ pub struct Facet {
     stiffness: Matrix18,
     /// The part of it that resists bending.
     bending: Matrix9,
+    /// Mean curvature [1/m] over (w, θx, θy), of the discrete Kirchhoff triangle.
+    mean_curvature: SMatrix<f64, 3, 9>,
     /// Mean membrane strain (εxx, εyy, γxy), and the area [m²] over which it is the mean.
     strain: (Matrix3x18, f64),
     /// Nodal forces of its tension at rest, and that tension [N/m].
@@ -203,6 +205,7 @@ impl Facet {
             curved: None,
             stiffness: Matrix18::zeros(),
             bending: formulation.bending_stiffness(&corners, &bent, thickness),
+            mean_curvature: mean_curvature(&corners),
             strain: (strain, area),
             tension: (Vector18::zeros(), 0.0),
         };
@@ -276,7 +279,8 @@ impl Facet {
             (0..3).map(|i| flat[i][row] * self.gradient[i][column]).sum()
         };
         let (sum, difference) = (f(0, 0) + f(1, 1), f(1, 0) - f(0, 1));
-        let (sine, cosine) = difference.atan2(sum).sin_cos();
+        let trace = sum.hypot(difference);
+        let (sine, cosine) = if trace > 0.0 { (difference / trace, sum / trace) } else { (0.0, 1.0) };
         let e1 = plane * Vector2::new(cosine, sine);
         let e2 = plane * Vector2::new(-sine, cosine);
         let axes = Matrix3::from_columns(&[e1, e2, normal]);
@@ -297,7 +301,7 @@ impl Facet {
                 return Err(Broken::Folded(turned.norm()));
             }
         }
-        Ok(Placed { axes, local, trace: sum.hypot(difference), theta, deformation })
+        Ok(Placed { axes, local, trace, theta, deformation })
     }
 
     /// K d and the tension at rest in the facet's axes.
@@ -542,7 +546,7 @@ impl Facet {
         };
         let strain = Vector3::new(entry(0, 0) - 1.0, entry(1, 1) - 1.0, entry(0, 1) + entry(1, 0));
         let own = SVector::<f64, 9>::from_fn(|i, _| placed.deformation[BENDING[i]]);
-        ShellStrain::new(&strain, &(mean_curvature(&self.corners) * own), self.thickness)
+        ShellStrain::new(&strain, &(self.mean_curvature * own), self.thickness)
     }
 
     /// Thickness [m] with the strain across that plane stress asks for, t (A/A₀)^(−ν/(1 − ν)): −ν/(1 − ν) (ε₁ + ε₂) where strains are
