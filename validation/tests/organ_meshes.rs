@@ -3,8 +3,9 @@
 //! TetGen gives τ = 0.02 to 0.29, fTetWild 0.19, Gmsh 0.29 to 0.52, and the ideal lattice 0.73.
 
 use pliant_geometry::{Mesh, Vector3};
-use pliant_imaging::{Cleaning, LabelImage, Smoothing};
+use pliant_imaging::{Cleaning, LabelImage, ReadOptions, Smoothing, read};
 use pliant_meshing::{Anatomy, Organ, OrganMesh, OrganTets};
+use pliant_testing::mesh_checks::{conforming_boundary, edge_counts, pinched};
 use pliant_testing::organs;
 use pliant_validation::{Specimen, elastic, law, run};
 use serde_json::json;
@@ -145,4 +146,22 @@ fn the_critical_step_of_an_organ_is_sharp() {
     let failure = run::<f64>(&held.model, 1.1 * limit, 1e4 * limit, |_, state| steps = state.steps);
     let failure = failure.err().expect("1.1 of the critical time step diverges");
     println!("1.1 of the critical time step fails after {steps} steps: {failure}");
+}
+
+/// White matter of an average brain, folded as finely as the cells: a boundary in which no two sheets meet in a point or an edge. Meshes
+/// of it once had two such points.
+#[test]
+#[ignore = "slow: real organ"]
+fn white_matter_has_no_pinch_points() {
+    let Some(folder) = std::env::var_os("PLIANT_DATA") else {
+        println!("skipped: PLIANT_DATA is not set");
+        return;
+    };
+    let path = std::path::Path::new(&folder).join("brain-mni152/mni_icbm152_wm_2009a_sym.nii.gz");
+    let image = read(&path, &ReadOptions::default()).unwrap().threshold(128.0..=f64::INFINITY);
+    let made = organ(&image, &[1], 0.004, Vector3::zeros());
+    println!("{}", made.report);
+    let faces = conforming_boundary(&made.mesh);
+    assert!(pinched(&faces).is_empty() && made.report.pinched_points.is_empty());
+    assert!(edge_counts(&faces).values().all(|&count| count == 2));
 }

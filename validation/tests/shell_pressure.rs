@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use pliant_geometry::{Mesh, Vector3};
 use pliant_implicit::element::{Bending, Formulation, Membrane};
-use pliant_implicit::{Explicit, State, StaticSettings, Statics};
+use pliant_implicit::{Assembly, Explicit, State, StaticSettings, Statics, Step};
 use pliant_mechanics::load::{LoadKind, Spread};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet, sphere};
 use pliant_validation::shells::{FLAT, Specimen, symmetry};
@@ -142,15 +142,48 @@ fn a_free_cylinder_under_pressure_stays_round() {
             claim(&format!("cylinder, {cut:?}, t = {thickness}"), worst(cut, thickness), limit);
         }
     }
+    // Measured 0.7 to 1.0 % and 3.3 to 3.6 %, the goal was 1.0 and 2.2 %.
     for seed in 1..=3 {
-        for thickness in [0.04, 0.01] {
+        for (thickness, limit) in [(0.04, 0.012), (0.01, 0.04)] {
             claim(
                 &format!("cylinder, irregular {seed}, t = {thickness}"),
                 worst(Cut::Irregular(seed), thickness),
-                0.05,
+                limit,
             );
         }
     }
+}
+
+/// R/t = 5000, where flat membranes find no equilibrium: strained by 1e-3 in one load step on regular meshes, also on a crossed one with
+/// edges of 11 √(R t), and by 1e-6 on an irregular one with edges of 2 √(R t), the longest that are advised. Strained by 1e-3, five times
+/// its thickness, the irregular one finds no equilibrium; nor do coarser irregular meshes.
+#[test]
+fn a_very_thin_cylinder_finds_its_equilibrium() {
+    let (formulation, spread) = DEFAULT;
+    for (cut, whole, cells, strain) in [
+        (Cut::Crossed, true, [40, 13], 1e-3),
+        (Cut::Diagonal, false, [56, 36], 1e-3),
+        (Cut::Irregular(1), false, [56, 36], 1e-6),
+    ] {
+        let cylinder = pressed(cylinder(cut, whole, cells), whole, 1.0 / 5000.0, formulation, spread);
+        let (found, step) = blown_up(cylinder.model, strain / 1e-6, strain);
+        println!("{} iterations, {} parts, {:?}", step.residuals.len() - 1, step.parts, bounds(&found));
+        assert_eq!(step.parts, 1);
+        claim(&format!("R/t = 5000, {cut:?}, {cells:?} cells"), off(&found), 0.01);
+    }
+}
+
+/// Radial displacements over Lamé's at a strain, after one load step with so many times the pressure.
+fn blown_up(mut model: Assembly, times: f64, strain: f64) -> (Vec<f64>, Step) {
+    let LoadKind::ShellPressure { pressure, .. } = &mut model.model_mut().loads[0].kind else {
+        panic!("no pressure")
+    };
+    *pressure *= times;
+    let mut state = State::at_rest(&model);
+    let step =
+        Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
+    let ratio = |(x, rest): (&Vector3, Vector3)| (x - rest).xy().dot(&rest.xy()) / strain;
+    (state.position.iter().zip(model.places()).map(ratio).collect(), step)
 }
 
 /// The irregular cylinder strained by 1e-3 in one load step, R/t = 100.
@@ -158,16 +191,7 @@ fn a_free_cylinder_under_pressure_stays_round() {
 fn an_irregular_cylinder_is_blown_up_in_one_step() {
     let (formulation, spread) = DEFAULT;
     let cylinder = pressed(cylinder(Cut::Irregular(1), true, [40, 13]), true, 0.01, formulation, spread);
-    let mut model = cylinder.model;
-    let LoadKind::ShellPressure { pressure, .. } = &mut model.model_mut().loads[0].kind else {
-        panic!("no pressure")
-    };
-    *pressure *= 1e3;
-    let mut state = State::at_rest(&model);
-    let step =
-        Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
-    let ratio = |(x, rest): (&Vector3, Vector3)| (x - rest).xy().dot(&rest.xy()) / 1e-3;
-    let found: Vec<f64> = state.position.iter().zip(model.places()).map(ratio).collect();
+    let (found, step) = blown_up(cylinder.model, 1e3, 1e-3);
     println!("{} iterations, {:?}", step.residuals.len() - 1, bounds(&found));
     assert!(step.parts == 1 && step.residuals.len() <= 14, "{:?}", step.residuals);
     claim("irregular cylinder, strain 1e-3", off(&found), 0.03);

@@ -92,3 +92,20 @@ fn a_series_with_slices_missing_or_mixed_is_refused() {
     workshop.write("none/notes.txt", "no image\n");
     assert_refused(&workshop, "none", &["none"]);
 }
+
+/// More than 2 GiB of voxels are refused by what the header says; `--force` goes on, here to the end of a file that has none of them.
+#[test]
+fn images_of_more_than_two_gigabytes_ask_for_force() {
+    let workshop = Workshop::new(BLOCK);
+    let large = Volume { dims: [800; 3], values: Vec::new(), ..box_of_labels() };
+    let mut bytes = nifti1(&large, Form::Sform, false);
+    // Eight bytes a voxel.
+    bytes[70..74].copy_from_slice(&[64, 0, 64, 0]);
+    workshop.write("large.nii", bytes);
+    let mesh = ["mesh", "large.nii", "--label", "1", "--edge", "5mm", "-o", "out.vtu"];
+    let told = workshop.pliant(&mesh);
+    assert!(told.code == 2 && told.words().contains("`--force` reads it anyway"), "{}", told.err);
+    let told = workshop.pliant(&[&mesh[..], &["--force"]].concat());
+    let words = told.words();
+    assert!(told.code == 2 && !words.contains("--force") && words.contains("large.nii"), "{}", told.err);
+}

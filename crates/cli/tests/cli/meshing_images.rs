@@ -195,6 +195,20 @@ fn tets_come_in_several_sizes_and_within_a_distance() {
     assert!(fine["edges"]["longest_part"].as_f64().unwrap() <= 1.6 + 1e-9, "{fine}");
     let held = mesh(&workshop, &["--threshold", "5", "--distance", "1mm", "-o", "held.vtu", "--json"]).json();
     assert!(held["distance"]["reached"].as_f64().unwrap() <= 1e-3, "{held}");
+    // A tenth of the ball's radius at its surface and up to four times that inside.
+    let cells = |more: &[&str]| {
+        let told = mesh(&workshop, &[&["--threshold", "5", "--edge", "1.5mm", "--json"][..], more].concat());
+        assert_eq!(told.code, 0, "{}", told.err);
+        told.json()
+    };
+    let even = cells(&["-o", "even.vtu"]);
+    let graded = cells(&["--inner-edge", "6mm", "-o", "graded.vtu"]);
+    let [all, fewer] = [&even, &graded].map(|json| json["cells"].as_u64().expect("a number of cells"));
+    assert!(4 * fewer < 3 * all, "{fewer} of {all}");
+    // Longer than any edge of one size may be.
+    let longest = graded["edges"]["longest"].as_f64().unwrap();
+    assert!(longest > 1.6 * 1.5e-3 && longest < 1.6 * 6e-3, "{graded}");
+    assert!(close(&graded["materials"][0]["volume"], even["materials"][0]["volume"].as_f64().unwrap(), 0.01));
     for (option, message) in [
         (["--distance", "1mm"], "`--distance` is for tets"),
         (["--inner-edge", "8mm"], "`--inner-edge` is for tets"),

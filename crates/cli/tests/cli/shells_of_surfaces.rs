@@ -142,7 +142,7 @@ fn the_nodes_of_a_sharp_rim_are_creases() {
 }
 
 /// Every closed organ at hand, with the factor that makes its lengths metres.
-const ORGANS: [(&str, &str); 11] = [
+const ORGANS: [(&str, &str); 15] = [
     ("aneurysm-sofa/aneurysm3D_1.off", "0.001"),
     ("liver-sofa/liver-smooth.obj", "0.01"),
     ("organs-openhelp/Duodenum.stl", "0.001"),
@@ -154,11 +154,15 @@ const ORGANS: [(&str, &str); 11] = [
     ("organs-openhelp/Trachea.stl", "0.001"),
     ("organs-openhelp/Abdominal_wall.stl", "0.001"),
     ("organs-sofa-env/glt_gallbladder_visual.stl", "0.001"),
+    ("organs-sofa-env/glt_gallbladder_collision.stl", "0.001"),
+    ("organs-sofa-env/glt_liver_collision.stl", "0.001"),
+    ("liver-sofa/liver2.obj", "0.01"),
+    ("aorta-vmtk/aorta-surface.vtp", "0.01"),
 ];
 
 /// Few shells, so that thin folds are as hard as they can be.
 #[test]
-#[ignore = "minutes: eleven organs"]
+#[ignore = "minutes: fifteen organs"]
 fn shells_of_organs_run_under_pressure() {
     let Some(data) = std::env::var_os("PLIANT_DATA") else {
         println!("skipped: PLIANT_DATA is not set");

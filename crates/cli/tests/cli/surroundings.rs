@@ -310,6 +310,16 @@ fn a_sandbox_keeps_a_scene_in_its_folder() {
         assert_eq!(told.code, if allowed { 0 } else { 2 }, "{mesh}, {table}: {}", told.err);
         let says = told.words().contains("it is outside the scene's folder");
         assert_eq!(says, !allowed, "{mesh}, {table}: {}", told.err);
+        // A run reads the same files, and leaves nothing where it may not.
+        let told =
+            workshop.pliant(&["run", "case", "--sandbox", "--until", "1e-4", "--out", "out", "--force"]);
+        assert_eq!(told.code, if allowed { 0 } else { 2 }, "{mesh}, {table}: {}", told.err);
+        let says = told.words().contains("it is outside the scene's folder");
+        assert_eq!(says, !allowed, "{mesh}, {table}: {}", told.err);
+        assert_eq!(workshop.path("out").exists(), allowed, "{mesh}, {table}");
+        if allowed {
+            std::fs::remove_dir_all(workshop.path("out")).unwrap();
+        }
     }
     // The scene file itself.
     workshop.write("elsewhere/other.toml", naming("organ.vtk", "table.csv"));

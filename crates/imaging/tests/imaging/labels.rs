@@ -1,11 +1,12 @@
 //! Labels and their names: segmentations in DICOM, names in NRRD and NIfTI, masks, scans without labels, paths that are not files.
 
 use std::fs;
+use std::io::Write;
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
 use pliant_imaging::{
-    Choice, Image, ImageError, ImageFormat, LabelChoice, LabelError, ReadOptions, read, read_bytes,
+    Choice, Image, ImageError, ImageFormat, LabelChoice, LabelError, ReadOptions, read, read_bytes, read_with,
 };
 
 use pliant_testing::image_files::*;
@@ -259,4 +260,60 @@ fn pipes_and_devices_are_refused_and_not_waited_for() {
         let told = read(&path, &ReadOptions::default()).unwrap_err().to_string();
         assert!(told.contains("ElementDataFile") && told.contains("not a regular file"), "{told}");
     }
+}
+
+/// Images of more than 16 MB are told how far reading and cutting are, from nothing to the end and never back.
+#[test]
+fn reading_and_cutting_a_large_image_tell_how_far_they_are() {
+    let dims = [260, 260, 160];
+    let label = |at: usize| i16::from((100..160).contains(&(at % 260)) && (40..100).contains(&(at / 67_600)));
+    let values: Vec<i16> = (0..dims.iter().product()).map(label).collect();
+    let volume = Volume { dims, values, ..Volume::oblique() };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("large.nii.gz");
+    fs::write(&path, gzip(&volume.nifti())).unwrap();
+    let heard = std::cell::RefCell::new(Vec::new());
+    let progress = |done: f64| heard.borrow_mut().push(done);
+    let image = read_with(&path, &ReadOptions::default(), &progress).unwrap();
+    let reading = heard.take();
+    let cut = image.cut(&Choice::Labels(vec![1]), 1e-3, &progress).unwrap();
+    let cutting = heard.take();
+    println!("{reading:?} {cutting:?}");
+    for steps in [&reading, &cutting] {
+        assert!(steps.len() > 1 && steps.windows(2).all(|pair| pair[0] <= pair[1]), "{steps:?}");
+        assert!(steps[0] > 0.0 && steps[0] < 1.0 && *steps.last().unwrap() == 1.0, "{steps:?}");
+    }
+    assert_eq!(cut.labels.grid.dims, [60, 260, 60]);
+}
+
+/// 760³ labels of one byte are 0.44 GB; reading them from a gzip file and cutting a body out takes half as much again at most.
+#[test]
+#[ignore = "half a GB of memory and ten seconds; by itself, as it measures the peak of the process"]
+fn a_large_packed_image_takes_little_more_memory_than_its_voxels() {
+    let edge = 760_usize;
+    let small = Volume { dims: [edge; 3], values: Vec::new(), ..Volume::oblique() };
+    let mut header = nifti1(&small, Form::Sform, false);
+    header.truncate(352);
+    // One byte a voxel.
+    header[70..74].copy_from_slice(&[2, 0, 8, 0]);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("large.nii.gz");
+    let mut file =
+        flate2::write::GzEncoder::new(fs::File::create(&path).unwrap(), flate2::Compression::fast());
+    file.write_all(&header).unwrap();
+    for k in 0..edge {
+        let inside = (300..400).contains(&k);
+        let slice: Vec<u8> = (0..edge * edge)
+            .map(|at| {
+                u8::from(inside && (200..320).contains(&(at % edge)) && (100..300).contains(&(at / edge)))
+            })
+            .collect();
+        file.write_all(&slice).unwrap();
+    }
+    file.finish().unwrap();
+    let before = pliant_testing::PeakMemory::now();
+    let image = read_with(&path, &ReadOptions::default(), &|_| {}).unwrap();
+    let cut = image.cut(&Choice::Labels(vec![1]), 1e-3, &|_| {}).unwrap();
+    assert_eq!(cut.labels.grid.dims, [120, 200, 100]);
+    before.assert_rise_below((1.5 * (edge * edge * edge) as f64 / 1024.0) as u64);
 }

@@ -109,6 +109,19 @@ fn labels_that_are_off_are_told_and_better_where_they_are_protected() {
     println!("{}\n{}", coarse.report, fine.report);
     check_sound(&fine);
     let better = Assessment::of(&fine.mesh, &block, edge).expect("a body");
+    for (made, found) in [&coarse, &fine].into_iter().zip([&found, &better]) {
+        for material in &made.report.materials {
+            let label = material.label;
+            let part = material.volume / material.voxel_volume.expect("the image knows") - 1.0;
+            let volume = found.missed.iter().find_map(|missed| match missed {
+                Missed::LabelVolume { label: own, part } if *own == label => Some(*part),
+                _ => None,
+            });
+            println!("label {label}: {part:+.4}, told {volume:?}");
+            assert_eq!(volume.is_some(), part.abs() > 0.05 && material.tets > 0, "{label}: {part}");
+            assert!(volume.is_none_or(|told| (told - part).abs() < 1e-9), "{label}: {part}, {volume:?}");
+        }
+    }
     // The sharp corners of the block are still cut.
     assert!(!told(&better, 2) && !told(&better, 3), "{:?}", better.missed);
     assert!(off(&fine, 2) < 0.02 && off(&fine, 3) < 0.05, "{}", fine.report);

@@ -29,6 +29,23 @@ fn a_scene_names_an_image_and_laws_by_label() {
     assert!(close(&json["mass"], 14.1e-3, 0.05), "{json}");
 }
 
+/// The keys `inner-edge` and `distance` of a scene: larger cells inside, and smaller ones where the surface asks for them.
+#[test]
+fn a_scene_asks_for_larger_cells_inside_and_for_a_distance() {
+    let elements = |edge: &str, more: &str| {
+        let mesh = format!("{{ image = \"seg.nii.gz\", threshold = 5, edge = {edge}{more} }}");
+        let told = workshop(&mesh, "\"tissue\"").run(&["scene.until=1e-5"]);
+        (told.done()["elements"].as_u64().unwrap(), told.words())
+    };
+    let (even, _) = elements("0.0015", "");
+    let (graded, _) = elements("0.0015", ", inner-edge = 0.006");
+    assert!(4 * graded < 3 * even, "{graded} of {even}");
+    let (coarse, _) = elements("0.014", "");
+    let (close, words) = elements("0.014", ", distance = 0.001");
+    assert!(close > 2 * coarse, "{close} of {coarse}");
+    assert!(!words.contains("not reached"), "{words}");
+}
+
 #[test]
 fn a_scene_with_hexes_of_an_image_runs() {
     let workshop = workshop(
