@@ -660,6 +660,11 @@ impl Explicit {
         &self.forces
     }
 
+    /// Time spent in the parts of the solver so far.
+    pub fn phases(&self) -> Phases {
+        self.forces.system.phases
+    }
+
     /// The second half of a step: moves the state on with the forces that were evaluated at it.
     pub fn go(&mut self, state: &mut State) {
         let (h, model) = (self.step, Arc::clone(&self.forces.system.model));

@@ -40,6 +40,8 @@ pub struct Phases {
     pub preparation: Duration,
     /// Solution of the linear equations.
     pub solution: Duration,
+    /// How often the forces of the cells were found.
+    pub evaluations: usize,
     /// Linear equations solved.
     pub solutions: usize,
     /// Iterations of conjugate gradients.
@@ -446,6 +448,7 @@ impl System {
             self.turn_moments(state.load_factor);
         }
         self.phases.cells += start.elapsed();
+        self.phases.evaluations += 1;
         Ok(())
     }
 

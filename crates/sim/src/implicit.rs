@@ -782,3 +782,39 @@ fn numbered(
     }
     own
 }
+
+#[cfg(test)]
+mod tests {
+    use pliant_implicit::element::Elasticity;
+    use pliant_implicit::{Shell, Wall};
+
+    use super::*;
+    use crate::{Method, Steps};
+
+    /// Explicit steps cost little but their forces, which whoever looks at an instant and the step from there on share.
+    #[test]
+    fn explicit_shells_find_their_forces_once_a_step() {
+        let corner = |i: u32| Vector3::new(f64::from(i / 2) * 0.1, f64::from(i % 2) * 0.1, 0.0);
+        let mut model = Assembly::new("strip", (0..4).map(corner));
+        let material = Wall { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
+        model.add_shell(&Shell::new("strip", vec![[0, 2, 3], [0, 3, 1]], 0.002, material)).unwrap();
+        model.model_mut().fix("clamp", vec![0, 1]);
+        let part = Part::implicit("strip", model, 0.1, 0.01);
+        let Method::Implicit(bodies, _) = &part.method else { panic!("an implicit part") };
+        let step = 0.9 * Explicit::stable_step(&bodies.model);
+        let part = Part {
+            method: Method::ExplicitShells(Arc::clone(bodies)),
+            steps: Steps::within(0.1, step),
+            ..part.clone()
+        };
+        let mut shells = Implicit::new(&part, bodies).unwrap();
+        for _ in 0..50 {
+            // The loop of a run, and somebody who looks.
+            shells.evaluate(Wanted::Energies).unwrap();
+            shells.evaluate(Wanted::Energies).unwrap();
+            shells.advance(1, &mut |_| ()).unwrap();
+        }
+        let SolverMethod::Explicit(solver) = &shells.method else { panic!("an explicit solver") };
+        assert_eq!(solver.phases().evaluations, 50);
+    }
+}
