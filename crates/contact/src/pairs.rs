@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
+use crate::barrier::distance::edge_edge;
 use crate::tree::{Bounds, Tree};
 pub use narrow::Edge;
 use narrow::{Above, Across, is_beyond};
@@ -24,6 +25,8 @@ const REACH: f64 = 0.25;
 const SKIN: f64 = 0.25;
 /// What lists hold, over the skin: the rest is round-off of single precision.
 const HELD: f64 = 1.01;
+/// What nodes have moved, for the round-off of single precision.
+const ROUND_OFF: f64 = 1.0 + 1e-6;
 /// Overlap, over the mean edge, up to which a surface is seen from behind.
 const DEPTH: f64 = 0.25;
 /// The cosine of the angle between outward normals up to which surfaces face each other.
@@ -179,8 +182,15 @@ impl Side {
     }
 }
 
+#[inline]
 fn around<const N: usize>(nodes: [u32; N], place: &impl Fn(u32) -> Vector3<f64>) -> Bounds {
     Bounds::of(nodes.map(place))
+}
+
+/// The distance [m] of two edges: boxes of edges that lie askew reach farther.
+fn between(first: &Edge, second: &Edge, place: &impl Fn(u32) -> Vector3<f64>) -> f64 {
+    let ([a, b], [c, d]) = (first.ends.map(place), second.ends.map(place));
+    edge_edge(&[a, b, c, d]).distance
 }
 
 /// Two surfaces, or one, with the candidates for contact.
@@ -196,6 +206,8 @@ pub struct Pairs {
     points: [Vec<[u32; 2]>; 2],
     /// Edges of the first with edges of the second.
     crossings: Vec<[u32; 2]>,
+    /// How far [m] beyond what a step looks at candidates were apart when they were listed: points by boxes, then crossings.
+    room: [Vec<f32>; 3],
     /// Candidates of one surface that never touch, since they are too near at rest: nodes with triangles, edges with edges.
     apart: [Vec<[u32; 2]>; 2],
     near: Vec<u32>,
@@ -219,8 +231,8 @@ impl Pairs {
         });
         let mean = sum / count.max(1.0);
         let [reach, skin, depth] = [REACH, SKIN, DEPTH].map(|part| part * mean);
-        let (points, crossings, apart, near) = Default::default();
-        let mut own = Self { sides, offset, reach, skin, depth, points, crossings, apart, near };
+        let (points, crossings, room, apart, near) = Default::default();
+        let mut own = Self { sides, offset, reach, skin, depth, points, crossings, room, apart, near };
         if second.is_none() {
             own.set_apart(&place);
         }
@@ -276,8 +288,10 @@ impl Pairs {
     /// Lists what is within a reach [m] by its boxes.
     fn list(&mut self, place: &impl Fn(u32) -> Vector3<f64>, reach: f64) {
         self.sides.iter_mut().for_each(|side| side.take_places(place));
-        let Self { sides, points, crossings, apart, near, .. } = self;
+        let within = self.within();
+        let Self { sides, points, crossings, room, apart, near, .. } = self;
         near.clear();
+        room.iter_mut().for_each(Vec::clear);
         let alone = sides.len() == 1;
         let other = |side: usize| if alone { &sides[0] } else { &sides[1 - side] };
         for (number, side) in sides.iter().enumerate() {
@@ -295,7 +309,9 @@ impl Pairs {
                 });
                 list[first..].sort_unstable();
                 for [_, face] in &list[first..] {
-                    near.extend(other.faces[*face as usize]);
+                    let corners = other.faces[*face as usize];
+                    room[number].push((around(corners, place).apart(&Bounds::of([*at])) - within) as f32);
+                    near.extend(corners);
                 }
                 near.extend((list.len() > first).then_some(node));
             }
@@ -311,6 +327,7 @@ impl Pairs {
                 if once
                     && around(ends, place).touches(&wanted)
                     && apart[1].binary_search(&[number, against]).is_err()
+                    && between(edge, &other.edges[against as usize], place) <= reach
                 {
                     crossings.push([number, against]);
                 }
@@ -323,6 +340,10 @@ impl Pairs {
         }
         near.sort_unstable();
         near.dedup();
+        let distances = crossings.iter().map(|&[first, second]| {
+            between(&side.edges[first as usize], &other.edges[second as usize], place)
+        });
+        room[2].extend(distances.map(|distance| (distance - within) as f32));
     }
 
     /// Nodes of all candidates, increasing.
@@ -335,6 +356,7 @@ impl Pairs {
         [self.offset, self.reach, self.depth]
     }
 
+    #[inline]
     fn other(&self, side: usize) -> &Side {
         if self.sides.len() == 1 { &self.sides[0] } else { &self.sides[1 - side] }
     }
@@ -365,41 +387,62 @@ impl Pairs {
     pub fn find(&self, place: impl Fn(u32) -> Vector3<f64>, mut found: impl FnMut(Pair)) {
         let (limit, within) = (self.offset + self.reach, self.within());
         let wanted = |pair: &Pair| -self.depth < pair.distance && pair.distance < limit;
+        // Candidates come nearer by what both have moved at most. So most of the skin need no look.
+        let moved = self.sides.iter().map(|side| side.moved(&place)).fold(0.0, f64::max).sqrt();
+        let closed = (2.0 * ROUND_OFF * moved) as f32;
         let mut rows = Vec::new();
         for (number, side) in self.sides.iter().enumerate() {
+            let mut room = &self.room[number][..];
             for list in self.points[number].chunk_by(|a, b| a[0] == b[0]) {
-                self.find_above(list, side, self.other(number), &place, &mut rows, |pair| {
+                let (rooms, rest) = room.split_at(list.len());
+                room = rest;
+                let near =
+                    list.iter().zip(rooms).filter(|(_, room)| **room <= closed).map(|([_, face], _)| *face);
+                let own = (list[0][0] as usize, side);
+                self.find_above(own, (near, self.other(number)), &place, &mut rows, |pair| {
                     if wanted(&pair) {
                         found(Pair { in_order: number == 0, ..pair });
                     }
                 });
             }
         }
-        for &[first, second] in &self.crossings {
-            let edges = [&self.sides[0].edges[first as usize], &self.other(0).edges[second as usize]];
-            let Some(Across { weights: [s, t], normal, distance }) = Across::of(edges, within, &place) else {
-                continue;
-            };
-            let [[a, b], [c, d]] = edges.map(|edge| edge.ends);
-            let weights = [1.0 - s, s, t - 1.0, -t];
-            let pair = Pair { nodes: [a, b, c, d], weights, normal, distance, in_order: true };
-            if wanted(&pair) {
-                found(pair);
+        let other = self.other(0);
+        let mut room = &self.room[2][..];
+        for list in self.crossings.chunk_by(|a, b| a[0] == b[0]) {
+            let (own, rest) = room.split_at(list.len());
+            room = rest;
+            let first = &self.sides[0].edges[list[0][0] as usize];
+            let near = around(first.ends, &place).grown(within);
+            for (&[_, second], _) in list.iter().zip(own).filter(|(_, room)| **room <= closed) {
+                let second = &other.edges[second as usize];
+                // Boxes are compared in a fifth of the time of closest points.
+                if !around(second.ends, &place).touches(&near) {
+                    continue;
+                }
+                let Some(Across { weights: [s, t], normal, distance }) =
+                    Across::of([first, second], within, &place)
+                else {
+                    continue;
+                };
+                let [[a, b], [c, d]] = [first.ends, second.ends];
+                let weights = [1.0 - s, s, t - 1.0, -t];
+                let pair = Pair { nodes: [a, b, c, d], weights, normal, distance, in_order: true };
+                if wanted(&pair) {
+                    found(pair);
+                }
             }
         }
     }
 
-    /// Of a node with the triangles that are near it; `rows` is room for pairs.
+    /// Of a node, by its place in its surface, with the triangles that may be near it; `rows` is room for pairs.
     fn find_above(
         &self,
-        list: &[[u32; 2]],
-        side: &Side,
-        other: &Side,
+        (own, side): (usize, &Side),
+        (list, other): (impl Iterator<Item = u32>, &Side),
         place: &impl Fn(u32) -> Vector3<f64>,
         rows: &mut Vec<(u32, Pair)>,
         mut found: impl FnMut(Pair),
     ) {
-        let own = list[0][0] as usize;
         let node = side.nodes[own];
         let point = place(node);
         let within = self.within();
@@ -422,7 +465,7 @@ impl Pairs {
         // Whether the nearest edge or corner is of a triangle that does not.
         let mut faces = false;
         rows.clear();
-        for &[_, face] in list {
+        for face in list {
             let nodes = other.faces[face as usize];
             let corners = nodes.map(place);
             if !Bounds::of(corners).touches(&wanted) || is_beyond(within, &corners, &point) {

@@ -14,21 +14,33 @@ pub struct Bounds {
 
 impl Bounds {
     /// The least box around points [m].
+    #[inline]
     pub fn of<const N: usize>(points: [Vector3<f64>; N]) -> Self {
         let start = Self { low: points[0], high: points[0] };
         points[1..].iter().fold(start, |all, x| Self { low: all.low.inf(x), high: all.high.sup(x) })
     }
 
     /// The box with a margin [m] on all sides.
+    #[inline]
     pub fn grown(&self, margin: f64) -> Self {
         Self { low: self.low.add_scalar(-margin), high: self.high.add_scalar(margin) }
     }
 
     /// Whether two boxes share a point.
+    #[inline]
     pub fn touches(&self, other: &Self) -> bool {
         (0..3).all(|c| self.low[c] <= other.high[c] && other.low[c] <= self.high[c])
     }
 
+    /// The largest way [m] along an axis from one box to the other; negative if they overlap.
+    #[inline]
+    pub fn apart(&self, other: &Self) -> f64 {
+        (0..3)
+            .map(|c| (other.low[c] - self.high[c]).max(self.low[c] - other.high[c]))
+            .fold(f64::MIN, f64::max)
+    }
+
+    #[inline]
     fn with(&self, other: &Self) -> Self {
         Self { low: self.low.inf(&other.low), high: self.high.sup(&other.high) }
     }

@@ -10,6 +10,9 @@ use pliant_mechanics::tensor::{Vector, add};
 
 use crate::Scalar;
 
+/// Nodes whose forces are passed over together where nothing acts on them.
+pub(crate) const BLOCK: usize = 16;
+
 /// Forces applied to the nodes, found anew for each instant.
 pub(crate) struct AppliedForces {
     model: Arc<Model>,
@@ -19,8 +22,11 @@ pub(crate) struct AppliedForces {
     gravity: Vec<Vector<f64>>,
     body_of: Vec<u16>,
     grips: Vec<Grip>,
-    /// Whether forces of collective constraints or contacts are added.
-    binds: bool,
+    /// Whether loads or grips act, on any node.
+    loaded: bool,
+    /// The blocks of nodes that forces were added to at this instant, and a mark of each block.
+    added: Vec<u32>,
+    pushed: Vec<bool>,
 }
 
 impl AppliedForces {
@@ -32,40 +38,46 @@ impl AppliedForces {
         Self {
             nodal: vec![[0.0; 3]; model.node_count()],
             gravity: vec![[0.0; 3]; model.bodies.len()],
-            binds: model.collective().is_some(),
+            loaded: !model.loads.is_empty(),
+            added: Vec::new(),
+            pushed: vec![false; model.node_count().div_ceil(BLOCK)],
             model,
             body_of,
             grips: Vec::new(),
         }
     }
 
-    /// Takes other grips; whether any force acts from now on.
-    pub(crate) fn hold(&mut self, grips: &[Grip]) -> bool {
+    /// Takes other grips.
+    pub(crate) fn hold(&mut self, grips: &[Grip]) {
         self.grips.clear();
         self.grips.extend_from_slice(grips);
         self.nodal.fill([0.0; 3]);
-        self.acts()
+        self.loaded = !self.grips.is_empty() || !self.model.loads.is_empty();
     }
 
-    /// Takes forces of contacts from now on; whether any force acts.
-    pub(crate) fn touch(&mut self) -> bool {
-        self.binds = true;
-        self.acts()
-    }
-
-    /// Whether any force acts.
-    pub(crate) fn acts(&self) -> bool {
-        self.binds || !self.grips.is_empty() || !self.model.loads.is_empty()
+    /// Whether any force acts on the block of a node.
+    #[inline(always)]
+    pub(crate) fn acts_at(&self, node: usize) -> bool {
+        self.loaded || self.pushed[node / BLOCK]
     }
 
     /// Adds a force [N] on a node to those of the instant.
     pub(crate) fn add(&mut self, node: u32, force: Vector<f64>) {
         self.nodal[node as usize] = add(self.nodal[node as usize], force);
+        let block = node as usize / BLOCK;
+        if !std::mem::replace(&mut self.pushed[block], true) {
+            self.added.push(block as u32);
+        }
     }
 
     /// Finds the forces at a time [s] and in a deformed place.
     pub(crate) fn update<R: Scalar>(&mut self, time: f64, displacement: &[Vector<R>]) {
-        if !self.acts() {
+        for block in self.added.drain(..).map(|block| block as usize) {
+            self.pushed[block] = false;
+            let end = self.nodal.len().min((block + 1) * BLOCK);
+            self.nodal[block * BLOCK..end].fill([0.0; 3]);
+        }
+        if !self.loaded {
             return;
         }
         self.nodal.fill([0.0; 3]);

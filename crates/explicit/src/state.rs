@@ -36,8 +36,8 @@ pub struct State<R> {
     pub lags: Vec<Lag>,
     /// Nodes that jaws hold.
     pub gripped: Vec<Gripped>,
-    /// How far each node has slid on what it touches since its touch began [m]; empty without contacts.
-    pub slip: Vec<Option<f64>>,
+    /// Nodes that touch something, increasing, with how far each has slid on it since its touch began [m].
+    pub slip: Vec<(u32, f64)>,
 }
 
 /// Work accumulated over the steps [J].

@@ -21,7 +21,7 @@ use pliant_mechanics::tensor::{Vector, add};
 use rayon::prelude::*;
 
 use crate::Scalar;
-use crate::applied::AppliedForces;
+use crate::applied::{AppliedForces, BLOCK};
 use crate::collective::{Collective, Predicted, enclosed};
 use crate::energies::{Sums, model_balance_floor};
 use crate::forces::{Deformed, Found, InternalForces};
@@ -159,8 +159,6 @@ pub struct CentralDifference<R> {
     collectives: Vec<Collective>,
     /// Contacts with rigid things.
     touching: Option<Touching>,
-    /// True if there is any load, grip or collective constraint.
-    loaded: bool,
     processor: Processor,
     /// Factors on the amplitudes of each constraint now and after the step.
     factors: Vec<[[f64; 2]; 2]>,
@@ -238,9 +236,6 @@ pub(crate) fn sum_owned<R: Scalar>(
     sum
 }
 
-/// Nodes that are passed over together, all components side by side.
-const BLOCK: usize = 16;
-
 /// A pass over the nodes from `first` on: the coming increments, reactions and sums.
 struct NodePass<'a, R> {
     stepper: &'a CentralDifference<R>,
@@ -267,7 +262,8 @@ impl<R: Scalar> LaneWork<R> for NodePass<'_, R> {
                 block = Block::at_rest();
             }
             stepper.forces.at_nodes(nodes.clone(), &mut block.internal);
-            if stepper.loaded {
+            let mut pushed = stepper.applied.acts_at(nodes.start);
+            if pushed {
                 for (to, node) in block.external.iter_mut().zip(nodes.clone()) {
                     *to = stepper.applied.at(node);
                 }
@@ -276,7 +272,6 @@ impl<R: Scalar> LaneWork<R> for NodePass<'_, R> {
             block.mass[..before.len()].copy_from_slice(&stepper.mass[nodes.clone()]);
             block.damping[..before.len()].copy_from_slice(&stepper.damping[nodes.clone()]);
             block.move_freely(&pace);
-            let mut pushed = stepper.loaded;
             while let Some(held) = held.next_if(|held| (held.node as usize) < nodes.end) {
                 let node = held.node as usize;
                 let to = node - nodes.start;
@@ -431,7 +426,6 @@ impl<R: Scalar> CentralDifference<R> {
                 .map(|node| [R::of(if follows[node] { 1.0 } else { model.inertia(node) }); 3])
                 .collect(),
             damping,
-            loaded: applied.acts(),
             applied,
             collectives: Collective::all(&model),
             touching: None,
@@ -457,7 +451,6 @@ impl<R: Scalar> CentralDifference<R> {
     #[must_use]
     pub fn touching(mut self, contacts: Arc<Contacts>) -> Self {
         self.touching = Some(Touching::new(contacts, &self.model.rest));
-        self.loaded = self.applied.touch();
         self
     }
 
@@ -473,7 +466,7 @@ impl<R: Scalar> CentralDifference<R> {
 
     /// Takes hold of points: these grips and no others act from the next evaluation on. Their work is external.
     pub fn hold(&mut self, grips: &[Grip]) {
-        self.loaded = self.applied.hold(grips);
+        self.applied.hold(grips);
     }
 
     /// Runs in the lanes of certain instructions instead of the widest.
@@ -556,7 +549,6 @@ impl<R: Scalar> CentralDifference<R> {
         });
         self.model.follow(&mut state.displacement);
         if let Some(touching) = &mut self.touching {
-            state.slip.resize(self.next.len(), None);
             touching.slide(&mut state.slip);
         }
         state.work.advance();
@@ -632,10 +624,11 @@ impl<R: Scalar> CentralDifference<R> {
         let mut gripped = std::mem::take(&mut state.gripped);
         let mut lags = std::mem::take(&mut state.lags);
         let rest = |node: u32| self.model.rest[node as usize];
+        let ratio = self.lengths.ratio() * self.lengths.ratio();
         let now = |node: u32| {
             let (moved, way) = (state.displacement[node as usize], state.increment[node as usize]);
-            let way = way.iter().map(|x| x.to_f64() * x.to_f64()).sum::<f64>().sqrt();
-            (add(rest(node), moved.map(|x| x.to_f64())), way * self.lengths.ratio())
+            let way = way.iter().map(|x| x.to_f64() * x.to_f64()).sum::<f64>();
+            (moved.map(|x| x.to_f64()), way * ratio)
         };
         let free = |node: u32| {
             let Predicted { mut displacement, mobility, .. } = self.predicted(state, node);

@@ -47,7 +47,6 @@ pub(crate) struct Free {
 /// A node in a step.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    now: Vector3<f64>,
     free: Vector3<f64>,
     then: Vector3<f64>,
     /// By how much contacts can move each component; zero also of nodes that jaws hold.
@@ -74,7 +73,6 @@ impl Node {
     const NONE: Self = {
         let zero = Vector3::new(0.0, 0.0, 0.0);
         Self {
-            now: zero,
             free: zero,
             then: zero,
             mobility: zero,
@@ -100,14 +98,19 @@ impl Node {
 enum Own {
     Rigid(Box<AtRigid>),
     /// Bodies, with a sign ([`Contact::pairs`](pliant_contact::touch::Contact::pairs)).
-    Bodies(Pairs, f64),
+    Bodies(Box<Pairs>, f64),
 }
 
 /// The contacts of a model, with the nodes that they are about.
 pub(crate) struct Touching {
     contacts: Arc<Contacts>,
     numbers: Vec<u32>,
+    /// Where the nodes are at rest, and before the step [m].
+    rest: Vec<Vector3<f64>>,
+    places: Vec<Vector3<f64>>,
     nodes: Vec<Node>,
+    /// The nodes that may touch something in the step, increasing.
+    near: Vec<u32>,
     own: Vec<Own>,
     /// Distances [m] of the nodes from a rigid thing, by node.
     distances: Vec<f64>,
@@ -116,6 +119,8 @@ pub(crate) struct Touching {
     faces: Vec<[u32; 3]>,
     /// Impulses [N] on each node in a step, and their slips weighted by them.
     slips: Vec<[f64; 2]>,
+    /// Room for the nodes that slide.
+    slid: Vec<(u32, f64)>,
     /// The force [N] of each contact on its first surface at the last evaluation.
     pub forces: Vec<Vector<f64>>,
 }
@@ -134,16 +139,20 @@ impl Touching {
             };
             match contact.with {
                 With::Rigid(rigid) => Some(at_rigid(rigid)),
-                _ => contact.pairs(number, place).map(|(pairs, sign)| Own::Bodies(pairs, sign)),
+                _ => contact.pairs(number, place).map(|(pairs, sign)| Own::Bodies(Box::new(pairs), sign)),
             }
         });
         let own = parts.flatten().collect();
         Self {
+            rest: (0..numbers.len() as u32).map(place).collect(),
+            places: vec![Vector3::zeros(); numbers.len()],
+            near: Vec::new(),
             nodes: vec![Node::NONE; numbers.len()],
             distances: vec![0.0; numbers.len()],
             rows: Vec::new(),
             faces: nodal::faces(&contacts, &numbers),
             slips: vec![[0.0; 2]; numbers.len()],
+            slid: Vec::new(),
             numbers,
             own,
             forces: vec![[0.0; 3]; contacts.contacts.len()],
@@ -151,8 +160,8 @@ impl Touching {
         }
     }
 
-    /// Finds the forces of contacts in a step. `now` is the place of a node [m] and about the way [m] it goes in the step; `gripped` are the
-    /// nodes that jaws hold.
+    /// Finds the forces of contacts in a step. `now` is the displacement of a node [m] and about the square of the way [m²] it goes in the step;
+    /// `gripped` are the nodes that jaws hold.
     pub fn find(
         &mut self,
         postures: impl Fn(usize, &Rigid) -> Posture,
@@ -162,10 +171,15 @@ impl Touching {
     ) {
         self.forces.fill([0.0; 3]);
         let mut farthest = 0.0_f64;
-        for (node, &number) in self.nodes.iter_mut().zip(&self.numbers) {
-            let (place, way) = now(number);
-            (node.now, node.near, node.paired) = (place.into(), false, false);
+        for ((at, rest), &number) in self.places.iter_mut().zip(&self.rest).zip(&self.numbers) {
+            let (displacement, way) = now(number);
+            *at = rest + Vector3::from(displacement);
             farthest = farthest.max(way);
+        }
+        let farthest = farthest.sqrt();
+        for node in self.near.drain(..) {
+            let node = &mut self.nodes[node as usize];
+            (node.near, node.paired) = (false, false);
         }
         for own in &mut self.own {
             if let Own::Rigid(own) = own {
@@ -176,7 +190,7 @@ impl Touching {
         }
         gripped.retain(|held| self.holder(held).is_some_and(|(_, own, _)| own.grips));
         self.look(farthest, free, gripped);
-        if self.nodes.iter().any(|node| node.near) {
+        if !self.near.is_empty() {
             self.hold(gripped);
             self.measure();
             self.solve();
@@ -216,33 +230,42 @@ impl Touching {
 
     /// The force [N] on each node that touches something.
     pub fn nodal_forces(&self) -> impl Iterator<Item = (u32, Vector<f64>)> {
-        let touching = |(node, _): &(&Node, &u32)| node.near && node.then != node.free;
-        let nodes = self.nodes.iter().zip(&self.numbers).filter(touching);
-        nodes.map(|(node, &number)| (number, over(&(node.then - node.free), &node.own).into()))
+        let nodes = self.near.iter().map(|&node| (&self.nodes[node as usize], self.numbers[node as usize]));
+        let touching = nodes.filter(|(node, _)| node.then != node.free);
+        touching.map(|(node, number)| (number, over(&(node.then - node.free), &node.own).into()))
     }
 
     /// Finds the nodes that may touch in the step, and where they go; rows of the points near rigid things.
     fn look(&mut self, farthest: f64, free: impl Fn(u32) -> Free, gripped: &[Gripped]) {
-        let Self { contacts, numbers, nodes, own, distances, rows, .. } = self;
+        let Self { contacts, numbers, places, nodes, near, own, distances, rows, .. } = self;
         rows.clear();
+        let mut mark = |node: u32| {
+            if !std::mem::replace(&mut nodes[node as usize].near, true) {
+                near.push(node);
+            }
+        };
         for (index, own) in own.iter_mut().enumerate() {
             match own {
                 Own::Rigid(own) => {
                     let offset = contacts.contacts[index].touch.offset;
-                    own.look(&contacts.rigids[own.rigid], offset + 2.0 * farthest, nodes, distances, |row| {
+                    let (rigid, room) = (&contacts.rigids[own.rigid], offset + 2.0 * farthest);
+                    own.look(rigid, room, places, distances, |row| {
                         rows.push(Row { contact: index, ..row });
                     });
+                    own.near.iter().for_each(|&node| mark(node));
                 }
                 Own::Bodies(pairs, _) => {
-                    pairs.update(|node| nodes[node as usize].now);
-                    pairs.near().iter().for_each(|&node| nodes[node as usize].near = true);
+                    pairs.update(|node| places[node as usize]);
+                    pairs.near().iter().for_each(|&node| mark(node));
                 }
             }
         }
         for node in gripped.iter().filter_map(|held| numbers.binary_search(&held.node).ok()) {
-            nodes[node].near = true;
+            mark(node as u32);
         }
-        for (node, &number) in nodes.iter_mut().zip(numbers.iter()).filter(|(node, _)| node.near) {
+        near.sort_unstable();
+        for &node in near.iter() {
+            let (node, number) = (&mut nodes[node as usize], numbers[node as usize]);
             let Free { then, mobility } = free(number);
             (node.free, node.then) = (then.into(), then.into());
             (node.mobility, node.own) = (mobility.into(), mobility.into());
@@ -306,11 +329,11 @@ impl Touching {
 
     /// Finds the gaps of all rows; leaves out those that are too wide to close.
     fn measure(&mut self) {
-        let Self { contacts, nodes, own, rows, .. } = self;
+        let Self { contacts, places, nodes, own, rows, .. } = self;
         let mut deepest = 0.0_f64;
         rows.retain_mut(|row| {
             let Own::Rigid(own) = &own[row.contact] else { return false };
-            let now = row.place(nodes);
+            let now = row.place(places, nodes);
             let rigid = &contacts.rigids[own.rigid];
             let offset = contacts.contacts[row.contact].touch.offset;
             let Near { distance, normal } = own.passage.meet(rigid, offset, &now, &row.place);
@@ -324,10 +347,10 @@ impl Touching {
             let first = rows.len();
             // Impulses along the way between two points before the step have no moment.
             pairs.find(
-                |node| nodes[node as usize].now,
+                |node| places[node as usize],
                 |pair| {
                     let mut row = Row::new(index, pair.nodes, pair.weights);
-                    row.carried = row.place(nodes);
+                    row.carried = row.place(places, nodes);
                     (row.normal, row.sign) = (pair.normal, if pair.in_order { *sign } else { -sign });
                     row.gap = row.normal.dot(&row.place) - offset;
                     deepest = deepest.max(-row.gap);
@@ -367,7 +390,10 @@ impl Touching {
 
     /// Links the rows of each node alone.
     fn chain(&mut self) {
-        self.nodes.iter_mut().for_each(|node| (node.first, node.depth) = (NONE, 0.0));
+        for &node in &self.near {
+            let node = &mut self.nodes[node as usize];
+            (node.first, node.depth) = (NONE, 0.0);
+        }
         let numbered = self.rows.iter_mut().enumerate().rev();
         for (number, row) in numbered.filter(|(_, row)| row.count == 1) {
             let node = &mut self.nodes[row.nodes[0] as usize];
@@ -392,7 +418,7 @@ impl Touching {
 
     /// Sides of things beside nodes that impulses have moved, and their impulses, a node at a time. How far that moves a node at most [m].
     fn settle(&mut self, deepest: f64) -> f64 {
-        let Self { contacts, nodes, own, rows, .. } = self;
+        let Self { contacts, places, nodes, own, rows, .. } = self;
         let mut farthest = 0.0_f64;
         for (index, own) in own.iter().enumerate() {
             let Own::Rigid(own) = own else { continue };
@@ -406,9 +432,9 @@ impl Touching {
                 let before = nodes[at].then;
                 for _ in 0..LOOKED {
                     let place = nodes[at].then;
-                    let (gap, normal) = own.gap(rigid, touch.offset, &nodes[at]);
+                    let (gap, normal) = own.gap(rigid, touch.offset, &places[at], &place);
                     let side = if gap < -OFF * depth {
-                        let carried = own.passage.carry(&nodes[at].now);
+                        let carried = own.passage.carry(&places[at]);
                         idle(rows, &mut nodes[at], Row { carried, ..Row::new(index, [number], [1.0]) })
                     } else if gap > OFF * depth {
                         take_back(rows, &mut nodes[at], index)
@@ -433,10 +459,11 @@ impl Touching {
             let Own::Rigid(own) = own else { continue };
             let rigid = &self.contacts.rigids[own.rigid];
             for &node in &own.near {
+                let now = &self.places[node as usize];
                 let node = &mut self.nodes[node as usize];
                 let mut first = None;
                 for _ in 0..LIFTS {
-                    let (gap, normal) = own.gap(rigid, contact.touch.offset, node);
+                    let (gap, normal) = own.gap(rigid, contact.touch.offset, now, &node.then);
                     let deepest = *first.get_or_insert(gap.min(0.0));
                     let along = node.mobility.component_mul(&normal);
                     if gap >= LIFTED * deepest || along.dot(&normal) <= 0.0 {

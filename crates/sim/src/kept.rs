@@ -193,7 +193,8 @@ fn fits<R: Scalar>(state: &State<R>, memory: &Memory<R>, part: &Part) -> bool {
             && (held.node as usize) < model.node_count()
             && held.at.iter().all(|x| x.is_finite())
     };
-    let slides = state.slip.is_empty() || state.slip.len() == model.node_count();
+    let slides = state.slip.is_sorted_by(|(a, _), (b, _)| a < b)
+        && state.slip.iter().all(|&(node, way)| (node as usize) < model.node_count() && way.is_finite());
     if !led || !lags || !slides || !state.gripped.iter().all(grips) {
         return false;
     }

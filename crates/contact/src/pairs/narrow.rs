@@ -30,6 +30,7 @@ impl Edge {
 }
 
 /// Whether a point is farther than a distance [m] from the plane of a triangle.
+#[inline]
 pub(super) fn is_beyond(within: f64, [a, b, c]: &[Vector3<f64>; 3], point: &Vector3<f64>) -> bool {
     let area = (b - a).cross(&(c - a));
     let height = area.dot(&(point - a));
@@ -51,6 +52,7 @@ pub(super) struct Above {
 
 impl Above {
     /// With points that are so far beside the triangle, over its height, as inner ones.
+    #[inline]
     pub fn of(corners: &[Vector3<f64>; 3], point: &Vector3<f64>, beside: f64) -> Self {
         let [a, b, c] = corners;
         let area = (b - a).cross(&(c - a));
@@ -79,6 +81,7 @@ impl Above {
 }
 
 /// Whether a way leads along a normal, or hardly against it: bodies that touch press each other flat, and what is flat is not left to round-off.
+#[inline]
 fn is_before(normal: &Vector3<f64>, way: &Vector3<f64>) -> bool {
     normal.dot(way) >= -FLAT * way.norm()
 }

@@ -6,7 +6,6 @@ use pliant_contact::pose::Pose;
 use pliant_contact::shape::{Near, Shape};
 use pliant_contact::touch::{LEFT, MARGIN, Passage, Rigid, lattice, parts_of};
 
-use super::Node;
 use super::rows::Row;
 
 /// How much farther than nodes count as near they are listed, over that margin.
@@ -58,20 +57,27 @@ impl AtRigid {
     }
 
     /// The gap [m] of a node as it lies in the step, less what may be left of it, and the direction away from the thing.
-    pub fn gap(&self, rigid: &Rigid, offset: f64, node: &Node) -> (f64, Vector3<f64>) {
-        let Near { distance, normal } = self.passage.near(rigid, &node.then);
+    /// `now` is its place before the step, `then` that after it [m].
+    pub fn gap(
+        &self,
+        rigid: &Rigid,
+        offset: f64,
+        now: &Vector3<f64>,
+        then: &Vector3<f64>,
+    ) -> (f64, Vector3<f64>) {
+        let Near { distance, normal } = self.passage.near(rigid, then);
         let mut gap = distance - offset;
         if gap < 0.0 {
-            gap -= LEFT * (self.passage.distance_before(rigid, &node.now) - offset).min(0.0);
+            gap -= LEFT * (self.passage.distance_before(rigid, now) - offset).min(0.0);
         }
         (gap, normal)
     }
 
     /// Lists what is within a distance [m] of the thing, if the list does not hold so much any more.
-    fn list(&mut self, rigid: &Rigid, room: f64, nodes: &[Node]) {
+    fn list(&mut self, rigid: &Rigid, room: f64, places: &[Vector3<f64>]) {
         let Self { surface, samples, margin, passage, listed, .. } = self;
-        let places = || surface.nodes.iter().map(|&node| nodes[node as usize].now);
-        let moved = places().zip(&listed.places).map(|(now, then)| (now - then).norm_squared());
+        let own = || surface.nodes.iter().map(|&node| places[node as usize]);
+        let moved = own().zip(&listed.places).map(|(now, then)| (now - then).norm_squared());
         let moved = moved.fold(0.0, f64::max).sqrt() + passage.travel_from(rigid, &listed.pose);
         if !listed.places.is_empty() && room + moved <= listed.reach {
             return;
@@ -81,16 +87,16 @@ impl AtRigid {
         let grows_evenly = !matches!(rigid.shape, Shape::Grid(_));
         (*reach, *pose) = (if grows_evenly { room + SKIN * *margin } else { f64::INFINITY }, passage.pose());
         then.clear();
-        then.extend(places());
+        then.extend(own());
         near.clear();
         faces.clear();
         let distance = |point: &Vector3<f64>| passage.near(rigid, point).distance;
-        near.extend(surface.nodes.iter().filter(|&&node| distance(&nodes[node as usize].now) < *reach));
+        near.extend(surface.nodes.iter().filter(|&&node| distance(&places[node as usize]) < *reach));
         if samples.is_empty() {
             return;
         }
         for (face, number) in surface.faces.iter().zip(0..) {
-            let (middle, around) = middle(face, nodes);
+            let (middle, around) = middle(face, places);
             if distance(&middle) < *reach + around {
                 faces.push(number);
                 near.extend(face);
@@ -100,20 +106,20 @@ impl AtRigid {
         near.dedup();
     }
 
-    /// Marks the nodes that may come nearer than a room [m] in the passage; rows of these and of points between them.
+    /// Finds the nodes that may come nearer than a room [m] in the passage; rows of these and of points between them.
     pub fn look(
         &mut self,
         rigid: &Rigid,
         room: f64,
-        nodes: &mut [Node],
+        places: &[Vector3<f64>],
         distances: &mut [f64],
         mut found: impl FnMut(Row),
     ) {
         let room = room + self.margin + self.passage.travel();
-        self.list(rigid, room, nodes);
+        self.list(rigid, room, places);
         self.near.clear();
         for &node in &self.listed.nodes {
-            let distance = self.passage.near(rigid, &nodes[node as usize].now).distance;
+            let distance = self.passage.near(rigid, &places[node as usize]).distance;
             distances[node as usize] = distance;
             if distance < room {
                 self.near.push(node);
@@ -122,8 +128,8 @@ impl AtRigid {
         }
         for &face in &self.listed.faces {
             let face = self.surface.faces[face as usize];
-            let corners = face.map(|node| nodes[node as usize].now);
-            let (middle, around) = middle(&face, nodes);
+            let corners = face.map(|node| places[node as usize]);
+            let (middle, around) = middle(&face, places);
             // No point is nearer than one beside it by more than the way between both.
             let own = face.map(|node| distances[node as usize]);
             if own.iter().all(|&distance| distance > room + 2.0 * around) {
@@ -151,13 +157,12 @@ impl AtRigid {
         }
         self.near.sort_unstable();
         self.near.dedup();
-        self.near.iter().for_each(|&node| nodes[node as usize].near = true);
     }
 }
 
 /// The middle of a face [m], and how far its corners are from there at most [m].
-fn middle(face: &[u32; 3], nodes: &[Node]) -> (Vector3<f64>, f64) {
-    let corners = face.map(|node| nodes[node as usize].now);
+fn middle(face: &[u32; 3], places: &[Vector3<f64>]) -> (Vector3<f64>, f64) {
+    let corners = face.map(|node| places[node as usize]);
     let middle = corners.iter().sum::<Vector3<f64>>() / 3.0;
     (middle, corners.iter().map(|corner| (corner - middle).norm()).fold(0.0, f64::max))
 }
@@ -204,22 +209,22 @@ mod tests {
             };
             let fresh = || AtRigid::new(&rigid, 0, surface.clone(), |node| rest[node as usize]);
             let (mut own, mut random) = (fresh(), Random::new(7));
-            let mut nodes = vec![Node::NONE; rest.len()];
+            let mut places = rest.clone();
             let mut before = Pose::translation(0.1, 0.5, 0.1);
             let (mut listed, mut found) = (0, 0);
             for step in 0..400 {
                 let time = f64::from(step) * 0.01;
-                for (node, at) in nodes.iter_mut().zip(&rest) {
-                    node.now =
+                for (place, at) in places.iter_mut().zip(&rest) {
+                    *place =
                         at + Vector3::z() * (0.02 * (3.0 * time + 5.0 * at.x).sin() + 1e-4 * random.part());
                 }
                 let turn = Vector3::new(0.2 * time.sin(), 0.0, 0.1 * time);
                 let after = Pose::new(Vector3::new(0.1 + 0.2 * time, 0.5, 0.08 + 0.05 * time.cos()), turn);
-                let mut rows = |own: &mut AtRigid| {
+                let rows = |own: &mut AtRigid| {
                     own.passage = Passage::new(&rigid, [before, after]);
                     let mut rows = Vec::new();
                     let mut distances = vec![0.0; rest.len()];
-                    own.look(&rigid, 1e-3, &mut nodes, &mut distances, |row| {
+                    own.look(&rigid, 1e-3, &places, &mut distances, |row| {
                         rows.push((row.nodes, row.weights))
                     });
                     rows

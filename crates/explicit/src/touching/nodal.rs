@@ -40,7 +40,7 @@ pub(super) fn faces(contacts: &Contacts, numbers: &[u32]) -> Vec<[u32; 3]> {
 
 impl Touching {
     /// All nodes that may touch, increasing, at the instant whose forces were found last. `slip` is that of [`State`](crate::State).
-    pub fn nodal(&self, slip: &[Option<f64>]) -> Vec<NodeContact> {
+    pub fn nodal(&self, slip: &[(u32, f64)]) -> Vec<NodeContact> {
         let (pressures, gaps) = (self.pressures(), self.gaps());
         let parts = self.numbers.iter().zip(&self.nodes).zip(pressures).zip(gaps);
         parts
@@ -49,7 +49,7 @@ impl Touching {
                 force: if own.near { over(&(own.then - own.free), &own.own).into() } else { [0.0; 3] },
                 pressure,
                 gap: Some(gap).filter(|gap| gap.is_finite()),
-                slip: slip.get(node as usize).copied().flatten(),
+                slip: way_of(slip, node),
             })
             .collect()
     }
@@ -90,7 +90,7 @@ impl Touching {
         let mut shares = vec![[0.0; 2]; self.nodes.len()];
         let mut has_faces = vec![false; self.nodes.len()];
         for face in &self.faces {
-            let [a, b, c] = face.map(|node| self.nodes[node as usize].now);
+            let [a, b, c] = face.map(|node| self.places[node as usize]);
             let third = (b - a).cross(&(c - a)) / 6.0;
             for node in face.map(|node| node as usize) {
                 let along = third.dot(&directions[node]);
@@ -115,13 +115,13 @@ impl Touching {
                 Own::Rigid(own) => {
                     let rigid = &self.contacts.rigids[own.rigid];
                     for &node in &own.surface.nodes {
-                        let now = &self.nodes[node as usize].now;
+                        let now = &self.places[node as usize];
                         let gap = &mut gaps[node as usize];
                         *gap = gap.min(own.passage.distance_before(rigid, now) - offset);
                     }
                 }
                 Own::Bodies(pairs, _) => pairs.find(
-                    |node| self.nodes[node as usize].now,
+                    |node| self.places[node as usize],
                     |pair| {
                         if pair.weights[0] == 1.0 {
                             let gap = &mut gaps[pair.nodes[0] as usize];
@@ -136,9 +136,9 @@ impl Touching {
 
     /// Adds the ways [m] that nodes slide in the step whose forces were found last. Where several points bear on a node, their mean counts,
     /// weighted by their impulses. A touch lasts while something bears on the node, or while it is as near as that.
-    pub fn slide(&mut self, slip: &mut [Option<f64>]) {
-        let Self { nodes, rows, slips, .. } = self;
-        slips.fill([0.0; 2]);
+    pub fn slide(&mut self, slip: &mut Vec<(u32, f64)>) {
+        let Self { nodes, rows, slips, near, .. } = self;
+        near.iter().for_each(|&index| slips[index as usize] = [0.0; 2]);
         for row in rows.iter().filter(|row| row.push > 0.0) {
             let place = row.parts().map(|(node, weight)| nodes[node].then * weight).sum::<Vector3<f64>>();
             let way = across(&(place - row.carried), &row.normal);
@@ -147,14 +147,18 @@ impl Touching {
                 slips[node] = [slips[node][0] + load, slips[node][1] + load * way];
             }
         }
-        for index in 0..self.numbers.len() {
-            let slip = &mut slip[self.numbers[index] as usize];
-            *slip = match (self.slips[index], *slip) {
+        let mut slid = std::mem::take(&mut self.slid);
+        slid.clear();
+        slid.extend(self.near.iter().filter_map(|&index| {
+            let node = self.numbers[index as usize];
+            let way = match (self.slips[index as usize], way_of(slip, node)) {
                 ([load, ways], before) if load > 0.0 => Some(before.unwrap_or(0.0) + ways / load),
-                (_, Some(before)) => self.hovering(index).map(|way| before + way),
+                (_, Some(before)) => self.hovering(index as usize).map(|way| before + way),
                 _ => None,
             };
-        }
+            way.map(|way| (node, way))
+        }));
+        self.slid = std::mem::replace(slip, slid);
     }
 
     /// The way [m] that a node slides in a step in which nothing bears on it; `None` if it leaves.
@@ -165,11 +169,16 @@ impl Touching {
             own.surface.nodes.binary_search(&(index as u32)).ok()?;
             let Near { distance, normal } = own.passage.near(&self.contacts.rigids[own.rigid], &node.then);
             let near = distance - contact.touch.offset < LASTS * own.margin;
-            near.then(|| across(&(node.then - own.passage.carry(&node.now)), &normal))
+            near.then(|| across(&(node.then - own.passage.carry(&self.places[index])), &normal))
         });
         // Its own part in a pair that bears nothing is not known.
         at_rigid.or(node.paired.then_some(0.0))
     }
+}
+
+/// How far [m] a node has slid, by its number.
+fn way_of(slip: &[(u32, f64)], node: u32) -> Option<f64> {
+    slip.binary_search_by_key(&node, |&(known, _)| known).ok().map(|at| slip[at].1)
 }
 
 /// Length [m] of a way across a normal.

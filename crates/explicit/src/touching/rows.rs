@@ -111,14 +111,14 @@ impl Row {
         self.mobility.component_mul(&more).norm()
     }
 
-    /// Takes places and mobilities; returns Σ cᵢ xᵢ [m] before the step.
-    pub fn place(&mut self, nodes: &[Node]) -> Vector3<f64> {
+    /// Takes places and mobilities after the step; returns Σ cᵢ xᵢ [m] before the step.
+    pub fn place(&mut self, places: &[Vector3<f64>], nodes: &[Node]) -> Vector3<f64> {
         let mut now = Vector3::zeros();
         let (mut place, mut mobility) = (Vector3::zeros(), Vector3::zeros());
         for (node, weight) in self.parts() {
+            now += places[node] * weight;
             let node = &nodes[node];
             place += node.then * weight;
-            now += node.now * weight;
             mobility += node.mobility * (weight * weight);
         }
         (self.place, self.mobility) = (place, mobility);

@@ -283,7 +283,7 @@ impl ContactReader<'_> {
     fn motion(&mut self, of: XmlElement<'_>) -> Result<RigidMotion, Fault> {
         let mut shift = Vector3::zeros();
         let mut turn: Option<([f64; 3], [f64; 3])> = None;
-        for motion in children(of, "RigidMotion") {
+        for motion in children(of, "Motion") {
             match motion.attribute("Type").map(str::trim) {
                 Some("Translation") => {
                     shift = Vector3::from(numbers_of::<3>(motion, "numbers of a translation")?);
@@ -298,7 +298,7 @@ impl ContactReader<'_> {
                         return Err(fault(motion, ImportProblem::Contradiction { what, remedy }));
                     }
                     self.note(
-                        "RigidMotion of type Rotation: three angles [rad] about x, then y, then z, and then the centre, as \
+                        "Motion of type Rotation: three angles [rad] about x, then y, then z, and then the centre, as \
                          NiftySim's code reads them; its guide may have the centre first",
                     );
                     turn = Some(([x, y, z], centre));
