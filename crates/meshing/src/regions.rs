@@ -132,3 +132,49 @@ fn volumes(mesh: &Mesh, anatomy: &Anatomy<'_>) -> Vec<LabelReport> {
     };
     anatomy.labels().into_iter().zip(anatomy.volumes()).map(of_label).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Volume and surface of a label are judged each by itself, at 5 % and at the distance allowed, and said with number and place.
+    #[test]
+    fn labels_off_by_volume_or_by_place_are_told_apart() {
+        let region = |label: i32, part: f64, away: f64| LabelReport {
+            label,
+            cells: 10,
+            volume: 1.0 + part,
+            input_volume: Some(1.0),
+            distances: Some(Deviation {
+                largest_from_body: away,
+                farthest: [0.01, 0.02, 0.03],
+                ..Deviation::default()
+            }),
+        };
+        let found = Regions {
+            labels: vec![
+                region(1, 0.049, 0.0039),
+                region(2, -0.16, 0.001),
+                region(3, 0.1, 0.001),
+                region(4, 0.01, 0.006),
+                LabelReport { cells: 0, ..region(5, -1.0, 0.02) },
+            ],
+            ..Regions::default()
+        };
+        let missed = found.missed(0.004);
+        let [
+            Missed::LabelVolume { label: 2, part },
+            _,
+            Missed::LabelAway { label: 4, place, distance },
+            Missed::Label { label: 5 },
+        ] = missed[..]
+        else {
+            panic!("{missed:?}")
+        };
+        assert!((part + 0.16).abs() < 1e-12 && distance == 0.006 && place == [0.01, 0.02, 0.03]);
+        let words: Vec<String> = missed.iter().map(ToString::to_string).collect();
+        assert_eq!(words[0], "label 2 has 16.0 % less volume than the input");
+        assert_eq!(words[1], "label 3 has 10.0 % more volume than the input");
+        assert!(words[2].starts_with("the surface of label 4 is 6.0 mm from the input at "), "{}", words[2]);
+    }
+}
