@@ -52,6 +52,10 @@ fn solvers_that_no_spring_ties_are_refused_with_the_line() {
             ["finds equilibria, which have no steps in common", "put both bodies into one participant"],
         ),
         (
+            apart("solver = 'static'"),
+            ["`vessel` is free in 6 rigid motions of 6", "participants hold nothing in a static run"],
+        ),
+        (
             apart("solver = 'implicit'\nstep = 0.01"),
             ["`walls` is implicit with longer steps than `solids`", "give it a `step` of at most"],
         ),

@@ -198,7 +198,15 @@ impl Builder<'_> {
                 counted(free_modes, "rigid motion"),
                 node - first
             );
-            let help = "fix more of its nodes, tie it to points with `type = \"spring\"`, or take `solver = \"implicit\"`";
+            let help = match self.source().node(&["participant"]) {
+                None => {
+                    "fix more of its nodes, tie it to points with `type = \"spring\"`, or take `solver = \"implicit\"`"
+                }
+                Some(_) => {
+                    "fix more of its nodes, or give its participant `solver = \"implicit\"`: ties to bodies of other \
+                     participants hold nothing in a static run"
+                }
+            };
             self.error(&["body", &name], message, "not held", help);
         }
     }
