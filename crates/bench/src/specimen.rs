@@ -7,7 +7,7 @@ use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE};
 use pliant_mechanics::model::{Averaging, Body, Cells, Constraint, Material, Model, Motion, Solid};
 use pliant_mechanics::tensor::Vector;
-use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell, Voxels};
+use pliant_meshing::{Block, Resolution, VolumeCell, Voxels};
 
 /// The hourglass coefficient of all hexahedra, the default of a scene.
 pub const HOURGLASS: f64 = 0.2;
@@ -216,7 +216,8 @@ impl Specimen {
 
 /// The mesh of [`Specimen::block`].
 pub(crate) fn block(size: [f64; 3], counts: [usize; 3], cells: VolumeCell) -> Mesh {
-    let mesh = Block::new(size).mesh(Resolution::Counts(counts), cells, DEFAULT_CELL_LIMIT);
+    // Cases choose their own sizes: cubes for GPUs have more cells than a user's mesh may have unasked.
+    let mesh = Block::new(size).mesh(Resolution::Counts(counts), cells, usize::MAX);
     mesh.unwrap_or_else(|error| panic!("{error}"))
 }
 

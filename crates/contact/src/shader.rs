@@ -53,7 +53,8 @@ pub fn shader(rigids: &[Rigid]) -> String {
             format!("const {name} = {own}u;\nconst HAS_{name} = {is_there};\n")
         })
         .collect();
-    [&numbers, &kinds, include_str!("shape.wgsl"), include_str!("touch.wgsl")].join("\n")
+    [&numbers, &kinds, include_str!("exact.wgsl"), include_str!("shape.wgsl"), include_str!("touch.wgsl")]
+        .join("\n")
 }
 
 fn constants(numbers: &[(&str, f64)]) -> String {
@@ -62,7 +63,7 @@ fn constants(numbers: &[(&str, f64)]) -> String {
 
 /// What surfaces find at each other, in WGSL: `find_above` of a node with triangles, and `find_crossing` of two edges.
 ///
-/// The module around it defines where nodes are and what happens with a pair; narrow.wgsl tells how.
+/// The module around it has the [`shader`] of rigid things, and defines where nodes are and what happens with a pair; narrow.wgsl tells how.
 pub fn pairs_shader() -> String {
     let numbers = [
         ("BESIDE", BESIDE),

@@ -1,4 +1,5 @@
-// Rigid shapes with their signed distance; twin of shape.rs and grid.rs. The module around it gives `thing_number`, and shader.rs the kinds.
+// Rigid shapes with their signed distance; twin of shape.rs and grid.rs. The module around it gives `thing_number`, and
+// shader.rs the kinds and exact.wgsl.
 
 // What a shape is at a point: its distance [m], negative inside, and the direction in which the distance grows.
 struct Near {
@@ -12,7 +13,7 @@ fn thing_vector(at: u32) -> vec3f {
 
 // A ball of a radius, from its centre.
 fn around(from_centre: vec3f, radius: f32) -> Near {
-    let distance = length(from_centre);
+    let distance = norm(from_centre);
     var normal = vec3f(1.0, 0.0, 0.0);
     if distance > 0.0 {
         normal = from_centre / distance;
@@ -22,7 +23,7 @@ fn around(from_centre: vec3f, radius: f32) -> Near {
 
 // A cylinder along z, of half its length.
 fn cylinder(point: vec3f, radius: f32, half: f32) -> Near {
-    let q = length(point.xy);
+    let q = flat_norm(point.xy);
     var radial = vec2f(1.0, 0.0);
     if q > 0.0 {
         radial = point.xy / q;
@@ -30,7 +31,7 @@ fn cylinder(point: vec3f, radius: f32, half: f32) -> Near {
     let up = select(1.0, -1.0, point.z < 0.0);
     let beyond = vec2f(q - radius, abs(point.z) - half);
     let outside = max(beyond, vec2f(0.0));
-    var distance = length(outside);
+    var distance = flat_norm(outside);
     var flat = vec2f(0.0, 1.0);
     if distance > 0.0 {
         flat = outside / distance;
@@ -44,7 +45,7 @@ fn cylinder(point: vec3f, radius: f32, half: f32) -> Near {
 fn cuboid(point: vec3f, half: vec3f) -> Near {
     let beyond = abs(point) - half;
     let outside = max(beyond, vec3f(0.0));
-    let distance = length(outside);
+    let distance = norm(outside);
     let signs = select(vec3f(1.0), vec3f(-1.0), point < vec3f(0.0));
     if distance > 0.0 {
         return Near(distance, outside * signs / distance);
@@ -60,18 +61,18 @@ fn cuboid(point: vec3f, half: vec3f) -> Near {
 
 // In the half-plane of the distance from the axis and the height, the nearest point of the base or of the slope.
 fn cone(point: vec3f, radius: f32, height: f32) -> Near {
-    let q = vec2f(length(point.xy), point.z);
+    let q = vec2f(flat_norm(point.xy), point.z);
     let rim = vec2f(radius, 0.0);
     let slope = vec2f(-radius, height);
     let on_base = vec2f(min(q.x, radius), 0.0);
     let on_slope = rim + slope * clamp(dot(q - rim, slope) / dot(slope, slope), 0.0, 1.0);
     let is_inside = q.y > 0.0 && q.x / radius + q.y / height < 1.0;
-    let is_at_base = length(q - on_base) < length(q - on_slope);
+    let is_at_base = flat_norm(q - on_base) < flat_norm(q - on_slope);
     let away = q - select(on_slope, on_base, is_at_base);
-    let distance = length(away);
+    let distance = flat_norm(away);
     let sign = select(1.0, -1.0, is_inside);
     // On the surface: across the slope or down.
-    var flat = select(normalize(vec2f(height, radius)), vec2f(0.0, -1.0), is_at_base || all(on_slope == rim));
+    var flat = select(vec2f(height, radius) / flat_norm(vec2f(height, radius)), vec2f(0.0, -1.0), is_at_base || all(on_slope == rim));
     if distance > 0.0 {
         flat = away * (sign / distance);
     }
@@ -112,7 +113,7 @@ fn sampled(at: u32, point: vec3f) -> Near {
     );
     var distance = lines.x + (lines.y - lines.x) * part.z;
     // Times the spacing.
-    let steepness = length(slope);
+    let steepness = norm(slope);
     var normal = vec3f(0.0, 0.0, 1.0);
     if steepness > 0.0 {
         normal = slope / steepness;
@@ -130,7 +131,7 @@ fn sampled(at: u32, point: vec3f) -> Near {
         return Near(distance + dot(normal, beyond), normal);
     }
     let from_surface = beyond + normal * distance;
-    let far = length(from_surface);
+    let far = norm(from_surface);
     return Near(far, select(normal, from_surface / far, far > 0.0));
 }
 

@@ -56,21 +56,21 @@ fn distance_before(passage: Passage, place: vec3f) -> f32 {
 
 // A vector turned about an axis by an angle [rad].
 fn rotated(by: vec3f, v: vec3f) -> vec3f {
-    let angle = length(by);
+    let angle = norm(by);
     if angle == 0.0 {
         return v;
     }
     let axis = by / angle;
-    let half = sin(0.5 * angle);
+    let half = sine(0.5 * angle);
     let across = cross(axis, v);
-    return v + sin(angle) * across + 2.0 * half * half * cross(axis, across);
+    return v + sine(angle) * across + 2.0 * half * half * cross(axis, across);
 }
 
 // The distance of a point that is predicted to go by `moved`, and the direction away from the thing; from its place less that of the thing
 // before. It is followed as `Passage::meet` does.
 fn meet(passage: Passage, offset: f32, place: vec3f, moved: vec3f) -> Near {
     let relative = moved - passage.shift;
-    let way = length(moved) + passage.travel;
+    let way = norm(moved) + passage.travel;
     let end = near_after(passage, place + relative);
     if way <= passage.half_thinnest && end.distance >= offset {
         return end;

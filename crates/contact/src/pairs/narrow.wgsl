@@ -2,7 +2,7 @@
 // `between(a, b)`, the way [m] from node b to node a before the step; `ring_of(k)`, the other corners, in order, of a triangle around a node, for every second k;
 // `corners_of(row)`, the triangle of a candidate; `at_border(row, corners)`,
 // whether those of its corners that are told are all at borders; `take_pair(row, nodes, weights, normal, distance)`, which notes a pair that is
-// found in the place of its candidate, and `leave_pair(row)`, which notes that there is none.
+// found in the place of its candidate, and `leave_pair(row)`, which notes that there is none; and exact.wgsl.
 //
 // Places are ways from one of the nodes, so that single precision keeps the digits of gaps.
 
@@ -28,7 +28,7 @@ struct Above {
 }
 
 fn unit(v: vec3f) -> vec3f {
-    let size = length(v);
+    let size = norm(v);
     return select(vec3f(0.0), v / max(size, 1e-37), size > 0.0);
 }
 
@@ -42,9 +42,9 @@ fn along_edge(a: vec3f, b: vec3f) -> f32 {
 // The weights of the point of the border of a triangle that is next to the origin.
 fn closest_of_border(a: vec3f, b: vec3f, c: vec3f) -> vec3f {
     let along = vec3f(along_edge(a, b), along_edge(b, c), along_edge(c, a));
-    let from_ab = length(mix(a, b, along.x));
-    let from_bc = length(mix(b, c, along.y));
-    let from_ca = length(mix(c, a, along.z));
+    let from_ab = norm(mix(a, b, along.x));
+    let from_bc = norm(mix(b, c, along.y));
+    let from_ca = norm(mix(c, a, along.z));
     if from_ab <= from_bc && from_ab <= from_ca {
         return vec3f(1.0 - along.x, along.x, 0.0);
     }
@@ -136,7 +136,7 @@ fn find_above(node: u32, ring: vec2u, first: u32, end: u32, within: f32, reach: 
             }
             continue;
         }
-        let distance = length(here.way);
+        let distance = norm(here.way);
         let same = SAME * nearest + ROUNDING * reach;
         if nearest == FAR || distance < nearest - same {
             nearest = distance;
@@ -152,7 +152,7 @@ fn find_above(node: u32, ring: vec2u, first: u32, end: u32, within: f32, reach: 
     }
     if faces && nearest < min(over, hidden) * (1.0 - SAME) - ROUNDING * reach {
         // In one plane with a triangle, beside it, is not beneath it.
-        let least = (SAME * nearest + ROUNDING * reach) * length(nearest_normals);
+        let least = (SAME * nearest + ROUNDING * reach) * norm(nearest_normals);
         let is_behind = dot(nearest_way, nearest_normals) < -least;
         // Who is behind a border is beside the surface.
         if !(is_behind && at_border(nearest_row, nearest_weights != vec3f(0.0))) {
@@ -189,7 +189,7 @@ fn find_above(node: u32, ring: vec2u, first: u32, end: u32, within: f32, reach: 
 
 // Whether a way leads along a normal, or hardly against it.
 fn is_before(normal: vec3f, way: vec3f) -> bool {
-    return dot(normal, way) >= -FLAT * length(way);
+    return dot(normal, way) >= -FLAT * norm(way);
 }
 
 // Finds where two edges from a to b and from c to d touch from outside, with the nodes across them of their triangles.
@@ -213,7 +213,7 @@ fn find_crossing(row: u32, nodes: vec4u, across: vec4u) {
     let of_first = array<vec3f, 2>(between(across.x, nodes.x), between(across.y, nodes.x));
     let of_second = array<vec3f, 2>(between(across.z, nodes.z), between(across.w, nodes.z));
     let outward = edge_outward(other, of_second[0], of_second[1], across.z == across.w);
-    var normal = area / sqrt(crossed);
+    var normal = area / root(crossed);
     if dot(normal, outward) < 0.0 {
         normal = -normal;
     }
@@ -227,7 +227,7 @@ fn find_crossing(row: u32, nodes: vec4u, across: vec4u) {
     }
     let distance = dot(normal, apart);
     // Edges that overlap by more than one of them goes on beyond the other leave each other past its end.
-    let ends = min(weights, vec2f(1.0) - weights) * sqrt(squares);
+    let ends = min(weights, vec2f(1.0) - weights) * vec2f(root(squares.x), root(squares.y));
     if distance > -min(ends.x, ends.y) {
         take_pair(row, nodes, vec4f(1.0 - weights.x, weights.x, weights.y - 1.0, -weights.y), normal, distance);
     }

@@ -110,3 +110,49 @@ fn shapes_and_ways_follow_double_precision() {
         assert!(worst < 1e-6 && jumps < 10 && apart < 20, "{:?}", rigid.shape);
     }
 }
+
+/// Of each number its root, and its sine.
+const ROOT_AND_SINE: &str = "
+@group(0) @binding(0) var<storage, read> given: array<f32>;
+@group(0) @binding(1) var<storage, read_write> found: array<f32>;
+
+fn thing_number(at: u32) -> f32 {
+    return given[at];
+}
+
+fn passage_number(at: u32) -> f32 {
+    return given[at];
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= arrayLength(&given) {
+        return;
+    }
+    found[2u * id.x] = root(given[id.x]);
+    found[2u * id.x + 1u] = sine(given[id.x]);
+}
+";
+
+/// To single precision, however small: devices need not find them so.
+#[test]
+fn roots_and_sines_keep_their_relative_digits() {
+    let Some(device) = support::device() else { return };
+    let mut random = Random::new(7);
+    let mut given = vec![0.0_f32];
+    given.extend((1..POINTS).map(|_| (10.0_f64.powf(7.0 * random.half() - 3.5) * 3.14) as f32));
+    given.iter_mut().for_each(|x| *x = x.min(3.14));
+    let source = [&shader(&[]), ROOT_AND_SINE].concat();
+    let found = compute(&device, &source, POINTS, &[&given], 2 * POINTS);
+    let mut worst = [0.0_f64; 2];
+    for (&x, found) in given.iter().zip(found.chunks_exact(2)) {
+        let x = f64::from(x);
+        for (k, exact) in [x.sqrt(), x.sin()].into_iter().enumerate() {
+            // Near half a turn the round-off of the angle counts.
+            let scale = if k == 1 && x > 1.5 { 1.0 } else { exact.max(f64::MIN_POSITIVE) };
+            worst[k] = worst[k].max((f64::from(found[k]) - exact).abs() / scale);
+        }
+    }
+    println!("roots {:.1e}, sines {:.1e}", worst[0], worst[1]);
+    assert!(worst[0] < 1.2e-7 && worst[1] < 3e-7, "{worst:?}");
+}

@@ -37,8 +37,12 @@ fn ln_1p(x: f32) -> f32 {
     return fma(k, 0.6931472, f - (half_square - s * (half_square + r)));
 }
 
-// 2ⁿ and eʳ − 1 with x = n ln 2 + r, |r| ≤ ln 2/2, so that eˣ = 2ⁿ eʳ. Beyond x = 88.3 2ⁿ is infinite.
+// 2ⁿ and eʳ − 1 with x = n ln 2 + r, |r| ≤ ln 2/2, so that eˣ = 2ⁿ eʳ. Beyond x = 88.3 2ⁿ is infinite. What is not a number stays so: a
+// compiler may make a maximum of the bound from below, which loses it.
 fn power_and_rest(x: f32) -> vec2f {
+    if (bitcast<u32>(x) & 0x7fffffffu) > 0x7f800000u {
+        return vec2f(x);
+    }
     let n = i32(round(clamp(x * 1.442695, -126.0, 128.0)));
     // ln 2 in two parts, the first 22713/2¹⁵: the product is exact, and whole, so that no compiler adds the parts up again.
     let r = (select(x, -87.0, x < -87.0) - f32(n * 22713) / 32768.0) - f32(n) * 1.4286068e-6;
