@@ -23,7 +23,7 @@ use crate::{Machine, Rates, Specimen};
 const SQUEEZE: [f64; 3] = [-0.02 * EDGE, 0.01 * EDGE, 0.005 * EDGE];
 /// Up to this many cells the critical time step of the assembled model is computed, which costs as much as some 100 steps
 /// in double precision. For a cube in real time it is always computed.
-const CELLS_OF_TRUE_LIMIT: usize = 100_000;
+const CELLS_OF_ASSEMBLED: usize = 100_000;
 /// Fraction of the limit that a run takes as its step: the critical step of a row.
 const PART_OF_LIMIT: f64 = 0.9;
 /// Fraction of the limit for timed steps. The length of a step does not change its cost. The cubes vibrate for tens of
@@ -84,7 +84,7 @@ pub fn measure(
     let mut refused = Vec::new();
     for (done, case) in cases.iter().enumerate() {
         progress(Progress { part: done as f64 / cases.len() as f64, now: case.id() });
-        match bench.row(case, CELLS_OF_TRUE_LIMIT) {
+        match bench.row(case, CELLS_OF_ASSEMBLED) {
             Ok(row) => rows.push(row),
             // The other meshes can still be measured.
             Err(BenchError::Device { source }) if source.is_about_the_model() => {

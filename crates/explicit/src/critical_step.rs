@@ -2,7 +2,7 @@
 //!
 //! *Element bound* (rigorous, Irons and Treharne): λ_max(K_e) ≤ V (λ+2μ) Σ|B_a|², hence
 //! Δt_e = 2/√(n (λ+2μ)/ρ Σ|B_a|²) and Δt_cr ≥ min Δt_e.
-//! *True limit*: 2/ω_max of the assembled, constrained operator M⁻¹K by the Lanczos method, the accelerated form of the
+//! *Assembled model*: 2/ω_max of the assembled, constrained operator M⁻¹K by the Lanczos method, the accelerated form of the
 //! power iteration: the same operator calls, far fewer of them. K v = (f(hv) − f(−hv))/2h.
 
 use pliant_mechanics::model::{Contradiction, FREE, MassScaling, Model, Solid};
