@@ -144,6 +144,13 @@ impl Weights {
         range.map(|k| (self.nodes[k], self.weights[k]))
     }
 
+    /// [`row`](Self::row) with weights from 0 to 1: of a point outside of its cell those of one inside. A field that no law extends, such as a
+    /// stress, is carried by these: it keeps between the values at the nodes.
+    pub fn inner_row(&self, point: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
+        let sum: f64 = self.row(point).map(|(_, weight)| weight.max(0.0)).sum();
+        self.row(point).map(move |(node, weight)| (node, weight.max(0.0) / sum))
+    }
+
     /// J v at all points: the carried values of a field on the nodes.
     pub fn apply<R: Real>(&self, field: &[Vector<R>]) -> Vec<Vector<f64>> {
         let value = |point| weighted(self.row(point), |node| cast(field[node as usize]));

@@ -249,7 +249,7 @@ fn moved_things(frame: &Frame<'_>, points: &[Vector3], owners: &[u32]) -> Vec<f6
     points.iter().zip(owners).flat_map(moved).collect()
 }
 
-/// Fields on a carried surface; those of cells as means at the nodes.
+/// Fields on a carried surface; those of cells as means at the nodes, which points outside of all cells do not extrapolate.
 fn fill_surface(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], surface: usize) {
     let model = &frame.built().model;
     let mapping = &model.surfaces[surface].mapping;
@@ -285,7 +285,8 @@ fn fill_surface(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], surfac
         let components = field.components();
         let carried = |point: usize| {
             let mean = |c: usize| {
-                mapping.row(point).map(|(node, w)| w * means[node as usize * components + c]).sum::<f64>()
+                let part = |(node, w): (u32, f64)| w * means[node as usize * components + c];
+                mapping.inner_row(point).map(part).sum::<f64>()
             };
             (0..components).map(mean).collect::<Vec<f64>>()
         };

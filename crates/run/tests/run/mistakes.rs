@@ -528,8 +528,13 @@ fn unknown_names_get_the_nearest_one() {
     ] {
         spoilt(good, bad, &says);
     }
-    let cells = "on = \"skin\"\ndata = [\"displacement\", ";
-    spoilt("data = [\"displacement\", ", cells, &["`von-mises` belongs to cells", "stresses on the body"]);
+    let carried = "on = \"skin\"\ndata = [\"reaction\", ";
+    spoilt("data = [\"displacement\", ", carried, &["surfaces have no `reaction`", "write it on the body"]);
+    spoilt(
+        "{ on = \"block\"",
+        "{ on = \"skin\", data = [\"von-mises\"]",
+        &["`von-mises` belongs to cells, and a probe on a surface has none", "probe the body"],
+    );
 }
 
 #[test]

@@ -180,6 +180,31 @@ fn a_carried_surface_is_written_and_follows_its_body() {
     assert_close(lift(&skin), lift(&body), 1e-9, "lift of the corner [m]");
 }
 
+/// Points of a surface that stand out of its body extrapolate its motion, but not its stress, which became negative there.
+#[test]
+fn stresses_on_a_surface_around_a_body_keep_between_those_of_the_body() {
+    let load =
+        "[load.one]\ntype = \"force\"\non = \"block\"\nnodes = { set = \"z-max\" }\ntotal = [0.5, 0, 1]\n";
+    let scene = resting(load).replace("as = \"hexes\"", "as = \"tets\"");
+    let around = "size = [0.112, 0.112, 0.112] }, edge = 0.02, at = [-0.006, -0.006, -0.006]";
+    let scene = scene.replace("size = [0.1, 0.1, 0.1] }, edge = 0.04", around);
+    let data = "data = [\"displacement\", \"von-mises\"]\n";
+    let scene = scene.replace("data = [\"displacement\", \"velocity\"]\n", data);
+    let body = format!("[output.body]\ntype = \"vtu\"\nevery = 0.5\nat = \"points\"\n{data}");
+    let workshop = Workshop::new(&(scene + &body));
+    workshop.run(&[]).done();
+    let of = |name: &str| {
+        let mesh = workshop.series(&format!("out/case/{name}.pvd")).pop().unwrap().1.mesh;
+        mesh.point_data["von-mises"].values.clone()
+    };
+    let [body, skin] = ["body", "skin"].map(of);
+    let [least, most] = [f64::min, f64::max].map(|pick| body.iter().copied().reduce(pick).unwrap());
+    assert!(least > 0.0 && most > 2.0 * least, "{least} to {most} Pa");
+    let slack = 1e-9 * most;
+    let out = skin.iter().filter(|stress| !(least - slack..=most + slack).contains(stress)).count();
+    assert_eq!(out, 0, "of {} points, from {least} to {most} Pa: {skin:?}", skin.len());
+}
+
 #[test]
 fn several_bodies_run_side_by_side() {
     let other = r#"[law.stiff]

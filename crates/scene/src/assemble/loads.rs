@@ -326,8 +326,7 @@ impl Builder<'_> {
         let at = |key| [path, &[key]].concat();
         let target = table.on.as_ref().map(|on| self.find_target(on, &at("on")));
         if let Some(Some(Subject::Surface(surface))) = target {
-            let help = "write displacement and velocity on surfaces, stresses on the body";
-            self.refuse_cell_fields(&table.data, surface, &at("data"), help);
+            self.refuse_fields_off_surfaces(&table.data, surface, &at("data"));
         }
         let body = match target {
             None => None,
@@ -437,7 +436,17 @@ impl Builder<'_> {
         let at = |key| [path, &[key]].concat();
         match self.find_target(&probe.on, &at("on")) {
             Some(Subject::Surface(surface)) => {
-                self.refuse_cell_fields(&probe.data, surface, &at("data"), "probe the body for stresses");
+                self.refuse_fields_off_surfaces(&probe.data, surface, &at("data"));
+                if let Some(field) = probe.data.iter().find(|field| !field.is_nodal()) {
+                    let message =
+                        format!("`{}` belongs to cells, and a probe on a surface has none", field.name());
+                    self.error(
+                        &at("data"),
+                        message,
+                        "not at points of a surface",
+                        "probe the body for stresses",
+                    );
+                }
             }
             Some(Subject::Body(body)) => {
                 self.refuse_other_fields(&probe.data, Some(body), &at("data"));
@@ -451,8 +460,8 @@ impl Builder<'_> {
         }
     }
 
-    /// Rejects fields that need cells: a carried surface has no cells with stresses.
-    fn refuse_cell_fields(&mut self, fields: &[FieldName], surface: usize, path: &[&str], help: &str) {
+    /// Rejects fields that are not carried by surfaces: those of nodes that say nothing between them, and of bodies that carry none.
+    fn refuse_fields_off_surfaces(&mut self, fields: &[FieldName], surface: usize, path: &[&str]) {
         let on_shell = self.assembly.carried.contains_key(&surface);
         if let Some(field) = fields.iter().find(|field| on_shell && **field != FieldName::Displacement) {
             let message = format!("surfaces on shells have a displacement and no `{}`", field.name());
@@ -460,15 +469,12 @@ impl Builder<'_> {
             return;
         }
         let of_nodes = [FieldName::Rotation, FieldName::Reaction, FieldName::ReactionMoment];
-        if let Some(field) = fields.iter().find(|field| of_nodes.contains(field) || field.is_of_contact()) {
+        let is_off = |field: &&FieldName| {
+            of_nodes.contains(field) || field.is_of_contact() || !field.is_of(BodyModel::Solid)
+        };
+        if let Some(field) = fields.iter().find(is_off) {
             let message = format!("surfaces have no `{}`", field.name());
             self.error(path, message, "not on a surface", "write it on the body");
-            return;
-        }
-        if let Some(field) = fields.iter().find(|field| !field.is_nodal()) {
-            let message =
-                format!("`{}` belongs to cells; a carried surface has none of its body's", field.name());
-            self.error(path, message, "not on a surface", help);
         }
     }
 }

@@ -345,7 +345,7 @@ pub enum At {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct VtuTable {
-    /// The body or the carried surface; if not given, all bodies together.
+    /// The body or the carried surface, which has fields of cells as means at its points; if not given, all bodies together.
     #[serde(default)]
     pub on: Option<String>,
     /// Time between frames [s]; the first and the last instant are always written.
