@@ -106,6 +106,8 @@ struct Watch {
     reference: Vec<Option<Stiffness>>,
     /// λ of hourglass control alone, over V [Pa/m²].
     hourglass: Vec<f64>,
+    /// Σ B_a ⊗ B_a [1/m²], as [`gradient_square_of`]: found once, a check would spend much of its time there.
+    square: Vec<Symmetric<f64>>,
     /// 1/(|G| (λ+2μ) max(Δt_e, L)²) with the element bound Δt_e at rest: brings the guesses of all cells to one scale.
     weight: Vec<f64>,
     /// What stands first in the two orders.
@@ -202,6 +204,7 @@ impl Watch {
             limit,
             reference: vec![None; count],
             hourglass: (0..count).map(|cell| hourglass_modulus(solid, cell)).collect(),
+            square: (0..count).map(|cell| gradient_square_of(solid, cell)).collect(),
             weight: (0..count).map(weight).collect(),
             rank: vec![[0.0; 2]; count],
             order: [(0..count as u32).collect(), (0..count as u32).collect()],
@@ -217,10 +220,9 @@ impl Watch {
             Cells::Membrane(..) | Cells::Bar(..) => 0.0,
             _ => solid.material.law.small_strain().bulk,
         };
-        let weight = &self.weight;
+        let (weight, squares) = (&self.weight, &self.square);
         self.rank.par_iter_mut().enumerate().with_min_len(256).for_each(|(cell, rank)| {
-            let (h, square) =
-                (displacement_gradient(solid, cell, displacement), gradient_square_of(solid, cell));
+            let (h, square) = (displacement_gradient(solid, cell, displacement), squares[cell]);
             let strain = Symmetric::green_lagrange_twice(&h);
             let c = strain + Symmetric::IDENTITY;
             let j = 1.0 + h.trace() + h.second_invariant() + h.determinant();
@@ -283,8 +285,7 @@ impl Watch {
     ) -> (f64, Stiffness) {
         let in_state = |displacement: &[Vector<R>]| {
             let h = displacement_gradient(solid, cell, displacement);
-            let square = gradient_square_of(solid, cell);
-            let Stiffness { mode, wave } = stiffness(solid, cell, &h, &square);
+            let Stiffness { mode, wave } = stiffness(solid, cell, &h, &self.square[cell]);
             Stiffness { mode: mode.max(self.hourglass[cell]), wave }
         };
         let now = in_state(displacement);
