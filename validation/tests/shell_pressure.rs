@@ -138,20 +138,37 @@ fn a_free_cylinder_under_pressure_stays_round() {
         off(&ratios(&pressed(cylinder(cut, true, [40, 13]), true, thickness, formulation, spread)))
     };
     for cut in [Cut::Diagonal, Cut::Crossed] {
-        for (thickness, limit) in [(0.04, 0.01), (0.01, 0.01), (0.001, 0.02)] {
+        for (thickness, limit) in [(0.04, 0.01), (0.01, 0.01), (0.001, 0.006)] {
             claim(&format!("cylinder, {cut:?}, t = {thickness}"), worst(cut, thickness), limit);
         }
     }
-    // Measured 0.7 to 1.0 % and 3.3 to 3.6 %, the goal was 1.0 and 2.2 %.
-    for seed in 1..=3 {
-        for (thickness, limit) in [(0.04, 0.012), (0.01, 0.04)] {
-            claim(
-                &format!("cylinder, irregular {seed}, t = {thickness}"),
-                worst(Cut::Irregular(seed), thickness),
-                limit,
-            );
-        }
+    // The goal was 1.0 and 2.2 %, measured on one mesh; on twelve the prototype's formulas, in its axes, give 0.6 to 1.1 and 2.0 to 5.0 %.
+    for (thickness, limit) in [(0.04, 0.012), (0.01, 0.055)] {
+        let all: Vec<f64> = (1..=12).map(|seed| worst(Cut::Irregular(seed), thickness)).collect();
+        let [least, most] = bounds(&all);
+        println!(
+            "twelve irregular cylinders, t = {thickness}: off by {:.2} to {:.2} %",
+            100.0 * least,
+            100.0 * most
+        );
+        claim(&format!("cylinder, irregular, t = {thickness}"), most, limit);
     }
+}
+
+/// A thousandth of the pressure moves the wall a thousandth as far: its own stiffness, 11 D/R³ at R/t = 1000, has no part in linear theory.
+#[test]
+fn linear_theory_is_linear_in_the_pressure() {
+    let (formulation, spread) = DEFAULT;
+    let mut cylinder = pressed(cylinder(Cut::Diagonal, false, [10, 7]), false, 0.001, formulation, spread);
+    let whole = ratios(&cylinder);
+    let LoadKind::ShellPressure { pressure, .. } = &mut cylinder.model.model_mut().loads[0].kind else {
+        panic!("no pressure")
+    };
+    *pressure *= 1e-3;
+    let part = ratios(&cylinder);
+    let apart = whole.iter().zip(&part).map(|(a, b)| (a - 1e3 * b).abs()).fold(0.0, f64::max);
+    // Round-off times (R/t)².
+    claim("linear theory, two pressures", apart, 1e-6);
 }
 
 /// R/t = 5000, where flat membranes find no equilibrium: strained by 1e-3 in one load step on regular meshes, also on a crossed one with

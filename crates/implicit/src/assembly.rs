@@ -71,6 +71,8 @@ pub struct Shell {
     /// Normals of nodes at rest, of any length and to either side: those of a surface that is known better than by its triangles.
     /// Nodes without one take the mean of their triangles.
     pub normals: BTreeMap<u32, Vector3<f64>>,
+    /// Which triangles are flat, whatever the normals of their nodes: their edges are straight. Empty: none.
+    pub flat: Vec<bool>,
     /// Whether more than two triangles may meet in an edge.
     pub branches: bool,
 }
@@ -89,6 +91,7 @@ impl Shell {
             tension: 0.0,
             crease: std::f64::consts::FRAC_PI_4,
             normals: BTreeMap::new(),
+            flat: Vec::new(),
             branches: false,
         }
     }
@@ -343,13 +346,17 @@ impl Assembly {
         if !(shell.tension >= 0.0 && shell.tension.is_finite()) {
             return out_of_range("tension".into(), shell.tension, "finite and not negative");
         }
+        let (cells, flat) = (shell.cells.len(), shell.flat.len());
+        if flat != 0 && flat != cells {
+            let what = "marks of flat triangles";
+            return Err(ModelError::Count { shell: shell.name.clone(), what, cells, given: flat });
+        }
         if !shell.layers.is_empty() {
             return check_layers(shell);
         }
         for &material in &shell.material {
             check_material(&shell.name, material)?;
         }
-        let cells = shell.cells.len();
         for (what, given) in [("thicknesses", shell.thickness.len()), ("materials", shell.material.len())] {
             if given != 1 && given != cells {
                 return Err(ModelError::Count { shell: shell.name.clone(), what, cells, given });
@@ -376,13 +383,20 @@ impl Assembly {
         };
         let face_normals: Vec<Vector3<f64>> = facets.iter().map(normal_of).collect();
         let mut around: BTreeMap<u32, Vec<(usize, usize)>> = BTreeMap::new();
+        let is_flat = |number: usize| shell.flat.get(number).is_some_and(|flat| *flat);
+        let mut normals = Vec::new();
+        let mut corner_normals = vec![[0; 3]; facets.len()];
         for (number, facet) in facets.iter().enumerate() {
             for (corner, &node) in facet.nodes.iter().enumerate() {
+                if is_flat(number) {
+                    // Other than those of its neighbours, which makes its edges straight.
+                    corner_normals[number][corner] = (self.normals.len() + normals.len()) as u32;
+                    normals.push(Normal { node, direction: face_normals[number], estimated: false });
+                    continue;
+                }
                 around.entry(node).or_default().push((number, corner));
             }
         }
-        let mut normals = Vec::new();
-        let mut corner_normals = vec![[0; 3]; facets.len()];
         for (&node, corners) in &around {
             let given = shell.normals.get(&node);
             let fans = match given {

@@ -228,14 +228,16 @@ impl Statics {
         nodes.map(|(internal, external)| [0, 1, 2, 3, 4, 5].map(|c| internal[c] - external[c]))
     }
 
-    /// Displacements and rotations (six a node) by linear theory about a state: one solution.
+    /// Displacements and rotations (six a node) by linear theory about a state: one solution with the loads and motions of a time. The
+    /// stiffness is that of the state under the loads of its own time, so it does not depend on how large the new loads are.
     ///
     /// # Errors
     /// If the stiffness is singular or conjugate gradients fail.
     pub fn linear(&mut self, state: &State, time: f64) -> Result<Vec<[f64; 6]>, SolveError> {
         self.system.prescribed(state.time, time, &mut self.pending);
         self.system.begin_step(&state.history, time - state.time);
-        self.system.evaluate(state, time, Some((self.settings.tangent, &self.pending)))?;
+        self.system.evaluate(state, state.time, Some((self.settings.tangent, &self.pending)))?;
+        self.system.evaluate(state, time, None)?;
         self.find_residual(state);
         self.system.prepare()?;
         self.system.solve(&self.residual, &mut self.solution)?;

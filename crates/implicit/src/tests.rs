@@ -1167,3 +1167,43 @@ fn navier_orthotropic_plate() {
     println!("orthotropic plate: w over Navier's {ratio:.4}");
     assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
 }
+
+/// A ball with given normals of which one triangle is flat: its patch is its facet, edges in common are straight on both sides, all others
+/// curved as before.
+#[test]
+fn flat_triangles_lie_beside_curved_ones() {
+    let (points, cells) = ball(1);
+    let made = |flat: Vec<bool>| {
+        let mut model = Assembly::new("ball", points.clone());
+        let mut shell = Shell::new("ball", cells.clone(), 0.01, MATERIAL);
+        shell.normals = (0..).zip(points.iter().copied()).collect();
+        shell.flat = flat;
+        model.add_shell(&shell).map(|_| model)
+    };
+    assert!(matches!(made(vec![true; 3]), Err(ModelError::Count { given: 3, .. })));
+    let [curved, flat] = [Vec::new(), (0..32).map(|t| t == 7).collect()].map(|flat| made(flat).unwrap());
+    let bulge = |model: &Assembly, facet: u32| {
+        let surface = CurvedSurface::new(model, EdgeRule::Arc);
+        let patch = surface.patch(model, &State::at_rest(model), facet);
+        let (start, normal) = (patch.corners()[0], patch.facet_normal());
+        patch.edge_points().map(|x| normal.dot(&(x - start)))
+    };
+    let nodes = flat.facets[7].nodes;
+    for facet in 0..32 {
+        let shared = flat.facets[facet as usize].nodes.iter().filter(|n| nodes.contains(n)).count();
+        let (before, after) = (bulge(&curved, facet), bulge(&flat, facet));
+        assert!(before.iter().all(|h| *h > 0.01));
+        let straight = after.iter().filter(|h| h.abs() < 1e-14).count();
+        assert_eq!(
+            straight,
+            if facet == 7 {
+                6
+            } else if shared == 2 {
+                2
+            } else {
+                0
+            }
+        );
+        assert!(before.iter().zip(&after).all(|(b, a)| a.abs() < 1e-14 || (a - b).abs() < 1e-14));
+    }
+}

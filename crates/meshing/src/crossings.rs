@@ -37,7 +37,7 @@ pub(crate) fn crossing_groups(
 ) -> (Vec<[u32; 2]>, Option<Vector3>) {
     let boxed = |nodes: &[[u32; 3]]| {
         let start = points[nodes[0][0] as usize];
-        nodes.as_flattened().iter().map(|&n| points[n as usize]).fold([start; 2], widened)
+        nodes.as_flattened().iter().map(|&n| &points[n as usize]).fold([start; 2], widened)
     };
     let boxes: Vec<[Vector3; 2]> = triangles.par_chunks(each).map(boxed).collect();
     let numbered = |(number, &[low, high]): (u32, &[Vector3; 2])| Boxed { number, low, high };
@@ -54,7 +54,7 @@ pub(crate) fn crossing_groups(
         let [a, b] = [own, other].map(|number| boxes[number as usize]);
         let both = [a[0].sup(&b[0]), a[1].inf(&b[1])];
         within(own, both).find_map(|&s| {
-            let near = s.iter().map(|&n| points[n as usize]).fold([points[s[0] as usize]; 2], widened);
+            let near = s.iter().map(|&n| &points[n as usize]).fold([points[s[0] as usize]; 2], widened);
             within(other, [near[0].sup(&both[0]), near[1].inf(&both[1])]).find_map(|&t| meet(points, s, t))
         })
     };
@@ -77,11 +77,18 @@ pub(crate) fn crossing_groups(
 }
 
 /// A box made to hold a point.
-fn widened([low, high]: [Vector3; 2], x: Vector3) -> [Vector3; 2] {
-    [low.inf(&x), high.sup(&x)]
+fn widened([low, high]: [Vector3; 2], x: &Vector3) -> [Vector3; 2] {
+    [low.inf(x), high.sup(x)]
 }
 
 impl TriangleMesh {
+    /// The box of triangles; none of no triangles [m].
+    pub(crate) fn bounds(&self, triangles: &[[u32; 3]]) -> Option<[Vector3; 2]> {
+        let start = self.points[*triangles.as_flattened().first()? as usize];
+        let corners = triangles.as_flattened().iter().map(|&n| self.points[n as usize]);
+        Some(corners.fold([start; 2], |own, x| widened(own, &x)))
+    }
+
     /// Whether new triangles would intersect each other or existing ones, except some that would be
     /// removed.
     pub(crate) fn would_cross(&self, new: &[[u32; 3]], gone: &[u32]) -> bool {
@@ -95,9 +102,7 @@ impl TriangleMesh {
         gone: &[u32],
         existing: impl Iterator<Item = u32>,
     ) -> bool {
-        let corners = || new.as_flattened().iter().map(|&n| self.points[n as usize]);
-        let Some(start) = corners().next() else { return false };
-        let (low, high) = corners().fold((start, start), |(low, high), x| (low.inf(&x), high.sup(&x)));
+        let Some([low, high]) = self.bounds(new) else { return false };
         let near = |t: &u32| {
             let [a, b, c] = self.corners(*t);
             (0..3).all(|k| a[k].min(b[k]).min(c[k]) <= high[k] && a[k].max(b[k]).max(c[k]) >= low[k])

@@ -8,6 +8,7 @@ use std::collections::BinaryHeap;
 use nalgebra::Matrix3;
 use pliant_geometry::Vector3;
 
+use crate::boxes::Boxes;
 use crate::error::{MeshingError, require_positive};
 use crate::triangles::{TriangleMesh, cross};
 
@@ -20,8 +21,8 @@ const PLACE_WEIGHT: f64 = 1e-3;
 /// Collapses leave no triangle of a worse shape, unless it was worse before.
 const LEAST_SHAPE: f64 = 0.1;
 
-/// From so many triangles down, collapses that make triangles cross are refused. Among more, looking would take too long.
-const UNCROSSED: usize = 20_000;
+/// Triangles are put in again where as many times their number were put in.
+const PUT_IN: usize = 4;
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,10 +108,8 @@ struct Decimation<'m> {
     quadrics: Vec<[Quadric; 2]>,
     changes: Vec<u32>,
     queue: BinaryHeap<Reverse<Candidate>>,
-    /// Whether the surface is kept from crossing itself.
-    uncrossed: bool,
-    /// Its triangles while it is, some of which may be gone.
-    listed: Vec<u32>,
+    /// Where the triangles are or were, if the surface is kept from crossing itself.
+    placed: Option<Boxes>,
     /// Origin of the points, so that sums of squares keep their digits [m].
     origin: Vector3,
 }
@@ -131,11 +130,12 @@ impl TriangleMesh {
         Ok(Decimation::new(self).run(least, limit))
     }
 
-    /// The surface in each of some numbers of triangles, decreasing, or in a few more where nothing more can collapse. From [`UNCROSSED`]
-    /// down collapses do not make triangles cross each other.
-    pub(crate) fn decimated_to_each(mut self, numbers: &[usize]) -> Vec<Self> {
+    /// The surface in each of some numbers of triangles, decreasing, or in a few more where nothing more can collapse. From `uncrossed`
+    /// triangles down collapses do not make triangles cross each other.
+    pub(crate) fn decimated_to_each(mut self, numbers: &[usize], uncrossed: usize) -> Vec<Self> {
         let mut work = Decimation::new(&mut self);
-        work.uncrossed = true;
+        work.run(uncrossed.max(numbers.first().copied().unwrap_or(0)), f64::INFINITY);
+        work.placed = Some(work.places());
         let at = |&number: &usize| {
             work.run(number, f64::INFINITY);
             let (points, triangles) = work.mesh.compact();
@@ -171,15 +171,7 @@ impl<'m> Decimation<'m> {
             }
         }
         let changes = vec![0; mesh.points.len()];
-        let mut work = Self {
-            mesh,
-            quadrics,
-            changes,
-            queue: BinaryHeap::new(),
-            listed: Vec::new(),
-            uncrossed: false,
-            origin,
-        };
+        let mut work = Self { mesh, quadrics, changes, queue: BinaryHeap::new(), placed: None, origin };
         for edge in work.mesh.edges() {
             work.consider(edge);
         }
@@ -235,16 +227,12 @@ impl<'m> Decimation<'m> {
             if !self.mesh.keeps_sides(keep, gone, &position, LEAST_SHAPE) {
                 continue;
             }
-            if self.uncrossed && count <= UNCROSSED {
-                if self.listed.is_empty() || self.listed.len() > 2 * count {
-                    self.listed = self.mesh.alive().collect();
-                }
-                if self.makes_cross(keep, gone, position) {
-                    continue;
-                }
+            if self.makes_cross(keep, gone, position) {
+                continue;
             }
             count -= self.mesh.sides(a, b).iter().flatten().count();
             self.mesh.collapse(keep, gone, position);
+            self.place_round(keep, count);
             let moved = self.quadrics[gone as usize];
             self.quadrics[keep as usize].iter_mut().zip(&moved).for_each(|(own, other)| own.add(other));
             self.changes[keep as usize] += 1;
@@ -256,13 +244,37 @@ impl<'m> Decimation<'m> {
         count
     }
 
-    /// The listed triangles that are not gone.
-    fn existing(&self) -> impl Iterator<Item = u32> {
-        self.listed.iter().copied().filter(|&t| self.mesh.exists(t))
+    /// Where all triangles are.
+    fn places(&self) -> Boxes {
+        let count = self.mesh.len().max(1) as f64;
+        let area: f64 = self.mesh.alive().map(|t| self.mesh.area(t)).sum();
+        let mut places = Boxes::new((area / count).sqrt());
+        for t in self.mesh.alive() {
+            places.insert(t, self.box_of(t));
+        }
+        places
     }
 
-    /// Whether triangles cross after a collapse where none did before.
+    fn box_of(&self, t: u32) -> [Vector3; 2] {
+        let [a, b, c] = self.mesh.corners(t);
+        [a.inf(&b).inf(&c), a.sup(&b).sup(&c)]
+    }
+
+    /// Puts in the triangles round a point, which have changed, or all if too many that have changed since are there.
+    fn place_round(&mut self, point: u32, count: usize) {
+        let Some(mut placed) = self.placed.take() else { return };
+        if placed.len() > PUT_IN * count {
+            placed = self.places();
+        } else {
+            let star = &self.mesh.star[point as usize];
+            star.iter().for_each(|&t| placed.insert(t, self.box_of(t)));
+        }
+        self.placed = Some(placed);
+    }
+
+    /// Whether triangles cross after a collapse where none did before, if that counts.
     fn makes_cross(&mut self, keep: u32, gone: u32, position: Vector3) -> bool {
+        let Some(placed) = &self.placed else { return false };
         let mut old: Vec<u32> =
             [keep, gone].iter().flat_map(|&n| &self.mesh.star[n as usize]).copied().collect();
         old.sort_unstable();
@@ -271,10 +283,14 @@ impl<'m> Decimation<'m> {
         let stay = before.iter().filter(|nodes| !(nodes.contains(&keep) && nodes.contains(&gone)));
         let after: Vec<[u32; 3]> =
             stay.map(|nodes| nodes.map(|n| if n == gone { keep } else { n })).collect();
+        let cross = |mesh: &TriangleMesh, own: &[[u32; 3]]| {
+            let near = mesh.bounds(own).map(|bounds| placed.near(bounds)).unwrap_or_default();
+            mesh.would_cross_among(own, &old, near.into_iter().filter(|&t| mesh.exists(t)))
+        };
         let here = std::mem::replace(&mut self.mesh.points[keep as usize], position);
-        let cross = self.mesh.would_cross_among(&after, &old, self.existing());
+        let crosses = cross(self.mesh, &after);
         self.mesh.points[keep as usize] = here;
-        cross && !self.mesh.would_cross_among(&before, &old, self.existing())
+        crosses && !cross(self.mesh, &before)
     }
 }
 
@@ -316,7 +332,7 @@ mod tests {
         let mut plain = fine.clone();
         plain.decimate(Fewer::Triangles(120)).unwrap();
         assert!(crossing(&plain) > 0);
-        let stages = fine.decimated_to_each(&[1000, 120]);
+        let stages = fine.decimated_to_each(&[1000, 120], usize::MAX);
         assert!(stages.iter().all(|stage| crossing(stage) == 0));
         assert!(stages[0].len() <= 1000 && stages[1].len() < 500, "{}", stages[1].len());
     }

@@ -24,6 +24,7 @@
 
 mod anatomy;
 mod assessment;
+mod boxes;
 mod complex;
 mod crossings;
 mod curvature;

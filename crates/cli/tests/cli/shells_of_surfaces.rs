@@ -105,7 +105,8 @@ fn pressed_file(workshop: &Workshop, file: &str, more: &[&str]) -> (serde_json::
     let warned =
         |words| done["warnings"].as_array().unwrap().iter().any(|w| w.as_str().unwrap().contains(words));
     assert_eq!(warned("without a normal"), report["creases"]["count"] != 0, "{done}");
-    assert_eq!(warned("through"), report["crossings"]["count"] != 0, "{done}");
+    assert_eq!(warned(" flat, at "), report["flattened"]["count"] != 0, "{done}");
+    assert_eq!(warned("through other shells"), report["crossings"]["count"] != 0, "{done}");
     assert_eq!(warned("not reached"), report["reached"] == false, "{done}");
     println!("{report}");
     let mesh = io::read(&workshop.path("shells.vtu")).unwrap().mesh;
@@ -156,28 +157,37 @@ const ORGANS: [(&str, &str); 15] = [
     ("organs-sofa-env/glt_gallbladder_visual.stl", "0.001"),
     ("organs-sofa-env/glt_gallbladder_collision.stl", "0.001"),
     ("organs-sofa-env/glt_liver_collision.stl", "0.001"),
-    ("liver-sofa/liver2.obj", "0.01"),
-    ("aorta-vmtk/aorta-surface.vtp", "0.01"),
+    ("liver-sofa/liver2.obj", "0.1"),
+    ("aorta-vmtk/aorta-surface.vtp", "0.001"),
 ];
 
-/// Few shells, so that thin folds are as hard as they can be.
+/// Few shells, so that thin folds are as hard as they can be. In the gate: four organs.
 #[test]
-#[ignore = "minutes: fifteen organs"]
-fn shells_of_organs_run_under_pressure() {
+#[ignore = "a minute: four organs"]
+fn shells_of_four_organs_run_under_pressure() {
+    press(&ORGANS[11..]);
+}
+
+#[test]
+#[ignore = "minutes: eleven organs"]
+fn shells_of_all_other_organs_run_under_pressure() {
+    press(&ORGANS[..11]);
+}
+
+/// No shells cross, normals stand on their triangles, and the shells run.
+fn press(organs: &[(&str, &str)]) {
     let Some(data) = std::env::var_os("PLIANT_DATA") else {
         println!("skipped: PLIANT_DATA is not set");
         return;
     };
-    for (organ, scale) in ORGANS {
+    for (organ, scale) in organs {
         let workshop = Workshop::new(SCENE);
         let file = std::path::Path::new(&data).join(organ);
         let file = file.to_str().unwrap();
         let (report, mesh, _) = pressed_file(&workshop, file, &["--shells", "150", "--scale", scale]);
         let (angle, without) = normals(&mesh);
-        println!(
-            "{organ}: {angle:.1}° at most, {without} nodes without a normal, {} crossings",
-            report["crossings"]["count"]
-        );
+        println!("{organ}: {angle:.1}° at most, {without} nodes without a normal");
         assert!(angle <= 60.0, "{organ}: {angle}");
+        assert_eq!(report["crossings"]["count"], 0, "{organ}");
     }
 }

@@ -139,7 +139,7 @@ impl Shells {
 
     /// Measures all and tells what was found.
     pub(super) fn finished(
-        self,
+        &self,
         target: &Target,
         rounds: usize,
         goal: ShellGoal,
@@ -147,7 +147,7 @@ impl Shells {
     ) -> FittedShells {
         let Picture { error_map, forward, mut far, mut farthest } = self.picture(target);
         let shells: Vec<u32> = self.mesh.alive().collect();
-        let nearest = Nearest::new(&self, shells);
+        let nearest = Nearest::new(self, shells);
         let samples = &target.fine.samples;
         let back = samples.par_iter().filter_map(|sample| nearest.nearest(&sample.point));
         let back: Vec<(usize, f64)> = back.map(|(shell, _, off)| (shell, off)).collect();
@@ -169,7 +169,17 @@ impl Shells {
         let normal = |(n, normal): (usize, &Vector3)| if creased(&n) { [0.0; 3] } else { (*normal).into() };
         let normals = self.normals.iter().enumerate().flat_map(normal).collect();
         mesh.point_data.insert("normal".into(), DataArray { components: 3, values: normals });
-        mesh.block_mut(CellKind::Triangle).data.insert("distance".into(), DataArray::scalar(far));
+        let data = &mut mesh.block_mut(CellKind::Triangle).data;
+        data.insert("distance".into(), DataArray::scalar(far));
+        let flat: Vec<bool> = self.mesh.alive().map(|t| self.is_flat(t)).collect();
+        let flattened = flat.iter().filter(|flat| **flat).count();
+        if flattened > 0 {
+            data.insert(
+                "flat".into(),
+                DataArray::scalar(flat.iter().map(|&flat| u8::from(flat).into()).collect()),
+            );
+        }
+        let first_flat = self.mesh.alive().find(|&t| self.is_flat(t)).map(|t| self.mesh.corners(t)[0]);
         let asked = match goal {
             ShellGoal::Error(error) => Some(error),
             ShellGoal::Shells(_) => None,
@@ -194,6 +204,7 @@ impl Shells {
             reached,
             stopped: stopped && !reached,
             creases: Flaw::of(creases.len(), creases.first().map(|&n| self.mesh.points[n])),
+            flattened: Flaw::of(flattened, first_flat),
             crossings: Flaw::of(crossing.shells().len(), crossing.place),
         };
         FittedShells { mesh, error_map, report }

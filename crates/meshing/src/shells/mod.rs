@@ -2,13 +2,15 @@
 //! A decimated surface starts; then, round by round, the shells that are too far off, either way, are halved at their longest edges, and
 //! round them triangles are evened out and fitted again, while the others rest. What is reached is looked at more closely before it counts.
 //! Normals stand within 60° of their triangles and shells do not pass through each other: where they would, they are halved, too.
-//! What crosses in the end is repaired (`repair`). Where a fit fails, it starts again from finer triangles (`start`). The work is bounded,
-//! by a count that is the same on every machine; what was closest by then is the result.
+//! What crosses in the end is repaired (`repair`), and of what is left shells become flat (`flatten`). Where a fit fails, it starts again from finer
+//! triangles, and where even flat triangles cross from some that never did (`start`). The work is bounded, by a count that is the same on
+//! every machine; what was closest by then is the result.
 //! Leaves out: creases of the target, but where it folds too sharply for one normal; edges that bend more than their end normals tell.
 
 mod crossing;
 mod effort;
 mod fit;
+mod flatten;
 mod measure;
 mod refine;
 mod repair;
@@ -16,6 +18,8 @@ mod report;
 mod solve;
 mod start;
 mod target;
+#[cfg(test)]
+mod tests;
 mod upright;
 
 use pliant_geometry::{CurvedTriangle, EdgeRule, Mesh, Vector3};
@@ -25,7 +29,7 @@ use crate::triangles::TriangleMesh;
 use effort::Effort;
 use measure::Distances;
 pub use report::{Flaw, ShellReport};
-use start::Starts;
+use start::{Starts, UNCROSSED};
 use target::Target;
 
 /// Rounds after the goal is reached, where distances can fall or triangles are poor.
@@ -80,7 +84,7 @@ pub enum ShellGoal {
 #[derive(Clone, Debug)]
 pub struct FittedShells {
     /// Triangles with the unit normals of their nodes as point data `normal` and the largest distance of each shell [m], both ways, as
-    /// cell data `distance`.
+    /// cell data `distance`. Where some shells are as flat as their triangles, cell data `flat` is 1 there and 0 elsewhere.
     pub mesh: Mesh,
     /// The curved surface in small flat triangles, with its distance from the target as point data `distance` [m].
     pub error_map: Mesh,
@@ -102,6 +106,8 @@ struct Shells {
     strict: bool,
     /// Points where no normal stands on all triangles.
     creased: Vec<bool>,
+    /// Shells that are as flat as their triangles, by the numbers of these; empty if there are none.
+    flat: Vec<bool>,
 }
 
 /// How far a fit has come.
@@ -134,28 +140,27 @@ impl FittedShells {
                 Effort::MOST_TO_A_NUMBER
             }
         };
-        let surface = target;
-        let target = Target::new(surface);
-        let Starts { first, finer, is_lost } = Starts::new(surface, goal, &target);
-        if is_lost {
-            return Ok(Fit::new(&target, &first, goal, Effort::new(most), true).unfitted());
-        }
-        let (mut fitted, effort) =
-            Fit::new(&target, &first, goal, Effort::new(most), finer.is_none()).run(progress);
-        let last = finer.as_ref().unwrap_or(&first);
-        if fitted.report.fails() && finer.is_some() {
-            let again = Fit::new(&target, last, goal, effort.with_left(AGAIN), true).run(progress).0;
-            fitted = fitted.better(again);
-        }
-        if fitted.report.crossings.count > 0 {
-            fitted = fitted.better(Fit::new(&target, last, goal, effort, true).unfitted());
-        }
-        Ok(fitted)
+        Ok(Self::within(target, goal, Effort::new(most), UNCROSSED, progress))
     }
 
-    /// The one that crosses less, reaches its goal, or is closer.
-    fn better(self, other: Self) -> Self {
-        if other.report.rank() < self.report.rank() { other } else { self }
+    /// The same with so much work for each of two attempts. In the first, collapses may make more than `uncrossed` triangles cross.
+    fn within(
+        surface: &TriangleMesh,
+        goal: ShellGoal,
+        effort: Effort,
+        uncrossed: usize,
+        progress: &dyn Fn(FitProgress),
+    ) -> Self {
+        let target = Target::new(surface);
+        let job = Job { target: &target, goal, progress };
+        let attempt = |uncrossed: usize| {
+            job.flattened(job.attempt(&Starts::new(surface, goal, &target, uncrossed), effort))
+        };
+        let first = attempt(uncrossed);
+        if first.fitted.report.crossings.count == 0 || surface.len() <= uncrossed {
+            return first.fitted;
+        }
+        first.better(attempt(usize::MAX)).fitted
     }
 
     /// Fits the shells of given triangles to a surface, without changing which points they join.
@@ -169,6 +174,58 @@ impl FittedShells {
         let start = shells.distances(&target.fine, &target);
         shells.settle(start, 0.0, 12, &target, &mut Effort::new(usize::MAX));
         shells.finished(&target, 0, ShellGoal::Shells(triangles.len()), false)
+    }
+}
+
+/// Shells that were found, and what there is to know about them.
+struct Found {
+    shells: Shells,
+    fitted: FittedShells,
+}
+
+impl Found {
+    /// The one that crosses less, reaches its goal, or is closer.
+    fn better(self, other: Self) -> Self {
+        if other.fitted.report.rank() < self.fitted.report.rank() { other } else { self }
+    }
+}
+
+/// What is to be fitted, and who hears how far it has come.
+#[derive(Clone, Copy)]
+struct Job<'t> {
+    target: &'t Target,
+    goal: ShellGoal,
+    progress: &'t dyn Fn(FitProgress),
+}
+
+impl Job<'_> {
+    /// Fits from few triangles, if that fails from finer ones, and if shells still cross takes those that it started from.
+    fn attempt(&self, starts: &Starts, effort: Effort) -> Found {
+        let fit = |mesh, effort, is_last| Fit::new(self.target, mesh, self.goal, effort, is_last);
+        if starts.is_lost {
+            return fit(&starts.first, effort, true).unfitted();
+        }
+        let (mut found, effort) = fit(&starts.first, effort, starts.finer.is_none()).run(self.progress);
+        let last = starts.finer.as_ref().unwrap_or(&starts.first);
+        if found.fitted.report.fails() && starts.finer.is_some() {
+            found = found.better(fit(last, effort.with_left(AGAIN), true).run(self.progress).0);
+        }
+        if found.fitted.report.crossings.count > 0 {
+            found = found.better(fit(last, effort, true).unfitted());
+        }
+        found
+    }
+
+    /// The same made flat where shells cross.
+    fn flattened(&self, found: Found) -> Found {
+        let FittedShells { report, .. } = &found.fitted;
+        if report.crossings.count == 0 {
+            return found;
+        }
+        let mut shells = found.shells.clone();
+        shells.flatten();
+        let fitted = shells.finished(self.target, report.rounds, self.goal, report.stopped);
+        found.better(Found { shells, fitted })
     }
 }
 
@@ -204,15 +261,16 @@ impl<'t> Fit<'t> {
     }
 
     /// The shells of the triangles that it starts from, which do not cross, with the normals of the target.
-    fn unfitted(mut self) -> FittedShells {
+    fn unfitted(mut self) -> Found {
         self.shells.require_upright();
         self.shells.uncross(&mut self.effort);
         self.shells.crease_crossing();
-        self.shells.finished(self.target, 0, self.goal, false)
+        let fitted = self.shells.finished(self.target, 0, self.goal, false);
+        Found { shells: self.shells, fitted }
     }
 
     /// Fits as long as it helps. Returns the shells, and the work done so far.
-    fn run(mut self, progress: &dyn Fn(FitProgress)) -> (FittedShells, Effort) {
+    fn run(mut self, progress: &dyn Fn(FitProgress)) -> (Found, Effort) {
         let target = self.target;
         self.shells.even_out(target, 10, &mut self.effort);
         let mut now = self.shells.distances(&target.coarse, target);
@@ -294,7 +352,8 @@ impl<'t> Fit<'t> {
             shells.repair(target);
             shells.crease_crossing();
         }
-        (shells.finished(target, self.rounds, self.goal, !ended), self.effort)
+        let fitted = shells.finished(target, self.rounds, self.goal, !ended);
+        (Found { shells, fitted }, self.effort)
     }
 
     /// How much of the goal is reached, the distance above which shells are halved [m], and how many may be.
@@ -368,6 +427,7 @@ impl Shells {
             active: vec![true; mesh.points.len()],
             strict: false,
             creased: vec![false; mesh.points.len()],
+            flat: Vec::new(),
             mesh,
         }
     }
@@ -383,6 +443,8 @@ impl Shells {
         let triangles = own.map(|nodes| nodes.map(|n| number[n as usize])).collect();
         let points = nodes.iter().map(|&n| self.mesh.points[n as usize]).collect();
         let some = |all: &[bool]| nodes.iter().map(|&n| all[n as usize]).collect();
+        let own_flat =
+            if self.flat.is_empty() { Vec::new() } else { shells.iter().map(|&t| self.is_flat(t)).collect() };
         let part = Self {
             mesh: TriangleMesh::new(points, triangles),
             normals: nodes.iter().map(|&n| self.normals[n as usize]).collect(),
@@ -390,6 +452,7 @@ impl Shells {
             active: some(&self.active),
             strict: self.strict,
             creased: some(&self.creased),
+            flat: own_flat,
         };
         (part, nodes)
     }

@@ -36,6 +36,8 @@ pub struct ShellReport {
     /// Vertices where the surface folds too sharply for a normal within 60° of all triangles, or for curved shells that do not cross: they
     /// have none, `normal` is zero there.
     pub creases: Flaw,
+    /// Shells that are as flat as their triangles, since curved they would cross others.
+    pub flattened: Flaw,
     /// Shells that pass through themselves or each other.
     pub crossings: Flaw,
 }
@@ -64,13 +66,13 @@ fn millimetres([x, y, z]: &[f64; 3]) -> String {
 }
 
 impl ShellReport {
-    /// What a user should know before using the shells, in sentences: a goal that was missed, crossings, creases.
+    /// What a user should know before using the shells, in sentences: a goal that was missed, crossings, flat shells, creases.
     pub fn warnings(&self) -> Vec<String> {
         let missed = (!self.reached).then(|| self.missed());
         let crossings = (self.crossings.count > 0).then(|| {
             format!(
-                "{} through other shells or {}, at {} and elsewhere: the surface is folded more tightly there than the shells can \
-                 follow; a smaller error or more shells help",
+                "{} through other shells or {}, at {} and elsewhere: so do flat triangles there; the surface may pass through itself, \
+                 or a smaller error or more shells help",
                 counted(self.crossings.count, "shell passes", "shells pass"),
                 if self.crossings.count == 1 { "itself" } else { "themselves" },
                 self.crossings.place(),
@@ -84,7 +86,15 @@ impl ShellReport {
                 self.creases.place(),
             )
         });
-        missed.into_iter().chain(crossings).chain(creases).collect()
+        let flat = (self.flattened.count > 0).then(|| {
+            format!(
+                "{} flat, at {} and elsewhere: curved they would pass through others; cell data `flat` says which, and a scene keeps \
+                 them flat",
+                counted(self.flattened.count, "shell is", "shells are"),
+                self.flattened.place(),
+            )
+        });
+        missed.into_iter().chain(crossings).chain(flat).chain(creases).collect()
     }
 
     /// Whether they cross or miss the goal.

@@ -23,6 +23,10 @@ const LOST: f64 = 0.5;
 const FINER: f64 = 1.5;
 const WHOLE: f64 = 1.2;
 
+/// From so many triangles down, collapses that make triangles cross are refused at first. Among more, looking takes longer than all else:
+/// that is for surfaces whose shells cross otherwise.
+pub(super) const UNCROSSED: usize = 20_000;
+
 /// What a fit starts from.
 pub(super) struct Starts {
     pub(super) first: TriangleMesh,
@@ -33,8 +37,8 @@ pub(super) struct Starts {
 }
 
 impl Starts {
-    /// Makes them of the surface of a target.
-    pub(super) fn new(mesh: &TriangleMesh, goal: ShellGoal, target: &Target) -> Self {
+    /// Makes them of the surface of a target. From `uncrossed` triangles down they do not come to cross.
+    pub(super) fn new(mesh: &TriangleMesh, goal: ShellGoal, target: &Target, uncrossed: usize) -> Self {
         let (numbers, aim) = match goal {
             ShellGoal::Error(error) => {
                 let doubled = (1..=DOUBLINGS).map(|k| START << k).filter(|&number| number < mesh.len());
@@ -43,7 +47,7 @@ impl Starts {
             ShellGoal::Shells(number) => (vec![number.div_ceil(2), number], 0.0),
         };
         let decreasing: Vec<usize> = numbers.into_iter().rev().collect();
-        let mut stages = mesh.clone().decimated_to_each(&decreasing);
+        let mut stages = mesh.clone().decimated_to_each(&decreasing, uncrossed);
         let first = stages.pop().unwrap_or_else(|| mesh.clone());
         let far = farthest(&first, target);
         let is_lost = |mesh: &TriangleMesh, far: f64| far > LOST * mean_edge(mesh);
@@ -112,7 +116,7 @@ mod tests {
         let starts = |field: &dyn ImplicitField, error: f64| {
             let mesh = TriangleMesh::of_field(field, 0.0012, DEFAULT_CELL_LIMIT).unwrap();
             let target = Target::new(&mesh);
-            let starts = Starts::new(&mesh, ShellGoal::Error(error), &target);
+            let starts = Starts::new(&mesh, ShellGoal::Error(error), &target, UNCROSSED);
             let far = farthest(starts.finer.as_ref().unwrap_or(&starts.first), &target);
             assert!(far <= FINER * error * target.diagonal, "{far}");
             starts

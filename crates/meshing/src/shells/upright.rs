@@ -109,10 +109,16 @@ impl Shells {
     pub(super) fn corner(&self, triangle: u32, corner: usize) -> (Vector3, [bool; 2]) {
         let nodes = self.mesh.triangles[triangle as usize];
         let point = nodes[corner];
-        if !self.creased[point as usize] {
-            return (self.normals[point as usize], [false; 2]);
+        if self.is_flat(triangle) {
+            return (self.mesh.normal(triangle), [true; 2]);
         }
-        let star = &self.mesh.star[point as usize];
+        let arms = [nodes[(corner + 1) % 3], nodes[(corner + 2) % 3]];
+        if !self.creased[point as usize] {
+            let flat =
+                |other: u32| self.mesh.sides(point, other).into_iter().flatten().any(|t| self.is_flat(t));
+            return (self.normals[point as usize], arms.map(|other| !self.flat.is_empty() && flat(other)));
+        }
+        let star = self.mesh.star[point as usize].iter().copied().filter(|&t| !self.is_flat(t));
         let others = |t: u32| self.mesh.triangles[t as usize].into_iter().filter(move |&n| n != point);
         let mut fan = vec![triangle];
         let mut at = 0;
@@ -122,7 +128,7 @@ impl Shells {
                 others(own).any(|n| self.mesh.triangles[*t as usize].contains(&n))
                     && self.mesh.normal(own).dot(&self.mesh.normal(*t)) > SMOOTH
             };
-            let more: Vec<u32> = star.iter().copied().filter(|t| !fan.contains(t) && joined(t)).collect();
+            let more: Vec<u32> = star.clone().filter(|t| !fan.contains(t) && joined(t)).collect();
             fan.extend(more);
             at += 1;
         }
@@ -136,7 +142,7 @@ impl Shells {
         let normal = fan.iter().map(weighted).sum::<Vector3>().try_normalize(0.0).unwrap_or_default();
         let leaves =
             |other: u32| self.mesh.sides(point, other).into_iter().flatten().any(|t| !fan.contains(&t));
-        (normal, [nodes[(corner + 1) % 3], nodes[(corner + 2) % 3]].map(leaves))
+        (normal, arms.map(leaves))
     }
 }
 

@@ -19,6 +19,9 @@ const DRILLING: f64 = 0.01;
 /// Point data with the normals of a surface.
 const NORMAL: &str = "normal";
 
+/// Cell data of triangles that are flat beside curved ones: not 0 where they are.
+const FLAT_CELLS: &str = "flat";
+
 /// Normals whose cosine is as close to 1 are parallel: to 0.1°.
 const FLAT: f64 = 1e-6;
 
@@ -89,6 +92,7 @@ impl Builder<'_> {
             _ => (Vec::new(), Vec::new()),
         };
         let normals = self.normals(draft, body)?;
+        let flat = given_normals(table, mesh).map(|_| self.flat(name, block)).unwrap_or_default();
         let own = &self.assembly.bodies[body];
         let cells: Vec<[u32; 3]> =
             (0..block.len() as u32).map(|cell| nodes(block, cell, |node| own.node(node))).collect();
@@ -104,6 +108,7 @@ impl Builder<'_> {
             tension: table.pre_tension,
             crease: table.crease.unwrap_or(45.0).to_radians(),
             normals,
+            flat,
             branches: table.branches,
         };
         let start = self.assembly.facets.len() as u32;
@@ -346,11 +351,9 @@ impl Builder<'_> {
             self.error(&["body", name, "crease"], message, "has no effect here", "remove it, or `normals`");
             return None;
         }
-        let found = mesh.point_data.get(NORMAL).filter(|data| data.components == 3);
         let own = &self.assembly.bodies[body];
-        match (table.normals, found) {
-            (Some(Normals::Triangles), _) | (None, None) => Some(BTreeMap::new()),
-            (None, Some(_)) if table.crease.is_some() => Some(BTreeMap::new()),
+        match (table.normals, given_normals(table, mesh)) {
+            (None | Some(Normals::Triangles), None) => Some(BTreeMap::new()),
             (Some(Normals::Mesh), None) => {
                 let message =
                     format!("the mesh of `{name}` has no point data `{NORMAL}` of three components");
@@ -380,6 +383,22 @@ impl Builder<'_> {
                 Some(given)
             }
         }
+    }
+
+    /// The triangles that the mesh keeps flat beside those that its normals curve.
+    fn flat(&mut self, name: &str, block: &CellBlock) -> Vec<bool> {
+        let Some(data) = block.data.get(FLAT_CELLS).filter(|data| data.components == 1) else {
+            return Vec::new();
+        };
+        let flat: Vec<bool> = data.values.iter().map(|&value| value != 0.0).collect();
+        let count = flat.iter().filter(|flat| **flat).count();
+        if count > 0 {
+            self.notes.push(format!(
+                "`{name}`: cell data `{FLAT_CELLS}` of the mesh keeps {} flat beside the curved ones",
+                counted(count, "triangle")
+            ));
+        }
+        flat
     }
 
     /// Reports nodes of a membrane without transverse stiffness at the start of a static run.
@@ -486,4 +505,14 @@ impl Builder<'_> {
         };
         self.error(&["body", name, key], error.to_string(), "here", help);
     }
+}
+
+/// The normals of a mesh that its shell takes.
+fn given_normals<'m>(table: &BodyTable, mesh: &'m Mesh) -> Option<&'m DataArray> {
+    let taken = match table.normals {
+        Some(Normals::Mesh) => true,
+        Some(Normals::Triangles) => false,
+        None => table.crease.is_none(),
+    };
+    mesh.point_data.get(NORMAL).filter(|data| taken && data.components == 3)
 }

@@ -1,0 +1,91 @@
+//! Shells that do not cross for certain: where they do, one of each two becomes as flat as its triangle. Flat triangles do not cross, so in
+//! the end no shells do.
+//! Leaves out: triangles that cross; these stay as they are.
+
+use pliant_geometry::Vector3;
+
+use super::Shells;
+
+impl Shells {
+    /// Makes shells flat until none cross but those whose triangles do: of two that cross the one that bulges more. Nothing may change
+    /// triangles or turn normals afterwards.
+    pub(super) fn flatten(&mut self) {
+        self.flat.resize(self.mesh.triangles.len(), false);
+        loop {
+            let curved = |t: &u32| !self.flat[*t as usize];
+            let bulge = |t: &u32| self.bulge(*t);
+            let more = |pair: [u32; 2]| {
+                pair.into_iter().filter(curved).max_by(|a, b| bulge(a).total_cmp(&bulge(b)).then(b.cmp(a)))
+            };
+            let chosen: Vec<u32> = self.crossing().pairs.into_iter().filter_map(more).collect();
+            if chosen.is_empty() {
+                return;
+            }
+            chosen.into_iter().for_each(|t| self.flat[t as usize] = true);
+        }
+    }
+
+    /// How far the control points of a shell lie from its triangle at most [m].
+    fn bulge(&self, shell: u32) -> f64 {
+        let patch = self.patch(shell);
+        let (start, normal) = (patch.corners()[0], patch.facet_normal());
+        let off = |x: &Vector3| normal.dot(&(x - start)).abs();
+        patch.edge_points().iter().map(off).fold(0.0, f64::max)
+    }
+
+    /// Whether a shell is flat.
+    pub(super) fn is_flat(&self, shell: u32) -> bool {
+        self.flat.get(shell as usize).is_some_and(|flat| *flat)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::triangles::TriangleMesh;
+
+    /// Two squares 0.13 apart, of four triangles each, with normals of which the shells of each bulge by 0.08 towards the other.
+    fn bulging() -> Shells {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.5]];
+        let of = |z: f64, lean: f64| {
+            corners.map(|[x, y]| {
+                let normal = Vector3::new(lean * (2.0 * x - 1.0), lean * (2.0 * y - 1.0), 1.0).normalize();
+                (Vector3::new(x, y, z), normal)
+            })
+        };
+        let (points, normals) = [of(0.0, 0.4), of(0.13, -0.4)].concat().into_iter().unzip();
+        let around = |first: u32| (0..4).map(move |k| [first + k, first + (k + 1) % 4, first + 4]);
+        let triangles = around(0).chain(around(5)).collect();
+        Shells {
+            mesh: TriangleMesh::new(points, triangles),
+            normals,
+            on_border: vec![true; 10],
+            active: vec![true; 10],
+            strict: true,
+            creased: vec![false; 10],
+            flat: Vec::new(),
+        }
+    }
+
+    /// No more are flat than one of each two that crossed, and those are exactly their triangles.
+    #[test]
+    fn shells_that_bulge_into_each_other_become_flat() {
+        let mut shells = bulging();
+        let before = shells.crossing();
+        assert!(before.pairs.len() >= 4, "{:?}", before.pairs);
+        shells.flatten();
+        assert!(shells.crossing().pairs.is_empty());
+        let flat: Vec<u32> = shells.mesh.alive().filter(|&t| shells.is_flat(t)).collect();
+        assert!(!flat.is_empty() && flat.len() < before.shells().len(), "{flat:?}");
+        for &t in &flat {
+            assert!(shells.bulge(t) < 1e-15);
+            for other in shells.mesh.alive().filter(|&other| !shells.is_flat(other)) {
+                // The edge in common is straight on both sides.
+                let shared = |n: &u32| shells.mesh.triangles[t as usize].contains(n);
+                if shells.mesh.triangles[other as usize].iter().filter(|n| shared(n)).count() == 2 {
+                    assert!(shells.patch(other).straight().iter().filter(|straight| **straight).count() >= 2);
+                }
+            }
+        }
+    }
+}
