@@ -110,15 +110,15 @@ pub enum Tangent {
 /// A facet where it is now.
 pub(crate) struct Placed {
     /// Axes as columns.
-    axes: Matrix3<f64>,
+    pub(crate) axes: Matrix3<f64>,
     /// Corners in them, relative to the centroid.
-    local: [Vector2<f64>; 3],
+    pub(crate) local: [Vector2<f64>; 3],
     /// F11 + F22 in them.
-    trace: f64,
+    pub(crate) trace: f64,
     /// Rotations of the nodes relative to the facet [rad].
-    theta: [Vector3<f64>; 3],
+    pub(crate) theta: [Vector3<f64>; 3],
     /// Displacements and rotations in the axes.
-    deformation: Vector18,
+    pub(crate) deformation: Vector18,
 }
 
 /// Why a facet or a tetrahedron has no force.
@@ -302,6 +302,21 @@ impl Facet {
             }
         }
         Ok(Placed { axes, local, trace, theta, deformation })
+    }
+
+    /// Stiffness of all, in the facet's axes.
+    pub(crate) fn stiffness(&self) -> &Matrix18 {
+        &self.stiffness
+    }
+
+    /// Nodal forces of its tension at rest.
+    pub(crate) fn tension(&self) -> &Vector18 {
+        &self.tension.0
+    }
+
+    /// Gradients of the shape functions at rest [1/m].
+    pub(crate) fn gradient(&self) -> &[Vector2<f64>; 3] {
+        &self.gradient
     }
 
     /// K d and the tension at rest in the facet's axes.
@@ -700,8 +715,12 @@ fn quaternion(axes: Matrix3<f64>) -> UnitQuaternion<f64> {
 mod tests {
     use pliant_geometry::EDGES;
 
+    use pulp::Arch;
+
     use super::*;
     use crate::element::Elasticity;
+    use crate::facets::{FacetPack, Work};
+    use crate::lanes::PACK;
     use crate::rotation::exponential;
     use pliant_testing::Random;
 
@@ -824,6 +843,41 @@ mod tests {
             let off = (slope - force).amax() / force.amax();
             println!("force against differences: {off:.1e}");
             assert!(off < 1e-7, "{off:e}");
+        }
+    }
+
+    /// Eight at a time, the last pack not full: energies, forces and stiffness of single facets to round-off, curved and under tension,
+    /// also where they are bent by half a radian.
+    #[test]
+    fn packs_have_forces_and_stiffness_of_single_facets() {
+        let mut random = Random::new(21);
+        for size in [0.0, 0.1, 1.0, 2.0] {
+            let orders = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
+            let facets: Vec<Facet> =
+                (0..11).map(|k| facet(orders[k % 3]).under_tension(10.0 * k as f64)).collect();
+            for (pack, own) in FacetPack::all(&facets).iter().zip(facets.chunks(PACK)) {
+                let mut work = Work::new();
+                let mut place = |facet: &Facet| {
+                    let (x, rotation) = pose(&mut random, size);
+                    facet.place(&x, &rotation).unwrap()
+                };
+                let placed: Vec<Placed> = own.iter().map(&mut place).collect();
+                placed.iter().enumerate().for_each(|(lane, placed)| work.put(lane, placed, true));
+                work.find(Arch::new(), pack, true);
+                for (lane, (facet, placed)) in own.iter().zip(&placed).enumerate() {
+                    let ((energy, force), mut tangent) = (work.force(lane), Matrix18::zeros());
+                    work.take_tangent(lane, &mut tangent);
+                    let (single_energy, single_force) = facet.force(placed);
+                    let mut single = Matrix18::zeros();
+                    facet.hessian(placed, Tangent::Full, &mut single);
+                    let off = [
+                        (energy - single_energy).abs() / single_energy.abs().max(1e-9),
+                        (force - single_force).amax() / (facet.stiffness.amax() * size).max(1.0),
+                        (tangent - single).amax() / single.amax(),
+                    ];
+                    assert!(off.iter().all(|off| *off < 1e-12), "size {size}, lane {lane}: {off:?}");
+                }
+            }
         }
     }
 

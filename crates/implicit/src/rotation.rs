@@ -25,7 +25,7 @@ pub(crate) fn exponential(a: &Vector3<f64>) -> UnitQuaternion<f64> {
 }
 
 /// (1 − (θ/2) cot(θ/2))/θ².
-fn eta(angle: f64) -> f64 {
+pub(crate) fn eta(angle: f64) -> f64 {
     let squared = angle * angle;
     if angle < 0.05 {
         1.0 / 12.0 + squared / 720.0 + squared * squared / 30240.0
@@ -35,7 +35,7 @@ fn eta(angle: f64) -> f64 {
 }
 
 /// (dη/dθ)/θ.
-fn mu(angle: f64) -> f64 {
+pub(crate) fn mu(angle: f64) -> f64 {
     let squared = angle * angle;
     // The closed form loses all digits to cancellation as θ⁶/θ⁶; the series leaves out θ⁶.
     if angle < 0.2 {

@@ -9,13 +9,16 @@ use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE, Spread, face_areas};
 use pliant_mechanics::mapping::{Configuration, Mapping};
 use pliant_mechanics::model::{Constraint, Enclosed, Motion, Solid};
 use pliant_mechanics::tensor::scale;
+use pulp::Arch;
 use rayon::prelude::*;
 
 use crate::assembly::{Assembly, Spring};
 use crate::conditions::{Conditions, add_gradient};
 use crate::error::SolveError;
 use crate::facet::{Broken, Facet, Matrix18, Tangent, symmetrise};
+use crate::facets::{FacetPack, Work};
 use crate::followers::{Followers, carried_turns};
+use crate::lanes::PACK;
 use crate::linear::{LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT};
 use crate::mapping::CarriedPoints;
 use crate::patch::Vector18;
@@ -86,6 +89,11 @@ pub(crate) struct System {
     /// Largest force on a node of a cell [N].
     pub(crate) largest: f64,
     results: Vec<FacetResult>,
+    /// Facets at rest, and their forces at work.
+    packs: Vec<FacetPack>,
+    works: Vec<Work>,
+    /// The instructions of the processor.
+    arch: Arch,
     solid_results: Vec<Response>,
     pub(crate) phases: Phases,
     pub(crate) last_solution: LinearReport,
@@ -294,6 +302,9 @@ impl System {
             energy: 0.0,
             largest: 0.0,
             results: vec![FacetResult::none(); CHUNK.min(model.facets.len())],
+            packs: FacetPack::all(&model.facets),
+            works: vec![Work::new(); CHUNK.min(model.facets.len()).div_ceil(PACK)],
+            arch: Arch::new(),
             phases: Phases::default(),
             last_solution: LinearReport::default(),
             solver: LinearSolver::Direct,
@@ -553,15 +564,30 @@ impl System {
             symmetric: self.matrix.mirror.is_empty(),
             exact_pressure: self.exact_pressure,
         };
+        let mut works = std::mem::take(&mut self.works);
         let mut broken = None;
         for first in (0..model.facets.len()).step_by(CHUNK) {
             let last = (first + CHUNK).min(model.facets.len());
-            let (pressure, surface) = (&self.pressure, self.surface.as_ref());
-            results[..last - first].par_iter_mut().with_min_len(16).enumerate().for_each(|(at, result)| {
-                let number = first + at;
-                let patch = || surface.map(|surface| surface.patch(&model, state, number as u32));
-                let facet = &model.facets[number];
-                result.broken = result.fill(facet, state, pressure[number], patch, wanted).err();
+            let (pressure, surface, packs, arch) =
+                (&self.pressure, self.surface.as_ref(), &self.packs, self.arch);
+            let chunks = results[..last - first].par_chunks_mut(PACK).zip(&mut works);
+            chunks.with_min_len(2).enumerate().for_each(|(at, (results, work))| {
+                let from = first + at * PACK;
+                let facets = &model.facets[from..from + results.len()];
+                place(facets, state, wanted, results, work);
+                if wanted.kind != Some(Tangent::Symmetric) {
+                    work.find(arch, &packs[from / PACK], wanted.kind.is_some());
+                    take(work, wanted, results);
+                }
+                for (at, result) in results.iter_mut().enumerate() {
+                    let number = from + at;
+                    let pressure = pressure[number];
+                    if pressure != Pressure::default() && result.broken.is_none() {
+                        let patch = || surface.map(|surface| surface.patch(&model, state, number as u32));
+                        let (x, _) = state.corners(facets[at].nodes);
+                        result.press(&x, pressure, patch, state.load_factor, wanted);
+                    }
+                }
             });
             broken = (first..last).zip(&results).find_map(|(cell, result)| Some((cell, result.broken?)));
             if broken.is_some() {
@@ -571,7 +597,7 @@ impl System {
                 self.add_facet(number, result, tangent.map(|(_, moved)| moved));
             }
         }
-        self.results = results;
+        (self.results, self.works) = (results, works);
         broken.map_or(Ok(()), |(cell, why)| Err(SolveError::Broken { cell, why }))
     }
 
@@ -1041,27 +1067,6 @@ impl FacetResult {
         Self { energy: 0.0, force: Vector18::zeros(), loads, tangent: Matrix18::zeros(), broken: None }
     }
 
-    /// Forces, and with a kind of tangent the stiffness under the pressures.
-    fn fill(
-        &mut self,
-        facet: &Facet,
-        state: &State,
-        pressure: Pressure,
-        patch: impl Fn() -> Option<Patch>,
-        wanted: Wanted,
-    ) -> Result<(), Broken> {
-        let (x, rotation) = state.corners(facet.nodes);
-        let placed = facet.place(&x, &rotation)?;
-        (self.energy, self.force) = facet.force(&placed);
-        if let Some(kind) = wanted.kind {
-            facet.hessian(&placed, kind, &mut self.tangent);
-        }
-        if pressure != Pressure::default() {
-            self.press(&x, pressure, patch, state.load_factor, wanted);
-        }
-        Ok(())
-    }
-
     /// Takes up the pressures.
     fn press(
         &mut self,
@@ -1093,6 +1098,33 @@ impl FacetResult {
             if wanted.symmetric {
                 symmetrise(&mut self.tangent);
             }
+        }
+    }
+}
+
+/// Places facets, each in its lane; with the simple stiffness it is done with them.
+fn place(facets: &[Facet], state: &State, wanted: Wanted, results: &mut [FacetResult], work: &mut Work) {
+    for (lane, (facet, result)) in facets.iter().zip(results).enumerate() {
+        let (x, rotation) = state.corners(facet.nodes);
+        let placed = facet.place(&x, &rotation);
+        result.broken = placed.as_ref().err().copied();
+        match (placed, wanted.kind) {
+            (Ok(placed), Some(kind @ Tangent::Symmetric)) => {
+                (result.energy, result.force) = facet.force(&placed);
+                facet.hessian(&placed, kind, &mut result.tangent);
+            }
+            (Ok(placed), _) => work.put(lane, &placed, wanted.kind.is_some()),
+            (Err(_), _) => {}
+        }
+    }
+}
+
+/// Takes what was found of each lane.
+fn take(work: &Work, wanted: Wanted, results: &mut [FacetResult]) {
+    for (lane, result) in results.iter_mut().enumerate() {
+        (result.energy, result.force) = work.force(lane);
+        if wanted.kind.is_some() {
+            work.take_tangent(lane, &mut result.tangent);
         }
     }
 }
