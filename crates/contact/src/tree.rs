@@ -40,8 +40,9 @@ impl Bounds {
             .fold(f64::MIN, f64::max)
     }
 
+    /// The least box around two.
     #[inline]
-    fn with(&self, other: &Self) -> Self {
+    pub fn with(&self, other: &Self) -> Self {
         Self { low: self.low.inf(&other.low), high: self.high.sup(&other.high) }
     }
 

@@ -115,8 +115,12 @@ pub(crate) fn descend(
         along: 0.0,
     };
     let (mut raised, mut lags, mut previous) = (0.0, 0, f64::INFINITY);
+    // Whether forces and stiffness of the state are known.
+    let mut known = false;
     for iteration in 0..=limits.iterations {
-        solver.evaluate(state, time, true)?;
+        if !std::mem::take(&mut known) {
+            solver.evaluate(state, time, true)?;
+        }
         let (norm, allowed) = solver.find_residual(state);
         found(norm, allowed);
         let complete = is_complete(solver);
@@ -157,12 +161,15 @@ pub(crate) fn descend(
             None => part,
         };
         (before.energy, before.size) = energy(solver);
-        if search(solver, state, time, &before, part, complete)? {
+        let is_slow = is_newton && largest > SLOW * std::mem::replace(&mut previous, largest);
+        let expands = is_slow && complete && part == 1.0 && iteration > 1;
+        let tries = Tries { part, complete, goes_on: complete && !last && !expands };
+        if let Some(first) = search(solver, state, time, &before, tries)? {
             if !last {
-                let is_slow = is_newton && largest > SLOW * std::mem::replace(&mut previous, largest);
-                if is_slow && complete && part == 1.0 && iteration > 1 {
+                if expands && first {
                     expand(solver, state, time, &mut before)?;
                 }
+                known = first && tries.goes_on;
                 continue;
             }
             if lags < limits.lags && lag(solver) {
@@ -203,18 +210,14 @@ fn begin(solver: &mut impl Contacting, state: &State, times: [f64; 2], guess: Op
     }
 }
 
-/// Goes to where the motion of before leads, as far as the filter lets it, if the energy is less there.
+/// Goes to where the motion of before leads, as far as the filter lets it and cells can follow. Whether the energy is less there is not
+/// asked: it seldom is, but what moves would have to start from rest else, in more iterations and short of where it comes to.
 fn start_from(
     solver: &mut impl Contacting,
     state: &mut State,
     time: f64,
     guess: &[f64],
 ) -> Result<(), SolveError> {
-    if solver.evaluate(state, time, false).is_err() {
-        return Ok(());
-    }
-    let (energy_here, size) = energy(solver);
-    let loads = own_loads(solver.system());
     let here = state.clone();
     let Vectors { system, pending, increment, .. } = solver.vectors();
     increment.copy_from_slice(guess);
@@ -228,15 +231,13 @@ fn start_from(
     let part = touching.barriers.allowed(&state.position, increment, 0.0, [KEEP[1], 1.0]);
     system.advance(state, increment, part);
     put(solver, part);
-    let lower = match solver.evaluate(state, time, false) {
-        Ok(()) => {
-            let work = part * work(solver, &loads);
-            energy(solver).0 - work <= energy_here + ROUND_OFF * size
-        }
-        Err(_) => false,
+    let possible = match solver.evaluate(state, time, false) {
+        Ok(()) => energy(solver).0.is_finite(),
+        Err(SolveError::Broken { .. }) => false,
+        Err(error) => return Err(error),
     };
     let Vectors { pending, .. } = solver.vectors();
-    if lower {
+    if possible {
         pending.iter_mut().for_each(|p| *p *= 1.0 - part);
     } else {
         *state = here;
@@ -334,17 +335,28 @@ fn find_direction(solver: &mut impl Contacting, raised: &mut f64) -> Result<(f64
     ))
 }
 
-/// Goes along the increment, in halves until the energy has fallen; false if it does not.
+/// How an increment is made.
+#[derive(Clone, Copy)]
+struct Tries {
+    /// The part to begin with.
+    part: f64,
+    /// Whether energy has to fall.
+    complete: bool,
+    /// Whether the stiffness where it first leads is found at once, since it is nearly always the next to be asked for.
+    goes_on: bool,
+}
+
+/// Goes along the increment, in halves until the energy has fallen: whether the first try was it, or none if it does not fall.
 fn search(
     solver: &mut impl Contacting,
     state: &mut State,
     time: f64,
     before: &Before,
-    mut part: f64,
-    complete: bool,
-) -> Result<bool, SolveError> {
+    tries: Tries,
+) -> Result<Option<bool>, SolveError> {
+    let Tries { mut part, complete, goes_on } = tries;
     let mut broken = None;
-    for _ in 0..=HALVINGS {
+    for halving in 0..=HALVINGS {
         state.clone_from(&before.state);
         let Vectors { system, increment, .. } = solver.vectors();
         system.advance(state, increment, part);
@@ -354,7 +366,7 @@ fn search(
             before.share + part * (1.0 - before.share)
         };
         put(solver, gone);
-        match solver.evaluate(state, time, false) {
+        match solver.evaluate(state, time, goes_on && halving == 0) {
             Ok(()) if energy(solver).0.is_finite() => {
                 let fallen = energy(solver).0 - part * work(solver, &before.loads) - before.energy;
                 let accepted = !complete || fallen <= ROUND_OFF * before.size || {
@@ -366,7 +378,7 @@ fn search(
                 if accepted {
                     let Vectors { pending, .. } = solver.vectors();
                     pending.iter_mut().for_each(|p| *p *= 1.0 - part);
-                    return Ok(true);
+                    return Ok(Some(halving == 0));
                 }
             }
             Ok(()) => broken = None,
@@ -375,7 +387,7 @@ fn search(
         }
         part *= 0.5;
     }
-    broken.map_or(Ok(false), Err)
+    broken.map_or(Ok(None), Err)
 }
 
 /// Goes on along an increment that was made in full, two, four and eight times as far while the energy falls and nothing is in the way.

@@ -197,6 +197,17 @@ impl Group {
         unsorted.clear();
         let at = |node: u32| place[node as usize];
         let margin = |node: u32| skin[node as usize] + 0.5 * within;
+        // Whole sides first: a tool that waits far away costs no more than their boxes.
+        let whole = |side: &BarrierSide| {
+            let boxes = side.points.iter().map(|&node| around([node], &at, &margin));
+            boxes.reduce(|all, one| all.with(&one))
+        };
+        if let [first, second] = &sides[..]
+            && !whole(first).zip(whole(second)).is_some_and(|(first, second)| first.touches(&second))
+        {
+            self.sort();
+            return;
+        }
         sides.iter_mut().for_each(|side| side.refit(at, margin));
         let most = |nodes: &[u32]| nodes.iter().map(|&node| skin[node as usize]).fold(0.0, f64::max);
         let alone = sides.len() == 1;
@@ -220,8 +231,13 @@ impl Group {
                     }
                     let [a, b, c] = corners;
                     let nodes = [node, a, b, c];
-                    let distance = Kind::PointTriangle.nearest(&nodes.map(at)).distance;
-                    if distance < within + skin[node as usize] + most(&corners) {
+                    let limit = within + skin[node as usize] + most(&corners);
+                    let points = nodes.map(at);
+                    if is_beyond(&points, limit) {
+                        continue;
+                    }
+                    let distance = Kind::PointTriangle.nearest(&points).distance;
+                    if distance < limit {
                         unsorted.push(Candidate {
                             kind: Kind::PointTriangle,
                             nodes,
@@ -298,8 +314,9 @@ impl Group {
         for bin in 1..self.bins.len() {
             self.bins[bin] += self.bins[bin - 1];
         }
-        // Each start is one place late until its bin is filled.
-        self.candidates.clone_from(&unsorted);
+        // Each start is one place late until its bin is filled. What lies in the list before does not matter.
+        self.candidates.truncate(unsorted.len());
+        self.candidates.extend_from_slice(&unsorted[self.candidates.len()..]);
         for one in &unsorted {
             let place = self.bin(one.distance) + 1;
             self.candidates[self.bins[place] as usize] = *one;
@@ -324,6 +341,14 @@ impl Group {
             sides => sides.iter().map(of).sum(),
         }
     }
+}
+
+/// Whether a point is farther from a triangle than a distance [m], by the ball around the triangle.
+fn is_beyond([point, a, b, c]: &[Vector3<f64>; 4], distance: f64) -> bool {
+    let middle = (a + b + c) / 3.0;
+    let squares = [a, b, c].map(|corner| (corner - middle).norm_squared());
+    let limit = distance + squares[0].max(squares[1]).max(squares[2]).sqrt();
+    (point - middle).norm_squared() > limit * limit
 }
 
 /// Whether two edges are farther from each other than a distance [m], by the balls around them.
