@@ -1,9 +1,15 @@
-//! Sparse factors of unsymmetric matrices, and what is told of symmetric ones.
+//! Sparse factors of symmetric and unsymmetric matrices.
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
+use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, LdltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky, supernodal::SupernodalLdltRef,
+};
 use faer::sparse::linalg::lu::{LuRef, LuSymbolicParams, NumericLu, SymbolicLu, factorize_symbolic_lu};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, Par, Spec};
+use faer::{Conj, MatMut, Par, Side, Spec};
 
 use crate::sparse::LowerMatrix;
 
@@ -20,6 +26,125 @@ pub(crate) struct Pivots {
 
 /// Pivots below this part of the diagonal are zero but for round-off.
 pub(crate) const ZERO_PIVOT: f64 = 1e-14;
+
+/// Operations for each entry of the factors, over the library's own measure, above which columns are taken together. Nodes have up to six
+/// equations with the same pattern, so it pays from the start.
+const SUPERNODES: f64 = 0.0;
+
+/// L D Lᵀ of a matrix scaled to a unit diagonal.
+pub(crate) struct Factors {
+    symbolic: SymbolicCholesky<u32>,
+    value: Vec<f64>,
+    scale: Vec<f64>,
+    scaled: Vec<f64>,
+    memory: MemBuffer,
+}
+
+impl Factors {
+    pub(crate) fn new(matrix: &LowerMatrix) -> Result<Self, faer::sparse::FaerError> {
+        let symbolic = factorize_symbolic_cholesky(
+            pattern(matrix),
+            Side::Lower,
+            SymmetricOrdering::Amd,
+            CholeskySymbolicParams {
+                supernodal_flop_ratio_threshold: SupernodalThreshold(SUPERNODES),
+                ..Default::default()
+            },
+        )?;
+        let memory = MemBuffer::new(StackReq::any_of(&[
+            symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Spec::default()),
+            symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
+        ]));
+        Ok(Self {
+            value: vec![0.0; symbolic.len_val()],
+            scale: vec![0.0; matrix.len()],
+            scaled: vec![0.0; matrix.value.len()],
+            symbolic,
+            memory,
+        })
+    }
+
+    /// Factors a matrix; `None` if it holds a number that is not finite.
+    pub(crate) fn factorise(&mut self, matrix: &LowerMatrix) -> Option<Pivots> {
+        for (equation, scale) in self.scale.iter_mut().enumerate() {
+            let diagonal = matrix.diagonal(equation).abs();
+            *scale = if diagonal > 0.0 { 1.0 / diagonal.sqrt() } else { 1.0 };
+        }
+        for (column, bounds) in matrix.column_start.windows(2).enumerate() {
+            for at in bounds[0] as usize..bounds[1] as usize {
+                let value = matrix.value[at] * self.scale[column] * self.scale[matrix.row[at] as usize];
+                if !value.is_finite() {
+                    return None;
+                }
+                self.scaled[at] = value;
+            }
+        }
+        let scaled = SparseColMatRef::new(pattern(matrix), &self.scaled[..]);
+        // Pivots that vanish are kept from dividing by zero; they are found below.
+        let tiny = 0.1 * ZERO_PIVOT;
+        let regularization = LdltRegularization {
+            dynamic_regularization_signs: None,
+            dynamic_regularization_delta: tiny,
+            dynamic_regularization_epsilon: tiny,
+        };
+        let stack = MemStack::new(&mut self.memory);
+        self.symbolic
+            .factorize_numeric_ldlt(
+                &mut self.value,
+                scaled,
+                Side::Lower,
+                regularization,
+                Par::Seq,
+                stack,
+                Spec::default(),
+            )
+            .ok()?;
+        Some(self.pivots())
+    }
+
+    fn pivots(&self) -> Pivots {
+        let mut pivots = Pivots { smallest: f64::INFINITY, ..Pivots::default() };
+        let permutation = self.symbolic.perm();
+        let mut look = |column: usize, pivot: f64| {
+            pivots.negative += usize::from(pivot < 0.0);
+            if pivot.abs() < pivots.smallest {
+                pivots.smallest = pivot.abs();
+                pivots.weakest = permutation.map_or(column, |p| p.arrays().0[column] as usize);
+            }
+        };
+        match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Simplicial(symbolic) => {
+                for (column, &start) in symbolic.col_ptr()[..symbolic.ncols()].iter().enumerate() {
+                    look(column, self.value[start as usize]);
+                }
+            }
+            SymbolicCholeskyRaw::Supernodal(symbolic) => {
+                let factor = SupernodalLdltRef::new(symbolic, &self.value);
+                for node in 0..symbolic.n_supernodes() {
+                    let node = factor.supernode(node);
+                    for column in 0..node.val().ncols() {
+                        look(node.start() + column, node.val()[(column, column)]);
+                    }
+                }
+            }
+        }
+        pivots
+    }
+
+    /// x ← A⁻¹ x.
+    pub(crate) fn solve(&mut self, x: &mut [f64]) {
+        let scale = |x: &mut [f64]| x.iter_mut().zip(&self.scale).for_each(|(x, s)| *x *= s);
+        scale(x);
+        let size = x.len();
+        LdltRef::new(&self.symbolic, &self.value).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(x, size, 1),
+            Par::Seq,
+            MemStack::new(&mut self.memory),
+        );
+        scale(x);
+    }
+}
 
 /// L U of the whole matrix.
 pub(super) struct LuFactors {
@@ -94,4 +219,9 @@ impl LuFactors {
             MemStack::new(&mut self.memory),
         );
     }
+}
+
+fn pattern(matrix: &LowerMatrix) -> SymbolicSparseColMatRef<'_, u32> {
+    let size = matrix.len();
+    SymbolicSparseColMatRef::new_checked(size, size, &matrix.column_start, None, &matrix.row)
 }

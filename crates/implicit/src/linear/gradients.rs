@@ -6,7 +6,7 @@
 use nalgebra::{Cholesky, Matrix3, SMatrix, Vector3};
 use rayon::prelude::*;
 
-use super::fronts::Fronts as Factors;
+use super::factors::Factors;
 use super::report::{LinearError, LinearReport};
 use crate::rotation::skew;
 use crate::sparse::{Equations, LowerMatrix, NONE};
@@ -264,7 +264,7 @@ impl Coarse {
         Some(Self {
             arm: vec![Vector3::zeros(); fine.nodes()],
             aggregate,
-            factors: Factors::new(&matrix)?,
+            factors: Factors::new(&matrix).ok()?,
             matrix,
             value: vec![Block::zeros(); pairs.len()],
             pairs,

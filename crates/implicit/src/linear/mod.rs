@@ -1,16 +1,14 @@
-//! Linear equations with a sparse matrix: factors L D Lᵀ (`fronts.rs`) or L U (faer; the symbolic part once a pattern), or conjugate gradients
+//! Linear equations with a sparse matrix: factors L D Lᵀ or L U (faer; the symbolic part once a pattern), or conjugate gradients
 //! (`gradients.rs`). Factors are found on one thread, so results do not depend on the number of threads.
 
 mod factors;
-mod fronts;
 mod gradients;
 mod report;
 
 use nalgebra::Vector3;
 
 use self::factors::LuFactors;
-pub(crate) use self::factors::{Pivots, ZERO_PIVOT};
-pub(crate) use self::fronts::Fronts as Factors;
+pub(crate) use self::factors::{Factors, Pivots, ZERO_PIVOT};
 use self::gradients::{Approximation, BlockMatrix, Coarse, KrylovVectors};
 pub(crate) use self::report::LinearError;
 pub use self::report::LinearReport;
@@ -81,7 +79,7 @@ impl Workspace {
         let coarse = blocks.as_ref().filter(|_| preconditioner == Some(Preconditioner::Aggregates));
         Some(Self {
             solver,
-            factors: if direct && !empty { Some(Factors::new(matrix)?) } else { None },
+            factors: if direct && !empty { Some(Factors::new(matrix).ok()?) } else { None },
             unsymmetric: if whole && !empty { Some(LuFactors::new(matrix).ok()?) } else { None },
             current: false,
             fresh: false,
