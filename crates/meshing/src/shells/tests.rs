@@ -17,28 +17,28 @@ impl ImplicitField for Lens {
     }
 }
 
-/// A sheet 2 mm thick folded into nine leaves with 1 mm between them, 24 mm deep and 27 mm high.
+/// A sheet 2 mm thick folded into five leaves with 1 mm between them, 16 mm deep and 14 mm high.
 struct Folds;
 
 impl ImplicitField for Folds {
     fn value(&self, x: &Vector3) -> f64 {
-        let half = 0.012;
+        let half = 0.008;
         let box_of = |x: &Vector3, half: [f64; 3]| {
             let off = x.abs() - Vector3::from(half);
             -(off.sup(&Vector3::zeros()).norm() + off.max().min(0.0))
         };
-        let mut inside = box_of(x, [half, 0.006, 0.013]);
-        for k in 0..8 {
+        let mut inside = box_of(x, [half, 0.004, 0.007]);
+        for k in 0..4 {
             // Gaps open to the left and to the right in turn.
-            let side = if k % 2 == 0 { 0.004 } else { -0.004 };
-            let gap = x - Vector3::new(side, 0.0, -0.0105 + 0.003 * f64::from(k));
+            let side = if k % 2 == 0 { 0.003 } else { -0.003 };
+            let gap = x - Vector3::new(side, 0.0, -0.0045 + 0.003 * f64::from(k));
             inside = inside.min(-box_of(&gap, [half, 0.02, 0.0005]));
         }
         inside
     }
 
     fn bounds(&self) -> (Vector3, Vector3) {
-        (Vector3::new(-0.014, -0.008, -0.015), Vector3::new(0.014, 0.008, 0.015))
+        (Vector3::new(-0.01, -0.006, -0.009), Vector3::new(0.01, 0.006, 0.009))
     }
 }
 
@@ -85,15 +85,14 @@ fn shells_whose_triangles_cross_are_fitted_again_from_some_that_never_did() {
     assert!(fitted.report.reached);
 }
 
-/// Leaves 2 mm thick with 1 mm between them, by shells of about 4 mm.
+/// Leaves 2 mm thick with 1 mm between them, by shells of about 3 mm.
 #[test]
 fn shells_of_a_deeply_folded_sheet_do_not_cross() {
     let mesh = surface(&Folds, 0.0009);
-    assert!(mesh.len() > UNCROSSED);
-    let (fitted, _) = found(&mesh, ShellGoal::Shells(600), 4_000_000, UNCROSSED);
+    let (fitted, _) = found(&mesh, ShellGoal::Shells(200), 1_000_000, 2000);
     println!("{} triangles\n{}", mesh.len(), fitted.report);
     assert_eq!(fitted.report.crossings, Flaw::default());
-    assert!(fitted.report.reached && fitted.report.shells + 1 >= 600);
+    assert!(fitted.report.reached && fitted.report.shells + 1 >= 200);
     let flat = fitted.mesh.blocks[0].data.get("flat").map_or(0.0, |flat| flat.values.iter().sum());
     assert_eq!(fitted.report.flattened.count as f64, flat);
 }
@@ -152,7 +151,7 @@ fn the_work_of_a_fit_does_not_grow_with_the_triangles_of_the_target() {
         assert!(found.fitted.report.reached);
         effort.part() * (usize::MAX / 2) as f64
     };
-    let [coarse, fine] = [5, 6].map(spent);
+    let [coarse, fine] = [4, 5].map(spent);
     println!("{coarse:.0} and {fine:.0} searches");
     assert!(fine < 1.5 * coarse, "{coarse} {fine}");
 }
