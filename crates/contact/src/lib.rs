@@ -19,6 +19,7 @@
 //! ```
 
 pub mod barrier;
+pub mod face_points;
 pub mod grid;
 pub mod lag;
 mod near;

@@ -3,6 +3,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::face_points::ALONG;
 use crate::grid::FLATTEST;
 use crate::pairs::{BESIDE, FACING, FLAT, ON, PARALLEL, SLIGHT};
 use crate::shape::Shape;
@@ -74,6 +75,11 @@ pub fn pairs_shader() -> String {
         ("ON", ON),
     ];
     [&constants(&numbers), include_str!("pairs/narrow.wgsl")].join("\n")
+}
+
+/// Points of faces at balls and capsules, in WGSL, beside [`shader`]: `takes_nearest` of a thing, and `nearest_point` of a face.
+pub fn face_points_shader() -> String {
+    [&constants(&[("ALONG", ALONG)]), include_str!("face_points.wgsl")].join("\n")
 }
 
 /// Rigid things as `thing_number` gives them: [`THING`] numbers each, in their order, then the values of grids.

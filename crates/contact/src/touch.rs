@@ -116,7 +116,7 @@ impl Rigid {
     }
 
     /// [`near`](Self::near) in the frame of the thing.
-    fn near_local(&self, point: &Vector3<f64>) -> Near {
+    pub fn near_local(&self, point: &Vector3<f64>) -> Near {
         let Near { distance, normal } = self.shape.near(point);
         let sign = if self.inside { -1.0 } else { 1.0 };
         Near { distance: sign * distance, normal: normal * sign }

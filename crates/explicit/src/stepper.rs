@@ -31,7 +31,7 @@ use crate::stability::Monitor;
 use crate::state::State;
 use crate::step_control::{Clock, Lengths, StepControl};
 use crate::step_error::StepError;
-use crate::touching::{Free, NodeContact, Posture, Touching};
+use crate::touching::{Free, NodeContact, Nodes, Posture, Touching};
 
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
@@ -158,7 +158,7 @@ pub struct CentralDifference<R> {
     /// Nodes that are bound to each other.
     collectives: Vec<Collective>,
     /// Contacts with rigid things.
-    touching: Option<Touching>,
+    touching: Option<Touching<R>>,
     processor: Processor,
     /// Factors on the amplitudes of each constraint now and after the step.
     factors: Vec<[[f64; 2]; 2]>,
@@ -196,7 +196,7 @@ impl<R: Scalar> Observable<R> for CentralDifference<R> {
     }
 
     fn contact_nodes(&self, state: &State<R>) -> Vec<NodeContact> {
-        self.touching.as_ref().map_or_else(Vec::new, |touching| touching.nodal(&state.slip))
+        self.touching.as_ref().map_or_else(Vec::new, |touching| touching.nodal(state))
     }
 
     /// The mean of the increments before and after.
@@ -624,11 +624,11 @@ impl<R: Scalar> CentralDifference<R> {
         let mut gripped = std::mem::take(&mut state.gripped);
         let mut lags = std::mem::take(&mut state.lags);
         let rest = |node: u32| self.model.rest[node as usize];
-        let ratio = self.lengths.ratio() * self.lengths.ratio();
-        let now = |node: u32| {
-            let (moved, way) = (state.displacement[node as usize], state.increment[node as usize]);
-            let way = way.iter().map(|x| x.to_f64() * x.to_f64()).sum::<f64>();
-            (moved.map(|x| x.to_f64()), way * ratio)
+        let now = Nodes {
+            displacement: &state.displacement,
+            increment: &state.increment,
+            ratio: self.lengths.ratio(),
+            processor: self.processor,
         };
         let free = |node: u32| {
             let Predicted { mut displacement, mobility, .. } = self.predicted(state, node);
@@ -649,7 +649,7 @@ impl<R: Scalar> CentralDifference<R> {
             let pose = |k: usize| Translation3::from(ways[k]) * rigid.at(times[k], leg);
             Posture { poses: [pose(0), pose(1)], opening: rigid.posture(times[1], leg).1 }
         };
-        touching.find(postures, now, free, &mut gripped);
+        touching.find(postures, &now, free, &mut gripped);
         touching.nodal_forces().for_each(|(node, force)| self.applied.add(node, force));
         touching.bear_on(&mut lags);
         (state.gripped, state.lags) = (gripped, lags);

@@ -6,7 +6,9 @@
 mod at_rigid;
 mod nodal;
 mod rows;
+mod ways;
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
@@ -19,9 +21,11 @@ use pliant_contact::touch::{
 };
 use pliant_mechanics::tensor::{Vector, add};
 
-use at_rigid::AtRigid;
+use crate::Scalar;
+use at_rigid::{AtRigid, Seen};
 pub use nodal::NodeContact;
 use rows::{NONE, Row, idle, push_alone, take_back};
+pub(crate) use ways::Nodes;
 
 /// Distance [thinnest part of a jaw] at which a node touches it.
 const TOUCHING: f64 = 1e-6;
@@ -102,18 +106,24 @@ enum Own {
 }
 
 /// The contacts of a model, with the nodes that they are about.
-pub(crate) struct Touching {
+pub(crate) struct Touching<R> {
     contacts: Arc<Contacts>,
     numbers: Vec<u32>,
-    /// Where the nodes are at rest, and before the step [m].
+    /// Where the nodes are at rest, and before the step [m]; the latter only of those that `placed` has.
     rest: Vec<Vector3<f64>>,
     places: Vec<Vector3<f64>>,
+    /// Nodes that a list of a thing has, and those that may touch other bodies; increasing.
+    placed: Vec<u32>,
+    /// The latter alone.
+    of_bodies: Vec<u32>,
+    /// Displacements [m] of all nodes of the model between the first and the last that touch, when lists were made.
+    listed: Vec<Vector<R>>,
     nodes: Vec<Node>,
     /// The nodes that may touch something in the step, increasing.
     near: Vec<u32>,
     own: Vec<Own>,
-    /// Distances [m] of the nodes from a rigid thing, by node.
-    distances: Vec<f64>,
+    /// Nodes at a rigid thing.
+    seen: Vec<Seen>,
     rows: Vec<Row>,
     /// Triangles of all surfaces, each once.
     faces: Vec<[u32; 3]>,
@@ -125,7 +135,7 @@ pub(crate) struct Touching {
     pub forces: Vec<Vector<f64>>,
 }
 
-impl Touching {
+impl<R: Scalar> Touching<R> {
     /// Those of a model with these nodes at rest [m].
     pub fn new(contacts: Arc<Contacts>, rest: &[Vector<f64>]) -> Self {
         let numbers = contacts.nodes();
@@ -143,12 +153,18 @@ impl Touching {
             }
         });
         let own = parts.flatten().collect();
+        let with_bodies = contacts.contacts.iter().filter(|contact| !matches!(contact.with, With::Rigid(_)));
+        let of_bodies = with_bodies.flat_map(Contact::surfaces).flat_map(|surface| &surface.nodes);
+        let of_bodies = of_bodies.map(|&node| number(node)).collect();
         Self {
             rest: (0..numbers.len() as u32).map(place).collect(),
             places: vec![Vector3::zeros(); numbers.len()],
+            placed: Vec::new(),
+            of_bodies,
+            listed: Vec::new(),
             near: Vec::new(),
             nodes: vec![Node::NONE; numbers.len()],
-            distances: vec![0.0; numbers.len()],
+            seen: vec![Seen::default(); numbers.len()],
             rows: Vec::new(),
             faces: nodal::faces(&contacts, &numbers),
             slips: vec![[0.0; 2]; numbers.len()],
@@ -160,23 +176,15 @@ impl Touching {
         }
     }
 
-    /// Finds the forces of contacts in a step. `now` is the displacement of a node [m] and about the square of the way [m²] it goes in the step;
-    /// `gripped` are the nodes that jaws hold.
+    /// Finds the forces of contacts in a step; `gripped` are the nodes that jaws hold.
     pub fn find(
         &mut self,
         postures: impl Fn(usize, &Rigid) -> Posture,
-        now: impl Fn(u32) -> (Vector<f64>, f64),
+        now: &Nodes<'_, R>,
         free: impl Fn(u32) -> Free,
         gripped: &mut Vec<Gripped>,
     ) {
         self.forces.fill([0.0; 3]);
-        let mut farthest = 0.0_f64;
-        for ((at, rest), &number) in self.places.iter_mut().zip(&self.rest).zip(&self.numbers) {
-            let (displacement, way) = now(number);
-            *at = rest + Vector3::from(displacement);
-            farthest = farthest.max(way);
-        }
-        let farthest = farthest.sqrt();
         for node in self.near.drain(..) {
             let node = &mut self.nodes[node as usize];
             (node.near, node.paired) = (false, false);
@@ -189,7 +197,9 @@ impl Touching {
             }
         }
         gripped.retain(|held| self.holder(held).is_some_and(|(_, own, _)| own.grips));
-        self.look(farthest, free, gripped);
+        let way = self.list(now);
+        self.place(now, gripped);
+        self.look(way, free, gripped);
         if !self.near.is_empty() {
             self.hold(gripped);
             self.measure();
@@ -235,9 +245,55 @@ impl Touching {
         touching.map(|(node, number)| (number, over(&(node.then - node.free), &node.own).into()))
     }
 
+    /// The nodes of the model between the first and the last that touch.
+    fn span(&self) -> Range<usize> {
+        match (self.numbers.first(), self.numbers.last()) {
+            (Some(&first), Some(&last)) => first as usize..last as usize + 1,
+            _ => 0..0,
+        }
+    }
+
+    /// Lists what may come near rigid things, if a list does not hold so much any more. How far a node goes in the step at most [m], if it goes on
+    /// as before.
+    fn list(&mut self, now: &Nodes<'_, R>) -> f64 {
+        let span = self.span();
+        let is_first = self.listed.is_empty();
+        let [way, moved] =
+            now.ways(span.clone(), if is_first { &now.displacement[span.clone()] } else { &self.listed });
+        let rigids = &self.contacts.rigids;
+        let rooms = self.contacts.contacts.iter().map(|contact| contact.touch.offset + 2.0 * way);
+        let holds = |(own, room): (&Own, f64)| match own {
+            Own::Rigid(own) => own.holds(&rigids[own.rigid], room, moved),
+            Own::Bodies(..) => true,
+        };
+        if !is_first && self.own.iter().zip(rooms.clone()).all(holds) {
+            return way;
+        }
+        self.listed.clear();
+        self.listed.extend_from_slice(&now.displacement[span]);
+        place_nodes(0..self.numbers.len() as u32, &self.numbers, &self.rest, now, &mut self.places);
+        self.placed.clone_from(&self.of_bodies);
+        for (own, room) in self.own.iter_mut().zip(rooms) {
+            if let Own::Rigid(own) = own {
+                own.list(&rigids[own.rigid], room, &self.places);
+                self.placed.extend_from_slice(own.listed());
+            }
+        }
+        self.placed.sort_unstable();
+        self.placed.dedup();
+        way
+    }
+
+    /// Where nodes are before the step that may touch something in it, and those that jaws hold.
+    fn place(&mut self, now: &Nodes<'_, R>, gripped: &[Gripped]) {
+        let held = gripped.iter().filter_map(|held| self.numbers.binary_search(&held.node).ok());
+        let nodes = self.placed.iter().copied().chain(held.map(|node| node as u32));
+        place_nodes(nodes, &self.numbers, &self.rest, now, &mut self.places);
+    }
+
     /// Finds the nodes that may touch in the step, and where they go; rows of the points near rigid things.
-    fn look(&mut self, farthest: f64, free: impl Fn(u32) -> Free, gripped: &[Gripped]) {
-        let Self { contacts, numbers, places, nodes, near, own, distances, rows, .. } = self;
+    fn look(&mut self, way: f64, free: impl Fn(u32) -> Free, gripped: &[Gripped]) {
+        let Self { contacts, numbers, places, nodes, near, own, seen, rows, .. } = self;
         rows.clear();
         let mut mark = |node: u32| {
             if !std::mem::replace(&mut nodes[node as usize].near, true) {
@@ -248,8 +304,8 @@ impl Touching {
             match own {
                 Own::Rigid(own) => {
                     let offset = contacts.contacts[index].touch.offset;
-                    let (rigid, room) = (&contacts.rigids[own.rigid], offset + 2.0 * farthest);
-                    own.look(rigid, room, places, distances, |row| {
+                    let (rigid, room) = (&contacts.rigids[own.rigid], offset + 2.0 * way);
+                    own.look(rigid, room, places, seen, |row| {
                         rows.push(Row { contact: index, ..row });
                     });
                     own.near.iter().for_each(|&node| mark(node));
@@ -461,6 +517,10 @@ impl Touching {
             for &node in &own.near {
                 let now = &self.places[node as usize];
                 let node = &mut self.nodes[node as usize];
+                // Where it goes freely it is out of the thing, or it would have a row.
+                if node.then == node.free {
+                    continue;
+                }
                 let mut first = None;
                 for _ in 0..LIFTS {
                     let (gap, normal) = own.gap(rigid, contact.touch.offset, now, &node.then);
@@ -476,6 +536,20 @@ impl Touching {
                 }
             }
         }
+    }
+}
+
+/// Finds where nodes are before the step [m], by their places among `numbers`.
+fn place_nodes<R: Scalar>(
+    nodes: impl Iterator<Item = u32>,
+    numbers: &[u32],
+    rest: &[Vector3<f64>],
+    now: &Nodes<'_, R>,
+    places: &mut [Vector3<f64>],
+) {
+    for node in nodes.map(|node| node as usize) {
+        let displacement = now.displacement[numbers[node] as usize].map(|x| x.to_f64());
+        places[node] = rest[node] + Vector3::from(displacement);
     }
 }
 

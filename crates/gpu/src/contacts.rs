@@ -4,12 +4,13 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use pliant_contact::face_points::FacePoints;
 use pliant_contact::pose::Leg;
-use pliant_contact::shader::{PASSAGE, THING, pairs_shader, shader, split, things};
+use pliant_contact::shader::{PASSAGE, THING, face_points_shader, pairs_shader, shader, split, things};
 use pliant_contact::shape::Shape;
 use pliant_contact::touch::{
     BAND, Contact, Contacts, FOUND, LIFTED, LIFTS, LOOKED, MARGIN, OFF, PASSES, Passage, ROUNDS, Rigid,
-    SIDES, With, lattice, parts_of,
+    SIDES, With,
 };
 use pliant_mechanics::model::Model;
 use pliant_mechanics::tensor::Vector;
@@ -123,6 +124,7 @@ impl DeviceContacts {
             ("SIDES", SIDES),
             ("LIFTS", LIFTS),
             ("ROWS", NODE_ROWS),
+            ("FACE_ROW", FACE_ROW),
             ("SOLVERS", solvers(device)),
         ];
         let counts = counts.map(|(name, count)| format!("const {name} = {count}u;\n"));
@@ -167,7 +169,8 @@ impl DeviceContacts {
             Kernel::new(device, "contacts", &constants, &snippets, &groups, invocations)
         };
         if lists.faces > 0 {
-            kernels.push(with(include_str!("shaders/touch_faces.wgsl"), lists.faces)?);
+            let faces = [&face_points_shader(), include_str!("shaders/touch_faces.wgsl")].concat();
+            kernels.push(with(&faces, lists.faces)?);
         }
         let finder = kernels.len();
         let mut before = None;
@@ -256,6 +259,8 @@ const PAIR_ROW: usize = 4;
 
 /// Fours of `rows` of a contact at a node: its force, and three of each side of the thing.
 const NODE_ROWS: usize = 1 + 3 * SIDES;
+/// Fours of a point of a face.
+const FACE_ROW: usize = 4;
 
 /// Numbers of a contact in `things`; twin of the one in touching.wgsl.
 const CONTACT: usize = 8;
@@ -264,7 +269,8 @@ const CONTACT: usize = 8;
 #[derive(Default)]
 struct Face {
     colour: usize,
-    contacts: Vec<usize>,
+    /// Its contacts, each with its edges as [`FacePoints::edges`] has them.
+    contacts: Vec<(usize, [bool; 3])>,
 }
 
 /// What touching.wgsl reads.
@@ -303,22 +309,25 @@ impl Lists {
             };
             surface.nodes.iter().for_each(|&node| at_node[place_of(node)].push(index));
             let longest = surface.longest_edge(|node| rest[node as usize].into());
-            let own = lattice(parts_of(longest, &rigids[rigid].shape));
+            let own = FacePoints::new(&surface.faces, longest, &rigids[rigid].shape, rigids[rigid].inside);
+            let most = own.most();
             // Edges may be twice as long as at rest.
-            let beyond = if own.is_empty() { 0.0 } else { 2.0 * longest };
+            let beyond = if most == 0 { 0.0 } else { 2.0 * longest };
             let numbers = [touch.friction, touch.offset, MARGIN * longest, beyond].map(|x| x as f32);
             let whole = |number: usize| number as f32;
             things.extend([whole(THING * rigid), whole(passages + PASSAGE * rigid)]);
             things.extend(numbers);
-            things.extend([whole(points.len()), whole(own.len())]);
-            points_of.push(own.len());
-            if !own.is_empty() {
-                for face in &surface.faces {
+            things.extend([whole(points.len()), whole(most)]);
+            points_of.push(most);
+            if most > 0 {
+                for (number, face) in surface.faces.iter().enumerate() {
                     let face = face.map(|node| place_of(node) as u32);
-                    faces.entry(face).or_default().contacts.push(index);
+                    faces.entry(face).or_default().contacts.push((index, own.edges(number)));
                 }
             }
-            points.extend(own);
+            if let FacePoints::Lattice(own) = own {
+                points.extend(own);
+            }
         }
         let first_point = things.len();
         things.extend(points.as_flattened().iter().map(|&weight| weight as f32));
@@ -344,14 +353,15 @@ impl Lists {
         let mut of_faces: Vec<u32> = Vec::new();
         for (corners, face) in &faces {
             numbers.extend(corners);
-            numbers.extend([face.colour as u32, of_faces.len() as u32 / 2]);
-            for &contact in &face.contacts {
+            numbers.extend([face.colour as u32, of_faces.len() as u32 / 3]);
+            for &(contact, edges) in &face.contacts {
                 sums[contact].push(rows as u32);
-                of_faces.extend([contact as u32, rows as u32]);
-                rows += 1 + 3 * points_of[contact];
+                let bits = (0..3).map(|k| u32::from(edges[k]) << k).sum();
+                of_faces.extend([contact as u32, rows as u32, bits]);
+                rows += 1 + FACE_ROW * points_of[contact];
             }
         }
-        numbers.extend([0, 0, 0, 0, of_faces.len() as u32 / 2]);
+        numbers.extend([0, 0, 0, 0, of_faces.len() as u32 / 3]);
         let contacts_of_faces = numbers.len();
         numbers.append(&mut of_faces);
         let first_colour = numbers.len();

@@ -1,10 +1,11 @@
 //! A surface at a rigid thing: what of it may touch the thing in a step.
 
 use nalgebra::Vector3;
+use pliant_contact::face_points::FacePoints;
 use pliant_contact::pairs::Surface;
 use pliant_contact::pose::Pose;
 use pliant_contact::shape::{Near, Shape};
-use pliant_contact::touch::{LEFT, MARGIN, Passage, Rigid, lattice, parts_of};
+use pliant_contact::touch::{LEFT, MARGIN, Passage, Rigid};
 
 use super::rows::Row;
 
@@ -17,7 +18,7 @@ pub(super) struct AtRigid {
     pub rigid: usize,
     pub surface: Surface,
     /// Points of each face.
-    samples: Vec<[f64; 3]>,
+    points: FacePoints,
     /// Distance [m] at which a node at rest still counts as near.
     pub margin: f64,
     pub passage: Passage,
@@ -33,9 +34,8 @@ pub(super) struct AtRigid {
 struct Listed {
     /// Distance [m] up to which nodes and faces are listed.
     reach: f64,
-    /// The pose of the thing then, and the places [m] of the nodes of the surface.
+    /// The pose of the thing then.
     pose: Pose,
-    places: Vec<Vector3<f64>>,
     /// Nodes of the surface with the corners of the faces, and faces by their place; increasing.
     nodes: Vec<u32>,
     faces: Vec<u32>,
@@ -46,7 +46,7 @@ impl AtRigid {
         let longest = surface.longest_edge(place);
         Self {
             rigid: number,
-            samples: lattice(parts_of(longest, &rigid.shape)),
+            points: FacePoints::new(&surface.faces, longest, &rigid.shape, rigid.inside),
             margin: MARGIN * longest,
             passage: Passage::new(rigid, [Pose::identity(); 2]),
             grips: false,
@@ -73,26 +73,41 @@ impl AtRigid {
         (gap, normal)
     }
 
-    /// Lists what is within a distance [m] of the thing, if the list does not hold so much any more.
-    fn list(&mut self, rigid: &Rigid, room: f64, places: &[Vector3<f64>]) {
-        let Self { surface, samples, margin, passage, listed, .. } = self;
-        let own = || surface.nodes.iter().map(|&node| places[node as usize]);
-        let moved = own().zip(&listed.places).map(|(now, then)| (now - then).norm_squared());
-        let moved = moved.fold(0.0, f64::max).sqrt() + passage.travel_from(rigid, &listed.pose);
-        if !listed.places.is_empty() && room + moved <= listed.reach {
+    /// Whether the list has all that may come nearer than a room [m] in the passage, of nodes that have moved by no more than this [m] since.
+    pub fn holds(&self, rigid: &Rigid, room: f64, moved: f64) -> bool {
+        let Listed { reach, pose, .. } = &self.listed;
+        let moved = moved + self.passage.travel_from(rigid, pose);
+        self.room(room) + moved <= *reach || *reach == f64::INFINITY
+    }
+
+    /// The nodes that are listed, with the corners of the faces; increasing.
+    pub fn listed(&self) -> &[u32] {
+        &self.listed.nodes
+    }
+
+    /// With what comes near by itself, besides a room [m].
+    fn room(&self, room: f64) -> f64 {
+        room + self.margin + self.passage.travel()
+    }
+
+    /// Lists what may come nearer than a room [m] in this passage, and in others till the surface or the thing has moved too far.
+    pub fn list(&mut self, rigid: &Rigid, room: f64, places: &[Vector3<f64>]) {
+        let room = self.room(room);
+        let Self { surface, points, margin, passage, listed, .. } = self;
+        let Listed { reach, pose, nodes: near, faces } = listed;
+        if *reach == f64::INFINITY {
             return;
         }
-        let Listed { reach, pose, places: then, nodes: near, faces } = listed;
-        // Sampled distances can change faster than a point moves.
-        let grows_evenly = !matches!(rigid.shape, Shape::Grid(_));
+        // Sampled distances can change faster than a point moves, and those of a half-space that turns without end.
+        let is_first = *reach == 0.0;
+        let grows_evenly = !matches!(rigid.shape, Shape::Grid(_))
+            && (is_first || passage.travel_from(rigid, pose).is_finite());
         (*reach, *pose) = (if grows_evenly { room + SKIN * *margin } else { f64::INFINITY }, passage.pose());
-        then.clear();
-        then.extend(own());
         near.clear();
         faces.clear();
         let distance = |point: &Vector3<f64>| passage.near(rigid, point).distance;
         near.extend(surface.nodes.iter().filter(|&&node| distance(&places[node as usize]) < *reach));
-        if samples.is_empty() {
+        if points.most() == 0 {
             return;
         }
         for (face, number) in surface.faces.iter().zip(0..) {
@@ -106,50 +121,38 @@ impl AtRigid {
         near.dedup();
     }
 
-    /// Finds the nodes that may come nearer than a room [m] in the passage; rows of these and of points between them.
+    /// Finds the nodes that may come nearer than a room [m] in the passage, of a list that holds; rows of these and of points between them.
     pub fn look(
         &mut self,
         rigid: &Rigid,
         room: f64,
         places: &[Vector3<f64>],
-        distances: &mut [f64],
+        seen: &mut [Seen],
         mut found: impl FnMut(Row),
     ) {
-        let room = room + self.margin + self.passage.travel();
-        self.list(rigid, room, places);
+        let room = self.room(room);
         self.near.clear();
         for &node in &self.listed.nodes {
-            let distance = self.passage.near(rigid, &places[node as usize]).distance;
-            distances[node as usize] = distance;
+            let (local, Near { distance, .. }) = self.passage.within(rigid, &places[node as usize]);
+            seen[node as usize] = Seen { local, distance };
             if distance < room {
                 self.near.push(node);
                 found(Row::new(0, [node], [1.0]));
             }
         }
-        for &face in &self.listed.faces {
-            let face = self.surface.faces[face as usize];
-            let corners = face.map(|node| places[node as usize]);
-            let (middle, around) = middle(&face, places);
-            // No point is nearer than one beside it by more than the way between both.
-            let own = face.map(|node| distances[node as usize]);
-            if own.iter().all(|&distance| distance > room + 2.0 * around) {
-                continue;
-            }
-            let between = self.passage.near(rigid, &middle).distance;
-            if between > room + around {
-                continue;
-            }
+        for &number in &self.listed.faces {
+            let face = self.surface.faces[number as usize];
+            let corners = face.map(|node| seen[node as usize]);
             let mut is_near = false;
-            for &weights in &self.samples {
-                let place = (0..3).map(|k| corners[k] * weights[k]).sum::<Vector3<f64>>();
-                let is_beyond = |at: &Vector3<f64>, distance: f64| {
-                    let far = distance - room;
-                    far > 0.0 && (place - at).norm_squared() < far * far
-                };
-                if !is_beyond(&middle, between) && !(0..3).any(|k| is_beyond(&corners[k], own[k])) {
-                    is_near = true;
-                    found(Row::new(0, face, weights));
+            let take = |weights: [f64; 3]| {
+                is_near = true;
+                found(Row::new(0, face, weights));
+            };
+            match &self.points {
+                FacePoints::Nearest(nearest) => {
+                    nearest.of(number as usize, &corners.map(|corner| corner.local), room, take);
                 }
+                FacePoints::Lattice(all) => self.look_at_lattice(rigid, room, all, &corners, take),
             }
             if is_near {
                 self.near.extend(face);
@@ -158,6 +161,46 @@ impl AtRigid {
         self.near.sort_unstable();
         self.near.dedup();
     }
+
+    /// Finds the points of a lattice on a face that may come nearer than a room [m].
+    fn look_at_lattice(
+        &self,
+        rigid: &Rigid,
+        room: f64,
+        all: &[[f64; 3]],
+        corners: &[Seen; 3],
+        mut found: impl FnMut([f64; 3]),
+    ) {
+        let middle = corners.iter().map(|corner| corner.local).sum::<Vector3<f64>>() / 3.0;
+        let around = corners.iter().map(|corner| (corner.local - middle).norm()).fold(0.0, f64::max);
+        // No point is nearer than one beside it by more than the way between both.
+        if corners.iter().all(|corner| corner.distance > room + 2.0 * around) {
+            return;
+        }
+        let middle = Seen { local: middle, distance: rigid.near_local(&middle).distance };
+        if middle.distance > room + around {
+            return;
+        }
+        for &weights in all {
+            let place = (0..3).map(|k| corners[k].local * weights[k]).sum::<Vector3<f64>>();
+            let is_beyond = |seen: &Seen| {
+                let far = seen.distance - room;
+                far > 0.0 && (place - seen.local).norm_squared() < far * far
+            };
+            if !is_beyond(&middle) && !corners.iter().any(is_beyond) {
+                found(weights);
+            }
+        }
+    }
+}
+
+/// A node at a thing.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Seen {
+    /// Its place in the frame of the thing at the end of the step [m].
+    local: Vector3<f64>,
+    /// Its distance from it [m].
+    distance: f64,
 }
 
 /// The middle of a face [m], and how far its corners are from there at most [m].
@@ -209,7 +252,7 @@ mod tests {
             };
             let fresh = || AtRigid::new(&rigid, 0, surface.clone(), |node| rest[node as usize]);
             let (mut own, mut random) = (fresh(), Random::new(7));
-            let mut places = rest.clone();
+            let (mut places, mut then) = (rest.clone(), rest.clone());
             let mut before = Pose::translation(0.1, 0.5, 0.1);
             let (mut listed, mut found) = (0, 0);
             for step in 0..400 {
@@ -222,17 +265,22 @@ mod tests {
                 let after = Pose::new(Vector3::new(0.1 + 0.2 * time, 0.5, 0.08 + 0.05 * time.cos()), turn);
                 let rows = |own: &mut AtRigid| {
                     own.passage = Passage::new(&rigid, [before, after]);
+                    let ways = places.iter().zip(&then).map(|(now, then)| (now - then).norm());
+                    if !own.holds(&rigid, 1e-3, ways.fold(0.0, f64::max)) {
+                        own.list(&rigid, 1e-3, &places);
+                    }
                     let mut rows = Vec::new();
-                    let mut distances = vec![0.0; rest.len()];
-                    own.look(&rigid, 1e-3, &places, &mut distances, |row| {
-                        rows.push((row.nodes, row.weights))
-                    });
+                    let mut seen = vec![Seen::default(); rest.len()];
+                    own.look(&rigid, 1e-3, &places, &mut seen, |row| rows.push((row.nodes, row.weights)));
                     rows
                 };
                 let anew = rows(&mut fresh());
                 let (pose, reach) = (own.listed.pose, own.listed.reach);
                 assert_eq!(rows(&mut own), anew, "{:?} at {time} s", rigid.shape);
-                listed += u32::from((own.listed.pose, own.listed.reach) != (pose, reach));
+                if (own.listed.pose, own.listed.reach) != (pose, reach) {
+                    listed += 1;
+                    then.clone_from(&places);
+                }
                 found += anew.len();
                 before = after;
             }

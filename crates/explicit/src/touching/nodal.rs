@@ -8,6 +8,7 @@ use pliant_contact::touch::{Contact, Contacts};
 use pliant_mechanics::tensor::Vector;
 
 use super::{Own, Touching, over};
+use crate::{Scalar, State};
 
 /// Gap, over the margin of a surface at a thing, up to which a touch lasts that nothing bears on.
 const LASTS: f64 = 0.1;
@@ -38,10 +39,14 @@ pub(super) fn faces(contacts: &Contacts, numbers: &[u32]) -> Vec<[u32; 3]> {
     faces
 }
 
-impl Touching {
-    /// All nodes that may touch, increasing, at the instant whose forces were found last. `slip` is that of [`State`](crate::State).
-    pub fn nodal(&self, slip: &[(u32, f64)]) -> Vec<NodeContact> {
-        let (pressures, gaps) = (self.pressures(), self.gaps());
+impl<R: Scalar> Touching<R> {
+    /// All nodes that may touch, increasing, at the instant whose forces were found last. `state` is that of the model then.
+    pub fn nodal(&self, state: &State<R>) -> Vec<NodeContact> {
+        let place = |(rest, &number): (&Vector3<f64>, &u32)| {
+            rest + Vector3::from(state.displacement[number as usize].map(|x| x.to_f64()))
+        };
+        let places: Vec<Vector3<f64>> = self.rest.iter().zip(&self.numbers).map(place).collect();
+        let (pressures, gaps) = (self.pressures(&places), self.gaps(&places));
         let parts = self.numbers.iter().zip(&self.nodes).zip(pressures).zip(gaps);
         parts
             .map(|(((&node, own), pressure), gap)| NodeContact {
@@ -49,7 +54,7 @@ impl Touching {
                 force: if own.near { over(&(own.then - own.free), &own.own).into() } else { [0.0; 3] },
                 pressure,
                 gap: Some(gap).filter(|gap| gap.is_finite()),
-                slip: way_of(slip, node),
+                slip: way_of(&state.slip, node),
             })
             .collect()
     }
@@ -82,7 +87,7 @@ impl Touching {
         all
     }
 
-    fn pressures(&self) -> Vec<Option<f64>> {
+    fn pressures(&self, places: &[Vector3<f64>]) -> Vec<Option<f64>> {
         let forces = self.normal_forces();
         let directions: Vec<Vector3<f64>> =
             forces.iter().map(|force| force.try_normalize(0.0).unwrap_or_default()).collect();
@@ -90,7 +95,7 @@ impl Touching {
         let mut shares = vec![[0.0; 2]; self.nodes.len()];
         let mut has_faces = vec![false; self.nodes.len()];
         for face in &self.faces {
-            let [a, b, c] = face.map(|node| self.places[node as usize]);
+            let [a, b, c] = face.map(|node| places[node as usize]);
             let third = (b - a).cross(&(c - a)) / 6.0;
             for node in face.map(|node| node as usize) {
                 let along = third.dot(&directions[node]);
@@ -107,7 +112,7 @@ impl Touching {
     }
 
     /// Least gaps [m]; infinite where nothing is near.
-    fn gaps(&self) -> Vec<f64> {
+    fn gaps(&self, places: &[Vector3<f64>]) -> Vec<f64> {
         let mut gaps = vec![f64::INFINITY; self.nodes.len()];
         for (contact, own) in self.contacts.contacts.iter().zip(&self.own) {
             let offset = contact.touch.offset;
@@ -115,13 +120,13 @@ impl Touching {
                 Own::Rigid(own) => {
                     let rigid = &self.contacts.rigids[own.rigid];
                     for &node in &own.surface.nodes {
-                        let now = &self.places[node as usize];
+                        let now = &places[node as usize];
                         let gap = &mut gaps[node as usize];
                         *gap = gap.min(own.passage.distance_before(rigid, now) - offset);
                     }
                 }
                 Own::Bodies(pairs, _) => pairs.find(
-                    |node| self.places[node as usize],
+                    |node| places[node as usize],
                     |pair| {
                         if pair.weights[0] == 1.0 {
                             let gap = &mut gaps[pair.nodes[0] as usize];

@@ -68,14 +68,23 @@ impl Row {
         self.nodes.iter().zip(&self.weights).take(self.count).map(|(&node, &weight)| (node as usize, weight))
     }
 
-    /// Σ |cᵢ| sᵢ [m] of the ways sᵢ of its nodes.
-    fn way(&self, nodes: &[Node]) -> f64 {
-        self.parts().map(|(node, weight)| weight.abs() * nodes[node].way).sum()
-    }
-
     /// Finds its impulse with the others as they are. How far it moves its point [m].
     pub fn push_apart(&mut self, nodes: &mut [Node], contacts: &Contacts) -> f64 {
-        if self.way(nodes) <= self.idle_to {
+        match self.count {
+            1 => self.push_parts::<1>(nodes, contacts),
+            2 => self.push_parts::<2>(nodes, contacts),
+            3 => self.push_parts::<3>(nodes, contacts),
+            _ => self.push_parts::<4>(nodes, contacts),
+        }
+    }
+
+    /// [`push_apart`](Self::push_apart) of so many nodes: loops of a length that the compiler knows take less time.
+    fn push_parts<const N: usize>(&mut self, nodes: &mut [Node], contacts: &Contacts) -> f64 {
+        let parts: [(usize, f64); N] = std::array::from_fn(|k| (self.nodes[k] as usize, self.weights[k]));
+        let way = |nodes: &[Node]| -> f64 {
+            parts.iter().map(|&(node, weight)| weight.abs() * nodes[node].way).sum()
+        };
+        if self.idle_to >= 0.0 && way(nodes) <= self.idle_to {
             return 0.0;
         }
         let friction = contacts.contacts[self.contact].touch.friction;
@@ -84,7 +93,7 @@ impl Row {
             return 0.0;
         }
         let mut place = Vector3::zeros();
-        for (node, weight) in self.parts() {
+        for (node, weight) in parts {
             place += nodes[node].then * weight;
         }
         let gap = self.gap + self.normal.dot(&(place - self.place));
@@ -102,12 +111,12 @@ impl Row {
             more += drag - self.drag;
             self.drag = drag;
         }
-        for (node, weight) in self.parts() {
+        for (node, weight) in parts {
             nodes[node].go(nodes[node].mobility.component_mul(&more) * weight);
         }
         let is_found = more.norm_squared() <= SETTLED * SETTLED * self.push * self.push;
         let room = if self.push == 0.0 { IDLE * gap } else { 0.0 };
-        self.idle_to = if is_found { self.way(nodes) + room } else { f64::NEG_INFINITY };
+        self.idle_to = if is_found { way(nodes) + room } else { f64::NEG_INFINITY };
         self.mobility.component_mul(&more).norm()
     }
 

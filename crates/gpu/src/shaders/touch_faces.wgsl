@@ -16,10 +16,10 @@ fn main(
     var deepest = 0.0;
     var takes_part = false;
     for (var entry = lists[record + 4u]; entry < lists[record + 9u]; entry++) {
-        let at = lists[FACE_CONTACTS + 2u * entry + 1u];
+        let at = lists[FACE_CONTACTS + 3u * entry + 1u];
         var count = 0u;
         if are_near {
-            let touch = touch_of(lists[FACE_CONTACTS + 2u * entry]);
+            let touch = touch_of(lists[FACE_CONTACTS + 3u * entry]);
             var places = array<vec3f, 3>();
             var moved = array<vec3f, 3>();
             var way = 0.0;
@@ -35,12 +35,27 @@ fn main(
             let room = touch.offset + way + touch.margin + touch.passage.travel;
             // No point is nearer than one beside it by more than the way between both.
             if near_after(touch.passage, middle - touch.passage.shift).distance <= room + around {
+                let nearest = takes_nearest(touch.passage.thing);
+                let edges = lists[FACE_CONTACTS + 3u * entry + 2u];
+                var local = array<vec3f, 3>();
+                for (var k = 0u; k < 3u && nearest; k++) {
+                    local[k] = (places[k] - touch.passage.shift) * touch.passage.turned_after;
+                }
                 for (var point = 0u; point < touch.points; point++) {
-                    let weights = weights_of(touch.first_point + point);
+                    var weights = vec3f(0.0);
+                    if nearest {
+                        weights = nearest_point(touch.passage.thing, point, edges, local);
+                        if all(weights == vec3f(0.0)) {
+                            continue;
+                        }
+                    } else {
+                        weights = weights_of(touch.first_point + point);
+                    }
                     let place = weights.x * places[0] + weights.y * places[1] + weights.z * places[2];
                     let goes = weights.x * moved[0] + weights.y * moved[1] + weights.z * moved[2];
-                    let tag = f32(touch.first_point + point);
-                    let gap = measure(at + 1u + 3u * count, touch, place, goes, tag);
+                    let row = at + 1u + FACE_ROW * count;
+                    let gap = measure(row, touch, place, goes, 1.0);
+                    rows[row + 3u] = vec4f(weights, 0.0);
                     if gap < touch.margin {
                         count += 1u;
                         deepest = max(deepest, -gap);
@@ -53,7 +68,7 @@ fn main(
     }
     if takes_part {
         let colour = lists[record + 3u];
-        atomicMax(&queue[DEEPEST], bitcast<u32>(deepest));
+        tell_depth(deepest);
         let place = lists[COLOURS_AT + colour] + atomicAdd(&queue[FACES_TOLD + colour], 1u);
         atomicStore(&queue[QUEUED_FACES + place], face);
     }

@@ -87,7 +87,7 @@ fn measure_node(n: u32) -> f32 {
         }
     }
     if IS_SHARED && takes_part {
-        atomicMax(&queue[DEEPEST], bitcast<u32>(deepest));
+        tell_depth(deepest);
         atomicStore(&queue[QUEUED_NODES + atomicAdd(&queue[NODES_TOLD], 1u)], n);
     }
     return deepest;

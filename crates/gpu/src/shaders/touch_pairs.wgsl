@@ -32,7 +32,7 @@ fn main(
     }
     for (var row = first; row < after; row++) {
         if rows[pair_at(row) + 2u].w > 0.0 {
-            atomicMax(&queue[DEEPEST], bitcast<u32>(max(-rows[pair_at(row)].w, 0.0)));
+            tell_depth(-rows[pair_at(row)].w);
             let place = atomicAdd(&pair_queue[FOUND_PAIRS], 1u);
             atomicStore(&pair_queue[QUEUED_PAIRS + place], row);
         }

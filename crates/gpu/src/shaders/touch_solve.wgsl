@@ -67,12 +67,11 @@ fn solve_face(face: u32) -> f32 {
     let corners = vec3u(lists[record], lists[record + 1u], lists[record + 2u]);
     var most = 0.0;
     for (var entry = lists[record + 4u]; entry < lists[record + 9u]; entry++) {
-        let friction = friction_of(lists[FACE_CONTACTS + 2u * entry]);
-        let at = lists[FACE_CONTACTS + 2u * entry + 1u];
-        let end = at + 1u + 3u * u32(rows[at].w);
-        for (var row = at + 1u; row < end; row += 3u) {
-            let weights = vec4f(weights_of(u32(rows[row + 2u].w)), 0.0);
-            most = max(most, solve_row(row, vec4u(corners, 0u), weights, 3u, friction));
+        let friction = friction_of(lists[FACE_CONTACTS + 3u * entry]);
+        let at = lists[FACE_CONTACTS + 3u * entry + 1u];
+        let end = at + 1u + FACE_ROW * u32(rows[at].w);
+        for (var row = at + 1u; row < end; row += FACE_ROW) {
+            most = max(most, solve_row(row, vec4u(corners, 0u), rows[row + 3u], 3u, friction));
         }
     }
     return most;
@@ -82,10 +81,10 @@ fn solve_face(face: u32) -> f32 {
 fn sum_face(face: u32) {
     let record = FACES_AT + 5u * face;
     for (var entry = lists[record + 4u]; entry < lists[record + 9u]; entry++) {
-        let at = lists[FACE_CONTACTS + 2u * entry + 1u];
-        let end = at + 1u + 3u * u32(rows[at].w);
+        let at = lists[FACE_CONTACTS + 3u * entry + 1u];
+        let end = at + 1u + FACE_ROW * u32(rows[at].w);
         var force = vec3f(0.0);
-        for (var row = at + 1u; row < end; row += 3u) {
+        for (var row = at + 1u; row < end; row += FACE_ROW) {
             force += row_force(row);
         }
         rows[at] = vec4f(force, rows[at].w);

@@ -6,15 +6,15 @@
 @group(2) @binding(8) var<storage, read> surface: array<vec4f>;
 // Rigid things; contacts; weights of the points on faces.
 @group(2) @binding(9) var<storage, read> things: array<f32>;
-// The contacts of nodes; faces; the contacts of faces, with their place in `rows`; where the faces of each colour begin; places of the forces of
+// The contacts of nodes; faces; the contacts of faces, with their place in `rows` and their edges; where the faces of each colour begin; places of the forces of
 // each contact.
 @group(2) @binding(10) var<storage, read> lists: array<u32>;
 // Two of each node that touches: its way [m] without contact, with NEAR and the components that are free; what contacts add to it
 // [m], and by how much a force moves it [m/N].
 @group(2) @binding(11) var<storage, read_write> states: array<vec4f>;
 // Of a contact at a node its gap as predicted [m], then the force on it [N]; of one on a face the force and how many of its points take part; then three of each side of the thing at the
-// node, or of each point of the face: its normal and gap without contact [m]; its slip without contact [m] and its impulse [N]; the force
-// against its slip [N], and whether it takes part, or its place among the points of a face. Then candidates for pairs: the same with their weights.
+// node, or FACE_ROW of each point of the face: its normal and gap without contact [m]; its slip without contact [m] and its impulse [N]; the force
+// against its slip [N], and whether it takes part; of a point of a face its weights. Then candidates for pairs: the same with their weights.
 @group(2) @binding(12) var<storage, read_write> rows: array<vec4f>;
 // The force of contacts on each node of the model [N].
 @group(2) @binding(13) var<storage, read_write> contact_forces: array<vec4f>;
@@ -105,6 +105,13 @@ fn measure(at: u32, touch: Touch, place: vec3f, moved: vec3f, tag: f32) -> f32 {
     rows[at + 1u] = vec4f(moved - carried(touch.passage, place), 0.0);
     rows[at + 2u] = vec4f(0.0, 0.0, 0.0, tag);
     return gap;
+}
+
+// Takes part in finding the deepest gap: depths [m] above zero compare as their bits do, those of -0 would be above all.
+fn tell_depth(depth: f32) {
+    if depth > 0.0 {
+        atomicMax(&queue[DEEPEST], bitcast<u32>(depth));
+    }
 }
 
 // Finds the impulse of a row as others stand now. By how much its point has moved [m].
@@ -283,7 +290,9 @@ fn lift(n: u32) {
             force += row_force(side_at(entry, side));
         }
         var first = 0.0;
-        for (var lifted = 0u; lifted < LIFTS; lifted++) {
+        // Where it goes freely it is out of the thing, or it would have a row.
+        let goes_freely = all(states[2u * n + 1u].xyz == vec3f(0.0));
+        for (var lifted = 0u; lifted < LIFTS && !goes_freely; lifted++) {
             let gap = gap_now(n, touch, place);
             first = select(first, gap.distance, lifted == 0u);
             let along = mobility * gap.normal;
