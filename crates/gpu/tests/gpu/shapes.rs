@@ -1,5 +1,6 @@
 //! Rigid shapes and their ways in WGSL against their twins in double precision.
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
@@ -140,8 +141,8 @@ fn roots_and_sines_keep_their_relative_digits() {
     let Some(device) = support::device() else { return };
     let mut random = Random::new(7);
     let mut given = vec![0.0_f32];
-    given.extend((1..POINTS).map(|_| (10.0_f64.powf(7.0 * random.half() - 3.5) * 3.14) as f32));
-    given.iter_mut().for_each(|x| *x = x.min(3.14));
+    given.extend((1..POINTS).map(|_| (10.0_f64.powf(7.0 * random.half() - 3.5) * PI) as f32));
+    given.iter_mut().for_each(|x| *x = x.min(PI as f32));
     let source = [&shader(&[]), ROOT_AND_SINE].concat();
     let found = compute(&device, &source, POINTS, &[&given], 2 * POINTS);
     let mut worst = [0.0_f64; 2];
