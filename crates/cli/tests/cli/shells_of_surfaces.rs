@@ -143,7 +143,7 @@ fn the_nodes_of_a_sharp_rim_are_creases() {
 }
 
 /// Every closed organ at hand, with the factor that makes its lengths metres.
-const ORGANS: [(&str, &str); 15] = [
+const ORGANS: [(&str, &str); 14] = [
     ("aneurysm-sofa/aneurysm3D_1.off", "0.001"),
     ("liver-sofa/liver-smooth.obj", "0.01"),
     ("organs-openhelp/Duodenum.stl", "0.001"),
@@ -156,15 +156,14 @@ const ORGANS: [(&str, &str); 15] = [
     ("organs-openhelp/Abdominal_wall.stl", "0.001"),
     ("organs-sofa-env/glt_gallbladder_visual.stl", "0.001"),
     ("organs-sofa-env/glt_gallbladder_collision.stl", "0.001"),
-    ("organs-sofa-env/glt_liver_collision.stl", "0.001"),
     ("liver-sofa/liver2.obj", "0.1"),
     ("aorta-vmtk/aorta-surface.vtp", "0.001"),
 ];
 
-/// Few shells, so that thin folds are as hard as they can be. In the gate: four organs.
+/// Few shells, so that thin folds are as hard as they can be. In the gate: three organs.
 #[test]
-#[ignore = "a minute: four organs"]
-fn shells_of_four_organs_run_under_pressure() {
+#[ignore = "a minute: three organs"]
+fn shells_of_three_organs_run_under_pressure() {
     press(&ORGANS[11..]);
 }
 
