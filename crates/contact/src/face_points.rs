@@ -203,7 +203,7 @@ mod tests {
         }
     }
 
-    /// An upright capsule, and one that lies on the edge between two faces or across it, meet them beneath their axes.
+    /// A capsule touches a face or an edge at the points below its axis: upright, along the edge of two faces, and across it.
     #[test]
     fn capsules_meet_faces_and_edges_beneath_their_axes() {
         let shape = Shape::Capsule { radius: 0.1, length: 0.4 };
@@ -211,7 +211,7 @@ mod tests {
         assert!(
             upright.iter().filter(|x| (x.xy() - Vector3::new(0.2, 0.3, 0.0).xy()).norm() < 1e-9).count() == 1
         );
-        // In its frame the axis is z, so the faces stand on it.
+        // The axis of the capsule is z in its own frame, so these faces are parallel to z.
         let corners = [[0.1, -0.5, -0.5], [0.1, 0.5, -0.5], [0.1, 0.0, 0.5]].map(Vector3::from);
         let mut heights = Vec::new();
         within(&corners, 0.2, |weights| heights.push((0..3).map(|k| corners[k].z * weights[k]).sum::<f64>()));

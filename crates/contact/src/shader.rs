@@ -64,7 +64,7 @@ fn constants(numbers: &[(&str, f64)]) -> String {
 
 /// What surfaces find at each other, in WGSL: `find_above` of a node with triangles, and `find_crossing` of two edges.
 ///
-/// The module around it has the [`shader`] of rigid things, and defines where nodes are and what happens with a pair; narrow.wgsl tells how.
+/// The surrounding module includes the [`shader`] of rigid things, and defines where nodes are and how a pair is stored; see narrow.wgsl.
 pub fn pairs_shader() -> String {
     let numbers = [
         ("BESIDE", BESIDE),

@@ -253,8 +253,8 @@ impl<R: Scalar> Touching<R> {
         }
     }
 
-    /// Lists what may come near rigid things, if a list does not hold so much any more. How far a node goes in the step at most [m], if it goes on
-    /// as before.
+    /// Lists the nodes and faces that may come near rigid things, if a list has expired. Returns a bound on the motion of a node in the
+    /// step [m], from its motion in the step before.
     fn list(&mut self, now: &Nodes<'_, R>) -> f64 {
         let span = self.span();
         let is_first = self.listed.is_empty();

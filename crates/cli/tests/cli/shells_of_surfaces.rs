@@ -173,7 +173,7 @@ fn shells_of_all_other_organs_run_under_pressure() {
     press(&ORGANS[..11]);
 }
 
-/// No shells cross, normals stand on their triangles, and the shells run.
+/// Fitted shells do not cross, their normals are within 60° of their triangles, and a run under pressure accepts them.
 fn press(organs: &[(&str, &str)]) {
     let Some(data) = std::env::var_os("PLIANT_DATA") else {
         println!("skipped: PLIANT_DATA is not set");

@@ -314,7 +314,7 @@ impl Group {
         for bin in 1..self.bins.len() {
             self.bins[bin] += self.bins[bin - 1];
         }
-        // Each start is one place late until its bin is filled. What lies in the list before does not matter.
+        // Each bin starts one entry late until it is filled. Entries of the former list are all overwritten.
         self.candidates.truncate(unsorted.len());
         self.candidates.extend_from_slice(&unsorted[self.candidates.len()..]);
         for one in &unsorted {

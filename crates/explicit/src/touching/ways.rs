@@ -23,7 +23,7 @@ pub(crate) struct Nodes<'a, R> {
 }
 
 impl<R: Scalar> Nodes<'_, R> {
-    /// At most how far [m] one of these nodes goes in the step if it goes on as before, and how far it is from where it was listed.
+    /// Bounds [m] on the motion of these nodes in the step, from that in the step before, and on their motion since they were listed.
     pub fn ways(&self, nodes: Range<usize>, listed: &[Vector<R>]) -> [f64; 2] {
         let increment = self.increment[nodes.clone()].as_flattened();
         let (displacement, listed) = (self.displacement[nodes].as_flattened(), listed.as_flattened());
@@ -75,7 +75,7 @@ mod tests {
     use super::*;
     use pliant_testing::Random;
 
-    /// No node goes farther or has gone farther, and what is told is not more than √3 times as far.
+    /// Both bounds hold for every node, and are at most √3 times the largest motion.
     #[test]
     fn ways_are_bounds() {
         let mut random = Random::new(5);

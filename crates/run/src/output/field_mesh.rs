@@ -284,9 +284,9 @@ fn fill_surface(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], surfac
     for (field, means) in of_cells.iter().zip(averages.means(&of_cells)) {
         let components = field.components();
         let carried = |point: usize| {
+            let row: Vec<(u32, f64)> = mapping.inner_row(point).collect();
             let mean = |c: usize| {
-                let part = |(node, w): (u32, f64)| w * means[node as usize * components + c];
-                mapping.inner_row(point).map(part).sum::<f64>()
+                row.iter().map(|&(node, w)| w * means[node as usize * components + c]).sum::<f64>()
             };
             (0..components).map(mean).collect::<Vec<f64>>()
         };
