@@ -4,6 +4,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 
+use pliant_picture::Series;
 use pliant_scene::World;
 use pliant_sim::number;
 use pliant_viewer::{
@@ -22,6 +23,7 @@ impl From<WindowError> for Failure {
 }
 
 pub fn view(arguments: &View) -> Result<ExitCode, Failure> {
+    refuse_runs(&arguments.scene)?;
     let world = prepare(&arguments.scene, &arguments.overrides)?;
     for note in world.notes() {
         eprintln!("note: {note}");
@@ -51,6 +53,23 @@ pub fn view(arguments: &View) -> Result<ExitCode, Failure> {
         say(told)?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Rejects finished runs and their series: the window plays scenes.
+fn refuse_runs(path: &Path) -> Result<(), Failure> {
+    let is_series = path.extension().is_some_and(|extension| extension == "pvd");
+    let folder = if is_series { path.parent().unwrap_or(path) } else { path };
+    let is_run = path.is_dir() && Series::find(path, None).is_ok() && !path.join("scene.toml").exists();
+    if !is_series && !is_run {
+        return Ok(());
+    }
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder }.display();
+    Err(Failure::plain(
+        format!("`{}` is a finished run, and the window plays scenes", path.display()),
+        format!(
+            "`pliant render {folder}` draws it, with `--film NAME.mp4` as a film; `pliant view` takes its scene"
+        ),
+    ))
 }
 
 /// The automatic task of the window.

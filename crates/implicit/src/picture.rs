@@ -19,6 +19,8 @@ pub struct Picture {
     pub places: Vec<Place>,
     /// Its triangles, facet by facet.
     pub triangles: Vec<[u32; 3]>,
+    /// Of each triangle, a bit for each side that lies on an edge of the facet: bit i for that opposite to corner i.
+    pub facet_edges: Vec<u8>,
     /// Its points at rest [m].
     pub rest: Vec<Vector3<f64>>,
     /// Triangles of each facet.
@@ -58,6 +60,7 @@ impl CurvedSurface {
         let mut places = vec![Place { facet: 0, weights: [1.0, 0.0, 0.0] }; count];
         let per_facet = (parts * parts) as usize;
         let mut triangles = Vec::with_capacity(facets * per_facet);
+        let mut facet_edges = Vec::with_capacity(facets * per_facet);
         // Points by (second, third), row after row of third.
         let mut grid = Vec::new();
         for (facet, normals) in model.corner_normals.iter().enumerate() {
@@ -96,7 +99,10 @@ impl CurvedSurface {
                 let above = row + width + 1;
                 for at in 0..width {
                     triangles.push([grid[row + at], grid[row + at + 1], grid[above + at]]);
+                    let on_edges = [at + 1 == width, at == 0, width == parts as usize];
+                    facet_edges.push(on_edges.iter().zip(0..).map(|(&on, bit)| u8::from(on) << bit).sum());
                     if at + 1 < width {
+                        facet_edges.push(0);
                         triangles.push([grid[row + at + 1], grid[above + at + 1], grid[above + at]]);
                     }
                 }
@@ -106,7 +112,7 @@ impl CurvedSurface {
         let state = State::at_rest(model);
         let point = |place: &Place| self.patch(model, &state, place.facet).point(place.weights);
         let rest = places.par_iter().with_min_len(64).map(point).collect();
-        Picture { places, triangles, rest, per_facet }
+        Picture { places, triangles, facet_edges, rest, per_facet }
     }
 }
 
@@ -217,6 +223,17 @@ mod tests {
                 let picture = surface.picture(&model, k as u32);
                 assert!(closed(picture.triangles.iter().copied()));
                 assert_eq!(picture.triangles.len(), f * k * k);
+                // Each facet has three edges of k parts.
+                let on_edges: u32 = picture.facet_edges.iter().map(|bits| bits.count_ones()).sum();
+                assert_eq!(on_edges as usize, 3 * k * f);
+                for (triangle, bits) in picture.triangles.iter().zip(&picture.facet_edges) {
+                    for corner in (0..3).filter(|corner| bits >> corner & 1 == 1) {
+                        let ends = [triangle[(corner + 1) % 3], triangle[(corner + 2) % 3]];
+                        assert!(
+                            ends.into_iter().all(|end| picture.places[end as usize].weights.contains(&0.0))
+                        );
+                    }
+                }
                 let inside = (k - 1) * k.saturating_sub(2) / 2;
                 assert_eq!(picture.places.len(), v + 3 * f / 2 * (k - 1) + f * inside);
                 // Triangles lie above their facets.

@@ -39,6 +39,11 @@ impl ColourMap {
         }
     }
 
+    /// Whether its middle is a colour of its own, which stands for zero.
+    pub const fn is_diverging(self) -> bool {
+        matches!(self, Self::BlueRed)
+    }
+
     /// The colour (sRGB) of a part of the range from 0 to 1.
     pub fn at(self, part: f64) -> [u8; 3] {
         let (gradient, part) = match self {
@@ -141,8 +146,8 @@ impl Extremes {
     }
 
     /// The range without the outermost values: from zero if no value is negative, around zero if many values have either
-    /// sign. `None` without values.
-    pub fn range(mut self) -> Option<[f64; 2]> {
+    /// sign or the map diverges; of equal values their own, without a length. `None` without values.
+    pub fn range(mut self, map: ColourMap) -> Option<[f64; 2]> {
         if self.values.is_empty() {
             return None;
         }
@@ -153,16 +158,14 @@ impl Extremes {
         let (low, high) = (at(LEFT_OUT), at(1.0 - LEFT_OUT));
         // Values that hardly differ keep their whole range.
         let (low, high) = if high > low { (low, high) } else { (least, most) };
-        Some(if least >= 0.0 && low < 0.5 * high {
-            [0.0, high]
-        } else if low < 0.0 && high > 0.0 && low.abs().min(high) > 0.2 * low.abs().max(high) {
+        let both = low < 0.0 && high > 0.0 && low.abs().min(high) > 0.2 * low.abs().max(high);
+        Some(if map.is_diverging() || both {
             let reach = high.max(-low);
             [-reach, reach]
-        } else if high > low {
-            [low, high]
+        } else if least >= 0.0 && low < 0.5 * high {
+            [0.0, high]
         } else {
-            let room = if low == 0.0 { 1.0 } else { 0.5 * low.abs() };
-            [low - if least >= 0.0 { low.min(room) } else { room }, high + room]
+            [low, high]
         })
     }
 }
@@ -211,7 +214,7 @@ mod tests {
     fn range(values: impl IntoIterator<Item = f64>) -> Option<[f64; 2]> {
         let mut extremes = Extremes::default();
         extremes.add(values);
-        extremes.range()
+        extremes.range(ColourMap::Viridis)
     }
 
     #[test]
@@ -222,7 +225,10 @@ mod tests {
         assert_eq!(range(many.clone().map(|x| x - 400.0)), Some([-595.0, 595.0]));
         assert_eq!(range(many.map(|x| x + 2000.0)), Some([2005.0, 2995.0]));
         assert_eq!(range([f64::NAN]), None);
-        assert_eq!(range([0.0, 0.0]), Some([0.0, 1.0]));
-        assert_eq!(range([4.0, f64::NAN]), Some([2.0, 6.0]));
+        assert_eq!(range([0.0, 0.0]), Some([0.0, 0.0]), "no range is made up");
+        assert_eq!(range([4.0, f64::NAN]), Some([4.0, 4.0]));
+        let mut extremes = Extremes::default();
+        extremes.add((0..=1000).map(|x| f64::from(x) - 100.0));
+        assert_eq!(extremes.range(ColourMap::BlueRed), Some([-895.0, 895.0]), "white is zero");
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::colour::label_colour;
 use crate::picture::Picture;
-use crate::style::Style;
+use crate::style::{MISSING, Style};
 use crate::text::{Align, Pen};
 
 /// Text in a picture.
@@ -18,6 +18,8 @@ pub struct Legend {
     pub note: String,
     /// Labels with their names, or empty: each has a swatch if colours show labels.
     pub labels: Vec<(i32, String)>,
+    /// Whether a part of what is drawn has no value: its grey then has a swatch.
+    pub missing: bool,
 }
 
 /// Part of the picture's width that names of labels take at most.
@@ -26,6 +28,9 @@ const WIDEST: f32 = 0.3;
 const SWATCHES: [f32; 2] = [0.12, 0.92];
 /// Distance from swatch to swatch over the height of letters.
 const ROW: f32 = 1.45;
+
+/// The text beside the grey of parts without a value.
+pub const NO_VALUE: &str = "no value";
 
 /// The text below the swatches if not all fit.
 fn told_of(more: usize) -> String {
@@ -55,6 +60,24 @@ pub fn ticks([low, high]: [f64; 2], about: usize) -> (Vec<f64>, f64) {
     let step = step.unwrap_or(10.0 * power);
     let (first, last) = ((low / step - 1e-6).ceil() as i64, (high / step + 1e-6).floor() as i64);
     ((first..=last).map(|n| n as f64 * step).collect(), step)
+}
+
+/// Where a scale of colours has marks, as parts of its length from the low end, and their numbers. Equal ends have one mark, in the middle.
+pub fn scale_marks([low, high]: [f64; 2], about: usize) -> Vec<(f64, String)> {
+    if low == high {
+        let decimals = (2.0 - low.abs().max(1e-300).log10().floor()).clamp(0.0, 9.0) as usize;
+        return vec![(0.5, written(low, decimals))];
+    }
+    let (values, step) = ticks([low, high], about);
+    let decimals = (-(step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize;
+    let shifted = step * 10_f64.powi(decimals as i32);
+    let decimals = if (shifted - shifted.round()).abs() > 1e-6 { decimals + 1 } else { decimals };
+    values.into_iter().map(|value| ((value - low) / (high - low), written(value, decimals))).collect()
+}
+
+fn written(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}").replace('-', "−");
+    if text.trim_start_matches('−').parse() == Ok(0.0) { "0".into() } else { text }
 }
 
 /// The unit with the prefix that makes a size readable, and the factor to it.
@@ -157,6 +180,7 @@ impl Legend {
         }
         for y in top.round() as i64..bottom.round() as i64 {
             let part = f64::from((bottom - y as f32 - 0.5) / (bottom - top));
+            let part = if high > low { part } else { 0.5 };
             for x in bar[0] as i64..bar[1] as i64 {
                 picture.mix(x, y, style.map.at(part), 1.0);
             }
@@ -169,25 +193,17 @@ impl Legend {
             picture.mix(bar[0] as i64 - 1, y, ink, 0.6);
             picture.mix(bar[1] as i64, y, ink, 0.6);
         }
-        let (values, step) = ticks([low * factor, high * factor], 6);
-        let decimals = (-(step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize;
-        let decimals =
-            if (step * 10_f64.powi(decimals as i32) - (step * 10_f64.powi(decimals as i32)).round()).abs()
-                > 1e-6
-            {
-                decimals + 1
-            } else {
-                decimals
-            };
-        for value in values {
-            let part = (value / factor - low) / (high - low);
+        for (part, text) in scale_marks([low * factor, high * factor], 6) {
             let y = (bottom - part as f32 * (bottom - top)).clamp(top, bottom - 1.0);
             for x in bar[1] as i64..(bar[1] + 0.35 * size) as i64 {
                 picture.mix(x, y.round() as i64, ink, 0.9);
             }
-            let text = format!("{value:.decimals$}").replace('-', "−");
-            let text = if text.trim_start_matches('−').parse() == Ok(0.0) { "0".into() } else { text };
             pen.write(picture, &text, [bar[1] + 0.6 * size, y], Align::Left, ink);
+        }
+        if self.missing {
+            let y = bottom + 1.7 * size;
+            pen.write(picture, NO_VALUE, [right, y], Align::Right, ink);
+            write_swatch(picture, [right - pen.width(NO_VALUE) - 1.6 * size, y], size, MISSING, ink);
         }
     }
 }
@@ -234,6 +250,14 @@ mod tests {
         let (values, step) = ticks([-0.37, 12.9], 6);
         assert_eq!((values.first(), values.last(), step), (Some(&0.0), Some(&12.5), 2.5));
         assert_eq!(ticks([3.0, 3.0], 5).0, [3.0]);
+    }
+
+    #[test]
+    fn marks_lie_on_the_scale_and_equal_ends_have_one() {
+        assert_eq!(scale_marks([0.0, 1.0], 2), [(0.0, "0".into()), (0.5, "0.5".into()), (1.0, "1.0".into())]);
+        assert_eq!(scale_marks([0.0, 0.0], 6), [(0.5, "0".into())]);
+        assert_eq!(scale_marks([1.25, 1.25], 6), [(0.5, "1.25".into())]);
+        assert_eq!(scale_marks([-4321.0, -4321.0], 6), [(0.5, "−4321".into())]);
     }
 
     #[test]
@@ -296,6 +320,10 @@ mod tests {
         assert_eq!(plain, blank);
         let style = Style { range: Some([0.0, 5e3]), ..Style::default() };
         legend.write(&mut coloured, &style);
+        let mut lacking = blank.clone();
+        Legend { missing: true, ..legend.clone() }.write(&mut lacking, &style);
+        let grey = |picture: &Picture| picture.rgba.chunks(4).filter(|pixel| pixel[..3] == MISSING).count();
+        assert!(grey(&lacking) > 60 && grey(&coloured) == 0);
         let difference = coloured.difference(&blank).unwrap();
         assert!(difference.everywhere > 1.0, "{difference:?}");
         assert!(legend.width(&style, [320, 240]) > 0.1 && legend.width(&Style::default(), [320, 240]) == 0.0);

@@ -8,7 +8,7 @@ use crate::camera::{Camera, Projection};
 use crate::colour::{ColourMap, linear};
 use crate::lines::{Line, MOST_EDGES};
 use crate::section::{Corner, Section};
-use crate::style::{PLAIN, Style, Texture};
+use crate::style::{MISSING, PLAIN, Style, Texture};
 use crate::subject::Subject;
 use crate::vertex::staged;
 
@@ -52,6 +52,7 @@ struct View {
     plane: [f32; 4],
     range: [f32; 4],
     plain: [f32; 4],
+    missing: [f32; 4],
     ghost: [f32; 4],
     top: [f32; 4],
     bottom: [f32; 4],
@@ -124,12 +125,6 @@ impl Renderer {
                 operation: wgpu::BlendOperation::Add,
             };
             let mixed = !matches!(kind, Kind::Behind | Kind::Solid);
-            // Where the shape at rest lies on the deformed one, it stays behind.
-            let bias = if veil {
-                wgpu::DepthBiasState { constant: 64, slope_scale: 4.0, clamp: 0.0 }
-            } else {
-                wgpu::DepthBiasState::default()
-            };
             device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(fragment),
                 layout: Some(&pipelines),
@@ -148,7 +143,7 @@ impl Renderer {
                     depth_write_enabled: Some(write),
                     depth_compare: Some(compare),
                     stencil: Default::default(),
-                    bias,
+                    bias: Default::default(),
                 }),
                 multisample: wgpu::MultisampleState { count: target.samples, ..Default::default() },
                 fragment: Some(wgpu::FragmentState {
@@ -187,7 +182,7 @@ impl Renderer {
             fibres: pipeline("line", "stroke", Kind::Line),
             mark: pipeline("line", "stroke", Kind::Mark),
             section: pipeline("section", "opaque", Kind::Solid),
-            ghost: pipeline("surface", "ghost", Kind::Veil),
+            ghost: pipeline("resting", "ghost", Kind::Veil),
             compute,
             view,
             shape,
@@ -346,7 +341,7 @@ impl Drawn {
         }
     }
 
-    /// Sets points [m] and a value at each; without values, or for non-finite ones, the colour is that of tissue.
+    /// Sets points [m] and a value at each; without values the colour is that of tissue, and grey for non-finite ones.
     pub fn set(&mut self, queue: &wgpu::Queue, points: &[Vector3], values: &[f64]) {
         let mut reach = 0.0_f64;
         for (index, (own, point)) in self.staged.iter_mut().zip(points).enumerate() {
@@ -503,6 +498,9 @@ fn view(camera: &Camera, style: &Style, aspect: f64, reach: f64, code: bool) -> 
     let [right, up, towards] = camera.axes();
     let perspective = if camera.projection == Projection::Perspective { 1.0 } else { 0.0 };
     let [low, high] = style.range.unwrap_or([0.0, 1.0]);
+    // A value that all have lies in the middle of the map.
+    let room = if high > low { 0.0 } else { 0.5 * low.abs().max(1.0) };
+    let (low, high) = (low - room, high + room);
     let [top, bottom] = style.background.colours();
     View {
         projection_view: camera.projection_view(aspect, reach).into(),
@@ -522,6 +520,7 @@ fn view(camera: &Camera, style: &Style, aspect: f64, reach: f64, code: bool) -> 
             if code { 1.0 } else { 0.0 },
         ],
         plain: colour(PLAIN, 1.0),
+        missing: colour(MISSING, 1.0),
         ghost: colour(style.background.ghost(), GHOST),
         top: colour(top, 1.0),
         bottom: colour(bottom, 1.0),

@@ -198,6 +198,8 @@ struct Common {
     points: Vec<Vector3>,
     /// The largest force of a contact [N].
     largest: f64,
+    /// Whether a part of a body has no value.
+    missing: bool,
 }
 
 /// An instant that is drawn.
@@ -215,12 +217,14 @@ struct Settled {
     style: Style,
     /// Length of arrows over their force [m/N], and the largest force [N].
     arrows: [f64; 2],
+    missing: bool,
 }
 
 impl Common {
     fn add(&mut self, subject: &Subject, shown: &Shown, ghost: bool) {
         let frame = &shown.frame;
         self.largest = self.largest.max(largest_force(&shown.forces));
+        self.missing |= subject.lacks_value(&frame.values);
         let surface = subject.surface_points();
         self.extremes.add(surface.iter().filter_map(|&point| frame.values.get(point as usize)).copied());
         self.points.extend(surface.iter().map(|&point| frame.points[point as usize]));
@@ -311,7 +315,10 @@ impl Look {
     /// Camera, style and the length of arrows for all frames.
     fn settle(&self, common: Common) -> Settled {
         let mut style = self.style;
-        style.range = self.field.as_ref().and_then(|_| self.style.range.or_else(|| common.extremes.range()));
+        style.range = self
+            .field
+            .as_ref()
+            .and_then(|_| self.style.range.or_else(|| common.extremes.range(self.style.map)));
         let [width, height] = self.size.map(f64::from);
         // The colour scale is beside the body, not on it.
         let taken = self.legend.width(&style, self.size);
@@ -325,11 +332,11 @@ impl Look {
         }
         camera.pan(-0.5 * taken * width / height, 0.0);
         let arrows = [arrow_unit(&common.points, common.largest), common.largest];
-        Settled { camera, style, arrows }
+        Settled { camera, style, arrows, missing: common.missing }
     }
 
     fn finished(&self, mut picture: Picture, settled: &Settled, shown: &Shown, time: f64) -> Picture {
-        let Settled { camera, style, arrows: [unit, largest] } = settled;
+        let Settled { camera, style, arrows: [unit, largest], missing } = settled;
         arrows::draw(&mut picture, camera, &shown.forces, *unit);
         let mut note =
             if self.legend.note.is_empty() { format!("t = {time:.3} s") } else { self.legend.note.clone() };
@@ -340,7 +347,7 @@ impl Look {
             let (unit, factor) = readable("s", step);
             note.push_str(&format!(", smallest element step {:.3} {unit} (marked)", step * factor));
         }
-        Legend { note, ..self.legend.clone() }.write(&mut picture, style);
+        Legend { note, missing: *missing, ..self.legend.clone() }.write(&mut picture, style);
         picture
     }
 

@@ -12,6 +12,8 @@ struct View {
     // First value, 1 / span; 1 for colours of values, 2 for colours of labels; whether colours are coded as sRGB here.
     range: vec4<f32>,
     plain: vec4<f32>,
+    // Of a point without a value among others that have one.
+    missing: vec4<f32>,
     ghost: vec4<f32>,
     top: vec4<f32>,
     bottom: vec4<f32>,
@@ -60,6 +62,19 @@ fn surface(@builtin(vertex_index) index: u32) -> Corner {
     return corner_at(points[node], normals[vertex].xyz, index, triangle.w, rest[node].xyz);
 }
 
+// The shape at rest, a little farther away, so that it stays behind the body where both lie in the same place.
+@vertex
+fn resting(@builtin(vertex_index) index: u32) -> Corner {
+    let triangle = triangles[index / 3u];
+    let vertex = triangle[index % 3u];
+    let node = vertices[vertex];
+    var result = corner_at(points[node], normals[vertex].xyz, index, triangle.w, rest[node].xyz);
+    let away = result.position - towards_eye(result.position) * 2.0 * view.line.w;
+    let clip = view.projection_view * vec4(away, 1.0);
+    result.clip.z = clip.z / clip.w * result.clip.w;
+    return result;
+}
+
 struct Cut {
     point: vec4<f32>,
     rest: vec3<f32>,
@@ -94,10 +109,13 @@ fn towards_eye(position: vec3<f32>) -> vec3<f32> {
     return select(view.towards.xyz, normalize(view.eye.xyz - position), view.eye.w > 0.5);
 }
 
-// Light of the value: a colour of the map, or that of tissue where there is none.
+// Light of the value: a colour of the map, or that of tissue where none has one.
 fn colour_of(value: f32) -> vec3<f32> {
-    if view.range.z < 0.5 || value > 1.0e30 {
+    if view.range.z < 0.5 {
         return view.plain.rgb;
+    }
+    if value > 1.0e30 {
+        return view.missing.rgb;
     }
     let part = clamp((value - view.range.x) * view.range.y, 0.0, 1.0) * 255.0;
     let low = u32(floor(part));

@@ -55,6 +55,9 @@ pub enum Texture {
 /// Colour (sRGB) without a value: soft tissue.
 pub(crate) const PLAIN: [u8; 3] = [214, 148, 132];
 
+/// Colour (sRGB) of points without a value where others have one: no map has this grey.
+pub const MISSING: [u8; 3] = [158, 162, 168];
+
 /// How a body is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Style {

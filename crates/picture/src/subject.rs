@@ -4,7 +4,9 @@
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
-use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3, boundary, cell_label, vector_area, volume};
+use pliant_geometry::{
+    CellBlock, CellId, CellKind, Mesh, Vector3, boundary, cell_label, vector_area, volume,
+};
 
 use crate::colour::label_colour;
 use crate::lines::{Fibres, Line, outline};
@@ -20,6 +22,8 @@ pub struct Subject {
     /// Three corners, each a vertex, and a bit for each edge, that opposite to the corner, which is one of a cell; beside these bits
     /// the paint of the cell.
     pub(crate) triangles: Vec<[u32; 4]>,
+    /// The cell of each triangle.
+    parents: Vec<CellId>,
     /// The point of each vertex. A point on a sharp edge has several vertices, each with its own normal.
     pub(crate) vertices: Vec<u32>,
     /// Where the triangles around each vertex begin in the next list; one more entry than vertices.
@@ -35,10 +39,22 @@ pub struct Subject {
     pub(crate) bars: Vec<Line>,
 }
 
-/// A face that is drawn: its three or four nodes, and the paint of its cell.
+/// A face that is drawn: its three or four nodes, the sides of a triangle that are edges of cells, and the paint of its cell.
 struct Patch {
     nodes: Vec<u32>,
+    parent: CellId,
+    edges: u32,
     paint: u32,
+}
+
+/// Cell data of triangles that elements are cut into: a bit for each side that is an edge of the element, bit i for that opposite to
+/// corner i.
+const ELEMENT_EDGES: &str = "element-edges";
+
+fn edges_of(block: Option<&CellBlock>, cell: u32) -> u32 {
+    let edges = block.and_then(|block| block.data.get(ELEMENT_EDGES));
+    let own = edges.and_then(|edges| edges.values.get(cell as usize)).filter(|bits| bits.is_finite());
+    own.map_or(0b111, |&bits| bits as u32 & 0b111)
 }
 
 /// Cell data: 1 of obstacles and tools, 2 of those whose inside bodies touch, 0 of bodies.
@@ -72,9 +88,11 @@ impl Subject {
         let normals: Vec<Vector3> = faces.iter().map(|face| normal(&face.nodes, &mesh.points)).collect();
         let (corners, vertices) = split_at_sharp_edges(&faces, &normals, mesh.points.len());
         let mut triangles = Vec::with_capacity(2 * faces.len());
-        for (corners, Patch { paint, .. }) in corners.iter().zip(&faces) {
+        let mut parents = Vec::with_capacity(2 * faces.len());
+        for (corners, Patch { parent, edges, paint, .. }) in corners.iter().zip(&faces) {
+            parents.resize(parents.len() + corners.len().saturating_sub(2).min(2), *parent);
             match corners[..] {
-                [a, b, c] => triangles.push([a, b, c, paint | 0b111]),
+                [a, b, c] => triangles.push([a, b, c, paint | edges]),
                 // The second bit of the first half and the third of the other are the diagonal.
                 [a, b, c, d] => triangles.extend([[a, b, c, paint | 0b101], [a, c, d, paint | 0b011]]),
                 _ => {}
@@ -111,6 +129,7 @@ impl Subject {
         Self {
             points: mesh.points.clone(),
             triangles,
+            parents,
             vertices,
             offsets,
             around,
@@ -135,6 +154,13 @@ impl Subject {
         cells.skip(cell as usize).take(1).flat_map(|(kind, nodes)| outline(kind, nodes)).collect()
     }
 
+    /// Whether a body has a corner without a value where others have one; things never have one.
+    pub fn lacks_value(&self, values: &[f64]) -> bool {
+        let bodies = self.triangles.iter().filter(|triangle| triangle[3] & STEEL == 0);
+        let mut corners = bodies.flat_map(|triangle| &triangle[..3]).map(|&v| self.vertices[v as usize]);
+        !values.is_empty() && corners.any(|point| !values[point as usize].is_finite())
+    }
+
     /// Triangles drawn.
     pub fn triangle_count(&self) -> usize {
         self.triangles.len()
@@ -149,6 +175,11 @@ impl Subject {
     /// The points of each triangle, in the order in which they are drawn.
     pub fn triangles(&self) -> impl ExactSizeIterator<Item = [u32; 3]> + '_ {
         self.triangles.iter().map(|&[a, b, c, _]| [a, b, c].map(|vertex| self.vertices[vertex as usize]))
+    }
+
+    /// The cell of the mesh that a triangle is a part of.
+    pub fn cell(&self, triangle: usize) -> Option<CellId> {
+        self.parents.get(triangle).copied()
     }
 
     /// Points on the surface and of lines, increasing, each once.
@@ -213,6 +244,8 @@ fn faces(mesh: &Mesh) -> Vec<Patch> {
     let skin = boundary(mesh);
     let of_skin = skin.faces.iter().map(|face| Patch {
         nodes: face.nodes().to_vec(),
+        parent: face.parent,
+        edges: edges_of(mesh.block(face.parent.kind), face.parent.index),
         paint: paint(mesh.block(face.parent.kind), face.parent.index),
     });
     let mut faces: Vec<Patch> = of_skin.collect();
@@ -229,7 +262,9 @@ fn faces(mesh: &Mesh) -> Vec<Patch> {
         for (nodes, cell) in block.cells().zip(0..) {
             let known = nodes.iter().all(|&node| (node as usize) < mesh.points.len());
             if known && !drawn.contains(&key(nodes)) {
-                faces.push(Patch { nodes: nodes.to_vec(), paint: paint(Some(block), cell) });
+                let (edges, paint) = (edges_of(Some(block), cell), paint(Some(block), cell));
+                let parent = CellId { kind: block.kind, index: cell };
+                faces.push(Patch { nodes: nodes.to_vec(), parent, edges, paint });
             }
         }
     }
@@ -382,6 +417,12 @@ pub(crate) mod tests {
     fn corners_of_a_block_have_a_normal_a_side_and_its_sides_share_them() {
         let subject = Subject::new(&block(2));
         assert_eq!(subject.triangle_count(), 48);
+        let of_last = (0..48).filter(|&t| subject.cell(t).is_some_and(|cell| cell.index == 7)).count();
+        assert_eq!(
+            (of_last, subject.cell(48)),
+            (6, None),
+            "three faces of the last cell are on the boundary"
+        );
         // 8 corners with 3, 12 middles of edges with 2, 6 middles of sides with 1.
         assert_eq!(subject.vertices.len(), 8 * 3 + 12 * 2 + 6);
         assert_eq!(subject.around.len(), 48 * 3);
@@ -413,6 +454,18 @@ pub(crate) mod tests {
         let rest = Subject::new(&mesh);
         assert!(rest.triangles.iter().all(|t| t[3] & !0b111 == two) && rest.triangle_count() > 6);
         assert_eq!(Subject::new(&tets(1)).triangles[0][3], 0b111, "without labels");
+    }
+
+    #[test]
+    fn only_sides_that_are_edges_of_elements_are_drawn_as_such() {
+        let mut mesh = Mesh { points: block(1).points, ..Mesh::default() };
+        let triangles = mesh.block_mut(CellKind::Triangle);
+        triangles.nodes = vec![0, 1, 2, 2, 1, 3];
+        triangles.data.insert(ELEMENT_EDGES.into(), DataArray::scalar(vec![6.0, f64::NAN]));
+        let edges: Vec<u32> = Subject::new(&mesh).triangles.iter().map(|triangle| triangle[3]).collect();
+        assert_eq!(edges, [0b110, 0b111]);
+        let all = [0.0, 1.0, 2.0, f64::NAN];
+        assert!(Subject::new(&mesh).lacks_value(&all) && !Subject::new(&mesh).lacks_value(&[0.0; 4]));
     }
 
     /// A tool beside a wall: its faces are marked, and what its points moved is no value of the field.

@@ -6,7 +6,7 @@ use pliant_geometry::Vector3;
 /// any number.
 const NO_VALUE: f32 = 1e38;
 
-/// A value for the shader; for a non-finite one the colour is that of tissue.
+/// A value for the shader; for a non-finite one the colour is grey.
 pub fn drawn_value(value: f64) -> f32 {
     if value.is_finite() { value.clamp(-1e29, 1e29) as f32 } else { NO_VALUE }
 }

@@ -140,6 +140,11 @@ impl Live {
         }
     }
 
+    /// What is shown, at rest, with the fields of the instant last shown.
+    pub fn shown(&self) -> &Mesh {
+        self.shown.mesh()
+    }
+
     /// What is shown, at rest, with the fields of the instant, whose forces are then found.
     ///
     /// # Errors

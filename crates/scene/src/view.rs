@@ -56,11 +56,36 @@ impl Scene {
         }
     }
 
+    /// The body that carries a surface of a name, with its model.
+    fn carrier(&self, surface: Option<&str>) -> Option<(&String, BodyModel)> {
+        let (_, surface) = self.surfaces.iter().find(|(name, _)| surface == Some(name))?;
+        let (name, body) = self.bodies.iter().find(|(name, _)| *name == surface.on)?;
+        Some((name, body.model))
+    }
+
+    /// The fields that colours can tell on a body or a carried surface, or on all bodies together.
+    pub fn fields_on(&self, on: Option<&str>) -> Vec<FieldName> {
+        let all = FieldName::ALL.into_iter();
+        match self.carrier(on) {
+            Some((_, BodyModel::Shell)) => vec![FieldName::Displacement],
+            Some((_, model)) => all.filter(|field| field.is_of(model) && field.is_of_surface()).collect(),
+            None => {
+                let shown = self.bodies.iter().filter(|(name, _)| on.is_none_or(|on| on == name));
+                let models: Vec<BodyModel> = shown.map(|(_, body)| body.model).collect();
+                all.filter(|field| models.iter().any(|&model| field.is_of(model))).collect()
+            }
+        }
+    }
+
+    /// What a section shows of a view: the body in place of a surface that it carries, which has no inside.
+    pub fn in_section(&self, view: &ViewTable) -> ViewTable {
+        let carrier = self.carrier(view.on.as_deref()).filter(|(_, model)| *model != BodyModel::Shell);
+        let on = carrier.map(|(body, _)| body.clone()).or_else(|| view.on.clone());
+        ViewTable { on, ..view.clone() }
+    }
+
     fn shows_surface_of_shell(&self, view: &ViewTable) -> bool {
-        let shown = self.surfaces.iter().filter(|(name, _)| view.on.as_ref() == Some(name));
-        let solid =
-            |on: &str| self.bodies.iter().any(|(name, body)| name == on && body.model != BodyModel::Shell);
-        shown.into_iter().any(|(_, surface)| !solid(&surface.on))
+        self.carrier(view.on.as_deref()).is_some_and(|(_, model)| model == BodyModel::Shell)
     }
 
     fn shows_surface(&self, view: &ViewTable) -> bool {
@@ -83,7 +108,10 @@ impl Scene {
 
     /// A series of what is shown, with displacements and the field of the colours.
     pub fn shown(&self, every: f64) -> VtuTable {
-        self.shown_as(&self.view, every)
+        match self.view.clip {
+            Some(_) => self.shown_as(&self.in_section(&self.view), every),
+            None => self.shown_as(&self.view, every),
+        }
     }
 
     /// The same of another view than its own.
@@ -115,6 +143,19 @@ mod tests {
     use super::*;
     use crate::testing::{built, labelled, mistakes, scene};
     use pliant_geometry::CellLabel;
+
+    #[test]
+    fn a_surface_has_the_fields_of_its_body_and_a_section_shows_that_body() {
+        let skin =
+            "[surface.skin]\non = 'cube'\nmesh = { block = { size = [0.2, 0.1, 0.1], cells = [3, 2, 2] } }\n";
+        let clip = "[view]\non = 'skin'\nclip = { point = [0, 0, 0], normal = [1, 0, 0] }\n";
+        let scene = scene(&format!("{skin}{clip}"));
+        let [on_skin, on_cube] = ["skin", "cube"].map(|on| scene.fields_on(Some(on)));
+        assert!(on_skin.contains(&FieldName::VonMises) && on_skin.contains(&FieldName::Displacement));
+        assert!(!on_skin.contains(&FieldName::Reaction) && on_cube.contains(&FieldName::Reaction));
+        assert_eq!(scene.shown(0.1).on.as_deref(), Some("cube"));
+        assert_eq!(scene.shown_as(&scene.view, 0.1).on.as_deref(), Some("skin"));
+    }
 
     #[test]
     fn a_view_shows_what_it_names_and_von_mises_stresses_otherwise() {

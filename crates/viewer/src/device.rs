@@ -8,6 +8,8 @@ use pliant_mechanics::Energies;
 use pliant_picture::PointForce;
 use pliant_sim::gpu::PointValue;
 
+use crate::followed::FollowedPoint;
+
 /// Wall time between two inspections of a state that lies on a device.
 pub const INSPECTION: Duration = Duration::from_millis(250);
 
@@ -28,6 +30,8 @@ pub(crate) struct Seen {
     pub held: Vec<[[f64; 3]; 2]>,
     /// Forces of contacts, where they are asked for.
     pub contacts: Vec<PointForce>,
+    /// Points that the user follows.
+    pub followed: Vec<FollowedPoint>,
     /// The sample of that instant.
     pub sample: Vec<f64>,
     /// When it was; `None` where the next one is due at once.

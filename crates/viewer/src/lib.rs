@@ -1,7 +1,9 @@
 //! The window: a scene played in real time on a thread of its own, pulled by hand and pinned, looked at from all sides. All but the
 //! window itself works without one: [`Session`] plays, [`pick`] finds what lies under a pixel, [`replay()`] repeats what a hand did.
 
+mod beside;
 mod device;
+mod followed;
 mod hand;
 mod parameters;
 mod recording;
@@ -13,6 +15,7 @@ mod sound;
 mod window;
 
 pub use device::INSPECTION;
+pub use followed::FollowedPoint;
 pub use hand::{Hand, Hold, Point, pick};
 pub use parameters::{Number, Parameter, parameters, with_numbers};
 pub use recording::{Break, Done, Move, Recording, Surface};

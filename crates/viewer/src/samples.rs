@@ -1,12 +1,12 @@
 //! What is plotted over time: samples of a run, few enough to be kept however long it lasts, and the table that they are written to.
 
-use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use pliant_run::Column;
 
+use crate::beside::create_beside;
 use crate::session::Frame;
 
 /// Samples kept.
@@ -47,12 +47,12 @@ impl Samples {
         *self = Self::default();
     }
 
-    /// Takes the sample of a frame, if its time is a later one. A run that starts anew begins anew here. Where there are too many, every
+    /// Takes the sample of a frame, if its time is a later one. Of a run that goes back the later ones are forgotten. Where there are too many, every
     /// second one goes, and from then on comes.
     pub fn take(&mut self, frame: &Frame) {
         let last = self.times.last().copied().unwrap_or(-1.0);
         if frame.time < last {
-            self.clear();
+            self.forget_from(frame.time);
         } else if frame.time == last {
             return;
         }
@@ -79,6 +79,16 @@ impl Samples {
         }
     }
 
+    /// Forgets the samples from a time on; all where none is before.
+    fn forget_from(&mut self, time: f64) {
+        let kept = self.times.partition_point(|known| *known < time);
+        if kept == 0 {
+            return self.clear();
+        }
+        self.times.truncate(kept);
+        self.values.truncate(kept * self.columns.len());
+    }
+
     /// Takes on other columns; those that were not there are not a number until now.
     fn rearrange(&mut self, columns: &Arc<[Column]>) {
         let places: Vec<_> =
@@ -103,17 +113,7 @@ impl Samples {
     /// # Errors
     /// What the system says.
     pub fn write_beside(&self, scene: &Path) -> std::io::Result<PathBuf> {
-        let stem = scene.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
-        let mut number = 1;
-        let (path, file) = loop {
-            let more = if number > 1 { format!("-{number}") } else { String::new() };
-            let path = scene.with_file_name(format!("{stem}-probes{more}.csv"));
-            match File::create_new(&path) {
-                Ok(file) => break (path, file),
-                Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => number += 1,
-                Err(error) => return Err(error),
-            }
-        };
+        let (path, file) = create_beside(scene, "probes", "csv")?;
         let mut out = BufWriter::new(file);
         write!(out, "time [s]")?;
         for Column { name, unit } in self.columns.iter() {

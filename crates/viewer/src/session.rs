@@ -8,7 +8,6 @@ use std::time::{Duration, Instant};
 
 use pliant_geometry::Vector3;
 use pliant_mechanics::Energies;
-use pliant_mechanics::grip::Grip;
 use pliant_picture::{
     PointForce, Subject, contact_forces, critical_cell, drawn_value, nodal_values, visible,
 };
@@ -19,7 +18,8 @@ use pliant_sim::gpu::{DevicePoints, PointValue};
 use pliant_sim::{Failure, State, number};
 
 use crate::device::{Seen, point_value};
-use crate::hand::{Hand, Hold, Point, nodes_of};
+use crate::followed::{Followed, FollowedPoint};
+use crate::hand::{Hand, Hold, Point};
 use crate::parameters::Number;
 use crate::recording::{Break, Done, Move, Recording, Surface};
 use crate::sound::{Sound, SoundStates};
@@ -38,6 +38,8 @@ pub enum Order {
     Step(u64),
     /// Starts anew at rest.
     Reset,
+    /// Goes back to the newest kept state of no more than so many steps, and lets go.
+    Back(u64),
     /// Simulated seconds a second.
     Speed(f64),
     /// Changes what a hand or a pin holds.
@@ -90,6 +92,8 @@ pub struct Frame {
     pub held: Vec<[[f64; 3]; 2]>,
     /// Forces of contacts on the nodes, where they are asked for.
     pub contacts: Vec<PointForce>,
+    /// Points that the user follows, in the order in which they were picked.
+    pub followed: Vec<FollowedPoint>,
     /// The tool that the hand holds.
     pub tool: Option<String>,
     /// Whether each triangle of the subject can be taken hold of: those of bodies and tools, not those of obstacles.
@@ -255,14 +259,6 @@ struct Playback {
     seen: Seen,
     /// Whether every frame comes to ordinary memory.
     in_memory: bool,
-}
-
-/// A point that a user follows.
-struct Followed {
-    /// Its nodes; it pulls at none.
-    point: Grip,
-    /// Its place at rest [m].
-    rest: Vector3,
 }
 
 /// Why a world is left.
@@ -548,6 +544,7 @@ impl<'s> Player<'s> {
             }
             Order::Step(steps) => (playback.playing, playback.owed) = (false, steps),
             Order::Reset => return Some(Left::Reset),
+            Order::Back(steps) => self.go_back_before(steps),
             Order::Speed(speed) => {
                 playback.pace.speed = speed.clamp(1e-6, 1e6);
                 playback.pace.anchor(self.live.simulation.time());
@@ -594,11 +591,9 @@ impl<'s> Player<'s> {
     }
 
     fn follow(&mut self, point: &Point) {
-        let Some(nodes) = nodes_of(point, &self.subject, &self.live) else { return };
-        let point = Grip { nodes, ..Grip::default() };
-        let rest = |&(node, weight): &(u32, f64)| Vector3::from(self.live.simulation.rest(node)) * weight;
-        let rest = point.nodes.iter().map(rest).sum();
-        self.playback.followed.push(Followed { point, rest });
+        let on = self.playback.view.on.as_deref();
+        let followed = Followed::new(point, &self.subject, &self.live, self.world, on, &self.hidden);
+        self.playback.followed.extend(followed);
         self.name_columns();
     }
 
@@ -638,6 +633,7 @@ impl<'s> Player<'s> {
     fn renew_subject(&mut self) -> Result<(), String> {
         let mesh = self.live.mesh().map_err(|failure| failure.message)?;
         self.subject = Arc::new(Subject::new(&visible(mesh, &self.hidden)));
+        self.playback.followed.iter_mut().for_each(Followed::forget_shown);
         self.find_movable();
         Ok(())
     }
@@ -692,13 +688,32 @@ impl<'s> Player<'s> {
     /// After a step that failed: goes back to a state before it, where hands let go; or stays, where no hand has broken it.
     fn go_back(&mut self, message: String) {
         let broken = self.live.simulation.time();
-        let back = self.sound.take().and_then(|Sound { state, steps, hold, moves }| {
-            self.live.restore(state).is_ok().then_some((steps, hold, moves))
-        });
-        let Some((steps, hold, moves)) = back else {
+        let sound = self.sound.take();
+        let Some(time) = sound.and_then(|sound| self.restore(sound)) else {
             self.playback.failure.get_or_insert(message);
             return;
         };
+        let playback = &mut self.playback;
+        if let Some(recording) = &mut playback.recording {
+            recording.breaks.push(Break { times: [broken, time], message: message.clone() });
+        }
+        playback.breaks += 1;
+        playback.note =
+            Some(format!("the hand let go, and the run went back to t = {} s: {message}", number(time)));
+    }
+
+    /// As a user wants it: to a state that is still kept.
+    fn go_back_before(&mut self, steps: u64) {
+        let sound = self.sound.before(steps);
+        if let Some(time) = sound.and_then(|sound| self.restore(sound)) {
+            self.playback.failure = None;
+            self.playback.note = Some(format!("the run went back to t = {} s", number(time)));
+        }
+    }
+
+    /// Goes back to a state, where the hand lets go and the recording goes on; its time [s], `None` where the stepper cannot.
+    fn restore(&mut self, Sound { state, steps, hold, moves }: Sound) -> Option<f64> {
+        self.live.restore(state).ok()?;
         let playback = &mut self.playback;
         (playback.hold, playback.steps, playback.owed) = (hold, steps, 0);
         playback.hold.take(&Hand::Release, &self.subject, &mut self.live);
@@ -706,14 +721,11 @@ impl<'s> Player<'s> {
         let time = self.live.simulation.time();
         if let Some(recording) = &mut playback.recording {
             recording.moves.truncate(moves);
-            recording.breaks.push(Break { times: [broken, time], message: message.clone() });
         }
         playback.record(false, Instant::now(), Done::Hand(Hand::Release));
-        playback.breaks += 1;
         playback.pace.anchor(time);
-        playback.note =
-            Some(format!("the hand let go, and the run went back to t = {} s: {message}", number(time)));
         playback.seen.at = None;
+        Some(time)
     }
 
     /// Looks at the instant in ordinary memory.
@@ -752,9 +764,11 @@ impl<'s> Player<'s> {
         seen.sample.clear();
         seen.sample.extend([x, y, z]);
         self.live.sample(&mut seen.sample);
+        seen.followed.clear();
         for followed in &playback.followed {
-            let [place, _] = self.live.simulation.pulled(&followed.point);
-            seen.sample.extend((Vector3::from(place) - followed.rest).iter());
+            let now = followed.now(&self.live, &seen.values);
+            seen.sample.extend((now.place - followed.rest()).iter());
+            seen.followed.push(now);
         }
         seen.number += 1;
         seen.at = Some(Instant::now());
@@ -797,6 +811,7 @@ impl<'s> Player<'s> {
             frame.energies = playback.seen.energies;
             frame.held.clone_from(&playback.seen.held);
             frame.contacts.clone_from(&playback.seen.contacts);
+            frame.followed.clone_from(&playback.seen.followed);
             frame.sample.clone_from(&playback.seen.sample);
         }
         let device = self.world.device();

@@ -66,6 +66,16 @@ impl SoundStates {
         self.later.push_back(sound);
     }
 
+    /// The newest state of no more than so many steps, and the ones after it are forgotten; the oldest that is kept where all have more.
+    pub fn before(&mut self, steps: u64) -> Option<Sound> {
+        while self.later.back().is_some_and(|newest| newest.steps > steps) {
+            self.later.pop_back();
+        }
+        let sound = self.later.back().or(self.first.as_ref())?.clone();
+        self.back_at = sound.steps;
+        Some(sound)
+    }
+
     /// The state to go back to after a break: the newest one that the run has not gone back to. `None` where hands did nothing and the run
     /// breaks all the same.
     pub fn take(&mut self) -> Option<Sound> {

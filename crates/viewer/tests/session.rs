@@ -236,6 +236,36 @@ fn a_pull_that_breaks_a_run_is_undone() {
 }
 
 /// However far the mouse goes, the hand pulls with its stiffness times two edges at most, also while the body gives way.
+/// It goes on from before the pull with the bits of a run that nobody pulled at; a picked point tells where it is and what lies there.
+#[test]
+fn a_pull_is_taken_back_and_a_picked_point_is_read() {
+    let world = world(BALL);
+    let tip = tip(&subject(&world));
+    let mut session = Session::start(world.clone(), || ()).unwrap();
+    session.order(Order::Record);
+    session.order(Order::Probe(tip));
+    session.order(Order::Step(1500));
+    let free = wait(&mut session, |frame| frame.steps == 1500).clone();
+    let picked = &free.followed[0];
+    assert!(picked.about.starts_with("ball, element "), "{}", picked.about);
+    assert!(picked.place.x > 0.04 && picked.value.is_some_and(|value| value >= 0.0), "{picked:?}");
+    session.order(Order::Hand(Hand::Take(tip, 20.0)));
+    session.order(Order::Hand(Hand::Pull([0.2, 0.0, 0.0])));
+    session.order(Order::Step(500));
+    let pulled = wait(&mut session, |frame| frame.steps == 2000).clone();
+    assert!(pulled.followed[0].place.x > picked.place.x);
+    session.order(Order::Back(1500));
+    let back = wait(&mut session, |frame| frame.steps <= 1500).clone();
+    assert!(back.held.is_empty() && back.time <= free.time && back.failure.is_none());
+    session.order(Order::Step(2000 - back.steps));
+    let after = wait(&mut session, |frame| frame.steps == 2000).clone();
+    let mut other = Session::start(world.clone(), || ()).unwrap();
+    other.order(Order::Step(2000));
+    assert_eq!(after.points, wait(&mut other, |frame| frame.steps == 2000).points);
+    let recording = session.end().unwrap();
+    assert!(recording.breaks.is_empty() && replay(&world, &recording).unwrap().held.is_none());
+}
+
 #[test]
 fn the_force_of_a_hand_has_a_limit() {
     let world = world(BALL);

@@ -34,12 +34,14 @@ impl Curved {
         };
         let mut own = vec![u32::MAX; picture.places.len()];
         let (mut points, mut facets, mut nodes) = (Vec::new(), Vec::new(), Vec::new());
+        let mut edges = Vec::new();
         for (number, triangle) in picture.triangles.iter().enumerate() {
             let facet = picture.facet(number);
             if !shown(facet) {
                 continue;
             }
             facets.push(facet);
+            edges.push(f64::from(picture.facet_edges[number]));
             for &point in triangle {
                 let at = &mut own[point as usize];
                 if *at == u32::MAX {
@@ -50,6 +52,7 @@ impl Curved {
             }
         }
         let mut block = CellBlock::new(CellKind::Triangle, nodes);
+        block.data.insert("element-edges".into(), DataArray::scalar(edges));
         if !built.labels(on).is_empty() {
             let labels = labels_of_facets(built, part);
             let labels = facets.iter().map(|&facet| labels[facet as usize]).collect();

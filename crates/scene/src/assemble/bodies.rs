@@ -10,6 +10,7 @@ use pliant_mechanics::prony::{Prony, PronyError};
 use pliant_sim::counted;
 
 use super::{Builder, BuiltBody, SCENE, suggestion};
+use crate::diagnostic::Diagnostic;
 use crate::format::{BodyModel, BodyTable, ByLabel, Density, Element, Hourglass, Thickness, ThicknessRule};
 use crate::registry::LawTable;
 
@@ -296,6 +297,7 @@ impl Builder<'_> {
         if !self.check_law_of_model(draft, &law_name, law, &prony, &at) {
             return;
         }
+        self.doubt_widening(&law_name, law);
         let Some(fibre) = self.fibres(draft, &law_name, law, block, &cells) else { return };
         let Some(fractions) = self.fractions(draft, block, &cells) else { return };
         let material = Material { law: law.law, prony, density: density.0 };
@@ -316,6 +318,22 @@ impl Builder<'_> {
             fibre,
             original: cells,
         });
+    }
+
+    /// Flags a law with a negative Poisson's ratio, once.
+    fn doubt_widening(&mut self, law_name: &str, law: &LawTable) {
+        let poisson = law.law.small_strain().poisson();
+        if poisson >= 0.0 {
+            return;
+        }
+        let message = format!(
+            "law `{law_name}` has a Poisson's ratio of {poisson:.2}: it gets wider when it is pulled, as no soft tissue does"
+        );
+        if self.out.iter().all(|known| known.message != message) {
+            let help = "take a `bulk-modulus` above two thirds of the `shear-modulus`, or a `poisson-ratio` from 0 to 0.5";
+            let place = self.source().span(&["law", law_name]);
+            self.out.push(Diagnostic::warning(message).at(place, "below 0").help(help));
+        }
     }
 
     /// Some cells of a block with their element; hourglass control has a coefficient and a shear modulus [Pa].
@@ -469,6 +487,20 @@ mod tests {
         assert_eq!(of(by_hourglass, hex), [told("soft", 9.0, 0.1, &[1]), told("soft", 9.0, 0.3, &[0, 2])]);
         // Tets have no hourglass patterns: they stay together.
         assert_eq!(of(by_hourglass, CellKind::Tet), [told("soft", 9.0, 0.0, &[0, 1, 2])]);
+    }
+
+    #[test]
+    fn a_law_that_gets_wider_when_it_is_pulled_is_flagged_once() {
+        let warned = |moduli: &str| {
+            let two = "[body.other]\nmesh = { block = { size = [1, 1, 1], cells = [1, 1, 1] } }\nlaw = 'tissue'\ndensity = 1\n";
+            let text = CUBE.replace("young-modulus = 10e3\npoisson-ratio = 0.3", moduli);
+            let built =
+                build(&read(&format!("{text}{two}"))).unwrap_or_else(|errors| panic!("{}", errors.plain()));
+            built.warnings.iter().map(|warning| warning.message.clone()).collect::<Vec<_>>()
+        };
+        let told = warned("shear-modulus = 3e3\nbulk-modulus = 1e3");
+        assert!(told.len() == 1 && told[0].contains("a Poisson's ratio of -0.25"), "{told:?}");
+        assert_eq!(warned("shear-modulus = 3e3\nbulk-modulus = 2e3"), [""; 0]);
     }
 
     #[test]

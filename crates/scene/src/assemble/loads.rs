@@ -468,10 +468,7 @@ impl Builder<'_> {
             self.error(path, message, "not on a surface", "write it on the body");
             return;
         }
-        let of_nodes = [FieldName::Rotation, FieldName::Reaction, FieldName::ReactionMoment];
-        let is_off = |field: &&FieldName| {
-            of_nodes.contains(field) || field.is_of_contact() || !field.is_of(BodyModel::Solid)
-        };
+        let is_off = |field: &&FieldName| !field.is_of_surface() || !field.is_of(BodyModel::Solid);
         if let Some(field) = fields.iter().find(is_off) {
             let message = format!("surfaces have no `{}`", field.name());
             self.error(path, message, "not on a surface", "write it on the body");

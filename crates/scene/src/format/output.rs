@@ -301,6 +301,12 @@ impl FieldName {
         matches!(self, Self::ContactForce | Self::ContactPressure | Self::Gap | Self::Slip)
     }
 
+    /// True for fields that surfaces on solids carry: those that say something between the nodes.
+    pub fn is_of_surface(self) -> bool {
+        let of_nodes = matches!(self, Self::Rotation | Self::Reaction | Self::ReactionMoment);
+        !of_nodes && !self.is_of_contact()
+    }
+
     /// True for fields that bodies of a model have.
     pub fn is_of(self, model: BodyModel) -> bool {
         match self {

@@ -7,6 +7,7 @@ use pliant_geometry::Vector3;
 use pliant_sim::gpu::{Device, DevicePoints, PointValue};
 
 use super::App;
+use super::told::Told;
 use crate::device::{INSPECTION, point_value};
 use crate::session::Order;
 use pliant_scene::World;
@@ -56,7 +57,7 @@ impl App {
                 let place = |[x, y, z, _]: [f32; 4]| Vector3::new(x.into(), y.into(), z.into());
                 self.points = Arc::new(points.into_iter().map(place).collect());
             }
-            Err(error) => self.message = Some(error.to_string()),
+            Err(error) => self.message = Some(Told::failure(error.to_string())),
         }
     }
 

@@ -1,12 +1,16 @@
 //! The window itself: what is drawn and typed. What is simulated lies behind [`Session`].
 
 mod device;
+mod keep;
+mod overlay;
 mod paint;
 mod panels;
 mod parameters;
 mod picture;
 mod plots;
 mod self_test;
+mod told;
+mod undo;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -21,12 +25,15 @@ use pliant_picture::{Camera, Extremes, Projection, Style, Subject, Target};
 use pliant_scene::format::{FieldName, ViewTable};
 use pliant_sim::gpu::Device;
 
+use self::keep::Taking;
 use self::paint::{SAMPLES, place};
 use self::parameters::Numbers;
-use self::picture::{Cut, SCALE};
+use self::picture::{Cut, FIGURES, SCALE};
 use self::self_test::RunningTest;
 pub use self::self_test::SelfTest;
-use crate::hand::{Hand, Point};
+use self::told::Told;
+use self::undo::Act;
+use crate::hand::Point;
 use crate::samples::Samples;
 use crate::session::{Frame, Order, Session};
 use pliant_scene::World;
@@ -116,6 +123,8 @@ struct App {
     style: Style,
     /// Whether the range stays as it is.
     locked: bool,
+    /// Whether a part of a body has no value of the field.
+    missing: bool,
     /// What is shown of the scene.
     view: ViewTable,
     /// The labels that this has.
@@ -139,10 +148,20 @@ struct App {
     strongest: f64,
     orbiting: bool,
     help: bool,
+    side_shown: bool,
+    plots_shown: bool,
+    /// What the window is drawn with.
+    adapter: String,
+    /// What can be taken back, the last at the end.
+    acts: Vec<Act>,
+    /// A picture that was asked for.
+    taking: Taking,
     numbers: Numbers,
     samples: Samples,
     /// Names of the curves that are plotted.
     plotted: BTreeSet<String>,
+    /// Whether plots show the last seconds instead of all.
+    lately: bool,
     /// Points that the user follows.
     probes: usize,
     file: PathBuf,
@@ -151,7 +170,11 @@ struct App {
     read: Read,
     /// A scene that is being read.
     reading: Option<Receiver<(PathBuf, Result<World, String>)>>,
-    message: Option<String>,
+    message: Option<Told>,
+    /// What the scene warns of, with the numbers that are played.
+    warnings: Vec<String>,
+    /// Messages that the user has closed.
+    closed: BTreeSet<String>,
     frame_seconds: f64,
     painted: Instant,
     running_test: Option<RunningTest>,
@@ -188,10 +211,12 @@ impl App {
             numbers: Numbers::of(&world.scene),
             view: world.scene.view.clone(),
             labels: world.labels(world.scene.view.on.as_deref()),
+            warnings: warnings(&world),
             world,
             home: camera,
             camera,
             locked: style.range.is_some(),
+            missing: false,
             style,
             cut: Cut::new(style.clip),
             in_memory: false,
@@ -206,8 +231,14 @@ impl App {
             strongest: 0.0,
             orbiting: false,
             help: false,
+            side_shown: true,
+            plots_shown: true,
+            acts: Vec::new(),
+            taking: Taking::default(),
+            adapter: state.adapter.get_info().name,
             samples: Samples::default(),
             plotted: plots::usual(),
+            lately: false,
             probes: 0,
             changed: modified(&file),
             file,
@@ -215,6 +246,7 @@ impl App {
             read,
             reading: None,
             message: None,
+            closed: BTreeSet::new(),
             frame_seconds: 0.0,
             painted: Instant::now(),
             running_test: self_test.map(RunningTest::new),
@@ -226,19 +258,19 @@ impl App {
         if app.record.is_some() {
             app.order(Order::Record);
         }
+        if app.cut.on {
+            app.show();
+        }
+        // A self-test plays when it is due.
+        if app.running_test.is_none() {
+            app.order(Order::Play(true));
+        }
         Ok(app)
     }
 
     /// The field that colours tell.
     fn field(&self) -> Option<FieldName> {
         self.world.scene.field_of(&self.view)
-    }
-
-    /// What a user should know now: why it cannot go on, what was done last, what the scene warns of.
-    fn banner(&self) -> Option<String> {
-        let warnings = self.world.warnings().map(|warning| warning.message.clone());
-        let told = self.frame.failure.clone().or_else(|| self.message.clone());
-        told.or_else(|| self.frame.note.clone()).or_else(|| warnings.last())
     }
 
     /// The scene's title, or the name of its file.
@@ -268,12 +300,16 @@ impl App {
 
     /// The camera that sees all, from where it starts.
     fn fitted(&self) -> Camera {
-        let mut camera = self.home;
-        // Beside the scale of colours.
-        let scale = f64::from(SCALE / self.picture.height().max(SCALE));
-        let aspect = (self.aspect() - scale).max(0.5);
+        let mut camera =
+            Camera { azimuth: self.camera.azimuth, elevation: self.camera.elevation, ..self.home };
+        // Beside the scale of colours and below the figures, as parts of the height.
+        let height = self.picture.height().max(SCALE);
+        let scale = f64::from(SCALE / height);
+        let figures = f64::from(FIGURES / height).min(0.4);
+        let aspect = ((self.aspect() - scale) / (1.0 - figures)).max(0.5);
         camera.fit(self.surface.iter().map(|&point| &self.points[point as usize]), aspect);
-        camera.pan(-0.5 * scale, 0.0);
+        camera.height /= 1.0 - figures;
+        camera.pan(-0.5 * scale, -0.5 * figures);
         camera
     }
 
@@ -300,13 +336,14 @@ impl App {
         if inspected && frame.points.len() == self.subject.points.len() {
             Arc::make_mut(&mut self.points).clone_from(&frame.points);
             Arc::make_mut(&mut self.values).clone_from(&frame.values);
+            self.missing = self.subject.lacks_value(&self.values);
             self.fresh = true;
         }
         self.frame = frame.clone();
         if !self.locked {
             let mut extremes = Extremes::default();
             extremes.add(self.surface.iter().filter_map(|&point| self.values.get(point as usize)).copied());
-            self.style.range = extremes.range();
+            self.style.range = extremes.range(self.style.map);
         }
         let force = self.frame.held.first().map_or(0.0, |[_, force]| Vector3::from(*force).norm());
         self.strongest = self.strongest.max(force);
@@ -318,12 +355,19 @@ impl App {
         }
     }
 
-    fn order(&self, order: Order) {
-        self.session.order(order);
+    /// Looks from another side at the same.
+    fn look_from(&mut self, [azimuth, elevation]: [f64; 2]) {
+        (self.camera.azimuth, self.camera.elevation) = (azimuth, elevation);
     }
 
-    fn act(&mut self, hand: Hand) {
-        self.order(Order::Hand(hand));
+    /// Shows what is asked for; in a section the body in place of a surface that it carries.
+    fn show(&self) {
+        let view = if self.cut.on { self.world.scene.in_section(&self.view) } else { self.view.clone() };
+        self.order(Order::Show(Box::new(view)));
+    }
+
+    fn order(&self, order: Order) {
+        self.session.order(order);
     }
 
     /// Reads the scene anew after a change of its file, or another one that was dropped.
@@ -343,7 +387,7 @@ impl App {
         let Some(Ok((path, read))) = self.reading.as_ref().map(|reading| reading.try_recv()) else { return };
         self.reading = None;
         let replaced = read.and_then(|world| self.replace(path, world));
-        self.message = Some(replaced.err().unwrap_or_else(|| REPLACED.into()));
+        self.message = Some(replaced.map_or_else(Told::failure, |()| Told::done(REPLACED)));
     }
 
     fn begin_reading(&mut self, path: PathBuf, context: &egui::Context) {
@@ -355,10 +399,10 @@ impl App {
             let _ = send.send((path, result));
             context.request_repaint();
         };
-        self.message = Some("reading the scene …".into());
+        self.message = Some(Told::hint("reading the scene …"));
         match std::thread::Builder::new().name("reader".into()).spawn(work) {
             Ok(_) => self.reading = Some(receive),
-            Err(error) => self.message = Some(error.to_string()),
+            Err(error) => self.message = Some(Told::failure(error.to_string())),
         }
     }
 
@@ -372,6 +416,9 @@ impl App {
             self.subject = Arc::default();
         }
         self.numbers = Numbers::of(&world.scene);
+        self.warnings = warnings(&world);
+        self.closed.clear();
+        self.acts.clear();
         self.forget_probes();
         self.labels = world.labels(self.view.on.as_deref());
         self.world = world;
@@ -384,7 +431,7 @@ impl App {
         }
         self.frame.inspections = 0;
         self.session.order(Order::Memory(self.in_memory));
-        self.session.order(Order::Show(Box::new(self.view.clone())));
+        self.show();
         self.session.order(Order::Speed(self.speed));
         self.session.order(Order::Play(self.frame.playing));
         Ok(())
@@ -404,6 +451,12 @@ impl App {
         if pressed(Key::R) {
             self.reset();
         }
+        if pressed(Key::Comma) {
+            self.step_back();
+        }
+        if pressed(Key::Z) && context.input(|input| input.modifiers.command) {
+            self.undo();
+        }
         if pressed(Key::F) {
             self.fit();
         }
@@ -415,6 +468,12 @@ impl App {
         }
         if pressed(Key::C) {
             self.cut.on = !self.cut.on;
+            self.show();
+        }
+        for (key, side) in SIDES {
+            if pressed(key) {
+                self.look_from(side);
+            }
         }
         if pressed(Key::L) {
             self.locked = !self.locked;
@@ -434,9 +493,21 @@ impl App {
     fn reset(&mut self) {
         self.holding = None;
         self.samples.clear();
+        self.closed.clear();
+        self.acts.clear();
         self.order(Order::Reset);
     }
 }
+
+/// Azimuth and elevation [°] of the sides: front, back, left, right, top, bottom.
+const SIDES: [(Key, [f64; 2]); 6] = [
+    (Key::Num1, [0.0, 0.0]),
+    (Key::Num2, [180.0, 0.0]),
+    (Key::Num3, [90.0, 0.0]),
+    (Key::Num4, [270.0, 0.0]),
+    (Key::Num5, [0.0, 89.9]),
+    (Key::Num6, [0.0, -89.9]),
+];
 
 /// The message after a scene was read again.
 const REPLACED: &str = "the scene was read anew";
@@ -455,10 +526,16 @@ impl eframe::App for App {
             place(state, self.target, &self.subject);
         }
         self.choose_memory();
+        self.take_picture(&context);
         self.keys(&context);
         egui::Panel::top("top").show(ui, |ui| self.top(ui));
-        egui::Panel::right("side").default_size(220.0).show(ui, |ui| self.side(ui));
-        egui::Panel::bottom("plots").show(ui, |ui| self.plots(ui));
+        if self.side_shown {
+            egui::Panel::right("side").default_size(220.0).show(ui, |ui| self.side(ui));
+        }
+        self.tell(ui);
+        if self.plots_shown {
+            egui::Panel::bottom("plots").show(ui, |ui| self.plots(ui));
+        }
         egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| self.scene(ui));
         self.drawn += 1;
         self.go_on_testing();
@@ -488,6 +565,11 @@ impl eframe::App for App {
 fn begin(world: &World, context: &egui::Context) -> Result<Session, String> {
     let context = context.clone();
     Session::start(world.clone(), move || context.request_repaint()).map_err(|error| error.to_string())
+}
+
+/// What a world warns of.
+fn warnings(world: &World) -> Vec<String> {
+    world.warnings().map(|warning| warning.message.clone()).collect()
 }
 
 fn modified(path: &Path) -> Option<SystemTime> {

@@ -2,7 +2,7 @@
 
 use eframe::egui;
 use pliant_geometry::{CellLabel, Vector3};
-use pliant_picture::{ColourMap, Texture, label_colour};
+use pliant_picture::{Background, ColourMap, Texture, label_colour, readable};
 use pliant_scene::format::{BodyModel, ColourBy, Component, FieldName, Labels, Nothing};
 
 use super::App;
@@ -30,6 +30,17 @@ impl App {
             if ui.button("Step").on_hover_text(".").clicked() {
                 self.order(Order::Step(1));
             }
+            if ui
+                .button("Back")
+                .on_hover_text("Comma: back to the last kept state, a quarter of a second before")
+                .clicked()
+            {
+                self.step_back();
+            }
+            let undo = ui.add_enabled(!self.acts.is_empty(), egui::Button::new("Undo"));
+            if undo.on_hover_text("Ctrl and Z: takes back a pull, a pin or changed numbers").clicked() {
+                self.undo();
+            }
             if ui.button("Reset").on_hover_text("R").clicked() {
                 self.reset();
             }
@@ -45,26 +56,52 @@ impl App {
             if ui.selectable_label(self.help, "Keys").on_hover_text("H").clicked() {
                 self.help = !self.help;
             }
+            ui.separator();
+            self.keep(ui);
+            ui.separator();
+            ui.menu_button("Window", |ui| self.settings(ui));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 ui.label(self.title());
             });
         });
     }
 
+    /// Theme, size of the text, the panels that are shown, and what this program is.
+    fn settings(&mut self, ui: &mut egui::Ui) {
+        let context = ui.ctx().clone();
+        let mut dark = ui.visuals().dark_mode;
+        if ui
+            .checkbox(&mut dark, "Dark")
+            .on_hover_text("a dark theme, and a dark background of the picture")
+            .changed()
+        {
+            context.set_visuals(if dark { egui::Visuals::dark() } else { egui::Visuals::light() });
+            self.style.background = if dark { Background::Dark } else { Background::Light };
+        }
+        let mut size = context.zoom_factor();
+        let slider = egui::Slider::new(&mut size, 0.7..=2.0).step_by(0.1).text("size of the text");
+        // Larger text moves the slider, so it acts once it is let go.
+        if ui.add(slider).drag_stopped() {
+            context.set_zoom_factor(size);
+        }
+        ui.checkbox(&mut self.side_shown, "Side panel").on_hover_text("colours, shape, hand and numbers");
+        ui.checkbox(&mut self.plots_shown, "Plots").on_hover_text("curves over time below the picture");
+        ui.separator();
+        ui.label(concat!("Pliant ", env!("CARGO_PKG_VERSION")));
+        ui.label(format!("draws with {}", self.adapter));
+    }
+
     pub(super) fn side(&mut self, ui: &mut egui::Ui) {
+        let folding = |title: &str| {
+            egui::CollapsingHeader::new(egui::RichText::new(title).heading()).default_open(true)
+        };
         egui::ScrollArea::vertical().show(ui, |ui| {
-            ui.heading("Colours");
-            let mut changed = self.colours(ui);
-            ui.separator();
-            ui.heading("Shape");
-            changed |= self.shape(ui);
-            if changed {
-                self.order(Order::Show(Box::new(self.view.clone())));
+            let colours = folding("Colours").show(ui, |ui| self.colours(ui));
+            let shape = folding("Shape").show(ui, |ui| self.shape(ui));
+            if [colours.body_returned, shape.body_returned].contains(&Some(true)) {
+                self.show();
             }
-            ui.separator();
-            ui.heading("Hand");
-            self.hand(ui);
-            ui.separator();
+            folding("Hand").show(ui, |ui| self.hand(ui));
             self.numbers(ui);
         });
     }
@@ -111,11 +148,33 @@ impl App {
                 }
             },
         );
-        ui.checkbox(&mut self.locked, "Lock the range").on_hover_text("L");
+        self.range(ui);
+        ui.checkbox(&mut self.locked, "Lock the range")
+            .on_hover_text("L: keeps the range while values change");
         let hidden = !self.labels.is_empty()
             && (colour == LABELS || !self.view.hide.is_empty())
             && self.labels_shown(ui);
         hidden || before != (self.colour(), self.view.component)
+    }
+
+    /// The range of colours, typed in the unit of the scale; a typed one is locked.
+    fn range(&mut self, ui: &mut egui::Ui) {
+        let (Some(range), Some(field)) = (self.style.range, self.field()) else { return };
+        let size = range[0].abs().max(range[1].abs());
+        let (unit, factor) = readable(field.unit(), size);
+        let mut typed = range.map(|value| value * factor);
+        let speed = 0.01 * (typed[1] - typed[0]).abs().max(1e-3 * size * factor).max(1e-9);
+        let changed = ui.horizontal(|ui| {
+            let [low, high] = &mut typed;
+            let ends = [low, high]
+                .map(|end| ui.add(egui::DragValue::new(end).speed(speed).max_decimals(4)).changed());
+            ui.label(unit);
+            ends.contains(&true)
+        });
+        if changed.inner && typed[0] < typed[1] {
+            self.style.range = Some(typed.map(|value| value / factor));
+            self.locked = true;
+        }
     }
 
     /// What colours tell now.
@@ -160,7 +219,7 @@ impl App {
 
     /// What is drawn beside colours; whether another surface is asked for.
     fn shape(&mut self, ui: &mut egui::Ui) -> bool {
-        let before = (Surface::of(&self.view), self.view.contacts);
+        let before = (Surface::of(&self.view), self.view.contacts, self.cut.on);
         let scene = &self.world.scene;
         let bodies = scene.bodies.iter().map(|(name, _)| name);
         let names: Vec<&String> = bodies.chain(scene.surfaces.iter().map(|(name, _)| name)).collect();
@@ -202,7 +261,7 @@ impl App {
             self.style.texture = if skin { Texture::Skin } else { Texture::None };
         }
         (self.style.fibres, self.style.critical) = (self.view.fibres, self.view.critical);
-        before != (Surface::of(&self.view), self.view.contacts)
+        before != (Surface::of(&self.view), self.view.contacts, self.cut.on)
     }
 
     fn hand(&mut self, ui: &mut egui::Ui) {
@@ -220,17 +279,11 @@ impl App {
         }
     }
 
-    /// The fields that bodies of the scene have.
+    /// The fields of what is shown.
     pub(super) fn fields(&self) -> Vec<FieldName> {
-        let on = self.view.on.as_ref();
-        let bodies = self.world.scene.bodies.iter().filter(|(name, _)| on.is_none_or(|on| on == name));
-        let models: Vec<_> = bodies.map(|(_, body)| body.model).collect();
-        let all = FieldName::ALL.into_iter();
-        if models.is_empty() {
-            return vec![FieldName::Displacement];
-        }
-        let touches = self.world.touches(on.map(String::as_str));
-        let is_of = |field: &FieldName| models.iter().any(|&model| field.is_of(model));
-        all.filter(|field| is_of(field) && (touches || !field.is_of_contact())).collect()
+        let on = self.view.on.as_deref();
+        let touches = self.world.touches(on);
+        let all = self.world.scene.fields_on(on).into_iter();
+        all.filter(|field| touches || !field.is_of_contact()).collect()
     }
 }

@@ -5,7 +5,9 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use eframe::egui;
 use pliant_scene::Scene;
 
-use super::App;
+use super::told::Told;
+use super::undo::Act;
+use super::{App, warnings};
 use crate::parameters::{Number, Parameter, parameters, with_numbers};
 use crate::session::Order;
 use pliant_scene::World;
@@ -21,13 +23,15 @@ pub(super) struct Numbers {
     accepted: Vec<f64>,
     /// A world that is being made of some numbers.
     making: Option<Making>,
+    /// Whether the numbers that wait are those before others.
+    undone: bool,
 }
 
 impl Numbers {
     pub(super) fn of(scene: &Scene) -> Self {
         let all = parameters(scene);
         let in_file: Vec<f64> = all.iter().map(|parameter| parameter.number.value).collect();
-        Self { all, accepted: in_file.clone(), in_file, making: None }
+        Self { all, accepted: in_file.clone(), in_file, making: None, undone: false }
     }
 
     fn values(&self) -> Vec<f64> {
@@ -64,6 +68,19 @@ fn dragged(ui: &mut egui::Ui, parameter: &mut Parameter) -> bool {
 }
 
 impl App {
+    /// The numbers that are others than in the file.
+    pub(super) fn changed_numbers(&self) -> Vec<Number> {
+        self.numbers.changed(&self.numbers.values())
+    }
+
+    /// Takes other numbers in place of the last ones.
+    pub(super) fn set_numbers(&mut self, values: &[f64]) {
+        self.numbers.set(values);
+        self.numbers.undone = true;
+        let context = self.context.clone();
+        self.make_stage(&context);
+    }
+
     /// The list of numbers; each acts once it is let go.
     pub(super) fn numbers(&mut self, ui: &mut egui::Ui) {
         let mut released = false;
@@ -109,7 +126,7 @@ impl App {
         };
         match std::thread::Builder::new().name("numbers".into()).spawn(work) {
             Ok(_) => self.numbers.making = Some((values, receive)),
-            Err(error) => self.message = Some(error.to_string()),
+            Err(error) => self.message = Some(Told::failure(error.to_string())),
         }
     }
 
@@ -126,14 +143,19 @@ impl App {
         match made {
             Ok(world) => {
                 self.message = None;
+                self.warnings = warnings(&world);
                 let changed = self.numbers.changed(&values);
-                self.numbers.accepted = values;
+                let before = std::mem::replace(&mut self.numbers.accepted, values);
+                if !std::mem::take(&mut self.numbers.undone) {
+                    self.acts.push(Act::Numbers(before));
+                }
                 self.order(Order::Change(Box::new(world), changed));
                 // They may be others again by now.
                 self.make_stage(context);
             }
             Err(message) => {
-                self.message = Some(message);
+                self.message = Some(Told::failure(message));
+                self.numbers.undone = false;
                 let accepted = self.numbers.accepted.clone();
                 self.numbers.set(&accepted);
             }

@@ -6,7 +6,8 @@ use eframe::egui::{
 use eframe::egui_wgpu::Callback;
 use pliant_geometry::Vector3;
 use pliant_picture::{
-    Background, Camera, Plane, Style, Subject, arrow_note, arrow_unit, largest_force, ticks,
+    Background, Camera, MISSING, NO_VALUE, Plane, Style, Subject, arrow_note, arrow_unit, largest_force,
+    scale_marks,
 };
 
 use super::App;
@@ -15,6 +16,8 @@ use crate::hand::{Hand, Point, pick};
 
 /// Width of the scale of colours on the screen.
 pub(super) const SCALE: f32 = 110.0;
+/// Height of the figures on the screen.
+pub(super) const FIGURES: f32 = 104.0;
 /// Length of the arrow of the strongest force of a pull on the screen.
 const ARROW: f32 = 120.0;
 /// Angle [rad] by which a tool turns for a point on the screen, and by which jaws open for one of the wheel.
@@ -26,27 +29,29 @@ const DOT: f32 = 2.5;
 const PIN_SIZE: f32 = 5.0;
 const PIN: Color32 = Color32::from_rgb(20, 90, 170);
 const FORCE: Color32 = Color32::from_rgb(190, 40, 40);
-const WARNING: Color32 = Color32::from_rgb(250, 225, 150);
-const FAILED: Color32 = Color32::from_rgb(245, 180, 170);
 
 /// Keys and what they do, as in `docs/viewer.md`.
-const KEYS: [(&str, &str); 18] = [
+const KEYS: [(&str, &str); 22] = [
     ("drag the body", "pull it"),
     ("drag a tool", "lead it; with Shift turn it about where it is held"),
     ("wheel while dragging a tool", "open and close its jaws"),
     ("Ctrl or P + click", "pin it; on a pin, take it away"),
-    ("Alt + click", "follow a point: its displacement is plotted"),
+    ("Alt + click", "follow a point: read and plot it; two give their distance"),
     ("drag beside it", "turn the view"),
     ("right drag", "turn the view; with Shift move it"),
     ("middle drag", "move the view"),
     ("wheel", "zoom"),
     ("Space", "play or pause"),
     (".", "one step"),
+    (",", "back to the last kept state, a quarter of a second before"),
+    ("Ctrl and Z", "take back a pull, a pin or changed numbers"),
     ("R", "start anew"),
     ("F", "see all"),
+    ("1 2 3 4 5 6", "look from the front, back, left, right, top, bottom"),
     ("E G C", "edges, shape at rest, section"),
     ("L", "lock the range of colours"),
     ("O", "parallel or perspective"),
+    ("Ctrl and + − 0", "larger or smaller text"),
     ("H", "these keys"),
     ("drop a scene", "open it"),
 ];
@@ -113,8 +118,11 @@ impl App {
         let painter = ui.painter_at(rect);
         self.draw_contacts(&painter, rect);
         self.draw_held(&painter, rect);
+        self.draw_axes(&painter, rect);
+        self.draw_followed(&painter, rect);
         if style.range.is_some() {
             self.draw_scale(&painter, rect);
+            self.draw_missing(&painter, rect);
         }
         self.draw_figures(&painter, rect);
         if self.help {
@@ -274,14 +282,14 @@ impl App {
     }
 
     /// What text stands on, so that it can be read over a body.
-    fn card(&self, painter: &egui::Painter, place: Rect) {
+    pub(super) fn card(&self, painter: &egui::Painter, place: Rect) {
         let dark = self.style.background == Background::Dark;
         let pale = if dark { Color32::from_black_alpha(150) } else { Color32::from_white_alpha(170) };
         painter.rect_filled(place.expand(6.0), 5.0, pale);
     }
 
     /// The colour of what is written over the picture.
-    fn ink(&self) -> Color32 {
+    pub(super) fn ink(&self) -> Color32 {
         let [r, g, b] = self.style.background.ink();
         Color32::from_rgb(r, g, b)
     }
@@ -305,17 +313,13 @@ impl App {
         }
         let rows = bar.height() as usize;
         for row in 0..rows {
-            let part = 1.0 - (row as f64 + 0.5) / rows as f64;
+            let part = if high > low { 1.0 - (row as f64 + 0.5) / rows as f64 } else { 0.5 };
             let [r, g, b] = self.style.map.at(part);
             let line = Rect::from_min_size(bar.min + vec2(0.0, row as f32), vec2(bar.width(), 1.5));
             painter.rect_filled(line.intersect(bar), 0.0, Color32::from_rgb(r, g, b));
         }
-        let (values, step) = ticks([low * factor, high * factor], 6);
-        let decimals = (-(step.log10() - 0.3).floor()).clamp(0.0, 6.0) as usize;
-        for value in values {
-            let part = ((value / factor - low) / (high - low)) as f32;
-            let y = bar.bottom() - part * bar.height();
-            let text = format!("{value:.decimals$}");
+        for (part, text) in scale_marks([low * factor, high * factor], 6) {
+            let y = bar.bottom() - part as f32 * bar.height();
             painter.text(
                 Pos2::new(bar.right() + 6.0, y),
                 Align2::LEFT_CENTER,
@@ -326,10 +330,24 @@ impl App {
         }
     }
 
+    /// The grey of parts without a value, where there are some.
+    fn draw_missing(&self, painter: &egui::Painter, rect: Rect) {
+        if !self.missing {
+            return;
+        }
+        let place = rect.right_bottom() - vec2(12.0, 34.0);
+        let text =
+            painter.text(place, Align2::RIGHT_CENTER, NO_VALUE, FontId::proportional(13.0), self.ink());
+        let [r, g, b] = MISSING;
+        let swatch = Rect::from_center_size(text.left_center() - vec2(12.0, 0.0), vec2(12.0, 12.0));
+        painter.rect_filled(swatch, 2.0, Color32::from_rgb(r, g, b));
+    }
+
     /// Time, pace and energies, and what a user should know.
     fn draw_figures(&self, painter: &egui::Painter, rect: Rect) {
         let frame = &self.frame;
-        let mut lines = vec![format!("t = {:.3} s", frame.time)];
+        let paused = if frame.playing || frame.failure.is_some() { "" } else { ", paused: Space plays" };
+        let mut lines = vec![format!("t = {:.3} s{paused}", frame.time)];
         if frame.playing {
             lines.push(format!(
                 "{:.2} × real time (up to {:.1} ×)",
@@ -361,17 +379,6 @@ impl App {
         let place = Rect::from_min_size(rect.min + vec2(12.0, 10.0), galley.size());
         self.card(painter, place);
         painter.galley(place.min, galley, ink);
-        if let Some(text) = self.banner() {
-            let colour = if frame.failure.is_some() { FAILED } else { WARNING };
-            let width = rect.width() - 40.0;
-            let galley = painter.layout(text, FontId::proportional(15.0), Color32::from_gray(20), width);
-            let place = Rect::from_min_size(
-                Pos2::new(rect.left() + 12.0, rect.bottom() - galley.size().y - 24.0),
-                galley.size() + vec2(16.0, 12.0),
-            );
-            painter.rect_filled(place, 4.0, colour);
-            painter.galley(place.min + vec2(8.0, 6.0), galley, Color32::BLACK);
-        }
     }
 }
 

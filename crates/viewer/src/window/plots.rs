@@ -3,9 +3,11 @@
 use std::collections::BTreeSet;
 
 use eframe::egui;
-use egui_plot::{Legend, Line, Plot, PlotPoints};
+use egui_plot::{Corner, Legend, Line, Plot};
+use pliant_picture::readable;
 
 use super::App;
+use super::told::Told;
 use crate::hand::Point;
 use crate::samples::Samples;
 use crate::session::Order;
@@ -32,6 +34,27 @@ fn curves(samples: &Samples) -> Vec<Curve> {
     all
 }
 
+/// Simulated time [s] of the plots of the last seconds.
+const LATELY: f64 = 10.0;
+
+/// The name of a curve in words.
+fn words(name: &str) -> String {
+    let parts: Vec<&str> = name.split('.').collect();
+    let (parts, axis) = match &parts[..] {
+        [head @ .., axis @ ("x" | "y" | "z")] if !head.is_empty() => (head, format!(", {axis}")),
+        all => (all, String::new()),
+    };
+    let told = match parts {
+        ["hand"] => "force of the hand".into(),
+        ["energy", kind] => format!("{kind} energy"),
+        ["reaction", of] => format!("reaction of {of}"),
+        ["point", number, field] => format!("{field} of point {number}"),
+        [of, field] => format!("{field} of {of}"),
+        other => other.join(" "),
+    };
+    format!("{told}{axis}")
+}
+
 /// The curves plotted at first.
 pub(super) fn usual() -> BTreeSet<String> {
     ["energy.kinetic", "energy.internal", "hand"].map(str::to_owned).into()
@@ -53,7 +76,8 @@ impl App {
                 egui::ScrollArea::vertical().max_height(400.0).show(ui, |ui| {
                     for curve in &all {
                         let mut on = self.plotted.contains(&curve.name);
-                        if ui.checkbox(&mut on, format!("{} [{}]", curve.name, curve.unit)).changed() {
+                        let text = format!("{} [{}]", words(&curve.name), curve.unit);
+                        if ui.checkbox(&mut on, text).on_hover_text(&curve.name).changed() {
                             if on {
                                 self.plotted.insert(curve.name.clone());
                             } else {
@@ -65,10 +89,15 @@ impl App {
             });
             if ui.add_enabled(!self.samples.is_empty(), egui::Button::new("Export CSV")).clicked() {
                 self.message = Some(match self.samples.write_beside(&self.file) {
-                    Ok(path) => format!("`{}` was written", path.display()),
-                    Err(error) => format!("the table cannot be written beside the scene: {error}"),
+                    Ok(path) => Told::done(format!("`{}` was written", path.display())),
+                    Err(error) => {
+                        Told::failure(format!("the table cannot be written beside the scene: {error}"))
+                    }
                 });
             }
+            ui.selectable_value(&mut self.lately, false, "all").on_hover_text("plots the whole run");
+            ui.selectable_value(&mut self.lately, true, "last 10 s")
+                .on_hover_text("plots the last ten simulated seconds");
             if self.probes > 0 && ui.button("Forget the points followed").clicked() {
                 self.forget_probes();
                 self.order(Order::ForgetProbes);
@@ -86,22 +115,37 @@ impl App {
         }
         ui.columns(units.len(), |columns| {
             for (column, unit) in columns.iter_mut().zip(&units) {
-                Plot::new(("curves", unit)).height(130.0).legend(Legend::default()).show(column, |plot| {
-                    for curve in shown.iter().filter(|curve| curve.unit == *unit) {
-                        plot.line(Line::new(format!("{} [{unit}]", curve.name), self.points_of(curve)));
+                let own: Vec<&&Curve> = shown.iter().filter(|curve| curve.unit == *unit).collect();
+                let mut lines: Vec<Vec<[f64; 2]>> = own.iter().map(|curve| self.points_of(curve)).collect();
+                let sizes =
+                    lines.iter().flatten().map(|[_, value]| value.abs()).filter(|size| size.is_finite());
+                let (unit, factor) = readable(unit, sizes.fold(0.0, f64::max));
+                lines.iter_mut().flatten().for_each(|[_, value]| *value *= factor);
+                let plot = Plot::new(("curves", &own[0].unit)).height(130.0).legend(Legend::default().position(Corner::LeftTop));
+                let plot = plot
+                    .x_axis_label("time [s]")
+                    .y_axis_label(format!("[{unit}]"))
+                    .grid_spacing(45.0..=300.0);
+                plot.allow_scroll(false).show(column, |plot| {
+                    for (curve, line) in own.iter().zip(lines) {
+                        plot.line(Line::new(words(&curve.name), line));
                     }
                 });
             }
         });
     }
 
-    fn points_of(&self, curve: &Curve) -> PlotPoints<'static> {
+    /// Time [s] and value of a curve.
+    fn points_of(&self, curve: &Curve) -> Vec<[f64; 2]> {
+        let first = if self.lately { self.frame.time - LATELY } else { f64::NEG_INFINITY };
+        let recent = |[time, _]: &[f64; 2]| *time >= first;
         match curve.columns[..] {
             [x, y, z] => {
                 let parts = self.samples.curve(x).zip(self.samples.curve(y)).zip(self.samples.curve(z));
-                parts.map(|(([time, x], [_, y]), [_, z])| [time, (x * x + y * y + z * z).sqrt()]).collect()
+                let size = parts.map(|(([time, x], [_, y]), [_, z])| [time, (x * x + y * y + z * z).sqrt()]);
+                size.filter(recent).collect()
             }
-            _ => self.samples.curve(curve.columns[0]).collect(),
+            _ => self.samples.curve(curve.columns[0]).filter(recent).collect(),
         }
     }
 
@@ -109,5 +153,32 @@ impl App {
     pub(super) fn forget_probes(&mut self) {
         self.probes = 0;
         self.plotted.retain(|name| !name.starts_with("point."));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn curves_have_names_in_words() {
+        let told = [
+            "hand",
+            "hand.x",
+            "energy.kinetic",
+            "reaction.base.z",
+            "point.2.displacement",
+            "balloon.pressure",
+        ]
+        .map(words);
+        let expected = [
+            "force of the hand",
+            "force of the hand, x",
+            "kinetic energy",
+            "reaction of base, z",
+            "displacement of point 2",
+            "pressure of balloon",
+        ];
+        assert_eq!(told, expected);
     }
 }

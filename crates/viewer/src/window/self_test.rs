@@ -135,7 +135,7 @@ fn tried(_app: &App) -> String {
 
 /// What a picture of the window shows.
 fn shown(app: &App) -> String {
-    let told = app.banner().map(|text| format!(": {text}")).unwrap_or_default();
+    let told = app.banner().map(|told| format!(": {}", told.text)).unwrap_or_default();
     format!("{} at t = {:.3} s{told}", app.title(), app.frame.time)
 }
 

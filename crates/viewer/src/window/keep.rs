@@ -1,0 +1,275 @@
+//! What a user takes away: a picture, the view as the table `[view]` of a scene, and the scene with the numbers that were changed.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use eframe::egui::{self, ColorImage, Rect};
+use pliant_geometry::CellLabel;
+use pliant_picture::{Background, Camera, Picture, Plane, Projection, Style, Texture};
+use pliant_scene::diagnostic::Place;
+use pliant_scene::format::{ColourBy, ViewTable};
+use pliant_scene::source::{Source, Value};
+
+use super::App;
+use super::told::Told;
+use crate::beside::create_beside;
+use crate::parameters::Number;
+
+/// A picture of the window on its way.
+pub(super) type Taking = Arc<Mutex<Option<Arc<ColorImage>>>>;
+
+/// Writes a file beside a scene.
+fn write_beside(scene: &Path, what: &str, extension: &str, bytes: &[u8]) -> std::io::Result<PathBuf> {
+    let (path, mut file) = create_beside(scene, what, extension)?;
+    file.write_all(bytes).map(|()| path)
+}
+
+fn told(written: std::io::Result<PathBuf>) -> Told {
+    match written {
+        Ok(path) => Told::done(format!("`{}` was written", path.display())),
+        Err(error) => Told::failure(format!("nothing can be written beside the scene: {error}")),
+    }
+}
+
+/// The part of a picture of the window that a rectangle covers, in egui's points; `None` of an empty one.
+fn part(image: &ColorImage, rect: Rect, pixels_per_point: f32) -> Option<Picture> {
+    let [width, height] = image.size;
+    let pixel = |at: f32, most: usize| ((at * pixels_per_point).round().max(0.0) as usize).min(most);
+    let (left, right) = (pixel(rect.left(), width), pixel(rect.right(), width));
+    let (top, bottom) = (pixel(rect.top(), height), pixel(rect.bottom(), height));
+    let rows = (top..bottom).map(|row| &image.pixels[row * width + left..row * width + right]);
+    let rgba: Vec<u8> = rows.flatten().flat_map(|pixel| pixel.to_array()).collect();
+    let (width, height) = ((right - left) as u32, (bottom - top) as u32);
+    (!rgba.is_empty()).then_some(Picture { width, height, rgba })
+}
+
+/// What a camera has to look at to see what it sees, where it does not see all: target [m] and magnification of what fits.
+type Closer = Option<([f64; 3], f64)>;
+
+/// A view as the table `[view]` of a scene.
+fn view_text(view: &ViewTable, style: &Style, camera: &Camera, cut: Option<Plane>, closer: Closer) -> String {
+    let mut lines = vec!["[view]".to_owned()];
+    let mut put = |key: &str, value: String| lines.push(format!("{key} = {value}"));
+    let text = |text: &str| toml_text(text);
+    let list = |numbers: &[f64]| {
+        format!("[{}]", numbers.iter().map(|x| format!("{x:?}")).collect::<Vec<_>>().join(", "))
+    };
+    if let Some(on) = &view.on {
+        put("on", text(on));
+    }
+    match view.colour {
+        Some(ColourBy::Field(field)) => put("colour", text(field.name())),
+        Some(ColourBy::Labels(_)) => put("colour", text("label")),
+        Some(ColourBy::Nothing(_)) => put("colour", text("none")),
+        None => {}
+    }
+    if let Some(component) = view.component {
+        put("component", text(component.word()));
+    }
+    put("map", text(style.map.name()));
+    if let Some(range) = style.range.filter(|[low, high]| low < high) {
+        put("range", list(&range));
+    }
+    if !view.hide.is_empty() {
+        let hidden: Vec<String> = (view.hide.iter())
+            .map(|label| match label {
+                CellLabel::Number(number) => number.to_string(),
+                CellLabel::Name(name) => text(name),
+            })
+            .collect();
+        put("hide", format!("[{}]", hidden.join(", ")));
+    }
+    let switches = [
+        ("edges", style.edges),
+        ("wireframe", style.wireframe),
+        ("ghost", style.ghost),
+        ("fibres", view.fibres),
+        ("contacts", view.contacts),
+        ("critical", view.critical),
+    ];
+    switches.into_iter().filter(|(_, on)| *on).for_each(|(key, _)| put(key, "true".into()));
+    if style.texture == Texture::Skin {
+        put("texture", text("skin"));
+    }
+    if let Some(plane) = cut {
+        let point = plane.normal * plane.offset;
+        let [point, normal] = [point, plane.normal].map(|v| list(v.as_slice()));
+        put("clip", format!("{{ point = {point}, normal = {normal} }}"));
+    }
+    match style.background {
+        Background::Light => {}
+        Background::White => put("background", text("white")),
+        Background::Dark => put("background", text("dark")),
+    }
+    put("curved", view.curved.to_string());
+    let mut seen =
+        format!("azimuth = {:?}, elevation = {:?}", rounded(camera.azimuth), rounded(camera.elevation));
+    if let Some((target, zoom)) = closer {
+        seen.push_str(&format!(", target = {}, zoom = {:?}", list(&target), rounded(zoom.clamp(1e-3, 1e3))));
+    }
+    if camera.projection == Projection::Orthographic {
+        seen.push_str(", orthographic = true");
+    }
+    put("camera", format!("{{ {seen} }}"));
+    lines.join("\n") + "\n"
+}
+
+/// A number with as many digits as a user sees.
+fn rounded(number: f64) -> f64 {
+    (number * 1e4).round() / 1e4
+}
+
+/// A text as a value of TOML.
+fn toml_text(text: &str) -> String {
+    format!("{:?}", text)
+}
+
+/// The text of a scene with other numbers in their places; those that do not stand in the file.
+fn with_numbers(source: &Source, numbers: &[Number]) -> (String, Vec<String>) {
+    let mut places = Vec::new();
+    let mut elsewhere = Vec::new();
+    for Number { path, value } in numbers {
+        let path: Vec<&str> = path.iter().map(String::as_str).collect();
+        let Some((Place::File(span), node)) = source.node(&path).map(|node| (source.span(&path), node))
+        else {
+            elsewhere.push(path.join("."));
+            continue;
+        };
+        let whole = matches!(node.value, Value::Integer(_)) && value.fract() == 0.0 && value.abs() < 1e15;
+        places.push((span, if whole { format!("{value:.0}") } else { format!("{value:?}") }));
+    }
+    places.sort_by_key(|(span, _)| std::cmp::Reverse(span.start));
+    let mut text = source.text().to_owned();
+    places.into_iter().for_each(|(span, value)| text.replace_range(span, &value));
+    (text, elsewhere)
+}
+
+impl App {
+    /// Buttons that keep something.
+    pub(super) fn keep(&mut self, ui: &mut egui::Ui) {
+        if ui.button("Picture").on_hover_text("writes the picture beside the scene, as PNG").clicked() {
+            let taking = self.taking.clone();
+            ui.ctx().request_screenshot(move |image| {
+                *taking.lock().unwrap_or_else(PoisonError::into_inner) = Some(image);
+            });
+        }
+        if ui.button("Copy view").on_hover_text("copies the view as the table [view] of a scene").clicked() {
+            ui.ctx().copy_text(self.view_text());
+            self.message =
+                Some(Told::done("the table [view] was copied: paste it into the scene in place of its own"));
+        }
+        let changed = self.changed_numbers();
+        let button = egui::Button::new("Save scene");
+        let button = ui.add_enabled(!changed.is_empty(), button);
+        if button.on_hover_text("writes the scene with the changed numbers beside it").clicked() {
+            let (text, elsewhere) = with_numbers(&self.world.scene.source, &changed);
+            let written = told(write_beside(&self.file, "changed", "toml", text.as_bytes()));
+            self.message = Some(match elsewhere.is_empty() {
+                true => written,
+                false => Told {
+                    text: format!(
+                        "{}, without `{}`, which the file lacks",
+                        written.text,
+                        elsewhere.join("`, `")
+                    ),
+                    ..written
+                },
+            });
+        }
+    }
+
+    /// The view as a table of a scene.
+    pub(super) fn view_text(&self) -> String {
+        let fitted = self.fitted();
+        let moved = (self.camera.target - fitted.target).norm() > 0.01 * fitted.height
+            || (self.camera.height / fitted.height - 1.0).abs() > 0.01;
+        let closer = moved.then(|| (self.camera.target.into(), fitted.height / self.camera.height));
+        view_text(&self.view, &self.style, &self.camera, self.style.clip, closer)
+    }
+
+    /// Writes a picture that has come.
+    pub(super) fn take_picture(&mut self, context: &egui::Context) {
+        let Some(image) = self.taking.lock().unwrap_or_else(PoisonError::into_inner).take() else { return };
+        let Some(picture) = part(&image, self.picture, context.pixels_per_point()) else { return };
+        self.message = Some(match picture.png() {
+            Ok(png) => told(write_beside(&self.file, "picture", "png", &png)),
+            Err(error) => Told::failure(error.to_string()),
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pliant_geometry::Vector3;
+    use pliant_picture::ColourMap;
+    use pliant_scene::Scene;
+
+    use super::*;
+
+    const SCENE: &str = "[scene]\nuntil = 1\n[law.tissue]\ntype = 'neo-hookean'\nyoung-modulus = 10e3 # soft\npoisson-ratio = 0.3\n\
+        [body.cube]\nmesh = { block = { size = [1, 1, 1], cells = [2, 2, 2] } }\nlaw = 'tissue'\ndensity = 1000\n";
+
+    fn scene(text: &str) -> Scene {
+        let source = Source::parse("scene.toml", text).unwrap_or_else(|errors| panic!("{}", errors.plain()));
+        Scene::from_source(source, ".".into()).unwrap_or_else(|errors| panic!("{}", errors.plain()))
+    }
+
+    #[test]
+    fn a_copied_view_is_the_view_of_the_scene_that_it_is_pasted_into() {
+        let asked = "[view]\non = 'cube'\ncolour = 'displacement'\ncomponent = 'z'\nhide = [2, '5-8']\n";
+        let view = scene(&format!("{SCENE}{asked}")).view;
+        let style = Style {
+            map: ColourMap::Magma,
+            range: Some([-1e-3, 0.25]),
+            edges: true,
+            ghost: true,
+            texture: Texture::Skin,
+            background: Background::Dark,
+            ..Style::default()
+        };
+        let camera = Camera {
+            azimuth: 12.25,
+            elevation: -30.0,
+            projection: Projection::Orthographic,
+            ..Camera::default()
+        };
+        let cut = Plane::through(&Vector3::new(0.5, 0.0, 0.0), &Vector3::x());
+        let text = view_text(&view, &style, &camera, cut, Some(([0.0, 0.5, 1.0], 2.5)));
+        let read = scene(&format!("{SCENE}{text}")).view;
+        assert_eq!((read.on, read.colour, read.component), (view.on, view.colour, view.component), "{text}");
+        assert_eq!(
+            (read.range, read.edges, read.ghost, read.wireframe),
+            (Some([-1e-3, 0.25]), true, true, false)
+        );
+        assert_eq!(read.hide, view.hide);
+        assert_eq!(read.clip.map(|clip| (clip.point, clip.normal)), Some(([0.5, 0.0, 0.0], [1.0, 0.0, 0.0])));
+        let camera = read.camera;
+        assert_eq!((camera.azimuth, camera.elevation, camera.orthographic), (12.25, -30.0, true));
+        assert_eq!((camera.target, camera.zoom, read.curved), (Some([0.0, 0.5, 1.0]), 2.5, view.curved));
+    }
+
+    #[test]
+    fn changed_numbers_stand_where_the_old_ones_stood() {
+        let number = |path: [&str; 3], value| Number { path: path.map(str::to_owned).to_vec(), value };
+        let numbers = [
+            number(["law", "tissue", "young-modulus"], 12.5e3),
+            number(["body", "cube", "density"], 1060.0),
+            number(["body", "cube", "damping"], 2.0),
+        ];
+        let (text, elsewhere) = with_numbers(&scene(SCENE).source, &numbers);
+        assert_eq!(text, SCENE.replace("10e3 #", "12500.0 #").replace("density = 1000", "density = 1060"));
+        assert_eq!(elsewhere, ["body.cube.damping"]);
+    }
+
+    #[test]
+    fn pictures_are_cut_out_of_the_window() {
+        let mut image = ColorImage::filled([8, 4], egui::Color32::BLACK);
+        image.pixels[2 * 8 + 5] = egui::Color32::WHITE;
+        let rect = Rect::from_min_max(egui::pos2(2.0, 1.0), egui::pos2(3.0, 2.0));
+        let picture = part(&image, rect, 2.0).unwrap();
+        assert_eq!((picture.width, picture.height), (2, 2));
+        assert_eq!(picture.rgba[4..8], [255; 4]);
+        assert!(part(&image, Rect::ZERO, 1.0).is_none());
+    }
+}

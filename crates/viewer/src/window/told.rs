@@ -1,0 +1,94 @@
+//! The line below the picture: a failure, a warning, a hint, or a thing that was done. It lies beside the picture, so it hides nothing.
+
+use eframe::egui::{self, Color32, Frame, Margin, RichText, Ui};
+
+use super::App;
+
+/// What a message is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// The run cannot go on, or something asked for was not done.
+    Failure,
+    /// A result may be questionable.
+    Warning,
+    /// What happens now, or can be done.
+    Hint,
+    /// Something was done.
+    Done,
+}
+
+/// A message of the window.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Told {
+    pub kind: Kind,
+    pub text: String,
+}
+
+impl Told {
+    pub fn failure(text: impl Into<String>) -> Self {
+        Self { kind: Kind::Failure, text: text.into() }
+    }
+
+    pub fn hint(text: impl Into<String>) -> Self {
+        Self { kind: Kind::Hint, text: text.into() }
+    }
+
+    pub fn done(text: impl Into<String>) -> Self {
+        Self { kind: Kind::Done, text: text.into() }
+    }
+}
+
+impl Kind {
+    /// The word before the text, and the colours of paper and word; the word makes it readable without colours.
+    fn look(self, dark: bool) -> (&'static str, Color32, Color32) {
+        let (word, [paper, ink]) = match self {
+            Self::Failure => ("error", [[252, 224, 219], [160, 28, 20]]),
+            Self::Warning => ("warning", [[253, 243, 208], [130, 88, 0]]),
+            Self::Hint => ("hint", [[226, 236, 248], [28, 78, 140]]),
+            Self::Done => ("done", [[221, 243, 225], [20, 104, 48]]),
+        };
+        let colour = |[r, g, b]: [u8; 3]| Color32::from_rgb(r, g, b);
+        if dark {
+            (word, colour(ink).gamma_multiply(0.45), colour(paper))
+        } else {
+            (word, colour(paper), colour(ink))
+        }
+    }
+}
+
+impl App {
+    /// What a user should know now: why the run cannot go on, what was done last, what the run notes, what the scene warns of. A message
+    /// that was closed does not come back.
+    pub(super) fn banner(&self) -> Option<Told> {
+        let warned = |text: String| Told { kind: Kind::Warning, text };
+        let failure = self.frame.failure.clone().map(Told::failure);
+        let notes = self.frame.note.iter().chain(&self.warnings).cloned().map(warned);
+        let mut all = failure.into_iter().chain(self.message.clone()).chain(notes);
+        all.find(|told| !self.closed.contains(&told.text))
+    }
+
+    /// The line, with a button that closes it.
+    pub(super) fn tell(&mut self, ui: &mut Ui) {
+        let Some(told) = self.banner() else { return };
+        let (word, paper, ink) = told.kind.look(ui.visuals().dark_mode);
+        let frame = Frame::NONE.fill(paper).inner_margin(Margin::symmetric(10, 5));
+        egui::Panel::bottom("told").frame(frame).show(ui, |ui| {
+            ui.horizontal_wrapped(|ui| {
+                ui.label(RichText::new(word).strong().color(ink));
+                ui.label(RichText::new(&told.text).color(if ui.visuals().dark_mode {
+                    paper_text(ink)
+                } else {
+                    Color32::from_gray(25)
+                }));
+                if ui.small_button("✕").on_hover_text("Close this message").clicked() {
+                    self.closed.insert(told.text.clone());
+                }
+            });
+        });
+    }
+}
+
+/// Text on dark paper.
+fn paper_text(ink: Color32) -> Color32 {
+    ink.lerp_to_gamma(Color32::WHITE, 0.5)
+}

@@ -1,0 +1,53 @@
+//! Ctrl+Z: what a user did last is taken back, as far as the run can go back.
+
+use super::App;
+use crate::hand::Hand;
+use crate::session::Order;
+
+/// Something that can be taken back.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Act {
+    /// Numbers were changed; those before.
+    Numbers(Vec<f64>),
+    /// A pin was set.
+    Pin,
+    /// A pull began after so many steps.
+    Pull(u64),
+}
+
+impl App {
+    /// Does what hand and pins do, and remembers what can be taken back.
+    pub(super) fn act(&mut self, hand: Hand) {
+        match hand {
+            Hand::Take(..) => self.acts.push(Act::Pull(self.frame.steps)),
+            Hand::Pin(_) => self.acts.push(Act::Pin),
+            _ => {}
+        }
+        self.order(Order::Hand(hand));
+    }
+
+    /// Takes back what was done last: numbers and pins as they were, a pull by going back to a state before it.
+    pub(super) fn undo(&mut self) {
+        match self.acts.pop() {
+            Some(Act::Numbers(before)) => self.set_numbers(&before),
+            Some(Act::Pin) => {
+                let pins =
+                    self.frame.held.len() - usize::from(self.holding.is_some()).min(self.frame.held.len());
+                if let Some(last) = pins.checked_sub(1) {
+                    self.order(Order::Hand(Hand::Unpin(last)));
+                }
+            }
+            Some(Act::Pull(steps)) => {
+                self.holding = None;
+                self.order(Order::Back(steps));
+            }
+            None => {}
+        }
+    }
+
+    /// Goes back by one of the states that are kept.
+    pub(super) fn step_back(&mut self) {
+        self.holding = None;
+        self.order(Order::Back(self.frame.steps.saturating_sub(1)));
+    }
+}
