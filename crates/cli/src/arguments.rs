@@ -92,9 +92,9 @@ pub enum Command {
     /// Measure the cost of a step on this machine.
     #[command(after_help = BENCH_HELP)]
     Bench(Bench),
-    /// Open a scene in a window: play it, pull it, turn the view.
+    /// Open a scene in a window: play it, pull it, turn the view. Or a finished run: scrub and play its frames.
     #[command(
-        after_help = "Examples:\n  pliant view scenes/liver\n  pliant view scenes/cube --threads 1 --set run.precision=single\n  \
+        after_help = "Examples:\n  pliant view scenes/liver\n  pliant view out/liver\n  pliant view scenes/cube --threads 1 --set run.precision=single\n  \
                             pliant view scenes/liver --record drag.pliant && pliant view scenes/liver --replay drag.pliant\n\n\
                             H in the window lists its keys. The window reloads the scene when its file changes."
     )]
@@ -176,7 +176,7 @@ fn model_rate(text: &str) -> Result<f64, String> {
 
 #[derive(Debug, clap::Args)]
 pub struct View {
-    /// A scene file, or a folder with a scene.toml.
+    /// A scene file, a folder with a scene.toml, or the folder or a series (.pvd) of a finished run.
     pub scene: PathBuf,
     /// Record the input of the hand, written when the window closes.
     #[arg(long, value_name = "FILE")]

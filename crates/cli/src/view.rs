@@ -8,7 +8,8 @@ use pliant_picture::Series;
 use pliant_scene::World;
 use pliant_sim::number;
 use pliant_viewer::{
-    Break, Lags, Opening, Recording, SelfTest, WindowError, open, replay, replay_in_real_time,
+    Break, FinishedRun, Lags, Opening, Recording, SelfTest, WindowError, open, open_finished, replay,
+    replay_in_real_time,
 };
 
 use crate::arguments::View;
@@ -23,7 +24,12 @@ impl From<WindowError> for Failure {
 }
 
 pub fn view(arguments: &View) -> Result<ExitCode, Failure> {
-    refuse_runs(&arguments.scene)?;
+    if let Some(run) = finished_run(arguments)? {
+        if let Some(told) = open_finished(run)? {
+            say(told)?;
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
     let world = prepare(&arguments.scene, &arguments.overrides)?;
     for note in world.notes() {
         eprintln!("note: {note}");
@@ -55,21 +61,31 @@ pub fn view(arguments: &View) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Rejects finished runs and their series: the window plays scenes.
-fn refuse_runs(path: &Path) -> Result<(), Failure> {
+/// A finished run: a folder with series of frames and no scene, or one of its series (`.pvd`).
+fn finished_run(arguments: &View) -> Result<Option<FinishedRun>, Failure> {
+    let path = &arguments.scene;
     let is_series = path.extension().is_some_and(|extension| extension == "pvd");
-    let folder = if is_series { path.parent().unwrap_or(path) } else { path };
-    let is_run = path.is_dir() && Series::find(path, None).is_ok() && !path.join("scene.toml").exists();
+    let is_run = path.is_dir() && !path.join("scene.toml").exists() && Series::names(path).is_ok();
     if !is_series && !is_run {
-        return Ok(());
+        return Ok(None);
     }
-    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder }.display();
-    Err(Failure::plain(
-        format!("`{}` is a finished run, and the window plays scenes", path.display()),
-        format!(
-            "`pliant render {folder}` draws it, with `--film NAME.mp4` as a film; `pliant view` takes its scene"
-        ),
-    ))
+    let options = [
+        ("--record", arguments.record.is_some()),
+        ("--replay", arguments.replay.is_some()),
+        ("--rehearse", arguments.rehearse),
+        ("--set", !arguments.overrides.set.is_empty()),
+    ];
+    if let Some((option, _)) = options.into_iter().find(|(_, given)| *given) {
+        return Err(Failure::plain(
+            format!("`{}` is a finished run, and `{option}` is for scenes", path.display()),
+            "leave it out, or give the scene",
+        ));
+    }
+    let series = path.file_stem().filter(|_| is_series).map(|stem| stem.to_string_lossy().into_owned());
+    let folder = if is_series { path.parent().unwrap_or(path) } else { path };
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder }.to_owned();
+    let portrait = arguments.screenshot.clone().map(|file| (arguments.after, file));
+    Ok(Some(FinishedRun { folder, series, portrait }))
 }
 
 /// The automatic task of the window.

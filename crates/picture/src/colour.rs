@@ -44,6 +44,11 @@ impl ColourMap {
         matches!(self, Self::BlueRed)
     }
 
+    /// The part of the map that a value has which all have: the middle of a diverging map, the beginning of the others.
+    pub const fn part_of_one_value(self) -> f64 {
+        if self.is_diverging() { 0.5 } else { 0.0 }
+    }
+
     /// The colour (sRGB) of a part of the range from 0 to 1.
     pub fn at(self, part: f64) -> [u8; 3] {
         let (gradient, part) = match self {

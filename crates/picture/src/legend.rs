@@ -180,7 +180,7 @@ impl Legend {
         }
         for y in top.round() as i64..bottom.round() as i64 {
             let part = f64::from((bottom - y as f32 - 0.5) / (bottom - top));
-            let part = if high > low { part } else { 0.5 };
+            let part = if high > low { part } else { style.map.part_of_one_value() };
             for x in bar[0] as i64..bar[1] as i64 {
                 picture.mix(x, y, style.map.at(part), 1.0);
             }

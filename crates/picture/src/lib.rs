@@ -55,5 +55,5 @@ pub use renderer::{Drawn, Renderer, Target};
 pub use section::Section;
 pub use series::{Look, Series, SeriesError};
 pub use style::{Background, MISSING, Style, Texture};
-pub use subject::{Subject, critical_cell, nodal_values, visible};
+pub use subject::{Subject, critical_cell, deformed_points, field_choices, nodal_values, visible};
 pub use vertex::drawn_value;

@@ -498,9 +498,10 @@ fn view(camera: &Camera, style: &Style, aspect: f64, reach: f64, code: bool) -> 
     let [right, up, towards] = camera.axes();
     let perspective = if camera.projection == Projection::Perspective { 1.0 } else { 0.0 };
     let [low, high] = style.range.unwrap_or([0.0, 1.0]);
-    // A value that all have lies in the middle of the map.
-    let room = if high > low { 0.0 } else { 0.5 * low.abs().max(1.0) };
-    let (low, high) = (low - room, high + room);
+    // Equal ends have no length: the one value gets a part of the map.
+    let length = if high > low { 0.0 } else { low.abs().max(1.0) };
+    let low = low - style.map.part_of_one_value() * length;
+    let high = high.max(low + length);
     let [top, bottom] = style.background.colours();
     View {
         projection_view: camera.projection_view(aspect, reach).into(),

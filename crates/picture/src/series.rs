@@ -15,7 +15,7 @@ use crate::legend::{Legend, readable};
 use crate::offscreen::{Frame, Offscreen};
 use crate::picture::Picture;
 use crate::style::Style;
-use crate::subject::{Subject, critical_cell, nodal_values, visible};
+use crate::subject::{Subject, critical_cell, deformed_points, nodal_values, visible};
 
 /// A series of frames that can't be shown.
 #[derive(Debug, thiserror::Error)]
@@ -112,6 +112,19 @@ pub struct Series {
 }
 
 impl Series {
+    /// The names of all series in the folder of a run, in alphabetical order.
+    ///
+    /// # Errors
+    /// If the folder cannot be read or has none.
+    pub fn names(folder: &Path) -> Result<Vec<String>, SeriesError> {
+        let mut names: Vec<String> = fs::read_dir(folder)
+            .map_err(|source| MeshFileError::Open { path: folder.to_owned(), source })?
+            .filter_map(|entry| Some(entry.ok()?.file_name().to_str()?.strip_suffix(".pvd")?.to_owned()))
+            .collect();
+        names.sort_unstable();
+        if names.is_empty() { Err(SeriesError::NoSeries(folder.to_owned())) } else { Ok(names) }
+    }
+
     /// The series of a name in the folder of a run; without a name the first in alphabetical order.
     ///
     /// # Errors
@@ -268,12 +281,7 @@ impl Look {
         let critical = (self.style.critical)
             .then(|| critical_cell(&visible(mesh, &self.hide)).ok_or(SeriesError::NoSteps))
             .transpose()?;
-        let mut points = mesh.points.clone();
-        if let Some(moved) = mesh.point_data.get("displacement").filter(|array| array.components == 3) {
-            for (point, by) in points.iter_mut().zip(moved.values.chunks_exact(3)) {
-                *point += Vector3::new(by[0], by[1], by[2]);
-            }
-        }
+        let points = deformed_points(mesh);
         let (critical, step) = critical.unzip();
         let forces = match self.style.contacts {
             true => contact_forces(mesh, &points).ok_or(SeriesError::NoContacts)?,

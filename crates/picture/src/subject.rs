@@ -318,6 +318,37 @@ fn split_at_sharp_edges(faces: &[Patch], normals: &[Vector3], points: usize) -> 
     (corners, vertices)
 }
 
+/// The points of a mesh, moved by its field `displacement` [m] if it has one.
+pub fn deformed_points(mesh: &Mesh) -> Vec<Vector3> {
+    let mut points = mesh.points.clone();
+    if let Some(moved) = mesh.point_data.get("displacement").filter(|array| array.components == 3) {
+        for (point, by) in points.iter_mut().zip(moved.values.chunks_exact(3)) {
+            *point += Vector3::new(by[0], by[1], by[2]);
+        }
+    }
+    points
+}
+
+/// What colours can tell of a mesh: names of fields as [`nodal_values`] takes them, with their components, and `label`.
+pub fn field_choices(mesh: &Mesh) -> Vec<String> {
+    let of_cells = mesh.blocks.iter().flat_map(|block| &block.data);
+    let all: BTreeMap<&String, usize> =
+        mesh.point_data.iter().chain(of_cells).map(|(name, array)| (name, array.components)).collect();
+    let mut choices = Vec::new();
+    for (name, components) in all {
+        let parts: &[&str] = match components {
+            3 => &["x", "y", "z"],
+            9 => &["xx", "yy", "zz", "xy", "yz", "xz"],
+            _ => &[],
+        };
+        if components == 1 && ![ELEMENT_EDGES, THING].contains(&name.as_str()) || components == 3 {
+            choices.push(name.clone());
+        }
+        choices.extend(parts.iter().map(|part| format!("{name}:{part}")));
+    }
+    choices
+}
+
 /// The values of a field at the points of a mesh. Vectors count by their norm, or by a component as in `displacement:z`; tensors
 /// need a component, as in `cauchy-stress:xx`. Values of cells are averaged, weighted by volume or area. `None` without this
 /// field.
@@ -466,6 +497,25 @@ pub(crate) mod tests {
         assert_eq!(edges, [0b110, 0b111]);
         let all = [0.0, 1.0, 2.0, f64::NAN];
         assert!(Subject::new(&mesh).lacks_value(&all) && !Subject::new(&mesh).lacks_value(&[0.0; 4]));
+    }
+
+    #[test]
+    fn fields_can_be_chosen_by_component_and_points_are_moved() {
+        let mut mesh = Mesh { points: block(1).points, ..Mesh::default() };
+        mesh.point_data.insert("displacement".into(), DataArray { components: 3, values: vec![0.5; 24] });
+        let triangles = mesh.block_mut(CellKind::Triangle);
+        triangles.nodes = vec![0, 1, 2];
+        triangles.data.insert(ELEMENT_EDGES.into(), DataArray::scalar(vec![7.0]));
+        triangles.data.insert("pressure".into(), DataArray::scalar(vec![1.0]));
+        triangles.data.insert("stress".into(), DataArray { components: 9, values: vec![1.0; 9] });
+        let choices = field_choices(&mesh);
+        assert!(choices.iter().all(|choice| nodal_values(&mesh, choice).is_some()), "{choices:?}");
+        assert_eq!(
+            choices[..5],
+            ["displacement", "displacement:x", "displacement:y", "displacement:z", "pressure"]
+        );
+        assert_eq!(choices.len(), 11);
+        assert_eq!(deformed_points(&mesh)[1], mesh.points[1] + Vector3::repeat(0.5));
     }
 
     /// A tool beside a wall: its faces are marked, and what its points moved is no value of the field.

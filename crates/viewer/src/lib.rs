@@ -23,4 +23,4 @@ pub use replay::{Lags, Replayed, replay, replay_in_real_time};
 pub use samples::Samples;
 pub use session::{Frame, Order, Session};
 #[cfg(feature = "window")]
-pub use window::{Opening, SelfTest, WindowError, open};
+pub use window::{FinishedRun, Opening, SelfTest, WindowError, open, open_finished};

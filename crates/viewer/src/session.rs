@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use pliant_geometry::Vector3;
 use pliant_mechanics::Energies;
 use pliant_picture::{
-    PointForce, Subject, contact_forces, critical_cell, drawn_value, nodal_values, visible,
+    PointForce, Subject, contact_forces, critical_cell, deformed_points, drawn_value, nodal_values, visible,
 };
 use pliant_run::{Column, Live};
 use pliant_scene::World;
@@ -735,12 +735,7 @@ impl<'s> Player<'s> {
         let seen = &mut playback.seen;
         match self.live.mesh() {
             Ok(mesh) => {
-                seen.points.clone_from(&mesh.points);
-                if let Some(moved) = mesh.point_data.get("displacement") {
-                    for (point, by) in seen.points.iter_mut().zip(moved.values.chunks_exact(3)) {
-                        *point += Vector3::new(by[0], by[1], by[2]);
-                    }
-                }
+                seen.points = deformed_points(mesh);
                 seen.values =
                     playback.field.as_deref().and_then(|f| nodal_values(mesh, f)).unwrap_or_default();
                 let contacts = playback.view.contacts.then(|| contact_forces(mesh, &seen.points));

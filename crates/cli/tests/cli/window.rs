@@ -130,6 +130,37 @@ fn the_window_takes_a_picture_of_itself_and_reads_a_scene_that_changed_while_it_
 }
 
 #[test]
+fn a_finished_run_is_looked_at_over_its_timeline() {
+    if !has_gpu() {
+        return;
+    }
+    let Some(screen) = Screen::start() else { return };
+    let fields = "[output.fields]\ntype = 'vtu'\nevery = 0.05\ndata = ['displacement', 'von-mises']\n";
+    let workshop = Workshop::new(&format!("{BALL}{fields}"));
+    let told = workshop.pliant(&["run", "case", "--until", "0.2", "--out", "out"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    let open = |what: &str, more: &[&str]| -> Told {
+        let mut command = workshop.command(&[&["view", what], more].concat());
+        command.env("DISPLAY", &screen.display).env_remove("WAYLAND_DISPLAY");
+        command.output().expect("the binary starts").into()
+    };
+    let mut pictures = Vec::new();
+    for (what, after) in [("out", "0"), ("out/fields.pvd", "0.16")] {
+        let told = open(what, &["--screenshot", "run.png", "--after", after]);
+        assert_eq!(told.code, 0, "{}", told.err);
+        assert!(told.out.starts_with("out at t = 0."), "{}", told.out);
+        pictures.push(std::fs::read(workshop.path("run.png")).unwrap());
+    }
+    assert!(pictures.iter().all(|picture| picture.starts_with(b"\x89PNG")) && pictures[0] != pictures[1]);
+    let told = open("out", &["--record", "drag"]);
+    assert_eq!(told.code, 2, "{}", told.err);
+    assert!(told.err.contains("`out` is a finished run, and `--record` is for scenes"), "{}", told.err);
+    let told = open("out/none.pvd", &[]);
+    assert_eq!(told.code, 2, "{}", told.err);
+    assert!(told.err.contains("has no series `none`; it has `fields`"), "{}", told.err);
+}
+
+#[test]
 fn without_a_screen_it_says_what_it_needs() {
     let workshop = Workshop::new(BLOCK);
     let mut command = workshop.command(&["view", "case", "--rehearse"]);

@@ -42,7 +42,7 @@ impl App {
     /// Has every frame in ordinary memory while a section is shown, or where the device is not the window's.
     pub(super) fn choose_memory(&mut self) {
         let elsewhere = self.frame.on_device.is_some() && self.on_device().is_none();
-        let in_memory = self.cut.on || elsewhere;
+        let in_memory = self.port.cut.on || elsewhere;
         if in_memory != self.in_memory {
             self.in_memory = in_memory;
             self.order(Order::Memory(in_memory));
@@ -55,7 +55,7 @@ impl App {
         match points.read() {
             Ok(points) => {
                 let place = |[x, y, z, _]: [f32; 4]| Vector3::new(x.into(), y.into(), z.into());
-                self.points = Arc::new(points.into_iter().map(place).collect());
+                self.port.points = Arc::new(points.into_iter().map(place).collect());
             }
             Err(error) => self.message = Some(Told::failure(error.to_string())),
         }

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use eframe::egui::{self, ColorImage, Rect};
+use eframe::egui::{self, ColorImage, Pos2, Rect, vec2};
 use pliant_geometry::CellLabel;
 use pliant_picture::{Background, Camera, Picture, Plane, Projection, Style, Texture};
 use pliant_scene::diagnostic::Place;
@@ -17,7 +17,41 @@ use crate::beside::create_beside;
 use crate::parameters::Number;
 
 /// A picture of the window on its way.
-pub(super) type Taking = Arc<Mutex<Option<Arc<ColorImage>>>>;
+#[derive(Clone, Default)]
+pub(super) struct Taking(Arc<Mutex<Option<Arc<ColorImage>>>>);
+
+impl Taking {
+    /// Asks for one.
+    pub fn ask(&self, context: &egui::Context) {
+        let taking = self.0.clone();
+        context.request_screenshot(move |image| {
+            *taking.lock().unwrap_or_else(PoisonError::into_inner) = Some(image);
+        });
+    }
+
+    fn taken(&self) -> Option<Arc<ColorImage>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+
+    /// Writes the whole window once it has come; what is wrong.
+    pub fn write(&self, file: &Path) -> Option<Result<(), String>> {
+        let image = self.taken()?;
+        let [width, height] = image.size.map(|size| size as f32);
+        let picture = part(&image, Rect::from_min_size(Pos2::ZERO, vec2(width, height)), 1.0)?;
+        let png = picture.png().map_err(|error| error.to_string());
+        let told = |error| format!("`{}` cannot be written: {error}", file.display());
+        Some(png.and_then(|png| std::fs::write(file, png).map_err(told)))
+    }
+
+    /// Writes the part of the window that the picture covers, once it has come, beside a scene or a run.
+    pub fn keep(&self, context: &egui::Context, rect: Rect, beside: &Path) -> Option<Told> {
+        let picture = part(&*self.taken()?, rect, context.pixels_per_point())?;
+        Some(match picture.png() {
+            Ok(png) => told(write_beside(beside, "picture", "png", &png)),
+            Err(error) => Told::failure(error.to_string()),
+        })
+    }
+}
 
 /// Writes a file beside a scene.
 fn write_beside(scene: &Path, what: &str, extension: &str, bytes: &[u8]) -> std::io::Result<PathBuf> {
@@ -149,10 +183,7 @@ impl App {
     /// Buttons that keep something.
     pub(super) fn keep(&mut self, ui: &mut egui::Ui) {
         if ui.button("Picture").on_hover_text("writes the picture beside the scene, as PNG").clicked() {
-            let taking = self.taking.clone();
-            ui.ctx().request_screenshot(move |image| {
-                *taking.lock().unwrap_or_else(PoisonError::into_inner) = Some(image);
-            });
+            self.taking.ask(ui.ctx());
         }
         if ui.button("Copy view").on_hover_text("copies the view as the table [view] of a scene").clicked() {
             ui.ctx().copy_text(self.view_text());
@@ -181,21 +212,17 @@ impl App {
 
     /// The view as a table of a scene.
     pub(super) fn view_text(&self) -> String {
-        let fitted = self.fitted();
-        let moved = (self.camera.target - fitted.target).norm() > 0.01 * fitted.height
-            || (self.camera.height / fitted.height - 1.0).abs() > 0.01;
-        let closer = moved.then(|| (self.camera.target.into(), fitted.height / self.camera.height));
-        view_text(&self.view, &self.style, &self.camera, self.style.clip, closer)
+        let fitted = self.port.fitted();
+        let moved = (self.port.camera.target - fitted.target).norm() > 0.01 * fitted.height
+            || (self.port.camera.height / fitted.height - 1.0).abs() > 0.01;
+        let closer = moved.then(|| (self.port.camera.target.into(), fitted.height / self.port.camera.height));
+        view_text(&self.view, &self.port.style, &self.port.camera, self.port.style.clip, closer)
     }
 
     /// Writes a picture that has come.
     pub(super) fn take_picture(&mut self, context: &egui::Context) {
-        let Some(image) = self.taking.lock().unwrap_or_else(PoisonError::into_inner).take() else { return };
-        let Some(picture) = part(&image, self.picture, context.pixels_per_point()) else { return };
-        self.message = Some(match picture.png() {
-            Ok(png) => told(write_beside(&self.file, "picture", "png", &png)),
-            Err(error) => Told::failure(error.to_string()),
-        });
+        let told = self.taking.keep(context, self.port.rect, &self.file);
+        self.message = told.or_else(|| self.message.take());
     }
 }
 

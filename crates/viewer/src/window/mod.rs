@@ -1,8 +1,9 @@
 //! The window itself: what is drawn and typed. What is simulated lies behind [`Session`].
 
 mod device;
+mod finished;
+mod followed;
 mod keep;
-mod overlay;
 mod paint;
 mod panels;
 mod parameters;
@@ -11,6 +12,7 @@ mod plots;
 mod self_test;
 mod told;
 mod undo;
+mod viewport;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -18,21 +20,22 @@ use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
-use eframe::egui::{self, Key, Rect};
-use eframe::wgpu;
+use eframe::egui::{self, Key};
+use eframe::egui_wgpu::WgpuConfiguration;
 use pliant_geometry::{Labels, Vector3};
-use pliant_picture::{Camera, Extremes, Projection, Style, Subject, Target};
+use pliant_picture::{Camera, Style};
 use pliant_scene::format::{FieldName, ViewTable};
 use pliant_sim::gpu::Device;
 
+pub use self::finished::{FinishedRun, open_finished};
 use self::keep::Taking;
-use self::paint::{SAMPLES, place};
+use self::paint::SAMPLES;
 use self::parameters::Numbers;
-use self::picture::{Cut, FIGURES, SCALE};
 use self::self_test::RunningTest;
 pub use self::self_test::SelfTest;
 use self::told::Told;
 use self::undo::Act;
+use self::viewport::Viewport;
 use crate::hand::Point;
 use crate::samples::Samples;
 use crate::session::{Frame, Order, Session};
@@ -68,6 +71,14 @@ pub enum WindowError {
     /// A self-test that went wrong.
     #[error("the window: {0}")]
     SelfTest(String),
+    /// A finished run that cannot be shown.
+    #[error("{message}")]
+    Run {
+        /// What is wrong.
+        message: String,
+        /// What to try.
+        remedy: &'static str,
+    },
 }
 
 impl WindowError {
@@ -79,6 +90,7 @@ impl WindowError {
                  Ubuntu: `apt-get install mesa-vulkan-drivers libvulkan1 libxkbcommon-x11-0`); `pliant render` needs no screen"
             }
             Self::SelfTest(_) => "",
+            Self::Run { remedy, .. } => remedy,
         }
     }
 }
@@ -88,6 +100,17 @@ impl WindowError {
 /// # Errors
 /// If it can't be opened, or its self-test fails.
 pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
+    run_window(device::setup(&opening.world), |context, outcome| App::new(context, opening, outcome))
+}
+
+/// Where a self-test leaves what came of it.
+type Outcome = Arc<Mutex<Option<Result<String, String>>>>;
+
+/// Opens a window on a device with what is made in it, until it is closed.
+fn run_window<A: eframe::App + 'static>(
+    wgpu_options: WgpuConfiguration,
+    make: impl FnOnce(&eframe::CreationContext<'_>, Outcome) -> Result<A, String>,
+) -> Result<Option<String>, WindowError> {
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("Pliant")
@@ -96,13 +119,13 @@ pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
         depth_buffer: 32,
         multisampling: SAMPLES as u16,
         renderer: eframe::Renderer::Wgpu,
-        wgpu_options: device::setup(&opening.world),
+        wgpu_options,
         ..Default::default()
     };
-    let outcome = Arc::<Mutex<Option<Result<String, String>>>>::default();
+    let outcome = Outcome::default();
     let told = outcome.clone();
     let create = Box::new(move |context: &eframe::CreationContext<'_>| {
-        App::new(context, opening, told).map(|app| Box::new(app) as Box<dyn eframe::App>).map_err(Into::into)
+        make(context, told).map(|app| Box::new(app) as Box<dyn eframe::App>).map_err(Into::into)
     });
     eframe::run_native("Pliant", options, create).map_err(|error| WindowError::Window(error.to_string()))?;
     let outcome = outcome.lock().unwrap_or_else(PoisonError::into_inner).take();
@@ -110,34 +133,18 @@ pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
 }
 
 struct App {
-    target: Target,
     world: World,
     session: Session,
-    subject: Arc<Subject>,
     frame: Frame,
-    points: Arc<Vec<Vector3>>,
-    values: Arc<Vec<f64>>,
-    fresh: bool,
-    camera: Camera,
-    home: Camera,
-    style: Style,
-    /// Whether the range stays as it is.
-    locked: bool,
-    /// Whether a part of a body has no value of the field.
-    missing: bool,
+    port: Viewport,
     /// What is shown of the scene.
     view: ViewTable,
     /// The labels that this has.
     labels: Labels,
-    cut: Cut,
     /// Whether every frame comes to ordinary memory.
     in_memory: bool,
     /// The device of the window, if it is one of a solver.
     device: Option<Device>,
-    /// Points on the surface, increasing.
-    surface: Vec<u32>,
-    /// Where the picture is in the window, in egui's points.
-    picture: Rect,
     /// What lies under the mouse, and where.
     hover: Option<(Point, Vector3)>,
     stiffness: f64,
@@ -182,48 +189,32 @@ struct App {
     drawn: u64,
     context: egui::Context,
     record: Option<PathBuf>,
-    outcome: Arc<Mutex<Option<Result<String, String>>>>,
+    outcome: Outcome,
 }
 
 impl App {
     fn new(
         context: &eframe::CreationContext<'_>,
         opening: Opening,
-        outcome: Arc<Mutex<Option<Result<String, String>>>>,
+        outcome: Outcome,
     ) -> Result<Self, String> {
         let state = context.wgpu_render_state.as_ref().ok_or("wgpu did not start")?;
-        let target = Target {
-            format: state.target_format,
-            depth: wgpu::TextureFormat::Depth32Float,
-            samples: SAMPLES,
-        };
         context.egui_ctx.set_visuals(egui::Visuals::light());
         let Opening { world, style, camera, file, read, record, self_test } = opening;
+        let port = Viewport::new(context, style, camera)?;
         let session = begin(&world, &context.egui_ctx)?;
         let device = device::shared(state, &world);
         let app = Self {
-            target,
             session,
             frame: Frame::default(),
-            points: Arc::default(),
-            values: Arc::default(),
-            fresh: true,
+            port,
             numbers: Numbers::of(&world.scene),
             view: world.scene.view.clone(),
             labels: world.labels(world.scene.view.on.as_deref()),
             warnings: warnings(&world),
             world,
-            home: camera,
-            camera,
-            locked: style.range.is_some(),
-            missing: false,
-            style,
-            cut: Cut::new(style.clip),
             in_memory: false,
             device,
-            surface: Vec::new(),
-            subject: Arc::default(),
-            picture: Rect::ZERO,
             hover: None,
             stiffness: 200.0,
             speed: 1.0,
@@ -258,7 +249,7 @@ impl App {
         if app.record.is_some() {
             app.order(Order::Record);
         }
-        if app.cut.on {
+        if app.port.cut.on {
             app.show();
         }
         // A self-test plays when it is due.
@@ -292,77 +283,37 @@ impl App {
         }
     }
 
-    /// Widths a height of the picture.
-    fn aspect(&self) -> f64 {
-        let size = self.picture.size();
-        if size.y > 0.0 { f64::from(size.x / size.y) } else { 1.3 }
-    }
-
-    /// The camera that sees all, from where it starts.
-    fn fitted(&self) -> Camera {
-        let mut camera =
-            Camera { azimuth: self.camera.azimuth, elevation: self.camera.elevation, ..self.home };
-        // Beside the scale of colours and below the figures, as parts of the height.
-        let height = self.picture.height().max(SCALE);
-        let scale = f64::from(SCALE / height);
-        let figures = f64::from(FIGURES / height).min(0.4);
-        let aspect = ((self.aspect() - scale) / (1.0 - figures)).max(0.5);
-        camera.fit(self.surface.iter().map(|&point| &self.points[point as usize]), aspect);
-        camera.height /= 1.0 - figures;
-        camera.pan(-0.5 * scale, -0.5 * figures);
-        camera
-    }
-
-    fn fit(&mut self) {
-        self.camera = self.fitted();
-    }
-
     /// Takes the newest instant.
     fn look(&mut self) {
         let (new, frame) = self.session.look();
         if !new {
             return;
         }
-        let first = self.subject.points.is_empty();
-        let renewed = !Arc::ptr_eq(&self.subject, &frame.subject);
+        let first = self.port.subject.points.is_empty();
+        let renewed = !Arc::ptr_eq(&self.port.subject, &frame.subject);
         if renewed {
-            self.subject = frame.subject.clone();
-            self.surface = self.subject.surface_points();
-            self.points = Arc::new(self.subject.points.clone());
-            self.values = Arc::default();
+            self.port.renew(&frame.subject);
         }
         // After a failure at the first instant there is nothing but the message.
         let inspected = renewed || frame.inspections != self.frame.inspections;
-        if inspected && frame.points.len() == self.subject.points.len() {
-            Arc::make_mut(&mut self.points).clone_from(&frame.points);
-            Arc::make_mut(&mut self.values).clone_from(&frame.values);
-            self.missing = self.subject.lacks_value(&self.values);
-            self.fresh = true;
+        if inspected && frame.points.len() == self.port.subject.points.len() {
+            self.port.set(&frame.points, &frame.values);
         }
         self.frame = frame.clone();
-        if !self.locked {
-            let mut extremes = Extremes::default();
-            extremes.add(self.surface.iter().filter_map(|&point| self.values.get(point as usize)).copied());
-            self.style.range = extremes.range(self.style.map);
-        }
+        self.port.fit_range();
         let force = self.frame.held.first().map_or(0.0, |[_, force]| Vector3::from(*force).norm());
         self.strongest = self.strongest.max(force);
         if inspected {
             self.samples.take(&self.frame);
         }
         if first {
-            self.fit();
+            self.port.fit();
         }
-    }
-
-    /// Looks from another side at the same.
-    fn look_from(&mut self, [azimuth, elevation]: [f64; 2]) {
-        (self.camera.azimuth, self.camera.elevation) = (azimuth, elevation);
     }
 
     /// Shows what is asked for; in a section the body in place of a surface that it carries.
     fn show(&self) {
-        let view = if self.cut.on { self.world.scene.in_section(&self.view) } else { self.view.clone() };
+        let view = if self.port.cut.on { self.world.scene.in_section(&self.view) } else { self.view.clone() };
         self.order(Order::Show(Box::new(view)));
     }
 
@@ -413,7 +364,7 @@ impl App {
         std::thread::spawn(move || drop(before));
         if path != self.file {
             self.view = world.scene.view.clone();
-            self.subject = Arc::default();
+            self.port.subject = Arc::default();
         }
         self.numbers = Numbers::of(&world.scene);
         self.warnings = warnings(&world);
@@ -457,33 +408,8 @@ impl App {
         if pressed(Key::Z) && context.input(|input| input.modifiers.command) {
             self.undo();
         }
-        if pressed(Key::F) {
-            self.fit();
-        }
-        if pressed(Key::E) {
-            self.style.edges = !self.style.edges;
-        }
-        if pressed(Key::G) {
-            self.style.ghost = !self.style.ghost;
-        }
-        if pressed(Key::C) {
-            self.cut.on = !self.cut.on;
+        if self.port.keys(context) {
             self.show();
-        }
-        for (key, side) in SIDES {
-            if pressed(key) {
-                self.look_from(side);
-            }
-        }
-        if pressed(Key::L) {
-            self.locked = !self.locked;
-        }
-        if pressed(Key::O) {
-            self.home.projection = match self.camera.projection {
-                Projection::Perspective => Projection::Orthographic,
-                Projection::Orthographic => Projection::Perspective,
-            };
-            self.camera.projection = self.home.projection;
         }
         if pressed(Key::H) {
             self.help = !self.help;
@@ -499,16 +425,6 @@ impl App {
     }
 }
 
-/// Azimuth and elevation [°] of the sides: front, back, left, right, top, bottom.
-const SIDES: [(Key, [f64; 2]); 6] = [
-    (Key::Num1, [0.0, 0.0]),
-    (Key::Num2, [180.0, 0.0]),
-    (Key::Num3, [90.0, 0.0]),
-    (Key::Num4, [270.0, 0.0]),
-    (Key::Num5, [0.0, 89.9]),
-    (Key::Num6, [0.0, -89.9]),
-];
-
 /// The message after a scene was read again.
 const REPLACED: &str = "the scene was read anew";
 
@@ -518,13 +434,8 @@ impl eframe::App for App {
         let painted = std::mem::replace(&mut self.painted, Instant::now());
         self.frame_seconds = 0.8 * self.frame_seconds + 0.2 * painted.elapsed().as_secs_f64();
         self.watch(&context);
-        let before = self.subject.clone();
         self.look();
-        if !Arc::ptr_eq(&before, &self.subject)
-            && let Some(state) = frame.wgpu_render_state()
-        {
-            place(state, self.target, &self.subject);
-        }
+        self.port.bring(frame);
         self.choose_memory();
         self.take_picture(&context);
         self.keys(&context);

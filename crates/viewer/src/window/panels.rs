@@ -2,7 +2,7 @@
 
 use eframe::egui;
 use pliant_geometry::{CellLabel, Vector3};
-use pliant_picture::{Background, ColourMap, Texture, label_colour, readable};
+use pliant_picture::{Background, ColourMap, Texture, label_colour};
 use pliant_scene::format::{BodyModel, ColourBy, Component, FieldName, Labels, Nothing};
 
 use super::App;
@@ -51,7 +51,7 @@ impl App {
             }
             ui.separator();
             if ui.button("Fit").on_hover_text("F").clicked() {
-                self.fit();
+                self.port.fit();
             }
             if ui.selectable_label(self.help, "Keys").on_hover_text("H").clicked() {
                 self.help = !self.help;
@@ -76,7 +76,7 @@ impl App {
             .changed()
         {
             context.set_visuals(if dark { egui::Visuals::dark() } else { egui::Visuals::light() });
-            self.style.background = if dark { Background::Dark } else { Background::Light };
+            self.port.style.background = if dark { Background::Dark } else { Background::Light };
         }
         let mut size = context.zoom_factor();
         let slider = egui::Slider::new(&mut size, 0.7..=2.0).step_by(0.1).text("size of the text");
@@ -130,7 +130,7 @@ impl App {
         if before.0 != colour {
             self.view.colour = Some(colour);
             self.view.component = components[0];
-            self.locked = false;
+            self.port.locked = false;
         }
         if components.len() > 1 {
             ui.horizontal_wrapped(|ui| {
@@ -140,41 +140,20 @@ impl App {
                 }
             });
         }
-        egui::ComboBox::from_id_salt("map").selected_text(self.style.map.name()).width(180.0).show_ui(
+        egui::ComboBox::from_id_salt("map").selected_text(self.port.style.map.name()).width(180.0).show_ui(
             ui,
             |ui| {
                 for map in ColourMap::ALL {
-                    ui.selectable_value(&mut self.style.map, map, map.name());
+                    ui.selectable_value(&mut self.port.style.map, map, map.name());
                 }
             },
         );
-        self.range(ui);
-        ui.checkbox(&mut self.locked, "Lock the range")
-            .on_hover_text("L: keeps the range while values change");
+        let unit = self.field().map_or("", FieldName::unit);
+        self.port.edit_range(ui, unit);
         let hidden = !self.labels.is_empty()
             && (colour == LABELS || !self.view.hide.is_empty())
             && self.labels_shown(ui);
         hidden || before != (self.colour(), self.view.component)
-    }
-
-    /// The range of colours, typed in the unit of the scale; a typed one is locked.
-    fn range(&mut self, ui: &mut egui::Ui) {
-        let (Some(range), Some(field)) = (self.style.range, self.field()) else { return };
-        let size = range[0].abs().max(range[1].abs());
-        let (unit, factor) = readable(field.unit(), size);
-        let mut typed = range.map(|value| value * factor);
-        let speed = 0.01 * (typed[1] - typed[0]).abs().max(1e-3 * size * factor).max(1e-9);
-        let changed = ui.horizontal(|ui| {
-            let [low, high] = &mut typed;
-            let ends = [low, high]
-                .map(|end| ui.add(egui::DragValue::new(end).speed(speed).max_decimals(4)).changed());
-            ui.label(unit);
-            ends.contains(&true)
-        });
-        if changed.inner && typed[0] < typed[1] {
-            self.style.range = Some(typed.map(|value| value / factor));
-            self.locked = true;
-        }
     }
 
     /// What colours tell now.
@@ -219,7 +198,7 @@ impl App {
 
     /// What is drawn beside colours; whether another surface is asked for.
     fn shape(&mut self, ui: &mut egui::Ui) -> bool {
-        let before = (Surface::of(&self.view), self.view.contacts, self.cut.on);
+        let before = (Surface::of(&self.view), self.view.contacts, self.port.cut.on);
         let scene = &self.world.scene;
         let bodies = scene.bodies.iter().map(|(name, _)| name);
         let names: Vec<&String> = bodies.chain(scene.surfaces.iter().map(|(name, _)| name)).collect();
@@ -238,30 +217,21 @@ impl App {
             ui.add(parts)
                 .on_hover_text("how finely the curved surface of shells is drawn; 1: flat triangles");
         }
-        ui.checkbox(&mut self.style.edges, "Edges of the elements").on_hover_text("E");
-        ui.checkbox(&mut self.style.ghost, "Shape at rest").on_hover_text("G");
-        ui.checkbox(&mut self.cut.on, "Section").on_hover_text("C");
-        if self.cut.on {
-            ui.horizontal(|ui| {
-                for (word, normal) in [("x", Vector3::x()), ("y", Vector3::y()), ("z", Vector3::z())] {
-                    ui.selectable_value(&mut self.cut.normal, normal, word);
-                    ui.selectable_value(&mut self.cut.normal, -normal, format!("−{word}"));
-                }
-            });
-            ui.add(egui::Slider::new(&mut self.cut.part, 0.0..=1.0).show_value(false));
-        }
+        ui.checkbox(&mut self.port.style.edges, "Edges of the elements").on_hover_text("E");
+        ui.checkbox(&mut self.port.style.ghost, "Shape at rest").on_hover_text("G");
+        self.port.cut.edit(ui, self.port.style.clip);
         ui.checkbox(&mut self.view.fibres, "Fibres");
         ui.checkbox(&mut self.view.critical, "Element that sets the step");
         if self.world.touches(self.view.on.as_deref()) {
             ui.checkbox(&mut self.view.contacts, "Forces of contacts");
         }
-        ui.checkbox(&mut self.style.wireframe, "Wireframe");
-        let mut skin = self.style.texture == Texture::Skin;
+        ui.checkbox(&mut self.port.style.wireframe, "Wireframe");
+        let mut skin = self.port.style.texture == Texture::Skin;
         if ui.checkbox(&mut skin, "Skin").changed() {
-            self.style.texture = if skin { Texture::Skin } else { Texture::None };
+            self.port.style.texture = if skin { Texture::Skin } else { Texture::None };
         }
-        (self.style.fibres, self.style.critical) = (self.view.fibres, self.view.critical);
-        before != (Surface::of(&self.view), self.view.contacts, self.cut.on)
+        (self.port.style.fibres, self.port.style.critical) = (self.view.fibres, self.view.critical);
+        before != (Surface::of(&self.view), self.view.contacts, self.port.cut.on)
     }
 
     fn hand(&mut self, ui: &mut egui::Ui) {

@@ -121,7 +121,9 @@ impl App {
                     lines.iter().flatten().map(|[_, value]| value.abs()).filter(|size| size.is_finite());
                 let (unit, factor) = readable(unit, sizes.fold(0.0, f64::max));
                 lines.iter_mut().flatten().for_each(|[_, value]| *value *= factor);
-                let plot = Plot::new(("curves", &own[0].unit)).height(130.0).legend(Legend::default().position(Corner::LeftTop));
+                let plot = Plot::new(("curves", &own[0].unit))
+                    .height(130.0)
+                    .legend(Legend::default().position(Corner::LeftTop));
                 let plot = plot
                     .x_axis_label("time [s]")
                     .y_axis_label(format!("[{unit}]"))

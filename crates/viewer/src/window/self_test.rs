@@ -5,15 +5,15 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::rc::Rc;
-use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use eframe::egui::{self, ColorImage, Event, Key, Modifiers, MouseWheelUnit, PointerButton, Pos2, vec2};
+use eframe::egui::{self, Event, Key, Modifiers, MouseWheelUnit, PointerButton, Pos2, vec2};
 use pliant_geometry::Vector3;
-use pliant_picture::{Camera, Picture, Projection};
+use pliant_picture::{Camera, Projection};
 
 use super::App;
-use super::picture::{in_picture, on_plane, to_screen};
+use super::keep::Taking;
+use super::picture::on_plane;
 
 /// What a window does by itself before it closes.
 #[derive(Clone, Debug)]
@@ -154,11 +154,11 @@ fn drawing() -> impl Iterator<Item = Cue> {
 /// The pixel of that number on the body, and the triangle that covers it, if it is far from all edges; found by projecting all
 /// triangles, where picking sends a ray.
 fn known_pixel(app: &App, number: u64) -> Option<(Pos2, u32)> {
-    let rect = app.picture;
+    let rect = app.port.rect;
     let aspect = f64::from(rect.width() / rect.height());
     // Halton's sequence over the picture: places on the body, counted.
     let places = (1..20_000).map(|index| rect.min + vec2(halton(index, 2), halton(index, 3)) * rect.size());
-    let known = |place: Pos2| Some((place, covering(app, in_picture(place, rect), aspect)?));
+    let known = |place: Pos2| Some((place, covering(app, app.port.in_picture(place), aspect)?));
     places.filter_map(known).nth(number as usize)
 }
 
@@ -175,10 +175,10 @@ fn halton(mut index: u32, base: u32) -> f32 {
 
 /// The nearest triangle whose projection covers a place.
 fn covering(app: &App, [x, y]: [f64; 2], aspect: f64) -> Option<u32> {
-    let camera = &app.camera;
+    let camera = &app.port.camera;
     let mut nearest: Option<(f64, u32, f64)> = None;
-    for (corners, number) in app.subject.triangles().zip(0..) {
-        let corners = corners.map(|point| app.points[point as usize]);
+    for (corners, number) in app.port.subject.triangles().zip(0..) {
+        let corners = corners.map(|point| app.port.points[point as usize]);
         let [Some(a), Some(b), Some(c)] = corners.map(|corner| camera.place(&corner, aspect)) else {
             continue;
         };
@@ -233,12 +233,12 @@ fn keys() -> Vec<Cue> {
         Cue::key("Space plays", Key::Space, |app| app.frame.playing && app.frame.steps > 0),
         Cue::key("Space pauses", Key::Space, |app| !app.frame.playing),
         Cue::key("R starts anew", Key::R, |app| app.frame.steps == 0),
-        turns("E shows or hides edges", Key::E, |app| app.style.edges),
-        turns("G shows or hides the shape at rest", Key::G, |app| app.style.ghost),
-        turns("C shows or hides a section", Key::C, |app| app.style.clip.is_some()),
-        turns("C shows or hides a section", Key::C, |app| app.style.clip.is_some()),
-        turns("G shows or hides the shape at rest", Key::G, |app| app.style.ghost),
-        turns("E shows or hides edges", Key::E, |app| app.style.edges),
+        turns("E shows or hides edges", Key::E, |app| app.port.style.edges),
+        turns("G shows or hides the shape at rest", Key::G, |app| app.port.style.ghost),
+        turns("C shows or hides a section", Key::C, |app| app.port.style.clip.is_some()),
+        turns("C shows or hides a section", Key::C, |app| app.port.style.clip.is_some()),
+        turns("G shows or hides the shape at rest", Key::G, |app| app.port.style.ghost),
+        turns("E shows or hides edges", Key::E, |app| app.port.style.edges),
     ]
 }
 
@@ -255,7 +255,7 @@ fn turns(what: &str, key: Key, switch: fn(&App) -> bool) -> Cue {
 
 /// Turns, comes nearer, and goes back to where all is seen.
 fn camera() -> Vec<Cue> {
-    let beside = |app: &App| app.picture.min + vec2(20.0, 150.0);
+    let beside = |app: &App| app.port.rect.min + vec2(20.0, 150.0);
     let right = PointerButton::Secondary;
     vec![
         Cue::new(
@@ -266,7 +266,7 @@ fn camera() -> Vec<Cue> {
         Cue::new(
             "the right button turns",
             move |app| vec![Event::PointerMoved(beside(app) + vec2(60.0, 10.0))],
-            |app| Ok((app.camera.azimuth - app.home.azimuth).abs() > 5.0),
+            |app| Ok((app.port.camera.azimuth - app.port.home.azimuth).abs() > 5.0),
         ),
         Cue::new(
             "the wheel comes nearer",
@@ -283,25 +283,26 @@ fn camera() -> Vec<Cue> {
                     },
                 ]
             },
-            |app| Ok(app.camera.height < 0.95 * app.fitted().height),
+            |app| Ok(app.port.camera.height < 0.95 * app.port.fitted().height),
         ),
         // A wheel glides.
         Cue::wait("the wheel comes to rest", {
             let mut before = 0.0;
-            move |app| std::mem::replace(&mut before, app.camera.height) == app.camera.height
+            move |app| std::mem::replace(&mut before, app.port.camera.height) == app.port.camera.height
         }),
-        Cue::key("F shows all", Key::F, |app| (app.camera.height / app.fitted().height - 1.0).abs() < 1e-6),
+        Cue::key("F shows all", Key::F, |app| {
+            (app.port.camera.height / app.port.fitted().height - 1.0).abs() < 1e-6
+        }),
     ]
 }
 
 /// A pixel on the body, well inside it.
 fn inside(app: &App) -> Pos2 {
-    let rect = app.picture;
-    let seen = app.subject.surface_points();
-    let places = seen.iter().filter_map(|&point| to_screen(&app.camera, &app.points[point as usize], rect));
+    let seen = app.port.subject.surface_points();
+    let places = seen.iter().filter_map(|&point| app.port.to_screen(&app.port.points[point as usize]));
     let (sum, count) = places.fold((egui::Vec2::ZERO, 0.0_f32), |(sum, n), p| (sum + p.to_vec2(), n + 1.0));
     let middle = (sum / count.max(1.0)).to_pos2();
-    let hit = |place: &Pos2| app.hit(in_picture(*place, rect)).is_some();
+    let hit = |place: &Pos2| app.hit(app.port.in_picture(*place)).is_some();
     if hit(&middle) { middle } else { known_pixel(app, 0).map_or(middle, |(place, _)| place) }
 }
 
@@ -333,7 +334,7 @@ fn pinning() -> Vec<Cue> {
 /// Plays, takes hold and pulls upwards, until all is at rest: the hand's force is that of its spring.
 fn pulling() -> Vec<Cue> {
     let start = Rc::new(RefCell::new(Pos2::ZERO));
-    let reach = |app: &App| 0.12 * app.picture.height();
+    let reach = |app: &App| 0.12 * app.port.rect.height();
     let mut cues = vec![Cue::key("Space plays", Key::Space, |app| app.frame.playing)];
     let from = start.clone();
     cues.push(Cue::new(
@@ -368,7 +369,7 @@ fn pulling() -> Vec<Cue> {
         |_| Vec::new(),
         move |app| {
             let place = *start.borrow() - vec2(0.0, reach(app));
-            spring(app, in_picture(place, app.picture)).map(|()| true)
+            spring(app, app.port.in_picture(place)).map(|()| true)
         },
     ));
     cues
@@ -380,7 +381,7 @@ fn spring(app: &App, place: [f64; 2]) -> Result<(), String> {
         return Err("nothing is held".into());
     };
     let [point, force] = [point, force].map(|v| Vector3::from(*v));
-    let along = on_plane(&app.camera, held, place, app.aspect()) - point;
+    let along = on_plane(&app.port.camera, held, place, app.port.aspect()) - point;
     let stiffness = force.dot(&along) / along.norm_squared();
     let off = (force - along * stiffness).norm() / force.norm();
     if off < 1e-3 && stiffness > 0.0 && stiffness <= app.stiffness * 1.001 {
@@ -391,27 +392,13 @@ fn spring(app: &App, place: [f64; 2]) -> Result<(), String> {
 
 /// Writes what the window shows.
 fn portrait(file: PathBuf) -> [Cue; 1] {
-    let taken = Arc::<Mutex<Option<Arc<ColorImage>>>>::default();
-    let seen = taken.clone();
-    let cue = Cue::new(
-        "a picture of the window",
-        move |app| {
-            app.context.request_screenshot(move |image| {
-                *taken.lock().unwrap_or_else(PoisonError::into_inner) = Some(image);
-            });
-            Vec::new()
-        },
-        move |_| {
-            let Some(image) = seen.lock().unwrap_or_else(PoisonError::into_inner).take() else {
-                return Ok(false);
-            };
-            let [width, height] = image.size.map(|n| n as u32);
-            let rgba = image.pixels.iter().flat_map(|pixel| pixel.to_array()).collect();
-            let png = Picture { width, height, rgba }.png().map_err(|error| error.to_string())?;
-            std::fs::write(&file, png)
-                .map_err(|error| format!("`{}` cannot be written: {error}", file.display()))?;
-            Ok(true)
-        },
-    );
-    [cue]
+    let taking = Taking::default();
+    let asking = taking.clone();
+    let give = move |app: &App| {
+        asking.ask(&app.context);
+        Vec::new()
+    };
+    [Cue::new("a picture of the window", give, move |_| {
+        taking.write(&file).map_or(Ok(false), |written| written.map(|()| true))
+    })]
 }

@@ -67,28 +67,29 @@ impl App {
         all.find(|told| !self.closed.contains(&told.text))
     }
 
-    /// The line, with a button that closes it.
+    /// The line, until it is closed.
     pub(super) fn tell(&mut self, ui: &mut Ui) {
-        let Some(told) = self.banner() else { return };
-        let (word, paper, ink) = told.kind.look(ui.visuals().dark_mode);
-        let frame = Frame::NONE.fill(paper).inner_margin(Margin::symmetric(10, 5));
-        egui::Panel::bottom("told").frame(frame).show(ui, |ui| {
-            ui.horizontal_wrapped(|ui| {
-                ui.label(RichText::new(word).strong().color(ink));
-                ui.label(RichText::new(&told.text).color(if ui.visuals().dark_mode {
-                    paper_text(ink)
-                } else {
-                    Color32::from_gray(25)
-                }));
-                if ui.small_button("✕").on_hover_text("Close this message").clicked() {
-                    self.closed.insert(told.text.clone());
-                }
-            });
-        });
+        let told = self.banner();
+        if tell(ui, told.as_ref()) {
+            self.closed.extend(told.map(|told| told.text));
+        }
     }
 }
 
-/// Text on dark paper.
-fn paper_text(ink: Color32) -> Color32 {
-    ink.lerp_to_gamma(Color32::WHITE, 0.5)
+/// A message in a line, with a button that closes it; whether it was pressed.
+pub(super) fn tell(ui: &mut Ui, told: Option<&Told>) -> bool {
+    let Some(Told { kind, text }) = told else { return false };
+    let dark = ui.visuals().dark_mode;
+    let (word, paper, ink) = kind.look(dark);
+    let frame = Frame::NONE.fill(paper).inner_margin(Margin::symmetric(10, 5));
+    let line = egui::Panel::bottom("told").frame(frame).show(ui, |ui| {
+        let row = ui.horizontal_wrapped(|ui| {
+            ui.label(RichText::new(word).strong().color(ink));
+            let ink = if dark { ink.lerp_to_gamma(Color32::WHITE, 0.5) } else { Color32::from_gray(25) };
+            ui.label(RichText::new(text).color(ink));
+            ui.small_button("✕").on_hover_text("closes this message").clicked()
+        });
+        row.inner
+    });
+    line.inner
 }

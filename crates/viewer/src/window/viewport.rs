@@ -1,0 +1,456 @@
+//! What is looked at, and from where: the body that is drawn, the camera, the style, and what is written around it. A scene that is played
+//! and a finished run are both seen through one.
+
+use std::sync::Arc;
+
+use eframe::egui::{
+    self, Align2, Color32, FontId, Key, Painter, PointerButton, Pos2, Rect, Stroke, Vec2, vec2,
+};
+use eframe::egui_wgpu::Callback;
+use eframe::{CreationContext, Frame, wgpu};
+use pliant_geometry::Vector3;
+use pliant_picture::{
+    Background, Camera, Extremes, MISSING, NO_VALUE, Plane, Projection, Style, Subject, Target, readable,
+    scale_marks,
+};
+
+use super::paint::{Paint, SAMPLES, place};
+
+/// Width of the scale of colours on the screen.
+const SCALE: f32 = 110.0;
+/// Height of the figures on the screen.
+const FIGURES: f32 = 104.0;
+/// Length of the axes on the screen, and how far their origin is from the corner.
+const AXES: f32 = 30.0;
+const CORNER: f32 = 46.0;
+/// Length of the bar on the screen, at most.
+const BAR: f64 = 150.0;
+/// Where the bar ends, from the left.
+pub(super) const BESIDE_BAR: f32 = 2.0 * CORNER + 24.0 + BAR as f32;
+/// Colours of x, y and z.
+const COLOURS: [Color32; 3] =
+    [Color32::from_rgb(196, 54, 46), Color32::from_rgb(46, 138, 60), Color32::from_rgb(50, 92, 196)];
+/// Azimuth and elevation [°] of the sides: front, back, left, right, top, bottom.
+const SIDES: [(Key, [f64; 2]); 6] = [
+    (Key::Num1, [0.0, 0.0]),
+    (Key::Num2, [180.0, 0.0]),
+    (Key::Num3, [90.0, 0.0]),
+    (Key::Num4, [270.0, 0.0]),
+    (Key::Num5, [0.0, 89.9]),
+    (Key::Num6, [0.0, -89.9]),
+];
+
+/// A section: whether it is on, its normal, and how far along it the plane lies, as a part of the body's extent at rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Cut {
+    pub on: bool,
+    pub normal: Vector3,
+    pub part: f64,
+    /// Where the scene has it [m], until it is moved.
+    pub offset: Option<f64>,
+}
+
+impl Cut {
+    /// The section at a plane; across the middle of x for none.
+    pub fn new(plane: Option<Plane>) -> Self {
+        let normal = plane.map_or(Vector3::x(), |plane| plane.normal);
+        Self { on: plane.is_some(), normal, part: 0.5, offset: plane.map(|plane| plane.offset) }
+    }
+
+    /// Its plane, if it is on.
+    fn plane(&mut self, subject: &Subject) -> Option<Plane> {
+        let [low, high] = extent(subject, &self.normal);
+        if let Some(offset) = self.offset.take_if(|_| high > low) {
+            self.part = (offset - low) / (high - low);
+        }
+        self.on.then_some(Plane { normal: self.normal, offset: low + self.part * (high - low) })
+    }
+
+    /// Its switch and its place.
+    pub fn edit(&mut self, ui: &mut egui::Ui, plane: Option<Plane>) {
+        ui.checkbox(&mut self.on, "Section").on_hover_text("C: cuts the body open along a plane");
+        if self.on {
+            ui.horizontal(|ui| {
+                for (word, normal) in [("x", Vector3::x()), ("y", Vector3::y()), ("z", Vector3::z())] {
+                    ui.selectable_value(&mut self.normal, normal, word);
+                    ui.selectable_value(&mut self.normal, -normal, format!("−{word}"));
+                }
+            });
+            let place = plane.map(|plane| format!("at {:.2} mm", 1e3 * plane.offset)).unwrap_or_default();
+            ui.add(egui::Slider::new(&mut self.part, 0.0..=1.0).show_value(false).text(place));
+        }
+    }
+}
+
+/// From where to where a body reaches along a direction [m], at rest.
+fn extent(subject: &Subject, along: &Vector3) -> [f64; 2] {
+    let places = subject.points.iter().map(|point| point.dot(along));
+    places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+}
+
+/// What is looked at, and from where.
+pub(super) struct Viewport {
+    target: Target,
+    pub subject: Arc<Subject>,
+    pub points: Arc<Vec<Vector3>>,
+    pub values: Arc<Vec<f64>>,
+    /// Whether points or values are other than at the last paint.
+    fresh: bool,
+    /// Whether the subject is other than on the device.
+    renewed: bool,
+    pub camera: Camera,
+    /// From where it is seen at first.
+    pub home: Camera,
+    pub style: Style,
+    /// Whether the range stays as it is.
+    pub locked: bool,
+    /// Whether a part of a body has no value of the field.
+    pub missing: bool,
+    pub cut: Cut,
+    /// Points on the surface, increasing.
+    pub surface: Vec<u32>,
+    /// Where the picture is in the window, in egui's points.
+    pub rect: Rect,
+}
+
+impl Viewport {
+    /// Nothing yet, from somewhere.
+    ///
+    /// # Errors
+    /// If the window has no GPU.
+    pub fn new(context: &CreationContext<'_>, style: Style, camera: Camera) -> Result<Self, String> {
+        let state = context.wgpu_render_state.as_ref().ok_or("wgpu did not start")?;
+        let target = Target {
+            format: state.target_format,
+            depth: wgpu::TextureFormat::Depth32Float,
+            samples: SAMPLES,
+        };
+        Ok(Self {
+            target,
+            subject: Arc::default(),
+            points: Arc::default(),
+            values: Arc::default(),
+            fresh: true,
+            renewed: false,
+            camera,
+            home: camera,
+            locked: style.range.is_some(),
+            cut: Cut::new(style.clip),
+            style,
+            missing: false,
+            surface: Vec::new(),
+            rect: Rect::ZERO,
+        })
+    }
+
+    /// Looks at another body, at rest and without values.
+    pub fn renew(&mut self, subject: &Arc<Subject>) {
+        self.subject = subject.clone();
+        self.surface = subject.surface_points();
+        self.points = Arc::new(subject.points.clone());
+        self.values = Arc::default();
+        self.renewed = true;
+    }
+
+    /// Puts the body into a state: its points [m] and a value at each.
+    pub fn set(&mut self, points: &[Vector3], values: &[f64]) {
+        let own = Arc::make_mut(&mut self.points);
+        own.clear();
+        own.extend_from_slice(points);
+        let own = Arc::make_mut(&mut self.values);
+        own.clear();
+        own.extend_from_slice(values);
+        self.missing = self.subject.lacks_value(values);
+        self.fresh = true;
+    }
+
+    /// The values on the surface.
+    pub fn values_seen(&self) -> impl Iterator<Item = f64> + '_ {
+        self.surface.iter().filter_map(|&point| self.values.get(point as usize)).copied()
+    }
+
+    /// Takes the range of the values, unless it is locked.
+    pub fn fit_range(&mut self) {
+        if !self.locked {
+            let mut extremes = Extremes::default();
+            extremes.add(self.values_seen());
+            self.style.range = extremes.range(self.style.map);
+        }
+    }
+
+    /// Brings the body to the device where it is another one.
+    pub fn bring(&mut self, frame: &Frame) {
+        if self.renewed
+            && let Some(state) = frame.wgpu_render_state()
+        {
+            place(state, self.target, &self.subject);
+            self.renewed = false;
+        }
+    }
+
+    /// Takes its place in the window, and lets the section follow the body.
+    pub fn lay_out(&mut self, rect: Rect) {
+        let first = self.rect == Rect::ZERO;
+        self.rect = rect;
+        if first {
+            self.fit();
+        }
+        self.style.clip = self.cut.plane(&self.subject);
+    }
+
+    /// Draws the body; from a buffer of points where they are on the device already.
+    pub fn paint(
+        &mut self,
+        painter: &Painter,
+        labels: bool,
+        critical: Option<u32>,
+        on_device: Option<wgpu::Buffer>,
+    ) {
+        let mut style = Style { labels, ..self.style };
+        if self.values.is_empty() {
+            style.range = None;
+        }
+        let paint = Paint {
+            on_device,
+            critical,
+            points: self.points.clone(),
+            values: self.values.clone(),
+            camera: self.camera,
+            style,
+            aspect: self.aspect(),
+            fresh: std::mem::take(&mut self.fresh),
+        };
+        painter.add(Callback::new_paint_callback(self.rect, paint));
+    }
+
+    /// Widths a height of the picture.
+    pub fn aspect(&self) -> f64 {
+        let size = self.rect.size();
+        if size.y > 0.0 { f64::from(size.x / size.y) } else { 1.3 }
+    }
+
+    /// The camera that sees all, from the side from which it looks.
+    pub fn fitted(&self) -> Camera {
+        let mut camera =
+            Camera { azimuth: self.camera.azimuth, elevation: self.camera.elevation, ..self.home };
+        // Beside the scale of colours and below the figures, as parts of the height.
+        let height = self.rect.height().max(SCALE);
+        let scale = f64::from(SCALE / height);
+        let figures = f64::from(FIGURES / height).min(0.4);
+        let aspect = ((self.aspect() - scale) / (1.0 - figures)).max(0.5);
+        camera.fit(self.surface.iter().map(|&point| &self.points[point as usize]), aspect);
+        camera.height /= 1.0 - figures;
+        camera.pan(-0.5 * scale, -0.5 * figures);
+        camera
+    }
+
+    pub fn fit(&mut self) {
+        self.camera = self.fitted();
+    }
+
+    /// What a mouse does beside what it holds: turns, moves and comes nearer.
+    pub fn turn(&mut self, context: &egui::Context, response: &egui::Response, orbiting: bool) {
+        let by = response.drag_delta();
+        let shift = context.input(|input| input.modifiers.shift);
+        let turns = response.dragged_by(PointerButton::Secondary) || (orbiting && response.dragged());
+        if response.dragged_by(PointerButton::Middle) || turns && shift {
+            let unit = f64::from(self.rect.height());
+            self.camera.pan(f64::from(by.x) / unit, -f64::from(by.y) / unit);
+        } else if turns {
+            self.camera.orbit(f64::from(-by.x) * 0.4, f64::from(by.y) * 0.4);
+        }
+        if response.hovered() {
+            let scroll = scrolled(context);
+            if scroll != 0.0 {
+                self.camera.zoom((-0.002 * f64::from(scroll)).exp());
+            }
+        }
+    }
+
+    /// Keys of the view; whether the section was turned on or off.
+    pub fn keys(&mut self, context: &egui::Context) -> bool {
+        let pressed = |key| context.input(|input| input.key_pressed(key) && !input.modifiers.command);
+        if pressed(Key::F) {
+            self.fit();
+        }
+        if pressed(Key::E) {
+            self.style.edges = !self.style.edges;
+        }
+        if pressed(Key::G) {
+            self.style.ghost = !self.style.ghost;
+        }
+        if pressed(Key::L) {
+            self.locked = !self.locked;
+        }
+        if pressed(Key::O) {
+            self.home.projection = match self.camera.projection {
+                Projection::Perspective => Projection::Orthographic,
+                Projection::Orthographic => Projection::Perspective,
+            };
+            self.camera.projection = self.home.projection;
+        }
+        for (_, [azimuth, elevation]) in SIDES.into_iter().filter(|(key, _)| pressed(*key)) {
+            (self.camera.azimuth, self.camera.elevation) = (azimuth, elevation);
+        }
+        let cuts = pressed(Key::C);
+        self.cut.on ^= cuts;
+        cuts
+    }
+
+    /// Where a point is seen; `None` behind the eye.
+    pub fn to_screen(&self, point: &Vector3) -> Option<Pos2> {
+        let half = 0.5 * self.rect.size();
+        let [x, y] = self.camera.place(point, self.aspect())?;
+        Some(self.rect.center() + vec2(half.x * x as f32, -half.y * y as f32))
+    }
+
+    /// A place of the window in the picture: x to the right and y up, from −1 to 1.
+    pub fn in_picture(&self, at: Pos2) -> [f64; 2] {
+        let from = at - self.rect.center();
+        let [width, height] = [self.rect.width(), self.rect.height()].map(|size| size.max(1.0));
+        [f64::from(2.0 * from.x / width), f64::from(-2.0 * from.y / height)]
+    }
+
+    /// What text stands on, so that it can be read over a body.
+    pub fn card(&self, painter: &Painter, place: Rect) {
+        let dark = self.style.background == Background::Dark;
+        let pale = if dark { Color32::from_black_alpha(150) } else { Color32::from_white_alpha(170) };
+        painter.rect_filled(place.expand(6.0), 5.0, pale);
+    }
+
+    /// Lines of text on a card, from a corner on.
+    pub fn write(&self, painter: &Painter, corner: Align2, at: Pos2, lines: &[String], size: f32) {
+        let galley = painter.layout_no_wrap(lines.join("\n"), FontId::proportional(size), self.ink());
+        let place = corner.anchor_size(at, galley.size());
+        self.card(painter, place);
+        painter.galley(place.min, galley, self.ink());
+    }
+
+    /// The colour of what is written over the picture.
+    pub fn ink(&self) -> Color32 {
+        let [r, g, b] = self.style.background.ink();
+        Color32::from_rgb(r, g, b)
+    }
+
+    /// The scale of colours with the quantity and its unit, and the grey of parts without a value.
+    pub fn draw_scale(&self, painter: &Painter, quantity: &str, unit: &str) {
+        let Some([low, high]) = self.style.range.filter(|_| !self.values.is_empty()) else { return };
+        let (rect, ink) = (self.rect, self.ink());
+        let (unit, factor) = readable(unit, low.abs().max(high.abs()));
+        let bar = Rect::from_min_max(
+            rect.right_top() + vec2(-78.0, 70.0),
+            Pos2::new(rect.right() - 60.0, (rect.bottom() - 60.0).max(rect.top() + 90.0)),
+        );
+        self.card(painter, Rect::from_min_max(bar.min - vec2(36.0, 46.0), bar.max + vec2(52.0, 8.0)));
+        let right = Pos2::new(rect.right() - 12.0, bar.top() - 34.0);
+        painter.text(right, Align2::RIGHT_CENTER, quantity, FontId::proportional(14.0), ink);
+        if !unit.is_empty() {
+            let below = right + vec2(0.0, 17.0);
+            painter.text(below, Align2::RIGHT_CENTER, format!("[{unit}]"), FontId::proportional(14.0), ink);
+        }
+        let rows = bar.height() as usize;
+        for row in 0..rows {
+            let part = 1.0 - (row as f64 + 0.5) / rows as f64;
+            let part = if high > low { part } else { self.style.map.part_of_one_value() };
+            let [r, g, b] = self.style.map.at(part);
+            let line = Rect::from_min_size(bar.min + vec2(0.0, row as f32), vec2(bar.width(), 1.5));
+            painter.rect_filled(line.intersect(bar), 0.0, Color32::from_rgb(r, g, b));
+        }
+        for (part, text) in scale_marks([low * factor, high * factor], 6) {
+            let place = Pos2::new(bar.right() + 6.0, bar.bottom() - part as f32 * bar.height());
+            painter.text(place, Align2::LEFT_CENTER, text, FontId::proportional(13.0), ink);
+        }
+        if self.missing {
+            let place = rect.right_bottom() - vec2(12.0, 34.0);
+            let text = painter.text(place, Align2::RIGHT_CENTER, NO_VALUE, FontId::proportional(13.0), ink);
+            let [r, g, b] = MISSING;
+            let swatch = Rect::from_center_size(text.left_center() - vec2(12.0, 0.0), vec2(12.0, 12.0));
+            painter.rect_filled(swatch, 2.0, Color32::from_rgb(r, g, b));
+        }
+    }
+
+    /// The range of colours, typed in the unit of the scale: a typed one is locked.
+    pub fn edit_range(&mut self, ui: &mut egui::Ui, unit: &str) {
+        if let Some(range) = self.style.range {
+            let size = range[0].abs().max(range[1].abs());
+            let (unit, factor) = readable(unit, size);
+            let mut typed = range.map(|value| value * factor);
+            let speed = 0.01 * (typed[1] - typed[0]).max(1e-3 * size * factor).max(1e-9);
+            let changed = ui.horizontal(|ui| {
+                let ends = typed.each_mut().map(|end| {
+                    let number = egui::DragValue::new(end).speed(speed).max_decimals(4);
+                    ui.add(number).on_hover_text("an end of the range of colours").changed()
+                });
+                ui.label(unit);
+                ends.contains(&true)
+            });
+            if changed.inner && typed[0] < typed[1] {
+                self.style.range = Some(typed.map(|value| value / factor));
+                self.locked = true;
+            }
+        }
+        ui.checkbox(&mut self.locked, "Lock the range")
+            .on_hover_text("L: keeps the range while values change");
+    }
+
+    /// The axes and a bar of a round length in the lower left corner.
+    pub fn draw_axes(&self, painter: &Painter) {
+        let origin = self.rect.left_bottom() + vec2(CORNER, -CORNER);
+        for (axis, along) in axes_of(&self.camera) {
+            painter.arrow(origin, AXES * along, Stroke::new(2.0, COLOURS[axis]));
+            let place = origin + (AXES + 9.0) * along;
+            let font = FontId::proportional(13.0);
+            painter.text(place, Align2::CENTER_CENTER, ["x", "y", "z"][axis], font, COLOURS[axis]);
+        }
+        let pixel = self.camera.height / f64::from(self.rect.height().max(1.0));
+        let metres = round_length(BAR * pixel);
+        let (unit, factor) = readable("m", metres);
+        let from = origin + vec2(CORNER + 14.0, 14.0);
+        let to = from + vec2((metres / pixel) as f32, 0.0);
+        let stroke = Stroke::new(2.0, self.ink());
+        painter.line_segment([from, to], stroke);
+        for end in [from, to] {
+            painter.line_segment([end - vec2(0.0, 4.0), end + vec2(0.0, 4.0)], stroke);
+        }
+        let text = format!("{:.0} {unit}", metres * factor);
+        let middle = from + 0.5 * (to - from) - vec2(0.0, 12.0);
+        painter.text(middle, Align2::CENTER_CENTER, text, FontId::proportional(13.0), self.ink());
+    }
+}
+
+/// By how much the wheel turned, and a pinch.
+pub(super) fn scrolled(context: &egui::Context) -> f32 {
+    context.input(|input| input.smooth_scroll_delta.y + 200.0 * (input.zoom_delta() - 1.0))
+}
+
+/// The longest length [m] of 1, 2 or 5 times a power of ten that is no longer than another.
+fn round_length(most: f64) -> f64 {
+    let power = 10_f64.powf(most.log10().floor());
+    [5.0, 2.0].map(|factor| factor * power).into_iter().find(|length| *length <= most).unwrap_or(power)
+}
+
+/// The axes as seen by a camera, the farthest first: which it is, and where it points on the screen.
+fn axes_of(camera: &Camera) -> [(usize, Vec2); 3] {
+    let [right, up, towards] = camera.axes();
+    let unit = [Vector3::x(), Vector3::y(), Vector3::z()];
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| unit[a].dot(&towards).total_cmp(&unit[b].dot(&towards)));
+    order.map(|axis| (axis, vec2(unit[axis].dot(&right) as f32, -unit[axis].dot(&up) as f32)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bars_have_round_lengths_and_axes_point_as_the_camera_sees_them() {
+        assert_eq!([0.19, 0.2, 0.07, 0.0123].map(round_length), [0.1, 0.2, 0.05, 0.01]);
+        // From the front, x comes towards the eye and is drawn last.
+        let camera = Camera { azimuth: 0.0, elevation: 0.0, ..Camera::default() };
+        let axes = axes_of(&camera);
+        assert_eq!(axes[2].0, 0);
+        assert!(axes[2].1.length() < 1e-6);
+        let z = axes.iter().find(|(axis, _)| *axis == 2).unwrap();
+        assert!((z.1 - vec2(0.0, -1.0)).length() < 1e-6, "up is up");
+    }
+}
