@@ -2,7 +2,7 @@
 //! A cylinder that is free at its ends bends almost without stretching, so nodal forces that the true load has not show up R²/t² times as
 //! large. Lamé for a thin wall: u = p R²/(E t).
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use pliant_geometry::{Mesh, Vector3};
 use pliant_implicit::element::{Bending, Formulation, Membrane};
@@ -152,6 +152,54 @@ fn a_free_cylinder_under_pressure_stays_round() {
             100.0 * most
         );
         claim(&format!("cylinder, irregular, t = {thickness}"), most, limit);
+    }
+}
+
+/// A8 of the acceptance tests of contact: a tube of r = 3 mm and t = 0.3 mm, E = 1 MPa, ν = 0.42, at 5 kPa. Thin walls widen by
+/// u = p r²/(E t) = 150 µm with open ends, by 1 − ν/2 of it with closed ones and by 1 − ν² in plane strain; around the tube the stress is
+/// p r/t = 50 kPa.
+#[test]
+fn a_tube_widens_as_its_ends_allow() {
+    let (radius, thickness, young, nu, pressure) = (3e-3, 3e-4, 1e6, 0.42, 5e3);
+    let mesh = || {
+        let mut mesh = cylinder(Cut::Diagonal, false, [10, 7]);
+        mesh.points.iter_mut().for_each(|point| *point *= radius);
+        mesh
+    };
+    for (ends, part) in [("open", 1.0), ("closed", 1.0 - 0.5 * nu), ("held", 1.0 - nu * nu)] {
+        let tube = Specimen::new(mesh(), [young, nu], thickness, DEFAULT.0).unwrap();
+        let mut tube = tube
+            .hold_edge("z-min", symmetry(2))
+            .hold_edge("start", symmetry(1))
+            .hold_edge("end", symmetry(0));
+        let cells = (0..tube.model.facets.len() as u32).collect();
+        let kind = LoadKind::ShellPressure { facets: cells, pressure, spread: Spread::Curved };
+        tube = tube.load(kind);
+        match ends {
+            "closed" => tube = tube.pull_edge("z-max", [0.0, 0.0, 0.25 * PI * radius * radius * pressure]),
+            "held" => tube = tube.hold_edge("z-max", symmetry(2)),
+            _ => {}
+        }
+        let exact = part * pressure * radius * radius / (young * thickness);
+        let mut solver = Statics::new(tube.model.clone(), StaticSettings::default()).unwrap();
+        let moved = solver.linear(&State::at_rest(&tube.model), 1.0).unwrap();
+        let radial = |(u, x): (&[f64; 6], Vector3)| (u[0] * x.x + u[1] * x.y) / radius / exact;
+        let found: Vec<f64> = moved.iter().zip(tube.model.places()).map(radial).collect();
+        claim(&format!("tube with {ends} ends: widening"), off(&found), 0.03);
+        // A thousandth of the load is nearly linear.
+        let mut state = State::at_rest(&tube.model);
+        solver.solve(&mut state, 1e-3).unwrap();
+        let around = |facet: usize| {
+            let own = state.resultants(&tube.model, facet).unwrap();
+            let nodes = tube.model.facets[facet].nodes.map(|node| tube.model.place(node as usize));
+            let middle = (nodes[0] + nodes[1] + nodes[2]) / 3.0;
+            let tangent = own.axes.transpose() * Vector3::new(-middle.y, middle.x, 0.0).normalize();
+            let [a, b] = [tangent.x, tangent.y];
+            let [xx, yy, xy] = own.membrane.into();
+            (a * a * xx + b * b * yy + 2.0 * a * b * xy) / (1e-3 * pressure * radius)
+        };
+        let stresses: Vec<f64> = (0..tube.model.facets.len()).map(around).collect();
+        claim(&format!("tube with {ends} ends: stress around it"), off(&stresses), 0.03);
     }
 }
 

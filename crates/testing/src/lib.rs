@@ -1,6 +1,6 @@
 //! Helpers of tests: numbers at random that are the same in every run, files damaged by them, hexahedra of simple bodies, and the memory of
-//! the process; with the features `images`, `organs` and `scenes` image files, label images and meshes of analytic organs, and scenes that
-//! are checked and run.
+//! the process; with the features `images`, `organs`, `pieces` and `scenes` image files, label images and meshes of analytic organs, small
+//! bodies that meet, and scenes that are checked and run.
 //!
 //! ```
 //! let mut random = pliant_testing::Random::new(1);
@@ -14,6 +14,8 @@ pub mod image_files;
 pub mod mesh_checks;
 #[cfg(feature = "organs")]
 pub mod organs;
+#[cfg(feature = "pieces")]
+pub mod pieces;
 #[cfg(feature = "scenes")]
 pub mod scenes;
 

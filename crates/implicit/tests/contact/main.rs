@@ -1,7 +1,11 @@
 //! Shells and solids in contact by a barrier, held to closed forms; every state that is accepted is searched for crossings.
 
 mod blocks;
+mod bodies;
+mod cards;
 mod cloth;
+mod degenerate;
+mod funnel;
 mod ring;
 
 use std::sync::Arc;

@@ -5,6 +5,7 @@ mod bars;
 mod collective;
 mod contact;
 mod contact_fields;
+mod contact_ways;
 mod corpus;
 mod force_limit;
 mod grasper;
