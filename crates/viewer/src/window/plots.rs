@@ -127,7 +127,7 @@ impl App {
                 let plot = plot
                     .x_axis_label("time [s]")
                     .y_axis_label(format!("[{unit}]"))
-                    .grid_spacing(45.0..=300.0);
+                    .grid_spacing(25.0..=300.0);
                 plot.allow_scroll(false).show(column, |plot| {
                     for (curve, line) in own.iter().zip(lines) {
                         plot.line(Line::new(words(&curve.name), line));

@@ -257,6 +257,8 @@ fn turns(what: &str, key: Key, switch: fn(&App) -> bool) -> Cue {
 fn camera() -> Vec<Cue> {
     let beside = |app: &App| app.port.rect.min + vec2(20.0, 150.0);
     let right = PointerButton::Secondary;
+    let before = Rc::new(RefCell::new(0.0));
+    let then = before.clone();
     vec![
         Cue::new(
             "the mouse goes beside the body",
@@ -272,6 +274,7 @@ fn camera() -> Vec<Cue> {
             "the wheel comes nearer",
             move |app| {
                 let place = beside(app) + vec2(60.0, 10.0);
+                *before.borrow_mut() = app.port.camera.height;
                 vec![
                     button(place, right, false),
                     Event::MouseWheel {
@@ -283,7 +286,7 @@ fn camera() -> Vec<Cue> {
                     },
                 ]
             },
-            |app| Ok(app.port.camera.height < 0.95 * app.port.fitted().height),
+            move |app| Ok(app.port.camera.height < 0.95 * *then.borrow()),
         ),
         // A wheel glides.
         Cue::wait("the wheel comes to rest", {
