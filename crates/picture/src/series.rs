@@ -130,14 +130,9 @@ impl Series {
     /// # Errors
     /// If none exists.
     pub fn find(folder: &Path, name: Option<&str>) -> Result<Self, SeriesError> {
-        let mut names: Vec<String> = fs::read_dir(folder)
-            .map_err(|source| MeshFileError::Open { path: folder.to_owned(), source })?
-            .filter_map(|entry| Some(entry.ok()?.file_name().to_str()?.strip_suffix(".pvd")?.to_owned()))
-            .collect();
-        names.sort_unstable();
-        let first = names.first().ok_or_else(|| SeriesError::NoSeries(folder.to_owned()))?;
+        let names = Self::names(folder)?;
         let name = match name {
-            None => first.clone(),
+            None => names[0].clone(),
             Some(name) if names.iter().any(|known| known == name) => name.to_owned(),
             Some(name) => {
                 let known = quoted(&names);
