@@ -3,7 +3,8 @@
 use eframe::egui;
 use pliant_geometry::{CellLabel, Vector3};
 use pliant_picture::{Background, ColourMap, Texture, label_colour};
-use pliant_scene::format::{BodyModel, ColourBy, Component, FieldName, Labels, Nothing};
+use pliant_scene::Part;
+use pliant_scene::format::{BodyModel, ColourBy, Component, FieldName, Labels, Nothing, SolverName};
 
 use super::App;
 use crate::hand::Hand;
@@ -235,6 +236,12 @@ impl App {
     }
 
     fn hand(&mut self, ui: &mut egui::Ui) {
+        let is_relaxed =
+            |part: &Part| part.scene.run.solver == SolverName::QuasiStatic && part.built.implicit.is_none();
+        if self.world.participants.iter().any(is_relaxed) {
+            ui.weak("the solver `quasi-static` knows no hand; `static` and `implicit` do");
+            return;
+        }
         ui.add(egui::Slider::new(&mut self.stiffness, 1.0..=5000.0).logarithmic(true).text("N/m"));
         let force = self.frame.held.first().filter(|_| self.holding.is_some());
         ui.label(match force {
