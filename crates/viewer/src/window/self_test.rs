@@ -14,6 +14,7 @@ use pliant_picture::{Camera, Projection};
 use super::App;
 use super::keep::Taking;
 use super::picture::on_plane;
+use super::undo::Act;
 
 /// What a window does by itself before it closes.
 #[derive(Clone, Debug)]
@@ -94,7 +95,15 @@ impl RunningTest {
             }
             SelfTest::Rehearsal { file } => {
                 let mut cues: VecDeque<Cue> = drawing().chain((0..PICKS).map(picking)).collect();
-                cues.extend(keys().into_iter().chain(camera()).chain(pinning()).chain(pulling()));
+                cues.extend(
+                    keys()
+                        .into_iter()
+                        .chain(camera())
+                        .chain(pinning())
+                        .chain(following())
+                        .chain(undoing())
+                        .chain(pulling()),
+                );
                 cues.extend(file.into_iter().flat_map(portrait));
                 (cues, tried)
             }
@@ -332,6 +341,83 @@ fn pinning() -> Vec<Cue> {
         .into_iter()
         .chain(click("a click with P on a pin takes it away", 0))
         .collect()
+}
+
+/// Keys such as Ctrl are held down from now on, or none.
+fn holding(modifiers: Modifiers) -> Cue {
+    let held = move |app: &App| app.context.input(|input| input.modifiers.matches_exact(modifiers));
+    Cue::new(
+        "keys are held down",
+        move |_| vec![Event::ModifiersChanged(modifiers)],
+        move |app| Ok(held(app)),
+    )
+}
+
+/// Looks from all sides; a click with Alt picks a point, which is read.
+fn following() -> Vec<Cue> {
+    let left = PointerButton::Primary;
+    let side = |key, azimuth: f64, elevation: f64| {
+        let there = move |app: &App| {
+            (app.port.camera.azimuth - azimuth).abs() < 1e-9
+                && (app.port.camera.elevation - elevation).abs() < 0.2
+        };
+        Cue::key("a number looks from a side", key, there)
+    };
+    vec![
+        side(Key::Num1, 0.0, 0.0),
+        side(Key::Num2, 180.0, 0.0),
+        side(Key::Num5, 0.0, 90.0),
+        side(Key::Num6, 0.0, -90.0),
+        side(Key::Num4, 270.0, 0.0),
+        side(Key::Num3, 90.0, 0.0),
+        Cue::key("F shows all", Key::F, |app| {
+            (app.port.camera.height / app.port.fitted().height - 1.0).abs() < 1e-6
+        }),
+        Cue::new("the mouse goes to the body", |app| vec![Event::PointerMoved(inside(app))], |_| Ok(true)),
+        holding(Modifiers::ALT),
+        Cue::new("a press", move |app| vec![button(inside(app), left, true)], |_| Ok(true)),
+        Cue::new(
+            "a click with Alt follows a point, which is read",
+            move |app| vec![button(inside(app), left, false)],
+            |app| Ok(app.read_points().len() == 1 && !app.frame.followed[0].about.is_empty()),
+        ),
+        holding(Modifiers::NONE),
+    ]
+}
+
+/// Pulls while the run is paused, and plays; Ctrl and Z goes back to before the pull.
+fn undoing() -> Vec<Cue> {
+    let left = PointerButton::Primary;
+    let steps = Rc::new(RefCell::new(0));
+    let then = steps.clone();
+    let taken = |app: &App| app.acts.last().is_some_and(|act| matches!(act, Act::Pull(_)));
+    vec![
+        Cue::new(
+            "the mouse takes hold",
+            move |app| {
+                *steps.borrow_mut() = app.frame.steps;
+                vec![Event::PointerMoved(inside(app)), button(inside(app), left, true)]
+            },
+            |_| Ok(true),
+        ),
+        Cue::new(
+            "the mouse pulls",
+            |app| vec![Event::PointerMoved(inside(app) + vec2(40.0, 0.0))],
+            move |app| Ok(taken(app)),
+        ),
+        Cue::key("Space plays", Key::Space, move |app| app.frame.steps > 0),
+        Cue::new(
+            "the hand lets go",
+            move |app| vec![button(inside(app), left, false)],
+            |app| Ok(app.holding.is_none()),
+        ),
+        Cue::key("Space pauses", Key::Space, |app| !app.frame.playing),
+        holding(Modifiers::COMMAND | Modifiers::CTRL),
+        Cue::key("Ctrl and Z goes back to before the pull", Key::Z, move |app| {
+            app.frame.steps <= *then.borrow() && app.frame.held.is_empty()
+        }),
+        holding(Modifiers::NONE),
+    ]
 }
 
 /// Plays, takes hold and pulls upwards, until all is at rest: the hand's force is that of its spring.
