@@ -95,4 +95,5 @@ if len(sys.argv) > 2:
     organ = read("ellipsoid_capsule.json")
     organ["rows"] = {name: rows["h0.0042"] for name, rows in organ["rows"].items() if "h0.0042" in rows}
     write("ellipsoid_capsule.json", organ)
-    shutil.copyfile(source / "tubes.json", here / "tubes.json")
+    for name in ("tubes.json", "angioplasty.json"):
+        shutil.copyfile(source / name, here / name)

@@ -26,7 +26,7 @@ fn check(name: &str, text: &str, folder: &Path, grow: f64) {
     let part = &world.participants[0].built;
     let contacts = part.contacts.as_ref().unwrap();
     let (rigid, nodes) = (&contacts.rigids[0], &contacts.contacts[0].surface.nodes);
-    let pose = rigid.trajectory.at(0.0);
+    let stance = rigid.stance(0.0, None);
     let mesh = &part.bodies[0].mesh;
     let surface = boundary(mesh);
     let faces: Vec<u32> = (0..surface.faces.len() as u32).collect();
@@ -46,7 +46,7 @@ fn check(name: &str, text: &str, folder: &Path, grow: f64) {
             .map(|&node| mesh.points[node as usize] + Vector3::from(displacements[node as usize]));
         let places: Vec<Vector3<f64>> = places.collect();
         for place in &places {
-            outside = outside.max(-rigid.near(&pose, place).distance);
+            outside = outside.max(-rigid.near(&stance, place).distance);
         }
         if time >= seen {
             seen += 0.05;

@@ -180,12 +180,12 @@ fn pressed(
         }
         stepper.evaluate(&mut state).unwrap();
         let [outer, inner] = [0, 1].map(|which| force(&stepper, which));
-        let pose = tool.trajectory.at(state.time);
+        let stance = tool.stance(state.time, None);
         let mut radii = [0.0_f64, f64::INFINITY];
         for &node in nodes.iter().filter(|&&node| model.rest[node as usize][1].abs() < 1e-9) {
             let (x, u) = (model.rest[node as usize], state.displacement[node as usize]);
             let now = [0, 1, 2].map(|c| x[c] + u[c]);
-            if tool.near(&pose, &now.into()).distance < 1e-9 {
+            if tool.near(&stance, &now.into()).distance < 1e-9 {
                 radii[0] = radii[0].max(radius(now));
             } else {
                 radii[1] = radii[1].min(radius(now));

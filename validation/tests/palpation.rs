@@ -5,6 +5,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use nalgebra::Vector3;
+use pliant_contact::pose::Stance;
 use pliant_scene::source::Source;
 use pliant_scene::{Scene, World};
 use pliant_validation::claim;
@@ -45,11 +46,11 @@ fn check(presses: u32, most: f64) {
     let (mut milliseconds, mut before, mut peak, mut jump) = (0.0, Vector3::zeros(), 0.0_f64, 0.0_f64);
     let mut simulation = world.simulation().unwrap();
     let played = simulation.run(until, |frame| {
-        let pose = frame.tool("finger").unwrap().pose;
+        let stance = Stance::at(frame.tool("finger").unwrap().pose);
         let displacements = frame.displacements("liver").unwrap();
         for &node in &feels.surface.nodes {
             let at = points[node as usize] + Vector3::from(displacements[node as usize]);
-            deepest = deepest.max(-rigid.near(&pose, &at).distance);
+            deepest = deepest.max(-rigid.near(&stance, &at).distance);
         }
         let energies = frame.energies();
         // In the first steps there is hardly any energy.

@@ -227,7 +227,7 @@ impl Around<'_> {
                 }
                 let friction = contact.touch.friction;
                 most = most.max(friction);
-                let pose = now.pose(index, rigid);
+                let stance = now.stance(index, rigid);
                 let place = |node: u32| {
                     let node = node as usize;
                     Vector3::from(part.model.rest[node]) + Vector3::from(now.displacement(node))
@@ -235,12 +235,12 @@ impl Around<'_> {
                 for face in &contact.surface.faces {
                     let corners = face.map(place);
                     let size = (corners[1] - corners[0]).norm().max((corners[2] - corners[0]).norm());
-                    if rigid.near(&pose, &corners[0]).distance > REACH + size {
+                    if rigid.near(&stance, &corners[0]).distance > REACH + size {
                         continue;
                     }
                     for weights in &self.samples {
                         let point: Vector3<f64> = corners.iter().zip(weights).map(|(x, &w)| x * w).sum();
-                        let near = rigid.near(&pose, &point);
+                        let near = rigid.near(&stance, &point);
                         let gap = near.distance - contact.touch.offset;
                         if gap < REACH {
                             // The tool goes away from the point against the direction in which its distance grows.

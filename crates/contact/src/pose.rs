@@ -7,12 +7,36 @@ use serde::{Deserialize, Serialize};
 /// A position and an orientation.
 pub type Pose = Isometry3<f64>;
 
-/// How a rigid thing moves.
+/// Where a rigid thing is, and by how much it has grown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stance {
+    /// Where its frame is.
+    pub pose: Pose,
+    /// How far [m] its surface is outside of that of its shape.
+    pub growth: f64,
+}
+
+impl Stance {
+    /// At a pose, as large as its shape.
+    pub fn at(pose: Pose) -> Self {
+        Self { pose, growth: 0.0 }
+    }
+
+    /// After a part of the way from one to another.
+    pub fn between([from, to]: [&Self; 2], part: f64) -> Self {
+        let pose = between([&from.pose, &to.pose], part);
+        Self { pose, growth: from.growth + (to.growth - from.growth) * part }
+    }
+}
+
+/// How a rigid thing moves and grows.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
     /// Where it is at the start.
     start: Pose,
     motion: Motion,
+    /// A distance [m] by which its surface moves outward as a curve goes.
+    growth: Option<(f64, Curve)>,
     /// The force [N] that it pushes with at most.
     limit: Option<f64>,
 }
@@ -35,7 +59,22 @@ enum Motion {
 
 impl Trajectory {
     fn of(start: Pose, motion: Motion) -> Self {
-        Self { start, motion, limit: None }
+        Self { start, motion, growth: None, limit: None }
+    }
+
+    /// With a surface that moves outward by a distance [m] as a curve goes from 0 to 1.
+    pub fn growing(self, by: f64, curve: Curve) -> Self {
+        Self { growth: Some((by, curve)), ..self }
+    }
+
+    /// How far [m] the surface has moved outward at a time [s].
+    pub fn growth(&self, time: f64) -> f64 {
+        self.growth.as_ref().map_or(0.0, |(by, curve)| by * curve.value(time))
+    }
+
+    /// Whether the surface moves outward or inward.
+    pub fn grows(&self) -> bool {
+        self.growth.is_some()
     }
 
     /// With a force [N] that the thing pushes with at most: it lags behind its trajectory where it would need more.
@@ -71,9 +110,9 @@ impl Trajectory {
         (increase && !poses.is_empty()).then_some(Self::of(start, Motion::Table(poses)))
     }
 
-    /// Whether it moves at all.
+    /// Whether it moves or grows at all.
     pub fn moves(&self) -> bool {
-        !matches!(self.motion, Motion::Fixed)
+        self.grows() || !matches!(self.motion, Motion::Fixed)
     }
 
     /// The pose at a time [s].

@@ -1,8 +1,9 @@
 //! Rigid shapes, each in a frame of its own, with their signed distance.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 use crate::grid::Grid;
 pub use crate::near::{Near, Triangles};
@@ -141,6 +142,36 @@ impl Shape {
             Self::Revolved(ref profile) => revolved(&profile.drawn(AROUND / 4)),
             Self::Grid(ref grid) => grid.surface().clone(),
         }
+    }
+}
+
+/// How far a drawn corner goes at most where a surface grows by 1: tips of cones would go on and on.
+const FARTHEST: f64 = 3.0;
+
+impl Shape {
+    /// Where points [m] of its drawn surface go as it grows, per distance: sides go straight outward by that, so edges stay sharp in pictures.
+    pub fn outward(&self, (points, triangles): &Triangles) -> Vec<Vector3<f64>> {
+        if matches!(self, Self::Sphere { .. } | Self::Capsule { .. }) {
+            return points.iter().map(|point| self.near(point).normal).collect();
+        }
+        // Points that stand for one place are one.
+        let bits = |x: &Vector3<f64>| [x.x, x.y, x.z].map(|c| (c + 0.0).to_bits());
+        let mut sides = BTreeMap::<[u64; 3], (Matrix3<f64>, Vector3<f64>)>::new();
+        for corners in triangles {
+            let [a, b, c] = corners.map(|k| points[k as usize]);
+            let Some(normal) = (b - a).cross(&(c - a)).try_normalize(0.0) else { continue };
+            for corner in [a, b, c] {
+                let (squares, sum) = sides.entry(bits(&corner)).or_default();
+                *squares += normal * normal.transpose();
+                *sum += normal;
+            }
+        }
+        let way = |point: &Vector3<f64>| {
+            let (squares, sum) = sides.get(&bits(point)).copied().unwrap_or_default();
+            let inverse = squares.pseudo_inverse(1e-6 * squares.trace().max(f64::MIN_POSITIVE));
+            inverse.map_or(Vector3::zeros(), |inverse| (inverse * sum).cap_magnitude(FARTHEST))
+        };
+        points.iter().map(way).collect()
     }
 }
 
@@ -310,6 +341,34 @@ mod tests {
                 assert!(outward > inward, "{shape:?}: {corners:?}");
             }
         }
+    }
+
+    /// Drawn surfaces that have grown lie on the shape grown by as much, beside its edges, which pictures leave sharp.
+    #[test]
+    fn drawn_surfaces_grow_outward() {
+        let cylinder = Shape::Cylinder { radius: 0.3, length: 0.8 };
+        let grown = |shape: &Shape, by: f64| {
+            let surface = shape.surface(1.0);
+            let outward = shape.outward(&surface);
+            surface.0.iter().zip(outward).map(|(point, way)| point + way * by).collect::<Vec<_>>()
+        };
+        for (shape, larger) in [
+            (Shape::Sphere { radius: 0.3 }, Shape::Sphere { radius: 0.35 }),
+            (Shape::Capsule { radius: 0.2, length: 0.7 }, Shape::Capsule { radius: 0.25, length: 0.7 }),
+            (Shape::Cuboid { size: [0.5, 0.9, 0.4] }, Shape::Cuboid { size: [0.6, 1.0, 0.5] }),
+            (Shape::HalfSpace, Shape::HalfSpace),
+        ] {
+            let raised = if matches!(shape, Shape::HalfSpace) { 0.05 } else { 0.0 };
+            let off = grown(&shape, 0.05)
+                .iter()
+                .map(|x| (larger.near(x).distance - raised).abs())
+                .fold(0.0, f64::max);
+            assert!(off < 1e-12, "{shape:?}: {off:e}");
+        }
+        // The 32 flat sides go out by as much as the round one.
+        let larger = Shape::Cylinder { radius: 0.35, length: 0.9 };
+        let off = grown(&cylinder, 0.05).iter().map(|x| larger.near(x).distance.abs()).fold(0.0, f64::max);
+        assert!(off < 3e-4, "{off:e}");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use pliant_mechanics::tensor::Vector;
 use serde::{Deserialize, Serialize};
 
 use crate::pairs::{Pairs, Surface};
-use crate::pose::{Leg, Pose, Trajectory, between};
+use crate::pose::{Leg, Pose, Stance, Trajectory};
 use crate::shape::{Near, Shape};
 
 /// Parts of a step at most in which a node is followed along a thing.
@@ -108,18 +108,28 @@ impl Rigid {
         }
     }
 
-    /// The distance of a point [m] from where it is free of the thing, and the direction there, at a pose.
-    pub fn near(&self, pose: &Pose, point: &Vector3<f64>) -> Near {
+    /// Its pose at a time [s], driven if there is a leg, and its growth.
+    pub fn stance(&self, time: f64, leg: Option<&Leg>) -> Stance {
+        Stance { pose: self.at(time, leg), growth: self.trajectory.growth(time) }
+    }
+
+    /// The distance of a point [m] from where it is free of the thing, and the direction there.
+    pub fn near(&self, Stance { pose, growth }: &Stance, point: &Vector3<f64>) -> Near {
         let local = pose.inverse_transform_point(&(*point).into());
-        let Near { distance, normal } = self.near_local(&local.coords);
+        let Near { distance, normal } = self.near_local(*growth, &local.coords);
         Near { distance, normal: pose.rotation * normal }
     }
 
-    /// [`near`](Self::near) in the frame of the thing.
-    pub fn near_local(&self, point: &Vector3<f64>) -> Near {
+    /// [`near`](Self::near) in the frame of the thing, grown by a distance [m].
+    pub fn near_local(&self, growth: f64, point: &Vector3<f64>) -> Near {
         let Near { distance, normal } = self.shape.near(point);
-        let sign = if self.inside { -1.0 } else { 1.0 };
-        Near { distance: sign * distance, normal: normal * sign }
+        let sign = self.sign();
+        Near { distance: sign * (distance - growth), normal: normal * sign }
+    }
+
+    /// −1 of a thing that bodies are inside of, else 1.
+    fn sign(&self) -> f64 {
+        if self.inside { -1.0 } else { 1.0 }
     }
 
     /// Whether its jaws hold all that touches them at an angle [rad] between them.
@@ -134,14 +144,17 @@ impl Rigid {
             let reach = jaw.place.translation.vector.norm() + self.shape.reach();
             (jaw.part * (open - closed)).abs() * reach
         });
-        2.0 * (travel(self, &[from, to]) + opened) / (MOST_PARTS * self.shape.thinnest()) * step
+        2.0 * (travel(self, &[from, to].map(Stance::at)) + opened) / (MOST_PARTS * self.shape.thinnest())
+            * step
     }
 }
 
-/// The largest way [m] of a point of a thing from one pose to another.
-fn travel(rigid: &Rigid, [from, to]: &[Pose; 2]) -> f64 {
-    let turned = from.rotation.angle_to(&to.rotation) * rigid.shape.reach();
-    (to.translation.vector - from.translation.vector).norm() + turned
+/// The largest way [m] of a point of the surface of a thing from one stance to another.
+fn travel(rigid: &Rigid, [before, after]: &[Stance; 2]) -> f64 {
+    let (from, to) = (&before.pose, &after.pose);
+    let reach = rigid.shape.reach() + before.growth.max(after.growth).max(0.0);
+    let turned = from.rotation.angle_to(&to.rotation) * reach;
+    (to.translation.vector - from.translation.vector).norm() + turned + (after.growth - before.growth).abs()
 }
 
 /// How bodies touch rigid things.
@@ -164,7 +177,7 @@ impl Touch {
         predicted: Vector<f64>,
         mobility: Vector<f64>,
     ) -> Option<Vector<f64>> {
-        let passage = Passage::new(rigid, times.map(|time| rigid.at(time, None)));
+        let passage = Passage::new(rigid, times.map(|time| rigid.stance(time, None)));
         let (now, predicted, mobility) = (now.into(), predicted.into(), mobility.into());
         let Near { distance, normal } = passage.meet(rigid, self.offset, &now, &predicted);
         let gap = distance - self.offset;
@@ -210,6 +223,8 @@ impl Touch {
 pub struct Passage {
     /// Its poses before and after.
     pub(crate) poses: [Pose; 2],
+    /// Its growth [m] before and after.
+    growth: [f64; 2],
     /// How its frame is turned after.
     pub(crate) turn: Matrix3<f64>,
     /// The motion from the pose before to that after.
@@ -221,12 +236,14 @@ pub struct Passage {
 }
 
 impl Passage {
-    /// In the step from one pose to another.
-    pub fn new(rigid: &Rigid, poses: [Pose; 2]) -> Self {
+    /// In the step from one stance to another.
+    pub fn new(rigid: &Rigid, stances: [Stance; 2]) -> Self {
+        let (poses, growth) = (stances.map(|own| own.pose), stances.map(|own| own.growth));
         let [before, after] = poses;
         let turn = after.rotation.to_rotation_matrix().into_inner();
-        let half_thinnest = 0.5 * rigid.shape.thinnest();
-        Self { poses, turn, motion: after * before.inverse(), travel: travel(rigid, &poses), half_thinnest }
+        let half_thinnest = 0.5 * (rigid.shape.thinnest() + growth[0].min(growth[1]));
+        let travel = travel(rigid, &stances);
+        Self { poses, growth, turn, motion: after * before.inverse(), travel, half_thinnest }
     }
 
     /// How far a point [m] is from the thing at the end of the step, and the direction away from it.
@@ -237,13 +254,13 @@ impl Passage {
 
     /// How far a point [m] is from the thing at the beginning of the step.
     pub fn distance_before(&self, rigid: &Rigid, point: &Vector3<f64>) -> f64 {
-        rigid.near(&self.poses[0], point).distance
+        rigid.near(&self.before(), point).distance
     }
 
     /// Where a point [m] at the end of the step is in the frame of the thing, and the direction away from it there.
     pub fn within(&self, rigid: &Rigid, point: &Vector3<f64>) -> (Vector3<f64>, Near) {
         let local = self.turn.tr_mul(&(point - self.poses[1].translation.vector));
-        (local, rigid.near_local(&local))
+        (local, rigid.near_local(self.growth[1], &local))
     }
 
     /// Where a point [m] in the frame of the thing is at the end of the step.
@@ -265,19 +282,20 @@ impl Passage {
         let least = self.half_thinnest.max(way / MOST_PARTS);
         let mut share = 0.0;
         while share < 1.0 {
-            let pose = self.at(share);
+            let stance = self.at(share);
             let place = now.lerp(predicted, share);
-            let Near { distance, normal: outward } = rigid.near(&pose, &place);
+            let Near { distance, normal: outward } = rigid.near(&stance, &place);
             let gap = distance - offset;
             if gap <= MEETS * self.half_thinnest {
                 let left = if share == 0.0 { LEFT * gap.min(0.0) } else { 0.0 };
-                let onward = self.poses[1] * pose.inverse();
+                let onward = self.poses[1] * stance.pose.inverse();
                 let normal = onward.rotation * outward;
                 if way <= self.half_thinnest && normal.dot(&end.normal) > ALIKE {
                     return Near { distance: end.distance - left, normal: end.normal };
                 }
                 let on_surface = onward * Point3::from(place - outward * distance);
-                let distance = normal.dot(&(predicted - on_surface.coords));
+                let risen = rigid.sign() * (self.growth[1] - stance.growth);
+                let distance = normal.dot(&(predicted - on_surface.coords)) - risen;
                 if distance < offset {
                     return Near { distance: distance - left, normal };
                 }
@@ -297,26 +315,30 @@ impl Passage {
         self.travel
     }
 
-    /// The largest way [m] of a point of the thing from a pose to that at the end of the step; infinite of a half-space that turns.
-    pub fn travel_from(&self, rigid: &Rigid, pose: &Pose) -> f64 {
-        let after = &self.poses[1];
+    /// The largest way [m] of a point of the thing from a stance to that at the end of the step; infinite of a half-space that turns.
+    pub fn travel_from(&self, rigid: &Rigid, stance: &Stance) -> f64 {
+        let after = self.stance();
         let is_endless = matches!(rigid.shape, Shape::HalfSpace);
-        if is_endless && pose.rotation != after.rotation {
+        if is_endless && stance.pose.rotation != after.pose.rotation {
             f64::INFINITY
         } else {
-            travel(rigid, &[*pose, *after])
+            travel(rigid, &[*stance, after])
         }
     }
 
-    /// The pose at the end of the step.
-    pub fn pose(&self) -> Pose {
-        self.poses[1]
+    /// Where and how large it is at the end of the step.
+    pub fn stance(&self) -> Stance {
+        Stance { pose: self.poses[1], growth: self.growth[1] }
     }
 
-    /// The pose after a share of the step.
-    fn at(&self, share: f64) -> Pose {
-        let [from, to] = &self.poses;
-        between([from, to], share)
+    /// The same at its beginning.
+    fn before(&self) -> Stance {
+        Stance { pose: self.poses[0], growth: self.growth[0] }
+    }
+
+    /// The same after a share of it.
+    fn at(&self, share: f64) -> Stance {
+        Stance::between([&self.before(), &self.stance()], share)
     }
 }
 

@@ -12,6 +12,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{Translation3, Vector3};
+use pliant_contact::pose::Stance;
 use pliant_contact::touch::{Contacts, Rigid};
 use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
@@ -646,8 +647,11 @@ impl<R: Scalar> CentralDifference<R> {
             let leg = state.leg(number);
             let lag = lags.iter().find(|lag| lag.rigid() == number);
             let ways = lag.map_or([Vector3::zeros(); 2], |lag| [lag.now(), lag.next()]);
-            let pose = |k: usize| Translation3::from(ways[k]) * rigid.at(times[k], leg);
-            Posture { poses: [pose(0), pose(1)], opening: rigid.posture(times[1], leg).1 }
+            let stance = |k: usize| {
+                let Stance { pose, growth } = rigid.stance(times[k], leg);
+                Stance { pose: Translation3::from(ways[k]) * pose, growth }
+            };
+            Posture { stances: [stance(0), stance(1)], opening: rigid.posture(times[1], leg).1 }
         };
         touching.find(postures, &now, free, &mut gripped);
         touching.nodal_forces().for_each(|(node, force)| self.applied.add(node, force));

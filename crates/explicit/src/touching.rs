@@ -14,7 +14,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use pliant_contact::lag::Lag;
 use pliant_contact::pairs::Pairs;
-use pliant_contact::pose::{Leg, Pose};
+use pliant_contact::pose::{Leg, Stance};
 use pliant_contact::shape::Near;
 use pliant_contact::touch::{
     BAND, Contact, Contacts, FOUND, Gripped, LIFTED, LIFTS, LOOKED, OFF, PASSES, Passage, ROUNDS, Rigid, With,
@@ -34,8 +34,8 @@ const INWARD: f64 = 0.7;
 
 /// How a rigid thing is in a step.
 pub(crate) struct Posture {
-    /// Its poses before and after.
-    pub poses: [Pose; 2],
+    /// Where and how large it is before and after.
+    pub stances: [Stance; 2],
     /// The angle [rad] between its jaws after.
     pub opening: f64,
 }
@@ -193,7 +193,8 @@ impl<R: Scalar> Touching<R> {
             if let Own::Rigid(own) = own {
                 let rigid = &self.contacts.rigids[own.rigid];
                 let posture = postures(own.rigid, rigid);
-                (own.passage, own.grips) = (Passage::new(rigid, posture.poses), rigid.grips(posture.opening));
+                (own.passage, own.grips) =
+                    (Passage::new(rigid, posture.stances), rigid.grips(posture.opening));
             }
         }
         gripped.retain(|held| self.holder(held).is_some_and(|(_, own, _)| own.grips));

@@ -28,9 +28,11 @@ pub fn processor_only(contacts: &Contacts) -> Option<String> {
     let gripping =
         contacts.rigids.iter().find(grips).map(|rigid| format!("the ideal grip of `{}`", rigid.tool()));
     let limited = contacts.rigids.iter().find(|rigid| rigid.trajectory.limit().is_some());
+    let growing = contacts.rigids.iter().find(|rigid| rigid.trajectory.grows());
     let revolved = contacts.rigids.iter().find(|rigid| matches!(rigid.shape, Shape::Revolved(_)));
     gripping
         .or_else(|| limited.map(|rigid| format!("the force limit of `{}`", rigid.tool())))
+        .or_else(|| growing.map(|rigid| format!("the growth of `{}`", rigid.tool())))
         .or_else(|| revolved.map(|rigid| format!("the outline of `{}`", rigid.tool())))
 }
 
@@ -43,7 +45,7 @@ pub(crate) fn add_passages(
 ) {
     for (index, rigid) in (0..).zip(&contacts.rigids) {
         let leg = driven.iter().find(|(own, _)| *own == index).map(|(_, leg)| leg);
-        numbers.extend(Passage::new(rigid, times.map(|time| rigid.at(time, leg))).numbers());
+        numbers.extend(Passage::new(rigid, times.map(|time| rigid.stance(time, leg))).numbers());
     }
 }
 

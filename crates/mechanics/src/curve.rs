@@ -72,6 +72,18 @@ impl Curve {
         }
     }
 
+    /// The least and the largest factor of all times.
+    pub fn range(&self) -> [f64; 2] {
+        match &self.shape {
+            Shape::Table(points) => {
+                points.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], point| {
+                    [low.min(point.1), high.max(point.1)]
+                })
+            }
+            _ => [0.0, 1.0],
+        }
+    }
+
     /// True if the factor never changes.
     pub fn is_constant(&self) -> bool {
         match &self.shape {

@@ -125,8 +125,9 @@ impl Live {
         let moved = self.shown.thing_of(point).and_then(|(part, number)| {
             let rigid = self.world.participants[part].built.contacts.as_ref()?.rigids.get(number)?;
             let now = self.simulation.instants().nth(part)?;
-            let motion = now.pose(number, rigid) * rigid.at(0.0, None).inverse();
-            Some((motion * Point3::from(*start)).coords)
+            let (from, to) = (rigid.stance(0.0, None), now.stance(number, rigid));
+            let grown = start + self.shown.outward_of(point) * (to.growth - from.growth);
+            Some((to.pose * from.pose.inverse() * Point3::from(grown)).coords)
         });
         moved.unwrap_or(*start)
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::Translation3;
 use pliant_contact::lag::Lag;
-use pliant_contact::pose::{Leg, Pose};
+use pliant_contact::pose::{Leg, Pose, Stance};
 use pliant_contact::touch::Rigid;
 use pliant_explicit::NodeContact;
 use pliant_explicit::recover::CellFields;
@@ -76,6 +76,11 @@ pub trait Instant {
     fn pose(&self, number: usize, rigid: &Rigid) -> Pose {
         let lag = self.lag(number).map(Lag::now).unwrap_or_default();
         Translation3::from(lag) * rigid.at(self.time(), self.leg(number))
+    }
+
+    /// Where and how large a rigid thing is, of a jaw its own.
+    fn stance(&self, number: usize, rigid: &Rigid) -> Stance {
+        Stance { pose: self.pose(number, rigid), growth: rigid.trajectory.growth(self.time()) }
     }
 
     /// Energies [J].

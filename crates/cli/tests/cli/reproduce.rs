@@ -27,6 +27,7 @@ fn the_list_names_every_case_in_a_line() {
         "fig-9.2",
         "fig-9.3",
         "fig-9.4",
+        "fig-9.5",
     ] {
         assert_eq!(told.out.lines().filter(|line| line.split(' ').next() == Some(id)).count(), 1, "{id}");
     }

@@ -49,6 +49,8 @@ pub(super) const ADVANCES: usize = 10_000;
 pub struct Query {
     /// The distance ξ [m] below which the primitives are in each other.
     pub offset: f64,
+    /// By how much [m] that distance grows over the motion.
+    pub rise: f64,
     /// Part of the gap at the start that is to be kept.
     pub keep: f64,
     /// How far the motion goes at most, 1 for all of it.
@@ -58,9 +60,9 @@ pub struct Query {
 /// The part of a motion, `most` or less, on the way to which at least half of `keep` of the gap at the start is left everywhere. Where it is less
 /// than `most`, no more than `keep` is left at its end. Zero where there is no gap at the start.
 pub fn allowed(kind: Kind, from: &[Vector3<f64>; 4], motion: &[Vector3<f64>; 4], query: Query) -> f64 {
-    let Query { offset, keep, most } = query;
+    let Query { offset, rise, keep, most } = query;
     let mean = motion.iter().sum::<Vector3<f64>>() / 4.0;
-    let way = kind.reach(motion.map(|p| (p - mean).norm()));
+    let way = kind.reach(motion.map(|p| (p - mean).norm())) + rise.max(0.0);
     let start = kind.nearest(from).distance - offset;
     if start <= 0.0 {
         return 0.0;
@@ -75,7 +77,7 @@ pub fn allowed(kind: Kind, from: &[Vector3<f64>; 4], motion: &[Vector3<f64>; 4],
             return most;
         }
         let points = std::array::from_fn(|i| from[i] + (motion[i] - mean) * part);
-        gap = kind.nearest(&points).distance - offset;
+        gap = kind.nearest(&points).distance - offset - rise * part;
         if gap <= keep * start {
             break;
         }
@@ -105,7 +107,7 @@ mod tests {
             let kind = if case["kind"] == "pt" { Kind::PointTriangle } else { Kind::EdgeEdge };
             let (from, to) = (four(&case["x0"]), four(&case["x1"]));
             let motion: [Vector3<f64>; 4] = std::array::from_fn(|i| to[i] - from[i]);
-            let found = allowed(kind, &from, &motion, Query { offset: 0.0, keep: 0.1, most: 1.0 });
+            let found = allowed(kind, &from, &motion, Query { offset: 0.0, rise: 0.0, keep: 0.1, most: 1.0 });
             if let Some(exact) = case["toi"].as_f64().filter(|_| case["hit"] == true) {
                 assert!(found <= exact, "{} {}: {found} > {exact}", case["id"], case["category"]);
                 let first = kind.nearest(&from).distance;
@@ -128,10 +130,13 @@ mod tests {
             let motion: [Vector3<f64>; 4] = std::array::from_fn(|_| 2.0 * Vector3::from(random.vector()));
             let start = kind.nearest(&from).distance;
             let offset = start * random.part();
-            let part = allowed(kind, &from, &motion, Query { offset, keep: 0.1, most: 1.0 });
+            // Every third distance to keep grows or shrinks on the way.
+            let rise = if number % 3 == 0 { start * (2.0 * random.part() - 1.0) } else { 0.0 };
+            let part = allowed(kind, &from, &motion, Query { offset, rise, keep: 0.1, most: 1.0 });
             for step in 0..=20 {
                 let at = part * f64::from(step) / 20.0;
-                let gap = kind.nearest(&std::array::from_fn(|i| from[i] + motion[i] * at)).distance - offset;
+                let distance = kind.nearest(&std::array::from_fn(|i| from[i] + motion[i] * at)).distance;
+                let gap = distance - offset - rise * at;
                 assert!(gap > 0.0499 * (start - offset), "{number}: {gap}");
             }
         }
@@ -143,7 +148,12 @@ mod tests {
         let sheet = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]].map(Vector3::from);
         let from = [Vector3::new(0.1, 0.0, 1e-5), sheet[0], sheet[1], sheet[2]];
         let motion = [Vector3::new(0.0, 0.0, -10.0), Vector3::zeros(), Vector3::zeros(), Vector3::zeros()];
-        let part = allowed(Kind::PointTriangle, &from, &motion, Query { offset: 0.0, keep: 0.1, most: 1.0 });
+        let part = allowed(
+            Kind::PointTriangle,
+            &from,
+            &motion,
+            Query { offset: 0.0, rise: 0.0, keep: 0.1, most: 1.0 },
+        );
         assert!(part > 0.0 && part < 1e-6, "{part}");
     }
 }

@@ -36,8 +36,10 @@ struct Candidate {
 /// How a contact acts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Action {
-    /// The distance ξ [m] that surfaces keep.
-    pub offset: f64,
+    /// The distance [m] that surfaces keep, with the radius of a rigid thing that is a point or an edge.
+    pub kept: f64,
+    /// How far [m] the surface of a rigid thing is outside of that of its shape now.
+    pub growth: f64,
     pub law: Barrier,
     /// κ [Pa].
     pub stiffness: f64,
@@ -50,14 +52,24 @@ pub(super) struct Action {
 }
 
 impl Action {
+    /// The distance ξ [m] below which primitives are in each other.
+    pub fn offset(&self) -> f64 {
+        self.kept + self.growth
+    }
+
     /// ξ + ĝ [m].
     pub fn reach(&self) -> f64 {
-        self.offset + self.law.distance
+        self.offset() + self.law.distance
+    }
+
+    /// The same for distances from the wall as it is now, its growth taken off already.
+    pub fn of_wall(&self) -> Self {
+        Self { growth: 0.0, ..*self }
     }
 
     /// What a distance below the reach makes of a pair; `None` if it is none.
     pub fn row(&self, stencil: Stencil, area: f64, distance: f64, normal: Vector3<f64>) -> Option<Row> {
-        let gap = distance - self.offset;
+        let gap = distance - self.offset();
         (gap < self.law.distance).then(|| Row {
             stencil,
             normal,
@@ -103,6 +115,9 @@ pub(super) struct Group {
     pub sides: Vec<BarrierSide>,
     /// The rigid thing whose distance nodes of the first keep, by its number.
     pub wall: Option<u32>,
+    /// The rigid thing of the second, if there is one, by its number; and by how much [m] its surface rises in the motion that is set.
+    pub thing: Option<u32>,
+    pub rise: f64,
     pub action: Action,
     /// Of one surface: nodes with triangles, and edges, that are too near at rest to touch.
     apart: [Apart; 2],
@@ -125,7 +140,7 @@ impl Group {
     pub fn new(
         number: u32,
         sides: Vec<BarrierSide>,
-        wall: Option<u32>,
+        [wall, thing]: [Option<u32>; 2],
         action: Action,
         rest: &[Vector3<f64>],
     ) -> Self {
@@ -136,6 +151,8 @@ impl Group {
             number,
             sides,
             wall,
+            thing,
+            rise: 0.0,
             action,
             apart: Default::default(),
             candidates: Vec::new(),
@@ -188,7 +205,7 @@ impl Group {
         }
         self.moved.fill(0.0);
         self.nearer = 0.0;
-        self.find(place, self.action.reach());
+        self.find(place, self.action.reach() + self.rise.max(0.0));
     }
 
     /// Lists what is within a distance [m] and the skins of both.
@@ -448,16 +465,16 @@ impl Group {
         for &node in sides.iter().flat_map(|side| &side.points) {
             way[node as usize] = (motion[node as usize] - common).norm();
         }
-        let widest = self.largest_of(&self.way) * most / (1.0 - keep);
-        for one in self.nearer_than(self.action.offset + widest) {
-            let gap = one.distance - self.moved(one) - self.action.offset;
-            let way = one.kind.reach(one.nodes.map(|node| self.way[node as usize]));
+        let (offset, rise) = (self.action.offset(), self.rise);
+        let widest = (self.largest_of(&self.way) + rise.max(0.0)) * most / (1.0 - keep);
+        for one in self.nearer_than(offset + widest) {
+            let gap = one.distance - self.moved(one) - offset;
+            let way = one.kind.reach(one.nodes.map(|node| self.way[node as usize])) + rise.max(0.0);
             if gap * (1.0 - keep) > way * most {
                 continue;
             }
             let [points, ways] = [place, motion].map(|of| one.nodes.map(|node| of[node as usize]));
-            most =
-                most.min(allowed(one.kind, &points, &ways, Query { offset: self.action.offset, keep, most }));
+            most = most.min(allowed(one.kind, &points, &ways, Query { offset, rise, keep, most }));
         }
         most
     }
@@ -476,7 +493,7 @@ impl Group {
     pub fn too_close(&self, place: &[Vector3<f64>], mut found: impl FnMut([u32; 4], f64)) {
         for one in &self.candidates {
             let gap =
-                one.kind.nearest(&one.nodes.map(|node| place[node as usize])).distance - self.action.offset;
+                one.kind.nearest(&one.nodes.map(|node| place[node as usize])).distance - self.action.offset();
             if gap <= 0.0 {
                 found(one.nodes, gap);
             }

@@ -1,7 +1,7 @@
 //! The contacts of a model by a barrier: their energy, forces and stiffness at a state, friction over a step, and how far a step may go.
 //!
 //! A step goes from one time to another. How far rigid things have gone in it is its *share*, from 0 to 1: on straight ways and shortest arcs
-//! between their poses. Friction of a step is that of the state where [`Barriers::hold`] was called last, with directions and normal forces
+//! between their poses, and their growth in proportion. Friction of a step is that of the state where [`Barriers::hold`] was called last, with directions and normal forces
 //! as they were there.
 
 use std::collections::BTreeMap;
@@ -18,7 +18,7 @@ use super::features::Features;
 use super::law::{Barrier, Slip};
 use super::rows::{Held, Row, Stencil};
 use super::surfaces::BarrierSide;
-use crate::pose::{Leg, Pose, between};
+use crate::pose::{Leg, Stance};
 use crate::shape::Near;
 use crate::touch::{Contacts, Passage, With};
 
@@ -62,10 +62,10 @@ pub struct Barriers {
     nodes: usize,
     /// Nodes of rigid things, after those: their thing and their place [m] in its frame.
     rigid_nodes: Vec<(u32, Vector3<f64>)>,
-    /// Poses of rigid things at the start and the end of the step, and now.
-    poses: [Vec<Pose>; 3],
-    /// Poses when pairs were listed.
-    listed_poses: Vec<Pose>,
+    /// Rigid things at the start and the end of the step, and now.
+    stances: [Vec<Stance>; 3],
+    /// Rigid things when pairs were listed.
+    listed_stances: Vec<Stance>,
     /// Places [m] of all nodes now, at the start of the step, and when pairs were listed; motions [m].
     place: Vec<Vector3<f64>>,
     start: Vec<Vector3<f64>>,
@@ -97,42 +97,45 @@ impl Barriers {
                 (features, first)
             })
             .collect();
-        let poses: Vec<Pose> = contacts.rigids.iter().map(|rigid| rigid.at(0.0, None)).collect();
+        let stances: Vec<Stance> = contacts.rigids.iter().map(|rigid| rigid.stance(0.0, None)).collect();
         places.extend(
-            rigid_nodes.iter().map(|(thing, x)| (poses[*thing as usize] * nalgebra::Point3::from(*x)).coords),
+            rigid_nodes
+                .iter()
+                .map(|(thing, x)| (stances[*thing as usize].pose * nalgebra::Point3::from(*x)).coords),
         );
         let at = |node: u32| places[node as usize];
         let mut groups = Vec::new();
         for ((contact, settings), number) in contacts.contacts.iter().zip(settings).zip(0..) {
             let own = BarrierSide::of_body(&contact.surface, at);
             let mut offset = contact.touch.offset;
-            let (sides, wall) = match &contact.with {
-                With::Itself => (vec![own], None),
-                With::Body(other) => (vec![own, BarrierSide::of_body(other, at)], None),
+            let (sides, wall, thing) = match &contact.with {
+                With::Itself => (vec![own], None, None),
+                With::Body(other) => (vec![own, BarrierSide::of_body(other, at)], None, None),
                 With::Rigid(rigid) => {
                     let (features, first) = &features[*rigid];
                     offset += features.offset;
                     let wall = (!features.is_all).then_some(*rigid as u32);
-                    (vec![own, BarrierSide::of_rigid(features, *first)], wall)
+                    (vec![own, BarrierSide::of_rigid(features, *first)], wall, Some(*rigid as u32))
                 }
             };
             let action = Action {
-                offset,
+                kept: offset,
+                growth: 0.0,
                 law: Barrier { distance: settings.distance },
                 stiffness: settings.stiffness,
                 friction: contact.touch.friction,
                 creep_speed: settings.creep_speed,
                 slip: Slip { creep: 0.0 },
             };
-            groups.push(Group::new(number, sides, wall, action, &places));
+            groups.push(Group::new(number, sides, [wall, thing], action, &places));
         }
         Self {
             wall_distances: groups.iter().map(|group| vec![0.0; group.sides[0].points.len()]).collect(),
             groups,
             nodes,
             rigid_nodes,
-            listed_poses: poses.clone(),
-            poses: [poses.clone(), poses.clone(), poses],
+            listed_stances: stances.clone(),
+            stances: [stances.clone(), stances.clone(), stances],
             start: places.clone(),
             listed: places.clone(),
             motion: vec![Vector3::zeros(); places.len()],
@@ -176,8 +179,8 @@ impl Barriers {
     pub fn begin(&mut self, position: &[Vector3<f64>], motion: &[f64], times: [f64; 2]) {
         let [from, to] = times;
         for (number, rigid) in self.contacts.rigids.iter().enumerate() {
-            for (pose, time) in self.poses.iter_mut().zip([from, to, from]) {
-                pose[number] = rigid.at(time, self.legs.get(&(number as u32)));
+            for (stance, time) in self.stances.iter_mut().zip([from, to, from]) {
+                stance[number] = rigid.stance(time, self.legs.get(&(number as u32)));
             }
         }
         for group in &mut self.groups {
@@ -195,12 +198,12 @@ impl Barriers {
 
     /// Puts nodes at places [m], and rigid things where they are at a share of the step.
     fn put(&mut self, position: &[Vector3<f64>], share: f64) {
-        let [from, to, now] = &mut self.poses;
+        let [from, to, now] = &mut self.stances;
         let mut is_current = self.is_current && self.place[..self.nodes] == *position;
         for ((now, from), to) in now.iter_mut().zip(from).zip(to) {
-            let pose = if share == 1.0 { *to } else { between([from, to], share) };
-            is_current &= *now == pose;
-            *now = pose;
+            let stance = if share == 1.0 { *to } else { Stance::between([from, to], share) };
+            is_current &= *now == stance;
+            *now = stance;
         }
         self.is_current = is_current;
         if is_current {
@@ -208,7 +211,10 @@ impl Barriers {
         }
         self.place[..self.nodes].copy_from_slice(position);
         for (place, (thing, x)) in self.place[self.nodes..].iter_mut().zip(&self.rigid_nodes) {
-            *place = (now[*thing as usize] * nalgebra::Point3::from(*x)).coords;
+            *place = (now[*thing as usize].pose * nalgebra::Point3::from(*x)).coords;
+        }
+        for group in &mut self.groups {
+            group.action.growth = group.thing.map_or(0.0, |thing| now[thing as usize].growth);
         }
     }
 
@@ -217,11 +223,14 @@ impl Barriers {
         for (own, way) in self.motion.iter_mut().zip(motion.chunks_exact(6)) {
             *own = Vector3::new(way[0], way[1], way[2]) * part;
         }
-        let [from, to, _] = &self.poses;
+        let [from, to, now] = &self.stances;
+        let then = |thing: u32| Stance::between([&from[thing as usize], &to[thing as usize]], share);
         for (at, (thing, x)) in self.rigid_nodes.iter().enumerate() {
-            let pose = between([&from[*thing as usize], &to[*thing as usize]], share);
-            let target = (pose * nalgebra::Point3::from(*x)).coords;
+            let target = (then(*thing).pose * nalgebra::Point3::from(*x)).coords;
             self.motion[self.nodes + at] = target - self.place[self.nodes + at];
+        }
+        for group in &mut self.groups {
+            group.rise = group.thing.map_or(0.0, |thing| then(thing).growth - now[thing as usize].growth);
         }
     }
 
@@ -229,22 +238,22 @@ impl Barriers {
     fn list(&mut self, motion: &[f64], share: f64) {
         self.set_motion(motion, 1.0, if share < 1.0 { 1.0 } else { share });
         self.listed.copy_from_slice(&self.place);
-        self.listed_poses.clone_from(&self.poses[2]);
-        let Self { groups, place, motion, wall_distances, contacts, poses, .. } = self;
+        self.listed_stances.clone_from(&self.stances[2]);
+        let Self { groups, place, motion, wall_distances, contacts, stances, .. } = self;
         for (group, distances) in groups.iter_mut().zip(wall_distances) {
             group.list(place, motion);
             let Some(wall) = group.wall else { continue };
-            let (rigid, pose) = (&contacts.rigids[wall as usize], &poses[2][wall as usize]);
+            let (rigid, stance) = (&contacts.rigids[wall as usize], &stances[2][wall as usize]);
             for (distance, &node) in distances.iter_mut().zip(&group.sides[0].points) {
-                *distance = rigid.near(pose, &place[node as usize]).distance;
+                *distance = rigid.near(stance, &place[node as usize]).distance;
             }
         }
     }
 
     /// How far [m] a rigid thing has gone since pairs were listed.
     fn travel(&self, wall: u32) -> f64 {
-        let (rigid, now) = (&self.contacts.rigids[wall as usize], self.poses[2][wall as usize]);
-        let then = self.listed_poses[wall as usize];
+        let (rigid, now) = (&self.contacts.rigids[wall as usize], self.stances[2][wall as usize]);
+        let then = self.listed_stances[wall as usize];
         if then == now { 0.0 } else { Passage::new(rigid, [then, now]).travel_from(rigid, &then) }
     }
 
@@ -272,8 +281,9 @@ impl Barriers {
     fn act_at_wall(&self, number: usize, rows: &mut Vec<Row>) -> bool {
         let group = &self.groups[number];
         let Some(wall) = group.wall else { return true };
-        let (rigid, pose) = (&self.contacts.rigids[wall as usize], &self.poses[2][wall as usize]);
-        let (travel, reach) = (self.travel(wall), group.action.reach());
+        let (rigid, stance) = (&self.contacts.rigids[wall as usize], &self.stances[2][wall as usize]);
+        let (travel, action) = (self.travel(wall), group.action.of_wall());
+        let reach = action.reach();
         let side = &group.sides[0];
         let points = side.points.iter().zip(&side.point_areas).zip(&self.wall_distances[number]);
         for ((&node, &area), then) in points {
@@ -282,7 +292,7 @@ impl Barriers {
             if then - way - travel >= reach {
                 continue;
             }
-            let Near { distance, normal } = rigid.near(pose, place);
+            let Near { distance, normal } = rigid.near(stance, place);
             let stencil = Stencil {
                 nodes: [node; 4],
                 coefficients: [1.0, 0.0, 0.0, 0.0],
@@ -291,7 +301,7 @@ impl Barriers {
                 split: 1,
                 in_order: true,
             };
-            let Some(row) = group.action.row(stencil, area, distance, normal) else { continue };
+            let Some(row) = action.row(stencil, area, distance, normal) else { continue };
             if row.gap <= 0.0 || row.gap.is_nan() {
                 return false;
             }
@@ -333,13 +343,13 @@ impl Barriers {
 
     /// Finds the slip of all that friction holds.
     fn slide(&mut self) {
-        let Self { groups, held, place, poses, .. } = self;
-        let [from, _, now] = poses;
+        let Self { groups, held, place, stances, .. } = self;
+        let [from, _, now] = stances;
         let mut energy = 0.0;
         for held in held.iter_mut() {
             let start = match held.wall {
                 Some(wall) => {
-                    let carried = now[wall as usize] * from[wall as usize].inverse();
+                    let carried = now[wall as usize].pose * from[wall as usize].pose.inverse();
                     (carried * nalgebra::Point3::from(held.start)).coords
                 }
                 None => held.start,
@@ -423,34 +433,40 @@ impl Barriers {
     /// rigid things among its nodes have yet to go in the step from a share on; of one node at a wall the way from the wall. That of barriers
     /// is κ A b″ ∇d ∇dᵀ and the positive part of κ A b′ ∂²d/∂x²; that of friction is exact.
     pub fn stiffness(&self, share: f64, mut add: impl FnMut(&Stencil, &Matrix12, [Vector3<f64>; 4])) {
-        let [from, to, now] = &self.poses;
+        let [from, to, now] = &self.stances;
         let goes_on = share < 1.0 && from != to;
-        let left = |stencil: &Stencil, wall: Option<u32>| {
+        let left = |stencil: &Stencil, wall: Option<u32>, outward: Vector3<f64>| {
             let mut ways = [Vector3::zeros(); 4];
             if !goes_on {
                 return ways;
             }
+            let rises = |thing: u32| to[thing as usize].growth - now[thing as usize].growth;
             if let Some(wall) = wall.filter(|_| stencil.count == 1) {
                 let place = self.place[stencil.nodes[0] as usize];
-                let carried = to[wall as usize] * now[wall as usize].inverse();
-                ways[0] = place - (carried * nalgebra::Point3::from(place)).coords;
+                let carried = to[wall as usize].pose * now[wall as usize].pose.inverse();
+                ways[0] = place - (carried * nalgebra::Point3::from(place)).coords - outward * rises(wall);
                 return ways;
             }
+            // What is left of the rise counts as a way of all nodes of the thing, along the normal by which their distance falls.
+            let own = |node: u32| self.rigid_node(node);
+            let sum: f64 = stencil.parts().filter_map(|(node, c)| own(node).map(|_| c)).sum();
             for (way, (node, _)) in ways.iter_mut().zip(stencil.parts()) {
-                if let Some((thing, x)) = self.rigid_node(node) {
-                    let target = (to[*thing as usize] * nalgebra::Point3::from(*x)).coords;
-                    *way = target - self.place[node as usize];
+                if let Some((thing, x)) = own(node) {
+                    let target = (to[*thing as usize].pose * nalgebra::Point3::from(*x)).coords;
+                    *way = target - self.place[node as usize] - outward * (rises(*thing) * sum);
                 }
             }
             ways
         };
         for row in &self.rows {
             let wall = self.groups[row.stencil.contact as usize].wall;
-            add(&row.stencil, &self.stiffness_of(row), left(&row.stencil, wall));
+            let is_inside = wall.is_some_and(|wall| self.contacts.rigids[wall as usize].inside);
+            let outward = if is_inside { -row.normal } else { row.normal };
+            add(&row.stencil, &self.stiffness_of(row), left(&row.stencil, wall, outward));
         }
         for held in &self.held {
             let across = block(&held.stencil.coefficients, &held.stiffness());
-            add(&held.stencil, &across, left(&held.stencil, held.wall));
+            add(&held.stencil, &across, left(&held.stencil, held.wall, Vector3::zeros()));
         }
     }
 
@@ -469,7 +485,7 @@ impl Barriers {
             return block(&coefficients, &(along + curved.unwrap_or_default() * row.force));
         };
         let points = nodes.map(|node| self.place[node as usize]);
-        let distance = row.gap + group.action.offset;
+        let distance = row.gap + group.action.offset();
         let near = Nearest { distance, coefficients, normal: row.normal, region };
         match &row.mollified {
             Some(with) => of_parallel(&points, &near, row.stiffness, with),
@@ -479,13 +495,13 @@ impl Barriers {
 
     /// The positive part [1/m] of −∂²d/∂x² of a node at a wall, by differences over a part of the distance [m] of its barrier.
     fn curved_wall(&self, wall: u32, node: u32, distance: f64) -> Matrix3<f64> {
-        let (rigid, pose) = (&self.contacts.rigids[wall as usize], &self.poses[2][wall as usize]);
+        let (rigid, stance) = (&self.contacts.rigids[wall as usize], &self.stances[2][wall as usize]);
         let h = DIFFERENCE * distance;
         let normals = [0, 1, 2].map(|axis| {
             [h, -h].map(|by| {
                 let mut place = self.place[node as usize];
                 place[axis] += by;
-                rigid.near(pose, &place).normal
+                rigid.near(stance, &place).normal
             })
         });
         of_wall(normals, h)
@@ -538,8 +554,9 @@ impl Barriers {
             part = within(self);
         }
         part = part.min(most);
-        let [from, to, _] = &self.poses;
-        let turns = share < 1.0 && from.iter().zip(to).any(|(from, to)| from.rotation != to.rotation);
+        let [from, to, _] = &self.stances;
+        let turns =
+            share < 1.0 && from.iter().zip(to).any(|(from, to)| from.pose.rotation != to.pose.rotation);
         for _ in 0..TURNS {
             // Things that turn do not move on a straight way: the way to where they really come is searched.
             self.set_motion(motion, part, share + part * (1.0 - share));
@@ -568,23 +585,23 @@ impl Barriers {
     fn allowed_at_wall(&self, number: usize, wall: u32, [keep, share, part]: [f64; 3], most: f64) -> f64 {
         let group = &self.groups[number];
         let rigid = &self.contacts.rigids[wall as usize];
-        let [from, to, now] = [0, 1, 2].map(|k| self.poses[k][wall as usize]);
-        let target = between([&from, &to], share + part * (1.0 - share));
+        let [from, to, now] = [0, 1, 2].map(|k| self.stances[k][wall as usize]);
+        let target = Stance::between([&from, &to], share + part * (1.0 - share));
         let travel =
             if target == now { 0.0 } else { Passage::new(rigid, [now, target]).travel_from(rigid, &now) };
         let since = self.travel(wall);
         let mut most: f64 = most;
         for (&node, then) in group.sides[0].points.iter().zip(&self.wall_distances[number]) {
             let (place, motion) = (self.place[node as usize], self.motion[node as usize]);
-            let offset = group.action.offset;
+            let offset = group.action.kept;
             let bound = then - (place - self.listed[node as usize]).norm() - since - offset;
             let way = motion.norm() + travel;
             if bound * (1.0 - keep) > way * most {
                 continue;
             }
             let gap_at = |part: f64| {
-                let pose = if target == now { now } else { between([&now, &target], part) };
-                rigid.near(&pose, &(place + motion * part)).distance - offset
+                let stance = if target == now { now } else { Stance::between([&now, &target], part) };
+                rigid.near(&stance, &(place + motion * part)).distance - offset
             };
             // A plane that turns has no largest way: it is followed where the node is.
             let way = if way.is_finite() { way } else { motion.norm() + self.swing(wall, &target, &place) };
@@ -606,12 +623,14 @@ impl Barriers {
     }
 
     /// How far [m] a thing that turns goes at most where a node is, from its present pose to another.
-    fn swing(&self, wall: u32, target: &Pose, place: &Vector3<f64>) -> f64 {
-        let now = self.poses[2][wall as usize];
+    fn swing(&self, wall: u32, target: &Stance, place: &Vector3<f64>) -> f64 {
+        let (now, rise) = (self.stances[2][wall as usize].pose, self.stances[2][wall as usize].growth);
+        let (target, rise) = (target.pose, (target.growth - rise).abs());
         let arm = (place - now.translation.vector).norm()
             + (target.translation.vector - now.translation.vector).norm();
         (target.translation.vector - now.translation.vector).norm()
             + now.rotation.angle_to(&target.rotation) * arm
+            + rise
     }
 
     /// Whatever has no gap at places [m] and a time [s]: pairs within the distance to keep, nodes in walls, and edges through triangles. With
@@ -629,7 +648,7 @@ impl Barriers {
             group.too_close(&self.place, |at, gap| all.extend(of(group.number, &at, Some(gap))));
             if group.wall.is_some() {
                 let distances = group.sides[0].points.iter().zip(&self.wall_distances[number]);
-                let gaps = distances.map(|(&node, distance)| (node, distance - group.action.offset));
+                let gaps = distances.map(|(&node, distance)| (node, distance - group.action.kept));
                 all.extend(
                     gaps.filter(|(_, gap)| *gap <= 0.0)
                         .filter_map(|(node, gap)| of(group.number, &[node], Some(gap))),

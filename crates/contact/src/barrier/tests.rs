@@ -84,12 +84,22 @@ fn things() -> Vec<Rigid> {
     ]
 }
 
+/// Things that stay where they are and grow by a distance [m].
+fn growing(by: f64) -> Vec<Rigid> {
+    let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: 1.0 };
+    let all = things().into_iter().map(|thing| {
+        let trajectory = Trajectory::fixed(thing.at(0.0, None)).growing(by, curve.clone());
+        Rigid { trajectory, ..thing }
+    });
+    all.collect()
+}
+
 /// Forces are minus the gradient of the energy of barriers and friction together, and those of a contact between bodies add up to nothing
 /// with those on the other side.
 #[test]
 fn forces_are_gradients_and_balance() {
     let mut random = Random::new(2);
-    for thing in things() {
+    for thing in things().into_iter().chain(growing(0.002)) {
         let shape = format!("{:?}", thing.shape);
         let mut scene = Scene::new(thing, 0.4);
         let count = scene.places.len();
@@ -166,7 +176,7 @@ fn stiffness_is_never_negative() {
 #[test]
 fn no_motion_that_is_allowed_goes_through() {
     let mut random = Random::new(9);
-    for thing in things() {
+    for thing in things().into_iter().chain(growing(0.2)) {
         let shape = format!("{:?}", thing.shape);
         for round in 0..12 {
             let mut scene = Scene::new(thing.clone(), 0.0);
@@ -192,8 +202,53 @@ fn no_motion_that_is_allowed_goes_through() {
                 scene.barriers.crossings(|_, _, _| crossed += 1);
                 assert_eq!(crossed, 0, "{shape} {round}");
             }
-            assert!(round > 0 || part == 1.0, "{shape}: {part}");
+            let is_small = round == 0 && scene.barriers.contacts().rigids[0].trajectory.growth(1.0) == 0.0;
+            assert!(!is_small || part == 1.0, "{shape}: {part}");
         }
+    }
+}
+
+/// A thing that grows by d presses like one that is larger by d, and the way that it has yet to go changes forces as its stiffness says.
+#[test]
+fn what_grows_presses_like_what_is_larger() {
+    for (thing, larger) in [
+        (Shape::Sphere { radius: 0.3 }, Shape::Sphere { radius: 0.302 }),
+        (Shape::Capsule { radius: 0.1, length: 0.1 }, Shape::Capsule { radius: 0.102, length: 0.1 }),
+    ] {
+        let at = [0.02, 0.03, if matches!(thing, Shape::Sphere { .. }) { -0.312 } else { -0.162 }];
+        let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: 1.0 };
+        let mut grown = rigid(thing, at, [0.0; 3]);
+        grown.trajectory = grown.trajectory.growing(0.002, curve);
+        let forces = |thing: Rigid, share: f64| {
+            let mut scene = Scene::new(thing, 0.0);
+            let count = scene.places.len();
+            scene.begin(&vec![0.0; 6 * count]);
+            assert!(scene.barriers.evaluate(&scene.places.clone(), share).is_finite());
+            let (mut forces, mut totals) = (vec![0.0; 6 * count], vec![Vector3::zeros(); 3]);
+            scene.barriers.add_forces(&mut forces, &mut totals);
+            (forces, totals[2], scene)
+        };
+        let (own, total, _) = forces(grown.clone(), 1.0);
+        let (wanted, same, _) = forces(rigid(larger, at, [0.0; 3]), 1.0);
+        let size = wanted.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
+        let off = own.iter().zip(&wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-11 * size && (total - same).norm() < 1e-11 * size && total.norm() > 0.0, "{off:e}");
+        // Forces fall by the stiffness times the way that is left: by differences over the share.
+        let (_, _, scene) = forces(grown.clone(), 0.5);
+        let mut slope = vec![0.0; own.len()];
+        scene.barriers.stiffness(0.5, |stencil: &Stencil, block, ways| {
+            let way = nalgebra::SVector::<f64, 12>::from_fn(|k, _| ways[k / 3][k % 3]);
+            let pull = block * way;
+            for (at, (node, _)) in stencil.parts().enumerate().filter(|(_, (node, _))| *node < 74) {
+                (0..3).for_each(|c| slope[6 * node as usize + c] -= pull[3 * at + c]);
+            }
+        });
+        let h = 1e-6;
+        let (after, before) = (forces(grown.clone(), 0.5 + h).0, forces(grown, 0.5 - h).0);
+        let most = slope.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
+        let differences = after.iter().zip(&before).map(|(a, b)| 0.5 * (a - b) / (2.0 * h));
+        let off = differences.zip(&slope).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(most > 0.0 && off < 1e-5 * most, "{off:e} of {most:e}");
     }
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use pliant_contact::face_points::FacePoints;
 use pliant_contact::pairs::Surface;
-use pliant_contact::pose::Pose;
+use pliant_contact::pose::{Pose, Stance};
 use pliant_contact::shape::{Near, Shape};
 use pliant_contact::touch::{LEFT, MARGIN, Passage, Rigid};
 
@@ -30,12 +30,11 @@ pub(super) struct AtRigid {
 }
 
 /// What may come near a rigid thing, until the surface and the thing have moved too far.
-#[derive(Default)]
 struct Listed {
     /// Distance [m] up to which nodes and faces are listed.
     reach: f64,
-    /// The pose of the thing then.
-    pose: Pose,
+    /// Where and how large the thing was then.
+    stance: Stance,
     /// Nodes of the surface with the corners of the faces, and faces by their place; increasing.
     nodes: Vec<u32>,
     faces: Vec<u32>,
@@ -44,14 +43,15 @@ struct Listed {
 impl AtRigid {
     pub fn new(rigid: &Rigid, number: usize, surface: Surface, place: impl Fn(u32) -> Vector3<f64>) -> Self {
         let longest = surface.longest_edge(place);
+        let start = Stance::at(Pose::identity());
         Self {
             rigid: number,
             points: FacePoints::new(&surface.faces, longest, &rigid.shape, rigid.inside),
             margin: MARGIN * longest,
-            passage: Passage::new(rigid, [Pose::identity(); 2]),
+            passage: Passage::new(rigid, [start; 2]),
             grips: false,
             near: Vec::new(),
-            listed: Listed::default(),
+            listed: Listed { reach: 0.0, stance: start, nodes: Vec::new(), faces: Vec::new() },
             surface,
         }
     }
@@ -75,8 +75,8 @@ impl AtRigid {
 
     /// Whether the list has all that may come nearer than a room [m] in the passage, of nodes that have moved by no more than this [m] since.
     pub fn holds(&self, rigid: &Rigid, room: f64, moved: f64) -> bool {
-        let Listed { reach, pose, .. } = &self.listed;
-        let moved = moved + self.passage.travel_from(rigid, pose);
+        let Listed { reach, stance, .. } = &self.listed;
+        let moved = moved + self.passage.travel_from(rigid, stance);
         self.room(room) + moved <= *reach || *reach == f64::INFINITY
     }
 
@@ -94,15 +94,16 @@ impl AtRigid {
     pub fn list(&mut self, rigid: &Rigid, room: f64, places: &[Vector3<f64>]) {
         let room = self.room(room);
         let Self { surface, points, margin, passage, listed, .. } = self;
-        let Listed { reach, pose, nodes: near, faces } = listed;
+        let Listed { reach, stance, nodes: near, faces } = listed;
         if *reach == f64::INFINITY {
             return;
         }
         // Sampled distances can change faster than a point moves, and those of a half-space that turns without end.
         let is_first = *reach == 0.0;
         let grows_evenly = !matches!(rigid.shape, Shape::Grid(_))
-            && (is_first || passage.travel_from(rigid, pose).is_finite());
-        (*reach, *pose) = (if grows_evenly { room + SKIN * *margin } else { f64::INFINITY }, passage.pose());
+            && (is_first || passage.travel_from(rigid, stance).is_finite());
+        (*reach, *stance) =
+            (if grows_evenly { room + SKIN * *margin } else { f64::INFINITY }, passage.stance());
         near.clear();
         faces.clear();
         let distance = |point: &Vector3<f64>| passage.near(rigid, point).distance;
@@ -150,6 +151,7 @@ impl AtRigid {
             };
             match &self.points {
                 FacePoints::Nearest(nearest) => {
+                    let room = room + self.passage.stance().growth;
                     nearest.of(number as usize, &corners.map(|corner| corner.local), room, take);
                 }
                 FacePoints::Lattice(all) => self.look_at_lattice(rigid, room, all, &corners, take),
@@ -177,7 +179,8 @@ impl AtRigid {
         if corners.iter().all(|corner| corner.distance > room + 2.0 * around) {
             return;
         }
-        let middle = Seen { local: middle, distance: rigid.near_local(&middle).distance };
+        let growth = self.passage.stance().growth;
+        let middle = Seen { local: middle, distance: rigid.near_local(growth, &middle).distance };
         if middle.distance > room + around {
             return;
         }
@@ -264,7 +267,7 @@ mod tests {
                 let turn = Vector3::new(0.2 * time.sin(), 0.0, 0.1 * time);
                 let after = Pose::new(Vector3::new(0.1 + 0.2 * time, 0.5, 0.08 + 0.05 * time.cos()), turn);
                 let rows = |own: &mut AtRigid| {
-                    own.passage = Passage::new(&rigid, [before, after]);
+                    own.passage = Passage::new(&rigid, [before, after].map(Stance::at));
                     let ways = places.iter().zip(&then).map(|(now, then)| (now - then).norm());
                     if !own.holds(&rigid, 1e-3, ways.fold(0.0, f64::max)) {
                         own.list(&rigid, 1e-3, &places);
@@ -275,9 +278,9 @@ mod tests {
                     rows
                 };
                 let anew = rows(&mut fresh());
-                let (pose, reach) = (own.listed.pose, own.listed.reach);
+                let (stance, reach) = (own.listed.stance, own.listed.reach);
                 assert_eq!(rows(&mut own), anew, "{:?} at {time} s", rigid.shape);
-                if (own.listed.pose, own.listed.reach) != (pose, reach) {
+                if (own.listed.stance, own.listed.reach) != (stance, reach) {
                     listed += 1;
                     then.clone_from(&places);
                 }

@@ -119,11 +119,11 @@ fn a_bar_bounces_off_a_wall_at_the_step_of_the_free_bar() {
     }
 }
 
-/// A capsule that is driven into a block stays free of all nodes, and of points between to a twentieth of its radius; the work that drives it is
-/// the energy of the block.
+/// A capsule that is driven into a block, or grows into it, stays free of all nodes, and of points between to a twentieth of its radius; the work
+/// that drives it is the energy of the block.
 #[test]
 fn a_tool_presses_no_node_into_itself() {
-    for fast in [1.0, 10.0] {
+    for (fast, growth) in [(1.0, 0.0), (10.0, 0.0), (10.0, 0.004), (1.0, 0.002)] {
         let mut model = block([8, 8, 4], 0.01, 2e3, Prony::default());
         model.bodies[0].damping = 20.0;
         let low =
@@ -133,8 +133,10 @@ fn a_tool_presses_no_node_into_itself() {
         let depth = 0.008;
         let over = |z: f64| Pose::translation(0.04, 0.04, z) * Pose::rotation([0.0, 1.6, 0.0].into());
         let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: 0.3 / fast };
-        let shape = Shape::Capsule { radius, length: 0.03 };
-        let trajectory = Trajectory::by(over(0.04 + radius + 0.001), [0.0, 0.0, -depth - 0.001], curve);
+        let shape = Shape::Capsule { radius: radius - growth, length: 0.03 };
+        let trajectory =
+            Trajectory::by(over(0.04 + radius + 0.001), [0.0, 0.0, -depth - 0.001], curve.clone());
+        let trajectory = if growth > 0.0 { trajectory.growing(growth, curve) } else { trajectory };
         let tool = Rigid { name: "tool".into(), shape, trajectory, inside: false, jaw: None };
         let contacts = at(tool.clone(), &model, 0.2);
         let model = Arc::new(model);
@@ -146,24 +148,24 @@ fn a_tool_presses_no_node_into_itself() {
             stepper.evaluate(&mut state).unwrap();
             force = stepper.contact_forces()[0];
             stepper.advance(&mut state);
-            let pose = tool.trajectory.at(state.time);
+            let stance = tool.stance(state.time, None);
             let place = |node: u32| {
                 let (u, x) = (state.displacement[node as usize], model.rest[node as usize]);
                 nalgebra::Vector3::from([0, 1, 2].map(|c| x[c] + u[c]))
             };
             for node in 0..model.node_count() as u32 {
-                deepest = deepest.min(tool.near(&pose, &place(node)).distance);
+                deepest = deepest.min(tool.near(&stance, &place(node)).distance);
             }
             for face in &contacts.contacts[0].surface.faces {
                 let corners = face.map(place);
                 for weights in &points {
                     let point = (0..3).map(|k| corners[k] * weights[k]).sum();
-                    between = between.min(tool.near(&pose, &point).distance);
+                    between = between.min(tool.near(&stance, &point).distance);
                 }
             }
         }
         println!(
-            "{fast}: deepest {deepest:.1e} m, between nodes {between:.1e} m, force {force:?} N, {:?}",
+            "{fast}, {growth} m: deepest {deepest:.1e} m, between nodes {between:.1e} m, force {force:?} N, {:?}",
             stepper.energies()
         );
         assert!(deepest > -1e-12 && between > -0.05 * radius, "{deepest:.1e} m, {between:.1e} m");

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 use pliant_contact::grid::Grid;
-use pliant_contact::pose::{Pose, Trajectory};
+use pliant_contact::pose::{Pose, Stance, Trajectory};
 use pliant_contact::shader::{shader, things};
 use pliant_contact::shape::{Near, Shape};
 use pliant_contact::touch::{Passage, Rigid};
@@ -78,7 +78,7 @@ fn shapes_and_ways_follow_double_precision() {
     for (shape, inside) in shapes.into_iter().flat_map(|shape| [(shape.clone(), false), (shape, true)]) {
         let (name, trajectory, jaw) = ("thing".into(), Trajectory::fixed(before), None);
         let rigid = Rigid { name, shape, trajectory, inside, jaw };
-        let passage = Passage::new(&rigid, [before, after]);
+        let passage = Passage::new(&rigid, [before, after].map(Stance::at));
         let source = [&shader(std::slice::from_ref(&rigid)), MAIN].concat();
         let mut random = Random::new(5);
         let numbers: Vec<f32> = (0..POINTS)

@@ -1,5 +1,6 @@
 //! The cases, in the order of the page.
 
+pub mod angioplasty;
 pub mod brain_shift;
 pub mod cost;
 pub mod cube;
@@ -40,6 +41,7 @@ pub const CASES: &[Case] = &[
     reconstruction::CAPSULE,
     reconstruction::ANEURYSM,
     shell_times::CASE,
+    angioplasty::CASE,
 ];
 
 /// The name of an adapter, marked if it is software.

@@ -52,31 +52,39 @@ impl FieldMesh {
         self.merged.as_ref().unwrap_or_else(|| &self.parts[0].1.mesh)
     }
 
-    /// A point of the mesh as a combination of nodes of a participant; of a curved surface, the combination under its bulge.
-    pub fn nodes_of(&self, world: &World, point: u32) -> (usize, Vec<(u32, f64)>) {
+    /// The participant of a point, what its mesh is of, and its number there.
+    fn part_of(&self, point: u32) -> Option<(usize, &ParticipantMesh, usize)> {
         let mut point = point as usize;
         for (index, own) in &self.parts {
             let points = own.mesh.points.len();
             if point < points {
-                return (*index, own.nodes_of(&world.participants[*index].built, point as u32));
-            }
-            point -= points;
-        }
-        (0, Vec::new())
-    }
-
-    /// The participant and the rigid thing that a point belongs to; `None` of a point of a body.
-    pub fn thing_of(&self, point: u32) -> Option<(usize, usize)> {
-        let mut point = point as usize;
-        for (index, own) in &self.parts {
-            let points = own.mesh.points.len();
-            if point < points {
-                let Content::Things(owners) = &own.content else { return None };
-                return Some((*index, owners[point] as usize));
+                return Some((*index, own, point));
             }
             point -= points;
         }
         None
+    }
+
+    /// A point of the mesh as a combination of nodes of a participant; of a curved surface, the combination under its bulge.
+    pub fn nodes_of(&self, world: &World, point: u32) -> (usize, Vec<(u32, f64)>) {
+        let Some((index, own, point)) = self.part_of(point) else { return (0, Vec::new()) };
+        (index, own.nodes_of(&world.participants[index].built, point as u32))
+    }
+
+    /// The participant and the rigid thing that a point belongs to; `None` of a point of a body.
+    pub fn thing_of(&self, point: u32) -> Option<(usize, usize)> {
+        let (index, own, point) = self.part_of(point)?;
+        let Content::Things { owners, .. } = &own.content else { return None };
+        Some((index, owners[point] as usize))
+    }
+
+    /// The way of a point of a rigid thing per growth of it; none of a point of a body.
+    pub fn outward_of(&self, point: u32) -> Vector3 {
+        let part = self.part_of(point).map(|(_, own, point)| (&own.content, point));
+        match part {
+            Some((Content::Things { outward, .. }, point)) => outward[point],
+            _ => Vector3::zeros(),
+        }
     }
 
     /// Takes the fields of an instant.
@@ -113,8 +121,8 @@ enum Content {
     Shells { nodes: Vec<u32>, facets: Vec<u32>, fields: Box<fields::OfShells> },
     /// The curved surface of shells.
     Curved(Box<super::curved::Curved>),
-    /// Obstacles and tools: the thing of each point.
-    Things(Vec<u32>),
+    /// Obstacles and tools: the thing of each point, and the way of the point per growth of it.
+    Things { owners: Vec<u32>, outward: Vec<Vector3> },
 }
 
 impl ParticipantMesh {
@@ -155,11 +163,19 @@ impl ParticipantMesh {
         let (low, high) = bounds.reduce(|(a, b), (c, d)| (a.inf(&c), b.sup(&d)))?;
         let mut mesh = Mesh::default();
         let mut block = CellBlock::new(CellKind::Triangle, Vec::new());
-        let (mut owners, mut things) = (Vec::new(), Vec::new());
+        let (mut owners, mut things, mut outward) = (Vec::new(), Vec::new(), Vec::new());
         for (rigid, index) in contacts.rigids.iter().zip(0..) {
-            let (points, triangles) = rigid.shape.surface(1.3 * (high - low).norm());
-            let (first, pose) = (mesh.points.len() as u32, rigid.at(0.0, None));
-            mesh.points.extend(points.iter().map(|point| (pose * nalgebra::Point3::from(*point)).coords));
+            let surface = rigid.shape.surface(1.3 * (high - low).norm());
+            let ways = if rigid.trajectory.grows() {
+                rigid.shape.outward(&surface)
+            } else {
+                vec![Vector3::zeros(); surface.0.len()]
+            };
+            let (points, triangles) = surface;
+            let (first, start) = (mesh.points.len() as u32, rigid.stance(0.0, None));
+            outward.extend(ways.iter().map(|way| start.pose.rotation * way));
+            let grown = points.iter().zip(&ways).map(|(point, way)| point + way * start.growth);
+            mesh.points.extend(grown.map(|point| (start.pose * nalgebra::Point3::from(point)).coords));
             owners.resize(mesh.points.len(), index);
             block.nodes.extend(triangles.iter().flatten().map(|node| first + node));
             things.resize(block.len(), if rigid.inside { 2.0 } else { 1.0 });
@@ -169,7 +185,7 @@ impl ParticipantMesh {
         block.data.insert("thing".into(), DataArray::scalar(things));
         mesh.blocks.push(block);
         let fields = fields.iter().copied().filter(|&field| field == FieldName::Displacement).collect();
-        let content = Content::Things(owners);
+        let content = Content::Things { owners, outward };
         Some(Self { mesh, first_body: 0, fields, at: At::default(), content })
     }
 
@@ -197,7 +213,7 @@ impl ParticipantMesh {
             Content::Curved(curved) => {
                 built.implicit.as_ref().map_or_else(Vec::new, |part| curved.nodes_of(part, point))
             }
-            Content::Things(_) => Vec::new(),
+            Content::Things { .. } => Vec::new(),
         }
     }
 
@@ -225,28 +241,31 @@ impl ParticipantMesh {
                 }
             }
             Content::Curved(curved) => curved.fill(&mut self.mesh, frame, &self.fields),
-            Content::Things(owners) if !self.fields.is_empty() => {
-                let values = moved_things(frame, &self.mesh.points, owners);
+            Content::Things { owners, outward } if !self.fields.is_empty() => {
+                let values = moved_things(frame, &self.mesh.points, owners, outward);
                 let name = FieldName::Displacement.name();
                 self.mesh.point_data.insert(name.into(), DataArray { components: 3, values });
             }
-            Content::Things(_) => {}
+            Content::Things { .. } => {}
         }
     }
 }
 
 /// Displacements [m] of the points of obstacles and tools since the start.
-fn moved_things(frame: &Frame<'_>, points: &[Vector3], owners: &[u32]) -> Vec<f64> {
+fn moved_things(frame: &Frame<'_>, points: &[Vector3], owners: &[u32], outward: &[Vector3]) -> Vec<f64> {
     let Some(contacts) = &frame.built().contacts else { return Vec::new() };
-    let motion =
-        |(rigid, number): (&Rigid, usize)| frame.now.pose(number, rigid) * rigid.at(0.0, None).inverse();
-    let motions: Vec<Pose> = contacts.rigids.iter().zip(0..).map(motion).collect();
-    let moved = |(point, &owner): (&Vector3, &u32)| {
-        let there = motions[owner as usize] * nalgebra::Point3::from(*point);
+    let motion = |(rigid, number): (&Rigid, usize)| {
+        let (start, now) = (rigid.stance(0.0, None), frame.now.stance(number, rigid));
+        (now.pose * start.pose.inverse(), now.growth - start.growth)
+    };
+    let motions: Vec<(Pose, f64)> = contacts.rigids.iter().zip(0..).map(motion).collect();
+    let moved = |((point, &owner), way): ((&Vector3, &u32), &Vector3)| {
+        let (motion, grown) = motions[owner as usize];
+        let there = motion * nalgebra::Point3::from(point + way * grown);
         let shift = there.coords - point;
         [shift.x, shift.y, shift.z]
     };
-    points.iter().zip(owners).flat_map(moved).collect()
+    points.iter().zip(owners).zip(outward).flat_map(moved).collect()
 }
 
 /// Fields on a carried surface; those of cells as means at the nodes, which points outside of all cells do not extrapolate.

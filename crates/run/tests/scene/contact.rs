@@ -38,6 +38,35 @@ fn a_tool_presses_a_body_onto_an_obstacle() {
     }
 }
 
+/// A ball that grows presses like one that moves: it is drawn as large as it is, and an explicit run and an implicit one feel the same force.
+#[test]
+fn a_ball_that_grows_presses_a_body() {
+    let small =
+        "shape = { sphere = { radius = 0.01 } }\nat = [0.02, 0.02, 0.0301]\nby = [0, 0, -0.005]\nto = 0.2";
+    let grown = "shape = { sphere = { radius = 0.008 } }\nat = [0.02, 0.02, 0.0301]\ngrows = { by = 0.005, to = 0.2 }\n";
+    let shown = "[output.all]\ntype = 'vtu'\nevery = 0.5\ndata = ['displacement']\n";
+    let mut forces = Vec::new();
+    for solver in ["", "solver = 'implicit'\nstep = 0.01"] {
+        let text = pressed(solver, shown)
+            .replace(small, grown)
+            // A barrier needs a gap to begin with.
+            .replace("shape = 'half-space'\n", "shape = 'half-space'\nat = [0, 0, -0.0001]\n");
+        let row = last_row(&text);
+        let (up, down) = (row["contact.above.z"], row["contact.below.z"]);
+        println!("{up} N on the ball, {down} N on the floor, top at {} m", row["probe.top.displacement.z"]);
+        assert!((up / -down - 1.0).abs() < 1e-2, "{up} N and {down} N");
+        forces.push(up);
+        let out = tempfile::tempdir().unwrap();
+        run(&text, out.path());
+        let mesh = pliant_geometry::io::read(&out.path().join("all/000001.vtu")).unwrap().mesh;
+        let moved = &mesh.point_data["displacement"].values;
+        let places = mesh.points.iter().zip(moved.chunks_exact(3));
+        let top = places.map(|(x, u)| x.z + u[2]).fold(f64::NEG_INFINITY, f64::max);
+        assert!((top - 0.0431).abs() < 1e-9, "{top}");
+    }
+    assert!((forces[0] / forces[1] - 1.0).abs() < 0.05, "{forces:?}");
+}
+
 /// The same on a GPU, as on the CPU in double precision. Both find impulses to a thousandth of the deepest gap predicted, with faces in another order. A
 /// stable step predicts at most four times the depth that forces hold, (ω Δt)² ≤ 4.
 #[cfg(feature = "gpu")]
@@ -264,6 +293,36 @@ fn contact_that_cannot_be_is_refused_with_its_line() {
         (
             pressed("device = 'gpu'\ndesign = 'blocks'", ""),
             ["the design `blocks` has no contact", "`gather`"],
+        ),
+        (
+            with("by = [0, 0, -0.005]", "grows = { by = -0.02 }\nby = [0, 0, -0.005]"),
+            ["it shrinks by 0.02000 m, and its radius is 0.01000 m", "shrink by less"],
+        ),
+        (
+            with("by = [0, 0, -0.005]", "inside = true\ngrows = { by = -0.001 }\nby = [0, 0, -0.005]"),
+            [
+                "shrinks to -0.001000 m within its shape, which only balls and capsules can",
+                "its smallest size",
+            ],
+        ),
+        (
+            with(
+                "shape = 'half-space'",
+                "shape = 'half-space'\ngrows = { by = 1, curve = { table = [[0, 0], [1, -0.001]] } }",
+            ),
+            ["which only balls and capsules can", "grow from there"],
+        ),
+        (
+            with(
+                "{ sphere = { radius = 0.01 } }",
+                "{ jaws = { length = 0.03, width = 0.01, thickness = 0.002 } }\ngrows = { by = 1 }",
+            ),
+            ["jaws do not grow", ""],
+        ),
+        (
+            pressed("device = 'gpu'", "")
+                .replace("by = [0, 0, -0.005]", "grows = { by = 0.005 }\nby = [0, 0, 0]"),
+            ["the growth of `ball` runs on the CPU only", ""],
         ),
         (with("[tool.ball]", "[tool.floor]"), ["`floor` is an obstacle already", ""]),
     ] {

@@ -488,7 +488,7 @@ fn what_is_not_supported_is_named_in_one_note() {
     let more = "<ShellElements Type=\"SURFACE\"/><ShellElementSet Size=\"all\"><Material Type=\"LinearShell\">\
                 1 0.4 1 0.4<Density>1</Density><Thickness>1</Thickness></Material></ShellElementSet>\
                 <KinematicContact/><Surprise/><ContactCylinder><Origin>0 0 2</Origin><Axis>0 0 1</Axis><Radius>0.1</Radius>\
-                <Length>1</Length><RadChange>0.1</RadChange><SlvNodes NumNodes=\"1\">3</SlvNodes></ContactCylinder>\
+                <Length>1</Length><RadChange>-0.05</RadChange><SlvNodes NumNodes=\"1\">3</SlvNodes></ContactCylinder>\
                 <Constraint Type=\"Disp\" NumNodes=\"1\" LoadShape=\"RAMP\"><Nodes>0</Nodes>\
                 <Magnitudes Type=\"FILE\">motion.txt</Magnitudes></Constraint>";
     let more = with(more).replace("</SystemParams>", "<ROM>1</ROM></SystemParams>");
@@ -498,7 +498,7 @@ fn what_is_not_supported_is_named_in_one_note() {
     for part in [
         "the shells of line 6 (LinearShell bends",
         "contact (KinematicContact",
-        "contact (ContactCylinder of line 6: its radius changes by 0.1",
+        "contact (ContactCylinder of line 6: its radius changes by -0.05",
         "<Surprise> of line",
         "magnitudes from a file",
     ] {
@@ -743,6 +743,7 @@ fn mistakes_of_contact_and_membranes_are_named() {
         ("<Axis>1 0 0", "<Axis>0 0 0", &["the length of the axis is 0"]),
         ("<Radius>0.1", "<Radius>-0.1", &["the radius is -0.1"]),
         ("NumEls=\"2\" Type=\"T3\"", "NumEls=\"2\" Type=\"T6\"", &["`T6` is not a known type of surface"]),
+        ("<RadChange>0<", "<RadChange>-0.1<", &["the change of the radius is -0.1", "minus the radius"]),
         ("<FrictionCoefficient>0.2", "<FrictionCoefficient>-1", &["friction is -1", "at least 0"]),
         (
             "Type=\"Rotation\">0.1 0.2 0  0 0 -2",
@@ -765,7 +766,12 @@ fn mistakes_of_contact_and_membranes_are_named() {
     }
     let left_out: &[(&str, &str, &str)] = &[
         ("<c>2 -0.5 -1</c>", "<c>2 -0.5 0</c>", "its edges meet in 71.57°, and plates are rectangles"),
-        ("<RadChange>0<", "<RadChange>-0.05<", "its radius changes by -0.05"),
+        (
+            "<RadChange>0<",
+            "<RadChange>-0.05<",
+            "its radius changes by -0.05, and cylinders of a scene only grow",
+        ),
+        ("<RadChange>0<", "<RadChange>0.05<", ""),
         ("0 1 2  0 2 3<", "0 1 2  2 3 0<", ""),
         (
             "0 1 2  0 2 3<",

@@ -197,9 +197,9 @@ fn played(model: &str) -> Trajectory {
         for contact in &contacts.contacts {
             if let With::Rigid(rigid) = contact.with {
                 let rigid = &contacts.rigids[rigid];
-                let pose = rigid.at(time, None);
+                let stance = rigid.stance(time, None);
                 for &node in &contact.surface.nodes {
-                    let depth = contact.touch.offset - rigid.near(&pose, &places[node as usize]).distance;
+                    let depth = contact.touch.offset - rigid.near(&stance, &places[node as usize]).distance;
                     trajectory.in_things = trajectory.in_things.max(depth);
                 }
             }

@@ -19,7 +19,7 @@ use pliant_sim::{counted, number};
 
 use super::barriers::BarrierTables;
 use super::{Builder, Subject, in_metres, suggestion};
-use crate::format::{ContactTable, ShapeName, SolverName, ToolTable};
+use crate::format::{ContactTable, GrowthTable, ShapeName, SolverName, ToolTable};
 use crate::reads::{rows_of, table as table_file};
 
 /// What a row of a table of poses holds.
@@ -199,6 +199,12 @@ impl Builder<'_> {
             Some(limit) => trajectory.limited(limit),
             None => trajectory,
         };
+        let trajectory = match &table.grows {
+            Some(growth) => {
+                self.growing(trajectory, growth, &shape, (jaws, table.inside), [kind, name, "grows"])?
+            }
+            None => trajectory,
+        };
         let ShapeName::Jaws(of) = &table.shape else {
             return Some(vec![Rigid {
                 name: name.into(),
@@ -233,6 +239,46 @@ impl Builder<'_> {
             }),
         });
         Some(rigids.into())
+    }
+
+    /// A trajectory with the growth of a table; `path` is that of its table.
+    fn growing(
+        &mut self,
+        trajectory: Trajectory,
+        growth: &GrowthTable,
+        shape: &Shape,
+        (jaws, inside): (bool, bool),
+        path: [&str; 3],
+    ) -> Option<Trajectory> {
+        if jaws {
+            self.error(
+                &path,
+                "jaws do not grow",
+                "of a tool with jaws",
+                "leave it out, or take another shape",
+            );
+            return None;
+        }
+        let curve = self.curve(&growth.timing, &path)?;
+        let [low, high] = curve.range().map(|part| part * growth.by);
+        let (least, thinnest) = (low.min(high), shape.thinnest());
+        let round = matches!(shape, Shape::Sphere { .. } | Shape::Capsule { .. });
+        if least < 0.0 && (inside || !round) {
+            let message = format!(
+                "it shrinks to {} m within its shape, which only balls and capsules can",
+                number(least)
+            );
+            let help = "give the shape its smallest size, and let it grow from there";
+            self.error(&path, message, "below 0", help);
+            return None;
+        }
+        if least <= -thinnest {
+            let message =
+                format!("it shrinks by {} m, and its radius is {} m", number(-least), number(thinnest));
+            self.error(&path, message, "nothing is left", "let it shrink by less");
+            return None;
+        }
+        Some(trajectory.growing(growth.by, curve))
     }
 
     /// The contacts of a table: one, or with `"all"` one for each pair.
@@ -514,11 +560,11 @@ impl Builder<'_> {
         rigid: &Rigid,
         surface: &Surface,
     ) {
-        let pose = rigid.at(0.0, None);
+        let stance = rigid.stance(0.0, None);
         let rest = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
         let size = self.assembly.rest.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
         let inside = |places: &mut dyn Iterator<Item = Vector3>| -> Vec<(f64, Vector3)> {
-            let gaps = places.map(|place| (rigid.near(&pose, &place).distance - kept(table), place));
+            let gaps = places.map(|place| (rigid.near(&stance, &place).distance - kept(table), place));
             gaps.filter(|(gap, _)| *gap < -OVERLAP * size).collect()
         };
         let mut of = "node";

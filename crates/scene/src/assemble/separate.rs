@@ -238,12 +238,12 @@ impl Builder<'_> {
 
 /// Pushes nodes and points of faces out of a rigid thing: the shortest way, unless this leads out of the body. A solid then draws back into itself.
 fn push_out(rigid: &Rigid, offset: f64, surface: &Surface, is_solid: bool, pushed: &mut Pushed) {
-    let pose = rigid.at(0.0, None);
+    let stance = rigid.stance(0.0, None);
     let thinnest = rigid.shape.thinnest();
     let push = |parts: Vec<(u32, f64)>, inward: Vector3, hangs: f64, pushed: &mut Pushed| {
         let place: Vector3 = parts.iter().map(|&(node, c)| pushed.places[node as usize] * c).sum();
-        let gap = |place: &Vector3| rigid.near(&pose, place).distance - offset + hangs;
-        let near = rigid.near(&pose, &place);
+        let gap = |place: &Vector3| rigid.near(&stance, place).distance - offset + hangs;
+        let near = rigid.near(&stance, &place);
         let (mut normal, mut depth) = (near.normal, gap(&place));
         if depth < 0.0
             && normal.dot(&inward) < FACING

@@ -38,6 +38,9 @@ pub struct ToolTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub force_limit: Option<f64>,
+    /// By how much it grows over time.
+    #[serde(default)]
+    pub grows: Option<GrowthTable>,
     /// Displacement [m], reached along the curve.
     #[serde(default)]
     pub by: Option<[f64; 3]>,
@@ -164,6 +167,19 @@ pub struct OpeningTable {
     /// The angle [rad].
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 3.0))]
     pub angle: f64,
+    /// Its curve over time.
+    #[serde(flatten)]
+    pub timing: Timing,
+}
+
+/// How a rigid thing grows: its surface moves outward, by 0 at `from` and the whole distance at `to`; of a thing with `inside = true` the room in it grows.
+/// Edges become round. A table lets it shrink again: `curve = { table = [[0, 0], [1, 1], [2, 0.2]] }`. Balls and capsules may shrink below the size of
+/// their shape. Not on GPUs. Curve: `smooth-step` if not given.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct GrowthTable {
+    /// The distance [m].
+    pub by: f64,
     /// Its curve over time.
     #[serde(flatten)]
     pub timing: Timing,

@@ -17,8 +17,8 @@ pub use body::{
     SurfaceTable, Thickness, ThicknessRule, TubeShape, TwistedStripShape,
 };
 pub use contact::{
-    BoxTool, CapsuleTool, ConeTool, ContactTable, ImageTool, JawsTool, MeshTool, OpeningTable, RevolvedTool,
-    Sampling, ShapeName, SphereTool, ToolTable,
+    BoxTool, CapsuleTool, ConeTool, ContactTable, GrowthTable, ImageTool, JawsTool, MeshTool, OpeningTable,
+    RevolvedTool, Sampling, ShapeName, SphereTool, ToolTable,
 };
 pub use linear::{
     ControlTable, ControlledNode, IntegratorName, LinearName, LinearTable, LinearWay, PreconditionerName,

@@ -2,7 +2,7 @@
 //!
 //! Plates, cylinders and probes move by POLY345, surfaces in proportion to time. NiftySim moves single nodes out of them; a scene
 //! keeps out the faces whose nodes they are.
-//! Leaves out: radii that change, `<KinematicContact>`, and what [`Remarks::missing`] names.
+//! Leaves out: `<KinematicContact>`, and what [`Remarks::missing`] names.
 
 use std::collections::BTreeSet;
 
@@ -57,6 +57,8 @@ pub(super) struct Thing {
     /// How its frame is turned [rad]: about this vector by its length.
     pub turn: [f64; 3],
     pub motion: RigidMotion,
+    /// By how much its radius grows [m], along POLY345.
+    pub growth: f64,
     /// The nodes of the model that touch it; all if not given.
     pub nodes: Option<BTreeSet<u32>>,
     pub friction: f64,
@@ -219,9 +221,19 @@ impl ContactReader<'_> {
         let nodes = self.slave_nodes(of)?;
         let motion = shift(of, "OrigDisp")?;
         let growth = child(of, "RadChange").map(number).transpose()?.unwrap_or(0.0);
-        if growth != 0.0 {
-            self.leave_out(of, &format!("its radius changes by {growth}, and shapes of a scene keep theirs"));
+        if !growth.is_finite() || radius + growth <= 0.0 {
+            let (what, range) = ("the change of the radius", "greater than minus the radius, and finite");
+            return Err(fault(of, ImportProblem::OutOfRange { what, value: growth, range }));
+        }
+        if growth < 0.0 && kind != "probe" {
+            self.leave_out(
+                of,
+                &format!("its radius changes by {growth}, and cylinders of a scene only grow"),
+            );
             return Ok(None);
+        }
+        if growth > 0.0 && kind != "probe" {
+            self.note("RadChange: NiftySim's cylinder grows in radius alone; the scene's grows at its ends, too, by as much");
         }
         if (unit - 1.0).abs() > 1e-3 {
             let line = line(of);
@@ -247,7 +259,7 @@ impl ContactReader<'_> {
         let turn = UnitQuaternion::rotation_between(&Vector3::z(), &along)
             .unwrap_or_else(|| UnitQuaternion::from_scaled_axis(Vector3::x() * std::f64::consts::PI));
         let at = origin + 0.5 * length * along;
-        thing(of, kind, form, (at, turn), motion, Some(nodes)).map(Some)
+        Ok(Some(Thing { growth, ..thing(of, kind, form, (at, turn), motion, Some(nodes))? }))
     }
 
     /// A rigid surface of triangles.
@@ -367,7 +379,7 @@ fn thing(
         let (what, range) = ("a coordinate of its frame", "a number that can be computed with");
         return Err(fault(of, ImportProblem::OutOfRange { what, value, range }));
     }
-    Ok(Thing { line: line(of), kind, form, at, turn, motion, nodes, friction: 0.0, margin: 0.0 })
+    Ok(Thing { line: line(of), kind, form, at, turn, motion, growth: 0.0, nodes, friction: 0.0, margin: 0.0 })
 }
 
 /// The displacement of a plate, a cylinder or a probe.

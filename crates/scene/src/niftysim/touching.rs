@@ -156,7 +156,8 @@ impl Writer {
 
     /// Writes an obstacle, or a tool if it moves; returns the mesh of a surface.
     fn thing(&mut self, thing: Thing, name: &str, stem: &str) -> Option<(String, Mesh)> {
-        let kind = if matches!(thing.motion, RigidMotion::Rest) { "obstacle" } else { "tool" };
+        let rests = matches!(thing.motion, RigidMotion::Rest) && thing.growth == 0.0;
+        let kind = if rests { "obstacle" } else { "tool" };
         self.line(format!("[{kind}.{name}]"));
         let mut file = None;
         let round = |[radius, length]: [f64; 2]| format!("{{ radius = {radius:?}, length = {length:?} }}");
@@ -179,6 +180,10 @@ impl Writer {
             if value != [0.0; 3] {
                 self.line(format!("{key} = {value:?}"));
             }
+        }
+        if thing.growth != 0.0 {
+            let (by, total) = (thing.growth, self.system.total);
+            self.line(format!("grows = {{ by = {by:?}, curve = \"polynomial-10-15-6\", to = {total:?} }}"));
         }
         match thing.motion {
             RigidMotion::Rest => {}

@@ -369,6 +369,7 @@ fn what_has_no_contact_is_refused_by_name() {
     let gripping =
         Jaw { tool: "grasper".into(), part: 0.5, opening: (0.5, smooth(1.0)), place, grip: Some(0.1) };
     let limited = Rigid { trajectory: floor.trajectory.clone().limited(2.0), ..floor.clone() };
+    let growing = Rigid { trajectory: floor.trajectory.clone().growing(0.01, smooth(1.0)), ..floor.clone() };
     let corner = |z: f64| Corner { at: [z, 0.1], rounding: 0.0 };
     let profile = Profile::new(vec![corner(0.0), corner(1.0)]).unwrap();
     let revolved = Rigid { shape: Shape::Revolved(Arc::new(profile)), ..floor.clone() };
@@ -376,6 +377,7 @@ fn what_has_no_contact_is_refused_by_name() {
     for (rigid, what) in [
         (jaw, "the ideal grip of `grasper`"),
         (limited, "the force limit of `floor`"),
+        (growing, "the growth of `floor`"),
         (revolved, "the outline of `floor`"),
     ] {
         let contacts = Contacts { rigids: vec![rigid], ..Contacts::clone(&contacts) };
