@@ -103,9 +103,11 @@ pub(crate) fn descend(
 ) -> Result<(), SolveError> {
     let times = [state.time, time];
     begin(solver, state, times, guess);
-    if let Some(guess) = guess {
-        start_from(solver, state, time, guess)?;
-    }
+    // Whether forces and stiffness of the state are known.
+    let mut known = match guess {
+        Some(guess) => start_from(solver, state, time, guess)?,
+        None => false,
+    };
     let mut before = Before {
         state: state.clone(),
         share: 0.0,
@@ -115,8 +117,6 @@ pub(crate) fn descend(
         along: 0.0,
     };
     let (mut raised, mut lags, mut previous) = (0.0, 0, f64::INFINITY);
-    // Whether forces and stiffness of the state are known.
-    let mut known = false;
     for iteration in 0..=limits.iterations {
         if !std::mem::take(&mut known) {
             solver.evaluate(state, time, true)?;
@@ -169,7 +169,7 @@ pub(crate) fn descend(
                 if expands && first {
                     expand(solver, state, time, &mut before)?;
                 }
-                known = first && tries.goes_on;
+                known = tries.goes_on;
                 continue;
             }
             if lags < limits.lags && lag(solver) {
@@ -211,13 +211,14 @@ fn begin(solver: &mut impl Contacting, state: &State, times: [f64; 2], guess: Op
 }
 
 /// Goes to where the motion of before leads, as far as the filter lets it and cells can follow. Whether the energy is less there is not
-/// asked: it seldom is, but what moves would have to start from rest else, in more iterations and short of where it comes to.
+/// asked: it seldom is, but what moves would have to start from rest else, in more iterations and short of where it comes to. Whether it went,
+/// and so found forces and stiffness there.
 fn start_from(
     solver: &mut impl Contacting,
     state: &mut State,
     time: f64,
     guess: &[f64],
-) -> Result<(), SolveError> {
+) -> Result<bool, SolveError> {
     let here = state.clone();
     let Vectors { system, pending, increment, .. } = solver.vectors();
     increment.copy_from_slice(guess);
@@ -227,23 +228,24 @@ fn start_from(
         }
     }
     system.follow(increment);
-    let Some(touching) = &mut system.touching else { return Ok(()) };
+    let Some(touching) = &mut system.touching else { return Ok(false) };
     let part = touching.barriers.allowed(&state.position, increment, 0.0, [KEEP[1], 1.0]);
     system.advance(state, increment, part);
     put(solver, part);
-    let possible = match solver.evaluate(state, time, false) {
+    let Vectors { pending, .. } = solver.vectors();
+    let whole = pending.to_vec();
+    pending.iter_mut().for_each(|p| *p *= 1.0 - part);
+    let possible = match solver.evaluate(state, time, true) {
         Ok(()) => energy(solver).0.is_finite(),
         Err(SolveError::Broken { .. }) => false,
         Err(error) => return Err(error),
     };
-    let Vectors { pending, .. } = solver.vectors();
-    if possible {
-        pending.iter_mut().for_each(|p| *p *= 1.0 - part);
-    } else {
+    if !possible {
+        solver.vectors().pending.copy_from_slice(&whole);
         *state = here;
         put(solver, 0.0);
     }
-    Ok(())
+    Ok(possible)
 }
 
 /// Sets how far rigid things have gone.
@@ -342,11 +344,11 @@ struct Tries {
     part: f64,
     /// Whether energy has to fall.
     complete: bool,
-    /// Whether the stiffness where it first leads is found at once, since it is nearly always the next to be asked for.
+    /// Whether the stiffness where it leads is found at once, since it is nearly always the next to be asked for.
     goes_on: bool,
 }
 
-/// Goes along the increment, in halves until the energy has fallen: whether the first try was it, or none if it does not fall.
+/// Goes along the increment, in halves until the energy has fallen: whether the first try was it; none if it does not fall.
 fn search(
     solver: &mut impl Contacting,
     state: &mut State,
@@ -366,7 +368,7 @@ fn search(
             before.share + part * (1.0 - before.share)
         };
         put(solver, gone);
-        match solver.evaluate(state, time, goes_on && halving == 0) {
+        match solver.evaluate(state, time, goes_on) {
             Ok(()) if energy(solver).0.is_finite() => {
                 let fallen = energy(solver).0 - part * work(solver, &before.loads) - before.energy;
                 let accepted = !complete || fallen <= ROUND_OFF * before.size || {

@@ -502,7 +502,7 @@ impl BackwardEuler {
 }
 
 /// How often a step takes friction anew.
-const LAGS: usize = 2;
+const LAGS: usize = 1;
 
 impl Contacting for BackwardEuler {
     fn system(&mut self) -> &mut System {

@@ -279,7 +279,7 @@ impl Facet {
             (0..3).map(|i| flat[i][row] * self.gradient[i][column]).sum()
         };
         let (sum, difference) = (f(0, 0) + f(1, 1), f(1, 0) - f(0, 1));
-        let trace = sum.hypot(difference);
+        let trace = (sum * sum + difference * difference).sqrt();
         let (sine, cosine) = if trace > 0.0 { (difference / trace, sum / trace) } else { (0.0, 1.0) };
         let e1 = plane * Vector2::new(cosine, sine);
         let e2 = plane * Vector2::new(-sine, cosine);

@@ -149,6 +149,7 @@ impl LowerMatrix {
         for (a, &row_node) in nodes.iter().enumerate() {
             let first = equations.first(row_node);
             let rows = &equations.number[6 * row_node as usize..6 * row_node as usize + components];
+            let all_free = self.mirror.is_empty() && rows.iter().all(|&row| row != NONE);
             for (b, &column_node) in nodes.iter().enumerate() {
                 if row_node < column_node {
                     continue;
@@ -159,6 +160,15 @@ impl LowerMatrix {
                         continue;
                     }
                     let base = places[(a * nodes.len() + b) * components + c];
+                    if all_free {
+                        // Nearly all nodes: their rows follow one another, those of the column's own node from the diagonal on.
+                        let from = if row_node == column_node { c } else { 0 };
+                        let at = base.wrapping_add(rows[from] - first) as usize;
+                        let own = &cell[(b * components + c) * size + a * components..][from..components];
+                        let values = &mut self.value[at..at + own.len()];
+                        values.iter_mut().zip(own).for_each(|(value, own)| *value += own);
+                        continue;
+                    }
                     for (r, &row) in rows.iter().enumerate() {
                         if row != NONE && row >= column {
                             let at = base.wrapping_add(row - first) as usize;
@@ -191,12 +201,23 @@ impl LowerMatrix {
         entry: impl Fn(usize, usize) -> f64,
     ) {
         let first = equations.first(row_node);
+        let columns = &equations.number[6 * column_node as usize..6 * column_node as usize + 3];
+        // The columns of a node that is free have the same rows, but for those above their diagonals: one search finds the place in all.
+        let places = columns.iter().all(|&column| column != NONE && first != NONE).then(|| {
+            let start = self.column_start[columns[0] as usize];
+            self.base(equations, row_node, columns[0]).wrapping_sub(start)
+        });
         for j in 0..3 {
-            let column = equations.number[6 * column_node as usize + j];
+            let column = columns[j];
             if column == NONE || first == NONE {
                 continue;
             }
-            let base = self.base(equations, row_node, column);
+            let base = match places {
+                Some(place) => {
+                    self.column_start[column as usize].wrapping_add(place).wrapping_sub(column - columns[0])
+                }
+                None => self.base(equations, row_node, column),
+            };
             for i in 0..3 {
                 let row = equations.number[6 * row_node as usize + i];
                 if row == NONE || row < column {

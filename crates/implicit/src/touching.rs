@@ -19,7 +19,7 @@ use crate::state::State;
 /// Pairs of nodes kept in the pattern at most, over those that are needed.
 const ROOM: usize = 2;
 /// How near pairs are, beyond the reach of their barrier and over its distance, that are taken into the pattern when it lacks some.
-const SOON: f64 = 1.0;
+const SOON: f64 = 0.3;
 
 /// Contacts by a barrier: surfaces never go into each other. Rigid things move as their courses say.
 #[derive(Clone, Debug)]

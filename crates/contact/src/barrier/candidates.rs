@@ -100,9 +100,12 @@ impl Apart {
         Self { start: start.collect(), second: pairs.iter().map(|pair| pair[1]).collect() }
     }
 
-    fn contains(&self, first: u32, second: u32) -> bool {
-        let Some(&[from, to]) = self.start.get(first as usize..first as usize + 2) else { return false };
-        self.second[from as usize..to as usize].binary_search(&second).is_ok()
+    /// The second numbers of a first one.
+    fn of(&self, first: u32) -> &[u32] {
+        match self.start.get(first as usize..first as usize + 2) {
+            Some(&[from, to]) => &self.second[from as usize..to as usize],
+            _ => &[],
+        }
     }
 }
 
@@ -126,6 +129,8 @@ pub(super) struct Group {
     /// Where the candidates of each bin begin; memory to sort them in.
     bins: Vec<u32>,
     unsorted: Vec<Candidate>,
+    /// Of each face or edge the number, from 1 on, of the point or edge for which it was last left out.
+    left_out: Vec<u32>,
     /// Skins [m] of all nodes, how far [m] they have gone since pairs were listed, and how far [m] they go in a motion.
     skin: Vec<f64>,
     moved: Vec<f64>,
@@ -147,6 +152,7 @@ impl Group {
         let place = |node: u32| rest[node as usize];
         let edge = sides[0].mean_edge(place);
         let largest = (SKINS[1] * action.law.distance).max(edge);
+        let most = sides.iter().map(|side| side.faces.len().max(side.edges.len())).max().unwrap_or(0);
         let mut group = Self {
             number,
             sides,
@@ -158,6 +164,7 @@ impl Group {
             candidates: Vec::new(),
             bins: Vec::new(),
             unsorted: Vec::new(),
+            left_out: vec![0; most],
             skin: vec![0.0; rest.len()],
             moved: vec![0.0; rest.len()],
             way: vec![0.0; rest.len()],
@@ -210,7 +217,7 @@ impl Group {
 
     /// Lists what is within a distance [m] and the skins of both.
     fn find(&mut self, place: &[Vector3<f64>], within: f64) {
-        let Self { sides, skin, apart, unsorted, .. } = self;
+        let Self { sides, skin, apart, unsorted, left_out, .. } = self;
         unsorted.clear();
         let at = |node: u32| place[node as usize];
         let margin = |node: u32| skin[node as usize] + 0.5 * within;
@@ -230,20 +237,24 @@ impl Group {
         let alone = sides.len() == 1;
         let other = |side: usize| if alone { &sides[0] } else { &sides[1 - side] };
         let mut met = Vec::new();
+        // Neighbours at rest are most of what boxes meet: they are marked, and seen no further.
+        left_out.fill(0);
         for (number, side) in sides.iter().enumerate() {
             let against = other(number);
             for (&node, point) in side.points.iter().zip(0..) {
                 let wanted = around([node], &at, &margin);
                 met.clear();
+                let mark = point + 1;
+                apart[0].of(point).iter().for_each(|&face| left_out[face as usize] = mark);
                 against.face_tree.near(&wanted, |face| {
-                    if against.face_boxes[face as usize].touches(&wanted) {
+                    if left_out[face as usize] != mark && against.face_boxes[face as usize].touches(&wanted) {
                         met.push(face);
                     }
                 });
                 met.sort_unstable();
                 for &face in &met {
                     let corners = against.faces[face as usize];
-                    if corners.contains(&node) || alone && apart[0].contains(point, face) {
+                    if corners.contains(&node) {
                         continue;
                     }
                     let [a, b, c] = corners;
@@ -271,19 +282,25 @@ impl Group {
                 }
             }
         }
+        left_out.fill(0);
         let (side, against) = (&sides[0], other(0));
         for (edge, number) in side.edges.iter().zip(0..) {
             let wanted = side.edge_boxes[number as usize];
             met.clear();
+            let mark = number + 1;
+            apart[1].of(number).iter().for_each(|&edge| left_out[edge as usize] = mark);
             against.edge_tree.near(&wanted, |other| {
-                if (!alone || other > number) && against.edge_boxes[other as usize].touches(&wanted) {
+                if (!alone || other > number)
+                    && left_out[other as usize] != mark
+                    && against.edge_boxes[other as usize].touches(&wanted)
+                {
                     met.push(other);
                 }
             });
             met.sort_unstable();
             for &second in &met {
                 let ends = against.edges[second as usize];
-                if edge.iter().any(|end| ends.contains(end)) || alone && apart[1].contains(number, second) {
+                if edge.iter().any(|end| ends.contains(end)) {
                     continue;
                 }
                 let nodes = [edge[0], edge[1], ends[0], ends[1]];

@@ -75,7 +75,7 @@ pub fn edge_edge(points: &[Vector3<f64>; 4]) -> Nearest {
     let [da, db] = [along.dot(&between), other.dot(&between)];
     let normal = along.cross(&other);
     let crossed = normal.norm_squared();
-    let mut best: Option<Nearest> = None;
+    let mut best = None;
     if crossed > 0.0 {
         let [s, t] = [(ab * db - bb * da) / crossed, (aa * db - ab * da) / crossed];
         if 0.0 < s && s < 1.0 && 0.0 < t && t < 1.0 {
@@ -90,24 +90,26 @@ pub fn edge_edge(points: &[Vector3<f64>; 4]) -> Nearest {
         }
     }
     // An end of one and the nearest point of the other.
-    for end in 0..4 {
-        let (point, [from, to]) = (points[end], if end < 2 { [c, d] } else { [a, b] });
-        let way = to - from;
-        let length = way.norm_squared();
-        let part = if length > 0.0 { (way.dot(&(point - from)) / length).clamp(0.0, 1.0) } else { 0.0 };
-        let mut coefficients = [0.0; 4];
-        let sign = if end < 2 { 1.0 } else { -1.0 };
-        coefficients[end] = sign;
-        let first = if end < 2 { 2 } else { 0 };
-        coefficients[first] = -sign * (1.0 - part);
-        coefficients[first + 1] = -sign * part;
-        let region = if 0.0 < part && part < 1.0 { Region::Edge } else { Region::Point };
-        let found = Nearest::new(points, coefficients, region);
-        if best.is_none_or(|best| found.distance < best.distance) {
-            best = Some(found);
+    let (mut nearest, mut end, mut part) = (f64::INFINITY, 0, 0.0);
+    for (number, point) in points.iter().enumerate() {
+        let (from, way, length) = if number < 2 { (c, other, bb) } else { (a, along, aa) };
+        let between = point - from;
+        let at = if length > 0.0 { (way.dot(&between) / length).clamp(0.0, 1.0) } else { 0.0 };
+        let squared = (between - way * at).norm_squared();
+        if squared < nearest {
+            (nearest, end, part) = (squared, number, at);
         }
     }
-    best.unwrap_or(Nearest::new(points, [1.0, 0.0, -1.0, 0.0], Region::Point))
+    if let Some(best) = best.filter(|best| best.distance * best.distance <= nearest) {
+        return best;
+    }
+    let (sign, first) = if end < 2 { (1.0, 2) } else { (-1.0, 0) };
+    let mut coefficients = [0.0; 4];
+    coefficients[end] = sign;
+    coefficients[first] = -sign * (1.0 - part);
+    coefficients[first + 1] = -sign * part;
+    let region = if 0.0 < part && part < 1.0 { Region::Edge } else { Region::Point };
+    Nearest::new(points, coefficients, region)
 }
 
 /// The square of the sine of the angle between edges above which their inner nearest points are exact.

@@ -2,12 +2,13 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
-use faer::sparse::linalg::SupernodalThreshold;
+use faer::perm::PermRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LdltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky, supernodal::SupernodalLdltRef,
 };
 use faer::sparse::linalg::lu::{LuRef, LuSymbolicParams, NumericLu, SymbolicLu, factorize_symbolic_lu};
+use faer::sparse::linalg::{SupernodalThreshold, amd};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side, Spec};
 
@@ -42,10 +43,12 @@ pub(crate) struct Factors {
 
 impl Factors {
     pub(crate) fn new(matrix: &LowerMatrix) -> Result<Self, faer::sparse::FaerError> {
+        let order = order(matrix)?;
+        let inverse = inverse_of(&order);
         let symbolic = factorize_symbolic_cholesky(
             pattern(matrix),
             Side::Lower,
-            SymmetricOrdering::Amd,
+            SymmetricOrdering::Custom(PermRef::new_checked(&order, &inverse, matrix.len())),
             CholeskySymbolicParams {
                 supernodal_flop_ratio_threshold: SupernodalThreshold(SUPERNODES),
                 ..Default::default()
@@ -219,6 +222,57 @@ impl LuFactors {
             MemStack::new(&mut self.memory),
         );
     }
+}
+
+/// An order of elimination with little fill (approximate minimum degree, Amestoy, Davis and Duff 1996). Equations that follow one another and
+/// have the same neighbours, as those of a node, are ordered as one: a sixth of the work, and they stay together.
+fn order(matrix: &LowerMatrix) -> Result<Vec<u32>, faer::sparse::FaerError> {
+    let size = matrix.len();
+    // Columns to the left that have a row.
+    let mut left: Vec<Vec<u32>> = vec![Vec::new(); size];
+    for column in 0..size as u32 {
+        matrix.rows(column)[1..].iter().for_each(|&row| left[row as usize].push(column));
+    }
+    let (mut group, mut starts) = (vec![0_u32; size], Vec::new());
+    for column in 0..size {
+        let follows = column > 0 && {
+            let [before, own] = [column - 1, column].map(|column| matrix.rows(column as u32));
+            let (above, last) = (&left[column], column as u32 - 1);
+            before[1..] == *own && above.split_last() == Some((&last, &left[column - 1][..]))
+        };
+        if !follows {
+            starts.push(column as u32);
+        }
+        group[column] = starts.len() as u32 - 1;
+    }
+    let (mut ends, mut rows) = (vec![0_u32], Vec::new());
+    for &start in &starts {
+        let first = rows.len();
+        rows.extend(matrix.rows(start).iter().map(|&row| group[row as usize]));
+        let mut kept = first;
+        for at in first..rows.len() {
+            if at == first || rows[at] != rows[kept - 1] {
+                rows[kept] = rows[at];
+                kept += 1;
+            }
+        }
+        rows.truncate(kept);
+        ends.push(kept as u32);
+    }
+    let count = starts.len();
+    let (mut order, mut place) = (vec![0_u32; count], vec![0_u32; count]);
+    let mut memory = MemBuffer::new(amd::order_scratch::<u32>(count, rows.len()));
+    let groups = SymbolicSparseColMatRef::new_checked(count, count, &ends, None, &rows);
+    amd::order(&mut order, &mut place, groups, amd::Control::default(), MemStack::new(&mut memory))?;
+    starts.push(size as u32);
+    Ok(order.iter().flat_map(|&group| starts[group as usize]..starts[group as usize + 1]).collect())
+}
+
+/// Where each number is in an order.
+fn inverse_of(order: &[u32]) -> Vec<u32> {
+    let mut inverse = vec![0; order.len()];
+    order.iter().zip(0..).for_each(|(&number, place)| inverse[number as usize] = place);
+    inverse
 }
 
 fn pattern(matrix: &LowerMatrix) -> SymbolicSparseColMatRef<'_, u32> {

@@ -9,7 +9,7 @@ use pliant_contact::pose::{Pose, Trajectory};
 use pliant_contact::shape::Shape;
 use pliant_implicit::element::Elasticity;
 use pliant_implicit::{
-    Assembly, BackwardEuler, DynamicSettings, Shell, State, StaticSettings, Statics, Wall,
+    Assembly, BackwardEuler, DynamicSettings, Integrator, Shell, State, StaticSettings, Statics, Wall,
 };
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::load::{Load, LoadKind};
@@ -132,10 +132,19 @@ fn a_ring_between_plates_is_an_elastica() {
     }
 }
 
-/// A6: a ring of 1 mm dropped at 0.5 m/s. Energy of the body and the barrier never grows by backward Euler, and it flies back more slowly
-/// than it came.
-#[test]
-fn a_dropped_ring_gains_no_energy() {
+/// What a ring that was dropped does, energies over that of its fall.
+struct Rebound {
+    /// The largest growth of energy in a step, and its change from the start until the ring has left the floor.
+    grown: f64,
+    drift: f64,
+    /// Steps in contact.
+    touched: u32,
+    /// The mean speed [m/s] with which it leaves.
+    speed: f64,
+}
+
+/// A ring of 1 mm dropped at 0.5 m/s, in steps of a length [s].
+fn dropped(integrator: Integrator, step: f64) -> Rebound {
     let (mut model, own, _) = ring(64, 1e-3);
     let barrier = 2e-4;
     let curve = Curve { shape: CurveShape::Hold, from: 0.0, to: 1.0 };
@@ -147,8 +156,8 @@ fn a_dropped_ring_gains_no_energy() {
         at_rigid(&own, vec![floor], 0.0, 5e-4),
         BarrierSettings { distance: barrier, stiffness: 0.1 * YOUNG, creep_speed: 1e-3 },
     );
-    let step = 1e-3;
-    let settings = DynamicSettings { iterations: 200, tolerance: 1e-9, ..DynamicSettings::new(step) };
+    let settings =
+        DynamicSettings { integrator, iterations: 200, tolerance: 1e-9, ..DynamicSettings::new(step) };
     let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
     let mut state = State::at_rest(&model);
     state.velocity.iter_mut().for_each(|v| v.z = -0.5);
@@ -164,19 +173,47 @@ fn a_dropped_ring_gains_no_energy() {
         moving + height + shell.membrane + shell.bending + shell.drilling + barrier
     };
     let start = 0.5 * model.mass.iter().sum::<f64>() * 0.25;
-    let mut last = energy(&state, 0.0);
-    let (mut grown, mut fastest, mut touched, mut iterations) = (0.0_f64, 0.0_f64, 0, 0);
-    while state.time < 0.1 {
+    let first = energy(&state, 0.0);
+    let mut last = first;
+    let (mut iterations, mut steps) = (0, 0);
+    let mut rebound = Rebound { grown: 0.0, drift: 0.0, touched: 0, speed: 0.0 };
+    // Until it flies up; on its way down it may leave the floor for some steps.
+    let flies_up = |state: &State, solver: &BackwardEuler| {
+        solver.touching().unwrap().now().gap.is_none() && mean(&model, &state.velocity).z > 0.0
+    };
+    while state.time < 0.2 && !flies_up(&state, &solver) {
         iterations += solver.advance(&mut state).unwrap().residuals.len();
+        steps += 1;
         let now = solver.touching().unwrap().now();
         let next = energy(&state, now.energy);
-        grown = grown.max((next - last) / start);
+        rebound.grown = rebound.grown.max((next - last) / start);
         last = next;
-        touched += u32::from(now.gap.is_some());
-        fastest = fastest.max(mean(&model, &state.velocity).z);
+        rebound.touched += u32::from(now.gap.is_some());
+        if now.gap.is_some() {
+            rebound.drift = (next - first) / start;
+        }
+        rebound.speed = rebound.speed.max(mean(&model, &state.velocity).z);
     }
+    let Rebound { grown, drift, touched, speed } = &rebound;
     println!(
-        "grows by {grown:.1e} of the start at most in a step; in contact for {touched} steps; flies back at {fastest:.3} m/s; {iterations} iterations in 100 steps"
+        "{integrator:?}: energy grows by {grown:.1e} in a step at most, {:+.1} % in all; in contact for {touched} steps; flies back at {speed:.3} \
+         m/s; {iterations} iterations in {steps} steps",
+        100.0 * drift
     );
-    assert!(grown < 1e-6 && touched > 5 && fastest > 0.0 && fastest < 0.5);
+    rebound
+}
+
+/// A6: energy of the body and the barrier never grows by backward Euler, and the ring flies back more slowly than it came. Differences of two
+/// steps lose less of it and fly back faster, in longer and in shorter steps; what they lose is what goes into vibrations that steps do not
+/// resolve (21 and 16 % of the energy of the fall).
+#[test]
+fn a_dropped_ring_gains_no_energy_and_rebounds_higher_by_differences_of_two_steps() {
+    for step in [1e-3, 2.5e-4] {
+        let [first, second] =
+            [Integrator::BackwardEuler, Integrator::Bdf2].map(|integrator| dropped(integrator, step));
+        assert!(first.grown < 1e-6 && first.touched > 5 && first.speed > 0.0 && first.speed < 0.5);
+        assert!(second.grown < 0.01 && second.drift < 0.0, "{} {}", second.grown, second.drift);
+        assert!(second.drift > 0.5 * first.drift, "{} {}", second.drift, first.drift);
+        assert!(second.speed > first.speed && second.speed < 0.5, "{} {}", second.speed, first.speed);
+    }
 }

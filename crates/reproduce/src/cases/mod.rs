@@ -7,6 +7,7 @@ pub mod cube;
 pub mod curved;
 pub mod elements;
 pub mod framework;
+pub mod lens;
 pub mod liver;
 pub mod obstacle_course;
 pub mod plate;
@@ -36,6 +37,8 @@ pub const CASES: &[Case] = &[
     curved::PATCH,
     curved::LAYERS,
     curved::RENDERING,
+    lens::MESH,
+    lens::INJECTION,
     obstacle_course::CASE,
     reconstruction::CYLINDER,
     reconstruction::CAPSULE,
