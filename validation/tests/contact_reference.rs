@@ -340,13 +340,6 @@ fn a_ball_pressed_on_a_plane_by_a_fifth_of_its_radius() {
     check_ball(8, 25, false, &depths, [0.02, 0.05]);
 }
 
-#[test]
-#[ignore = "slow"]
-fn a_ball_pressed_on_a_barrier_by_a_fifth_of_its_radius() {
-    let depths = [0.0002, 0.0005, 0.001, 0.0015, 0.002, 0.0025, 0.003, 0.0035, 0.004];
-    check_ball(8, 25, true, &depths, [0.02, 0.05]);
-}
-
 /// A quarter of a disc of 50 mm radius and height, the middle of its top at the origin.
 fn disc(cells: i32, layers: i32) -> Quarter {
     let (radius, inner) = (0.05, 0.0015);
