@@ -127,10 +127,10 @@ fn play(scene: &Scene, is_rigid: bool) -> Result<(), String> {
             };
             crossed += intersections(&surfaces, &place);
             for rigid in &contacts.rigids {
-                let pose = rigid.trajectory.at(state.time);
+                let stance = rigid.stance(state.time, None);
                 let nodes = surfaces.iter().flat_map(|surface| &surface.nodes);
                 deepest =
-                    nodes.fold(deepest, |most, &node| most.max(-rigid.near(&pose, &place(node)).distance));
+                    nodes.fold(deepest, |most, &node| most.max(-rigid.near(&stance, &place(node)).distance));
             }
         }
         for way in &state.increment {
