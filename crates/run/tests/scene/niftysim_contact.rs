@@ -322,18 +322,20 @@ fn a_plate_presses_a_cube_as_a_prescribed_displacement_does() {
     }
 }
 
-/// A cylinder and a probe are pressed into a block on its side: no node goes in, and the base carries their force.
+/// A cylinder and a probe are pressed into a block on its side, or grow into it: no node goes in, and the base carries their force.
 #[test]
 fn round_things_are_pressed_into_a_block() {
     let grid = Grid::hexes([8, 4, 4], [0.08, 0.04, 0.04], [0.0; 3], |_| true);
     let (top, base) = (grid.at(2, 0.04), grid.at(2, 0.0));
-    for (tag, axis, origin) in
-        [("ContactCylinder", "0 1 0", "0.04 -0.02 0.0505"), ("ContactUSProbe", "0 0 -1", "0.04 0.02 0.0905")]
+    let cylinder = ("ContactCylinder", "0 1 0", "0.04 -0.02 0.0505");
+    let probe = ("ContactUSProbe", "0 0 -1", "0.04 0.02 0.0905");
+    for ((tag, axis, origin), moved, grown) in
+        [(cylinder, 0.0055, 0.0), (probe, 0.0055, 0.0), (cylinder, 0.003, 0.0025), (probe, 0.003, 0.0025)]
     {
         let length = if tag == "ContactCylinder" { 0.08 } else { 0.04 };
         let model = format!(
             "<Model>\n{}{}{}<{tag}><Origin>{origin}</Origin><Axis>{axis}</Axis><Radius>0.01</Radius>\
-             <Length>{length}</Length><OrigDisp>0 0 -0.0055</OrigDisp><RadChange>0</RadChange>{}</{tag}>{}</Model>",
+             <Length>{length}</Length><OrigDisp>0 0 -{moved}</OrigDisp><RadChange>{grown}</RadChange>{}</{tag}>{}</Model>",
             grid.xml(),
             set(),
             fix("all", &base),
@@ -343,7 +345,10 @@ fn round_things_are_pressed_into_a_block() {
         let trajectory = played(&model);
         let name = if tag == "ContactCylinder" { "cylinder-0" } else { "probe-0" };
         let (up, down) = (trajectory.forces[name], trajectory.forces["fix-0"]);
-        println!("{tag}: {:.1e} m in it, {up:?} N on it, {down:?} N from the base", trajectory.in_things);
+        println!(
+            "{tag}, {grown} m: {:.1e} m in it, {up:?} N on it, {down:?} N from the base",
+            trajectory.in_things
+        );
         assert!(trajectory.in_things < 1e-12, "{:e}", trajectory.in_things);
         assert!(up.z > 0.01 && (up.z / down.z - 1.0).abs() < 1e-3, "{up:?} and {down:?}");
     }
