@@ -467,7 +467,8 @@ impl Pairs {
         rows.clear();
         for face in list {
             let nodes = other.faces[face as usize];
-            let corners = nodes.map(place);
+            let [a, b, c] = nodes;
+            let corners = [place(a), place(b), place(c)];
             if !Bounds::of(corners).touches(&wanted) || is_beyond(within, &corners, &point) {
                 continue;
             }
