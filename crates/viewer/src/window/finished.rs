@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
-use eframe::egui::{self, Align2, Key, PointerButton, Sense, vec2};
+use eframe::egui::{self, Align2, Key, PointerButton, vec2};
 use eframe::egui_wgpu::WgpuConfiguration;
 use pliant_geometry::{CellKind, Mesh, Vector3};
 use pliant_picture::{
@@ -373,9 +373,8 @@ impl Finished {
     }
 
     fn scene(&mut self, ui: &mut egui::Ui) {
-        let rect = ui.available_rect_before_wrap();
-        let response = ui.allocate_rect(rect, Sense::click_and_drag());
-        self.port.lay_out(rect);
+        let response = self.port.lay_out(ui);
+        let rect = response.rect;
         self.port.turn(ui.ctx(), &response, response.dragged_by(PointerButton::Primary));
         let labels = self.field.as_deref() == Some("label");
         self.port.paint(ui.painter(), labels, None, None);

@@ -1,8 +1,6 @@
 //! The picture in the middle: what the mouse does in it, and what is written over it.
 
-use eframe::egui::{
-    self, Align2, Color32, CursorIcon, FontId, Key, PointerButton, Pos2, Rect, Sense, Stroke, vec2,
-};
+use eframe::egui::{self, Align2, Color32, CursorIcon, FontId, Key, PointerButton, Pos2, Rect, Stroke, vec2};
 use pliant_geometry::Vector3;
 use pliant_picture::{Camera, arrow_note, arrow_unit, largest_force};
 
@@ -23,7 +21,7 @@ const PIN: Color32 = Color32::from_rgb(20, 90, 170);
 const FORCE: Color32 = Color32::from_rgb(190, 40, 40);
 
 /// Keys and what they do, as in `docs/viewer.md`.
-const KEYS: [(&str, &str); 22] = [
+const KEYS: [(&str, &str); 23] = [
     ("drag the body", "pull it"),
     ("drag a tool", "lead it; with Shift turn it about where it is held"),
     ("wheel while dragging a tool", "open and close its jaws"),
@@ -39,6 +37,7 @@ const KEYS: [(&str, &str); 22] = [
     ("Ctrl and Z", "take back a pull, a pin or changed numbers"),
     ("R", "start anew"),
     ("F", "see all"),
+    ("0", "look as at the start"),
     ("1 2 3 4 5 6", "look from the front, back, left, right, top, bottom"),
     ("E G C", "edges, shape at rest, section"),
     ("L", "lock the range of colours"),
@@ -50,9 +49,8 @@ const KEYS: [(&str, &str); 22] = [
 
 impl App {
     pub(super) fn scene(&mut self, ui: &mut egui::Ui) {
-        let rect = ui.available_rect_before_wrap();
-        let response = ui.allocate_rect(rect, Sense::click_and_drag());
-        self.port.lay_out(rect);
+        let response = self.port.lay_out(ui);
+        let rect = response.rect;
         self.mouse(ui.ctx(), &response);
         let on_device = self.on_device().map(|points| points.buffer().clone());
         self.port.paint(ui.painter(), self.view.shows_labels(), self.frame.critical, on_device);

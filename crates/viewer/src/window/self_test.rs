@@ -370,6 +370,9 @@ fn following() -> Vec<Cue> {
         side(Key::Num6, 0.0, -90.0),
         side(Key::Num4, 270.0, 0.0),
         side(Key::Num3, 90.0, 0.0),
+        Cue::key("0 looks as at the start", Key::Num0, |app| {
+            app.port.camera.azimuth == app.port.home.azimuth
+        }),
         Cue::key("F shows all", Key::F, |app| {
             (app.port.camera.height / app.port.fitted().height - 1.0).abs() < 1e-6
         }),
@@ -401,8 +404,8 @@ fn undoing() -> Vec<Cue> {
             |_| Ok(true),
         ),
         Cue::new(
-            "the mouse pulls",
-            |app| vec![Event::PointerMoved(inside(app) + vec2(40.0, 0.0))],
+            "the mouse pulls while the run is paused",
+            |app| vec![Event::PointerMoved(inside(app) + vec2(12.0, 0.0))],
             move |app| Ok(taken(app)),
         ),
         Cue::key("Space plays", Key::Space, move |app| app.frame.steps > 0),

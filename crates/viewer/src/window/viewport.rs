@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use eframe::egui::{
-    self, Align2, Color32, FontId, Key, Painter, PointerButton, Pos2, Rect, Stroke, Vec2, vec2,
+    self, Align2, Color32, FontId, Key, Painter, PointerButton, Pos2, Rect, Sense, Stroke, Vec2, vec2,
 };
 use eframe::egui_wgpu::Callback;
 use eframe::{CreationContext, Frame, wgpu};
@@ -188,14 +188,18 @@ impl Viewport {
         }
     }
 
-    /// Takes its place in the window, and lets the section follow the body.
-    pub fn lay_out(&mut self, rect: Rect) {
+    /// Takes what is left of the window, and lets the section follow the body; what the mouse does there. A name of its own keeps a drag
+    /// alive where a panel beside it comes or goes.
+    pub fn lay_out(&mut self, ui: &mut egui::Ui) -> egui::Response {
+        let rect = ui.available_rect_before_wrap();
+        let response = ui.interact(rect, egui::Id::new("picture"), Sense::click_and_drag());
         let first = self.rect == Rect::ZERO;
         self.rect = rect;
         if first {
             self.fit();
         }
         self.style.clip = self.cut.plane(&self.subject);
+        response
     }
 
     /// Draws the body; from a buffer of points where they are on the device already.
@@ -289,7 +293,8 @@ impl Viewport {
             };
             self.camera.projection = self.home.projection;
         }
-        for (_, [azimuth, elevation]) in SIDES.into_iter().filter(|(key, _)| pressed(*key)) {
+        let home = [(Key::Num0, [self.home.azimuth, self.home.elevation])];
+        for (_, [azimuth, elevation]) in home.into_iter().chain(SIDES).filter(|(key, _)| pressed(*key)) {
             (self.camera.azimuth, self.camera.elevation) = (azimuth, elevation);
         }
         let cuts = pressed(Key::C);
