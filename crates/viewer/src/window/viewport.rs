@@ -192,7 +192,7 @@ impl Viewport {
     /// alive where a panel beside it comes or goes.
     pub fn lay_out(&mut self, ui: &mut egui::Ui) -> egui::Response {
         let rect = ui.available_rect_before_wrap();
-        let response = ui.interact(rect, egui::Id::new("picture"), Sense::click_and_drag());
+        let response = ui.interact(rect, egui::Id::unique("picture"), Sense::click_and_drag());
         let first = self.rect == Rect::ZERO;
         self.rect = rect;
         if first {
