@@ -152,6 +152,18 @@ pub struct Scene {
     pub has_floor: bool,
 }
 
+/// Plays each scene with soft bodies, and again with rigid ones in place of those that are held, if any is (`true`).
+///
+/// # Panics
+/// With the mistakes of all scenes that went wrong.
+pub fn play_all(scenes: &[Scene], play: impl Fn(&Scene, bool) -> Result<(), String>) {
+    let held = |scene: &&Scene| scene.pieces.iter().any(|piece| piece.velocity.is_none());
+    let all = scenes.iter().map(|scene| (scene, false));
+    let all = all.chain(scenes.iter().filter(held).map(|scene| (scene, true)));
+    let wrong: Vec<String> = all.filter_map(|(scene, is_rigid)| play(scene, is_rigid).err()).collect();
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
 fn at(x: f64, y: f64, z: f64) -> Isometry3<f64> {
     Isometry3::translation(x, y, z)
 }
