@@ -23,15 +23,15 @@ pub(super) struct Numbers {
     accepted: Vec<f64>,
     /// A world that is being made of some numbers.
     making: Option<Making>,
-    /// Whether the numbers that wait are those before others.
-    undone: bool,
+    /// Numbers that an undo asks for, until they are accepted.
+    undone: Option<Vec<f64>>,
 }
 
 impl Numbers {
     pub(super) fn of(scene: &Scene) -> Self {
         let all = parameters(scene);
         let in_file: Vec<f64> = all.iter().map(|parameter| parameter.number.value).collect();
-        Self { all, accepted: in_file.clone(), in_file, making: None, undone: false }
+        Self { all, accepted: in_file.clone(), in_file, making: None, undone: None }
     }
 
     fn values(&self) -> Vec<f64> {
@@ -76,7 +76,7 @@ impl App {
     /// Takes other numbers in place of the last ones.
     pub(super) fn set_numbers(&mut self, values: &[f64]) {
         self.numbers.set(values);
-        self.numbers.undone = true;
+        self.numbers.undone = Some(values.to_vec());
         let context = self.context.clone();
         self.make_stage(&context);
     }
@@ -145,8 +145,9 @@ impl App {
                 self.message = None;
                 self.warnings = warnings(&world);
                 let changed = self.numbers.changed(&values);
+                let is_undone = self.numbers.undone.take_if(|undone| *undone == values).is_some();
                 let before = std::mem::replace(&mut self.numbers.accepted, values);
-                if !std::mem::take(&mut self.numbers.undone) {
+                if !is_undone {
                     self.acts.push(Act::Numbers(before));
                 }
                 self.order(Order::Change(Box::new(world), changed));
@@ -155,7 +156,7 @@ impl App {
             }
             Err(message) => {
                 self.message = Some(Told::failure(message));
-                self.numbers.undone = false;
+                self.numbers.undone = None;
                 let accepted = self.numbers.accepted.clone();
                 self.numbers.set(&accepted);
             }
