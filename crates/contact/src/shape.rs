@@ -145,7 +145,7 @@ impl Shape {
     }
 }
 
-/// How far a drawn corner goes at most where a surface grows by 1: tips of cones would go on and on.
+/// Largest distance that a drawn corner moves where the surface grows by 1: the tip of a sharp cone has no bound of its own.
 const FARTHEST: f64 = 3.0;
 
 impl Shape {
@@ -343,7 +343,7 @@ mod tests {
         }
     }
 
-    /// Drawn surfaces that have grown lie on the shape grown by as much, beside its edges, which pictures leave sharp.
+    /// A drawn surface that has grown lies on the larger shape. Its edges are excepted: pictures leave them sharp.
     #[test]
     fn drawn_surfaces_grow_outward() {
         let cylinder = Shape::Cylinder { radius: 0.3, length: 0.8 };

@@ -19,7 +19,7 @@ pub struct Picture {
     pub places: Vec<Place>,
     /// Its triangles, facet by facet.
     pub triangles: Vec<[u32; 3]>,
-    /// Of each triangle, a bit for each side that lies on an edge of the facet: bit i for that opposite to corner i.
+    /// A bit set for each triangle: bit i tells that the side opposite to corner i lies on an edge of the facet.
     pub facet_edges: Vec<u8>,
     /// Its points at rest [m].
     pub rest: Vec<Vector3<f64>>,

@@ -62,7 +62,7 @@ fn surface(@builtin(vertex_index) index: u32) -> Corner {
     return corner_at(points[node], normals[vertex].xyz, index, triangle.w, rest[node].xyz);
 }
 
-// The shape at rest, a little farther away, so that it stays behind the body where both lie in the same place.
+// Moves the shape at rest a little away from the eye: the body hides it where both have the same position.
 @vertex
 fn resting(@builtin(vertex_index) index: u32) -> Corner {
     let triangle = triangles[index / 3u];

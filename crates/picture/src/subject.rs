@@ -47,8 +47,7 @@ struct Patch {
     paint: u32,
 }
 
-/// Cell data of triangles that elements are cut into: a bit for each side that is an edge of the element, bit i for that opposite to
-/// corner i.
+/// Cell data of the triangles of a subdivided element: bit i tells that the side opposite to corner i is an edge of the element.
 const ELEMENT_EDGES: &str = "element-edges";
 
 fn edges_of(block: Option<&CellBlock>, cell: u32) -> u32 {
@@ -329,7 +328,7 @@ pub fn deformed_points(mesh: &Mesh) -> Vec<Vector3> {
     points
 }
 
-/// What colours can tell of a mesh: names of fields as [`nodal_values`] takes them, with their components, and `label`.
+/// Fields of a mesh that colours can show, with their components, by the names that [`nodal_values`] takes; `label` is one of them.
 pub fn field_choices(mesh: &Mesh) -> Vec<String> {
     let of_cells = mesh.blocks.iter().flat_map(|block| &block.data);
     let all: BTreeMap<&String, usize> =

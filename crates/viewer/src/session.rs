@@ -711,7 +711,7 @@ impl<'s> Player<'s> {
         }
     }
 
-    /// Goes back to a state, where the hand lets go and the recording goes on; its time [s], `None` where the stepper cannot.
+    /// Restores a state, releases the hand and continues the recording. Returns the time [s] of the state; `None` if the stepper rejects it.
     fn restore(&mut self, Sound { state, steps, hold, moves }: Sound) -> Option<f64> {
         self.live.restore(state).ok()?;
         let playback = &mut self.playback;

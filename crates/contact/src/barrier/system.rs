@@ -624,13 +624,12 @@ impl Barriers {
 
     /// How far [m] a thing that turns goes at most where a node is, from its present pose to another.
     fn swing(&self, wall: u32, target: &Stance, place: &Vector3<f64>) -> f64 {
-        let (now, rise) = (self.stances[2][wall as usize].pose, self.stances[2][wall as usize].growth);
-        let (target, rise) = (target.pose, (target.growth - rise).abs());
-        let arm = (place - now.translation.vector).norm()
-            + (target.translation.vector - now.translation.vector).norm();
-        (target.translation.vector - now.translation.vector).norm()
-            + now.rotation.angle_to(&target.rotation) * arm
-            + rise
+        let now = &self.stances[2][wall as usize];
+        let [from, to] = [&now.pose, &target.pose].map(|pose| pose.translation.vector);
+        let shift = (to - from).norm();
+        let arm = (place - from).norm() + shift;
+        let turn = now.pose.rotation.angle_to(&target.pose.rotation);
+        shift + turn * arm + (target.growth - now.growth).abs()
     }
 
     /// Whatever has no gap at places [m] and a time [s]: pairs within the distance to keep, nodes in walls, and edges through triangles. With

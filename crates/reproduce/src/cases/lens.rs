@@ -32,8 +32,8 @@ pub const INJECTION: Case = Case {
     shows: "The haptics are folded onto the optic, the optic is bent about them, and the lens is pushed through an injector into \
             the capsular bag: steps of 10 ms with a direct solver, with contact and friction of the lens with itself, the \
             injector and the bag, at about 5 frames a second on a CPU of 2.4 GHz. Here a fork folds the lens in two, and a \
-            plunger pushes it through a tube of 2.6 mm at 10 mm/s into a rigid bag of 11 mm. Each step is solved until no node would go on \
-            faster than 1 mm/s, and no edge goes through a triangle in any. Times of this machine are not judged.",
+            plunger pushes it through a tube of 2.6 mm at 10 mm/s into a rigid bag of 11 mm. The solver ends a step when \
+            every node is within 1 mm/s of its solution, and no edge crosses a triangle in any step. Times of this machine are not judged.",
     corrections: &[],
     seconds: 45.0,
     compute: injection,
@@ -47,7 +47,7 @@ const FOLDED: f64 = 2.0;
 const PUSHED: f64 = 4.14;
 /// Where the tube ends, along y [m].
 const TUBE_END: f64 = 30e-3;
-/// How long [s] after it has left the tube the lens is looked at.
+/// Time [s] from the exit of the lens to the measurement of its shape.
 const REST: f64 = 2.0;
 /// Radius [m] of the optic.
 const OPTIC: f64 = 3e-3;

@@ -181,7 +181,7 @@ impl Finished {
         series: Series,
         outcome: Outcome,
     ) -> Result<Self, String> {
-        let port = Viewport::new(context, Style { edges: false, ..Style::default() }, Camera::default())?;
+        let port = Viewport::new(context, Style::default(), Camera::default())?;
         let ((asks, asked), (found, receive)) = (channel(), channel());
         let woken = context.egui_ctx.clone();
         let work = move || read_frames(&asked, &found, &|| woken.request_repaint());

@@ -85,23 +85,22 @@ type Closer = Option<([f64; 3], f64)>;
 fn view_text(view: &ViewTable, style: &Style, camera: &Camera, cut: Option<Plane>, closer: Closer) -> String {
     let mut lines = vec!["[view]".to_owned()];
     let mut put = |key: &str, value: String| lines.push(format!("{key} = {value}"));
-    let text = |text: &str| toml_text(text);
     let list = |numbers: &[f64]| {
         format!("[{}]", numbers.iter().map(|x| format!("{x:?}")).collect::<Vec<_>>().join(", "))
     };
     if let Some(on) = &view.on {
-        put("on", text(on));
+        put("on", toml_text(on));
     }
     match view.colour {
-        Some(ColourBy::Field(field)) => put("colour", text(field.name())),
-        Some(ColourBy::Labels(_)) => put("colour", text("label")),
-        Some(ColourBy::Nothing(_)) => put("colour", text("none")),
+        Some(ColourBy::Field(field)) => put("colour", toml_text(field.name())),
+        Some(ColourBy::Labels(_)) => put("colour", toml_text("label")),
+        Some(ColourBy::Nothing(_)) => put("colour", toml_text("none")),
         None => {}
     }
     if let Some(component) = view.component {
-        put("component", text(component.word()));
+        put("component", toml_text(component.word()));
     }
-    put("map", text(style.map.name()));
+    put("map", toml_text(style.map.name()));
     if let Some(range) = style.range.filter(|[low, high]| low < high) {
         put("range", list(&range));
     }
@@ -109,7 +108,7 @@ fn view_text(view: &ViewTable, style: &Style, camera: &Camera, cut: Option<Plane
         let hidden: Vec<String> = (view.hide.iter())
             .map(|label| match label {
                 CellLabel::Number(number) => number.to_string(),
-                CellLabel::Name(name) => text(name),
+                CellLabel::Name(name) => toml_text(name),
             })
             .collect();
         put("hide", format!("[{}]", hidden.join(", ")));
@@ -124,7 +123,7 @@ fn view_text(view: &ViewTable, style: &Style, camera: &Camera, cut: Option<Plane
     ];
     switches.into_iter().filter(|(_, on)| *on).for_each(|(key, _)| put(key, "true".into()));
     if style.texture == Texture::Skin {
-        put("texture", text("skin"));
+        put("texture", toml_text("skin"));
     }
     if let Some(plane) = cut {
         let point = plane.normal * plane.offset;
@@ -133,8 +132,8 @@ fn view_text(view: &ViewTable, style: &Style, camera: &Camera, cut: Option<Plane
     }
     match style.background {
         Background::Light => {}
-        Background::White => put("background", text("white")),
-        Background::Dark => put("background", text("dark")),
+        Background::White => put("background", toml_text("white")),
+        Background::Dark => put("background", toml_text("dark")),
     }
     put("curved", view.curved.to_string());
     let mut seen =
@@ -156,11 +155,11 @@ fn rounded(number: f64) -> f64 {
 
 /// A text as a value of TOML.
 fn toml_text(text: &str) -> String {
-    format!("{:?}", text)
+    format!("{text:?}")
 }
 
 /// The text of a scene with other numbers in their places; those that do not stand in the file.
-fn with_numbers(source: &Source, numbers: &[Number]) -> (String, Vec<String>) {
+fn text_with(source: &Source, numbers: &[Number]) -> (String, Vec<String>) {
     let mut places = Vec::new();
     let mut elsewhere = Vec::new();
     for Number { path, value } in numbers {
@@ -194,7 +193,7 @@ impl App {
         let button = egui::Button::new("Save scene");
         let button = ui.add_enabled(!changed.is_empty(), button);
         if button.on_hover_text("writes the scene with the changed numbers beside it").clicked() {
-            let (text, elsewhere) = with_numbers(&self.world.scene.source, &changed);
+            let (text, elsewhere) = text_with(&self.world.scene.source, &changed);
             let written = told(write_beside(&self.file, "changed", "toml", text.as_bytes()));
             self.message = Some(match elsewhere.is_empty() {
                 true => written,
@@ -284,7 +283,7 @@ mod tests {
             number(["body", "cube", "density"], 1060.0),
             number(["body", "cube", "damping"], 2.0),
         ];
-        let (text, elsewhere) = with_numbers(&scene(SCENE).source, &numbers);
+        let (text, elsewhere) = text_with(&scene(SCENE).source, &numbers);
         assert_eq!(text, SCENE.replace("10e3 #", "12500.0 #").replace("density = 1000", "density = 1060"));
         assert_eq!(elsewhere, ["body.cube.damping"]);
     }
