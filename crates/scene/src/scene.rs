@@ -25,7 +25,8 @@ pub struct Scene {
     pub scene: SceneTable,
     /// `[run]`
     pub run: RunTable,
-    /// `[participant.NAME]`, in the order of the file, as all below.
+    /// `[participant.NAME]`, in the order of the file, as all below but bodies, obstacles, tools and contacts: these are in the order of their
+    /// names, with walls after the other bodies.
     pub participants: Vec<(String, ParticipantTable)>,
     /// `[law.NAME]`
     pub laws: Vec<(String, LawTable)>,
@@ -152,7 +153,7 @@ impl Scene {
             }
         }
         // Walls after the bodies that they are on.
-        bodies.sort_by_key(|(_, table)| table.on.is_some());
+        bodies.sort_by(|(a, of_a), (b, of_b)| (of_a.on.is_some(), a).cmp(&(of_b.on.is_some(), b)));
         let ties =
             read_all(&source, "tie", |s, path, out| read_table::<TieTable>(s, path, &[], out), &mut out);
         let surfaces = read_all(
@@ -165,14 +166,14 @@ impl Scene {
         let loads = read_all(&source, "load", read_typed::<LoadTable>, &mut out);
         let rigid =
             |s: &Source, path: &[&str], out: &mut Vec<Diagnostic>| read_table::<ToolTable>(s, path, &[], out);
-        let obstacles = read_all(&source, "obstacle", rigid, &mut out);
-        let tools = read_all(&source, "tool", rigid, &mut out);
-        let contacts = read_all(
+        let obstacles = by_name(read_all(&source, "obstacle", rigid, &mut out));
+        let tools = by_name(read_all(&source, "tool", rigid, &mut out));
+        let contacts = by_name(read_all(
             &source,
             "contact",
             |s, path, out| read_table::<ContactTable>(s, path, &[], out),
             &mut out,
-        );
+        ));
         let outputs = read_all(&source, "output", read_typed::<OutputTable>, &mut out);
         let view = read_table::<ViewTable>(&source, &["view"], &[], &mut out);
         check_probe_names(&source, &mut out);
@@ -266,6 +267,12 @@ fn read_all<T>(
         }
     }
     all
+}
+
+/// Tables in the order of their names: the order of what touches in the file changes no digit.
+fn by_name<T>(mut tables: Vec<(String, T)>) -> Vec<(String, T)> {
+    tables.sort_by(|(a, _), (b, _)| a.cmp(b));
+    tables
 }
 
 /// Files and columns are called after names: whether this is a plain word; a diagnostic if not.
