@@ -161,7 +161,7 @@ fn pressed(
     let own = |face: &[u32; 3]| face.iter().all(|node| around.contains(node));
     let outer = triangles.iter().copied().filter(own).collect();
     let contacts = vec![contact(&around, outer), contact(&pole, Vec::new())];
-    let contacts = Arc::new(Contacts { rigids: vec![tool.clone()], contacts });
+    let contacts = Arc::new(Contacts { rigids: vec![tool.clone()], contacts, ..Default::default() });
     let mut stepper = CentralDifference::<f64>::new(model.clone(), step).unwrap().touching(contacts);
     let mut state = State::at_rest(&model);
     let force =
@@ -219,7 +219,7 @@ fn pressed_at_a_barrier(quarter: &Quarter, depths: &[f64], near_pole: f64) -> Ve
     let surface = Surface { nodes: nodes.clone(), faces: quarter.triangles() };
     let touch = Touch { friction: 0.0, offset: 0.0 };
     let contact = Contact { name: "touch".into(), surface, with: With::Rigid(0), touch };
-    let contacts = Arc::new(Contacts { rigids: vec![plane], contacts: vec![contact] });
+    let contacts = Arc::new(Contacts { rigids: vec![plane], contacts: vec![contact], ..Default::default() });
     let settings = BarrierSettings { distance: BARRIER, stiffness: 1e4, creep_speed: 1e-3 };
     let model = Assembly {
         rotary_inertia: vec![0.0; quarter.model.rest.len()],

@@ -485,7 +485,7 @@ fn valve_leaflets_coapt_and_hold_their_pressure() {
     };
     let settings = BarrierSettings { distance: barrier, stiffness: 1e5, creep_speed: 1e-3 };
     valve.model.touching = Some(Touching {
-        contacts: Arc::new(Contacts { rigids: Vec::new(), contacts: vec![contact] }),
+        contacts: Arc::new(Contacts { rigids: Vec::new(), contacts: vec![contact], ..Default::default() }),
         settings: vec![settings],
         check_crossings: true,
     });

@@ -413,6 +413,8 @@ pub struct Contacts {
     pub rigids: Vec<Rigid>,
     /// Who touches whom.
     pub contacts: Vec<Contact>,
+    /// Rest places [m] of nodes that another solver moves: in surfaces they are numbered after the nodes of the model.
+    pub guests: Vec<Vector<f64>>,
 }
 
 /// Points on a triangle besides its corners, by their weights: a lattice of so many parts of an edge.

@@ -455,6 +455,22 @@ impl<R: Scalar> CentralDifference<R> {
         self
     }
 
+    /// Says where guests of contacts ([`Contacts::guests`]) go between two times [s], from one place [m] to another, at the same speed; before
+    /// and after that they go on so.
+    ///
+    /// # Panics
+    /// If there are not as many ways as guests.
+    pub fn lead_guests(&mut self, times: [f64; 2], ways: &[[Vector<f64>; 2]]) {
+        if let Some(touching) = &mut self.touching {
+            touching.lead(times, ways);
+        }
+    }
+
+    /// Impulses [N s] of contacts on each guest since it was led, over the steps that have ended.
+    pub fn guest_impulses(&self) -> &[Vector<f64>] {
+        self.touching.as_ref().map_or(&[], Touching::impulses)
+    }
+
     /// How another stepper goes on from a state of this one.
     pub fn clock(&self, state: &State<R>) -> Clock {
         self.control.clock(state)
@@ -551,6 +567,7 @@ impl<R: Scalar> CentralDifference<R> {
         self.model.follow(&mut state.displacement);
         if let Some(touching) = &mut self.touching {
             touching.slide(&mut state.slip);
+            touching.press_guests(self.lengths.next);
         }
         state.work.advance();
         self.control.count(state);
@@ -653,7 +670,7 @@ impl<R: Scalar> CentralDifference<R> {
             };
             Posture { stances: [stance(0), stance(1)], opening: rigid.posture(times[1], leg).1 }
         };
-        touching.find(postures, &now, free, &mut gripped);
+        touching.find(postures, &now, times, free, &mut gripped);
         touching.nodal_forces().for_each(|(node, force)| self.applied.add(node, force));
         touching.bear_on(&mut lags);
         (state.gripped, state.lags) = (gripped, lags);

@@ -4,6 +4,7 @@
 //! each impulse. A last pass over nodes alone keeps these out of curved rigid things, too.
 
 mod at_rigid;
+mod guests;
 mod nodal;
 mod rows;
 mod ways;
@@ -23,6 +24,7 @@ use pliant_mechanics::tensor::{Vector, add};
 
 use crate::Scalar;
 use at_rigid::{AtRigid, Seen};
+use guests::Guests;
 pub use nodal::NodeContact;
 use rows::{NONE, Row, idle, push_alone, take_back};
 pub(crate) use ways::Nodes;
@@ -108,7 +110,9 @@ enum Own {
 /// The contacts of a model, with the nodes that they are about.
 pub(crate) struct Touching<R> {
     contacts: Arc<Contacts>,
+    /// Their numbers in the model, increasing; those of guests come after it.
     numbers: Vec<u32>,
+    guests: Guests,
     /// Where the nodes are at rest, and before the step [m]; the latter only of those that `placed` has.
     rest: Vec<Vector3<f64>>,
     places: Vec<Vector3<f64>>,
@@ -139,9 +143,13 @@ impl<R: Scalar> Touching<R> {
     /// Those of a model with these nodes at rest [m].
     pub fn new(contacts: Arc<Contacts>, rest: &[Vector<f64>]) -> Self {
         let numbers = contacts.nodes();
+        let guests = Guests::new(rest.len(), &contacts.guests);
         // Faces are of nodes that touch.
         let number = |node: u32| numbers.partition_point(|&known| known < node) as u32;
-        let place = |node: u32| Vector3::from(rest[numbers[node as usize] as usize]);
+        let place = |node: u32| {
+            let number = numbers[node as usize] as usize;
+            rest.get(number).map_or_else(|| guests.rest(number), |&rest| rest.into())
+        };
         let parts = contacts.contacts.iter().map(|contact| {
             let at_rigid = |rigid: usize| {
                 let surface = contact.surface.numbered(number);
@@ -170,6 +178,7 @@ impl<R: Scalar> Touching<R> {
             slips: vec![[0.0; 2]; numbers.len()],
             slid: Vec::new(),
             numbers,
+            guests,
             own,
             forces: vec![[0.0; 3]; contacts.contacts.len()],
             contacts,
@@ -181,9 +190,11 @@ impl<R: Scalar> Touching<R> {
         &mut self,
         postures: impl Fn(usize, &Rigid) -> Posture,
         now: &Nodes<'_, R>,
+        times: [f64; 2],
         free: impl Fn(u32) -> Free,
         gripped: &mut Vec<Gripped>,
     ) {
+        self.guests.go(times);
         self.forces.fill([0.0; 3]);
         for node in self.near.drain(..) {
             let node = &mut self.nodes[node as usize];
@@ -228,7 +239,7 @@ impl<R: Scalar> Touching<R> {
 
     /// Gives each lag the force of its tool in the step.
     pub fn bear_on(&self, lags: &mut [Lag]) {
-        let Contacts { rigids, contacts } = &*self.contacts;
+        let Contacts { rigids, contacts, .. } = &*self.contacts;
         for lag in lags {
             let tool = rigids[lag.rigid()].tool();
             let on = |(contact, force): (&Contact, &Vector<f64>)| {
@@ -246,9 +257,28 @@ impl<R: Scalar> Touching<R> {
         touching.map(|(node, number)| (number, over(&(node.then - node.free), &node.own).into()))
     }
 
+    /// Says where guests go between two times [s]: from one place [m] to the other, at the same speed. Impulses on them count from now on.
+    pub fn lead(&mut self, times: [f64; 2], ways: &[[Vector<f64>; 2]]) {
+        self.guests.lead(times, ways);
+    }
+
+    /// Impulses [N s] on the guests since they were led.
+    pub fn impulses(&self) -> &[Vector<f64>] {
+        self.guests.impulses()
+    }
+
+    /// Adds the impulses on guests of the step whose forces were found last, over its length [s].
+    pub fn press_guests(&mut self, length: f64) {
+        for &near in self.near.iter().rev() {
+            let Some(guest) = self.guests.place_of(self.numbers[near as usize]) else { break };
+            self.guests.press(guest, self.nodes[near as usize].borne * length);
+        }
+    }
+
     /// The nodes of the model between the first and the last that touch.
     fn span(&self) -> Range<usize> {
-        match (self.numbers.first(), self.numbers.last()) {
+        let own = &self.numbers[..self.numbers.partition_point(|&node| self.guests.place_of(node).is_none())];
+        match (own.first(), own.last()) {
             (Some(&first), Some(&last)) => first as usize..last as usize + 1,
             _ => 0..0,
         }
@@ -272,7 +302,7 @@ impl<R: Scalar> Touching<R> {
         }
         self.listed.clear();
         self.listed.extend_from_slice(&now.displacement[span]);
-        place_nodes(0..self.numbers.len() as u32, &self.numbers, &self.rest, now, &mut self.places);
+        self.guests.place(0..self.numbers.len() as u32, &self.numbers, &self.rest, now, &mut self.places);
         self.placed.clone_from(&self.of_bodies);
         for (own, room) in self.own.iter_mut().zip(rooms) {
             if let Own::Rigid(own) = own {
@@ -289,12 +319,12 @@ impl<R: Scalar> Touching<R> {
     fn place(&mut self, now: &Nodes<'_, R>, gripped: &[Gripped]) {
         let held = gripped.iter().filter_map(|held| self.numbers.binary_search(&held.node).ok());
         let nodes = self.placed.iter().copied().chain(held.map(|node| node as u32));
-        place_nodes(nodes, &self.numbers, &self.rest, now, &mut self.places);
+        self.guests.place(nodes, &self.numbers, &self.rest, now, &mut self.places);
     }
 
     /// Finds the nodes that may touch in the step, and where they go; rows of the points near rigid things.
     fn look(&mut self, way: f64, free: impl Fn(u32) -> Free, gripped: &[Gripped]) {
-        let Self { contacts, numbers, places, nodes, near, own, seen, rows, .. } = self;
+        let Self { contacts, numbers, guests, places, nodes, near, own, seen, rows, .. } = self;
         rows.clear();
         let mut mark = |node: u32| {
             if !std::mem::replace(&mut nodes[node as usize].near, true) {
@@ -323,7 +353,7 @@ impl<R: Scalar> Touching<R> {
         near.sort_unstable();
         for &node in near.iter() {
             let (node, number) = (&mut nodes[node as usize], numbers[node as usize]);
-            let Free { then, mobility } = free(number);
+            let Free { then, mobility } = guests.free(number).unwrap_or_else(|| free(number));
             (node.free, node.then) = (then.into(), then.into());
             (node.mobility, node.own) = (mobility.into(), mobility.into());
             (node.borne, node.lifted, node.way) = (Vector3::zeros(), Vector3::zeros(), 0.0);
@@ -537,20 +567,6 @@ impl<R: Scalar> Touching<R> {
                 }
             }
         }
-    }
-}
-
-/// Finds where nodes are before the step [m], by their places among `numbers`.
-fn place_nodes<R: Scalar>(
-    nodes: impl Iterator<Item = u32>,
-    numbers: &[u32],
-    rest: &[Vector3<f64>],
-    now: &Nodes<'_, R>,
-    places: &mut [Vector3<f64>],
-) {
-    for node in nodes.map(|node| node as usize) {
-        let displacement = now.displacement[numbers[node] as usize].map(|x| x.to_f64());
-        places[node] = rest[node] + Vector3::from(displacement);
     }
 }
 

@@ -291,7 +291,7 @@ struct Lists {
 impl Lists {
     /// Of the nodes that touch, and from where the ways of things begin in a row of the table.
     fn new(
-        Contacts { rigids, contacts }: &Contacts,
+        Contacts { rigids, contacts, .. }: &Contacts,
         nodes: Vec<u32>,
         rest: &[Vector<f64>],
         passages: usize,

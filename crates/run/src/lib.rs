@@ -48,8 +48,8 @@ mod testing;
 pub use checkpoint::{Checkpoint, ResumeError};
 pub use live::Live;
 pub use output::{
-    AddedMass, BodySummary, Column, OutputError, OutputFolder, ParticipantSummary, StabilitySummary, Summary,
-    TieSummary, failed_input, failed_output,
+    AddedMass, BodySummary, Column, GuestSummary, OutputError, OutputFolder, ParticipantSummary,
+    StabilitySummary, Summary, TieSummary, failed_input, failed_output,
 };
 pub use overview::overview;
 pub use run::{Draw, Options, Progress, run, run_with};

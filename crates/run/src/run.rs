@@ -12,9 +12,9 @@ use pliant_sim::{Failure, LoadStepProgress, Observer, Schedule, Simulation};
 use crate::advice::remedy;
 use crate::checkpoint::{Checkpoint, Checkpoints, Progressed};
 use crate::output::{
-    CONVERGENCE, FieldMesh, History, Outcome, OutputError, OutputFolder, PICTURE, PLOT, PartOutcome, SUMMARY,
-    Scheduled, Summary, TieSummary, Watched, frames, interrupted, markdown, output_failure, outputs, plot,
-    summarise,
+    CONVERGENCE, FieldMesh, GuestSummary, History, Outcome, OutputError, OutputFolder, PICTURE, PLOT,
+    PartOutcome, SUMMARY, Scheduled, Summary, TieSummary, Watched, frames, interrupted, markdown,
+    output_failure, outputs, plot, summarise,
 };
 use pliant_scene::World;
 
@@ -156,6 +156,7 @@ fn go(
         energies: simulation.energies(),
         parts: parts.map(|((part, own), watched)| PartOutcome::new(part, own, watched)).collect(),
         ties: simulation.ties().map(|tie| TieSummary::new(world, tie)).collect(),
+        guests: simulation.guests().map(|now| GuestSummary::new(world, now)).collect(),
         ended: simulation.ended().map(ToOwned::to_owned),
         history,
         files: files.into_iter().chain(kept).chain(drawn.clone()).collect(),

@@ -38,6 +38,7 @@ mod cache;
 pub mod checker;
 pub mod diagnostic;
 pub mod format;
+mod guests;
 mod method;
 mod nearest;
 pub mod niftysim;

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use crate::assemble::{SCENE, suggestion};
 use crate::diagnostic::{Diagnostic, SceneErrors};
 use crate::format::{
-    BodyModel, BodyTable, ColourBy, DeviceName, FieldName, ParticipantTable, RunTable, SolverName, ViewTable,
+    BodyModel, BodyTable, ColourBy, ContactTable, DeviceName, FieldName, ParticipantTable, RunTable,
+    SolverName, ViewTable,
 };
 use crate::registry::{ConstraintTable, OutputTable};
 use crate::scene::Scene;
@@ -245,17 +246,26 @@ impl Scene {
         let table = self.participants.iter().find(|(known, _)| known == name);
         let bodies: Vec<_> = self.bodies.iter().filter(|(body, _)| owns(body)).cloned().collect();
         let models: Vec<BodyModel> = bodies.iter().map(|(_, body)| body.model).collect();
+        let apart = |table: &ContactTable| {
+            let [first, second] = &table.between;
+            owners.of.contains_key(first) && owners.of.contains_key(second) && owns(first) != owns(second)
+        };
+        let meets: Vec<_> = self.contacts.iter().filter(|(_, table)| apart(table)).cloned().collect();
         let contacts: Vec<_> = self
             .contacts
             .iter()
             .filter(|(_, table)| {
                 let body = table.between.iter().find(|name| owners.of.contains_key(*name));
-                body.map_or(index == 0 || table.between.iter().any(|name| name == "all"), |name| owns(name))
+                !apart(table)
+                    && body.map_or(index == 0 || table.between.iter().any(|name| name == "all"), |name| {
+                        owns(name)
+                    })
             })
             .cloned()
             .collect();
+        let touches_something = !(contacts.is_empty() && meets.is_empty());
         let has = |field: FieldName| {
-            let touches = !contacts.is_empty() || !field.is_of_contact();
+            let touches = touches_something || !field.is_of_contact();
             touches && models.iter().any(|&model| field.is_of(model))
         };
         // A field that no body of the scene has is reported once, with the first participant.
@@ -308,7 +318,7 @@ impl Scene {
         } else if !coloured {
             view.colour = None;
         }
-        view.contacts &= seen && (!contacts.is_empty() || self.contacts.is_empty() && index == 0);
+        view.contacts &= seen && (touches_something || self.contacts.is_empty() && index == 0);
         let on_part = |on: Option<&str>| on.is_none_or(owns);
         Self {
             run: self.run_of(table.map(|(_, table)| table), &models),
@@ -334,6 +344,7 @@ impl Scene {
             obstacles: self.obstacles.clone(),
             tools: self.tools.clone(),
             contacts,
+            meets,
             loads: self.loads.iter().filter(|(_, load)| on_part(load.on())).cloned().collect(),
             outputs,
             view,

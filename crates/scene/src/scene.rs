@@ -48,6 +48,8 @@ pub struct Scene {
     pub tools: Vec<(String, ToolTable)>,
     /// `[contact.NAME]`
     pub contacts: Vec<(String, ContactTable)>,
+    /// Those between a body of this scene and one of another participant.
+    pub(crate) meets: Vec<(String, ContactTable)>,
     /// `[output.NAME]`
     pub outputs: Vec<(String, OutputTable)>,
     /// `[view]`
@@ -199,6 +201,7 @@ impl Scene {
                 obstacles,
                 tools,
                 contacts,
+                meets: Vec::new(),
                 outputs,
                 view,
                 doubts: out,

@@ -168,6 +168,9 @@ fn with_design(scene: &Scene, built: &Built) -> Result<(), Box<Diagnostic>> {
 
 /// What of its contacts a GPU can't support, in words.
 fn contact_only(built: &Built) -> Option<String> {
+    if !built.meets.is_empty() {
+        return Some("contact between participants".into());
+    }
     #[cfg(feature = "gpu")]
     return built.contacts.as_deref().and_then(pliant_sim::gpu::processor_only);
     #[cfg(not(feature = "gpu"))]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use pliant_geometry::Labels;
 #[cfg(feature = "gpu")]
 use pliant_sim::gpu::Device;
-use pliant_sim::{Failure, PenaltyTie, Simulation};
+use pliant_sim::{Failure, Guests, PenaltyTie, Simulation};
 
 use crate::assemble::{Built, Meshing, build_watched};
 use crate::cache::MeshCache;
@@ -23,6 +23,8 @@ pub struct World {
     pub participants: Vec<Part>,
     /// Ties between them.
     pub ties: Vec<PenaltyTie>,
+    /// Nodes of participants that others touch.
+    pub guests: Vec<Guests>,
 }
 
 /// A participant: some bodies of a scene, with their model and how it is stepped.
@@ -76,14 +78,16 @@ impl World {
             Ok(Part { name, plan: plan?, scene: part, built: Arc::new(built) })
         };
         let participants = built.into_iter().map(planned).collect::<Result<Vec<_>, SceneErrors>>()?;
-        let mut world = Self { scene: scene.clone(), participants, ties: Vec::new() };
+        let mut world = Self { scene: scene.clone(), participants, ties: Vec::new(), guests: Vec::new() };
         if world.only().is_none() {
             world.check_load_steps()?;
         }
         let mut found = Vec::new();
         world.find_ties(&mut found);
+        world.find_guests(&mut found);
         world.meet();
         world.check_ties(&mut found);
+        world.check_guests(&mut found);
         if found.iter().any(Diagnostic::is_error) {
             return Err(scene.source.errors(found));
         }
@@ -107,7 +111,7 @@ impl World {
     pub fn of(scene: &Scene, built: &Arc<Built>, plan: &Plan) -> Self {
         let part =
             Part { name: String::new(), scene: scene.clone(), built: Arc::clone(built), plan: plan.clone() };
-        Self { scene: scene.clone(), participants: vec![part], ties: Vec::new() }
+        Self { scene: scene.clone(), participants: vec![part], ties: Vec::new(), guests: Vec::new() }
     }
 
     /// The same of another duration [s].
@@ -169,7 +173,7 @@ impl World {
     /// Its participants without their tables.
     pub fn simulated(&self) -> pliant_sim::World {
         let parts = self.participants.iter().map(Part::simulated).collect();
-        pliant_sim::World { parts, ties: self.ties.clone() }
+        pliant_sim::World { parts, ties: self.ties.clone(), guests: self.guests.clone() }
     }
 
     /// Adds a doubt to those that did not keep the models from being built.

@@ -690,6 +690,15 @@ impl Participant for Implicit {
         [grip.position(&self.state, 0), grip.force(&self.state)]
     }
 
+    /// What was spent since then counts.
+    fn go_back(&mut self, kept: &Kept) -> Result<(), Failure> {
+        let Kept::Implicit(state) = kept else { return Ok(()) };
+        let (effort, before) = (self.effort.clone(), self.effort_before.clone());
+        self.resume((**state).clone())?;
+        (self.effort, self.effort_before) = (effort, before);
+        Ok(())
+    }
+
     fn kept(&self) -> Kept {
         Kept::Implicit(Box::new(self.snapshot()))
     }

@@ -41,6 +41,7 @@ mod bodies;
 #[cfg(feature = "gpu")]
 mod device;
 mod failure;
+mod guests;
 mod implicit;
 mod instant;
 mod kept;
@@ -60,6 +61,7 @@ pub use bodies::{BodyCells, ImplicitBodies, RunControl, Stop};
 #[cfg(feature = "gpu")]
 pub use device::{MappedPoint, OnDevice};
 pub use failure::{FailedLoadStep, Failure};
+pub use guests::{Guests, GuestsNow};
 pub use instant::{CellsNow, Effort, Instant};
 pub use part::{Explicit, Method, Part, Precision};
 pub use penalty::{PenaltyTie, TieNow};

@@ -7,6 +7,7 @@ use pliant_explicit::{Clock, Wanted};
 #[cfg(feature = "gpu")]
 use pliant_gpu::GpuStepper;
 use pliant_mechanics::grip::Grip;
+use pliant_mechanics::tensor::Vector;
 
 use crate::failure::Failure;
 use crate::instant::Instant;
@@ -52,6 +53,20 @@ pub(crate) trait Participant: Instant + Send {
 
     /// The point of a grip now [m], and its force on the body [N].
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2];
+
+    /// Says where guests of its contacts go between two times [s], from one place [m] to another; only explicit solids have some.
+    fn lead_guests(&mut self, _times: [f64; 2], _ways: &[[Vector<f64>; 2]]) {}
+
+    /// Impulses [N s] on each guest since it was led.
+    fn guest_impulses(&self) -> &[Vector<f64>] {
+        &[]
+    }
+
+    /// Goes back to a state that it was in.
+    ///
+    /// # Errors
+    /// If equations are too many.
+    fn go_back(&mut self, kept: &Kept) -> Result<(), Failure>;
 
     /// Brings the state back to ordinary memory, whole.
     ///

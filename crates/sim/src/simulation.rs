@@ -7,10 +7,12 @@ use pliant_explicit::{Clock, Wanted};
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::model::Enclosed;
 use pliant_mechanics::{Energies, Model, fingerprint};
+use serde::{Deserialize, Serialize};
 
 #[cfg(feature = "gpu")]
 use crate::device::OnDevice;
 use crate::failure::Failure;
+use crate::guests::{GuestMemory, Guests, GuestsNow, Meetings};
 use crate::instant::Instant;
 use crate::kept::Kept;
 use crate::part::Part;
@@ -27,6 +29,8 @@ pub struct World {
     pub parts: Vec<Part>,
     /// Ties between participants.
     pub ties: Vec<PenaltyTie>,
+    /// Nodes of participants that others touch.
+    pub guests: Vec<Guests>,
 }
 
 impl World {
@@ -38,7 +42,7 @@ impl World {
             let duration = part.steps.step * part.steps.number as f64;
             part.steps.meet(common, duration);
         }
-        Self { parts, ties: Vec::new() }
+        Self { parts, ties: Vec::new(), guests: Vec::new() }
     }
 
     /// Steps of each participant between two common instants.
@@ -57,7 +61,7 @@ impl World {
 
 impl From<Part> for World {
     fn from(part: Part) -> Self {
-        Self { parts: vec![part], ties: Vec::new() }
+        Self { parts: vec![part], ties: Vec::new(), guests: Vec::new() }
     }
 }
 
@@ -69,7 +73,20 @@ impl From<Part> for Arc<World> {
 
 /// The state of a simulation between two steps: a snapshot of all that another one needs to go on from there.
 #[derive(Clone, Debug)]
-pub struct State(Vec<OwnState>, TieMemory);
+pub struct State(Vec<OwnState>, Between);
+
+/// What a restart needs of ties and contacts between participants.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct Between {
+    ties: TieMemory,
+    guests: GuestMemory,
+}
+
+impl Between {
+    fn fits(&self, world: &World) -> bool {
+        self.ties.fits(&world.ties) && self.guests.fits(&world.guests)
+    }
+}
 
 /// That of a participant.
 #[derive(Clone, Debug)]
@@ -83,10 +100,10 @@ struct OwnState {
 impl State {
     /// The state whose participants were [encoded](Simulation::encode); `None` where these bytes are none of this world.
     pub fn decode<B: AsRef<[u8]>>(world: &World, bytes: &[B]) -> Option<Self> {
-        let (participants, ties) = bytes.split_at_checked(world.parts.len())?;
-        let ties: TieMemory = match ties {
-            [] => TieMemory::default(),
-            [ties] => postcard::from_bytes(ties.as_ref()).ok()?,
+        let (participants, between) = bytes.split_at_checked(world.parts.len())?;
+        let between: Between = match between {
+            [] => Between::default(),
+            [between] => postcard::from_bytes(between.as_ref()).ok()?,
             _ => return None,
         };
         let of = |(part, bytes): (&Part, &B)| {
@@ -94,7 +111,7 @@ impl State {
             Some(OwnState { kept, clock: None, step: part.steps.step })
         };
         let parts = world.parts.iter().zip(participants).map(of).collect::<Option<_>>()?;
-        ties.fits(&world.ties).then_some(Self(parts, ties))
+        between.fits(world).then_some(Self(parts, between))
     }
 }
 
@@ -140,6 +157,9 @@ pub struct Simulation {
     /// Hands on each participant.
     hands: Vec<Vec<Grip>>,
     springs: Springs,
+    meetings: Meetings,
+    /// States at the common instant before the step, where participants touch each other.
+    before: Vec<Kept>,
     /// Whether forces, energies and reactions belong to the instant.
     evaluated: bool,
 }
@@ -155,23 +175,23 @@ impl Simulation {
         if participants.is_empty() {
             return Err(Failure::input(&"the world has no participants"));
         }
-        Self::of(world, participants, TieMemory::default())
+        Self::of(world, participants, Between::default())
     }
 
     /// From a state of this world on.
     ///
     /// # Errors
     /// If a stepper can't be made, or the state is of another world.
-    pub fn resumed(world: impl Into<Arc<World>>, State(state, ties): State) -> Result<Self, Failure> {
+    pub fn resumed(world: impl Into<Arc<World>>, State(state, between): State) -> Result<Self, Failure> {
         let (world, other) = (world.into(), || Failure::input(&"the state is of another model"));
-        if state.is_empty() || state.len() != world.parts.len() || !ties.fits(&world.ties) {
+        if state.is_empty() || state.len() != world.parts.len() || !between.fits(&world) {
             return Err(other());
         }
         let mut participants = Vec::new();
         for (part, own) in world.parts.iter().zip(state) {
             participants.push(go_on(part, own.kept, None)?.ok_or_else(other)?);
         }
-        Self::of(world, participants, ties)
+        Self::of(world, participants, between)
     }
 
     /// From a state that another world was in, with displacements, velocities and the history of relaxing laws. `None` where this world
@@ -181,11 +201,11 @@ impl Simulation {
     /// If a stepper can't be made.
     pub fn continued(
         world: impl Into<Arc<World>>,
-        State(state, ties): State,
+        State(state, between): State,
         before: &World,
     ) -> Result<Option<Self>, Failure> {
         let world = world.into();
-        let fits = ties.fits(&world.ties);
+        let fits = between.fits(&world);
         if state.is_empty() || [state.len(), before.parts.len()] != [world.parts.len(); 2] || !fits {
             return Ok(None);
         }
@@ -201,24 +221,42 @@ impl Simulation {
                 None => return Ok(None),
             }
         }
-        Self::of(world, participants, ties).map(Some)
+        Self::of(world, participants, between).map(Some)
     }
 
     fn of(
         world: Arc<World>,
         participants: Vec<Box<dyn Participant>>,
-        ties: TieMemory,
+        between: Between,
     ) -> Result<Self, Failure> {
         let ratios = world.ratios();
         let nodes = world.parts.iter().map(|part| part.model.node_count() as u32);
         let first_nodes = nodes.scan(0, |next, nodes| Some(std::mem::replace(next, *next + nodes))).collect();
         let hands = vec![Vec::new(); participants.len()];
         let mut order: Vec<usize> = (0..participants.len()).collect();
-        // Of the same steps, one whose equations are solved goes last.
-        order.sort_by_key(|&part| (ratios[part], world.parts[part].method.solves_steps()));
+        // Of the same steps, one whose equations are solved goes last; but its guests go before their hosts.
+        let solves = |part: usize| world.parts[part].method.solves_steps();
+        order.sort_by_key(|&part| (ratios[part], solves(part) == world.guests.is_empty()));
         let done = vec![0; participants.len()];
-        let springs = Springs::new(&world.ties, &world.parts, ties)?;
-        Ok(Self { world, participants, ratios, first_nodes, order, done, hands, springs, evaluated: false })
+        if !(world.ties.is_empty() || world.guests.is_empty()) {
+            return Err(Failure::input(&"participants are tied to each other or touch each other, not both"));
+        }
+        let springs = Springs::new(&world.ties, &world.parts, between.ties)?;
+        let meetings = Meetings::new(&world.guests, &world.parts, &ratios, between.guests)?;
+        let before = Vec::new();
+        Ok(Self {
+            world,
+            participants,
+            ratios,
+            first_nodes,
+            order,
+            done,
+            hands,
+            springs,
+            meetings,
+            before,
+            evaluated: false,
+        })
     }
 
     /// The world.
@@ -311,8 +349,13 @@ impl Simulation {
     /// If those of a participant can't be found.
     pub fn evaluate(&mut self, wanted: Wanted) -> Result<(), Failure> {
         if !self.evaluated {
-            if !self.springs.is_empty() {
+            if !self.meetings.is_empty() {
+                self.before.clear();
+                self.before.extend(self.participants.iter().map(|own| own.kept()));
+            }
+            if !(self.springs.is_empty() && self.meetings.is_empty()) {
                 self.springs.meet(&self.participants);
+                self.meetings.meet(&self.world.parts, &mut self.participants);
                 self.done.fill(0);
                 for part in 0..self.participants.len() {
                     self.take_hold(part);
@@ -334,13 +377,14 @@ impl Simulation {
     /// # Errors
     /// If a step of a participant can't be taken.
     pub fn advance(&mut self, steps: u64, watch: &mut dyn FnMut(LoadStepProgress)) -> Result<(), Failure> {
-        match self.springs.is_empty() {
-            true => {
-                for part in 0..self.participants.len() {
-                    self.advance_apart(part, steps, watch)?;
-                }
+        if !self.meetings.is_empty() {
+            self.advance_in_contact(watch)?;
+        } else if !self.springs.is_empty() {
+            self.advance_tied(watch)?;
+        } else {
+            for part in 0..self.participants.len() {
+                self.advance_apart(part, steps, watch)?;
             }
-            false => self.advance_tied(watch)?,
         }
         self.evaluated = false;
         Ok(())
@@ -391,6 +435,30 @@ impl Simulation {
         Ok(())
     }
 
+    /// One common step of participants that touch each other, taken until the forces on both sides agree.
+    fn advance_in_contact(&mut self, watch: &mut dyn FnMut(LoadStepProgress)) -> Result<(), Failure> {
+        for pass in 0.. {
+            self.done.fill(0);
+            for (part, before) in self.before.iter().enumerate() {
+                // Forces of a host were found with guests where they were expected.
+                if pass > 0 || self.meetings.is_host(part) {
+                    self.participants[part].go_back(before)?;
+                }
+            }
+            while let Some(part) = self.hindmost() {
+                self.take_hold(part);
+                self.participants[part].evaluate(Wanted::Energies)?;
+                self.participants[part].advance(1, watch)?;
+                self.done[part] += 1;
+                self.meetings.after(part, &self.world.parts, &mut self.participants);
+            }
+            if self.meetings.settle(pass, &self.world.parts, &self.participants) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
     /// The participant that is farthest from the next common instant.
     fn hindmost(&self) -> Option<usize> {
         let left = self.order.iter().copied().filter(|&part| self.done[part] < self.ratios[part]);
@@ -407,6 +475,7 @@ impl Simulation {
         let ahead = ahead(&self.world.parts, &self.done, part, 1);
         self.springs.before(part, &self.participants, ahead);
         self.springs.add_to(part, &mut grips);
+        self.meetings.add_to(part, &mut grips);
         self.participants[part].hold(&grips)
     }
 
@@ -418,6 +487,11 @@ impl Simulation {
     /// The ties between participants at the instant last evaluated.
     pub fn ties(&self) -> impl Iterator<Item = TieNow<'_>> {
         self.springs.now()
+    }
+
+    /// The contacts between participants where they met last.
+    pub fn guests(&self) -> impl Iterator<Item = GuestsNow> {
+        self.meetings.now()
     }
 
     /// The most common instants that it passes in one go: more than one where the state lies on a GPU.
@@ -440,7 +514,7 @@ impl Simulation {
         let parts = self.world.parts.iter().zip(&self.participants);
         let own =
             parts.map(|(part, now)| OwnState { clock: now.clock(), kept: now.kept(), step: part.steps.step });
-        Ok(State(own.collect(), self.springs.memory().clone()))
+        Ok(State(own.collect(), self.between()))
     }
 
     /// Goes back, or on, to a state of this world.
@@ -468,16 +542,21 @@ impl Simulation {
         }
     }
 
-    /// The state of each participant as bytes of a checkpoint, after a step; with ties between participants, theirs after them.
+    /// The state of each participant as bytes of a checkpoint, after a step; with ties or contacts between participants, theirs after them.
     ///
     /// # Errors
     /// If a device fails, or a state can't be encoded.
     pub fn encode(&mut self) -> Result<Vec<Vec<u8>>, Failure> {
         self.bring_back()?;
         let own = self.participants.iter().map(|participant| participant.encode());
-        let ties = (!self.springs.is_empty()).then(|| postcard::to_stdvec(self.springs.memory()));
+        let alone = self.springs.is_empty() && self.meetings.is_empty();
+        let between = (!alone).then(|| postcard::to_stdvec(&self.between()));
         let failed = |error: postcard::Error| Failure::new("output", error.to_string(), Some(self.time()));
-        own.chain(ties).collect::<postcard::Result<_>>().map_err(failed)
+        own.chain(between).collect::<postcard::Result<_>>().map_err(failed)
+    }
+
+    fn between(&self) -> Between {
+        Between { ties: self.springs.memory().clone(), guests: self.meetings.memory().clone() }
     }
 
     fn bring_back(&mut self) -> Result<(), Failure> {

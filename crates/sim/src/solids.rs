@@ -12,6 +12,7 @@ use pliant_gpu::GpuStepper;
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::mapping::{Displaced, Mapping};
 use pliant_mechanics::model::Enclosed;
+use pliant_mechanics::tensor::Vector;
 use pliant_mechanics::{Energies, Model, fingerprint};
 
 use crate::failure::Failure;
@@ -25,6 +26,9 @@ use crate::solver::{Equilibria, LoadStepProgress, Memory, Solver, on_cpu};
 pub(crate) trait Numeric: Scalar {
     /// A state with its memory, kept.
     fn keep(state: State<Self>, memory: Memory<Self>) -> Kept;
+
+    /// The same, from what is kept; `None` of another number type.
+    fn kept(kept: &Kept) -> Option<(&State<Self>, &Memory<Self>)>;
 
     /// The stepper of a participant, from a state on.
     ///
@@ -42,6 +46,10 @@ pub(crate) trait Numeric: Scalar {
 impl Numeric for f32 {
     fn keep(state: State<f32>, memory: Memory<f32>) -> Kept {
         Kept::Single(state, memory)
+    }
+
+    fn kept(kept: &Kept) -> Option<(&State<f32>, &Memory<f32>)> {
+        if let Kept::Single(state, memory) = kept { Some((state, memory)) } else { None }
     }
 
     #[cfg_attr(
@@ -65,6 +73,10 @@ impl Numeric for f32 {
 impl Numeric for f64 {
     fn keep(state: State<f64>, memory: Memory<f64>) -> Kept {
         Kept::Double(state, memory)
+    }
+
+    fn kept(kept: &Kept) -> Option<(&State<f64>, &Memory<f64>)> {
+        if let Kept::Double(state, memory) = kept { Some((state, memory)) } else { None }
     }
 
     fn solver(part: &Part, _state: &State<f64>) -> Result<Box<dyn Solver<f64>>, Failure> {
@@ -249,6 +261,22 @@ impl<R: Numeric> Participant for Solids<R> {
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2] {
         let nodes = self.nodes();
         [grip.position(&nodes, 0), grip.force(&nodes)]
+    }
+
+    fn lead_guests(&mut self, times: [f64; 2], ways: &[[Vector<f64>; 2]]) {
+        self.solver.lead_guests(times, ways);
+    }
+
+    fn guest_impulses(&self) -> &[Vector<f64>] {
+        self.solver.guest_impulses()
+    }
+
+    fn go_back(&mut self, kept: &Kept) -> Result<(), Failure> {
+        if let Some((state, memory)) = R::kept(kept) {
+            self.state.clone_from(state);
+            self.solver.resume(memory.clone());
+        }
+        Ok(())
     }
 
     fn bring_back(&mut self) -> Result<(), Failure> {

@@ -10,6 +10,7 @@ use pliant_explicit::{
 use pliant_gpu::GpuStepper;
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::model::Contradiction;
+use pliant_mechanics::tensor::Vector;
 use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
@@ -90,6 +91,14 @@ pub(crate) trait Solver<R>: Send {
     /// Takes hold of points: these grips and no others act from the next evaluation on. False of a solver that knows none.
     fn hold(&mut self, grips: &[Grip]) -> bool {
         grips.is_empty()
+    }
+
+    /// Says where guests of contacts go between two times [s], from one place [m] to another.
+    fn lead_guests(&mut self, _times: [f64; 2], _ways: &[[Vector<f64>; 2]]) {}
+
+    /// Impulses [N s] on each guest since it was led.
+    fn guest_impulses(&self) -> &[Vector<f64>] {
+        &[]
     }
 
     /// Makes the state complete, as a checkpoint needs it.
@@ -184,6 +193,14 @@ impl<R: Scalar> Solver<R> for CentralDifference<R> {
     fn hold(&mut self, grips: &[Grip]) -> bool {
         CentralDifference::hold(self, grips);
         true
+    }
+
+    fn lead_guests(&mut self, times: [f64; 2], ways: &[[Vector<f64>; 2]]) {
+        CentralDifference::lead_guests(self, times, ways);
+    }
+
+    fn guest_impulses(&self) -> &[Vector<f64>] {
+        CentralDifference::guest_impulses(self)
     }
 
     fn clock(&self, state: &State<R>) -> Option<Clock> {

@@ -53,7 +53,7 @@ pub struct ToolNow {
 /// let touch = Touch { friction: 0.0, offset: 0.0 };
 /// let contact = Contact { name: "press".into(), surface, with: With::Rigid(0), touch };
 /// let Method::Explicit(explicit) = &mut part.method else { unreachable!() };
-/// explicit.contacts = Some(Arc::new(Contacts { rigids: vec![ball], contacts: vec![contact] }));
+/// explicit.contacts = Some(Arc::new(Contacts { rigids: vec![ball], contacts: vec![contact], ..Default::default() }));
 ///
 /// let mut simulation = Simulation::new(part)?;
 /// let arrival = simulation.drive("ball", Pose::translation(0.0, 0.0, 0.11), 0.1)?;

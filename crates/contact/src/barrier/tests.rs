@@ -64,7 +64,7 @@ impl Scene {
         ];
         let settings = BarrierSettings { distance: 0.015, stiffness: 1e4, creep_speed: 1e-3 };
         let rest: Vec<[f64; 3]> = places.iter().map(|&x| x.into()).collect();
-        let contacts = Arc::new(Contacts { rigids: vec![thing], contacts });
+        let contacts = Arc::new(Contacts { rigids: vec![thing], contacts, ..Default::default() });
         Self { barriers: Barriers::new(contacts, &[settings; 3], &rest), places }
     }
 

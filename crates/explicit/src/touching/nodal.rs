@@ -42,13 +42,14 @@ pub(super) fn faces(contacts: &Contacts, numbers: &[u32]) -> Vec<[u32; 3]> {
 impl<R: Scalar> Touching<R> {
     /// All nodes that may touch, increasing, at the instant whose forces were found last. `state` is that of the model then.
     pub fn nodal(&self, state: &State<R>) -> Vec<NodeContact> {
-        let place = |(rest, &number): (&Vector3<f64>, &u32)| {
-            rest + Vector3::from(state.displacement[number as usize].map(|x| x.to_f64()))
-        };
+        let place =
+            |(rest, &number): (&Vector3<f64>, &u32)| self.guests.place_at(number, rest, &state.displacement);
         let places: Vec<Vector3<f64>> = self.rest.iter().zip(&self.numbers).map(place).collect();
         let (pressures, gaps) = (self.pressures(&places), self.gaps(&places));
         let parts = self.numbers.iter().zip(&self.nodes).zip(pressures).zip(gaps);
+        let is_own = |node: u32| self.guests.place_of(node).is_none();
         parts
+            .filter(|(((node, _), _), _)| is_own(**node))
             .map(|(((&node, own), pressure), gap)| NodeContact {
                 node,
                 force: if own.near { over(&(own.then - own.free), &own.own).into() } else { [0.0; 3] },
@@ -156,6 +157,7 @@ impl<R: Scalar> Touching<R> {
         slid.clear();
         slid.extend(self.near.iter().filter_map(|&index| {
             let node = self.numbers[index as usize];
+            self.guests.place_of(node).is_none().then_some(())?;
             let way = match (self.slips[index as usize], way_of(slip, node)) {
                 ([load, ways], before) if load > 0.0 => Some(before.unwrap_or(0.0) + ways / load),
                 (_, Some(before)) => self.hovering(index as usize).map(|way| before + way),

@@ -35,7 +35,7 @@ fn between(model: &Model, friction: f64, offset: f64) -> Arc<Contacts> {
     let with = model.solids.get(1).map_or(With::Itself, |second| With::Body(surface(second)));
     let touch = Touch { friction, offset };
     let contact = Contact { name: "touch".into(), surface: surface(&model.solids[0]), with, touch };
-    Arc::new(Contacts { rigids: Vec::new(), contacts: vec![contact] })
+    Arc::new(Contacts { rigids: Vec::new(), contacts: vec![contact], ..Default::default() })
 }
 
 /// Momentum [kg m/s] and its moment about the origin at a state, by the velocities between two instants.

@@ -111,7 +111,7 @@ fn play(scene: &Scene, is_rigid: bool) -> Result<(), String> {
         contacts.extend(surfaces[k + 1..].iter().map(|second| contact(first, With::Body(second.clone()))));
         contacts.extend((0..rigids.len()).map(|number| contact(first, With::Rigid(number))));
     }
-    let contacts = Arc::new(Contacts { rigids, contacts });
+    let contacts = Arc::new(Contacts { rigids, contacts, ..Default::default() });
     let model = Arc::new(model);
     let mut stepper = stepper(&model, &contacts, part);
     let mut state = State::at_rest(&model);

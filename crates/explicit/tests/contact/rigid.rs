@@ -23,6 +23,7 @@ pub fn at(rigid: Rigid, model: &Model, friction: f64) -> Arc<Contacts> {
     Arc::new(Contacts {
         rigids: vec![rigid],
         contacts: vec![Contact { name: "touch".into(), surface, with, touch }],
+        ..Default::default()
     })
 }
 

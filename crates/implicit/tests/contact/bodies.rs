@@ -29,7 +29,11 @@ fn add(model: &mut Assembly, piece: &Piece) -> Vec<[u32; 3]> {
 fn between(first: Vec<[u32; 3]>, second: Vec<[u32; 3]>, friction: f64) -> Contacts {
     let (surface, with) = (surface(first), With::Body(surface(second)));
     let touch = Touch { friction, offset: 0.0 };
-    Contacts { rigids: Vec::new(), contacts: vec![Contact { name: "touch".into(), surface, with, touch }] }
+    Contacts {
+        rigids: Vec::new(),
+        contacts: vec![Contact { name: "touch".into(), surface, with, touch }],
+        ..Default::default()
+    }
 }
 
 /// Nominal stress [Pa] of a neo-Hookean tet, P = μ J^(−2/3) (F − I₁/3 F⁻ᵀ) + κ (J − 1) J F⁻ᵀ, and its volume [m³] at rest.

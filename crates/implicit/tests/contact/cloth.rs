@@ -162,7 +162,8 @@ fn a_twisted_strip_does_not_go_through_itself() {
     let own = surface(faces);
     let own_touch = Touch { friction: 0.2, offset: thickness };
     let contact = Contact { name: "itself".into(), surface: own, with: With::Itself, touch: own_touch };
-    let contacts = pliant_contact::touch::Contacts { rigids: Vec::new(), contacts: vec![contact] };
+    let contacts =
+        pliant_contact::touch::Contacts { rigids: Vec::new(), contacts: vec![contact], ..Default::default() };
     touch(
         &mut model,
         contacts,

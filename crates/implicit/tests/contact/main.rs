@@ -44,7 +44,7 @@ fn at_rigid(own: &Surface, rigids: Vec<Rigid>, friction: f64, offset: f64) -> Co
         with: With::Rigid(number),
         touch: Touch { friction, offset },
     });
-    Contacts { contacts: contacts.collect(), rigids }
+    Contacts { contacts: contacts.collect(), rigids, ..Default::default() }
 }
 
 /// Gives a model contacts that all act in one way.

@@ -233,7 +233,7 @@ pub fn widened(divisions: Divisions, young: f64, radii: &[f64]) -> Result<Vec<Wi
     };
     let barrier = BarrierSettings { distance: BARRIER, stiffness: 0.1 * young, creep_speed: 1e-3 };
     vessel.model.touching = Some(Touching {
-        contacts: Arc::new(Contacts { rigids: vec![balloon], contacts: vec![contact] }),
+        contacts: Arc::new(Contacts { rigids: vec![balloon], contacts: vec![contact], ..Default::default() }),
         settings: vec![barrier],
         check_crossings: false,
     });

@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) use file::{check_own_folder, replace};
 pub use folder::OutputFolder;
 pub(crate) use folder::{CONVERGENCE, PICTURE, PLOT, SUMMARY};
-pub use outcome::TieSummary;
+pub use outcome::{GuestSummary, TieSummary};
 pub(crate) use outcome::{History, Outcome, PartOutcome, Watched};
 pub use stability::{AddedMass, StabilitySummary};
 pub(crate) use strains::ShellStrains;

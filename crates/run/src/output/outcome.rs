@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use pliant_explicit::stability::Stability;
 use pliant_mechanics::Energies;
 use pliant_mechanics::model::Enclosed;
-use pliant_sim::{Effort, Equilibria, Failure, Instant, TieNow};
+use pliant_sim::{Effort, Equilibria, Failure, GuestsNow, Instant, TieNow};
 use serde::{Deserialize, Serialize};
 
 use super::{Frame, ShellStrains, time_of};
@@ -26,6 +26,8 @@ pub(crate) struct Outcome {
     pub parts: Vec<PartOutcome>,
     /// The ties between participants.
     pub ties: Vec<TieSummary>,
+    /// The contacts between participants.
+    pub guests: Vec<GuestSummary>,
     /// Why it ended before the time of the scene was over, without a failure.
     pub ended: Option<String>,
     pub history: History,
@@ -52,6 +54,7 @@ impl Outcome {
             energies: Energies::default(),
             parts: world.participants.iter().map(part).collect(),
             ties: Vec::new(),
+            guests: Vec::new(),
             ended: None,
             history: History::default(),
             files: Vec::new(),
@@ -143,6 +146,27 @@ impl TieSummary {
         let table = world.scene.ties.iter().find(|(known, _)| known == name);
         let bodies = table.map_or_else(Default::default, |(_, table)| table.between.clone());
         Self { name: name.into(), bodies, points, force, gap, widest }
+    }
+}
+
+/// The contacts between two participants.
+#[derive(Clone, Debug, Serialize)]
+pub struct GuestSummary {
+    /// The explicit and the implicit participant.
+    pub participants: [String; 2],
+    /// Mean force [N] over the last step on each.
+    pub forces: [[f64; 3]; 2],
+    /// Mean of the times that a step in contact was taken.
+    pub passes: f64,
+    /// The largest difference of the forces on both in a step, relative to them.
+    pub worst_difference: f64,
+}
+
+impl GuestSummary {
+    pub(crate) fn new(world: &World, now: GuestsNow) -> Self {
+        let GuestsNow { parts, forces, passes, worst } = now;
+        let participants = parts.map(|part| world.participants[part].name.clone());
+        Self { participants, forces, passes, worst_difference: worst }
     }
 }
 

@@ -10,7 +10,7 @@ use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
 
 use super::stability::{AddedMass, StabilitySummary, doubts};
-use super::{History, Outcome, PartOutcome, TieSummary};
+use super::{GuestSummary, History, Outcome, PartOutcome, TieSummary};
 use super::{OutputError, StrainSummary, constraints};
 use pliant_scene::{Built, LimitingElement, Limits, Part, World, printable};
 
@@ -44,6 +44,8 @@ pub struct Summary {
     pub participants: Vec<ParticipantSummary>,
     /// The ties between participants.
     pub ties: Vec<TieSummary>,
+    /// The contacts between participants.
+    pub guests: Vec<GuestSummary>,
     /// Cost of its equations; `null` where none were solved.
     pub solver: Option<Effort>,
     /// How good the equilibria of a quasi-static run are; `null` of others.
@@ -166,7 +168,7 @@ fn empty(status: &str, error: Failure) -> Json {
         "status": status,
         "error": error,
         "bodies": [], "nodes": null, "elements": null, "mass": null, "step": null, "element_bound": null,
-        "critical_step": null, "limiting_element": null, "participants": [], "ties": [], "solver": null, "equilibria": null, "ended": null, "shell_strains": [], "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
+        "critical_step": null, "limiting_element": null, "participants": [], "ties": [], "guests": [], "solver": null, "equilibria": null, "ended": null, "shell_strains": [], "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
         "stability": null, "added_mass": null, "energy_balance": null, "reactions": {}, "volumes": {}, "warnings": [], "files": [],
     })
 }
@@ -250,6 +252,7 @@ pub(crate) fn summarise(world: &World, outcome: &Outcome) -> Summary {
             None => parts().map(|(part, own)| ParticipantSummary::new(part, own)).collect(),
         },
         ties: outcome.ties.clone(),
+        guests: outcome.guests.clone(),
         solver: parts().find_map(|(_, own)| own.effort.clone()),
         equilibria: parts().find_map(|(_, own)| own.equilibria),
         ended: outcome.ended.clone(),
@@ -337,6 +340,7 @@ fn write_page(page: &mut String, world: &World, outcome: &Outcome, summary: &Sum
     write_reactions(page, world, outcome)?;
     write_volumes(page, &summary.volumes)?;
     write_ties(page, &outcome.ties)?;
+    write_guests(page, &outcome.guests)?;
     writeln!(page, "\n## Cost\n\n| | |\n|---|---|")?;
     writeln!(page, "| wall time | {} s |", number(summary.wall_seconds))?;
     writeln!(page, "| real-time factor | {} |", number(summary.real_time_factor))?;
@@ -536,6 +540,28 @@ fn write_ties(page: &mut String, ties: &[TieSummary]) -> std::fmt::Result {
         writeln!(page, "| {name} | {points} | ({x}, {y}, {z}) | {} | {} |", number(*gap), number(*widest))?;
     }
     writeln!(page, "\nThese ties are springs: they open under load, less with shorter steps.")
+}
+
+fn write_guests(page: &mut String, guests: &[GuestSummary]) -> std::fmt::Result {
+    if guests.is_empty() {
+        return Ok(());
+    }
+    writeln!(
+        page,
+        "\n## Contact between participants\n\n| participants | force on each at the end [N] | passes per step | largest difference |\n|---|---|---|---|"
+    )?;
+    for GuestSummary { participants: [first, second], forces, passes, worst_difference } in guests {
+        let [one, other] = forces.map(|force| {
+            let [x, y, z] = force.map(number);
+            format!("({x}, {y}, {z})")
+        });
+        let (passes, worst) = (number(*passes), number(100.0 * worst_difference));
+        writeln!(page, "| {first}, {second} | {one}, {other} | {passes} | {worst} % |")?;
+    }
+    writeln!(
+        page,
+        "\nA step in contact is taken again until the forces on both sides agree to 1 %; what is left acts in the next step."
+    )
 }
 
 fn short(file: &Path) -> String {

@@ -11,6 +11,7 @@ mod corpus;
 mod force_limit;
 mod grasper;
 mod grips;
+mod guests;
 mod niftysim;
 mod niftysim_contact;
 mod obstacles;

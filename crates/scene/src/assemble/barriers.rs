@@ -52,10 +52,13 @@ impl Builder<'_> {
         for (key, _, of_barrier) in given.into_iter().filter(|(_, given, of)| *given && *of != is_barrier) {
             let solvers =
                 if of_barrier { "the solvers `implicit` and `static`" } else { "the solver `explicit`" };
-            let message = format!(
-                "`{key}` of a contact is for {solvers}, and this scene goes with `{}`",
-                self.scene.run.solver.word()
-            );
+            let message = match self.scene.meets.iter().any(|(known, _)| known == name) {
+                true => format!("`{key}` of a contact is for bodies of one participant with {solvers}"),
+                false => format!(
+                    "`{key}` of a contact is for {solvers}, and this scene goes with `{}`",
+                    self.scene.run.solver.word()
+                ),
+            };
             self.error(&["contact", name, key], message, "not for this solver", "leave it out");
             fits = false;
         }
@@ -182,7 +185,7 @@ impl Builder<'_> {
     }
 
     /// The largest thickness [m] of a shell; zero of another body.
-    fn thickest(&self, body: usize) -> f64 {
+    pub(super) fn thickest(&self, body: usize) -> f64 {
         let cells = self.shell_cells(body).unwrap_or_default();
         cells.iter().map(|&cell| self.assembly.facets[cell as usize].thickness).fold(0.0, f64::max)
     }

@@ -31,7 +31,7 @@ const FASTEST: f64 = 10.0;
 const UNIT: f64 = 1e-3;
 
 /// Overlap, over the size of all, above which bodies are in each other.
-pub(super) const OVERLAP: f64 = 1e-9;
+pub(crate) const OVERLAP: f64 = 1e-9;
 
 /// What to do about contact with other solvers.
 const EXPLICIT: &str = "take `solver = \"explicit\"` on the CPU, for solids, membranes and bars, or `\"implicit\"` or `\"static\"`, for solids and shells";
@@ -39,6 +39,21 @@ const EXPLICIT: &str = "take `solver = \"explicit\"` on the CPU, for solids, mem
 /// The distance [m] that surfaces keep without a barrier.
 fn kept(table: &ContactTable) -> f64 {
     table.thickness.unwrap_or(0.0)
+}
+
+/// The surface of a body that one of another participant touches.
+#[derive(Clone, Debug)]
+pub(crate) struct Meet {
+    /// The name of the contact.
+    pub contact: String,
+    /// Its place among the two that touch.
+    pub side: usize,
+    /// The body.
+    pub body: usize,
+    /// Its surface.
+    pub surface: Surface,
+    /// Half of its thickness, if it is a shell [m].
+    pub offset: f64,
 }
 
 /// Who touches.
@@ -87,12 +102,38 @@ impl Builder<'_> {
     }
 
     /// Takes note of the bodies that touch something, unless a mistake leaves that open.
-    pub(super) fn note_touching(&mut self, contacts: Option<&Contacts>) {
+    pub(super) fn note_touching(&mut self, contacts: Option<&Contacts>, meets: &[Meet]) {
         if self.failed() {
             return;
         }
-        let bodies = self.assembly.bodies.iter();
-        self.touching = Some(bodies.map(|body| contacts.is_some_and(|all| touches(all, body))).collect());
+        let is_host = self.scene.run.solver == SolverName::Explicit;
+        let bodies = self.assembly.bodies.iter().enumerate();
+        let touching = bodies.map(|(index, body)| {
+            contacts.is_some_and(|all| touches(all, body))
+                || is_host && meets.iter().any(|meet| meet.body == index)
+        });
+        self.touching = Some(touching.collect());
+    }
+
+    /// The surfaces of bodies that those of other participants touch.
+    pub(super) fn meets(&mut self) -> Vec<Meet> {
+        let scene = self.scene;
+        let meet = |own: &mut Self, (name, table): &(String, ContactTable)| {
+            let side =
+                table.between.iter().position(|body| scene.bodies.iter().any(|(known, _)| known == body))?;
+            if table.separate {
+                let message = "`separate` is for bodies of one participant";
+                own.error(&["contact", name, "separate"], message, "of two participants", "move one of them");
+                return None;
+            }
+            if !own.check_keys_of_contact(name, table, false) {
+                return None;
+            }
+            let body = own.bodies.iter().position(|own| own.name == table.between[side])?;
+            let surface = own.surface_of(name, table, body, side)?;
+            Some(Meet { contact: name.clone(), side, body, surface, offset: 0.5 * own.thickest(body) })
+        };
+        scene.meets.iter().filter_map(|table| meet(self, table)).collect()
     }
 
     /// The rigid thing of a table, or its two jaws.

@@ -40,7 +40,7 @@ use crate::scene::Scene;
 use crate::source::Source;
 
 use contacts::Partner;
-pub(crate) use contacts::touches;
+pub(crate) use contacts::{Meet, OVERLAP, touches};
 pub use mesh_files::SizeDoubt;
 pub(crate) use meshes::MeshOrigin;
 pub(crate) use ties::{Placed, attach, holds_nothing};
@@ -58,6 +58,8 @@ pub struct Built {
     pub surfaces: Vec<Mesh>,
     /// Contacts with obstacles and tools.
     pub contacts: Option<Arc<Contacts>>,
+    /// Surfaces that bodies of other participants touch.
+    pub(crate) meets: Vec<Meet>,
     /// Displacements [m] of all nodes at the start, where bodies were pushed apart.
     pub pushed: Option<Arc<Vec<[f64; 3]>>>,
     /// Doubts that did not keep the model from being built.
@@ -237,7 +239,8 @@ pub fn build_watched(
     builder.check_turns();
     builder.add_loads();
     let (contacts, barriers) = builder.contacts().unzip();
-    builder.note_touching(contacts.as_deref());
+    let meets = builder.meets();
+    builder.note_touching(contacts.as_deref(), &meets);
     builder.check_outputs();
     builder.check_view();
     builder.check_free_bodies();
@@ -257,7 +260,7 @@ pub fn build_watched(
     let implicit = start.map(|start| {
         Arc::new(ImplicitBodies { model: Arc::new(assembly), cells, control, start, surface: curved })
     });
-    Ok(Built { model, implicit, bodies, surfaces, contacts, pushed, warnings, notes })
+    Ok(Built { model, implicit, bodies, surfaces, contacts, meets, pushed, warnings, notes })
 }
 
 /// The labels of a body or a surface by name, or of all bodies.
@@ -416,7 +419,7 @@ impl<'s> Builder<'s> {
 pub(crate) const SCENE: &str = "the scene";
 
 /// A place [m] in messages.
-fn in_metres(place: impl Into<[f64; 3]>) -> String {
+pub(crate) fn in_metres(place: impl Into<[f64; 3]>) -> String {
     let [x, y, z] = place.into().map(pliant_sim::number);
     format!("({x}, {y}, {z}) m")
 }

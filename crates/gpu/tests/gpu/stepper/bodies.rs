@@ -57,7 +57,7 @@ fn touching(model: &Model, rigids: Vec<Rigid>, friction: f64) -> Arc<Contacts> {
     });
     let mut contacts: Vec<Contact> = at_things.collect();
     contacts.push(Contact { name: "touch".into(), surface: own, with, touch });
-    Arc::new(Contacts { rigids, contacts })
+    Arc::new(Contacts { rigids, contacts, ..Default::default() })
 }
 
 /// The first flies at the second, with a corner ahead.

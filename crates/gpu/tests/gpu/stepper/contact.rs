@@ -69,7 +69,7 @@ pub(super) fn with(model: &Model, rigids: Vec<Rigid>, friction: f64) -> Arc<Cont
         touch: Touch { friction, offset: 1e-4 },
     };
     let contacts = rigids.iter().enumerate().map(contact).collect();
-    Arc::new(Contacts { rigids, contacts })
+    Arc::new(Contacts { rigids, contacts, ..Default::default() })
 }
 
 /// Displacements, velocities, energies and reactions as `compare` has them; forces differ by a thousandth of the largest one.

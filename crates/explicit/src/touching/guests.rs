@@ -1,0 +1,102 @@
+//! Guests: nodes of surfaces that another solver moves. Contacts find them where that one says, and no impulse moves them; it is told the impulses.
+
+use nalgebra::Vector3;
+use pliant_mechanics::tensor::{Vector, add};
+
+use super::{Free, Nodes};
+use crate::Scalar;
+
+/// The guests of a model.
+pub(super) struct Guests {
+    /// Nodes of the model; guests are numbered from here on.
+    first: usize,
+    /// The times [s] between which they go, and where they are then [m].
+    times: [f64; 2],
+    ways: Vec<[Vector<f64>; 2]>,
+    /// Shares of that time at the beginning and the end of the step.
+    shares: [f64; 2],
+    /// On each since it was led [N s].
+    impulses: Vec<Vector<f64>>,
+}
+
+impl Guests {
+    /// Those with these places at rest [m], of a model with so many nodes; they stay until they are led.
+    pub fn new(first: usize, rest: &[Vector<f64>]) -> Self {
+        Self {
+            first,
+            times: [0.0, 1.0],
+            ways: rest.iter().map(|&place| [place; 2]).collect(),
+            shares: [0.0; 2],
+            impulses: vec![[0.0; 3]; rest.len()],
+        }
+    }
+
+    /// Where one is at rest [m], by its number.
+    pub fn rest(&self, number: usize) -> Vector3<f64> {
+        self.ways[number - self.first][0].into()
+    }
+
+    /// Its place among the guests; `None` of a node of the model.
+    pub fn place_of(&self, number: u32) -> Option<usize> {
+        (number as usize).checked_sub(self.first)
+    }
+
+    pub fn lead(&mut self, times: [f64; 2], ways: &[[Vector<f64>; 2]]) {
+        self.times = times;
+        self.ways.copy_from_slice(ways);
+        self.impulses.fill([0.0; 3]);
+    }
+
+    /// Begins a step between two times [s].
+    pub fn go(&mut self, times: [f64; 2]) {
+        let [from, to] = self.times;
+        self.shares = times.map(|time| (time - from) / (to - from));
+    }
+
+    pub fn impulses(&self) -> &[Vector<f64>] {
+        &self.impulses
+    }
+
+    pub fn press(&mut self, guest: usize, impulse: Vector3<f64>) {
+        let own = &mut self.impulses[guest];
+        *own = add(*own, impulse.into());
+    }
+
+    fn at(&self, guest: usize, share: f64) -> Vector3<f64> {
+        let [from, to] = self.ways[guest].map(Vector3::from);
+        from.lerp(&to, share)
+    }
+
+    /// Where a guest goes; `None` of a node of the model.
+    pub fn free(&self, number: u32) -> Option<Free> {
+        let guest = self.place_of(number)?;
+        Some(Free { then: self.at(guest, self.shares[1]).into(), mobility: [0.0; 3] })
+    }
+
+    /// Finds where nodes are before the step [m], by their places among `numbers`.
+    pub fn place<R: Scalar>(
+        &self,
+        nodes: impl Iterator<Item = u32>,
+        numbers: &[u32],
+        rest: &[Vector3<f64>],
+        now: &Nodes<'_, R>,
+        places: &mut [Vector3<f64>],
+    ) {
+        for node in nodes.map(|node| node as usize) {
+            places[node] = self.place_at(numbers[node], &rest[node], now.displacement);
+        }
+    }
+
+    /// Where a node is before the step [m], by its number and its place at rest.
+    pub fn place_at<R: Scalar>(
+        &self,
+        number: u32,
+        rest: &Vector3<f64>,
+        displacement: &[Vector<R>],
+    ) -> Vector3<f64> {
+        match self.place_of(number) {
+            None => rest + Vector3::from(displacement[number as usize].map(|x| x.to_f64())),
+            Some(guest) => self.at(guest, self.shares[0]),
+        }
+    }
+}

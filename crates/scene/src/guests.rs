@@ -1,0 +1,186 @@
+//! Contacts between participants: found once all are built.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use pliant_geometry::{Locator, SurfaceLocator};
+use pliant_sim::contact::pairs::{Pairs, Surface};
+use pliant_sim::contact::touch::{Contact, Touch, With};
+use pliant_sim::{Guests, counted, number};
+
+use crate::assemble::{Meet, OVERLAP, in_metres};
+use crate::diagnostic::Diagnostic;
+use crate::format::SolverName;
+use crate::world::World;
+
+/// How bodies of two participants can touch.
+const HOW: &str = "a solid with `explicit` steps on the CPU and bodies with `implicit` ones touch each other; or put both bodies into one participant";
+
+impl World {
+    /// Finds the contacts between participants; mistakes go to `out`.
+    pub(crate) fn find_guests(&mut self, out: &mut Vec<Diagnostic>) {
+        let mut notes = Vec::new();
+        let mut met: Vec<(Contact, [usize; 2])> = Vec::new();
+        let mut nodes: BTreeMap<[usize; 2], Vec<u32>> = BTreeMap::new();
+        for (name, table) in &self.scene.contacts {
+            let sides = self.participants.iter().enumerate().flat_map(|(part, own)| {
+                let meets = own.built.meets.iter().filter(|meet| meet.contact == *name);
+                meets.map(move |meet| (part, meet))
+            });
+            let mut sides: Vec<(usize, &Meet)> = sides.collect();
+            sides.sort_by_key(|(part, _)| {
+                let own = &self.participants[*part];
+                own.built.implicit.is_some() || own.scene.run.solver != SolverName::Explicit
+            });
+            let [(host, own), (of, other)] = sides[..] else { continue };
+            let path = ["contact", name.as_str(), "between"];
+            let place = self.scene.source.span(&path);
+            let solvers = [host, of].map(|part| self.participants[part].scene.run.solver);
+            if solvers != [SolverName::Explicit, SolverName::Implicit] {
+                let message = format!(
+                    "`{}` and `{}` are of two participants that cannot touch each other",
+                    table.between[0], table.between[1]
+                );
+                out.push(Diagnostic::error(message).at(place, "two participants").help(HOW));
+                continue;
+            }
+            if own.surface.faces.is_empty() || other.surface.faces.is_empty() {
+                let message = "bodies of two participants touch each other by faces, and bars have none";
+                let help = "name the solid beside it, or let it touch obstacles and tools only";
+                out.push(Diagnostic::error(message).at(place, "no faces").help(help));
+                continue;
+            }
+            if !self.ties.is_empty() {
+                let message = "participants are tied to each other or touch each other, not both";
+                let help = "put bodies that are tied into one participant";
+                out.push(Diagnostic::error(message).at(place, "beside a tie").help(help));
+                continue;
+            }
+            let touch = Touch {
+                friction: table.friction,
+                offset: table.thickness.unwrap_or(own.offset + other.offset),
+            };
+            let mut surface = other.surface.clone();
+            if self.is_behind([(host, own), (of, other)]) {
+                surface.faces.iter_mut().for_each(|face| face.swap(1, 2));
+                notes.push(format!(
+                    "contact `{name}`: `{}` touches by its nearer side, which its normals point away from",
+                    table.between[other.side]
+                ));
+            }
+            if let Some(told) = self.overlap([(host, own), (of, other)], &surface, touch.offset) {
+                let help = "move one of them (`at` of its mesh), or make `thickness` smaller";
+                out.push(Diagnostic::error(told).at(place, "overlapping").help(help));
+                continue;
+            }
+            nodes.entry([host, of]).or_default().extend(&other.surface.nodes);
+            let contact = Contact {
+                name: name.clone(),
+                surface: own.surface.clone(),
+                with: With::Body(surface),
+                touch,
+            };
+            met.push((contact, [host, of]));
+        }
+        notes.into_iter().for_each(|note| self.note(note));
+        let mut counts: BTreeMap<usize, u32> = BTreeMap::new();
+        let mut first: BTreeMap<[usize; 2], u32> = BTreeMap::new();
+        for (&[host, of], own) in &mut nodes {
+            own.sort_unstable();
+            own.dedup();
+            let model = &self.participants[host].built.model;
+            let taken = counts.entry(host).or_insert(model.node_count() as u32);
+            first.insert([host, of], *taken);
+            *taken += own.len() as u32;
+            let rest = &self.participants[of].built.model.rest;
+            let places: Vec<[f64; 3]> = own.iter().map(|&node| rest[node as usize]).collect();
+            let built = Arc::make_mut(&mut self.participants[host].built);
+            Arc::make_mut(built.contacts.get_or_insert_default()).guests.extend(places);
+            self.guests.push(Guests { host, of, nodes: own.clone() });
+        }
+        for (mut contact, pair) in met {
+            let (own, first) = (&nodes[&pair], first[&pair]);
+            if let With::Body(surface) = &mut contact.with {
+                *surface = surface.numbered(|node| first + own.partition_point(|&known| known < node) as u32);
+            }
+            let built = Arc::make_mut(&mut self.participants[pair[0]].built);
+            Arc::make_mut(built.contacts.get_or_insert_default()).contacts.push(contact);
+        }
+    }
+
+    /// Whether the second body is a sheet whose side towards the first one is that which its normals point away from.
+    fn is_behind(&self, sides: [(usize, &Meet); 2]) -> bool {
+        let [(host, own), (of, other)] = sides;
+        let sheet = &self.participants[of].built.bodies[other.body];
+        if sheet.mesh.volume_blocks().any(|block| !block.is_empty()) {
+            return false;
+        }
+        let all: Vec<u32> = (0..sheet.boundary.faces.len() as u32).collect();
+        let faces = SurfaceLocator::new(&sheet.boundary, &all, &sheet.mesh.points);
+        let rest = &self.participants[host].built.model.rest;
+        let ways = own.surface.nodes.iter().filter_map(|&node| {
+            let at = Vector3::from(rest[node as usize]);
+            let found = faces.closest(&at)?;
+            let way = at - found.position;
+            Some((way.norm_squared(), way.dot(&found.normal)))
+        });
+        ways.min_by(|a, b| a.0.total_cmp(&b.0)).is_some_and(|(_, along)| along < 0.0)
+    }
+
+    /// How the surfaces of two participants overlap at the start, in words; `None` where they are apart by the distance that they keep [m].
+    fn overlap(&self, sides: [(usize, &Meet); 2], surface: &Surface, offset: f64) -> Option<String> {
+        let models = sides.map(|(part, _)| &self.participants[part].built.model);
+        let bodies = sides.map(|(part, meet)| &self.participants[part].built.bodies[meet.body]);
+        let first = models[0].node_count() as u32;
+        let place = |node: u32| -> Vector3<f64> {
+            let (model, node) = if node < first { (models[0], node) } else { (models[1], node - first) };
+            model.rest[node as usize].into()
+        };
+        let other = surface.numbered(|node| first + node);
+        let size = sides[0].1.surface.nodes.iter().map(|&node| place(node).amax()).fold(0.0, f64::max);
+        let mut inside: Vec<(f64, Vector3<f64>)> = Vec::new();
+        let cells = Locator::new(&bodies[0].mesh);
+        for at in other.nodes.iter().map(|&node| place(node)) {
+            if cells.locate(at).is_some_and(|found| found.distance == 0.0) {
+                inside.push((offset, at));
+            }
+        }
+        let mut pairs = Pairs::new(&sides[0].1.surface, Some(&other), offset, place);
+        pairs.update(place);
+        pairs.find(place, |pair| inside.push((offset - pair.distance, place(pair.nodes[0]))));
+        inside.retain(|(depth, _)| *depth > OVERLAP * size);
+        let (depth, at) = inside.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(format!(
+            "`{}` and `{}` overlap at the start in {}, up to {} m deep at {}",
+            bodies[0].name,
+            bodies[1].name,
+            counted(inside.len(), "place"),
+            number(*depth),
+            in_metres(*at)
+        ))
+    }
+
+    /// Refuses contacts between participants whose steps do not fit, once these are chosen.
+    pub(crate) fn check_guests(&self, out: &mut Vec<Diagnostic>) {
+        let common = self.steps();
+        for set in &self.guests {
+            let of = &self.participants[set.of];
+            if of.plan.steps.number == common {
+                continue;
+            }
+            let names = self.scene.contacts.iter().map(|(name, _)| name);
+            let mut names = names.filter(|name| of.built.meets.iter().any(|meet| meet.contact == **name));
+            let Some(name) = names.next() else { continue };
+            let message = format!(
+                "participant `{}` has steps of {} s, and another one has longer ones: its contact with `{}` needs the longest",
+                of.name,
+                number(of.plan.steps.step),
+                self.participants[set.host].name
+            );
+            let place = self.scene.source.span(&["contact", name, "between"]);
+            let help = "give implicit participants the same `step`, longer than that of explicit ones";
+            out.push(Diagnostic::error(message).at(place, "shorter steps").help(help));
+        }
+    }
+}

@@ -1,0 +1,404 @@
+//! Contact between participants: the surface of one whose equations are solved is a guest in the contacts of an explicit one.
+//!
+//! The implicit participant takes its step H. Its surface then goes from where it was to where it is, at the same speed, and the explicit one takes
+//! its steps h against it, as against a tool. Their impulses P say by which force P/H the implicit step is to be taken, which is taken anew: until the
+//! force that it has felt is that of the impulses to a part of [`FOUND`], or [`PASSES`] times. What is left is felt in the next step, so that momentum
+//! is kept.
+//!
+//! In a pass the surface feels f − k (x − x̄), with f and x̄ of the pass before: at the end nothing but f. The impedance of an explicit body with
+//! the mass m of a surface node is 2 m/h, so that its force changes by 2 m/(h H) (x − x̄) in the step. With twice that as k, passes come together
+//! for walls of a hundredth of the mass of a node and for heavy ones, with and without stiffness; with half of that they do not (measured with bars).
+
+use std::ops::Range;
+
+use pliant_contact::pairs::Surface;
+use pliant_contact::touch::Contact;
+use pliant_mechanics::grip::Grip;
+use pliant_mechanics::tensor::{Vector, add, cross, dot, scale, sub};
+use serde::{Deserialize, Serialize};
+
+use crate::failure::Failure;
+use crate::part::{Method, Part};
+use crate::participant::Participant;
+
+/// Difference of the forces on both sides, over that of the impulses, at which a step is found.
+const FOUND: f64 = 0.01;
+/// Times that a step is taken at most.
+const PASSES: u32 = 6;
+/// k h H/m.
+const FIRM: f64 = 4.0;
+
+/// Nodes of a participant that are guests in the contacts of another one: in the order of these sets, its
+/// [`guests`](pliant_contact::touch::Contacts::guests).
+#[derive(Clone, Debug)]
+pub struct Guests {
+    /// The explicit participant, by its place in the world.
+    pub host: usize,
+    /// The implicit participant whose nodes they are.
+    pub of: usize,
+    /// The nodes.
+    pub nodes: Vec<u32>,
+}
+
+/// The contact of two participants at an instant.
+#[derive(Clone, Copy, Debug)]
+pub struct GuestsNow {
+    /// The explicit and the implicit participant, by their places in the world.
+    pub parts: [usize; 2],
+    /// The mean force [N] over the last step on the explicit and on the implicit one.
+    pub forces: [Vector<f64>; 2],
+    /// Mean of the times that a step in contact was taken.
+    pub passes: f64,
+    /// The largest difference of the forces on both sides in a step, over that of the impulses.
+    pub worst: f64,
+}
+
+/// What a restart needs of guests.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct GuestMemory {
+    /// Of each guest, its force in the last step [N], and the impulse [N s] that it is still to feel.
+    guests: Vec<[Vector<f64>; 2]>,
+    /// Of each set, steps in contact, and how often they were taken in all.
+    counts: Vec<[u64; 2]>,
+    /// Of each set, the relative difference of the forces on both sides over the last step, and these [N].
+    last: Vec<(f64, [Vector<f64>; 2])>,
+    /// The largest difference so far.
+    worst: Vec<f64>,
+}
+
+impl GuestMemory {
+    /// Whether it is of these sets, or of none.
+    pub(crate) fn fits(&self, sets: &[Guests]) -> bool {
+        let guests: usize = sets.iter().map(|set| set.nodes.len()).sum();
+        let lengths = [self.guests.len(), self.counts.len(), self.last.len(), self.worst.len()];
+        lengths == [0; 4] || lengths == [guests, sets.len(), sets.len(), sets.len()]
+    }
+}
+
+/// A guest.
+struct Guest {
+    node: u32,
+    /// Its place at rest [m].
+    rest: Vector<f64>,
+    /// k [N/m].
+    stiffness: f64,
+    /// x̄ [m].
+    anchor: Vector<f64>,
+    /// f [N].
+    force: Vector<f64>,
+    /// Its way in the step [m].
+    way: [Vector<f64>; 2],
+}
+
+impl Guest {
+    fn place(&self, own: &dyn Participant) -> Vector<f64> {
+        add(self.rest, own.displacement(self.node as usize))
+    }
+
+    /// Whether contacts push it.
+    fn is_pushed(&self) -> bool {
+        self.force != [0.0; 3]
+    }
+
+    fn grip(&self) -> Grip {
+        let place = add(self.anchor, scale(self.force, 1.0 / self.stiffness));
+        Grip { nodes: vec![(self.node, 1.0)], place, stiffness: self.stiffness }
+    }
+}
+
+/// Where the guests of a set are among all, and among those of its host.
+#[derive(Clone)]
+struct Places {
+    all: Range<usize>,
+    at_host: Range<usize>,
+}
+
+/// The guests of a simulation.
+pub(crate) struct Meetings {
+    sets: Vec<Guests>,
+    places: Vec<Places>,
+    guests: Vec<Guest>,
+    /// Room for the ways of all guests of a host.
+    ways: Vec<[Vector<f64>; 2]>,
+    memory: GuestMemory,
+}
+
+impl Meetings {
+    /// Those of a world, from a state on or from none; `ratios` are the steps of each participant between common instants.
+    ///
+    /// # Errors
+    /// If participants can't meet so.
+    pub(crate) fn new(
+        sets: &[Guests],
+        parts: &[Part],
+        ratios: &[u64],
+        memory: GuestMemory,
+    ) -> Result<Self, Failure> {
+        let (mut guests, mut places) = (Vec::new(), Vec::new());
+        let mut counts = vec![0; parts.len()];
+        for set in sets {
+            set.check(parts)?;
+            if ratios[set.of] != 1 {
+                return Err(set.refused(parts, "has shorter steps than another one: give it the longest"));
+            }
+            let (host, of) = (&parts[set.host], &parts[set.of]);
+            let at_host = counts[set.host]..counts[set.host] + set.nodes.len();
+            counts[set.host] = at_host.end;
+            let [first, end] = [at_host.start, at_host.end].map(|own| (host.model.node_count() + own) as u32);
+            let rest = |node: u32| of.model.rest[node as usize];
+            let areas = areas(host, &(first..end), |node| rest(set.nodes[(node - first) as usize]));
+            let unit = FIRM / (host.steps.step * of.steps.step) * mass_per_area(host, &(first..end));
+            if areas.iter().any(|&area| !(unit * area > 0.0)) {
+                return Err(set.refused(
+                    parts,
+                    "has guests without a face, or its host has no surface that they touch",
+                ));
+            }
+            places.push(Places { all: guests.len()..guests.len() + set.nodes.len(), at_host });
+            guests.extend(set.nodes.iter().zip(areas).map(|(&node, area)| Guest {
+                node,
+                rest: rest(node),
+                stiffness: unit * area,
+                anchor: [0.0; 3],
+                force: [0.0; 3],
+                way: [[0.0; 3]; 2],
+            }));
+        }
+        for (part, count) in parts.iter().zip(counts) {
+            let awaited = part.method.contacts().map_or(0, |contacts| contacts.guests.len());
+            if awaited != count {
+                return Err(Failure::input(&format_args!(
+                    "contacts of participant `{}` have {awaited} guests, and the world has {count}",
+                    part.name
+                )));
+            }
+        }
+        let memory = match memory.counts.is_empty() {
+            true => GuestMemory {
+                guests: vec![[[0.0; 3]; 2]; guests.len()],
+                counts: vec![[0; 2]; sets.len()],
+                last: vec![(0.0, [[0.0; 3]; 2]); sets.len()],
+                worst: vec![0.0; sets.len()],
+            },
+            false => memory,
+        };
+        Ok(Self { sets: sets.to_vec(), places, guests, ways: Vec::new(), memory })
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.sets.is_empty()
+    }
+
+    pub(crate) fn memory(&self) -> &GuestMemory {
+        &self.memory
+    }
+
+    /// Whether a participant has guests, so that its steps are against them.
+    pub(crate) fn is_host(&self, part: usize) -> bool {
+        self.sets.iter().any(|set| set.host == part)
+    }
+
+    /// Prepares the first pass of a step from where all participants meet: forces and places to be expected, so that forces can be found there.
+    pub(crate) fn meet(&mut self, parts: &[Part], participants: &mut [Box<dyn Participant>]) {
+        for (set, Places { all, .. }) in self.sets.iter().zip(&self.places) {
+            let (step, own) = (parts[set.of].steps.step, participants[set.of].as_ref());
+            let remembered = &self.memory.guests[all.clone()];
+            for (guest, &[force, owed]) in self.guests[all.clone()].iter_mut().zip(remembered) {
+                let here = guest.place(own);
+                guest.anchor = add(here, scale(own.last_velocity(guest.node as usize), step));
+                guest.force = add(force, scale(owed, 1.0 / step));
+                guest.way = [here, guest.anchor];
+            }
+        }
+        self.lead(|_| true, parts, participants);
+    }
+
+    /// Follows the step of a participant, before its hosts take theirs.
+    pub(crate) fn after(&mut self, part: usize, parts: &[Part], participants: &mut [Box<dyn Participant>]) {
+        for (_, Places { all, .. }) in self.sets.iter().zip(&self.places).filter(|(set, _)| set.of == part) {
+            for guest in &mut self.guests[all.clone()] {
+                guest.way[1] = guest.place(participants[part].as_ref());
+            }
+        }
+        self.lead(|set| set.of == part, parts, participants);
+    }
+
+    /// Tells the hosts of some sets where their guests go in the step that begins where all participants meet.
+    fn lead(
+        &mut self,
+        of: impl Fn(&Guests) -> bool,
+        parts: &[Part],
+        participants: &mut [Box<dyn Participant>],
+    ) {
+        let Self { sets, places, guests, ways, .. } = self;
+        for (host, participant) in participants.iter_mut().enumerate() {
+            let own = || sets.iter().zip(&*places).filter(|(set, _)| set.host == host);
+            let Some((set, _)) = own().find(|(set, _)| of(set)) else { continue };
+            ways.clear();
+            ways.extend(own().flat_map(|(_, places)| &guests[places.all.clone()]).map(|guest| guest.way));
+            let begin = participant.time();
+            participant.lead_guests([begin, begin + parts[set.of].steps.step], ways);
+        }
+    }
+
+    /// Adds what pushes a participant's nodes to grips.
+    pub(crate) fn add_to(&self, part: usize, grips: &mut Vec<Grip>) {
+        let own = self.sets.iter().zip(&self.places).filter(|(set, _)| set.of == part);
+        let guests = own.flat_map(|(_, places)| &self.guests[places.all.clone()]);
+        grips.extend(guests.filter(|guest| guest.is_pushed()).map(Guest::grip));
+    }
+
+    /// Ends a pass: whether the step is found, and taken note of, or has to be taken anew with the forces of this one.
+    pub(crate) fn settle(
+        &mut self,
+        pass: u32,
+        parts: &[Part],
+        participants: &[Box<dyn Participant>],
+    ) -> bool {
+        let Self { sets, places, guests, memory, .. } = self;
+        let impulses =
+            |set: &Guests, own: &Places| &participants[set.host].guest_impulses()[own.at_host.clone()];
+        let mut is_found = true;
+        for (index, (set, own)) in sets.iter().zip(&*places).enumerate() {
+            let step = parts[set.of].steps.step;
+            let (mut apart, mut size, mut sums) = (0.0, 0.0, [[0.0; 3]; 2]);
+            let remembered = &memory.guests[own.all.clone()];
+            for ((guest, [_, owed]), &impulse) in
+                guests[own.all.clone()].iter().zip(remembered).zip(impulses(set, own))
+            {
+                let (wanted, felt) = (scale(add(impulse, *owed), 1.0 / step), guest.felt());
+                let difference = sub(wanted, felt);
+                (apart, size) = (apart + dot(difference, difference), size + dot(wanted, wanted));
+                sums = [sub(sums[0], scale(impulse, 1.0 / step)), add(sums[1], felt)];
+            }
+            let difference = if size > 0.0 { (apart / size).sqrt() } else { apart };
+            memory.last[index] = (difference, sums);
+            is_found &= difference <= FOUND;
+        }
+        is_found |= pass + 1 == PASSES;
+        for (index, (set, own)) in sets.iter().zip(&*places).enumerate() {
+            let step = parts[set.of].steps.step;
+            let remembered = memory.guests[own.all.clone()].iter_mut();
+            let mut touches = false;
+            for ((guest, [force, owed]), &impulse) in
+                guests[own.all.clone()].iter_mut().zip(remembered).zip(impulses(set, own))
+            {
+                let mean = scale(impulse, 1.0 / step);
+                touches |= mean != [0.0; 3] || guest.is_pushed();
+                if is_found {
+                    (*force, *owed) = (mean, sub(add(*owed, impulse), scale(guest.felt(), step)));
+                } else {
+                    (guest.force, guest.anchor) = (add(mean, scale(*owed, 1.0 / step)), guest.way[1]);
+                }
+            }
+            if is_found && touches {
+                let [steps, passes] = &mut memory.counts[index];
+                (*steps, *passes) = (*steps + 1, *passes + u64::from(pass + 1));
+                memory.worst[index] = memory.worst[index].max(memory.last[index].0);
+            }
+        }
+        is_found
+    }
+
+    /// The contacts of participants at the instant where they met last.
+    pub(crate) fn now(&self) -> impl Iterator<Item = GuestsNow> {
+        let GuestMemory { counts, last, worst, .. } = &self.memory;
+        self.sets.iter().zip(counts).zip(last).zip(worst).map(
+            |(((set, [steps, passes]), (_, forces)), &worst)| GuestsNow {
+                parts: [set.host, set.of],
+                forces: *forces,
+                passes: *passes as f64 / (*steps).max(1) as f64,
+                worst,
+            },
+        )
+    }
+}
+
+impl Guest {
+    /// The mean force [N] that it has felt in the step.
+    fn felt(&self) -> Vector<f64> {
+        match self.is_pushed() {
+            true => sub(self.force, scale(sub(self.way[1], self.anchor), self.stiffness)),
+            false => [0.0; 3],
+        }
+    }
+}
+
+impl Guests {
+    /// Whether their participants can meet so.
+    ///
+    /// # Errors
+    /// If one is not explicit on the CPU, the other one not implicit, or nodes are not theirs.
+    pub fn check(&self, parts: &[Part]) -> Result<(), Failure> {
+        let [Some(host), Some(of)] = [self.host, self.of].map(|part| parts.get(part)) else {
+            return Err(Failure::input(&"guests name a participant that there is not"));
+        };
+        match &host.method {
+            #[cfg(feature = "gpu")]
+            Method::Explicit(settings) if settings.device.is_some() => {
+                return Err(self.refused(parts, "meets one that is on a GPU, which knows no guests"));
+            }
+            Method::Explicit(_) => {}
+            _ => {
+                return Err(
+                    self.refused(parts, "meets one that is not explicit: one of two takes explicit steps")
+                );
+            }
+        }
+        if !of.method.solves_steps() {
+            return Err(self.refused(parts, "is not implicit: the other one of two solves its steps"));
+        }
+        if self.nodes.iter().any(|&node| node as usize >= of.model.node_count()) {
+            return Err(self.refused(parts, "has fewer nodes than its guests"));
+        }
+        Ok(())
+    }
+
+    fn refused(&self, parts: &[Part], why: &str) -> Failure {
+        Failure::input(&format_args!("contact between participants: `{}` {why}", parts[self.of].name))
+    }
+}
+
+/// Surfaces of a host's contacts that have nodes of a set, and those that touch these.
+fn surfaces<'a>(host: &'a Part, guests: &Range<u32>) -> impl Iterator<Item = &'a Contact> {
+    let guests = guests.clone();
+    let all = host.method.contacts().into_iter().flat_map(|contacts| &contacts.contacts);
+    all.filter(move |contact| {
+        contact.surfaces().any(|surface| surface.nodes.iter().any(|node| guests.contains(node)))
+    })
+}
+
+/// A third of the areas [m²] of the triangles around nodes, added up; each triangle once.
+fn add_areas(surface: &Surface, place: impl Fn(u32) -> Vector<f64>, mut add_to: impl FnMut(u32, f64)) {
+    for face in &surface.faces {
+        let [a, b, c] = face.map(&place);
+        let area = cross(sub(b, a), sub(c, a));
+        let third = dot(area, area).sqrt() / 6.0;
+        face.iter().for_each(|&node| add_to(node, third));
+    }
+}
+
+/// The share of each guest [m²] in the surfaces that it is part of, at rest.
+fn areas(host: &Part, guests: &Range<u32>, place: impl Fn(u32) -> Vector<f64>) -> Vec<f64> {
+    let mut areas = vec![0.0_f64; guests.len()];
+    for contact in surfaces(host, guests) {
+        let mut own = vec![0.0; guests.len()];
+        for surface in contact.surfaces().filter(|own| own.nodes.iter().all(|node| guests.contains(node))) {
+            add_areas(surface, &place, |node, area| own[(node - guests.start) as usize] += area);
+        }
+        areas.iter_mut().zip(own).for_each(|(area, own)| *area = area.max(own));
+    }
+    areas
+}
+
+/// Mass of the nodes of a host's surfaces that meet guests, over their area [kg/m²].
+fn mass_per_area(host: &Part, guests: &Range<u32>) -> f64 {
+    let (mut mass, mut area) = (0.0, 0.0);
+    for contact in surfaces(host, guests) {
+        for surface in contact.surfaces().filter(|own| own.nodes.iter().all(|node| !guests.contains(node))) {
+            mass += surface.nodes.iter().map(|&node| host.model.inertia(node as usize)).sum::<f64>();
+            add_areas(surface, |node| host.model.rest[node as usize], |_, third| area += third);
+        }
+    }
+    if area > 0.0 { mass / area } else { 0.0 }
+}
