@@ -20,7 +20,7 @@ use pliant_scene::{Part, World};
 /// The first bytes of every checkpoint.
 const MAGIC: [u8; 8] = *b"\x89PLIANT\n";
 /// The version of what follows. Any change of what is in a body needs the next number.
-const FORMAT: u32 = 13;
+const FORMAT: u32 = 14;
 /// Bytes before the body: magic, format, length.
 const HEAD: usize = 20;
 /// Bytes after it.
@@ -611,6 +611,6 @@ mod tests {
         let shell = shell.simulation().unwrap().encode().unwrap()[0].len();
         let explicit = bytes("[run]\nprecision = 'single'\n");
         let quasi_static = bytes("[run]\nprecision = 'single'\nsolver = 'quasi-static'\n");
-        assert_eq!((FORMAT, explicit, quasi_static, shell), (13, 1088, 1472, 1058));
+        assert_eq!((FORMAT, explicit, quasi_static, shell), (14, 1088, 1472, 1058));
     }
 }
