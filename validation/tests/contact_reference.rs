@@ -242,7 +242,7 @@ fn pressed_at_a_barrier(quarter: &Quarter, depths: &[f64], near_pole: f64) -> Ve
         let mut radii = [0.0_f64, f64::INFINITY];
         for &node in nodes.iter().filter(|&&node| model.rest[node as usize][1].abs() < 1e-9) {
             let from_axis = radius(state.position[node as usize].into());
-            match now.gaps.binary_search_by_key(&node, |(own, _)| *own) {
+            match now.nodes.binary_search_by_key(&node, |own| own.node) {
                 Ok(_) => radii[0] = radii[0].max(from_axis),
                 Err(_) => radii[1] = radii[1].min(from_axis),
             }

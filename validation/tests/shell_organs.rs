@@ -504,7 +504,7 @@ fn valve_leaflets_coapt_and_hold_their_pressure() {
             println!(
                 "{:.3} s: {} nodes touch, least gap {:.1e} m, open {:.3}, {iterations} iterations, {:.0} s",
                 state.time,
-                now.gaps.len(),
+                now.nodes.len(),
                 now.gap.unwrap_or(f64::NAN),
                 leak(&valve, &state, LEAFLET + barrier),
                 start.elapsed().as_secs_f64()
@@ -512,7 +512,7 @@ fn valve_leaflets_coapt_and_hold_their_pressure() {
         }
     }
     let now = solver.touching().unwrap().now();
-    let touching: Vec<u32> = now.gaps.iter().map(|(node, _)| *node).collect();
+    let touching: Vec<u32> = now.nodes.iter().map(|own| own.node).collect();
     let loose = |n: &&u32| valve.held.binary_search(n).is_err();
     let free: Vec<u32> = valve.free.iter().filter(loose).copied().collect();
     let lie = free.iter().filter(|n| touching.binary_search(n).is_ok()).count() as f64 / free.len() as f64;

@@ -68,17 +68,31 @@ impl Lag {
         self.longest
     }
 
+    /// The force [N] with which it pushes, on average.
+    pub fn force(&self) -> Vector3<f64> {
+        self.forces[0].into()
+    }
+
+    /// The part of a way against what it pushes that a thing goes, if it pushes with a force [N] under a limit [N].
+    pub fn part(force: f64, limit: f64) -> f64 {
+        (2.0 * (1.0 - force / limit)).clamp(-1.0, 1.0)
+    }
+
     /// Finds the lag after a step of a length [s], over which the trajectory goes a way [m], under a limit [N].
     pub fn follow(&mut self, limit: f64, way: Vector3<f64>, step: f64) {
-        let force = Vector3::from(self.forces[0]);
+        self.go(self.force(), Self::part(self.force().norm(), limit), way, step);
+    }
+
+    /// Finds the lag after a step of a length [s], over which the trajectory goes a way [m], when of what leads along a force [N] with which it
+    /// pushes it goes a part. How long [m] the whole of that is.
+    pub fn go(&mut self, force: Vector3<f64>, part: f64, way: Vector3<f64>, step: f64) -> f64 {
         let mut wanted = way - self.now() * (step / CATCHES_UP).min(1.0);
-        if let Some((ahead, size)) = nalgebra::Unit::try_new_and_get(force, 0.0) {
-            let into = wanted.dot(&ahead).max(0.0);
-            let part = (2.0 * (1.0 - size / limit)).clamp(-1.0, 1.0);
-            wanted -= ahead.into_inner() * (into * (1.0 - part));
-        }
+        let ahead = force.try_normalize(0.0).unwrap_or_default();
+        let into = wanted.dot(&ahead).max(0.0);
+        wanted -= ahead * (into * (1.0 - part));
         self.ways[1] = (self.now() + wanted - way).into();
         self.step = step;
+        into
     }
 
     /// Takes the force [N] with which it pushes in this step.

@@ -25,6 +25,7 @@ pub mod lag;
 mod near;
 pub mod pairs;
 pub mod pose;
+pub mod pressure;
 pub mod profile;
 pub mod shader;
 pub mod shape;

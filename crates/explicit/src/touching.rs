@@ -16,6 +16,7 @@ use nalgebra::Vector3;
 use pliant_contact::lag::Lag;
 use pliant_contact::pairs::Pairs;
 use pliant_contact::pose::{Leg, Stance};
+use pliant_contact::pressure::faces;
 use pliant_contact::shape::Near;
 use pliant_contact::touch::{
     BAND, Contact, Contacts, FOUND, Gripped, LIFTED, LIFTS, LOOKED, OFF, PASSES, Passage, ROUNDS, Rigid, With,
@@ -174,7 +175,7 @@ impl<R: Scalar> Touching<R> {
             nodes: vec![Node::NONE; numbers.len()],
             seen: vec![Seen::default(); numbers.len()],
             rows: Vec::new(),
-            faces: nodal::faces(&contacts, &numbers),
+            faces: faces(&contacts, &numbers),
             slips: vec![[0.0; 2]; numbers.len()],
             slid: Vec::new(),
             numbers,

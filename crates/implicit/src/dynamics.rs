@@ -18,6 +18,7 @@ use crate::descent::{Contacting, Limits, Vectors, descend};
 use crate::error::SolveError;
 use crate::facet::Tangent;
 use crate::forces::Forces;
+use crate::limited::within_limits;
 use crate::linear::{LinearReport, LinearSolver, dot};
 use crate::rotation::{exponential, logarithm, spin_to_vector};
 use crate::solid::highest_frequency_squared;
@@ -361,8 +362,10 @@ impl BackwardEuler {
             close: self.settings.speed_tolerance.map(|speed| speed * h),
         };
         let mut residuals = Vec::new();
-        let result = descend(self, state, time, Some(&guess), &limits, &mut |norm, allowed| {
-            residuals.push((norm, allowed));
+        let result = within_limits(self, state, time, |solver, state| {
+            descend(solver, state, time, Some(&guess), &limits, &mut |norm, allowed| {
+                residuals.push((norm, allowed));
+            })
         });
         let tolerance = self.settings.tolerance;
         let relative =

@@ -46,6 +46,7 @@ mod followers;
 mod forces;
 mod initial;
 mod lanes;
+mod limited;
 mod linear;
 mod mapping;
 mod patch;

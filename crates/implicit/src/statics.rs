@@ -15,6 +15,7 @@ use crate::assembly::{Assembly, Spring};
 use crate::descent::{Contacting, Limits, Vectors, descend};
 use crate::error::SolveError;
 use crate::facet::Tangent;
+use crate::limited::within_limits;
 use crate::linear::{LinearSolver, dot};
 use crate::sparse::NONE;
 use crate::state::State;
@@ -432,9 +433,11 @@ impl Statics {
         let mut residuals = Vec::new();
         let mut last = 0.0;
         let limits = Limits { iterations: self.settings.iterations, lags: LAGS, close: None };
-        let result = descend(self, state, time, None, &limits, &mut |norm, allowed| {
-            residuals.push(norm);
-            last = allowed;
+        let result = within_limits(self, state, time, |solver, state| {
+            descend(solver, state, time, None, &limits, &mut |norm, allowed| {
+                residuals.push(norm);
+                last = allowed;
+            })
         });
         if let Some(attempt) = self.attempts.last_mut() {
             (attempt.residuals, attempt.allowed) = (residuals.clone(), last);

@@ -338,6 +338,9 @@ impl System {
 
     /// Ends a step [s]: the history of a state is advanced from the state before, or from rest.
     pub(crate) fn end_step(&mut self, before: Option<&State>, state: &mut State, step: f64) {
+        if let (Some(touching), Some(before)) = (&mut self.touching, before) {
+            touching.end_step(before.time + step);
+        }
         if !self.relaxes() {
             return;
         }

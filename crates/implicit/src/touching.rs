@@ -6,9 +6,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use pliant_contact::barrier::{BarrierSettings, Barriers, Matrix12, Meeting};
+use pliant_contact::barrier::{BarrierSettings, Barriers, Matrix12, Meeting, NodeTouch};
+use pliant_contact::lag::Lag;
 use pliant_contact::pose::Leg;
-use pliant_contact::touch::Contacts;
+use pliant_contact::touch::{Contact, Contacts, With};
 use pliant_mechanics::Model;
 
 use crate::error::SolveError;
@@ -55,8 +56,8 @@ pub struct TouchingNow {
     pub energy: f64,
     /// The least gap [m], where something touches.
     pub gap: Option<f64>,
-    /// The least gap [m] of each node that touches something, by increasing node.
-    pub gaps: Vec<(u32, f64)>,
+    /// Nodes that touch something, increasing.
+    pub nodes: Vec<NodeTouch>,
 }
 
 /// Contacts in the equations of a solver.
@@ -71,6 +72,10 @@ pub struct TouchingSystem {
     totals: Vec<Vector3<f64>>,
     /// Of barriers and friction [J]; infinite where there is no gap.
     pub(crate) energy: f64,
+    /// Nodes that touch something at the end of the last step, increasing.
+    touches: Vec<NodeTouch>,
+    /// How far tools whose force is limited are behind their trajectories.
+    lags: Vec<Lag>,
     /// Pairs of nodes in the pattern beside those of cells, increasing.
     pub(crate) pairs: Vec<[u32; 2]>,
     pub(crate) check_crossings: bool,
@@ -85,13 +90,17 @@ impl TouchingSystem {
     pub(crate) fn new(touching: &Touching, model: &Model) -> Self {
         let nearest =
             touching.settings.iter().map(|settings| settings.distance).fold(f64::INFINITY, f64::min);
+        let rigids = touching.contacts.rigids.iter().zip(0..);
+        let limited = rigids.filter(|(rigid, _)| rigid.trajectory.limit().is_some());
         Self {
+            lags: limited.map(|(_, number)| Lag::new(number)).collect(),
             barriers: touching.barriers(model),
             share: 1.0,
             forces: vec![0.0; 6 * model.rest.len()],
             given: vec![0.0; 6 * model.rest.len()],
             totals: vec![Vector3::zeros(); touching.settings.len()],
             energy: 0.0,
+            touches: Vec::new(),
             pairs: Vec::new(),
             check_crossings: touching.check_crossings,
             close: CLOSE * nearest,
@@ -118,17 +127,82 @@ impl TouchingSystem {
             totals: self.totals.iter().map(|&total| total.into()).collect(),
             energy: self.barriers.barrier_energy(),
             gap: self.barriers.least_gap(),
-            gaps: self.barriers.gaps().into_iter().collect(),
+            nodes: self.touches.clone(),
         }
     }
 
     /// [`now`](Self::now) at a state that no step led to: without friction.
     pub fn at(&mut self, state: &State) -> TouchingNow {
         let still = vec![0.0; self.forces.len()];
+        let shifts = self.lags.iter().map(|lag| (lag.rigid() as u32, [lag.now(); 2]));
+        *self.barriers.shifts_mut() = shifts.collect();
         self.barriers.begin(&state.position, &still, [state.time; 2]);
         self.share = 1.0;
         self.evaluate(state, None);
+        self.touches = self.barriers.touches(&self.touches);
         self.now()
+    }
+
+    /// Ends a step at the state last evaluated, a time [s]: nodes have slid in it, and tools are where they lag.
+    pub(crate) fn end_step(&mut self, time: f64) {
+        self.touches = self.barriers.touches(&self.touches);
+        self.lags.iter_mut().for_each(|lag| lag.advance(time));
+    }
+
+    /// Goes on where another one stood: with nodes that touch something, increasing, and the lags of tools.
+    pub fn go_on_from(&mut self, touches: Vec<NodeTouch>, lags: Vec<Lag>) {
+        (self.touches, self.lags) = (touches, lags);
+    }
+
+    /// The contacts at the state last evaluated.
+    pub fn barriers(&self) -> &Barriers {
+        &self.barriers
+    }
+
+    /// How far tools whose force is limited are behind their trajectories.
+    pub fn lags(&self) -> &[Lag] {
+        &self.lags
+    }
+
+    /// The force [N] that the tool of a lag pushes with at most.
+    pub(crate) fn limit(&self, lag: &Lag) -> f64 {
+        self.barriers.contacts().rigids[lag.rigid()].trajectory.limit().unwrap_or(f64::INFINITY)
+    }
+
+    /// Finds where tools whose force is limited go between two times [s]: each a part of its way along a force [N]; how long [m] the whole of
+    /// that is.
+    pub(crate) fn follow<'a>(
+        &mut self,
+        [from, to]: [f64; 2],
+        parts: impl Iterator<Item = (Vector3<f64>, f64, &'a mut f64)>,
+    ) {
+        let mut lags = std::mem::take(&mut self.lags);
+        self.barriers.shifts_mut().clear();
+        for (lag, (ahead, part, into)) in lags.iter_mut().zip(parts) {
+            let number = lag.rigid() as u32;
+            let leg = self.barriers.legs().get(&number);
+            let rigid = &self.barriers.contacts().rigids[lag.rigid()];
+            let place = |time| rigid.posture(time, leg).0.translation.vector;
+            *into = lag.go(ahead, part, place(to) - place(from), to - from);
+            self.barriers.shifts_mut().push((number, [lag.now(), lag.next()]));
+        }
+        self.lags = lags;
+    }
+
+    /// Gives each lag the force [N] with which its tool pushes at the state last evaluated; these forces.
+    pub(crate) fn bear_on(&mut self) -> Vec<Vector3<f64>> {
+        let Contacts { rigids, contacts } = self.barriers.contacts();
+        let force = |lag: &mut Lag| {
+            let tool = rigids[lag.rigid()].tool();
+            let on = |(contact, force): (&Contact, &Vector3<f64>)| {
+                let of_tool = matches!(contact.with, With::Rigid(rigid) if rigids[rigid].tool() == tool);
+                of_tool.then_some(*force)
+            };
+            let force = -contacts.iter().zip(&self.totals).filter_map(on).sum::<Vector3<f64>>();
+            lag.found(force);
+            force
+        };
+        self.lags.iter_mut().map(force).collect()
     }
 
     /// Where rigid things go that are driven from outside, by their number.

@@ -5,7 +5,9 @@ use std::fmt::Write;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use pliant_contact::lag::Lag;
 use pliant_contact::pose::Leg;
+use pliant_contact::pressure::{faces, pressures};
 use pliant_explicit::{NodeContact, Wanted};
 use pliant_implicit::{
     Assembly, BackwardEuler, DynamicSettings, Explicit, Forces, Phases, SolveError, Spring, State, Statics,
@@ -476,12 +478,15 @@ impl Implicit {
         self.energies = energies;
         (self.effort, self.effort_before) = (effort.clone(), effort);
         self.evaluated = false;
-        let Some(ContactState { forces, totals, energy, gaps, pairs, legs }) = contact else { return Ok(()) };
-        let gap = gaps.iter().map(|&(_, gap)| gap).reduce(f64::min);
-        self.touching = Some(TouchingNow { forces, totals, energy, gap, gaps });
+        let Some(ContactState { forces, totals, energy, touches, pairs, legs, lags }) = contact else {
+            return Ok(());
+        };
+        let gap = touches.iter().map(|own| own.gap).reduce(f64::min);
         if let Some(own) = self.method.touching_mut() {
+            own.go_on_from(touches.clone(), lags);
             *own.legs_mut() = legs.into_iter().collect();
         }
+        self.touching = Some(TouchingNow { forces, totals, energy, gap, nodes: touches });
         let taken = self.method.take_contact_pairs(pairs);
         taken.map_err(|error| failure(&error, &self.model, &self.bodies, self.time))
     }
@@ -504,9 +509,10 @@ impl Implicit {
                 forces: now.forces.clone(),
                 totals: now.totals.clone(),
                 energy: now.energy,
-                gaps: now.gaps.clone(),
+                touches: now.nodes.clone(),
                 pairs: own.pairs().to_vec(),
                 legs: own.legs().iter().map(|(&rigid, &leg)| (rigid, leg)).collect(),
+                lags: own.lags().to_vec(),
             }),
         }
     }
@@ -553,17 +559,37 @@ impl Instant for Implicit {
         let (Some(now), Some(touching)) = (&self.touching, &self.bodies.model.touching) else {
             return Vec::new();
         };
-        let own = |node: u32| {
-            let at = 6 * node as usize;
-            let force = [0, 1, 2].map(|c| now.forces[at + c]);
-            let found = now.gaps.binary_search_by_key(&node, |&(known, _)| known);
-            NodeContact { node, force, pressure: None, gap: found.ok().map(|at| now.gaps[at].1), slip: None }
+        let numbers = touching.contacts.nodes();
+        let touch = |node: u32| {
+            let found = now.nodes.binary_search_by_key(&node, |own| own.node);
+            found.ok().map(|at| &now.nodes[at])
         };
-        touching.contacts.nodes().into_iter().map(own).collect()
+        let pushes: Vec<Vector3<f64>> = numbers
+            .iter()
+            .map(|&node| touch(node).map_or_else(Vector3::zeros, |own| own.push.into()))
+            .collect();
+        let places: Vec<Vector3<f64>> =
+            numbers.iter().map(|&node| self.state.position[node as usize]).collect();
+        let pressures = pressures(&faces(&touching.contacts, &numbers), &pushes, &places);
+        let own = |(node, pressure): (u32, Option<f64>)| {
+            let (at, own) = (6 * node as usize, touch(node));
+            NodeContact {
+                node,
+                force: [0, 1, 2].map(|c| now.forces[at + c]),
+                pressure,
+                gap: own.map(|own| own.gap),
+                slip: own.map(|own| own.slip),
+            }
+        };
+        numbers.into_iter().zip(pressures).map(own).collect()
     }
 
     fn leg(&self, rigid: usize) -> Option<&Leg> {
         self.method.touching()?.legs().get(&(rigid as u32))
+    }
+
+    fn lag(&self, rigid: usize) -> Option<&Lag> {
+        self.method.touching()?.lags().iter().find(|lag| lag.rigid() == rigid)
     }
 
     fn energies(&self) -> Energies {

@@ -3,8 +3,10 @@
 use std::collections::VecDeque;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector4};
+use pliant_contact::barrier::NodeTouch;
+use pliant_contact::lag::Lag;
 use pliant_contact::pose::Leg;
-use pliant_contact::touch::Gripped;
+use pliant_contact::touch::{Contacts, Gripped};
 use pliant_explicit::{Scalar, State};
 use pliant_implicit::History;
 use pliant_mechanics::tensor::Symmetric;
@@ -46,7 +48,7 @@ impl Kept {
         match self {
             Self::Single(state, memory) => fits(state, memory, part),
             Self::Double(state, memory) => fits(state, memory, part),
-            Self::Implicit(state) => state.fits(&part.model),
+            Self::Implicit(state) => state.fits(part),
         }
     }
 }
@@ -75,31 +77,43 @@ pub(crate) struct ContactState {
     pub totals: Vec<[f64; 3]>,
     /// Of the barriers [J].
     pub energy: f64,
-    /// The least gap [m] of nodes that touch something.
-    pub gaps: Vec<(u32, f64)>,
+    /// Nodes that touch something, increasing.
+    pub touches: Vec<NodeTouch>,
     /// Pairs of nodes in the pattern of the equations beside those of cells: the order of sums depends on it.
     pub pairs: Vec<[u32; 2]>,
     /// Where tools go that are driven from outside.
     pub legs: Vec<(u32, Leg)>,
+    /// How far tools whose force is limited are behind their trajectories.
+    pub lags: Vec<Lag>,
 }
 
 impl ContactState {
-    /// Whether it is of a model with so many nodes.
-    fn fits(&self, nodes: usize) -> bool {
+    /// Whether it is of a model with so many nodes and such contacts.
+    fn fits(&self, nodes: usize, contacts: &Contacts) -> bool {
+        let limited = contacts.rigids.iter().enumerate();
+        let limited = limited.filter(|(_, rigid)| rigid.trajectory.limit().is_some());
         let known = |node: u32| (node as usize) < nodes;
         self.forces.len() == 6 * nodes
-            && self.gaps.iter().all(|&(node, _)| known(node))
+            && self.touches.is_sorted_by(|a, b| a.node < b.node)
+            && self.touches.iter().all(|own| known(own.node) && own.slip.is_finite())
             && self.pairs.iter().flatten().all(|&node| known(node))
             && self.legs.iter().all(|(_, leg)| leg.is_finite())
+            && self.lags.iter().map(Lag::rigid).eq(limited.map(|(number, _)| number))
+            && self.lags.iter().all(Lag::is_finite)
     }
 }
 
 impl ImplicitState {
-    /// Whether it has the sizes of a model.
-    pub(crate) fn fits(&self, model: &Model) -> bool {
+    /// Whether it has the sizes of a participant's model and contacts.
+    pub(crate) fn fits(&self, part: &Part) -> bool {
+        let model: &Model = &part.model;
         let nodes = model.node_count();
         let before = self.before.iter().all(|(forces, state)| forces.len() == 6 * nodes && state.fits(model));
-        let contact = self.contact.iter().all(|contact| contact.fits(nodes));
+        let contact = match (&self.contact, part.method.contacts()) {
+            (None, _) => true,
+            (Some(contact), Some(contacts)) => contact.fits(nodes, contacts),
+            (Some(_), None) => false,
+        };
         before && contact && self.previous.iter().all(|state| state.fits(model)) && self.state.fits(model)
     }
 }

@@ -13,6 +13,7 @@ mod curvature;
 pub mod distance;
 mod features;
 pub mod law;
+mod nodal;
 mod rows;
 mod surfaces;
 mod system;
@@ -20,5 +21,6 @@ mod system;
 mod tests;
 
 pub use curvature::Matrix12;
+pub use nodal::NodeTouch;
 pub use rows::{Held, Mollified, Row, Stencil};
 pub use system::{BarrierSettings, Barriers, Meeting};

@@ -75,6 +75,8 @@ pub struct Barriers {
     wall_distances: Vec<Vec<f64>>,
     /// Where rigid things go that are driven from outside, by their number.
     legs: BTreeMap<u32, Leg>,
+    /// Rigid things beside their trajectories, by their number: how far [m] at the start and the end of the step.
+    shifts: Vec<(u32, [Vector3<f64>; 2])>,
     rows: Vec<Row>,
     held: Vec<Held>,
     energy: [f64; 2],
@@ -141,6 +143,7 @@ impl Barriers {
             motion: vec![Vector3::zeros(); places.len()],
             place: places,
             legs: BTreeMap::new(),
+            shifts: Vec::new(),
             rows: Vec::new(),
             held: Vec::new(),
             energy: [0.0; 2],
@@ -174,6 +177,11 @@ impl Barriers {
         &self.legs
     }
 
+    /// Rigid things beside their trajectories, by their number, at the start and the end of a step [m]; from the next step on.
+    pub fn shifts_mut(&mut self) -> &mut Vec<(u32, [Vector3<f64>; 2])> {
+        &mut self.shifts
+    }
+
     /// Begins a step between two times [s], with nodes at places [m], expected to go by a motion (six numbers a node, translations first).
     /// Friction is that of the start.
     pub fn begin(&mut self, position: &[Vector3<f64>], motion: &[f64], times: [f64; 2]) {
@@ -181,6 +189,11 @@ impl Barriers {
         for (number, rigid) in self.contacts.rigids.iter().enumerate() {
             for (stance, time) in self.stances.iter_mut().zip([from, to, from]) {
                 stance[number] = rigid.stance(time, self.legs.get(&(number as u32)));
+            }
+        }
+        for (number, [before, after]) in &self.shifts {
+            for (stance, shift) in self.stances.iter_mut().zip([before, after, before]) {
+                stance[*number as usize].pose.translation.vector += shift;
             }
         }
         for group in &mut self.groups {
@@ -348,10 +361,7 @@ impl Barriers {
         let mut energy = 0.0;
         for held in held.iter_mut() {
             let start = match held.wall {
-                Some(wall) => {
-                    let carried = now[wall as usize].pose * from[wall as usize].pose.inverse();
-                    (carried * nalgebra::Point3::from(held.start)).coords
-                }
+                Some(wall) => carried([&from[wall as usize], &now[wall as usize]], &held.start),
                 None => held.start,
             };
             let way = held.stencil.combine(|node| place[node as usize]) - start;
@@ -363,6 +373,17 @@ impl Barriers {
             energy += held.limit * slip.energy(length);
         }
         self.energy[1] = energy;
+    }
+
+    /// How far [m] the first primitive of a row has gone from the second in the step: Σ c x less that of its start, which a wall carries along.
+    pub(super) fn way(&self, stencil: &Stencil) -> Vector3<f64> {
+        let start = stencil.combine(|node| self.start[node as usize]);
+        let wall = self.groups[stencil.contact as usize].wall.filter(|_| stencil.count == 1);
+        let start = match wall.map(|wall| wall as usize) {
+            Some(wall) => carried([&self.stances[0][wall], &self.stances[2][wall]], &start),
+            None => start,
+        };
+        stencil.combine(|node| self.place[node as usize]) - start
     }
 
     /// The energy [J] with nodes at places [m] and rigid things at a share of the step, that of friction with it; infinite if there is no gap
@@ -392,19 +413,6 @@ impl Barriers {
     /// The least gap [m] at the state last evaluated; none where nothing is within the reach of the barrier.
     pub fn least_gap(&self) -> Option<f64> {
         self.rows.iter().map(|row| row.gap).reduce(f64::min)
-    }
-
-    /// The least gap [m] of each node of the model that is within the reach of a barrier, by increasing node.
-    pub fn gaps(&self) -> BTreeMap<u32, f64> {
-        let mut gaps = BTreeMap::new();
-        for row in &self.rows {
-            let parts = row.stencil.parts().filter(|&(node, c)| (node as usize) < self.nodes && c != 0.0);
-            for (node, _) in parts {
-                let least = gaps.entry(node).or_insert(row.gap);
-                *least = least.min(row.gap);
-            }
-        }
-        gaps
     }
 
     /// Adds the forces [N] at the state last evaluated to those of nodes, six numbers a node, and sets those of each contact on its second
@@ -670,4 +678,9 @@ impl Barriers {
             }
         }
     }
+}
+
+/// Where a point [m] that goes along with a rigid thing is after it has gone from one stance to another.
+fn carried([from, now]: [&Stance; 2], point: &Vector3<f64>) -> Vector3<f64> {
+    (now.pose * from.pose.inverse() * nalgebra::Point3::from(*point)).coords
 }

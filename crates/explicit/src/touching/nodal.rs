@@ -1,10 +1,8 @@
-//! What contacts do to single nodes: forces, pressures, gaps, and how far nodes slide.
-//! The pressure is p = |N| / A: N is the sum of the impulses on a node along the normals of its contacts, and A = Σ ⅓ max(0, −a·N/|N|) is its
-//! share of the vector areas a of its deformed faces, outward, that N presses on.
+//! What contacts do to single nodes: forces, [pressures](pliant_contact::pressure), gaps, and how far nodes slide.
 
 use nalgebra::Vector3;
+use pliant_contact::pressure::pressures;
 use pliant_contact::shape::Near;
-use pliant_contact::touch::{Contact, Contacts};
 use pliant_mechanics::tensor::Vector;
 
 use super::{Own, Touching, over};
@@ -28,24 +26,14 @@ pub struct NodeContact {
     pub slip: Option<f64>,
 }
 
-/// Triangles of all surfaces of contacts, each once, in places of their nodes among `numbers`.
-pub(super) fn faces(contacts: &Contacts, numbers: &[u32]) -> Vec<[u32; 3]> {
-    let surfaces = contacts.contacts.iter().flat_map(Contact::surfaces);
-    let place = |node: u32| numbers.partition_point(|&known| known < node) as u32;
-    let mut faces: Vec<[u32; 3]> =
-        surfaces.flat_map(|surface| &surface.faces).map(|face| face.map(place)).collect();
-    faces.sort_unstable();
-    faces.dedup();
-    faces
-}
-
 impl<R: Scalar> Touching<R> {
     /// All nodes that may touch, increasing, at the instant whose forces were found last. `state` is that of the model then.
     pub fn nodal(&self, state: &State<R>) -> Vec<NodeContact> {
         let place =
             |(rest, &number): (&Vector3<f64>, &u32)| self.guests.place_at(number, rest, &state.displacement);
         let places: Vec<Vector3<f64>> = self.rest.iter().zip(&self.numbers).map(place).collect();
-        let (pressures, gaps) = (self.pressures(&places), self.gaps(&places));
+        let pressures = pressures(&self.faces, &self.normal_forces(), &places);
+        let gaps = self.gaps(&places);
         let parts = self.numbers.iter().zip(&self.nodes).zip(pressures).zip(gaps);
         let is_own = |node: u32| self.guests.place_of(node).is_none();
         parts
@@ -86,30 +74,6 @@ impl<R: Scalar> Touching<R> {
             }
         }
         all
-    }
-
-    fn pressures(&self, places: &[Vector3<f64>]) -> Vec<Option<f64>> {
-        let forces = self.normal_forces();
-        let directions: Vec<Vector3<f64>> =
-            forces.iter().map(|force| force.try_normalize(0.0).unwrap_or_default()).collect();
-        // Of faces that look against the force, and along it: sheets are pressed on from both sides.
-        let mut shares = vec![[0.0; 2]; self.nodes.len()];
-        let mut has_faces = vec![false; self.nodes.len()];
-        for face in &self.faces {
-            let [a, b, c] = face.map(|node| places[node as usize]);
-            let third = (b - a).cross(&(c - a)) / 6.0;
-            for node in face.map(|node| node as usize) {
-                let along = third.dot(&directions[node]);
-                shares[node][0] += (-along).max(0.0);
-                shares[node][1] += along.max(0.0);
-                has_faces[node] = true;
-            }
-        }
-        let pressure = |((force, [against, along]), has_faces): ((&Vector3<f64>, [f64; 2]), bool)| {
-            let (force, area) = (force.norm(), against.max(along));
-            has_faces.then_some(if force > 0.0 && area > 0.0 { force / area } else { 0.0 })
-        };
-        forces.iter().zip(shares).zip(has_faces).map(pressure).collect()
     }
 
     /// Least gaps [m]; infinite where nothing is near.

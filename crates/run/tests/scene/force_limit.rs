@@ -3,6 +3,7 @@
 use pliant_run::OutputFolder;
 use pliant_testing::scenes::{last_row, resumes, run, world};
 
+use super::barriers;
 use super::contact::pressed;
 
 /// A finger that goes 60 mm through a block of 50 mm, by these keys.
@@ -60,6 +61,60 @@ fn a_limit_that_is_far_away_changes_nothing() {
 fn a_resumed_run_with_a_limit_ends_in_the_same_bits() {
     let text = through("from = 0.1\nto = 0.6\nforce-limit = 2", 1.0);
     resumes(&text.replace("[run]\n", "[run]\nstep = 2e-3\ncheckpoint = { every = 0.35 }\n"));
+}
+
+/// The same by a barrier, in time and as equilibria: in no step the force is above the limit, and nothing is in anything.
+#[test]
+fn a_tool_stops_at_its_limit_under_a_barrier() {
+    for run_table in ["solver = 'implicit'\nstep = 0.02", "solver = 'static'\nload-steps = 60"] {
+        let text = through("from = 0.1\nto = 0.6\nforce-limit = 2", 1.2)
+            .replace("[run]\n", &format!("[run]\n{run_table}\n"))
+            .replace("['block', 'finger']\n", "['block', 'finger']\ncheck-intersections = true\n")
+            .replace("every = 1.2", "every = 0.02");
+        let out = tempfile::tempdir().unwrap();
+        let summary = run(&text, &out.path().join("out"));
+        let told: Vec<&String> = summary
+            .warnings
+            .iter()
+            .filter(|text| text.contains("was held back by its `force-limit`"))
+            .collect();
+        assert!(told.len() == 1 && told[0].contains("`finger`"), "{:?}", summary.warnings);
+        let table = std::fs::read_to_string(out.path().join("out/history.csv")).unwrap();
+        let mut rows = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
+        let column = rows.next().unwrap().iter().position(|name| *name == "contact.feels.z").unwrap();
+        let forces: Vec<f64> = rows.map(|row| row[column].parse().unwrap()).collect();
+        let most = forces.iter().copied().fold(0.0, f64::max);
+        println!("{run_table}: {} N in the end, {most} N at most; {}", forces[forces.len() - 1], told[0]);
+        assert!((forces[forces.len() - 1] / 2.0 - 1.0).abs() < 0.015 && most < 2.04, "{forces:?}");
+    }
+}
+
+/// Called back, it goes along, off the body, and a limit that is far away changes no bit, with barriers as well.
+#[test]
+fn a_tool_with_a_limit_is_called_back_from_a_barrier() {
+    let table = "curve = { table = [[0.1, 0], [0.6, 1], [0.8, 1], [1.4, 0]] }\nforce-limit = 2";
+    let text = through(table, 3.0).replace("[run]\n", "[run]\nsolver = 'implicit'\nstep = 0.02\n");
+    let world = world(&text).unwrap();
+    let mut simulation = world.simulation().unwrap();
+    simulation.run(3.0, |_| ()).unwrap();
+    let finger = simulation.frame().unwrap().tool("finger").unwrap();
+    assert!((finger.pose.translation.z - 0.09).abs() < 1e-3 && finger.force == [0.0; 3], "{finger:?}");
+    let implicit = "solver = 'implicit'\nstep = 0.02";
+    let limited = |limit| {
+        last_row(
+            &barriers::pressed(implicit, barriers::HELD)
+                .replace("to = 0.4\n", &format!("to = 0.4\n{limit}\n")),
+        )
+    };
+    assert_eq!(limited("force-limit = 50"), limited(""));
+}
+
+#[test]
+fn a_resumed_run_with_a_limit_under_a_barrier_ends_in_the_same_bits() {
+    let text = through("from = 0.1\nto = 0.6\nforce-limit = 2", 1.0);
+    resumes(
+        &text.replace("[run]\n", "[run]\nsolver = 'implicit'\nstep = 0.02\ncheckpoint = { every = 0.4 }\n"),
+    );
 }
 
 /// Without a limit a cell is inverted, and the message names the tool.

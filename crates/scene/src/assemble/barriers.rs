@@ -11,7 +11,7 @@ use pliant_sim::contact::touch::{Contacts, With};
 use pliant_sim::{counted, number};
 
 use super::{Builder, Partner, in_metres};
-use crate::format::{ContactTable, FieldName};
+use crate::format::ContactTable;
 
 /// The distance of a barrier over the diagonal of all bodies, if none is given.
 const DISTANCE: f64 = 1e-3;
@@ -162,12 +162,6 @@ impl Builder<'_> {
         self.error(&["contact", table, "between"], message, "no gap", help);
     }
 
-    /// Fields that contacts by a barrier don't have.
-    pub(super) fn lacks_field(&self, field: FieldName) -> bool {
-        self.scene.run.solver.solves_equations()
-            && matches!(field, FieldName::ContactPressure | FieldName::Slip)
-    }
-
     /// The diagonal [m] of all bodies.
     fn diagonal(&self) -> f64 {
         let bounds = self.bodies.iter().filter_map(|body| body.mesh.bounds());
@@ -201,20 +195,11 @@ impl Builder<'_> {
         surface.faces.iter().map(altitude).fold(f64::INFINITY, f64::min)
     }
 
-    /// Refuses what goes with no barrier: a controlled load, tools whose force is limited, and jaws that hold by an ideal grip.
+    /// Refuses what goes with no barrier: a controlled load, and jaws that hold by an ideal grip.
     pub(super) fn check_goes_with_barriers(&mut self, name: &str, contacts: &Contacts) {
         if self.scene.run.control.is_some() {
             let help = "prescribe the load, or move a tool or nodes instead";
             self.error(&["contact", name, "between"], "contact does not go with `control`", "here", help);
-        }
-        if let Some(limited) = contacts.rigids.iter().find(|rigid| rigid.trajectory.limit().is_some()) {
-            let message = format!(
-                "`{}` has a `force-limit`, which the solver `{}` does not know",
-                limited.tool(),
-                self.scene.run.solver.word()
-            );
-            let help = "leave it out, or take `solver = \"explicit\"`";
-            self.error(&["contact", name, "between"], message, "a limited force", help);
         }
         let held = contacts.contacts.iter().find_map(|contact| match contact.with {
             With::Rigid(rigid) => contacts.rigids[rigid].jaw.as_ref().filter(|jaw| jaw.grip.is_some()),

@@ -371,7 +371,8 @@ impl Builder<'_> {
                 BodyModel::Shell => {
                     "fields of a shell: `displacement`, `velocity`, `rotation`, `von-mises`, `stress-top`, `stress-middle`, \
                      `stress-bottom`, `membrane-force`, `bending-moment`, `membrane-energy`, `bending-energy`, \
-                     `drilling-energy`, `thickness`, `current-thickness`, `surface-strain`, `element-step`"
+                     `drilling-energy`, `thickness`, `current-thickness`, `surface-strain`, `element-step`, and of contacts \
+                     `contact-force`, `contact-pressure`, `gap`, `slip`"
                 }
                 _ => "leave it out: it is a field of other bodies",
             };
@@ -387,16 +388,6 @@ impl Builder<'_> {
     fn refuse_fields_without_contact(&mut self, fields: &[FieldName], body: Option<usize>, path: &[&str]) {
         let Some(touching) = &self.touching else { return };
         let chosen = touching.iter().enumerate().filter(|(index, _)| body.is_none_or(|body| body == *index));
-        if let Some(field) = fields.iter().find(|&&field| self.lacks_field(field)) {
-            let message = format!(
-                "contacts with the solver `{}` have no `{}`",
-                self.scene.run.solver.word(),
-                field.name()
-            );
-            let help = "take `contact-force` or `gap`";
-            self.error(path, message, "not with this solver", help);
-            return;
-        }
         let Some(index) = fields.iter().position(|field| field.is_of_contact()) else { return };
         if chosen.into_iter().any(|(_, touches)| *touches) {
             return;

@@ -316,14 +316,14 @@ impl FieldName {
             | Self::VonMises
             | Self::ElementStep
             | Self::ContactForce
-            | Self::Gap => true,
+            | Self::ContactPressure
+            | Self::Gap
+            | Self::Slip => true,
             Self::CauchyStress
             | Self::EnergyDensity
             | Self::Pk2Stress
             | Self::GreenStrain
-            | Self::DeformationGradient
-            | Self::ContactPressure
-            | Self::Slip => model != BodyModel::Shell,
+            | Self::DeformationGradient => model != BodyModel::Shell,
             Self::Pressure | Self::VolumeRatio | Self::CellVolumeRatio | Self::Fibre | Self::FibreStretch => {
                 matches!(model, BodyModel::Solid | BodyModel::Membrane)
             }

@@ -1,0 +1,55 @@
+//! What barriers do to single nodes: how hard they push them along their normals, the least gaps, and how far nodes slide.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::system::Barriers;
+
+/// A node of the model within the reach of a barrier.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NodeTouch {
+    /// Its number.
+    pub node: u32,
+    /// The least gap [m] of what it takes part in.
+    pub gap: f64,
+    /// Sum of the forces [N] of barriers on it, without friction.
+    pub push: [f64; 3],
+    /// How far it has slid [m] since it came within the reach.
+    pub slip: f64,
+}
+
+impl Barriers {
+    /// All nodes within the reach of a barrier at the state last evaluated, by increasing node. `before` has them at the start of the step:
+    /// their slip goes on by the length of the way that they went in it along what they touch, the mean of all that bears on a node, weighted by
+    /// its forces.
+    pub fn touches(&self, before: &[NodeTouch]) -> Vec<NodeTouch> {
+        let mut all: BTreeMap<u32, (f64, Vector3<f64>, [f64; 2])> = BTreeMap::new();
+        for row in self.rows() {
+            let way = self.way(&row.stencil);
+            let slip = (way - row.normal * row.normal.dot(&way)).norm();
+            for (at, (node, c)) in row.stencil.parts().enumerate() {
+                if node as usize >= self.node_count() || c == 0.0 {
+                    continue;
+                }
+                let own = all.entry(node).or_insert((f64::INFINITY, Vector3::zeros(), [0.0; 2]));
+                let load = c.abs() * row.force;
+                own.0 = own.0.min(row.gap);
+                own.1 += row.force_on(at);
+                own.2 = [own.2[0] + load, own.2[1] + load * slip];
+            }
+        }
+        let slid = |node: u32| {
+            let found = before.binary_search_by_key(&node, |own| own.node);
+            found.map_or(0.0, |at| before[at].slip)
+        };
+        let touch = |(node, (gap, push, [load, slips])): (u32, (f64, Vector3<f64>, [f64; 2]))| NodeTouch {
+            node,
+            gap,
+            push: push.into(),
+            slip: slid(node) + if load > 0.0 { slips / load } else { 0.0 },
+        };
+        all.into_iter().map(touch).collect()
+    }
+}
