@@ -191,7 +191,7 @@ impl TouchingSystem {
 
     /// Gives each lag the force [N] with which its tool pushes at the state last evaluated; these forces.
     pub(crate) fn bear_on(&mut self) -> Vec<Vector3<f64>> {
-        let Contacts { rigids, contacts } = self.barriers.contacts();
+        let Contacts { rigids, contacts, .. } = self.barriers.contacts();
         let force = |lag: &mut Lag| {
             let tool = rigids[lag.rigid()].tool();
             let on = |(contact, force): (&Contact, &Vector3<f64>)| {

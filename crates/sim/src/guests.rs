@@ -148,7 +148,7 @@ impl Meetings {
             let rest = |node: u32| of.model.rest[node as usize];
             let areas = areas(host, &(first..end), |node| rest(set.nodes[(node - first) as usize]));
             let unit = FIRM / (host.steps.step * of.steps.step) * mass_per_area(host, &(first..end));
-            if areas.iter().any(|&area| !(unit * area > 0.0)) {
+            if areas.iter().any(|&area| unit * area <= 0.0) {
                 return Err(set.refused(
                     parts,
                     "has guests without a face, or its host has no surface that they touch",

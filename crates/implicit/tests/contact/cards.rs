@@ -55,7 +55,7 @@ fn sunk(friction: f64) -> f64 {
     ];
     let floor = fixed("floor", Shape::HalfSpace, [0.0; 3], [0.0; 3]);
     let barrier = BarrierSettings { distance: barrier, stiffness: 1e4, creep_speed: 1e-3 };
-    touch(&mut model, Contacts { rigids: vec![floor], contacts }, barrier);
+    touch(&mut model, Contacts { rigids: vec![floor], contacts, ..Default::default() }, barrier);
     let settings = DynamicSettings { iterations: 200, ..DynamicSettings::new(5e-3) };
     let mut solver = BackwardEuler::new(model.clone(), settings).unwrap();
     let mut state = State::at_rest(&model);

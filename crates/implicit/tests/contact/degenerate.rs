@@ -71,7 +71,7 @@ fn play(scene: &Scene, is_rigid: bool) -> Result<(), String> {
         contacts.extend((0..rigids.len()).map(|number| contact(first, With::Rigid(number))));
     }
     let barrier = BarrierSettings { distance: 2e-4, stiffness: 0.2 * SHEAR, creep_speed: 1e-3 };
-    touch(&mut model, Contacts { rigids, contacts }, barrier);
+    touch(&mut model, Contacts { rigids, contacts, ..Default::default() }, barrier);
     let settings = DynamicSettings { iterations: 200, ..DynamicSettings::new(5e-3) };
     let mut solver =
         BackwardEuler::new(model.clone(), settings).map_err(|error| format!("{name}: {error}"))?;
