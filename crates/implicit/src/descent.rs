@@ -79,6 +79,8 @@ pub(crate) struct Limits {
     pub lags: usize,
     /// A Newton step [m] that is the last one, whatever the residual.
     pub close: Option<f64>,
+    /// Whether a state is good enough when iterations run out.
+    pub accept: bool,
 }
 
 /// What an iteration started from.
@@ -92,7 +94,7 @@ struct Before {
     along: f64,
 }
 
-/// Finds the state at the end of a step; residuals go to `found` with what is allowed.
+/// Finds the state at the end of a step, or takes what iterations reach; whether it is found. Residuals go to `found` with what is allowed.
 pub(crate) fn descend(
     solver: &mut impl Contacting,
     state: &mut State,
@@ -100,7 +102,7 @@ pub(crate) fn descend(
     guess: Option<&[f64]>,
     limits: &Limits,
     found: &mut dyn FnMut(f64, f64),
-) -> Result<(), SolveError> {
+) -> Result<bool, SolveError> {
     let times = [state.time, time];
     begin(solver, state, times, guess);
     // Whether forces and stiffness of the state are known.
@@ -129,12 +131,13 @@ pub(crate) fn descend(
                 lags += 1;
                 continue;
             }
-            return check(solver, time);
+            return check(solver, time).map(|()| true);
         }
         if iteration == limits.iterations || !norm.is_finite() {
             // A single iteration is not checked, but what moves by itself must have come to its end.
-            return if complete && limits.iterations == 1 && norm.is_finite() {
-                check(solver, time)
+            let single = limits.iterations == 1;
+            return if complete && (single || limits.accept) && norm.is_finite() {
+                check(solver, time).map(|()| single)
             } else {
                 Err(not_found(solver, time, iteration))
             };
@@ -176,19 +179,19 @@ pub(crate) fn descend(
                 lags += 1;
                 continue;
             }
-            return check(solver, time);
+            return check(solver, time).map(|()| true);
         }
         // Nothing falls any more: round-off, or a direction that is none.
         state.clone_from(&before.state);
         put(solver, before.share);
         solver.evaluate(state, time, false)?;
         if complete && (last || before.along.abs() <= ROUND_OFF * before.size) {
-            return check(solver, time);
+            return check(solver, time).map(|()| true);
         }
         let node = solver.worst();
         return Err(SolveError::Uphill { time, node, iterations: iteration + 1 });
     }
-    Ok(())
+    Ok(true)
 }
 
 /// Tells the contacts of the step and what is expected to move in it.

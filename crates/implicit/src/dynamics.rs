@@ -51,6 +51,9 @@ pub struct DynamicSettings {
     /// Speed [m/s] of all nodes below which a Newton step in contact is the last one; if not given, it must move nothing by more than
     /// counts for a gap.
     pub speed_tolerance: Option<f64>,
+    /// Whether a step whose iterations run out takes what they have reached instead of being halved: bounded time, accuracy unchecked
+    /// ([`DynamicStep::converged`] tells). In contact such a state has no intersection.
+    pub accept_unconverged: bool,
     /// How often a step that fails is halved.
     pub halvings: usize,
     /// Which stiffness.
@@ -71,6 +74,7 @@ impl DynamicSettings {
             iterations: 20,
             tolerance: 1e-6,
             speed_tolerance: None,
+            accept_unconverged: false,
             halvings: 6,
             tangent: Tangent::Full,
             linear: LinearSolver::Direct,
@@ -94,6 +98,8 @@ pub struct DynamicStep {
     pub linear: LinearReport,
     /// Steps that it took: 1, or more where it was halved.
     pub parts: usize,
+    /// Whether residuals of all parts have come below the tolerance, or were not asked for.
+    pub converged: bool,
 }
 
 /// The implicit solver.
@@ -261,7 +267,7 @@ impl BackwardEuler {
     pub fn advance(&mut self, state: &mut State) -> Result<DynamicStep, SolveError> {
         let until = state.time + self.settings.step;
         let mut size = self.settings.step;
-        let (mut parts, mut halvings) = (0, 0);
+        let (mut parts, mut halvings, mut converged) = (0, 0, true);
         // Of a state that was moved in between nothing is known of the step before.
         let previous = self.previous.take().filter(|before| before.time < state.time);
         self.system.begin_history(state);
@@ -274,6 +280,7 @@ impl BackwardEuler {
             match self.newton(state, h) {
                 Ok(step) => {
                     parts += 1;
+                    converged &= step.converged;
                     if last {
                         state.time = until;
                         if self.settings.integrator == Integrator::Bdf2 && parts == 1 {
@@ -281,7 +288,7 @@ impl BackwardEuler {
                             kept.as_mut().clone_from(&self.start);
                             self.previous = Some(kept);
                         }
-                        return Ok(DynamicStep { parts, ..step });
+                        return Ok(DynamicStep { parts, converged, ..step });
                     }
                 }
                 Err(error) => {
@@ -305,6 +312,7 @@ impl BackwardEuler {
             return self.newton_in_contact(state, h);
         }
         let mut residuals = Vec::with_capacity(self.settings.iterations + 1);
+        let mut converged = true;
         for iteration in 0..=self.settings.iterations {
             if iteration == 1 && self.settings.iterations == 1 {
                 break;
@@ -317,6 +325,14 @@ impl BackwardEuler {
             residuals.push(if scale > 0.0 { norm / scale } else { 0.0 });
             let moving = self.pending.iter().any(|&p| p != 0.0) || !self.system.conditions.are_closed();
             if iteration > 0 && !moving && norm <= self.settings.tolerance * scale + self.round_off {
+                break;
+            }
+            if iteration == self.settings.iterations
+                && norm.is_finite()
+                && !moving
+                && self.settings.accept_unconverged
+            {
+                converged = false;
                 break;
             }
             if iteration == self.settings.iterations || !norm.is_finite() {
@@ -343,7 +359,7 @@ impl BackwardEuler {
             self.find_motion(state);
         }
         self.end(state, time);
-        Ok(DynamicStep { residuals, linear: self.system.last_solution, parts: 0 })
+        Ok(DynamicStep { residuals, linear: self.system.last_solution, parts: 0, converged })
     }
 
     /// [`newton`](Self::newton) in contact, from the motion of before.
@@ -360,6 +376,7 @@ impl BackwardEuler {
             iterations: self.settings.iterations,
             lags: LAGS,
             close: self.settings.speed_tolerance.map(|speed| speed * h),
+            accept: self.settings.accept_unconverged,
         };
         let mut residuals = Vec::new();
         let result = within_limits(self, state, time, |solver, state| {
@@ -371,16 +388,16 @@ impl BackwardEuler {
         let relative =
             |&(norm, allowed): &(f64, f64)| if allowed > 0.0 { norm / allowed * tolerance } else { 0.0 };
         let told: Vec<f64> = residuals.iter().map(relative).collect();
-        match result {
-            Ok(()) => {}
+        let converged = match result {
+            Ok(converged) => converged,
             Err(SolveError::NotConverged { time, node, broken, .. }) => {
                 return Err(SolveError::NotConverged { time, node, residuals: told, broken });
             }
             Err(error) => return Err(error),
-        }
+        };
         self.find_motion(state);
         self.end(state, time);
-        Ok(DynamicStep { residuals: told, linear: self.system.last_solution, parts: 0 })
+        Ok(DynamicStep { residuals: told, linear: self.system.last_solution, parts: 0, converged })
     }
 
     /// Ends a step: velocities and spins of the motion in it.

@@ -432,7 +432,7 @@ impl Statics {
         }
         let mut residuals = Vec::new();
         let mut last = 0.0;
-        let limits = Limits { iterations: self.settings.iterations, lags: LAGS, close: None };
+        let limits = Limits { iterations: self.settings.iterations, lags: LAGS, close: None, accept: false };
         let result = within_limits(self, state, time, |solver, state| {
             descend(solver, state, time, None, &limits, &mut |norm, allowed| {
                 residuals.push(norm);
@@ -443,7 +443,7 @@ impl Statics {
             (attempt.residuals, attempt.allowed) = (residuals.clone(), last);
         }
         match result {
-            Ok(()) => {
+            Ok(_) => {
                 state.time = time;
                 Ok(Step { time, residuals, negative_pivots: 0, parts: 0 })
             }

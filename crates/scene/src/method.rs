@@ -69,6 +69,7 @@ fn method_of(bodies: &Arc<ImplicitBodies>, run: &RunTable, step: f64) -> Method 
             settings.tolerance = run.tolerance.unwrap_or(settings.tolerance);
             settings.iterations = iterations(&bodies, run, settings.iterations);
             settings.speed_tolerance = run.speed_tolerance;
+            settings.accept_unconverged = run.accept_unconverged.unwrap_or(false);
             settings.accept_stalled = table.accept_stalled;
             if settings.iterations == 1 {
                 settings = settings.real_time(linear);

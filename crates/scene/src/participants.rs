@@ -378,6 +378,7 @@ impl Scene {
             run = RunTable {
                 iterations: None,
                 speed_tolerance: None,
+                accept_unconverged: None,
                 integrator: None,
                 control: None,
                 linear: usual().linear,

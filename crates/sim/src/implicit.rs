@@ -335,7 +335,7 @@ impl Implicit {
         let allowed = solver.settings().tolerance;
         let result = solver.advance(&mut self.state);
         let (residuals, found) = match &result {
-            Ok(step) => (&step.residuals[..], true),
+            Ok(step) => (&step.residuals[..], step.converged),
             Err(SolveError::NotConverged { residuals, .. }) => (&residuals[..], false),
             Err(_) => (&[][..], false),
         };
@@ -358,6 +358,7 @@ impl Implicit {
         let iterations = step.residuals.len().saturating_sub(1).max(1);
         self.effort.newton_iterations += iterations as u64;
         self.effort.halved += u64::from(step.parts > 1);
+        self.effort.unconverged += u64::from(!step.converged);
         self.effort.linear_residual = step.linear.residual;
         self.effort.residual = if step.residuals.len() > 1 { step.residuals.last().copied() } else { None };
         self.effort.take(phases, &self.effort_before);
@@ -629,6 +630,10 @@ impl Instant for Implicit {
             let _ = writeln!(table, "{step},{attempt},{time},{iteration},{residual:e},{allowed:e},{found}");
         }
         (!self.convergence.is_empty()).then_some(table)
+    }
+
+    fn least_gap(&self) -> Option<f64> {
+        self.touching.as_ref()?.gap
     }
 
     fn ended(&self) -> Option<&str> {

@@ -127,6 +127,11 @@ pub trait Instant {
         None
     }
 
+    /// The least gap [m] in contacts with barriers; `None` where nothing is near.
+    fn least_gap(&self) -> Option<f64> {
+        None
+    }
+
     /// Why it has ended before its last step.
     fn ended(&self) -> Option<&str> {
         None
@@ -148,6 +153,8 @@ pub struct Effort {
     pub residual: Option<f64>,
     /// Steps that were halved.
     pub halved: u64,
+    /// Steps whose iterations ran out, and that were taken as they were.
+    pub unconverged: u64,
     /// Wall time of forces and stiffness of the cells [s].
     pub seconds_cells: f64,
     /// Wall time of factorising, or of making the preconditioner [s].

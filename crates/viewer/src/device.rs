@@ -26,6 +26,10 @@ pub(crate) struct Seen {
     pub critical: Option<u32>,
     /// Energies [J].
     pub energies: Energies,
+    /// The least gap [m] in contacts with barriers.
+    pub least_gap: Option<f64>,
+    /// Steps that were taken though they had not converged.
+    pub unconverged: u64,
     /// What is held: point [m] and force [N].
     pub held: Vec<[[f64; 3]; 2]>,
     /// Forces of contacts, where they are asked for.

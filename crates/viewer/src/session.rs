@@ -88,6 +88,10 @@ pub struct Frame {
     pub critical: Option<u32>,
     /// Energies [J].
     pub energies: Energies,
+    /// The least gap [m] in contacts with barriers; `None` where nothing is near.
+    pub least_gap: Option<f64>,
+    /// Steps that were taken though they had not converged.
+    pub unconverged: u64,
     /// What is held: the point [m] and the force on the body [N] of each grip, hand first.
     pub held: Vec<[[f64; 3]; 2]>,
     /// Forces of contacts on the nodes, where they are asked for.
@@ -743,6 +747,10 @@ impl<'s> Player<'s> {
                 let critical = || critical_cell(&visible(mesh, &self.hidden));
                 seen.critical = playback.view.critical.then(critical).flatten().map(|(cell, _)| cell);
                 seen.energies = self.live.simulation.energies();
+                let gaps = self.live.simulation.instants().filter_map(|now| now.least_gap());
+                seen.least_gap = gaps.reduce(f64::min);
+                let efforts = self.live.simulation.instants().filter_map(|now| now.effort());
+                seen.unconverged = efforts.map(|effort| effort.unconverged).sum();
             }
             // The last good picture stays.
             Err(failure) => broken = Some(failure.message),
@@ -804,6 +812,7 @@ impl<'s> Player<'s> {
             frame.points.clone_from(&playback.seen.points);
             frame.values.clone_from(&playback.seen.values);
             frame.energies = playback.seen.energies;
+            (frame.least_gap, frame.unconverged) = (playback.seen.least_gap, playback.seen.unconverged);
             frame.held.clone_from(&playback.seen.held);
             frame.contacts.clone_from(&playback.seen.contacts);
             frame.followed.clone_from(&playback.seen.followed);

@@ -414,6 +414,13 @@ fn write_effort(page: &mut String, effort: &Effort, steps: u64) -> std::fmt::Res
         writeln!(page, "| last residual, relative | {} |", number(residual))?;
     }
     writeln!(page, "| steps that were halved | {} |", effort.halved)?;
+    if effort.unconverged > 0 {
+        writeln!(
+            page,
+            "| steps that did not converge, and were taken as they were | {} |",
+            effort.unconverged
+        )?;
+    }
     let milliseconds = |seconds: f64| number(seconds * 1e3 / steps.max(1) as f64);
     writeln!(page, "| forces and stiffness | {} ms per step |", milliseconds(effort.seconds_cells))?;
     writeln!(page, "| factors or preconditioner | {} ms per step |", milliseconds(effort.seconds_factors))?;

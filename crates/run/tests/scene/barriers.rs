@@ -1,6 +1,6 @@
 //! Contact with the solvers `implicit` and `static`: a barrier keeps surfaces apart, from the text of a scene to its outputs, and what is refused.
 
-use pliant_testing::scenes::{last_row, resumes, world};
+use pliant_testing::scenes::{last_row, resumes, run, world};
 
 /// A block of 40 × 40 × 20 mm of tissue a little above a floor, and a ball that is pressed into its top; `held` holds its underside.
 pub(super) fn pressed(run: &str, more: &str) -> String {
@@ -88,6 +88,23 @@ fn a_sheet_hangs_in_a_funnel() {
         row["probe.end.displacement.z"]
     });
     assert!((ends[0] - ends[1]).abs() < 2e-4, "{ends:?}");
+}
+
+/// Steps whose iterations run out are taken as they are, with no edge in a triangle in any of them, and counted.
+#[test]
+fn steps_that_do_not_converge_have_no_intersection_either() {
+    let text = cloth("")
+        .replace("until = 1\n", "until = 0.4\n")
+        .replace("tolerance = 1e-4\n", "tolerance = 1e-8\niterations = 3\naccept-unconverged = true\n");
+    let out = tempfile::tempdir().unwrap();
+    let summary = run(&text, &out.path().join("out"));
+    let effort = summary.solver.unwrap();
+    println!("{} of 20 steps did not converge, {} halved", effort.unconverged, effort.halved);
+    assert!(effort.unconverged > 5 && effort.newton_iterations <= 20 * 3 * 4, "{effort:?}");
+    let page = std::fs::read_to_string(out.path().join("out/summary.md")).unwrap();
+    assert!(page.contains("steps that did not converge"), "{page}");
+    let told = world(&pressed("solver = 'static'\naccept-unconverged = true", "")).unwrap_err();
+    assert!(told.contains("`accept-unconverged` is for `solver = \"implicit\"`"), "{told}");
 }
 
 /// The block with a coat of a model on its top, on the nodes of the block or on a mesh of its own that is tied, which the ball presses.

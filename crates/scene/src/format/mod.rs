@@ -111,6 +111,10 @@ pub struct RunTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub speed_tolerance: Option<f64>,
+    /// Whether a step of `implicit` whose `iterations` run out goes on with what they have reached instead of being halved: bounded time, for real
+    /// time. In contact that state has no intersection. Summary and window tell how many steps did so.
+    #[serde(default)]
+    pub accept_unconverged: Option<bool>,
     /// How `implicit` goes on in time; `backward-euler` if not given.
     #[serde(default)]
     pub integrator: Option<IntegratorName>,

@@ -49,6 +49,9 @@ pub struct ParticipantTable {
     pub speed_tolerance: Option<f64>,
     /// As in `[run]`.
     #[serde(default)]
+    pub accept_unconverged: Option<bool>,
+    /// As in `[run]`.
+    #[serde(default)]
     pub integrator: Option<IntegratorName>,
     /// As in `[run]`.
     #[serde(default)]
@@ -84,6 +87,7 @@ impl ParticipantTable {
             tolerance: self.tolerance.or(run.tolerance),
             iterations: self.iterations.or(run.iterations),
             speed_tolerance: self.speed_tolerance.or(run.speed_tolerance),
+            accept_unconverged: self.accept_unconverged.or(run.accept_unconverged),
             integrator: self.integrator.or(run.integrator),
             linear: self.linear.clone().unwrap_or(run.linear),
             control: self.control.clone().or(run.control),

@@ -234,6 +234,12 @@ impl App {
                 arrow_note(largest_force(&frame.contacts))
             ));
         }
+        if let Some(gap) = frame.least_gap {
+            lines.push(format!("least gap {:.3} mm", 1e3 * gap));
+        }
+        if frame.unconverged > 0 {
+            lines.push(format!("steps that did not converge: {}", frame.unconverged));
+        }
         lines.extend(self.told_of_device());
         self.port.write(painter, Align2::LEFT_TOP, self.port.rect.min + vec2(12.0, 10.0), &lines, 14.0);
     }

@@ -108,6 +108,7 @@ impl Builder<'_> {
             ("linear", newton, "`solver = \"implicit\"` and `\"static\"`"),
             ("control", newton && run.solver == SolverName::Static, "`solver = \"static\"`"),
             ("speed-tolerance", newton && run.solver == SolverName::Implicit, "`solver = \"implicit\"`"),
+            ("accept-unconverged", newton && run.solver == SolverName::Implicit, "`solver = \"implicit\"`"),
             ("integrator", newton && run.solver == SolverName::Implicit, "`solver = \"implicit\"`"),
         ] {
             if scene.gives(key) && !wanted {
