@@ -13,6 +13,9 @@ pub(super) fn crossings(
     place: &impl Fn(u32) -> Vector3<f64>,
     mut found: impl FnMut([u32; 2], [u32; 3]),
 ) {
+    if edges.edges.is_empty() {
+        return;
+    }
     let none = |_| 0.0;
     let tree = Tree::new(faces.faces.len(), |face| around(faces.faces[face as usize], place, &none));
     for &ends in &edges.edges {

@@ -19,6 +19,7 @@ mod surfaces;
 mod system;
 #[cfg(test)]
 mod tests;
+mod wide;
 
 pub use curvature::Matrix12;
 pub use nodal::NodeTouch;
