@@ -8,7 +8,7 @@ use clap::{Parser, Subcommand, ValueEnum};
 use pliant_bench::Instructions;
 use pliant_geometry::CellLabel;
 use pliant_imaging::LabelChoice;
-use pliant_scene::format::{BackgroundName, Choice, MapName, TextureName};
+use pliant_scene::format::{BackgroundName, Choice, LookColour, LookTable, MapName, TextureName};
 
 /// Real-time simulation of soft organs.
 #[derive(Debug, Parser)]
@@ -209,7 +209,9 @@ Examples:
   pliant render scenes/cube --colour displacement:z --map cividis --range 0,0.02 --ghost
   pliant render scenes/liver --fibres --critical --colour element-step
   pliant render organs.vtu --colour label --hide skin,5-8    the labels of a mesh in colours, some hidden
+  pliant render organs.vtu --look liver=0.3,liver            what lies inside of a label or a body
   pliant render scenes -o gallery                            a page with a picture of each scene in a folder
+  pliant render scenes --gallery                             the pictures of docs and scenes that are older than their scenes
 
 A scene runs first, without its own outputs. Its table [view] sets how it is drawn; the options below override it. A mesh file with
 labels is drawn without a run; any other mesh, or a film, runs a scene as in `pliant view`. A film named .mp4 needs ffmpeg.
@@ -230,6 +232,9 @@ pub struct Render {
     /// Write into a folder with other files.
     #[arg(long)]
     pub force: bool,
+    /// Make the pictures anew that a folder of scenes lists in `gallery.txt`, where they do not fit their scenes.
+    #[arg(long, conflicts_with_all = ["frames", "film", "out"])]
+    pub gallery: bool,
     /// Also make a film of them (.mp4 or .png).
     #[arg(long, value_name = "FILE")]
     pub film: Option<PathBuf>,
@@ -243,9 +248,12 @@ pub struct Render {
     /// or `none`.
     #[arg(long, value_name = "FIELD")]
     pub colour: Option<String>,
-    /// Hide the cells of labels to show the inside: numbers, names or ranges, such as 2,tumour,5-8.
-    #[arg(long, value_name = "LABELS", value_delimiter = ',', allow_hyphen_values = true)]
+    /// Hide labels, to show the inside, by number, name or range, and bodies, obstacles and tools by name, such as 2,tumour,5-8,grasper.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', allow_hyphen_values = true)]
     pub hide: Vec<CellLabel>,
+    /// See through labels or bodies, or give them one colour; repeatable: liver=0.3, or liver=0.3,liver.
+    #[arg(long, value_name = "NAME=OPACITY[,COLOUR]", value_parser = look)]
+    pub look: Vec<(CellLabel, LookTable)>,
     /// Colour map.
     #[arg(long, value_name = "MAP", value_parser = word::<MapName>())]
     pub map: Option<MapName>,
@@ -370,6 +378,22 @@ where
 {
     PossibleValuesParser::new(T::WORDS)
         .try_map(|typed| T::of_word(&typed).ok_or_else(|| format!("`{typed}` is unknown")))
+}
+
+/// The opacity and the colour of something.
+fn look(typed: &str) -> Result<(CellLabel, LookTable), String> {
+    let help = || {
+        format!(
+            "give a name, an opacity from 0 to 1 and one of {}, as in liver=0.3,liver",
+            LookColour::WORDS.join(", ")
+        )
+    };
+    let (name, look) = typed.rsplit_once('=').ok_or_else(help)?;
+    let (opacity, colour) = look.split_once(',').unwrap_or((look, "view"));
+    let opacity = opacity.parse().ok().filter(|opacity| (0.0..=1.0).contains(opacity)).ok_or_else(help)?;
+    let colour = LookColour::of_word(colour).ok_or_else(help)?;
+    let Ok(name) = name.parse();
+    Ok((name, LookTable { opacity, colour }))
 }
 
 fn factor(typed: &str) -> Result<f64, String> {

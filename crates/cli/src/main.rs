@@ -9,6 +9,8 @@ macro_rules! eprintln {
 mod arguments;
 mod bench;
 mod commands;
+#[cfg(feature = "viewer")]
+mod gallery;
 mod haptics;
 mod info;
 #[cfg(feature = "viewer")]

@@ -3,17 +3,19 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use pliant_geometry::{CellLabel, Labels, Mesh, Vector3, io};
+use pliant_geometry::{CellLabel, Labels, Mesh, RegionNames, Vector3, io};
 use pliant_picture::{
-    AnimatedPng, Axis, Film, Graphics, Legend, Look, Picture, PictureError, Plane, Projection, Series,
-    SeriesError, ffmpeg,
+    AnimatedPng, Axis, Film, Graphics, Legend, Look, Picture, PictureError, Plane, Projection, Regions,
+    Series, SeriesError, ffmpeg,
 };
 use pliant_run::{Draw, Options, OutputFolder};
 use pliant_scene::format::VtuTable;
 use pliant_scene::registry::OutputTable;
 use pliant_scene::{Scene, World};
+use pliant_viewer::{coat_of, regions_of};
 
 use crate::arguments::{Frames, Overrides, Render};
+use crate::gallery;
 use crate::look::{background_of, colour_by_name, look_of, map_of, texture_of};
 use crate::prepare::prepare_changed;
 use crate::report::{Bar, Failure, say};
@@ -83,7 +85,7 @@ pub struct FinalPicture {
 
 impl FinalPicture {
     pub fn new(world: &World) -> Result<Self, Failure> {
-        let look = Look { hide: world.hidden(&world.scene.view), ..look_of(&world.scene) };
+        let look = Look { regions: regions_of_scene(world), ..look_of(&world.scene) };
         Ok(Self { look, graphics: Graphics::open()? })
     }
 }
@@ -97,9 +99,12 @@ impl Draw for FinalPicture {
 
 pub fn render(arguments: &Render) -> Result<ExitCode, Failure> {
     let film = arguments.film.as_deref().map(film_kind).transpose()?;
-    let scenes = scenes_in(&arguments.what);
+    if arguments.gallery {
+        return gallery::renew(&arguments.what);
+    }
+    let scenes = gallery::scenes_in(&arguments.what);
     if !scenes.is_empty() {
-        return gallery(arguments, &scenes);
+        return gallery::page(arguments, &scenes);
     }
     let graphics = Graphics::open()?;
     let folder = claim(arguments, is_picture)?;
@@ -112,8 +117,8 @@ pub fn render(arguments: &Render) -> Result<ExitCode, Failure> {
             colour_by_name(&mut look, field);
         }
         typed(&mut look, arguments);
-        if !arguments.hide.is_empty() {
-            look.hide = hidden(&series.labels()?, &arguments.hide)?;
+        if !arguments.hide.is_empty() || !arguments.look.is_empty() {
+            typed_regions(&mut look.regions, &series.regions()?, arguments)?;
         }
         return shoot(arguments, &look, &graphics, &series, &folder, film);
     }
@@ -131,11 +136,28 @@ pub fn render(arguments: &Render) -> Result<ExitCode, Failure> {
     Ok(if shown.failed { ExitCode::from(1) } else { code })
 }
 
-/// The existing labels named on the command line.
-fn hidden(labels: &Labels, typed: &[CellLabel]) -> Result<Vec<i32>, Failure> {
-    let found = typed.iter().map(|label| labels.find_all(label)).collect::<Result<Vec<_>, _>>();
-    let help = "`--hide` takes numbers, names and ranges, such as 2,tumour,5-8";
-    Ok(found.map_err(|error| Failure::plain(error, help))?.concat())
+/// What the view of a scene hides, and what has a look of its own.
+fn regions_of_scene(world: &World) -> Regions {
+    let view = &world.scene.view;
+    regions_of(view, &world.region_names(view.on.as_deref()))
+}
+
+/// Hides what the command line names, and gives it looks of its own.
+fn typed_regions(regions: &mut Regions, names: &RegionNames, arguments: &Render) -> Result<(), Failure> {
+    let find = |option: &str, name: &CellLabel| {
+        let help = format!(
+            "`{option}` takes labels by number, name and range, and bodies, obstacles and tools by name"
+        );
+        names.find(name).map_err(|error| Failure::plain(error, &help))
+    };
+    for name in &arguments.hide {
+        regions.hidden.extend(find("--hide", name)?);
+    }
+    for (name, look) in &arguments.look {
+        let found = find("--look", name)?;
+        regions.coats.splice(..0, found.into_iter().map(|region| (region, coat_of(*look))));
+    }
+    Ok(())
 }
 
 /// The mesh of a file that is drawn without a run: it has labels, and no option needs a run.
@@ -165,30 +187,30 @@ fn portrait(
     let mut look = Look { size: [1280, 800], legend, ..Look::default() };
     look.style.labels = true;
     typed(&mut look, arguments);
-    look.hide = hidden(&Labels::of(mesh), &arguments.hide)?;
+    typed_regions(&mut look.regions, &RegionNames::of(mesh), arguments)?;
     let picture = look.picture(graphics, mesh, 0.0)?;
     save(folder, &picture_name(0), &picture)?;
     say(format_args!("wrote {} in {} ({})", picture_name(0), folder.path().display(), graphics.adapter()))?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn claim(arguments: &Render, own: fn(&str) -> bool) -> Result<OutputFolder, Failure> {
+pub(crate) fn claim(arguments: &Render, own: fn(&str) -> bool) -> Result<OutputFolder, Failure> {
     OutputFolder::claim(arguments.out.clone(), arguments.force, own)
         .map_err(|error| Failure::plain(&error, error.remedy))
 }
 
 /// A scene after the run for its pictures.
-struct Shown {
-    look: Look,
-    series: Series,
-    title: String,
-    failed: bool,
+pub(crate) struct Shown {
+    pub look: Look,
+    pub series: Series,
+    pub title: String,
+    pub failed: bool,
     /// Keeps the frames until they are drawn.
     _space: tempfile::TempDir,
 }
 
 /// Runs a scene with only the displayed series as its output; `None` if it was interrupted.
-fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>, Failure> {
+pub(crate) fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>, Failure> {
     let space = tempfile::tempdir().map_err(|error| {
         Failure::plain(
             format!("no temporary folder can be made: {error}"),
@@ -200,8 +222,9 @@ fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>, Failure> 
     let mut world = prepare_changed(path, &overrides, |scene| every = forget_outputs(scene, arguments))?;
     world.scene.outputs = vec![("shown".into(), OutputTable::Vtu(world.scene.shown(every)))];
     let scene = &world.scene;
-    let mut look = Look { hide: world.hidden(&scene.view), ..look_of(scene) };
+    let mut look = Look { regions: regions_of_scene(&world), ..look_of(scene) };
     typed(&mut look, arguments);
+    typed_regions(&mut look.regions, &world.region_names(scene.view.on.as_deref()), arguments)?;
     let run = OutputFolder::prepare(space.path().join("run"), scene, false)
         .map_err(|error| Failure::plain(&error, error.remedy))?;
     let bar = Bar::new();
@@ -224,66 +247,8 @@ fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>, Failure> 
     Ok(Some(Shown { look, series, title: scene.scene.title.clone(), failed, _space: space }))
 }
 
-/// Width of a picture in a gallery [pixels].
-const GALLERY_WIDTH: u32 = 640;
-
-/// The scenes in a folder that is not a scene itself, in alphabetical order.
-fn scenes_in(folder: &Path) -> Vec<PathBuf> {
-    if !is_folder_of_run(folder) {
-        return Vec::new();
-    }
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut scenes: Vec<PathBuf> =
-        entries.map(|entry| entry.path()).filter(|path| path.join("scene.toml").is_file()).collect();
-    scenes.sort_unstable();
-    scenes
-}
-
-/// Runs scenes and makes a page with the last picture of each.
-fn gallery(arguments: &Render, scenes: &[PathBuf]) -> Result<ExitCode, Failure> {
-    if arguments.film.is_some() || arguments.frames.is_some() || arguments.series.is_some() {
-        let message = "a gallery has the last picture of each scene";
-        return Err(Failure::plain(message, "omit `--film`, `--frames` and `--series`, or give one scene"));
-    }
-    let graphics = Graphics::open()?;
-    let folder = claim(arguments, |name| name == "README.md" || name.ends_with(".png"))?;
-    let until = arguments.overrides.until.map(|until| format!(" --until {until}")).unwrap_or_default();
-    let (what, out) = (arguments.what.display(), arguments.out.display());
-    let mut page = format!(
-        "# Gallery\n\nMade by `pliant render {what} -o {out}{until}`: the final state of each scene.\n"
-    );
-    let mut failed = false;
-    for scene in scenes {
-        let Some(mut shown) = run_scene(scene, arguments)? else {
-            return Ok(ExitCode::from(signals::exit_code()));
-        };
-        failed |= shown.failed;
-        let name = scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        let title = if shown.title.is_empty() { name.clone() } else { shown.title };
-        let [width, height] = shown.look.size;
-        if arguments.size.is_none() {
-            shown.look.size = [GALLERY_WIDTH, (GALLERY_WIDTH * height / width).max(1)];
-        }
-        // The page has the title.
-        shown.look.legend.title.clear();
-        let file = folder.path().join(format!("{name}.png"));
-        let last = shown.series.frames.len() - 1;
-        shown.look.pictures(&graphics, &shown.series, &[last], |_, picture| {
-            save(&folder, &format!("{name}.png"), &picture)
-        })?;
-        say(format_args!("wrote {}", file.display()))?;
-        page.push_str(&format!(
-            "\n## {title}\n\n![{title}]({name}.png)\n\n```sh\npliant render {}{until}\n```\n",
-            scene.display()
-        ));
-    }
-    let path = folder.write("README.md", &page).map_err(|error| Failure::plain(&error, error.remedy))?;
-    say(format_args!("wrote {} ({})", path.display(), graphics.adapter()))?;
-    Ok(ExitCode::from(u8::from(failed)))
-}
-
 /// Whether a path is the folder of a run, not of a scene.
-fn is_folder_of_run(path: &Path) -> bool {
+pub(crate) fn is_folder_of_run(path: &Path) -> bool {
     path.is_dir() && !path.join("scene.toml").exists()
 }
 
@@ -295,6 +260,11 @@ fn changes_a_run(arguments: &Render) -> bool {
         || changes.threads.is_some()
         || changes.precision.is_some()
         || changes.device.is_some()
+}
+
+/// Whether options choose instants.
+fn changes_time(arguments: &Render) -> bool {
+    arguments.film.is_some() || arguments.frames.is_some() || arguments.overrides.until.is_some()
 }
 
 fn refuse_words_of_scenes(arguments: &Render) -> Result<(), Failure> {
@@ -311,6 +281,9 @@ fn forget_outputs(scene: &mut Scene, arguments: &Render) -> f64 {
         OutputTable::Vtu(VtuTable { every, .. }) => Some(every),
         OutputTable::Csv(_) => None,
     });
+    if let Some(at) = scene.view.at.filter(|_| !changes_time(arguments)) {
+        scene.scene.until = at.min(scene.scene.until);
+    }
     // A different field does not use the scene's component.
     if arguments.colour.as_ref().is_some_and(|name| !name.contains(':')) {
         scene.view.component = None;
@@ -422,7 +395,7 @@ fn shoot(
 }
 
 /// Writes a picture into the folder.
-fn save(folder: &OutputFolder, name: &str, picture: &Picture) -> Result<(), PictureError> {
+pub(crate) fn save(folder: &OutputFolder, name: &str, picture: &Picture) -> Result<(), PictureError> {
     let written = folder.write(name, picture.png()?);
     written.map(|_| ()).map_err(|error| PictureError::Write { path: error.path, reason: error.reason })
 }

@@ -72,6 +72,16 @@ pub enum UnknownLabel {
         /// All labels with their names, increasing.
         known: Vec<String>,
     },
+    /// Neither a label nor a body has the name.
+    #[error("nothing that is shown is named `{name}`{}", instead(.nearest, .known))]
+    Region {
+        /// The requested name.
+        name: String,
+        /// The most similar name of a body, an obstacle or a tool, if one is similar.
+        nearest: Option<String>,
+        /// All labels with their names, then the names of bodies.
+        known: Vec<String>,
+    },
     /// Several labels have the name.
     #[error("`{name}` names the labels {}; choose by number", list(.labels))]
     Ambiguous {
@@ -201,15 +211,19 @@ impl Labels {
             (1, _) => Ok(found[0]),
             (0, Ok(number)) => self.find(&CellLabel::Number(number)),
             (0, Err(_)) => {
-                let similar =
-                    self.0.values().flatten().map(|known| (strsim::jaro_winkler(name, known), known));
-                let nearest = similar.filter(|(likeness, _)| *likeness > ALIKE);
-                let nearest = nearest.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, known)| known.clone());
+                let nearest = most_similar(name, self.0.values().flatten());
                 Err(UnknownLabel::Name { name: name.to_owned(), nearest, known: self.all_shown() })
             }
             _ => Err(UnknownLabel::Ambiguous { name: name.to_owned(), labels: found }),
         }
     }
+}
+
+/// The name that is most similar to another, if one is similar.
+pub(crate) fn most_similar<'n>(name: &str, known: impl Iterator<Item = &'n String>) -> Option<String> {
+    let similar = known.map(|known| (strsim::jaro_winkler(name, known), known));
+    let nearest = similar.filter(|(likeness, _)| *likeness > ALIKE);
+    nearest.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, known)| known.clone())
 }
 
 /// Two numbers with a dash between them; a first sign may belong to a negative number.
@@ -227,8 +241,8 @@ pub(crate) fn clean_name(name: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::DataArray;
     use crate::testing::block_of_hexes;
+    use crate::{DataArray, Region};
 
     fn named(names: &[(i32, &str)]) -> Labels {
         let mut mesh = block_of_hexes([4, 1, 1]);
@@ -274,7 +288,7 @@ mod tests {
         mesh.blocks[0].sets.insert("ends".into(), vec![0, 3]);
         let points = mesh.points.clone();
         let last = mesh.blocks[0].cell(3).to_vec();
-        mesh.drop_labels(&[7, 9]);
+        mesh.drop_regions(&[7, 9].map(Region::Label));
         assert_eq!((mesh.blocks[0].len(), &mesh.points), (2, &points));
         assert_eq!((mesh.blocks[0].cell(1), &mesh.blocks[0].sets["ends"]), (&last[..], &vec![0, 1]));
         assert_eq!(Labels::of(&mesh).all_shown(), ["5", "8"]);

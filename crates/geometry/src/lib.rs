@@ -44,6 +44,7 @@ mod labels;
 mod locate;
 mod mesh;
 mod quality;
+mod regions;
 mod selection;
 mod surface;
 #[cfg(test)]
@@ -62,8 +63,9 @@ pub use quality::{
     QualityReport, Spread, acoustic_length, dihedral_angles, gradient_integrals, relative_acoustic_length,
     scaled_jacobian, vector_area, volume,
 };
+pub use regions::{Region, RegionNames, cell_body};
 pub use selection::{Selection, SelectionError};
-pub use surface::{Face, Surface, boundary, cell_label, label_boundary, label_nodes, labels};
+pub use surface::{Face, Surface, borders, boundary, cell_label, label_boundary, label_nodes, labels};
 
 /// A point or a vector in space.
 pub type Vector3 = nalgebra::Vector3<f64>;

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::Vector3;
-use crate::surface::cell_label;
 
 /// Shape of a cell and the number and order of its nodes (the order of VTK).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -126,7 +125,7 @@ impl CellBlock {
     }
 
     /// Removes cells that are not kept, with their data and set entries.
-    fn retain(&mut self, kept: &[bool]) {
+    pub(crate) fn retain(&mut self, kept: &[bool]) {
         if kept.iter().all(|&kept| kept) {
             return;
         }
@@ -163,6 +162,8 @@ pub struct Mesh {
     pub point_sets: BTreeMap<String, Vec<u32>>,
     /// Names of labels of cells (cell data `label`), of some or all.
     pub label_names: BTreeMap<i32, String>,
+    /// Names of bodies, obstacles and tools (cell data `body`), of some or all.
+    pub body_names: BTreeMap<i32, String>,
 }
 
 impl Mesh {
@@ -248,15 +249,6 @@ impl Mesh {
         }
         let target: Vec<u32> = (0..self.points.len() as u32).collect();
         self.renumber(&target, &used)
-    }
-
-    /// Removes the cells of some labels, with their data and places in sets; all points stay.
-    pub fn drop_labels(&mut self, labels: &[i32]) {
-        for block in &mut self.blocks {
-            let kept = |cell| cell_label(block, cell).is_none_or(|label| !labels.contains(&label));
-            let kept: Vec<bool> = (0..block.len() as u32).map(kept).collect();
-            block.retain(&kept);
-        }
     }
 
     /// Joins pairs of points, each second one into its first, and removes the second ones; returns how many.

@@ -136,6 +136,16 @@ pub fn boundary(mesh: &Mesh) -> Surface {
     Surface { faces }
 }
 
+/// The faces between volume cells of different kinds, each once as a face of one cell, with the other one.
+pub fn borders<K: PartialEq>(mesh: &Mesh, kind: impl Fn(CellId) -> K) -> Vec<(Face, CellId)> {
+    let groups = FaceGroups::new(mesh);
+    let pairs = groups.iter().filter_map(|group| match group {
+        [(_, face), (_, other)] => Some((*face, other.parent)),
+        _ => None,
+    });
+    pairs.filter(|(face, other)| kind(face.parent) != kind(*other)).collect()
+}
+
 impl Surface {
     /// Its nodes, increasing, each once.
     pub fn nodes(&self) -> Vec<u32> {
@@ -228,6 +238,18 @@ mod tests {
     use super::*;
     use crate::DataArray;
     use crate::testing::{UNIT_CUBE, block_of_hexes, block_of_tets, points};
+
+    #[test]
+    fn borders_are_the_faces_between_kinds() {
+        let mesh = block_of_hexes([3, 2, 2]);
+        let between = borders(&mesh, |cell| cell.index % 3 == 0);
+        assert_eq!(between.len(), 4);
+        assert!(between.iter().all(|(face, other)| {
+            [face.parent, *other].map(|cell| cell.index % 3 == 0) == [true, false]
+                && (face.area(&mesh.points) - 1.0).abs() < 1e-12
+        }));
+        assert!(borders(&mesh, |_| 0).is_empty());
+    }
 
     #[test]
     fn boundary_of_a_block_is_closed_and_points_outwards() {

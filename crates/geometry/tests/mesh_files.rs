@@ -90,16 +90,18 @@ fn with_sets() -> Mesh {
 // --- files of other programs --------------------------------------------------------------------------------
 
 #[test]
-fn names_of_labels_come_back_from_vtu_files() {
+fn names_of_labels_and_bodies_come_back_from_vtu_files() {
     let mut mesh = mixed();
     let names = [(10, "liver"), (11, "left kidney"), (-3, "Größe & <b>")];
     mesh.label_names = names.iter().map(|&(label, name)| (label, name.to_owned())).collect();
+    mesh.body_names = [(0, "liver".to_owned()), (1, "a grasper".to_owned())].into();
     for options in
         [VtuOptions::default(), VtuOptions { compress: true, time: Some(0.5), ..VtuOptions::default() }]
     {
         let mut bytes = Vec::new();
         write_vtu(&mut bytes, &mesh, &options).unwrap();
         let back = read_bytes(&bytes, Format::Vtu).unwrap();
+        assert_eq!(back.mesh.body_names, mesh.body_names);
         assert_eq!((&back.mesh.label_names, back.time), (&mesh.label_names, options.time));
         // Texts without a name are ignored; invalid codes are rejected.
         let text = String::from_utf8(bytes).unwrap();

@@ -4,7 +4,7 @@
 use std::error::Error;
 
 use pliant_geometry::{CellKind, Mesh, Vector3};
-use pliant_picture::{Camera, Frame, Graphics, Offscreen, Style, Subject};
+use pliant_picture::{Camera, Frame, Graphics, Offscreen, Regions, Style, Subject};
 
 const SIZE: [u32; 2] = [640, 480];
 
@@ -32,7 +32,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut camera = Camera::default();
     camera.fit(&points, f64::from(SIZE[0]) / f64::from(SIZE[1]));
     let style = Style { range: Some([0.0, largest]), edges: true, ..Style::default() };
-    let picture = offscreen.draw(&Frame { points, values, critical: None }, &camera, &style)?;
+    let picture =
+        offscreen.draw(&Frame { points, values, critical: None }, &camera, &style, &Regions::default())?;
     std::fs::write(&file, picture.png()?)?;
     println!("wrote {file}");
     Ok(())

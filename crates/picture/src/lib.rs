@@ -4,7 +4,7 @@
 //!
 //! ```no_run
 //! use pliant_geometry::{CellKind, Mesh, Vector3};
-//! use pliant_picture::{Camera, Frame, Graphics, Offscreen, Style, Subject};
+//! use pliant_picture::{Camera, Frame, Graphics, Offscreen, Regions, Style, Subject};
 //!
 //! let points = [[0., 0., 0.], [0.1, 0., 0.], [0., 0.1, 0.], [0., 0., 0.1]];
 //! let mut mesh = Mesh { points: points.map(Vector3::from).to_vec(), ..Mesh::default() };
@@ -17,7 +17,7 @@
 //! let style = Style { range: Some([0.0, 3.0]), ..Style::default() };
 //! let mut camera = Camera::default();
 //! camera.fit(&frame.points, 640.0 / 480.0);
-//! let picture = offscreen.draw(&frame, &camera, &style)?;
+//! let picture = offscreen.draw(&frame, &camera, &style, &Regions::default())?;
 //! std::fs::write("tet.png", picture.png()?)?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -28,11 +28,13 @@ mod colour;
 mod error;
 mod film;
 mod graphics;
+mod layers;
 mod legend;
 mod lines;
 mod offscreen;
 mod picture;
 mod plane;
+mod regions;
 mod renderer;
 mod section;
 mod series;
@@ -51,9 +53,10 @@ pub use legend::{Legend, NO_VALUE, readable, scale_marks, swatches};
 pub use offscreen::{Frame, Offscreen};
 pub use picture::{Difference, Picture};
 pub use plane::Plane;
+pub use regions::{Coat, Paint, Regions};
 pub use renderer::{Drawn, Renderer, Target};
 pub use section::Section;
 pub use series::{Look, Series, SeriesError};
-pub use style::{Background, MISSING, Style, Texture};
+pub use style::{Background, MISSING, Material, Style, Texture};
 pub use subject::{Subject, critical_cell, deformed_points, field_choices, nodal_values, visible};
 pub use vertex::drawn_value;

@@ -6,6 +6,7 @@ use crate::camera::Camera;
 use crate::error::PictureError;
 use crate::graphics::Graphics;
 use crate::picture::Picture;
+use crate::regions::Regions;
 use crate::renderer::{Drawn, Renderer, Target};
 use crate::section::Section;
 use crate::style::Style;
@@ -106,7 +107,13 @@ impl<'s> Offscreen<'s> {
     ///
     /// # Errors
     /// If the GPU fails.
-    pub fn draw(&mut self, frame: &Frame, camera: &Camera, style: &Style) -> Result<Picture, PictureError> {
+    pub fn draw(
+        &mut self,
+        frame: &Frame,
+        camera: &Camera,
+        style: &Style,
+        regions: &Regions,
+    ) -> Result<Picture, PictureError> {
         let Graphics { device, queue, .. } = &self.graphics;
         let [width, height] = self.size;
         self.drawn.set(queue, &frame.points, &frame.values);
@@ -114,6 +121,7 @@ impl<'s> Offscreen<'s> {
             self.section.cut(self.subject, &frame.points, &frame.values, plane);
             self.drawn.set_section(device, queue, &self.renderer, &self.section);
         }
+        self.drawn.set_regions(queue, self.subject, regions, style.labels);
         self.drawn.mark(queue, self.subject, frame.critical);
         let mut encoder = device.create_command_encoder(&Default::default());
         let aspect = f64::from(width) / f64::from(height);

@@ -6,7 +6,9 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
 use crate::camera::{Camera, Projection};
 use crate::colour::{ColourMap, linear};
+use crate::layers::Layers;
 use crate::lines::{Line, MOST_EDGES};
+use crate::regions::{Kind as CellKind, Regions, light};
 use crate::section::{Corner, Section};
 use crate::style::{MISSING, PLAIN, Style, Texture};
 use crate::subject::Subject;
@@ -33,6 +35,8 @@ pub struct Renderer {
     background: wgpu::RenderPipeline,
     opaque: wgpu::RenderPipeline,
     clipped: wgpu::RenderPipeline,
+    glass: wgpu::RenderPipeline,
+    clipped_glass: wgpu::RenderPipeline,
     wireframe: wgpu::RenderPipeline,
     fibres: wgpu::RenderPipeline,
     mark: wgpu::RenderPipeline,
@@ -95,7 +99,7 @@ impl Renderer {
         let read = BufferBindingType::Storage { read_only: true };
         let write = BufferBindingType::Storage { read_only: false };
         let uniform = (ShaderStages::VERTEX_FRAGMENT, BufferBindingType::Uniform);
-        let view = layout(device, &[uniform, (ShaderStages::FRAGMENT, read)]);
+        let view = layout(device, &[uniform, (ShaderStages::FRAGMENT, read), (ShaderStages::FRAGMENT, read)]);
         let shape = layout(device, &[(ShaderStages::VERTEX, read); 7]);
         let normals =
             layout(device, &[read, read, read, write, read, read].map(|kind| (ShaderStages::COMPUTE, kind)));
@@ -108,8 +112,8 @@ impl Renderer {
         let pipeline = |vertex: &str, fragment: &str, kind: Kind| {
             let (write, compare) = match kind {
                 Kind::Behind => (false, wgpu::CompareFunction::Always),
-                Kind::Solid | Kind::Wire => (true, wgpu::CompareFunction::Less),
-                Kind::Veil | Kind::Line => (false, wgpu::CompareFunction::Less),
+                Kind::Solid | Kind::Wire | Kind::Cut => (true, wgpu::CompareFunction::Less),
+                Kind::Veil | Kind::Line | Kind::Glass => (false, wgpu::CompareFunction::Less),
                 Kind::Mark => (false, wgpu::CompareFunction::Always),
             };
             let over = wgpu::BlendComponent {
@@ -178,10 +182,12 @@ impl Renderer {
             background: pipeline("background", "sky", Kind::Behind),
             opaque: pipeline("surface", "opaque", Kind::Solid),
             clipped: pipeline("surface", "clipped", Kind::Solid),
+            glass: pipeline("surface", "opaque", Kind::Glass),
+            clipped_glass: pipeline("surface", "clipped", Kind::Glass),
             wireframe: pipeline("surface", "wireframe", Kind::Wire),
             fibres: pipeline("line", "stroke", Kind::Line),
             mark: pipeline("line", "stroke", Kind::Mark),
-            section: pipeline("section", "opaque", Kind::Solid),
+            section: pipeline("section", "opaque", Kind::Cut),
             ghost: pipeline("resting", "ghost", Kind::Veil),
             compute,
             view,
@@ -196,6 +202,9 @@ enum Kind {
     Behind,
     Solid,
     Wire,
+    /// What may be seen through, and hides what is behind in part.
+    Cut,
+    Glass,
     Veil,
     Line,
     /// Seen through everything.
@@ -213,10 +222,19 @@ pub struct Drawn {
     poses: [Pose; 2],
     view: wgpu::Buffer,
     colours: wgpu::Buffer,
+    /// Light and opacity of each kind of cells, for these regions and with or without colours of labels.
+    lights: wgpu::Buffer,
+    kinds: Vec<CellKind>,
+    regions: Regions,
+    labels: bool,
+    /// Where one sees through something.
+    layers: Option<Layers>,
     view_group: wgpu::BindGroup,
     map: ColourMap,
     section: wgpu::Buffer,
     section_corners: u32,
+    /// Whether the eye is on the side of the section that is left.
+    seen_from_behind: bool,
     /// Edges of the marked cell, bars, fibres on the surface, fibres in the section.
     lines: wgpu::Buffer,
     first: [Line; MOST_EDGES],
@@ -226,7 +244,10 @@ pub struct Drawn {
     strokes: Vec<Line>,
     bars: u32,
     section_fibres: u32,
+    /// Of the surface.
     corners: u32,
+    /// All triangles of the subject; a list in another order lies behind them on the device.
+    triangle_count: u32,
     vertex_count: u32,
     /// From the middle of the body at rest to its farthest point so far [m].
     size: f64,
@@ -268,7 +289,8 @@ fn group(
 impl Drawn {
     /// Brings a subject to the device, at rest.
     pub fn new(device: &wgpu::Device, renderer: &Renderer, subject: &Subject) -> Self {
-        let triangles = storage(device, &subject.triangles);
+        let list = vec![[0; 4]; subject.triangles.len()];
+        let triangles = storage(device, &[&subject.triangles[..], &list].concat());
         let vertices = storage(device, &subject.vertices);
         let offsets = storage(device, &subject.offsets);
         let around = storage(device, &subject.around);
@@ -301,7 +323,10 @@ impl Drawn {
         });
         let map = ColourMap::default();
         let colours = storage(device, &map.table());
-        let view_group = group(device, &renderer.view, &[&view, &colours]);
+        let kinds = subject.kinds.clone();
+        let regions = Regions::default();
+        let lights = storage(device, &lights_of(&kinds, &regions, false));
+        let view_group = group(device, &renderer.view, &[&view, &colours, &lights]);
         let used = subject.surface_points();
         let low =
             used.iter().fold(Vector3::repeat(f64::INFINITY), |low, &p| low.inf(&subject.points[p as usize]));
@@ -321,10 +346,16 @@ impl Drawn {
             poses,
             view,
             colours,
+            lights,
+            kinds,
+            regions,
+            labels: false,
+            layers: None,
             view_group,
             map,
             section,
             section_corners: 0,
+            seen_from_behind: false,
             lines,
             first,
             marked: None,
@@ -332,7 +363,8 @@ impl Drawn {
             strokes,
             bars: subject.bars.len() as u32,
             section_fibres: 0,
-            corners: 3 * subject.triangles.len() as u32,
+            corners: 3 * subject.outer as u32,
+            triangle_count: subject.triangles.len() as u32,
             vertex_count: subject.vertices.len() as u32,
             size,
             rest_size: size,
@@ -343,19 +375,39 @@ impl Drawn {
 
     /// Sets points [m] and a value at each; without values the colour is that of tissue, and grey for non-finite ones.
     pub fn set(&mut self, queue: &wgpu::Queue, points: &[Vector3], values: &[f64]) {
+        self.stage(points, values);
+        queue.write_buffer(&self.poses[0].points, 0, bytemuck::cast_slice(&self.staged));
+    }
+
+    /// Takes note of how far points [m] reach that are drawn from a buffer of someone else's.
+    pub fn reach(&mut self, points: &[Vector3]) {
+        self.stage(points, &[]);
+    }
+
+    fn stage(&mut self, points: &[Vector3], values: &[f64]) {
         let mut reach = 0.0_f64;
         for (index, (own, point)) in self.staged.iter_mut().zip(points).enumerate() {
             *own = staged(point, values.get(index).copied().unwrap_or(f64::NAN));
             reach = reach.max((point - self.middle).norm_squared());
         }
         self.size = self.size.max(reach.sqrt());
-        queue.write_buffer(&self.poses[0].points, 0, bytemuck::cast_slice(&self.staged));
     }
 
-    /// Takes note of how far points [m] reach that are drawn from a buffer of someone else's.
-    pub fn reach(&mut self, points: &[Vector3]) {
-        let reach = points.iter().map(|point| (point - self.middle).norm_squared()).fold(0.0, f64::max);
-        self.size = self.size.max(reach.sqrt());
+    /// Sets how regions look; `labels` where colours show labels.
+    pub fn set_regions(&mut self, queue: &wgpu::Queue, subject: &Subject, regions: &Regions, labels: bool) {
+        if (&self.regions, self.labels) == (regions, labels) {
+            return;
+        }
+        self.regions.clone_from(regions);
+        self.labels = labels;
+        let lights = lights_of(&self.kinds, regions, labels);
+        queue.write_buffer(&self.lights, 0, bytemuck::cast_slice(&lights));
+        let opacities: Vec<f32> = lights.iter().map(|light| light[3]).collect();
+        self.layers = Layers::new(subject, &opacities);
+        if let Some(layers) = &self.layers {
+            let behind = u64::from(self.triangle_count) * size_of::<[u32; 4]>() as u64;
+            queue.write_buffer(&self.triangles, behind, bytemuck::cast_slice(&layers.list));
+        }
     }
 
     /// Draws from an external buffer with four numbers per point (position [m], value), such as a solver's on the same device.
@@ -431,11 +483,19 @@ impl Drawn {
             self.map = style.map;
             queue.write_buffer(&self.colours, 0, bytemuck::cast_slice(&self.map.table()));
         }
+        self.seen_from_behind = style.clip.is_some_and(|plane| plane.distance(&camera.eye()) < 0.0);
         let reach = (camera.target - self.middle).norm() + 1.5 * self.size.max(1e-12);
         let mut view = view(camera, style, aspect, reach, !renderer.target.format.is_srgb());
         view.line[3] = (LIFT * self.rest_size) as f32;
         view.skin[0] = (1.0 / self.rest_size.max(1e-12)) as f32;
         queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
+        if let Some(layers) = &mut self.layers {
+            let parallel = (view.eye[3] < 0.5).then_some([0, 1, 2].map(|axis| view.towards[axis]));
+            let before = u64::from(self.triangle_count) + layers.opaque as u64;
+            let glass = layers.sort(&self.staged, [0, 1, 2].map(|axis| view.eye[axis]), parallel);
+            let place = before * size_of::<[u32; 4]>() as u64;
+            queue.write_buffer(&self.triangles, place, bytemuck::cast_slice(glass));
+        }
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
         pass.set_pipeline(&renderer.compute);
         let poses = if style.ghost { 2 } else { 1 };
@@ -451,21 +511,46 @@ impl Drawn {
         pass.set_bind_group(1, &self.poses[0].draw, &[]);
         pass.set_pipeline(&renderer.background);
         pass.draw(0..3, 0..1);
-        if style.wireframe {
-            pass.set_pipeline(&renderer.wireframe);
-            pass.draw(0..self.corners, 0..1);
+        let list = 3 * self.triangle_count;
+        let (opaque, glass) = match &self.layers {
+            None => (0..self.corners, 0..0),
+            Some(layers) => {
+                let middle = list + 3 * layers.opaque as u32;
+                (list..middle, middle..list + 3 * layers.list.len() as u32)
+            }
+        };
+        let solid = if style.wireframe {
+            &renderer.wireframe
         } else if style.clip.is_some() {
-            pass.set_pipeline(&renderer.clipped);
-            pass.draw(0..self.corners, 0..1);
-            pass.set_pipeline(&renderer.section);
-            pass.draw(0..self.section_corners, 0..1);
+            &renderer.clipped
         } else {
-            pass.set_pipeline(&renderer.opaque);
-            pass.draw(0..self.corners, 0..1);
-        }
+            &renderer.opaque
+        };
+        pass.set_pipeline(solid);
+        pass.draw(opaque, 0..1);
         let first = MOST_EDGES as u32;
         pass.set_pipeline(&renderer.fibres);
         pass.draw(6 * first..6 * (first + self.bars), 2..3);
+        // A section hides what is behind it in part, and is behind what is seen from the other side.
+        let is_cut = style.clip.is_some() && !style.wireframe;
+        let cut = |pass: &mut wgpu::RenderPass<'_>, turned: bool| {
+            if is_cut && turned == self.seen_from_behind {
+                pass.set_pipeline(&renderer.section);
+                pass.draw(0..self.section_corners, 0..1);
+            }
+        };
+        cut(pass, true);
+        if !glass.is_empty() {
+            let pipeline = match (style.wireframe, style.clip) {
+                (true, _) => &renderer.wireframe,
+                (false, Some(_)) => &renderer.clipped_glass,
+                (false, None) => &renderer.glass,
+            };
+            pass.set_pipeline(pipeline);
+            pass.draw(glass, 0..1);
+        }
+        cut(pass, false);
+        pass.set_pipeline(&renderer.fibres);
         if style.fibres {
             let surface = first + self.strokes.len() as u32;
             let last = surface + if style.clip.is_some() { self.section_fibres } else { 0 };
@@ -491,6 +576,10 @@ fn four(v: &Vector3, w: f64) -> [f32; 4] {
 fn colour(bytes: [u8; 3], alpha: f32) -> [f32; 4] {
     let [r, g, b] = bytes.map(linear);
     [r, g, b, alpha]
+}
+
+fn lights_of(kinds: &[CellKind], regions: &Regions, labels: bool) -> Vec<[f32; 4]> {
+    kinds.iter().map(|&kind| light(kind, regions.coat(kind), labels)).collect()
 }
 
 /// The uniforms of a picture.

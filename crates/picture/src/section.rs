@@ -19,7 +19,7 @@ pub(crate) struct Corner {
     pub point: [f32; 4],
     /// Position at rest [m].
     pub rest: [f32; 3],
-    /// A bit for each edge of its triangle, that opposite to the corner, which is one of the polygon; beside them the paint of the cell.
+    /// A bit for each edge of its triangle, that opposite to the corner, which is one of the polygon; beside them the marks and the kind of the cell.
     pub edges: u32,
 }
 
@@ -73,7 +73,7 @@ impl Section {
                     });
                 }
             }
-            self.add(&mut polygon, &axes, subject.paint(number));
+            self.add(&mut polygon, &axes, subject.word(number));
             if subject.has_fibres() {
                 parts.iter_mut().for_each(|part| *part /= polygon.len() as f64);
                 let middle: Vector3 =
@@ -85,7 +85,7 @@ impl Section {
         }
     }
 
-    fn add(&mut self, polygon: &mut [Cut], axes: &[Vector3; 2], paint: u32) {
+    fn add(&mut self, polygon: &mut [Cut], axes: &[Vector3; 2], word: u32) {
         let middle = polygon.iter().map(|cut| cut.point).sum::<Vector3>() / polygon.len() as f64;
         for cut in polygon.iter_mut() {
             let from = cut.point - middle;
@@ -95,7 +95,7 @@ impl Section {
         let last = polygon.len().saturating_sub(1);
         for at in 1..last {
             // Bit 0: from the second to the third corner, an edge always; the others are ends of the fan.
-            let edges = paint | 1 | (u32::from(at + 1 == last) << 1) | (u32::from(at == 1) << 2);
+            let edges = word | 1 | (u32::from(at + 1 == last) << 1) | (u32::from(at == 1) << 2);
             let corner = |at: usize| {
                 let Cut { point, rest, value, .. } = &polygon[at];
                 Corner {

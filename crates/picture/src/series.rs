@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::{MeshFileError, read, read_pvd};
-use pliant_geometry::{Labels, Mesh, Vector3};
+use pliant_geometry::{Labels, Mesh, RegionNames, Vector3};
 
 use crate::arrows::{self, PointForce, arrow_note, arrow_unit, contact_forces, largest_force};
 use crate::camera::Camera;
@@ -14,6 +14,7 @@ use crate::graphics::Graphics;
 use crate::legend::{Legend, readable};
 use crate::offscreen::{Frame, Offscreen};
 use crate::picture::Picture;
+use crate::regions::Regions;
 use crate::style::Style;
 use crate::subject::{Subject, critical_cell, deformed_points, nodal_values, visible};
 
@@ -60,7 +61,7 @@ pub enum SeriesError {
     #[error("the cells of the frames have no labels (the field `label`)")]
     NoLabels,
     /// All cells are hidden.
-    #[error("all labels are hidden: nothing is visible")]
+    #[error("everything is hidden: nothing is visible")]
     AllHidden,
     /// A frame of another mesh than the first.
     #[error("the mesh of frame {0} differs from the first one")]
@@ -95,7 +96,7 @@ impl SeriesError {
             Self::NoLabels => {
                 "show bodies whose mesh has cell data `label`, such as meshes from images with several labels"
             }
-            Self::AllHidden => "hide fewer labels",
+            Self::AllHidden => "hide less",
             Self::OtherMesh(_) => "run the scene again into an empty folder",
             Self::Picture(error) => error.remedy(),
         }
@@ -151,12 +152,12 @@ impl Series {
         Ok(Self { name, frames })
     }
 
-    /// The labels of the cells of its first frame.
+    /// Labels and bodies of its first frame.
     ///
     /// # Errors
     /// If it can't be read.
-    pub fn labels(&self) -> Result<Labels, SeriesError> {
-        Ok(Labels::of(&self.mesh(0)?))
+    pub fn regions(&self) -> Result<RegionNames, SeriesError> {
+        Ok(RegionNames::of(&self.mesh(0)?))
     }
 
     fn mesh(&self, index: usize) -> Result<Mesh, SeriesError> {
@@ -182,8 +183,8 @@ fn quoted(names: &[String]) -> String {
 pub struct Look {
     /// The field that colours tell (see [`nodal_values`]); `None` for the colour of tissue.
     pub field: Option<String>,
-    /// Labels whose cells are hidden to show the inside.
-    pub hide: Vec<i32>,
+    /// Regions that are hidden, and those with a look of their own.
+    pub regions: Regions,
     /// The style of bodies; without a range, that of the values.
     pub style: Style,
     /// The camera; its target and height fit the body, except for the two below.
@@ -274,7 +275,7 @@ impl Look {
             Some(field) => nodal_values(mesh, field).ok_or_else(|| missing(field))?,
         };
         let critical = (self.style.critical)
-            .then(|| critical_cell(&visible(mesh, &self.hide)).ok_or(SeriesError::NoSteps))
+            .then(|| critical_cell(&visible(mesh, &self.regions.hidden)).ok_or(SeriesError::NoSteps))
             .transpose()?;
         let points = deformed_points(mesh);
         let (critical, step) = critical.unzip();
@@ -289,9 +290,9 @@ impl Look {
     fn with_labels_of(&self, mesh: &Mesh) -> Result<Self, SeriesError> {
         let mut look = self.clone();
         if self.style.labels {
-            let labels = Labels::of(&visible(mesh, &self.hide));
+            let labels = Labels::of(&visible(mesh, &self.regions.hidden));
             if labels.is_empty() {
-                return Err(if self.hide.is_empty() {
+                return Err(if self.regions.hidden.is_empty() {
                     SeriesError::NoLabels
                 } else {
                     SeriesError::AllHidden
@@ -305,8 +306,8 @@ impl Look {
 
     /// The drawn parts of a mesh.
     fn subject(&self, mesh: &Mesh) -> Result<Subject, SeriesError> {
-        let subject = Subject::new(&visible(mesh, &self.hide));
-        if subject.triangle_count() == 0 && !self.hide.is_empty() {
+        let subject = Subject::new(&visible(mesh, &self.regions.hidden));
+        if subject.triangle_count() == 0 && !self.regions.hidden.is_empty() {
             return Err(SeriesError::AllHidden);
         }
         if self.style.fibres && !subject.has_fibres() {
@@ -366,7 +367,7 @@ impl Look {
         common.add(&subject, &shown, look.style.ghost);
         let settled = look.settle(common);
         let mut offscreen = Offscreen::new(graphics, &subject, look.size)?;
-        let picture = offscreen.draw(&shown.frame, &settled.camera, &settled.style)?;
+        let picture = offscreen.draw(&shown.frame, &settled.camera, &settled.style, &look.regions)?;
         Ok(look.finished(picture, &settled, &shown, time))
     }
 
@@ -403,7 +404,7 @@ impl Look {
         let mut offscreen = Offscreen::new(graphics, &subject, look.size)?;
         for (count, &index) in frames.iter().enumerate() {
             let shown = read(index)?;
-            let picture = offscreen.draw(&shown.frame, &settled.camera, &settled.style)?;
+            let picture = offscreen.draw(&shown.frame, &settled.camera, &settled.style, &look.regions)?;
             take(count, look.finished(picture, &settled, &shown, series.frames[index].0))?;
         }
         Ok(())

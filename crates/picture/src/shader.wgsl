@@ -27,11 +27,13 @@ struct View {
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> colours: array<vec4<f32>, 256>;
+// Of each kind of cells: light of its colour, or −1 for that of the value, −2 for that of tissue; and opacity.
+@group(0) @binding(2) var<storage, read> lights: array<vec4<f32>>;
 
 // Position [m] and value of each point.
 @group(1) @binding(0) var<storage, read> points: array<vec4<f32>>;
-// Three vertices, and a word: bits 0 to 2 tell which edges are drawn, bit 3 that the cell has a label, bits 8 to 31 its colour; bit 4 that it
-// is of an obstacle or tool, bit 5 of one that holds bodies inside.
+// Three vertices, and a word: bits 0 to 2 tell which edges are drawn, bit 4 that it is of an obstacle or tool, bit 5 of one that holds bodies
+// inside, bits 8 to 31 are the number of its kind.
 @group(1) @binding(1) var<storage, read> triangles: array<vec4<u32>>;
 // The point of each vertex.
 @group(1) @binding(2) var<storage, read> vertices: array<u32>;
@@ -134,30 +136,30 @@ fn is_behind(at: Corner) -> bool {
     return is_thing(at) && select((facing < -0.2), (facing > 0.0), (at.edges & 32u) != 0u);
 }
 
-fn no_colour(at: Corner) -> bool {
-    if is_thing(at) {
-        return false;
-    }
-    if view.range.z > 1.5 {
-        return (at.edges & 8u) == 0u;
-    }
-    return view.range.z < 0.5 || at.value > 1.0e30;
+// Whether it has the colour of tissue: by itself, or because there are no values.
+fn is_tissue(at: Corner) -> bool {
+    let light = lights[at.edges >> 8u].r;
+    return light < -1.5 || (light < -0.5 && view.range.z < 0.5);
 }
 
-// Light of the label where labels have colours, else of the value.
+fn no_colour(at: Corner) -> bool {
+    return is_tissue(at) || (lights[at.edges >> 8u].r < 0.0 && at.value > 1.0e30);
+}
+
+// Light of its own colour, else of the value.
 fn colour_at(at: Corner) -> vec3<f32> {
-    if is_thing(at) {
-        return vec3(0.36, 0.39, 0.43);
+    let own = lights[at.edges >> 8u].rgb;
+    if own.r >= 0.0 {
+        return own;
     }
-    if view.range.z < 1.5 {
-        return colour_of(at.value);
-    }
-    if no_colour(at) {
-        return view.plain.rgb;
-    }
-    let bytes = vec3((at.edges >> 8u) & 255u, (at.edges >> 16u) & 255u, at.edges >> 24u);
-    let code = vec3<f32>(bytes) / 255.0;
-    return select(pow((code + 0.055) / 1.055, vec3(2.4)), code / 12.92, code <= vec3(0.04045));
+    return select(colour_of(at.value), view.plain.rgb, is_tissue(at));
+}
+
+// What is thin glass from the front is thicker where it is seen from the side.
+fn opacity_at(at: Corner, facing: f32) -> f32 {
+    let own = lights[at.edges >> 8u].a;
+    let grazing = 1.0 - facing;
+    return mix(own, sqrt(own), grazing * grazing);
 }
 
 // A key light over the left shoulder, a fill from the right, sky above and ground below (all of them turn with the camera).
@@ -207,10 +209,10 @@ fn shade(at: Corner) -> vec4<f32> {
     // Derivatives over pixels are taken where all pixels pass.
     let bumpy = uneven(at, normal);
     if view.skin.y > 0.0 && !is_thing(at) {
-        colour = moist(albedo * mottled(at.rest), bumpy, eye);
+        colour = moist(albedo * mottled(at.rest, is_tissue(at)), bumpy, eye);
     }
     let edges = edge_cover(at.corner, at.edges) * view.edge.a;
-    return vec4(coded(mix(colour, view.edge.rgb, edges)), 1.0);
+    return vec4(coded(mix(colour, view.edge.rgb, edges)), opacity_at(at, dot(normal, eye)));
 }
 
 // Random unit-ish vector of a lattice point (PCG hash: Jarzynski and Olano 2020).
@@ -301,7 +303,7 @@ fn uneven(at: Corner, normal: vec3<f32>) -> vec3<f32> {
 @fragment
 fn opaque(at: Corner) -> @location(0) vec4<f32> {
     let colour = shade(at);
-    if is_behind(at) {
+    if is_behind(at) || colour.a < 0.004 {
         discard;
     }
     return colour;
@@ -429,7 +431,7 @@ fn wireframe(at: Corner) -> @location(0) vec4<f32> {
 }
 
 // Colours of tissue vary: paler and darker patches, and thin vessels below the surface.
-fn mottled(rest: vec3<f32>) -> vec3<f32> {
+fn mottled(rest: vec3<f32>, tissue: bool) -> vec3<f32> {
     let patches = octaves(rest, 2.3, 3, 0.0).w;
     let fine = octaves(rest, 19.0, 2, 0.0).w;
     let warped = rest + 0.07 * vec3(noise(rest * 5.0 + 3.1).w, noise(rest * 5.0 + 11.7).w, noise(rest * 5.0 + 23.9).w);
@@ -437,9 +439,9 @@ fn mottled(rest: vec3<f32>) -> vec3<f32> {
     let tone = clamp(0.5 + 0.55 * patches + 0.16 * fine, 0.0, 1.0);
     let tint = mix(vec3(0.52, 0.27, 0.25), vec3(0.88, 0.60, 0.54), tone);
     let full = mix(tint, vec3(0.50, 0.12, 0.13), 0.35 * vessel);
-    // Under colours of values only its lightness, so that they can be read.
+    // Under other colours only its lightness, so that they can be read.
     let light = vec3(0.86 + 0.2 * tone);
-    return select(full, light, view.range.z > 0.5);
+    return select(light, full, tissue);
 }
 
 // Sharp reflections on what is uneven, and a film that shines where it is seen from the side.

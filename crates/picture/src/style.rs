@@ -58,6 +58,75 @@ pub(crate) const PLAIN: [u8; 3] = [214, 148, 132];
 /// Colour (sRGB) of points without a value where others have one: no map has this grey.
 pub const MISSING: [u8; 3] = [158, 162, 168];
 
+/// What one colour stands for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Material {
+    /// Soft tissue of any kind.
+    #[default]
+    Tissue,
+    /// Dark red.
+    Liver,
+    /// Pale.
+    Brain,
+    /// Rose.
+    Colon,
+    /// Red.
+    Artery,
+    /// Blue, as in atlases.
+    Vein,
+    /// Yellow, as in plans of operations.
+    Tumour,
+    /// Ivory.
+    Bone,
+    /// Grey metal: of obstacles and tools.
+    Steel,
+}
+
+impl Material {
+    /// All of them.
+    pub const ALL: [Self; 9] = [
+        Self::Tissue,
+        Self::Liver,
+        Self::Brain,
+        Self::Colon,
+        Self::Artery,
+        Self::Vein,
+        Self::Tumour,
+        Self::Bone,
+        Self::Steel,
+    ];
+
+    /// Its word.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Tissue => "tissue",
+            Self::Liver => "liver",
+            Self::Brain => "brain",
+            Self::Colon => "colon",
+            Self::Artery => "artery",
+            Self::Vein => "vein",
+            Self::Tumour => "tumour",
+            Self::Bone => "bone",
+            Self::Steel => "steel",
+        }
+    }
+
+    /// Its colour (sRGB).
+    pub const fn colour(self) -> [u8; 3] {
+        match self {
+            Self::Tissue => PLAIN,
+            Self::Liver => [150, 62, 52],
+            Self::Brain => [222, 196, 182],
+            Self::Colon => [222, 150, 142],
+            Self::Artery => [196, 44, 40],
+            Self::Vein => [62, 88, 170],
+            Self::Tumour => [226, 190, 84],
+            Self::Bone => [228, 218, 192],
+            Self::Steel => [162, 168, 175],
+        }
+    }
+}
+
 /// How a body is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Style {

@@ -5,11 +5,12 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use pliant_geometry::{
-    CellBlock, CellId, CellKind, Mesh, Vector3, boundary, cell_label, vector_area, volume,
+    CellBlock, CellId, CellKind, Face, Mesh, Region, Vector3, borders, boundary, cell_body, cell_label,
+    vector_area, volume,
 };
 
-use crate::colour::label_colour;
 use crate::lines::{Fibres, Line, outline};
+use crate::regions::Kind;
 
 /// Cosine of the angle between faces [75°] from which on their edge is sharp: the round sides of a coarse organ stay smooth.
 const SHARP: f64 = 0.26;
@@ -20,31 +21,38 @@ pub struct Subject {
     /// Points at rest [m].
     pub points: Vec<Vector3>,
     /// Three corners, each a vertex, and a bit for each edge, that opposite to the corner, which is one of a cell; beside these bits
-    /// the paint of the cell.
+    /// the marks of things and the kind of the cell. Those of the surface, then those of borders between labels.
     pub(crate) triangles: Vec<[u32; 4]>,
+    /// How many are of the surface.
+    pub(crate) outer: usize,
+    /// The kind of the cell beyond each triangle of a border.
+    pub(crate) beyond: Vec<u32>,
+    /// What the cells are of.
+    pub(crate) kinds: Vec<Kind>,
     /// The cell of each triangle.
     parents: Vec<CellId>,
     /// The point of each vertex. A point on a sharp edge has several vertices, each with its own normal.
     pub(crate) vertices: Vec<u32>,
+    /// How many are of the surface.
+    outer_vertices: usize,
     /// Where the triangles around each vertex begin in the next list; one more entry than vertices.
     pub(crate) offsets: Vec<u32>,
     /// Triangles around vertices.
     pub(crate) around: Vec<u32>,
     /// Cells with a face: kind and nodes.
     cells: Vec<(CellKind, Vec<u32>)>,
-    /// Of each volume cell; empty without labels.
-    paints: Vec<u32>,
+    /// Marks and kind of each volume cell.
+    words: Vec<u32>,
     pub(crate) fibres: Fibres,
     /// Cells that are lines, such as ligaments.
     pub(crate) bars: Vec<Line>,
 }
 
-/// A face that is drawn: its three or four nodes, the sides of a triangle that are edges of cells, and the paint of its cell.
+/// A face that is drawn: its three or four nodes, and the sides of a triangle that are edges of cells.
 struct Patch {
     nodes: Vec<u32>,
     parent: CellId,
     edges: u32,
-    paint: u32,
 }
 
 /// Cell data of the triangles of a subdivided element: bit i tells that the side opposite to corner i is an edge of the element.
@@ -65,38 +73,73 @@ const STEEL: u32 = 0b1_0000;
 /// Marks those of things that hold bodies inside: they are drawn from the back.
 const HOLLOW: u32 = 0b10_0000;
 
-/// What the shader takes of a cell beside the bits of edges: the colour of its label, or the mark of a thing; 0 without both.
-fn paint(block: Option<&CellBlock>, cell: u32) -> u32 {
-    let Some(block) = block else { return 0 };
-    match block.data.get(THING).and_then(|things| things.values.get(cell as usize)) {
-        Some(1.0) => STEEL,
-        Some(2.0) => STEEL | HOLLOW,
-        _ => cell_label(block, cell).map_or(0, |label| paint_of(label_colour(label))),
-    }
+/// Where the number of the kind begins in the word of a triangle.
+pub(crate) const KIND: u32 = 8;
+
+/// What cells are of, each once.
+#[derive(Default)]
+struct Kinds {
+    list: Vec<Kind>,
+    known: BTreeMap<Kind, u32>,
 }
 
-fn paint_of(colour: [u8; 3]) -> u32 {
-    let [r, g, b] = colour.map(u32::from);
-    0b1000 | (r << 8) | (g << 16) | (b << 24)
+impl Kinds {
+    /// What the shader takes of a cell beside the bits of edges: the marks of a thing, and the number of its kind.
+    fn word(&mut self, block: Option<&CellBlock>, cell: u32) -> u32 {
+        let thing = block.and_then(|block| block.data.get(THING)?.values.get(cell as usize).copied());
+        let marks = match thing {
+            Some(1.0) => STEEL,
+            Some(2.0) => STEEL | HOLLOW,
+            _ => 0,
+        };
+        let label = block.filter(|_| marks == 0).and_then(|block| cell_label(block, cell));
+        let body = block.map_or(0, |block| cell_body(block, cell));
+        let kind = Kind { label, body, thing: marks != 0 };
+        let number = *self.known.entry(kind).or_insert_with(|| {
+            self.list.push(kind);
+            self.list.len() as u32 - 1
+        });
+        marks | (number << KIND)
+    }
 }
 
 impl Subject {
     /// The boundary of the volume cells, and triangles and quads that are not on it.
     pub fn new(mesh: &Mesh) -> Self {
-        let faces = faces(mesh);
-        let normals: Vec<Vector3> = faces.iter().map(|face| normal(&face.nodes, &mesh.points)).collect();
-        let (corners, vertices) = split_at_sharp_edges(&faces, &normals, mesh.points.len());
-        let mut triangles = Vec::with_capacity(2 * faces.len());
-        let mut parents = Vec::with_capacity(2 * faces.len());
-        for (corners, Patch { parent, edges, paint, .. }) in corners.iter().zip(&faces) {
-            parents.resize(parents.len() + corners.len().saturating_sub(2).min(2), *parent);
-            match corners[..] {
-                [a, b, c] => triangles.push([a, b, c, paint | edges]),
-                // The second bit of the first half and the third of the other are the diagonal.
-                [a, b, c, d] => triangles.extend([[a, b, c, paint | 0b101], [a, c, d, paint | 0b011]]),
-                _ => {}
+        let mut kinds = Kinds::default();
+        let mut triangles = Vec::new();
+        let mut parents = Vec::new();
+        let mut vertices = Vec::new();
+        let mut add = |faces: &[Patch], kinds: &mut Kinds| {
+            let normals: Vec<Vector3> = faces.iter().map(|face| normal(&face.nodes, &mesh.points)).collect();
+            let (corners, own) = split_at_sharp_edges(faces, &normals, mesh.points.len());
+            let first = vertices.len() as u32;
+            vertices.extend(own);
+            for (corners, Patch { parent, edges, .. }) in corners.iter().zip(faces) {
+                parents.resize(parents.len() + corners.len().saturating_sub(2).min(2), *parent);
+                let word = kinds.word(mesh.block(parent.kind), parent.index);
+                let corner = |at: usize| first + corners[at];
+                match corners.len() {
+                    3 => triangles.push([corner(0), corner(1), corner(2), word | edges]),
+                    // The second bit of the first half and the third of the other are the diagonal.
+                    4 => triangles.extend([
+                        [corner(0), corner(1), corner(2), word | 0b101],
+                        [corner(0), corner(2), corner(3), word | 0b011],
+                    ]),
+                    _ => {}
+                }
             }
+            (triangles.len(), vertices.len())
+        };
+        let (outer, outer_vertices) = add(&faces(mesh), &mut kinds);
+        let mut beyond = Vec::new();
+        let mut inner = Vec::new();
+        for (face, other) in borders_of_labels(mesh) {
+            let kind = kinds.word(mesh.block(other.kind), other.index) >> KIND;
+            beyond.resize(beyond.len() + face.nodes.len() - 2, kind);
+            inner.push(face);
         }
+        add(&inner, &mut kinds);
         let mut counts = vec![0_u32; vertices.len() + 1];
         for triangle in &triangles {
             triangle[..3].iter().for_each(|&vertex| counts[vertex as usize + 1] += 1);
@@ -118,9 +161,8 @@ impl Subject {
         }
         let cells: Vec<_> = shown_blocks(mesh).map(|block| (block.kind, block.nodes.clone())).collect();
         let volumes = shown_blocks(mesh).filter(|block| block.kind.dimension() == 3);
-        let labelled = volumes.clone().any(|block| block.data.contains_key("label"));
-        let painted = |block| (0..CellBlock::len(block) as u32).map(move |cell| paint(Some(block), cell));
-        let paints = volumes.filter(|_| labelled).flat_map(painted).collect();
+        let cells_of = |block| (0..CellBlock::len(block) as u32).map(move |cell| (block, cell));
+        let words = volumes.flat_map(cells_of).map(|(block, cell)| kinds.word(Some(block), cell)).collect();
         let fibres = Fibres::new(mesh, &cells);
         let lines = mesh.block(CellKind::Line).into_iter().flat_map(CellBlock::cells);
         let known = |nodes: &&[u32]| nodes.iter().all(|&node| (node as usize) < mesh.points.len());
@@ -128,12 +170,16 @@ impl Subject {
         Self {
             points: mesh.points.clone(),
             triangles,
+            outer,
+            beyond,
+            kinds: kinds.list,
             parents,
             vertices,
+            outer_vertices,
             offsets,
             around,
             cells,
-            paints,
+            words,
             fibres,
             bars,
         }
@@ -155,14 +201,14 @@ impl Subject {
 
     /// Whether a body has a corner without a value where others have one; things never have one.
     pub fn lacks_value(&self, values: &[f64]) -> bool {
-        let bodies = self.triangles.iter().filter(|triangle| triangle[3] & STEEL == 0);
+        let bodies = self.triangles[..self.outer].iter().filter(|triangle| triangle[3] & STEEL == 0);
         let mut corners = bodies.flat_map(|triangle| &triangle[..3]).map(|&v| self.vertices[v as usize]);
         !values.is_empty() && corners.any(|point| !values[point as usize].is_finite())
     }
 
     /// Triangles drawn.
     pub fn triangle_count(&self) -> usize {
-        self.triangles.len()
+        self.outer
     }
 
     /// Whether a triangle is drawn as seen from its front, or its back: of things only one side is.
@@ -171,9 +217,22 @@ impl Subject {
         mark == 0 || (mark == STEEL) == from_front
     }
 
+    /// A triangle of each obstacle and tool.
+    pub fn things(&self) -> Vec<u32> {
+        let mut known = BTreeSet::new();
+        let outer = self.triangles[..self.outer].iter().zip(0..);
+        let of_things = outer.filter(|(triangle, _)| triangle[3] & STEEL != 0);
+        of_things
+            .filter(|(triangle, _)| known.insert(triangle[3] >> KIND))
+            .map(|(_, number)| number)
+            .collect()
+    }
+
     /// The points of each triangle, in the order in which they are drawn.
     pub fn triangles(&self) -> impl ExactSizeIterator<Item = [u32; 3]> + '_ {
-        self.triangles.iter().map(|&[a, b, c, _]| [a, b, c].map(|vertex| self.vertices[vertex as usize]))
+        self.triangles[..self.outer]
+            .iter()
+            .map(|&[a, b, c, _]| [a, b, c].map(|vertex| self.vertices[vertex as usize]))
     }
 
     /// The cell of the mesh that a triangle is a part of.
@@ -183,16 +242,16 @@ impl Subject {
 
     /// Points on the surface and of lines, increasing, each once.
     pub fn surface_points(&self) -> Vec<u32> {
-        let mut points = self.vertices.clone();
+        let mut points = self.vertices[..self.outer_vertices].to_vec();
         points.extend(self.bars.iter().flat_map(Line::ends));
         points.sort_unstable();
         points.dedup();
         points
     }
 
-    /// The paint of a volume cell.
-    pub(crate) fn paint(&self, cell: usize) -> u32 {
-        self.paints.get(cell).copied().unwrap_or(0)
+    /// Marks and kind of a volume cell, as in the word of a triangle.
+    pub(crate) fn word(&self, cell: usize) -> u32 {
+        self.words.get(cell).copied().unwrap_or(0)
     }
 
     /// Volume cells with their nodes.
@@ -202,13 +261,13 @@ impl Subject {
     }
 }
 
-/// A mesh without the cells of labels that are hidden; its points stay.
-pub fn visible<'m>(mesh: &'m Mesh, hidden: &[i32]) -> Cow<'m, Mesh> {
+/// A mesh without the cells of regions that are hidden; its points stay.
+pub fn visible<'m>(mesh: &'m Mesh, hidden: &[Region]) -> Cow<'m, Mesh> {
     if hidden.is_empty() {
         return Cow::Borrowed(mesh);
     }
     let mut rest = mesh.clone();
-    rest.drop_labels(hidden);
+    rest.drop_regions(hidden);
     Cow::Owned(rest)
 }
 
@@ -245,7 +304,6 @@ fn faces(mesh: &Mesh) -> Vec<Patch> {
         nodes: face.nodes().to_vec(),
         parent: face.parent,
         edges: edges_of(mesh.block(face.parent.kind), face.parent.index),
-        paint: paint(mesh.block(face.parent.kind), face.parent.index),
     });
     let mut faces: Vec<Patch> = of_skin.collect();
     if mesh.volume_blocks().all(|block| block.is_empty()) {
@@ -261,13 +319,23 @@ fn faces(mesh: &Mesh) -> Vec<Patch> {
         for (nodes, cell) in block.cells().zip(0..) {
             let known = nodes.iter().all(|&node| (node as usize) < mesh.points.len());
             if known && !drawn.contains(&key(nodes)) {
-                let (edges, paint) = (edges_of(Some(block), cell), paint(Some(block), cell));
+                let edges = edges_of(Some(block), cell);
                 let parent = CellId { kind: block.kind, index: cell };
-                faces.push(Patch { nodes: nodes.to_vec(), parent, edges, paint });
+                faces.push(Patch { nodes: nodes.to_vec(), parent, edges });
             }
         }
     }
     faces
+}
+
+/// The faces between volume cells of different labels, each with the cell beyond.
+fn borders_of_labels(mesh: &Mesh) -> Vec<(Patch, CellId)> {
+    if mesh.volume_blocks().all(|block| !block.data.contains_key("label")) {
+        return Vec::new();
+    }
+    let label = |cell: CellId| mesh.block(cell.kind).and_then(|block| cell_label(block, cell.index));
+    let patch = |face: &Face| Patch { nodes: face.nodes().to_vec(), parent: face.parent, edges: 0b111 };
+    borders(mesh, label).iter().map(|(face, other)| (patch(face), *other)).collect()
 }
 
 fn normal(face: &[u32], points: &[Vector3]) -> Vector3 {
@@ -471,18 +539,23 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn triangles_and_cells_have_the_paint_of_their_label() {
+    fn triangles_and_cells_have_the_kind_of_their_label_and_body() {
         let mut mesh = tets(1);
         mesh.blocks[0].data.insert("label".into(), DataArray::scalar(vec![1.0, 1.0, 2.0, 2.0, 2.0, 1.0]));
         let subject = Subject::new(&mesh);
-        let [one, two] = [1, 2].map(|label| paint_of(label_colour(label)));
-        let painted = |paint: u32| subject.triangles.iter().filter(|t| t[3] & !0b111 == paint).count();
-        assert_eq!((painted(one), painted(two)), (6, 6), "two faces of each tet are on the boundary");
-        assert_eq!([subject.paint(0), subject.paint(2), subject.paint(6)], [one, two, 0]);
+        let kind = |label: i32| Kind { label: Some(label), body: 0, thing: false };
+        assert_eq!(subject.kinds, [kind(1), kind(2)]);
+        let of = |number: u32| {
+            subject.triangles[..subject.outer].iter().filter(|t| t[3] >> KIND == number).count()
+        };
+        assert_eq!((of(0), of(1)), (6, 6), "two faces of each tet are on the boundary");
+        assert_eq!([subject.word(0), subject.word(2), subject.word(6)], [0, 1 << KIND, 0]);
         // Without what hides them, the faces between the labels are drawn.
-        mesh.drop_labels(&[1]);
+        mesh.drop_regions(&[Region::Label(1)]);
         let rest = Subject::new(&mesh);
-        assert!(rest.triangles.iter().all(|t| t[3] & !0b111 == two) && rest.triangle_count() > 6);
+        assert!(rest.kinds == [kind(2)] && rest.triangle_count() > 6 && rest.beyond.is_empty());
+        mesh.blocks[0].data.insert("body".into(), DataArray::scalar(vec![0.0, 3.0, 3.0]));
+        assert_eq!(Subject::new(&mesh).kinds[1], Kind { body: 3, ..kind(2) });
         assert_eq!(Subject::new(&tets(1)).triangles[0][3], 0b111, "without labels");
     }
 
@@ -527,9 +600,13 @@ pub(crate) mod tests {
         block.nodes.extend([0, 1, 2, 3, 4, 5, 3, 4, 6]);
         block.data.insert(THING.into(), DataArray::scalar(vec![0.0, 1.0, 2.0]));
         mesh.point_data.insert("displacement".into(), DataArray { components: 3, values: vec![2.0; 21] });
-        let marks = Subject::new(&mesh).triangles.iter().map(|t| t[3] & !0b111).collect::<Vec<_>>();
+        let marks = Subject::new(&mesh).triangles.iter().map(|t| t[3] & 0b11_1000).collect::<Vec<_>>();
         assert_eq!(marks, [0, STEEL, STEEL | HOLLOW]);
+        assert_eq!(Subject::new(&mesh).things(), [1], "both are of one body");
+        let block = mesh.block_mut(CellKind::Triangle);
+        block.data.insert("body".into(), DataArray::scalar(vec![0.0, 1.0, 2.0]));
         let subject = Subject::new(&mesh);
+        assert_eq!(subject.things(), [1, 2]);
         assert_eq!([0, 1, 2].map(|triangle| subject.is_drawn(triangle, true)), [true, true, false]);
         assert_eq!([0, 1, 2].map(|triangle| subject.is_drawn(triangle, false)), [true, false, true]);
         let values = nodal_values(&mesh, "displacement:x").unwrap();

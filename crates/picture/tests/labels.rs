@@ -3,8 +3,8 @@
 
 mod support;
 
-use pliant_geometry::{CellKind, DataArray, Mesh, Vector3};
-use pliant_picture::{Look, Picture, Plane, Style, label_colour};
+use pliant_geometry::{CellKind, DataArray, Mesh, Region, Vector3};
+use pliant_picture::{Coat, Look, Picture, Plane, Regions, Style, label_colour};
 use support::graphics;
 
 /// A cube of 6³ hexes: label 1 in one half and 2 in the other, around a core of 2³ with label 3.
@@ -60,6 +60,10 @@ fn counts(picture: &Picture) -> [usize; 4] {
     counts
 }
 
+fn without(labels: &[i32]) -> Regions {
+    Regions { hidden: labels.iter().copied().map(Region::Label).collect(), ..Regions::default() }
+}
+
 fn swatches(picture: &Picture) -> Vec<i32> {
     let exact = |label: &i32| {
         let colour = label_colour(*label);
@@ -82,7 +86,8 @@ fn cells_have_the_colours_of_their_labels_and_none_between() {
 #[test]
 fn hidden_labels_show_what_lies_inside_and_leave_the_legend() {
     let Some(graphics) = graphics() else { return };
-    let hiding = |hide: Vec<i32>| Look { hide, ..look() }.picture(&graphics, &cube(), 0.0);
+    let hiding =
+        |labels: Vec<i32>| Look { regions: without(&labels), ..look() }.picture(&graphics, &cube(), 0.0);
     let picture = hiding(vec![1, 2]).unwrap();
     let [left, right, core, _] = counts(&picture);
     assert!((left, right) == (0, 0) && core > 3000, "{left} {right} {core}");
@@ -92,6 +97,36 @@ fn hidden_labels_show_what_lies_inside_and_leave_the_legend() {
     assert!(right == 0 && left > 3000 && core > 200, "{left} {right} {core}");
     let told = hiding(vec![1, 2, 3]).unwrap_err().to_string();
     assert!(told.contains("nothing is visible"), "{told}");
+}
+
+#[test]
+fn one_sees_through_half_of_the_body_to_what_lies_inside_and_through_nothing_of_the_rest() {
+    let Some(graphics) = graphics() else { return };
+    let seen = |opacity: [f64; 2]| {
+        let coat = |(label, opacity)| (Region::Label(label), Coat { opacity, ..Coat::default() });
+        let regions = Regions { coats: (1..).zip(opacity).map(coat).collect(), ..Regions::default() };
+        Look { regions, ..look() }.picture(&graphics, &cube(), 0.0).unwrap()
+    };
+    let whole = look().picture(&graphics, &cube(), 0.0).unwrap();
+    assert_eq!(whole.rgba, seen([1.0, 1.0]).rgba);
+    // What is invisible is as hidden as its cells, but for the camera, which still sees all.
+    let [left, right, core, _] = counts(&seen([0.0, 0.0]));
+    assert!((left, right) == (0, 0) && core > 1000, "{left} {right} {core}");
+    let half = seen([0.3, 0.3]);
+    let at = |picture: &Picture, x: u32, y: u32| {
+        let from = 4 * (y * picture.width + x) as usize;
+        Vector3::from_iterator(picture.rgba[from..from + 3].iter().map(|&byte| light(byte)))
+    };
+    let green = |picture: &Picture| {
+        let places = (0..48).flat_map(|x| (0..32).map(move |y| (10 * x, 10 * y)));
+        places
+            .filter(|&(x, y)| {
+                let c = at(picture, x, y);
+                c.y > 1.15 * c.x && c.y > 1.05 * c.z
+            })
+            .count()
+    };
+    assert!(green(&half) > green(&whole) + 10, "{} {}", green(&half), green(&whole));
 }
 
 #[test]

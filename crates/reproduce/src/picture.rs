@@ -84,8 +84,8 @@ mod drawn {
     use pliant_geometry::Vector3;
     use pliant_geometry::io::encode_base64;
     use pliant_picture::{
-        Axis, Background, Camera, ColourMap, Frame, Graphics, Offscreen, PictureError, Projection, Style,
-        Subject, Texture,
+        Axis, Background, Camera, ColourMap, Frame, Graphics, Offscreen, PictureError, Projection, Regions,
+        Style, Subject, Texture,
     };
 
     use super::{Body, CaseError, View};
@@ -215,7 +215,8 @@ mod drawn {
         style: &Style,
         size: [u32; 2],
     ) -> Result<String, PictureError> {
-        let picture = Offscreen::new(graphics, subject, size)?.draw(frame, camera, style)?;
+        let picture =
+            Offscreen::new(graphics, subject, size)?.draw(frame, camera, style, &Regions::default())?;
         let mut uri = b"data:image/png;base64,".to_vec();
         encode_base64(&picture.png()?, &mut uri);
         Ok(uri.into_iter().map(char::from).collect())

@@ -122,6 +122,23 @@ impl Key {
     }
 }
 
+/// The folder for what is kept from run to run, and whether the user named it; `None` where nothing is to be kept.
+fn folder_of_user() -> Option<(PathBuf, bool)> {
+    match std::env::var_os(VARIABLE).filter(|value| !value.is_empty()) {
+        Some(value) if value == "off" => None,
+        Some(folder) => Some((folder.into(), true)),
+        None => {
+            let user = etcetera::choose_base_strategy().ok()?;
+            Some((etcetera::BaseStrategy::cache_dir(&user).join("pliant"), false))
+        }
+    }
+}
+
+/// The folder for what is kept from run to run beside meshes; `None` where nothing is to be kept.
+pub fn cache_folder() -> Option<PathBuf> {
+    Some(folder_of_user()?.0)
+}
+
 impl MeshCache {
     /// Keeps nothing.
     pub fn off() -> Self {
@@ -136,15 +153,10 @@ impl MeshCache {
     /// The folder that the variable `PLIANT_CACHE` names, where it does not say `off`; else `pliant/meshes` in the user's
     /// folder for caches.
     pub fn of_user() -> Self {
-        match std::env::var_os(VARIABLE).filter(|value| !value.is_empty()) {
-            Some(value) if value == "off" => Self::off(),
-            Some(folder) => Self::in_folder(folder.into()),
-            None => etcetera::choose_base_strategy().map_or_else(
-                |_| Self::off(),
-                |user| {
-                    Self::in_folder(etcetera::BaseStrategy::cache_dir(&user).join("pliant").join("meshes"))
-                },
-            ),
+        match folder_of_user() {
+            Some((folder, true)) => Self::in_folder(folder),
+            Some((folder, false)) => Self::in_folder(folder.join("meshes")),
+            None => Self::off(),
         }
     }
 

@@ -65,7 +65,7 @@ pub use assemble::{
     BodyLocator, Built, BuiltBody, Located, Meshing, SizeDoubt, build, build_watched, build_with,
 };
 pub use bound::element_bound;
-pub use cache::MeshCache;
+pub use cache::{MeshCache, cache_folder};
 pub use of_mesh::{SceneOfMesh, is_mesh, scene_of_mesh};
 pub use organ_scene::OrganScene;
 pub use plan::{LimitingElement, Limits, Plan, plan};

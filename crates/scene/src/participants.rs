@@ -314,7 +314,7 @@ impl Scene {
             _ => true,
         };
         if !seen {
-            view = ViewTable { on: None, colour: None, hide: Vec::new(), ..view };
+            view = ViewTable { on: None, colour: None, ..view };
         } else if !coloured {
             view.colour = None;
         }

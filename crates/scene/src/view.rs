@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use pliant_geometry::Labels;
+use pliant_geometry::{CellLabel, Labels, Region, RegionNames};
 
 use crate::assemble::{Built, labels_of, touches};
-use crate::format::{At, BodyModel, ColourBy, CsvTable, FieldName, ViewTable, VtuTable};
+use crate::diagnostic::Diagnostic;
+use crate::format::{At, BodyModel, ColourBy, CsvTable, FieldName, LookTable, ViewTable, VtuTable};
 use crate::registry::OutputTable;
 use crate::scene::Scene;
+use crate::world::World;
 
 impl ViewTable {
     /// Whether the colours are those of labels.
@@ -15,9 +17,18 @@ impl ViewTable {
         matches!(self.colour, Some(ColourBy::Labels(_)))
     }
 
-    /// The labels that it hides of those there are. Others are left out: a scene that asks for them is refused when it is built.
-    pub fn hidden(&self, labels: &Labels) -> Vec<i32> {
-        self.hide.iter().filter_map(|label| labels.find_all(label).ok()).flatten().collect()
+    /// The regions that it hides of those there are. Others are left out: a scene that asks for them is refused when it is built.
+    pub fn hidden(&self, names: &RegionNames) -> Vec<Region> {
+        self.hide.iter().filter_map(|name| names.find(name).ok()).flatten().collect()
+    }
+
+    /// The regions with a look of their own, of those there are.
+    pub fn looks(&self, names: &RegionNames) -> Vec<(Region, LookTable)> {
+        let regions = |name: &String| names.find(&CellLabel::Name(name.clone())).unwrap_or_default();
+        let of = |(name, look): (&String, &LookTable)| {
+            regions(name).into_iter().map(|region| (region, *look)).collect::<Vec<_>>()
+        };
+        self.look.iter().flat_map(of).collect()
     }
 }
 
@@ -34,11 +45,89 @@ impl Built {
         labels_of(&self.model, &self.bodies, &self.surfaces, on)
     }
 
-    /// The labels that a view hides.
-    pub fn hidden(&self, view: &ViewTable) -> Vec<i32> {
-        if view.hide.is_empty() { Vec::new() } else { view.hidden(&self.labels(view.on.as_deref())) }
+    /// The obstacles and tools that its bodies can touch, in the order of their numbers.
+    pub fn rigid_names(&self) -> impl Iterator<Item = &str> {
+        self.contacts.iter().flat_map(|contacts| &contacts.rigids).map(|rigid| rigid.name.as_str())
     }
 }
+
+impl World {
+    /// The labels of a body or a surface by name, or of all bodies.
+    pub fn labels(&self, on: Option<&str>) -> Labels {
+        let mut labels = Labels::default();
+        self.participants
+            .iter()
+            .filter(|part| part.shows(on))
+            .for_each(|part| labels.join(part.built.labels(on)));
+        labels
+    }
+
+    /// The names of bodies, then of obstacles and tools, by their number in what is shown on a body by name, or of all of them. None on a
+    /// surface.
+    pub fn body_names(&self, on: Option<&str>) -> BTreeMap<i32, String> {
+        let shown = self.participants.iter().filter(|part| part.shows(on));
+        let bodies = shown.flat_map(|part| part.built.bodies.iter().map(|body| body.name.as_str()));
+        let things =
+            self.participants.iter().filter(|_| on.is_none()).flat_map(|part| part.built.rigid_names());
+        let named = (0..).zip(bodies.chain(things).map(str::to_owned));
+        named.filter(|(_, name)| on.is_none_or(|on| on == name)).collect()
+    }
+
+    /// Labels and bodies of a body or a surface by name, or of all bodies, obstacles and tools.
+    pub fn region_names(&self, on: Option<&str>) -> RegionNames {
+        RegionNames { labels: self.labels(on), bodies: self.body_names(on) }
+    }
+
+    /// The regions that a view hides.
+    pub fn hidden(&self, view: &ViewTable) -> Vec<Region> {
+        if view.hide.is_empty() { Vec::new() } else { view.hidden(&self.region_names(view.on.as_deref())) }
+    }
+
+    /// Whether a body of a name, or any one, touches something.
+    pub fn touches(&self, on: Option<&str>) -> bool {
+        self.participants.iter().any(|part| part.built.touches(on))
+    }
+
+    /// Finds what the view names and nothing has, and a view that leaves nothing.
+    pub(crate) fn check_view(&self, found: &mut Vec<Diagnostic>) {
+        let view = &self.scene.view;
+        let names = self.region_names(view.on.as_deref());
+        let mut refuse = |path: &[&str], message: String, label: &str, help: &str| {
+            found.push(Diagnostic::error(message).at(self.scene.source.span(path), label).help(help));
+        };
+        let mut hidden = Vec::new();
+        for (index, name) in view.hide.iter().enumerate() {
+            match names.find(name) {
+                Ok(regions) => hidden.extend(regions),
+                Err(error) => {
+                    refuse(
+                        &["view", "hide", &index.to_string()],
+                        error.to_string(),
+                        "nothing of this name",
+                        NAMED,
+                    );
+                }
+            }
+        }
+        for name in view.look.keys() {
+            if let Err(error) = names.find(&CellLabel::Name(name.clone())) {
+                refuse(&["view", "look", name], error.to_string(), "nothing of this name", NAMED);
+            }
+        }
+        let labels: Vec<Region> = names.labels.iter().map(|(label, _)| Region::Label(label)).collect();
+        let bodies: Vec<Region> = names.bodies.keys().map(|&body| Region::Body(body)).collect();
+        for (all, what) in [(labels, "labels"), (bodies, "bodies")] {
+            if !all.is_empty() && all.iter().all(|region| hidden.contains(region)) {
+                let message = format!("all {what} are hidden: nothing is left to be seen");
+                refuse(&["view", "hide"], message, "all", "hide fewer");
+            }
+        }
+    }
+}
+
+/// What can be named in a view.
+const NAMED: &str =
+    "labels of elements by number, name or range, and bodies, obstacles and tools by name can be given";
 
 impl Scene {
     /// The field that colours tell; `None` for the colours of labels and that of tissue.
@@ -54,6 +143,13 @@ impl Scene {
             None if self.shows_surface_of_shell(view) => Some(FieldName::Displacement),
             None => Some(FieldName::VonMises),
         }
+    }
+
+    /// Whether its axes are those of a patient (x to the right, y to the front, z to the head): all bodies are meshed from images.
+    pub fn is_of_patient(&self) -> bool {
+        let meshes = self.bodies.iter().filter(|(_, body)| body.on.is_none()).map(|(_, body)| &body.mesh);
+        let mut images = meshes.map(|mesh| mesh.image.is_some() || mesh.masks.is_some()).peekable();
+        images.peek().is_some() && images.all(|image| image)
     }
 
     /// The body that carries a surface of a name, with its model.
@@ -142,7 +238,6 @@ impl Scene {
 mod tests {
     use super::*;
     use crate::testing::{built, labelled, mistakes, scene};
-    use pliant_geometry::CellLabel;
 
     #[test]
     fn a_surface_has_the_fields_of_its_body_and_a_section_shows_that_body() {
@@ -185,25 +280,31 @@ mod tests {
             labelled(folder.path(), &format!("law = 'tissue'\ndensity = 1000\n[view]\n{view}\n"))
         };
         let scene = bar("colour = 'label'\nhide = ['Tumour', 5]");
-        let built = crate::build(&scene).unwrap_or_else(|error| panic!("{}", error.plain()));
+        let world = World::new(&scene).unwrap_or_else(|error| panic!("{}", error.plain()));
         assert!(scene.view.shows_labels() && scene.shown_field().is_none());
         assert_eq!(scene.shown(0.1).data, [FieldName::Displacement]);
-        assert_eq!(built.hidden(&scene.view), [2, 5]);
-        assert_eq!(built.labels(None).all_shown(), ["1 (liver)", "2 (tumour)", "5"]);
+        assert_eq!(world.hidden(&scene.view), [2, 5].map(Region::Label));
+        assert_eq!(world.labels(None).all_shown(), ["1 (liver)", "2 (tumour)", "5"]);
         let range = ViewTable { hide: vec![CellLabel::Name("2-9".into())], ..scene.view.clone() };
-        assert_eq!(built.hidden(&range), [2, 5]);
+        assert_eq!(world.hidden(&range), [2, 5].map(Region::Label));
         for (view, piece) in [
             ("hide = ['tumor']", "no label is named `tumor`; did you mean `tumour`?"),
             ("hide = [1, 7]", "no cell has label 7: the mesh has 1 (liver), 2 (tumour), 5"),
             ("hide = [1, '2-5']", "all labels are hidden"),
+            ("hide = ['bar']", "all bodies are hidden"),
+            ("look.bat = { opacity = 0.5 }", "nothing that is shown is named `bat`; did you mean `bar`?"),
         ] {
-            let told = crate::build(&bar(view)).unwrap_err().plain().to_string();
+            let told = World::new(&bar(view)).unwrap_err().plain().to_string();
             assert!(told.contains(piece) && told.contains("bar.toml:"), "{view}: {told}");
         }
-        for view in ["colour = 'label'", "hide = [1]"] {
-            let told = mistakes(&format!("[view]\n{view}\n")).plain().to_string();
-            assert!(told.contains("have no labels") && told.contains("cell data `label`"), "{view}: {told}");
-        }
+        let told = mistakes("[view]\ncolour = 'label'\n").plain().to_string();
+        assert!(told.contains("have no labels") && told.contains("cell data `label`"), "{told}");
+        let told =
+            World::new(&crate::testing::scene("[view]\nhide = [1]\n")).unwrap_err().plain().to_string();
+        assert!(
+            told.contains("no cell has label 1") && told.contains("obstacles and tools by name"),
+            "{told}"
+        );
     }
 
     #[test]

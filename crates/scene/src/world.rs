@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use pliant_geometry::Labels;
 #[cfg(feature = "gpu")]
 use pliant_sim::gpu::Device;
 use pliant_sim::{Failure, Guests, PenaltyTie, Simulation};
@@ -10,7 +9,7 @@ use pliant_sim::{Failure, Guests, PenaltyTie, Simulation};
 use crate::assemble::{Built, Meshing, build_watched};
 use crate::cache::MeshCache;
 use crate::diagnostic::{Diagnostic, SceneErrors};
-use crate::format::{FieldName, ViewTable};
+use crate::format::FieldName;
 use crate::plan::{Plan, plan, steps};
 use crate::scene::Scene;
 
@@ -88,6 +87,7 @@ impl World {
         world.meet();
         world.check_ties(&mut found);
         world.check_guests(&mut found);
+        world.check_view(&mut found);
         if found.iter().any(Diagnostic::is_error) {
             return Err(scene.source.errors(found));
         }
@@ -198,26 +198,6 @@ impl World {
     /// Doubts that did not keep the models from being built.
     pub fn warnings(&self) -> impl Iterator<Item = &Diagnostic> {
         self.participants.iter().flat_map(|part| &part.built.warnings)
-    }
-
-    /// The labels of a body or a surface by name, or of all bodies.
-    pub fn labels(&self, on: Option<&str>) -> Labels {
-        let mut labels = Labels::default();
-        self.participants
-            .iter()
-            .filter(|part| part.shows(on))
-            .for_each(|part| labels.join(part.built.labels(on)));
-        labels
-    }
-
-    /// Whether a body of a name, or any one, touches something.
-    pub fn touches(&self, on: Option<&str>) -> bool {
-        self.participants.iter().any(|part| part.built.touches(on))
-    }
-
-    /// The labels that a view hides.
-    pub fn hidden(&self, view: &ViewTable) -> Vec<i32> {
-        if view.hide.is_empty() { Vec::new() } else { view.hidden(&self.labels(view.on.as_deref())) }
     }
 }
 

@@ -9,6 +9,7 @@ use pliant_picture::PointForce;
 use pliant_sim::gpu::PointValue;
 
 use crate::followed::FollowedPoint;
+use crate::marks::Mark;
 
 /// Wall time between two inspections of a state that lies on a device.
 pub const INSPECTION: Duration = Duration::from_millis(250);
@@ -34,6 +35,8 @@ pub(crate) struct Seen {
     pub held: Vec<[[f64; 3]; 2]>,
     /// Forces of contacts, where they are asked for.
     pub contacts: Vec<PointForce>,
+    /// Where bodies are held, moved and loaded, where that is asked for.
+    pub marks: Vec<Mark>,
     /// Points that the user follows.
     pub followed: Vec<FollowedPoint>,
     /// The sample of that instant.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use pliant_geometry::{CellBlock, CellId, Vector3};
+use pliant_geometry::{CellBlock, CellId, Region, Vector3, cell_body};
 use pliant_mechanics::grip::Grip;
 use pliant_picture::{Subject, visible};
 use pliant_run::Live;
@@ -33,14 +33,14 @@ pub(crate) struct Followed {
 }
 
 impl Followed {
-    /// A point of what is drawn `on` a body or a surface, without the cells of hidden labels; `None` of an obstacle or a tool.
+    /// A point of what is drawn `on` a body or a surface, without hidden cells; `None` of an obstacle or a tool.
     pub fn new(
         point: &Point,
         subject: &Subject,
         live: &Live,
         world: &World,
         on: Option<&str>,
-        hidden: &[i32],
+        hidden: &[Region],
     ) -> Option<Self> {
         let grip = Grip { nodes: nodes_of(point, subject, live)?, ..Grip::default() };
         let rest = |&(node, weight): &(u32, f64)| Vector3::from(live.simulation.rest(node)) * weight;
@@ -72,14 +72,13 @@ impl Followed {
 }
 
 /// Body, element and label of a cell that is drawn.
-fn about(cell: CellId, live: &Live, world: &World, on: Option<&str>, hidden: &[i32]) -> Option<String> {
+fn about(cell: CellId, live: &Live, world: &World, on: Option<&str>, hidden: &[Region]) -> Option<String> {
     let seen = visible(live.shown(), hidden);
     let block = seen.block(cell.kind)?;
     let number = |name: &str| block.data.get(name)?.values.get(cell.index as usize).copied();
-    let parts = world.participants.iter().filter(|part| part.shows(on));
-    let mut bodies = parts.flat_map(|part| &part.built.bodies).map(|body| body.name.as_str());
-    let body = on.or_else(|| bodies.nth(number("body").unwrap_or(0.0) as usize))?;
-    // Cells are counted in the whole mesh, those of hidden labels included.
+    let names = world.body_names(on);
+    let body = on.or_else(|| names.get(&cell_body(block, cell.index)).map(String::as_str))?;
+    // Cells are counted in the whole mesh, hidden ones included.
     let own = block.cells().nth(cell.index as usize)?;
     let element = live
         .shown()

@@ -6,7 +6,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use pliant_geometry::Vector3;
+use pliant_geometry::{Region, Vector3};
 use pliant_mechanics::Energies;
 use pliant_picture::{
     PointForce, Subject, contact_forces, critical_cell, deformed_points, drawn_value, nodal_values, visible,
@@ -20,6 +20,7 @@ use pliant_sim::{Failure, State, number};
 use crate::device::{Seen, point_value};
 use crate::followed::{Followed, FollowedPoint};
 use crate::hand::{Hand, Hold, Point};
+use crate::marks::{Mark, marks};
 use crate::parameters::Number;
 use crate::recording::{Break, Done, Move, Recording, Surface};
 use crate::sound::{Sound, SoundStates};
@@ -46,6 +47,8 @@ pub enum Order {
     Hand(Hand),
     /// Goes on as another world from the next step on, from where the run stands: that of numbers which are others than in the file.
     Change(Box<World>, Vec<Number>),
+    /// Finds where bodies are held, moved and loaded in each frame, or not any more.
+    Marks(bool),
     /// Follows a point.
     Probe(Point),
     /// Follows no point any more but those that the scene names.
@@ -96,6 +99,8 @@ pub struct Frame {
     pub held: Vec<[[f64; 3]; 2]>,
     /// Forces of contacts on the nodes, where they are asked for.
     pub contacts: Vec<PointForce>,
+    /// Where bodies are held, moved and loaded, where that is asked for.
+    pub marks: Vec<Mark>,
     /// Points that the user follows, in the order in which they were picked.
     pub followed: Vec<FollowedPoint>,
     /// The tool that the hand holds.
@@ -261,6 +266,8 @@ struct Playback {
     followed: Vec<Followed>,
     columns: Arc<[Column]>,
     seen: Seen,
+    /// Whether marks are found.
+    marked: bool,
     /// Whether every frame comes to ordinary memory.
     in_memory: bool,
 }
@@ -280,8 +287,8 @@ struct Player<'s> {
     subject: Arc<Subject>,
     /// Whether each triangle of the subject can be taken hold of.
     movable: Arc<[bool]>,
-    /// Labels whose cells are not shown.
-    hidden: Vec<i32>,
+    /// Regions whose cells are not shown.
+    hidden: Vec<Region>,
     live: Live,
     /// Whether the state lies on a device.
     on_device: bool,
@@ -366,6 +373,7 @@ impl Playback {
             followed: Vec::new(),
             columns: Arc::default(),
             seen: Seen::default(),
+            marked: false,
             in_memory: false,
         }
     }
@@ -555,6 +563,7 @@ impl<'s> Player<'s> {
             }
             Order::Hand(hand) => self.hold(sent, &hand),
             Order::Change(world, numbers) => playback.change = Some((world, numbers)),
+            Order::Marks(marked) => (playback.marked, playback.seen.at) = (marked, None),
             Order::Probe(point) => self.follow(&point),
             Order::ForgetProbes => {
                 playback.followed.clear();
@@ -773,6 +782,7 @@ impl<'s> Player<'s> {
             seen.sample.extend((now.place - followed.rest()).iter());
             seen.followed.push(now);
         }
+        seen.marks = if playback.marked { marks(self.world, &self.live) } else { Vec::new() };
         seen.number += 1;
         seen.at = Some(Instant::now());
     }
@@ -815,6 +825,7 @@ impl<'s> Player<'s> {
             (frame.least_gap, frame.unconverged) = (playback.seen.least_gap, playback.seen.unconverged);
             frame.held.clone_from(&playback.seen.held);
             frame.contacts.clone_from(&playback.seen.contacts);
+            frame.marks.clone_from(&playback.seen.marks);
             frame.followed.clone_from(&playback.seen.followed);
             frame.sample.clone_from(&playback.seen.sample);
         }

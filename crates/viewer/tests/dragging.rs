@@ -3,6 +3,8 @@
 
 mod support;
 
+use std::time::{Duration, Instant};
+
 use pliant_geometry::Vector3;
 use pliant_testing::Random;
 use pliant_viewer::{Frame, Hand, Order, Point, Session};
@@ -23,10 +25,26 @@ fn walk(random: &mut Random) -> Vector3 {
     Vector3::from_fn(|_, _| random.part() - 0.5) * 2.0
 }
 
-/// So many drags of a second each at a body, each at a place of its own, with a stiffness between 20 and 500 N/m. The run never ends: after
+/// How long a body is dragged.
+enum Until {
+    Drags(u64),
+    Wall(Duration),
+}
+
+impl Until {
+    /// The part of it that is done.
+    fn part(&self, drags: u64, began: Instant) -> f64 {
+        match self {
+            Self::Drags(all) => drags as f64 / *all as f64,
+            Self::Wall(all) => began.elapsed().as_secs_f64() / all.as_secs_f64(),
+        }
+    }
+}
+
+/// Drags of a second each at a body, each at a place of its own, with a stiffness between 20 and 500 N/m. The run never ends: after
 /// a pull that would break it, it is where it was before. All that is shown is a number, and after the first tenth memory grows by less
 /// than a megabyte.
-fn drag(text: &str, drags: u64) {
+fn drag(text: &str, until: &Until) {
     let world = world(text);
     let steps = (1.0 / 60.0 / world.step()).ceil() as u64;
     let subject = subject(&world);
@@ -38,8 +56,10 @@ fn drag(text: &str, drags: u64) {
     let size = (0..3).map(extent).fold(0.0, f64::max);
     let mut session = Session::start(world, || ()).unwrap();
     let (mut random, mut before, mut strongest) = (Random::new(1), None, 0.0_f64);
-    let (mut total, mut broken) = (0, 0);
-    for drag in 0..drags {
+    let (mut total, mut broken, mut drag) = (0, 0, 0);
+    let began = Instant::now();
+    while until.part(drag, began) < 1.0 {
+        drag += 1;
         let triangle = (random.part() * subject.triangle_count() as f64) as u32;
         let stiffness = 20.0 * 25.0_f64.powf(random.part());
         session.order(Order::Hand(Hand::Take(Point { triangle, weights: [0.2, 0.3, 0.5] }, stiffness)));
@@ -70,11 +90,15 @@ fn drag(text: &str, drags: u64) {
         strongest = strongest.max(Vector3::from(frame.held[0][1]).norm());
         session.order(Order::Hand(Hand::Release));
         wait(&mut session, |frame| frame.held.is_empty());
-        if drag == drags / 10 {
+        if before.is_none() && until.part(drag, began) >= 0.1 {
             before = resident();
         }
     }
-    println!("{drags} drags, {total} steps, up to {strongest:.2} N, went back {broken} times");
+    let drags = drag;
+    println!(
+        "{drags} drags in {:.0} s, {total} steps, up to {strongest:.2} N, went back {broken} times",
+        began.elapsed().as_secs_f64()
+    );
     assert!(broken <= drags / 100, "broken {broken} times in {drags} drags");
     if let (Some(before), Some(after)) = (before, resident()) {
         println!("{before} pages after the first tenth, {after} in the end");
@@ -84,13 +108,25 @@ fn drag(text: &str, drags: u64) {
 
 #[test]
 fn random_dragging_breaks_nothing_and_takes_no_more_memory() {
-    drag(BALL, 30);
-    drag(LIVER, 10);
+    drag(BALL, &Until::Drags(30));
+    drag(LIVER, &Until::Drags(10));
+}
+
+/// Wall minutes of dragging at each scene; a quarter unless `PLIANT_DRAG_MINUTES` says another number.
+fn minutes() -> f64 {
+    std::env::var("PLIANT_DRAG_MINUTES").ok().and_then(|minutes| minutes.parse().ok()).unwrap_or(0.25)
 }
 
 #[test]
 #[ignore = "takes minutes"]
 fn an_hour_of_random_dragging() {
     // Larger cells than usual take longer steps: an hour goes by in minutes.
-    drag(&BALL.replace("edge = 0.012", "edge = 0.02"), 3600);
+    drag(&BALL.replace("edge = 0.012", "edge = 0.02"), &Until::Drags(3600));
+    // The usual scenes as they are, one after the other, since they share the memory that is watched.
+    for scene in [
+        include_str!("../../../scenes/stretched-cube/scene.toml"),
+        include_str!("../../../scenes/liver/scene.toml"),
+    ] {
+        drag(scene, &Until::Wall(Duration::from_secs_f64(60.0 * minutes())));
+    }
 }

@@ -498,9 +498,9 @@ fn hand_and_pins_hold_shells_with_every_solver() {
 #[test]
 fn the_examples_start_and_play() {
     let scenes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
-    let names =
-        std::fs::read_dir(&scenes).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
-    for name in names {
+    let entries = std::fs::read_dir(&scenes).unwrap().map(|entry| entry.unwrap());
+    let folders = entries.filter(|entry| entry.path().is_dir());
+    for name in folders.map(|folder| folder.file_name().into_string().unwrap()) {
         let name = name.as_str();
         let (mut source, folder) = pliant_scene::open(&scenes.join(name)).unwrap();
         let settings: &[(&[&str], f64)] = match name {

@@ -10,6 +10,8 @@ use crate::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 pub(super) const SET_PREFIX: &str = "set:";
 /// The texts of a file that name labels.
 pub(super) const LABEL_NAMES: &str = "label-names";
+/// The texts that name bodies, obstacles and tools.
+pub(super) const BODY_NAMES: &str = "body-names";
 
 /// Where the cells that came from one cell of the file are.
 #[derive(Clone, Copy)]

@@ -8,7 +8,7 @@ use std::io::Read;
 use roxmltree::Node;
 
 use super::base64::Base64;
-use super::cells::{Cells, LABEL_NAMES, array_limit, finite_points, index_limit};
+use super::cells::{BODY_NAMES, Cells, LABEL_NAMES, array_limit, finite_points, index_limit};
 use super::cursor::{Cursor, Order, Scalar};
 use super::error::{Fault, Place};
 use super::vtk_cells::{Connectivity, PolyList, add_grid, add_poly};
@@ -184,13 +184,15 @@ impl<'a> Storage<'a> {
         };
         let limit = self.budget;
         let mut notes = Vec::new();
-        let (mut time, mut label_names) = (None, BTreeMap::new());
+        let (mut time, mut label_names, mut body_names) = (None, BTreeMap::new(), BTreeMap::new());
         for array in child(set, "FieldData").into_iter().flat_map(|fields| children(fields, "DataArray")) {
             let name = array.attribute("Name").unwrap_or_default();
             if name.eq_ignore_ascii_case("TimeValue") {
                 time = self.reals(array)?.first().copied().filter(|time| time.is_finite());
             } else if name == LABEL_NAMES && array.attribute("type") == Some("String") {
-                label_names = self.label_names(array)?;
+                label_names = self.numbered_names(array)?;
+            } else if name == BODY_NAMES && array.attribute("type") == Some("String") {
+                body_names = self.numbered_names(array)?;
             }
         }
         let mut points: Vec<Vector3> = Vec::new();
@@ -222,12 +224,12 @@ impl<'a> Storage<'a> {
             cells.add_data(name, array);
         }
         let mut mesh = cells.into_mesh(points, point_data.arrays, &mut notes)?;
-        mesh.label_names = label_names;
+        (mesh.label_names, mesh.body_names) = (label_names, body_names);
         Ok(MeshFile { mesh, format: String::new(), notes, time })
     }
 
     /// The names in texts such as `5 liver`, each ended by a 0. Other texts contain no names.
-    fn label_names(&mut self, array: Node<'a, 'a>) -> Result<BTreeMap<i32, String>, Fault> {
+    fn numbered_names(&mut self, array: Node<'a, 'a>) -> Result<BTreeMap<i32, String>, Fault> {
         let bytes: Bytes<'a> = if is_text(array) {
             let codes = self.words(array, |cursor, what| cursor.integer(format_args!("{what}")))?;
             codes.into_iter().map(|code| u8::try_from(code).unwrap_or(b'?')).collect::<Vec<u8>>().into()

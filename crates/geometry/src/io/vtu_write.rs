@@ -11,7 +11,7 @@ use std::path::Path;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 
-use super::cells::{LABEL_NAMES, SET_PREFIX};
+use super::cells::{BODY_NAMES, LABEL_NAMES, SET_PREFIX};
 use super::vtk_cells::type_number;
 use super::{MeshFileError, base64, check, save};
 use crate::{DataArray, Mesh};
@@ -179,9 +179,10 @@ pub(super) fn write(out: &mut dyn Write, mesh: &Mesh, options: &VtuOptions) -> i
     out.write_all(&parts.xml)
 }
 
-/// The time, and the names of labels: a text such as `5 liver` for each, as byte codes ended by a 0.
+/// The time, and the names of labels and bodies: a text such as `5 liver` for each, as byte codes ended by a 0.
 fn write_field_data(parts: &mut Parts, mesh: &Mesh, options: &VtuOptions) -> io::Result<()> {
-    if options.time.is_none() && mesh.label_names.is_empty() {
+    let names = [(LABEL_NAMES, &mesh.label_names), (BODY_NAMES, &mesh.body_names)];
+    if options.time.is_none() && names.iter().all(|(_, names)| names.is_empty()) {
         return Ok(());
     }
     parts.push("    <FieldData>\n");
@@ -189,15 +190,12 @@ fn write_field_data(parts: &mut Parts, mesh: &Mesh, options: &VtuOptions) -> io:
         parts.push("      <DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\"");
         writeln!(parts.xml, " format=\"ascii\">{time:?}</DataArray>")?;
     }
-    if !mesh.label_names.is_empty() {
-        let count = mesh.label_names.len();
-        write!(
-            parts.xml,
-            "      <DataArray type=\"String\" Name=\"{LABEL_NAMES}\" NumberOfTuples=\"{count}\""
-        )?;
+    for (of, names) in names.into_iter().filter(|(_, names)| !names.is_empty()) {
+        let count = names.len();
+        write!(parts.xml, "      <DataArray type=\"String\" Name=\"{of}\" NumberOfTuples=\"{count}\"")?;
         parts.push(" format=\"ascii\">");
-        for (label, name) in &mesh.label_names {
-            for byte in format!("{label} {name}\0").bytes() {
+        for (number, name) in names {
+            for byte in format!("{number} {name}\0").bytes() {
                 write!(parts.xml, "{byte} ")?;
             }
         }

@@ -1,5 +1,7 @@
 //! A body, all bodies or a carried surface as a mesh with the fields of an instant. Points are at rest.
 
+use std::collections::BTreeMap;
+
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use pliant_mechanics::model::{Cells, Solid};
 use pliant_sim::contact::pose::Pose;
@@ -16,6 +18,8 @@ use pliant_scene::{Built, World};
 pub(crate) struct FieldMesh {
     /// Participants that are shown, by number.
     parts: Vec<(usize, ParticipantMesh)>,
+    /// Names of bodies, obstacles and tools by their number.
+    names: BTreeMap<i32, String>,
     /// Those of several together.
     merged: Option<Mesh>,
 }
@@ -37,11 +41,16 @@ impl FieldMesh {
             let things = world.participants.iter().enumerate();
             parts.extend(things.filter_map(|(index, part)| {
                 let own = ParticipantMesh::of_things(&part.built, &table.data)?;
-                first_body += 1;
-                Some((index, ParticipantMesh { first_body: first_body - 1, ..own }))
+                let own = ParticipantMesh { first_body, ..own };
+                first_body += part.built.rigid_names().count();
+                Some((index, own))
             }));
         }
-        let mut mesh = Self { parts, merged: None };
+        let names = world.body_names(on);
+        if let [(_, only)] = &mut parts[..] {
+            only.mesh.body_names.clone_from(&names);
+        }
+        let mut mesh = Self { parts, names, merged: None };
         mesh.merge();
         mesh
     }
@@ -96,7 +105,7 @@ impl FieldMesh {
     fn merge(&mut self) {
         if self.parts.len() > 1 {
             let meshes: Vec<_> = self.parts.iter().map(|(_, own)| (&own.mesh, own.first_body)).collect();
-            self.merged = Some(merged(&meshes));
+            self.merged = Some(Mesh { body_names: self.names.clone(), ..merged(&meshes) });
         }
     }
 }
@@ -164,6 +173,7 @@ impl ParticipantMesh {
         let mut mesh = Mesh::default();
         let mut block = CellBlock::new(CellKind::Triangle, Vec::new());
         let (mut owners, mut things, mut outward) = (Vec::new(), Vec::new(), Vec::new());
+        let mut bodies = Vec::new();
         for (rigid, index) in contacts.rigids.iter().zip(0..) {
             let surface = rigid.shape.surface(1.3 * (high - low).norm());
             let ways = if rigid.trajectory.grows() {
@@ -178,10 +188,10 @@ impl ParticipantMesh {
             mesh.points.extend(grown.map(|point| (start.pose * nalgebra::Point3::from(point)).coords));
             owners.resize(mesh.points.len(), index);
             block.nodes.extend(triangles.iter().flatten().map(|node| first + node));
+            bodies.resize(block.len(), f64::from(index));
             things.resize(block.len(), if rigid.inside { 2.0 } else { 1.0 });
         }
-        let cells = block.len();
-        block.data.insert("body".into(), DataArray::scalar(vec![0.0; cells]));
+        block.data.insert("body".into(), DataArray::scalar(bodies));
         block.data.insert("thing".into(), DataArray::scalar(things));
         mesh.blocks.push(block);
         let fields = fields.iter().copied().filter(|&field| field == FieldName::Displacement).collect();

@@ -288,37 +288,15 @@ impl Builder<'_> {
         }
     }
 
-    /// Refuses labels that nothing shown has, and a view that leaves nothing.
+    /// Refuses colours of labels that nothing shown has.
     fn check_labels_of_view(&mut self) {
         let view = &self.scene.view;
-        let mut left = labels_of(&self.assembly, &self.bodies, &self.surfaces, view.on.as_deref());
-        let key = if view.hide.is_empty() { "colour" } else { "hide" };
-        if left.is_empty() {
-            if view.shows_labels() || !view.hide.is_empty() {
-                let help =
-                    "meshes of images with several `labels` have them, and mesh files with cell data `label`";
-                let message = "the elements that are shown have no labels";
-                self.error(&["view", key], message, "no labels", help);
-            }
-            return;
-        }
-        let mut hidden = Vec::new();
-        for (index, label) in view.hide.iter().enumerate() {
-            match left.find_all(label) {
-                Ok(found) => hidden.extend(found),
-                Err(error) => {
-                    self.error(&["view", "hide", &index.to_string()], error.to_string(), "no such label", "");
-                }
-            }
-        }
-        left.retain(|label| !hidden.contains(&label));
-        if left.is_empty() {
-            self.error(
-                &["view", "hide"],
-                "all labels are hidden: nothing is left to be seen",
-                "all",
-                "hide fewer",
-            );
+        let labels = labels_of(&self.assembly, &self.bodies, &self.surfaces, view.on.as_deref());
+        if labels.is_empty() && view.shows_labels() {
+            let help =
+                "meshes of images with several `labels` have them, and mesh files with cell data `label`";
+            let message = "the elements that are shown have no labels";
+            self.error(&["view", "colour"], message, "no labels", help);
         }
     }
 

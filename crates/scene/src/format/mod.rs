@@ -33,8 +33,8 @@ pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
 pub use participant::ParticipantTable;
 pub use tie::{Rotations, TieTable};
 pub use view::{
-    BackgroundName, CameraTable, Choice, ClipTable, ColourBy, Component, Labels, MapName, Nothing,
-    TextureName, UpName, ViewTable,
+    BackgroundName, CameraTable, Choice, ClipTable, ColourBy, Component, Labels, LookColour, LookTable,
+    MapName, Nothing, TextureName, UpName, ViewTable,
 };
 
 use pliant_explicit::stability::OnUnstable;

@@ -1,5 +1,7 @@
 //! How a scene is looked at, in pictures and in the window.
 
+use std::collections::BTreeMap;
+
 use pliant_geometry::CellLabel;
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
@@ -26,6 +28,11 @@ impl Choice for BackgroundName {
     const WORDS: &[&str] = &["light", "white", "dark"];
 }
 
+impl Choice for LookColour {
+    const WORDS: &[&str] =
+        &["view", "label", "tissue", "liver", "brain", "colon", "artery", "vein", "tumour", "bone", "steel"];
+}
+
 impl Choice for TextureName {
     const WORDS: &[&str] = &["none", "skin"];
 }
@@ -42,9 +49,14 @@ pub struct ViewTable {
     /// `displacement` on surfaces that shells carry.
     #[serde(default)]
     pub colour: Option<ColourBy>,
-    /// Labels whose elements are left out, so that what lies inside is seen: numbers, names or ranges, as `[2, "tumour", "5-8"]`.
+    /// What is left out, so that what lies inside or behind is seen: labels of elements by number, name or range, and bodies, obstacles and tools by
+    /// name, as `[2, "tumour", "5-8", "grasper"]`. A name that both have is that of the label.
     #[serde(default)]
     pub hide: Vec<CellLabel>,
+    /// What looks otherwise than the rest, by names as in `hide`: `look.liver = { opacity = 0.3, colour = "liver" }`. The opacity goes from 0
+    /// to 1; the colour is `view` (as the rest), `label`, `tissue`, `liver`, `brain`, `colon`, `artery`, `vein`, `tumour`, `bone` or `steel`.
+    #[serde(default)]
+    pub look: BTreeMap<String, LookTable>,
     /// A component of a vector (`x`, `y`, `z`) or a tensor (`xx`, `xy`, …), instead of the size of a vector; a tensor needs one.
     #[serde(default)]
     pub component: Option<Component>,
@@ -79,6 +91,10 @@ pub struct ViewTable {
     /// A plane: what lies on the side of its normal is taken away, and shows what is inside.
     #[serde(default)]
     pub clip: Option<ClipTable>,
+    /// The instant of a single picture [s]; if not given, the end of the run.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub at: Option<f64>,
     /// Where it is seen from.
     #[serde(default)]
     pub camera: CameraTable,
@@ -93,6 +109,54 @@ pub struct ViewTable {
     #[serde(default = "four")]
     #[schemars(range(min = 1, max = 100))]
     pub curved: u32,
+}
+
+/// How a body, an obstacle, a tool or the elements of a label look.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct LookTable {
+    /// From 0, invisible, to 1, opaque: a body of 0.3 shows what lies inside.
+    #[serde(default = "one")]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub opacity: f64,
+    /// What colours it.
+    #[serde(default)]
+    pub colour: LookColour,
+}
+
+impl Default for LookTable {
+    fn default() -> Self {
+        Self { opacity: one(), colour: LookColour::default() }
+    }
+}
+
+/// What colours a body, an obstacle, a tool or the elements of a label.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum LookColour {
+    /// The same as the rest: `colour` of the view; steel for obstacles and tools.
+    #[default]
+    View,
+    /// The colour of each label.
+    Label,
+    /// That of soft tissue.
+    Tissue,
+    /// Dark red.
+    Liver,
+    /// Pale.
+    Brain,
+    /// Rose.
+    Colon,
+    /// Red.
+    Artery,
+    /// Blue.
+    Vein,
+    /// Yellow.
+    Tumour,
+    /// Ivory.
+    Bone,
+    /// Grey.
+    Steel,
 }
 
 fn size() -> [u32; 2] {
@@ -325,5 +389,6 @@ mod tests {
         same::<MapName>();
         same::<BackgroundName>();
         same::<TextureName>();
+        same::<LookColour>();
     }
 }

@@ -8,13 +8,14 @@ use std::time::{Duration, Instant};
 
 use eframe::egui::{self, Align2, Key, PointerButton, vec2};
 use eframe::egui_wgpu::WgpuConfiguration;
-use pliant_geometry::{CellKind, Mesh, Vector3};
+use pliant_geometry::{CellKind, Mesh, RegionNames, Vector3};
 use pliant_picture::{
     Camera, ColourMap, Extremes, Series, SeriesError, Style, Subject, Texture, deformed_points,
     field_choices, nodal_values,
 };
 use pliant_scene::format::FieldName;
 
+use super::bodies::Listed;
 use super::keep::Taking;
 use super::told::{Told, tell};
 use super::viewport::Viewport;
@@ -55,8 +56,8 @@ struct Asked {
 /// A frame that was read.
 struct Loaded {
     asked: Asked,
-    /// The body, where it is another one than in the frame before.
-    subject: Option<Arc<Subject>>,
+    /// The body and the names of its regions, where it is another one than in the frame before.
+    subject: Option<(Arc<Subject>, RegionNames)>,
     points: Vec<Vector3>,
     values: Vec<f64>,
     /// Fields that colours can tell.
@@ -87,7 +88,7 @@ fn loaded(mesh: &Mesh, asked: Asked, before: &mut Option<Shape>) -> Loaded {
     let renewed = before.as_ref() != Some(&shape);
     *before = Some(shape);
     Loaded {
-        subject: renewed.then(|| Arc::new(Subject::new(mesh))),
+        subject: renewed.then(|| (Arc::new(Subject::new(mesh)), RegionNames::of(mesh))),
         points: deformed_points(mesh),
         values: asked.field.as_deref().and_then(|field| nodal_values(mesh, field)).unwrap_or_default(),
         choices: field_choices(mesh),
@@ -160,6 +161,7 @@ struct Finished {
     timeline: Timeline,
     field: Option<String>,
     choices: Vec<String>,
+    listed: Listed,
     asks: Sender<Asked>,
     found: Receiver<Result<Loaded, String>>,
     /// What was asked for last, and what is shown.
@@ -201,6 +203,7 @@ impl Finished {
             timeline,
             field,
             choices: Vec::new(),
+            listed: Listed::default(),
             asks,
             found: receive,
             asked: None,
@@ -232,8 +235,9 @@ impl Finished {
 
     fn show(&mut self, loaded: Loaded) {
         let first = self.port.subject.points.is_empty();
-        if let Some(subject) = &loaded.subject {
-            self.port.renew(subject);
+        if let Some((subject, names)) = loaded.subject {
+            self.port.renew(&subject);
+            self.listed.names = names;
         }
         self.port.set(&loaded.points, &loaded.values);
         if first {
@@ -346,6 +350,9 @@ impl Finished {
         });
         let unit = self.field.as_deref().map_or("", |field| words(field).1);
         self.port.edit_range(ui, unit);
+        ui.separator();
+        ui.heading("Bodies");
+        self.port.regions = self.listed.edit(ui);
         ui.separator();
         ui.heading("Shape");
         let style = &mut self.port.style;

@@ -8,7 +8,7 @@ use eframe::egui::{self, ColorImage, Pos2, Rect, vec2};
 use pliant_geometry::CellLabel;
 use pliant_picture::{Background, Camera, Picture, Plane, Projection, Style, Texture};
 use pliant_scene::diagnostic::Place;
-use pliant_scene::format::{ColourBy, ViewTable};
+use pliant_scene::format::{Choice, ColourBy, LookColour, ViewTable};
 use pliant_scene::source::{Source, Value};
 
 use super::App;
@@ -29,7 +29,7 @@ impl Taking {
         });
     }
 
-    fn taken(&self) -> Option<Arc<ColorImage>> {
+    pub fn taken(&self) -> Option<Arc<ColorImage>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
@@ -43,9 +43,14 @@ impl Taking {
         Some(png.and_then(|png| std::fs::write(file, png).map_err(told)))
     }
 
+    /// The part of the window that the picture covers, once it has come.
+    pub fn picture(&self, context: &egui::Context, rect: Rect) -> Option<Picture> {
+        part(&*self.taken()?, rect, context.pixels_per_point())
+    }
+
     /// Writes the part of the window that the picture covers, once it has come, beside a scene or a run.
     pub fn keep(&self, context: &egui::Context, rect: Rect, beside: &Path) -> Option<Told> {
-        let picture = part(&*self.taken()?, rect, context.pixels_per_point())?;
+        let picture = self.picture(context, rect)?;
         Some(match picture.png() {
             Ok(png) => told(write_beside(beside, "picture", "png", &png)),
             Err(error) => Told::failure(error.to_string()),
@@ -112,6 +117,11 @@ fn view_text(view: &ViewTable, style: &Style, camera: &Camera, cut: Option<Plane
             })
             .collect();
         put("hide", format!("[{}]", hidden.join(", ")));
+    }
+    for (name, look) in &view.look {
+        let colour = LookColour::WORDS[look.colour as usize];
+        let look = format!("{{ opacity = {:?}, colour = {} }}", rounded(look.opacity), toml_text(colour));
+        put(&format!("look.{}", toml_text(name)), look);
     }
     let switches = [
         ("edges", style.edges),
@@ -184,6 +194,13 @@ impl App {
         if ui.button("Picture").on_hover_text("writes the picture beside the scene, as PNG").clicked() {
             self.taking.ask(ui.ctx());
         }
+        if ui
+            .selectable_label(self.filming.is_on(), "Film")
+            .on_hover_text("V: begins a film, and ends and writes it beside the scene")
+            .clicked()
+        {
+            self.film();
+        }
         if ui.button("Copy view").on_hover_text("copies the view as the table [view] of a scene").clicked() {
             ui.ctx().copy_text(self.view_text());
             self.message =
@@ -243,7 +260,8 @@ mod tests {
 
     #[test]
     fn a_copied_view_is_the_view_of_the_scene_that_it_is_pasted_into() {
-        let asked = "[view]\non = 'cube'\ncolour = 'displacement'\ncomponent = 'z'\nhide = [2, '5-8']\n";
+        let asked = "[view]\non = 'cube'\ncolour = 'displacement'\ncomponent = 'z'\nhide = ['cube']\n\
+            look.cube = { opacity = 0.25, colour = 'liver' }\n";
         let view = scene(&format!("{SCENE}{asked}")).view;
         let style = Style {
             map: ColourMap::Magma,
@@ -268,7 +286,7 @@ mod tests {
             (read.range, read.edges, read.ghost, read.wireframe),
             (Some([-1e-3, 0.25]), true, true, false)
         );
-        assert_eq!(read.hide, view.hide);
+        assert_eq!((read.hide, read.look), (view.hide, view.look));
         assert_eq!(read.clip.map(|clip| (clip.point, clip.normal)), Some(([0.5, 0.0, 0.0], [1.0, 0.0, 0.0])));
         let camera = read.camera;
         assert_eq!((camera.azimuth, camera.elevation, camera.orthographic), (12.25, -30.0, true));

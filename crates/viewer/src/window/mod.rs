@@ -1,9 +1,14 @@
 //! The window itself: what is drawn and typed. What is simulated lies behind [`Session`].
 
+mod bodies;
 mod device;
+mod filming;
 mod finished;
 mod followed;
+mod glass;
 mod keep;
+mod led;
+mod opening;
 mod paint;
 mod panels;
 mod parameters;
@@ -22,13 +27,15 @@ use std::time::{Duration, Instant, SystemTime};
 
 use eframe::egui::{self, Key};
 use eframe::egui_wgpu::WgpuConfiguration;
-use pliant_geometry::{Labels, Vector3};
+use pliant_geometry::{RegionNames, Vector3};
 use pliant_picture::{Camera, Style};
 use pliant_scene::format::{FieldName, ViewTable};
 use pliant_sim::gpu::Device;
 
+use self::filming::Filming;
 pub use self::finished::{FinishedRun, open_finished};
 use self::keep::Taking;
+use self::opening::{Browser, remember};
 use self::paint::SAMPLES;
 use self::parameters::Numbers;
 use self::self_test::RunningTest;
@@ -139,8 +146,8 @@ struct App {
     port: Viewport,
     /// What is shown of the scene.
     view: ViewTable,
-    /// The labels that this has.
-    labels: Labels,
+    /// The labels and bodies that this has.
+    names: RegionNames,
     /// Whether every frame comes to ordinary memory.
     in_memory: bool,
     /// The device of the window, if it is one of a solver.
@@ -177,6 +184,12 @@ struct App {
     read: Read,
     /// A scene that is being read.
     reading: Option<Receiver<(PathBuf, Result<World, String>)>>,
+    marks_shown: bool,
+    filming: Filming,
+    /// The tool that keys lead, in the order of tools.
+    led: Option<usize>,
+    /// What can be opened.
+    browser: Browser,
     message: Option<Told>,
     /// What the scene warns of, with the numbers that are played.
     warnings: Vec<String>,
@@ -204,13 +217,13 @@ impl App {
         let port = Viewport::new(context, style, camera)?;
         let session = begin(&world, &context.egui_ctx)?;
         let device = device::shared(state, &world);
-        let app = Self {
+        let mut app = Self {
             session,
             frame: Frame::default(),
             port,
             numbers: Numbers::of(&world.scene),
             view: world.scene.view.clone(),
-            labels: world.labels(world.scene.view.on.as_deref()),
+            names: RegionNames::default(),
             warnings: warnings(&world),
             world,
             in_memory: false,
@@ -236,6 +249,10 @@ impl App {
             looked: Instant::now(),
             read,
             reading: None,
+            marks_shown: false,
+            filming: Filming::default(),
+            led: None,
+            browser: Browser::default(),
             message: None,
             closed: BTreeSet::new(),
             frame_seconds: 0.0,
@@ -249,9 +266,8 @@ impl App {
         if app.record.is_some() {
             app.order(Order::Record);
         }
-        if app.port.cut.on {
-            app.show();
-        }
+        app.show();
+        remember(&app.file);
         // A self-test plays when it is due.
         if app.running_test.is_none() {
             app.order(Order::Play(true));
@@ -312,8 +328,11 @@ impl App {
     }
 
     /// Shows what is asked for; in a section the body in place of a surface that it carries.
-    fn show(&self) {
+    fn show(&mut self) {
         let view = if self.port.cut.on { self.world.scene.in_section(&self.view) } else { self.view.clone() };
+        self.names = self.world.region_names(view.on.as_deref());
+        self.port.patient = self.world.scene.is_of_patient();
+        self.look_at_regions();
         self.order(Order::Show(Box::new(view)));
     }
 
@@ -371,9 +390,9 @@ impl App {
         self.closed.clear();
         self.acts.clear();
         self.forget_probes();
-        self.labels = world.labels(self.view.on.as_deref());
         self.world = world;
         self.changed = modified(&path);
+        remember(&path);
         self.file = path;
         self.samples.clear();
         self.holding = None;
@@ -382,6 +401,7 @@ impl App {
         }
         self.frame.inspections = 0;
         self.session.order(Order::Memory(self.in_memory));
+        self.session.order(Order::Marks(self.marks_shown));
         self.show();
         self.session.order(Order::Speed(self.speed));
         self.session.order(Order::Play(self.frame.playing));
@@ -411,6 +431,22 @@ impl App {
         if self.port.keys(context) {
             self.show();
         }
+        if pressed(Key::O) && context.input(|input| input.modifiers.command) {
+            self.browser.turn(&self.file);
+        }
+        if pressed(Key::M) {
+            self.show_marks(!self.marks_shown);
+        }
+        if pressed(Key::V) {
+            self.film();
+        }
+        if pressed(Key::K) {
+            self.take_next_tool();
+        }
+        self.lead_tool(context);
+        if pressed(Key::Escape) {
+            self.browser.shown = false;
+        }
         if pressed(Key::H) {
             self.help = !self.help;
         }
@@ -438,6 +474,7 @@ impl eframe::App for App {
         self.port.bring(frame);
         self.choose_memory();
         self.take_picture(&context);
+        self.go_on_filming();
         self.keys(&context);
         egui::Panel::top("top").show(ui, |ui| self.top(ui));
         if self.side_shown {
@@ -448,6 +485,7 @@ impl eframe::App for App {
             egui::Panel::bottom("plots").show(ui, |ui| self.plots(ui));
         }
         egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| self.scene(ui));
+        self.browse(&context);
         self.drawn += 1;
         self.go_on_testing();
         context.request_repaint_after(Duration::from_millis(250));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use eframe::egui_wgpu::{self, CallbackResources, CallbackTrait, ScreenDescriptor};
 use eframe::{egui, wgpu};
 use pliant_geometry::Vector3;
-use pliant_picture::{Camera, Drawn, Renderer, Section, Style, Subject, Target};
+use pliant_picture::{Camera, Drawn, Regions, Renderer, Section, Style, Subject, Target};
 
 /// Samples a pixel.
 pub const SAMPLES: u32 = 4;
@@ -30,6 +30,7 @@ pub struct Paint {
     pub values: Arc<Vec<f64>>,
     pub camera: Camera,
     pub style: Style,
+    pub regions: Regions,
     pub aspect: f64,
     /// Set if points or values are other than at the last paint.
     pub fresh: bool,
@@ -64,6 +65,7 @@ impl CallbackTrait for Paint {
             None if self.fresh => drawn.set(queue, &self.points, &self.values),
             None => {}
         }
+        drawn.set_regions(queue, subject, &self.regions, self.style.labels);
         if self.style.critical {
             drawn.mark(queue, subject, self.critical);
         }

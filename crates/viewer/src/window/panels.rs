@@ -1,8 +1,8 @@
 //! The panels around the picture: what is played and shown, and plots.
 
 use eframe::egui;
-use pliant_geometry::{CellLabel, Vector3};
-use pliant_picture::{Background, ColourMap, Texture, label_colour};
+use pliant_geometry::Vector3;
+use pliant_picture::{Background, ColourMap, Texture};
 use pliant_scene::Part;
 use pliant_scene::format::{BodyModel, ColourBy, Component, FieldName, Labels, Nothing, SolverName};
 
@@ -51,6 +51,9 @@ impl App {
                 self.order(Order::Speed(self.speed));
             }
             ui.separator();
+            if ui.button("Open").on_hover_text("Ctrl and O: lists scenes and meshes").clicked() {
+                self.browser.turn(&self.file);
+            }
             if ui.button("Fit").on_hover_text("F").clicked() {
                 self.port.fit();
             }
@@ -98,8 +101,9 @@ impl App {
         };
         egui::ScrollArea::vertical().show(ui, |ui| {
             let colours = folding("Colours").show(ui, |ui| self.colours(ui));
+            let bodies = folding("Bodies").show(ui, |ui| self.bodies(ui));
             let shape = folding("Shape").show(ui, |ui| self.shape(ui));
-            if [colours.body_returned, shape.body_returned].contains(&Some(true)) {
+            if [colours, bodies, shape].map(|part| part.body_returned).contains(&Some(true)) {
                 self.show();
             }
             folding("Hand").show(ui, |ui| self.hand(ui));
@@ -117,7 +121,7 @@ impl App {
             ColourBy::Field(field) => field.title(),
         };
         egui::ComboBox::from_id_salt("field").selected_text(name(colour)).width(180.0).show_ui(ui, |ui| {
-            let plain = [NO_FIELD, LABELS].into_iter().take(if self.labels.is_empty() { 1 } else { 2 });
+            let plain = [NO_FIELD, LABELS].into_iter().take(if self.names.labels.is_empty() { 1 } else { 2 });
             for other in plain.chain(self.fields().into_iter().map(ColourBy::Field)) {
                 ui.selectable_value(&mut colour, other, name(other));
             }
@@ -151,10 +155,7 @@ impl App {
         );
         let unit = self.field().map_or("", FieldName::unit);
         self.port.edit_range(ui, unit);
-        let hidden = !self.labels.is_empty()
-            && (colour == LABELS || !self.view.hide.is_empty())
-            && self.labels_shown(ui);
-        hidden || before != (self.colour(), self.view.component)
+        before != (self.colour(), self.view.component)
     }
 
     /// What colours tell now.
@@ -166,41 +167,17 @@ impl App {
         }
     }
 
-    /// A tick and a swatch for each label; whether other ones are hidden than before.
-    fn labels_shown(&mut self, ui: &mut egui::Ui) -> bool {
-        let before = self.view.hidden(&self.labels);
-        let mut hidden = before.clone();
-        egui::ScrollArea::vertical().id_salt("labels").max_height(260.0).show(ui, |ui| {
-            for (label, name) in self.labels.iter() {
-                ui.horizontal(|ui| {
-                    let (place, _) = ui.allocate_exact_size(egui::vec2(14.0, 14.0), egui::Sense::hover());
-                    let [r, g, b] = label_colour(label);
-                    ui.painter().rect_filled(place, 2.0, egui::Color32::from_rgb(r, g, b));
-                    let mut shown = !hidden.contains(&label);
-                    let text = format!("{label} {}", name.unwrap_or_default());
-                    if ui.checkbox(&mut shown, text.trim_end()).changed() {
-                        hidden.retain(|other| *other != label);
-                        hidden.extend((!shown).then_some(label));
-                    }
-                });
-            }
-        });
-        if !hidden.is_empty() && ui.button("Show all").clicked() {
-            hidden.clear();
-        }
-        // Something has to be left to be seen.
-        let left = self.labels.iter().any(|(label, _)| !hidden.contains(&label));
-        if hidden == before || !left {
-            return false;
-        }
-        self.view.hide = hidden.into_iter().map(CellLabel::Number).collect();
-        true
+    /// Shows where bodies are held, moved and loaded, or not.
+    pub(super) fn show_marks(&mut self, shown: bool) {
+        self.marks_shown = shown;
+        self.order(Order::Marks(shown));
     }
 
     /// What is drawn beside colours; whether another surface is asked for.
     fn shape(&mut self, ui: &mut egui::Ui) -> bool {
         let before = (Surface::of(&self.view), self.view.contacts, self.port.cut.on);
         let scene = &self.world.scene;
+        let is_shell = scene.bodies.iter().any(|(_, body)| body.model == BodyModel::Shell);
         let bodies = scene.bodies.iter().map(|(name, _)| name);
         let names: Vec<&String> = bodies.chain(scene.surfaces.iter().map(|(name, _)| name)).collect();
         if names.len() > 1 {
@@ -211,9 +188,8 @@ impl App {
                     ui.selectable_value(&mut self.view.on, Some(name.clone()), name);
                 }
             });
-            self.labels = self.world.labels(self.view.on.as_deref());
         }
-        if scene.bodies.iter().any(|(_, body)| body.model == BodyModel::Shell) {
+        if is_shell {
             let parts = egui::Slider::new(&mut self.view.curved, 1..=12).text("parts of an edge");
             ui.add(parts)
                 .on_hover_text("how finely the curved surface of shells is drawn; 1: flat triangles");
@@ -225,6 +201,11 @@ impl App {
         ui.checkbox(&mut self.view.critical, "Element that sets the step");
         if self.world.touches(self.view.on.as_deref()) {
             ui.checkbox(&mut self.view.contacts, "Forces of contacts");
+        }
+        let mut marks = self.marks_shown;
+        let told = "M: squares where nodes are held, dots where they are moved, arrows of loads";
+        if ui.checkbox(&mut marks, "Constraints and loads").on_hover_text(told).changed() {
+            self.show_marks(marks);
         }
         ui.checkbox(&mut self.port.style.wireframe, "Wireframe");
         let mut skin = self.port.style.texture == Texture::Skin;

@@ -7,24 +7,32 @@ use pliant_picture::{Camera, arrow_note, arrow_unit, largest_force};
 use super::App;
 use super::viewport::scrolled;
 use crate::hand::{Hand, Point, pick};
+use crate::marks::Marked;
 
 /// Length of the arrow of the strongest force of a pull on the screen.
 const ARROW: f32 = 120.0;
 /// Angle [rad] by which a tool turns for a point on the screen, and by which jaws open for one of the wheel.
-const TURN: f64 = 0.01;
-const OPEN: f64 = 0.002;
+pub(super) const TURN: f64 = 0.01;
+pub(super) const OPEN: f64 = 0.002;
 /// Radius of a point of contact on the screen.
 const DOT: f32 = 2.5;
 /// Radius of a pin on the screen.
 const PIN_SIZE: f32 = 5.0;
 const PIN: Color32 = Color32::from_rgb(20, 90, 170);
+const HELD: Color32 = Color32::from_rgb(40, 44, 52);
+const MOVED: Color32 = Color32::from_rgb(206, 112, 20);
+const LOAD: Color32 = Color32::from_rgb(24, 128, 80);
 const FORCE: Color32 = Color32::from_rgb(190, 40, 40);
 
 /// Keys and what they do, as in `docs/viewer.md`.
-const KEYS: [(&str, &str); 23] = [
+const KEYS: [(&str, &str); 27] = [
     ("drag the body", "pull it"),
     ("drag a tool", "lead it; with Shift turn it about where it is held"),
     ("wheel while dragging a tool", "open and close its jaws"),
+    (
+        "K, arrows, Page Up and Down",
+        "take the next tool, and move it; with Shift turn it; Home and End open and close its jaws",
+    ),
     ("Ctrl or P + click", "pin it; on a pin, take it away"),
     ("Alt + click", "follow a point: read and plot it; two give their distance"),
     ("drag beside it", "turn the view"),
@@ -43,6 +51,9 @@ const KEYS: [(&str, &str); 23] = [
     ("L", "lock the range of colours"),
     ("O", "parallel or perspective"),
     ("Ctrl and + − 0", "larger or smaller text"),
+    ("M", "constraints and loads"),
+    ("V", "begin a film, or end and write it"),
+    ("Ctrl and O", "list what can be opened"),
     ("H", "these keys"),
     ("drop a scene", "open it"),
 ];
@@ -56,6 +67,7 @@ impl App {
         self.port.paint(ui.painter(), self.view.shows_labels(), self.frame.critical, on_device);
         let painter = ui.painter_at(rect);
         self.draw_contacts(&painter);
+        self.draw_marks(&painter);
         self.draw_held(&painter);
         self.port.draw_axes(&painter);
         self.draw_followed(&painter);
@@ -66,7 +78,7 @@ impl App {
         self.draw_figures(&painter);
         if self.help {
             let mut text = String::new();
-            KEYS.iter().for_each(|(key, does)| text.push_str(&format!("{key:<22}{does}\n")));
+            KEYS.iter().for_each(|(key, does)| text.push_str(&format!("{key:<29}{does}\n")));
             let at = rect.center();
             let font = FontId::monospace(13.0);
             let galley = painter.layout_no_wrap(text, font, Color32::from_gray(30));
@@ -108,6 +120,7 @@ impl App {
             match self.hit(self.port.in_picture(origin)) {
                 Some((point, at)) => {
                     self.holding = Some(at);
+                    self.led = None;
                     self.strongest = 0.0;
                     self.act(Hand::Take(point, self.stiffness));
                 }
@@ -125,7 +138,7 @@ impl App {
                 let to = on_plane(&self.port.camera, &at, place, self.port.aspect());
                 self.holding = Some(to);
                 self.act(Hand::Pull(to.into()));
-            } else {
+            } else if self.led.is_none() {
                 self.holding = None;
                 self.act(Hand::Release);
             }
@@ -172,6 +185,33 @@ impl App {
             if from.distance(to) > 2.0 {
                 painter.arrow(from, to - from, Stroke::new(3.0, Color32::WHITE));
                 painter.arrow(from, to - from, Stroke::new(1.5, FORCE));
+            }
+        }
+    }
+
+    /// Squares where nodes are held, dots where they are moved, arrows of loads.
+    fn draw_marks(&self, painter: &egui::Painter) {
+        let loads = self.frame.marks.iter().filter_map(|(place, marked)| match marked {
+            Marked::Loaded(force) => Some([*place, *force]),
+            _ => None,
+        });
+        let unit = arrow_unit(&self.frame.points, largest_force(&loads.collect::<Vec<_>>()));
+        for (place, marked) in &self.frame.marks {
+            let Some(at) = self.port.to_screen(place) else { continue };
+            let square = Rect::from_center_size(at, vec2(2.0 * DOT, 2.0 * DOT));
+            match marked {
+                Marked::Held => {
+                    painter.rect_filled(square.expand(1.0), 0.0, Color32::WHITE);
+                    painter.rect_filled(square, 0.0, HELD);
+                }
+                Marked::Moved => {
+                    painter.circle(at, DOT, MOVED, Stroke::new(1.0, Color32::WHITE));
+                }
+                Marked::Loaded(force) => {
+                    let Some(to) = self.port.to_screen(&(place + force * unit)) else { continue };
+                    painter.arrow(at, to - at, Stroke::new(3.0, Color32::WHITE));
+                    painter.arrow(at, to - at, Stroke::new(1.5, LOAD));
+                }
             }
         }
     }

@@ -12,6 +12,7 @@ use pliant_geometry::Vector3;
 use pliant_picture::{Camera, Projection};
 
 use super::App;
+use super::glass::glass;
 use super::keep::Taking;
 use super::picture::on_plane;
 use super::undo::Act;
@@ -43,21 +44,21 @@ const PATIENCE: Duration = Duration::from_secs(180);
 const SETTLING: f64 = 1.0;
 
 /// Events of one frame.
-type Give = Box<dyn FnOnce(&App) -> Vec<Event>>;
+type Give = Box<dyn FnOnce(&mut App) -> Vec<Event>>;
 /// Whether what has to come of them did; what is wrong.
 type Check = Box<dyn FnMut(&App) -> Result<bool, String>>;
 
 /// What is done in one frame, and what has to come of it before the next.
-struct Cue {
+pub(super) struct Cue {
     what: String,
     give: Option<Give>,
     check: Check,
 }
 
 impl Cue {
-    fn new(
+    pub fn new(
         what: impl Into<String>,
-        give: impl FnOnce(&App) -> Vec<Event> + 'static,
+        give: impl FnOnce(&mut App) -> Vec<Event> + 'static,
         check: impl FnMut(&App) -> Result<bool, String> + 'static,
     ) -> Self {
         Self { what: what.into(), give: Some(Box::new(give)), check: Box::new(check) }
@@ -99,6 +100,7 @@ impl RunningTest {
                     keys()
                         .into_iter()
                         .chain(camera())
+                        .chain(glass())
                         .chain(pinning())
                         .chain(following())
                         .chain(undoing())
@@ -112,7 +114,7 @@ impl RunningTest {
     }
 
     /// The events of a frame.
-    pub(super) fn give(&mut self, app: &App, events: &mut Vec<Event>) {
+    pub(super) fn give(&mut self, app: &mut App, events: &mut Vec<Event>) {
         if let Some(give) = self.cues.front_mut().and_then(|cue| cue.give.take()) {
             events.extend(give(app));
             self.since = Instant::now();
@@ -243,6 +245,20 @@ fn keys() -> Vec<Cue> {
         Cue::key("Space pauses", Key::Space, |app| !app.frame.playing),
         Cue::key("R starts anew", Key::R, |app| app.frame.steps == 0),
         turns("E shows or hides edges", Key::E, |app| app.port.style.edges),
+        holding(Modifiers::COMMAND | Modifiers::CTRL),
+        Cue::key("Ctrl and O lists what can be opened", Key::O, |app| {
+            app.browser.shown && !app.browser.entries.is_empty()
+        }),
+        holding(Modifiers::NONE),
+        Cue::key("V begins a film", Key::V, |app| app.filming.pictures.len() >= 3),
+        Cue::key("V ends the film, which is written", Key::V, |app| {
+            let told = app.message.as_ref().and_then(|told| told.text.split('`').nth(1));
+            let film = told.filter(|path| path.ends_with("-film.png"));
+            film.is_some_and(|path| std::fs::remove_file(path).is_ok())
+        }),
+        Cue::key("Escape closes the list", Key::Escape, |app| !app.browser.shown),
+        Cue::key("M shows where the body is held", Key::M, |app| !app.frame.marks.is_empty()),
+        Cue::key("M hides it", Key::M, |app| app.frame.marks.is_empty()),
         turns("G shows or hides the shape at rest", Key::G, |app| app.port.style.ghost),
         turns("C shows or hides a section", Key::C, |app| app.port.style.clip.is_some()),
         turns("C shows or hides a section", Key::C, |app| app.port.style.clip.is_some()),
@@ -255,7 +271,7 @@ fn keys() -> Vec<Cue> {
 fn turns(what: &str, key: Key, switch: fn(&App) -> bool) -> Cue {
     let before = Rc::new(RefCell::new(false));
     let then = before.clone();
-    let give = move |app: &App| {
+    let give = move |app: &mut App| {
         *before.borrow_mut() = switch(app);
         vec![press(key, true), press(key, false)]
     };
@@ -309,7 +325,7 @@ fn camera() -> Vec<Cue> {
 }
 
 /// A pixel on the body, well inside it.
-fn inside(app: &App) -> Pos2 {
+pub(super) fn inside(app: &App) -> Pos2 {
     let seen = app.port.subject.surface_points();
     let places = seen.iter().filter_map(|&point| app.port.to_screen(&app.port.points[point as usize]));
     let (sum, count) = places.fold((egui::Vec2::ZERO, 0.0_f32), |(sum, n), p| (sum + p.to_vec2(), n + 1.0));
@@ -486,7 +502,7 @@ fn spring(app: &App, place: [f64; 2]) -> Result<(), String> {
 fn portrait(file: PathBuf) -> [Cue; 1] {
     let taking = Taking::default();
     let asking = taking.clone();
-    let give = move |app: &App| {
+    let give = move |app: &mut App| {
         asking.ask(&app.context);
         Vec::new()
     };

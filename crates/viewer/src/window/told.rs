@@ -87,7 +87,7 @@ pub(super) fn tell(ui: &mut Ui, told: Option<&Told>) -> bool {
             ui.label(RichText::new(word).strong().color(ink));
             let ink = if dark { ink.lerp_to_gamma(Color32::WHITE, 0.5) } else { Color32::from_gray(25) };
             ui.label(RichText::new(text).color(ink));
-            ui.small_button("✕").on_hover_text("closes this message").clicked()
+            ui.small_button("×").on_hover_text("closes this message").clicked()
         });
         row.inner
     });

@@ -10,8 +10,8 @@ use eframe::egui_wgpu::Callback;
 use eframe::{CreationContext, Frame, wgpu};
 use pliant_geometry::Vector3;
 use pliant_picture::{
-    Background, Camera, Extremes, MISSING, NO_VALUE, Plane, Projection, Style, Subject, Target, readable,
-    scale_marks,
+    Background, Camera, Extremes, MISSING, NO_VALUE, Plane, Projection, Regions, Style, Subject, Target,
+    readable, scale_marks,
 };
 
 use super::paint::{Paint, SAMPLES, place};
@@ -30,6 +30,9 @@ pub(super) const BESIDE_BAR: f32 = 2.0 * CORNER + 24.0 + BAR as f32;
 /// Colours of x, y and z.
 const COLOURS: [Color32; 3] =
     [Color32::from_rgb(196, 54, 46), Color32::from_rgb(46, 138, 60), Color32::from_rgb(50, 92, 196)];
+/// Letters of the sides of a patient to which x, y and z point, and of the other sides: right and left, front (anterior) and back, head (superior)
+/// and feet.
+const SIDES_OF_PATIENT: [[&str; 2]; 3] = [["R", "L"], ["A", "P"], ["S", "I"]];
 /// Azimuth and elevation [°] of the sides: front, back, left, right, top, bottom.
 const SIDES: [(Key, [f64; 2]); 6] = [
     (Key::Num1, [0.0, 0.0]),
@@ -102,6 +105,10 @@ pub(super) struct Viewport {
     /// From where it is seen at first.
     pub home: Camera,
     pub style: Style,
+    /// Regions with a look of their own.
+    pub regions: Regions,
+    /// Whether the axes are those of a patient.
+    pub patient: bool,
     /// Whether the range stays as it is.
     pub locked: bool,
     /// Whether a part of a body has no value of the field.
@@ -137,6 +144,8 @@ impl Viewport {
             locked: style.range.is_some(),
             cut: Cut::new(style.clip),
             style,
+            regions: Regions::default(),
+            patient: false,
             missing: false,
             surface: Vec::new(),
             rect: Rect::ZERO,
@@ -221,6 +230,7 @@ impl Viewport {
             values: self.values.clone(),
             camera: self.camera,
             style,
+            regions: self.regions.clone(),
             aspect: self.aspect(),
             fresh: std::mem::take(&mut self.fresh),
         };
@@ -405,7 +415,15 @@ impl Viewport {
             painter.arrow(origin, AXES * along, Stroke::new(2.0, COLOURS[axis]));
             let place = origin + (AXES + 9.0) * along;
             let font = FontId::proportional(13.0);
-            painter.text(place, Align2::CENTER_CENTER, ["x", "y", "z"][axis], font, COLOURS[axis]);
+            if self.patient {
+                let [far, near] = SIDES_OF_PATIENT[axis];
+                painter.text(place, Align2::CENTER_CENTER, far, font.clone(), COLOURS[axis]);
+                if along.length() > 0.5 {
+                    painter.text(origin - 14.0 * along, Align2::CENTER_CENTER, near, font, COLOURS[axis]);
+                }
+            } else {
+                painter.text(place, Align2::CENTER_CENTER, ["x", "y", "z"][axis], font, COLOURS[axis]);
+            }
         }
         let pixel = self.camera.height / f64::from(self.rect.height().max(1.0));
         let metres = round_length(BAR * pixel);

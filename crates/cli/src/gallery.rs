@@ -1,0 +1,309 @@
+//! Pictures of all scenes: a page with one of each, and the pictures that a folder lists, made anew where they do not fit their scenes. Files
+//! keep no times that last, so a picture has a hash of the scene and the options that it was made of.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Parser;
+use pliant_picture::Graphics;
+use sha2::{Digest, Sha256};
+
+use crate::arguments::{Arguments, Command, Render};
+use crate::pictures::{claim, is_folder_of_run, render, run_scene, save};
+use crate::report::{Failure, say};
+use crate::signals;
+
+/// The list of pictures in a folder of scenes, and what they were made of.
+const LIST: &str = "gallery.txt";
+const SUMS: &str = "gallery.sums";
+
+/// A picture that a folder lists.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Entry {
+    /// Its file, relative to the folder.
+    file: String,
+    /// The scene, relative to the folder, and options of `pliant render`.
+    words: Vec<String>,
+}
+
+/// A line of the list: a file, a scene and options; `None` of a comment.
+fn entry(line: &str) -> Option<Entry> {
+    let mut words = line.split('#').next()?.split_whitespace().map(str::to_owned);
+    Some(Entry { file: words.next()?, words: words.collect() })
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+    fs::read(path).map_err(|error| Failure::plain(format!("`{}`: {error}", path.display()), "check the path"))
+}
+
+fn entries(folder: &Path) -> Result<Vec<Entry>, Failure> {
+    let list = read(&folder.join(LIST))?;
+    Ok(String::from_utf8_lossy(&list).lines().filter_map(entry).collect())
+}
+
+fn hex(hash: Sha256) -> String {
+    hash.finalize().iter().take(16).map(|byte| format!("{byte:02x}")).collect()
+}
+
+impl Entry {
+    /// A hash of all that it is made of: options, and files of the scene but pictures and texts on it.
+    fn source(&self, folder: &Path) -> Result<String, Failure> {
+        let mut hash = Sha256::new();
+        self.words.iter().for_each(|word| hash.update(format!("{word}\0")));
+        let scene = folder.join(self.words.first().map_or("", String::as_str));
+        let listed = fs::read_dir(&scene).map_err(|error| {
+            Failure::plain(format!("`{}`: {error}", scene.display()), format!("mend the list `{LIST}`"))
+        })?;
+        let mut files: Vec<PathBuf> =
+            listed.flatten().map(|file| file.path()).filter(|path| path.is_file()).collect();
+        files.retain(|path| !matches!(path.extension().and_then(|end| end.to_str()), Some("md" | "png")));
+        files.sort_unstable();
+        for path in files {
+            let content = read(&path)?;
+            hash.update(format!("{} {}\0", path.file_name().unwrap_or_default().display(), content.len()));
+            hash.update(content);
+        }
+        Ok(hex(hash))
+    }
+
+    /// The command that makes it.
+    fn command(&self, folder: &Path, out: &Path) -> Result<Render, Failure> {
+        let file = folder.join(&self.file);
+        let mut words = vec!["pliant".into(), "render".into(), folder.join(&self.words[0]).into_os_string()];
+        for word in &self.words[1..] {
+            words.push(word.into());
+            if word == "--film" {
+                words.push(file.clone().into_os_string());
+            }
+        }
+        words.extend(["--out".into(), out.as_os_str().to_owned()]);
+        match Arguments::try_parse_from(words).map(|typed| typed.command) {
+            Ok(Command::Render(render)) => Ok(*render),
+            Ok(_) => {
+                Err(Failure::plain("only `pliant render` makes pictures", format!("mend the list `{LIST}`")))
+            }
+            Err(error) => {
+                Err(Failure::plain(format!("{}: {error}", self.file), format!("mend the list `{LIST}`")))
+            }
+        }
+    }
+}
+
+/// What pictures were made of, and their own hashes, by their file.
+fn sums(folder: &Path) -> BTreeMap<String, [String; 2]> {
+    let text = fs::read_to_string(folder.join(SUMS)).unwrap_or_default();
+    let line = |line: &str| {
+        let mut words = line.split_whitespace().map(str::to_owned);
+        let [source, picture, file] = [words.next()?, words.next()?, words.next()?];
+        Some((file, [source, picture]))
+    };
+    text.lines().filter_map(line).collect()
+}
+
+fn hash_of(file: &Path) -> Option<String> {
+    let mut hash = Sha256::new();
+    hash.update(fs::read(file).ok()?);
+    Some(hex(hash))
+}
+
+/// Pictures that are not made of what the list has now, or that are other files than were made.
+fn outdated(folder: &Path) -> Result<Vec<Entry>, Failure> {
+    let sums = sums(folder);
+    let mut old = Vec::new();
+    for entry in entries(folder)? {
+        let made = sums.get(&entry.file);
+        let source = entry.source(folder)?;
+        if made.is_none_or(|made| {
+            made[0] != source || hash_of(&folder.join(&entry.file)).as_ref() != Some(&made[1])
+        }) {
+            old.push(entry);
+        }
+    }
+    Ok(old)
+}
+
+/// Makes the pictures anew that do not fit their scenes.
+pub fn renew(folder: &Path) -> Result<ExitCode, Failure> {
+    let old = outdated(folder)?;
+    let space =
+        tempfile::tempdir().map_err(|error| Failure::plain(error, "check the free space, or set TMPDIR"))?;
+    for (index, entry) in old.iter().enumerate() {
+        let out = space.path().join(index.to_string());
+        let command = entry.command(folder, &out)?;
+        let code = render(&command)?;
+        if code != ExitCode::SUCCESS {
+            return Ok(code);
+        }
+        let file = folder.join(&entry.file);
+        let unwritable = |error: std::io::Error| {
+            Failure::plain(format!("`{}`: {error}", file.display()), "check the path")
+        };
+        if command.film.is_none() {
+            let taken = fs::read_dir(&out).map_err(unwritable)?.flatten().next();
+            taken.map_or(Ok(0), |taken| fs::copy(taken.path(), &file)).map_err(unwritable)?;
+        }
+        let mut sums = sums(folder);
+        sums.insert(entry.file.clone(), [entry.source(folder)?, hash_of(&file).unwrap_or_default()]);
+        let lines = sums.iter().map(|(file, [source, picture])| format!("{source} {picture} {file}\n"));
+        fs::write(folder.join(SUMS), lines.collect::<String>()).map_err(unwritable)?;
+        say(format_args!("made {}", file.display()))?;
+    }
+    say(format_args!("{} pictures were made anew, all others fit their scenes", old.len()))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Width of a picture in a gallery [pixels].
+const GALLERY_WIDTH: u32 = 640;
+
+/// The scenes in a folder that is not a scene itself, in alphabetical order.
+pub fn scenes_in(folder: &Path) -> Vec<PathBuf> {
+    if !is_folder_of_run(folder) {
+        return Vec::new();
+    }
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut scenes: Vec<PathBuf> =
+        entries.map(|entry| entry.path()).filter(|path| path.join("scene.toml").is_file()).collect();
+    scenes.sort_unstable();
+    scenes
+}
+
+/// Runs scenes and makes a page with the last picture of each.
+pub fn page(arguments: &Render, scenes: &[PathBuf]) -> Result<ExitCode, Failure> {
+    if arguments.film.is_some() || arguments.frames.is_some() || arguments.series.is_some() {
+        let message = "a gallery has the last picture of each scene";
+        return Err(Failure::plain(message, "omit `--film`, `--frames` and `--series`, or give one scene"));
+    }
+    let graphics = Graphics::open()?;
+    let folder = claim(arguments, |name| name == "README.md" || name.ends_with(".png"))?;
+    let until = arguments.overrides.until.map(|until| format!(" --until {until}")).unwrap_or_default();
+    let (what, out) = (arguments.what.display(), arguments.out.display());
+    let mut page = format!(
+        "# Gallery\n\nMade by `pliant render {what} -o {out}{until}`: the final state of each scene.\n"
+    );
+    let mut failed = false;
+    for scene in scenes {
+        let Some(mut shown) = run_scene(scene, arguments)? else {
+            return Ok(ExitCode::from(signals::exit_code()));
+        };
+        failed |= shown.failed;
+        let name = scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let title = if shown.title.is_empty() { name.clone() } else { shown.title };
+        let [width, height] = shown.look.size;
+        if arguments.size.is_none() {
+            shown.look.size = [GALLERY_WIDTH, (GALLERY_WIDTH * height / width).max(1)];
+        }
+        // The page has the title.
+        shown.look.legend.title.clear();
+        let file = folder.path().join(format!("{name}.png"));
+        let last = shown.series.frames.len() - 1;
+        shown.look.pictures(&graphics, &shown.series, &[last], |_, picture| {
+            save(&folder, &format!("{name}.png"), &picture)
+        })?;
+        say(format_args!("wrote {}", file.display()))?;
+        page.push_str(&format!(
+            "\n## {title}\n\n![{title}]({name}.png)\n\n```sh\npliant render {}{until}\n```\n",
+            scene.display()
+        ));
+    }
+    let path = folder.write("README.md", &page).map_err(|error| Failure::plain(&error, error.remedy))?;
+    say(format_args!("wrote {} ({})", path.display(), graphics.adapter()))?;
+    Ok(ExitCode::from(u8::from(failed)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn repository() -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+    }
+
+    #[test]
+    fn lines_name_a_file_a_scene_and_options() {
+        let read = entry("../docs/a.png  liver --until 1 # quick").unwrap();
+        assert_eq!(
+            (read.file.as_str(), &read.words[..]),
+            ("../docs/a.png", &["liver", "--until", "1"].map(String::from)[..])
+        );
+        assert_eq!((entry("# a comment"), entry("")), (None, None));
+        let film = Entry { words: ["liver", "--film"].map(String::from).to_vec(), ..read };
+        let command = film.command(Path::new("scenes"), Path::new("out")).unwrap();
+        assert_eq!(command.film.as_deref(), Some(Path::new("scenes/../docs/a.png")));
+    }
+
+    /// Where this fails, make the pictures anew: `pliant render scenes --gallery`.
+    #[test]
+    fn pictures_of_this_repository_fit_their_scenes() {
+        let old = outdated(&repository().join("scenes")).unwrap();
+        let files: Vec<&str> = old.iter().map(|entry| entry.file.as_str()).collect();
+        assert!(
+            files.is_empty(),
+            "older than their scenes: {files:?}; make them by `pliant render scenes --gallery`"
+        );
+    }
+
+    #[test]
+    fn a_change_of_a_scene_or_of_a_picture_is_seen() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("ball")).unwrap();
+        fs::write(at("ball/scene.toml"), "[scene]").unwrap();
+        fs::write(at(LIST), "ball.png ball --until 1").unwrap();
+        fs::write(at("ball.png"), "a picture").unwrap();
+        let old = || outdated(folder.path()).unwrap().len();
+        assert_eq!(old(), 1, "never made");
+        let source = entries(folder.path()).unwrap()[0].source(folder.path()).unwrap();
+        fs::write(at(SUMS), format!("{source} {} ball.png\n", hash_of(&at("ball.png")).unwrap())).unwrap();
+        assert_eq!(old(), 0);
+        fs::write(at("ball/README.md"), "a text").unwrap();
+        assert_eq!(old(), 0, "texts are not drawn");
+        fs::write(at("ball/scene.toml"), "[scene] # other").unwrap();
+        assert_eq!(old(), 1);
+        fs::write(at("ball/scene.toml"), "[scene]").unwrap();
+        fs::write(at("ball.png"), "another").unwrap();
+        assert_eq!(old(), 1);
+        fs::write(at(LIST), "ball.png ball --until 2").unwrap();
+        assert_eq!(old(), 1);
+    }
+
+    /// All pictures that texts show are listed, but those of the window and of data that is not here; and so is each scene.
+    #[test]
+    fn pictures_in_texts_are_listed() {
+        let listed = entries(&repository().join("scenes")).unwrap();
+        let listed_scenes: Vec<String> = listed.iter().map(|entry| entry.words[0].clone()).collect();
+        let listed: Vec<PathBuf> = listed
+            .iter()
+            .filter_map(|entry| repository().join("scenes").join(&entry.file).canonicalize().ok())
+            .collect();
+        let folder =
+            |path: &str| fs::read_dir(repository().join(path)).unwrap().flatten().map(|file| file.path());
+        let mut texts: Vec<PathBuf> = ["", "docs", "docs/gallery"].into_iter().flat_map(folder).collect();
+        texts.extend(
+            folder("scenes")
+                .flat_map(|scene| fs::read_dir(scene).into_iter().flatten().flatten())
+                .map(|file| file.path()),
+        );
+        texts.retain(|path| path.extension().is_some_and(|end| end == "md"));
+        for scene in scenes_in(&repository().join("scenes")) {
+            let name = scene.file_name().unwrap().to_string_lossy().into_owned();
+            assert!(listed_scenes.contains(&name), "scenes/{LIST} has no picture of {name}");
+        }
+        for text in texts {
+            let content = fs::read_to_string(&text).unwrap();
+            for link in
+                content.split("](").skip(1).filter_map(|rest| rest.split_once(')')).map(|(link, _)| link)
+            {
+                if !link.ends_with(".png") || ELSEWHERE.iter().any(|name| link.ends_with(name)) {
+                    continue;
+                }
+                let picture = text.parent().unwrap().join(link).canonicalize().unwrap();
+                assert!(listed.contains(&picture), "{}: {link} is not in scenes/{LIST}", text.display());
+            }
+        }
+    }
+
+    /// Made by `pliant view --rehearse`, and of a brain from an image.
+    const ELSEWHERE: [&str; 2] = ["window.png", "labels.png"];
+}

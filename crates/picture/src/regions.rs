@@ -1,0 +1,84 @@
+//! Regions of a picture (labels, bodies, obstacles and tools): which are hidden, through which one sees, and what colours them.
+
+use pliant_geometry::Region;
+
+use crate::colour::{label_colour, linear};
+use crate::style::{Material, PLAIN};
+
+/// What colours a region.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Paint {
+    /// The same as all bodies: values, labels or the colour of tissue; that of steel for obstacles and tools.
+    #[default]
+    AsAll,
+    /// The colour of each label.
+    Labels,
+    /// One colour.
+    Plain(Material),
+}
+
+/// How a region looks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coat {
+    /// From 0, which hides it, to 1, through which nothing is seen.
+    pub opacity: f64,
+    /// What colours it.
+    pub paint: Paint,
+}
+
+impl Default for Coat {
+    fn default() -> Self {
+        Self { opacity: 1.0, paint: Paint::AsAll }
+    }
+}
+
+/// Regions that are hidden, and those with a look of their own.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Regions {
+    /// Those whose cells are left out.
+    pub hidden: Vec<Region>,
+    /// Those with a coat; that of a label counts more than that of a body.
+    pub coats: Vec<(Region, Coat)>,
+}
+
+/// What cells have in common that look alike.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Kind {
+    pub label: Option<i32>,
+    pub body: i32,
+    /// Whether it is an obstacle or a tool.
+    pub thing: bool,
+}
+
+impl Regions {
+    /// The coat of cells.
+    pub(crate) fn coat(&self, kind: Kind) -> Coat {
+        let of = |is_label: bool| {
+            let mut coats =
+                self.coats.iter().filter(|(region, _)| matches!(region, Region::Label(_)) == is_label);
+            coats.find(|(region, _)| region.has(kind.label, kind.body)).map(|(_, coat)| *coat)
+        };
+        of(true).or_else(|| of(false)).unwrap_or_default()
+    }
+}
+
+/// Colours that are none, for the shader: that of the value, and that of tissue.
+const OF_VALUE: f32 = -1.0;
+const OF_TISSUE: f32 = -2.0;
+
+/// What the shader takes of cells: light of their colour and opacity; with `labels`, colours show labels.
+pub(crate) fn light(kind: Kind, coat: Coat, labels: bool) -> [f32; 4] {
+    let opacity = coat.opacity.clamp(0.0, 1.0) as f32;
+    let of = |bytes: [u8; 3]| {
+        let [r, g, b] = bytes.map(linear);
+        [r, g, b, opacity]
+    };
+    let none = |which: f32| [which, 0.0, 0.0, opacity];
+    match coat.paint {
+        Paint::Plain(material) if material.colour() == PLAIN => none(OF_TISSUE),
+        Paint::Plain(material) => of(material.colour()),
+        Paint::AsAll if kind.thing => of(Material::Steel.colour()),
+        Paint::AsAll if !labels => none(OF_VALUE),
+        Paint::AsAll | Paint::Labels => kind.label.map_or(none(OF_TISSUE), |label| of(label_colour(label))),
+    }
+}

@@ -1,0 +1,50 @@
+//! Regions as a view has them, for pictures.
+
+use pliant_geometry::RegionNames;
+use pliant_picture::{Coat, Material, Paint, Regions};
+use pliant_scene::format::{LookColour, LookTable, ViewTable};
+
+/// What a view hides of some regions, and those with a look of their own.
+pub fn regions_of(view: &ViewTable, names: &RegionNames) -> Regions {
+    let coats = view.looks(names).into_iter().map(|(region, look)| (region, coat_of(look)));
+    Regions { hidden: view.hidden(names), coats: coats.collect() }
+}
+
+/// How a picture draws what a scene gives a look of its own.
+pub fn coat_of(look: LookTable) -> Coat {
+    Coat { opacity: look.opacity, paint: paint_of(look.colour) }
+}
+
+/// What colours a region.
+fn paint_of(colour: LookColour) -> Paint {
+    Paint::Plain(match colour {
+        LookColour::View => return Paint::AsAll,
+        LookColour::Label => return Paint::Labels,
+        LookColour::Tissue => Material::Tissue,
+        LookColour::Liver => Material::Liver,
+        LookColour::Brain => Material::Brain,
+        LookColour::Colon => Material::Colon,
+        LookColour::Artery => Material::Artery,
+        LookColour::Vein => Material::Vein,
+        LookColour::Tumour => Material::Tumour,
+        LookColour::Bone => Material::Bone,
+        LookColour::Steel => Material::Steel,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use pliant_scene::format::Choice;
+
+    use super::*;
+
+    #[test]
+    fn words_of_scenes_and_of_materials_are_the_same() {
+        let words = LookColour::WORDS;
+        let paints: Vec<Paint> =
+            words.iter().map(|word| paint_of(LookColour::of_word(word).unwrap())).collect();
+        assert_eq!(paints[..2], [Paint::AsAll, Paint::Labels]);
+        assert_eq!(paints[2..], Material::ALL.map(Paint::Plain));
+        assert_eq!(words[2..], Material::ALL.map(Material::name));
+    }
+}

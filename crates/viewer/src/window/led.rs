@@ -1,0 +1,69 @@
+//! Tools that are led by keys.
+
+use eframe::egui::{self, Key};
+use pliant_geometry::Vector3;
+
+use super::App;
+use super::picture::{OPEN, TURN};
+use crate::hand::{Hand, Point};
+
+/// How far a tool goes in a second while a key is held, over the height of the picture; by how many points of the mouse it turns, and of
+/// the wheel its jaws open.
+const SPEED: f64 = 0.15;
+const TURNS: f64 = 60.0;
+const OPENS: f64 = 300.0;
+/// Seconds of a frame, at most.
+const LONGEST: f64 = 0.1;
+
+impl App {
+    /// Takes hold of the next tool, or lets go after the last one.
+    pub(super) fn take_next_tool(&mut self) {
+        if self.holding.is_some() {
+            self.holding = None;
+            self.act(Hand::Release);
+        }
+        let movable = |triangle: u32| self.frame.movable.get(triangle as usize).copied().unwrap_or(false);
+        let tools: Vec<u32> = self.port.subject.things().into_iter().filter(|&tool| movable(tool)).collect();
+        let next = self.led.map_or(0, |led| led + 1);
+        self.led = tools.get(next).map(|_| next);
+        let Some(&triangle) = tools.get(next) else { return };
+        let Some(corners) = self.port.subject.triangles().nth(triangle as usize) else { return };
+        let middle = corners.iter().map(|&point| self.port.points[point as usize]).sum::<Vector3>() / 3.0;
+        self.holding = Some(middle);
+        self.strongest = 0.0;
+        self.act(Hand::Take(Point { triangle, weights: [1.0 / 3.0; 3] }, self.stiffness));
+    }
+
+    /// Moves the tool that keys lead: arrows across the view, Page Up and Page Down along it; with Shift arrows turn it; Home and End open
+    /// and close its jaws.
+    pub(super) fn lead_tool(&mut self, context: &egui::Context) {
+        let (Some(_), Some(at)) = (self.led, self.holding) else {
+            self.led = None;
+            return;
+        };
+        let (seconds, shift) =
+            context.input(|input| (f64::from(input.stable_dt).min(LONGEST), input.modifiers.shift));
+        let held = |plus, minus| {
+            let is = |key| f64::from(u8::from(context.input(|input| input.key_down(key))));
+            is(plus) - is(minus)
+        };
+        let [right, up, towards] = self.port.camera.axes();
+        let [x, y] = [held(Key::ArrowRight, Key::ArrowLeft), held(Key::ArrowUp, Key::ArrowDown)];
+        let (depth, opening) = (held(Key::PageDown, Key::PageUp), held(Key::Home, Key::End));
+        if shift && (x, y) != (0.0, 0.0) {
+            let turn = (up * x - right * y) * (TURNS * TURN * seconds);
+            self.act(Hand::Turn(turn.into()));
+        } else if (x, y, depth) != (0.0, 0.0, 0.0) {
+            let to =
+                at + (right * x + up * y + towards * depth) * (SPEED * self.port.camera.height * seconds);
+            self.holding = Some(to);
+            self.act(Hand::Pull(to.into()));
+        }
+        if opening != 0.0 {
+            self.act(Hand::Open(OPENS * OPEN * opening * seconds));
+        }
+        if [x, y, depth, opening].iter().any(|way| *way != 0.0) {
+            context.request_repaint();
+        }
+    }
+}

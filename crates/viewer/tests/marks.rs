@@ -1,0 +1,64 @@
+//! Constraints and loads are marked where the body is now.
+
+mod support;
+
+use pliant_geometry::Vector3;
+use pliant_viewer::{Marked, Order, Session};
+use support::{wait, world};
+
+/// A bar that is held at one end, moved at the other one, and pressed from above.
+const BAR: &str = r#"
+[scene]
+until = 100
+[run]
+threads = 1
+[law.tissue]
+type = "neo-hookean"
+young-modulus = 1e4
+poisson-ratio = 0.3
+[body.bar]
+mesh = { block = { size = [0.2, 0.1, 0.1], cells = [4, 2, 2] } }
+law = "tissue"
+density = 1000
+damping = 20
+[constraint.wall]
+type = "fix"
+body = "bar"
+nodes = { set = "x-min" }
+[constraint.pull]
+type = "move"
+body = "bar"
+nodes = { set = "x-max" }
+by = [0.02, 0, 0]
+curve = "ramp"
+to = 0.1
+[load.weight]
+type = "pressure"
+on = "bar"
+faces = { set = "z-max" }
+pressure = 50
+curve = "hold"
+"#;
+
+#[test]
+fn held_moved_and_loaded_nodes_are_marked_where_they_are() {
+    let mut session = Session::start(world(BAR), || ()).unwrap();
+    session.order(Order::Step(1));
+    assert!(wait(&mut session, |frame| frame.steps >= 1).marks.is_empty());
+    session.order(Order::Marks(true));
+    session.order(Order::Step(2000));
+    let frame = wait(&mut session, |frame| frame.time > 0.1 && !frame.marks.is_empty());
+    let of = |is: fn(&Marked) -> bool| -> Vec<(Vector3, Marked)> {
+        frame.marks.iter().filter(|(_, marked)| is(marked)).copied().collect()
+    };
+    let (held, moved) = (of(|m| *m == Marked::Held), of(|m| *m == Marked::Moved));
+    assert_eq!((held.len(), moved.len()), (9, 9));
+    let [low, high] = [&held, &moved].map(|marks| marks.iter().map(|(place, _)| place.x).collect::<Vec<_>>());
+    assert!(low.iter().all(|x| (x - low[0]).abs() < 1e-12));
+    assert!(high.iter().all(|x| (x - low[0] - 0.22).abs() < 1e-6), "{high:?}");
+    let force: Vector3 = (of(|m| matches!(m, Marked::Loaded(_))).iter())
+        .map(|(_, marked)| if let Marked::Loaded(force) = marked { *force } else { Vector3::zeros() })
+        .sum();
+    // The pressure times the area of the upper side, which the pull stretches by a tenth and thins, and slopes a little.
+    assert!(force.z < -0.9 && force.z > -1.2 && force.y.abs() < 1e-3, "{force:?}");
+}
