@@ -223,7 +223,12 @@ fn pressed_at_a_barrier(quarter: &Quarter, depths: &[f64], near_pole: f64) -> Ve
     let settings = BarrierSettings { distance: BARRIER, stiffness: 1e4, creep_speed: 1e-3 };
     let model = Assembly {
         rotary_inertia: vec![0.0; quarter.model.rest.len()],
-        touching: Some(Touching { contacts, settings: vec![settings], check_crossings: false }),
+        touching: Some(Touching {
+            contacts,
+            settings: vec![settings],
+            levels: Vec::new(),
+            check_crossings: false,
+        }),
         model: Arc::new(quarter.model.clone()),
         ..Assembly::default()
     };

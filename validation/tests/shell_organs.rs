@@ -487,6 +487,7 @@ fn valve_leaflets_coapt_and_hold_their_pressure() {
     valve.model.touching = Some(Touching {
         contacts: Arc::new(Contacts { rigids: Vec::new(), contacts: vec![contact], ..Default::default() }),
         settings: vec![settings],
+        levels: Vec::new(),
         check_crossings: true,
     });
     let settings = DynamicSettings { iterations: 200, ..DynamicSettings::new(2e-3) };

@@ -158,9 +158,7 @@ pub(crate) fn descend(
         let part = solver.part();
         let Vectors { system, increment, .. } = solver.vectors();
         let part = match &mut system.touching {
-            Some(touching) => {
-                touching.barriers.allowed(&state.position, increment, touching.share, [KEEP[0], part])
-            }
+            Some(touching) => touching.allowed(state, increment, [KEEP[0], part]),
             None => part,
         };
         (before.energy, before.size) = energy(solver);
@@ -208,8 +206,7 @@ fn begin(solver: &mut impl Contacting, state: &State, times: [f64; 2], guess: Op
     }
     system.follow(increment);
     if let Some(touching) = &mut system.touching {
-        touching.barriers.begin(&state.position, increment, times);
-        touching.share = 0.0;
+        touching.begin(state, increment, times);
     }
 }
 
@@ -232,7 +229,7 @@ fn start_from(
     }
     system.follow(increment);
     let Some(touching) = &mut system.touching else { return Ok(false) };
-    let part = touching.barriers.allowed(&state.position, increment, 0.0, [KEEP[1], 1.0]);
+    let part = touching.allowed(state, increment, [KEEP[1], 1.0]);
     system.advance(state, increment, part);
     put(solver, part);
     let Vectors { pending, .. } = solver.vectors();
@@ -391,6 +388,11 @@ fn search(
             Err(error) => return Err(error),
         }
         part *= 0.5;
+        let Vectors { system, increment, .. } = solver.vectors();
+        if let Some(touching) = system.touching.as_mut().filter(|touching| touching.is_curved()) {
+            touching.share = before.share;
+            part = touching.allowed(&before.state, increment, [KEEP[0], part]);
+        }
     }
     broken.map_or(Ok(None), Err)
 }
@@ -411,7 +413,7 @@ fn expand(
             increment.iter_mut().for_each(|way| *way *= 2.0);
         }
         let Some(touching) = &mut system.touching else { return Ok(()) };
-        let part = touching.barriers.allowed(&state.position, increment, touching.share, [KEEP[0], 1.0]);
+        let part = touching.allowed(state, increment, [KEEP[0], 1.0]);
         let falls = part == 1.0 && {
             system.advance(state, increment, 1.0);
             match solver.evaluate(state, time, false) {

@@ -56,6 +56,7 @@ mod recover;
 mod relaxation;
 mod resolution;
 mod rotation;
+mod samples;
 mod solid;
 mod sparse;
 mod state;

@@ -193,22 +193,23 @@ impl LowerMatrix {
         column == NONE || row == NONE || self.rows(column).binary_search(&row).is_ok()
     }
 
-    /// Adds to the translations of two nodes that the pattern couples, of which the first has the higher number or is the same.
+    /// Adds to so many components of two nodes that the pattern couples, translations first; the first node has the higher number or is the
+    /// same.
     pub(crate) fn add_node_block(
         &mut self,
         equations: &Equations,
         [row_node, column_node]: [u32; 2],
+        components: usize,
         entry: impl Fn(usize, usize) -> f64,
     ) {
         let first = equations.first(row_node);
-        let columns = &equations.number[6 * column_node as usize..6 * column_node as usize + 3];
+        let columns = &equations.number[6 * column_node as usize..][..components];
         // The columns of a node that is free have the same rows, but for those above their diagonals: one search finds the place in all.
         let places = columns.iter().all(|&column| column != NONE && first != NONE).then(|| {
             let start = self.column_start[columns[0] as usize];
             self.base(equations, row_node, columns[0]).wrapping_sub(start)
         });
-        for j in 0..3 {
-            let column = columns[j];
+        for (j, &column) in columns.iter().enumerate() {
             if column == NONE || first == NONE {
                 continue;
             }
@@ -218,15 +219,14 @@ impl LowerMatrix {
                 }
                 None => self.base(equations, row_node, column),
             };
-            for i in 0..3 {
-                let row = equations.number[6 * row_node as usize + i];
+            for (i, &row) in equations.number[6 * row_node as usize..][..components].iter().enumerate() {
                 if row == NONE || row < column {
                     continue;
                 }
                 let at = base.wrapping_add(row - first) as usize;
                 self.value[at] += entry(i, j);
                 if !self.mirror.is_empty() {
-                    self.mirror[at] += entry(j, i);
+                    self.mirror[at] += entry(i, j);
                 }
             }
         }

@@ -147,6 +147,10 @@ impl System {
         let facets = model.facets.iter().map(|facet| &facet.nodes[..]);
         let stars = system.stars.iter().flatten().flat_map(|stars| stars.nodes.iter().map(Vec::as_slice));
         let pairs = system.touching.as_ref().map_or(&[][..], |touching| touching.pairs());
+        // Contacts on curved surfaces couple rotations, too.
+        let is_curved = system.touching.as_ref().is_some_and(|touching| touching.is_curved());
+        let (pairs, turning) = if is_curved { (&[][..], pairs) } else { (pairs, &[][..]) };
+        let turning = turning.iter().map(|pair| &pair[..]);
         let followers = system.followers.as_ref();
         let expand = |nodes: &[u32], turns: bool| {
             let own = || (nodes.to_vec(), if turns { 6 } else { 3 });
@@ -163,11 +167,11 @@ impl System {
         };
         *matrix = match followers {
             None => {
-                let cells = facets.chain(model.solid_cells()).chain(stars);
+                let cells = facets.chain(model.solid_cells()).chain(stars).chain(turning);
                 LowerMatrix::new(&system.equations, cells, pairs)
             }
             Some(_) => {
-                let cells = expanded.iter().map(|(nodes, _)| nodes.as_slice());
+                let cells = expanded.iter().map(|(nodes, _)| nodes.as_slice()).chain(turning);
                 LowerMatrix::new(&system.equations, cells, pairs)
             }
         };

@@ -1,6 +1,6 @@
 //! Contacts of a model in its equations: their forces are loads and their stiffness is added to that of the cells. The pattern of the matrix grows
 //! with the pairs that may come near, and by more than those, so that it changes seldom. What pushes a tied node pushes those that it
-//! follows.
+//! follows, and what pushes a point of the curved surface of a shell the nodes that move it.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,15 +10,20 @@ use pliant_contact::barrier::{BarrierSettings, Barriers, Matrix12, Meeting, Node
 use pliant_contact::lag::Lag;
 use pliant_contact::pose::Leg;
 use pliant_contact::touch::{Contact, Contacts, With};
-use pliant_mechanics::Model;
 
+use crate::assembly::Assembly;
 use crate::error::SolveError;
 use crate::followers::Followers;
+use crate::samples::{Movers, Samples};
 use crate::sparse::{Equations, LowerMatrix};
 use crate::state::State;
 
 /// Pairs of nodes kept in the pattern at most, over those that are needed.
 const ROOM: usize = 2;
+/// How often an increment is shortened because points of curved surfaces are not free on their way.
+const SHORTENED: usize = 60;
+/// Part of what is free that is tried next.
+const SHORTER: f64 = 0.9;
 /// How near pairs are, beyond the reach of their barrier and over its distance, that are taken into the pattern when it lacks some.
 const SOON: f64 = 0.3;
 
@@ -29,19 +34,36 @@ pub struct Touching {
     pub contacts: Arc<Contacts>,
     /// How each contact acts.
     pub settings: Vec<BarrierSettings>,
+    /// How often triangles of shells are divided into four on their curved surface, for each contact; empty: never.
+    pub levels: Vec<u8>,
     /// Whether each state that is accepted is searched for edges that go through triangles, which would be an error of the program.
     pub check_crossings: bool,
 }
 
 impl Touching {
-    /// The contacts at work, with nodes at rest where those of a model are.
-    pub fn barriers(&self, model: &Model) -> Barriers {
-        Barriers::new(Arc::clone(&self.contacts), &self.settings, &model.rest)
+    /// The contacts at work, with nodes at rest where those of a model are, and the points of theirs that are no nodes.
+    fn made(&self, model: &Assembly) -> (Barriers, Option<Samples>) {
+        match Samples::of(model, &self.contacts, &self.levels) {
+            None => (Barriers::new(Arc::clone(&self.contacts), &self.settings, &model.rest), None),
+            Some((samples, contacts)) => {
+                let rest: Vec<[f64; 3]> = samples.places.iter().map(|&place| place.into()).collect();
+                (Barriers::new(Arc::new(contacts), &self.settings, &rest), Some(samples))
+            }
+        }
+    }
+
+    /// Of each contact the pairs that never touch, since they are too near at rest.
+    pub fn apart_counts(&self, model: &Assembly) -> Vec<usize> {
+        self.made(model).0.apart_counts()
     }
 
     /// Whatever has no gap at a state: a run can't start there.
-    pub fn meetings(&self, model: &Model, state: &State) -> Vec<Meeting> {
-        self.barriers(model).meetings(&state.position, state.time)
+    pub fn meetings(&self, model: &Assembly, state: &State) -> Vec<Meeting> {
+        let (mut barriers, samples) = self.made(model);
+        let Some(mut samples) = samples else { return barriers.meetings(&state.position, state.time) };
+        samples.place(model, state);
+        let met = barriers.meetings(&samples.places, state.time);
+        met.into_iter().map(|one| Meeting { node: samples.node_at(model, one.node), ..one }).collect()
     }
 }
 
@@ -62,7 +84,10 @@ pub struct TouchingNow {
 
 /// Contacts in the equations of a solver.
 pub struct TouchingSystem {
+    model: Arc<Assembly>,
     pub(crate) barriers: Barriers,
+    /// Points of contacts that are no nodes, and forces on nodes and them, six each; `None` where surfaces are flat.
+    samples: Option<(Samples, Vec<f64>)>,
     /// How far rigid things have gone in the step, from 0 to 1.
     pub(crate) share: f64,
     /// Forces on nodes, six a node, and on the second side of each contact.
@@ -87,14 +112,21 @@ pub struct TouchingSystem {
 const CLOSE: f64 = 1e-3;
 
 impl TouchingSystem {
-    pub(crate) fn new(touching: &Touching, model: &Model) -> Self {
+    pub(crate) fn new(touching: &Touching, model: &Arc<Assembly>) -> Self {
         let nearest =
             touching.settings.iter().map(|settings| settings.distance).fold(f64::INFINITY, f64::min);
         let rigids = touching.contacts.rigids.iter().zip(0..);
         let limited = rigids.filter(|(rigid, _)| rigid.trajectory.limit().is_some());
+        let (barriers, samples) = touching.made(model);
+        let samples = samples.map(|samples| {
+            let forces = vec![0.0; 6 * samples.places.len()];
+            (samples, forces)
+        });
         Self {
+            model: Arc::clone(model),
+            samples,
             lags: limited.map(|(_, number)| Lag::new(number)).collect(),
-            barriers: touching.barriers(model),
+            barriers,
             share: 1.0,
             forces: vec![0.0; 6 * model.rest.len()],
             given: vec![0.0; 6 * model.rest.len()],
@@ -107,12 +139,65 @@ impl TouchingSystem {
         }
     }
 
+    /// Begins a step between two times [s] at a state, expected to go by a motion, six numbers a node. Friction is that of the start.
+    pub(crate) fn begin(&mut self, state: &State, motion: &[f64], times: [f64; 2]) {
+        match &mut self.samples {
+            None => self.barriers.begin(&state.position, motion, times),
+            Some((samples, _)) => {
+                samples.place(&self.model, state);
+                samples.move_along(&self.model, state, motion, 1.0);
+                self.barriers.begin(&samples.places, &samples.motion, times);
+            }
+        }
+        self.share = 0.0;
+    }
+
+    /// The part of an increment (six numbers a node), of so much of it at most, from a state on that leaves at least half of a part of every gap.
+    /// Points of curved surfaces go on straight ways to where they come: if these are free, nothing has gone through anything.
+    pub(crate) fn allowed(&mut self, state: &State, increment: &[f64], [keep, most]: [f64; 2]) -> f64 {
+        let Some((samples, _)) = &mut self.samples else {
+            return self.barriers.allowed(&state.position, increment, self.share, [keep, most]);
+        };
+        samples.place(&self.model, state);
+        let mut part = most;
+        for _ in 0..SHORTENED {
+            if part == 0.0 {
+                break;
+            }
+            samples.move_along(&self.model, state, increment, part);
+            let free = self.barriers.allowed(&samples.places, &samples.motion, self.share, [keep, part]);
+            if free >= part {
+                return part;
+            }
+            part = (SHORTER * free).max(0.5 * part);
+        }
+        0.0
+    }
+
+    /// Whether points go on other ways than nodes, so that a part of an increment that is free says nothing of less of it.
+    pub(crate) fn is_curved(&self) -> bool {
+        self.samples.is_some()
+    }
+
     /// Finds forces and energy at a state.
     pub(crate) fn evaluate(&mut self, state: &State, followers: Option<&Followers>) {
-        self.energy = self.barriers.evaluate(&state.position, self.share);
         self.forces.fill(0.0);
-        if self.energy.is_finite() {
-            self.barriers.add_forces(&mut self.forces, &mut self.totals);
+        match &mut self.samples {
+            None => {
+                self.energy = self.barriers.evaluate(&state.position, self.share);
+                if self.energy.is_finite() {
+                    self.barriers.add_forces(&mut self.forces, &mut self.totals);
+                }
+            }
+            Some((samples, all)) => {
+                samples.place(&self.model, state);
+                self.energy = self.barriers.evaluate(&samples.places, self.share);
+                all.fill(0.0);
+                if self.energy.is_finite() {
+                    self.barriers.add_forces(all, &mut self.totals);
+                }
+                samples.give_back(&self.model, all, &mut self.forces);
+            }
         }
         self.given.copy_from_slice(&self.forces);
         if let Some(followers) = followers {
@@ -136,17 +221,26 @@ impl TouchingSystem {
         let still = vec![0.0; self.forces.len()];
         let shifts = self.lags.iter().map(|lag| (lag.rigid() as u32, [lag.now(); 2]));
         *self.barriers.shifts_mut() = shifts.collect();
-        self.barriers.begin(&state.position, &still, [state.time; 2]);
+        self.begin(state, &still, [state.time; 2]);
         self.share = 1.0;
         self.evaluate(state, None);
-        self.touches = self.barriers.touches(&self.touches);
+        self.touches = self.touched();
         self.now()
     }
 
     /// Ends a step at the state last evaluated, a time [s]: nodes have slid in it, and tools are where they lag.
     pub(crate) fn end_step(&mut self, time: f64) {
-        self.touches = self.barriers.touches(&self.touches);
+        self.touches = self.touched();
         self.lags.iter_mut().for_each(|lag| lag.advance(time));
+    }
+
+    /// Nodes that touch something at the state last evaluated; what touches between them is shared out.
+    fn touched(&self) -> Vec<NodeTouch> {
+        let share = |number: u32, found: &mut dyn FnMut(u32, f64)| match &self.samples {
+            Some((samples, _)) => samples.shares(&self.model, number, found),
+            None => found(number, 1.0),
+        };
+        self.barriers.touches(&self.touches, share)
     }
 
     /// Goes on where another one stood: with nodes that touch something, increasing, and the lags of tools.
@@ -228,15 +322,17 @@ impl TouchingSystem {
         followers: Option<&Followers>,
     ) -> bool {
         let mut lacks = false;
+        let movers =
+            Movers { model: &self.model, followers, samples: self.samples.as_ref().map(|own| &own.0) };
         self.barriers.acting(|nodes| {
-            each_pair(nodes, followers, |pair| lacks = lacks || !matrix.couples(equations, pair));
+            movers.each_pair(nodes, |pair| lacks = lacks || !matrix.couples(equations, pair));
         });
         if !lacks {
             return false;
         }
         let mut needed = Vec::new();
-        self.barriers.acting(|nodes| each_pair(nodes, followers, |pair| needed.push(pair)));
-        self.barriers.near(SOON, |nodes| each_pair(nodes, followers, |pair| needed.push(pair)));
+        self.barriers.acting(|nodes| movers.each_pair(nodes, |pair| needed.push(pair)));
+        self.barriers.near(SOON, |nodes| movers.each_pair(nodes, |pair| needed.push(pair)));
         needed.sort_unstable();
         needed.dedup();
         if self.pairs.len() > ROOM * needed.len() {
@@ -258,6 +354,10 @@ impl TouchingSystem {
         moved: &[f64],
         coupling: &mut [f64],
     ) {
+        if let Some((samples, _)) = &self.samples {
+            let movers = Movers { model: &self.model, followers, samples: Some(samples) };
+            return movers.add_stiffness(&self.barriers, self.share, equations, matrix, moved, coupling);
+        }
         let nodes = self.barriers.node_count();
         // Nodes that move those of a row: their number, its place in the row, and their weight.
         let mut movers: Vec<(u32, usize, f64)> = Vec::new();
@@ -272,7 +372,7 @@ impl TouchingSystem {
                 for &(column_node, column, v) in &movers {
                     if row_node >= column_node {
                         let entry = |i, j| w * v * block[(3 * row + i, 3 * column + j)];
-                        matrix.add_node_block(equations, [row_node, column_node], entry);
+                        matrix.add_node_block(equations, [row_node, column_node], 3, entry);
                     }
                 }
             }
@@ -305,7 +405,11 @@ impl TouchingSystem {
         let (mut count, mut first) = (0, None);
         self.barriers.crossings(|contact, ends, corners| {
             count += 1;
-            first.get_or_insert((contact, ends, corners));
+            let node = |number: u32| match &self.samples {
+                Some((samples, _)) => samples.node_at(&self.model, number),
+                None => number,
+            };
+            first.get_or_insert_with(|| (contact, ends.map(node), corners.map(node)));
         });
         match first {
             Some((contact, edge, triangle)) => {
@@ -316,23 +420,8 @@ impl TouchingSystem {
     }
 }
 
-/// Calls back with each pair of the nodes that move these, the lower number first.
-fn each_pair(nodes: &[u32], followers: Option<&Followers>, mut found: impl FnMut([u32; 2])) {
-    for (at, &a) in nodes.iter().enumerate() {
-        for &b in &nodes[..at] {
-            movers_of(a, followers, |a, _| {
-                movers_of(b, followers, |b, _| {
-                    if a != b {
-                        found([a.min(b), a.max(b)]);
-                    }
-                });
-            });
-        }
-    }
-}
-
 /// Calls back with the nodes that move a node, and their weights: itself, or those that it is tied to.
-fn movers_of(node: u32, followers: Option<&Followers>, mut found: impl FnMut(u32, f64)) {
+pub(crate) fn movers_of(node: u32, followers: Option<&Followers>, mut found: impl FnMut(u32, f64)) {
     match followers.filter(|followers| followers.follows(node)) {
         None => found(node, 1.0),
         Some(followers) => followers.weights(node).for_each(|(node, weight)| found(node, weight)),
@@ -340,6 +429,6 @@ fn movers_of(node: u32, followers: Option<&Followers>, mut found: impl FnMut(u32
 }
 
 /// Whether the part of a node in a stiffness that is never negative is not zero.
-fn acts(block: &Matrix12, at: usize) -> bool {
+pub(crate) fn acts(block: &Matrix12, at: usize) -> bool {
     (3 * at..3 * at + 3).any(|k| block[(k, k)] != 0.0)
 }

@@ -42,8 +42,11 @@ pub trait Mapping<S: ?Sized> {
     }
 }
 
+/// What sums may be off by, over the sizes of their parts.
+const ROUND_OFF: f64 = 1e-12;
+
 /// Checks a mapping at some points, for those who write one: forces go back by the transpose (⟨J v, f⟩ = ⟨v, Jᵀ f⟩) and keep their sum
-/// and their moment, to 1e-10; velocities are the change of positions between two states a time apart [s], to 1e-6. `node` gives
+/// and their moment, to 1e-12 of what is summed up; velocities are the change of positions between two states a time apart [s], to 1e-6. `node` gives
 /// position, velocity and spin of a node in between, where the mapping is asked.
 ///
 /// # Errors
@@ -59,18 +62,22 @@ pub fn check<S>(
         let force = [0.3, -0.7, 0.5];
         let (place, velocity) = (mapping.position(state, point), mapping.velocity(state, point));
         let (mut power, mut sum, mut moment) = (0.0, [0.0; 3], [0.0; 3]);
+        // Of the parts that are summed up.
+        let mut sizes = [0.0; 3];
         mapping.add_force(state, point, force, &mut |at, own, turning| {
             let [x, v, w] = node(at);
             power += dot(v, own) + dot(w, turning);
             sum = add(sum, own);
             moment = add(moment, add(cross(x, own), turning));
+            let [x, v, w, own, turning] = [x, v, w, own, turning].map(|vector| dot(vector, vector).sqrt());
+            sizes = add(sizes, [v * own + w * turning, own, x * own + turning]);
         });
         let moved = sub(mapping.position(after, point), mapping.position(before, point));
         let largest = |v: Vector<f64>| v.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
         let checks = [
-            ("the transpose", power - dot(velocity, force), 1e-10),
-            ("the sum of forces", largest(sub(sum, force)), 1e-10),
-            ("their moment", largest(sub(moment, cross(place, force))), 1e-10),
+            ("the transpose", power - dot(velocity, force), ROUND_OFF * sizes[0]),
+            ("the sum of forces", largest(sub(sum, force)), ROUND_OFF * sizes[1]),
+            ("their moment", largest(sub(moment, cross(place, force))), ROUND_OFF * sizes[2]),
             ("the velocity", largest(sub(scale(moved, 1.0 / apart), velocity)), 1e-6),
         ];
         if let Some((what, off, _)) =

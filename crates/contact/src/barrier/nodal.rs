@@ -23,8 +23,12 @@ pub struct NodeTouch {
 impl Barriers {
     /// All nodes within the reach of a barrier at the state last evaluated, by increasing node. `before` has them at the start of the step:
     /// their slip goes on by the length of the way that they went in it along what they touch, the mean of all that bears on a node, weighted by
-    /// its forces.
-    pub fn touches(&self, before: &[NodeTouch]) -> Vec<NodeTouch> {
+    /// its forces. `share` calls back with the nodes that a node of the contacts stands for and their parts in it: itself, or those around it.
+    pub fn touches(
+        &self,
+        before: &[NodeTouch],
+        share: impl Fn(u32, &mut dyn FnMut(u32, f64)),
+    ) -> Vec<NodeTouch> {
         let mut all: BTreeMap<u32, (f64, Vector3<f64>, [f64; 2])> = BTreeMap::new();
         for row in self.rows() {
             let way = self.way(&row.stencil);
@@ -33,11 +37,14 @@ impl Barriers {
                 if node as usize >= self.node_count() || c == 0.0 {
                     continue;
                 }
-                let own = all.entry(node).or_insert((f64::INFINITY, Vector3::zeros(), [0.0; 2]));
-                let load = c.abs() * row.force;
-                own.0 = own.0.min(row.gap);
-                own.1 += row.force_on(at);
-                own.2 = [own.2[0] + load, own.2[1] + load * slip];
+                let push = row.force_on(at);
+                share(node, &mut |node, part| {
+                    let own = all.entry(node).or_insert((f64::INFINITY, Vector3::zeros(), [0.0; 2]));
+                    let load = part * c.abs() * row.force;
+                    own.0 = own.0.min(row.gap);
+                    own.1 += push * part;
+                    own.2 = [own.2[0] + load, own.2[1] + load * slip];
+                });
             }
         }
         let slid = |node: u32| {

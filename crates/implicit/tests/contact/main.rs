@@ -50,7 +50,8 @@ fn at_rigid(own: &Surface, rigids: Vec<Rigid>, friction: f64, offset: f64) -> Co
 /// Gives a model contacts that all act in one way.
 fn touch(model: &mut Assembly, contacts: Contacts, settings: BarrierSettings) {
     let settings = vec![settings; contacts.contacts.len()];
-    model.touching = Some(Touching { contacts: Arc::new(contacts), settings, check_crossings: true });
+    model.touching =
+        Some(Touching { contacts: Arc::new(contacts), settings, levels: Vec::new(), check_crossings: true });
 }
 
 /// The sum of vectors of nodes by their masses, over the mass.

@@ -235,6 +235,7 @@ pub fn widened(divisions: Divisions, young: f64, radii: &[f64]) -> Result<Vec<Wi
     vessel.model.touching = Some(Touching {
         contacts: Arc::new(Contacts { rigids: vec![balloon], contacts: vec![contact], ..Default::default() }),
         settings: vec![barrier],
+        levels: Vec::new(),
         check_crossings: false,
     });
     let settings = StaticSettings { iterations: 200, ..StaticSettings::default() };

@@ -1,7 +1,7 @@
 //! Fields of contacts by a barrier: pressure and gap of a node, and how far it slides.
 
 use pliant_geometry::{CellKind, io};
-use pliant_testing::scenes::{last_row, resumes, run};
+use pliant_testing::scenes::{last_row, resumes, run, world};
 
 use super::barriers::{HELD, pressed};
 
@@ -97,6 +97,9 @@ fn fields_go_on_with_the_same_bits_in_a_resumed_run() {
         .replace("by = [0, 0, -0.003]\nto = 0.4", "by = [0.004, 0, -0.003]\nto = 0.8")
         .replace("'gap']", "'contact-pressure', 'gap', 'slip']");
     resumes(&text);
+    for colour in ["contact-pressure", "slip"] {
+        world(&format!("{text}[view]\ncolour = '{colour}'\n")).unwrap();
+    }
     let row = last_row(&text);
     assert!(row["probe.top.slip"] > 1e-4 && row["probe.top.contact-pressure"] > 0.0, "{row:?}");
 }

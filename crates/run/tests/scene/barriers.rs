@@ -45,7 +45,7 @@ fn a_tool_presses_a_body_onto_an_obstacle_by_barriers() {
 }
 
 /// A piece of cloth that falls onto a ball and itself.
-fn cloth(more: &str) -> String {
+pub(super) fn cloth(more: &str) -> String {
     format!(
         "[scene]\nuntil = 1\ngravity = [0, 0, -9.81]\n[run]\nsolver = 'implicit'\nstep = 0.02\ntolerance = 1e-4\ncheckpoint = {{ every = 0.4 }}\n\
          [law.cotton]\ntype = 'neo-hookean'\nyoung-modulus = 1e5\npoisson-ratio = 0.3\n\

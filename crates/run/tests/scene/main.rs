@@ -1,6 +1,7 @@
 //! Scenes without the binary. One program for all files here; run those of a file with `cargo test -p pliant-run --test scene grips::`.
 
 mod angioplasty;
+mod barrier_curved;
 mod barrier_fields;
 mod barriers;
 mod bars;

@@ -1,6 +1,6 @@
 //! Contacts of the solvers `implicit` and `static`: how their barriers act, and whether bodies are apart at the start.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
 use pliant_geometry::Vector3;
@@ -28,6 +28,7 @@ const LISTED: usize = 3;
 #[derive(Debug, Default)]
 pub(super) struct BarrierTables {
     settings: Vec<BarrierSettings>,
+    levels: Vec<u8>,
     /// The table of each contact.
     tables: Vec<String>,
     check: bool,
@@ -45,6 +46,7 @@ impl Builder<'_> {
             ("barrier-distance", table.barrier_distance.is_some(), true),
             ("barrier-stiffness", table.barrier_stiffness.is_some(), true),
             ("creep-speed", table.creep_speed.is_some(), true),
+            ("subdivision", table.subdivision.is_some(), true),
             ("check-intersections", table.check_intersections, true),
             ("separate", table.separate, false),
         ];
@@ -90,8 +92,9 @@ impl Builder<'_> {
             Partner::Body(other) => 0.5 * (thick(bodies[0]) + thick(other)),
             Partner::Rigid(_) => 0.5 * thick(bodies[0]),
         });
+        let level = self.level(name, table, &bodies)?;
         if own == with {
-            let altitude = ALTITUDE * self.least_altitude(surface);
+            let altitude = ALTITUDE * self.least_altitude(surface) / f64::from(1 << level);
             if offset + distance > altitude {
                 let kept = (altitude - distance).max(0.0);
                 let message = format!(
@@ -109,6 +112,7 @@ impl Builder<'_> {
             stiffness,
             creep_speed: table.creep_speed.unwrap_or(CREEP),
         });
+        barriers.levels.push(level);
         barriers.tables.push(name.into());
         barriers.check |= table.check_intersections;
         Some(offset)
@@ -116,16 +120,15 @@ impl Builder<'_> {
 
     /// Gives the contacts to the model, unless bodies have no gap at the start.
     pub(super) fn touch(&mut self, contacts: &Arc<Contacts>, barriers: BarrierTables, start: &State) {
-        let BarrierTables { settings, tables, check } = barriers;
-        let touching = Touching { contacts: Arc::clone(contacts), settings, check_crossings: check };
+        let BarrierTables { settings, levels, tables, check } = barriers;
+        let touching = Touching { contacts: Arc::clone(contacts), settings, levels, check_crossings: check };
         let met = touching.meetings(&self.assembly, start);
         let mut of_contacts = BTreeMap::<u32, Vec<Meeting>>::new();
         met.into_iter().for_each(|one| of_contacts.entry(one.contact).or_default().push(one));
         for (contact, met) in &of_contacts {
             self.refuse_meetings(&contacts.contacts[*contact as usize].name, &tables[*contact as usize], met);
         }
-        for (contact, count) in contacts.contacts.iter().zip(touching.barriers(&self.assembly).apart_counts())
-        {
+        for (contact, count) in contacts.contacts.iter().zip(touching.apart_counts(&self.assembly)) {
             if count > 0 {
                 self.notes.push(format!(
                     "contact `{}`: {} of nodes with triangles or of edges never touch, since they are too near at rest",
@@ -135,6 +138,37 @@ impl Builder<'_> {
             }
         }
         self.assembly.touching = Some(touching);
+    }
+
+    /// How often the triangles of shells among these bodies are divided.
+    fn level(&mut self, name: &str, table: &ContactTable, bodies: &[usize]) -> Option<u8> {
+        let level = table.subdivision.unwrap_or(0);
+        if level == 0 {
+            return Some(0);
+        }
+        let path = ["contact", name, "subdivision"];
+        let shells: Vec<usize> =
+            bodies.iter().copied().filter(|&body| self.shell_cells(body).is_some()).collect();
+        if shells.is_empty() {
+            let names: Vec<String> =
+                bodies.iter().map(|&body| format!("`{}`", self.bodies[body].name)).collect();
+            let message = format!("only shells have a curved surface, and {} is none", names.join(" or "));
+            self.error(&path, message, "no shell", "leave it out");
+            return None;
+        }
+        let follows = self.assembly.followers();
+        let turns: HashSet<u32> = self.assembly.turns.iter().map(|turn| turn.node).collect();
+        let bound = shells
+            .iter()
+            .flat_map(|&body| self.assembly.bodies[body].all_nodes())
+            .find(|node| follows[*node as usize] || turns.contains(node));
+        if let Some(node) = bound {
+            let (body, node) = self.assembly.locate_node(node);
+            let message = format!("node {node} of `{}` follows others by a tie", self.bodies[body].name);
+            self.error(&path, message, "bound to others", "leave it out: flat triangles touch then");
+            return None;
+        }
+        Some(level)
     }
 
     fn refuse_meetings(&mut self, contact: &str, table: &str, met: &[Meeting]) {

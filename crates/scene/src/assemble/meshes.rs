@@ -245,7 +245,7 @@ impl Builder<'_> {
                 self.notes.push(format!("`{}` is made of {} separate parts", path[1], found.components));
             }
         }
-        problems.is_empty()
+        problems.is_empty() && (dimension != 2 || self.check_slivers(mesh, path, &place))
     }
 
     /// Warns of a size that no organ has.

@@ -18,6 +18,7 @@ mod node_vectors;
 mod obstacles;
 mod separate;
 mod sheets;
+mod slivers;
 mod surfaces;
 mod ties;
 mod turns;

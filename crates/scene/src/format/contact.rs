@@ -296,6 +296,11 @@ pub struct ContactTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub barrier_stiffness: Option<f64>,
+    /// How often each triangle of a shell is divided into four on its curved surface, which touches in its place: 0, flat triangles, 1 or 2. With the
+    /// solvers `implicit` and `static`.
+    #[serde(default)]
+    #[schemars(range(max = 2))]
+    pub subdivision: Option<u8>,
     /// Speed [m/s] below which bodies creep that friction should hold, with the solvers `implicit` and `static`; 0.001 if not given.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
