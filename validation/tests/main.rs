@@ -12,6 +12,7 @@ mod elements;
 mod energy_balance;
 mod failures;
 mod immersed_hexes;
+mod lens_bag;
 mod loads;
 mod material_points;
 mod momentum;

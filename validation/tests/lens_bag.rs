@@ -1,0 +1,49 @@
+//! `scenes/lens/bag.toml`: a lens is folded, pushed through a tube of 2.6 mm and comes into a capsular bag that deforms. Each state is searched for edges that go
+//! through triangles; one would end the run.
+
+use std::path::Path;
+
+use pliant_scene::{Scene, World, open};
+
+/// Where the tube ends along y [m].
+const TUBE_ENDS: f64 = 30e-3;
+/// The size of the force [N] between the lens and the bag above which they touch: the lens weighs 0.14 mN.
+const TOUCHES: f64 = 1e-4;
+
+/// Up to 4.3 s, when the lens has left the tube and begins to unfold: 1 to 3 minutes.
+#[test]
+#[ignore = "takes 1 to 3 minutes"]
+fn a_lens_is_injected_into_a_bag_that_deforms() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/lens/bag.toml");
+    let (source, folder) = open(&path).unwrap();
+    let scene = Scene::from_source(source, folder).unwrap_or_else(|error| panic!("{}", error.plain()));
+    assert!(scene.contacts.iter().any(|(_, contact)| contact.check_intersections));
+    let world = World::new(&scene).unwrap_or_else(|error| panic!("{}", error.plain()));
+    let part = &world.participants[0].built;
+    let body = part.bodies.iter().find(|body| body.name == "lens").unwrap();
+    let rest = body.mesh.points.clone();
+    let optic: Vec<usize> = (0..rest.len()).filter(|&node| rest[node].norm() < 3.01e-3).collect();
+    let mut simulation = world.simulation().unwrap();
+    let (mut steps, mut touched, mut largest) = (0_u32, 0_u32, 0.0_f64);
+    let mut left = f64::INFINITY;
+    simulation
+        .run(4.3, |frame| {
+            steps += 1;
+            let force = frame.contact_force("bag").unwrap();
+            touched += u32::from(force.iter().any(|x| x.abs() > TOUCHES));
+            let moved = frame.displacements("lens").unwrap();
+            let out = optic.iter().all(|&node| rest[node].y + moved[node][1] > TUBE_ENDS);
+            if out && left.is_infinite() {
+                left = frame.time();
+            }
+            let bag = frame.displacements("bag").unwrap();
+            let size = |u: &[f64; 3]| u.iter().map(|x| x * x).sum::<f64>().sqrt();
+            largest = bag.iter().map(size).fold(largest, f64::max);
+        })
+        .unwrap_or_else(|failure| panic!("{failure}"));
+    println!(
+        "{steps} states; the optic is out of the tube at {left:.2} s; lens and bag touch in {touched}, the bag gives way by {:.2} mm",
+        1e3 * largest
+    );
+    assert!(steps == 431 && left < 4.3 && touched > 0 && largest > 5e-4);
+}
