@@ -6,12 +6,13 @@ use super::advance::{Kind, Query, allowed};
 use super::distance::Mollifier;
 use super::law::{Barrier, Slip};
 use super::rows::{Mollified, Row, Stencil};
-use super::surfaces::{BarrierSide, around};
+use super::surfaces::BarrierSide;
+use super::wide::{Apart, ROUND_OFF, Sort, Wide, bound, common, other};
 
 /// Rest distances, over the reach, up to which parts of one surface never touch each other.
 const AT_REST: f64 = 1.02;
 /// The skin of a node over the motion that it is to make.
-const SKIN: f64 = 2.0;
+const SKIN: f64 = 1.25;
 /// Width of the bins that pairs are sorted into by their distance, over the distance of the barrier.
 const BIN: f64 = 0.2;
 /// The least and the largest skin, over the distance of the barrier; and the largest over the mean edge, if that is more.
@@ -22,8 +23,6 @@ const SKINS: [f64; 2] = [0.5, 20.0];
 struct Candidate {
     kind: Kind,
     nodes: [u32; 4],
-    /// The numbers of its primitives in their sides.
-    numbers: [u32; 2],
     /// The area [m²] that it stands for.
     area: f64,
     /// Threshold [m⁴] of the mollifier; zero of a point and a triangle.
@@ -83,32 +82,6 @@ impl Action {
     }
 }
 
-/// Pairs of numbers, by the first.
-#[derive(Clone, Debug, Default)]
-struct Apart {
-    /// Where those of each first number begin.
-    start: Vec<u32>,
-    /// Second numbers, increasing for each first one.
-    second: Vec<u32>,
-}
-
-impl Apart {
-    /// Of pairs whose first numbers are below a count.
-    fn new(mut pairs: Vec<[u32; 2]>, count: usize) -> Self {
-        pairs.sort_unstable();
-        let start = (0..=count as u32).map(|first| pairs.partition_point(|pair| pair[0] < first) as u32);
-        Self { start: start.collect(), second: pairs.iter().map(|pair| pair[1]).collect() }
-    }
-
-    /// The second numbers of a first one.
-    fn of(&self, first: u32) -> &[u32] {
-        match self.start.get(first as usize..first as usize + 2) {
-            Some(&[from, to]) => &self.second[from as usize..to as usize],
-            _ => &[],
-        }
-    }
-}
-
 /// A contact with its surfaces and lists.
 #[derive(Clone, Debug)]
 pub(super) struct Group {
@@ -129,8 +102,8 @@ pub(super) struct Group {
     /// Where the candidates of each bin begin; memory to sort them in.
     bins: Vec<u32>,
     unsorted: Vec<Candidate>,
-    /// Of each face or edge the number, from 1 on, of the point or edge for which it was last left out.
-    left_out: Vec<u32>,
+    /// Pairs that candidates are chosen from.
+    wide: Wide,
     /// Skins [m] of all nodes, how far [m] they have gone since pairs were listed, and how far [m] they go in a motion.
     skin: Vec<f64>,
     moved: Vec<f64>,
@@ -152,7 +125,7 @@ impl Group {
         let place = |node: u32| rest[node as usize];
         let edge = sides[0].mean_edge(place);
         let largest = (SKINS[1] * action.law.distance).max(edge);
-        let most = sides.iter().map(|side| side.faces.len().max(side.edges.len())).max().unwrap_or(0);
+        let wide = Wide::new(&sides, rest.len());
         let mut group = Self {
             number,
             sides,
@@ -164,7 +137,7 @@ impl Group {
             candidates: Vec::new(),
             bins: Vec::new(),
             unsorted: Vec::new(),
-            left_out: vec![0; most],
+            wide,
             skin: vec![0.0; rest.len()],
             moved: vec![0.0; rest.len()],
             way: vec![0.0; rest.len()],
@@ -173,36 +146,21 @@ impl Group {
         };
         if group.sides.len() == 1 {
             let near = AT_REST * group.action.reach();
-            group.find(rest, near);
-            let own = |kind: Kind, count: usize| {
-                let of = group.candidates.iter().filter(move |one| one.kind == kind && one.distance < near);
-                Apart::new(of.map(|one| one.numbers).collect(), count)
-            };
+            let [points, edges] = group.wide.within(&mut group.sides, rest, near);
             let side = &group.sides[0];
-            group.apart =
-                [own(Kind::PointTriangle, side.points.len()), own(Kind::EdgeEdge, side.edges.len())];
-            group.candidates.clear();
+            group.apart = [Apart::new(points, side.points.len()), Apart::new(edges, side.edges.len())];
         }
         group
     }
 
     /// Pairs that never touch, since they are too near at rest.
     pub fn apart_count(&self) -> usize {
-        self.apart.iter().map(|apart| apart.second.len()).sum()
-    }
-
-    /// How far [m] the whole surface goes that touches itself: what its parts have in common.
-    fn common(&self, motion: impl Fn(u32) -> Vector3<f64>) -> Vector3<f64> {
-        let points = &self.sides[0].points;
-        if self.sides.len() > 1 || points.is_empty() {
-            return Vector3::zeros();
-        }
-        points.iter().map(|&node| motion(node)).sum::<Vector3<f64>>() / points.len() as f64
+        self.apart.iter().map(Apart::len).sum()
     }
 
     /// Lists what may come near while nodes go by a motion [m] from their places [m].
     pub fn list(&mut self, place: &[Vector3<f64>], motion: &[Vector3<f64>]) {
-        let common = self.common(|node| motion[node as usize]);
+        let common = common(&self.sides, |node| motion[node as usize]);
         let least = SKINS[0] * self.action.law.distance;
         for side in &self.sides {
             for &node in &side.points {
@@ -217,117 +175,38 @@ impl Group {
 
     /// Lists what is within a distance [m] and the skins of both.
     fn find(&mut self, place: &[Vector3<f64>], within: f64) {
-        let Self { sides, skin, apart, unsorted, left_out, .. } = self;
+        let Self { sides, skin, apart, unsorted, wide, action, .. } = self;
         unsorted.clear();
-        let at = |node: u32| place[node as usize];
-        let margin = |node: u32| skin[node as usize] + 0.5 * within;
-        // Whole sides first: a tool that waits far away costs no more than their boxes.
-        let whole = |side: &BarrierSide| {
-            let boxes = side.points.iter().map(|&node| around([node], &at, &margin));
-            boxes.reduce(|all, one| all.with(&one))
-        };
-        if let [first, second] = &sides[..]
-            && !whole(first).zip(whole(second)).is_some_and(|(first, second)| first.touches(&second))
-        {
-            self.sort();
-            return;
-        }
-        sides.iter_mut().for_each(|side| side.refit(at, margin));
         let most = |nodes: &[u32]| nodes.iter().map(|&node| skin[node as usize]).fold(0.0, f64::max);
-        let alone = sides.len() == 1;
-        let other = |side: usize| if alone { &sides[0] } else { &sides[1 - side] };
-        let mut met = Vec::new();
-        // Neighbours at rest are most of what boxes meet: they are marked, and seen no further.
-        left_out.fill(0);
-        for (number, side) in sides.iter().enumerate() {
-            let against = other(number);
-            for (&node, point) in side.points.iter().zip(0..) {
-                let wanted = around([node], &at, &margin);
-                met.clear();
-                let mark = point + 1;
-                apart[0].of(point).iter().for_each(|&face| left_out[face as usize] = mark);
-                against.face_tree.near(&wanted, |face| {
-                    if left_out[face as usize] != mark && against.face_boxes[face as usize].touches(&wanted) {
-                        met.push(face);
-                    }
-                });
-                met.sort_unstable();
-                for &face in &met {
-                    let corners = against.faces[face as usize];
-                    if corners.contains(&node) {
-                        continue;
-                    }
-                    let [a, b, c] = corners;
-                    let nodes = [node, a, b, c];
-                    let limit = within + skin[node as usize] + most(&corners);
-                    let points = nodes.map(at);
-                    if is_beyond(&points, limit) {
-                        continue;
-                    }
-                    let distance = Kind::PointTriangle.nearest(&points).distance;
-                    if distance < limit {
-                        unsorted.push(Candidate {
-                            kind: Kind::PointTriangle,
-                            nodes,
-                            numbers: [point, face],
-                            area: match side.is_rigid {
-                                true => against.face_areas[face as usize],
-                                false => 0.25 * side.point_areas[point as usize],
-                            },
-                            threshold: 0.0,
-                            distance,
-                            in_order: number == 0,
-                        });
-                    }
-                }
+        wide.each(sides, apart, place, skin, [within, action.law.distance], |sides, sort, numbers| {
+            let (kind, nodes) = (sort.kind(), sort.nodes(sides, numbers));
+            let (first, second) = nodes.split_at(kind.split());
+            let limit = within + most(first) + most(second);
+            let points = nodes.map(|node| place[node as usize]);
+            if bound(&points, kind) >= limit * (1.0 + ROUND_OFF) {
+                return;
             }
-        }
-        left_out.fill(0);
-        let (side, against) = (&sides[0], other(0));
-        for (edge, number) in side.edges.iter().zip(0..) {
-            let wanted = side.edge_boxes[number as usize];
-            met.clear();
-            let mark = number + 1;
-            apart[1].of(number).iter().for_each(|&edge| left_out[edge as usize] = mark);
-            against.edge_tree.near(&wanted, |other| {
-                if (!alone || other > number)
-                    && left_out[other as usize] != mark
-                    && against.edge_boxes[other as usize].touches(&wanted)
-                {
-                    met.push(other);
-                }
-            });
-            met.sort_unstable();
-            for &second in &met {
-                let ends = against.edges[second as usize];
-                if edge.iter().any(|end| ends.contains(end)) {
-                    continue;
-                }
-                let nodes = [edge[0], edge[1], ends[0], ends[1]];
-                let limit = within + most(edge) + most(&ends);
-                let points = nodes.map(at);
-                if are_apart(&points, limit) {
-                    continue;
-                }
-                let distance = Kind::EdgeEdge.nearest(&points).distance;
-                if distance < limit {
-                    let own = side.edge_areas[number as usize];
-                    let rest = [side.squares[number as usize], against.squares[second as usize]];
-                    unsorted.push(Candidate {
-                        kind: Kind::EdgeEdge,
-                        nodes,
-                        numbers: [number, second],
-                        area: match against.is_rigid {
-                            true => own,
-                            false => 0.25 * (own + against.edge_areas[second as usize]),
-                        },
-                        threshold: Mollifier::threshold(rest),
-                        distance,
-                        in_order: true,
-                    });
-                }
+            let distance = kind.distance(&points);
+            if distance >= limit {
+                return;
             }
-        }
+            let [first, second] = numbers.map(|number| number as usize);
+            let (area, threshold) = match sort {
+                Sort::Point(side) if sides[side].is_rigid => (other(sides, side).face_areas[second], 0.0),
+                Sort::Point(side) => (0.25 * sides[side].point_areas[first], 0.0),
+                Sort::Edges => {
+                    let (side, against) = (&sides[0], other(sides, 0));
+                    let own = side.edge_areas[first];
+                    let area = match against.is_rigid {
+                        true => own,
+                        false => 0.25 * (own + against.edge_areas[second]),
+                    };
+                    (area, Mollifier::threshold([side.squares[first], against.squares[second]]))
+                }
+            };
+            let in_order = sort != Sort::Point(1);
+            unsorted.push(Candidate { kind, nodes, area, threshold, distance, in_order });
+        });
         self.sort();
     }
 
@@ -377,25 +256,11 @@ impl Group {
     }
 }
 
-/// Whether a point is farther from a triangle than a distance [m], by the ball around the triangle.
-fn is_beyond([point, a, b, c]: &[Vector3<f64>; 4], distance: f64) -> bool {
-    let middle = (a + b + c) / 3.0;
-    let squares = [a, b, c].map(|corner| (corner - middle).norm_squared());
-    let limit = distance + squares[0].max(squares[1]).max(squares[2]).sqrt();
-    (point - middle).norm_squared() > limit * limit
-}
-
-/// Whether two edges are farther from each other than a distance [m], by the balls around them.
-fn are_apart([a, b, c, d]: &[Vector3<f64>; 4], distance: f64) -> bool {
-    let between = 0.5 * ((a + b) - (c + d)).norm();
-    between > distance + 0.5 * ((b - a).norm() + (d - c).norm())
-}
-
 impl Group {
     /// Takes the places [m] of all nodes; whether no node has left its skin.
     pub fn take(&mut self, place: &[Vector3<f64>], listed: &[Vector3<f64>]) -> bool {
         let way = |node: u32| place[node as usize] - listed[node as usize];
-        let common = self.common(way);
+        let common = common(&self.sides, way);
         let Self { sides, skin, moved, .. } = self;
         let mut holds = true;
         for &node in sides.iter().flat_map(|side| &side.points) {
@@ -409,7 +274,7 @@ impl Group {
 
     /// The part of a motion [m] in which no node leaves its skin.
     pub fn within_skins(&self, motion: &[Vector3<f64>]) -> f64 {
-        let common = self.common(|node| motion[node as usize]);
+        let common = common(&self.sides, |node| motion[node as usize]);
         let nodes = self.sides.iter().flat_map(|side| &side.points);
         let part = nodes.map(|&node| {
             let (left, way) = (
@@ -477,7 +342,7 @@ impl Group {
         keep: f64,
         mut most: f64,
     ) -> f64 {
-        let common = self.common(|node| motion[node as usize]);
+        let common = common(&self.sides, |node| motion[node as usize]);
         let Self { sides, way, .. } = self;
         for &node in sides.iter().flat_map(|side| &side.points) {
             way[node as usize] = (motion[node as usize] - common).norm();

@@ -18,6 +18,7 @@ mod surfaces;
 mod system;
 #[cfg(test)]
 mod tests;
+mod wide;
 
 pub use curvature::Matrix12;
 pub use rows::{Held, Mollified, Row, Stencil};
