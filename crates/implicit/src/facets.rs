@@ -208,6 +208,20 @@ fn load3<S: Simd>(simd: S, from: &[Pack], at: usize, register: usize) -> Three<S
     [0, 1, 2].map(|k: usize| Lane::load(simd, &from[at + k], register))
 }
 
+/// Three rows and columns of the stiffness at rest.
+#[inline(always)]
+fn block<S: Simd>(simd: S, pack: &FacetPack, register: usize, [a, b]: [usize; 2]) -> Square<S> {
+    let mut block = [[Lane::splat(simd, 0.0); 3]; 3];
+    for (r, row) in block.iter_mut().enumerate() {
+        for (c, entry) in row.iter_mut().enumerate() {
+            let (row, column) = (3 * a + r, 3 * b + c);
+            let at = if row >= column { place(row, column) } else { place(column, row) };
+            *entry = Lane::load(simd, &pack.stiffness[at], register);
+        }
+    }
+    block
+}
+
 impl<S: Simd> Now<S> {
     #[inline(always)]
     fn new(simd: S, pack: &FacetPack, work: &Work, register: usize) -> Self {
@@ -243,16 +257,21 @@ impl<S: Simd> Now<S> {
         let local = [0, 1, 2].map(|i: usize| [load(&work.local[2 * i]), load(&work.local[2 * i + 1])]);
         let arm = local.map(|[x, y]| Sparse { xz: y, yz: -x, zx: -y, zy: x });
         let trace = load(&work.trace);
-        let spin = [0, 1, 2].map(|i: usize| {
+        let mut spin = arm;
+        let [p, q, r] = [local[0], local[1], local[2]];
+        let double_area = ((q[0] - p[0]) * (r[1] - p[1])).less(r[0] - p[0], q[1] - p[1]);
+        let inverse = one.over(double_area);
+        for (i, spin) in spin.iter_mut().enumerate() {
             let [a, b] = [local[(i + 1) % 3], local[(i + 2) % 3]];
-            // Of twice the area, found from each corner in the same way.
-            let [p, q, r] = [local[0], local[1], local[2]];
-            let double_area = ((q[0] - p[0]) * (r[1] - p[1])).less(r[0] - p[0], q[1] - p[1]);
-            let inverse = one.over(double_area);
             let rest = [load(&pack.gradient[2 * i]) * trace, load(&pack.gradient[2 * i + 1]) * trace];
             // ∇N of the present shape: (y₂ − y₃, x₃ − x₂)/2A.
-            Sparse { xz: (b[0] - a[0]) * inverse, yz: (b[1] - a[1]) * inverse, zx: -rest[1], zy: rest[0] }
-        });
+            *spin = Sparse {
+                xz: (b[0] - a[0]) * inverse,
+                yz: (b[1] - a[1]) * inverse,
+                zx: -rest[1],
+                zy: rest[0],
+            };
+        }
         let third = Lane::splat(simd, 1.0 / 3.0);
         let mean = [0, 1, 2].map(|c: usize| (spun[0][c] + spun[2][c] + spun[4][c]) * third);
         let mut moment = [0, 1, 2].map(|c: usize| spun[1][c] + spun[3][c] + spun[5][c]);
@@ -292,53 +311,53 @@ impl<S: Simd> Now<S> {
         let along = dot(&theta, m);
         let squared = dot(&theta, &theta);
         // η (θ·m I + θ mᵀ − 2 m θᵀ) + μ S² m θᵀ − S(m)/2, S² m = (θ·m) θ − |θ|² m.
-        let bent = [0, 1, 2].map(|c: usize| (along * theta[c]).less(squared, m[c]) * mu);
-        let mut change = [0, 1, 2].map(|i: usize| {
-            [0, 1, 2].map(|j: usize| {
+        let mut change = self.turn[node];
+        for i in 0..3 {
+            let bent = (along * theta[i]).less(squared, m[i]) * mu;
+            for j in 0..3 {
                 let outer = (theta[i] * m[j]).less(m[i] + m[i], theta[j]);
-                (bent[i] * theta[j]).plus(outer, eta)
-            })
-        });
+                change[i][j] = (bent * theta[j]).plus(outer, eta);
+            }
+        }
         (0..3).for_each(|k| change[k][k] = change[k][k].plus(along, eta));
-        add_half_skew(&mut change, &m.map(|m| -m));
+        add_half_skew(&mut change, &[-m[0], -m[1], -m[2]]);
         symmetric(&times(&change, &self.turn[node]))
     }
 
     /// Writes the stiffness, in space.
     #[inline(always)]
     fn tangent(&self, pack: &FacetPack, work: &mut Work, register: usize) {
-        let simd = self.simd;
-        let block = |a: usize, b: usize| -> Square<S> {
-            [0, 1, 2].map(|r: usize| {
-                [0, 1, 2].map(|c: usize| {
-                    let (row, column) = (3 * a + r, 3 * b + c);
-                    let at = if row >= column { place(row, column) } else { place(column, row) };
-                    Lane::load(simd, &pack.stiffness[at], register)
-                })
-            })
-        };
-        // Over spins: Hᵀ K H. Blocks of turns and translations, and of turns.
-        let back = self.turn.each_ref().map(transpose);
-        let mixed =
-            [0, 1, 2].map(|i: usize| [0, 1, 2].map(|j: usize| times(&back[i], &block(2 * i + 1, 2 * j))));
-        let turned = [[0, 0], [1, 0], [1, 1], [2, 0], [2, 1], [2, 2]]
-            .map(|[i, j]: [usize; 2]| times(&times(&back[i], &block(2 * i + 1, 2 * j + 1)), &self.turn[j]));
+        let zero = Lane::splat(self.simd, 0.0);
+        let none = [[zero; 3]; 3];
+        let block = |a: usize, b: usize| block(self.simd, pack, register, [a, b]);
+        // Over spins: Hᵀ K H. Blocks of turns and translations, and of turns. In loops: closures of `map` are left as calls, without the
+        // instructions of this kernel, and take most of its time.
+        let (mut mixed, mut turned, mut corrections) = ([[none; 3]; 3], [none; 6], [none; 3]);
+        for i in 0..3 {
+            let back = transpose(&self.turn[i]);
+            for (j, mixed) in mixed[i].iter_mut().enumerate() {
+                *mixed = times(&back, &block(2 * i + 1, 2 * j));
+            }
+            for j in 0..=i {
+                turned[place(i, j)] = times(&times(&back, &block(2 * i + 1, 2 * j + 1)), &self.turn[j]);
+            }
+            corrections[i] = self.correction(i, work, register);
+        }
         let of_turns = |i: usize, j: usize| {
             if i >= j { turned[place(i, j)] } else { transpose(&turned[place(j, i)]) }
         };
-        let corrections = [0, 1, 2].map(|i: usize| self.correction(i, work, register));
 
         // What rigid turns make of it, and its symmetric part seen from them.
-        let mut of_rigid = [corrections[0]; 6];
+        let mut of_rigid = [none; 6];
         for i in 0..3 {
-            let arms = &self.arm;
-            let part = |j: usize| difference(&of_turns(i, j), &arms[j].after(&mixed[i][j]));
-            of_rigid[2 * i + 1] = sum(&sum(&part(0), &part(1)), &part(2));
-            let part = |j: usize| difference(&transpose(&mixed[j][i]), &arms[j].after(&block(2 * i, 2 * j)));
-            of_rigid[2 * i] = sum(&sum(&part(0), &part(1)), &part(2));
+            for (j, arm) in self.arm.iter().enumerate() {
+                let turns = difference(&of_turns(i, j), &arm.after(&mixed[i][j]));
+                of_rigid[2 * i + 1] = if j == 0 { turns } else { sum(&of_rigid[2 * i + 1], &turns) };
+                let ways = difference(&transpose(&mixed[j][i]), &arm.after(&block(2 * i, 2 * j)));
+                of_rigid[2 * i] = if j == 0 { ways } else { sum(&of_rigid[2 * i], &ways) };
+            }
         }
-        let zero = Lane::splat(simd, 0.0);
-        let mut whole = [[zero; 3]; 3];
+        let mut whole = none;
         for i in 0..3 {
             whole = sum(&whole, &of_rigid[2 * i + 1]);
             whole = difference(&whole, &self.arm[i].transposed_before(&of_rigid[2 * i]));
@@ -347,9 +366,15 @@ impl<S: Simd> Now<S> {
             let skew = [[zero, -z, y], [z, zero, -x], [-y, x, zero]];
             whole = sum(&whole, &self.arm[i].after(&skew));
         }
-        let whole = symmetric(&whole).map(|row| row.map(Lane::half));
+        whole = symmetric(&whole);
+        for row in &mut whole {
+            for entry in row {
+                *entry = entry.half();
+            }
+        }
 
-        let left = [0, 1, 2].map(|i: usize| {
+        let mut left = [none; 3];
+        for i in 0..3 {
             let mut own = of_rigid[2 * i];
             let [p, f] = [&self.projected[2 * i], &self.spun[2 * i]];
             add_half_skew(&mut own, &[p[0] + f[0], p[1] + f[1], p[2] + f[2]]);
@@ -357,8 +382,8 @@ impl<S: Simd> Now<S> {
             let g = &self.spin[i];
             let tilt = (g.xz * self.moment[1]).less(g.yz, self.moment[0]);
             own[2][2] = own[2][2] - tilt.half();
-            difference(&own, &g.transposed_before(&whole))
-        });
+            left[i] = difference(&own, &g.transposed_before(&whole));
+        }
         for i in 0..3 {
             for j in 0..=i {
                 let mut own = difference(&block(2 * i, 2 * j), &self.spin[j].after(&left[i]));
