@@ -335,8 +335,8 @@ impl<S: Simd> Now<S> {
         let (mut mixed, mut turned, mut corrections) = ([[none; 3]; 3], [none; 6], [none; 3]);
         for i in 0..3 {
             let back = transpose(&self.turn[i]);
-            for j in 0..3 {
-                mixed[i][j] = times(&back, &block(2 * i + 1, 2 * j));
+            for (j, mixed) in mixed[i].iter_mut().enumerate() {
+                *mixed = times(&back, &block(2 * i + 1, 2 * j));
             }
             for j in 0..=i {
                 turned[place(i, j)] = times(&times(&back, &block(2 * i + 1, 2 * j + 1)), &self.turn[j]);
@@ -350,10 +350,10 @@ impl<S: Simd> Now<S> {
         // What rigid turns make of it, and its symmetric part seen from them.
         let mut of_rigid = [none; 6];
         for i in 0..3 {
-            for j in 0..3 {
-                let turns = difference(&of_turns(i, j), &self.arm[j].after(&mixed[i][j]));
+            for (j, arm) in self.arm.iter().enumerate() {
+                let turns = difference(&of_turns(i, j), &arm.after(&mixed[i][j]));
                 of_rigid[2 * i + 1] = if j == 0 { turns } else { sum(&of_rigid[2 * i + 1], &turns) };
-                let ways = difference(&transpose(&mixed[j][i]), &self.arm[j].after(&block(2 * i, 2 * j)));
+                let ways = difference(&transpose(&mixed[j][i]), &arm.after(&block(2 * i, 2 * j)));
                 of_rigid[2 * i] = if j == 0 { ways } else { sum(&of_rigid[2 * i], &ways) };
             }
         }

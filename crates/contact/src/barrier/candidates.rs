@@ -158,15 +158,14 @@ impl Group {
         self.apart.iter().map(Apart::len).sum()
     }
 
-    /// Lists what may come near while nodes go by a motion [m] from their places [m], with skins of so many distances of the barrier at most.
-    pub fn list(&mut self, place: &[Vector3<f64>], motion: &[Vector3<f64>], most: f64) {
+    /// Lists what may come near while nodes go by a motion [m] from their places [m].
+    pub fn list(&mut self, place: &[Vector3<f64>], motion: &[Vector3<f64>]) {
         let common = common(&self.sides, |node| motion[node as usize]);
         let least = SKINS[0] * self.action.law.distance;
-        let largest = self.largest.min(most * self.action.law.distance);
         for side in &self.sides {
             for &node in &side.points {
                 let way = (motion[node as usize] - common).norm();
-                self.skin[node as usize] = (SKIN * way).clamp(least, largest);
+                self.skin[node as usize] = (SKIN * way).clamp(least, self.largest);
             }
         }
         self.moved.fill(0.0);
@@ -187,7 +186,7 @@ impl Group {
             if bound(&points, kind) >= limit * (1.0 + ROUND_OFF) {
                 return;
             }
-            let distance = kind.nearest(&points).distance;
+            let distance = kind.distance(&points);
             if distance >= limit {
                 return;
             }

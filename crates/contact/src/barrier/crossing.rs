@@ -4,7 +4,7 @@
 use nalgebra::Vector3;
 
 use super::surfaces::{BarrierSide, around};
-use crate::tree::Tree;
+use crate::tree::{Bounds, Tree};
 
 /// Edges that go through triangles: calls back with the ends and the corners. Of one side alone those with a node in common count for
 /// nothing.
@@ -17,22 +17,34 @@ pub(super) fn crossings(
         return;
     }
     let none = |_| 0.0;
-    let tree = Tree::new(faces.faces.len(), |face| around(faces.faces[face as usize], place, &none));
-    for &ends in &edges.edges {
-        let wanted = around(ends, place, &none);
-        let mut met = Vec::new();
-        tree.near(&wanted, |face| met.push(face));
-        met.sort_unstable();
-        for face in met {
+    let mut met = Vec::new();
+    let mut look = |ends: [u32; 2], wanted: &Bounds, met: &[u32]| {
+        for &face in met {
             let corners = faces.faces[face as usize];
             let apart = !ends.iter().any(|end| corners.contains(end));
-            let near = apart && around(corners, place, &none).touches(&wanted);
+            let near = apart && around(corners, place, &none).touches(wanted);
             if near && goes_through(ends.map(place), corners.map(place)) {
                 found(ends, corners);
             }
         }
+    };
+    if edges.edges.len() <= FEW {
+        met.extend(0..faces.faces.len() as u32);
+        edges.edges.iter().for_each(|&ends| look(ends, &around(ends, place, &none), &met));
+        return;
+    }
+    let tree = Tree::new(faces.faces.len(), |face| around(faces.faces[face as usize], place, &none));
+    for &ends in &edges.edges {
+        let wanted = around(ends, place, &none);
+        met.clear();
+        tree.near(&wanted, |face| met.push(face));
+        met.sort_unstable();
+        look(ends, &wanted, &met);
     }
 }
+
+/// Edges for which no tree of triangles is made.
+const FEW: usize = 4;
 
 /// Volumes over the cube of the largest extent that are none but for round-off: of points in a plane.
 const FLAT: f64 = 1e-14;

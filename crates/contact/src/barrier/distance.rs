@@ -112,6 +112,34 @@ pub fn edge_edge(points: &[Vector3<f64>; 4]) -> Nearest {
     Nearest::new(points, coefficients, region)
 }
 
+/// The distance [m] of two edges alone, in a third of the time of [`edge_edge`]; but for round-off the same.
+pub(super) fn edge_distance(points: &[Vector3<f64>; 4]) -> f64 {
+    let [a, b, c, d] = points;
+    let (along, other, between) = (b - a, d - c, a - c);
+    let [aa, bb, ab] = [along.norm_squared(), other.norm_squared(), along.dot(&other)];
+    let [da, db] = [along.dot(&between), other.dot(&between)];
+    let normal = along.cross(&other);
+    let crossed = normal.norm_squared();
+    let [s, t] = [ab * db - bb * da, aa * db - ab * da];
+    if 0.0 < s && s < crossed && 0.0 < t && t < crossed {
+        let is_sure = crossed > SURE * aa * bb;
+        return if is_sure {
+            normal.dot(&between).abs() / crossed.sqrt()
+        } else {
+            edge_edge(points).distance
+        };
+    }
+    // An end of one and the nearest point of the other.
+    let part = |way: f64, length: f64| if length > 0.0 { (way / length).clamp(0.0, 1.0) } else { 0.0 };
+    let squares = [
+        (between - other * part(db, bb)).norm_squared(),
+        (between + along - other * part(db + ab, bb)).norm_squared(),
+        (between + along * part(-da, aa)).norm_squared(),
+        (between - other + along * part(ab - da, aa)).norm_squared(),
+    ];
+    squares[0].min(squares[1]).min(squares[2].min(squares[3])).sqrt()
+}
+
 /// The square of the sine of the angle between edges above which their inner nearest points are exact.
 const SURE: f64 = 1e-6;
 
@@ -161,6 +189,24 @@ mod tests {
     use crate::barrier::law::Barrier;
     use pliant_testing::Random;
     use serde_json::Value;
+
+    /// The distance alone is that of the nearest points, of edges in any position, parallel ones and points among them: 1e-9 of it and of the
+    /// round-off of coordinates.
+    #[test]
+    fn distances_of_edges_alone_are_those_of_their_nearest_points() {
+        let mut random = Random::new(8);
+        for number in 0..200_000 {
+            let mut points: [Vector3<f64>; 4] = std::array::from_fn(|_| Vector3::from(random.vector()));
+            match number % 5 {
+                0 => points[3] = points[2] + (points[1] - points[0]) * random.number(),
+                1 => points[3] = points[2] + (points[1] - points[0]) + 1e-5 * Vector3::from(random.vector()),
+                2 => points[3] = points[2],
+                _ => {}
+            }
+            let (own, wanted) = (edge_distance(&points), edge_edge(&points).distance);
+            assert!((own - wanted).abs() < 1e-9 * wanted + ROUNDING, "{number}: {own} {wanted}");
+        }
+    }
 
     fn reference() -> Value {
         let text = include_str!("../../../../validation/data/coupling/ipc_primitives.json");

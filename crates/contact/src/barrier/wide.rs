@@ -6,10 +6,12 @@ use nalgebra::Vector3;
 use super::advance::Kind;
 use super::surfaces::{BarrierSide, around};
 
-/// The wide skin of a node over that of a list, and what it has more at most; its least; and what it keeps of the one before.
+/// The wide skin of a node over that of a list.
 const WIDER: f64 = 2.5;
+/// By how much it is wider at most, and its least, over the distance of the barrier.
 const MORE: f64 = 10.0;
 const LEAST: f64 = 4.0;
+/// The part of the wide skin of before that it is at least.
 const KEPT: f64 = 0.5;
 /// What round-off takes of a distance at most, over it.
 pub(super) const ROUND_OFF: f64 = 1e-9;
@@ -113,7 +115,7 @@ impl Wide {
         }
     }
 
-    /// Pairs within a distance [m] of each other at places [m], with their numbers and that distance.
+    /// Numbers of the pairs within a distance [m] of each other at places [m]: points with faces of one surface, and edges.
     pub fn within(
         &mut self,
         sides: &mut [BarrierSide],
@@ -241,7 +243,7 @@ impl Wide {
                         met.push(face);
                     }
                 });
-                met.sort_unstable();
+                let first = pairs.len();
                 for &face in &met {
                     let corners = against.faces[face as usize];
                     if corners.contains(&node) {
@@ -254,6 +256,7 @@ impl Wide {
                         pairs.push(Pair { numbers: [point, face], distance });
                     }
                 }
+                pairs[first..].sort_unstable_by_key(|pair| pair.numbers[1]);
             }
             ends[number] = pairs.len();
         }
@@ -273,7 +276,7 @@ impl Wide {
                     met.push(other);
                 }
             });
-            met.sort_unstable();
+            let first = pairs.len();
             for &second in &met {
                 let ends = against.edges[second as usize];
                 if edge.iter().any(|end| ends.contains(end)) {
@@ -286,6 +289,7 @@ impl Wide {
                     pairs.push(Pair { numbers: [number, second], distance });
                 }
             }
+            pairs[first..].sort_unstable_by_key(|pair| pair.numbers[1]);
         }
         ends[2] = pairs.len();
     }
