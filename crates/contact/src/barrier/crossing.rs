@@ -13,9 +13,6 @@ pub(super) fn crossings(
     place: &impl Fn(u32) -> Vector3<f64>,
     mut found: impl FnMut([u32; 2], [u32; 3]),
 ) {
-    if edges.edges.is_empty() {
-        return;
-    }
     let none = |_| 0.0;
     let mut met = Vec::new();
     let mut look = |ends: [u32; 2], wanted: &Bounds, met: &[u32]| {

@@ -29,9 +29,6 @@ const DIFFERENCE: f64 = 0.01;
 /// Part of the way to a meeting that is gone where things turn.
 const SHORTER: f64 = 0.9;
 
-/// The largest skins of a list, over the distance of the barrier, one after the other until a motion is followed to its end.
-const STAGES: [f64; 2] = [4.0, f64::INFINITY];
-
 /// How a contact acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BarrierSettings {
@@ -207,7 +204,7 @@ impl Barriers {
         self.is_current = false;
         self.put(position, 0.0);
         self.start.copy_from_slice(&self.place);
-        self.list(motion, 0.0, f64::INFINITY);
+        self.list(motion, 0.0);
         self.act();
         self.hold();
     }
@@ -250,15 +247,14 @@ impl Barriers {
         }
     }
 
-    /// Lists what may come near in a motion, and while rigid things go on from a share to the end of the step, with skins of so many distances
-    /// of the barrier at most.
-    fn list(&mut self, motion: &[f64], share: f64, most: f64) {
+    /// Lists what may come near in a motion, and while rigid things go on from a share to the end of the step.
+    fn list(&mut self, motion: &[f64], share: f64) {
         self.set_motion(motion, 1.0, if share < 1.0 { 1.0 } else { share });
         self.listed.copy_from_slice(&self.place);
         self.listed_stances.clone_from(&self.stances[2]);
         let Self { groups, place, motion, wall_distances, contacts, stances, .. } = self;
         for (group, distances) in groups.iter_mut().zip(wall_distances) {
-            group.list(place, motion, most);
+            group.list(place, motion);
             let Some(wall) = group.wall else { continue };
             let (rigid, stance) = (&contacts.rigids[wall as usize], &stances[2][wall as usize]);
             for (distance, &node) in distances.iter_mut().zip(&group.sides[0].points) {
@@ -561,25 +557,11 @@ impl Barriers {
         let within =
             |own: &Self| own.groups.iter().map(|group| group.within_skins(&own.motion)).fold(1.0, f64::min);
         let mut part = within(self);
-        if part >= most {
-            return self.followed(motion, share, [keep, most]);
+        if part < most {
+            self.list(motion, share);
+            part = within(self);
         }
-        // A long motion seldom gets far: what it comes near at first is listed before all that it might.
-        let mut gone = 0.0;
-        for stage in STAGES {
-            self.set_motion(motion, 1.0, 1.0);
-            self.list(motion, share, stage);
-            part = within(self).min(most);
-            gone = self.followed(motion, share, [keep, part]);
-            if gone < part || part == most {
-                return gone;
-            }
-        }
-        gone
-    }
-
-    /// [`allowed`](Self::allowed) for a part of a motion within the skins.
-    fn followed(&mut self, motion: &[f64], share: f64, [keep, mut part]: [f64; 2]) -> f64 {
+        part = part.min(most);
         let [from, to, _] = &self.stances;
         let turns =
             share < 1.0 && from.iter().zip(to).any(|(from, to)| from.pose.rotation != to.pose.rotation);
