@@ -62,9 +62,12 @@ impl World {
         labels
     }
 
-    /// The names of bodies, then of obstacles and tools, by their number in what is shown on a body by name, or of all of them. None on a
-    /// surface.
+    /// The names of bodies, then of obstacles and tools, by their number in what is shown on a body by name, or of all of them; that of a surface
+    /// on a surface.
     pub fn body_names(&self, on: Option<&str>) -> BTreeMap<i32, String> {
+        if let Some(surface) = on.filter(|on| self.scene.surfaces.iter().any(|(name, _)| name == on)) {
+            return [(0, surface.to_owned())].into();
+        }
         let shown = self.participants.iter().filter(|part| part.shows(on));
         let bodies = shown.flat_map(|part| part.built.bodies.iter().map(|body| body.name.as_str()));
         let things =
@@ -250,6 +253,8 @@ mod tests {
         assert!(!on_skin.contains(&FieldName::Reaction) && on_cube.contains(&FieldName::Reaction));
         assert_eq!(scene.shown(0.1).on.as_deref(), Some("cube"));
         assert_eq!(scene.shown_as(&scene.view, 0.1).on.as_deref(), Some("skin"));
+        let world = World::new(&scene).unwrap_or_else(|error| panic!("{}", error.plain()));
+        assert_eq!(world.body_names(Some("skin")), [(0, "skin".to_owned())].into());
     }
 
     #[test]
@@ -285,6 +290,9 @@ mod tests {
         assert_eq!(scene.shown(0.1).data, [FieldName::Displacement]);
         assert_eq!(world.hidden(&scene.view), [2, 5].map(Region::Label));
         assert_eq!(world.labels(None).all_shown(), ["1 (liver)", "2 (tumour)", "5"]);
+        let [on_bar, on_none] = [Some("bar"), None].map(|on| world.body_names(on));
+        assert_eq!((on_bar, world.body_names(Some("skin")).len()), (on_none.clone(), 0));
+        assert_eq!(on_none, [(0, "bar".to_owned())].into());
         let range = ViewTable { hide: vec![CellLabel::Name("2-9".into())], ..scene.view.clone() };
         assert_eq!(world.hidden(&range), [2, 5].map(Region::Label));
         for (view, piece) in [

@@ -36,10 +36,8 @@ pub(super) fn glass() -> Vec<Cue> {
         },
     )];
     cues.push(middle("one sees through the body", look(Some(0.2)), move |app, colour| {
-        // A surface that a body carries has no bodies in its list.
-        app.names.bodies.is_empty()
-            || app.view_text().contains("opacity = 0.2")
-                && glassy.borrow().is_some_and(|before| differ(before, colour))
+        app.view_text().contains("opacity = 0.2")
+            && glassy.borrow().is_some_and(|before| differ(before, colour))
     }));
     cues.push(middle("the body is opaque again", look(None), move |app, colour| {
         !app.view_text().contains("look.") && again.borrow().is_some_and(|before| !differ(before, colour))

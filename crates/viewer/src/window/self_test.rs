@@ -253,7 +253,7 @@ fn keys() -> Vec<Cue> {
         Cue::key("V begins a film", Key::V, |app| app.filming.pictures.len() >= 3),
         Cue::key("V ends the film, which is written", Key::V, |app| {
             let told = app.message.as_ref().and_then(|told| told.text.split('`').nth(1));
-            let film = told.filter(|path| path.ends_with("-film.png"));
+            let film = told.filter(|path| path.contains("-film"));
             film.is_some_and(|path| std::fs::remove_file(path).is_ok())
         }),
         Cue::key("Escape closes the list", Key::Escape, |app| !app.browser.shown),
