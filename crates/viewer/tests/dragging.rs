@@ -12,6 +12,8 @@ use support::{BALL, LIVER, subject, wait, world};
 
 /// Pulls of a drag, a sixtieth of a second each.
 const PULLS: u32 = 60;
+/// Drags after which all states are kept that ever are: eight, of a quarter of a second each.
+const FULL: u64 = 4;
 /// Part of the body's longest side that a hand moves from pull to pull, at most along each axis.
 const WALK: f64 = 0.02;
 
@@ -90,7 +92,7 @@ fn drag(text: &str, until: &Until) -> [u64; 2] {
         strongest = strongest.max(Vector3::from(frame.held[0][1]).norm());
         session.order(Order::Hand(Hand::Release));
         wait(&mut session, |frame| frame.held.is_empty());
-        if before.is_none() && until.part(drag, began) >= 0.1 {
+        if before.is_none() && until.part(drag, began) >= 0.1 && drag >= FULL {
             before = resident();
         }
     }
