@@ -137,7 +137,7 @@ impl Samples {
         };
         let all =
             contacts.contacts.iter().zip(levels).map(|(contact, &level)| of(contact, level, &mut divided));
-        let sampled = Contacts { contacts: all.collect(), rigids: contacts.rigids.clone() };
+        let sampled = Contacts { contacts: all.collect(), ..contacts.clone() };
         let points = numbers.points;
         let state = State::at_rest(model);
         let mut own = Self {

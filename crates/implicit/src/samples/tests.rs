@@ -33,7 +33,7 @@ fn touching(model: &Assembly, radius: f64, at: Vector3<f64>, level: u8) -> Touch
         touch: Touch { friction: 0.0, offset: 0.0 },
     };
     Touching {
-        contacts: Arc::new(Contacts { contacts: vec![contact], rigids: vec![rigid] }),
+        contacts: Arc::new(Contacts { contacts: vec![contact], rigids: vec![rigid], ..Default::default() }),
         settings: vec![BarrierSettings { distance: REACH, stiffness: 1.0, creep_speed: 1e-3 }],
         levels: vec![level],
         check_crossings: true,

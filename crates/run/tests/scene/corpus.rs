@@ -46,8 +46,8 @@ fn mistakes(bytes: &[u8]) -> Option<String> {
 /// The project's scenes.
 fn scenes() -> Vec<(String, Vec<u8>)> {
     let all = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
-    let mut found: Vec<_> =
-        fs::read_dir(all).unwrap().map(|entry| entry.unwrap().path().join("scene.toml")).collect();
+    let paths = fs::read_dir(all).unwrap().map(|entry| entry.unwrap().path().join("scene.toml"));
+    let mut found: Vec<_> = paths.filter(|path| path.is_file()).collect();
     found.sort();
     found.into_iter().map(|path| (path.display().to_string(), fs::read(path).unwrap())).collect()
 }
