@@ -23,7 +23,7 @@ fn keys(object: &Value) -> Vec<&str> {
 }
 
 /// The keys of `--json`, in their order.
-const KEYS: [&str; 28] = [
+const KEYS: [&str; 29] = [
     "status",
     "error",
     "bodies",
@@ -36,6 +36,7 @@ const KEYS: [&str; 28] = [
     "limiting_element",
     "participants",
     "ties",
+    "guests",
     "solver",
     "equilibria",
     "ended",
