@@ -39,6 +39,8 @@ const CHUNK: usize = 256;
 pub struct Phases {
     /// Forces and stiffness of the cells, and adding them up.
     pub cells: Duration,
+    /// Contacts: what comes near, gaps, forces and stiffness, and what motions are free.
+    pub contact: Duration,
     /// Factorisation, or inverting the blocks of the preconditioner.
     pub preparation: Duration,
     /// Solution of the linear equations.
@@ -376,6 +378,7 @@ impl System {
             }
         }
         let start = Instant::now();
+        let mut of_contact = Duration::ZERO;
         if let Some(followers) = &mut self.followers {
             followers.turn(state);
         }
@@ -446,9 +449,10 @@ impl System {
                 followers.give_back(forces);
             }
         }
-        if let Some(touching) = &self.touching {
+        if let Some(touching) = &mut self.touching {
             self.external.iter_mut().zip(&touching.given).for_each(|(load, force)| *load += force);
             if let Some((_, moved)) = tangent {
+                let begun = Instant::now();
                 let followers = self.followers.as_ref();
                 touching.add_stiffness(
                     &self.equations,
@@ -457,7 +461,10 @@ impl System {
                     moved,
                     &mut self.coupling,
                 );
+                of_contact = begun.elapsed();
+                touching.spent += of_contact;
             }
+            self.phases.contact = touching.spent;
         }
         if let Some((_, moved)) = tangent {
             self.press_enclosures(state, moved);
@@ -465,7 +472,7 @@ impl System {
         if tangent.is_some() && !self.matrix.mirror.is_empty() {
             self.turn_moments(state.load_factor);
         }
-        self.phases.cells += start.elapsed();
+        self.phases.cells += start.elapsed() - of_contact;
         self.phases.evaluations += 1;
         Ok(())
     }

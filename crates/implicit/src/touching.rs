@@ -4,6 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
 use pliant_contact::barrier::{BarrierSettings, Barriers, Matrix12, Meeting, NodeTouch};
@@ -90,6 +91,8 @@ pub struct TouchingSystem {
     samples: Option<(Samples, Vec<f64>)>,
     /// How far rigid things have gone in the step, from 0 to 1.
     pub(crate) share: f64,
+    /// Time spent so far.
+    pub(crate) spent: Duration,
     /// Forces on nodes, six a node, and on the second side of each contact.
     forces: Vec<f64>,
     /// Those forces where the unknowns are: on the nodes that tied ones follow.
@@ -128,6 +131,7 @@ impl TouchingSystem {
             lags: limited.map(|(_, number)| Lag::new(number)).collect(),
             barriers,
             share: 1.0,
+            spent: Duration::ZERO,
             forces: vec![0.0; 6 * model.rest.len()],
             given: vec![0.0; 6 * model.rest.len()],
             totals: vec![Vector3::zeros(); touching.settings.len()],
@@ -141,6 +145,7 @@ impl TouchingSystem {
 
     /// Begins a step between two times [s] at a state, expected to go by a motion, six numbers a node. Friction is that of the start.
     pub(crate) fn begin(&mut self, state: &State, motion: &[f64], times: [f64; 2]) {
+        let begun = Instant::now();
         match &mut self.samples {
             None => self.barriers.begin(&state.position, motion, times),
             Some((samples, _)) => {
@@ -150,11 +155,19 @@ impl TouchingSystem {
             }
         }
         self.share = 0.0;
+        self.spent += begun.elapsed();
     }
 
     /// The part of an increment (six numbers a node), of so much of it at most, from a state on that leaves at least half of a part of every gap.
     /// Points of curved surfaces go on straight ways to where they come: if these are free, nothing has gone through anything.
-    pub(crate) fn allowed(&mut self, state: &State, increment: &[f64], [keep, most]: [f64; 2]) -> f64 {
+    pub(crate) fn allowed(&mut self, state: &State, increment: &[f64], keep_and_most: [f64; 2]) -> f64 {
+        let begun = Instant::now();
+        let part = self.free_part(state, increment, keep_and_most);
+        self.spent += begun.elapsed();
+        part
+    }
+
+    fn free_part(&mut self, state: &State, increment: &[f64], [keep, most]: [f64; 2]) -> f64 {
         let Some((samples, _)) = &mut self.samples else {
             return self.barriers.allowed(&state.position, increment, self.share, [keep, most]);
         };
@@ -181,6 +194,7 @@ impl TouchingSystem {
 
     /// Finds forces and energy at a state.
     pub(crate) fn evaluate(&mut self, state: &State, followers: Option<&Followers>) {
+        let begun = Instant::now();
         self.forces.fill(0.0);
         match &mut self.samples {
             None => {
@@ -203,6 +217,7 @@ impl TouchingSystem {
         if let Some(followers) = followers {
             followers.give_back(&mut self.given);
         }
+        self.spent += begun.elapsed();
     }
 
     /// What acts at the state last evaluated.
@@ -316,6 +331,18 @@ impl TouchingSystem {
 
     /// Takes up the pairs of nodes that may act soon if the pattern lacks one that acts; whether it does.
     pub(crate) fn grow(
+        &mut self,
+        equations: &Equations,
+        matrix: &LowerMatrix,
+        followers: Option<&Followers>,
+    ) -> bool {
+        let begun = Instant::now();
+        let grows = self.takes_more(equations, matrix, followers);
+        self.spent += begun.elapsed();
+        grows
+    }
+
+    fn takes_more(
         &mut self,
         equations: &Equations,
         matrix: &LowerMatrix,

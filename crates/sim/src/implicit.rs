@@ -443,6 +443,7 @@ impl Effort {
         self.solutions = before.solutions + phases.solutions as u64;
         self.linear_iterations = before.linear_iterations + phases.iterations as u64;
         self.seconds_cells = before.seconds_cells + phases.cells.as_secs_f64();
+        self.seconds_contact = before.seconds_contact + phases.contact.as_secs_f64();
         self.seconds_factors = before.seconds_factors + phases.preparation.as_secs_f64();
         self.seconds_solution = before.seconds_solution + phases.solution.as_secs_f64();
     }

@@ -157,6 +157,8 @@ pub struct Effort {
     pub unconverged: u64,
     /// Wall time of forces and stiffness of the cells [s].
     pub seconds_cells: f64,
+    /// Wall time of contacts [s].
+    pub seconds_contact: f64,
     /// Wall time of factorising, or of making the preconditioner [s].
     pub seconds_factors: f64,
     /// Wall time of solving with them [s].

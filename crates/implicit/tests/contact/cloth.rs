@@ -142,6 +142,15 @@ fn cloth_of_20_cells() {
     draped(20, 0.5, 0.5);
 }
 
+/// The time of a step of 5,000, 10,000 and 20,000 triangles that touch a ball and each other.
+#[test]
+#[ignore = "prints times: minutes"]
+fn cloth_of_20_000_triangles() {
+    for cells in [50, 71, 100] {
+        draped(cells, 0.5, 0.15);
+    }
+}
+
 /// S7: a strip whose ends are turned against each other by two turns.
 #[test]
 fn a_twisted_strip_does_not_go_through_itself() {

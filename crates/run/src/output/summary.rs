@@ -423,6 +423,9 @@ fn write_effort(page: &mut String, effort: &Effort, steps: u64) -> std::fmt::Res
     }
     let milliseconds = |seconds: f64| number(seconds * 1e3 / steps.max(1) as f64);
     writeln!(page, "| forces and stiffness | {} ms per step |", milliseconds(effort.seconds_cells))?;
+    if effort.seconds_contact > 0.0 {
+        writeln!(page, "| contact | {} ms per step |", milliseconds(effort.seconds_contact))?;
+    }
     writeln!(page, "| factors or preconditioner | {} ms per step |", milliseconds(effort.seconds_factors))?;
     writeln!(page, "| solution | {} ms per step |", milliseconds(effort.seconds_solution))?;
     if let Some(time) = effort.unstable_from {
