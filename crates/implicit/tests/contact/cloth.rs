@@ -100,7 +100,7 @@ fn draped(cells: u32, friction: f64, until: f64) -> f64 {
     let mut state = State::at_rest(&model);
     let (start, mut iterations, mut slowest, mut halved, mut least) =
         (Instant::now(), 0, 0.0_f64, 0, f64::INFINITY);
-    let mut steps = 0;
+    let (mut steps, mut rows) = (0, 0);
     while state.time < until - 1e-9 {
         let begun = Instant::now();
         let done = solver.advance(&mut state).unwrap_or_else(|error| panic!("{error}"));
@@ -108,17 +108,19 @@ fn draped(cells: u32, friction: f64, until: f64) -> f64 {
         iterations += done.residuals.len();
         halved += usize::from(done.parts > 1);
         steps += 1;
+        rows += solver.touching().unwrap().barriers().rows().len();
         least = least.min(solver.touching().unwrap().now().gap.unwrap_or(f64::INFINITY));
     }
     let border: Vec<usize> = (0..model.rest.len()).filter(|&n| model.place(n).amax() > 0.1499).collect();
     let radius = border.iter().map(|&n| state.position[n].xy().norm()).sum::<f64>() / border.len() as f64;
     let fastest = state.velocity.iter().map(|v| v.norm()).fold(0.0, f64::max);
     println!(
-        "{cells} cells, mu {friction}: {steps} steps in {:.1} s, {:.1} ms a step (longest {:.0}), {:.1} iterations, {halved} halved, least gap {:.1} um, border at {:.1} mm, fastest {fastest:.3} m/s, phases {:?}",
+        "{cells} cells, mu {friction}: {steps} steps in {:.1} s, {:.1} ms a step (longest {:.0}), {:.1} iterations, {halved} halved, {:.0} pairs act, least gap {:.1} um, border at {:.1} mm, fastest {fastest:.3} m/s, phases {:?}",
         start.elapsed().as_secs_f64(),
         1e3 * start.elapsed().as_secs_f64() / f64::from(steps),
         1e3 * slowest,
         iterations as f64 / f64::from(steps),
+        rows as f64 / f64::from(steps),
         1e6 * least,
         1e3 * radius,
         solver.phases(),
