@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use pliant_geometry::{Locator, SurfaceLocator};
-use pliant_sim::contact::pairs::{Pairs, Surface};
+use pliant_geometry::SurfaceLocator;
+use pliant_sim::contact::pairs::Surface;
 use pliant_sim::contact::touch::{Contact, Touch, With};
-use pliant_sim::{Guests, counted, number};
+use pliant_sim::{Guests, number};
 
-use crate::assemble::{Meet, OVERLAP, in_metres};
+use crate::assemble::{Meet, overlaps, told_overlap};
 use crate::diagnostic::Diagnostic;
 use crate::format::SolverName;
 use crate::world::World;
@@ -138,27 +138,10 @@ impl World {
             model.rest[node as usize].into()
         };
         let other = surface.numbered(|node| first + node);
-        let size = sides[0].1.surface.nodes.iter().map(|&node| place(node).amax()).fold(0.0, f64::max);
-        let mut inside: Vec<(f64, Vector3<f64>)> = Vec::new();
-        let cells = Locator::new(&bodies[0].mesh);
-        for at in other.nodes.iter().map(|&node| place(node)) {
-            if cells.locate(at).is_some_and(|found| found.distance == 0.0) {
-                inside.push((offset, at));
-            }
-        }
-        let mut pairs = Pairs::new(&sides[0].1.surface, Some(&other), offset, place);
-        pairs.update(place);
-        pairs.find(place, |pair| inside.push((offset - pair.distance, place(pair.nodes[0]))));
-        inside.retain(|(depth, _)| *depth > OVERLAP * size);
-        let (depth, at) = inside.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(format!(
-            "`{}` and `{}` overlap at the start in {}, up to {} m deep at {}",
-            bodies[0].name,
-            bodies[1].name,
-            counted(inside.len(), "place"),
-            number(*depth),
-            in_metres(*at)
-        ))
+        let own = &sides[0].1.surface;
+        let size = own.nodes.iter().map(|&node| place(node).amax()).fold(0.0, f64::max);
+        let inside = overlaps([(bodies[0], own), (bodies[1], &other)], offset, size, place);
+        told_overlap([&bodies[0].name, &bodies[1].name], &inside)
     }
 
     /// Refuses contacts between participants whose steps do not fit, once these are chosen.

@@ -446,8 +446,11 @@ impl Simulation {
                 }
             }
             while let Some(part) = self.hindmost() {
-                self.take_hold(part);
-                self.participants[part].evaluate(Wanted::Energies)?;
+                // Who has not gone back has found the forces of the first step where all met.
+                if pass > 0 || self.done[part] > 0 || self.meetings.is_host(part) {
+                    self.take_hold(part);
+                    self.participants[part].evaluate(Wanted::Energies)?;
+                }
                 self.participants[part].advance(1, watch)?;
                 self.done[part] += 1;
                 self.meetings.after(part, &self.world.parts, &mut self.participants);

@@ -104,6 +104,20 @@ fn momentum_passes_from_one_participant_to_the_other() {
     (0..3).for_each(|c| assert!((last[c] - first[c]).abs() < 0.01 * first[2], "{first:?} {last:?}"));
 }
 
+/// Solids whose equations are solved overlap, too, where no distance is to be kept.
+#[test]
+fn solids_of_two_participants_that_overlap_are_refused() {
+    let text = pressed(0.01, 1.0, "")
+        .replace(
+            "model = 'shell'\nmesh = { plate = { size = [0.03, 0.03], cells = [6, 6] }, at = [0.0051, 0.0052, 0.0212] }",
+            "mesh = { block = { size = [0.03, 0.03, 0.01], cells = [6, 6, 2] }, as = 'tets', at = [0.0051, 0.0052, 0.0052] }",
+        )
+        .replace("thickness = 0.002\n", "");
+    assert!(text.contains("'tets'"));
+    let told = world(&text).err().unwrap();
+    assert!(told.contains("overlap at the start") && told.contains("m deep"), "{told}");
+}
+
 #[test]
 fn contacts_of_participants_that_cannot_be_are_refused_with_the_line() {
     let told = |text: &str| world(text).err().unwrap_or_else(|| panic!("accepted:\n{text}"));

@@ -18,7 +18,7 @@ use pliant_sim::contact::touch::{Contact, Contacts, Jaw, Rigid, Touch, With, lat
 use pliant_sim::{counted, number};
 
 use super::barriers::BarrierTables;
-use super::{Builder, Subject, in_metres, suggestion};
+use super::{Builder, BuiltBody, Subject, in_metres, suggestion};
 use crate::format::{ContactTable, GrowthTable, ShapeName, SolverName, ToolTable};
 use crate::reads::{rows_of, table as table_file};
 
@@ -31,7 +31,7 @@ const FASTEST: f64 = 10.0;
 const UNIT: f64 = 1e-3;
 
 /// Overlap, over the size of all, above which bodies are in each other.
-pub(crate) const OVERLAP: f64 = 1e-9;
+pub(super) const OVERLAP: f64 = 1e-9;
 
 /// What to do about contact with other solvers.
 const EXPLICIT: &str = "take `solver = \"explicit\"` on the CPU, for solids, membranes and bars, or `\"implicit\"` or `\"static\"`, for solids and shells";
@@ -39,6 +39,51 @@ const EXPLICIT: &str = "take `solver = \"explicit\"` on the CPU, for solids, mem
 /// The distance [m] that surfaces keep without a barrier.
 fn kept(table: &ContactTable) -> f64 {
     table.thickness.unwrap_or(0.0)
+}
+
+/// Where two bodies overlap by more than round-off of a size [m], or are nearer than the distance to keep [m]: how deep [m], and the places. `place` has
+/// nodes by their numbers in the surfaces.
+pub(crate) fn overlaps(
+    sides: [(&BuiltBody, &Surface); 2],
+    offset: f64,
+    size: f64,
+    place: impl Fn(u32) -> Vector3 + Copy,
+) -> Vec<(f64, Vector3)> {
+    // How deep nodes lie in the other body: from cells for large overlaps, from faces for the distance to keep.
+    let mut inside = Vec::new();
+    let [first, second] = sides;
+    for ((_, surface), (body, _)) in [(first, second), (second, first)] {
+        // A sheet has no inside.
+        if body.mesh.volume_blocks().all(|block| block.is_empty()) {
+            continue;
+        }
+        let (cells, all) =
+            (Locator::new(&body.mesh), (0..body.boundary.faces.len() as u32).collect::<Vec<_>>());
+        let faces = SurfaceLocator::new(&body.boundary, &all, &body.mesh.points);
+        for at in surface.nodes.iter().map(|&node| place(node)) {
+            if cells.locate(at).is_some_and(|found| found.distance == 0.0)
+                && let Some(on) = faces.closest(&at)
+            {
+                inside.push(((on.position - at).norm(), at));
+            }
+        }
+    }
+    let mut pairs = Pairs::new(first.1, Some(second.1), offset, place);
+    pairs.update(place);
+    pairs.find(place, |pair| inside.push((offset - pair.distance, place(pair.nodes[0]))));
+    inside.retain(|(depth, _)| *depth > OVERLAP * size);
+    inside
+}
+
+/// How two bodies overlap, in words, with the deepest of these places; `None` without any.
+pub(crate) fn told_overlap([first, second]: [&str; 2], inside: &[(f64, Vector3)]) -> Option<String> {
+    let (depth, at) = inside.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(format!(
+        "`{first}` and `{second}` overlap at the start in {}, up to {} m deep at {}",
+        counted(inside.len(), "place"),
+        number(*depth),
+        in_metres(*at)
+    ))
 }
 
 /// The surface of a body that one of another participant touches.
@@ -555,39 +600,13 @@ impl Builder<'_> {
         }
         let size = self.assembly.rest.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
         let place = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
-        // How deep nodes lie in the other body: from cells for large overlaps, from faces for the distance to keep.
-        let mut inside: Vec<(f64, Vector3)> = Vec::new();
-        for (surface, other) in [(surfaces[0], bodies[1]), (surfaces[1], bodies[0])] {
-            let body = &self.bodies[other];
-            let (cells, all) =
-                (Locator::new(&body.mesh), (0..body.boundary.faces.len() as u32).collect::<Vec<_>>());
-            let faces = SurfaceLocator::new(&body.boundary, &all, &body.mesh.points);
-            for at in surface.nodes.iter().map(|&node| place(node)) {
-                if cells.locate(at).is_some_and(|found| found.distance == 0.0)
-                    && let Some(on) = faces.closest(&at)
-                {
-                    inside.push(((on.position - at).norm(), at));
-                }
-            }
-        }
-        let mut pairs = Pairs::new(surfaces[0], Some(surfaces[1]), kept(table), place);
-        pairs.update(place);
-        pairs.find(place, |pair| {
-            inside.push((kept(table) - pair.distance, place(pair.nodes[0])));
-        });
-        inside.retain(|(depth, _)| *depth > OVERLAP * size);
+        let sides = [0, 1].map(|side| (&self.bodies[bodies[side]], surfaces[side]));
+        let inside = overlaps(sides, kept(table), size, place);
         if !inside.is_empty() && table.separate {
             self.overlapping.get_or_insert_with(|| name.into());
             return;
         }
-        let Some((depth, at)) = inside.iter().max_by(|a, b| a.0.total_cmp(&b.0)) else { return };
-        let [first, second] = &names;
-        let message = format!(
-            "`{first}` and `{second}` overlap at the start in {}, up to {} m deep at {}",
-            counted(inside.len(), "place"),
-            number(*depth),
-            in_metres(*at)
-        );
+        let Some(message) = told_overlap([&names[0], &names[1]], &inside) else { return };
         let help = "move one of them (`at` of its mesh), make `thickness` smaller, or let `separate = true` push them apart";
         self.error(&path, message, "overlapping", help);
     }

@@ -41,7 +41,7 @@ use crate::scene::Scene;
 use crate::source::Source;
 
 use contacts::Partner;
-pub(crate) use contacts::{Meet, OVERLAP, touches};
+pub(crate) use contacts::{Meet, overlaps, told_overlap, touches};
 pub use mesh_files::SizeDoubt;
 pub(crate) use meshes::MeshOrigin;
 pub(crate) use ties::{Placed, attach, holds_nothing};
@@ -420,7 +420,7 @@ impl<'s> Builder<'s> {
 pub(crate) const SCENE: &str = "the scene";
 
 /// A place [m] in messages.
-pub(crate) fn in_metres(place: impl Into<[f64; 3]>) -> String {
+fn in_metres(place: impl Into<[f64; 3]>) -> String {
     let [x, y, z] = place.into().map(pliant_sim::number);
     format!("({x}, {y}, {z}) m")
 }
