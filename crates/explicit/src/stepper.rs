@@ -455,8 +455,8 @@ impl<R: Scalar> CentralDifference<R> {
         self
     }
 
-    /// Says where guests of contacts ([`Contacts::guests`]) go between two times [s], from one place [m] to another, at the same speed; before
-    /// and after that they go on so.
+    /// Says where guests of contacts ([`Contacts::guests`]) go between two times [s], from one place [m] to another, at the same speed, also
+    /// beyond these times.
     ///
     /// # Panics
     /// If there are not as many ways as guests.

@@ -60,7 +60,7 @@ impl Guess {
     }
 }
 
-/// Solves a step to a time [s] with tools whose force is limited; `solve` solves it from its start with tools that go where they are told.
+/// Solves a step to a time [s] with tools whose force is limited; `solve` solves it from its start with tools at their assumed places.
 pub(crate) fn within_limits<S: Contacting, T>(
     solver: &mut S,
     state: &mut State,

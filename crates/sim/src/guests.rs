@@ -1,8 +1,8 @@
 //! Contact between participants: the surface of one whose equations are solved is a guest in the contacts of an explicit one.
 //!
 //! The implicit participant takes its step H. Its surface then goes from where it was to where it is, at the same speed, and the explicit one takes
-//! its steps h against it, as against a tool. Their impulses P say by which force P/H the implicit step is to be taken, which is taken anew: until the
-//! force that it has felt is that of the impulses to a part of [`FOUND`], or [`PASSES`] times. What is left is felt in the next step, so that momentum
+//! its steps h against it, as against a tool. Their impulses P give the mean force P/H on the implicit participant. The step is repeated with this force until the
+//! force on the surface differs from it by less than a part of [`FOUND`], [`PASSES`] times at most. The rest acts in the next step, so that momentum
 //! is kept.
 //!
 //! In a pass the surface feels f − k (x − x̄), with f and x̄ of the pass before: at the end nothing but f. The impedance of an explicit body with

@@ -1,4 +1,4 @@
-//! Guests: nodes of surfaces that another solver moves. Contacts find them where that one says, and no impulse moves them; it is told the impulses.
+//! Guests: nodes of surfaces that another solver moves. That solver gives their places; no impulse moves them, and their impulses are summed for it.
 
 use nalgebra::Vector3;
 use pliant_mechanics::tensor::{Vector, add};
