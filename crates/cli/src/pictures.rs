@@ -84,10 +84,18 @@ pub struct FinalPicture {
 }
 
 impl FinalPicture {
-    pub fn new(world: &World) -> Result<Self, Failure> {
-        let look = Look { regions: regions_of_scene(world), ..look_of(&world.scene) };
-        Ok(Self { look, graphics: Graphics::open()? })
+    /// With the look of a world.
+    ///
+    /// # Errors
+    /// If nothing can draw.
+    pub fn new(world: &World) -> Result<Self, PictureError> {
+        Ok(Self { look: look_of_world(world), graphics: Graphics::open()? })
     }
+}
+
+/// The look of pictures of a world, as its `[view]` asks.
+pub fn look_of_world(world: &World) -> Look {
+    Look { regions: regions_of_scene(world), ..look_of(&world.scene) }
 }
 
 impl Draw for FinalPicture {

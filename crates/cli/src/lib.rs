@@ -1,0 +1,66 @@
+//! `pliant`: real-time simulation of soft organs. This crate parses commands and prints results; the libraries compute. The binary and
+//! the Python package both call [`main`].
+//!
+//! ```
+//! let words = ["pliant", "schema", "--markdown"].map(std::ffi::OsString::from);
+//! assert_eq!(pliant_command::main(words), std::process::ExitCode::SUCCESS);
+//! ```
+
+/// A line on standard error. A full disk or a closed pipe must not end a run: unlike the standard library's macro, this one
+/// never panics.
+macro_rules! eprintln {
+    ($($text:tt)*) => { $crate::report::tell(format_args!($($text)*)) };
+}
+
+mod arguments;
+mod bench;
+mod commands;
+#[cfg(feature = "viewer")]
+mod gallery;
+mod haptics;
+mod info;
+#[cfg(feature = "viewer")]
+mod look;
+mod mesh;
+mod page;
+#[cfg_attr(not(feature = "viewer"), path = "no_pictures.rs")]
+mod pictures;
+mod prepare;
+mod report;
+mod reproduce;
+mod signals;
+#[cfg(feature = "viewer")]
+mod view;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use clap::Parser;
+
+#[cfg(feature = "viewer")]
+pub use pictures::{FinalPicture, look_of_world};
+
+/// Does what a command line says, whose first word is the program: prints, writes files, opens a window. The code that the process is to
+/// end with.
+pub fn main(words: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let words: Vec<OsString> = words.into_iter().collect();
+    let arguments = match arguments::Arguments::try_parse_from(&words) {
+        Ok(arguments) => arguments,
+        Err(error) => return mistyped(&error, &words),
+    };
+    let json = arguments.command.wants_json();
+    match commands::execute(arguments.command) {
+        Ok(code) => code,
+        Err(failure) => report::failure(&failure, json),
+    }
+}
+
+/// An invalid command line, or a request for help.
+fn mistyped(error: &clap::Error, words: &[OsString]) -> ExitCode {
+    if error.use_stderr() && words.iter().any(|word| word == "--json") {
+        report::refused(error.to_string().trim_end());
+    }
+    // A closed terminal is not an error.
+    let _ = error.print();
+    ExitCode::from(error.exit_code() as u8)
+}
