@@ -8,6 +8,7 @@ use clap::{Parser, Subcommand, ValueEnum};
 use pliant_bench::Instructions;
 use pliant_geometry::CellLabel;
 use pliant_imaging::LabelChoice;
+use pliant_run::SweepPart;
 use pliant_scene::format::{BackgroundName, Choice, LookColour, LookTable, MapName, TextureName};
 
 /// Real-time simulation of soft organs.
@@ -53,6 +54,9 @@ pub enum Command {
         /// Print the reference page of all parameters as Markdown instead.
         #[arg(long)]
         markdown: bool,
+        /// Print the classes of the Python package (`pliant.tables`) instead.
+        #[arg(long, conflicts_with = "markdown")]
+        python: bool,
     },
     /// Translate a NiftySim model into a scene.
     #[command(after_help = "Examples:\n  pliant import model.xml -o model && pliant run model\n  \
@@ -598,6 +602,13 @@ pub struct Sweep {
     /// Write into a folder that is not empty.
     #[arg(long)]
     pub force: bool,
+    /// Run only every N-th combination from the I-th on, and append rows to rows-I-of-N.jsonl in the folder: for job arrays. The same command again runs
+    /// what is missing.
+    #[arg(long, value_name = "I/N", conflicts_with_all = ["force", "dry_run", "merge"])]
+    pub part: Option<SweepPart>,
+    /// Put the rows of all parts in the folder together into the table, and name what is missing.
+    #[arg(long, conflicts_with_all = ["force", "dry_run"])]
+    pub merge: bool,
     /// Check and list the combinations without running or writing anything.
     #[arg(long, alias = "list")]
     pub dry_run: bool,

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use pliant_gpu::{Adapter, GpuError};
-use pliant_run::{Checkpoint, Draw, Options, OutputFolder, Sweep, SweepOptions};
+use pliant_run::{Checkpoint, Draw, Options, OutputFolder, Sweep, SweepOptions, SweepPart};
 use pliant_scene::diagnostic::Diagnostic;
 use pliant_scene::{Reads, Scene, World, reference, registry};
 use pliant_sim::number;
@@ -29,11 +29,12 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Sweep(arguments) => sweep(&arguments),
         Command::Check(arguments) => check(&arguments),
         Command::New { name } => new(&name),
-        Command::Schema { markdown } => {
-            if markdown {
-                say(reference::page(&registry::sections()).trim_end())?;
-            } else {
-                say(format_args!("{:#}", registry::scene_schema()))?;
+        Command::Schema { markdown, python } => {
+            let sections = registry::sections();
+            match (markdown, python) {
+                (true, _) => say(reference::page(&sections).trim_end())?,
+                (_, true) => say(reference::python(&sections).trim_end())?,
+                _ => say(format_args!("{:#}", registry::scene_schema()))?,
             }
             Ok(ExitCode::SUCCESS)
         }
@@ -195,6 +196,12 @@ fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
         path.as_mut_os_string().push("-sweep");
         path
     });
+    if arguments.merge {
+        return merge(&sweep, &path);
+    }
+    if let Some(part) = arguments.part {
+        return sweep_part(&sweep, &path, part, threads, arguments.keep_fields);
+    }
     let folder =
         sweep.open_folder(path, arguments.force).map_err(|error| Failure::plain(&error, error.remedy))?;
     let bar = Bar::new();
@@ -209,9 +216,7 @@ fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
         }
     };
     say(summary.words())?;
-    for (run, message) in &summary.failures {
-        eprintln!("error: run-{run:04} ({}): {message}", sweep.title(*run));
-    }
+    told_failures(&sweep, &summary.failures);
     if summary.interrupted {
         eprintln!("error: the sweep was interrupted; the table contains the finished runs");
         return Ok(ExitCode::from(signals::exit_code()));
@@ -221,6 +226,46 @@ fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
     }
     eprintln!("error: {} of {runs} runs failed", summary.failures.len());
     Ok(ExitCode::from(1))
+}
+
+/// Runs a part of a sweep.
+fn sweep_part(
+    sweep: &Sweep,
+    folder: &Path,
+    part: SweepPart,
+    threads: usize,
+    keep_fields: bool,
+) -> Result<ExitCode, Failure> {
+    let options = SweepOptions { threads, keep_fields, stop: Some(signals::stop()) };
+    let found = sweep.run_part(folder, part, options, &|_| {});
+    let summary = found.map_err(|error| Failure::plain(&error, error.remedy))?;
+    let known = if summary.known > 0 { format!(", {} of them before", summary.known) } else { String::new() };
+    let failed = summary.failures.len();
+    say(format_args!("{} runs{known}, {failed} failed\nwrote {}", summary.runs, summary.rows.display()))?;
+    told_failures(sweep, &summary.failures);
+    if summary.interrupted {
+        eprintln!("error: the part was interrupted; the same command again runs what is missing");
+        return Ok(ExitCode::from(signals::exit_code()));
+    }
+    Ok(ExitCode::from(u8::from(failed > 0)))
+}
+
+/// Puts the parts of a sweep together.
+fn merge(sweep: &Sweep, folder: &Path) -> Result<ExitCode, Failure> {
+    let merged = sweep.merge(folder).map_err(|error| Failure::plain(&error, error.remedy))?;
+    let there = sweep.runs() - merged.missing.len();
+    say(format_args!("{there} of {} runs\nwrote {}", sweep.runs(), merged.table.display()))?;
+    told_failures(sweep, &merged.failures);
+    for &run in &merged.missing {
+        eprintln!("error: run-{run:04} ({}) is missing", sweep.title(run));
+    }
+    Ok(ExitCode::from(u8::from(!(merged.missing.is_empty() && merged.failures.is_empty()))))
+}
+
+fn told_failures(sweep: &Sweep, failures: &[(usize, String)]) {
+    for (run, message) in failures {
+        eprintln!("error: run-{run:04} ({}): {message}", sweep.title(*run));
+    }
 }
 
 /// Rejects a sweep with invalid combinations; an error shared by several is reported once.

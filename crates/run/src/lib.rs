@@ -40,6 +40,7 @@ mod checkpoint;
 mod live;
 mod output;
 mod overview;
+mod parts;
 mod run;
 mod sweep;
 #[cfg(test)]
@@ -52,5 +53,6 @@ pub use output::{
     StabilitySummary, Summary, TieSummary, failed_input, failed_output,
 };
 pub use overview::overview;
+pub use parts::{MergedSweep, PartSummary, SweepPart};
 pub use run::{Draw, Options, Progress, run, run_with};
 pub use sweep::{Sweep, SweepOptions, SweepProgress, SweepSummary};

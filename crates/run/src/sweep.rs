@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use pliant_mechanics::Energies;
+use pliant_mechanics::{Energies, fingerprint};
 use pliant_sim::number;
+use serde::{Deserialize, Serialize};
 
 use crate::output::{
     AXES, ENERGIES, MOST_CURVES, OutputError, OutputFolder, Reactions, Summary, check_own_folder,
@@ -39,7 +40,7 @@ pub struct Sweep {
 
 /// A key with its values, in the order given.
 #[derive(Clone, Debug, PartialEq)]
-struct Axis {
+pub(crate) struct Axis {
     key: String,
     values: Vec<String>,
 }
@@ -82,17 +83,18 @@ pub struct SweepSummary {
 }
 
 /// The result of one run.
-struct Row {
-    status: &'static str,
-    message: String,
-    time: f64,
-    steps: u64,
-    step: f64,
-    energies: Energies,
-    reactions: Vec<(String, [f64; 3])>,
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Row {
+    pub status: String,
+    pub message: String,
+    pub time: f64,
+    pub steps: u64,
+    pub step: f64,
+    pub energies: Energies,
+    pub reactions: Vec<(String, [f64; 3])>,
     /// Column and value of each probe at the end.
-    probes: Vec<(String, String)>,
-    wall_seconds: f64,
+    pub probes: Vec<(String, String)>,
+    pub wall_seconds: f64,
 }
 
 impl Sweep {
@@ -237,7 +239,7 @@ impl Sweep {
                 lock(&parts)[run] = part;
                 tell();
             };
-            let row = self.run_one(run, folder, options, &mut watch);
+            let row = self.run_one(run, folder.path(), options, &mut watch);
             lock(&parts)[run] = 1.0;
             ended[0].fetch_add(1, Ordering::Relaxed);
             ended[1].fetch_add(usize::from(row.status != "done"), Ordering::Relaxed);
@@ -264,10 +266,11 @@ impl Sweep {
         })
     }
 
-    fn run_one(
+    /// Does one run in a folder of its own within a folder.
+    pub(crate) fn run_one(
         &self,
         run: usize,
-        folder: &OutputFolder,
+        folder: &Path,
         options: SweepOptions<'_>,
         watch: &mut (dyn FnMut(f64) + Send),
     ) -> Row {
@@ -278,7 +281,7 @@ impl Sweep {
         if !options.keep_fields {
             world.scene.outputs.retain(|(_, table)| !matches!(table, OutputTable::Vtu(_)));
         }
-        let path = folder.path().join(format!("run-{run:04}"));
+        let path = folder.join(format!("run-{run:04}"));
         // Files in it that are not of a run stay.
         let folder = match OutputFolder::prepare(path, &world.scene, true) {
             Ok(folder) => folder,
@@ -306,12 +309,23 @@ impl Sweep {
         svg.map(|svg| folder.write(SWEEP_PLOT, svg)).transpose()
     }
 
+    /// Paths of the values that are varied.
+    pub(crate) fn keys(&self) -> impl Iterator<Item = &str> {
+        self.axes.iter().map(|axis| axis.key.as_str())
+    }
+
+    /// What a row belongs to: the scene, the values of its run, this version.
+    pub(crate) fn key(&self, run: usize) -> String {
+        let scene = (self.source.text(), self.source.assignments(), self.title(run), env!("CARGO_PKG_VERSION"));
+        format!("{:016x}", fingerprint(&scene))
+    }
+
     fn write(&self, folder: &OutputFolder, rows: &[Option<Row>]) -> Result<(), OutputError> {
         folder.write(SWEEP, self.table(rows)).map(|_| ())
     }
 
     /// The table of the runs that have ended. Columns that a run has no value for stay empty.
-    fn table(&self, rows: &[Option<Row>]) -> String {
+    pub(crate) fn table(&self, rows: &[Option<Row>]) -> String {
         let ended = || rows.iter().flatten();
         let reactions = distinct(ended().flat_map(|row| row.reactions.iter().map(|(name, _)| name)));
         let probes = distinct(ended().flat_map(|row| row.probes.iter().map(|(column, _)| column)));
@@ -329,7 +343,7 @@ impl Sweep {
             let Some(row) = row else { continue };
             let mut cells = vec![run.to_string()];
             cells.extend(self.combination(run).into_iter().map(|(_, value)| quoted(value)));
-            cells.extend([row.status.to_owned(), quoted(&row.message)]);
+            cells.extend([row.status.clone(), quoted(&row.message)]);
             cells.extend([format!("{:e}", row.time), row.steps.to_string(), format!("{:e}", row.step)]);
             let good = row.status == "done";
             let Energies { kinetic, internal, damping, external, hourglass, balance } = row.energies;
@@ -354,7 +368,7 @@ impl Sweep {
 impl Row {
     fn new(summary: Summary, probes: Vec<(String, String)>) -> Self {
         Self {
-            status: summary.status,
+            status: summary.status.to_owned(),
             message: summary.error.map_or(String::new(), |error| error.message),
             time: summary.time,
             steps: summary.steps,
@@ -369,7 +383,7 @@ impl Row {
     /// Of a run that did not start.
     fn failed(reason: impl ToString) -> Self {
         Self {
-            status: "failed",
+            status: "failed".to_owned(),
             message: reason.to_string(),
             time: 0.0,
             steps: 0,
@@ -446,7 +460,7 @@ fn quoted(text: &str) -> String {
 
 /// Does the work of all runs on some threads, each run on one; after `stop` none is begun. A run's own pool is inside
 /// its thread: a worker of rayon's that waits for it would begin another run meanwhile.
-fn in_parallel(runs: usize, threads: usize, stop: Option<&AtomicBool>, work: impl Fn(usize) + Sync) {
+pub(crate) fn in_parallel(runs: usize, threads: usize, stop: Option<&AtomicBool>, work: impl Fn(usize) + Sync) {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = if threads == 0 { cores } else { threads }.min(runs.max(1));
     let next = AtomicUsize::new(0);
@@ -471,7 +485,7 @@ fn in_parallel(runs: usize, threads: usize, stop: Option<&AtomicBool>, work: imp
     });
 }
 
-fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
