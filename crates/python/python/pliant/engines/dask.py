@@ -1,0 +1,51 @@
+"""Dask's distributed scheduler."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from pliant.engines import Task
+from pliant.mesh import _extra
+
+__all__ = ["Dask"]
+
+
+class Dask:
+    """Runs on workers of Dask: those of a client, of the current one, or of a local cluster that is started."""
+
+    def __init__(self, client: Any, cores: int, gpus: float, retries: int) -> None:
+        self._distributed = _extra("distributed", "dask")
+        self._client, self._retries = client, retries
+        self._resources = {"GPU": gpus} if gpus else None
+        self._cores = cores
+
+    def run(self, task: Task, bundle: Any, numbers: Iterable[int]) -> Iterator[dict[str, Any]]:
+        """Rows as runs end."""
+        client, own = self._client, None
+        if client is None:
+            try:
+                client = self._distributed.get_client()
+            except ValueError:
+                own = client = self._distributed.Client(processes=True, threads_per_worker=1, dashboard_address=None)
+        # The bundle is the result of a task, not scattered: a worker that has it and is lost does not take it away.
+        shared = client.submit(_same, bundle, pure=False)
+        options = {"pure": False, "retries": self._retries, "resources": self._resources}
+        left = iter(numbers)
+        most = max(2, 2 * sum(client.nthreads().values()) // max(1, self._cores))
+        try:
+            first = [client.submit(task, shared, number, **options) for number, _ in zip(left, range(most), strict=False)]
+            running = self._distributed.as_completed(first)
+            for future in running:
+                row = future.result()
+                number = next(left, None)
+                if number is not None:
+                    running.add(client.submit(task, shared, number, **options))
+                yield row
+        finally:
+            if own is not None:
+                own.close()
+
+
+def _same(bundle: Any) -> Any:
+    return bundle

@@ -1,0 +1,45 @@
+"""Ray."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from pliant.engines import Task
+from pliant.mesh import _extra
+
+__all__ = ["Ray"]
+
+
+class Ray:
+    """Runs on the instance of Ray that is there, or on a local one that is started."""
+
+    def __init__(self, cores: int, gpus: float, retries: int) -> None:
+        self._ray = _extra("ray", "ray")
+        self._options = {"num_cpus": cores, "num_gpus": gpus, "max_retries": retries}
+
+    def run(self, task: Task, bundle: Any, numbers: Iterable[int]) -> Iterator[dict[str, Any]]:
+        """Rows as runs end."""
+        ray = self._ray
+        own = not ray.is_initialized()
+        if own:
+            ray.init(include_dashboard=False, log_to_driver=False)
+        shared, remote = ray.put(bundle), ray.remote(task).options(**self._options)
+        cores = int(ray.cluster_resources().get("CPU", 1))
+        most, left, running = max(2, 2 * cores // max(1, self._options["num_cpus"])), iter(numbers), []
+        try:
+            while True:
+                for number in left:
+                    running.append(remote.remote(shared, number))
+                    if len(running) >= most:
+                        break
+                if not running:
+                    return
+                done, running = ray.wait(running, num_returns=1)
+                for reference in done:
+                    yield ray.get(reference)
+        finally:
+            for reference in running:
+                ray.cancel(reference, force=True)
+            if own:
+                ray.shutdown()

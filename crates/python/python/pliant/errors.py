@@ -1,0 +1,153 @@
+"""What can go wrong, each with its place. Every error is also the built-in exception that Python users expect.
+
+>>> issubclass(SceneError, ValueError) and issubclass(SceneError, Error)
+True
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+__all__ = [
+    "BusyError",
+    "ClosedError",
+    "ClusterError",
+    "ConvergenceError",
+    "DeviceError",
+    "Diagnostic",
+    "Error",
+    "InternalError",
+    "MeshError",
+    "OutputError",
+    "PliantWarning",
+    "ResumeError",
+    "SceneError",
+    "SimulationError",
+    "UnstableError",
+]
+
+
+class PliantWarning(UserWarning):
+    """A model or a result that is questionable; nothing was stopped."""
+
+
+@dataclass(frozen=True)
+class Diagnostic:
+    """A finding about a scene.
+
+    `line` and `column` count from 1 in the text of the scene; `key` is the path of the key, such as ``law.tissue.young-modulus``.
+    """
+
+    severity: str
+    message: str
+    file: str
+    line: int | None
+    column: int | None
+    key: str | None
+    label: str
+    help: str | None
+
+    def __str__(self) -> str:
+        place = self.file if self.line is None else f"{self.file}:{self.line}:{self.column}"
+        advice = f" ({self.help})" if self.help else ""
+        return f"{place}: {self.severity}: {self.message}{advice}"
+
+
+class Error(Exception):
+    """The base of all errors of Pliant."""
+
+    _fields: tuple[str, ...] = ()
+
+    def __init__(self, message: str, **fields: Any) -> None:
+        super().__init__(message)
+        for name in self._fields:
+            setattr(self, name, fields.get(name))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        fields = {name: getattr(self, name) for name in self._fields}
+        return _again, (type(self), str(self), fields)
+
+
+def _again(kind: type[Error], message: str, fields: dict[str, Any]) -> Error:
+    return kind(message, **fields)
+
+
+class SceneError(Error, ValueError):
+    """A scene has mistakes: `diagnostics` has all of them, and the text shows the lines."""
+
+    _fields = ("diagnostics",)
+    diagnostics: Sequence[Diagnostic]
+
+
+class MeshError(Error, ValueError):
+    """A mesh or an image that can't be read, repaired or meshed."""
+
+    _fields = ("path", "line", "place")
+    path: str | None
+    line: int | None
+    place: Sequence[float] | None
+
+
+class SimulationError(Error, RuntimeError):
+    """A simulation that can't go on. It stays at the last good instant; `time` is in s."""
+
+    _fields = ("kind", "body", "element", "node", "time")
+    kind: str
+    body: str | None
+    element: int | None
+    node: int | None
+    time: float | None
+
+
+class UnstableError(SimulationError):
+    """A step was too long, an element inverted, or energy came from nowhere."""
+
+
+class ConvergenceError(SimulationError):
+    """Equations that were not solved, in a load step counted from 1."""
+
+    _fields = (*SimulationError._fields, "load_step", "residual")
+    load_step: int | None
+    residual: float | None
+
+
+class DeviceError(Error, RuntimeError):
+    """No graphics adapter can do what was asked for; the text names the packages to install."""
+
+    _fields = ("adapter",)
+    adapter: str | None
+
+
+class OutputError(Error, OSError):
+    """A file or folder that can't be written."""
+
+    _fields = ("path",)
+    path: str | None
+
+
+class ResumeError(Error, ValueError):
+    """A state or a checkpoint of another model."""
+
+    _fields = ("path",)
+    path: str | None
+
+
+class BusyError(Error, RuntimeError):
+    """A call while another one computes, from a callback, or after a fork."""
+
+
+class ClosedError(Error, RuntimeError):
+    """A call after `close`."""
+
+
+class ClusterError(Error, RuntimeError):
+    """Workers that have another version, or an engine that is not there."""
+
+    _fields = ("hosts",)
+    hosts: Sequence[str] | None
+
+
+class InternalError(Error, RuntimeError):
+    """A mistake of Pliant. This simulation is over, others go on."""

@@ -1,0 +1,285 @@
+"""Models: scenes that are built, constant and shared between simulations."""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pliant import _native
+from pliant._arrays import fixed
+from pliant.errors import PliantWarning, SimulationError
+from pliant.mesh import Mesh, _table
+
+if TYPE_CHECKING:
+    from pliant.result import Progress, Result
+    from pliant.scene import Scene
+    from pliant.simulation import Simulation
+
+__all__ = ["Body", "Model"]
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body of a model.
+
+    `nodes` are those of the model that are its own, `mesh` is at rest [m], and `given_numbers` (nodes,) holds the number of each node in
+    the mesh that was given or read.
+    """
+
+    name: str
+    nodes: slice
+    mesh: Mesh
+    given_numbers: NDArray[np.uint32]
+
+
+class Model:
+    """A scene that is built. It does not change, and any number of simulations share it.
+
+    Examples
+    --------
+    >>> from pliant import Mesh, Scene
+    >>> model = Scene.of_mesh(Mesh.block([0.1, 0.05, 0.05], edge=0.025)).build()
+    >>> model.rest.shape
+    (45, 3)
+    >>> model.mass.sum().round(3)
+    np.float64(0.25)
+    """
+
+    _native: _native.Model
+    _scene: Scene
+
+    @classmethod
+    def _of(cls, scene: Scene, native: _native.Model) -> Model:
+        model = cls.__new__(cls)
+        model._scene, model._native = scene, native
+        for text in {str(found) for found in native.warnings()}:
+            warnings.warn(text, PliantWarning, stacklevel=3)
+        return model
+
+    @property
+    def scene(self) -> Scene:
+        """A copy of the scene it was built from."""
+        return self._scene.copy()
+
+    @property
+    def rest(self) -> NDArray[np.float64]:
+        """Places of all nodes at rest [m], (nodes, 3), bodies one after another."""
+        own: NDArray[np.float64] = self._kept("_rest", lambda: fixed(self._native.rest()))
+        return own
+
+    @property
+    def mass(self) -> NDArray[np.float64]:
+        """Masses of all nodes [kg], (nodes,)."""
+        own: NDArray[np.float64] = self._kept("_mass", lambda: fixed(self._native.mass()))
+        return own
+
+    @property
+    def step(self) -> float:
+        """Time step [s]."""
+        return self._native.steps()[0]
+
+    @property
+    def limit(self) -> float | None:
+        """Critical time step [s] of explicit steps; `None` where steps of any length are stable."""
+        return self._native.steps()[1]
+
+    @property
+    def steps(self) -> int:
+        """Steps to the end of the scene."""
+        return self._native.steps()[2]
+
+    @property
+    def bodies(self) -> Mapping[str, Body]:
+        """The bodies by name."""
+
+        def make() -> Mapping[str, Body]:
+            all_bodies = {}
+            for name, first, count, mesh, given in self._native.bodies():
+                all_bodies[name] = Body(name, slice(first, first + count), Mesh._of(mesh), fixed(given))
+            return MappingProxyType(all_bodies)
+
+        own: Mapping[str, Body] = self._kept("_bodies", make)
+        return own
+
+    @property
+    def constraints(self) -> list[str]:
+        """Names of what is held and moved."""
+        return self._native.names()["constraints"]
+
+    @property
+    def contacts(self) -> list[str]:
+        """Names of contacts."""
+        return self._native.names()["contacts"]
+
+    @property
+    def tools(self) -> list[str]:
+        """Names of tools."""
+        return self._native.names()["tools"]
+
+    @property
+    def notes(self) -> list[str]:
+        """Remarks on how it was built."""
+        return self._native.notes()
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is questionable about it."""
+        return [str(found) for found in self._native.warnings()]
+
+    @property
+    def device(self) -> str:
+        """``"cpu"``, or the GPU that it is stepped on."""
+        return self._native.device()
+
+    def _kept(self, name: str, make: Callable[[], Any]) -> Any:
+        if name not in self.__dict__:
+            self.__dict__[name] = make()
+        return self.__dict__[name]
+
+    def _body_mesh(self, name: str) -> Mesh:
+        return self.bodies[name].mesh
+
+    def select(self, body: str, what: str | Mapping[str, Any]) -> NDArray[np.uint32]:
+        """Nodes of a body's mesh: a named set, or a selection as scenes write it.
+
+        >>> from pliant import Mesh, Scene
+        >>> model = Scene.of_mesh(Mesh.block([0.1, 0.05, 0.05], edge=0.025)).build()
+        >>> model.select("body", "x-max").size, model.select("body", {"sphere": {"centre": [0, 0, 0], "radius": 0.03}}).size
+        (9, 4)
+        """
+        selection = {"set": what} if isinstance(what, str) and what != "all" else what
+        return np.asarray(self._native.select(body, json.dumps(selection)), dtype=np.uint32)
+
+    def simulate(self, *, threads: int = 1, precision: str | None = None, device: str | None = None) -> Simulation:
+        """A simulation at its start.
+
+        Parameters
+        ----------
+        threads
+            Threads of its own; 0 for all cores. Many simulations at once do best with one each.
+        precision
+            ``"single"`` or ``"double"`` instead of the scene's.
+        device
+            ``"cpu"``, ``"gpu"`` or the name of an adapter instead of the scene's.
+        """
+        from pliant.simulation import Simulation
+
+        values = {"run.precision": precision, "run.device": device}
+        changed = {key: value for key, value in values.items() if value is not None}
+        model = self._scene.replace(changed).build(like=self) if changed else self
+        return Simulation._of(model, threads)
+
+    def run(
+        self,
+        out: str | os.PathLike[str] | None = None,
+        *,
+        until: float | None = None,
+        each: Callable[[Progress], object] | None = None,
+        force: bool = False,
+        threads: int = 0,
+        picture: bool = False,
+    ) -> Result:
+        """Runs it to its end, with the outputs of the scene in the folder `out`, or in memory.
+
+        Parameters
+        ----------
+        out
+            Folder of the outputs, as of ``pliant run``; without one nothing is written, and `Result.history` has the tables.
+        until
+            Duration [s] instead of the scene's.
+        each
+            Called about ten times a second with a `Progress`. What it raises ends the run.
+        force
+            Whether files of an earlier run are replaced.
+        threads
+            Threads; 0 for all cores.
+        picture
+            Whether ``picture.png`` is drawn at the end.
+
+        A run that fails warns and returns a result whose `status` is ``"failed"``: `Result.error` has the reason, and what was found until then is kept.
+        """
+        from pliant.result import Progress, Result
+
+        if out is None:
+            return self._run_in_memory(until, each, threads)
+        told = None if each is None else lambda time, end, wall: each(Progress(time, end, wall))
+        text, time, energies = self._native.run(os.fspath(out), until, threads, force, picture, told)
+        result = Result._of_files(json.loads(text), time, energies, os.fspath(out))
+        _doubt(result)
+        return result
+
+    def _run_in_memory(self, until: float | None, each: Callable[[Progress], object] | None, threads: int) -> Result:
+        import time as clock
+
+        from pliant.result import Progress, Result
+
+        started = clock.monotonic()
+        end = self._scene.until if until is None else until
+        simulation = self.simulate(threads=threads)
+        error: SimulationError | None = None
+
+        def look(now: Simulation) -> None:
+            if each is not None:
+                each(Progress(now.time, end, clock.monotonic() - started))
+
+        history = simulation._history(())
+        try:
+            simulation._run_into(history, end, look, None)
+        except SimulationError as failure:
+            error = failure
+        result = Result._of_memory(simulation, history, clock.monotonic() - started, error)
+        _doubt(result)
+        return result
+
+    def _lends(self, scene: Scene) -> dict[str, Mesh]:
+        """Meshes for the bodies of another scene whose tables of the mesh are the same, and are not given anyway."""
+        lent = {}
+        if os.path.abspath(scene.folder) != os.path.abspath(self._scene.folder):
+            return lent
+        for name, body in scene.body.items():
+            known = self._scene.body.get(name)
+            table = _get(body, "mesh")
+            if known is None or table is None or isinstance(table, Mesh) or _get(known, "mesh") != table:
+                continue
+            if isinstance(table, Mapping) and ("given" in table or "fix" in table or ("file" in table and "as" not in table)):
+                continue
+            lent[name] = self._body_mesh(name)
+        return lent
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _built_again, (self._scene,)
+
+    def __repr__(self) -> str:
+        count = len(self.bodies)
+        return f"Model({count} {'body' if count == 1 else 'bodies'}, {len(self.rest)} nodes, step {self.step:.3g} s)"
+
+    def _repr_html_(self) -> str:
+        rows: dict[str, Any] = {"bodies": ", ".join(self.bodies), "nodes": len(self.rest), "mass [kg]": f"{self.mass.sum():.4g}"}
+        rows |= {"step [s]": f"{self.step:.3g}", "steps": self.steps, "device": self.device}
+        return _table("Model", rows)
+
+
+def _built_again(scene: Scene) -> Model:
+    with warnings.catch_warnings():
+        # They were shown when the model was built first.
+        warnings.simplefilter("ignore", PliantWarning)
+        return scene.build()
+
+
+def _get(body: Any, key: str) -> Any:
+    return body.get(key) if isinstance(body, Mapping) else getattr(body, key, None)
+
+
+def _doubt(result: Result) -> None:
+    for text in dict.fromkeys(result.warnings):
+        warnings.warn(text, PliantWarning, stacklevel=3)
+    if result.error is not None:
+        warnings.warn(f"the run failed: {result.error}", PliantWarning, stacklevel=3)

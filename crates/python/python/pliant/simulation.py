@@ -1,0 +1,592 @@
+"""Simulations under way."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pliant import _native
+from pliant._arrays import indices, numbers
+from pliant.errors import BusyError, ResumeError
+from pliant.mesh import Mesh
+from pliant.result import History
+
+if TYPE_CHECKING:
+    from pliant.model import Model
+    from pliant.pictures import Picture
+
+__all__ = ["Energies", "Grip", "Simulation", "State", "Tool"]
+
+
+class Energies(NamedTuple):
+    """Energies [J]; `balance` is what is missing, as a part of the largest."""
+
+    kinetic: float
+    internal: float
+    damping: float
+    external: float
+    hourglass: float
+    balance: float
+
+
+class Tool(NamedTuple):
+    """A tool at an instant: place [m] and quaternion (x, y, z, w), the angle between its jaws [rad], the force [N] of all that touches it."""
+
+    place: NDArray[np.float64]
+    quaternion: NDArray[np.float64]
+    opening: float
+    force: NDArray[np.float64]
+
+
+class State:
+    """A snapshot: displacements, velocities, and what relaxing tissue remembers. It fits any model with the same meshes, and pickles."""
+
+    _native: _native.State
+
+    @classmethod
+    def _of(cls, native: _native.State) -> State:
+        state = cls.__new__(cls)
+        state._native = native
+        return state
+
+    @property
+    def time(self) -> float:
+        """Time [s]."""
+        return self._native.time
+
+    @property
+    def steps(self) -> int:
+        """Steps since the start."""
+        return self._native.steps
+
+    @property
+    def displacement(self) -> NDArray[np.float64]:
+        """Displacements of all nodes [m], (nodes, 3)."""
+        return self._native.displacement()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes it to a file."""
+        bytes_of, time, steps, moved = self._native.encoded()
+        parts = {f"part{k}": np.frombuffer(part, dtype=np.uint8) for k, part in enumerate(bytes_of)}
+        with open(path, "wb") as file:
+            np.savez(file, time=time, steps=steps, moved=np.asarray(moved), **parts)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> State:
+        """Reads what `save` wrote."""
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                parts = [file[f"part{k}"].tobytes() for k in range(sum(name.startswith("part") for name in file.files))]
+                return _state(parts, float(file["time"]), int(file["steps"]), file["moved"].tolist())
+        except (KeyError, ValueError) as error:
+            raise ResumeError(f"`{os.fspath(path)}` is no state of a simulation: {error}", path=os.fspath(path)) from error
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _state, self._native.encoded()
+
+    def __repr__(self) -> str:
+        return f"State({self.time:g} s, {len(self.displacement)} nodes)"
+
+
+def _state(parts: list[bytes], time: float, steps: int, moved: list[float]) -> State:
+    return State._of(_native.State.decoded(parts, time, steps, moved))
+
+
+class Grip:
+    """A hand: a spring between the surface around a point and a place. Setting `place` pulls."""
+
+    def __init__(self, simulation: Simulation, nodes: list[tuple[int, float]], stiffness: float) -> None:
+        self._simulation: Simulation | None = simulation
+        self._nodes, self._asked = nodes, stiffness
+        self._stiffness = stiffness
+        rest, moved = simulation.model.rest, simulation.displacement
+        self._place = np.sum([w * (rest[n] + moved[n]) for n, w in nodes], axis=0, dtype=np.float64)
+
+    def _held(self) -> Simulation:
+        if self._simulation is None:
+            raise ValueError("this grip is released")
+        return self._simulation
+
+    @property
+    def point(self) -> NDArray[np.float64]:
+        """Where what it holds is now [m]."""
+        return self._pulled()[0]
+
+    @property
+    def force(self) -> NDArray[np.float64]:
+        """Its force on the body [N]."""
+        return self._pulled()[1]
+
+    def _pulled(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        simulation = self._held()
+        found = simulation._native.pulled(simulation._grips.index(self))
+        assert found is not None
+        return np.array(found[0]), np.array(found[1])
+
+    @property
+    def place(self) -> NDArray[np.float64]:
+        """Where it pulls to [m]."""
+        return self._place.copy()
+
+    @place.setter
+    def place(self, place: ArrayLike) -> None:
+        self._place = numbers(place, "the place of a grip", (3,)).copy()
+        self._held()._hold()
+
+    @property
+    def stiffness(self) -> float:
+        """Its stiffness [N/m]: as asked for, or as steps stay stable with."""
+        return self._stiffness
+
+    def release(self) -> None:
+        """Lets go."""
+        if self._simulation is not None:
+            self._simulation._grips.remove(self)
+            self._simulation._hold()
+            self._simulation = None
+
+
+class Simulation:
+    """A model under way. One call at a time: another one meanwhile raises `BusyError`. It is a context manager.
+
+    Examples
+    --------
+    >>> from pliant import Mesh, Scene
+    >>> scene = Scene.of_mesh(Mesh.block([0.1, 0.05, 0.05], edge=0.025))
+    >>> scene["scene.gravity"] = (0.0, 0.0, -9.81)
+    >>> with scene.build().simulate() as sim:
+    ...     u = sim.displacement
+    ...     sim.step(100)
+    ...     bool(u[:, 2].min() < -1e-4)
+    100
+    True
+    """
+
+    _native: _native.Simulation
+    _model: Model
+
+    @classmethod
+    def _of(cls, model: Model, threads: int) -> Simulation:
+        simulation = cls.__new__(cls)
+        simulation._model = model
+        simulation._native = _native.Simulation(model._native, threads)
+        simulation._threads = threads
+        simulation._grips = []
+        simulation._pushed = None
+        simulation._calling = False
+        return simulation
+
+    _threads: int
+    _grips: list[Grip]
+    _pushed: NDArray[np.float64] | None
+    _calling: bool
+
+    @property
+    def model(self) -> Model:
+        """The model, with the numbers of the last `set`."""
+        return self._model
+
+    @property
+    def time(self) -> float:
+        """Time [s]."""
+        return self._native.time
+
+    @property
+    def steps(self) -> int:
+        """Steps since the start."""
+        return self._native.steps
+
+    @property
+    def step_size(self) -> float:
+        """Length of the next step [s]."""
+        return self._native.step_size
+
+    @property
+    def device(self) -> str:
+        """``"cpu"``, or the GPU that it is stepped on."""
+        return self._model.device
+
+    @property
+    def ended(self) -> str | None:
+        """Why it has ended before the last step of its scene."""
+        return self._native.ended()
+
+    @property
+    def displacement(self) -> NDArray[np.float32] | NDArray[np.float64]:
+        """Displacements of all nodes [m], (nodes, 3): a live view, always of the newest instant, read-only, without a copy.
+
+        It is in the solver's own numbers. ``np.array(sim.displacement)`` keeps an instant. A thread that reads it during a step of another
+        one may see two instants mixed.
+        """
+        return self._native.displacement
+
+    def positions(self, out: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Positions of all nodes [m], (nodes, 3), in a fresh array or in `out`."""
+        out = self._out(out)
+        self._native.positions(out)
+        return out
+
+    def velocities(self, out: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Velocities of all nodes [m/s], (nodes, 3), in a fresh array or in `out`."""
+        out = self._out(out)
+        self._native.velocities(out)
+        return out
+
+    def _out(self, out: NDArray[np.float64] | None) -> NDArray[np.float64]:
+        shape = self._model.rest.shape
+        if out is None:
+            return np.empty(shape)
+        if out.dtype != np.float64 or out.shape != shape or not out.flags.writeable:
+            raise ValueError(f"`out` has shape {out.shape} of {out.dtype}, a writeable one of {shape} of float64 is expected")
+        return out
+
+    def field(self, name: str, *, on: str | None = None, at: Literal["points", "cells"] | None = None) -> NDArray[np.float64]:
+        """A field at the instant: (n,), (n, 3) or (n, 3, 3), as `pliant.tables.Vtu` describes them.
+
+        Parameters
+        ----------
+        name
+            As in ``data = […]`` of outputs: ``"von-mises"``, ``"contact-pressure"``, ….
+        on
+            A body or a carried surface; without one all bodies, one after another.
+        at
+            ``"points"`` or ``"cells"``; where the field is, if not given.
+        """
+        if at not in (None, "points", "cells"):
+            raise ValueError(f"a field is at points or cells, not {at!r}")
+        if on is None:
+            return np.concatenate([self.field(name, on=body, at=at) for body in self._model.bodies])
+        cells = at == "cells"
+        if at is None:
+            cells = name not in _NODAL
+        values = self._native.field(name, on, cells)
+        if values.shape[1] == 1:
+            return values[:, 0]
+        return values.reshape(-1, 3, 3) if values.shape[1] == 9 else values
+
+    @property
+    def energies(self) -> Energies:
+        """Energies at the instant [J]."""
+        return Energies(*self._native.energies())
+
+    def reaction(self, constraint: str) -> NDArray[np.float64]:
+        """Force by which a constraint holds or moves its nodes [N], (3,)."""
+        found = self._native.reaction(constraint)
+        if found is None:
+            raise KeyError(f"there is no constraint `{constraint}`; there are {', '.join(self._model.constraints) or 'none'}")
+        return np.array(found)
+
+    def enclosed(self, constraint: str) -> tuple[float, float]:
+        """Volume [m³] and pressure [Pa] of a constraint of volume."""
+        found = self._native.enclosed(constraint)
+        if found is None:
+            raise KeyError(f"there is no constraint of volume `{constraint}`")
+        return found[0], found[1]
+
+    def contacts(self) -> dict[str, NDArray[np.float64]]:
+        """Force of each contact on what it is with [N], (3,), by name."""
+        return {name: np.array(force) for name, force in self._native.contacts().items()}
+
+    def tool(self, name: str) -> Tool:
+        """A tool or an obstacle at the instant."""
+        found = self._native.tool(name)
+        if found is None:
+            raise KeyError(f"nothing touches a tool `{name}`; there are {', '.join(self._model.tools) or 'none'}")
+        (place, quaternion), opening, force = found
+        return Tool(np.array(place), np.array(quaternion), opening, np.array(force))
+
+    def drive(self, tool: str, pose: ArrayLike | tuple[ArrayLike, ArrayLike], *, within: float = 0.0) -> float:
+        """Leads a tool to a pose: when it arrives [s].
+
+        Parameters
+        ----------
+        tool
+            Its name.
+        pose
+            A place [m], a pair of place and quaternion (x, y, z, w), or a matrix (4, 4). A place alone keeps its orientation.
+        within
+            Time to get there [s]; a step, if it is shorter.
+        """
+        place, quaternion = _pose(pose)
+        if quaternion is None:
+            quaternion = self.tool(tool).quaternion
+        x, q = [float(c) for c in place], [float(c) for c in quaternion]
+        return self._native.drive(tool, (x, q), float(within))
+
+    def open(self, tool: str, angle: float, *, within: float = 0.0) -> float:
+        """Opens the jaws of a tool to an angle [rad], or closes them: when they are there [s]."""
+        return self._native.open(tool, float(angle), float(within))
+
+    def sample(self) -> dict[str, float]:
+        """All columns of the scene's tables at the instant."""
+        return dict(zip((name for name, _ in self._native.columns()), self._native.sample(), strict=True))
+
+    def step(self, count: int = 1) -> int:
+        """Goes so many steps on; the steps done, fewer where the run ends before."""
+        if count < 0:
+            raise ValueError(f"{count} steps can't be taken")
+        self._free()
+        return self._native.advance(int(count), None)
+
+    def run(
+        self,
+        until: float | None = None,
+        *,
+        each: Callable[[Simulation], object] | None = None,
+        every: float | None = None,
+        record: Sequence[str] = (),
+    ) -> History:
+        """Goes on to a time, and records on the way.
+
+        Parameters
+        ----------
+        until
+            Time [s]; the end of the scene, if not given.
+        each
+            Called at every sample, between steps: it may read, move grips and tools, push and set. What it raises comes through.
+        every
+            Time between samples [s]; that of the scene's table, or a thousandth of the way.
+        record
+            Fields at points that are recorded, too: ``history["displacement"]`` is (samples, nodes, 3).
+        """
+        self._free()
+        history = self._history(record)
+        self._run_into(history, self._model._scene.until if until is None else float(until), each, every)
+        return history
+
+    def _history(self, record: Sequence[str]) -> History:
+        return History._empty(self._native.columns(), list(record))
+
+    def _run_into(
+        self,
+        history: History,
+        until: float,
+        each: Callable[[Simulation], object] | None,
+        every: float | None,
+    ) -> None:
+        if every is None:
+            tables = [own for own in self._model._scene._data.get("output", {}).values() if _kind(own) == "csv"]
+            every = float(_every(tables[0])) if tables else (until - self.time) / 1000.0
+        if not every > 0.0 and until > self.time:
+            raise ValueError(f"samples can't be {every} s apart")
+        start, count = self.time, 0
+        while True:
+            history._add(self.time, self._native.sample(), {name: self._recorded(name) for name in history._fields})
+            if each is not None:
+                self._calling = True
+                try:
+                    each(self)
+                finally:
+                    self._calling = False
+            done = 0
+            while done == 0:
+                count += 1
+                target = min(start + count * every, until)
+                done = self._native.advance(None, target)
+                if target >= until or self.ended is not None:
+                    break
+            if done == 0:
+                return
+
+    def _recorded(self, name: str) -> NDArray[np.float64]:
+        return np.array(self.displacement, dtype=np.float64) if name == "displacement" else self.field(name, at="points")
+
+    def _free(self) -> None:
+        if self._calling:
+            raise BusyError("a callback of `run` reads, pulls and sets; steps are taken by `run` itself")
+
+    def push(self, forces: ArrayLike | None, *, body: str | None = None) -> None:
+        """Forces on all nodes [N], (nodes, 3), or on those of a body; they stay until replaced. `None` ends them."""
+        if forces is None:
+            self._pushed = None
+            self._native.push(None)
+            return
+        count = len(self._model.rest)
+        if body is None:
+            self._pushed = numbers(forces, "forces", (count, 3))
+        else:
+            if body not in self._model.bodies:
+                raise KeyError(f"there is no body `{body}`; there are {', '.join(self._model.bodies)}")
+            own = self._model.bodies[body].nodes
+            before = np.zeros((count, 3)) if self._pushed is None else self._pushed.copy()
+            before[own] = numbers(forces, f"forces on `{body}`", (own.stop - own.start, 3))
+            self._pushed = before
+        self._native.push(self._pushed)
+
+    def grip(
+        self,
+        at: ArrayLike | None = None,
+        *,
+        nodes: ArrayLike | None = None,
+        on: str | None = None,
+        radius: float | None = None,
+        stiffness: float = 100.0,
+    ) -> Grip:
+        """Takes hold of the surface around the place that is nearest to `at` [m], or of nodes.
+
+        Parameters
+        ----------
+        at
+            A place [m].
+        nodes
+            Nodes of the model instead, held by their mean.
+        on
+            The body to hold; the nearest one, if not given.
+        radius
+            How far around the place it holds [m]; two edges of the mesh, if not given.
+        stiffness
+            Of its spring [N/m]; less, where steps would not be stable.
+        """
+        if (at is None) == (nodes is None):
+            raise ValueError("a grip takes a place or nodes, one of them")
+        if not stiffness > 0.0:
+            raise ValueError(f"a grip of {stiffness} N/m holds nothing")
+        if nodes is not None:
+            own = indices(nodes, "nodes of a grip", (None,), len(self._model.rest))
+            if not len(own):
+                raise ValueError("a grip needs nodes")
+            weights = [(int(node), 1.0 / len(own)) for node in own]
+        else:
+            place = numbers(at if at is not None else (), "the place of a grip", (3,))
+            weights = self._native.around([float(x) for x in place], on, radius)
+        grip = Grip(self, weights, float(stiffness))
+        self._grips.append(grip)
+        try:
+            self._hold()
+        except Exception:
+            self._grips.remove(grip)
+            raise
+        return grip
+
+    def _hold(self) -> None:
+        all_grips = [(own._nodes, [float(x) for x in own._place], own._asked) for own in self._grips]
+        for grip, stiffness in zip(self._grips, self._native.hold(all_grips), strict=True):
+            grip._stiffness = stiffness
+
+    def set(self, values: Mapping[str, float]) -> None:
+        """Other numbers of laws, loads, density or damping, by their paths, from the next step on. Steps may get another length."""
+        scene = self._model._scene.replace(dict(values))
+        model = scene.build(like=self._model)
+        if not self._native.exchange(model._native):
+            raise ValueError(f"{', '.join(values)}: the mesh, the solver or the precision would be another; build a new model")
+        self._model = model
+
+    def state(self) -> State:
+        """A snapshot. Hands, pushed forces and the numbers of `set` are not part of it."""
+        return State._of(self._native.state())
+
+    def restore(self, state: State) -> None:
+        """Goes back, or on, to a snapshot. Grips and pushed forces stay."""
+        try:
+            self._native.restore(state._native)
+        except ValueError as error:
+            raise ResumeError(str(error)) from None
+
+    def reset(self) -> None:
+        """Goes back to the start of the scene."""
+        self.restore(Simulation._of(self._model, 1).state())
+
+    def copy(self) -> Simulation:
+        """Another simulation in the same state, without grips and pushed forces."""
+        other = Simulation._of(self._model, self._threads)
+        other.restore(self.state())
+        return other
+
+    def fingerprint(self) -> int:
+        """A number of all bits of the motion: equal motions have equal ones."""
+        return self._native.fingerprint()
+
+    def mesh(self, data: Sequence[str] = ("displacement",), *, on: str | None = None, at: str = "points") -> Mesh:
+        """The mesh at rest of a body, a surface or all, with fields of the instant."""
+        return Mesh._of(self._native.mesh(list(data), on, at == "cells"))
+
+    def picture(
+        self,
+        *,
+        field: str | None = None,
+        size: tuple[int, int] = (960, 720),
+        camera: tuple[float, float] | None = None,
+    ) -> Picture:
+        """A picture of the instant, as ``[view]`` of the scene shows it. No screen is needed.
+
+        Parameters
+        ----------
+        field
+            What the colours tell, instead of the scene's.
+        size
+            Width and height in pixels.
+        camera
+            Azimuth and elevation [degrees], instead of the scene's.
+        """
+        from pliant.pictures import Picture
+
+        if len(size) != 2 or not all(1 <= int(n) <= 8192 for n in size):
+            raise ValueError(f"a picture of {size} pixels can't be drawn; each side has 1 to 8192")
+        png = self._native.picture(field, [int(size[0]), int(size[1])], None if camera is None else list(camera))
+        return Picture(bytes(png))
+
+    def close(self) -> None:
+        """Ends it. Views stay readable; everything else raises `ClosedError`."""
+        self._native.close()
+
+    def __enter__(self) -> Simulation:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"Simulation({self.time:g} s, {self.steps} steps, {len(self._model.rest)} nodes, {self.device})"
+
+
+_NODAL = {
+    "displacement",
+    "velocity",
+    "rotation",
+    "reaction",
+    "reaction-moment",
+    "contact-force",
+    "contact-pressure",
+    "gap",
+    "slip",
+}
+
+
+def _kind(table: Any) -> str | None:
+    return table.get("type") if isinstance(table, Mapping) else getattr(table, "_type", None)
+
+
+def _every(table: Any) -> Any:
+    return table.get("every") if isinstance(table, Mapping) else table.every
+
+
+def _pose(pose: Any) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    if isinstance(pose, tuple) and len(pose) == 2:
+        return numbers(pose[0], "the place of a tool", (3,)), numbers(pose[1], "the quaternion of a tool", (4,))
+    array = np.asarray(pose)
+    if array.shape == (3,):
+        return numbers(array, "the place of a tool", (3,)), None
+    matrix = numbers(array, "the pose of a tool", (4, 4))
+    turn = matrix[:3, :3]
+    if not np.allclose(turn @ turn.T, np.eye(3), atol=1e-6) or np.linalg.det(turn) < 0.0:
+        raise ValueError("the pose of a tool turns without stretching: its 3 × 3 part must be a rotation")
+    return matrix[:3, 3], _quaternion(turn)
+
+
+def _quaternion(turn: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(x, y, z, w) of a rotation matrix, from the eigenvector of the largest eigenvalue (Bar-Itzhack 2000)."""
+    a = turn
+    k = np.array(
+        [
+            [a[0, 0] - a[1, 1] - a[2, 2], a[0, 1] + a[1, 0], a[0, 2] + a[2, 0], a[2, 1] - a[1, 2]],
+            [a[0, 1] + a[1, 0], a[1, 1] - a[0, 0] - a[2, 2], a[1, 2] + a[2, 1], a[0, 2] - a[2, 0]],
+            [a[0, 2] + a[2, 0], a[1, 2] + a[2, 1], a[2, 2] - a[0, 0] - a[1, 1], a[1, 0] - a[0, 1]],
+            [a[2, 1] - a[1, 2], a[0, 2] - a[2, 0], a[1, 0] - a[0, 1], a[0, 0] + a[1, 1] + a[2, 2]],
+        ]
+    )
+    own: NDArray[np.float64] = np.linalg.eigh(k)[1][:, 3]
+    return own

@@ -1,0 +1,400 @@
+"""Many runs with other values, on one machine or many."""
+
+from __future__ import annotations
+
+import csv
+import glob
+import hashlib
+import itertools
+import json
+import math
+import os
+import pickle
+import socket
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from pliant import _native, _toml
+from pliant.engines import engine_of
+from pliant.errors import ClusterError, PliantWarning
+from pliant.mesh import _extra, _table
+from pliant.model import Model
+from pliant.result import Result
+from pliant.scene import Scene, load
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+__all__ = ["Sweep", "merge", "sweep"]
+
+_ROWS = "rows.jsonl"
+_TABLE = "sweep.csv"
+
+
+@dataclass
+class Sweep:
+    """The rows of a sweep, in the order of the combinations: values, `status`, `error`, and what was found at the end of each run.
+
+    `keys` are the paths that were varied, `path` is the folder of the table.
+    """
+
+    rows: list[dict[str, Any]]
+    keys: list[str]
+    path: str | None = None
+    missing: list[int] = field(default_factory=list)
+
+    @property
+    def failures(self) -> list[dict[str, Any]]:
+        """Rows of runs that failed."""
+        return [row for row in self.rows if row["status"] != "done"]
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A data frame, a row a run."""
+        pd = _extra("pandas", "tables")
+        return pd.DataFrame(self.rows).set_index("run")
+
+    def to_xarray(self) -> xarray.Dataset:
+        """A data set over the values, if all their combinations were run."""
+        xr = _extra("xarray", "tables")
+        axes = {key: list(dict.fromkeys(row[key] for row in self.rows)) for key in self.keys}
+        shape = tuple(len(own) for own in axes.values())
+        if math.prod(shape) != len(self.rows):
+            raise ValueError("these runs are no grid of values; `to_pandas` has them as a table")
+        names = [name for name in _columns(self.rows, self.keys) if name not in ("run", *self.keys, *_TOLD)]
+        data = {}
+        for name in names:
+            own = np.array([row.get(name, math.nan) for row in self.rows])
+            data[name] = (list(axes), own.reshape(shape))
+        return xr.Dataset(data, coords=axes)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        return iter(self.rows)
+
+    def __repr__(self) -> str:
+        failed = f", {len(self.failures)} failed" if self.failures else ""
+        return f"Sweep({len(self.rows)} runs{failed})"
+
+    def _repr_html_(self) -> str:
+        return _table("Sweep", {"runs": len(self.rows), "failed": len(self.failures), "values": ", ".join(self.keys)})
+
+
+_TOLD = ("status", "error", "host", "wall_seconds")
+
+
+@dataclass(frozen=True)
+class _Bundle:
+    """What all runs share, and workers get once."""
+
+    scene: bytes
+    files: dict[str, bytes]
+    combinations: list[dict[str, Any]]
+    keys: list[str]
+    measure: Callable[[Result], Mapping[str, object]] | None
+    threads: int
+    keep: str | None
+    version: str
+
+    def hashed(self, number: int) -> str:
+        """The key of a row: it belongs to these values of this scene, in this version."""
+        own = hashlib.sha256(self.scene)
+        for name in sorted(self.files):
+            own.update(name.encode() + hashlib.sha256(self.files[name]).digest())
+        measure = getattr(self.measure, "__qualname__", "")
+        own.update(json.dumps([self.combinations[number], measure, self.version], sort_keys=True).encode())
+        return own.hexdigest()
+
+
+def sweep(
+    scene: Scene | str | os.PathLike[str],
+    values: Mapping[str, Sequence[Any]] | Sequence[Mapping[str, Any]] | pandas.DataFrame,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    on: Literal["local", "dask", "ray"] | Any = "local",
+    cores: int = 1,
+    gpus: float = 0,
+    retries: int = 3,
+    measure: Callable[[Result], Mapping[str, object]] | None = None,
+    keep: Literal["table", "all"] = "table",
+    resume: bool = True,
+    progress: bool = True,
+) -> Sweep:
+    """Runs a scene with many values.
+
+    Parameters
+    ----------
+    scene
+        The scene, or the path of its file.
+    values
+        Lists of values by path, of which all combinations are run, the last path changing fastest; or one mapping for each run; or a data frame, a row a run.
+    out
+        Folder of ``rows.jsonl`` and ``sweep.csv``. The same call again goes on where it was interrupted.
+    on
+        ``"local"`` (threads), ``"dask"``, ``"ray"``, a client of Dask, or an executor.
+    cores, gpus
+        What a run takes.
+    retries
+        How often a run is repeated whose worker was lost. Runs that fail are rows, and not repeated.
+    measure
+        Called with the `Result` of each run, where it was done; what it returns goes into the row.
+    keep
+        ``"all"`` writes the outputs of each run to ``out/run-NNNN``, which all workers must reach.
+    resume
+        Whether rows of an earlier call are taken.
+    progress
+        Whether a line on standard error tells how many runs have ended.
+
+    Examples
+    --------
+    >>> from pliant import Mesh, Scene
+    >>> scene = Scene.of_mesh(Mesh.block([0.1, 0.05, 0.05], edge=0.025))
+    >>> table = sweep(scene, {"scene.until": [0.01], "law.tissue.young-modulus": [4e3, 8e3]}, progress=False)
+    >>> [row["law.tissue.young-modulus"] for row in table], len(table.failures)
+    ([4000.0, 8000.0], 0)
+    """
+    scene = scene if isinstance(scene, Scene) else load(scene)
+    combinations, keys = _combinations(values)
+    if not combinations:
+        raise ValueError("a sweep needs values")
+    if keep == "all" and out is None:
+        raise ValueError("to keep the outputs of all runs, give a folder `out`")
+    folder = None if out is None else os.path.abspath(os.fspath(out))
+    bundle = _bundle(scene, combinations, keys, measure, cores, folder if keep == "all" else None)
+    rows: dict[int, dict[str, Any]] = {}
+    if folder is not None:
+        os.makedirs(folder, exist_ok=True)
+        rows = _known(os.path.join(folder, _ROWS), bundle) if resume else {}
+        if not resume and os.path.exists(os.path.join(folder, _ROWS)):
+            os.remove(os.path.join(folder, _ROWS))
+    left = [number for number in range(len(combinations)) if number not in rows]
+    sink = None if folder is None else open(os.path.join(folder, _ROWS), "a", encoding="utf-8")  # noqa: SIM115
+    runs = engine_of(on, cores, gpus, retries).run(_run, bundle, left)
+    try:
+        for row in runs:
+            _take(row, rows, bundle)
+            if sink is not None:
+                sink.write(json.dumps(row) + "\n")
+                sink.flush()
+            if progress:
+                print(f"\r{len(rows)} of {len(combinations)} runs", end="", file=sys.stderr, flush=True)
+    finally:
+        close = getattr(runs, "close", None)
+        if close is not None:
+            close()
+        if sink is not None:
+            sink.close()
+        if progress and rows:
+            print(file=sys.stderr)
+    done = Sweep([_public(rows[number]) for number in sorted(rows)], keys, folder)
+    if folder is not None:
+        _write(done, folder)
+    return done
+
+
+def merge(out: str | os.PathLike[str]) -> Sweep:
+    """Puts together the parts that ``pliant sweep --part i/n`` wrote to a folder, writes the table, and names what is missing."""
+    folder = os.fspath(out)
+    parts = sorted(glob.glob(os.path.join(glob.escape(folder), "rows-*-of-*.jsonl")))
+    if not parts:
+        raise ValueError(f"there are no parts of a sweep (rows-1-of-4.jsonl, …) in `{folder}`")
+    rows: dict[int, dict[str, Any]] = {}
+    keys: list[str] = []
+    runs = 0
+    for path in parts:
+        for row in _lines(path):
+            keys, runs = row["keys"], max(runs, int(row["runs"]))
+            rows[int(row["run"])] = row
+    missing = [number for number in range(runs) if number not in rows]
+    if missing:
+        warnings.warn(f"{len(missing)} of {runs} runs are missing: {missing[:20]}", PliantWarning, stacklevel=2)
+    done = Sweep([_public(rows[number]) for number in sorted(rows)], keys, folder, missing)
+    _write(done, folder)
+    return done
+
+
+def _combinations(values: Any) -> tuple[list[dict[str, Any]], list[str]]:
+    if hasattr(values, "to_dict") and hasattr(values, "columns"):
+        values = values.to_dict(orient="records")
+    if isinstance(values, Mapping):
+        keys = list(values)
+        lists = [list(own) if not isinstance(own, str) else [own] for own in values.values()]
+        return [dict(zip(keys, map(_number, own), strict=True)) for own in itertools.product(*lists)], keys
+    rows = [{str(key): _number(value) for key, value in row.items()} for row in values]
+    keys = list(dict.fromkeys(key for row in rows for key in row))
+    if any(list(row) != keys for row in rows):
+        raise ValueError("the runs of a sweep set the same values, in the same order")
+    return rows, keys
+
+
+def _number(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _bundle(
+    scene: Scene,
+    combinations: list[dict[str, Any]],
+    keys: list[str],
+    measure: Callable[[Result], Mapping[str, object]] | None,
+    threads: int,
+    keep: str | None,
+) -> _Bundle:
+    scene = scene.copy()
+    # Meshes of images and surfaces are made here, once, unless a value changes them.
+    if not any(".mesh" in key for key in keys):
+        model = scene.replace(combinations[0]).build()
+        for name, mesh in model._lends(scene).items():
+            if any(word in scene.body[name]["mesh"] for word in ("image", "masks", "file")):
+                scene.body[name]["mesh"] = mesh
+    files = {name: _bytes(os.path.join(scene.folder, name)) for name in _files(scene._data, scene.folder)}
+    carried = scene if not files else _elsewhere(scene)
+    return _Bundle(pickle.dumps(carried), files, combinations, keys, measure, threads, keep, _native.__version__)
+
+
+def _elsewhere(scene: Scene) -> Scene:
+    copy = scene.copy()
+    copy.folder = ""
+    return copy
+
+
+def _files(value: Any, folder: str) -> Iterator[str]:
+    """Files of its folder that a scene names."""
+    if isinstance(value, str):
+        if value and len(value) < 4096 and "\n" not in value and os.path.isfile(os.path.join(folder, value)):
+            yield value
+    elif isinstance(value, Mapping):
+        for own in value.values():
+            yield from _files(own, folder)
+    elif isinstance(value, (list, tuple)):
+        for own in value:
+            yield from _files(own, folder)
+
+
+def _bytes(path: str) -> bytes:
+    with open(path, "rb") as file:
+        return file.read()
+
+
+def _run(bundle: _Bundle, number: int) -> dict[str, Any]:
+    """A run as a row. It never raises, so that no engine repeats it."""
+    row: dict[str, Any] = {"run": number, **bundle.combinations[number]}
+    row |= {"key": bundle.hashed(number), "host": socket.gethostname(), "version": _native.__version__}
+    if bundle.version != _native.__version__:
+        return row | {"status": "failed", "error": "another version"}
+    try:
+        if bundle.files:
+            with tempfile.TemporaryDirectory() as folder:
+                return row | _measured(bundle, number, folder)
+        return row | _measured(bundle, number, None)
+    except Exception as error:
+        return row | {"status": "failed", "error": f"{type(error).__name__}: {error}"}
+
+
+def _measured(bundle: _Bundle, number: int, folder: str | None) -> dict[str, Any]:
+    scene: Scene = pickle.loads(bundle.scene)
+    if folder is not None:
+        for name, content in bundle.files.items():
+            path = os.path.join(folder, os.path.basename(name) if os.path.isabs(name) or ".." in name else name)
+            os.makedirs(os.path.dirname(path), exist_ok=True)
+            with open(path, "wb") as file:
+                file.write(content)
+        scene.folder = folder
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PliantWarning)
+        model: Model = scene.replace(bundle.combinations[number]).build()
+        out = None if bundle.keep is None else os.path.join(bundle.keep, f"run-{number:04}")
+        result = model.run(out, threads=bundle.threads, **({} if out is None else {"force": True}))
+        last = {} if out is not None else {name: float(own[-1]) for name, own in result.history.items() if name != "time"}
+    row = {"status": result.status, "error": "" if result.error is None else str(result.error)}
+    row |= {"time": result.time, "steps": result.steps, "step": model.step, "wall_seconds": result.wall_seconds}
+    row |= last or {f"energy.{name}": own for name, own in result.energies._asdict().items()}
+    for name, force in result.reactions.items():
+        row |= {f"reaction.{name}.{axis}": float(own) for axis, own in zip("xyz", force, strict=True)}
+    if bundle.measure is not None and result.status == "done":
+        row |= {str(name): _jsonable(own) for name, own in bundle.measure(result).items()}
+    return row
+
+
+def _jsonable(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return _number(value)
+
+
+def _take(row: dict[str, Any], rows: dict[int, dict[str, Any]], bundle: _Bundle) -> None:
+    if row["version"] != bundle.version:
+        message = f"a worker on {row['host']} has version {row['version']} of pliant, and this is {bundle.version}"
+        raise ClusterError(message, hosts=[row["host"]])
+    rows[int(row["run"])] = row
+
+
+def _lines(path: str) -> Iterator[dict[str, Any]]:
+    """Whole lines of a file of rows: one that was cut off is passed over."""
+    with open(path, encoding="utf-8") as file:
+        for line in file:
+            if not line.endswith("\n"):
+                return
+            try:
+                yield json.loads(line)
+            except json.JSONDecodeError:
+                continue
+
+
+def _known(path: str, bundle: _Bundle) -> dict[int, dict[str, Any]]:
+    if not os.path.exists(path):
+        return {}
+    # A line that was cut off ends here, so that the next one begins afresh.
+    content = _bytes(path)
+    if content and not content.endswith(b"\n"):
+        with open(path, "ab") as file:
+            file.write(b"\n")
+    rows = {}
+    for row in _lines(path):
+        number = int(row.get("run", -1))
+        if 0 <= number < len(bundle.combinations) and row.get("key") == bundle.hashed(number):
+            rows[number] = row
+    return rows
+
+
+def _public(row: dict[str, Any]) -> dict[str, Any]:
+    return {name: own for name, own in row.items() if name not in ("key", "keys", "runs", "version")}
+
+
+def _columns(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> list[str]:
+    names = ["run", *keys, "status", "error", "time", "steps", "step"]
+    found = dict.fromkeys(name for row in rows for name in row if name not in (*names, "wall_seconds", "host"))
+    return [*names, *found, "wall_seconds", "host"]
+
+
+def _write(done: Sweep, folder: str) -> None:
+    names = _columns(done.rows, done.keys)
+    temporary = os.path.join(folder, f".{_TABLE}.{os.getpid()}")
+    with open(temporary, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(names)
+        for row in done.rows:
+            writer.writerow([_cell(row.get(name)) for name in names])
+    os.replace(temporary, os.path.join(folder, _TABLE))
+    try:
+        import pandas as pd
+        import pyarrow  # noqa: F401
+
+        pd.DataFrame(done.rows).to_parquet(os.path.join(folder, "sweep.parquet"))
+    except ImportError:
+        pass
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, str):
+        return value
+    return _toml.value(value) if isinstance(value, (bool, list, tuple, dict)) else repr(value)

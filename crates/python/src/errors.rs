@@ -1,0 +1,174 @@
+//! Errors of the engine as the exceptions of `pliant.errors`, with their places.
+
+use miette::{GraphicalReportHandler, GraphicalTheme};
+use pliant_run::OutputError;
+use pliant_scene::diagnostic::{SceneErrors, Severity};
+use pliant_sim::Failure;
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// Why a call can't do what it was asked for.
+#[derive(Debug)]
+pub enum Trouble {
+    /// Mistakes in a scene.
+    Scene(Box<SceneErrors>),
+    /// A simulation that can't go on.
+    Failure(Box<Failure>),
+    /// A file that can't be written.
+    Output(OutputError),
+    /// A mesh or an image that can't be used: its file, and why.
+    Mesh(Option<String>, String),
+    /// No picture: why, and what to do.
+    Device(String),
+    /// A call while another one computes, or after a fork.
+    Busy(String),
+    /// A call after `close`.
+    Closed,
+    /// A panic: its text and place.
+    Internal(String),
+    /// A value that can't be.
+    Value(String),
+}
+
+impl From<SceneErrors> for Trouble {
+    fn from(errors: SceneErrors) -> Self {
+        Self::Scene(Box::new(errors))
+    }
+}
+
+impl From<Failure> for Trouble {
+    fn from(failure: Failure) -> Self {
+        match failure.kind {
+            "device" => Self::Device(failure.message),
+            "input" => Self::Value(failure.message),
+            _ => Self::Failure(Box::new(failure)),
+        }
+    }
+}
+
+impl From<OutputError> for Trouble {
+    fn from(error: OutputError) -> Self {
+        Self::Output(error)
+    }
+}
+
+impl From<Trouble> for PyErr {
+    fn from(trouble: Trouble) -> Self {
+        Python::attach(|py| trouble.raised(py).unwrap_or_else(|error| error))
+    }
+}
+
+impl Trouble {
+    fn raised(self, py: Python<'_>) -> PyResult<PyErr> {
+        let fields = PyDict::new(py);
+        let (class, message) = match self {
+            Self::Scene(errors) => {
+                fields.set_item("diagnostics", diagnostics(py, &errors)?)?;
+                ("SceneError", underlined(&errors))
+            }
+            Self::Failure(failure) => {
+                fields.set_item("kind", failure.kind)?;
+                fields.set_item("body", &failure.body)?;
+                fields.set_item("element", failure.element)?;
+                fields.set_item("node", failure.node)?;
+                fields.set_item("time", failure.time)?;
+                let step = failure.load_step.as_deref();
+                let class = match failure.kind {
+                    "not-converged" | "singular" => {
+                        fields.set_item("load_step", step.map(|step| step.number))?;
+                        fields.set_item("residual", step.and_then(|step| step.residual))?;
+                        "ConvergenceError"
+                    }
+                    "not-finite" | "inverted" | "unbalanced" | "unstable" => "UnstableError",
+                    _ => "SimulationError",
+                };
+                (class, failure.message)
+            }
+            Self::Output(error) => {
+                fields.set_item("path", error.path.display().to_string())?;
+                ("OutputError", format!("{error}; {}", error.remedy))
+            }
+            Self::Mesh(path, message) => {
+                fields.set_item("path", path)?;
+                ("MeshError", message)
+            }
+            Self::Device(message) => ("DeviceError", message),
+            Self::Busy(message) => ("BusyError", message),
+            Self::Closed => ("ClosedError", "the simulation is closed; make another one".to_owned()),
+            Self::Internal(message) => ("InternalError", message),
+            Self::Value(message) => return Ok(pyo3::exceptions::PyValueError::new_err(message)),
+        };
+        let class = py.import("pliant.errors")?.getattr(class)?;
+        Ok(PyErr::from_value(class.call((message,), Some(&fields))?))
+    }
+}
+
+/// A panic: what it said.
+pub fn told(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default()
+}
+
+/// The mistakes of a scene with its lines underlined, without colours.
+fn underlined(errors: &SceneErrors) -> String {
+    let mut text = String::new();
+    let handler = GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor());
+    match handler.render_report(&mut text, errors) {
+        Ok(()) => text.trim_end().to_owned(),
+        Err(_) => errors.plain().to_string(),
+    }
+}
+
+/// Findings as `Diagnostic`s.
+pub fn diagnostics<'py>(py: Python<'py>, errors: &SceneErrors) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    let class = py.import("pliant.errors")?.getattr("Diagnostic")?;
+    let one = |found: &pliant_scene::diagnostic::Diagnostic| {
+        let place = errors.line_and_column(found);
+        let severity = match found.severity {
+            Severity::Error => "error",
+            Severity::Warning => "warning",
+        };
+        let text = found.option.as_deref();
+        let key = match (place, text) {
+            (_, Some(option)) => option.strip_prefix("--set ").and_then(|set| set.split('=').next()).map(|key| key.trim().to_owned()),
+            (Some((line, _)), None) => key_of(errors.text(), line),
+            (None, None) => None,
+        };
+        class.call1((
+            severity,
+            &found.message,
+            errors.name(),
+            place.map(|(line, _)| line),
+            place.map(|(_, column)| column),
+            key,
+            &found.label,
+            &found.help,
+        ))
+    };
+    errors.diagnostics().iter().map(one).collect()
+}
+
+/// The path of the key on a line, counted from 1: that of the header above it, and its own.
+fn key_of(text: &str, line: usize) -> Option<String> {
+    let mut header = "";
+    let mut own = None;
+    for text in text.lines().take(line) {
+        let text = text.trim();
+        if let Some(named) = text.strip_prefix('[') {
+            (header, own) = (named.trim_start_matches('[').split(']').next().unwrap_or("").trim(), None);
+        } else {
+            own = text.split_once('=').map(|(key, _)| key.trim());
+        }
+    }
+    match (header, own) {
+        ("", own) => own.map(str::to_owned),
+        (header, None) => Some(header.to_owned()),
+        (header, Some(own)) => Some(format!("{header}.{own}")),
+    }
+}
+
+/// The error of an engine without its Python half: the package is not whole.
+pub fn broken(error: impl std::fmt::Display) -> PyErr {
+    PyRuntimeError::new_err(error.to_string())
+}

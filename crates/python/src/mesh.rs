@@ -1,0 +1,136 @@
+//! Meshes between arrays and the engine.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use pliant_geometry::{CellBlock, CellKind, DataArray, Vector3, io};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::{array, array1, array3, flat, vectors};
+use crate::errors::Trouble;
+
+/// A mesh, shared with the engine.
+#[pyclass(frozen, module = "pliant._native")]
+pub struct Mesh(pub Arc<pliant_geometry::Mesh>);
+
+/// Kinds of cells by the words of meshio and VTK.
+const KINDS: [(&str, CellKind); 6] = [
+    ("vertex", CellKind::Vertex),
+    ("line", CellKind::Line),
+    ("triangle", CellKind::Triangle),
+    ("quad", CellKind::Quad),
+    ("tetra", CellKind::Tet),
+    ("hexahedron", CellKind::Hex),
+];
+
+/// The word for a kind.
+pub fn word(kind: CellKind) -> &'static str {
+    KINDS.iter().find(|(_, own)| *own == kind).map_or("", |(word, _)| word)
+}
+
+type Blocks<'py> = Vec<(String, PyReadonlyArray2<'py, u32>)>;
+type Data<'py> = Vec<(String, PyReadonlyArray2<'py, f64>)>;
+
+#[pymethods]
+impl Mesh {
+    /// From arrays that Python has checked.
+    #[new]
+    fn new(
+        points: PyReadonlyArray2<'_, f64>,
+        cells: Blocks<'_>,
+        point_data: Data<'_>,
+        cell_data: Vec<(String, String, PyReadonlyArray2<'_, f64>)>,
+        point_sets: Vec<(String, PyReadonlyArray1<'_, u32>)>,
+    ) -> Result<Self, Trouble> {
+        let mut mesh = pliant_geometry::Mesh {
+            points: vectors(&points)?.into_iter().map(Vector3::from).collect(),
+            ..Default::default()
+        };
+        for (word, nodes) in &cells {
+            let kind = KINDS.iter().find(|(own, _)| own == word).map(|(_, kind)| *kind).ok_or_else(|| {
+                let known = KINDS.map(|(word, _)| word).join(", ");
+                Trouble::Value(format!("there are no cells `{word}`; there are {known}"))
+            })?;
+            mesh.blocks.push(CellBlock::new(kind, nodes.as_array().iter().copied().collect()));
+        }
+        let data = |array: &PyReadonlyArray2<'_, f64>| {
+            let values = array.as_array();
+            DataArray { components: values.ncols(), values: values.iter().copied().collect() }
+        };
+        mesh.point_data.extend(point_data.iter().map(|(name, values)| (name.clone(), data(values))));
+        for (word, name, values) in &cell_data {
+            if let Some(at) = cells.iter().position(|(own, _)| own == word) {
+                mesh.blocks[at].data.insert(name.clone(), data(values));
+            }
+        }
+        for (name, nodes) in &point_sets {
+            let mut nodes: Vec<u32> = nodes.as_array().iter().copied().collect();
+            nodes.sort_unstable();
+            nodes.dedup();
+            mesh.point_sets.insert(name.clone(), nodes);
+        }
+        Ok(Self(Arc::new(mesh)))
+    }
+
+    /// From a file of any format that `pliant info` reads.
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf, scale: f64) -> PyResult<(Self, Vec<String>)> {
+        crate::jobs::on_thread(py, move || {
+            let failed = |error: io::MeshFileError| Trouble::Mesh(Some(path.display().to_string()), error.to_string());
+            let mut file = io::read(&path).map_err(failed)?;
+            file.mesh.points.iter_mut().for_each(|point| *point *= scale);
+            Ok((Self(Arc::new(file.mesh)), file.notes))
+        })
+    }
+
+    /// To a file whose ending tells its format.
+    fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let mesh = Arc::clone(&self.0);
+        crate::jobs::on_thread(py, move || {
+            let failed = |error: io::WriteError| Trouble::Mesh(Some(path.display().to_string()), error.to_string());
+            io::write(&path, &mesh).map_err(failed)
+        })
+    }
+
+    fn points<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        array3(py, flat(&self.0.points))
+    }
+
+    fn cells<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let cells = PyDict::new(py);
+        for block in &self.0.blocks {
+            cells.set_item(word(block.kind), array(py, block.nodes.clone(), block.kind.node_count()))?;
+        }
+        Ok(cells)
+    }
+
+    fn point_data<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let data = PyDict::new(py);
+        for (name, values) in &self.0.point_data {
+            data.set_item(name, array(py, values.values.clone(), values.components))?;
+        }
+        Ok(data)
+    }
+
+    /// By name, one array for each kind of cells that has it.
+    fn cell_data<'py>(&self, py: Python<'py>) -> PyResult<Vec<(String, &'static str, Bound<'py, PyArray2<f64>>)>> {
+        let mut data = Vec::new();
+        for block in &self.0.blocks {
+            for (name, values) in &block.data {
+                data.push((name.clone(), word(block.kind), array(py, values.values.clone(), values.components)));
+            }
+        }
+        Ok(data)
+    }
+
+    fn point_sets<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let sets = PyDict::new(py);
+        for name in self.0.set_names() {
+            let nodes: Bound<'_, PyArray1<u32>> = array1(py, self.0.set_points(name).unwrap_or_default());
+            sets.set_item(name, nodes)?;
+        }
+        Ok(sets)
+    }
+}

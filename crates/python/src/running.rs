@@ -1,0 +1,206 @@
+//! What a simulation owns: the run, what is shown of it, and its displacements where the stepper has none of its own.
+
+use std::sync::Arc;
+
+use pliant_explicit::Wanted;
+use pliant_geometry::{Mesh, SurfaceLocator, Vector3, patch};
+use pliant_mechanics::grip::Grip;
+use pliant_run::{FieldReader, Live};
+use pliant_scene::World;
+use pliant_scene::format::{At, FieldName, VtuTable};
+use pliant_sim::{Reals, Simulation};
+
+use crate::errors::Trouble;
+
+/// A run under way.
+pub struct Running {
+    pub live: Live,
+    pub world: Arc<World>,
+    /// Displacements [m] in the binding's own memory, of solvers that keep none; filled after each call.
+    own: Option<Vec<[f64; 3]>>,
+    /// Where displacements lie, as long as it lives.
+    address: usize,
+    shown: VtuTable,
+    /// Readers of the fields that were asked for.
+    readers: Vec<((FieldName, String, At), FieldReader)>,
+    /// Forces on nodes [N], until replaced; empty for none.
+    pub pushed: Vec<[f64; 3]>,
+    /// Hands on it.
+    pub grips: Vec<Grip>,
+}
+
+/// Names of fields as scenes spell them.
+pub fn field_of(name: &str) -> Result<FieldName, Trouble> {
+    FieldName::ALL.into_iter().find(|field| field.name() == name).ok_or_else(|| {
+        let all: Vec<&str> = FieldName::ALL.iter().map(|field| field.name()).collect();
+        Trouble::Value(format!("there is no field `{name}`; there are {}", all.join(", ")))
+    })
+}
+
+impl Running {
+    pub fn new(live: Live, world: Arc<World>) -> Self {
+        let shown = world.scene.shown(1.0);
+        let mut running = Self { live, world, own: None, address: 0, shown, readers: Vec::new(), pushed: Vec::new(), grips: Vec::new() };
+        if running.stepper_s_own().is_none() {
+            running.own = Some(vec![[0.0; 3]; running.nodes()]);
+        }
+        running.refresh();
+        running.address = running.displacement().address();
+        running
+    }
+
+    pub fn nodes(&self) -> usize {
+        self.world.participants.iter().map(|part| part.built.model.node_count()).sum()
+    }
+
+    /// Displacements of the only participant, where its stepper keeps them.
+    fn stepper_s_own(&self) -> Option<Reals<'_>> {
+        let mut all = self.live.simulation.instants();
+        let first = all.next()?;
+        if all.next().is_some() { None } else { first.displacements() }
+    }
+
+    /// Displacements [m] of all nodes.
+    pub fn displacement(&self) -> Reals<'_> {
+        match &self.own {
+            Some(own) => Reals::Double(own),
+            None => self.stepper_s_own().unwrap_or(Reals::Double(&[])),
+        }
+    }
+
+    /// Fills the binding's own displacements; an error if those of the stepper have moved.
+    pub fn refresh(&mut self) {
+        let Some(own) = &mut self.own else { return };
+        let parts = self.world.participants.iter().zip(self.live.simulation.instants());
+        let all = parts.flat_map(|(part, now)| (0..part.built.model.node_count()).map(move |node| now.displacement(node)));
+        own.iter_mut().zip(all).for_each(|(own, now)| *own = now);
+    }
+
+    /// Whether displacements lie where views of them look.
+    pub fn is_in_place(&self) -> bool {
+        self.displacement().address() == self.address
+    }
+
+    /// Finds forces, and with them all that can be asked, at the instant.
+    pub fn evaluate(&mut self) -> Result<(), Trouble> {
+        Ok(self.live.simulation.evaluate(Wanted::Everything)?)
+    }
+
+    /// A vector of each node.
+    pub fn nodal(&self, of: impl Fn(&dyn pliant_sim::Instant, &pliant_mechanics::Model, usize) -> [f64; 3]) -> Vec<f64> {
+        let mut all = Vec::with_capacity(3 * self.nodes());
+        for (part, now) in self.world.participants.iter().zip(self.live.simulation.instants()) {
+            let model = &part.built.model;
+            (0..model.node_count()).for_each(|node| all.extend(of(now, model, node)));
+        }
+        all
+    }
+
+    /// Positions [m] of all nodes.
+    pub fn positions(&self) -> Vec<f64> {
+        self.nodal(|now, model, node| {
+            let (rest, moved) = (model.rest[node], now.displacement(node));
+            [0, 1, 2].map(|c| rest[c] + moved[c])
+        })
+    }
+
+    /// A mesh of a body, of a surface or of all, at rest, with fields.
+    pub fn mesh(&mut self, fields: &[FieldName], on: Option<&str>, at: At) -> Result<&Mesh, Trouble> {
+        let has = |shown: &VtuTable| {
+            shown.on.as_deref() == on && shown.at == at && shown.curved.is_none() && fields.iter().all(|field| shown.data.contains(field))
+        };
+        if !has(&self.shown) {
+            if let Some(name) = on
+                && !self.world.participants.iter().any(|part| part.shows(Some(name)))
+            {
+                let known: Vec<&str> = self.world.scene.bodies.iter().map(|(name, _)| name.as_str()).collect();
+                let message = format!("there is no body or surface `{name}`; bodies: {}", known.join(", "));
+                return Err(Trouble::Value(message));
+            }
+            let data = fields.to_vec();
+            self.show(VtuTable { on: on.map(str::to_owned), every: 1.0, data, at, curved: None });
+        }
+        Ok(self.live.mesh()?)
+    }
+
+    /// Shows another series.
+    pub fn show(&mut self, shown: VtuTable) {
+        if self.shown.on != shown.on || self.shown.at != shown.at || self.shown.curved != shown.curved || self.shown.data != shown.data {
+            self.live.show(&shown);
+            self.shown = shown;
+        }
+    }
+
+    /// A field of a body or a surface: numbers, and how many each point or cell has.
+    pub fn field(&mut self, name: &str, on: &str, at: At) -> Result<(Vec<f64>, usize), Trouble> {
+        let field = field_of(name)?;
+        let has = self.world.scene.fields_on(Some(on));
+        if !has.contains(&field) {
+            let has: Vec<&str> = has.iter().map(|field| field.name()).collect();
+            return Err(Trouble::Value(format!("`{on}` has no field `{name}`; it has {}", has.join(", "))));
+        }
+        let known = self.readers.iter().position(|(key, _)| (key.0, key.1.as_str(), key.2) == (field, on, at));
+        let known = match known {
+            Some(known) => known,
+            None => {
+                let reader = FieldReader::new(&self.world, Some(on), name, at)?;
+                self.readers.push(((field, on.to_owned(), at), reader));
+                self.readers.len() - 1
+            }
+        };
+        self.evaluate()?;
+        let reader = &mut self.readers[known].1;
+        let values = reader.read(&self.world, &self.live.simulation)?.to_vec();
+        Ok((values, reader.components()))
+    }
+
+    /// The surface around the point of bodies that is nearest to a place [m]: nodes, counted over all, with weights that sum to 1.
+    pub fn around(&self, at: [f64; 3], on: Option<&str>, radius: Option<f64>) -> Result<Vec<(u32, f64)>, Trouble> {
+        let at = Vector3::from(at);
+        let mut nearest: Option<(f64, Vec<(u32, f64)>)> = None;
+        for (index, (part, now)) in self.world.participants.iter().zip(self.live.simulation.instants()).enumerate() {
+            let bodies = part.built.model.bodies.iter().zip(&part.built.bodies);
+            for (body, built) in bodies.filter(|(body, _)| on.is_none_or(|on| on == body.name)) {
+                let node = |own: u32| body.node(own);
+                let place = |(own, rest): (u32, &Vector3)| rest + Vector3::from(now.displacement(node(own) as usize));
+                let places: Vec<Vector3> = (0..).zip(&built.mesh.points).map(place).collect();
+                let faces: Vec<u32> = (0..built.boundary.faces.len() as u32).collect();
+                let Some(found) = SurfaceLocator::new(&built.boundary, &faces, &places).closest(&at) else { continue };
+                let distance = (found.position - at).norm();
+                if nearest.as_ref().is_some_and(|(known, _)| *known <= distance) {
+                    continue;
+                }
+                let triangles = built.boundary.triangles();
+                let corners = patch(&built.mesh.points, &triangles, found.nodes, found.weights, radius);
+                let nodes = corners.into_iter().map(|(own, weight)| (self.live.simulation.node(index, node(own)), weight));
+                nearest = Some((distance, nodes.collect()));
+            }
+        }
+        nearest.map(|(_, nodes)| nodes).ok_or_else(|| {
+            Trouble::Value(match on {
+                Some(on) => format!("there is no body `{on}` with a surface"),
+                None => "no body has a surface".into(),
+            })
+        })
+    }
+
+    /// Takes hold of all that is gripped, and pushes as before.
+    pub fn hold(&mut self) -> Result<(), Trouble> {
+        self.live.simulation.push(&self.pushed)?;
+        if self.live.simulation.hold(&self.grips) {
+            return Ok(());
+        }
+        self.grips.clear();
+        Err(Trouble::Value("the solver of this body knows no grips, or a grip holds nodes of several participants".into()))
+    }
+
+    pub fn simulation(&self) -> &Simulation {
+        &self.live.simulation
+    }
+
+    /// After another world has taken over: the series that is shown belongs to the one before.
+    pub fn show_again(&mut self) {
+        self.shown = self.world.scene.shown(1.0);
+        self.readers.clear();
+    }
+}

@@ -1,0 +1,440 @@
+//! A simulation under way.
+
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use numpy::ndarray::ArrayView2;
+use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray2};
+use pliant_mechanics::grip::Grip;
+use pliant_run::Live;
+use pliant_scene::format::At;
+use pliant_sim::contact::pose::Pose;
+use pliant_sim::Reals;
+use pyo3::prelude::*;
+
+use crate::arrays::{array, array3, vectors};
+use crate::errors::{Trouble, broken, told};
+use crate::jobs::on_pool;
+use crate::mesh::Mesh;
+use crate::model::{Model, in_order};
+use crate::running::{Running, field_of};
+use crate::state::State;
+
+/// A simulation. One call at a time: a second one is told so at once.
+#[pyclass(frozen, weakref, module = "pliant._native")]
+pub struct Simulation {
+    slot: Mutex<Slot>,
+    pool: rayon::ThreadPool,
+    stop: Arc<AtomicBool>,
+    /// The process that made it: threads don't come along into a fork.
+    process: u32,
+}
+
+/// Where the run is. Its memory stays as long as the simulation, since views look at it.
+enum Slot {
+    Here(Box<Running>),
+    /// A call computes.
+    Away,
+    Closed(Option<Box<Running>>),
+    Broken(Box<Running>, String),
+}
+
+/// A pose: place [m] and quaternion (x, y, z, w).
+type Posed = ([f64; 3], [f64; 4]);
+
+impl Simulation {
+    fn slot(&self) -> Result<MutexGuard<'_, Slot>, Trouble> {
+        if std::process::id() != self.process {
+            let message = "the simulation was made before a fork, which leaves its threads behind; start processes by \"spawn\"";
+            return Err(Trouble::Busy(message.into()));
+        }
+        Ok(self.slot.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Reads something that needs no computation.
+    fn quick<T>(&self, read: impl FnOnce(&mut Running) -> T) -> Result<T, Trouble> {
+        match &mut *self.slot()? {
+            Slot::Here(running) => Ok(read(running)),
+            other => Err(other.trouble()),
+        }
+    }
+
+    /// Computes on the simulation's threads, without the interpreter.
+    fn work<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        job: impl FnOnce(&mut Running, &AtomicBool) -> Result<T, Trouble> + Send + 'static,
+    ) -> PyResult<T> {
+        let taken = {
+            let mut slot = self.slot()?;
+            match std::mem::replace(&mut *slot, Slot::Away) {
+                Slot::Here(running) => running,
+                other => {
+                    let trouble = other.trouble();
+                    *slot = other;
+                    return Err(trouble.into());
+                }
+            }
+        };
+        let stop = Arc::clone(&self.stop);
+        let done = on_pool(py, &self.pool, &self.stop, move || {
+            let mut running = taken;
+            let done = catch_unwind(AssertUnwindSafe(|| {
+                let done = job(&mut running, &stop);
+                running.refresh();
+                done
+            }));
+            (running, done)
+        });
+        let ((running, done), signal) = done?;
+        let mut slot = self.slot()?;
+        let done = match done {
+            Ok(_) if !running.is_in_place() => {
+                let message = "displacements have moved in memory: this is a mistake of Pliant, please tell it";
+                *slot = Slot::Broken(running, message.to_owned());
+                return Err(Trouble::Internal(message.into()).into());
+            }
+            Ok(done) => {
+                *slot = Slot::Here(running);
+                done
+            }
+            Err(panic) => {
+                let message = told(&*panic);
+                *slot = Slot::Broken(running, message.clone());
+                return Err(Trouble::Internal(message).into());
+            }
+        };
+        drop(slot);
+        signal?;
+        Ok(done?)
+    }
+}
+
+impl Slot {
+    fn trouble(&self) -> Trouble {
+        match self {
+            Self::Here(_) | Self::Away => Trouble::Busy(
+                "the simulation computes for another call: one at a time, and no steps within callbacks".into(),
+            ),
+            Self::Closed(_) => Trouble::Closed,
+            Self::Broken(_, message) => {
+                Trouble::Internal(format!("the simulation ended with an internal error before: {message}"))
+            }
+        }
+    }
+}
+
+#[pymethods]
+impl Simulation {
+    #[new]
+    fn new(py: Python<'_>, model: &Model, threads: usize) -> PyResult<Self> {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .thread_name(|_| "pliant".into())
+            .build()
+            .map_err(broken)?;
+        let (world, stop) = (Arc::clone(&model.world), Arc::new(AtomicBool::new(false)));
+        let made = on_pool(py, &pool, &stop, move || {
+            catch_unwind(AssertUnwindSafe(|| Ok(Running::new(Live::new(&world)?, world))))
+                .unwrap_or_else(|panic| Err(Trouble::Internal(told(&*panic))))
+        })?;
+        made.1?;
+        let slot = Mutex::new(Slot::Here(Box::new(made.0?)));
+        Ok(Self { slot, pool, stop, process: std::process::id() })
+    }
+
+    /// Time [s].
+    #[getter]
+    fn time(&self) -> Result<f64, Trouble> {
+        self.quick(|running| running.simulation().time())
+    }
+
+    #[getter]
+    fn steps(&self) -> Result<u64, Trouble> {
+        self.quick(|running| running.simulation().steps())
+    }
+
+    /// Length [s] of the next step.
+    #[getter]
+    fn step_size(&self) -> Result<f64, Trouble> {
+        self.quick(|running| running.simulation().step_length())
+    }
+
+    fn fingerprint(&self) -> Result<u64, Trouble> {
+        self.quick(|running| running.simulation().fingerprint())
+    }
+
+    /// Why it has ended before the last step of its scene.
+    fn ended(&self) -> Result<Option<String>, Trouble> {
+        self.quick(|running| running.simulation().ended().map(str::to_owned))
+    }
+
+    /// The view of displacements [m], (nodes, 3): read-only, without a copy.
+    #[getter]
+    fn displacement<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let own = slf.get();
+        if own.quick(|running| running.world.device().is_some())? {
+            own.work(slf.py(), |running, _| running.evaluate())?;
+        }
+        enum Place {
+            Single(usize, usize),
+            Double(usize, usize),
+        }
+        let place = own.quick(|running| match running.displacement() {
+            Reals::Single(all) => Place::Single(all.as_ptr().expose_provenance(), all.len()),
+            Reals::Double(all) => Place::Double(all.as_ptr().expose_provenance(), all.len()),
+        })?;
+        Ok(match place {
+            Place::Single(address, nodes) => view::<f32>(slf.into_any(), address, nodes).into_any(),
+            Place::Double(address, nodes) => view::<f64>(slf.into_any(), address, nodes).into_any(),
+        })
+    }
+
+    /// Fills an array (nodes, 3) with positions [m].
+    fn positions(&self, mut out: PyReadwriteArray2<'_, f64>) -> PyResult<()> {
+        let values = self.quick(|running| running.positions())?;
+        fill(&mut out, &values)
+    }
+
+    /// Fills an array (nodes, 3) with velocities [m/s] at the instant.
+    fn velocities(&self, py: Python<'_>, mut out: PyReadwriteArray2<'_, f64>) -> PyResult<()> {
+        let values = self.work(py, |running, _| {
+            running.evaluate()?;
+            Ok(running.nodal(|now, _, node| now.velocity(node)))
+        })?;
+        fill(&mut out, &values)
+    }
+
+    /// A field of a body or a surface, (n, numbers of each).
+    fn field<'py>(&self, py: Python<'py>, name: String, on: String, cells: bool) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let at = if cells { At::Cells } else { At::Points };
+        let (values, columns) = self.work(py, move |running, _| running.field(&name, &on, at))?;
+        Ok(array(py, values, columns))
+    }
+
+    /// Kinetic, internal, damping, external and hourglass energy [J], and the balance.
+    fn energies(&self, py: Python<'_>) -> PyResult<[f64; 6]> {
+        self.work(py, |running, _| {
+            running.evaluate()?;
+            Ok(in_order(&running.simulation().energies()))
+        })
+    }
+
+    /// Force [N] by which a constraint holds or moves its nodes; `None` without one of this name.
+    fn reaction(&self, py: Python<'_>, constraint: String) -> PyResult<Option<[f64; 3]>> {
+        self.work(py, move |running, _| Ok(running.live.simulation.frame()?.reaction(&constraint)))
+    }
+
+    /// Volume [m³] and pressure [Pa] of a constraint of volume.
+    fn enclosed(&self, py: Python<'_>, constraint: String) -> PyResult<Option<[f64; 2]>> {
+        self.work(py, move |running, _| {
+            let found = running.live.simulation.frame()?.enclosed(&constraint);
+            Ok(found.map(|own| [own.volume, own.pressure]))
+        })
+    }
+
+    /// Force [N] of each contact.
+    fn contacts(&self, py: Python<'_>) -> PyResult<BTreeMap<String, [f64; 3]>> {
+        self.work(py, |running, _| {
+            let names: Vec<String> = running.world.scene.contacts.iter().map(|(name, _)| name.clone()).collect();
+            let frame = running.live.simulation.frame()?;
+            Ok(names.into_iter().filter_map(|name| Some((name.clone(), frame.contact_force(&name)?))).collect())
+        })
+    }
+
+    /// Names and units of what is sampled.
+    fn columns(&self) -> Result<Vec<(String, &'static str)>, Trouble> {
+        self.quick(|running| running.live.columns().iter().map(|own| (own.name.clone(), own.unit)).collect())
+    }
+
+    /// The sample of the instant.
+    fn sample(&self, py: Python<'_>) -> PyResult<Vec<f64>> {
+        self.work(py, |running, _| {
+            running.evaluate()?;
+            let mut row = Vec::new();
+            running.live.sample(&mut row);
+            Ok(row)
+        })
+    }
+
+    /// Goes so many steps on, or until a time [s]; fewer after a signal or where the run ends. The steps done.
+    fn advance(&self, py: Python<'_>, steps: Option<u64>, until: Option<f64>) -> PyResult<u64> {
+        self.work(py, move |running, stop| {
+            let mut done = 0;
+            loop {
+                let simulation = &mut running.live.simulation;
+                let left = match (steps, until) {
+                    (Some(steps), _) => steps - done,
+                    (None, Some(until)) => {
+                        let length = simulation.step_length();
+                        let left = (until - simulation.time()) / length - 0.5;
+                        // Of times to which no step leads, none.
+                        if left > 0.0 { left.ceil() as u64 } else { 0 }
+                    }
+                    (None, None) => 0,
+                };
+                if left == 0 || simulation.ended().is_some() || stop.load(Ordering::Relaxed) {
+                    return Ok(done);
+                }
+                done += simulation.step(left)?;
+            }
+        })
+    }
+
+    /// Replaces all grips: nodes with weights, place [m], stiffness [N/m], at most the stable one of each. The stiffnesses taken.
+    fn hold(&self, grips: Vec<(Vec<(u32, f64)>, [f64; 3], f64)>) -> PyResult<Vec<f64>> {
+        let taken = self.quick(|running| {
+            let nodes = running.nodes() as u32;
+            if grips.iter().flat_map(|(nodes, ..)| nodes).any(|&(node, _)| node >= nodes) {
+                return Err(Trouble::Value(format!("a grip names a node that is not there; there are {nodes}")));
+            }
+            let simulation = running.simulation();
+            let grip = |(nodes, place, stiffness)| {
+                let mut grip = Grip { nodes, place, stiffness: 0.0 };
+                grip.stiffness = f64::min(stiffness, simulation.stiffest(&grip));
+                grip
+            };
+            running.grips = grips.into_iter().map(grip).collect();
+            running.hold()?;
+            Ok(running.grips.iter().map(|grip| grip.stiffness).collect())
+        })?;
+        Ok(taken?)
+    }
+
+    /// The point of a grip [m], and its force on the body [N].
+    fn pulled(&self, grip: usize) -> Result<Option<[[f64; 3]; 2]>, Trouble> {
+        self.quick(|running| running.grips.get(grip).map(|grip| running.simulation().pulled(grip)))
+    }
+
+    /// The surface around the place [m] that is nearest: nodes with weights.
+    fn around(&self, at: [f64; 3], on: Option<String>, radius: Option<f64>) -> PyResult<Vec<(u32, f64)>> {
+        Ok(self.quick(|running| running.around(at, on.as_deref(), radius))??)
+    }
+
+    /// Drives a tool to a pose within a time [s]: when it arrives [s].
+    fn drive(&self, tool: &str, (place, quaternion): Posed, within: f64) -> PyResult<f64> {
+        let [x, y, z, w] = quaternion;
+        let turn = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9)
+            .ok_or_else(|| Trouble::Value("the quaternion of a pose has no length".into()))?;
+        let pose = Pose::from_parts(Translation3::new(place[0], place[1], place[2]), turn);
+        let arrival = self.quick(|running| running.live.simulation.drive(tool, pose, within))?;
+        Ok(arrival.map_err(|failure| Trouble::Value(failure.message))?)
+    }
+
+    /// Opens the jaws of a tool to an angle [rad] within a time [s]: when they are there [s].
+    fn open(&self, tool: &str, angle: f64, within: f64) -> PyResult<f64> {
+        let arrival = self.quick(|running| running.live.simulation.open(tool, angle, within))?;
+        Ok(arrival.map_err(|failure| Trouble::Value(failure.message))?)
+    }
+
+    /// A tool: its pose, the angle between its jaws [rad], and the force [N] of all that touches it.
+    fn tool(&self, py: Python<'_>, name: String) -> PyResult<Option<(Posed, f64, [f64; 3])>> {
+        self.work(py, move |running, _| {
+            running.evaluate()?;
+            Ok(running.simulation().tool(&name).map(|tool| {
+                let (at, turn) = (tool.pose.translation.vector, tool.pose.rotation.coords);
+                ((at.into(), turn.into()), tool.opening, tool.force)
+            }))
+        })
+    }
+
+    /// Forces on nodes [N], (nodes, 3), until replaced; `None` takes them away.
+    fn push(&self, forces: Option<PyReadonlyArray2<'_, f64>>) -> PyResult<()> {
+        let forces = forces.as_ref().map(vectors).transpose()?.unwrap_or_default();
+        self.quick(|running| {
+            running.live.simulation.push(&forces)?;
+            running.pushed = forces;
+            Ok::<(), Trouble>(())
+        })??;
+        Ok(())
+    }
+
+    /// A snapshot.
+    fn state(&self, py: Python<'_>) -> PyResult<State> {
+        self.work(py, |running, _| State::of(running))
+    }
+
+    /// Goes back, or on, to a snapshot.
+    fn restore(&self, py: Python<'_>, state: &State) -> PyResult<()> {
+        let state = state.clone();
+        self.work(py, move |running, _| {
+            let state = state.taken(running)?;
+            running.live.restore(state)?;
+            running.hold()
+        })
+    }
+
+    /// Goes on with the numbers of another model. False where its meshes, solvers or precision differ.
+    fn exchange(&self, py: Python<'_>, model: &Model) -> PyResult<bool> {
+        let world = Arc::clone(&model.world);
+        self.work(py, move |running, _| {
+            let goes_on = running.live.exchange(&world)?;
+            if goes_on {
+                running.world = world;
+                running.show_again();
+                running.hold()?;
+            }
+            Ok(goes_on)
+        })
+    }
+
+    /// A mesh at rest with fields of the instant.
+    fn mesh(&self, py: Python<'_>, fields: Vec<String>, on: Option<String>, cells: bool) -> PyResult<Mesh> {
+        let at = if cells { At::Cells } else { At::Points };
+        self.work(py, move |running, _| {
+            let fields = fields.iter().map(|name| field_of(name)).collect::<Result<Vec<_>, _>>()?;
+            Ok(Mesh(Arc::new(running.mesh(&fields, on.as_deref(), at)?.clone())))
+        })
+    }
+
+    /// A picture as PNG.
+    fn picture(
+        &self,
+        py: Python<'_>,
+        field: Option<String>,
+        size: [u32; 2],
+        camera: Option<[f64; 2]>,
+    ) -> PyResult<Vec<u8>> {
+        self.work(py, move |running, _| crate::picture::draw(running, field.as_deref(), size, camera))
+    }
+
+    /// Ends it. Its memory goes with the last view of it.
+    fn close(&self) -> Result<(), Trouble> {
+        let mut slot = self.slot()?;
+        *slot = match std::mem::replace(&mut *slot, Slot::Away) {
+            Slot::Here(running) => Slot::Closed(Some(running)),
+            Slot::Away => return Err(Slot::Away.trouble()),
+            other => other,
+        };
+        Ok(())
+    }
+}
+
+/// Writes values into an array of the same size.
+fn fill(out: &mut PyReadwriteArray2<'_, f64>, values: &[f64]) -> PyResult<()> {
+    let mut out = out.as_array_mut();
+    if out.len() != values.len() || out.ncols() != 3 {
+        let message = format!("`out` has shape {:?}, ({}, 3) is wanted", out.shape(), values.len() / 3);
+        return Err(Trouble::Value(message).into());
+    }
+    out.iter_mut().zip(values).for_each(|(out, value)| *out = *value);
+    Ok(())
+}
+
+/// A read-only array (nodes, 3) over memory that lives as long as the simulation.
+#[allow(unsafe_code, reason = "NumPy borrows the memory of the simulation, which the array keeps alive")]
+fn view<T: numpy::Element>(simulation: Bound<'_, PyAny>, address: usize, nodes: usize) -> Bound<'_, PyArray2<T>> {
+    let data: *const T = std::ptr::with_exposed_provenance(address);
+    // SAFETY: the vector at this address has 3 · `nodes` numbers of this type, and stays there as long as the simulation: `work` ends it
+    // where they have moved, and neither `close` nor a panic frees it. The array holds a reference to the simulation, and is not writeable
+    // before anybody sees it. A thread that reads it during a step may see two instants mixed, which the documentation says.
+    unsafe {
+        let own = ArrayView2::from_shape_ptr((nodes, 3), data);
+        let array = PyArray2::borrow_from_array(&own, simulation);
+        array.readwrite().make_nonwriteable();
+        array
+    }
+}

@@ -1,0 +1,81 @@
+//! Snapshots.
+
+use std::sync::Arc;
+
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+use crate::arrays::array3;
+use crate::errors::Trouble;
+use crate::running::Running;
+
+/// A snapshot: displacements, velocities, and what relaxing tissue remembers.
+#[derive(Clone)]
+#[pyclass(frozen, module = "pliant._native")]
+pub struct State {
+    kept: Kept,
+    time: f64,
+    steps: u64,
+    displacement: Arc<Vec<f64>>,
+}
+
+#[derive(Clone)]
+enum Kept {
+    Whole(Arc<pliant_sim::State>),
+    /// As it came from a file or another process, of no world yet.
+    Bytes(Arc<Vec<Vec<u8>>>),
+}
+
+impl State {
+    pub fn of(running: &mut Running) -> Result<Self, Trouble> {
+        let kept = Kept::Whole(Arc::new(running.live.simulation.state()?));
+        let displacement = Arc::new(running.nodal(|now, _, node| now.displacement(node)));
+        let simulation = running.simulation();
+        Ok(Self { kept, time: simulation.time(), steps: simulation.steps(), displacement })
+    }
+
+    /// As a state of the world of a run.
+    pub fn taken(&self, running: &Running) -> Result<pliant_sim::State, Trouble> {
+        let world = running.simulation().world();
+        let other = || Trouble::Value("the state is of a model with other meshes, solvers or precision".into());
+        match &self.kept {
+            Kept::Whole(state) if state.fits(world) => Ok((**state).clone()),
+            Kept::Whole(_) => Err(other()),
+            Kept::Bytes(bytes) => pliant_sim::State::decode(world, bytes).ok_or_else(other),
+        }
+    }
+}
+
+#[pymethods]
+impl State {
+    /// From its bytes.
+    #[staticmethod]
+    fn decoded(bytes: Vec<Vec<u8>>, time: f64, steps: u64, displacement: Vec<f64>) -> Self {
+        Self { kept: Kept::Bytes(Arc::new(bytes)), time, steps, displacement: Arc::new(displacement) }
+    }
+
+    /// Its bytes, time [s], steps and displacements [m].
+    #[allow(clippy::type_complexity, reason = "the arguments of `decoded`")]
+    fn encoded(&self) -> Result<(Vec<std::borrow::Cow<'_, [u8]>>, f64, u64, Vec<f64>), Trouble> {
+        let bytes = match &self.kept {
+            Kept::Whole(state) => state.encode()?.into_iter().map(Into::into).collect(),
+            Kept::Bytes(bytes) => bytes.iter().map(|own| own.as_slice().into()).collect(),
+        };
+        Ok((bytes, self.time, self.steps, self.displacement.to_vec()))
+    }
+
+    #[getter]
+    fn time(&self) -> f64 {
+        self.time
+    }
+
+    #[getter]
+    fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// Displacements [m], (nodes, 3).
+    fn displacement<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        array3(py, self.displacement.to_vec())
+    }
+}

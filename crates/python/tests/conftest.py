@@ -1,0 +1,45 @@
+"""Scenes that tests share."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+import pliant
+
+ROOT = Path(__file__).parents[3]
+sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+os.chdir(ROOT)
+
+
+def cube(cells: int = 2, **changes: object) -> pliant.Scene:
+    """A cube of soft tissue that hangs on its base."""
+    scene = pliant.Scene(until=0.2, gravity=(0, 0, -9.81))
+    scene.law["tissue"] = {"type": "neo-hookean", "young-modulus": 10e3, "poisson-ratio": 0.3}
+    mesh = {"block": {"size": [0.1, 0.1, 0.1], "cells": [cells] * 3}}
+    scene.body["cube"] = {"mesh": mesh, "law": "tissue", "density": 1000.0, "damping": 5.0}
+    scene.constraint["base"] = {"type": "fix", "body": "cube", "nodes": {"set": "z-min"}}
+    return scene.replace(changes)
+
+
+@pytest.fixture
+def scene() -> pliant.Scene:
+    """The cube."""
+    return cube()
+
+
+@pytest.fixture(params=["explicit single", "explicit double", "quasi-static", "implicit"])
+def any_solver(request: pytest.FixtureRequest) -> pliant.Scene:
+    """The cube by each solver."""
+    solver, _, precision = request.param.partition(" ")
+    own = cube(**{"run.solver": solver})
+    if precision:
+        own["run.precision"] = precision
+    if solver == "implicit":
+        own["run.step"] = 0.01
+    if solver == "quasi-static":
+        own["run.load-steps"] = 8
+    return own

@@ -1,0 +1,284 @@
+"""Simulations: the same bits by every way, threads, signals, hands, tools."""
+
+from __future__ import annotations
+
+import gc
+import os
+import pickle
+import signal
+import threading
+import time
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+
+import pliant
+from conftest import ROOT, cube
+
+
+def test_every_way_gives_the_same_bits(any_solver: pliant.Scene, tmp_path: object) -> None:
+    model = any_solver.build()
+    steps = min(model.steps, 60)
+    one, many = model.simulate(), model.simulate(threads=2)
+    for _ in range(steps):
+        one.step()
+    assert many.step(steps) == steps
+    looked = model.simulate()
+    for _ in range(steps):
+        looked.step()
+        looked.sample()
+    kept = model.simulate()
+    kept.step(steps // 2)
+    kept.field("displacement")
+    state = pickle.loads(pickle.dumps(kept.state()))
+    path = os.path.join(str(tmp_path), "state")
+    state.save(path)
+    again = pickle.loads(pickle.dumps(model)).simulate()
+    again.restore(pliant.State.load(path))
+    again.step(steps - steps // 2)
+    copy = kept.copy()
+    copy.step(steps - steps // 2)
+    prints = {sim.fingerprint() for sim in (one, many, looked, again, copy)}
+    assert len(prints) == 1, prints
+
+
+def test_runs_with_files_are_those_of_the_command_line(scene: pliant.Scene, tmp_path: object) -> None:
+    scene.output["history"] = {"type": "csv", "every": 0.02}
+    files = scene.run(f"{tmp_path}/out")
+    memory = scene.run()
+    assert files.status == memory.status == "done" and files.steps == memory.steps
+    assert np.array_equal(files.reactions["base"], memory.reactions["base"])
+    assert np.array_equal(files.history["time"], memory.history["time"])
+    assert files.history.units["reaction.base.z"] == "N" == memory.history.units["reaction.base.z"]
+    assert files.energies == memory.energies
+    with pytest.raises(pliant.OutputError):
+        scene.run(f"{tmp_path}/out")
+    assert scene.run(f"{tmp_path}/out", force=True).status == "done"
+
+
+def test_a_failed_run_keeps_what_was_found(scene: pliant.Scene) -> None:
+    scene["run.step"] = 0.02
+    scene["run.on-unstable"] = "stop"
+    with pytest.warns(pliant.PliantWarning, match="failed"):
+        result = scene.run()
+    assert result.status == "failed" and isinstance(result.error, pliant.UnstableError)
+    assert len(result.history["time"]) >= 1
+
+
+def test_steps_end_where_the_run_is_asked_to_end(scene: pliant.Scene) -> None:
+    sim = scene.build().simulate()
+    history = sim.run(until=0.05, every=0.01, record=["displacement", "velocity"])
+    assert history["displacement"].shape == (len(history["time"]), *sim.model.rest.shape)
+    assert np.allclose(np.diff(history["time"]), 0.01, atol=sim.step_size)
+    assert abs(sim.time - 0.05) <= 0.5 * sim.step_size
+    assert history["velocity"][-1, :, 2].min() < 0.0
+
+
+def test_the_interpreter_is_released() -> None:
+    model = cube(8).build()
+    sim, stamps, began = model.simulate(), [], threading.Event()
+
+    def look() -> None:
+        began.wait()
+        for _ in range(20):
+            stamps.append(time.monotonic())
+            time.sleep(2e-3)
+
+    thread = threading.Thread(target=look)
+    thread.start()
+    began.set()
+    begin = time.monotonic()
+    sim.step(2000)
+    end = time.monotonic()
+    thread.join()
+    assert end - begin > 0.02
+    assert sum(begin < stamp < end for stamp in stamps) > 3, (begin, end, stamps)
+
+
+def test_simulations_of_one_model_run_side_by_side(scene: pliant.Scene) -> None:
+    model = scene.build()
+    alone = model.simulate()
+    alone.step(300)
+    sims = [model.simulate() for _ in range(3)]
+    threads = [threading.Thread(target=sim.step, args=(300,)) for sim in sims]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert {sim.fingerprint() for sim in sims} == {alone.fingerprint()}
+
+
+def test_a_second_call_is_told_so_at_once() -> None:
+    sim = cube(8).build().simulate()
+    thread = threading.Thread(target=sim.step, args=(3000,))
+    thread.start()
+    time.sleep(0.05)
+    begin = time.monotonic()
+    with pytest.raises(pliant.BusyError):
+        sim.step()
+    assert time.monotonic() - begin < 0.05
+    thread.join()
+    assert sim.steps == 3000
+
+
+def test_ctrl_c_comes_through_and_the_simulation_goes_on() -> None:
+    sim = cube(8).build().simulate()
+    timer = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    begin = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        sim.step(10**9)
+    assert time.monotonic() - begin < 0.2 + 0.5
+    done = sim.steps
+    assert done > 0 and sim.step(3) == 3 and sim.steps == done + 3
+
+
+def test_callbacks_see_all_and_take_no_steps(scene: pliant.Scene) -> None:
+    sim, seen = scene.build().simulate(), []
+
+    def look(now: pliant.Simulation) -> None:
+        seen.append((now.time, now.energies.kinetic))
+        with pytest.raises(pliant.BusyError):
+            now.step()
+        if len(seen) == 5:
+            raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        sim.run(every=0.01, each=look)
+    assert len(seen) == 5 and sim.step() == 1
+
+
+def test_a_fork_is_told() -> None:
+    sim = cube().build().simulate()
+    if not hasattr(os, "fork"):
+        pytest.skip("there are no forks here")
+    pid = os.fork()
+    if pid == 0:
+        code = 1
+        try:
+            sim.step()
+        except pliant.BusyError as error:
+            code = 0 if "spawn" in str(error) else 2
+        os._exit(code)
+    assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
+    assert sim.step() == 1
+
+
+def _stepped(scene: pliant.Scene) -> tuple[int, pliant.State]:
+    sim = scene.build().simulate()
+    sim.step(30)
+    return sim.fingerprint(), sim.state()
+
+
+def test_scenes_and_states_travel_to_other_processes(scene: pliant.Scene) -> None:
+    with get_context("spawn").Pool(1) as pool:
+        print_, state = pool.apply(_stepped, (scene,))
+    sim = scene.build().simulate()
+    sim.step(30)
+    assert sim.fingerprint() == print_
+    sim.restore(state)
+    assert sim.fingerprint() == print_ and np.array_equal(state.displacement, sim.displacement)
+
+
+def test_numbers_change_from_the_next_step_on(scene: pliant.Scene) -> None:
+    sim = scene.build().simulate()
+    sim.step(10)
+    before = np.array(sim.displacement)
+    sim.set({"law.tissue.young-modulus": 20e3})
+    assert np.array_equal(sim.displacement, before)
+    assert sim.model.scene["law.tissue.young-modulus"] == 20e3
+    sim.step(10)
+    with pytest.raises(ValueError, match="build a new model"):
+        sim.set({"body.cube.mesh": {"block": {"size": [0.1, 0.1, 0.1], "cells": [3, 3, 3]}}})
+    with pytest.raises(pliant.SceneError):
+        sim.set({"law.tissue.poisson-ratio": 0.7})
+    assert sim.step() == 1
+
+
+def test_pushed_forces_do_work_and_stay(scene: pliant.Scene) -> None:
+    scene["scene.gravity"] = (0.0, 0.0, 0.0)
+    scene["body.cube.damping"] = 100.0
+    model = scene.build()
+    sim = model.simulate()
+    forces = np.zeros_like(model.rest)
+    top = model.select("cube", "z-max")
+    forces[top, 2] = 0.1 / len(top)
+    sim.push(forces)
+    sim.step(3000)
+    assert abs(sim.reaction("base")[2] + 0.1) < 1e-3
+    assert abs(sim.energies.balance) < 0.01
+    state = sim.state()
+    sim.restore(state)
+    sim.step(10)
+    assert abs(sim.reaction("base")[2] + 0.1) < 1e-3
+    sim.push(None)
+    sim.step(3000)
+    assert np.abs(sim.displacement).max() < 1e-6
+    sim.push(forces[model.bodies["cube"].nodes], body="cube")
+
+
+def test_a_hand_pulls_with_the_force_that_the_base_holds(scene: pliant.Scene) -> None:
+    scene["scene.gravity"] = (0.0, 0.0, 0.0)
+    scene["body.cube.damping"] = 100.0
+    sim = scene.build().simulate()
+    hand = sim.grip(at=(0.05, 0.05, 0.1), stiffness=50.0)
+    hand.place = hand.point + (0.0, 0.0, 0.002)
+    sim.step(4000)
+    assert hand.force[2] > 1e-3
+    assert np.allclose(hand.force, -sim.reaction("base"), atol=1e-5)
+    other = sim.grip(nodes=sim.model.select("cube", "x-max"), stiffness=10.0)
+    hand.release()
+    sim.step()
+    with pytest.raises(ValueError, match="released"):
+        _ = hand.force
+    assert other.stiffness <= 10.0
+
+
+def test_contacts_and_tools_are_reached_as_in_scenes() -> None:
+    sim = pliant.load(ROOT / "scenes/palpation").build().simulate()
+    tools = sim.model.tools
+    assert tools and sim.model.contacts
+    tool = sim.tool(tools[0])
+    arrival = sim.drive(tools[0], tool.place + (0.0, 0.0, -0.002), within=0.01)
+    assert arrival > sim.time
+    sim.step(20)
+    assert set(sim.contacts()) == set(sim.model.contacts)
+    assert np.isfinite(sim.tool(tools[0]).force).all()
+    pose = np.eye(4)
+    pose[:3, 3] = tool.place
+    sim.drive(tools[0], pose)
+    sim.drive(tools[0], (tool.place, (0.0, 0.0, 0.0, 1.0)))
+
+
+def test_a_thousand_simulations_leave_nothing(scene: pliant.Scene) -> None:
+    model = scene.build()
+
+    def pages() -> int:
+        with open("/proc/self/statm") as file:
+            return int(file.read().split()[1])
+
+    for _ in range(50):
+        model.simulate().step()
+    gc.collect()
+    before, threads = pages(), threading.active_count()
+    tasks = len(os.listdir("/proc/self/task"))
+    for _ in range(1000):
+        model.simulate()
+    gc.collect()
+    time.sleep(0.2)
+    assert (pages() - before) * os.sysconf("SC_PAGESIZE") < 5e6
+    assert threading.active_count() == threads and len(os.listdir("/proc/self/task")) <= tasks
+
+
+def test_shells_fields_and_pictures_are_reached(tmp_path: object) -> None:
+    sim = pliant.load(ROOT / "scenes/colon").build().simulate()
+    sim.step(2)
+    assert sim.field("membrane-force", on="colon").shape[1:] == (3, 3)
+    mesh = sim.mesh(["displacement"])
+    assert mesh.point_data["displacement"].shape == mesh.points.shape
+    picture = sim.picture(size=(320, 240))
+    picture.save(f"{tmp_path}/colon.png")
+    pixels = picture.to_numpy()
+    assert pixels.shape == (240, 320, 4) and pixels[..., :3].std() > 5
+    assert picture._repr_png_()[:8] == b"\x89PNG\r\n\x1a\n"
