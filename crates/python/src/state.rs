@@ -39,8 +39,8 @@ impl State {
         let world = running.simulation().world();
         let other = || Trouble::Value("the state is of a model with other meshes, solvers or precision".into());
         match &self.kept {
-            Kept::Whole(state) if state.fits(world) => Ok((**state).clone()),
-            Kept::Whole(_) => Err(other()),
+            // Another world refuses it when it is taken up.
+            Kept::Whole(state) => Ok((**state).clone()),
             Kept::Bytes(bytes) => pliant_sim::State::decode(world, bytes).ok_or_else(other),
         }
     }
@@ -58,7 +58,10 @@ impl State {
     #[allow(clippy::type_complexity, reason = "the arguments of `decoded`")]
     fn encoded(&self) -> Result<(Vec<std::borrow::Cow<'_, [u8]>>, f64, u64, Vec<f64>), Trouble> {
         let bytes = match &self.kept {
-            Kept::Whole(state) => state.encode()?.into_iter().map(Into::into).collect(),
+            Kept::Whole(state) => {
+                let bytes = state.encode().map_err(|error| Trouble::Internal(error.to_string()))?;
+                bytes.into_iter().map(Into::into).collect()
+            }
             Kept::Bytes(bytes) => bytes.iter().map(|own| own.as_slice().into()).collect(),
         };
         Ok((bytes, self.time, self.steps, self.displacement.to_vec()))
