@@ -43,6 +43,7 @@ pub mod io;
 mod labels;
 mod locate;
 mod mesh;
+mod patch;
 mod quality;
 mod regions;
 mod selection;
@@ -59,6 +60,7 @@ pub use grid::{FlatGrid, Grid};
 pub use labels::{CellLabel, Labels, UnknownLabel};
 pub use locate::{Location, Locator, barycentric_of_closest};
 pub use mesh::{CellBlock, CellKind, DataArray, Mesh};
+pub use patch::patch;
 pub use quality::{
     QualityReport, Spread, acoustic_length, dihedral_angles, gradient_integrals, relative_acoustic_length,
     scaled_jacobian, vector_area, volume,

@@ -155,6 +155,16 @@ impl Surface {
         nodes
     }
 
+    /// Its faces as triangles, quads cut in two, in the order of the faces.
+    pub fn triangles(&self) -> Vec<[u32; 3]> {
+        let halves = |face: &Face| {
+            let [a, b, c, d] = face.corners;
+            let second = (face.kind == CellKind::Quad).then_some([a, c, d]);
+            std::iter::once([a, b, c]).chain(second)
+        };
+        self.faces.iter().flat_map(halves).collect()
+    }
+
     /// Total area [m²].
     pub fn area(&self, points: &[Vector3]) -> f64 {
         self.faces.iter().map(|face| face.area(points)).sum()
