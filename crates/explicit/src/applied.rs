@@ -22,7 +22,9 @@ pub(crate) struct AppliedForces {
     gravity: Vec<Vector<f64>>,
     body_of: Vec<u16>,
     grips: Vec<Grip>,
-    /// Whether loads or grips act, on any node.
+    /// Forces [N] from outside that stay, one a node; empty for none.
+    given: Vec<Vector<f64>>,
+    /// Whether loads, grips or given forces act, on any node.
     loaded: bool,
     /// The blocks of nodes that forces were added to at this instant, and a mark of each block.
     added: Vec<u32>,
@@ -44,6 +46,7 @@ impl AppliedForces {
             model,
             body_of,
             grips: Vec::new(),
+            given: Vec::new(),
         }
     }
 
@@ -51,8 +54,19 @@ impl AppliedForces {
     pub(crate) fn hold(&mut self, grips: &[Grip]) {
         self.grips.clear();
         self.grips.extend_from_slice(grips);
+        self.see_whether_loaded();
+    }
+
+    /// Takes other forces [N] from outside that stay, one a node, or none.
+    pub(crate) fn push(&mut self, forces: &[Vector<f64>]) {
+        self.given.clear();
+        self.given.extend_from_slice(forces);
+        self.see_whether_loaded();
+    }
+
+    fn see_whether_loaded(&mut self) {
         self.nodal.fill([0.0; 3]);
-        self.loaded = !self.grips.is_empty() || !self.model.loads.is_empty();
+        self.loaded = !(self.grips.is_empty() && self.given.is_empty() && self.model.loads.is_empty());
     }
 
     /// Whether any force acts on the block of a node.
@@ -94,6 +108,9 @@ impl AppliedForces {
         }
         for grip in &self.grips {
             grip.add_forces(&state, &mut self.nodal);
+        }
+        for (own, given) in self.nodal.iter_mut().zip(&self.given) {
+            *own = add(*own, *given);
         }
         model.give_back(&mut self.nodal);
     }

@@ -410,6 +410,12 @@ impl<R: Scalar> DynamicRelaxation<R> {
         Equilibrium { energies: self.energies, residual: self.residual.clone(), way: self.way.clone() }
     }
 
+    /// Takes forces [N] from outside, one a node, or none: they and no others act in the equilibria to come until they are replaced. Their work is
+    /// external.
+    pub fn push(&mut self, forces: &[Vector<f64>]) {
+        self.applied.push(forces);
+    }
+
     /// Takes up an equilibrium of the same model, so that all that can be asked belongs to it.
     pub fn resume(&mut self, Equilibrium { energies, residual, way }: Equilibrium<R>) {
         (self.energies, self.residual, self.way) = (energies, residual, way);

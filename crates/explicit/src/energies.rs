@@ -79,9 +79,17 @@ impl Work {
         (self.shaken, self.steps_off_balance) = (true, 0);
     }
 
-    /// Enters the sums of an instant, `before` seconds after the one before; `None` at the start. Judged above `floor`.
-    pub fn settle(&mut self, sums: &Sums, hourglass: f64, before: Option<f64>, floor: f64) -> Energies {
-        if let Some(before) = before {
+    /// Enters the sums of an instant, `before` seconds after the one before; `None` at the start. Judged above `floor`. What was entered
+    /// before (`again`) is not entered twice.
+    pub fn settle(
+        &mut self,
+        sums: &Sums,
+        hourglass: f64,
+        before: Option<f64>,
+        floor: f64,
+        again: bool,
+    ) -> Energies {
+        if let (Some(before), false) = (before, again) {
             self.internal += sums.internal_before;
             self.external += sums.external_before;
             self.damping += 0.5 * (self.damping_power + sums.damping_power) * before;
@@ -99,8 +107,10 @@ impl Work {
         };
         let balance = missing / self.largest.max(floor);
         let off = self.largest > floor && balance > BALANCE_LIMIT;
-        self.shaken &= off;
-        self.steps_off_balance = if off && !self.shaken { self.steps_off_balance + 1 } else { 0 };
+        if !again {
+            self.shaken &= off;
+            self.steps_off_balance = if off && !self.shaken { self.steps_off_balance + 1 } else { 0 };
+        }
         Energies {
             kinetic: sums.kinetic,
             internal,

@@ -38,6 +38,9 @@ pub struct State<R> {
     pub gripped: Vec<Gripped>,
     /// Nodes that touch something, increasing, with how far each has slid on it since its touch began [m].
     pub slip: Vec<(u32, f64)>,
+    /// Whether forces were found at the instant: their work is then entered, laws have relaxed to it, and the limit of the step is known.
+    /// Who finds them again enters nothing twice.
+    pub evaluated: bool,
 }
 
 /// Work accumulated over the steps [J].
@@ -92,6 +95,7 @@ impl<R: Scalar> State<R> {
             lags: Vec::new(),
             gripped: Vec::new(),
             slip: Vec::new(),
+            evaluated: false,
         }
     }
 

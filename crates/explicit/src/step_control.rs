@@ -122,9 +122,10 @@ impl StepControl {
         Lengths { before, next: part(self.substeps) }
     }
 
-    /// The time [s] over which relaxing laws come to the state's instant: what acts at the start came at once.
+    /// The time [s] over which relaxing laws come to the state's instant: what acts at the start came at once, and where forces were found
+    /// before, the laws are there.
     pub fn relaxing<R: Scalar>(&self, state: &State<R>) -> f64 {
-        if state.is_at_start() { 0.0 } else { self.lengths(state).before }
+        if state.is_at_start() || state.evaluated { 0.0 } else { self.lengths(state).before }
     }
 
     /// Whether a check of the limit is due: the first one, [`CHECK_EVERY`] steps after the last, or where the deformation differs.
@@ -132,8 +133,9 @@ impl StepControl {
         let seen = &state.stability;
         self.monitor.is_some()
             && (seen.checks == 0
-                || state.steps >= seen.checked_at.saturating_add(CHECK_EVERY)
-                || deformed.differs(&seen.deformed, CHANGE))
+                || !state.evaluated
+                    && (state.steps >= seen.checked_at.saturating_add(CHECK_EVERY)
+                        || deformed.differs(&seen.deformed, CHANGE)))
     }
 
     /// Steps that pass over no check of the limit, at least one, if the deformation goes on to change as it did within the last `steps`
@@ -196,8 +198,11 @@ impl StepControl {
         Ok(())
     }
 
-    /// Notes that a whole step begins.
+    /// Notes that a whole step begins, once.
     pub fn note<R>(&self, state: &mut State<R>) {
+        if state.evaluated {
+            return;
+        }
         let (Some(_), Some(look)) = (&self.monitor, state.stability.last) else { return };
         state.stability.steps_below += u64::from(look.limit < self.step);
         state.stability.note_substeps(self.substeps, state.time);
@@ -206,6 +211,7 @@ impl StepControl {
     /// Moves the clock of a state on by the (sub)step to come.
     pub fn count<R>(&mut self, state: &mut State<R>) {
         self.before = None;
+        state.evaluated = false;
         state.stability.substeps = self.substeps;
         state.stability.done += 1;
         if state.stability.done == self.substeps {

@@ -75,6 +75,11 @@ pub trait Observable<R> {
         Vec::new()
     }
 
+    /// Moment [N m] about the origin of the force of each contact on the rigid thing that its nodes touch; `None` where it is not found.
+    fn contact_moments(&self) -> Option<Vec<Vector<f64>>> {
+        None
+    }
+
     /// The nodes that may touch something, increasing, with what contacts do to them.
     fn contact_nodes(&self, _state: &State<R>) -> Vec<NodeContact> {
         Vec::new()
@@ -194,6 +199,11 @@ impl<R: Scalar> Observable<R> for CentralDifference<R> {
     fn contact_forces(&self) -> Vec<Vector<f64>> {
         let on_nodes = self.touching.iter().flat_map(|touching| &touching.forces);
         on_nodes.map(|force| force.map(|f| -f)).collect()
+    }
+
+    fn contact_moments(&self) -> Option<Vec<Vector<f64>>> {
+        let on_nodes = self.touching.iter().flat_map(|touching| &touching.moments);
+        Some(on_nodes.map(|moment| moment.map(|m| -m)).collect())
     }
 
     fn contact_nodes(&self, state: &State<R>) -> Vec<NodeContact> {
@@ -486,6 +496,12 @@ impl<R: Scalar> CentralDifference<R> {
         self.applied.hold(grips);
     }
 
+    /// Takes forces [N] from outside, one a node, or none: they and no others act from the next evaluation on until they are replaced. Their work
+    /// is external.
+    pub fn push(&mut self, forces: &[Vector<f64>]) {
+        self.applied.push(forces);
+    }
+
     /// Runs in the lanes of certain instructions instead of the widest.
     ///
     /// # Errors
@@ -501,7 +517,8 @@ impl<R: Scalar> CentralDifference<R> {
         self.control.step()
     }
 
-    /// Forces, coming increments, reactions and energies at the current time.
+    /// Forces, coming increments, reactions and energies at the current time. Where they were found before, also by another stepper, they
+    /// are found again.
     ///
     /// # Errors
     /// If the state is not finite, a cell is inverted, the energies do not balance, or the step is above the limit and
@@ -567,6 +584,7 @@ impl<R: Scalar> CentralDifference<R> {
         self.model.follow(&mut state.displacement);
         if let Some(touching) = &mut self.touching {
             touching.slide(&mut state.slip);
+            state.gripped.append(&mut touching.taken);
             touching.press_guests(self.lengths.next);
         }
         state.work.advance();
@@ -749,7 +767,8 @@ impl<R: Scalar> CentralDifference<R> {
         hourglass: f64,
     ) -> Result<(), StepError> {
         let before = (!state.is_at_start()).then_some(self.lengths.before);
-        self.energies = state.work.settle(sums, hourglass, before, self.balance_floor);
+        let again = std::mem::replace(&mut state.evaluated, true);
+        self.energies = state.work.settle(sums, hourglass, before, self.balance_floor, again);
         if state.work.has_lost_balance() {
             let (fastest, balance) = (self.fastest_node(), self.energies.balance);
             return Err(StepError::unbalanced(&self.model, fastest, balance, state.time));

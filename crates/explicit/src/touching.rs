@@ -134,10 +134,14 @@ pub(crate) struct Touching<R> {
     faces: Vec<[u32; 3]>,
     /// Impulses [N] on each node in a step, and their slips weighted by them.
     slips: Vec<[f64; 2]>,
+    /// Nodes that jaws hold from the next step on.
+    pub taken: Vec<Gripped>,
     /// Room for the nodes that slide.
     slid: Vec<(u32, f64)>,
     /// The force [N] of each contact on its first surface at the last evaluation.
     pub forces: Vec<Vector<f64>>,
+    /// The moment [N m] of that of each contact with a rigid thing about the origin, where points were before the step.
+    pub moments: Vec<Vector<f64>>,
 }
 
 impl<R: Scalar> Touching<R> {
@@ -177,11 +181,13 @@ impl<R: Scalar> Touching<R> {
             rows: Vec::new(),
             faces: faces(&contacts, &numbers),
             slips: vec![[0.0; 2]; numbers.len()],
+            taken: Vec::new(),
             slid: Vec::new(),
             numbers,
             guests,
             own,
             forces: vec![[0.0; 3]; contacts.contacts.len()],
+            moments: vec![[0.0; 3]; contacts.contacts.len()],
             contacts,
         }
     }
@@ -196,7 +202,9 @@ impl<R: Scalar> Touching<R> {
         gripped: &mut Vec<Gripped>,
     ) {
         self.guests.go(times);
+        self.taken.clear();
         self.forces.fill([0.0; 3]);
+        self.moments.fill([0.0; 3]);
         for node in self.near.drain(..) {
             let node = &mut self.nodes[node as usize];
             (node.near, node.paired) = (false, false);
@@ -387,29 +395,31 @@ impl<R: Scalar> Touching<R> {
     /// Adds the forces of jaws on the nodes that they hold: what rows on these do not bear.
     fn bear(&mut self, gripped: &[Gripped]) {
         for held in gripped {
-            let Some((index, _, node)) = self.holder(held) else { continue };
-            let node = &self.nodes[node];
+            let Some((index, _, at)) = self.holder(held) else { continue };
+            let node = &self.nodes[at];
             let force = over(&(node.then - node.free), &node.own) - node.borne;
             self.forces[index] = add(self.forces[index], force.into());
+            self.moments[index] = add(self.moments[index], self.places[at].cross(&force).into());
         }
     }
 
-    /// Lets jaws that are closed hold the nodes that touch their inner faces.
-    fn take(&self, gripped: &mut Vec<Gripped>) {
-        for (contact, own) in self.contacts.contacts.iter().zip(&self.own) {
+    /// Lets jaws that are closed hold, from the next step on, the nodes that touch their inner faces.
+    fn take(&mut self, gripped: &[Gripped]) {
+        let Self { contacts, own, nodes, numbers, taken, .. } = self;
+        for (contact, own) in contacts.contacts.iter().zip(&*own) {
             let Own::Rigid(own) = own else { continue };
             if !own.grips {
                 continue;
             }
-            let rigid = &self.contacts.rigids[own.rigid];
+            let rigid = &contacts.rigids[own.rigid];
             let inward = rigid.jaw.as_ref().map_or(0.0, |jaw| jaw.part.signum());
-            for &node in own.surface.nodes.iter().filter(|&&node| self.nodes[node as usize].near) {
-                let (at, Near { distance, normal }) =
-                    own.passage.within(rigid, &self.nodes[node as usize].then);
-                let node = self.numbers[node as usize];
+            for &node in own.surface.nodes.iter().filter(|&&node| nodes[node as usize].near) {
+                let (at, Near { distance, normal }) = own.passage.within(rigid, &nodes[node as usize].then);
+                let node = numbers[node as usize];
                 let touches = distance - contact.touch.offset <= TOUCHING * rigid.shape.thinnest();
-                if touches && normal.y * inward > INWARD && gripped.iter().all(|held| held.node != node) {
-                    gripped.push(Gripped { rigid: own.rigid as u32, node, at: at.into() });
+                let known = || gripped.iter().chain(&*taken).any(|held| held.node == node);
+                if touches && normal.y * inward > INWARD && !known() {
+                    taken.push(Gripped { rigid: own.rigid as u32, node, at: at.into() });
                 }
             }
         }
@@ -466,10 +476,14 @@ impl<R: Scalar> Touching<R> {
                 break;
             }
         }
-        let Self { nodes, rows, forces, .. } = self;
+        let Self { nodes, rows, forces, moments, places, own, .. } = self;
         for row in rows.iter() {
             let force = (row.normal * row.push + row.drag) * row.sign;
             forces[row.contact] = add(forces[row.contact], force.into());
+            if matches!(own[row.contact], Own::Rigid(_)) {
+                let place: Vector3<f64> = row.parts().map(|(node, weight)| places[node] * weight).sum();
+                moments[row.contact] = add(moments[row.contact], place.cross(&force).into());
+            }
             for (node, weight) in row.parts() {
                 nodes[node].borne += (row.normal * row.push + row.drag) * weight;
             }
@@ -543,7 +557,8 @@ impl<R: Scalar> Touching<R> {
 
     /// Lifts nodes that are still in a thing.
     fn lift(&mut self) {
-        for ((contact, own), force) in self.contacts.contacts.iter().zip(&self.own).zip(&mut self.forces) {
+        let sums = self.forces.iter_mut().zip(&mut self.moments);
+        for ((contact, own), (force, moment)) in self.contacts.contacts.iter().zip(&self.own).zip(sums) {
             let Own::Rigid(own) = own else { continue };
             let rigid = &self.contacts.rigids[own.rigid];
             for &node in &own.near {
@@ -565,6 +580,7 @@ impl<R: Scalar> Touching<R> {
                     node.then += along * push;
                     node.lifted += normal * push;
                     *force = add(*force, (normal * push).into());
+                    *moment = add(*moment, now.cross(&(normal * push)).into());
                 }
             }
         }

@@ -42,7 +42,9 @@ pub fn patch(
     let mut before = 0;
     while before < reached.len() {
         before = reached.len();
-        for triangle in triangles.iter().filter(|triangle| triangle.iter().any(|corner| known.contains(corner))) {
+        for triangle in
+            triangles.iter().filter(|triangle| triangle.iter().any(|corner| known.contains(corner)))
+        {
             for &corner in triangle {
                 if distance(corner) < radius && !known.contains(&corner) {
                     reached.push(corner);

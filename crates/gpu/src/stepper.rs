@@ -397,7 +397,9 @@ impl GpuStepper {
             state.work.begin(self.kinetic_at_start(), stored, results.shock);
         }
         let before = (!at_start).then_some(self.lengths.before);
-        self.energies = state.work.settle(&results.sums, results.hourglass, before, self.balance_floor);
+        let again = std::mem::replace(&mut state.evaluated, true);
+        self.energies =
+            state.work.settle(&results.sums, results.hourglass, before, self.balance_floor, again);
         self.enter_reactions(&results.reactions);
         self.contact_forces.clone_from(&results.contact_forces);
         (self.evaluated, self.since) = (true, 0);

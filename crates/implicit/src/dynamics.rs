@@ -245,6 +245,11 @@ impl BackwardEuler {
         self.system.hold(springs);
     }
 
+    /// Takes forces [N] on nodes, as [`Forces::push`](crate::Forces::push).
+    pub fn push(&mut self, forces: &[(u32, [f64; 3])]) {
+        self.system.push(forces);
+    }
+
     /// How its steps are solved.
     pub fn settings(&self) -> &DynamicSettings {
         &self.settings
@@ -673,6 +678,11 @@ impl Explicit {
     /// Takes hold of nodes, as [`Forces::hold`].
     pub fn hold(&mut self, springs: &[Spring]) {
         self.forces.hold(springs);
+    }
+
+    /// Takes forces [N] on nodes, as [`Forces::push`].
+    pub fn push(&mut self, forces: &[(u32, [f64; 3])]) {
+        self.forces.push(forces);
     }
 
     /// The forces last evaluated.

@@ -43,6 +43,11 @@ impl Forces {
         self.system.hold(springs);
     }
 
+    /// Takes forces [N] on nodes: they and no others act from the next evaluation on, as loads.
+    pub fn push(&mut self, forces: &[(u32, [f64; 3])]) {
+        self.system.push(forces);
+    }
+
     /// Takes the forces of contacts, six numbers a node: they are loads from the next evaluation on.
     pub fn touch(&mut self, forces: &[f64]) {
         self.touching.clear();

@@ -217,6 +217,11 @@ impl Statics {
         self.system.hold(springs);
     }
 
+    /// Takes forces [N] on nodes, as [`Forces::push`](crate::Forces::push).
+    pub fn push(&mut self, forces: &[(u32, [f64; 3])]) {
+        self.system.push(forces);
+    }
+
     /// The attempts of the last call of [`solve`](Self::solve) or [`control`](Self::control), one after the other.
     pub fn attempts(&self) -> &[Attempted] {
         &self.attempts

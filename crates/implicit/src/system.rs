@@ -79,6 +79,8 @@ pub(crate) struct System {
     pub(crate) coupling: Vec<f64>,
     /// Springs that come and go between steps; their forces count as loads.
     held: Vec<Spring>,
+    /// Forces [N] on nodes that come and go between steps.
+    pushed: Vec<(u32, [f64; 3])>,
     /// Pressures on facets.
     pressure: Vec<Pressure>,
     /// The curved surface, if a load acts on it.
@@ -302,6 +304,7 @@ impl System {
             controlled: vec![0.0; 6 * nodes],
             coupling: Vec::new(),
             held: Vec::new(),
+            pushed: Vec::new(),
             pressure: vec![Pressure::default(); model.facets.len()],
             exact_pressure: true,
             surface: needs_surface(&model).then(|| CurvedSurface::new(&model, EdgeRule::Arc)),
@@ -325,6 +328,12 @@ impl System {
     pub(crate) fn hold(&mut self, springs: &[Spring]) {
         self.held.clear();
         self.held.extend_from_slice(springs);
+    }
+
+    /// Takes forces [N] on nodes: they and no others act from the next evaluation on.
+    pub(crate) fn push(&mut self, forces: &[(u32, [f64; 3])]) {
+        self.pushed.clear();
+        self.pushed.extend_from_slice(forces);
     }
 
     /// Whether any law relaxes.
@@ -415,6 +424,10 @@ impl System {
             for c in 0..3 {
                 self.external[at + c] -= spring.stiffness * stretch[c];
             }
+        }
+        for (node, force) in &self.pushed {
+            let own = &mut self.external[6 * *node as usize..];
+            own.iter_mut().zip(force).for_each(|(own, force)| *own += force);
         }
         if tangent.is_some() {
             let held = std::mem::take(&mut self.held);

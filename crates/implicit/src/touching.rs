@@ -75,6 +75,8 @@ pub struct TouchingNow {
     pub forces: Vec<f64>,
     /// Force [N] of each contact on the second of the two that touch.
     pub totals: Vec<[f64; 3]>,
+    /// Their moments about the origin [N m].
+    pub moments: Vec<[f64; 3]>,
     /// Energy of the barriers [J].
     pub energy: f64,
     /// The least gap [m], where something touches.
@@ -98,6 +100,7 @@ pub struct TouchingSystem {
     /// Those forces where the unknowns are: on the nodes that tied ones follow.
     pub(crate) given: Vec<f64>,
     totals: Vec<Vector3<f64>>,
+    moments: Vec<Vector3<f64>>,
     /// Of barriers and friction [J]; infinite where there is no gap.
     pub(crate) energy: f64,
     /// Nodes that touch something at the end of the last step, increasing.
@@ -135,6 +138,7 @@ impl TouchingSystem {
             forces: vec![0.0; 6 * model.rest.len()],
             given: vec![0.0; 6 * model.rest.len()],
             totals: vec![Vector3::zeros(); touching.settings.len()],
+            moments: vec![Vector3::zeros(); touching.settings.len()],
             energy: 0.0,
             touches: Vec::new(),
             pairs: Vec::new(),
@@ -201,6 +205,7 @@ impl TouchingSystem {
                 self.energy = self.barriers.evaluate(&state.position, self.share);
                 if self.energy.is_finite() {
                     self.barriers.add_forces(&mut self.forces, &mut self.totals);
+                    self.barriers.find_moments(&state.position, &mut self.moments);
                 }
             }
             Some((samples, all)) => {
@@ -209,6 +214,7 @@ impl TouchingSystem {
                 all.fill(0.0);
                 if self.energy.is_finite() {
                     self.barriers.add_forces(all, &mut self.totals);
+                    self.barriers.find_moments(&samples.places, &mut self.moments);
                 }
                 samples.give_back(&self.model, all, &mut self.forces);
             }
@@ -225,6 +231,7 @@ impl TouchingSystem {
         TouchingNow {
             forces: self.forces.clone(),
             totals: self.totals.iter().map(|&total| total.into()).collect(),
+            moments: self.moments.iter().map(|&moment| moment.into()).collect(),
             energy: self.barriers.barrier_energy(),
             gap: self.barriers.least_gap(),
             nodes: self.touches.clone(),

@@ -37,16 +37,20 @@
 
 mod advice;
 mod checkpoint;
+mod field_reader;
 mod live;
 mod output;
 mod overview;
 mod parts;
 mod run;
+mod skin;
+mod snapshot;
 mod sweep;
 #[cfg(test)]
 mod testing;
 
 pub use checkpoint::{Checkpoint, ResumeError};
+pub use field_reader::FieldReader;
 pub use live::Live;
 pub use output::{
     AddedMass, BodySummary, Column, GuestSummary, OutputError, OutputFolder, ParticipantSummary,
@@ -55,4 +59,6 @@ pub use output::{
 pub use overview::overview;
 pub use parts::{MergedSweep, PartSummary, SweepPart};
 pub use run::{Draw, Options, Progress, run, run_with};
+pub use skin::Skin;
+pub use snapshot::{snapshot_from_bytes, snapshot_to_bytes};
 pub use sweep::{Sweep, SweepOptions, SweepProgress, SweepSummary};

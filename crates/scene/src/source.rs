@@ -259,6 +259,30 @@ impl Source {
         path.iter().try_fold(&self.root, |node, key| node.get(key))
     }
 
+    /// The keys, joined by points, of the smallest value or table header whose text, or whose key, has the byte at a place; `None` where there is none.
+    pub fn key_at(&self, byte: usize) -> Option<String> {
+        fn smallest(node: &Node, path: &str, byte: usize, found: &mut Option<(usize, String)>) {
+            let own = if let Place::File(span) = &node.place { Some(span) } else { None };
+            for span in own.into_iter().chain(&node.key_span) {
+                let is_smaller = found.as_ref().is_none_or(|(length, _)| span.len() <= *length);
+                if span.contains(&byte) && is_smaller && !path.is_empty() {
+                    *found = Some((span.len(), path.to_owned()));
+                }
+            }
+            let join = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
+            node.entries().iter().for_each(|(key, node)| smallest(node, &join(key), byte, found));
+            if let Value::Array(items) = &node.value {
+                items
+                    .iter()
+                    .enumerate()
+                    .for_each(|(index, node)| smallest(node, &join(&index.to_string()), byte, found));
+            }
+        }
+        let mut found = None;
+        smallest(&self.root, "", byte, &mut found);
+        found.map(|(_, key)| key)
+    }
+
     /// Where the value at a path stands; for a missing one the header or key of the nearest table around it. Of a value
     /// within a line, in which an option set a part, that part.
     pub fn span(&self, path: &[&str]) -> Place {
@@ -593,6 +617,23 @@ at = { node = 4 }
 
     fn liver() -> Source {
         Source::parse("liver.toml", LIVER).unwrap()
+    }
+
+    #[test]
+    fn a_place_in_the_text_tells_its_key() {
+        let source = liver();
+        let key = |word: &str| source.key_at(LIVER.find(word).unwrap());
+        for (word, expected) in [
+            ("5.0", "scene.until"),
+            ("-9.81", "scene.gravity.2"),
+            ("shear-modulus", "law.parenchyma.shear-modulus"),
+            ("[law", "law.parenchyma"),
+            ("\"liver.msh", "law.parenchyma.mesh.file"),
+            ("4 }", "probe.1.at.node"),
+        ] {
+            assert_eq!(key(word).as_deref(), Some(expected), "{word}");
+        }
+        assert_eq!(key("# Gewebe"), None);
     }
 
     fn text(place: Place) -> &'static str {

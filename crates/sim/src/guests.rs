@@ -67,6 +67,11 @@ pub(crate) struct GuestMemory {
 }
 
 impl GuestMemory {
+    /// Whether it is of no sets.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.counts.is_empty()
+    }
+
     /// Whether it is of these sets, or of none.
     pub(crate) fn fits(&self, sets: &[Guests]) -> bool {
         let guests: usize = sets.iter().map(|set| set.nodes.len()).sum();

@@ -16,6 +16,7 @@ use pliant_implicit::{
 use pliant_mechanics::grip::{Grip, ROOM};
 use pliant_mechanics::mapping::Mapping;
 use pliant_mechanics::model::{Enclosed, Motion};
+use pliant_mechanics::tensor::Vector;
 use pliant_mechanics::{Energies, fingerprint};
 
 use crate::bodies::{ImplicitBodies, RunControl, Stop};
@@ -61,6 +62,8 @@ pub(crate) struct Implicit {
     /// What constraints of volume enclose.
     enclosed: Vec<Option<Enclosed>>,
     evaluated: bool,
+    /// Whether the work to the instant is entered.
+    entered: bool,
     effort: Effort,
     /// What was taken before the run was resumed.
     effort_before: Effort,
@@ -183,6 +186,7 @@ impl Implicit {
             reactions: vec![[0.0; 3]; own.constraints.len()],
             enclosed: vec![None; own.constraints.len()],
             evaluated: false,
+            entered: false,
             effort: Effort::default(),
             effort_before: Effort::default(),
             convergence: VecDeque::new(),
@@ -244,6 +248,7 @@ impl Implicit {
         let kinetic = self.kinetic();
         let internal = self.method.forces().strain_energy();
         let external = match &self.before {
+            Some(_) if self.entered => self.energies.external,
             Some(_) => self.energies.external + self.work(),
             // What is given at the start.
             None => kinetic + internal,
@@ -468,8 +473,18 @@ impl Implicit {
     /// # Errors
     /// If its equations are too many.
     pub(crate) fn resume(&mut self, remembered: ImplicitState) -> Result<(), Failure> {
-        let ImplicitState { done, time, state, before, previous, energies, effort, convergence, contact } =
-            remembered;
+        let ImplicitState {
+            done,
+            time,
+            state,
+            before,
+            previous,
+            energies,
+            effort,
+            convergence,
+            contact,
+            entered,
+        } = remembered;
         (self.done, self.time) = (done, time);
         self.convergence = convergence;
         self.state = state.state();
@@ -479,8 +494,9 @@ impl Implicit {
         self.before = before.map(|(forces, state)| (forces, state.state()));
         self.energies = energies;
         (self.effort, self.effort_before) = (effort.clone(), effort);
-        self.evaluated = false;
-        let Some(ContactState { forces, totals, energy, touches, pairs, legs, lags }) = contact else {
+        (self.evaluated, self.entered) = (false, entered);
+        let Some(ContactState { forces, totals, moments, energy, touches, pairs, legs, lags }) = contact
+        else {
             return Ok(());
         };
         let gap = touches.iter().map(|own| own.gap).reduce(f64::min);
@@ -488,7 +504,7 @@ impl Implicit {
             own.go_on_from(touches.clone(), lags);
             *own.legs_mut() = legs.into_iter().collect();
         }
-        self.touching = Some(TouchingNow { forces, totals, energy, gap, nodes: touches });
+        self.touching = Some(TouchingNow { forces, totals, moments, energy, gap, nodes: touches });
         let taken = self.method.take_contact_pairs(pairs);
         taken.map_err(|error| failure(&error, &self.model, &self.bodies, self.time))
     }
@@ -510,12 +526,14 @@ impl Implicit {
             contact: self.touching.as_ref().zip(self.method.touching()).map(|(now, own)| ContactState {
                 forces: now.forces.clone(),
                 totals: now.totals.clone(),
+                moments: now.moments.clone(),
                 energy: now.energy,
                 touches: now.nodes.clone(),
                 pairs: own.pairs().to_vec(),
                 legs: own.legs().iter().map(|(&rigid, &leg)| (rigid, leg)).collect(),
                 lags: own.lags().to_vec(),
             }),
+            entered: self.entered,
         }
     }
 }
@@ -555,6 +573,10 @@ impl Instant for Implicit {
 
     fn contact_forces(&self) -> Vec<[f64; 3]> {
         self.touching.as_ref().map(|now| now.totals.clone()).unwrap_or_default()
+    }
+
+    fn contact_moments(&self) -> Option<Vec<[f64; 3]>> {
+        Some(self.touching.as_ref().map(|now| now.moments.clone()).unwrap_or_default())
     }
 
     fn contact_nodes(&self) -> Vec<NodeContact> {
@@ -676,7 +698,7 @@ impl Participant for Implicit {
                 }
             }
         }
-        self.evaluated = true;
+        (self.evaluated, self.entered) = (true, true);
         Ok(())
     }
 
@@ -686,7 +708,7 @@ impl Participant for Implicit {
         self.go(number).map_err(|error| failure(&error, &self.model, &self.bodies, self.state.time))?;
         (self.done, self.time) = (number, self.state.time);
         self.touching = self.method.touching().map(TouchingSystem::now);
-        self.evaluated = false;
+        (self.evaluated, self.entered) = (false, false);
         Ok(())
     }
 
@@ -695,6 +717,23 @@ impl Participant for Implicit {
         self.grips.extend_from_slice(grips);
         self.evaluated = false;
         true
+    }
+
+    fn push(&mut self, forces: &[Vector<f64>]) {
+        let acting = (0..).zip(forces.iter().copied()).filter(|(_, force)| *force != [0.0; 3]);
+        let acting: Vec<_> = acting.collect();
+        match &mut self.method {
+            SolverMethod::Static(solver, forces) => {
+                solver.push(&acting);
+                forces.push(&acting);
+            }
+            SolverMethod::Implicit(solver, forces) => {
+                solver.push(&acting);
+                forces.push(&acting);
+            }
+            SolverMethod::Explicit(solver) => solver.push(&acting),
+        }
+        self.evaluated = false;
     }
 
     fn drive(&mut self, rigid: usize, leg: Leg) {
@@ -753,7 +792,7 @@ impl Participant for Implicit {
             self.time = self.state.time;
             // Contacts without friction: that of the part of the step that was found is not known.
             self.touching = None;
-            self.evaluated = false;
+            (self.evaluated, self.entered) = (false, false);
         }
         is_static
     }

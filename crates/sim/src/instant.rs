@@ -59,6 +59,12 @@ pub trait Instant {
         Vec::new()
     }
 
+    /// Moment [N m] about the origin of the force of each contact on the rigid thing that it is with, in the order of the contacts; `None` where it
+    /// is not found: on a GPU.
+    fn contact_moments(&self) -> Option<Vec<[f64; 3]>> {
+        None
+    }
+
     /// The nodes that may touch something, increasing, with what contacts do to them.
     fn contact_nodes(&self) -> Vec<NodeContact> {
         Vec::new()

@@ -43,6 +43,18 @@ impl Kept {
         kept.fits(part).then_some(kept)
     }
 
+    /// As bytes of a checkpoint.
+    ///
+    /// # Errors
+    /// If it can't be encoded.
+    pub fn encode(&self) -> postcard::Result<Vec<u8>> {
+        match self {
+            Self::Single(state, memory) => postcard::to_stdvec(&(state, memory)),
+            Self::Double(state, memory) => postcard::to_stdvec(&(state, memory)),
+            Self::Implicit(state) => postcard::to_stdvec(state),
+        }
+    }
+
     /// Whether it has the sizes of a participant's model, and is of its method.
     pub fn fits(&self, part: &Part) -> bool {
         match self {
@@ -67,6 +79,8 @@ pub(crate) struct ImplicitState {
     pub effort: Effort,
     pub convergence: VecDeque<Iterated>,
     pub contact: Option<ContactState>,
+    /// Whether forces were found at the instant, so that their work is entered.
+    pub entered: bool,
 }
 
 /// What a resumed run needs to know of contacts.
@@ -75,6 +89,8 @@ pub(crate) struct ContactState {
     /// Forces on nodes, six a node [N], and on the second side of each contact [N].
     pub forces: Vec<f64>,
     pub totals: Vec<[f64; 3]>,
+    /// Their moments about the origin [N m].
+    pub moments: Vec<[f64; 3]>,
     /// Of the barriers [J].
     pub energy: f64,
     /// Nodes that touch something, increasing.

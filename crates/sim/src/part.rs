@@ -118,6 +118,15 @@ impl Method {
         }
     }
 
+    /// Whether its stepper takes forces on nodes from outside; that on a GPU takes none.
+    pub(crate) fn takes_forces(&self) -> bool {
+        #[cfg(feature = "gpu")]
+        if let Self::Explicit(Explicit { device, .. }) = self {
+            return device.is_none();
+        }
+        true
+    }
+
     /// The number type.
     pub fn precision(&self) -> Precision {
         match self {

@@ -64,6 +64,11 @@ pub(crate) struct TieMemory {
 }
 
 impl TieMemory {
+    /// Whether it is of no ties.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
     /// Whether it is of these ties, or of none.
     pub(crate) fn fits(&self, ties: &[PenaltyTie]) -> bool {
         let points: usize = ties.iter().map(|tie| tie.points[0].len()).sum();

@@ -6,6 +6,7 @@ use pliant_contact::pose::Leg;
 use pliant_explicit::{Clock, Wanted};
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::model::Enclosed;
+use pliant_mechanics::tensor::Vector;
 use pliant_mechanics::{Energies, Model, fingerprint};
 use serde::{Deserialize, Serialize};
 
@@ -83,6 +84,11 @@ struct Between {
 }
 
 impl Between {
+    /// Whether participants have neither ties nor contacts.
+    fn is_empty(&self) -> bool {
+        self.ties.is_empty() && self.guests.is_empty()
+    }
+
     fn fits(&self, world: &World) -> bool {
         self.ties.fits(&world.ties) && self.guests.fits(&world.guests)
     }
@@ -98,6 +104,17 @@ struct OwnState {
 }
 
 impl State {
+    /// The state of each participant as bytes, as [`Simulation::encode`] has it.
+    ///
+    /// # Errors
+    /// If a state can't be encoded.
+    pub fn encode(&self) -> postcard::Result<Vec<Vec<u8>>> {
+        let Self(parts, between) = self;
+        let alone = between.is_empty();
+        let between = (!alone).then(|| postcard::to_stdvec(between));
+        parts.iter().map(|own| own.kept.encode()).chain(between).collect()
+    }
+
     /// The state whose participants were [encoded](Simulation::encode); `None` where these bytes are none of this world.
     pub fn decode<B: AsRef<[u8]>>(world: &World, bytes: &[B]) -> Option<Self> {
         let (participants, between) = bytes.split_at_checked(world.parts.len())?;
@@ -503,24 +520,27 @@ impl Simulation {
         of.map(|(participant, ratio)| participant.stride() / ratio).min().unwrap_or(1).max(1)
     }
 
-    /// The state. It can be taken until the forces of the instant are found, which belong to the step to come.
+    /// The state, at any instant. What goes on from it finds the forces of its instant again, with the same bits where they were found.
+    /// Hands and forces of [`push`](Self::push) are not part of it; a tool that was driven after the forces were found begins its way in that step.
     ///
     /// # Errors
-    /// If the forces of the instant are found, or a device fails.
+    /// If a device fails.
     pub fn state(&mut self) -> Result<State, Failure> {
-        if self.evaluated {
-            return Err(Failure::input(
-                &"the forces of this instant are found and belong to the step to come: take the state before its frame, or after a step",
-            ));
-        }
         self.bring_back()?;
-        let parts = self.world.parts.iter().zip(&self.participants);
-        let own =
-            parts.map(|(part, now)| OwnState { clock: now.clock(), kept: now.kept(), step: part.steps.step });
+        let parts = self.world.parts.iter().zip(&self.participants).enumerate();
+        let own = parts.map(|(index, (part, now))| {
+            let kept = self.met().map_or_else(|| now.kept(), |met| met[index].clone());
+            OwnState { clock: now.clock(), kept, step: part.steps.step }
+        });
         Ok(State(own.collect(), self.between()))
     }
 
-    /// Goes back, or on, to a state of this world.
+    /// The states at the instant before its forces were found, where participants touch each other and forces are found.
+    fn met(&self) -> Option<&[Kept]> {
+        (self.evaluated && !self.meetings.is_empty()).then_some(&self.before[..])
+    }
+
+    /// Goes back, or on, to a state of this world. Hands let go.
     ///
     /// # Errors
     /// If it is of another world, or a device fails. The simulation then stays as it was.
@@ -556,13 +576,16 @@ impl Simulation {
         }
     }
 
-    /// The state of each participant as bytes of a checkpoint, after a step; with ties or contacts between participants, theirs after them.
+    /// The state of each participant as bytes of a checkpoint; with ties or contacts between participants, theirs after them.
     ///
     /// # Errors
     /// If a device fails, or a state can't be encoded.
     pub fn encode(&mut self) -> Result<Vec<Vec<u8>>, Failure> {
         self.bring_back()?;
-        let own = self.participants.iter().map(|participant| participant.encode());
+        let own = self.participants.iter().enumerate().map(|(index, now)| match self.met() {
+            Some(met) => met[index].encode(),
+            None => now.encode(),
+        });
         let alone = self.springs.is_empty() && self.meetings.is_empty();
         let between = (!alone).then(|| postcard::to_stdvec(&self.between()));
         let failed = |error: postcard::Error| Failure::new("output", error.to_string(), Some(self.time()));
@@ -642,6 +665,35 @@ impl Simulation {
             all &= self.take_hold(part);
         }
         all
+    }
+
+    /// Pushes nodes with forces [N], one a node, counted over the models of all participants: they and no others act from the next evaluation on,
+    /// until they are replaced. An empty slice ends them. Their work is external.
+    ///
+    /// # Errors
+    /// If there are not as many forces as nodes, a force is not finite, or a stepper takes none: that of a GPU. No force is then replaced.
+    pub fn push(&mut self, forces: &[Vector<f64>]) -> Result<(), Failure> {
+        let nodes: usize = self.world.parts.iter().map(|part| part.model.node_count()).sum();
+        if !forces.is_empty() && forces.len() != nodes {
+            let given = forces.len();
+            return Err(Failure::input(&format_args!(
+                "{given} forces were given for {nodes} nodes: give one a node of all bodies, or none"
+            )));
+        }
+        if let Some(node) = forces.iter().position(|force| !force.iter().all(|f| f.is_finite())) {
+            return Err(Failure::input(&format_args!("the force on node {node} is not finite")));
+        }
+        if !forces.is_empty() && !self.world.parts.iter().all(|part| part.method.takes_forces()) {
+            let remedy =
+                "forces on nodes act on the CPU only: choose `device = \"cpu\"`, or hold nodes by grips";
+            return Err(Failure::new("device", remedy.to_owned(), Some(self.time())));
+        }
+        for (part, &first) in self.first_nodes.iter().enumerate() {
+            let first = (first as usize).min(forces.len());
+            let own = &forces[first..(first + self.world.parts[part].model.node_count()).min(forces.len())];
+            self.participants[part].push(own);
+        }
+        Ok(())
     }
 
     /// The stiffness [N/m] up to which a grip leaves steps stable; infinite where steps are stable with any.
@@ -726,7 +778,7 @@ pub trait Observer {
     /// Whatever shall end the run.
     fn see(&mut self, simulation: &Simulation, last: bool) -> Result<(), Failure>;
 
-    /// Follows a step. Forces are not found yet, so the state can be taken.
+    /// Follows a step. Forces are not found yet.
     ///
     /// # Errors
     /// Whatever shall end the run.

@@ -183,6 +183,10 @@ impl<R: Numeric> Instant for Solids<R> {
         self.solver.observable().contact_forces()
     }
 
+    fn contact_moments(&self) -> Option<Vec<[f64; 3]>> {
+        self.solver.observable().contact_moments()
+    }
+
     fn contact_nodes(&self) -> Vec<NodeContact> {
         self.solver.observable().contact_nodes(&self.state)
     }
@@ -270,6 +274,10 @@ impl<R: Numeric> Participant for Solids<R> {
 
     fn hold(&mut self, grips: &[Grip]) -> bool {
         self.solver.hold(grips)
+    }
+
+    fn push(&mut self, forces: &[Vector<f64>]) {
+        self.solver.push(forces);
     }
 
     fn drive(&mut self, rigid: usize, leg: Leg) {

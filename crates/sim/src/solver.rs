@@ -93,6 +93,9 @@ pub(crate) trait Solver<R>: Send {
         grips.is_empty()
     }
 
+    /// Takes forces [N], one a node, or none: they and no others act from the next evaluation on. Only where the method takes some.
+    fn push(&mut self, _forces: &[Vector<f64>]) {}
+
     /// Says where guests of contacts go between two times [s], from one place [m] to another.
     fn lead_guests(&mut self, _times: [f64; 2], _ways: &[[Vector<f64>; 2]]) {}
 
@@ -195,6 +198,10 @@ impl<R: Scalar> Solver<R> for CentralDifference<R> {
         true
     }
 
+    fn push(&mut self, forces: &[Vector<f64>]) {
+        CentralDifference::push(self, forces);
+    }
+
     fn lead_guests(&mut self, times: [f64; 2], ways: &[[Vector<f64>; 2]]) {
         CentralDifference::lead_guests(self, times, ways);
     }
@@ -249,6 +256,10 @@ impl<R: Scalar> Solver<R> for LoadSteps<R> {
             .solve_watched(state, self.steps.end_of(number), &mut told)
             .map(|_| ())
             .map_err(|error| Failure::load_step(&error, number, of))
+    }
+
+    fn push(&mut self, forces: &[Vector<f64>]) {
+        self.relaxation.push(forces);
     }
 
     fn balance_floor(&self) -> f64 {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use pliant_contact::pose::{Leg, Pose};
 use pliant_contact::touch::{Rigid, With};
-use pliant_mechanics::tensor::add;
+use pliant_mechanics::tensor::{add, cross, sub};
 
 use crate::failure::Failure;
 use crate::simulation::{Frame, Simulation};
@@ -18,6 +18,8 @@ pub struct ToolNow {
     pub opening: f64,
     /// The force [N] of all that touches it.
     pub force: [f64; 3],
+    /// The moment [N m] of that about its frame; `None` on a GPU.
+    pub torque: Option<[f64; 3]>,
 }
 
 /// Tools.
@@ -60,6 +62,7 @@ pub struct ToolNow {
 /// simulation.run(arrival, |_| ())?;
 /// let ball = simulation.frame()?.tool("ball").unwrap();
 /// assert!((ball.pose.translation.z - 0.11).abs() < 1e-12 && ball.force[2] > 0.0);
+/// assert!(ball.torque.unwrap().iter().all(|m| m.abs() < 1e-3 * 0.02 * ball.force[2]), "without friction nothing turns a ball");
 /// # Ok::<(), pliant_sim::Failure>(())
 /// ```
 impl Simulation {
@@ -142,10 +145,15 @@ impl Simulation {
             let own = |number: usize| all.rigids[number].tool() == name;
             let Some(number) = (0..all.rigids.len()).find(|&number| own(number)) else { continue };
             let (pose, opening) = now.posture(number, &all.rigids[number]);
-            let sum = found.get_or_insert(ToolNow { pose, opening, force: [0.0; 3] });
-            for (contact, force) in all.contacts.iter().zip(now.contact_forces()) {
+            let sum = found.get_or_insert(ToolNow { pose, opening, force: [0.0; 3], torque: Some([0.0; 3]) });
+            let moments = now.contact_moments();
+            let frame = pose.translation.vector.into();
+            for (index, (contact, force)) in all.contacts.iter().zip(now.contact_forces()).enumerate() {
                 if matches!(contact.with, With::Rigid(rigid) if own(rigid)) {
                     sum.force = add(sum.force, force);
+                    let moment = moments.as_ref().and_then(|all| all.get(index));
+                    let about = |moment: &[f64; 3]| sub(*moment, cross(frame, force));
+                    sum.torque = sum.torque.zip(moment).map(|(sum, moment)| add(sum, about(moment)));
                 }
             }
         }

@@ -4,12 +4,13 @@ use nalgebra::Vector3;
 use pliant_explicit::Wanted;
 use pliant_implicit::element::Elasticity;
 use pliant_implicit::{Shell, Wall};
-use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_mechanics::model::{Cells, Material, Motion, Solid};
+use pliant_mechanics::prony::{self, Prony, PronyTerm, PronyUpdate};
+use pliant_mechanics::{Energies, Model};
 use pliant_sim::{Method, Part, Precision, Simulation, State, World};
 
 /// Duration of a run [s].
@@ -58,7 +59,19 @@ fn parts(shear: f64) -> Vec<Part> {
     let shells = Part { method: Method::ExplicitShells(bodies.clone()), ..implicit.clone() };
     let stable = pliant_implicit::Explicit::stable_step(&bodies.model);
     let shells = Part { steps: pliant_sim::Steps::within(DURATION, 0.9 * stable), ..shells };
-    vec![explicit, single, quasi_static, equilibria, implicit, shells]
+    vec![explicit, single, quasi_static, equilibria, implicit, shells, relaxing(shear)]
+}
+
+/// The cube as a material that relaxes, in steps whose limit is monitored.
+fn relaxing(shear: f64) -> Part {
+    let mut model = cube(shear);
+    let terms = [
+        PronyTerm { part: prony::Part::Isochoric, weight: 0.5, time: 0.02 },
+        PronyTerm { part: prony::Part::Volumetric, weight: 0.2, time: 0.05 },
+    ];
+    model.solids[0].material.prony = Prony::new(&terms, PronyUpdate::BackwardEuler).unwrap();
+    model.initial_velocity = vec![[0.01, 0.0, 0.0]; 8];
+    Part::explicit("cube", model, DURATION).unwrap()
 }
 
 fn ended(mut simulation: Simulation) -> u64 {
@@ -96,10 +109,44 @@ fn a_state_goes_on_with_the_same_bits_in_every_method() {
     }
 }
 
+/// Whoever looks before a state is taken, and whoever goes on from that state, changes no bit of what follows; energies and reactions are
+/// found again as they were.
 #[test]
-fn a_state_is_of_its_model_and_between_two_steps() {
+fn a_state_can_be_taken_at_a_look_in_every_method() {
+    for part in parts(1e5) {
+        let whole = ended(Simulation::new(part.clone()).unwrap());
+        let world = World::from(part.clone());
+        let mut simulation = Simulation::new(part.clone()).unwrap();
+        let mut looks = 0;
+        while simulation.time() + 0.5 * simulation.step_length() < DURATION {
+            let seen = |frame: pliant_sim::Frame<'_>| {
+                let reactions: Vec<_> =
+                    part.model.constraints.iter().map(|own| frame.reaction(&own.name)).collect();
+                let stability: Vec<_> = frame.parts().map(|(_, now)| now.stability()).collect();
+                format!("{:?} {reactions:?} {stability:?}", frame.energies())
+            };
+            let first = seen(simulation.frame().unwrap());
+            let (state, bytes) = (simulation.state().unwrap(), simulation.encode().unwrap());
+            match looks % 3 {
+                0 => simulation.restore(state).unwrap(),
+                1 => {
+                    simulation =
+                        Simulation::resumed(world.clone(), State::decode(&world, &bytes).unwrap()).unwrap()
+                }
+                _ => {}
+            }
+            assert_eq!(seen(simulation.frame().unwrap()), first, "{part:?} {looks}");
+            simulation.step(1).unwrap();
+            looks += 1;
+        }
+        assert_eq!(simulation.fingerprint(), whole, "{part:?}");
+    }
+}
+
+#[test]
+fn a_state_is_of_its_model() {
     let parts = parts(1e5);
-    let [explicit, _, quasi_static, equilibria, ..] = &parts[..] else { unreachable!("six parts") };
+    let [explicit, _, quasi_static, equilibria, ..] = &parts[..] else { unreachable!("seven parts") };
     let mut simulation = Simulation::new(explicit.clone()).unwrap();
     let state = simulation.state().unwrap();
     let bytes = simulation.encode().unwrap();
@@ -111,11 +158,6 @@ fn a_state_is_of_its_model_and_between_two_steps() {
     }
     assert!(State::decode(simulation.world(), &[&bytes[0][..bytes[0].len() / 2]]).is_none());
     assert!(State::decode::<Vec<u8>>(simulation.world(), &[]).is_none());
-    simulation.frame().unwrap();
-    let refused = simulation.state().unwrap_err();
-    assert!(refused.message.contains("belong to the step to come"), "{refused}");
-    simulation.step(1).unwrap();
-    simulation.state().unwrap();
     assert!(Simulation::new(World::new(Vec::new())).is_err());
 }
 
@@ -212,4 +254,93 @@ fn solids_refuse_loads_of_shells() {
             assert!(told.contains("`twist` is a load of shells"), "{told}");
         }
     }
+}
+
+/// Forces on nodes [N] of a simulation: one on each of these nodes.
+fn on(simulation: &Simulation, nodes: &[u32], force: [f64; 3]) -> Vec<[f64; 3]> {
+    let count: usize = simulation.world().parts.iter().map(|part| part.model.node_count()).sum();
+    let mut forces = vec![[0.0; 3]; count];
+    nodes.iter().for_each(|&node| forces[node as usize] = force);
+    forces
+}
+
+/// Forces that nodes are pushed with do external work f u, and in the end the base bears them; once they end, nothing of them is left.
+#[test]
+fn a_pushed_cube_comes_to_rest_against_its_base() {
+    const FORCE: [f64; 3] = [0.3, -0.2, 0.5];
+    // Damped about critically in its slowest mode (84 rad/s), it is at rest by then.
+    const REST: f64 = 3.0 * DURATION;
+    for (precision, close) in [(Precision::Double, 1e-6), (Precision::Single, 1e-3)] {
+        let mut model = cube(1e5);
+        model.constraints.truncate(1);
+        model.bodies[0].damping = 150.0;
+        let mut part = Part::explicit("cube", model, 2.0 * REST).unwrap();
+        let Method::Explicit(settings) = &mut part.method else { unreachable!("an explicit part") };
+        settings.precision = precision;
+        let mut simulation = Simulation::new(part).unwrap();
+        assert!(simulation.push(&[FORCE]).unwrap_err().message.contains("1 forces were given for 8 nodes"));
+        let nan = on(&simulation, &[5], [0.0, f64::NAN, 0.0]);
+        assert!(simulation.push(&nan).unwrap_err().message.contains("node 5 is not finite"));
+        let forces = on(&simulation, &[4, 5, 6, 7], FORCE);
+        simulation.push(&forces).unwrap();
+        simulation.run(REST, |_| ()).unwrap();
+        let frame = simulation.frame().unwrap();
+        let (base, energies) = (frame.reaction("base").unwrap(), frame.energies());
+        let moved = frame.displacements("cube").unwrap();
+        let work: f64 =
+            moved.iter().zip(&forces).map(|(u, f)| u.iter().zip(f).map(|(u, f)| u * f).sum::<f64>()).sum();
+        for c in 0..3 {
+            assert!((base[c] + 4.0 * FORCE[c]).abs() < close * 4.0, "{base:?} N");
+        }
+        assert!(energies.balance < 0.01 && energies.damping > 0.3 * work, "{energies:?}");
+        assert!((energies.external - work).abs() < close * work, "{} J of {work} J", energies.external);
+        simulation.push(&[]).unwrap();
+        simulation.run(2.0 * REST, |_| ()).unwrap();
+        let left = simulation.frame().unwrap().displacements("cube").unwrap();
+        assert!(left.iter().flatten().all(|u| u.abs() < close * 1e-4), "{left:?}");
+    }
+}
+
+/// Whatever solves for equilibrium or for steps so long that all comes to rest: the clamp bears what nodes are pushed with.
+#[test]
+fn pushed_nodes_are_borne_in_equilibrium() {
+    const FORCE: [f64; 3] = [1e-3, -5e-4, 1e-3];
+    let strips =
+        [Part::equilibria("strip", strip(), DURATION, 4), Part::implicit("strip", strip(), 400.0, 1.0)];
+    let cube = Part::quasi_static("cube", cube(1e5), DURATION, 4);
+    let cases = strips.map(|part| (part, [2, 3], "clamp")).into_iter().chain([(cube, [6, 7], "base")]);
+    for (part, nodes, base) in cases {
+        let borne = |pushed: bool| {
+            let mut simulation = Simulation::new(part.clone()).unwrap();
+            if pushed {
+                let forces = on(&simulation, &nodes, FORCE);
+                simulation.push(&forces).unwrap();
+            }
+            simulation.run(part.steps.step * part.steps.number as f64, |_| ()).unwrap();
+            let frame = simulation.frame().unwrap();
+            let others = frame.reaction("top").unwrap_or_default();
+            let base = frame.reaction(base).unwrap();
+            [0, 1, 2].map(|c| base[c] + others[c])
+        };
+        let [with, without] = [true, false].map(borne);
+        for c in 0..3 {
+            // Equilibria are found to 1e-6 of the largest force.
+            assert!(
+                (with[c] - without[c] + 2.0 * FORCE[c]).abs() < 2e-5,
+                "{part:?}: {with:?} N, {without:?} N"
+            );
+        }
+    }
+}
+
+/// Nothing takes the work of forces on explicit shells but motion and strain.
+#[test]
+fn forces_on_explicit_shells_do_work() {
+    let part = parts(1e5).into_iter().find(|part| matches!(part.method, Method::ExplicitShells(_))).unwrap();
+    let mut simulation = Simulation::new(part).unwrap();
+    let forces = on(&simulation, &[2, 3], [1e-3, 0.0, 5e-3]);
+    simulation.push(&forces).unwrap();
+    simulation.run(DURATION, |_| ()).unwrap();
+    let Energies { external, kinetic, internal, .. } = simulation.frame().unwrap().energies();
+    assert!(external > 1e-5 && (external - kinetic - internal).abs() < 0.01 * external);
 }

@@ -170,6 +170,9 @@ impl<'r> Replay<'r> {
                     }
                     Done::Numbers(numbers) if self.steps == 0 => return Ok(Ended::Change(None, numbers)),
                     Done::Numbers(numbers) => {
+                        if then.evaluated {
+                            live.mesh().map_err(|failure| failure.message)?;
+                        }
                         let snapshot = live.simulation.state().map_err(|failure| failure.message)?;
                         return Ok(Ended::Change(Some(Box::new(snapshot)), numbers));
                     }

@@ -306,8 +306,8 @@ fn play(
     let mut from = None;
     let mut subject = None;
     loop {
-        let (left, snapshot);
-        (left, snapshot, subject, playback) = {
+        let (left, snapshot, evaluated);
+        (left, snapshot, evaluated, subject, playback) = {
             let mut player = match Player::enter(&world, from, subject, playback) {
                 Ok(player) => player,
                 Err(message) => {
@@ -326,8 +326,9 @@ fn play(
             } else {
                 None
             };
+            let evaluated = player.live.simulation.is_evaluated();
             let (subject, playback) = player.end();
-            (left, snapshot, subject, playback)
+            (left, snapshot, evaluated, subject, playback)
         };
         if matches!(left, Left::Quit) {
             let recording = playback.recording.unwrap_or_default();
@@ -338,7 +339,7 @@ fn play(
         }
         from = playback.change.take().map(|(mut next, numbers)| {
             next.share(world.device());
-            playback.record(false, Instant::now(), Done::Numbers(numbers.clone()));
+            playback.record(evaluated, Instant::now(), Done::Numbers(numbers.clone()));
             playback.numbers = numbers;
             (std::mem::replace(&mut world, *next), snapshot)
         });
@@ -484,7 +485,7 @@ impl<'s> Player<'s> {
     ) -> Left {
         let mut changed = false;
         loop {
-            if self.is_due_to_change() {
+            if self.playback.change.is_some() {
                 return Left::Change;
             }
             // Orders come first, before each step; while it stands still nothing but orders happens.
@@ -506,7 +507,7 @@ impl<'s> Player<'s> {
                     next = if self.playback.owed > 0 { None } else { inbox.try_recv().ok() };
                 }
             }
-            if self.is_due_to_change() {
+            if self.playback.change.is_some() {
                 return Left::Change;
             }
             if self.playback.owed > 0
@@ -514,10 +515,6 @@ impl<'s> Player<'s> {
             {
                 self.step();
                 changed = true;
-                // Looked at, the run would not stand between two steps any more.
-                if self.is_due_to_change() {
-                    return Left::Change;
-                }
             }
             let still = !self.playback.is_going() && self.playback.owed == 0;
             if changed && (still || self.playback.shown.elapsed() >= self.playback.interval()) {
@@ -526,13 +523,6 @@ impl<'s> Player<'s> {
                 changed = false;
             }
         }
-    }
-
-    /// Whether another world waits, and the run stands between two steps.
-    fn is_due_to_change(&self) -> bool {
-        let playback = &self.playback;
-        playback.change.is_some()
-            && (playback.steps == 0 || playback.failure.is_some() || !self.live.simulation.is_evaluated())
     }
 
     /// How long it may wait for orders: until the simulation is due to go on, or the frame of what has changed is.

@@ -437,6 +437,24 @@ impl Barriers {
         self.held.iter().for_each(|held| add(&held.stencil, &|at| held.force_on(at)));
     }
 
+    /// Sets the moments [N m] about the origin of the forces of each contact on its second side at the state last evaluated, whose nodes are at these
+    /// places [m]. Forces act where the nodes of the first side are.
+    pub fn find_moments(&self, places: &[Vector3<f64>], moments: &mut [Vector3<f64>]) {
+        moments.fill(Vector3::zeros());
+        let mut add = |stencil: &Stencil, force_on: &dyn Fn(usize) -> Vector3<f64>| {
+            let moment = &mut moments[stencil.contact as usize];
+            for (at, (node, _)) in stencil.parts().enumerate() {
+                if let Some(place) =
+                    places.get(node as usize).filter(|_| stencil.count == 1 || !stencil.is_second(at))
+                {
+                    *moment -= place.cross(&force_on(at));
+                }
+            }
+        };
+        self.rows.iter().for_each(|row| add(&row.stencil, &|at| row.force_on(at)));
+        self.held.iter().for_each(|held| add(&held.stencil, &|at| held.force_on(at)));
+    }
+
     /// Calls back with the stiffness [N/m] of each row, never negative: its stencil, three rows and columns a node, and the ways [m] that the
     /// rigid things among its nodes have yet to go in the step from a share on; of one node at a wall the way from the wall. That of barriers
     /// is κ A b″ ∇d ∇dᵀ and the positive part of κ A b′ ∂²d/∂x²; that of friction is exact.

@@ -411,7 +411,7 @@ fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
 }
 
 /// Displacements [m] of the points of a surface that a shell carries; `None` for other surfaces.
-pub(super) fn carried_on_shell(frame: &Frame<'_>, surface: usize) -> Option<Vec<Vector3>> {
+pub(crate) fn carried_on_shell(frame: &Frame<'_>, surface: usize) -> Option<Vec<Vector3>> {
     let part = frame.built().implicit.as_ref()?;
     let (points, curved) = (part.model.carried.get(&surface)?, part.surface.as_ref()?);
     let mut positions = vec![Vector3::zeros(); points.len()];

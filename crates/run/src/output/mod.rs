@@ -31,7 +31,7 @@ pub use summary::{BodySummary, ParticipantSummary, Summary, failed_input, failed
 
 pub use csv::Column;
 pub(crate) use csv::{AXES, ENERGIES, Samples};
-pub(crate) use field_mesh::FieldMesh;
+pub(crate) use field_mesh::{FieldMesh, carried_on_shell};
 pub(crate) use plot::{MOST_CURVES, Reactions, constraints, plot, plot_of_sweep};
 pub(crate) use summary::{bodies, interrupted, markdown, output_failure, summarise, told_limit};
 

@@ -14,6 +14,7 @@ mod force_limit;
 mod grasper;
 mod grips;
 mod guests;
+mod looks;
 mod niftysim;
 mod niftysim_contact;
 mod obstacles;

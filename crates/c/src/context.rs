@@ -1,0 +1,348 @@
+//! The context: a table of what a program has open. A handle is a place in the table and how often the place was used, so that a closed handle is known
+//! as one, however often its place was used again.
+
+use std::any::Any;
+use std::ffi::CStr;
+use std::ffi::c_char;
+use std::mem::MaybeUninit;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::slice;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+
+use crate::scene::OpenScene;
+use crate::simulation::Shared;
+use crate::snapshot::OpenSnapshot;
+use crate::status::{Fault, PliantError, PliantStatus, told};
+
+/// All that a program has open. Opened by `pliant_context_open`.
+pub struct PliantContext {
+    slots: Mutex<Vec<Slot>>,
+}
+
+/// A place of the table.
+struct Slot {
+    /// How often it was used.
+    uses: u32,
+    item: Option<Item>,
+}
+
+/// What a handle means.
+#[derive(Clone)]
+pub(crate) enum Item {
+    Scene(Arc<Mutex<OpenScene>>),
+    Simulation(Arc<Shared>),
+    Snapshot(Arc<OpenSnapshot>),
+}
+
+impl Item {
+    fn kind(&self) -> &'static str {
+        match self {
+            Self::Scene(_) => "scene",
+            Self::Simulation(_) => "simulation",
+            Self::Snapshot(_) => "snapshot",
+        }
+    }
+}
+
+impl PliantContext {
+    pub(crate) fn new() -> Self {
+        Self { slots: Mutex::new(Vec::new()) }
+    }
+
+    fn slots(&self) -> MutexGuard<'_, Vec<Slot>> {
+        // Nothing panics while it is held.
+        self.slots.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Gives a thing a handle.
+    pub(crate) fn open(&self, item: Item) -> u64 {
+        let mut slots = self.slots();
+        let free = slots.iter().position(|slot| slot.item.is_none() && slot.uses < u32::MAX);
+        let at = free.unwrap_or_else(|| {
+            slots.push(Slot { uses: 0, item: None });
+            slots.len() - 1
+        });
+        let slot = &mut slots[at];
+        slot.uses += 1;
+        slot.item = Some(item);
+        u64::from(slot.uses) << 32 | at as u64
+    }
+
+    fn item(&self, handle: u64) -> Result<Item, Fault> {
+        let mut slots = self.slots();
+        let slot = found(&mut slots, handle)?;
+        slot.item.clone().ok_or_else(closed)
+    }
+
+    /// Takes a handle out of the table. Steps under way end.
+    pub(crate) fn close(&self, handle: u64) -> Result<(), Fault> {
+        let mut slots = self.slots();
+        let item = found(&mut slots, handle)?.item.take().ok_or_else(closed)?;
+        // What was open is dropped without the table.
+        drop(slots);
+        if let Item::Simulation(shared) = &item {
+            shared.stop();
+        }
+        Ok(())
+    }
+
+    pub(crate) fn scene(&self, handle: u64) -> Result<Arc<Mutex<OpenScene>>, Fault> {
+        match self.item(handle)? {
+            Item::Scene(scene) => Ok(scene),
+            other => Err(wrong("scene", &other)),
+        }
+    }
+
+    pub(crate) fn simulation(&self, handle: u64) -> Result<Arc<Shared>, Fault> {
+        match self.item(handle)? {
+            Item::Simulation(simulation) => Ok(simulation),
+            other => Err(wrong("simulation", &other)),
+        }
+    }
+
+    pub(crate) fn snapshot(&self, handle: u64) -> Result<Arc<OpenSnapshot>, Fault> {
+        match self.item(handle)? {
+            Item::Snapshot(snapshot) => Ok(snapshot),
+            other => Err(wrong("snapshot", &other)),
+        }
+    }
+}
+
+fn closed() -> Fault {
+    Fault::new(PliantStatus::Closed, "the handle is closed")
+}
+
+/// The place of a handle that was not used again since.
+fn found(slots: &mut [Slot], handle: u64) -> Result<&mut Slot, Fault> {
+    let (at, uses) = (handle as u32 as usize, (handle >> 32) as u32);
+    match slots.get_mut(at) {
+        Some(slot) if slot.uses == uses => Ok(slot),
+        Some(slot) if (1..slot.uses).contains(&uses) => Err(closed()),
+        _ => Err(Fault::new(PliantStatus::BadHandle, format!("{handle:#x} is no handle of this context"))),
+    }
+}
+
+fn wrong(wanted: &str, given: &Item) -> Fault {
+    Fault::new(PliantStatus::BadHandle, format!("the handle is of a {}, not of a {wanted}", given.kind()))
+}
+
+/// Holds what only one thread may use at a time; the second one is told at once.
+pub(crate) fn hold<T>(mutex: &Mutex<T>) -> Result<MutexGuard<'_, T>, Fault> {
+    mutex.try_lock().map_err(|error| match error {
+        TryLockError::WouldBlock => {
+            Fault::new(PliantStatus::Busy, "another thread has a call on this handle under way")
+        }
+        TryLockError::Poisoned(_) => {
+            Fault::new(PliantStatus::Internal, "an earlier call on this handle panicked")
+        }
+    })
+}
+
+/// The border: what a call does, with its errors and panics told to the caller. A panic closes the handle that it was about.
+///
+/// # Safety
+/// `context` and `error` are null or point to what they say.
+pub(crate) unsafe fn call(
+    context: *const PliantContext,
+    handle: u64,
+    error: *mut PliantError,
+    what: impl FnOnce(&PliantContext) -> Result<(), Fault>,
+) -> PliantStatus {
+    // SAFETY: as the caller promises.
+    let (context, error) = unsafe { (context.as_ref(), error.cast::<MaybeUninit<PliantError>>().as_mut()) };
+    let Some(context) = context else {
+        return told(Err(Fault::new(PliantStatus::Null, "the context is null")), error);
+    };
+    let result = catch_unwind(AssertUnwindSafe(|| what(context))).unwrap_or_else(|panic| {
+        let _ = context.close(handle);
+        Err(Fault::new(
+            PliantStatus::Internal,
+            format!("Pliant panicked: {}; the handle is closed", words(&*panic)),
+        ))
+    });
+    told(result, error)
+}
+
+/// What a panic says.
+pub(crate) fn words(panic: &(dyn Any + Send)) -> &str {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message")
+}
+
+fn null(what: &str) -> Fault {
+    Fault::new(PliantStatus::Null, format!("`{what}` is null"))
+}
+
+/// A text of the caller.
+///
+/// # Safety
+/// It is null or ends with a zero, and lives as long as the text is used.
+pub(crate) unsafe fn text<'a>(text: *const c_char, what: &str) -> Result<&'a str, Fault> {
+    // SAFETY: as the caller promises.
+    unsafe { some_text(text, what)? }.ok_or_else(|| null(what))
+}
+
+/// A text of the caller; `None` if it is null.
+///
+/// # Safety
+/// As [`text`].
+pub(crate) unsafe fn some_text<'a>(text: *const c_char, what: &str) -> Result<Option<&'a str>, Fault> {
+    if text.is_null() {
+        return Ok(None);
+    }
+    // SAFETY: it is not null, and the caller promises the zero at its end.
+    let text = unsafe { CStr::from_ptr(text) }.to_str();
+    text.map(Some).map_err(|_| Fault::new(PliantStatus::NotText, format!("`{what}` is not UTF-8")))
+}
+
+/// An array of the caller.
+///
+/// # Safety
+/// It is null or has so many items, and lives as long as the array is used.
+pub(crate) unsafe fn array<'a, T>(items: *const T, count: usize, what: &str) -> Result<&'a [T], Fault> {
+    if count == 0 {
+        return Ok(&[]);
+    }
+    if items.is_null() {
+        return Err(null(what));
+    }
+    if count > isize::MAX as usize / size_of::<T>().max(1) || !items.is_aligned() {
+        return Err(Fault::new(
+            PliantStatus::ShortBuffer,
+            format!("`{what}` is not aligned, or {count} items are too many"),
+        ));
+    }
+    // SAFETY: it is not null and aligned, not too long, and the caller promises the items.
+    Ok(unsafe { slice::from_raw_parts(items, count) })
+}
+
+/// Three finite numbers of the caller.
+///
+/// # Safety
+/// As [`array`], with three items.
+pub(crate) unsafe fn numbers<const N: usize>(items: *const f64, what: &str) -> Result<[f64; N], Fault> {
+    // SAFETY: as the caller promises.
+    let items = unsafe { array(items, N, what)? };
+    let mut own = [0.0; N];
+    own.copy_from_slice(items);
+    finite(&own, what)?;
+    Ok(own)
+}
+
+/// Says which of some numbers is not finite.
+pub(crate) fn finite(numbers: &[f64], what: &str) -> Result<(), Fault> {
+    match numbers.iter().position(|number| !number.is_finite()) {
+        None => Ok(()),
+        Some(at) => Err(Fault::new(PliantStatus::NotANumber, format!("`{what}` is {} at {at}", numbers[at]))),
+    }
+}
+
+/// Gives the caller a value.
+///
+/// # Safety
+/// `to` is null or may be written.
+pub(crate) unsafe fn give<T>(to: *mut T, what: &str, value: T) -> Result<(), Fault> {
+    if to.is_null() {
+        return Err(null(what));
+    }
+    // SAFETY: it is not null, and the caller promises the rest.
+    unsafe { to.write_unaligned(value) };
+    Ok(())
+}
+
+/// Refuses a pointer that must not be null, before anything is done.
+pub(crate) fn needed<T>(to: *const T, what: &str) -> Result<(), Fault> {
+    if to.is_null() { Err(null(what)) } else { Ok(()) }
+}
+
+/// Gives the caller a text with a zero at its end, and its length without it; a short or null buffer gets the length alone.
+///
+/// # Safety
+/// `to` is null or has so many bytes; `length` is null or may be written.
+pub(crate) unsafe fn give_bytes(
+    bytes: &[u8],
+    to: *mut u8,
+    capacity: usize,
+    length: *mut usize,
+    zero: bool,
+) -> Result<(), Fault> {
+    if !length.is_null() {
+        // SAFETY: it is not null.
+        unsafe { length.write_unaligned(bytes.len()) };
+    }
+    if to.is_null() && capacity == 0 && !length.is_null() {
+        return Ok(());
+    }
+    needed(to, "buffer")?;
+    let room = bytes.len() + usize::from(zero);
+    if capacity < room {
+        return Err(Fault::new(
+            PliantStatus::ShortBuffer,
+            format!("the buffer has {capacity} bytes, {room} are needed"),
+        ));
+    }
+    // SAFETY: there is room for all bytes and the zero, and buffers of the caller are not those of the library.
+    unsafe {
+        to.copy_from_nonoverlapping(bytes.as_ptr(), bytes.len());
+        if zero {
+            to.add(bytes.len()).write(0);
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pliant_scene::source::Source;
+
+    fn scene(context: &PliantContext) -> u64 {
+        let source = Source::parse("scene.toml", "").unwrap();
+        context.open(Item::Scene(Arc::new(Mutex::new(OpenScene::new(source, ".".into())))))
+    }
+
+    #[test]
+    fn a_context_is_shared_between_threads() {
+        fn shared<T: Send + Sync>(_: &T) {}
+        shared(&PliantContext::new());
+    }
+
+    #[test]
+    fn a_handle_that_was_closed_stays_closed_when_its_place_is_used_again() {
+        let context = PliantContext::new();
+        let first = scene(&context);
+        context.close(first).unwrap();
+        let second = scene(&context);
+        assert!(first as u32 == second as u32 && first != second);
+        let status = |handle| context.scene(handle).err().map(|fault| fault.status);
+        assert_eq!(
+            [first, second, second + (1 << 32), 7, 0].map(status),
+            [
+                Some(PliantStatus::Closed),
+                None,
+                Some(PliantStatus::BadHandle),
+                Some(PliantStatus::BadHandle),
+                Some(PliantStatus::BadHandle),
+            ]
+        );
+    }
+
+    #[test]
+    fn a_panic_becomes_a_status_and_closes_the_handle() {
+        let context = PliantContext::new();
+        let handle = scene(&context);
+        let mut error = MaybeUninit::<PliantError>::uninit();
+        // SAFETY: the context and the error are alive.
+        let status = unsafe {
+            call(&raw const context, handle, error.as_mut_ptr(), |context| {
+                let _held = hold(&*context.scene(handle)?)?.world();
+                panic!("a defect")
+            })
+        };
+        assert_eq!(status, PliantStatus::Internal);
+        // SAFETY: a call that fails writes its error.
+        let message = unsafe { error.assume_init() }.message.map(|byte| byte as u8);
+        assert!(message.starts_with(b"Pliant panicked: a defect"));
+        assert_eq!(context.scene(handle).err().unwrap().status, PliantStatus::Closed);
+    }
+}

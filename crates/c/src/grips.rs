@@ -1,0 +1,226 @@
+//! Hands and pins: springs between a part of a body and a place that the program moves.
+
+use pliant_mechanics::grip::Grip;
+use pliant_sim::Simulation;
+
+use crate::context::{PliantContext, array, finite, give, needed, numbers};
+use crate::simulation::{PliantSimulation, Running, running};
+use crate::status::{Fault, PliantError, PliantStatus};
+
+/// What a program holds.
+#[derive(Default)]
+pub(crate) struct Held {
+    /// Grips by their number; none where one was released.
+    grips: Vec<Option<Grip>>,
+}
+
+impl Held {
+    fn all(&self) -> Vec<Grip> {
+        self.grips.iter().flatten().cloned().collect()
+    }
+
+    /// Lets all grips act.
+    pub(crate) fn put_on(&self, simulation: &mut Simulation) -> Result<(), Fault> {
+        match simulation.hold(&self.all()) {
+            true => Ok(()),
+            false => {
+                let message = "nothing can be held here: the solver knows no hands, or a grip has nodes of several participants";
+                Err(Fault::new(PliantStatus::Unsupported, message))
+            }
+        }
+    }
+
+    fn get(&mut self, number: u32) -> Result<&mut Grip, Fault> {
+        let found = self.grips.get_mut(number as usize);
+        match found {
+            Some(Some(grip)) => Ok(grip),
+            Some(None) => Err(Fault::new(PliantStatus::Closed, format!("the grip {number} is released"))),
+            None => Err(Fault::new(PliantStatus::BadHandle, format!("there is no grip {number}"))),
+        }
+    }
+
+    /// Takes one more grip; its number.
+    fn add(&mut self, grip: Grip) -> u32 {
+        let free = self.grips.iter().position(Option::is_none).unwrap_or(self.grips.len());
+        if free == self.grips.len() {
+            self.grips.push(None);
+        }
+        self.grips[free] = Some(grip);
+        free as u32
+    }
+}
+
+impl Running {
+    /// Holds a combination of nodes where it is, as firmly as asked and stable.
+    fn take(&mut self, nodes: Vec<(u32, f64)>, stiffness: f64) -> Result<u32, Fault> {
+        if stiffness.is_nan() || stiffness <= 0.0 {
+            let message = format!("`stiffness` is {stiffness}: it is above 0, or infinite for a pin");
+            return Err(Fault::new(PliantStatus::NotANumber, message));
+        }
+        self.see_places()?;
+        let mut grip = Grip { nodes, ..Grip::default() };
+        grip.stiffness = stiffness.min(self.simulation.stiffest(&grip));
+        if !(grip.stiffness.is_finite() && grip.stiffness > 0.0) {
+            let message = "these nodes can't be held: they are of several participants, or a stiffness is needed that is not infinite";
+            return Err(Fault::new(PliantStatus::Unsupported, message));
+        }
+        [grip.place, _] = self.simulation.pulled(&grip);
+        let number = self.held.add(grip);
+        if let Err(fault) = self.held.put_on(&mut self.simulation) {
+            self.held.grips[number as usize] = None;
+            let _ = self.held.put_on(&mut self.simulation);
+            return Err(fault);
+        }
+        Ok(number)
+    }
+}
+
+/// Takes hold of nodes by a spring of a stiffness [N/m]; infinite is a pin. It acts on their mean by `weights`, which need not sum to 1; null weighs all the same.
+/// The stiffness is at most the one with which steps stay stable; `pliant_grip` tells it. `grip` gets its number. It pulls nothing until it is moved.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_grip_nodes(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    nodes: *const u32,
+    weights: *const f64,
+    count: usize,
+    stiffness: f64,
+    grip: *mut u32,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        running(context, simulation, error, |own| {
+            needed(grip, "grip")?;
+            let nodes = array(nodes, count, "nodes")?;
+            let all = own.nodes();
+            if count == 0 || nodes.iter().any(|&node| node as usize >= all) {
+                let message = format!("a grip holds at least one node, from 0 to {}", all - 1);
+                return Err(Fault::new(PliantStatus::Unknown, message));
+            }
+            let same = vec![1.0; count];
+            let weights = if weights.is_null() { &same[..] } else { array(weights, count, "weights")? };
+            finite(weights, "weights")?;
+            let sum: f64 = weights.iter().sum();
+            if weights.iter().any(|&weight| weight < 0.0) || sum <= 0.0 {
+                let message = "weights are at least 0, and not all of them are";
+                return Err(Fault::new(PliantStatus::NotANumber, message));
+            }
+            let mut held: Vec<(u32, f64)> =
+                nodes.iter().copied().zip(weights.iter().map(|weight| weight / sum)).collect();
+            held.sort_by_key(|(node, _)| *node);
+            held.dedup_by(|(b, more), (a, weight)| {
+                let same = a == b;
+                *weight += if same { *more } else { 0.0 };
+                same
+            });
+            give(grip, "grip", own.take(held, stiffness)?)
+        })
+    }
+}
+
+/// Takes hold of a surface around its vertex that is nearest to a point [m], as a hand does: of what lies within a radius [m] of it at rest and hangs together with it,
+/// less with the distance; else as `pliant_grip_nodes`. With a radius of 0 it holds the vertex alone.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_grip_surface(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    surface: u32,
+    point: *const f64,
+    radius: f64,
+    stiffness: f64,
+    grip: *mut u32,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        running(context, simulation, error, |own| {
+            needed(grip, "grip")?;
+            let point: [f64; 3] = numbers(point, "point")?;
+            finite(&[radius], "radius")?;
+            own.see_places()?;
+            own.surface(surface)?;
+            let skin = &own.surfaces[surface as usize].skin;
+            let (mut nearest, mut least) = (0, f64::INFINITY);
+            skin.positions(&own.world, &own.simulation, |vertex, place| {
+                let apart = (0..3).map(|c| (place[c] - point[c]).powi(2)).sum();
+                if apart < least {
+                    (nearest, least) = (vertex as u32, apart);
+                }
+            });
+            let held = skin.around(&own.simulation, nearest, radius);
+            give(grip, "grip", own.take(held, stiffness)?)
+        })
+    }
+}
+
+/// Moves a grip to a place [m]: what it holds is pulled there from the next step on.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_grip_move(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    grip: u32,
+    place: *const f64,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        running(context, simulation, error, |own| {
+            let place = numbers(place, "place")?;
+            own.held.get(grip)?.place = place;
+            own.held.put_on(&mut own.simulation)
+        })
+    }
+}
+
+/// A grip at an instant.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct PliantGrip {
+    /// The mean of what it holds [m].
+    pub point: [f64; 3],
+    /// Where it pulls to [m].
+    pub place: [f64; 3],
+    /// Its force on the body [N].
+    pub force: [f64; 3],
+    /// Its stiffness [N/m].
+    pub stiffness: f64,
+}
+
+/// Tells how a grip pulls.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_grip(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    grip: u32,
+    now: *mut PliantGrip,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        running(context, simulation, error, |own| {
+            own.see_places()?;
+            let held = own.held.get(grip)?.clone();
+            let [point, force] = own.simulation.pulled(&held);
+            give(now, "now", PliantGrip { point, place: held.place, force, stiffness: held.stiffness })
+        })
+    }
+}
+
+/// Releases a grip.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_grip_release(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    grip: u32,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        running(context, simulation, error, |own| {
+            own.held.get(grip)?;
+            own.held.grips[grip as usize] = None;
+            own.held.put_on(&mut own.simulation)
+        })
+    }
+}

@@ -1,0 +1,383 @@
+//! Simulations under way: made of a scene, stepped, and asked for numbers.
+
+use std::ffi::c_char;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+
+use pliant_scene::World;
+use pliant_sim::Simulation;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::context::{Item, PliantContext, array, call, finite, give, hold, needed};
+use crate::grips::Held;
+use crate::scene::PliantScene;
+use crate::status::{Fault, PliantError, PliantStatus};
+use crate::surface::OpenSurface;
+use crate::values::OpenField;
+
+/// A simulation that is open: a number that `pliant_simulation_open` gives, never 0.
+pub type PliantSimulation = u64;
+
+/// What threads share of a simulation: one of them runs it, any of them stops it.
+pub(crate) struct Shared {
+    running: Mutex<Running>,
+    stopped: AtomicBool,
+}
+
+impl Shared {
+    pub(crate) fn stop(&self) {
+        self.stopped.store(true, Ordering::Relaxed);
+    }
+}
+
+/// A simulation with what the program has asked of it.
+pub(crate) struct Running {
+    pub(crate) world: Arc<World>,
+    pub(crate) simulation: Simulation,
+    /// The threads that it computes on: its numbers do not depend on the state of the caller's.
+    pool: ThreadPool,
+    pub(crate) surfaces: Vec<OpenSurface>,
+    pub(crate) fields: Vec<OpenField>,
+    pub(crate) held: Held,
+    /// Forces [N] on the nodes; empty for none.
+    pub(crate) pushes: Vec<[f64; 3]>,
+}
+
+impl Running {
+    /// Does something on the threads of the simulation.
+    pub(crate) fn compute<T: Send>(&mut self, what: impl FnOnce(&mut Computing<'_>) -> T + Send) -> T {
+        let Self { world, simulation, pool, fields, .. } = self;
+        pool.install(|| what(&mut Computing { world, simulation, fields }))
+    }
+
+    /// Finds forces at the instant, and reads back what lies on a device.
+    pub(crate) fn look(&mut self) -> Result<(), Fault> {
+        if self.simulation.is_evaluated() && self.world.device().is_none() {
+            return Ok(());
+        }
+        self.compute(|now| now.simulation.frame().map(|_| ()))?;
+        Ok(())
+    }
+
+    /// Brings places of nodes to ordinary memory.
+    pub(crate) fn see_places(&mut self) -> Result<(), Fault> {
+        if self.world.device().is_some() { self.look() } else { Ok(()) }
+    }
+
+    /// Puts hands and forces on a simulation that has none yet.
+    pub(crate) fn put_on(&mut self) -> Result<(), Fault> {
+        self.held.put_on(&mut self.simulation)?;
+        self.simulation.push(&self.pushes)?;
+        Ok(())
+    }
+
+    pub(crate) fn nodes(&self) -> usize {
+        self.simulation.world().parts.iter().map(|part| part.model.node_count()).sum()
+    }
+}
+
+/// What is computed with on the threads of a simulation.
+pub(crate) struct Computing<'r> {
+    pub(crate) world: &'r Arc<World>,
+    pub(crate) simulation: &'r mut Simulation,
+    pub(crate) fields: &'r mut Vec<OpenField>,
+}
+
+/// A call about a simulation that no other thread has a call on.
+///
+/// # Safety
+/// As [`call`].
+pub(crate) unsafe fn running(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    error: *mut PliantError,
+    what: impl FnOnce(&mut Running) -> Result<(), Fault>,
+) -> PliantStatus {
+    // SAFETY: as the caller promises.
+    unsafe {
+        call(context, simulation, error, |context| {
+            let shared = context.simulation(simulation)?;
+            let mut running = hold(&shared.running)?;
+            what(&mut running)
+        })
+    }
+}
+
+/// Makes a simulation of a scene as it is now, at its start. It computes on so many threads of its own; 0 takes `threads` of the scene's `[run]`. Results
+/// do not depend on their number. Images are meshed and shapes built here: this can take seconds.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_simulation_open(
+    context: *const PliantContext,
+    scene: PliantScene,
+    threads: u32,
+    simulation: *mut PliantSimulation,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        call(context, scene, error, |context| {
+            needed(simulation, "simulation")?;
+            let scene = context.scene(scene)?;
+            let world = Arc::new(hold(&scene)?.world()?);
+            let threads = if threads == 0 { world.scene.run.threads as usize } else { threads as usize };
+            let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+            let pool = pool.map_err(|error| Fault::new(PliantStatus::Unsupported, error.to_string()))?;
+            let made = pool.install(|| world.simulation())?;
+            let running = Running {
+                world,
+                simulation: made,
+                pool,
+                surfaces: Vec::new(),
+                fields: Vec::new(),
+                held: Held::default(),
+                pushes: Vec::new(),
+            };
+            let shared = Shared { running: Mutex::new(running), stopped: AtomicBool::new(false) };
+            give(simulation, "simulation", context.open(Item::Simulation(Arc::new(shared))))
+        })
+    }
+}
+
+/// Closes a simulation. One that is stepped by another thread is stopped first; its memory goes when that call returns.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_simulation_close(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        call(context, simulation, error, |context| {
+            context.simulation(simulation)?;
+            context.close(simulation)
+        })
+    }
+}
+
+/// Where a simulation is, and its sizes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct PliantNow {
+    /// Time [s].
+    pub time: f64,
+    /// Length [s] of the next step.
+    pub step: f64,
+    /// Steps since the start.
+    pub steps: u64,
+    /// Nodes of all bodies.
+    pub nodes: u64,
+}
+
+/// Tells where a simulation is.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_now(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    now: *mut PliantNow,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        running(context, simulation, error, |own| {
+            let Running { simulation, .. } = &*own;
+            let [time, step] = [simulation.time(), simulation.step_length()];
+            give(now, "now", PliantNow { time, step, steps: simulation.steps(), nodes: own.nodes() as u64 })
+        })
+    }
+}
+
+/// Goes so many steps on. `done`, if it is not null, gets how many were taken, also where one fails or another thread asks to stop. After a failure the
+/// simulation stands at the last good instant; restore a snapshot, or close it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_step(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    count: u64,
+    done: *mut u64,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe { go(context, simulation, done, error, |_, taken| Ok(count - taken)) }
+}
+
+/// Goes on until a time [s], to the instant nearest to it; else as `pliant_step`. A time that has passed takes no step.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_run_until(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    time: f64,
+    done: *mut u64,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        go(context, simulation, done, error, |now, _| {
+            finite(&[time], "time")?;
+            let steps = (time - now.time()) / now.step_length();
+            Ok((steps + 0.5).clamp(0.0, MOST_STEPS) as u64)
+        })
+    }
+}
+
+/// Steps at most between two looks at the stop flag where many are taken at once: on a GPU.
+const MOST_STEPS: f64 = 1e4;
+
+/// Takes steps until none are left.
+///
+/// # Safety
+/// As [`call`]; `done` is null or may be written.
+unsafe fn go(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    done: *mut u64,
+    error: *mut PliantError,
+    left: impl Fn(&Simulation, u64) -> Result<u64, Fault> + Sync,
+) -> PliantStatus {
+    let mut taken = 0;
+    // SAFETY: as the caller promises.
+    let status = unsafe {
+        call(context, simulation, error, |context| {
+            let shared = context.simulation(simulation)?;
+            let mut running = hold(&shared.running)?;
+            let stopped = &shared.stopped;
+            let (now, result) = running.compute(|own| {
+                let mut taken = 0;
+                let mut step = || {
+                    while let more @ 1.. = left(own.simulation, taken)? {
+                        if stopped.swap(false, Ordering::Relaxed) {
+                            return Err(Fault::new(PliantStatus::Stopped, "another thread asked to stop"));
+                        }
+                        if own.simulation.ended().is_some() {
+                            break;
+                        }
+                        taken += own.simulation.step(more)?;
+                    }
+                    Ok(())
+                };
+                let result = step();
+                (taken, result)
+            });
+            taken = now;
+            result
+        })
+    };
+    if !done.is_null() {
+        // SAFETY: it is not null, and the caller promises the rest.
+        unsafe { done.write_unaligned(taken) };
+    }
+    status
+}
+
+/// Asks the thread that steps a simulation to stop after the step under way; without one the next call that steps returns at once. Any thread may ask.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_stop(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        call(context, simulation, error, |context| {
+            context.simulation(simulation)?.stop();
+            Ok(())
+        })
+    }
+}
+
+/// Pushes nodes with forces [N], three numbers a node, in the order of `pliant_body`, until they are replaced; their work is external. `count` is the
+/// number of nodes of all bodies, or 0 to end all.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_push(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    forces: *const f64,
+    count: usize,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        running(context, simulation, error, |own| {
+            let numbers = array(forces, count.saturating_mul(3), "forces")?;
+            finite(numbers, "forces")?;
+            let (forces, nodes) = (numbers.as_chunks().0, own.nodes());
+            if count > 0 && count != nodes {
+                let message = format!("{count} forces are given, {nodes} are needed: one a node");
+                return Err(Fault::new(PliantStatus::ShortBuffer, message));
+            }
+            own.simulation
+                .push(forces)
+                .map_err(|failure| Fault::new(PliantStatus::Unsupported, failure.message))?;
+            own.pushes.clear();
+            own.pushes.extend_from_slice(forces);
+            Ok(())
+        })
+    }
+}
+
+/// What a name is looked for among.
+pub const PLIANT_BODIES: u32 = 0;
+/// Surfaces that bodies carry.
+pub const PLIANT_SURFACES: u32 = 1;
+/// Constraints.
+pub const PLIANT_CONSTRAINTS: u32 = 2;
+/// Contacts.
+pub const PLIANT_CONTACTS: u32 = 3;
+/// Tools and obstacles.
+pub const PLIANT_TOOLS: u32 = 4;
+/// Warnings about the scene, a sentence each.
+pub const PLIANT_WARNINGS: u32 = 5;
+
+/// Gives the name of a thing of a kind (`PLIANT_BODIES`, …) by its number from 0, with a zero at its end; `PLIANT_STATUS_UNKNOWN` after the last. `length`,
+/// if it is not null, gets the bytes without the zero; with a null buffer of 0 bytes nothing else is given.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_name(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    kind: u32,
+    index: usize,
+    buffer: *mut c_char,
+    capacity: usize,
+    length: *mut usize,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        running(context, simulation, error, |own| {
+            let names = names(own, kind)?;
+            let Some(name) = names.get(index) else {
+                let message = format!("there are {} of this kind", names.len());
+                return Err(Fault::new(PliantStatus::Unknown, message));
+            };
+            crate::context::give_bytes(name.as_bytes(), buffer.cast(), capacity, length, true)
+        })
+    }
+}
+
+/// The names of all things of a kind.
+pub(crate) fn names(own: &Running, kind: u32) -> Result<Vec<String>, Fault> {
+    let parts = || own.simulation.world().parts.iter();
+    let models = || parts().map(|part| &part.model);
+    let contacts = || parts().filter_map(|part| part.method.contacts());
+    let names: Vec<&str> = match kind {
+        PLIANT_BODIES => models().flat_map(|model| &model.bodies).map(|own| own.name.as_str()).collect(),
+        PLIANT_SURFACES => models().flat_map(|model| &model.surfaces).map(|own| own.name.as_str()).collect(),
+        PLIANT_CONSTRAINTS => {
+            models().flat_map(|model| &model.constraints).map(|own| own.name.as_str()).collect()
+        }
+        PLIANT_CONTACTS => contacts().flat_map(|all| &all.contacts).map(|own| own.name.as_str()).collect(),
+        PLIANT_TOOLS => contacts().flat_map(|all| &all.rigids).map(|own| own.tool()).collect(),
+        PLIANT_WARNINGS => own.world.warnings().map(|warning| warning.message.as_str()).collect(),
+        other => {
+            let message = format!("there is no kind {other} of names: take PLIANT_BODIES or another one");
+            return Err(Fault::new(PliantStatus::NotANumber, message));
+        }
+    };
+    let mut known = Vec::new();
+    for name in names {
+        // Jaws of a tool, and tools of several participants, have one name.
+        if !known.iter().any(|known| known == name) {
+            known.push(name.to_owned());
+        }
+    }
+    Ok(known)
+}

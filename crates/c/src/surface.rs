@@ -1,0 +1,182 @@
+//! Surfaces for renderers: positions, normals and triangles, copied into buffers of the caller or lent.
+
+use std::ffi::c_char;
+
+use pliant_run::Skin;
+
+use crate::buffer::PliantBuffer;
+use crate::context::{PliantContext, give, needed, some_text};
+use crate::simulation::{PLIANT_BODIES, PLIANT_SURFACES, PliantSimulation, Running, names, running};
+use crate::status::{Fault, PliantError, PliantStatus};
+
+/// A surface with what was last lent of it.
+pub(crate) struct OpenSurface {
+    pub(crate) skin: Skin,
+    places: Vec<[f64; 3]>,
+    normals: Vec<[f64; 3]>,
+}
+
+impl Running {
+    pub(crate) fn surface(&mut self, number: u32) -> Result<&mut OpenSurface, Fault> {
+        let open = self.surfaces.len();
+        self.surfaces.get_mut(number as usize).ok_or_else(|| {
+            let message = format!("there is no surface {number}: {open} are open in this simulation");
+            Fault::new(PliantStatus::BadHandle, message)
+        })
+    }
+
+    /// Brings the places of a surface to the instant, and its normals if they are wanted.
+    fn bring(&mut self, number: u32, normals: bool) -> Result<&OpenSurface, Fault> {
+        self.see_places()?;
+        self.surface(number)?;
+        let Self { world, simulation, surfaces, .. } = self;
+        let OpenSurface { skin, places, normals: own } = &mut surfaces[number as usize];
+        skin.positions(world, simulation, |vertex, place| places[vertex] = place);
+        if normals {
+            skin.normals(places, own);
+        }
+        Ok(&surfaces[number as usize])
+    }
+}
+
+/// What a surface has.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct PliantSurface {
+    /// Its number in the simulation, for the calls below.
+    pub number: u32,
+    /// Its vertices.
+    pub vertices: u32,
+    /// Its triangles.
+    pub triangles: u32,
+}
+
+/// Opens the boundary of a body, or a surface that one carries, by name; null is the only body. Of a solid only nodes on the boundary are vertices. It stays
+/// open as long as the simulation.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_surface_open(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    name: *const c_char,
+    surface: *mut PliantSurface,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        running(context, simulation, error, |own| {
+            needed(surface, "surface")?;
+            let name = some_text(name, "name")?;
+            let Some(skin) = Skin::new(&own.world, name) else {
+                let known = [names(own, PLIANT_BODIES)?, names(own, PLIANT_SURFACES)?].concat().join(", ");
+                return Err(Fault::new(
+                    PliantStatus::Unknown,
+                    match name {
+                        Some(name) => format!("there is no body or surface `{name}`; there are {known}"),
+                        None => format!("there are several bodies: name one of {known}"),
+                    },
+                ));
+            };
+            let (vertices, triangles) = (skin.rest().len(), skin.triangles().len());
+            let told = PliantSurface {
+                number: own.surfaces.len() as u32,
+                vertices: vertices as u32,
+                triangles: triangles as u32,
+            };
+            let zeros = || vec![[0.0; 3]; vertices];
+            own.surfaces.push(OpenSurface { skin, places: zeros(), normals: zeros() });
+            give(surface, "surface", told)
+        })
+    }
+}
+
+/// Copies the three vertices of each triangle, counter-clockwise seen from outside. There is room for so many triangles.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_surface_triangles(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    surface: u32,
+    triangles: *mut u32,
+    capacity: usize,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        running(context, simulation, error, |own| {
+            let all = own.surface(surface)?.skin.triangles();
+            if capacity < all.len() {
+                let message = format!("there is room for {capacity} triangles, {} are needed", all.len());
+                return Err(Fault::new(PliantStatus::ShortBuffer, message));
+            }
+            needed(triangles, "triangles")?;
+            let flat = all.as_flattened();
+            triangles.cast::<u8>().copy_from_nonoverlapping(flat.as_ptr().cast(), size_of_val(flat));
+            Ok(())
+        })
+    }
+}
+
+/// Copies where the vertices are [m].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_surface_positions(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    surface: u32,
+    buffer: PliantBuffer,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        running(context, simulation, error, |own| {
+            own.see_places()?;
+            let vertices = own.surface(surface)?.skin.rest().len();
+            let Running { world, simulation, surfaces, .. } = own;
+            let writer = buffer.writer(vertices)?;
+            surfaces[surface as usize]
+                .skin
+                .positions(world, simulation, |vertex, place| writer.put(vertex, place));
+            Ok(())
+        })
+    }
+}
+
+/// Copies the unit normals of the vertices: the mean of those of the triangles around each, by area.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_surface_normals(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    surface: u32,
+    buffer: PliantBuffer,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        running(context, simulation, error, |own| {
+            let open = own.bring(surface, true)?;
+            let writer = buffer.writer(open.normals.len())?;
+            open.normals.iter().enumerate().for_each(|(vertex, &normal)| writer.put(vertex, normal));
+            Ok(())
+        })
+    }
+}
+
+/// Lends positions [m] and unit normals, three `double` a vertex. What is pointed to stays as it is until the next call of this function for this surface,
+/// and is there until the simulation is closed; the pointers stay the same. `normals` may be null, which saves their cost.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_surface_lend(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    surface: u32,
+    positions: *mut *const f64,
+    normals: *mut *const f64,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        running(context, simulation, error, |own| {
+            needed(positions, "positions")?;
+            let open = own.bring(surface, !normals.is_null())?;
+            give(positions, "positions", open.places.as_ptr().cast())?;
+            if normals.is_null() { Ok(()) } else { give(normals, "normals", open.normals.as_ptr().cast()) }
+        })
+    }
+}

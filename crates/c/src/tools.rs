@@ -1,0 +1,119 @@
+//! Tools: where a program leads them, and what they feel.
+
+use std::ffi::c_char;
+
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use pliant_sim::Failure;
+use pliant_sim::contact::pose::Pose;
+
+use crate::context::{PliantContext, finite, give, needed, numbers, text};
+use crate::simulation::{PLIANT_TOOLS, PliantSimulation, Running, running};
+use crate::status::{Fault, PliantError, PliantStatus};
+use crate::values::unknown;
+
+/// A tool or an obstacle at an instant.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct PliantTool {
+    /// Where its frame is [m].
+    pub position: [f64; 3],
+    /// How it is turned: a unit quaternion x, y, z, w.
+    pub rotation: [f64; 4],
+    /// The angle [rad] between its jaws; 0 without any.
+    pub opening: f64,
+    /// The force [N] on it of all that touches it.
+    pub force: [f64; 3],
+    /// The moment [N m] of these forces about its frame; NaN on a GPU.
+    pub torque: [f64; 3],
+}
+
+/// A tool that is there, or the fault.
+fn known(own: &Running, name: &str) -> Result<(), Fault> {
+    own.simulation.tool(name).map(|_| ()).ok_or_else(|| unknown(own, PLIANT_TOOLS, "tool", name))
+}
+
+fn led(result: Result<f64, Failure>) -> Result<f64, Fault> {
+    result.map_err(|failure| Fault::new(PliantStatus::NotANumber, failure.message))
+}
+
+/// Leads a tool to a pose within a time [s] from now, on a straight way and the shortest turn; there it stays. `rotation` is a quaternion x, y, z, w of any
+/// length but 0. `arrival`, if it is not null, gets the time [s] at which it is there: later than asked for where nodes would be passed over on the way.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_tool_lead(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    tool: *const c_char,
+    position: *const f64,
+    rotation: *const f64,
+    within: f64,
+    arrival: *mut f64,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        running(context, simulation, error, |own| {
+            let (name, [x, y, z]) = (text(tool, "tool")?, numbers(position, "position")?);
+            let [i, j, k, w] = numbers(rotation, "rotation")?;
+            finite(&[within], "within")?;
+            let rotation = UnitQuaternion::try_new(Quaternion::new(w, i, j, k), 1e-9);
+            let rotation = rotation.ok_or_else(|| {
+                Fault::new(PliantStatus::NotANumber, "`rotation` is a quaternion of length 0")
+            })?;
+            known(own, name)?;
+            let pose = Pose::from_parts(Translation3::new(x, y, z), rotation);
+            let there = led(own.simulation.drive(name, pose, within))?;
+            if arrival.is_null() { Ok(()) } else { give(arrival, "arrival", there) }
+        })
+    }
+}
+
+/// Opens or closes the jaws of a tool to an angle [rad] within a time [s] from now; else as `pliant_tool_lead`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_tool_open(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    tool: *const c_char,
+    angle: f64,
+    within: f64,
+    arrival: *mut f64,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        running(context, simulation, error, |own| {
+            let name = text(tool, "tool")?;
+            finite(&[angle, within], "angle and within")?;
+            known(own, name)?;
+            let there = led(own.simulation.open(name, angle, within))?;
+            if arrival.is_null() { Ok(()) } else { give(arrival, "arrival", there) }
+        })
+    }
+}
+
+/// Tells where a tool or an obstacle is, and what it feels.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_tool(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    tool: *const c_char,
+    now: *mut PliantTool,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        running(context, simulation, error, |own| {
+            needed(now, "now")?;
+            let name = text(tool, "tool")?;
+            own.look()?;
+            let found = own.simulation.tool(name).ok_or_else(|| unknown(own, PLIANT_TOOLS, "tool", name))?;
+            let told = PliantTool {
+                position: found.pose.translation.vector.into(),
+                rotation: found.pose.rotation.coords.into(),
+                opening: found.opening,
+                force: found.force,
+                torque: found.torque.unwrap_or([f64::NAN; 3]),
+            };
+            give(now, "now", told)
+        })
+    }
+}

@@ -1,0 +1,72 @@
+//! A field of a body or of a carried surface by name, as the outputs have it, for programs.
+
+use std::borrow::Cow;
+
+use pliant_scene::World;
+use pliant_scene::format::{At, FieldName, VtuTable};
+use pliant_sim::{Failure, Simulation};
+
+use crate::output::{FieldMesh, frames};
+
+/// Reads one field at instants.
+pub struct FieldReader {
+    mesh: FieldMesh,
+    field: FieldName,
+}
+
+impl FieldReader {
+    /// A field by its name in outputs (`von-mises`) on a body or a carried surface, at its points or its cells; without a name on all bodies together.
+    ///
+    /// # Errors
+    /// If there is no such body or field, or the body doesn't have it.
+    pub fn new(world: &World, on: Option<&str>, field: &str, at: At) -> Result<Self, Failure> {
+        let known = |field: &FieldName| field.name();
+        let Some(name) = FieldName::ALL.iter().copied().find(|known| known.name() == field) else {
+            let all: Vec<&str> = FieldName::ALL.iter().map(known).collect();
+            return Err(Failure::input(&format_args!(
+                "there is no field `{field}`; there are {}",
+                all.join(", ")
+            )));
+        };
+        if !world.participants.iter().any(|part| part.shows(on)) {
+            let on = on.unwrap_or_default();
+            return Err(Failure::input(&format_args!("there is no body or surface `{on}`")));
+        }
+        if !world.participants.iter().any(|part| !part.fields(&[name]).is_empty()) {
+            return Err(Failure::input(&format_args!("no body of this scene has the field `{field}`")));
+        }
+        let table = VtuTable { on: on.map(str::to_owned), every: 1.0, data: vec![name], at, curved: None };
+        Ok(Self { mesh: FieldMesh::new(world, &table), field: name })
+    }
+
+    /// Numbers of an item: 1, 3, or 9 of a tensor.
+    pub fn components(&self) -> usize {
+        self.field.components()
+    }
+
+    /// Takes the values at an instant whose forces are found.
+    pub fn fill(&mut self, world: &World, simulation: &Simulation) {
+        self.mesh.fill(&frames(world, simulation));
+    }
+
+    /// The values last taken, an item after the other: at points those of the mesh of the body in its order, at cells those of its cells. `NaN` where a body
+    /// has none.
+    ///
+    /// # Errors
+    /// If the body doesn't have the field.
+    pub fn values(&self) -> Result<Cow<'_, [f64]>, Failure> {
+        let (mesh, name) = (self.mesh.mesh(), self.field.name());
+        if let Some(data) = mesh.point_data.get(name) {
+            return Ok(Cow::Borrowed(&data.values));
+        }
+        let mut found = mesh.blocks.iter().filter_map(|block| block.data.get(name));
+        match (found.next(), found.next()) {
+            (Some(only), None) => Ok(Cow::Borrowed(&only.values)),
+            (Some(first), Some(second)) => {
+                let all = [first, second].into_iter().chain(found);
+                Ok(Cow::Owned(all.flat_map(|data| &data.values).copied().collect()))
+            }
+            (None, _) => Err(Failure::input(&format_args!("the field `{name}` is not one of this body"))),
+        }
+    }
+}
