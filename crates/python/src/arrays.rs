@@ -13,7 +13,11 @@ pub fn array3<'py, T: numpy::Element>(py: Python<'py>, flat: Vec<T>) -> Bound<'p
 }
 
 /// A fresh array (n, `columns`).
-pub fn array<'py, T: numpy::Element>(py: Python<'py>, flat: Vec<T>, columns: usize) -> Bound<'py, PyArray2<T>> {
+pub fn array<'py, T: numpy::Element>(
+    py: Python<'py>,
+    flat: Vec<T>,
+    columns: usize,
+) -> Bound<'py, PyArray2<T>> {
     let rows = flat.len() / columns.max(1);
     // The length is a product of both.
     Array2::from_shape_vec((rows, columns), flat).unwrap_or_default().into_pyarray(py)
@@ -26,9 +30,13 @@ pub fn array1<T: numpy::Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, Py
 
 /// Three numbers an item, from an array (n, 3) of any strides that Python has checked.
 pub fn vectors(array: &PyReadonlyArray2<'_, f64>) -> Result<Vec<[f64; 3]>, Trouble> {
-    let [rows, columns] = array.shape() else { return Err(Trouble::Value("an array (n, 3) is wanted".into())) };
+    let [rows, columns] = array.shape() else {
+        return Err(Trouble::Value("an array (n, 3) is wanted".into()));
+    };
     if *columns != 3 {
-        return Err(Trouble::Value(format!("an array of shape ({rows}, {columns}) is given, (n, 3) is wanted")));
+        return Err(Trouble::Value(format!(
+            "an array of shape ({rows}, {columns}) is given, (n, 3) is wanted"
+        )));
     }
     let view = array.as_array();
     Ok(view.rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())

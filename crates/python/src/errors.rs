@@ -131,7 +131,10 @@ pub fn diagnostics<'py>(py: Python<'py>, errors: &SceneErrors) -> PyResult<Vec<B
         };
         let text = found.option.as_deref();
         let key = match (place, text) {
-            (_, Some(option)) => option.strip_prefix("--set ").and_then(|set| set.split('=').next()).map(|key| key.trim().to_owned()),
+            (_, Some(option)) => option
+                .strip_prefix("--set ")
+                .and_then(|set| set.split('=').next())
+                .map(|key| key.trim().to_owned()),
             (Some((line, _)), None) => key_of(errors.text(), line),
             (None, None) => None,
         };

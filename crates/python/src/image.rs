@@ -16,7 +16,9 @@ type Read<'py> = (Bound<'py, PyArray1<f64>>, [usize; 3], [[f64; 4]; 3], Vec<(i32
 #[pyfunction]
 pub fn read_image(py: Python<'_>, path: PathBuf) -> PyResult<Read<'_>> {
     let image = on_thread(py, move || {
-        let failed = |error: pliant_imaging::ImageError| Trouble::Mesh(Some(path.display().to_string()), error.to_string());
+        let failed = |error: pliant_imaging::ImageError| {
+            Trouble::Mesh(Some(path.display().to_string()), error.to_string())
+        };
         pliant_imaging::read(&path).map_err(failed)
     })?;
     let grid = image.grid;

@@ -78,7 +78,8 @@ impl Mesh {
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf, scale: f64) -> PyResult<(Self, Vec<String>)> {
         crate::jobs::on_thread(py, move || {
-            let failed = |error: io::MeshFileError| Trouble::Mesh(Some(path.display().to_string()), error.to_string());
+            let failed =
+                |error: io::MeshFileError| Trouble::Mesh(Some(path.display().to_string()), error.to_string());
             let mut file = io::read(&path).map_err(failed)?;
             file.mesh.points.iter_mut().for_each(|point| *point *= scale);
             Ok((Self(Arc::new(file.mesh)), file.notes))
@@ -89,7 +90,8 @@ impl Mesh {
     fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let mesh = Arc::clone(&self.0);
         crate::jobs::on_thread(py, move || {
-            let failed = |error: io::WriteError| Trouble::Mesh(Some(path.display().to_string()), error.to_string());
+            let failed =
+                |error: io::WriteError| Trouble::Mesh(Some(path.display().to_string()), error.to_string());
             io::write(&path, &mesh).map_err(failed)
         })
     }
@@ -115,11 +117,18 @@ impl Mesh {
     }
 
     /// By name, one array for each kind of cells that has it.
-    fn cell_data<'py>(&self, py: Python<'py>) -> PyResult<Vec<(String, &'static str, Bound<'py, PyArray2<f64>>)>> {
+    fn cell_data<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<Vec<(String, &'static str, Bound<'py, PyArray2<f64>>)>> {
         let mut data = Vec::new();
         for block in &self.0.blocks {
             for (name, values) in &block.data {
-                data.push((name.clone(), word(block.kind), array(py, values.values.clone(), values.components)));
+                data.push((
+                    name.clone(),
+                    word(block.kind),
+                    array(py, values.values.clone(), values.components),
+                ));
             }
         }
         Ok(data)

@@ -14,8 +14,8 @@ use pyo3::prelude::*;
 
 use crate::arrays::{array1, array3};
 use crate::errors::{Trouble, diagnostics};
-use crate::mesh::Mesh;
 use crate::jobs::on_pool;
+use crate::mesh::Mesh;
 
 /// A model.
 #[pyclass(frozen, weakref, module = "pliant._native")]
@@ -140,14 +140,17 @@ impl Model {
             };
             let mut report = |progress: pliant_run::Progress| {
                 let Some(each) = &each else { return };
-                let called = Python::attach(|py| each.call1(py, (progress.time, progress.until, progress.wall.as_secs_f64())).map(drop));
+                let called = Python::attach(|py| {
+                    each.call1(py, (progress.time, progress.until, progress.wall.as_secs_f64())).map(drop)
+                });
                 if let Err(error) = called {
                     flag.store(true, Ordering::Relaxed);
                     *kept.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(error);
                 }
             };
             let summary = run_with(&world, &folder, options, &mut report)?;
-            let text = serde_json::to_string(&summary).map_err(|error| Trouble::Internal(error.to_string()))?;
+            let text =
+                serde_json::to_string(&summary).map_err(|error| Trouble::Internal(error.to_string()))?;
             Ok((text, summary.time, in_order(&summary.energies)))
         };
         let (summary, signal) = on_pool(py, &pool, &stop, job)?;

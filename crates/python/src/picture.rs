@@ -37,7 +37,8 @@ pub fn draw(
     let mesh = running.live.mesh()?;
     let mut graphics = GRAPHICS.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     if graphics.is_none() {
-        let opened = Graphics::open().map_err(|error| Trouble::Device(format!("{error}; {}", error.remedy())))?;
+        let opened =
+            Graphics::open().map_err(|error| Trouble::Device(format!("{error}; {}", error.remedy())))?;
         *graphics = Some(opened);
     }
     let Some(graphics) = &*graphics else { return Err(Trouble::Device("no graphics".into())) };

@@ -40,7 +40,16 @@ pub fn field_of(name: &str) -> Result<FieldName, Trouble> {
 impl Running {
     pub fn new(live: Live, world: Arc<World>) -> Self {
         let shown = world.scene.shown(1.0);
-        let mut running = Self { live, world, own: None, address: 0, shown, readers: Vec::new(), pushed: Vec::new(), grips: Vec::new() };
+        let mut running = Self {
+            live,
+            world,
+            own: None,
+            address: 0,
+            shown,
+            readers: Vec::new(),
+            pushed: Vec::new(),
+            grips: Vec::new(),
+        };
         if running.stepper_s_own().is_none() {
             running.own = Some(vec![[0.0; 3]; running.nodes()]);
         }
@@ -72,7 +81,9 @@ impl Running {
     pub fn refresh(&mut self) {
         let Some(own) = &mut self.own else { return };
         let parts = self.world.participants.iter().zip(self.live.simulation.instants());
-        let all = parts.flat_map(|(part, now)| (0..part.built.model.node_count()).map(move |node| now.displacement(node)));
+        let all = parts.flat_map(|(part, now)| {
+            (0..part.built.model.node_count()).map(move |node| now.displacement(node))
+        });
         own.iter_mut().zip(all).for_each(|(own, now)| *own = now);
     }
 
@@ -87,7 +98,10 @@ impl Running {
     }
 
     /// A vector of each node.
-    pub fn nodal(&self, of: impl Fn(&dyn pliant_sim::Instant, &pliant_mechanics::Model, usize) -> [f64; 3]) -> Vec<f64> {
+    pub fn nodal(
+        &self,
+        of: impl Fn(&dyn pliant_sim::Instant, &pliant_mechanics::Model, usize) -> [f64; 3],
+    ) -> Vec<f64> {
         let mut all = Vec::with_capacity(3 * self.nodes());
         for (part, now) in self.world.participants.iter().zip(self.live.simulation.instants()) {
             let model = &part.built.model;
@@ -107,13 +121,17 @@ impl Running {
     /// A mesh of a body, of a surface or of all, at rest, with fields.
     pub fn mesh(&mut self, fields: &[FieldName], on: Option<&str>, at: At) -> Result<&Mesh, Trouble> {
         let has = |shown: &VtuTable| {
-            shown.on.as_deref() == on && shown.at == at && shown.curved.is_none() && fields.iter().all(|field| shown.data.contains(field))
+            shown.on.as_deref() == on
+                && shown.at == at
+                && shown.curved.is_none()
+                && fields.iter().all(|field| shown.data.contains(field))
         };
         if !has(&self.shown) {
             if let Some(name) = on
                 && !self.world.participants.iter().any(|part| part.shows(Some(name)))
             {
-                let known: Vec<&str> = self.world.scene.bodies.iter().map(|(name, _)| name.as_str()).collect();
+                let known: Vec<&str> =
+                    self.world.scene.bodies.iter().map(|(name, _)| name.as_str()).collect();
                 let message = format!("there is no body or surface `{name}`; bodies: {}", known.join(", "));
                 return Err(Trouble::Value(message));
             }
@@ -125,7 +143,11 @@ impl Running {
 
     /// Shows another series.
     pub fn show(&mut self, shown: VtuTable) {
-        if self.shown.on != shown.on || self.shown.at != shown.at || self.shown.curved != shown.curved || self.shown.data != shown.data {
+        if self.shown.on != shown.on
+            || self.shown.at != shown.at
+            || self.shown.curved != shown.curved
+            || self.shown.data != shown.data
+        {
             self.live.show(&shown);
             self.shown = shown;
         }
@@ -139,7 +161,8 @@ impl Running {
             let has: Vec<&str> = has.iter().map(|field| field.name()).collect();
             return Err(Trouble::Value(format!("`{on}` has no field `{name}`; it has {}", has.join(", "))));
         }
-        let known = self.readers.iter().position(|(key, _)| (key.0, key.1.as_str(), key.2) == (field, on, at));
+        let known =
+            self.readers.iter().position(|(key, _)| (key.0, key.1.as_str(), key.2) == (field, on, at));
         let known = match known {
             Some(known) => known,
             None => {
@@ -155,24 +178,36 @@ impl Running {
     }
 
     /// The surface around the point of bodies that is nearest to a place [m]: nodes, counted over all, with weights that sum to 1.
-    pub fn around(&self, at: [f64; 3], on: Option<&str>, radius: Option<f64>) -> Result<Vec<(u32, f64)>, Trouble> {
+    pub fn around(
+        &self,
+        at: [f64; 3],
+        on: Option<&str>,
+        radius: Option<f64>,
+    ) -> Result<Vec<(u32, f64)>, Trouble> {
         let at = Vector3::from(at);
         let mut nearest: Option<(f64, Vec<(u32, f64)>)> = None;
-        for (index, (part, now)) in self.world.participants.iter().zip(self.live.simulation.instants()).enumerate() {
+        for (index, (part, now)) in
+            self.world.participants.iter().zip(self.live.simulation.instants()).enumerate()
+        {
             let bodies = part.built.model.bodies.iter().zip(&part.built.bodies);
             for (body, built) in bodies.filter(|(body, _)| on.is_none_or(|on| on == body.name)) {
                 let node = |own: u32| body.node(own);
-                let place = |(own, rest): (u32, &Vector3)| rest + Vector3::from(now.displacement(node(own) as usize));
+                let place =
+                    |(own, rest): (u32, &Vector3)| rest + Vector3::from(now.displacement(node(own) as usize));
                 let places: Vec<Vector3> = (0..).zip(&built.mesh.points).map(place).collect();
                 let faces: Vec<u32> = (0..built.boundary.faces.len() as u32).collect();
-                let Some(found) = SurfaceLocator::new(&built.boundary, &faces, &places).closest(&at) else { continue };
+                let Some(found) = SurfaceLocator::new(&built.boundary, &faces, &places).closest(&at) else {
+                    continue;
+                };
                 let distance = (found.position - at).norm();
                 if nearest.as_ref().is_some_and(|(known, _)| *known <= distance) {
                     continue;
                 }
                 let triangles = built.boundary.triangles();
                 let corners = patch(&built.mesh.points, &triangles, found.nodes, found.weights, radius);
-                let nodes = corners.into_iter().map(|(own, weight)| (self.live.simulation.node(index, node(own)), weight));
+                let nodes = corners
+                    .into_iter()
+                    .map(|(own, weight)| (self.live.simulation.node(index, node(own)), weight));
                 nearest = Some((distance, nodes.collect()));
             }
         }
@@ -191,7 +226,9 @@ impl Running {
             return Ok(());
         }
         self.grips.clear();
-        Err(Trouble::Value("the solver of this body knows no grips, or a grip holds nodes of several participants".into()))
+        Err(Trouble::Value(
+            "the solver of this body knows no grips, or a grip holds nodes of several participants".into(),
+        ))
     }
 
     pub fn simulation(&self) -> &Simulation {

@@ -42,7 +42,8 @@ impl Given {
                 "the text of the scene has {size} MiB, and 64 are the most; give large tables as meshes or files"
             )));
         }
-        let shared = |meshes: Meshes<'_>| meshes.into_iter().map(|(name, mesh)| (name, Arc::clone(&mesh.get().0)));
+        let shared =
+            |meshes: Meshes<'_>| meshes.into_iter().map(|(name, mesh)| (name, Arc::clone(&mesh.get().0)));
         Ok(Self { text, name, folder, set, meshes: shared(meshes).collect(), lent: shared(lent).collect() })
     }
 

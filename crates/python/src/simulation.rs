@@ -11,8 +11,8 @@ use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray2};
 use pliant_mechanics::grip::Grip;
 use pliant_run::Live;
 use pliant_scene::format::At;
-use pliant_sim::contact::pose::Pose;
 use pliant_sim::Reals;
+use pliant_sim::contact::pose::Pose;
 use pyo3::prelude::*;
 
 use crate::arrays::{array, array3, vectors};
@@ -93,7 +93,8 @@ impl Simulation {
         let mut slot = self.slot()?;
         let done = match done {
             Ok(_) if !running.is_in_place() => {
-                let message = "displacements have moved in memory: this is a mistake of Pliant, please tell it";
+                let message =
+                    "displacements have moved in memory: this is a mistake of Pliant, please tell it";
                 *slot = Slot::Broken(running, message.to_owned());
                 return Err(Trouble::Internal(message.into()).into());
             }
@@ -117,7 +118,8 @@ impl Slot {
     fn trouble(&self) -> Trouble {
         match self {
             Self::Here(_) | Self::Away => Trouble::Busy(
-                "the simulation computes for another call: one at a time, and no steps within callbacks".into(),
+                "the simulation computes for another call: one at a time, and no steps within callbacks"
+                    .into(),
             ),
             Self::Closed(_) => Trouble::Closed,
             Self::Broken(_, message) => {
@@ -209,7 +211,13 @@ impl Simulation {
     }
 
     /// A field of a body or a surface, (n, numbers of each).
-    fn field<'py>(&self, py: Python<'py>, name: String, on: String, cells: bool) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn field<'py>(
+        &self,
+        py: Python<'py>,
+        name: String,
+        on: String,
+        cells: bool,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let at = if cells { At::Cells } else { At::Points };
         let (values, columns) = self.work(py, move |running, _| running.field(&name, &on, at))?;
         Ok(array(py, values, columns))
@@ -239,9 +247,13 @@ impl Simulation {
     /// Force [N] of each contact.
     fn contacts(&self, py: Python<'_>) -> PyResult<BTreeMap<String, [f64; 3]>> {
         self.work(py, |running, _| {
-            let names: Vec<String> = running.world.scene.contacts.iter().map(|(name, _)| name.clone()).collect();
+            let names: Vec<String> =
+                running.world.scene.contacts.iter().map(|(name, _)| name.clone()).collect();
             let frame = running.live.simulation.frame()?;
-            Ok(names.into_iter().filter_map(|name| Some((name.clone(), frame.contact_force(&name)?))).collect())
+            Ok(names
+                .into_iter()
+                .filter_map(|name| Some((name.clone(), frame.contact_force(&name)?)))
+                .collect())
         })
     }
 
@@ -289,7 +301,9 @@ impl Simulation {
         let taken = self.quick(|running| {
             let nodes = running.nodes() as u32;
             if grips.iter().flat_map(|(nodes, ..)| nodes).any(|&(node, _)| node >= nodes) {
-                return Err(Trouble::Value(format!("a grip names a node that is not there; there are {nodes}")));
+                return Err(Trouble::Value(format!(
+                    "a grip names a node that is not there; there are {nodes}"
+                )));
             }
             let simulation = running.simulation();
             let grip = |(nodes, place, stiffness)| {
@@ -426,7 +440,11 @@ fn fill(out: &mut PyReadwriteArray2<'_, f64>, values: &[f64]) -> PyResult<()> {
 
 /// A read-only array (nodes, 3) over memory that lives as long as the simulation.
 #[allow(unsafe_code, reason = "NumPy borrows the memory of the simulation, which the array keeps alive")]
-fn view<T: numpy::Element>(simulation: Bound<'_, PyAny>, address: usize, nodes: usize) -> Bound<'_, PyArray2<T>> {
+fn view<T: numpy::Element>(
+    simulation: Bound<'_, PyAny>,
+    address: usize,
+    nodes: usize,
+) -> Bound<'_, PyArray2<T>> {
     let data: *const T = std::ptr::with_exposed_provenance(address);
     // SAFETY: the vector at this address has 3 · `nodes` numbers of this type, and stays there as long as the simulation: `work` ends it
     // where they have moved, and neither `close` nor a panic frees it. The array holds a reference to the simulation, and is not writeable

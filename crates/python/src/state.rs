@@ -37,7 +37,8 @@ impl State {
     /// As a state of the world of a run.
     pub fn taken(&self, running: &Running) -> Result<pliant_sim::State, Trouble> {
         let world = running.simulation().world();
-        let other = || Trouble::Value("the state is of a model with other meshes, solvers or precision".into());
+        let other =
+            || Trouble::Value("the state is of a model with other meshes, solvers or precision".into());
         match &self.kept {
             // Another world refuses it when it is taken up.
             Kept::Whole(state) => Ok((**state).clone()),

@@ -124,13 +124,15 @@ impl Sweep {
             if !(name.starts_with("rows-") && name.ends_with(".jsonl")) {
                 continue;
             }
-            let text = fs::read_to_string(entry.path()).map_err(|error| OutputError::new(&entry.path(), error))?;
+            let text =
+                fs::read_to_string(entry.path()).map_err(|error| OutputError::new(&entry.path(), error))?;
             for (run, line) in self.known(&text) {
                 rows[run] = serde_json::from_value(line["row"].clone()).ok();
             }
         }
         let table = folder.join(SWEEP);
-        replace(&table, |file| file.write_all(self.table(&rows).as_bytes())).map_err(|error| OutputError::new(&table, error))?;
+        replace(&table, |file| file.write_all(self.table(&rows).as_bytes()))
+            .map_err(|error| OutputError::new(&table, error))?;
         let missing = rows.iter().enumerate().filter(|(_, row)| row.is_none()).map(|(run, _)| run).collect();
         let failures = rows.iter().enumerate().filter_map(|(run, row)| {
             row.as_ref().filter(|row| row.status == "failed").map(|row| (run, row.message.clone()))
@@ -155,7 +157,10 @@ impl Sweep {
         line.insert("keys".into(), json!(self.keys().collect::<Vec<_>>()));
         line.insert("key".into(), json!(self.key(run)));
         for (key, value) in self.combination(run) {
-            line.insert(key.into(), value.parse::<f64>().map_or_else(|_| json!(value), |number| json!(number)));
+            line.insert(
+                key.into(),
+                value.parse::<f64>().map_or_else(|_| json!(value), |number| json!(number)),
+            );
         }
         line.insert("status".into(), json!(row.status));
         line.insert("error".into(), json!(row.message));

@@ -316,7 +316,8 @@ impl Sweep {
 
     /// What a row belongs to: the scene, the values of its run, this version.
     pub(crate) fn key(&self, run: usize) -> String {
-        let scene = (self.source.text(), self.source.assignments(), self.title(run), env!("CARGO_PKG_VERSION"));
+        let scene =
+            (self.source.text(), self.source.assignments(), self.title(run), env!("CARGO_PKG_VERSION"));
         format!("{:016x}", fingerprint(&scene))
     }
 
@@ -460,7 +461,12 @@ fn quoted(text: &str) -> String {
 
 /// Does the work of all runs on some threads, each run on one; after `stop` none is begun. A run's own pool is inside
 /// its thread: a worker of rayon's that waits for it would begin another run meanwhile.
-pub(crate) fn in_parallel(runs: usize, threads: usize, stop: Option<&AtomicBool>, work: impl Fn(usize) + Sync) {
+pub(crate) fn in_parallel(
+    runs: usize,
+    threads: usize,
+    stop: Option<&AtomicBool>,
+    work: impl Fn(usize) + Sync,
+) {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = if threads == 0 { cores } else { threads }.min(runs.max(1));
     let next = AtomicUsize::new(0);
