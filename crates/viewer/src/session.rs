@@ -19,7 +19,7 @@ use pliant_sim::{Failure, State, number};
 
 use crate::device::{Seen, point_value};
 use crate::followed::{Followed, FollowedPoint};
-use crate::hand::{Hand, Hold, Point};
+use crate::hand::{Hand, Hold, Point, Which};
 use crate::marks::{Mark, marks};
 use crate::parameters::Number;
 use crate::recording::{Break, Done, Move, Recording, Surface};
@@ -43,8 +43,10 @@ pub enum Order {
     Back(u64),
     /// Simulated seconds a second.
     Speed(f64),
-    /// Changes what a hand or a pin holds.
+    /// Changes what the first hand or a pin holds.
     Hand(Hand),
+    /// Changes what the second hand or a pin holds.
+    Second(Hand),
     /// Goes on as another world from the next step on, from where the run stands: that of numbers which are others than in the file.
     Change(Box<World>, Vec<Number>),
     /// Finds where bodies are held, moved and loaded in each frame, or not any more.
@@ -95,16 +97,18 @@ pub struct Frame {
     pub least_gap: Option<f64>,
     /// Steps that were taken though they had not converged.
     pub unconverged: u64,
-    /// What is held: the point [m] and the force on the body [N] of each grip, hand first.
+    /// What is held: the point [m] and the force on the body [N] of each hand that holds something, then of each pin.
     pub held: Vec<[[f64; 3]; 2]>,
+    /// Where each hand is among what is held; `None` of one that holds nothing.
+    pub hands: [Option<usize>; 2],
     /// Forces of contacts on the nodes, where they are asked for.
     pub contacts: Vec<PointForce>,
     /// Where bodies are held, moved and loaded, where that is asked for.
     pub marks: Vec<Mark>,
     /// Points that the user follows, in the order in which they were picked.
     pub followed: Vec<FollowedPoint>,
-    /// The tool that the hand holds.
-    pub tool: Option<String>,
+    /// The tool that each hand holds.
+    pub tools: [Option<String>; 2],
     /// Whether each triangle of the subject can be taken hold of: those of bodies and tools, not those of obstacles.
     pub movable: Arc<[bool]>,
     /// Steps since the frame before.
@@ -127,8 +131,21 @@ pub struct Frame {
     pub note: Option<String>,
     /// Names and units of the sample of this instant.
     pub columns: Arc<[Column]>,
-    /// The sample: force of the hand, energies, reactions and probes.
+    /// The sample: forces of the hands, energies, reactions and probes.
     pub sample: Vec<f64>,
+}
+
+impl Frame {
+    /// What each pin holds: the point [m] and the force on the body [N].
+    pub fn pins(&self) -> &[[[f64; 3]; 2]] {
+        let hands = self.hands.iter().flatten().count();
+        self.held.get(hands..).unwrap_or_default()
+    }
+
+    /// What a hand holds: the point [m] and the force on the body [N].
+    pub fn hand(&self, which: Which) -> Option<[[f64; 3]; 2]> {
+        self.held.get(self.hands[which as usize]?).copied()
+    }
 }
 
 /// A scene that is played on another thread.
@@ -561,7 +578,8 @@ impl<'s> Player<'s> {
                 playback.pace.speed = speed.clamp(1e-6, 1e6);
                 playback.pace.anchor(self.live.simulation.time());
             }
-            Order::Hand(hand) => self.hold(sent, &hand),
+            Order::Hand(hand) => self.hold(sent, Which::First, &hand),
+            Order::Second(hand) => self.hold(sent, Which::Second, &hand),
             Order::Change(world, numbers) => playback.change = Some((world, numbers)),
             Order::Marks(marked) => (playback.marked, playback.seen.at) = (marked, None),
             Order::Probe(point) => self.follow(&point),
@@ -577,7 +595,7 @@ impl<'s> Player<'s> {
         None
     }
 
-    fn hold(&mut self, sent: Instant, hand: &Hand) {
+    fn hold(&mut self, sent: Instant, which: Which, hand: &Hand) {
         // Where it takes hold has to be known.
         if self.on_device && matches!(hand, Hand::Take(..) | Hand::Pin(_)) {
             self.inspect();
@@ -589,7 +607,7 @@ impl<'s> Player<'s> {
             self.sound.touch();
         }
         let evaluated = self.live.simulation.is_evaluated();
-        let held = self.playback.hold.take(hand, &self.subject, &mut self.live);
+        let held = self.playback.hold.take(which, hand, &self.subject, &mut self.live);
         let playback = &mut self.playback;
         if !held {
             playback.note = Some("this solver knows no hand: it does not pull".into());
@@ -597,7 +615,7 @@ impl<'s> Player<'s> {
             playback.note = None;
         }
         let number = playback.recording.as_ref().map_or(0, |recording| recording.moves.len());
-        playback.record(evaluated, sent, Done::Hand(*hand));
+        playback.record(evaluated, sent, Done::by(which, *hand));
         if held && playback.is_going() {
             playback.waiting.push((sent, playback.steps + u64::from(evaluated), number));
         }
@@ -613,7 +631,7 @@ impl<'s> Player<'s> {
     fn name_columns(&mut self) {
         let axes =
             |name: String, unit| ["x", "y", "z"].map(|axis| Column { name: format!("{name}.{axis}"), unit });
-        let mut columns = axes("hand".into(), "N").to_vec();
+        let mut columns = [axes("hand".into(), "N"), axes("second-hand".into(), "N")].concat();
         columns.extend_from_slice(self.live.columns());
         for number in 1..=self.playback.followed.len() {
             columns.extend(axes(format!("point.{number}.displacement"), "m"));
@@ -724,18 +742,22 @@ impl<'s> Player<'s> {
         }
     }
 
-    /// Restores a state, releases the hand and continues the recording. Returns the time [s] of the state; `None` if the stepper rejects it.
+    /// Restores a state, releases the hands and continues the recording. Returns the time [s] of the state; `None` if the stepper rejects it.
     fn restore(&mut self, Sound { state, steps, hold, moves }: Sound) -> Option<f64> {
         self.live.restore(state).ok()?;
         let playback = &mut self.playback;
         (playback.hold, playback.steps, playback.owed) = (hold, steps, 0);
-        playback.hold.take(&Hand::Release, &self.subject, &mut self.live);
         playback.waiting.clear();
         let time = self.live.simulation.time();
         if let Some(recording) = &mut playback.recording {
             recording.moves.truncate(moves);
         }
-        playback.record(false, Instant::now(), Done::Hand(Hand::Release));
+        for which in Which::BOTH {
+            if playback.hold.holds(which) {
+                playback.hold.take(which, &Hand::Release, &self.subject, &mut self.live);
+                playback.record(false, Instant::now(), Done::by(which, Hand::Release));
+            }
+        }
         playback.pace.anchor(time);
         playback.seen.at = None;
         Some(time)
@@ -771,10 +793,11 @@ impl<'s> Player<'s> {
         let seen = &mut playback.seen;
         seen.held.clear();
         seen.held.extend(playback.hold.shown(&self.live));
-        let [x, y, z] =
-            seen.held.first().filter(|_| playback.hold.by_hand()).map_or([0.0; 3], |[_, force]| *force);
+        seen.hands = playback.hold.hands();
         seen.sample.clear();
-        seen.sample.extend([x, y, z]);
+        for hand in seen.hands {
+            seen.sample.extend(hand.and_then(|at| seen.held.get(at)).map_or([0.0; 3], |[_, force]| *force));
+        }
         self.live.sample(&mut seen.sample);
         seen.followed.clear();
         for followed in &playback.followed {
@@ -824,6 +847,7 @@ impl<'s> Player<'s> {
             frame.energies = playback.seen.energies;
             (frame.least_gap, frame.unconverged) = (playback.seen.least_gap, playback.seen.unconverged);
             frame.held.clone_from(&playback.seen.held);
+            frame.hands = playback.seen.hands;
             frame.contacts.clone_from(&playback.seen.contacts);
             frame.marks.clone_from(&playback.seen.marks);
             frame.followed.clone_from(&playback.seen.followed);
@@ -840,7 +864,7 @@ impl<'s> Player<'s> {
         frame.number = playback.frames;
         frame.subject = self.subject.clone();
         frame.movable = Arc::clone(&self.movable);
-        frame.tool = playback.hold.tool().map(str::to_owned);
+        frame.tools = playback.hold.tools().map(|tool| tool.map(str::to_owned));
         frame.critical = playback.seen.critical;
         frame.time = self.live.simulation.time();
         frame.steps = playback.steps;

@@ -348,7 +348,7 @@ fn pinning() -> Vec<Cue> {
             Cue::new(
                 what,
                 move |app| vec![button(inside(app), left, false)],
-                move |app| Ok(app.frame.held.len() == pins),
+                move |app| Ok(app.frame.pins().len() == pins),
             ),
             Cue::new("P is let go", |_| vec![press(Key::P, false)], |_| Ok(true)),
         ]
@@ -428,7 +428,7 @@ fn undoing() -> Vec<Cue> {
         Cue::new(
             "the hand lets go",
             move |app| vec![button(inside(app), left, false)],
-            |app| Ok(app.holding.is_none()),
+            |app| Ok(app.hands == [None; 2]),
         ),
         Cue::key("Space pauses", Key::Space, |app| !app.frame.playing),
         holding(Modifiers::COMMAND | Modifiers::CTRL),
@@ -459,7 +459,7 @@ fn pulling() -> Vec<Cue> {
         cues.push(Cue::new(
             "the mouse pulls",
             move |app| vec![Event::PointerMoved(*from.borrow() - vec2(0.0, reach(app) * part as f32 / 10.0))],
-            move |app| Ok(part < 3 || app.holding.is_some()),
+            move |app| Ok(part < 3 || app.hands[0].is_some()),
         ));
     }
     cues.push(Cue::wait("the hand pulls", |app| {
@@ -485,7 +485,7 @@ fn pulling() -> Vec<Cue> {
 
 /// Whether the hand's force points from where it holds to where the mouse is, with no more than its stiffness.
 fn spring(app: &App, place: [f64; 2]) -> Result<(), String> {
-    let (Some([point, force]), Some(held)) = (app.frame.held.first(), &app.holding) else {
+    let (Some([point, force]), Some(held)) = (app.frame.held.first(), &app.hands[0]) else {
         return Err("nothing is held".into());
     };
     let [point, force] = [point, force].map(|v| Vector3::from(*v));
