@@ -25,7 +25,7 @@ pub struct Replayed {
     pub fingerprint: u64,
     /// The largest force of a hand [N].
     pub largest_force: f64,
-    /// The point that the first hand holds in the end [m] and the force on it [N].
+    /// The point that a hand holds in the end, the first one where both do [m] and the force on it [N].
     pub held: Option<[[f64; 3]; 2]>,
     /// Force [N] of each constraint in the end.
     pub reactions: Vec<[f64; 3]>,
@@ -201,7 +201,7 @@ impl<'r> Replay<'r> {
             time,
             fingerprint,
             largest_force: self.largest_force,
-            held: self.hold.hands()[0].and_then(|at| self.hold.shown(live).nth(at)),
+            held: self.hold.shown(live).next().filter(|_| self.hold.hands() != [None; 2]),
             reactions: live.reactions(),
             breaks: Vec::new(),
         })

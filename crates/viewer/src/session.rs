@@ -1,6 +1,7 @@
 //! A scene on a thread of its own: it is played there in real time, and handed over frame by frame. Neither side ever waits for the
 //! other: orders go through a channel, the newest frame lies in one of three places of which each side holds one.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
@@ -111,6 +112,8 @@ pub struct Frame {
     pub tools: [Option<String>; 2],
     /// Whether each triangle of the subject can be taken hold of: those of bodies and tools, not those of obstacles.
     pub movable: Arc<[bool]>,
+    /// A triangle of each tool.
+    pub tool_triangles: Arc<[u32]>,
     /// Steps since the frame before.
     pub steps_a_frame: u64,
     /// Mean wall time of a step [s].
@@ -304,6 +307,8 @@ struct Player<'s> {
     subject: Arc<Subject>,
     /// Whether each triangle of the subject can be taken hold of.
     movable: Arc<[bool]>,
+    /// A triangle of each tool.
+    tool_triangles: Arc<[u32]>,
     /// Regions whose cells are not shown.
     hidden: Vec<Region>,
     live: Live,
@@ -471,6 +476,7 @@ impl<'s> Player<'s> {
             world,
             subject: known.unwrap_or_default(),
             movable: Arc::default(),
+            tool_triangles: Arc::default(),
             hidden: Vec::new(),
             live,
             on_device,
@@ -670,7 +676,16 @@ impl<'s> Player<'s> {
     }
 
     fn find_movable(&mut self) {
-        self.movable = self.subject.triangles().map(|corners| self.live.is_movable(corners[0])).collect();
+        let corners: Vec<u32> = self.subject.triangles().map(|corners| corners[0]).collect();
+        self.movable = corners.iter().map(|&corner| self.live.is_movable(corner)).collect();
+        // Jaws are two things and one tool.
+        let mut known = BTreeSet::new();
+        let mut is_new = |triangle: &u32| {
+            let thing = self.live.thing_of(corners[*triangle as usize]);
+            thing.is_some_and(|thing| known.insert(thing.tool().to_owned()))
+        };
+        let movable = self.subject.things().into_iter().filter(|&thing| self.movable[thing as usize]);
+        self.tool_triangles = movable.filter(|triangle| is_new(triangle)).collect();
     }
 
     fn step(&mut self) {
@@ -864,6 +879,7 @@ impl<'s> Player<'s> {
         frame.number = playback.frames;
         frame.subject = self.subject.clone();
         frame.movable = Arc::clone(&self.movable);
+        frame.tool_triangles = Arc::clone(&self.tool_triangles);
         frame.tools = playback.hold.tools().map(|tool| tool.map(str::to_owned));
         frame.critical = playback.seen.critical;
         frame.time = self.live.simulation.time();

@@ -520,34 +520,7 @@ fn the_examples_start_and_play() {
 }
 
 /// A block on a table, and jaws over it.
-const GRASPED: &str = "[scene]
-until = 1
-gravity = [0, 0, -9.81]
-[run]
-step = 2e-4
-[law.tissue]
-type = 'neo-hookean'
-young-modulus = 2e4
-poisson-ratio = 0.4
-[body.flap]
-mesh = { block = { size = [0.03, 0.006, 0.02], cells = [10, 2, 7] }, as = 'hexes' }
-law = 'tissue'
-element = 'hex8-full'
-density = 1000
-damping = 40
-[obstacle.floor]
-shape = 'half-space'
-[tool.grasper]
-shape = { jaws = { length = 0.04, width = 0.012, thickness = 0.004 } }
-at = [0.015, 0.003, 0.045]
-turn = [3.141592653589793, 0, 0]
-opening = { angle = 0.4, curve = 'hold' }
-ideal-grip = 0.2
-[contact.stands]
-between = ['flap', 'floor']
-[contact.holds]
-between = ['flap', 'grasper']
-";
+const GRASPED: &str = include_str!("support/grasped.toml");
 
 /// Forces of contacts come with the frames where a view asks for them: those of the floor carry what lies on it.
 #[test]
@@ -653,7 +626,8 @@ fn two_hands_pull_each_on_its_own_and_are_repeated() {
     let recording = session.end().unwrap();
     let once = replay(&world, &recording).unwrap();
     assert_eq!(once, replay(&world, &recording).unwrap());
-    assert!(once.held.is_none() && once.largest_force >= up.max(-down));
+    let end = one.hand(Which::Second).unwrap();
+    assert!(once.held == Some(end) && once.largest_force >= up.max(-down));
     let told = Recording::from_bytes(&recording.to_bytes().unwrap()).unwrap();
     assert_eq!(told, recording);
 }
@@ -680,6 +654,7 @@ fn a_tool_is_in_one_hand_and_tissue_in_the_other() {
     let led = wait(&mut session, |frame| frame.steps == 100);
     let place_now = Vector3::from(led.hand(Which::Second).unwrap()[0]);
     assert!((place_now - place).norm() < 1e-9, "{place_now:?} {place:?}");
+    assert_eq!(led.tool_triangles.len(), 1, "two jaws are one tool");
     session.order(Order::Hand(Hand::Take(jaw, 100.0)));
     let taken = wait(&mut session, |frame| frame.tools[0].is_some());
     assert_eq!((taken.tools[1].clone(), taken.hands), (None, [Some(0), None]));

@@ -1,5 +1,7 @@
 //! Tools that are led by keys, with one hand, while the mouse has the other one.
 
+use std::sync::Arc;
+
 use eframe::egui::{self, Key};
 use pliant_geometry::Vector3;
 
@@ -24,8 +26,7 @@ impl App {
         if self.hands[which as usize].take().is_some() {
             self.act_with(which, Hand::Release);
         }
-        let movable = |triangle: u32| self.frame.movable.get(triangle as usize).copied().unwrap_or(false);
-        let tools: Vec<u32> = self.port.subject.things().into_iter().filter(|&tool| movable(tool)).collect();
+        let tools = Arc::clone(&self.frame.tool_triangles);
         self.led = tools.get(next).map(|_| (next, which));
         let Some(&triangle) = tools.get(next) else { return };
         let Some(corners) = self.port.subject.triangles().nth(triangle as usize) else { return };

@@ -6,6 +6,7 @@ mod filming;
 mod finished;
 mod followed;
 mod glass;
+mod grasping;
 mod hands;
 mod keep;
 mod led;
@@ -222,6 +223,7 @@ impl App {
         let port = Viewport::new(context, style, camera)?;
         let session = begin(&world, &context.egui_ctx)?;
         let device = device::shared(state, &world);
+        let has_tools = !world.scene.tools.is_empty();
         let mut app = Self {
             session,
             frame: Frame::default(),
@@ -264,7 +266,7 @@ impl App {
             closed: BTreeSet::new(),
             frame_seconds: 0.0,
             painted: Instant::now(),
-            running_test: self_test.map(RunningTest::new),
+            running_test: self_test.map(|test| RunningTest::new(test, has_tools)),
             drawn: 0,
             context: context.egui_ctx.clone(),
             record,
