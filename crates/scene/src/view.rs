@@ -240,6 +240,7 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::source::Source;
     use crate::testing::{built, labelled, mistakes, scene};
 
     #[test]
@@ -255,6 +256,25 @@ mod tests {
         assert_eq!(scene.shown_as(&scene.view, 0.1).on.as_deref(), Some("skin"));
         let world = World::new(&scene).unwrap_or_else(|error| panic!("{}", error.plain()));
         assert_eq!(world.body_names(Some("skin")), [(0, "skin".to_owned())].into());
+    }
+
+    #[test]
+    fn axes_are_those_of_a_patient_where_all_bodies_are_meshed_from_images() {
+        let of = |meshes: &[&str]| {
+            let body = |(number, mesh): (usize, &&str)| {
+                format!(
+                    "[body.b{number}]\nmesh = {{ {mesh}, edge = 0.005 }}\nlaw = 'tissue'\ndensity = 1000\n"
+                )
+            };
+            let bodies: String = meshes.iter().enumerate().map(body).collect();
+            let law = "[law.tissue]\ntype = 'neo-hookean'\nyoung-modulus = 1e3\npoisson-ratio = 0.4\n";
+            let source = Source::parse("scene.toml", format!("[scene]\nuntil = 1\n{law}{bodies}"));
+            let scene = Scene::from_source(source.unwrap(), ".".into());
+            scene.unwrap_or_else(|error| panic!("{}", error.plain())).is_of_patient()
+        };
+        let (image, shape) = ("image = 'organ.nii.gz'", "organ = 'liver'");
+        assert!(of(&[image]) && of(&[image, image]));
+        assert!(!of(&[shape]) && !of(&[image, shape]));
     }
 
     #[test]

@@ -33,6 +33,8 @@ pub(crate) struct Seen {
     pub unconverged: u64,
     /// What is held: point [m] and force [N].
     pub held: Vec<[[f64; 3]; 2]>,
+    /// Where each hand is among it.
+    pub hands: [Option<usize>; 2],
     /// Forces of contacts, where they are asked for.
     pub contacts: Vec<PointForce>,
     /// Where bodies are held, moved and loaded, where that is asked for.

@@ -3,6 +3,8 @@
 //! A hand has no point: it holds the surface around the one that it took, within two edges of the elements there, with the
 //! weights of a Gaussian whose deviation is one edge. So a pull meets tissue as a grasper does, and not a single element. Its spring gets no
 //! longer than two edges, however far the mouse goes: its force is at most that long times its stiffness.
+//!
+//! There are two hands. Each holds tissue or a tool, and keeps it while the other one is led.
 
 use std::collections::HashSet;
 
@@ -32,7 +34,7 @@ pub enum Hand {
     Take(Point, f64),
     /// Pulls what it holds towards a place [m].
     Pull([f64; 3]),
-    /// Lets go; a tool stays.
+    /// Lets go; a tool stays where it is.
     Release,
     /// Pins the surface around a point where it is.
     Pin(Point),
@@ -44,16 +46,48 @@ pub enum Hand {
     Open(f64),
 }
 
-/// What is held at the moment: by the hand first, then by pins.
-#[derive(Clone, Debug, Default)]
-pub struct Hold {
-    grips: Vec<Grip>,
-    taken: Vec<Taken>,
-    by_hand: bool,
-    tool: Option<Tool>,
+/// One of the two hands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Which {
+    /// The first one.
+    First,
+    /// The second one.
+    Second,
 }
 
-/// A tool in the hand.
+impl Which {
+    /// Both of them.
+    pub const BOTH: [Self; 2] = [Self::First, Self::Second];
+
+    /// The other one.
+    pub fn other(self) -> Self {
+        match self {
+            Self::First => Self::Second,
+            Self::Second => Self::First,
+        }
+    }
+}
+
+/// What is held at the moment, by hands and by pins.
+#[derive(Clone, Debug, Default)]
+pub struct Hold {
+    /// Of hands that hold tissue, in their order, then of pins.
+    grips: Vec<Grip>,
+    taken: Vec<Taken>,
+    hands: [Holds; 2],
+}
+
+/// What a hand holds.
+#[derive(Clone, Debug, Default)]
+enum Holds {
+    #[default]
+    Nothing,
+    Tissue,
+    Tool(Tool),
+}
+
+/// A tool in a hand.
 #[derive(Clone, Debug)]
 struct Tool {
     name: String,
@@ -186,64 +220,97 @@ fn around(point: &Point, subject: &Subject, live: &Live) -> Option<Nodes> {
 }
 
 impl Hold {
-    /// Whether the first of what is held is the hand's.
-    pub fn by_hand(&self) -> bool {
-        self.by_hand || self.tool.is_some()
+    /// Where each hand is among [`Self::shown`]; `None` of one that holds nothing.
+    pub fn hands(&self) -> [Option<usize>; 2] {
+        let [first, second] = Which::BOTH.map(|which| usize::from(self.holds(which)));
+        [(first > 0).then_some(0), (second > 0).then_some(first)]
     }
 
-    /// The tool that the hand holds.
-    pub fn tool(&self) -> Option<&str> {
-        self.tool.as_ref().map(|tool| tool.name.as_str())
+    /// Whether a hand holds something.
+    pub fn holds(&self, which: Which) -> bool {
+        !matches!(self.hands[which as usize], Holds::Nothing)
     }
 
-    /// Of each grip the point [m], and its force on the body [N].
+    /// The tool that each hand holds.
+    pub fn tools(&self) -> [Option<&str>; 2] {
+        [0, 1].map(|hand| match &self.hands[hand] {
+            Holds::Tool(tool) => Some(tool.name.as_str()),
+            _ => None,
+        })
+    }
+
+    /// Of what each hand holds, then of each pin, the point [m], and the force on the body [N].
     pub fn shown<'h>(&'h self, live: &'h Live) -> impl Iterator<Item = [[f64; 3]; 2]> + 'h {
-        let tool = self.tool.iter().filter_map(|tool| {
-            let now = live.simulation.tool(&tool.name)?;
-            Some([tool.held(&now.pose).into(), now.force.map(|f| -f)])
-        });
-        tool.chain(self.grips.iter().zip(&self.taken).map(|(grip, taken)| {
-            let [middle, force] = live.simulation.pulled(grip);
-            [(Vector3::from(middle) + taken.offset).into(), force]
-        }))
+        let grip = |at: usize| {
+            let [middle, force] = live.simulation.pulled(&self.grips[at]);
+            [(Vector3::from(middle) + self.taken[at].offset).into(), force]
+        };
+        let hand = move |which: Which| match &self.hands[which as usize] {
+            Holds::Nothing => None,
+            Holds::Tissue => Some(grip(self.grip_of(which))),
+            Holds::Tool(tool) => {
+                let now = live.simulation.tool(&tool.name)?;
+                Some([tool.held(&now.pose).into(), now.force.map(|f| -f)])
+            }
+        };
+        Which::BOTH.into_iter().filter_map(hand).chain((self.first_pin()..self.grips.len()).map(grip))
     }
 
-    /// Does what hand and pins do; the stiffness stays below the bound of stable steps. False where the solver knows no hand.
-    pub fn take(&mut self, hand: &Hand, subject: &Subject, live: &mut Live) -> bool {
+    /// The number of the grip of a hand, or that it would have.
+    fn grip_of(&self, which: Which) -> usize {
+        let before = &self.hands[..which as usize];
+        before.iter().filter(|holds| matches!(holds, Holds::Tissue)).count()
+    }
+
+    /// The number of the first grip that is a pin's.
+    fn first_pin(&self) -> usize {
+        self.hands.iter().filter(|holds| matches!(holds, Holds::Tissue)).count()
+    }
+
+    /// Does what a hand does, or pins; the stiffness stays below the bound of stable steps. False where the solver knows no hand.
+    pub fn take(&mut self, which: Which, does: &Hand, subject: &Subject, live: &mut Live) -> bool {
         let grip = |point: &Point, stiffness| grip(point, stiffness, subject, &*live);
         let mut found = true;
-        match hand {
+        match does {
             Hand::Take(point, stiffness) => {
-                self.release();
-                self.tool = Tool::at(point, subject, live);
-                if self.tool.is_some() {
+                self.release(which);
+                if let Some(tool) = Tool::at(point, subject, live) {
+                    // A tool is in one hand.
+                    if self.tools()[which.other() as usize] == Some(&tool.name) {
+                        self.release(which.other());
+                    }
+                    self.hands[which as usize] = Holds::Tool(tool);
                     return true;
                 }
                 match grip(point, *stiffness) {
                     Some((grip, taken)) => {
-                        self.grips.insert(0, grip);
-                        self.taken.insert(0, taken);
-                        self.by_hand = true;
+                        let at = self.grip_of(which);
+                        self.grips.insert(at, grip);
+                        self.taken.insert(at, taken);
+                        self.hands[which as usize] = Holds::Tissue;
                     }
                     None => found = false,
                 }
             }
             Hand::Turn(by) => {
-                let Some(tool) = &mut self.tool else { return true };
+                let Holds::Tool(tool) = &mut self.hands[which as usize] else { return true };
                 let place = tool.held(&tool.goal);
                 return tool.lead(&place, &(*by).into(), live);
             }
-            Hand::Open(by) => return self.tool.as_mut().is_none_or(|tool| tool.open(*by, live)),
-            Hand::Pull(place) if self.tool.is_some() => {
-                let lead = |tool: &mut Tool| tool.lead(&(*place).into(), &Vector3::zeros(), live);
-                return self.tool.as_mut().is_none_or(lead);
+            Hand::Open(by) => {
+                let Holds::Tool(tool) = &mut self.hands[which as usize] else { return true };
+                return tool.open(*by, live);
             }
-            Hand::Pull(place) if self.by_hand => {
-                self.taken[0].goal = Vector3::from(*place) - self.taken[0].offset;
-                self.stretch(live);
-            }
-            Hand::Pull(_) => {}
-            Hand::Release => self.release(),
+            Hand::Pull(place) => match &mut self.hands[which as usize] {
+                Holds::Tool(tool) => return tool.lead(&(*place).into(), &Vector3::zeros(), live),
+                Holds::Tissue => {
+                    let at = self.grip_of(which);
+                    self.taken[at].goal = Vector3::from(*place) - self.taken[at].offset;
+                    self.stretch(at, live);
+                }
+                Holds::Nothing => {}
+            },
+            Hand::Release => self.release(which),
             Hand::Pin(point) => match grip(point, f64::INFINITY) {
                 Some((grip, taken)) => {
                     self.grips.push(grip);
@@ -252,7 +319,7 @@ impl Hold {
                 None => found = false,
             },
             Hand::Unpin(pin) => {
-                let at = pin + usize::from(self.by_hand);
+                let at = pin + self.first_pin();
                 if at < self.grips.len() {
                     self.grips.remove(at);
                     self.taken.remove(at);
@@ -262,21 +329,25 @@ impl Hold {
         self.hold(live) && found
     }
 
-    /// After a step: pulls on towards the goal. The force stays below its limit while what is held gives way.
+    /// After a step: hands pull on towards their goals. Their forces stay below their limits while what is held gives way.
     pub fn follow(&mut self, live: &mut Live) {
-        if self.follows() && self.stretch(live) {
+        let mut moved = false;
+        for at in 0..self.first_pin() {
+            moved |= self.taken[at].longest.is_finite() && self.stretch(at, live);
+        }
+        if moved {
             self.hold(live);
         }
     }
 
-    /// Whether the end of the hand's spring goes along with what is held.
+    /// Whether the end of a hand's spring goes along with what is held.
     pub fn follows(&self) -> bool {
-        self.by_hand && self.taken[0].longest.is_finite()
+        self.taken[..self.first_pin()].iter().any(|taken| taken.longest.is_finite())
     }
 
-    /// Brings the end of the hand's spring as near to the goal as its length allows; whether it moves.
-    fn stretch(&mut self, live: &Live) -> bool {
-        let (grip, Taken { goal, longest, .. }) = (&mut self.grips[0], self.taken[0]);
+    /// Brings the end of a hand's spring as near to the goal as its length allows; whether it moves.
+    fn stretch(&mut self, at: usize, live: &Live) -> bool {
+        let (grip, Taken { goal, longest, .. }) = (&mut self.grips[at], self.taken[at]);
         let held = Vector3::from(live.simulation.pulled(grip)[0]);
         let way = goal - held;
         let length = way.norm();
@@ -286,7 +357,11 @@ impl Hold {
 
     /// Holds the same in another run.
     pub fn hold_on(&mut self, live: &mut Live) -> bool {
-        self.tool.take_if(|tool| live.simulation.tool(&tool.name).is_none());
+        for hand in &mut self.hands {
+            if matches!(hand, Holds::Tool(tool) if live.simulation.tool(&tool.name).is_none()) {
+                *hand = Holds::Nothing;
+            }
+        }
         for (grip, taken) in self.grips.iter_mut().zip(&self.taken) {
             grip.stiffness = taken.stiffness.min(live.simulation.stiffest(grip));
         }
@@ -301,11 +376,11 @@ impl Hold {
         held
     }
 
-    fn release(&mut self) {
-        self.tool = None;
-        if std::mem::take(&mut self.by_hand) {
-            self.grips.remove(0);
-            self.taken.remove(0);
+    fn release(&mut self, which: Which) {
+        let at = self.grip_of(which);
+        if let Holds::Tissue = std::mem::take(&mut self.hands[which as usize]) {
+            self.grips.remove(at);
+            self.taken.remove(at);
         }
     }
 }

@@ -18,7 +18,7 @@ mod window;
 
 pub use device::INSPECTION;
 pub use followed::FollowedPoint;
-pub use hand::{Hand, Hold, Point, pick};
+pub use hand::{Hand, Hold, Point, Which, pick};
 pub use marks::{Mark, Marked};
 pub use parameters::{Number, Parameter, parameters, with_numbers};
 pub use recording::{Break, Done, Move, Recording, Surface};

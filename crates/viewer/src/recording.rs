@@ -4,18 +4,30 @@ use pliant_geometry::CellLabel;
 use pliant_scene::format::ViewTable;
 use serde::{Deserialize, Serialize};
 
-use crate::hand::Hand;
+use crate::hand::{Hand, Which};
 use crate::parameters::Number;
 
 /// Something done to a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Done {
-    /// By hand.
+    /// By the first hand, or to a pin.
     Hand(Hand),
     /// Numbers of the scene that are others from then on; all others are as in the file.
     Numbers(Vec<Number>),
     /// Another surface is shown, whose triangles are held from then on.
     Surface(Surface),
+    /// By the second hand.
+    Second(Hand),
+}
+
+impl Done {
+    /// What one of the hands did.
+    pub(crate) fn by(which: Which, hand: Hand) -> Self {
+        match which {
+            Which::First => Self::Hand(hand),
+            Which::Second => Self::Second(hand),
+        }
+    }
 }
 
 /// What of a view decides which triangles are drawn.

@@ -10,7 +10,7 @@ use pliant_scene::format::ViewTable;
 use pliant_sim::State;
 use serde::Serialize;
 
-use crate::hand::Hold;
+use crate::hand::{Hand, Hold, Which};
 use crate::parameters::{Number, with_numbers};
 use crate::recording::{Break, Done, Move, Recording, Surface};
 use crate::session::{FRAME, Order, Session};
@@ -23,9 +23,9 @@ pub struct Replayed {
     pub time: f64,
     /// A fingerprint of the state.
     pub fingerprint: u64,
-    /// The largest force of the hand [N].
+    /// The largest force of a hand [N].
     pub largest_force: f64,
-    /// The point that the hand holds in the end [m] and the force on it [N].
+    /// The point that a hand holds in the end, the first one where both do [m] and the force on it [N].
     pub held: Option<[[f64; 3]; 2]>,
     /// Force [N] of each constraint in the end.
     pub reactions: Vec<[f64; 3]>,
@@ -69,6 +69,7 @@ pub fn replay_in_real_time(world: &World, recording: &Recording) -> Result<Recor
     for then in &recording.moves {
         let order = match &then.done {
             Done::Hand(hand) => Order::Hand(*hand),
+            Done::Second(hand) => Order::Second(*hand),
             Done::Numbers(numbers) => {
                 Order::Change(Box::new(with_numbers(&world.scene, numbers)?), numbers.clone())
             }
@@ -155,13 +156,16 @@ impl<'r> Replay<'r> {
                 self.moves.split_first().filter(|(then, _)| then.steps <= self.steps)
             {
                 self.moves = rest;
-                match &then.done {
-                    Done::Hand(hand) => {
-                        if then.evaluated {
-                            live.mesh().map_err(|failure| failure.message)?;
-                        }
-                        self.hold.take(hand, subject, &mut live);
+                let mut by = |which, hand: &Hand| -> Result<(), String> {
+                    if then.evaluated {
+                        live.mesh().map_err(|failure| failure.message)?;
                     }
+                    self.hold.take(which, hand, subject, &mut live);
+                    Ok(())
+                };
+                match &then.done {
+                    Done::Hand(hand) => by(Which::First, hand)?,
+                    Done::Second(hand) => by(Which::Second, hand)?,
                     Done::Surface(surface) => {
                         self.surface = Some(surface);
                         let view = surface.put_into(&world.scene.view);
@@ -185,7 +189,8 @@ impl<'r> Replay<'r> {
             let steps = if self.hold.follows() { 1 } else { next - self.steps };
             self.steps += live.simulation.step(steps).map_err(|failure| failure.message)?;
             self.hold.follow(&mut live);
-            if let Some([_, force]) = self.hold.shown(&live).next().filter(|_| self.hold.by_hand()) {
+            let hands = self.hold.hands().into_iter().flatten().count();
+            for [_, force] in self.hold.shown(&live).take(hands) {
                 self.largest_force = self.largest_force.max(Vector3::from(force).norm());
             }
         }
@@ -199,7 +204,7 @@ impl<'r> Replay<'r> {
             time,
             fingerprint,
             largest_force: self.largest_force,
-            held: self.hold.shown(live).next().filter(|_| self.hold.by_hand()),
+            held: self.hold.shown(live).next().filter(|_| self.hold.hands() != [None; 2]),
             reactions: live.reactions(),
             breaks: Vec::new(),
         })

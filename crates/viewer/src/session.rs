@@ -1,6 +1,7 @@
 //! A scene on a thread of its own: it is played there in real time, and handed over frame by frame. Neither side ever waits for the
 //! other: orders go through a channel, the newest frame lies in one of three places of which each side holds one.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
@@ -19,7 +20,7 @@ use pliant_sim::{Failure, State, number};
 
 use crate::device::{Seen, point_value};
 use crate::followed::{Followed, FollowedPoint};
-use crate::hand::{Hand, Hold, Point};
+use crate::hand::{Hand, Hold, Point, Which};
 use crate::marks::{Mark, marks};
 use crate::parameters::Number;
 use crate::recording::{Break, Done, Move, Recording, Surface};
@@ -43,8 +44,10 @@ pub enum Order {
     Back(u64),
     /// Simulated seconds a second.
     Speed(f64),
-    /// Changes what a hand or a pin holds.
+    /// Changes what the first hand or a pin holds.
     Hand(Hand),
+    /// Changes what the second hand or a pin holds.
+    Second(Hand),
     /// Goes on as another world from the next step on, from where the run stands: that of numbers which are others than in the file.
     Change(Box<World>, Vec<Number>),
     /// Finds where bodies are held, moved and loaded in each frame, or not any more.
@@ -95,18 +98,22 @@ pub struct Frame {
     pub least_gap: Option<f64>,
     /// Steps that were taken though they had not converged.
     pub unconverged: u64,
-    /// What is held: the point [m] and the force on the body [N] of each grip, hand first.
+    /// What is held: the point [m] and the force on the body [N] of each hand that holds something, then of each pin.
     pub held: Vec<[[f64; 3]; 2]>,
+    /// Where each hand is among what is held; `None` of one that holds nothing.
+    pub hands: [Option<usize>; 2],
     /// Forces of contacts on the nodes, where they are asked for.
     pub contacts: Vec<PointForce>,
     /// Where bodies are held, moved and loaded, where that is asked for.
     pub marks: Vec<Mark>,
     /// Points that the user follows, in the order in which they were picked.
     pub followed: Vec<FollowedPoint>,
-    /// The tool that the hand holds.
-    pub tool: Option<String>,
+    /// The tool that each hand holds.
+    pub tools: [Option<String>; 2],
     /// Whether each triangle of the subject can be taken hold of: those of bodies and tools, not those of obstacles.
     pub movable: Arc<[bool]>,
+    /// A triangle of each tool.
+    pub tool_triangles: Arc<[u32]>,
     /// Steps since the frame before.
     pub steps_a_frame: u64,
     /// Mean wall time of a step [s].
@@ -127,8 +134,21 @@ pub struct Frame {
     pub note: Option<String>,
     /// Names and units of the sample of this instant.
     pub columns: Arc<[Column]>,
-    /// The sample: force of the hand, energies, reactions and probes.
+    /// The sample: forces of the hands, energies, reactions and probes.
     pub sample: Vec<f64>,
+}
+
+impl Frame {
+    /// What each pin holds: the point [m] and the force on the body [N].
+    pub fn pins(&self) -> &[[[f64; 3]; 2]] {
+        let hands = self.hands.iter().flatten().count();
+        self.held.get(hands..).unwrap_or_default()
+    }
+
+    /// What a hand holds: the point [m] and the force on the body [N].
+    pub fn hand(&self, which: Which) -> Option<[[f64; 3]; 2]> {
+        self.held.get(self.hands[which as usize]?).copied()
+    }
 }
 
 /// A scene that is played on another thread.
@@ -287,6 +307,8 @@ struct Player<'s> {
     subject: Arc<Subject>,
     /// Whether each triangle of the subject can be taken hold of.
     movable: Arc<[bool]>,
+    /// A triangle of each tool.
+    tool_triangles: Arc<[u32]>,
     /// Regions whose cells are not shown.
     hidden: Vec<Region>,
     live: Live,
@@ -455,6 +477,7 @@ impl<'s> Player<'s> {
             world,
             subject: known.unwrap_or_default(),
             movable: Arc::default(),
+            tool_triangles: Arc::default(),
             hidden: Vec::new(),
             live,
             on_device,
@@ -551,7 +574,8 @@ impl<'s> Player<'s> {
                 playback.pace.speed = speed.clamp(1e-6, 1e6);
                 playback.pace.anchor(self.live.simulation.time());
             }
-            Order::Hand(hand) => self.hold(sent, &hand),
+            Order::Hand(hand) => self.hold(sent, Which::First, &hand),
+            Order::Second(hand) => self.hold(sent, Which::Second, &hand),
             Order::Change(world, numbers) => playback.change = Some((world, numbers)),
             Order::Marks(marked) => (playback.marked, playback.seen.at) = (marked, None),
             Order::Probe(point) => self.follow(&point),
@@ -567,7 +591,7 @@ impl<'s> Player<'s> {
         None
     }
 
-    fn hold(&mut self, sent: Instant, hand: &Hand) {
+    fn hold(&mut self, sent: Instant, which: Which, hand: &Hand) {
         // Where it takes hold has to be known.
         if self.on_device && matches!(hand, Hand::Take(..) | Hand::Pin(_)) {
             self.inspect();
@@ -579,7 +603,7 @@ impl<'s> Player<'s> {
             self.sound.touch();
         }
         let evaluated = self.live.simulation.is_evaluated();
-        let held = self.playback.hold.take(hand, &self.subject, &mut self.live);
+        let held = self.playback.hold.take(which, hand, &self.subject, &mut self.live);
         let playback = &mut self.playback;
         if !held {
             playback.note = Some("this solver knows no hand: it does not pull".into());
@@ -587,7 +611,7 @@ impl<'s> Player<'s> {
             playback.note = None;
         }
         let number = playback.recording.as_ref().map_or(0, |recording| recording.moves.len());
-        playback.record(evaluated, sent, Done::Hand(*hand));
+        playback.record(evaluated, sent, Done::by(which, *hand));
         if held && playback.is_going() {
             playback.waiting.push((sent, playback.steps + u64::from(evaluated), number));
         }
@@ -603,7 +627,7 @@ impl<'s> Player<'s> {
     fn name_columns(&mut self) {
         let axes =
             |name: String, unit| ["x", "y", "z"].map(|axis| Column { name: format!("{name}.{axis}"), unit });
-        let mut columns = axes("hand".into(), "N").to_vec();
+        let mut columns = [axes("hand".into(), "N"), axes("second-hand".into(), "N")].concat();
         columns.extend_from_slice(self.live.columns());
         for number in 1..=self.playback.followed.len() {
             columns.extend(axes(format!("point.{number}.displacement"), "m"));
@@ -642,7 +666,16 @@ impl<'s> Player<'s> {
     }
 
     fn find_movable(&mut self) {
-        self.movable = self.subject.triangles().map(|corners| self.live.is_movable(corners[0])).collect();
+        let corners: Vec<u32> = self.subject.triangles().map(|corners| corners[0]).collect();
+        self.movable = corners.iter().map(|&corner| self.live.is_movable(corner)).collect();
+        // Jaws are two things and one tool.
+        let mut known = BTreeSet::new();
+        let mut is_new = |triangle: &u32| {
+            let thing = self.live.thing_of(corners[*triangle as usize]);
+            thing.is_some_and(|thing| known.insert(thing.tool().to_owned()))
+        };
+        let movable = self.subject.things().into_iter().filter(|&thing| self.movable[thing as usize]);
+        self.tool_triangles = movable.filter(|triangle| is_new(triangle)).collect();
     }
 
     fn step(&mut self) {
@@ -714,18 +747,22 @@ impl<'s> Player<'s> {
         }
     }
 
-    /// Restores a state, releases the hand and continues the recording. Returns the time [s] of the state; `None` if the stepper rejects it.
+    /// Restores a state, releases the hands and continues the recording. Returns the time [s] of the state; `None` if the stepper rejects it.
     fn restore(&mut self, Sound { state, steps, hold, moves }: Sound) -> Option<f64> {
         self.live.restore(state).ok()?;
         let playback = &mut self.playback;
         (playback.hold, playback.steps, playback.owed) = (hold, steps, 0);
-        playback.hold.take(&Hand::Release, &self.subject, &mut self.live);
         playback.waiting.clear();
         let time = self.live.simulation.time();
         if let Some(recording) = &mut playback.recording {
             recording.moves.truncate(moves);
         }
-        playback.record(false, Instant::now(), Done::Hand(Hand::Release));
+        for which in Which::BOTH {
+            if playback.hold.holds(which) {
+                playback.hold.take(which, &Hand::Release, &self.subject, &mut self.live);
+                playback.record(false, Instant::now(), Done::by(which, Hand::Release));
+            }
+        }
         playback.pace.anchor(time);
         playback.seen.at = None;
         Some(time)
@@ -761,10 +798,11 @@ impl<'s> Player<'s> {
         let seen = &mut playback.seen;
         seen.held.clear();
         seen.held.extend(playback.hold.shown(&self.live));
-        let [x, y, z] =
-            seen.held.first().filter(|_| playback.hold.by_hand()).map_or([0.0; 3], |[_, force]| *force);
+        seen.hands = playback.hold.hands();
         seen.sample.clear();
-        seen.sample.extend([x, y, z]);
+        for hand in seen.hands {
+            seen.sample.extend(hand.and_then(|at| seen.held.get(at)).map_or([0.0; 3], |[_, force]| *force));
+        }
         self.live.sample(&mut seen.sample);
         seen.followed.clear();
         for followed in &playback.followed {
@@ -814,6 +852,7 @@ impl<'s> Player<'s> {
             frame.energies = playback.seen.energies;
             (frame.least_gap, frame.unconverged) = (playback.seen.least_gap, playback.seen.unconverged);
             frame.held.clone_from(&playback.seen.held);
+            frame.hands = playback.seen.hands;
             frame.contacts.clone_from(&playback.seen.contacts);
             frame.marks.clone_from(&playback.seen.marks);
             frame.followed.clone_from(&playback.seen.followed);
@@ -830,7 +869,8 @@ impl<'s> Player<'s> {
         frame.number = playback.frames;
         frame.subject = self.subject.clone();
         frame.movable = Arc::clone(&self.movable);
-        frame.tool = playback.hold.tool().map(str::to_owned);
+        frame.tool_triangles = Arc::clone(&self.tool_triangles);
+        frame.tools = playback.hold.tools().map(|tool| tool.map(str::to_owned));
         frame.critical = playback.seen.critical;
         frame.time = self.live.simulation.time();
         frame.steps = playback.steps;

@@ -9,8 +9,8 @@ use pliant_picture::{Camera, Projection, Subject};
 use pliant_scene::World;
 use pliant_scene::format::ViewTable;
 use pliant_viewer::{
-    Done, Frame, Hand, Lags, Number, Order, Point, Recording, Samples, Session, parameters, pick, replay,
-    replay_in_real_time, with_numbers,
+    Done, Frame, Hand, Lags, Number, Order, Point, Recording, Samples, Session, Which, parameters, pick,
+    replay, replay_in_real_time, with_numbers,
 };
 use support::{BALL, shell, subject, wait, world};
 
@@ -520,34 +520,7 @@ fn the_examples_start_and_play() {
 }
 
 /// A block on a table, and jaws over it.
-const GRASPED: &str = "[scene]
-until = 1
-gravity = [0, 0, -9.81]
-[run]
-step = 2e-4
-[law.tissue]
-type = 'neo-hookean'
-young-modulus = 2e4
-poisson-ratio = 0.4
-[body.flap]
-mesh = { block = { size = [0.03, 0.006, 0.02], cells = [10, 2, 7] }, as = 'hexes' }
-law = 'tissue'
-element = 'hex8-full'
-density = 1000
-damping = 40
-[obstacle.floor]
-shape = 'half-space'
-[tool.grasper]
-shape = { jaws = { length = 0.04, width = 0.012, thickness = 0.004 } }
-at = [0.015, 0.003, 0.045]
-turn = [3.141592653589793, 0, 0]
-opening = { angle = 0.4, curve = 'hold' }
-ideal-grip = 0.2
-[contact.stands]
-between = ['flap', 'floor']
-[contact.holds]
-between = ['flap', 'grasper']
-";
+const GRASPED: &str = include_str!("support/grasped.toml");
 
 /// Forces of contacts come with the frames where a view asks for them: those of the floor carry what lies on it.
 #[test]
@@ -589,7 +562,7 @@ fn a_tool_is_led_by_hand_and_repeated() {
     session.order(Order::Hand(Hand::Open(-0.22)));
     session.order(Order::Step(400));
     let closed = wait(&mut session, |frame| frame.steps == 400);
-    assert_eq!(closed.tool.as_deref(), Some("grasper"));
+    assert_eq!(closed.tools, [Some("grasper".to_owned()), None]);
     for step in 1..=20 {
         let place = taken + Vector3::z() * (0.001 * f64::from(step));
         session.order(Order::Hand(Hand::Pull(place.into())));
@@ -608,9 +581,81 @@ fn a_tool_is_led_by_hand_and_repeated() {
     assert!(lowest > 0.015, "{lowest} m");
     session.order(Order::Hand(Hand::Release));
     session.order(Order::Step(1));
-    assert!(wait(&mut session, |frame| frame.steps == steps + 1).tool.is_none());
+    assert!(wait(&mut session, |frame| frame.steps == steps + 1).tools == [None, None]);
     let recording = session.end().unwrap();
     let once = replay(&world, &recording).unwrap();
     assert_eq!(once, replay(&world, &recording).unwrap());
     assert!(once.largest_force > 0.9 * weight, "{once:?}");
+}
+
+/// Two hands that pull at opposite sides of a ball: each goes on while the other one is led or lets go, and a replay comes to the same bits.
+#[test]
+fn two_hands_pull_each_on_its_own_and_are_repeated() {
+    let world = world(BALL);
+    let mut session = Session::start(world.clone(), || ()).unwrap();
+    session.order(Order::Record);
+    let first = wait(&mut session, |frame| !frame.points.is_empty());
+    let place = |t: u32| {
+        let corners = first.subject.triangles().nth(t as usize).unwrap();
+        corners.map(|p| first.points[p as usize]).iter().sum::<Vector3>() / 3.0
+    };
+    let count = first.subject.triangle_count() as u32;
+    let extreme = |sign: f64| (0..count).max_by(|&a, &b| (sign * place(a).y).total_cmp(&(sign * place(b).y)));
+    let sides = [1.0, -1.0].map(|sign| extreme(sign).unwrap());
+    let point = |triangle| Point { triangle, weights: [1.0 / 3.0; 3] };
+    session.order(Order::Second(Hand::Take(point(sides[1]), 50.0)));
+    let frame = wait(&mut session, |frame| frame.held.len() == 1);
+    assert_eq!((frame.hands, frame.hand(Which::First)), ([None, Some(0)], None));
+    session.order(Order::Hand(Hand::Take(point(sides[0]), 50.0)));
+    wait(&mut session, |frame| frame.hands == [Some(0), Some(1)]);
+    session.order(Order::Hand(Hand::Pin(point(count / 2))));
+    let pull = |t: u32, by: f64| Hand::Pull((place(t) + Vector3::y() * by).into());
+    session.order(Order::Hand(pull(sides[0], 0.01)));
+    session.order(Order::Second(pull(sides[1], -0.02)));
+    session.order(Order::Step(200));
+    let both = wait(&mut session, |frame| frame.steps == 200);
+    let [up, down] = Which::BOTH.map(|which| both.hand(which).unwrap()[1][1]);
+    assert!(up > 0.0 && down < 0.0 && both.pins().len() == 1, "{up} N, {down} N");
+    let last = |name: &str| both.sample[both.columns.iter().position(|own| own.name == name).unwrap()];
+    assert_eq!([last("hand.y"), last("second-hand.y")], [up, down]);
+    session.order(Order::Hand(Hand::Release));
+    session.order(Order::Step(50));
+    let one = wait(&mut session, |frame| frame.steps == 250);
+    assert_eq!((one.hands, one.held.len()), ([None, Some(0)], 2));
+    assert!(one.hand(Which::Second).unwrap()[1][1] < 0.0, "the second hand still pulls");
+    let recording = session.end().unwrap();
+    let once = replay(&world, &recording).unwrap();
+    assert_eq!(once, replay(&world, &recording).unwrap());
+    let end = one.hand(Which::Second).unwrap();
+    assert!(once.held == Some(end) && once.largest_force >= up.max(-down));
+    let told = Recording::from_bytes(&recording.to_bytes().unwrap()).unwrap();
+    assert_eq!(told, recording);
+}
+
+/// A hand keeps the tissue while the other one leads the tool, and takes the tool over.
+#[test]
+fn a_tool_is_in_one_hand_and_tissue_in_the_other() {
+    let mut session = Session::start(world(GRASPED), || ()).unwrap();
+    let first = wait(&mut session, |frame| !frame.points.is_empty());
+    let middle = |t: [u32; 3]| t.map(|p| first.points[p as usize]).iter().sum::<Vector3>() / 3.0;
+    let at = |wanted: &dyn Fn(Vector3) -> bool| {
+        let triangle = first.subject.triangles().position(|corners| wanted(middle(corners))).unwrap();
+        Point { triangle: triangle as u32, weights: [1.0 / 3.0; 3] }
+    };
+    let jaw = at(&|place| place.z > 0.03);
+    let body = at(&|place| (place.z - 0.02).abs() < 1e-9 && (place.y - 0.003).abs() < 0.003);
+    session.order(Order::Second(Hand::Take(jaw, 100.0)));
+    session.order(Order::Hand(Hand::Take(body, 20.0)));
+    let frame = wait(&mut session, |frame| frame.hands == [Some(0), Some(1)]);
+    assert_eq!(frame.tools, [None, Some("grasper".to_owned())]);
+    let place = Vector3::from(frame.hand(Which::Second).unwrap()[0]) + Vector3::z() * 0.01;
+    session.order(Order::Second(Hand::Pull(place.into())));
+    session.order(Order::Step(100));
+    let led = wait(&mut session, |frame| frame.steps == 100);
+    let place_now = Vector3::from(led.hand(Which::Second).unwrap()[0]);
+    assert!((place_now - place).norm() < 1e-9, "{place_now:?} {place:?}");
+    assert_eq!(led.tool_triangles.len(), 1, "two jaws are one tool");
+    session.order(Order::Hand(Hand::Take(jaw, 100.0)));
+    let taken = wait(&mut session, |frame| frame.tools[0].is_some());
+    assert_eq!((taken.tools[1].clone(), taken.hands), (None, [Some(0), None]));
 }

@@ -82,6 +82,19 @@ fn the_window_draws_picks_pins_and_pulls_and_what_holds_the_body_holds_against_t
     }
 }
 
+/// Keys take the grasper, move it, turn it, and close its jaws.
+#[test]
+fn tools_are_led_by_keys() {
+    if !has_gpu() {
+        return;
+    }
+    let Some(screen) = Screen::start() else { return };
+    let workshop = Workshop::new(include_str!("../../../viewer/tests/support/grasped.toml"));
+    let told = view(&workshop, &screen, &["--rehearse"]);
+    assert_eq!(told.code, 0, "{}", told.err);
+    assert!(told.out.contains("tools led by keys"), "{}", told.out);
+}
+
 #[test]
 fn the_window_is_on_the_device_of_a_scene_that_runs_on_one() {
     if !has_gpu() {

@@ -6,6 +6,8 @@ mod filming;
 mod finished;
 mod followed;
 mod glass;
+mod grasping;
+mod hands;
 mod keep;
 mod led;
 mod opening;
@@ -43,7 +45,7 @@ pub use self::self_test::SelfTest;
 use self::told::Told;
 use self::undo::Act;
 use self::viewport::Viewport;
-use crate::hand::Point;
+use crate::hand::{Point, Which};
 use crate::samples::Samples;
 use crate::session::{Frame, Order, Session};
 use pliant_scene::World;
@@ -156,9 +158,13 @@ struct App {
     hover: Option<(Point, Vector3)>,
     stiffness: f64,
     speed: f64,
-    /// Where the hand is [m], while it holds something.
-    holding: Option<Vector3>,
-    /// The largest force of this pull [N].
+    /// Where each hand is [m], while it holds something.
+    hands: [Option<Vector3>; 2],
+    /// The hand that the mouse leads.
+    mouse: Which,
+    /// From where the mouse is to where its hand is [m]; zero of a hand that it has taken.
+    beside: Vector3,
+    /// The largest force of these pulls [N].
     strongest: f64,
     orbiting: bool,
     help: bool,
@@ -186,8 +192,8 @@ struct App {
     reading: Option<Receiver<(PathBuf, Result<World, String>)>>,
     marks_shown: bool,
     filming: Filming,
-    /// The tool that keys lead, in the order of tools.
-    led: Option<usize>,
+    /// The tool that keys lead, in the order of tools, and the hand that holds it.
+    led: Option<(usize, Which)>,
     /// What can be opened.
     browser: Browser,
     message: Option<Told>,
@@ -217,6 +223,7 @@ impl App {
         let port = Viewport::new(context, style, camera)?;
         let session = begin(&world, &context.egui_ctx)?;
         let device = device::shared(state, &world);
+        let has_tools = !world.scene.tools.is_empty();
         let mut app = Self {
             session,
             frame: Frame::default(),
@@ -231,7 +238,9 @@ impl App {
             hover: None,
             stiffness: 200.0,
             speed: 1.0,
-            holding: None,
+            hands: [None; 2],
+            mouse: Which::First,
+            beside: Vector3::zeros(),
             strongest: 0.0,
             orbiting: false,
             help: false,
@@ -257,7 +266,7 @@ impl App {
             closed: BTreeSet::new(),
             frame_seconds: 0.0,
             painted: Instant::now(),
-            running_test: self_test.map(RunningTest::new),
+            running_test: self_test.map(|test| RunningTest::new(test, has_tools)),
             drawn: 0,
             context: context.egui_ctx.clone(),
             record,
@@ -317,8 +326,9 @@ impl App {
         }
         self.frame = frame.clone();
         self.port.fit_range();
-        let force = self.frame.held.first().map_or(0.0, |[_, force]| Vector3::from(*force).norm());
-        self.strongest = self.strongest.max(force);
+        let hands = Which::BOTH.into_iter().filter_map(|which| self.frame.hand(which));
+        let strongest = hands.map(|[_, force]| Vector3::from(force).norm()).fold(0.0, f64::max);
+        self.strongest = self.strongest.max(strongest);
         if inspected {
             self.samples.take(&self.frame);
         }
@@ -395,7 +405,7 @@ impl App {
         remember(&path);
         self.file = path;
         self.samples.clear();
-        self.holding = None;
+        self.let_go();
         if self.record.is_some() {
             self.session.order(Order::Record);
         }
@@ -443,6 +453,9 @@ impl App {
         if pressed(Key::K) {
             self.take_next_tool();
         }
+        if pressed(Key::B) {
+            self.change_hands();
+        }
         self.lead_tool(context);
         if pressed(Key::Escape) {
             self.browser.shown = false;
@@ -453,7 +466,7 @@ impl App {
     }
 
     fn reset(&mut self) {
-        self.holding = None;
+        self.let_go();
         self.samples.clear();
         self.closed.clear();
         self.acts.clear();

@@ -7,7 +7,7 @@ use pliant_scene::Part;
 use pliant_scene::format::{BodyModel, ColourBy, Component, FieldName, Labels, Nothing, SolverName};
 
 use super::App;
-use crate::hand::Hand;
+use crate::hand::{Hand, Which};
 use crate::recording::Surface;
 use crate::session::Order;
 
@@ -224,12 +224,13 @@ impl App {
             return;
         }
         ui.add(egui::Slider::new(&mut self.stiffness, 1.0..=5000.0).logarithmic(true).text("N/m"));
-        let force = self.frame.held.first().filter(|_| self.holding.is_some());
-        ui.label(match force {
-            Some([_, force]) => format!("pulls with {:.3} N", Vector3::from(*force).norm()),
-            None => "drag the body to pull it".into(),
+        let pulls = Which::BOTH.map(|which| Some(Vector3::from(self.frame.hand(which)?[1]).norm()));
+        ui.label(match pulls {
+            [Some(first), Some(second)] => format!("pull with {first:.3} N and {second:.3} N"),
+            [Some(newtons), None] | [None, Some(newtons)] => format!("pulls with {newtons:.3} N"),
+            [None, None] => "drag the body to pull it".into(),
         });
-        let pins = self.frame.held.len() - usize::from(force.is_some());
+        let pins = self.frame.pins().len();
         if pins > 0 && ui.button(format!("Remove {pins} pins")).clicked() {
             for pin in (0..pins).rev() {
                 self.act(Hand::Unpin(pin));

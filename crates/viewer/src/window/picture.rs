@@ -6,7 +6,7 @@ use pliant_picture::{Camera, arrow_note, arrow_unit, largest_force};
 
 use super::App;
 use super::viewport::scrolled;
-use crate::hand::{Hand, Point, pick};
+use crate::hand::{Hand, Point, Which, pick};
 use crate::marks::Marked;
 
 /// Length of the arrow of the strongest force of a pull on the screen.
@@ -25,7 +25,7 @@ const LOAD: Color32 = Color32::from_rgb(24, 128, 80);
 const FORCE: Color32 = Color32::from_rgb(190, 40, 40);
 
 /// Keys and what they do, as in `docs/viewer.md`.
-const KEYS: [(&str, &str); 27] = [
+const KEYS: [(&str, &str); 29] = [
     ("drag the body", "pull it"),
     ("drag a tool", "lead it; with Shift turn it about where it is held"),
     ("wheel while dragging a tool", "open and close its jaws"),
@@ -33,6 +33,11 @@ const KEYS: [(&str, &str); 27] = [
         "K, arrows, Page Up and Down",
         "take the next tool, and move it; with Shift turn it; Home and End open and close its jaws",
     ),
+    (
+        "B while dragging",
+        "keep it with this hand, go on with the other one; drag what is kept to take it again",
+    ),
+    ("B", "let go what the other hand keeps"),
     ("Ctrl or P + click", "pin it; on a pin, take it away"),
     ("Alt + click", "follow a point: read and plot it; two give their distance"),
     ("drag beside it", "turn the view"),
@@ -91,9 +96,9 @@ impl App {
     fn mouse(&mut self, context: &egui::Context, response: &egui::Response) {
         let Some(pointer) = context.pointer_latest_pos() else { return };
         let place = self.port.in_picture(pointer);
-        self.hover =
-            if response.contains_pointer() && self.holding.is_none() { self.hit(place) } else { None };
-        if self.holding.is_some() {
+        let pulls = self.pulls();
+        self.hover = if response.contains_pointer() && !pulls { self.hit(place) } else { None };
+        if pulls {
             context.set_cursor_icon(CursorIcon::Grabbing);
         } else if self.hover.is_some() {
             context.set_cursor_icon(CursorIcon::Grab);
@@ -118,35 +123,34 @@ impl App {
         if response.drag_started_by(PointerButton::Primary) {
             let origin = context.input(|input| input.pointer.press_origin()).unwrap_or(pointer);
             match self.hit(self.port.in_picture(origin)) {
-                Some((point, at)) => {
-                    self.holding = Some(at);
-                    self.led = None;
-                    self.strongest = 0.0;
-                    self.act(Hand::Take(point, self.stiffness));
-                }
+                _ if self.take_kept(origin) => {}
+                Some((point, at)) => self.take_hold(point, at),
                 None => self.orbiting = true,
             }
         }
         let by = response.drag_delta();
-        if let Some(at) = self.holding {
-            let turns = context.input(|input| input.modifiers.shift) && self.frame.tool.is_some();
+        let is_tool = self.frame.tools[self.mouse as usize].is_some();
+        if let Some(at) = self.hands[self.mouse as usize].filter(|_| !self.is_led(self.mouse)) {
+            let turns = context.input(|input| input.modifiers.shift) && is_tool;
             if response.dragged_by(PointerButton::Primary) && turns {
                 let [right, up, _] = self.port.camera.axes();
                 let turn = (up * f64::from(by.x) + right * f64::from(by.y)) * TURN;
                 self.act(Hand::Turn(turn.into()));
             } else if response.dragged_by(PointerButton::Primary) {
-                let to = on_plane(&self.port.camera, &at, place, self.port.aspect());
-                self.holding = Some(to);
+                let aspect = self.port.aspect();
+                let to = on_plane(&self.port.camera, &(at - self.beside), place, aspect) + self.beside;
+                self.hands[self.mouse as usize] = Some(to);
                 self.act(Hand::Pull(to.into()));
-            } else if self.led.is_none() {
-                self.holding = None;
+            } else {
+                self.hands[self.mouse as usize] = None;
                 self.act(Hand::Release);
             }
         }
         let scroll = if response.hovered() { scrolled(context) } else { 0.0 };
-        if scroll != 0.0 && self.holding.is_some() && self.frame.tool.is_some() {
+        let pulls = self.pulls();
+        if scroll != 0.0 && pulls && is_tool {
             self.act(Hand::Open(OPEN * f64::from(scroll)));
-        } else if self.holding.is_none() || scroll != 0.0 {
+        } else if !pulls || scroll != 0.0 {
             self.port.turn(context, response, self.orbiting);
         }
         if response.drag_stopped() {
@@ -167,11 +171,13 @@ impl App {
 
     /// The pin that is shown there.
     fn pin_at(&self, place: Pos2) -> Option<usize> {
-        let pins = self.frame.held.iter().skip(usize::from(self.holding.is_some()));
-        let seen = pins.map(|[point, _]| self.port.to_screen(&Vector3::from(*point)));
-        seen.enumerate()
-            .find(|(_, at)| at.is_some_and(|at| at.distance(place) <= PIN_SIZE + 3.0))
-            .map(|(pin, _)| pin)
+        self.frame.pins().iter().position(|[point, _]| self.is_at(point, place))
+    }
+
+    /// Whether a point that is held is shown there.
+    pub(super) fn is_at(&self, point: &[f64; 3], place: Pos2) -> bool {
+        let at = self.port.to_screen(&Vector3::from(*point));
+        at.is_some_and(|at| at.distance(place) <= PIN_SIZE + 3.0)
     }
 
     /// The forces of contacts as arrows.
@@ -216,16 +222,16 @@ impl App {
         }
     }
 
-    /// The force of the hand as an arrow with its newtons, the longest where it was strongest; and pins.
+    /// Forces of the hands as arrows with their newtons, the longest where one was strongest; and pins.
     fn draw_held(&self, painter: &egui::Painter) {
-        let hand = self.holding.is_some();
-        for (index, [point, force]) in self.frame.held.iter().enumerate() {
-            let [point, force] = [point, force].map(|v| Vector3::from(*v));
-            let Some(from) = self.port.to_screen(&point) else { continue };
-            if index > 0 || !hand {
-                painter.circle(from, PIN_SIZE, PIN, Stroke::new(1.5, Color32::WHITE));
-                continue;
+        for [point, _] in self.frame.pins() {
+            if let Some(at) = self.port.to_screen(&Vector3::from(*point)) {
+                painter.circle(at, PIN_SIZE, PIN, Stroke::new(1.5, Color32::WHITE));
             }
+        }
+        let hands = Which::BOTH.into_iter().filter_map(|which| self.frame.hand(which));
+        for [point, force] in hands.map(|hand| hand.map(Vector3::from)) {
+            let Some(from) = self.port.to_screen(&point) else { continue };
             painter.circle(from, 4.0, FORCE, Stroke::new(1.0, Color32::WHITE));
             let newtons = force.norm();
             let unit = f64::from(ARROW / self.port.rect.height()) * self.port.camera.height

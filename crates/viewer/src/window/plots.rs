@@ -46,6 +46,7 @@ fn words(name: &str) -> String {
     };
     let told = match parts {
         ["hand"] => "force of the hand".into(),
+        ["second-hand"] => "force of the second hand".into(),
         ["energy", kind] => format!("{kind} energy"),
         ["reaction", of] => format!("reaction of {of}"),
         ["point", number, field] => format!("{field} of point {number}"),
@@ -167,6 +168,7 @@ mod tests {
         let told = [
             "hand",
             "hand.x",
+            "second-hand",
             "energy.kinetic",
             "reaction.base.z",
             "point.2.displacement",
@@ -176,6 +178,7 @@ mod tests {
         let expected = [
             "force of the hand",
             "force of the hand, x",
+            "force of the second hand",
             "kinetic energy",
             "reaction of base, z",
             "displacement of point 2",

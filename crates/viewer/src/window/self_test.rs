@@ -13,6 +13,7 @@ use pliant_picture::{Camera, Projection};
 
 use super::App;
 use super::glass::glass;
+use super::grasping::{tools, two_hands};
 use super::keep::Taking;
 use super::picture::on_plane;
 use super::undo::Act;
@@ -65,7 +66,7 @@ impl Cue {
     }
 
     /// Keys of the keyboard, and what has to come of them.
-    fn key(what: &str, key: Key, mut check: impl FnMut(&App) -> bool + 'static) -> Self {
+    pub fn key(what: &str, key: Key, mut check: impl FnMut(&App) -> bool + 'static) -> Self {
         Self::new(what, move |_| vec![press(key, true), press(key, false)], move |app| Ok(check(app)))
     }
 
@@ -83,7 +84,8 @@ pub(super) struct RunningTest {
 }
 
 impl RunningTest {
-    pub(super) fn new(self_test: SelfTest) -> Self {
+    /// In a scene with or without tools.
+    pub(super) fn new(self_test: SelfTest, has_tools: bool) -> Self {
         let (cues, told): (_, fn(&App) -> String) = match self_test {
             SelfTest::Portrait { after, file } => {
                 let mut cues = VecDeque::from([
@@ -95,17 +97,24 @@ impl RunningTest {
                 (cues, shown)
             }
             SelfTest::Rehearsal { file } => {
-                let mut cues: VecDeque<Cue> = drawing().chain((0..PICKS).map(picking)).collect();
-                cues.extend(
-                    keys()
-                        .into_iter()
-                        .chain(camera())
-                        .chain(glass())
-                        .chain(pinning())
-                        .chain(following())
-                        .chain(undoing())
-                        .chain(pulling()),
-                );
+                // What can be pulled lies under tools.
+                let rehearsed = if has_tools {
+                    vec![tools()]
+                } else {
+                    vec![
+                        (0..PICKS).map(picking).collect(),
+                        keys(),
+                        camera(),
+                        glass(),
+                        pinning(),
+                        following(),
+                        undoing(),
+                        two_hands(),
+                        pulling(),
+                    ]
+                };
+                let mut cues: VecDeque<Cue> = drawing().collect();
+                cues.extend(rehearsed.into_iter().flatten());
                 cues.extend(file.into_iter().flat_map(portrait));
                 (cues, tried)
             }
@@ -140,8 +149,11 @@ impl RunningTest {
 }
 
 /// What was tried.
-fn tried(_app: &App) -> String {
-    format!("{FRAMES} frames drawn, {PICKS} pixels picked, keys, camera, pins and hand tried")
+fn tried(app: &App) -> String {
+    if !app.world.scene.tools.is_empty() {
+        return format!("{FRAMES} frames drawn, tools led by keys");
+    }
+    format!("{FRAMES} frames drawn, {PICKS} pixels picked, keys, camera, pins and hands tried")
 }
 
 /// What a picture of the window shows.
@@ -150,11 +162,11 @@ fn shown(app: &App) -> String {
     format!("{} at t = {:.3} s{told}", app.title(), app.frame.time)
 }
 
-fn press(key: Key, pressed: bool) -> Event {
+pub(super) fn press(key: Key, pressed: bool) -> Event {
     Event::Key { key, physical_key: None, pressed, repeat: false, modifiers: Modifiers::NONE }
 }
 
-fn button(pos: Pos2, button: PointerButton, pressed: bool) -> Event {
+pub(super) fn button(pos: Pos2, button: PointerButton, pressed: bool) -> Event {
     Event::PointerButton { pos, button, pressed, modifiers: Modifiers::NONE }
 }
 
@@ -164,7 +176,7 @@ fn drawing() -> impl Iterator<Item = Cue> {
 
 /// The pixel of that number on the body, and the triangle that covers it, if it is far from all edges; found by projecting all
 /// triangles, where picking sends a ray.
-fn known_pixel(app: &App, number: u64) -> Option<(Pos2, u32)> {
+pub(super) fn known_pixel(app: &App, number: u64) -> Option<(Pos2, u32)> {
     let rect = app.port.rect;
     let aspect = f64::from(rect.width() / rect.height());
     // Halton's sequence over the picture: places on the body, counted.
@@ -348,7 +360,7 @@ fn pinning() -> Vec<Cue> {
             Cue::new(
                 what,
                 move |app| vec![button(inside(app), left, false)],
-                move |app| Ok(app.frame.held.len() == pins),
+                move |app| Ok(app.frame.pins().len() == pins),
             ),
             Cue::new("P is let go", |_| vec![press(Key::P, false)], |_| Ok(true)),
         ]
@@ -360,7 +372,7 @@ fn pinning() -> Vec<Cue> {
 }
 
 /// Keys such as Ctrl are held down from now on, or none.
-fn holding(modifiers: Modifiers) -> Cue {
+pub(super) fn holding(modifiers: Modifiers) -> Cue {
     let held = move |app: &App| app.context.input(|input| input.modifiers.matches_exact(modifiers));
     Cue::new(
         "keys are held down",
@@ -428,7 +440,7 @@ fn undoing() -> Vec<Cue> {
         Cue::new(
             "the hand lets go",
             move |app| vec![button(inside(app), left, false)],
-            |app| Ok(app.holding.is_none()),
+            |app| Ok(app.hands == [None; 2]),
         ),
         Cue::key("Space pauses", Key::Space, |app| !app.frame.playing),
         holding(Modifiers::COMMAND | Modifiers::CTRL),
@@ -459,11 +471,11 @@ fn pulling() -> Vec<Cue> {
         cues.push(Cue::new(
             "the mouse pulls",
             move |app| vec![Event::PointerMoved(*from.borrow() - vec2(0.0, reach(app) * part as f32 / 10.0))],
-            move |app| Ok(part < 3 || app.holding.is_some()),
+            move |app| Ok(part < 3 || app.pulls()),
         ));
     }
     cues.push(Cue::wait("the hand pulls", |app| {
-        app.frame.held.first().is_some_and(|[_, force]| Vector3::from(*force).norm() > 0.0)
+        app.frame.hand(app.mouse).is_some_and(|[_, force]| Vector3::from(force).norm() > 0.0)
     }));
     cues.push(Cue::new("what is pulled comes to rest", |_| Vec::new(), {
         let mut began = None;
@@ -485,10 +497,11 @@ fn pulling() -> Vec<Cue> {
 
 /// Whether the hand's force points from where it holds to where the mouse is, with no more than its stiffness.
 fn spring(app: &App, place: [f64; 2]) -> Result<(), String> {
-    let (Some([point, force]), Some(held)) = (app.frame.held.first(), &app.holding) else {
+    let (Some([point, force]), Some(held)) = (app.frame.hand(app.mouse), &app.hands[app.mouse as usize])
+    else {
         return Err("nothing is held".into());
     };
-    let [point, force] = [point, force].map(|v| Vector3::from(*v));
+    let [point, force] = [point, force].map(Vector3::from);
     let along = on_plane(&app.port.camera, held, place, app.port.aspect()) - point;
     let stiffness = force.dot(&along) / along.norm_squared();
     let off = (force - along * stiffness).norm() / force.norm();

@@ -1,7 +1,7 @@
 //! Ctrl+Z: what a user did last is taken back, as far as the run can go back.
 
 use super::App;
-use crate::hand::Hand;
+use crate::hand::{Hand, Which};
 use crate::session::Order;
 
 /// Something that can be taken back.
@@ -16,14 +16,22 @@ pub(super) enum Act {
 }
 
 impl App {
-    /// Does what hand and pins do, and remembers what can be taken back.
+    /// Does what the hand of the mouse or a pin does, and remembers what can be taken back.
     pub(super) fn act(&mut self, hand: Hand) {
+        self.act_with(self.mouse, hand);
+    }
+
+    /// The same with one of the hands.
+    pub(super) fn act_with(&mut self, which: Which, hand: Hand) {
         match hand {
             Hand::Take(..) => self.acts.push(Act::Pull(self.frame.steps)),
             Hand::Pin(_) => self.acts.push(Act::Pin),
             _ => {}
         }
-        self.order(Order::Hand(hand));
+        self.order(match which {
+            Which::First => Order::Hand(hand),
+            Which::Second => Order::Second(hand),
+        });
     }
 
     /// Takes back what was done last: numbers and pins as they were, a pull by going back to a state before it.
@@ -31,14 +39,12 @@ impl App {
         match self.acts.pop() {
             Some(Act::Numbers(before)) => self.set_numbers(&before),
             Some(Act::Pin) => {
-                let pins =
-                    self.frame.held.len() - usize::from(self.holding.is_some()).min(self.frame.held.len());
-                if let Some(last) = pins.checked_sub(1) {
+                if let Some(last) = self.frame.pins().len().checked_sub(1) {
                     self.order(Order::Hand(Hand::Unpin(last)));
                 }
             }
             Some(Act::Pull(steps)) => {
-                self.holding = None;
+                self.let_go();
                 self.order(Order::Back(steps));
             }
             None => {}
@@ -47,7 +53,7 @@ impl App {
 
     /// Goes back by one of the states that are kept.
     pub(super) fn step_back(&mut self) {
-        self.holding = None;
+        self.let_go();
         self.order(Order::Back(self.frame.steps.saturating_sub(1)));
     }
 }

@@ -415,15 +415,9 @@ impl Viewport {
             painter.arrow(origin, AXES * along, Stroke::new(2.0, COLOURS[axis]));
             let place = origin + (AXES + 9.0) * along;
             let font = FontId::proportional(13.0);
-            if self.patient {
-                let [far, near] = SIDES_OF_PATIENT[axis];
-                painter.text(place, Align2::CENTER_CENTER, far, font.clone(), COLOURS[axis]);
-                if along.length() > 0.5 {
-                    painter.text(origin - 14.0 * along, Align2::CENTER_CENTER, near, font, COLOURS[axis]);
-                }
-            } else {
-                painter.text(place, Align2::CENTER_CENTER, ["x", "y", "z"][axis], font, COLOURS[axis]);
-            }
+            let [far, near] = letters(axis, self.patient, along);
+            painter.text(place, Align2::CENTER_CENTER, far, font.clone(), COLOURS[axis]);
+            painter.text(origin - 14.0 * along, Align2::CENTER_CENTER, near, font, COLOURS[axis]);
         }
         let pixel = self.camera.height / f64::from(self.rect.height().max(1.0));
         let metres = round_length(BAR * pixel);
@@ -438,6 +432,17 @@ impl Viewport {
         let text = format!("{:.0} {unit}", metres * factor);
         let middle = from + 0.5 * (to - from) - vec2(0.0, 12.0);
         painter.text(middle, Align2::CENTER_CENTER, text, FontId::proportional(13.0), self.ink());
+    }
+}
+
+/// The letters at the end of an axis that points somewhere on the screen, and at the other side of the origin: sides of a patient, of which
+/// the other one has no room where the axis is short; or the name of the axis alone.
+fn letters(axis: usize, patient: bool, along: Vec2) -> [&'static str; 2] {
+    let [far, near] = SIDES_OF_PATIENT[axis];
+    match patient {
+        true if along.length() > 0.5 => [far, near],
+        true => [far, ""],
+        false => [["x", "y", "z"][axis], ""],
     }
 }
 
@@ -475,5 +480,15 @@ mod tests {
         assert!(axes[2].1.length() < 1e-6);
         let z = axes.iter().find(|(axis, _)| *axis == 2).unwrap();
         assert!((z.1 - vec2(0.0, -1.0)).length() < 1e-6, "up is up");
+    }
+
+    /// x goes to the right of a patient, y to the front, z to the head.
+    #[test]
+    fn axes_have_the_letters_of_a_patient_or_their_names() {
+        let long = vec2(0.8, 0.0);
+        let sides = [0, 1, 2].map(|axis| letters(axis, true, long));
+        assert_eq!(sides, [["R", "L"], ["A", "P"], ["S", "I"]]);
+        assert_eq!(letters(2, true, vec2(0.1, 0.0)), ["S", ""]);
+        assert_eq!([0, 1, 2].map(|axis| letters(axis, false, long)[0]), ["x", "y", "z"]);
     }
 }

@@ -1,0 +1,77 @@
+//! Two hands: the mouse leads one of them, while the other one keeps what it holds or is led by keys.
+
+use eframe::egui::Pos2;
+use pliant_geometry::Vector3;
+
+use super::App;
+use super::picture::on_plane;
+use crate::hand::{Hand, Point, Which};
+
+impl App {
+    /// The hand of the mouse takes hold of a point at a place [m]. A tool that keys lead stays in its hand.
+    pub(super) fn take_hold(&mut self, point: Point, at: Vector3) {
+        if self.is_led(self.mouse) {
+            self.mouse = self.mouse.other();
+        }
+        if self.hands == [None; 2] {
+            self.strongest = 0.0;
+        }
+        self.beside = Vector3::zeros();
+        self.take_with(self.mouse, point, at);
+    }
+
+    /// A hand takes hold of a point at a place [m].
+    pub(super) fn take_with(&mut self, which: Which, point: Point, at: Vector3) {
+        self.hands[which as usize] = Some(at);
+        self.act_with(which, Hand::Take(point, self.stiffness));
+    }
+
+    /// Takes what the other hand keeps where it is shown; whether it keeps something there.
+    pub(super) fn take_kept(&mut self, place: Pos2) -> bool {
+        let kept = self.mouse.other();
+        let there = self.frame.hand(kept).is_some_and(|[point, _]| self.is_at(&point, place));
+        let taken = there && self.hands[kept as usize].is_some() && !self.is_led(kept);
+        if taken {
+            self.lead(kept, place);
+        }
+        taken
+    }
+
+    /// The mouse leads a hand from a place on, without a jump.
+    fn lead(&mut self, which: Which, place: Pos2) {
+        self.mouse = which;
+        if let Some(at) = self.hands[which as usize] {
+            let place = self.port.in_picture(place);
+            self.beside = at - on_plane(&self.port.camera, &at, place, self.port.aspect());
+        }
+    }
+
+    /// While the mouse pulls, its hand keeps what it holds, and the mouse goes on with the other one; else that lets go what it keeps.
+    pub(super) fn change_hands(&mut self) {
+        let other = self.mouse.other();
+        match self.context.pointer_latest_pos() {
+            Some(_) if self.pulls() && self.is_led(other) => {}
+            Some(place) if self.pulls() => self.lead(other, place),
+            _ if self.hands[other as usize].is_some() && !self.is_led(other) => {
+                self.hands[other as usize] = None;
+                self.act_with(other, Hand::Release);
+            }
+            _ => {}
+        }
+    }
+
+    /// Both hands have let go: the run has gone back, or starts anew.
+    pub(super) fn let_go(&mut self) {
+        (self.hands, self.led) = ([None; 2], None);
+    }
+
+    /// Whether the mouse leads something.
+    pub(super) fn pulls(&self) -> bool {
+        self.hands[self.mouse as usize].is_some() && !self.is_led(self.mouse)
+    }
+
+    /// Whether keys lead a tool in a hand.
+    pub(super) fn is_led(&self, which: Which) -> bool {
+        self.led.is_some_and(|(_, hand)| hand == which)
+    }
+}
