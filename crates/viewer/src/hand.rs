@@ -6,10 +6,8 @@
 //!
 //! There are two hands. Each holds tissue or a tool, and keeps it while the other one is led.
 
-use std::collections::HashSet;
-
 use nalgebra::Point3;
-use pliant_geometry::Vector3;
+use pliant_geometry::{Vector3, patch};
 use pliant_mechanics::grip::Grip;
 use pliant_picture::Subject;
 use pliant_run::Live;
@@ -188,35 +186,14 @@ fn edge(corners: [u32; 3], live: &Live) -> f64 {
 
 /// The surface around a point, as a combination of nodes: what lies within two edges of it at rest and hangs together with it.
 fn around(point: &Point, subject: &Subject, live: &Live) -> Option<Nodes> {
-    let corners = subject.triangles().nth(point.triangle as usize)?;
-    let middle: Vector3 =
-        corners.into_iter().zip(point.weights).map(|(corner, w)| subject.points[corner as usize] * w).sum();
-    let edge = edge(corners, live);
-    let distance = |corner: u32| (subject.points[corner as usize] - middle).norm();
-    let mut reached: Vec<u32> = corners.into_iter().filter(|&c| distance(c) < REACH * edge).collect();
-    let mut known: HashSet<u32> = reached.iter().copied().collect();
-    let mut before = 0;
-    while before < reached.len() {
-        before = reached.len();
-        for triangle in subject.triangles() {
-            if triangle.iter().any(|corner| known.contains(corner)) {
-                let near = triangle.into_iter().filter(|&c| distance(c) < REACH * edge);
-                near.for_each(|corner| {
-                    if known.insert(corner) {
-                        reached.push(corner);
-                    }
-                });
-            }
-        }
-    }
+    let triangles: Vec<[u32; 3]> = subject.triangles().collect();
+    let corners = *triangles.get(point.triangle as usize)?;
+    let radius = REACH * edge(corners, live);
     let mut nodes = Nodes::new();
-    for corner in reached {
-        let part = distance(corner) / edge;
-        add(&mut nodes, live.nodes_of(corner), (-0.5 * part * part).exp());
+    for (corner, weight) in patch(&subject.points, &triangles, corners, point.weights, Some(radius)) {
+        add(&mut nodes, live.nodes_of(corner), weight);
     }
-    let sum: f64 = nodes.iter().map(|(_, weight)| weight).sum();
-    nodes.iter_mut().for_each(|(_, weight)| *weight /= sum);
-    if nodes.is_empty() { nodes_of(point, subject, live) } else { Some(nodes) }
+    (!nodes.is_empty()).then_some(nodes)
 }
 
 impl Hold {
