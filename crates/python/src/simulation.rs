@@ -44,6 +44,8 @@ enum Slot {
 
 /// A pose: place [m] and quaternion (x, y, z, w).
 type Posed = ([f64; 3], [f64; 4]);
+/// A pose, an opening [rad], a force [N] and a moment [N m].
+type ToolNow = (Posed, f64, [f64; 3], Option<[f64; 3]>);
 
 impl Simulation {
     fn slot(&self) -> Result<MutexGuard<'_, Slot>, Trouble> {
@@ -344,13 +346,13 @@ impl Simulation {
         Ok(arrival.map_err(|failure| Trouble::Value(failure.message))?)
     }
 
-    /// A tool: its pose, the angle between its jaws [rad], and the force [N] of all that touches it.
-    fn tool(&self, py: Python<'_>, name: String) -> PyResult<Option<(Posed, f64, [f64; 3])>> {
+    /// A tool: its pose, the angle between its jaws [rad], the force [N] of all that touches it, and its moment about the tool's frame [N m].
+    fn tool(&self, py: Python<'_>, name: String) -> PyResult<Option<ToolNow>> {
         self.work(py, move |running, _| {
             running.evaluate()?;
             Ok(running.simulation().tool(&name).map(|tool| {
                 let (at, turn) = (tool.pose.translation.vector, tool.pose.rotation.coords);
-                ((at.into(), turn.into()), tool.opening, tool.force)
+                ((at.into(), turn.into()), tool.opening, tool.force, tool.torque)
             }))
         })
     }

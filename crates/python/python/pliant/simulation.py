@@ -34,12 +34,16 @@ class Energies(NamedTuple):
 
 
 class Tool(NamedTuple):
-    """A tool at an instant: place [m] and quaternion (x, y, z, w), the angle between its jaws [rad], the force [N] of all that touches it."""
+    """A tool at an instant: place [m], quaternion (x, y, z, w), angle between its jaws [rad], and what touches it.
+
+    `force` [N] is the sum of all contacts, `torque` [N m] their moment about the place; `None` on a GPU.
+    """
 
     place: NDArray[np.float64]
     quaternion: NDArray[np.float64]
     opening: float
     force: NDArray[np.float64]
+    torque: NDArray[np.float64] | None
 
 
 class State:
@@ -296,8 +300,8 @@ class Simulation:
         found = self._native.tool(name)
         if found is None:
             raise KeyError(f"nothing touches a tool `{name}`; there are {', '.join(self._model.tools) or 'none'}")
-        (place, quaternion), opening, force = found
-        return Tool(np.array(place), np.array(quaternion), opening, np.array(force))
+        (place, quaternion), opening, force, torque = found
+        return Tool(np.array(place), np.array(quaternion), opening, np.array(force), None if torque is None else np.array(torque))
 
     def drive(self, tool: str, pose: ArrayLike | tuple[ArrayLike, ArrayLike], *, within: float = 0.0) -> float:
         """Leads a tool to a pose: when it arrives [s].
