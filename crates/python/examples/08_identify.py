@@ -15,8 +15,8 @@ def scene() -> pliant.Scene:
     mesh = {"block": {"size": [0.05, 0.05, 0.1]}, "edge": 0.025}
     own.body["block"] = {"mesh": mesh, "element": "tet4-anp", "law": "tissue", "density": 1000.0, "damping": 50.0}
     own.constraint["base"] = {"type": "fix", "body": "block", "nodes": {"set": "z-min"}}
-    curve = {"shape": "smooth-step", "from": 0.0, "to": 0.15}
-    own.constraint["hand"] = {"type": "move", "body": "block", "nodes": {"set": "z-max"}, "displacement": [0, 0, 0.005], "curve": curve}
+    hand = {"type": "move", "body": "block", "nodes": {"set": "z-max"}, "by": [0, 0, 0.005], "curve": "smooth-step", "to": 0.15}
+    own.constraint["hand"] = hand
     return own
 
 

@@ -19,8 +19,9 @@ pub fn array<'py, T: numpy::Element>(
     columns: usize,
 ) -> Bound<'py, PyArray2<T>> {
     let rows = flat.len() / columns.max(1);
+    let whole = Array2::from_shape_vec((rows, columns), flat);
     // The length is a product of both.
-    Array2::from_shape_vec((rows, columns), flat).unwrap_or_default().into_pyarray(py)
+    whole.unwrap_or_else(|_| Array2::from_shape_simple_fn((0, columns), || unreachable!())).into_pyarray(py)
 }
 
 /// A fresh array (n,).

@@ -19,7 +19,7 @@ pub fn read_image(py: Python<'_>, path: PathBuf) -> PyResult<Read<'_>> {
         let failed = |error: pliant_imaging::ImageError| {
             Trouble::Mesh(Some(path.display().to_string()), error.to_string())
         };
-        pliant_imaging::read(&path).map_err(failed)
+        pliant_imaging::read(&path, &pliant_imaging::ReadOptions::default()).map_err(failed)
     })?;
     let grid = image.grid;
     let values: Vec<f64> = (0..grid.len()).map(|at| image.value(at)).collect();

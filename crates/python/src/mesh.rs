@@ -91,7 +91,7 @@ impl Mesh {
         let mesh = Arc::clone(&self.0);
         crate::jobs::on_thread(py, move || {
             let failed =
-                |error: io::WriteError| Trouble::Mesh(Some(path.display().to_string()), error.to_string());
+                |error: io::MeshFileError| Trouble::Mesh(Some(path.display().to_string()), error.to_string());
             io::write(&path, &mesh).map_err(failed)
         })
     }

@@ -89,6 +89,12 @@ impl Model {
         .into()
     }
 
+    /// Names and units of what is sampled.
+    fn columns(&self) -> Result<Vec<(String, &'static str)>, Trouble> {
+        let live = pliant_run::Live::new(&self.world)?;
+        Ok(live.columns().iter().map(|own| (own.name.clone(), own.unit)).collect())
+    }
+
     fn notes(&self) -> Vec<String> {
         self.world.notes().cloned().collect()
     }
@@ -99,7 +105,7 @@ impl Model {
 
     /// The device that it is stepped on.
     fn device(&self) -> String {
-        self.world.device().map_or_else(|| "cpu".into(), |device| device.adapter().to_string())
+        self.world.device().map_or_else(|| "cpu".into(), |device| device.adapter().name.clone())
     }
 
     /// Nodes of a body that a selection of scenes means, as JSON.
@@ -170,5 +176,5 @@ pub fn in_order(e: &Energies) -> [f64; 6] {
 /// The adapters of this machine, the best first.
 #[pyfunction]
 pub fn devices(py: Python<'_>) -> Vec<String> {
-    py.detach(|| pliant_sim::gpu::adapters().iter().map(ToString::to_string).collect())
+    py.detach(|| pliant_sim::gpu::adapters().into_iter().map(|adapter| adapter.name).collect())
 }

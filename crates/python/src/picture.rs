@@ -42,8 +42,9 @@ pub fn draw(
         *graphics = Some(opened);
     }
     let Some(graphics) = &*graphics else { return Err(Trouble::Device("no graphics".into())) };
-    let drawn = look.picture(graphics, mesh, time).and_then(|picture| picture.png());
-    drawn.map_err(|error| Trouble::Device(format!("{error}; {}", error.remedy())))
+    let picture = look.picture(graphics, mesh, time);
+    let picture = picture.map_err(|error| Trouble::Device(format!("{error}; {}", error.remedy())))?;
+    picture.png().map_err(|error| Trouble::Device(format!("{error}; {}", error.remedy())))
 }
 
 /// The pixels of a PNG, (n, 4), and how many rows they are.

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use pliant_explicit::Wanted;
 use pliant_geometry::{Mesh, SurfaceLocator, Vector3, patch};
 use pliant_mechanics::grip::Grip;
 use pliant_run::{FieldReader, Live};
@@ -94,7 +93,8 @@ impl Running {
 
     /// Finds forces, and with them all that can be asked, at the instant.
     pub fn evaluate(&mut self) -> Result<(), Trouble> {
-        Ok(self.live.simulation.evaluate(Wanted::Everything)?)
+        self.live.simulation.frame()?;
+        Ok(())
     }
 
     /// A vector of each node.
@@ -173,8 +173,8 @@ impl Running {
         };
         self.evaluate()?;
         let reader = &mut self.readers[known].1;
-        let values = reader.read(&self.world, &self.live.simulation)?.to_vec();
-        Ok((values, reader.components()))
+        reader.fill(&self.world, &self.live.simulation);
+        Ok((reader.values()?.into_owned(), reader.components()))
     }
 
     /// The surface around the point of bodies that is nearest to a place [m]: nodes, counted over all, with weights that sum to 1.

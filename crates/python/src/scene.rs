@@ -30,6 +30,11 @@ pub struct Given {
 
 type Meshes<'py> = BTreeMap<String, Bound<'py, Mesh>>;
 
+/// Meshes as the engine shares them.
+fn shared(meshes: Meshes<'_>) -> BTreeMap<String, Arc<pliant_geometry::Mesh>> {
+    meshes.into_iter().map(|(name, mesh)| (name, Arc::clone(&mesh.get().0))).collect()
+}
+
 impl Given {
     fn new(
         (text, name, folder, set): (String, String, PathBuf, Vec<String>),
@@ -42,9 +47,7 @@ impl Given {
                 "the text of the scene has {size} MiB, and 64 are the most; give large tables as meshes or files"
             )));
         }
-        let shared =
-            |meshes: Meshes<'_>| meshes.into_iter().map(|(name, mesh)| (name, Arc::clone(&mesh.get().0)));
-        Ok(Self { text, name, folder, set, meshes: shared(meshes).collect(), lent: shared(lent).collect() })
+        Ok(Self { text, name, folder, set, meshes: shared(meshes), lent: shared(lent) })
     }
 
     fn scene(self) -> Result<Scene, Trouble> {

@@ -15,7 +15,7 @@ use pliant_sim::Reals;
 use pliant_sim::contact::pose::Pose;
 use pyo3::prelude::*;
 
-use crate::arrays::{array, array3, vectors};
+use crate::arrays::{array, vectors};
 use crate::errors::{Trouble, broken, told};
 use crate::jobs::on_pool;
 use crate::mesh::Mesh;
@@ -33,14 +33,17 @@ pub struct Simulation {
     process: u32,
 }
 
-/// Where the run is. Its memory stays as long as the simulation, since views look at it.
+/// Where the run is.
 enum Slot {
     Here(Box<Running>),
     /// A call computes.
     Away,
-    Closed(Option<Box<Running>>),
-    Broken(Box<Running>, String),
+    Closed { _kept: Kept },
+    Broken { _kept: Kept, message: String },
 }
+
+/// The memory of a run that is over: views still look at it.
+type Kept = Option<Box<Running>>;
 
 /// A pose: place [m] and quaternion (x, y, z, w).
 type Posed = ([f64; 3], [f64; 4]);
@@ -97,7 +100,7 @@ impl Simulation {
             Ok(_) if !running.is_in_place() => {
                 let message =
                     "displacements have moved in memory: this is a mistake of Pliant, please tell it";
-                *slot = Slot::Broken(running, message.to_owned());
+                *slot = Slot::Broken { _kept: Some(running), message: message.to_owned() };
                 return Err(Trouble::Internal(message.into()).into());
             }
             Ok(done) => {
@@ -106,7 +109,7 @@ impl Simulation {
             }
             Err(panic) => {
                 let message = told(&*panic);
-                *slot = Slot::Broken(running, message.clone());
+                *slot = Slot::Broken { _kept: Some(running), message: message.clone() };
                 return Err(Trouble::Internal(message).into());
             }
         };
@@ -123,8 +126,8 @@ impl Slot {
                 "the simulation computes for another call: one at a time, and no steps within callbacks"
                     .into(),
             ),
-            Self::Closed(_) => Trouble::Closed,
-            Self::Broken(_, message) => {
+            Self::Closed { .. } => Trouble::Closed,
+            Self::Broken { message, .. } => {
                 Trouble::Internal(format!("the simulation ended with an internal error before: {message}"))
             }
         }
@@ -283,10 +286,10 @@ impl Simulation {
                 let left = match (steps, until) {
                     (Some(steps), _) => steps - done,
                     (None, Some(until)) => {
-                        let length = simulation.step_length();
-                        let left = (until - simulation.time()) / length - 0.5;
-                        // Of times to which no step leads, none.
-                        if left > 0.0 { left.ceil() as u64 } else { 0 }
+                        // As the schedules of outputs count.
+                        let (time, length) = (simulation.time(), simulation.step_length());
+                        let left = ((until - time) / length - 0.5 - 1e-6).ceil().max(1.0) as u64;
+                        if time + 0.5 * length < until { left } else { 0 }
                     }
                     (None, None) => 0,
                 };
@@ -331,8 +334,8 @@ impl Simulation {
     }
 
     /// Drives a tool to a pose within a time [s]: when it arrives [s].
-    fn drive(&self, tool: &str, (place, quaternion): Posed, within: f64) -> PyResult<f64> {
-        let [x, y, z, w] = quaternion;
+    fn drive(&self, tool: &str, pose: Posed, within: f64) -> PyResult<f64> {
+        let (place, [x, y, z, w]) = pose;
         let turn = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9)
             .ok_or_else(|| Trouble::Value("the quaternion of a pose has no length".into()))?;
         let pose = Pose::from_parts(Translation3::new(place[0], place[1], place[2]), turn);
@@ -421,7 +424,7 @@ impl Simulation {
     fn close(&self) -> Result<(), Trouble> {
         let mut slot = self.slot()?;
         *slot = match std::mem::replace(&mut *slot, Slot::Away) {
-            Slot::Here(running) => Slot::Closed(Some(running)),
+            Slot::Here(running) => Slot::Closed { _kept: Some(running) },
             Slot::Away => return Err(Slot::Away.trouble()),
             other => other,
         };

@@ -25,6 +25,14 @@ def cube(cells: int = 2, **changes: object) -> pliant.Scene:
     return scene.replace(changes)
 
 
+def crushed() -> pliant.Scene:
+    """The cube, whose top is pushed through its base: its elements invert on the way."""
+    scene = cube(**{"run.on-unstable": "report"})
+    crush = {"type": "move", "body": "cube", "nodes": {"set": "z-max"}, "by": [0.0, 0.0, -0.2], "curve": "smooth-step", "to": 0.1}
+    scene.constraint["crush"] = crush
+    return scene
+
+
 @pytest.fixture
 def scene() -> pliant.Scene:
     """The cube."""

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import pliant
+from conftest import crushed
 
 
 def test_it_is_read_only_and_of_the_newest_instant(scene: pliant.Scene) -> None:
@@ -41,7 +42,7 @@ def test_it_lives_as_long_as_someone_looks(scene: pliant.Scene) -> None:
     sim = scene.build().simulate()
     sim.step(50)
     u = sim.displacement
-    kept, native = np.array(u), weakref.ref(sim._native)
+    kept, native = np.array(u), weakref.ref(sim._own)
     del sim
     gc.collect()
     assert native() is not None
@@ -58,7 +59,7 @@ def test_it_survives_a_close_and_a_failure(scene: pliant.Scene) -> None:
     u, kept = sim.displacement, np.array(sim.displacement)
     sim.close()
     assert np.array_equal(u, kept)
-    sim = scene.replace({"run.step": 0.02, "run.on-unstable": "stop"}).build().simulate()
+    sim = crushed().build().simulate()
     u = sim.displacement
     with pytest.raises(pliant.UnstableError) as caught:
         sim.step(200)

@@ -77,14 +77,14 @@ def _again(kind: type[Error], message: str, fields: dict[str, Any]) -> Error:
 class SceneError(Error, ValueError):
     """A scene has mistakes: `diagnostics` has all of them, and the text shows the lines."""
 
-    _fields = ("diagnostics",)
+    _fields: tuple[str, ...] = ("diagnostics",)
     diagnostics: Sequence[Diagnostic]
 
 
 class MeshError(Error, ValueError):
     """A mesh or an image that can't be read, repaired or meshed."""
 
-    _fields = ("path", "line", "place")
+    _fields: tuple[str, ...] = ("path", "line", "place")
     path: str | None
     line: int | None
     place: Sequence[float] | None
@@ -93,7 +93,7 @@ class MeshError(Error, ValueError):
 class SimulationError(Error, RuntimeError):
     """A simulation that can't go on. It stays at the last good instant; `time` is in s."""
 
-    _fields = ("kind", "body", "element", "node", "time")
+    _fields: tuple[str, ...] = ("kind", "body", "element", "node", "time")
     kind: str
     body: str | None
     element: int | None
@@ -108,7 +108,7 @@ class UnstableError(SimulationError):
 class ConvergenceError(SimulationError):
     """Equations that were not solved, in a load step counted from 1."""
 
-    _fields = (*SimulationError._fields, "load_step", "residual")
+    _fields: tuple[str, ...] = (*SimulationError._fields, "load_step", "residual")
     load_step: int | None
     residual: float | None
 
@@ -116,21 +116,21 @@ class ConvergenceError(SimulationError):
 class DeviceError(Error, RuntimeError):
     """No graphics adapter can do what was asked for; the text names the packages to install."""
 
-    _fields = ("adapter",)
+    _fields: tuple[str, ...] = ("adapter",)
     adapter: str | None
 
 
 class OutputError(Error, OSError):
     """A file or folder that can't be written."""
 
-    _fields = ("path",)
+    _fields: tuple[str, ...] = ("path",)
     path: str | None
 
 
 class ResumeError(Error, ValueError):
     """A state or a checkpoint of another model."""
 
-    _fields = ("path",)
+    _fields: tuple[str, ...] = ("path",)
     path: str | None
 
 
@@ -145,7 +145,7 @@ class ClosedError(Error, RuntimeError):
 class ClusterError(Error, RuntimeError):
     """Workers that have another version, or an engine that is not there."""
 
-    _fields = ("hosts",)
+    _fields: tuple[str, ...] = ("hosts",)
     hosts: Sequence[str] | None
 
 

@@ -49,7 +49,7 @@ class Mesh:
     Mesh(4 points, 1 tetra)
     """
 
-    _native: _native.Mesh
+    _own: _native.Mesh
 
     def __init__(
         self,
@@ -79,39 +79,46 @@ class Mesh:
                 by_cell.append((kind, name, np.ascontiguousarray(all_values[first : first + len(corners)])))
                 first += len(corners)
         sets = [(name, indices(own, f"points of the set `{name}`", (None,), count)) for name, own in (point_sets or {}).items()]
-        self._native = _native.Mesh(places, blocks, by_point, by_cell, sets)
+        self._own = _native.Mesh(places, blocks, by_point, by_cell, sets)
 
     @classmethod
     def _of(cls, native: _native.Mesh) -> Mesh:
         mesh = cls.__new__(cls)
-        mesh._native = native
+        mesh._own = native
         return mesh
 
     @property
     def points(self) -> NDArray[np.float64]:
         """Places [m], (n, 3)."""
-        return self._kept("_points", lambda: fixed(self._native.points()))
+        own: NDArray[np.float64] = self._kept("_points", lambda: fixed(self._own.points()))
+        return own
 
     @property
     def cells(self) -> Mapping[str, NDArray[np.uint32]]:
         """Corners of the cells by kind."""
-        return self._kept("_cells", lambda: MappingProxyType({k: fixed(v) for k, v in self._native.cells().items()}))
+        make = lambda: MappingProxyType({k: fixed(v) for k, v in self._own.cells().items()})  # noqa: E731
+        own: Mapping[str, NDArray[np.uint32]] = self._kept("_cells", make)
+        return own
 
     @property
     def point_data(self) -> Mapping[str, NDArray[np.float64]]:
         """Values of points by name: (n,), (n, 3) or (n, 3, 3)."""
-        make = lambda: MappingProxyType({k: fixed(_shaped(v)) for k, v in self._native.point_data().items()})  # noqa: E731
-        return self._kept("_point_data", make)
+        make = lambda: MappingProxyType({k: fixed(_shaped(v)) for k, v in self._own.point_data().items()})  # noqa: E731
+        own: Mapping[str, NDArray[np.float64]] = self._kept("_point_data", make)
+        return own
 
     @property
     def cell_data(self) -> Mapping[str, NDArray[np.float64]]:
         """Values of cells by name, all kinds of cells after each other; NaN where a kind has none."""
-        return self._kept("_cell_data", self._gather)
+        own: Mapping[str, NDArray[np.float64]] = self._kept("_cell_data", self._gather)
+        return own
 
     @property
     def point_sets(self) -> Mapping[str, NDArray[np.uint32]]:
         """Named sets of points."""
-        return self._kept("_point_sets", lambda: MappingProxyType({k: fixed(v) for k, v in self._native.point_sets().items()}))
+        make = lambda: MappingProxyType({k: fixed(v) for k, v in self._own.point_sets().items()})  # noqa: E731
+        own: Mapping[str, NDArray[np.uint32]] = self._kept("_point_sets", make)
+        return own
 
     def _kept(self, name: str, make: Any) -> Any:
         if name not in self.__dict__:
@@ -119,7 +126,7 @@ class Mesh:
         return self.__dict__[name]
 
     def _gather(self) -> Mapping[str, NDArray[np.float64]]:
-        found = self._native.cell_data()
+        found = self._own.cell_data()
         by_name: dict[str, dict[str, NDArray[np.float64]]] = {}
         for name, kind, values in found:
             by_name.setdefault(name, {})[kind] = values
@@ -138,7 +145,7 @@ class Mesh:
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes it; the ending tells the format (``.vtu``, ``.vtk``, ``.msh``, ``.stl``, …)."""
-        self._native.write(os.fspath(path))
+        self._own.write(os.fspath(path))
 
     @classmethod
     def block(
@@ -278,7 +285,7 @@ class Mesh:
 
     def _repr_html_(self) -> str:
         low, high = self.points.min(axis=0), self.points.max(axis=0)
-        rows = {"points": len(self.points), **{kind: len(own) for kind, own in self.cells.items()}}
+        rows: dict[str, Any] = {"points": len(self.points), **{kind: len(own) for kind, own in self.cells.items()}}
         rows["size [m]"] = " × ".join(f"{x:.4g}" for x in high - low)
         return _table("Mesh", rows)
 

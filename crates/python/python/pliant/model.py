@@ -53,13 +53,13 @@ class Model:
     np.float64(0.25)
     """
 
-    _native: _native.Model
+    _own: _native.Model
     _scene: Scene
 
     @classmethod
     def _of(cls, scene: Scene, native: _native.Model) -> Model:
         model = cls.__new__(cls)
-        model._scene, model._native = scene, native
+        model._scene, model._own = scene, native
         for text in {str(found) for found in native.warnings()}:
             warnings.warn(text, PliantWarning, stacklevel=3)
         return model
@@ -72,29 +72,29 @@ class Model:
     @property
     def rest(self) -> NDArray[np.float64]:
         """Places of all nodes at rest [m], (nodes, 3), bodies one after another."""
-        own: NDArray[np.float64] = self._kept("_rest", lambda: fixed(self._native.rest()))
+        own: NDArray[np.float64] = self._kept("_rest", lambda: fixed(self._own.rest()))
         return own
 
     @property
     def mass(self) -> NDArray[np.float64]:
         """Masses of all nodes [kg], (nodes,)."""
-        own: NDArray[np.float64] = self._kept("_mass", lambda: fixed(self._native.mass()))
+        own: NDArray[np.float64] = self._kept("_mass", lambda: fixed(self._own.mass()))
         return own
 
     @property
     def step(self) -> float:
         """Time step [s]."""
-        return self._native.steps()[0]
+        return self._own.steps()[0]
 
     @property
     def limit(self) -> float | None:
         """Critical time step [s] of explicit steps; `None` where steps of any length are stable."""
-        return self._native.steps()[1]
+        return self._own.steps()[1]
 
     @property
     def steps(self) -> int:
         """Steps to the end of the scene."""
-        return self._native.steps()[2]
+        return self._own.steps()[2]
 
     @property
     def bodies(self) -> Mapping[str, Body]:
@@ -102,7 +102,7 @@ class Model:
 
         def make() -> Mapping[str, Body]:
             all_bodies = {}
-            for name, first, count, mesh, given in self._native.bodies():
+            for name, first, count, mesh, given in self._own.bodies():
                 all_bodies[name] = Body(name, slice(first, first + count), Mesh._of(mesh), fixed(given))
             return MappingProxyType(all_bodies)
 
@@ -112,32 +112,32 @@ class Model:
     @property
     def constraints(self) -> list[str]:
         """Names of what is held and moved."""
-        return self._native.names()["constraints"]
+        return self._own.names()["constraints"]
 
     @property
     def contacts(self) -> list[str]:
         """Names of contacts."""
-        return self._native.names()["contacts"]
+        return self._own.names()["contacts"]
 
     @property
     def tools(self) -> list[str]:
         """Names of tools."""
-        return self._native.names()["tools"]
+        return self._own.names()["tools"]
 
     @property
     def notes(self) -> list[str]:
         """Remarks on how it was built."""
-        return self._native.notes()
+        return self._own.notes()
 
     @property
     def warnings(self) -> list[str]:
         """What is questionable about it."""
-        return [str(found) for found in self._native.warnings()]
+        return [str(found) for found in self._own.warnings()]
 
     @property
     def device(self) -> str:
         """``"cpu"``, or the GPU that it is stepped on."""
-        return self._native.device()
+        return self._own.device()
 
     def _kept(self, name: str, make: Callable[[], Any]) -> Any:
         if name not in self.__dict__:
@@ -156,7 +156,7 @@ class Model:
         (9, 4)
         """
         selection = {"set": what} if isinstance(what, str) and what != "all" else what
-        return np.asarray(self._native.select(body, json.dumps(selection)), dtype=np.uint32)
+        return np.asarray(self._own.select(body, json.dumps(selection)), dtype=np.uint32)
 
     def simulate(self, *, threads: int = 1, precision: str | None = None, device: str | None = None) -> Simulation:
         """A simulation at its start.
@@ -211,8 +211,9 @@ class Model:
         if out is None:
             return self._run_in_memory(until, each, threads)
         told = None if each is None else lambda time, end, wall: each(Progress(time, end, wall))
-        text, time, energies = self._native.run(os.fspath(out), until, threads, force, picture, told)
-        result = Result._of_files(json.loads(text), time, energies, os.fspath(out))
+        text, time, energies = self._own.run(os.fspath(out), until, threads, force, picture, told)
+        units = {"time": "s", **dict(self._own.columns())}
+        result = Result._of_files(json.loads(text), time, energies, os.fspath(out), units)
         _doubt(result)
         return result
 
@@ -241,7 +242,7 @@ class Model:
 
     def _lends(self, scene: Scene) -> dict[str, Mesh]:
         """Meshes for the bodies of another scene whose tables of the mesh are the same, and are not given anyway."""
-        lent = {}
+        lent: dict[str, Mesh] = {}
         if os.path.abspath(scene.folder) != os.path.abspath(self._scene.folder):
             return lent
         for name, body in scene.body.items():

@@ -95,7 +95,8 @@ class History(Mapping[str, NDArray[np.float64]]):
         for name, own in rest.items():
             dims = ("time", *(f"{name}_{k}" for k in range(1, own.ndim)))
             data[name] = (dims, own, {"units": self.units.get(name, "")})
-        return xr.Dataset(data, coords={"time": ("time", self["time"], {"units": "s"})})
+        found: xarray.Dataset = xr.Dataset(data, coords={"time": ("time", self["time"], {"units": "s"})})
+        return found
 
     def plot(self, *names: str, ax: Any = None) -> Any:
         """Draws columns over time with matplotlib; all reactions, if none are named."""
@@ -136,7 +137,14 @@ class Result:
     folder: str | None = None
 
     @classmethod
-    def _of_files(cls, summary: dict[str, Any], time: float, energies: Sequence[float], folder: str) -> Result:
+    def _of_files(
+        cls,
+        summary: dict[str, Any],
+        time: float,
+        energies: Sequence[float],
+        folder: str,
+        units: Mapping[str, str],
+    ) -> Result:
         from pliant.simulation import Energies
 
         told = summary.get("error")
@@ -149,7 +157,7 @@ class Result:
             reactions={name: np.array(own) for name, own in summary["reactions"].items()},
             warnings=summary["warnings"],
             files=summary["files"],
-            history=_read_tables(summary["files"]),
+            history=_read_tables(summary["files"], units),
             error=None if told is None else _failure(told),
             summary=summary,
             folder=folder,
@@ -204,6 +212,7 @@ class Result:
 
 
 def _failure(told: Mapping[str, Any]) -> SimulationError:
+    kinds: dict[str, type[SimulationError]]
     kinds = {"not-finite": UnstableError, "inverted": UnstableError, "unbalanced": UnstableError, "unstable": UnstableError}
     kinds |= {"not-converged": ConvergenceError, "singular": ConvergenceError}
     step = told.get("load_step") or {}
@@ -212,17 +221,12 @@ def _failure(told: Mapping[str, Any]) -> SimulationError:
     return kind(told["message"], **fields, load_step=step.get("number"), residual=step.get("residual"))
 
 
-def _read_tables(files: Sequence[str]) -> History:
+def _read_tables(files: Sequence[str], units: Mapping[str, str]) -> History:
     """The first table that a run has written."""
     tables = [path for path in files if path.endswith(".csv") and not os.path.basename(path).startswith("convergence")]
     if not tables:
         return History({}, {})
     with open(tables[0], newline="", encoding="utf-8") as file:
-        rows = list(csv.reader(file))
-    header, units = [], {}
-    for cell in rows[0]:
-        name, _, unit = cell.partition(" [")
-        header.append(name)
-        units[name] = unit.rstrip("]")
-    numbers = np.array([[float(cell) if cell else float("nan") for cell in row] for row in rows[1:]])
-    return History(dict(zip(header, numbers.T, strict=True)), units)
+        header, *rows = list(csv.reader(file))
+    numbers = np.array([[float(cell) if cell else float("nan") for cell in row] for row in rows]).reshape(-1, len(header))
+    return History(dict(zip(header, numbers.T, strict=True)), {name: units.get(name, "") for name in header})

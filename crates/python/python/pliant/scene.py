@@ -109,7 +109,7 @@ class Scene:
         >>> Scene.of_mesh(Mesh.block([0.1, 0.05, 0.05], edge=0.025)).constraint["held"]["type"]
         'fix'
         """
-        scene = cls.from_toml(_native.scene_of_mesh(mesh._native, "mesh"))
+        scene = cls.from_toml(_native.scene_of_mesh(mesh._own, "mesh"))
         scene._meshes["mesh"] = mesh
         return scene
 
@@ -284,7 +284,7 @@ class Scene:
     def check(self) -> list[Diagnostic]:
         """Builds the model and forgets it: the warnings. Raises `SceneError` with all mistakes."""
         given, meshes = self._given()
-        return _native.check(given, {name: mesh._native for name, mesh in meshes.items()})
+        return _native.check(given, {name: mesh._own for name, mesh in meshes.items()})
 
     def build(self, *, cache: bool = True, like: Model | None = None) -> Model:
         """Makes the model: meshes, masses, the critical time step.
@@ -302,8 +302,8 @@ class Scene:
         lent = {} if like is None else like._lends(self)
         native = _native.build(
             given,
-            {name: mesh._native for name, mesh in meshes.items()},
-            {name: mesh._native for name, mesh in lent.items()},
+            {name: mesh._own for name, mesh in meshes.items()},
+            {name: mesh._own for name, mesh in lent.items()},
             cache,
         )
         return Model._of(self.copy(), native)
@@ -314,7 +314,7 @@ class Scene:
 
     def _mesh_of(self, body: str) -> Mesh:
         given, meshes = self._given()
-        native, _ = _native.mesh(given, {name: mesh._native for name, mesh in meshes.items()}, body)
+        native, _ = _native.mesh(given, {name: mesh._own for name, mesh in meshes.items()}, body)
         return Mesh._of(native)
 
     def _counts(self) -> Iterator[tuple[int, str]]:

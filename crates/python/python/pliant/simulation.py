@@ -49,35 +49,35 @@ class Tool(NamedTuple):
 class State:
     """A snapshot: displacements, velocities, and what relaxing tissue remembers. It fits any model with the same meshes, and pickles."""
 
-    _native: _native.State
+    _own: _native.State
 
     @classmethod
     def _of(cls, native: _native.State) -> State:
         state = cls.__new__(cls)
-        state._native = native
+        state._own = native
         return state
 
     @property
     def time(self) -> float:
         """Time [s]."""
-        return self._native.time
+        return self._own.time
 
     @property
     def steps(self) -> int:
         """Steps since the start."""
-        return self._native.steps
+        return self._own.steps
 
     @property
     def displacement(self) -> NDArray[np.float64]:
         """Displacements of all nodes [m], (nodes, 3)."""
-        return self._native.displacement()
+        return self._own.displacement()
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes it to a file."""
-        bytes_of, time, steps, moved = self._native.encoded()
+        bytes_of, time, steps, moved = self._own.encoded()
         parts = {f"part{k}": np.frombuffer(part, dtype=np.uint8) for k, part in enumerate(bytes_of)}
         with open(path, "wb") as file:
-            np.savez(file, time=time, steps=steps, moved=np.asarray(moved), **parts)
+            np.savez(file, allow_pickle=False, time=time, steps=steps, moved=np.asarray(moved), **parts)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> State:
@@ -90,7 +90,7 @@ class State:
             raise ResumeError(f"`{os.fspath(path)}` is no state of a simulation: {error}", path=os.fspath(path)) from error
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _state, self._native.encoded()
+        return _state, self._own.encoded()
 
     def __repr__(self) -> str:
         return f"State({self.time:g} s, {len(self.displacement)} nodes)"
@@ -108,7 +108,8 @@ class Grip:
         self._nodes, self._asked = nodes, stiffness
         self._stiffness = stiffness
         rest, moved = simulation.model.rest, simulation.displacement
-        self._place = np.sum([w * (rest[n] + moved[n]) for n, w in nodes], axis=0, dtype=np.float64)
+        places = np.array([rest[n] + moved[n] for n, _ in nodes], dtype=np.float64)
+        self._place: NDArray[np.float64] = np.array([w for _, w in nodes]) @ places
 
     def _held(self) -> Simulation:
         if self._simulation is None:
@@ -127,7 +128,7 @@ class Grip:
 
     def _pulled(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         simulation = self._held()
-        found = simulation._native.pulled(simulation._grips.index(self))
+        found = simulation._own.pulled(simulation._grips.index(self))
         assert found is not None
         return np.array(found[0]), np.array(found[1])
 
@@ -170,14 +171,14 @@ class Simulation:
     True
     """
 
-    _native: _native.Simulation
+    _own: _native.Simulation
     _model: Model
 
     @classmethod
     def _of(cls, model: Model, threads: int) -> Simulation:
         simulation = cls.__new__(cls)
         simulation._model = model
-        simulation._native = _native.Simulation(model._native, threads)
+        simulation._own = _native.Simulation(model._own, threads)
         simulation._threads = threads
         simulation._grips = []
         simulation._pushed = None
@@ -197,17 +198,17 @@ class Simulation:
     @property
     def time(self) -> float:
         """Time [s]."""
-        return self._native.time
+        return self._own.time
 
     @property
     def steps(self) -> int:
         """Steps since the start."""
-        return self._native.steps
+        return self._own.steps
 
     @property
     def step_size(self) -> float:
         """Length of the next step [s]."""
-        return self._native.step_size
+        return self._own.step_size
 
     @property
     def device(self) -> str:
@@ -217,7 +218,7 @@ class Simulation:
     @property
     def ended(self) -> str | None:
         """Why it has ended before the last step of its scene."""
-        return self._native.ended()
+        return self._own.ended()
 
     @property
     def displacement(self) -> NDArray[np.float32] | NDArray[np.float64]:
@@ -226,18 +227,18 @@ class Simulation:
         It is in the solver's own numbers. ``np.array(sim.displacement)`` keeps an instant. A thread that reads it during a step of another
         one may see two instants mixed.
         """
-        return self._native.displacement
+        return self._own.displacement
 
     def positions(self, out: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Positions of all nodes [m], (nodes, 3), in a fresh array or in `out`."""
         out = self._out(out)
-        self._native.positions(out)
+        self._own.positions(out)
         return out
 
     def velocities(self, out: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Velocities of all nodes [m/s], (nodes, 3), in a fresh array or in `out`."""
         out = self._out(out)
-        self._native.velocities(out)
+        self._own.velocities(out)
         return out
 
     def _out(self, out: NDArray[np.float64] | None) -> NDArray[np.float64]:
@@ -267,7 +268,7 @@ class Simulation:
         cells = at == "cells"
         if at is None:
             cells = name not in _NODAL
-        values = self._native.field(name, on, cells)
+        values = self._own.field(name, on, cells)
         if values.shape[1] == 1:
             return values[:, 0]
         return values.reshape(-1, 3, 3) if values.shape[1] == 9 else values
@@ -275,29 +276,29 @@ class Simulation:
     @property
     def energies(self) -> Energies:
         """Energies at the instant [J]."""
-        return Energies(*self._native.energies())
+        return Energies(*self._own.energies())
 
     def reaction(self, constraint: str) -> NDArray[np.float64]:
         """Force by which a constraint holds or moves its nodes [N], (3,)."""
-        found = self._native.reaction(constraint)
+        found = self._own.reaction(constraint)
         if found is None:
             raise KeyError(f"there is no constraint `{constraint}`; there are {', '.join(self._model.constraints) or 'none'}")
         return np.array(found)
 
     def enclosed(self, constraint: str) -> tuple[float, float]:
         """Volume [m³] and pressure [Pa] of a constraint of volume."""
-        found = self._native.enclosed(constraint)
+        found = self._own.enclosed(constraint)
         if found is None:
             raise KeyError(f"there is no constraint of volume `{constraint}`")
         return found[0], found[1]
 
     def contacts(self) -> dict[str, NDArray[np.float64]]:
         """Force of each contact on what it is with [N], (3,), by name."""
-        return {name: np.array(force) for name, force in self._native.contacts().items()}
+        return {name: np.array(force) for name, force in self._own.contacts().items()}
 
     def tool(self, name: str) -> Tool:
         """A tool or an obstacle at the instant."""
-        found = self._native.tool(name)
+        found = self._own.tool(name)
         if found is None:
             raise KeyError(f"nothing touches a tool `{name}`; there are {', '.join(self._model.tools) or 'none'}")
         (place, quaternion), opening, force, torque = found
@@ -319,22 +320,22 @@ class Simulation:
         if quaternion is None:
             quaternion = self.tool(tool).quaternion
         x, q = [float(c) for c in place], [float(c) for c in quaternion]
-        return self._native.drive(tool, (x, q), float(within))
+        return self._own.drive(tool, (x, q), float(within))
 
     def open(self, tool: str, angle: float, *, within: float = 0.0) -> float:
         """Opens the jaws of a tool to an angle [rad], or closes them: when they are there [s]."""
-        return self._native.open(tool, float(angle), float(within))
+        return self._own.open(tool, float(angle), float(within))
 
     def sample(self) -> dict[str, float]:
         """All columns of the scene's tables at the instant."""
-        return dict(zip((name for name, _ in self._native.columns()), self._native.sample(), strict=True))
+        return dict(zip((name for name, _ in self._own.columns()), self._own.sample(), strict=True))
 
     def step(self, count: int = 1) -> int:
         """Goes so many steps on; the steps done, fewer where the run ends before."""
         if count < 0:
             raise ValueError(f"{count} steps can't be taken")
         self._free()
-        return self._native.advance(int(count), None)
+        return self._own.advance(int(count), None)
 
     def run(
         self,
@@ -363,7 +364,7 @@ class Simulation:
         return history
 
     def _history(self, record: Sequence[str]) -> History:
-        return History._empty(self._native.columns(), list(record))
+        return History._empty(self._own.columns(), list(record))
 
     def _run_into(
         self,
@@ -379,7 +380,7 @@ class Simulation:
             raise ValueError(f"samples can't be {every} s apart")
         start, count = self.time, 0
         while True:
-            history._add(self.time, self._native.sample(), {name: self._recorded(name) for name in history._fields})
+            history._add(self.time, self._own.sample(), {name: self._recorded(name) for name in history._fields})
             if each is not None:
                 self._calling = True
                 try:
@@ -390,7 +391,7 @@ class Simulation:
             while done == 0:
                 count += 1
                 target = min(start + count * every, until)
-                done = self._native.advance(None, target)
+                done = self._own.advance(None, target)
                 if target >= until or self.ended is not None:
                     break
             if done == 0:
@@ -407,7 +408,7 @@ class Simulation:
         """Forces on all nodes [N], (nodes, 3), or on those of a body; they stay until replaced. `None` ends them."""
         if forces is None:
             self._pushed = None
-            self._native.push(None)
+            self._own.push(None)
             return
         count = len(self._model.rest)
         if body is None:
@@ -419,7 +420,7 @@ class Simulation:
             before = np.zeros((count, 3)) if self._pushed is None else self._pushed.copy()
             before[own] = numbers(forces, f"forces on `{body}`", (own.stop - own.start, 3))
             self._pushed = before
-        self._native.push(self._pushed)
+        self._own.push(self._pushed)
 
     def grip(
         self,
@@ -456,7 +457,7 @@ class Simulation:
             weights = [(int(node), 1.0 / len(own)) for node in own]
         else:
             place = numbers(at if at is not None else (), "the place of a grip", (3,))
-            weights = self._native.around([float(x) for x in place], on, radius)
+            weights = self._own.around([float(x) for x in place], on, radius)
         grip = Grip(self, weights, float(stiffness))
         self._grips.append(grip)
         try:
@@ -468,25 +469,25 @@ class Simulation:
 
     def _hold(self) -> None:
         all_grips = [(own._nodes, [float(x) for x in own._place], own._asked) for own in self._grips]
-        for grip, stiffness in zip(self._grips, self._native.hold(all_grips), strict=True):
+        for grip, stiffness in zip(self._grips, self._own.hold(all_grips), strict=True):
             grip._stiffness = stiffness
 
     def set(self, values: Mapping[str, float]) -> None:
         """Other numbers of laws, loads, density or damping, by their paths, from the next step on. Steps may get another length."""
         scene = self._model._scene.replace(dict(values))
         model = scene.build(like=self._model)
-        if not self._native.exchange(model._native):
+        if not self._own.exchange(model._own):
             raise ValueError(f"{', '.join(values)}: the mesh, the solver or the precision would be another; build a new model")
         self._model = model
 
     def state(self) -> State:
         """A snapshot. Hands, pushed forces and the numbers of `set` are not part of it."""
-        return State._of(self._native.state())
+        return State._of(self._own.state())
 
     def restore(self, state: State) -> None:
         """Goes back, or on, to a snapshot. Grips and pushed forces stay."""
         try:
-            self._native.restore(state._native)
+            self._own.restore(state._own)
         except ValueError as error:
             raise ResumeError(str(error)) from None
 
@@ -502,11 +503,11 @@ class Simulation:
 
     def fingerprint(self) -> int:
         """A number of all bits of the motion: equal motions have equal ones."""
-        return self._native.fingerprint()
+        return self._own.fingerprint()
 
     def mesh(self, data: Sequence[str] = ("displacement",), *, on: str | None = None, at: str = "points") -> Mesh:
         """The mesh at rest of a body, a surface or all, with fields of the instant."""
-        return Mesh._of(self._native.mesh(list(data), on, at == "cells"))
+        return Mesh._of(self._own.mesh(list(data), on, at == "cells"))
 
     def picture(
         self,
@@ -530,12 +531,12 @@ class Simulation:
 
         if len(size) != 2 or not all(1 <= int(n) <= 8192 for n in size):
             raise ValueError(f"a picture of {size} pixels can't be drawn; each side has 1 to 8192")
-        png = self._native.picture(field, [int(size[0]), int(size[1])], None if camera is None else list(camera))
+        png = self._own.picture(field, [int(size[0]), int(size[1])], None if camera is None else list(camera))
         return Picture(bytes(png))
 
     def close(self) -> None:
         """Ends it. Views stay readable; everything else raises `ClosedError`."""
-        self._native.close()
+        self._own.close()
 
     def __enter__(self) -> Simulation:
         return self

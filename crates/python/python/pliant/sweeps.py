@@ -72,7 +72,8 @@ class Sweep:
         for name in names:
             own = np.array([row.get(name, math.nan) for row in self.rows])
             data[name] = (list(axes), own.reshape(shape))
-        return xr.Dataset(data, coords=axes)
+        found: xarray.Dataset = xr.Dataset(data, coords=axes)
+        return found
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -311,9 +312,9 @@ def _measured(bundle: _Bundle, number: int, folder: str | None) -> dict[str, Any
         warnings.simplefilter("ignore", PliantWarning)
         model: Model = scene.replace(bundle.combinations[number]).build()
         out = None if bundle.keep is None else os.path.join(bundle.keep, f"run-{number:04}")
-        result = model.run(out, threads=bundle.threads, **({} if out is None else {"force": True}))
-        last = {} if out is not None else {name: float(own[-1]) for name, own in result.history.items() if name != "time"}
-    row = {"status": result.status, "error": "" if result.error is None else str(result.error)}
+        result = model.run(out, threads=bundle.threads, force=out is not None)
+        last: dict[str, Any] = {} if out is not None else {name: float(own[-1]) for name, own in result.history.items() if name != "time"}
+    row: dict[str, Any] = {"status": result.status, "error": "" if result.error is None else str(result.error)}
     row |= {"time": result.time, "steps": result.steps, "step": model.step, "wall_seconds": result.wall_seconds}
     row |= last or {f"energy.{name}": own for name, own in result.energies._asdict().items()}
     for name, force in result.reactions.items():
