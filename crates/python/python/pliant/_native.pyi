@@ -6,6 +6,24 @@ from numpy.typing import NDArray
 
 from pliant.errors import Diagnostic
 
+__all__ = [
+    "Mesh",
+    "Model",
+    "Simulation",
+    "State",
+    "__version__",
+    "build",
+    "check",
+    "devices",
+    "main",
+    "mesh",
+    "parse",
+    "pixels",
+    "read",
+    "read_image",
+    "scene_of_mesh",
+]
+
 __version__: str
 
 _Scene = tuple[str, str, str, list[str]]

@@ -159,7 +159,7 @@ class Mesh:
         """A box from the origin, of edges `size` [m]. Point sets: ``x-min``, ``x-max``, ``y-min``, …
 
         >>> Mesh.block([0.1, 0.1, 0.1], edge=0.05)
-        Mesh(27 points, 40 tetra)
+        Mesh(27 points, 48 tetra)
         """
         shape: dict[str, Any] = {"size": list(size)}
         if cells is not None:

@@ -65,7 +65,7 @@ class Scene:
     >>> scene
     Scene('', 0.1 s, 1 body, 1 law, 1 constraint)
     >>> scene.build()
-    Model(1 body, 27 nodes, step 0.00461 s)
+    Model(1 body, 27 nodes, step 0.00909 s)
     """
 
     folder: str

@@ -34,7 +34,7 @@ class Dask:
         left = iter(numbers)
         most = max(2, 2 * sum(client.nthreads().values()) // max(1, self._cores))
         try:
-            first = [client.submit(task, shared, number, **options) for number, _ in zip(left, range(most), strict=False)]
+            first = [client.submit(task, shared, number, **options) for _, number in zip(range(most), left, strict=False)]
             running = self._distributed.as_completed(first)
             for future in running:
                 row = future.result()
