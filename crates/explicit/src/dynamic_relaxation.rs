@@ -441,7 +441,7 @@ impl<R: Scalar> DynamicRelaxation<R> {
         let before = state.displacement.clone();
         state.displacement.fill([R::ZERO; 3]);
         self.approach(state, LoadPath::Start, [0.0, 1.0], &mut Convergence::default(), &mut |_| ())
-            .inspect_err(|_| state.displacement = before)
+            .inspect_err(|_| state.displacement.copy_from_slice(&before))
     }
 
     /// Brings a state to the equilibrium at a later time [s]. On failure the state is that of the last equilibrium.
@@ -491,7 +491,7 @@ impl<R: Scalar> DynamicRelaxation<R> {
                     reached = end;
                 }
                 Err(error) => {
-                    state.displacement = before;
+                    state.displacement.copy_from_slice(&before);
                     self.slowness *= 2.0;
                     size = 0.5 * (end - reached);
                     if size < least * (1.0 - 1e-9) {

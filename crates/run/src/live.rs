@@ -58,6 +58,21 @@ impl Live {
         Ok(())
     }
 
+    /// Goes on with other numbers (laws, loads, steps) from the present state. False, and nothing changes, where the other world has other
+    /// meshes, solvers or number types.
+    ///
+    /// # Errors
+    /// If the state can't be taken, or a stepper can't be made. The run then stays as it was.
+    pub fn exchange(&mut self, world: &Arc<World>) -> Result<bool, Failure> {
+        let goes_on = self.simulation.exchange(world.simulated())?;
+        if goes_on {
+            self.world = Arc::clone(world);
+            self.show(&world.scene.shown(1.0));
+            self.samples = Samples::new(world, &world.scene.sampled());
+        }
+        Ok(goes_on)
+    }
+
     fn of(world: &Arc<World>, simulation: Simulation) -> Self {
         Self {
             simulation,
@@ -175,6 +190,7 @@ impl Live {
 #[cfg(test)]
 mod tests {
     use pliant_mechanics::grip::Grip;
+    use pliant_sim::Reals;
 
     use super::*;
     use crate::testing::{CUBE, read};
@@ -252,6 +268,43 @@ mod tests {
         whole.mesh().unwrap();
         half.mesh().unwrap();
         assert_eq!(whole.simulation.energies(), half.simulation.energies());
+    }
+
+    #[test]
+    fn displacements_keep_their_address_as_long_as_the_run_lives() {
+        let solvers = [
+            ("", "single"),
+            ("solver = 'explicit'\nprecision = 'double'", "double"),
+            ("solver = 'quasi-static'\nload-steps = 4\nprecision = 'double'", "double"),
+        ];
+        for (run, precision) in solvers {
+            let with = |modulus: &str| {
+                let run = format!("[run]\n{run}\n[law.tissue]");
+                other(&[("[law.tissue]", &run), ("young-modulus = 10e3", modulus)])
+            };
+            let mut live = Live::new(&with("young-modulus = 10e3")).unwrap();
+            let shown = |live: &Live| live.simulation.instants().next().unwrap().displacements().unwrap().address();
+            let address = shown(&live);
+            let start = live.simulation.state().unwrap();
+            for _ in 0..4 {
+                live.simulation.step(1).unwrap();
+            }
+            let node = model(&with("young-modulus = 10e3")).node_count() - 1;
+            let now = live.simulation.instants().next().unwrap();
+            let last = match now.displacements().unwrap() {
+                Reals::Single(all) => all[node].map(f64::from),
+                Reals::Double(all) => all[node],
+            };
+            assert_eq!((last, precision), (now.displacement(node), if now.is_single() { "single" } else { "double" }));
+            assert_eq!(shown(&live), address);
+            let state = live.simulation.state().unwrap();
+            live.restore(start).unwrap();
+            assert_eq!(shown(&live), address, "after going back");
+            assert!(live.exchange(&with("young-modulus = 11e3")).unwrap());
+            assert_eq!(shown(&live), address, "after an exchange");
+            live.restore(state).unwrap();
+            assert_eq!(shown(&live), address, "after going on again");
+        }
     }
 
     #[test]

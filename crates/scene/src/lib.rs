@@ -63,10 +63,11 @@ mod world;
 
 pub use assemble::{
     BodyLocator, Built, BuiltBody, Located, Meshing, SizeDoubt, build, build_watched, build_with,
+    mesh_of,
 };
 pub use bound::element_bound;
 pub use cache::{MeshCache, cache_folder};
-pub use of_mesh::{SceneOfMesh, is_mesh, scene_of_mesh};
+pub use of_mesh::{SceneOfMesh, is_mesh, scene_of_given, scene_of_mesh};
 pub use organ_scene::OrganScene;
 pub use plan::{LimitingElement, Limits, Plan, plan};
 pub use printable::printable;

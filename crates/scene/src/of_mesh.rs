@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use pliant_geometry::Labels;
+use pliant_geometry::{Labels, Mesh};
 use pliant_geometry::io::{self, Format, MeshFileError};
 use pliant_sim::number;
 
@@ -35,15 +35,26 @@ pub fn is_mesh(path: &Path) -> bool {
 /// # Errors
 /// If the file can't be read.
 pub fn scene_of_mesh(path: &Path) -> Result<SceneOfMesh, MeshFileError> {
-    let mesh = io::read(path)?.mesh;
+    let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+    Ok(SceneOfMesh { folder, ..scene_of(&io::read(path)?.mesh, "file", &name) })
+}
+
+/// The same of a mesh in metres that a program [gives](crate::source::Source::giving) by a name.
+pub fn scene_of_given(mesh: &Mesh, name: &str) -> SceneOfMesh {
+    scene_of(mesh, "given", name)
+}
+
+/// The scene of a mesh that stands under a key of `mesh`.
+fn scene_of(mesh: &Mesh, key: &str, name: &str) -> SceneOfMesh {
     let (low, high) = mesh.bounds().unwrap_or_default();
     let size = high - low;
     let axis = size.imax();
-    let (scale, unit) = if size[axis] > LARGEST { (1e-3, "millimetres") } else { (1.0, "metres") };
+    let in_millimetres = key == "file" && size[axis] > LARGEST;
+    let (scale, unit) = if in_millimetres { (1e-3, "millimetres") } else { (1.0, "metres") };
     let length = scale * size[axis];
     let filled = mesh.volume_blocks().all(|block| block.is_empty());
-    let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let quoted = serde_json::Value::from(name.as_str());
+    let quoted = serde_json::Value::from(name);
     let edge = rounded(length / CELLS);
     let how = if filled {
         format!("as = \"tets\", edge = {edge}")
@@ -52,7 +63,7 @@ pub fn scene_of_mesh(path: &Path) -> Result<SceneOfMesh, MeshFileError> {
     };
     let [young, poisson, density] = TISSUE;
     let damping = rounded(calming(young, density, length));
-    let labelled = !filled && !Labels::of(&mesh).is_empty();
+    let labelled = !filled && !Labels::of(mesh).is_empty();
     let view = if labelled { "\n[view]\ncolour = \"label\"\n" } else { "" };
     let mut point = scale * low;
     point[axis] += 0.1 * length;
@@ -69,7 +80,7 @@ young-modulus = {young:?}
 poisson-ratio = {poisson:?}
 
 [body.body]
-mesh = {{ file = {quoted}, scale = {scale:?}, {how} }}
+mesh = {{ {key} = {quoted}, scale = {scale:?}, {how} }}
 law = "tissue"
 density = {density:?}
 damping = {damping}
@@ -90,8 +101,7 @@ nodes = {{ half-space = {{ point = {point:?}, normal = {normal:?} }} }}
     if filled {
         assumed.push_str(&format!("; its surface is filled with tets of {} m", number(edge)));
     }
-    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-    Ok(SceneOfMesh { text, folder, assumed })
+    SceneOfMesh { text, folder: PathBuf::new(), assumed }
 }
 
 /// Damping [1/s] of a body of a length [m]: half of the critical one of its slowest vibration along it, α = 2 · ½ · (π/2) √(E/ρ)/L.
@@ -109,7 +119,7 @@ mod tests {
     use super::*;
     use crate::scene::Scene;
     use crate::source::Source;
-    use pliant_geometry::{Mesh, Vector3, boundary};
+    use pliant_geometry::{Vector3, boundary};
     use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Resolution, VolumeCell};
 
     /// A bar along y, in a unit of so many metres.
@@ -172,5 +182,7 @@ mod tests {
         labelled.blocks[0].data.insert("label".into(), pliant_geometry::DataArray::scalar(labels));
         let (made, built) = opened("organs.vtu", &labelled);
         assert!(made.text.contains("colour = \"label\"") && built.labels(None).len() == 2);
+        let given = scene_of_given(&labelled, "organs");
+        assert_eq!(given.text, made.text.replace("file = \"organs.vtu\"", "given = \"organs\"").replace("organs.vtu", "organs"));
     }
 }

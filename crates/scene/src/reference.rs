@@ -81,6 +81,97 @@ fn shared_tables(described: &[Vec<Parameter>]) -> Vec<&Parameter> {
     found.into_iter().filter(|(_, count)| *count > 1).map(|(parameter, _)| parameter).collect()
 }
 
+/// The classes of all tables but `[scene]` for the Python package, one a table.
+pub fn python(sections: &[Section]) -> String {
+    let mut page = String::from(
+        "\"\"\"The tables of scenes as classes, with units, ranges and defaults. SI units throughout.\n\nWritten by `pliant schema --python` from the parameter structs; do not edit.\n\"\"\"\n\n\
+         from __future__ import annotations\n\nfrom collections.abc import Mapping, Sequence\nfrom dataclasses import dataclass\n\
+         from typing import TYPE_CHECKING, Any, ClassVar\n\nfrom pliant._table import Table\n\nif TYPE_CHECKING:\n    from pliant.mesh import Mesh\n",
+    );
+    let mut names: Vec<String> = Vec::new();
+    for section in sections.iter().filter(|section| section.header != "[scene]") {
+        let kind = section.header.trim_matches(['[', ']']).trim_end_matches(".NAME");
+        let mut name = camel(section.name.unwrap_or(kind));
+        if names.contains(&name) {
+            name.push_str(&camel(kind));
+        }
+        let doc = section.schema.get("description").and_then(Json::as_str).unwrap_or_default();
+        page.push_str(&python_class(&name, section, doc, &describe(&section.schema)));
+        names.push(name);
+    }
+    names.push("Table".into());
+    names.sort_unstable();
+    let all: Vec<String> = names.iter().map(|name| format!("    \"{name}\",\n")).collect();
+    page + &format!("\n\n__all__ = [\n{}]\n", all.concat())
+}
+
+/// `NeoHookean` of `neo-hookean`.
+fn camel(name: &str) -> String {
+    let parts = name.split(['-', '_']).filter(|part| !part.is_empty());
+    parts.map(|part| part[..1].to_uppercase() + &part[1..]).collect()
+}
+
+fn python_class(name: &str, section: &Section, doc: &str, parameters: &[Parameter]) -> String {
+    let of = |parameter: &Parameter| {
+        let key = parameter.key.replace('-', "_");
+        if ["as", "from", "is", "in"].contains(&key.as_str()) { key + "_" } else { key }
+    };
+    let mut page = format!("\n\n@dataclass(frozen=True, kw_only=True)\nclass {name}(Table):\n    \"\"\"");
+    let header = match section.name {
+        Some(name) => format!("`{}` with ``type = \"{name}\"``.", section.header),
+        None => format!("`{}`.", section.header),
+    };
+    page.push_str(&header);
+    if !doc.is_empty() {
+        page.push_str(&format!(" {}", one_line(doc)));
+    }
+    if !parameters.is_empty() {
+        page.push_str("\n\n    Parameters\n    ----------\n");
+    }
+    for parameter in parameters {
+        let takes = match (&parameter.kind, &parameter.range) {
+            (kind, range) if range.is_empty() => one_line(kind),
+            (kind, range) => format!("{}, {range}", one_line(kind)),
+        };
+        let default = match &parameter.default {
+            Some(value) => format!("; {value} if not given"),
+            None => String::new(),
+        };
+        let meaning = one_line(&parameter.description).replace('\\', "\\\\");
+        page.push_str(&format!("    {}\n        {meaning} Takes {takes}{default}.\n", of(parameter)));
+    }
+    page.push_str(if parameters.is_empty() { "\"\"\"\n" } else { "    \"\"\"\n" });
+    page.push_str(&format!("\n    _type: ClassVar[str | None] = {}\n", section.name.map_or("None".into(), |name| format!("\"{name}\""))));
+    let keys: Vec<String> = parameters.iter().map(|own| format!("\"{}\": \"{}\"", of(own), own.key)).collect();
+    page.push_str(&format!("    _keys: ClassVar[dict[str, str]] = {{{}}}\n", keys.join(", ")));
+    if !parameters.is_empty() {
+        page.push('\n');
+    }
+    // Those without a default come first, as in any signature.
+    for parameter in parameters.iter().filter(|own| own.required).chain(parameters.iter().filter(|own| !own.required)) {
+        let kind = python_type(parameter);
+        page.push_str(&match parameter.required {
+            true => format!("    {}: {kind}\n", of(parameter)),
+            false => format!("    {}: {kind} | None = None\n", of(parameter)),
+        });
+    }
+    page
+}
+
+fn python_type(parameter: &Parameter) -> &'static str {
+    match parameter.kind.as_str() {
+        _ if parameter.key == "mesh" => "Mesh | Mapping[str, Any]",
+        "a number" => "float",
+        "a whole number" => "int",
+        "a text" => "str",
+        "true or false" => "bool",
+        "2 numbers" | "3 numbers" => "Sequence[float]",
+        "an array of texts" => "Sequence[str]",
+        kind if kind.starts_with("one of ") => "str",
+        _ => "Any",
+    }
+}
+
 /// The doc comment of a definition.
 fn definition<'s>(sections: &'s [Section], name: &str) -> &'s str {
     let find = |section: &'s Section| section.schema.get("$defs")?.get(name)?.get("description")?.as_str();

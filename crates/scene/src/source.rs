@@ -3,9 +3,11 @@
 //! TOML is read with the `toml` crate's spanned tree; the tree here owns its text, keeps the order of the file and
 //! takes values from the command line, which have no place in the file.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
+use pliant_geometry::Mesh;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -26,6 +28,7 @@ pub struct Source {
     root: Node,
     assignments: Vec<String>,
     reads: Reads,
+    given: BTreeMap<String, Arc<Mesh>>,
 }
 
 /// What the user types before an assignment.
@@ -210,6 +213,7 @@ impl Source {
                 root: Node { place: Place::File(0..0), key_span: None, value },
                 assignments: Vec::new(),
                 reads: Reads::anywhere(),
+                given: BTreeMap::new(),
             }),
             _ => Err(SceneErrors::new(name, text, diagnostics)),
         }
@@ -218,6 +222,16 @@ impl Source {
     /// The same, for a scene that may read these files only.
     pub fn reading(self, reads: Reads) -> Self {
         Self { reads, ..self }
+    }
+
+    /// The same, with meshes of the program that reads it: bodies take them by their names, `mesh = { given = "NAME" }`.
+    pub fn giving(self, given: BTreeMap<String, Arc<Mesh>>) -> Self {
+        Self { given, ..self }
+    }
+
+    /// The meshes that the program gives, by name.
+    pub fn given(&self) -> &BTreeMap<String, Arc<Mesh>> {
+        &self.given
     }
 
     /// The files that the scene may read.

@@ -11,6 +11,7 @@ use pliant_mechanics::Energies;
 use pliant_mechanics::model::Enclosed;
 use serde::{Deserialize, Serialize};
 
+use crate::reals::Reals;
 use crate::solver::Equilibria;
 
 /// A participant at the instant last evaluated. Nodes and constraints are numbered in its model.
@@ -23,6 +24,13 @@ pub trait Instant {
 
     /// Displacement [m] of a node.
     fn displacement(&self, node: usize) -> [f64; 3];
+
+    /// Displacements [m] of all nodes in the stepper's own numbers, where it keeps them; `None` of one that keeps positions. They stay at their
+    /// address as long as the simulation lives, over steps that fail, [`restore`](crate::Simulation::restore) and
+    /// [`exchange`](crate::Simulation::exchange), too. Of a state on a GPU, those last brought back.
+    fn displacements(&self) -> Option<Reals<'_>> {
+        None
+    }
 
     /// Velocity [m/s] of a node.
     fn velocity(&self, node: usize) -> [f64; 3];

@@ -11,6 +11,7 @@ use pliant_mechanics::tensor::Vector;
 
 use crate::failure::Failure;
 use crate::instant::Instant;
+use crate::reals::RealsMut;
 use crate::kept::Kept;
 use crate::solver::LoadStepProgress;
 
@@ -63,6 +64,11 @@ pub(crate) trait Participant: Instant + Send {
     /// Impulses [N s] on each guest since it was led.
     fn guest_impulses(&self) -> &[Vector<f64>] {
         &[]
+    }
+
+    /// The displacements that [`Instant::displacements`] shows, for a participant that takes the place of this one.
+    fn displacements_mut(&mut self) -> Option<RealsMut<'_>> {
+        None
     }
 
     /// Goes back to a state that it was in.

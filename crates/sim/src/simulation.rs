@@ -545,8 +545,18 @@ impl Simulation {
     /// # Errors
     /// If it is of another world, or a device fails. The simulation then stays as it was.
     pub fn restore(&mut self, state: State) -> Result<(), Failure> {
-        *self = Self::resumed(Arc::clone(&self.world), state)?;
+        let before = std::mem::replace(self, Self::resumed(Arc::clone(&self.world), state)?);
+        self.take_place_of(before);
         Ok(())
+    }
+
+    /// Keeps displacements at the addresses where those of another simulation of the same meshes were.
+    fn take_place_of(&mut self, mut before: Self) {
+        for (own, before) in self.participants.iter_mut().zip(&mut before.participants) {
+            if let (Some(here), Some(there)) = (own.displacements_mut(), before.displacements_mut()) {
+                here.take_place_of(there);
+            }
+        }
     }
 
     /// Goes on with other numbers (laws, loads, steps) from the present state. False, and nothing changes, where the other world has other
@@ -558,7 +568,8 @@ impl Simulation {
         let state = self.state()?;
         match Self::continued(world, state, &self.world)? {
             Some(other) => {
-                *self = other;
+                let before = std::mem::replace(self, other);
+                self.take_place_of(before);
                 Ok(true)
             }
             None => Ok(false),

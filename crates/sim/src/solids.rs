@@ -20,6 +20,7 @@ use crate::instant::{CellsNow, Instant};
 use crate::kept::Kept;
 use crate::part::Part;
 use crate::participant::Participant;
+use crate::reals::{Reals, RealsMut};
 use crate::solver::{Equilibria, LoadStepProgress, Memory, Solver, on_cpu};
 
 /// The number types that solids in large strain are computed in.
@@ -29,6 +30,12 @@ pub(crate) trait Numeric: Scalar {
 
     /// The same, from what is kept; `None` of another number type.
     fn kept(kept: &Kept) -> Option<(&State<Self>, &Memory<Self>)>;
+
+    /// Vectors of nodes as they are shown.
+    fn reals(values: &[Vector<Self>]) -> Reals<'_>;
+
+    /// The vector of vectors of nodes.
+    fn reals_mut(values: &mut Vec<Vector<Self>>) -> RealsMut<'_>;
 
     /// The stepper of a participant, from a state on.
     ///
@@ -46,6 +53,14 @@ pub(crate) trait Numeric: Scalar {
 impl Numeric for f32 {
     fn keep(state: State<f32>, memory: Memory<f32>) -> Kept {
         Kept::Single(state, memory)
+    }
+
+    fn reals(values: &[Vector<f32>]) -> Reals<'_> {
+        Reals::Single(values)
+    }
+
+    fn reals_mut(values: &mut Vec<Vector<f32>>) -> RealsMut<'_> {
+        RealsMut::Single(values)
     }
 
     fn kept(kept: &Kept) -> Option<(&State<f32>, &Memory<f32>)> {
@@ -73,6 +88,14 @@ impl Numeric for f32 {
 impl Numeric for f64 {
     fn keep(state: State<f64>, memory: Memory<f64>) -> Kept {
         Kept::Double(state, memory)
+    }
+
+    fn reals(values: &[Vector<f64>]) -> Reals<'_> {
+        Reals::Double(values)
+    }
+
+    fn reals_mut(values: &mut Vec<Vector<f64>>) -> RealsMut<'_> {
+        RealsMut::Double(values)
     }
 
     fn kept(kept: &Kept) -> Option<(&State<f64>, &Memory<f64>)> {
@@ -130,6 +153,10 @@ impl<R: Numeric> Instant for Solids<R> {
 
     fn displacement(&self, node: usize) -> [f64; 3] {
         self.state.displacement[node].map(R::to_f64)
+    }
+
+    fn displacements(&self) -> Option<Reals<'_>> {
+        Some(R::reals(&self.state.displacement))
     }
 
     fn velocity(&self, node: usize) -> [f64; 3] {
@@ -279,9 +306,15 @@ impl<R: Numeric> Participant for Solids<R> {
         self.solver.guest_impulses()
     }
 
+    fn displacements_mut(&mut self) -> Option<RealsMut<'_>> {
+        Some(R::reals_mut(&mut self.state.displacement))
+    }
+
     fn go_back(&mut self, kept: &Kept) -> Result<(), Failure> {
         if let Some((state, memory)) = R::kept(kept) {
-            self.state.clone_from(state);
+            let mut displacement = std::mem::take(&mut self.state.displacement);
+            displacement.copy_from_slice(&state.displacement);
+            self.state = State { displacement, ..state.clone() };
             self.solver.resume(memory.clone());
         }
         Ok(())

@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::f64::consts::FRAC_PI_3;
 use std::path::{Path, PathBuf};
 
-use pliant_geometry::io::{self, MeshFile, MeshFileError};
+use pliant_geometry::io::MeshFile;
 use pliant_geometry::{CellKind, CellLabel, Labels, Mesh, Vector3, labels};
 use pliant_imaging::{
     Border, Choice, Cleaning, Image, ImageError, LabelChoice, LabelError, LabelNames, ReadOptions, Smoothing,
@@ -15,7 +15,7 @@ use pliant_meshing::{
     TriangleMesh, Voxels, require_room_for,
 };
 
-use super::mesh_files::{unscaled, words};
+use super::mesh_files::{MeshFault, words};
 use super::{Builder, MeshOrigin, Meshing};
 use crate::cache::{Kept, Key};
 use crate::diagnostic::Diagnostic;
@@ -76,13 +76,6 @@ enum Goal {
     Shells(ShellGoal),
 }
 
-/// Why no mesh could be made: the key to point at, the message and what to do.
-struct MeshFault {
-    key: &'static str,
-    message: String,
-    help: String,
-}
-
 impl Builder<'_> {
     /// The mesh of what is segmented in an image, or of what the surface of a file encloses.
     pub(super) fn scanned(&mut self, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
@@ -94,9 +87,10 @@ impl Builder<'_> {
             recipe.protect(&scan, table)?;
             Ok((scan, recipe))
         });
-        let name = match (&table.file, &table.image, &table.masks) {
-            (Some(file), ..) | (None, Some(file), _) => file.display().to_string(),
-            (None, None, masks) => {
+        let name = match (&table.file, &table.given, &table.image, &table.masks) {
+            (Some(file), ..) | (None, None, Some(file), _) => file.display().to_string(),
+            (None, Some(name), ..) => name.clone(),
+            (None, None, None, masks) => {
                 let names = masks.iter().flatten().map(|mask| mask.display().to_string());
                 names.collect::<Vec<_>>().join(", ")
             }
@@ -146,25 +140,13 @@ impl Builder<'_> {
     }
 
     fn scan(&self, table: &MeshTable, watch: Watch<'_>) -> Result<Scan, MeshFault> {
-        let Some(file) = &table.file else {
-            require_one_cut(table)?;
-            let image = self.read_images(table, watch)?;
-            let choice = choice(&image, table)?;
-            return Ok(Scan::Image(image, choice));
-        };
-        let opened = |source| MeshFileError::Open { path: file.to_owned(), source };
-        let read = self.scene.file(file).map_err(opened).and_then(|path| io::read(&path));
-        let mut read = read.map_err(|error| {
-            let help = match error {
-                MeshFileError::Open { .. } => "file names are relative to the scene file",
-                _ => "`pliant info` reads a mesh file on its own",
-            };
-            MeshFault { key: "file", message: error.to_string(), help: help.into() }
-        })?;
-        match unscaled(&mut read.mesh, table) {
-            Some((message, help)) => Err(MeshFault { key: "file", message, help }),
-            None => Ok(Scan::Surface(read)),
+        if table.own_cells().is_some() {
+            return Ok(Scan::Surface(self.mesh_file(table)?.1));
         }
+        require_one_cut(table)?;
+        let image = self.read_images(table, watch)?;
+        let choice = choice(&image, table)?;
+        Ok(Scan::Image(image, choice))
     }
 
     /// The image, with the one that is added to it, or several masks as one; with the names of its labels.

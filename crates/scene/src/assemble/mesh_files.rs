@@ -1,8 +1,12 @@
 //! Meshes of files in metres, and the words for their cells.
 
+use std::path::Path;
+
 use pliant_geometry::Mesh;
+use pliant_geometry::io::{self, MeshFile, MeshFileError};
 use pliant_sim::number;
 
+use super::Builder;
 use crate::format::{Cells, MeshTable};
 
 /// An organ larger or smaller than this [m] is probably in other units.
@@ -67,12 +71,59 @@ impl std::fmt::Display for SizeDoubt {
     }
 }
 
-/// Brings the mesh of a file to metres; the message and what to do where it is in metres only by default, and too large for that.
-pub(super) fn unscaled(mesh: &mut Mesh, table: &MeshTable) -> Option<(String, String)> {
-    mesh.points.iter_mut().for_each(|point| *point *= table.factor());
-    let doubt = SizeDoubt::of(mesh).filter(|doubt| doubt.is_large() && table.scale.is_none())?;
-    let help = format!("{}; `scale = 1` if it is in metres", doubt.advice("scale = "));
-    Some((format!("the mesh measures {doubt}"), help))
+/// Why no mesh could be made: the key to point at, the message and what to do.
+pub(super) struct MeshFault {
+    pub key: &'static str,
+    pub message: String,
+    pub help: String,
+}
+
+impl Builder<'_> {
+    /// The mesh of a file or of the program in metres, with its name.
+    pub(super) fn mesh_file(&self, table: &MeshTable) -> Result<(String, MeshFile), MeshFault> {
+        let key = table.own_cells().unwrap_or("file");
+        let (name, mut read) = match (&table.file, &table.given) {
+            (Some(file), _) => (file.display().to_string(), self.read_mesh(file)?),
+            (None, given) => {
+                let name = given.clone().unwrap_or_default();
+                let mesh = self.given_mesh(&name)?;
+                let format = "given by the program".to_owned();
+                (name, MeshFile { mesh, format, notes: Vec::new(), time: None })
+            }
+        };
+        read.mesh.points.iter_mut().for_each(|point| *point *= table.factor());
+        match SizeDoubt::of(&read.mesh).filter(|doubt| doubt.is_large() && table.scale.is_none()) {
+            None => Ok((name, read)),
+            Some(doubt) => {
+                let help = format!("{}; `scale = 1` if it is in metres", doubt.advice("scale = "));
+                Err(MeshFault { key, message: format!("the mesh measures {doubt}"), help })
+            }
+        }
+    }
+
+    fn read_mesh(&self, file: &Path) -> Result<MeshFile, MeshFault> {
+        let opened = |source| MeshFileError::Open { path: file.to_owned(), source };
+        let read = self.scene.file(file).map_err(opened).and_then(|path| io::read(&path));
+        read.map_err(|error| {
+            let help = match error {
+                MeshFileError::Open { .. } => "file names are relative to the scene file",
+                _ => "`pliant info` reads a mesh file on its own",
+            };
+            MeshFault { key: "file", message: error.to_string(), help: help.into() }
+        })
+    }
+
+    fn given_mesh(&self, name: &str) -> Result<Mesh, MeshFault> {
+        let given = self.source().given();
+        given.get(name).map(|mesh| mesh.as_ref().clone()).ok_or_else(|| {
+            let known: Vec<String> = given.keys().map(|name| format!("`{name}`")).collect();
+            let help = match known.is_empty() {
+                true => "the program that reads this scene gives no meshes; take a `file`".into(),
+                false => format!("it gives {}", known.join(", ")),
+            };
+            MeshFault { key: "given", message: format!("no mesh `{name}` is given"), help }
+        })
+    }
 }
 
 /// The word for cells in messages.

@@ -1,8 +1,6 @@
 //! The mesh of a body or a surface: read from a file or made from a shape, brought to metres, checked and repaired.
 
-use std::path::PathBuf;
-
-use pliant_geometry::io::{self, MeshFileError};
+use pliant_geometry::io::MeshFile;
 use pliant_geometry::{
     CellBlock, CellId, CellKind, DataArray, Diagnosis, Mesh, Vector3, boundary, diagnose, reorder,
 };
@@ -13,7 +11,7 @@ use pliant_meshing::{
 use pliant_sim::counted;
 
 use super::Builder;
-use super::mesh_files::{SizeDoubt, unscaled, words};
+use super::mesh_files::{MeshFault, SizeDoubt, words};
 use crate::diagnostic::Diagnostic;
 use crate::format::{BodyModel, BodyTable, Cells, Fix, MeshTable, Organ};
 
@@ -34,6 +32,7 @@ impl Builder<'_> {
     pub(super) fn mesh(&mut self, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
         let given = [
             ("file", table.file.is_some()),
+            ("given", table.given.is_some()),
             ("image", table.image.is_some()),
             ("masks", table.masks.is_some()),
             ("block", table.block.is_some()),
@@ -57,7 +56,7 @@ impl Builder<'_> {
             self.error(path, message, "this mesh", help);
             return None;
         };
-        let from_file = source == "file" && table.cells.is_some();
+        let from_file = matches!(source, "file" | "given") && table.cells.is_some();
         let of_scans = [
             ("label", table.label.is_some(), false),
             ("labels", table.labels.is_some(), false),
@@ -79,9 +78,9 @@ impl Builder<'_> {
             self.error(&[path, &[key]].concat(), message, "here", "leave it out");
             return None;
         }
-        let mut made = match &table.file {
-            Some(file) if !from_file => self.file(file.clone(), table, path)?,
-            _ if matches!(source, "file" | "image" | "masks") => self.scanned(table, path)?,
+        let mut made = match source {
+            "file" | "given" if !from_file => self.with_own_cells(table, path)?,
+            "file" | "given" | "image" | "masks" => self.scanned(table, path)?,
             _ if source == "lines" => self.lines(table, path)?,
             _ if SOLID_SHAPES.contains(&source) => self.shape(source, table, path)?,
             _ => self.sheet(source, table, path)?,
@@ -91,32 +90,21 @@ impl Builder<'_> {
         Some(made)
     }
 
-    /// The mesh of a file, in metres.
-    pub(super) fn file(&mut self, file: PathBuf, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
-        let at = |key| [path, &[key]].concat();
+    /// A mesh with cells of its own, in metres.
+    pub(super) fn with_own_cells(&mut self, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
         if table.edge.is_some() {
             let message = "a mesh file has its own cells, whose `edge` is not for choosing";
             let help = "leave it out, or add `as = \"tets\"` to make new cells in the surface of the file";
-            self.error(&at("edge"), message, "here", help);
+            self.error(&[path, &["edge"]].concat(), message, "here", help);
             return None;
         }
-        let opened = |source| MeshFileError::Open { path: file.clone(), source };
-        match self.scene.file(&file).map_err(opened).and_then(|path| io::read(&path)) {
-            Ok(mut read) => {
-                if let Some((message, help)) = unscaled(&mut read.mesh, table) {
-                    self.error(&at("file"), message, "this file", help);
-                    return None;
-                }
-                let name = file.display();
-                self.notes.extend(read.notes.iter().map(|note| format!("{name}: {note}")));
-                Some(MeshOrigin { mesh: read.mesh, origin: format!("{name} ({})", read.format) })
+        match self.mesh_file(table) {
+            Ok((name, MeshFile { mesh, format, notes, .. })) => {
+                self.notes.extend(notes.iter().map(|note| format!("{name}: {note}")));
+                Some(MeshOrigin { mesh, origin: format!("{name} ({format})") })
             }
-            Err(error) => {
-                let help = match error {
-                    MeshFileError::Open { .. } => "file names are relative to the scene file",
-                    _ => "`pliant info` reads a mesh file on its own",
-                };
-                self.error(&at("file"), error.to_string(), "this file", help);
+            Err(MeshFault { key, message, help }) => {
+                self.error(&[path, &[key]].concat(), message, "this file", help);
                 None
             }
         }
@@ -208,7 +196,7 @@ impl Builder<'_> {
     pub(super) fn check_mesh(&mut self, mesh: &Mesh, body: &BodyTable, path: &[&str]) -> bool {
         let table = &body.mesh;
         let fixes: &[Fix] = table.fix.as_ref().map_or(&[], |fixes| fixes.as_slice());
-        let place = if table.file.is_some() { [path, &["file"]].concat() } else { path.to_vec() };
+        let place: Vec<&str> = path.iter().copied().chain(table.own_cells()).collect();
         let dimension = match body.model {
             BodyModel::Solid => 3,
             BodyModel::Shell | BodyModel::Membrane => 2,
@@ -231,7 +219,7 @@ impl Builder<'_> {
             return false;
         }
         let mut found = diagnose(mesh);
-        if dimension != 3 && table.file.is_none() {
+        if dimension != 3 && table.own_cells().is_none() {
             // The slit of an annulus.
             found.duplicate_nodes.clear();
         }
@@ -445,6 +433,34 @@ mod tests {
         let found = Diagnosis { inverted_cells: vec![tet(1)], ..Diagnosis::default() };
         assert!(problems(&found, &[], 3)[0].1.contains("fix = \"reorder\""));
         assert!(problems(&found, &[Fix::Reorder], 3)[0].1.contains("remesh"));
+    }
+
+    #[test]
+    fn a_program_gives_meshes_from_its_memory() {
+        let block = Block::new([0.1, 0.1, 0.1]);
+        let mesh = block.mesh(Resolution::Edge(0.05), VolumeCell::Tet, DEFAULT_CELL_LIMIT).unwrap();
+        let mesh = std::sync::Arc::new(mesh);
+        let with = |table: &str, given: &str| {
+            let text = CUBE.replace("{ block = { size = [0.1, 0.1, 0.1], cells = [2, 2, 2] } }", table);
+            assert_ne!(text, CUBE);
+            let source = crate::source::Source::parse("cube.toml", text).unwrap();
+            let source = source.giving([(given.to_owned(), std::sync::Arc::clone(&mesh))].into());
+            crate::Scene::from_source(source, ".".into()).and_then(|scene| crate::build(&scene))
+        };
+        let built = with("{ given = 'mine' }", "mine").unwrap_or_else(|error| panic!("{}", error.plain()));
+        assert_eq!(built.bodies[0].mesh.points, mesh.points);
+        assert_eq!(built.bodies[0].origin, "mine (given by the program)");
+        let finer = with("{ given = 'mine', as = 'tets', edge = 0.02 }", "mine")
+            .unwrap_or_else(|error| panic!("{}", error.plain()));
+        assert!(finer.model.node_count() > 2 * built.model.node_count());
+        for (table, says) in [
+            ("{ given = 'other' }", "no mesh `other` is given"),
+            ("{ given = 'mine', edge = 0.1 }", "has its own cells"),
+            ("{ given = 'mine', file = 'a.msh' }", "exactly one source, found 2"),
+        ] {
+            let errors = with(table, "mine").unwrap_err().plain().to_string();
+            assert!(errors.contains(says), "{errors}");
+        }
     }
 
     #[test]

@@ -104,8 +104,8 @@ impl BuiltBody {
         BodyLocator::Wall(&self.boundary, SurfaceLocator::new(&self.boundary, &all, &self.mesh.points))
     }
 
-    /// The number that a node has in the mesh file.
-    fn number_in_file(&self, node: u32) -> u32 {
+    /// The number that a node has in the mesh file, or in the mesh that a program gives.
+    pub fn number_in_file(&self, node: u32) -> u32 {
         self.file_numbers.get(node as usize).copied().unwrap_or(node)
     }
 }
@@ -210,21 +210,7 @@ pub fn build_watched(
     cache: &MeshCache,
     watch: &dyn Fn(Meshing<'_>),
 ) -> Result<Built, SceneErrors> {
-    let mut builder = Builder {
-        scene,
-        cache,
-        watch,
-        assembly: Assembly::default(),
-        cells: Vec::new(),
-        control: None,
-        curved: None,
-        bodies: Vec::new(),
-        surfaces: Vec::new(),
-        out: scene.doubts.clone(),
-        notes: Vec::new(),
-        touching: None,
-        overlapping: None,
-    };
+    let mut builder = Builder::new(scene, cache, watch);
     builder.check_models();
     builder.add_bodies();
     if !builder.failed() {
@@ -262,6 +248,28 @@ pub fn build_watched(
         Arc::new(ImplicitBodies { model: Arc::new(assembly), cells, control, start, surface: curved })
     });
     Ok(Built { model, implicit, bodies, surfaces, contacts, meets, pushed, warnings, notes })
+}
+
+/// The mesh alone of a body of a scene, in metres, with remarks on how it was made.
+///
+/// # Errors
+/// What is wrong with the mesh, or that there is no such body.
+pub fn mesh_of(
+    scene: &Scene,
+    body: &str,
+    cache: &MeshCache,
+    watch: &dyn Fn(Meshing<'_>),
+) -> Result<(Mesh, Vec<String>), SceneErrors> {
+    let mut builder = Builder::new(scene, cache, watch);
+    let found = scene.bodies.iter().find(|(name, _)| name == body);
+    let Some((_, table)) = found else {
+        let missing = Diagnostic::error(format!("there is no body `{body}`"));
+        return Err(scene.source.errors(vec![missing]));
+    };
+    match builder.mesh(&table.mesh, &["body", body, "mesh"]) {
+        Some(made) if !builder.failed() => Ok((made.mesh, builder.notes)),
+        _ => Err(scene.source.errors(builder.out)),
+    }
 }
 
 /// The labels of a body or a surface by name, or of all bodies.
@@ -308,6 +316,24 @@ pub(crate) enum Subject {
 }
 
 impl<'s> Builder<'s> {
+    fn new(scene: &'s Scene, cache: &'s MeshCache, watch: &'s dyn Fn(Meshing<'_>)) -> Self {
+        Self {
+            scene,
+            cache,
+            watch,
+            assembly: Assembly::default(),
+            cells: Vec::new(),
+            control: None,
+            curved: None,
+            bodies: Vec::new(),
+            surfaces: Vec::new(),
+            out: scene.doubts.clone(),
+            notes: Vec::new(),
+            touching: None,
+            overlapping: None,
+        }
+    }
+
     fn failed(&self) -> bool {
         self.out.iter().any(Diagnostic::is_error)
     }

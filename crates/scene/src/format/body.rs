@@ -369,6 +369,10 @@ pub struct MeshTable {
     /// asks for others made of its surface.
     #[serde(default)]
     pub file: Option<PathBuf>,
+    /// The name of a mesh that the program which reads the scene gives from its memory, instead of a `file`; scenes that the command line
+    /// reads have none.
+    #[serde(default)]
+    pub given: Option<String>,
     /// A segmented image, relative to the scene: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, a DICOM segmentation, or the
     /// folder of a DICOM series. Coordinates are those of the patient: x to the right, y to the front, z to the head [m].
     #[serde(default)]
@@ -486,6 +490,15 @@ impl MeshTable {
     /// The factor on all lengths.
     pub fn factor(&self) -> f64 {
         self.scale.unwrap_or(1.0)
+    }
+
+    /// The key of a mesh that has cells of its own, if there is one.
+    pub fn own_cells(&self) -> Option<&'static str> {
+        match (&self.file, &self.given) {
+            (Some(_), _) => Some("file"),
+            (None, Some(_)) => Some("given"),
+            (None, None) => None,
+        }
     }
 
     /// The cells of a built-in shape or an image.
