@@ -123,7 +123,7 @@ pub unsafe extern "C" fn pliant_nodes(
 
 /// A field that is read again and again.
 pub(crate) struct OpenField {
-    on: Option<String>,
+    on: String,
     name: String,
     at: u32,
     reader: FieldReader,
@@ -134,7 +134,7 @@ pub const PLIANT_AT_POINTS: u32 = 0;
 /// Fields are read in the elements, as computed.
 pub const PLIANT_AT_CELLS: u32 = 1;
 
-/// Copies a field, such as `von-mises`, of a body or a surface that one carries, by name; null is all bodies. Fields have the names, units and components of
+/// Copies a field, such as `von-mises`, of a body or a surface that one carries, by name; null is the only body. Fields have the names, units and components of
 /// `data` in the scene. `items` and `components`, if not null, get how many items there are, and numbers in each; with a null buffer nothing else is given.
 /// A field that a body does not have is NaN there.
 #[unsafe(no_mangle)]
@@ -153,8 +153,16 @@ pub unsafe extern "C" fn pliant_field(
     unsafe {
         running(context, simulation, error, |own| {
             let (on, name) = (some_text(on, "on")?, text(name, "name")?);
-            let known =
-                |open: &OpenField| (open.on.as_deref(), open.name.as_str(), open.at) == (on, name, at);
+            let bodies = names(own, PLIANT_BODIES)?;
+            let on = match (on, &bodies[..]) {
+                (Some(on), _) => on,
+                (None, [only]) => only,
+                (None, all) => {
+                    let message = format!("there are several bodies: name one of {}", all.join(", "));
+                    return Err(Fault::new(PliantStatus::Unknown, message));
+                }
+            };
+            let known = |open: &OpenField| (open.on.as_str(), open.name.as_str(), open.at) == (on, name, at);
             let place = match own.fields.iter().position(known) {
                 Some(place) => place,
                 None => {
@@ -167,15 +175,10 @@ pub unsafe extern "C" fn pliant_field(
                             return Err(Fault::new(PliantStatus::NotANumber, message));
                         }
                     };
-                    let reader = FieldReader::new(&own.world, on, name, kind);
+                    let reader = FieldReader::new(&own.world, Some(on), name, kind);
                     let reader =
                         reader.map_err(|failure| Fault::new(PliantStatus::Unknown, failure.message))?;
-                    own.fields.push(OpenField {
-                        on: on.map(str::to_owned),
-                        name: name.to_owned(),
-                        at,
-                        reader,
-                    });
+                    own.fields.push(OpenField { on: on.to_owned(), name: name.to_owned(), at, reader });
                     own.fields.len() - 1
                 }
             };
