@@ -283,7 +283,8 @@ mod tests {
                 other(&[("[law.tissue]", &run), ("young-modulus = 10e3", modulus)])
             };
             let mut live = Live::new(&with("young-modulus = 10e3")).unwrap();
-            let shown = |live: &Live| live.simulation.instants().next().unwrap().displacements().unwrap().address();
+            let shown =
+                |live: &Live| live.simulation.instants().next().unwrap().displacements().unwrap().address();
             let address = shown(&live);
             let start = live.simulation.state().unwrap();
             for _ in 0..4 {
@@ -295,7 +296,10 @@ mod tests {
                 Reals::Single(all) => all[node].map(f64::from),
                 Reals::Double(all) => all[node],
             };
-            assert_eq!((last, precision), (now.displacement(node), if now.is_single() { "single" } else { "double" }));
+            assert_eq!(
+                (last, precision),
+                (now.displacement(node), if now.is_single() { "single" } else { "double" })
+            );
             assert_eq!(shown(&live), address);
             let state = live.simulation.state().unwrap();
             live.restore(start).unwrap();

@@ -62,8 +62,7 @@ mod view;
 mod world;
 
 pub use assemble::{
-    BodyLocator, Built, BuiltBody, Located, Meshing, SizeDoubt, build, build_watched, build_with,
-    mesh_of,
+    BodyLocator, Built, BuiltBody, Located, Meshing, SizeDoubt, build, build_watched, build_with, mesh_of,
 };
 pub use bound::element_bound;
 pub use cache::{MeshCache, cache_folder};

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use pliant_geometry::{Labels, Mesh};
 use pliant_geometry::io::{self, Format, MeshFileError};
+use pliant_geometry::{Labels, Mesh};
 use pliant_sim::number;
 
 /// A body whose longest side is longer than this [m] is taken to be in millimetres.
@@ -183,6 +183,9 @@ mod tests {
         let (made, built) = opened("organs.vtu", &labelled);
         assert!(made.text.contains("colour = \"label\"") && built.labels(None).len() == 2);
         let given = scene_of_given(&labelled, "organs");
-        assert_eq!(given.text, made.text.replace("file = \"organs.vtu\"", "given = \"organs\"").replace("organs.vtu", "organs"));
+        assert_eq!(
+            given.text,
+            made.text.replace("file = \"organs.vtu\"", "given = \"organs\"").replace("organs.vtu", "organs")
+        );
     }
 }

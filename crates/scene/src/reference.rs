@@ -141,14 +141,20 @@ fn python_class(name: &str, section: &Section, doc: &str, parameters: &[Paramete
         page.push_str(&format!("    {}\n        {meaning} Takes {takes}{default}.\n", of(parameter)));
     }
     page.push_str(if parameters.is_empty() { "\"\"\"\n" } else { "    \"\"\"\n" });
-    page.push_str(&format!("\n    _type: ClassVar[str | None] = {}\n", section.name.map_or("None".into(), |name| format!("\"{name}\""))));
-    let keys: Vec<String> = parameters.iter().map(|own| format!("\"{}\": \"{}\"", of(own), own.key)).collect();
+    page.push_str(&format!(
+        "\n    _type: ClassVar[str | None] = {}\n",
+        section.name.map_or("None".into(), |name| format!("\"{name}\""))
+    ));
+    let keys: Vec<String> =
+        parameters.iter().map(|own| format!("\"{}\": \"{}\"", of(own), own.key)).collect();
     page.push_str(&format!("    _keys: ClassVar[dict[str, str]] = {{{}}}\n", keys.join(", ")));
     if !parameters.is_empty() {
         page.push('\n');
     }
     // Those without a default come first, as in any signature.
-    for parameter in parameters.iter().filter(|own| own.required).chain(parameters.iter().filter(|own| !own.required)) {
+    for parameter in
+        parameters.iter().filter(|own| own.required).chain(parameters.iter().filter(|own| !own.required))
+    {
         let kind = python_type(parameter);
         page.push_str(&match parameter.required {
             true => format!("    {}: {kind}\n", of(parameter)),

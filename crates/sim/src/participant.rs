@@ -11,8 +11,8 @@ use pliant_mechanics::tensor::Vector;
 
 use crate::failure::Failure;
 use crate::instant::Instant;
-use crate::reals::RealsMut;
 use crate::kept::Kept;
+use crate::reals::RealsMut;
 use crate::solver::LoadStepProgress;
 
 /// Bodies that one stepper advances together.

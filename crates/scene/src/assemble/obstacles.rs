@@ -32,8 +32,7 @@ const MEBIBYTES: f64 = 4.0 / 1_048_576.0;
 impl Builder<'_> {
     /// The shape of a mesh file; `path` is that of its table.
     pub(super) fn shape_of_mesh(&mut self, table: &MeshTool, path: &[&str]) -> Option<Shape> {
-        let source =
-            MeshTable { file: Some(table.file.clone()), scale: table.scale, ..MeshTable::default() };
+        let source = MeshTable { file: Some(table.file.clone()), scale: table.scale, ..MeshTable::default() };
         let mesh = self.with_own_cells(&source, path)?.mesh;
         self.sampled(&mesh, &table.file, table.sampling(), path)
     }
