@@ -54,7 +54,7 @@ impl OpenScene {
 
     /// The world of the scene as it is now.
     pub(crate) fn world(&self) -> Result<World, Fault> {
-        let source = self.source.clone();
+        let source = self.source.clone().giving(self.given.clone());
         let told = |errors| Fault::scene(&errors, Some(&source));
         let scene = Scene::from_source(source.clone(), self.folder.clone()).map_err(told)?;
         World::new(&scene).map_err(told)

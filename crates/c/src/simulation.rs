@@ -50,9 +50,17 @@ impl Running {
         pool.install(|| what(&mut Computing { world, simulation, fields }))
     }
 
+    /// Whether the state lies on a GPU.
+    fn is_on_device(&self) -> bool {
+        #[cfg(feature = "gpu")]
+        return self.world.device().is_some();
+        #[cfg(not(feature = "gpu"))]
+        false
+    }
+
     /// Finds forces at the instant, and reads back what lies on a device.
     pub(crate) fn look(&mut self) -> Result<(), Fault> {
-        if self.simulation.is_evaluated() && self.world.device().is_none() {
+        if self.simulation.is_evaluated() && !self.is_on_device() {
             return Ok(());
         }
         self.compute(|now| now.simulation.frame().map(|_| ()))?;
@@ -61,7 +69,7 @@ impl Running {
 
     /// Brings places of nodes to ordinary memory.
     pub(crate) fn see_places(&mut self) -> Result<(), Fault> {
-        if self.world.device().is_some() { self.look() } else { Ok(()) }
+        if self.is_on_device() { self.look() } else { Ok(()) }
     }
 
     /// Puts hands and forces on a simulation that has none yet.

@@ -54,8 +54,14 @@ fn build(compiler: &str, standard: &str, file: &Path, folder: &Path, more: &[&st
 }
 
 fn run(program: &Path, arguments: &[&str]) -> String {
-    let Output { status, stdout, stderr } =
-        Command::new(program).args(arguments).current_dir(Path::new(OWN).join("../..")).output().unwrap();
+    // Before what cargo says, which may name an older build.
+    let own = libraries();
+    let Output { status, stdout, stderr } = Command::new(program)
+        .env("LD_LIBRARY_PATH", own)
+        .args(arguments)
+        .current_dir(Path::new(OWN).join("../.."))
+        .output()
+        .unwrap();
     let (said, errors) = (String::from_utf8_lossy(&stdout), String::from_utf8_lossy(&stderr));
     assert!(status.success(), "{status}: {said}{errors}");
     said.into_owned()

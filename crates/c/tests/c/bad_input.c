@@ -112,6 +112,34 @@ int main(void) {
     EXPECT(pliant_simulation_open(context, other, 1, &simulation, &error), PLIANT_STATUS_CLOSED, "closed");
     EXPECT(pliant_simulation_open(context, scene, 1, NULL, &error), PLIANT_STATUS_NULL, "`simulation`");
 
+    /* Meshes from memory. */
+    const double corners[] = {0, 0, 0, 0.1, 0, 0, 0, 0.1, 0, 0, 0, 0.1};
+    const uint32_t tet[] = {0, 1, 2, 3}, outside[] = {0, 1, 2, 4};
+    PliantCells cells = {PLIANT_TETS, 1, tet, NULL}, twice[2] = {cells, cells};
+    OK(pliant_scene_parse(context, BLOCK, strlen(BLOCK), NULL, NULL, &other, &error));
+    EXPECT(pliant_scene_give_mesh(context, other, NULL, corners, 4, &cells, 1, &error), PLIANT_STATUS_NULL, "`name`");
+    EXPECT(pliant_scene_give_mesh(context, other, "mine", NULL, 4, &cells, 1, &error), PLIANT_STATUS_NULL, "`points`");
+    EXPECT(pliant_scene_give_mesh(context, other, "mine", nan3, 1, &cells, 1, &error), PLIANT_STATUS_NOT_A_NUMBER, "`points`");
+    EXPECT(pliant_scene_give_mesh(context, other, "mine", corners, SIZE_MAX / 2, &cells, 1, &error), PLIANT_STATUS_SHORT_BUFFER, "too many");
+    EXPECT(pliant_scene_give_mesh(context, other, "mine", corners, 4, twice, 2, &error), PLIANT_STATUS_BAD_CELLS, "twice");
+    cells.nodes = outside;
+    EXPECT(pliant_scene_give_mesh(context, other, "mine", corners, 4, &cells, 1, &error), PLIANT_STATUS_BAD_CELLS, "cell 0 has the node 4");
+    cells.nodes = NULL;
+    EXPECT(pliant_scene_give_mesh(context, other, "mine", corners, 4, &cells, 1, &error), PLIANT_STATUS_NULL, "`nodes`");
+    cells.kind = 99;
+    EXPECT(pliant_scene_give_mesh(context, other, "mine", corners, 4, &cells, 1, &error), PLIANT_STATUS_BAD_CELLS, "kind 99");
+    OK(pliant_scene_give_mesh(context, other, "mine", corners, 4, twice, 1, &error));
+    OK(pliant_scene_set(context, other, "body.block.mesh={ given = 'mine' }", &error));
+    OK(pliant_scene_set(context, other, "constraint.wall.nodes={ half-space = { point = [0, 0, 0.01], normal = [0, 0, -1] } }", &error));
+    OK(pliant_simulation_open(context, other, 1, &simulation, &error));
+    PliantNodes body;
+    EXPECT(pliant_body(context, simulation, "blok", &body, &error), PLIANT_STATUS_UNKNOWN, "there are block");
+    OK(pliant_body(context, simulation, "block", &body, &error));
+    TRUE(body.first == 0 && body.count == 4);
+    OK(pliant_step(context, simulation, 5, NULL, &error));
+    OK(pliant_simulation_close(context, simulation, &error));
+    OK(pliant_scene_close(context, other, &error));
+
     /* Simulations. */
     OK(pliant_simulation_open(context, scene, 1, &simulation, &error));
     EXPECT(pliant_step(context, scene, 1, &done, &error), PLIANT_STATUS_BAD_HANDLE, "of a scene");

@@ -22,6 +22,7 @@ mod participants;
 mod penalty;
 mod static_solids;
 mod ties;
+mod torques;
 mod turns;
 mod volumes;
 mod walls;
