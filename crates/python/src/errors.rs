@@ -1,7 +1,7 @@
 //! Errors of the engine as the exceptions of `pliant.errors`, with their places.
 
 use miette::{GraphicalReportHandler, GraphicalTheme};
-use pliant_run::OutputError;
+use pliant_run::{OutputError, ResumeError};
 use pliant_scene::diagnostic::{SceneErrors, Severity};
 use pliant_sim::Failure;
 use pyo3::exceptions::PyRuntimeError;
@@ -17,6 +17,8 @@ pub enum Trouble {
     Failure(Box<Failure>),
     /// A file that can't be written.
     Output(OutputError),
+    /// A checkpoint that a run can't go on from.
+    Resume(Box<ResumeError>),
     /// A mesh or an image that can't be used: its file, and why.
     Mesh(Option<String>, String),
     /// No picture: why, and what to do.
@@ -50,6 +52,12 @@ impl From<Failure> for Trouble {
 impl From<OutputError> for Trouble {
     fn from(error: OutputError) -> Self {
         Self::Output(error)
+    }
+}
+
+impl From<ResumeError> for Trouble {
+    fn from(error: ResumeError) -> Self {
+        Self::Resume(Box::new(error))
     }
 }
 
@@ -89,6 +97,7 @@ impl Trouble {
                 fields.set_item("path", error.path.display().to_string())?;
                 ("OutputError", format!("{error}; {}", error.remedy))
             }
+            Self::Resume(error) => ("ResumeError", format!("{error}; {}", error.remedy())),
             Self::Mesh(path, message) => {
                 fields.set_item("path", path)?;
                 ("MeshError", message)

@@ -1,6 +1,7 @@
 //! Models: worlds of scenes, constant and shared between simulations.
 
 use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,12 +9,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use numpy::{PyArray1, PyArray2};
 use pliant_geometry::Selection;
 use pliant_mechanics::Energies;
-use pliant_run::{Options, OutputFolder, run_with};
+use pliant_run::{Checkpoint, Options, OutputFolder, run_with};
 use pliant_scene::World;
 use pyo3::prelude::*;
 
 use crate::arrays::{array1, array3};
-use crate::errors::{Trouble, diagnostics};
+use crate::errors::{Trouble, diagnostics, told};
 use crate::jobs::on_pool;
 use crate::mesh::Mesh;
 
@@ -27,6 +28,17 @@ impl Model {
     pub fn new(world: World) -> Self {
         Self { world: Arc::new(world) }
     }
+}
+
+/// How a run with files is done.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct RunOptions {
+    until: Option<f64>,
+    threads: u32,
+    force: bool,
+    resume: bool,
+    picture: bool,
 }
 
 /// A body: its name, its first node, their number, its mesh, and the number that each node has in the file or the given mesh.
@@ -123,12 +135,10 @@ impl Model {
         &self,
         py: Python<'_>,
         out: PathBuf,
-        until: Option<f64>,
-        threads: u32,
-        force: bool,
-        picture: bool,
+        options: RunOptions,
         each: Option<Py<PyAny>>,
     ) -> PyResult<(String, f64, [f64; 6])> {
+        let RunOptions { until, threads, force, resume, picture } = options;
         let mut world = until.map_or_else(|| (*self.world).clone(), |until| self.world.lasting(until));
         world.scene.run.threads = threads;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(crate::errors::broken)?;
@@ -136,13 +146,21 @@ impl Model {
         let (flag, raised) = (Arc::clone(&stop), Arc::new(std::sync::Mutex::new(None::<PyErr>)));
         let kept = Arc::clone(&raised);
         let job = move || -> Result<_, Trouble> {
-            let folder = OutputFolder::prepare(out, &world.scene, force)?;
+            let checkpoint = resume.then(|| Checkpoint::read(&out)).transpose()?;
+            let world = match &checkpoint {
+                Some(checkpoint) => checkpoint.continues(&world)?,
+                None => world,
+            };
+            let folder = match &checkpoint {
+                Some(checkpoint) => OutputFolder::reopen(out, &world.scene, checkpoint)?,
+                None => OutputFolder::prepare(out, &world.scene, force)?,
+            };
             let drawn = picture.then(|| pliant_command::FinalPicture::new(&world)).transpose();
-            let drawn = drawn.map_err(|failure| Trouble::Device(failure.to_string()))?;
+            let drawn = drawn.map_err(|error| Trouble::Device(format!("{error}; {}", error.remedy())))?;
             let options = Options {
+                resume: checkpoint.as_ref(),
                 stop: Some(&flag),
                 picture: drawn.as_ref().map(|drawn| drawn as &dyn pliant_run::Draw),
-                ..Options::default()
             };
             let mut report = |progress: pliant_run::Progress| {
                 let Some(each) = &each else { return };
@@ -158,6 +176,10 @@ impl Model {
             let text =
                 serde_json::to_string(&summary).map_err(|error| Trouble::Internal(error.to_string()))?;
             Ok((text, summary.time, in_order(&summary.energies)))
+        };
+        let job = || {
+            let done = catch_unwind(AssertUnwindSafe(job));
+            done.unwrap_or_else(|panic| Err(Trouble::Internal(told(&*panic))))
         };
         let (summary, signal) = on_pool(py, &pool, &stop, job)?;
         signal?;

@@ -38,8 +38,13 @@ enum Slot {
     Here(Box<Running>),
     /// A call computes.
     Away,
-    Closed { _kept: Kept },
-    Broken { _kept: Kept, message: String },
+    Closed {
+        _kept: Kept,
+    },
+    Broken {
+        _kept: Kept,
+        message: String,
+    },
 }
 
 /// The memory of a run that is over: views still look at it.

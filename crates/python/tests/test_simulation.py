@@ -57,6 +57,24 @@ def test_runs_with_files_are_those_of_the_command_line(scene: pliant.Scene, tmp_
     assert scene.run(f"{tmp_path}/out", force=True).status == "done"
 
 
+def test_an_interrupted_run_goes_on_from_its_checkpoint(scene: pliant.Scene, tmp_path: object) -> None:
+    scene.run_table["checkpoint"] = {"every": 0.01}
+    model, out = scene.build(), f"{tmp_path}/out"
+
+    def stop(now: pliant.Progress) -> None:
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        model.run(out, each=stop)
+    result = model.run(out, resume=True)
+    assert result.status == "done" and result.steps == model.steps
+    assert np.array_equal(result.reactions["base"], model.run().reactions["base"])
+    with pytest.raises(pliant.ResumeError):
+        model.run(f"{tmp_path}/none", resume=True)
+    with pytest.raises(ValueError, match="folder"):
+        model.run(resume=True)
+
+
 def test_a_failed_run_keeps_what_was_found() -> None:
     with pytest.warns(pliant.PliantWarning, match="failed"):
         result = crushed().run()

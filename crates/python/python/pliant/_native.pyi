@@ -74,10 +74,7 @@ class Model:
     def run(
         self,
         out: str,
-        until: float | None,
-        threads: int,
-        force: bool,
-        picture: bool,
+        options: Mapping[str, object],
         each: Callable[[float, float, float], object] | None,
     ) -> tuple[str, float, list[float]]: ...
 

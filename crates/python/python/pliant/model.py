@@ -184,6 +184,7 @@ class Model:
         until: float | None = None,
         each: Callable[[Progress], object] | None = None,
         force: bool = False,
+        resume: bool = False,
         threads: int = 0,
         picture: bool = False,
     ) -> Result:
@@ -199,6 +200,8 @@ class Model:
             Called about ten times a second with a `Progress`. What it raises ends the run.
         force
             Whether files of an earlier run are replaced.
+        resume
+            Whether it goes on from the last checkpoint in `out`.
         threads
             Threads; 0 for all cores.
         picture
@@ -209,9 +212,17 @@ class Model:
         from pliant.result import Progress, Result
 
         if out is None:
+            if resume or picture:
+                raise ValueError("a run in memory has no checkpoints and draws no file: give a folder `out`")
             return self._run_in_memory(until, each, threads)
         told = None if each is None else lambda time, end, wall: each(Progress(time, end, wall))
-        text, time, energies = self._own.run(os.fspath(out), until, threads, force, picture, told)
+        try:
+            options = {"until": until, "threads": threads, "force": force, "resume": resume, "picture": picture}
+            text, time, energies = self._own.run(os.fspath(out), options, told)
+        except KeyboardInterrupt as interrupt:
+            if "checkpoint" in self._scene.run_table and hasattr(interrupt, "add_note"):
+                interrupt.add_note(f"`run({os.fspath(out)!r}, resume=True)` goes on from the last checkpoint")
+            raise
         units = {"time": "s", **dict(self._own.columns())}
         result = Result._of_files(json.loads(text), time, energies, os.fspath(out), units)
         _doubt(result)
