@@ -1,17 +1,20 @@
-//! Linear equations with a sparse matrix: factors L D Lᵀ or L U (faer; the symbolic part once a pattern), or conjugate gradients
+//! Linear equations with a sparse matrix: factors L D Lᵀ (`factors.rs`) or L U (`unsymmetric.rs`), or conjugate gradients
 //! (`gradients.rs`). Factors are found on one thread, so results do not depend on the number of threads.
 
 mod factors;
+mod fronts;
 mod gradients;
 mod report;
+mod supernodes;
+mod unsymmetric;
 
 use nalgebra::Vector3;
 
-use self::factors::LuFactors;
 pub(crate) use self::factors::{Factors, Pivots, ZERO_PIVOT};
 use self::gradients::{Approximation, BlockMatrix, Coarse, KrylovVectors};
 pub(crate) use self::report::LinearError;
 pub use self::report::LinearReport;
+use self::unsymmetric::LuFactors;
 use crate::sparse::{Equations, LowerMatrix};
 
 /// How linear equations are solved.

@@ -1,0 +1,83 @@
+//! L U of a matrix that is not symmetric (faer; the symbolic part once a pattern), on one thread.
+
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::sparse::linalg::lu::{LuRef, LuSymbolicParams, NumericLu, SymbolicLu, factorize_symbolic_lu};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::{Conj, MatMut, Par, Spec};
+
+use crate::sparse::LowerMatrix;
+
+/// L U of the whole matrix.
+pub(super) struct LuFactors {
+    symbolic: SymbolicLu<u32>,
+    numeric: NumericLu<u32, f64>,
+    column_start: Vec<u32>,
+    row: Vec<u32>,
+    value: Vec<f64>,
+    /// Where each entry comes from: a place in the lower half, or a mirrored one.
+    source: Vec<(u32, bool)>,
+    memory: MemBuffer,
+}
+
+impl LuFactors {
+    pub(super) fn new(matrix: &LowerMatrix) -> Result<Self, faer::sparse::FaerError> {
+        let mut columns: Vec<Vec<(u32, (u32, bool))>> = vec![Vec::new(); matrix.len()];
+        // Columns to the left are done first, so rows above the diagonal come in order.
+        for column in 0..matrix.len() {
+            for at in matrix.column_start[column]..matrix.column_start[column + 1] {
+                let row = matrix.row[at as usize];
+                columns[column].push((row, (at, false)));
+                if row as usize != column {
+                    columns[row as usize].push((column as u32, (at, true)));
+                }
+            }
+        }
+        let mut column_start = vec![0];
+        let (mut row, mut source) = (Vec::new(), Vec::new());
+        for column in columns {
+            for (r, from) in column {
+                row.push(r);
+                source.push(from);
+            }
+            column_start.push(row.len() as u32);
+        }
+        let size = matrix.len();
+        let pattern = SymbolicSparseColMatRef::new_checked(size, size, &column_start, None, &row);
+        let symbolic = factorize_symbolic_lu(pattern, LuSymbolicParams::default())?;
+        let memory = MemBuffer::new(StackReq::any_of(&[
+            symbolic.factorize_numeric_lu_scratch::<f64>(Par::Seq, Spec::default()),
+            symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
+        ]));
+        let value = vec![0.0; row.len()];
+        Ok(Self { symbolic, numeric: NumericLu::new(), column_start, row, value, source, memory })
+    }
+
+    /// Factors a matrix; `None` if it holds a number that is not finite.
+    pub(super) fn factorise(&mut self, matrix: &LowerMatrix) -> Option<()> {
+        for (value, &(at, mirrored)) in self.value.iter_mut().zip(&self.source) {
+            *value = if mirrored { matrix.mirror[at as usize] } else { matrix.value[at as usize] };
+            if !value.is_finite() {
+                return None;
+            }
+        }
+        let size = matrix.len();
+        let pattern = SymbolicSparseColMatRef::new_checked(size, size, &self.column_start, None, &self.row);
+        let whole = SparseColMatRef::new(pattern, &self.value[..]);
+        let stack = MemStack::new(&mut self.memory);
+        self.symbolic
+            .factorize_numeric_lu(&mut self.numeric, whole, Par::Seq, stack, Spec::default())
+            .ok()
+            .map(|_| ())
+    }
+
+    /// x ← A⁻¹ x.
+    pub(super) fn solve(&mut self, x: &mut [f64]) {
+        let size = x.len();
+        LuRef::new_unchecked(&self.symbolic, &self.numeric).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(x, size, 1),
+            Par::Seq,
+            MemStack::new(&mut self.memory),
+        );
+    }
+}
