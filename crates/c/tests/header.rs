@@ -87,9 +87,9 @@ fn translated(source: &str) -> String {
             fields(&mut lines, &mut |docs, field| {
                 let (name, of) =
                     field.strip_prefix("pub ").unwrap().trim_end_matches(',').split_once(": ").unwrap();
-                let _ = write!(out, "{}    {};\n", comment(docs, "    "), declared(of, name));
+                let _ = writeln!(out, "{}    {};", comment(docs, "    "), declared(of, name));
             });
-            let _ = write!(out, "}} {name};\n");
+            let _ = writeln!(out, "}} {name};");
         } else if let Some(name) =
             words("pub enum ").and_then(|rest| rest.strip_suffix(" {")).filter(|_| is_c)
         {
@@ -97,9 +97,9 @@ fn translated(source: &str) -> String {
             fields(&mut lines, &mut |docs, field| {
                 let (own, value) = field.trim_end_matches(',').split_once(" = ").unwrap();
                 let own = format!("{}_{}", shouted(name), shouted(own));
-                let _ = write!(out, "{}    {own} = {value},\n", comment(docs, "    "));
+                let _ = writeln!(out, "{}    {own} = {value},", comment(docs, "    "));
             });
-            let _ = write!(out, "}} {name};\n");
+            let _ = writeln!(out, "}} {name};");
         } else if let Some(rest) = line.split_once("extern \"C\" fn ").map(|(_, rest)| rest).filter(|_| is_c)
         {
             let mut all = rest.to_owned();

@@ -64,6 +64,19 @@ static void *long_run(void *result) {
     return NULL;
 }
 
+struct job {
+    PliantSimulation simulation;
+    PliantStatus status;
+    uint64_t print;
+};
+
+static void *side_by_side(void *argument) {
+    struct job *job = argument;
+    job->status = pliant_step(context, job->simulation, 500, NULL, NULL);
+    if (job->status == PLIANT_STATUS_OK) job->status = pliant_fingerprint(context, job->simulation, &job->print, NULL);
+    return NULL;
+}
+
 int main(void) {
     PliantScene scene = 0, other = 0;
     PliantSnapshot snapshot = 0;
@@ -292,6 +305,19 @@ int main(void) {
     pthread_join(thread, NULL);
     TRUE(status == PLIANT_STATUS_STOPPED);
     OK(pliant_step(context, simulation, 1, &done, &error));
+
+    /* Two simulations run side by side, to the same bits. */
+    struct job jobs[2];
+    pthread_t threads[2];
+    for (int at = 0; at < 2; at++) {
+        OK(pliant_simulation_open(context, scene, at + 1, &jobs[at].simulation, &error));
+        if (pthread_create(&threads[at], NULL, side_by_side, &jobs[at])) return 1;
+    }
+    for (int at = 0; at < 2; at++) {
+        pthread_join(threads[at], NULL);
+        TRUE(jobs[at].status == PLIANT_STATUS_OK && jobs[at].print == jobs[0].print);
+        OK(pliant_simulation_close(context, jobs[at].simulation, &error));
+    }
 
     /* A simulation that fails tells where; it stays at the last good instant. */
     for (size_t at = 0; at < 3 * now.nodes; at++) numbers[at] = at == 3 * now.nodes - 1 ? -1e6 : 0;
