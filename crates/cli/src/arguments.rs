@@ -291,6 +291,10 @@ pub struct Render {
     /// Draw the forces of contacts as arrows, through the bodies. A finished run needs the field `contact-force` in its series.
     #[arg(long)]
     pub contacts: bool,
+    /// Mark constraints and loads, through the bodies: squares where nodes are held, dots where they are moved, arrows of loads. A finished
+    /// run needs the fields `constraint` and `load` in a series.
+    #[arg(long)]
+    pub marks: bool,
     /// Mark the element with the smallest stable step, through the body. A finished run needs the field `element-step` on the cells of
     /// its series.
     #[arg(long)]

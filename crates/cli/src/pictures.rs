@@ -99,8 +99,9 @@ pub fn look_of_world(world: &World) -> Look {
 }
 
 impl Draw for FinalPicture {
-    fn draw(&self, mesh: &Mesh, time: f64) -> Result<Vec<u8>, String> {
-        let picture = self.look.picture(&self.graphics, mesh, time).map_err(|error| error.to_string())?;
+    fn draw(&self, mesh: &Mesh, marks: Option<&Mesh>, time: f64) -> Result<Vec<u8>, String> {
+        let picture =
+            self.look.picture(&self.graphics, mesh, marks, time).map_err(|error| error.to_string())?;
         picture.png().map_err(|error| error.to_string())
     }
 }
@@ -125,6 +126,9 @@ pub fn render(arguments: &Render) -> Result<ExitCode, Failure> {
             colour_by_name(&mut look, field);
         }
         typed(&mut look, arguments);
+        if arguments.marks {
+            look.marks = Some(Series::of_marks(&arguments.what)?);
+        }
         if !arguments.hide.is_empty() || !arguments.look.is_empty() {
             typed_regions(&mut look.regions, &series.regions()?, arguments)?;
         }
@@ -172,7 +176,7 @@ fn typed_regions(regions: &mut Regions, names: &RegionNames, arguments: &Render)
 fn labelled_mesh(arguments: &Render) -> Result<Option<Mesh>, Failure> {
     let of_cells = matches!(arguments.colour.as_deref(), None | Some("label" | "none"));
     let runs = arguments.film.is_some() || arguments.frames.is_some() || changes_a_run(arguments);
-    let marks = arguments.critical || arguments.fibres || arguments.contacts;
+    let marks = arguments.critical || arguments.fibres || arguments.contacts || arguments.marks;
     if !of_cells || runs || marks || !pliant_scene::is_mesh(&arguments.what) {
         return Ok(None);
     }
@@ -196,7 +200,7 @@ fn portrait(
     look.style.labels = true;
     typed(&mut look, arguments);
     typed_regions(&mut look.regions, &RegionNames::of(mesh), arguments)?;
-    let picture = look.picture(graphics, mesh, 0.0)?;
+    let picture = look.picture(graphics, mesh, None, 0.0)?;
     save(folder, &picture_name(0), &picture)?;
     say(format_args!("wrote {} in {} ({})", picture_name(0), folder.path().display(), graphics.adapter()))?;
     Ok(ExitCode::SUCCESS)
@@ -228,7 +232,11 @@ pub(crate) fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>
     let overrides = with_view(arguments);
     let mut every = 0.0;
     let mut world = prepare_changed(path, &overrides, |scene| every = forget_outputs(scene, arguments))?;
-    world.scene.outputs = vec![("shown".into(), OutputTable::Vtu(world.scene.shown(every)))];
+    let shown = world.scene.shown(every);
+    let marks = world.scene.shown_marks(every);
+    let series = [("shown", Some(shown)), ("marks", marks)];
+    let table = |(name, table): (&str, Option<_>)| Some((name.into(), OutputTable::Vtu(table?)));
+    world.scene.outputs = series.into_iter().filter_map(table).collect();
     let scene = &world.scene;
     let mut look = Look { regions: regions_of_scene(&world), ..look_of(scene) };
     typed(&mut look, arguments);
@@ -250,7 +258,10 @@ pub(crate) fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>
     if let Some(error) = &summary.error {
         eprintln!("error: {}", error.message);
     }
-    let series = Series::find(run.path(), None)?;
+    let series = Series::find(run.path(), Some("shown"))?;
+    if scene.view.marks {
+        look.marks = Some(Series::find(run.path(), Some("marks"))?);
+    }
     let failed = summary.error.is_some();
     Ok(Some(Shown { look, series, title: scene.scene.title.clone(), failed, _space: space }))
 }
@@ -298,6 +309,7 @@ fn forget_outputs(scene: &mut Scene, arguments: &Render) -> f64 {
     }
     scene.view.fibres |= arguments.fibres;
     scene.view.contacts |= arguments.contacts;
+    scene.view.marks |= arguments.marks;
     scene.view.critical |= arguments.critical;
     arguments.every.or(own).unwrap_or(0.01 * scene.scene.until)
 }

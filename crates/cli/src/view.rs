@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::time::Instant;
 
 use pliant_picture::Series;
 use pliant_scene::World;
@@ -24,6 +25,7 @@ impl From<WindowError> for Failure {
 }
 
 pub fn view(arguments: &View) -> Result<ExitCode, Failure> {
+    let began = Instant::now();
     if let Some(run) = finished_run(arguments)? {
         if let Some(told) = open_finished(run)? {
             say(told)?;
@@ -54,6 +56,7 @@ pub fn view(arguments: &View) -> Result<ExitCode, Failure> {
         read: Arc::new(read),
         record: arguments.record.clone(),
         self_test: self_test(arguments),
+        began,
     })?;
     if let Some(told) = told {
         say(told)?;

@@ -10,7 +10,7 @@ use crate::element::{
 };
 use crate::law::AnyLaw;
 use crate::load::{Face, Load, face_areas};
-use crate::mapping::Weights;
+use crate::mapping::{Displaced, Weights};
 use crate::order::order;
 use crate::prony::Prony;
 use crate::tensor::{Vector, add, cross, dot, scale, sub};
@@ -935,6 +935,17 @@ impl Model {
     pub fn locate_node(&self, node: u32) -> (usize, u32) {
         let body = self.bodies.partition_point(|body| body.nodes.end <= node);
         (body, node - self.bodies[body].nodes.start)
+    }
+
+    /// The forces [N] of loads on each node at a time [s] and displacements [m], without weights and without what only shells take.
+    pub fn load_forces(&self, time: f64, displacement: &[Vector<f64>]) -> Vec<Vector<f64>> {
+        let state = Displaced { rest: &self.rest, displacement, velocity: &[] };
+        let mut forces = vec![[0.0; 3]; self.node_count()];
+        for load in &self.loads {
+            let points = load.surface.map(|surface| &self.surfaces[surface].mapping);
+            load.add_forces(time, points, &state, &mut forces);
+        }
+        forces
     }
 
     /// The constraint on each component of each node, [`FREE`] where there is none. Two constraints may prescribe the

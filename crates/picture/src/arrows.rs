@@ -10,13 +10,13 @@ use crate::picture::Picture;
 /// Length of the longest arrow, over the diagonal of the box around what is shown.
 const LENGTH: f64 = 0.14;
 /// Radius of a dot, half the width of a shaft, length and half the width of a head, width of a rim: over the height of the picture.
-const DOT: f32 = 0.0042;
+pub(crate) const DOT: f32 = 0.0042;
 const SHAFT: f32 = 0.0021;
 const HEAD: [f32; 2] = [0.019, 0.0078];
-const RIM: f32 = 0.0019;
+pub(crate) const RIM: f32 = 0.0019;
 /// Colour (sRGB) of forces, and of the rim around them.
 const FORCE: [u8; 3] = [190, 40, 40];
-const PALE: [u8; 3] = [255, 255, 255];
+pub(crate) const PALE: [u8; 3] = [255, 255, 255];
 
 /// A point [m] and the force there [N].
 pub type PointForce = [Vector3; 2];
@@ -52,27 +52,30 @@ pub fn arrow_note(largest: f64) -> String {
     format!("longest arrow {value:.decimals$} {unit}")
 }
 
+/// Where points [m] are in a picture, in pixels; `None` behind the camera.
+pub(crate) fn pixels(picture: &Picture, camera: &Camera) -> impl Fn(&Vector3) -> Option<[f32; 2]> + use<> {
+    let [width, height] = [picture.width, picture.height].map(|pixels| pixels as f32);
+    let camera = *camera;
+    move |point| {
+        let [x, y] = camera.place(point, f64::from(width) / f64::from(height))?;
+        Some([0.5 * width * (1.0 + x as f32), 0.5 * height * (1.0 - y as f32)])
+    }
+}
+
 /// Draws forces whose arrows have a length over their force [m/N], the largest last.
 pub(crate) fn draw(picture: &mut Picture, camera: &Camera, forces: &[PointForce], unit: f64) {
-    let [width, height] = [picture.width, picture.height].map(|pixels| pixels as f32);
-    let aspect = f64::from(width) / f64::from(height);
-    let pixel = |point: &Vector3| {
-        let [x, y] = camera.place(point, aspect)?;
-        Some([0.5 * width * (1.0 + x as f32), 0.5 * height * (1.0 - y as f32)])
-    };
+    let height = picture.height as f32;
+    let pixel = pixels(picture, camera);
     let mut ordered: Vec<&PointForce> = forces.iter().collect();
     ordered.sort_by(|a, b| a[1].norm_squared().total_cmp(&b[1].norm_squared()));
     for [point, force] in ordered {
         let (Some(from), Some(to)) = (pixel(point), pixel(&(point + force * unit))) else { continue };
-        let arrow = Arrow::new(from, to, height);
-        for (wider, colour) in [(RIM * height, PALE), (0.0, FORCE)] {
-            arrow.fill(picture, wider, colour);
-        }
+        Arrow::new(from, to, height).draw(picture, FORCE);
     }
 }
 
 /// A dot with an arrow, in pixels.
-struct Arrow {
+pub(crate) struct Arrow {
     from: [f32; 2],
     /// Length, and the unit vector along.
     length: f32,
@@ -84,7 +87,8 @@ struct Arrow {
 }
 
 impl Arrow {
-    fn new(from: [f32; 2], to: [f32; 2], height: f32) -> Self {
+    /// From a pixel to another one in a picture of a height.
+    pub fn new(from: [f32; 2], to: [f32; 2], height: f32) -> Self {
         let way = [to[0] - from[0], to[1] - from[1]];
         let length = way[0].hypot(way[1]);
         let along = if length > 0.0 { way.map(|x| x / length) } else { [1.0, 0.0] };
@@ -92,6 +96,12 @@ impl Arrow {
         let part = (length / (HEAD[0] * height)).min(1.0);
         let head = HEAD.map(|size| size * height * part);
         Self { from, length, along, dot: DOT * height, shaft: SHAFT * height * part, head }
+    }
+
+    /// Draws it in a colour, with a pale rim.
+    pub fn draw(&self, picture: &mut Picture, colour: [u8; 3]) {
+        self.fill(picture, RIM * picture.height as f32, PALE);
+        self.fill(picture, 0.0, colour);
     }
 
     /// Fills it in a colour, wider by some pixels, with smooth edges.

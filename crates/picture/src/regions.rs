@@ -3,7 +3,7 @@
 use pliant_geometry::Region;
 
 use crate::colour::{label_colour, linear};
-use crate::style::{Material, PLAIN};
+use crate::style::{DULL, Finish, Material, PLAIN};
 
 /// What colours a region.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,8 +66,18 @@ impl Regions {
 const OF_VALUE: f32 = -1.0;
 const OF_TISSUE: f32 = -2.0;
 
-/// What the shader takes of cells: light of their colour and opacity; with `labels`, colours show labels.
-pub(crate) fn light(kind: Kind, coat: Coat, labels: bool) -> [f32; 4] {
+/// What the shader takes of cells: light of their colour and opacity, and their finish; with `labels`, colours show labels.
+pub(crate) fn light(kind: Kind, coat: Coat, labels: bool) -> [[f32; 4]; 2] {
+    let Finish { shine, sharpness, perfusion } = match coat.paint {
+        Paint::Plain(material) => material.finish(),
+        Paint::AsAll if kind.thing => Material::Steel.finish(),
+        Paint::AsAll | Paint::Labels => DULL,
+    };
+    [colour(kind, coat, labels), [shine, sharpness, perfusion, 0.0]]
+}
+
+/// Light of the colour of cells, and their opacity.
+fn colour(kind: Kind, coat: Coat, labels: bool) -> [f32; 4] {
     let opacity = coat.opacity.clamp(0.0, 1.0) as f32;
     let of = |bytes: [u8; 3]| {
         let [r, g, b] = bytes.map(linear);

@@ -222,7 +222,7 @@ pub struct Drawn {
     poses: [Pose; 2],
     view: wgpu::Buffer,
     colours: wgpu::Buffer,
-    /// Light and opacity of each kind of cells, for these regions and with or without colours of labels.
+    /// Light, opacity and finish of each kind of cells, for these regions and with or without colours of labels.
     lights: wgpu::Buffer,
     kinds: Vec<CellKind>,
     regions: Regions,
@@ -402,7 +402,7 @@ impl Drawn {
         self.labels = labels;
         let lights = lights_of(&self.kinds, regions, labels);
         queue.write_buffer(&self.lights, 0, bytemuck::cast_slice(&lights));
-        let opacities: Vec<f32> = lights.iter().map(|light| light[3]).collect();
+        let opacities: Vec<f32> = lights.iter().map(|[light, _]| light[3]).collect();
         self.layers = Layers::new(subject, &opacities);
         if let Some(layers) = &self.layers {
             let behind = u64::from(self.triangle_count) * size_of::<[u32; 4]>() as u64;
@@ -578,7 +578,7 @@ fn colour(bytes: [u8; 3], alpha: f32) -> [f32; 4] {
     [r, g, b, alpha]
 }
 
-fn lights_of(kinds: &[CellKind], regions: &Regions, labels: bool) -> Vec<[f32; 4]> {
+fn lights_of(kinds: &[CellKind], regions: &Regions, labels: bool) -> Vec<[[f32; 4]; 2]> {
     kinds.iter().map(|&kind| light(kind, regions.coat(kind), labels)).collect()
 }
 

@@ -12,6 +12,7 @@ use crate::colour::Extremes;
 use crate::error::PictureError;
 use crate::graphics::Graphics;
 use crate::legend::{Legend, readable};
+use crate::marks::{self, Mark, largest_load, marks_of};
 use crate::offscreen::{Frame, Offscreen};
 use crate::picture::Picture;
 use crate::regions::Regions;
@@ -57,6 +58,9 @@ pub enum SeriesError {
     /// Forces of contacts were requested, but the frames have none.
     #[error("the points of the frames have no forces of contacts (the field `contact-force`)")]
     NoContacts,
+    /// Marks of constraints and loads were requested, but the frames have none.
+    #[error("the points of the frames have no constraints and loads (the fields `constraint` and `load`)")]
+    NoMarks,
     /// Colours of labels were requested, but the frames have none.
     #[error("the cells of the frames have no labels (the field `label`)")]
     NoLabels,
@@ -92,6 +96,9 @@ impl SeriesError {
             }
             Self::NoContacts => {
                 "show bodies that touch something; a finished run needs `contact-force` in `data` of its output"
+            }
+            Self::NoMarks => {
+                "a finished run needs `constraint` and `load` in `data` of an output of bodies, of the same instants"
             }
             Self::NoLabels => {
                 "show bodies whose mesh has cell data `label`, such as meshes from images with several labels"
@@ -152,6 +159,27 @@ impl Series {
         Ok(Self { name, frames })
     }
 
+    /// The first series in the folder of a run that has constraints or loads.
+    ///
+    /// # Errors
+    /// If none has, or the folder cannot be read.
+    pub fn of_marks(folder: &Path) -> Result<Self, SeriesError> {
+        for name in Self::names(folder)? {
+            let series = Self::find(folder, Some(&name))?;
+            let mesh = series.mesh(0)?;
+            if marks_of(&mesh, &mesh.points).is_some() {
+                return Ok(series);
+            }
+        }
+        Err(SeriesError::NoMarks)
+    }
+
+    /// The mesh of the frame at a time [s].
+    fn mesh_at(&self, time: f64) -> Result<Mesh, SeriesError> {
+        let at = self.frames.iter().position(|(own, _)| (own - time).abs() <= 1e-9 * time.abs());
+        self.mesh(at.ok_or(SeriesError::NoMarks)?)
+    }
+
     /// Labels and bodies of its first frame.
     ///
     /// # Errors
@@ -193,6 +221,8 @@ pub struct Look {
     pub target: Option<Vector3>,
     /// Magnification of what fits; 0 counts as 1.
     pub zoom: f64,
+    /// The series whose constraints and loads are marked; `None` for no marks.
+    pub marks: Option<Series>,
     /// Width and height of pictures [pixels].
     pub size: [u32; 2],
     /// Their text; labels come from the mesh.
@@ -205,8 +235,8 @@ struct Common {
     extremes: Extremes,
     /// The middle of the points is enough for the camera: corners of the boxes around them.
     points: Vec<Vector3>,
-    /// The largest force of a contact [N].
-    largest: f64,
+    /// The largest force of a contact and of a load [N].
+    largest: [f64; 2],
     /// Whether a part of a body has no value.
     missing: bool,
 }
@@ -218,21 +248,24 @@ struct Shown {
     step: Option<f64>,
     /// Forces of contacts, if they are drawn.
     forces: Vec<PointForce>,
+    /// Constraints and loads, if they are marked.
+    marks: Vec<Mark>,
 }
 
 /// What all pictures have in common.
 struct Settled {
     camera: Camera,
     style: Style,
-    /// Length of arrows over their force [m/N], and the largest force [N].
-    arrows: [f64; 2],
+    /// Length of arrows over their force [m/N], and the largest force [N], of contacts and of loads.
+    arrows: [[f64; 2]; 2],
     missing: bool,
 }
 
 impl Common {
     fn add(&mut self, subject: &Subject, shown: &Shown, ghost: bool) {
         let frame = &shown.frame;
-        self.largest = self.largest.max(largest_force(&shown.forces));
+        let largest = [largest_force(&shown.forces), largest_load(&shown.marks)];
+        self.largest = [0, 1].map(|kind| self.largest[kind].max(largest[kind]));
         self.missing |= subject.lacks_value(&frame.values);
         let surface = subject.surface_points();
         self.extremes.add(surface.iter().filter_map(|&point| frame.values.get(point as usize)).copied());
@@ -266,8 +299,8 @@ fn spread_directions() -> Vec<Vector3> {
 }
 
 impl Look {
-    /// What is drawn of a mesh with fields.
-    fn frame(&self, mesh: &Mesh) -> Result<Shown, SeriesError> {
+    /// What is drawn of a mesh with fields; with the marks of another one.
+    fn frame(&self, mesh: &Mesh, marks: Option<&Mesh>) -> Result<Shown, SeriesError> {
         let missing =
             |field: &str| SeriesError::NoField { field: field.to_owned(), known: quoted(&fields(mesh)) };
         let values = match &self.field {
@@ -283,7 +316,9 @@ impl Look {
             true => contact_forces(mesh, &points).ok_or(SeriesError::NoContacts)?,
             false => Vec::new(),
         };
-        Ok(Shown { frame: Frame { points, values, critical }, step, forces })
+        let marks = marks.map(|mesh| marks_of(mesh, &deformed_points(mesh)).ok_or(SeriesError::NoMarks));
+        let marks = marks.transpose()?.unwrap_or_default();
+        Ok(Shown { frame: Frame { points, values, critical }, step, forces, marks })
     }
 
     /// The same with the labels of a mesh in its legend.
@@ -335,17 +370,20 @@ impl Look {
             camera.zoom(1.0 / self.zoom);
         }
         camera.pan(-0.5 * taken * width / height, 0.0);
-        let arrows = [arrow_unit(&common.points, common.largest), common.largest];
+        let arrows = common.largest.map(|largest| [arrow_unit(&common.points, largest), largest]);
         Settled { camera, style, arrows, missing: common.missing }
     }
 
     fn finished(&self, mut picture: Picture, settled: &Settled, shown: &Shown, time: f64) -> Picture {
-        let Settled { camera, style, arrows: [unit, largest], missing } = settled;
-        arrows::draw(&mut picture, camera, &shown.forces, *unit);
+        let Settled { camera, style, arrows: [contacts, loads], missing } = settled;
+        marks::draw(&mut picture, camera, &shown.marks, loads[0]);
+        arrows::draw(&mut picture, camera, &shown.forces, contacts[0]);
         let mut note =
             if self.legend.note.is_empty() { format!("t = {time:.3} s") } else { self.legend.note.clone() };
-        if *largest > 0.0 {
-            note.push_str(&format!(", {}", arrow_note(*largest)));
+        for ([_, largest], of) in [(contacts, ""), (loads, " of loads")] {
+            if *largest > 0.0 {
+                note.push_str(&format!(", {}{of}", arrow_note(*largest)));
+            }
         }
         if let Some(step) = shown.step {
             let (unit, factor) = readable("s", step);
@@ -355,14 +393,20 @@ impl Look {
         picture
     }
 
-    /// One picture of a mesh with fields at a time [s].
+    /// One picture of a mesh with fields at a time [s], with the constraints and loads of another mesh.
     ///
     /// # Errors
     /// If the field is missing, or drawing fails.
-    pub fn picture(&self, graphics: &Graphics, mesh: &Mesh, time: f64) -> Result<Picture, SeriesError> {
+    pub fn picture(
+        &self,
+        graphics: &Graphics,
+        mesh: &Mesh,
+        marks: Option<&Mesh>,
+        time: f64,
+    ) -> Result<Picture, SeriesError> {
         let look = self.with_labels_of(mesh)?;
         let subject = look.subject(mesh)?;
-        let shown = look.frame(mesh)?;
+        let shown = look.frame(mesh, marks)?;
         let mut common = Common::default();
         common.add(&subject, &shown, look.style.ghost);
         let settled = look.settle(common);
@@ -394,7 +438,8 @@ impl Look {
             if (mesh.points.len(), blocks(&mesh)) != shape {
                 return Err(SeriesError::OtherMesh(index));
             }
-            look.frame(&mesh)
+            let marks = look.marks.as_ref().map(|marks| marks.mesh_at(series.frames[index].0)).transpose()?;
+            look.frame(&mesh, marks.as_ref())
         };
         let mut common = Common::default();
         for &index in frames {

@@ -27,8 +27,14 @@ struct View {
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> colours: array<vec4<f32>, 256>;
-// Of each kind of cells: light of its colour, or −1 for that of the value, −2 for that of tissue; and opacity.
-@group(0) @binding(2) var<storage, read> lights: array<vec4<f32>>;
+// Of each kind of cells: light of its colour, or −1 for that of the value, −2 for that of tissue, and opacity; then the strength and the
+// exponent of its highlight, and how much its colour varies.
+struct Kind {
+    light: vec4<f32>,
+    finish: vec4<f32>,
+}
+
+@group(0) @binding(2) var<storage, read> kinds: array<Kind>;
 
 // Position [m] and value of each point.
 @group(1) @binding(0) var<storage, read> points: array<vec4<f32>>;
@@ -138,17 +144,17 @@ fn is_behind(at: Corner) -> bool {
 
 // Whether it has the colour of tissue: by itself, or because there are no values.
 fn is_tissue(at: Corner) -> bool {
-    let light = lights[at.edges >> 8u].r;
+    let light = kinds[at.edges >> 8u].light.r;
     return light < -1.5 || (light < -0.5 && view.range.z < 0.5);
 }
 
 fn no_colour(at: Corner) -> bool {
-    return is_tissue(at) || (lights[at.edges >> 8u].r < 0.0 && at.value > 1.0e30);
+    return is_tissue(at) || (kinds[at.edges >> 8u].light.r < 0.0 && at.value > 1.0e30);
 }
 
 // Light of its own colour, else of the value.
 fn colour_at(at: Corner) -> vec3<f32> {
-    let own = lights[at.edges >> 8u].rgb;
+    let own = kinds[at.edges >> 8u].light.rgb;
     if own.r >= 0.0 {
         return own;
     }
@@ -157,20 +163,20 @@ fn colour_at(at: Corner) -> vec3<f32> {
 
 // What is thin glass from the front is thicker where it is seen from the side.
 fn opacity_at(at: Corner, facing: f32) -> f32 {
-    let own = lights[at.edges >> 8u].a;
+    let own = kinds[at.edges >> 8u].light.a;
     let grazing = 1.0 - facing;
     return mix(own, sqrt(own), grazing * grazing);
 }
 
 // A key light over the left shoulder, a fill from the right, sky above and ground below (all of them turn with the camera).
-fn lit(albedo: vec3<f32>, normal: vec3<f32>, eye: vec3<f32>) -> vec3<f32> {
+fn lit(albedo: vec3<f32>, normal: vec3<f32>, eye: vec3<f32>, finish: vec2<f32>) -> vec3<f32> {
     let key = normalize(view.right.xyz * -0.45 + view.up.xyz * 0.65 + view.towards.xyz * 0.75);
     let fill = normalize(view.right.xyz * 0.8 + view.up.xyz * 0.05 + view.towards.xyz * 0.5);
     let sky = 0.5 + 0.5 * dot(normal, view.up.xyz);
     let direct = max(dot(normal, key), 0.0) * 0.62 + max(dot(normal, fill), 0.0) * 0.16;
     let ambient = mix(0.22, 0.40, sky);
     let half_way = normalize(key + eye);
-    let shine = pow(max(dot(normal, half_way), 0.0), 40.0) * 0.10;
+    let shine = pow(max(dot(normal, half_way), 0.0), finish.y) * finish.x;
     let grazing = 1.0 - max(dot(normal, eye), 0.0);
     let outline = 1.0 - 0.35 * grazing * grazing * grazing;
     return (albedo * (ambient + direct) + vec3(shine)) * outline;
@@ -205,11 +211,12 @@ fn shade(at: Corner) -> vec4<f32> {
     var normal = normalize(at.normal);
     normal = select(-normal, normal, dot(normal, eye) >= 0.0);
     let albedo = colour_at(at);
-    var colour = lit(albedo, normal, eye);
+    let finish = kinds[at.edges >> 8u].finish;
+    var colour = lit(albedo, normal, eye, finish.xy);
     // Derivatives over pixels are taken where all pixels pass.
     let bumpy = uneven(at, normal);
     if view.skin.y > 0.0 && !is_thing(at) {
-        colour = moist(albedo * mottled(at.rest, is_tissue(at)), bumpy, eye);
+        colour = moist(albedo * mottled(at.rest, is_tissue(at), finish.z), bumpy, eye, finish.xy);
     }
     let edges = edge_cover(at.corner, at.edges) * view.edge.a;
     return vec4(coded(mix(colour, view.edge.rgb, edges)), opacity_at(at, dot(normal, eye)));
@@ -431,7 +438,7 @@ fn wireframe(at: Corner) -> @location(0) vec4<f32> {
 }
 
 // Colours of tissue vary: paler and darker patches, and thin vessels below the surface.
-fn mottled(rest: vec3<f32>, tissue: bool) -> vec3<f32> {
+fn mottled(rest: vec3<f32>, tissue: bool, perfusion: f32) -> vec3<f32> {
     let patches = octaves(rest, 2.3, 3, 0.0).w;
     let fine = octaves(rest, 19.0, 2, 0.0).w;
     let warped = rest + 0.07 * vec3(noise(rest * 5.0 + 3.1).w, noise(rest * 5.0 + 11.7).w, noise(rest * 5.0 + 23.9).w);
@@ -441,15 +448,18 @@ fn mottled(rest: vec3<f32>, tissue: bool) -> vec3<f32> {
     let full = mix(tint, vec3(0.50, 0.12, 0.13), 0.35 * vessel);
     // Under other colours only its lightness, so that they can be read.
     let light = vec3(0.86 + 0.2 * tone);
-    return select(light, full, tissue);
+    // Organs keep their own colour, which is redder where more blood flows.
+    let blood = mix(vec3(0.86, 0.68, 0.66), vec3(1.10, 1.08, 1.04), tone);
+    let organ = mix(light, mix(blood, vec3(0.80, 0.34, 0.34), 0.5 * vessel), perfusion);
+    return select(organ, full, tissue);
 }
 
 // Sharp reflections on what is uneven, and a film that shines where it is seen from the side.
-fn moist(albedo: vec3<f32>, normal: vec3<f32>, eye: vec3<f32>) -> vec3<f32> {
+fn moist(albedo: vec3<f32>, normal: vec3<f32>, eye: vec3<f32>, finish: vec2<f32>) -> vec3<f32> {
     let key = normalize(view.right.xyz * -0.45 + view.up.xyz * 0.65 + view.towards.xyz * 0.75);
     let facing = max(dot(normal, normalize(key + eye)), 0.0);
     let glint = pow(facing, 180.0) * 0.50 + pow(facing, 28.0) * 0.09;
     let grazing = 1.0 - max(dot(normal, eye), 0.0);
     let film = 0.16 * grazing * grazing * grazing * grazing;
-    return lit(albedo, normal, eye) + vec3((glint + film) * view.skin.y);
+    return lit(albedo, normal, eye, finish) + vec3((glint + film) * view.skin.y);
 }

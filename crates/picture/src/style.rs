@@ -127,6 +127,37 @@ impl Material {
     }
 }
 
+/// How a material shines, and how its colour varies where it has a texture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Finish {
+    /// Light of the highlight of a white lamp.
+    pub shine: f32,
+    /// Blinn's exponent: the larger, the smaller the highlight.
+    pub sharpness: f32,
+    /// How much its colour varies with the blood below, from 0 to 1.
+    pub perfusion: f32,
+}
+
+/// Of surfaces that show values and labels, and of tissue without a texture.
+pub(crate) const DULL: Finish = Finish { shine: 0.10, sharpness: 40.0, perfusion: 0.0 };
+
+impl Material {
+    /// Its gloss: wet serous surfaces (liver, colon) shine more than the brain, bone is dull, steel sharp.
+    pub(crate) const fn finish(self) -> Finish {
+        let [shine, sharpness, perfusion] = match self {
+            Self::Tissue => return DULL,
+            Self::Liver => [0.26, 70.0, 1.0],
+            Self::Brain => [0.16, 45.0, 0.7],
+            Self::Colon => [0.30, 80.0, 0.9],
+            Self::Artery | Self::Vein => [0.24, 60.0, 0.5],
+            Self::Tumour => [0.18, 50.0, 0.6],
+            Self::Bone => [0.05, 14.0, 0.25],
+            Self::Steel => [0.45, 110.0, 0.0],
+        };
+        Finish { shine, sharpness, perfusion }
+    }
+}
+
 /// How a body is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Style {

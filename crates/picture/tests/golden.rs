@@ -5,10 +5,10 @@ mod support;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
-use pliant_geometry::{CellKind, DataArray, Mesh, Vector3};
+use pliant_geometry::{CellKind, DataArray, Mesh, Region, Vector3};
 use pliant_picture::{
-    Background, Camera, ColourMap, Difference, Graphics, Legend, Look, Picture, Plane, Projection, Style,
-    Texture,
+    Background, Camera, Coat, ColourMap, Difference, Graphics, Legend, Look, Material, Paint, Picture, Plane,
+    Projection, Regions, Style, Texture,
 };
 use support::graphics;
 
@@ -141,7 +141,7 @@ fn stored(name: &str) -> Picture {
 }
 
 fn difference(graphics: &Graphics, look: &Look, mesh: &Mesh, name: &str) -> Difference {
-    let drawn = look.picture(graphics, mesh, 0.25).unwrap();
+    let drawn = look.picture(graphics, mesh, None, 0.25).unwrap();
     if std::env::var_os("PLIANT_RENEW_GOLDEN").is_some() {
         std::fs::write(file(name), drawn.png_with_coverage().unwrap()).unwrap();
     }
@@ -171,7 +171,7 @@ fn a_missing_organ_and_wrong_colours_are_seen() {
     let Some(graphics) = graphics() else { return };
     let bodies = stored("bodies");
     let seen = |look: &Look, mesh: &Mesh| {
-        let difference = look.picture(&graphics, mesh, 0.25).unwrap().difference(&bodies).unwrap();
+        let difference = look.picture(&graphics, mesh, None, 0.25).unwrap().difference(&bodies).unwrap();
         assert!(!difference.is_same(), "{difference:?}");
         difference
     };
@@ -194,7 +194,7 @@ fn what_is_not_drawn_is_seen() {
         ("skin", skin(), Style { texture: Texture::None, ..skin().style }),
         ("wireframe", wireframe(), Style { wireframe: false, ..wireframe().style }),
     ] {
-        let drawn = Look { style: without, ..look }.picture(&graphics, &fibrous(), 0.25).unwrap();
+        let drawn = Look { style: without, ..look }.picture(&graphics, &fibrous(), None, 0.25).unwrap();
         let difference = drawn.difference(&stored(name)).unwrap();
         assert!(!difference.is_same(), "{name}: {difference:?}");
     }
@@ -206,7 +206,8 @@ fn the_marked_cell_is_seen_through_the_body_where_it_is_and_nowhere_else() {
     let look =
         Look { style: Style { critical: true, range: None, ..Style::default() }, field: None, ..look() };
     let plain = Look { style: Style { critical: false, ..look.style }, ..look.clone() };
-    let [with, without] = [&look, &plain].map(|look| look.picture(&graphics, &fibrous(), 0.25).unwrap());
+    let [with, without] =
+        [&look, &plain].map(|look| look.picture(&graphics, &fibrous(), None, 0.25).unwrap());
     // The note at the bottom shows its step.
     let above = (4 * with.width * (with.height - 40)) as usize;
     let changed: Vec<usize> = (0..above / 4)
@@ -215,7 +216,7 @@ fn the_marked_cell_is_seen_through_the_body_where_it_is_and_nowhere_else() {
     let marked = changed.iter().filter(|&&p| with.rgba[4 * p] > 180 && with.rgba[4 * p + 1] < 100).count();
     assert!(marked > 20 && changed.len() < 1000, "{marked} of {}", changed.len());
     assert!(with.rgba[above..] != without.rgba[above..], "its step is told");
-    let none = look.picture(&graphics, &organs(true), 0.25).unwrap_err().to_string();
+    let none = look.picture(&graphics, &organs(true), None, 0.25).unwrap_err().to_string();
     assert!(none.contains("element-step"), "{none}");
 }
 
@@ -226,7 +227,8 @@ fn texture_stays_on_the_body_when_it_moves() {
     let away = Vector3::new(0.3, -0.2, 0.1);
     let moved = far.point_data.get_mut("displacement").unwrap();
     moved.values.chunks_mut(3).for_each(|u| (0..3).for_each(|c| u[c] += away[c]));
-    let difference = skin().picture(&graphics, &far, 0.25).unwrap().difference(&stored("skin")).unwrap();
+    let difference =
+        skin().picture(&graphics, &far, None, 0.25).unwrap().difference(&stored("skin")).unwrap();
     assert!(difference.is_same(), "{difference:?}");
 }
 
@@ -235,7 +237,7 @@ fn a_section_shows_what_is_inside_and_nothing_beyond_the_plane() {
     let Some(graphics) = graphics() else { return };
     let mesh = organs(true);
     let whole = Look { style: Style { clip: None, ..section().style }, ..section() };
-    let [cut, whole] = [&section(), &whole].map(|look| look.picture(&graphics, &mesh, 0.25).unwrap());
+    let [cut, whole] = [&section(), &whole].map(|look| look.picture(&graphics, &mesh, None, 0.25).unwrap());
     let covered = |picture: &Picture| picture.rgba.chunks(4).filter(|pixel| pixel[3] > 127).count();
     assert!(covered(&cut) < covered(&whole));
     assert!(covered(&cut) * 3 > covered(&whole), "the section is closed by what it cuts");
@@ -245,14 +247,14 @@ fn a_section_shows_what_is_inside_and_nothing_beyond_the_plane() {
 fn the_same_picture_has_the_same_pixels_and_any_size_is_drawn() {
     let Some(graphics) = graphics() else { return };
     let mesh = organs(true);
-    let draw = |size| Look { size, ..look() }.picture(&graphics, &mesh, 0.25).unwrap();
+    let draw = |size| Look { size, ..look() }.picture(&graphics, &mesh, None, 0.25).unwrap();
     assert_eq!(draw([200, 130]), draw([200, 130]));
     for size in [[1, 1], [63, 500], [1000, 17]] {
         assert_eq!(draw(size).rgba.len(), 4 * (size[0] * size[1]) as usize);
     }
     let most = graphics.device.limits().max_texture_dimension_2d;
     let refused =
-        Look { size: [most + 1, 10], ..look() }.picture(&graphics, &mesh, 0.0).unwrap_err().to_string();
+        Look { size: [most + 1, 10], ..look() }.picture(&graphics, &mesh, None, 0.0).unwrap_err().to_string();
     assert!(refused.contains("cannot draw"), "{refused}");
 }
 
@@ -273,11 +275,11 @@ fn forces_of_contacts_are_drawn_where_they_act_and_told_in_the_note() {
     let style = Style { contacts: true, range: None, ..Style::default() };
     let camera = Camera { projection: Projection::Orthographic, elevation: 0.0, ..Camera::default() };
     let look = Look { field: None, style, camera, ..look() };
-    let none = look.picture(&graphics, &mesh, 0.25).unwrap_err();
+    let none = look.picture(&graphics, &mesh, None, 0.25).unwrap_err();
     assert!(none.to_string().contains("`contact-force`") && !none.remedy().is_empty(), "{none}");
     mesh.point_data.insert("contact-force".into(), DataArray { components: 3, values });
     let plain = Look { style: Style { contacts: false, ..style }, ..look.clone() };
-    let [with, without] = [&look, &plain].map(|look| look.picture(&graphics, &mesh, 0.25).unwrap());
+    let [with, without] = [&look, &plain].map(|look| look.picture(&graphics, &mesh, None, 0.25).unwrap());
     let above = with.width * (with.height - 40);
     let changed: Vec<[u32; 2]> = (0..above)
         .filter(|&pixel| {
@@ -297,4 +299,24 @@ fn forces_of_contacts_are_drawn_where_they_act_and_told_in_the_note() {
         with.rgba[4 * above as usize..] != without.rgba[4 * above as usize..],
         "what it stands for is told"
     );
+}
+
+/// Dark red reflects 3 % of blue light: what is brighter on a liver is its highlight, which bone lacks.
+#[test]
+fn organs_shine_each_in_its_way() {
+    let Some(graphics) = graphics() else { return };
+    let brightest_blue = |material: Material| {
+        let coat = Coat { paint: Paint::Plain(material), ..Coat::default() };
+        let regions = Regions { coats: vec![(Region::Body(0), coat)], ..Regions::default() };
+        let style = Style { range: None, ..Style::default() };
+        let look = Look { field: None, style, regions, ..look() };
+        let picture = look.picture(&graphics, &organs(true), None, 0.25).unwrap();
+        let covered = picture.rgba.chunks(4).filter(|pixel| pixel[3] == 255);
+        let light = |byte: u8| ((f64::from(byte) / 255.0 + 0.055) / 1.055).powf(2.4);
+        // Over what a white lamp makes of the same colour.
+        let own = light(material.colour()[2]);
+        covered.map(|pixel| light(pixel[2])).fold(0.0, f64::max) - own
+    };
+    let [liver, bone] = [Material::Liver, Material::Bone].map(brightest_blue);
+    assert!(liver > 0.15 && bone < 0.12, "{liver} {bone}");
 }

@@ -75,7 +75,7 @@ fn swatches(picture: &Picture) -> Vec<i32> {
 #[test]
 fn cells_have_the_colours_of_their_labels_and_none_between() {
     let Some(graphics) = graphics() else { return };
-    let picture = look().picture(&graphics, &cube(), 0.0).unwrap();
+    let picture = look().picture(&graphics, &cube(), None, 0.0).unwrap();
     let [left, right, core, other] = counts(&picture);
     assert!(left > 3000 && right > 3000 && core == 0, "{left} {right} {core}");
     // Where a pixel lies on the border, samples of both are in it.
@@ -86,8 +86,9 @@ fn cells_have_the_colours_of_their_labels_and_none_between() {
 #[test]
 fn hidden_labels_show_what_lies_inside_and_leave_the_legend() {
     let Some(graphics) = graphics() else { return };
-    let hiding =
-        |labels: Vec<i32>| Look { regions: without(&labels), ..look() }.picture(&graphics, &cube(), 0.0);
+    let hiding = |labels: Vec<i32>| {
+        Look { regions: without(&labels), ..look() }.picture(&graphics, &cube(), None, 0.0)
+    };
     let picture = hiding(vec![1, 2]).unwrap();
     let [left, right, core, _] = counts(&picture);
     assert!((left, right) == (0, 0) && core > 3000, "{left} {right} {core}");
@@ -105,9 +106,9 @@ fn one_sees_through_half_of_the_body_to_what_lies_inside_and_through_nothing_of_
     let seen = |opacity: [f64; 2]| {
         let coat = |(label, opacity)| (Region::Label(label), Coat { opacity, ..Coat::default() });
         let regions = Regions { coats: (1..).zip(opacity).map(coat).collect(), ..Regions::default() };
-        Look { regions, ..look() }.picture(&graphics, &cube(), 0.0).unwrap()
+        Look { regions, ..look() }.picture(&graphics, &cube(), None, 0.0).unwrap()
     };
-    let whole = look().picture(&graphics, &cube(), 0.0).unwrap();
+    let whole = look().picture(&graphics, &cube(), None, 0.0).unwrap();
     assert_eq!(whole.rgba, seen([1.0, 1.0]).rgba);
     // What is invisible is as hidden as its cells, but for the camera, which still sees all.
     let [left, right, core, _] = counts(&seen([0.0, 0.0]));
@@ -134,7 +135,7 @@ fn a_section_has_the_colours_of_the_cells_it_cuts() {
     let Some(graphics) = graphics() else { return };
     let clip = Plane::through(&Vector3::new(0.0, 0.031, 0.0), &-Vector3::y());
     let look = Look { style: Style { clip, ..look().style }, ..look() };
-    let [left, right, core, other] = counts(&look.picture(&graphics, &cube(), 0.0).unwrap());
+    let [left, right, core, other] = counts(&look.picture(&graphics, &cube(), None, 0.0).unwrap());
     assert!(left > 2000 && right > 2000 && core > 400, "{left} {right} {core}");
     assert!(other * 50 < left + right, "{other}");
 }
@@ -144,6 +145,6 @@ fn a_mesh_without_labels_is_refused() {
     let Some(graphics) = graphics() else { return };
     let mut mesh = cube();
     mesh.blocks[0].data.clear();
-    let told = look().picture(&graphics, &mesh, 0.0).unwrap_err();
+    let told = look().picture(&graphics, &mesh, None, 0.0).unwrap_err();
     assert!(told.to_string().contains("have no labels") && !told.remedy().is_empty(), "{told}");
 }

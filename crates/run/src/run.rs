@@ -20,11 +20,12 @@ use pliant_scene::World;
 
 /// Draws an instant of a run.
 pub trait Draw: fmt::Debug + Sync {
-    /// A PNG file of a mesh at rest with the fields of an instant, at a time [s].
+    /// A PNG file of a mesh at rest with the fields of an instant, at a time [s]; and of the constraints and loads of another one, where
+    /// these are marked.
     ///
     /// # Errors
     /// Why there is no picture.
-    fn draw(&self, mesh: &Mesh, time: f64) -> Result<Vec<u8>, String>;
+    fn draw(&self, mesh: &Mesh, marks: Option<&Mesh>, time: f64) -> Result<Vec<u8>, String>;
 }
 
 /// How far a run is.
@@ -269,8 +270,14 @@ impl<'a> Run<'a> {
     ) -> Result<PathBuf, OutputError> {
         let world = self.world;
         let mut shown = FieldMesh::new(world, &world.scene.shown(world.scene.scene.until));
-        shown.fill(&frames(world, simulation));
-        let drawn = picture.draw(shown.mesh(), simulation.time());
+        let frames = frames(world, simulation);
+        shown.fill(&frames);
+        let marks = world.scene.shown_marks(1.0).map(|table| {
+            let mut marks = FieldMesh::new(world, &table);
+            marks.fill(&frames);
+            marks
+        });
+        let drawn = picture.draw(shown.mesh(), marks.as_ref().map(FieldMesh::mesh), simulation.time());
         let png = drawn.map_err(|reason| OutputError::new(&folder.path().join(PICTURE), reason))?;
         folder.write(PICTURE, &png)
     }

@@ -213,6 +213,14 @@ impl Scene {
         }
     }
 
+    /// A series of constraints and loads, where the view marks them: those of the body that carries a surface which is shown.
+    pub fn shown_marks(&self, every: f64) -> Option<VtuTable> {
+        let data = vec![FieldName::Displacement, FieldName::Constraint, FieldName::Load];
+        let on = self.carrier(self.view.on.as_deref()).map(|(body, _)| body.clone());
+        let on = on.or_else(|| self.view.on.clone());
+        self.view.marks.then_some(VtuTable { on, every, data, at: At::Points, curved: None })
+    }
+
     /// The same of another view than its own.
     pub fn shown_as(&self, view: &ViewTable, every: f64) -> VtuTable {
         let mut data = vec![FieldName::Displacement];

@@ -5,11 +5,10 @@ use std::time::{Duration, Instant};
 
 use pliant_geometry::Vector3;
 use pliant_mechanics::Energies;
-use pliant_picture::PointForce;
+use pliant_picture::{Mark, PointForce};
 use pliant_sim::gpu::PointValue;
 
 use crate::followed::FollowedPoint;
-use crate::marks::Mark;
 
 /// Wall time between two inspections of a state that lies on a device.
 pub const INSPECTION: Duration = Duration::from_millis(250);

@@ -19,7 +19,6 @@ mod window;
 pub use device::INSPECTION;
 pub use followed::FollowedPoint;
 pub use hand::{Hand, Hold, Point, Which, pick};
-pub use marks::{Mark, Marked};
 pub use parameters::{Number, Parameter, parameters, with_numbers};
 pub use recording::{Break, Done, Move, Recording, Surface};
 pub use regions::{coat_of, regions_of};

@@ -10,7 +10,8 @@ use std::time::{Duration, Instant};
 use pliant_geometry::{Region, Vector3};
 use pliant_mechanics::Energies;
 use pliant_picture::{
-    PointForce, Subject, contact_forces, critical_cell, deformed_points, drawn_value, nodal_values, visible,
+    Mark, PointForce, Subject, contact_forces, critical_cell, deformed_points, drawn_value, nodal_values,
+    visible,
 };
 use pliant_run::{Column, Live};
 use pliant_scene::World;
@@ -21,7 +22,7 @@ use pliant_sim::{Failure, State, number};
 use crate::device::{Seen, point_value};
 use crate::followed::{Followed, FollowedPoint};
 use crate::hand::{Hand, Hold, Point, Which};
-use crate::marks::{Mark, marks};
+use crate::marks::marks;
 use crate::parameters::Number;
 use crate::recording::{Break, Done, Move, Recording, Surface};
 use crate::sound::{Sound, SoundStates};

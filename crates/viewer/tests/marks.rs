@@ -3,42 +3,12 @@
 mod support;
 
 use pliant_geometry::Vector3;
-use pliant_viewer::{Marked, Order, Session};
+use pliant_picture::Marked;
+use pliant_viewer::{Order, Session};
 use support::{wait, world};
 
 /// A bar that is held at one end, moved at the other one, and pressed from above.
-const BAR: &str = r#"
-[scene]
-until = 100
-[run]
-threads = 1
-[law.tissue]
-type = "neo-hookean"
-young-modulus = 1e4
-poisson-ratio = 0.3
-[body.bar]
-mesh = { block = { size = [0.2, 0.1, 0.1], cells = [4, 2, 2] } }
-law = "tissue"
-density = 1000
-damping = 20
-[constraint.wall]
-type = "fix"
-body = "bar"
-nodes = { set = "x-min" }
-[constraint.pull]
-type = "move"
-body = "bar"
-nodes = { set = "x-max" }
-by = [0.02, 0, 0]
-curve = "ramp"
-to = 0.1
-[load.weight]
-type = "pressure"
-on = "bar"
-faces = { set = "z-max" }
-pressure = 50
-curve = "hold"
-"#;
+const BAR: &str = include_str!("support/bar.toml");
 
 #[test]
 fn held_moved_and_loaded_nodes_are_marked_where_they_are() {

@@ -212,6 +212,49 @@ mod with_pictures {
         assert!(told.err.contains("the last picture of each scene"), "{}", told.err);
     }
 
+    /// A bar that is held at one end, moved at the other one, and pressed from above: in its files, and in pictures of the scene, of a surface that it
+    /// carries, of the run and of its files.
+    #[test]
+    fn constraints_and_loads_are_written_and_marked() {
+        if !has_gpu() {
+            return;
+        }
+        let bar = include_str!("../../../viewer/tests/support/bar.toml");
+        let more = "[output.marks]\ntype = 'vtu'\nevery = 0.05\ndata = ['displacement', 'constraint', 'load']\n\
+                    [surface.skin]\non = 'bar'\nmesh = { block = { size = [0.2, 0.1, 0.1], cells = [3, 2, 2] } }\n\
+                    [view]\nsize = [600, 400]\ncolour = 'none'\nmarks = true\n";
+        let workshop = Workshop::new(&format!("{bar}{more}"));
+        workshop.run(&["--until", "0.1", "--picture"]).done();
+        let last = workshop.path("out/case/marks/000002.vtu");
+        let mesh = pliant_geometry::io::read(&last).unwrap().mesh;
+        let held = &mesh.point_data["constraint"].values;
+        assert_eq!([1.0, 2.0].map(|kind| held.iter().filter(|own| **own == kind).count()), [9, 9]);
+        let pressed: f64 = mesh.point_data["load"].values.chunks(3).map(|force| force[2]).sum();
+        // The pressure times the area of the upper side, which the pull stretches by a tenth and thins.
+        assert!(pressed < -0.9 && pressed > -1.2, "{pressed} N");
+
+        let has = |name: &str| {
+            let picture = Picture::from_png(&fs::read(workshop.path(name)).unwrap()).unwrap();
+            [[40, 44, 52], [206, 112, 20], [24, 128, 80]]
+                .map(|own: [u8; 3]| picture.rgb().chunks(3).filter(|pixel| *pixel == own).count() > 5)
+        };
+        assert_eq!(has("out/case/picture.png"), [true; 3]);
+        let render = |what: &str, out: &str, more: &[&str]| {
+            done(&workshop.pliant(&[&["render", what, "-o", out], more].concat()));
+            fs::read_dir(workshop.path(out)).unwrap().next().unwrap().unwrap().path()
+        };
+        for (what, out, more) in [
+            ("case", "scene", &["--until", "0.1"][..]),
+            ("case", "skin", &["--until", "0.1", "--set", "view.on=skin"]),
+            ("out/case", "files", &["--marks", "--size", "600x400", "--colour", "none"]),
+        ] {
+            let picture = render(what, out, more);
+            assert_eq!(has(picture.to_str().unwrap()), [true; 3], "{out}");
+        }
+        let without = render("case", "without", &["--until", "0.1", "--set", "view.marks=false"]);
+        assert_eq!(has(without.to_str().unwrap()), [false; 3]);
+    }
+
     #[test]
     fn what_cannot_be_shown_is_refused_with_a_remedy() {
         if !has_gpu() {
@@ -221,7 +264,7 @@ mod with_pictures {
         workshop.run(&["--step", "1e-3"]).done();
         workshop.write("full/letter.txt", "mine");
         workshop.write("empty/letter.txt", "mine");
-        let cases: [(&[&str], &str); 15] = [
+        let cases: [(&[&str], &str); 16] = [
             (&["render", "nowhere"], "nowhere"),
             (&["render", "out/case", "--fibres"], "needs `fibre` in `data`"),
             (&["render", "out/case", "--critical"], "needs `element-step` in `data`"),
@@ -230,6 +273,7 @@ mod with_pictures {
                 &["render", "case", "--contacts"],
                 "no body touches anything, so that there is no `contact-force`",
             ),
+            (&["render", "out/case", "--marks"], "needs `constraint` and `load` in `data`"),
             (&["render", "case", "--texture", "wood"], "possible values: none, skin"),
             (&["render", "empty"], "has no series of frames"),
             (&["render", "out/case", "--series", "skin"], "it has `fields`"),

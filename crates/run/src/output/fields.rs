@@ -4,6 +4,7 @@ use nalgebra::Matrix3;
 use pliant_explicit::NodeContact;
 use pliant_explicit::recover::CellFields;
 use pliant_implicit::{Assembly, ShellFields, State};
+use pliant_mechanics::model::{Model, Motion};
 use pliant_mechanics::tensor::Symmetric;
 use rayon::prelude::*;
 
@@ -18,14 +19,44 @@ pub(super) struct OfNodes<'f, 'p> {
     frame: &'f Frame<'p>,
     /// Nodes that may touch something, increasing; empty where no field of contacts is wanted.
     touching: Vec<NodeContact>,
+    /// Forces of loads [N]; empty where they are not wanted.
+    loads: Vec<[f64; 3]>,
+    /// Whether each node is free, held or moved; empty where that is not wanted.
+    held: Vec<f64>,
+}
+
+/// What the field `constraint` is of a node that is held and of one that is moved.
+const HELD: f64 = 1.0;
+const MOVED: f64 = 2.0;
+
+/// The field `constraint` of all nodes.
+fn held(model: &Model) -> Vec<f64> {
+    let mut held = vec![0.0; model.node_count()];
+    for constraint in &model.constraints {
+        let own = if matches!(constraint.motion, Motion::Fixed) { HELD } else { MOVED };
+        for &node in &constraint.nodes {
+            held[node as usize] = own.max(held[node as usize]);
+        }
+    }
+    held
 }
 
 impl<'f, 'p> OfNodes<'f, 'p> {
     /// Finds those that are wanted.
-    pub fn new(frame: &'f Frame<'p>, mut wanted: impl Iterator<Item = FieldName>) -> Self {
-        let touching =
-            if wanted.any(FieldName::is_of_contact) { frame.now.contact_nodes() } else { Vec::new() };
-        Self { frame, touching }
+    pub fn new(frame: &'f Frame<'p>, wanted: impl Iterator<Item = FieldName>) -> Self {
+        let mut found = Self { frame, touching: Vec::new(), loads: Vec::new(), held: Vec::new() };
+        let (model, now) = (&frame.built().model, frame.now);
+        for field in wanted {
+            if field.is_of_contact() && found.touching.is_empty() {
+                found.touching = now.contact_nodes();
+            } else if field == FieldName::Constraint {
+                found.held = held(model);
+            } else if field == FieldName::Load {
+                let moved: Vec<_> = (0..model.node_count()).map(|node| now.displacement(node)).collect();
+                found.loads = model.load_forces(now.time(), &moved);
+            }
+        }
+        found
     }
 
     /// The value of a field on a node of the model; the first `components` numbers count.
@@ -36,6 +67,8 @@ impl<'f, 'p> OfNodes<'f, 'p> {
             FieldName::Reaction => padded(&now.nodal_reaction(node)),
             FieldName::ReactionMoment => padded(&now.nodal_reaction_moment(node)),
             FieldName::Rotation => padded(&now.rotation(node)),
+            FieldName::Constraint => padded(&[self.held[node]]),
+            FieldName::Load => padded(&self.loads[node]),
             _ if field.is_of_contact() => self.of_contact(field, node),
             _ => padded(&now.displacement(node)),
         }

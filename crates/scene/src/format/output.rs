@@ -89,11 +89,15 @@ pub enum FieldName {
     Gap,
     /// How far [m] a node has slid on what it touches since its touch began; not a number where it touches nothing.
     Slip,
+    /// Whether constraints hold a node: 0 where it is free, 1 where it stays where it is at rest, 2 where it is moved.
+    Constraint,
+    /// Force [N] of loads on a node, without weights; zero on shells.
+    Load,
 }
 
 impl FieldName {
     /// All of them.
-    pub const ALL: [Self; 34] = [
+    pub const ALL: [Self; 36] = [
         Self::Displacement,
         Self::Velocity,
         Self::Rotation,
@@ -128,6 +132,8 @@ impl FieldName {
         Self::ContactPressure,
         Self::Gap,
         Self::Slip,
+        Self::Constraint,
+        Self::Load,
     ];
 
     /// The name in files.
@@ -167,6 +173,8 @@ impl FieldName {
             Self::ContactPressure => "contact-pressure",
             Self::Gap => "gap",
             Self::Slip => "slip",
+            Self::Constraint => "constraint",
+            Self::Load => "load",
         }
     }
 
@@ -181,7 +189,7 @@ impl FieldName {
             Self::Displacement | Self::Thickness | Self::CurrentThickness | Self::Gap | Self::Slip => "m",
             Self::Velocity => "m/s",
             Self::Rotation => "rad",
-            Self::Reaction | Self::AxialForce | Self::ContactForce => "N",
+            Self::Reaction | Self::AxialForce | Self::ContactForce | Self::Load => "N",
             Self::ReactionMoment => "N m",
             Self::CauchyStress
             | Self::Pk2Stress
@@ -198,7 +206,8 @@ impl FieldName {
             | Self::VolumeRatio
             | Self::CellVolumeRatio
             | Self::AxialStretch
-            | Self::SurfaceStrain => "",
+            | Self::SurfaceStrain
+            | Self::Constraint => "",
             Self::EnergyDensity => "J/m³",
             Self::ElementStep => "s",
             Self::MembraneForce => "N/m",
@@ -244,6 +253,8 @@ impl FieldName {
             Self::ContactPressure => "contact pressure",
             Self::Gap => "gap",
             Self::Slip => "slip",
+            Self::Constraint => "constraint",
+            Self::Load => "load",
         }
     }
 
@@ -256,7 +267,8 @@ impl FieldName {
             | Self::Reaction
             | Self::ReactionMoment
             | Self::Fibre
-            | Self::ContactForce => 3,
+            | Self::ContactForce
+            | Self::Load => 3,
             Self::CauchyStress
             | Self::Pk2Stress
             | Self::GreenStrain
@@ -283,7 +295,8 @@ impl FieldName {
             | Self::SurfaceStrain
             | Self::ContactPressure
             | Self::Gap
-            | Self::Slip => 1,
+            | Self::Slip
+            | Self::Constraint => 1,
         }
     }
 
@@ -293,7 +306,12 @@ impl FieldName {
             self,
             Self::Displacement | Self::Velocity | Self::Rotation | Self::Reaction | Self::ReactionMoment
         );
-        moved || self.is_of_contact()
+        moved || self.is_of_contact() || self.is_of_marks()
+    }
+
+    /// True for fields of what holds, moves and loads nodes.
+    pub fn is_of_marks(self) -> bool {
+        matches!(self, Self::Constraint | Self::Load)
     }
 
     /// True for fields of bodies that touch something.
@@ -304,7 +322,7 @@ impl FieldName {
     /// True for fields that surfaces on solids carry: those that say something between the nodes.
     pub fn is_of_surface(self) -> bool {
         let of_nodes = matches!(self, Self::Rotation | Self::Reaction | Self::ReactionMoment);
-        !of_nodes && !self.is_of_contact()
+        !of_nodes && !self.is_of_contact() && !self.is_of_marks()
     }
 
     /// True for fields that bodies of a model have.
@@ -318,7 +336,9 @@ impl FieldName {
             | Self::ContactForce
             | Self::ContactPressure
             | Self::Gap
-            | Self::Slip => true,
+            | Self::Slip
+            | Self::Constraint
+            | Self::Load => true,
             Self::CauchyStress
             | Self::EnergyDensity
             | Self::Pk2Stress

@@ -82,6 +82,10 @@ pub struct ViewTable {
     /// note tells what the longest one stands for.
     #[serde(default)]
     pub contacts: bool,
+    /// Whether constraints and loads are marked, through the bodies: squares where nodes are held, dots where they are moved, arrows along the forces of
+    /// loads. At most 300 of each kind are drawn.
+    #[serde(default)]
+    pub marks: bool,
     /// Whether the element with the smallest `element-step` is marked, through the body. Shells are then shown flat.
     #[serde(default)]
     pub critical: bool,

@@ -129,6 +129,7 @@ fn view_text(view: &ViewTable, style: &Style, camera: &Camera, cut: Option<Plane
         ("ghost", style.ghost),
         ("fibres", view.fibres),
         ("contacts", view.contacts),
+        ("marks", view.marks),
         ("critical", view.critical),
     ];
     switches.into_iter().filter(|(_, on)| *on).for_each(|(key, _)| put(key, "true".into()));

@@ -69,6 +69,8 @@ pub struct Opening {
     pub record: Option<PathBuf>,
     /// What it does by itself before it closes; without, it stays open.
     pub self_test: Option<SelfTest>,
+    /// When the user asked for it.
+    pub began: Instant,
 }
 
 /// A window that could not be opened.
@@ -190,7 +192,6 @@ struct App {
     read: Read,
     /// A scene that is being read.
     reading: Option<Receiver<(PathBuf, Result<World, String>)>>,
-    marks_shown: bool,
     filming: Filming,
     /// The tool that keys lead, in the order of tools, and the hand that holds it.
     led: Option<(usize, Which)>,
@@ -203,6 +204,9 @@ struct App {
     closed: BTreeSet<String>,
     frame_seconds: f64,
     painted: Instant,
+    began: Instant,
+    /// Wall time [s] from then to the first picture of the scene.
+    first_picture: Option<f64>,
     running_test: Option<RunningTest>,
     /// Frames drawn.
     drawn: u64,
@@ -219,7 +223,7 @@ impl App {
     ) -> Result<Self, String> {
         let state = context.wgpu_render_state.as_ref().ok_or("wgpu did not start")?;
         context.egui_ctx.set_visuals(egui::Visuals::light());
-        let Opening { world, style, camera, file, read, record, self_test } = opening;
+        let Opening { world, style, camera, file, read, record, self_test, began } = opening;
         let port = Viewport::new(context, style, camera)?;
         let session = begin(&world, &context.egui_ctx)?;
         let device = device::shared(state, &world);
@@ -258,7 +262,6 @@ impl App {
             looked: Instant::now(),
             read,
             reading: None,
-            marks_shown: false,
             filming: Filming::default(),
             led: None,
             browser: Browser::default(),
@@ -266,6 +269,8 @@ impl App {
             closed: BTreeSet::new(),
             frame_seconds: 0.0,
             painted: Instant::now(),
+            began,
+            first_picture: None,
             running_test: self_test.map(|test| RunningTest::new(test, has_tools)),
             drawn: 0,
             context: context.egui_ctx.clone(),
@@ -276,6 +281,7 @@ impl App {
             app.order(Order::Record);
         }
         app.show();
+        app.show_marks(app.view.marks);
         remember(&app.file);
         // A self-test plays when it is due.
         if app.running_test.is_none() {
@@ -411,7 +417,7 @@ impl App {
         }
         self.frame.inspections = 0;
         self.session.order(Order::Memory(self.in_memory));
-        self.session.order(Order::Marks(self.marks_shown));
+        self.session.order(Order::Marks(self.view.marks));
         self.show();
         self.session.order(Order::Speed(self.speed));
         self.session.order(Order::Play(self.frame.playing));
@@ -445,7 +451,7 @@ impl App {
             self.browser.turn(&self.file);
         }
         if pressed(Key::M) {
-            self.show_marks(!self.marks_shown);
+            self.show_marks(!self.view.marks);
         }
         if pressed(Key::V) {
             self.film();
@@ -500,6 +506,9 @@ impl eframe::App for App {
         egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| self.scene(ui));
         self.browse(&context);
         self.drawn += 1;
+        if !self.frame.points.is_empty() {
+            self.first_picture.get_or_insert_with(|| self.began.elapsed().as_secs_f64());
+        }
         self.go_on_testing();
         context.request_repaint_after(Duration::from_millis(250));
     }

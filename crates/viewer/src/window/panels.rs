@@ -169,7 +169,7 @@ impl App {
 
     /// Shows where bodies are held, moved and loaded, or not.
     pub(super) fn show_marks(&mut self, shown: bool) {
-        self.marks_shown = shown;
+        self.view.marks = shown;
         self.order(Order::Marks(shown));
     }
 
@@ -202,7 +202,7 @@ impl App {
         if self.world.touches(self.view.on.as_deref()) {
             ui.checkbox(&mut self.view.contacts, "Forces of contacts");
         }
-        let mut marks = self.marks_shown;
+        let mut marks = self.view.marks;
         let told = "M: squares where nodes are held, dots where they are moved, arrows of loads";
         if ui.checkbox(&mut marks, "Constraints and loads").on_hover_text(told).changed() {
             self.show_marks(marks);

@@ -2,12 +2,11 @@
 
 use eframe::egui::{self, Align2, Color32, CursorIcon, FontId, Key, PointerButton, Pos2, Rect, Stroke, vec2};
 use pliant_geometry::Vector3;
-use pliant_picture::{Camera, arrow_note, arrow_unit, largest_force};
+use pliant_picture::{Camera, Marked, arrow_note, arrow_unit, largest_force, largest_load};
 
 use super::App;
 use super::viewport::scrolled;
 use crate::hand::{Hand, Point, Which, pick};
-use crate::marks::Marked;
 
 /// Length of the arrow of the strongest force of a pull on the screen.
 const ARROW: f32 = 120.0;
@@ -19,9 +18,6 @@ const DOT: f32 = 2.5;
 /// Radius of a pin on the screen.
 const PIN_SIZE: f32 = 5.0;
 const PIN: Color32 = Color32::from_rgb(20, 90, 170);
-const HELD: Color32 = Color32::from_rgb(40, 44, 52);
-const MOVED: Color32 = Color32::from_rgb(206, 112, 20);
-const LOAD: Color32 = Color32::from_rgb(24, 128, 80);
 const FORCE: Color32 = Color32::from_rgb(190, 40, 40);
 
 /// Keys and what they do, as in `docs/viewer.md`.
@@ -197,26 +193,24 @@ impl App {
 
     /// Squares where nodes are held, dots where they are moved, arrows of loads.
     fn draw_marks(&self, painter: &egui::Painter) {
-        let loads = self.frame.marks.iter().filter_map(|(place, marked)| match marked {
-            Marked::Loaded(force) => Some([*place, *force]),
-            _ => None,
-        });
-        let unit = arrow_unit(&self.frame.points, largest_force(&loads.collect::<Vec<_>>()));
+        let unit = arrow_unit(&self.frame.points, largest_load(&self.frame.marks));
         for (place, marked) in &self.frame.marks {
             let Some(at) = self.port.to_screen(place) else { continue };
             let square = Rect::from_center_size(at, vec2(2.0 * DOT, 2.0 * DOT));
+            let [red, green, blue] = marked.colour();
+            let colour = Color32::from_rgb(red, green, blue);
             match marked {
                 Marked::Held => {
                     painter.rect_filled(square.expand(1.0), 0.0, Color32::WHITE);
-                    painter.rect_filled(square, 0.0, HELD);
+                    painter.rect_filled(square, 0.0, colour);
                 }
                 Marked::Moved => {
-                    painter.circle(at, DOT, MOVED, Stroke::new(1.0, Color32::WHITE));
+                    painter.circle(at, DOT, colour, Stroke::new(1.0, Color32::WHITE));
                 }
                 Marked::Loaded(force) => {
                     let Some(to) = self.port.to_screen(&(place + force * unit)) else { continue };
                     painter.arrow(at, to - at, Stroke::new(3.0, Color32::WHITE));
-                    painter.arrow(at, to - at, Stroke::new(1.5, LOAD));
+                    painter.arrow(at, to - at, Stroke::new(1.5, colour));
                 }
             }
         }

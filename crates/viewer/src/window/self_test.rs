@@ -159,7 +159,14 @@ fn tried(app: &App) -> String {
 /// What a picture of the window shows.
 fn shown(app: &App) -> String {
     let told = app.banner().map(|told| format!(": {}", told.text)).unwrap_or_default();
-    format!("{} at t = {:.3} s{told}", app.title(), app.frame.time)
+    let first = app.first_picture.unwrap_or_default();
+    let frame = 1e3 * app.frame_seconds;
+    format!(
+        "{} at t = {:.3} s{told}; first picture after {first:.2} s, frames of {frame:.1} ms ({})",
+        app.title(),
+        app.frame.time,
+        app.adapter
+    )
 }
 
 pub(super) fn press(key: Key, pressed: bool) -> Event {
