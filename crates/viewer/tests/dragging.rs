@@ -130,9 +130,11 @@ fn drag(text: &str, until: &Until) -> [u64; 2] {
         if frame.breaks > broken {
             broken = frame.breaks;
             let told = frame.note.as_deref().unwrap_or_default();
-            // It is turned inside out, or squeezed until it is too stiff for the step.
+            // It is turned inside out, squeezed until it is too stiff for the step, or gains energy.
             let is_told =
-                ["is inverted", "the largest stable step has fallen"].iter().any(|why| told.contains(why));
+                ["is inverted", "the largest stable step has fallen", "the energies are off balance"]
+                    .iter()
+                    .any(|why| told.contains(why));
             assert!(is_told && told.contains("went back to"), "in drag {drag}: {told}");
             session.order(Order::Hand(Hand::Release));
             whole = 0;

@@ -14,7 +14,7 @@ impl App {
             self.mouse = self.mouse.other();
         }
         if self.hands == [None; 2] {
-            self.strongest = 0.0;
+            (self.mouse, self.strongest) = (Which::First, 0.0);
         }
         self.beside = Vector3::zeros();
         self.take_with(self.mouse, point, at);
