@@ -8,6 +8,7 @@
 //! * A step is found where the residual is below its tolerance, or where the unfiltered Newton step with fresh factors moves nothing by more than
 //!   counts for a gap and the residual is not far above its tolerance, or by less than is asked for; that step is still made.
 //! * A full Newton step that is hardly shorter than the one before is made longer while the energy falls.
+//! * In time, no Newton step takes a node further than a mean edge: longer ones are nearly always halved.
 //! * Friction is then taken anew from the state found, while its size changes by more than a tenth.
 
 use crate::error::SolveError;
@@ -81,6 +82,9 @@ pub(crate) struct Limits {
     pub close: Option<f64>,
     /// Whether a state is good enough when iterations run out.
     pub accept: bool,
+    /// How far [m] an iteration takes nodes at most once all that moves by itself has gone its way: what is found at a state tells nothing of
+    /// what is further away, and pairs need not be listed so far.
+    pub farthest: f64,
 }
 
 /// What an iteration started from.
@@ -155,7 +159,8 @@ pub(crate) fn descend(
         before.state.clone_from(state);
         before.loads.copy_from_slice(&own_loads(system));
         before.share = share(system);
-        let part = solver.part();
+        let farthest = if complete && largest > limits.farthest { limits.farthest / largest } else { 1.0 };
+        let part = solver.part().min(farthest);
         let Vectors { system, increment, .. } = solver.vectors();
         let part = match &mut system.touching {
             Some(touching) => touching.allowed(state, increment, [KEEP[0], part]),

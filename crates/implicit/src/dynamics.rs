@@ -382,6 +382,7 @@ impl BackwardEuler {
             lags: LAGS,
             close: self.settings.speed_tolerance.map(|speed| speed * h),
             accept: self.settings.accept_unconverged,
+            farthest: self.length,
         };
         let mut residuals = Vec::new();
         let result = within_limits(self, state, time, |solver, state| {

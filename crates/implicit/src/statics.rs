@@ -437,7 +437,13 @@ impl Statics {
         }
         let mut residuals = Vec::new();
         let mut last = 0.0;
-        let limits = Limits { iterations: self.settings.iterations, lags: LAGS, close: None, accept: false };
+        let limits = Limits {
+            iterations: self.settings.iterations,
+            lags: LAGS,
+            close: None,
+            accept: false,
+            farthest: f64::INFINITY,
+        };
         let result = within_limits(self, state, time, |solver, state| {
             descend(solver, state, time, None, &limits, &mut |norm, allowed| {
                 residuals.push(norm);

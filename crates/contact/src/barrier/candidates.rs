@@ -15,7 +15,8 @@ const AT_REST: f64 = 1.02;
 const SKIN: f64 = 1.25;
 /// Width of the bins that pairs are sorted into by their distance, over the distance of the barrier.
 const BIN: f64 = 0.2;
-/// The least and the largest skin, over the distance of the barrier; and the largest over the mean edge, if that is more.
+/// The least and the largest skin, over the distance of the barrier. The largest is a mean edge if that is more, and that of a surface which touches
+/// itself always: all its parts are near others, and their lists would grow with the square of a skin over an edge.
 const SKINS: [f64; 2] = [0.5, 20.0];
 
 /// A pair that may come near.
@@ -124,7 +125,7 @@ impl Group {
     ) -> Self {
         let place = |node: u32| rest[node as usize];
         let edge = sides[0].mean_edge(place);
-        let largest = (SKINS[1] * action.law.distance).max(edge);
+        let largest = if sides.len() == 1 { edge } else { (SKINS[1] * action.law.distance).max(edge) };
         let wide = Wide::new(&sides, rest.len());
         let mut group = Self {
             number,

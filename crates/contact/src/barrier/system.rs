@@ -204,7 +204,7 @@ impl Barriers {
         self.is_current = false;
         self.put(position, 0.0);
         self.start.copy_from_slice(&self.place);
-        self.list(motion, 0.0);
+        self.list(motion, 1.0, 0.0);
         self.act();
         self.hold();
     }
@@ -247,9 +247,9 @@ impl Barriers {
         }
     }
 
-    /// Lists what may come near in a motion, and while rigid things go on from a share to the end of the step.
-    fn list(&mut self, motion: &[f64], share: f64) {
-        self.set_motion(motion, 1.0, if share < 1.0 { 1.0 } else { share });
+    /// Lists what may come near in a part of a motion, and while rigid things go on from a share to the end of the step.
+    fn list(&mut self, motion: &[f64], part: f64, share: f64) {
+        self.set_motion(motion, part, if share < 1.0 { 1.0 } else { share });
         self.listed.copy_from_slice(&self.place);
         self.listed_stances.clone_from(&self.stances[2]);
         let Self { groups, place, motion, wall_distances, contacts, stances, .. } = self;
@@ -568,18 +568,18 @@ impl Barriers {
         [keep, most]: [f64; 2],
     ) -> f64 {
         self.put(position, share);
-        self.set_motion(motion, 1.0, 1.0);
+        self.set_motion(motion, most, 1.0);
         for group in &mut self.groups {
             group.take(&self.place, &self.listed);
         }
         let within =
             |own: &Self| own.groups.iter().map(|group| group.within_skins(&own.motion)).fold(1.0, f64::min);
         let mut part = within(self);
-        if part < most {
-            self.list(motion, share);
+        if part < 1.0 {
+            self.list(motion, most, share);
             part = within(self);
         }
-        part = part.min(most);
+        part *= most;
         let [from, to, _] = &self.stances;
         let turns =
             share < 1.0 && from.iter().zip(to).any(|(from, to)| from.pose.rotation != to.pose.rotation);

@@ -1,7 +1,11 @@
 //! Dense parts of factors: panels of columns with rows in multiples of [`PACK`], and kernels for the registers of any processor. Columns are
 //! done in blocks, and these in strips that stay in registers with some of their rows.
 
-#![expect(clippy::needless_range_loop, reason = "plain loops over tiles stay in registers")]
+#![expect(
+    clippy::needless_range_loop,
+    clippy::manual_memcpy,
+    reason = "plain loops over tiles stay in registers"
+)]
 
 use pulp::Simd;
 
@@ -68,7 +72,7 @@ macro_rules! for_strips {
         let to: usize = $to;
         macro_rules! with {
             ($width:expr) => {
-                while $column + $width <= to {
+                while to - $column >= $width {
                     const $count: usize = $width;
                     $call;
                     $column += $width;

@@ -98,14 +98,14 @@ impl Groups {
         }
         let left_of = |row: usize| &left[left_start[row] as usize..left_start[row + 1] as usize];
         let (mut group, mut start) = (vec![0_u32; size], Vec::new());
-        for column in 0..size {
+        for (column, group) in group.iter_mut().enumerate() {
             let follows = column > 0
                 && inner(column as u32 - 1) == matrix.rows(column as u32)
                 && left_of(column).split_last() == Some((&(column as u32 - 1), left_of(column - 1)));
             if !follows {
                 start.push(column as u32);
             }
-            group[column] = start.len() as u32 - 1;
+            *group = start.len() as u32 - 1;
         }
         let (mut row_start, mut row) = (vec![0], Vec::<u32>::new());
         for &column in &start {
