@@ -32,6 +32,13 @@ pub fn draw(
         (world.scene.view.camera.azimuth, world.scene.view.camera.elevation) = (azimuth, elevation);
     }
     let look = pliant_command::look_of_world(&world);
+    let marks = match world.scene.shown_marks(1.0) {
+        Some(marked) => {
+            running.show(marked);
+            Some(running.live.mesh()?.clone())
+        }
+        None => None,
+    };
     running.show(world.scene.shown(1.0));
     let time = running.simulation().time();
     let mesh = running.live.mesh()?;
@@ -42,7 +49,7 @@ pub fn draw(
         *graphics = Some(opened);
     }
     let Some(graphics) = &*graphics else { return Err(Trouble::Device("no graphics".into())) };
-    let picture = look.picture(graphics, mesh, time);
+    let picture = look.picture(graphics, mesh, marks.as_ref(), time);
     let picture = picture.map_err(|error| Trouble::Device(format!("{error}; {}", error.remedy())))?;
     picture.png().map_err(|error| Trouble::Device(format!("{error}; {}", error.remedy())))
 }
