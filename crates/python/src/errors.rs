@@ -3,6 +3,7 @@
 use miette::{GraphicalReportHandler, GraphicalTheme};
 use pliant_run::{OutputError, ResumeError};
 use pliant_scene::diagnostic::{SceneErrors, Severity};
+use pliant_scene::source::Source;
 use pliant_sim::Failure;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -132,20 +133,19 @@ fn underlined(errors: &SceneErrors) -> String {
 /// Findings as `Diagnostic`s.
 pub fn diagnostics<'py>(py: Python<'py>, errors: &SceneErrors) -> PyResult<Vec<Bound<'py, PyAny>>> {
     let class = py.import("pliant.errors")?.getattr("Diagnostic")?;
+    let source = Source::parse(errors.name(), errors.text());
     let one = |found: &pliant_scene::diagnostic::Diagnostic| {
         let place = errors.line_and_column(found);
         let severity = match found.severity {
             Severity::Error => "error",
             Severity::Warning => "warning",
         };
-        let text = found.option.as_deref();
-        let key = match (place, text) {
-            (_, Some(option)) => option
-                .strip_prefix("--set ")
-                .and_then(|set| set.split('=').next())
-                .map(|key| key.trim().to_owned()),
-            (Some((line, _)), None) => key_of(errors.text(), line),
-            (None, None) => None,
+        let set = found.option.as_deref().and_then(|option| option.strip_prefix("--set "));
+        let key = match (set, &found.span) {
+            (Some(set), _) => set.split('=').next().map(|key| key.trim().to_owned()),
+            (None, span) => {
+                source.as_ref().ok().zip(span.as_ref()).and_then(|(source, span)| source.key_at(span.start))
+            }
         };
         class.call1((
             severity,
@@ -159,25 +159,6 @@ pub fn diagnostics<'py>(py: Python<'py>, errors: &SceneErrors) -> PyResult<Vec<B
         ))
     };
     errors.diagnostics().iter().map(one).collect()
-}
-
-/// The path of the key on a line, counted from 1: that of the header above it, and its own.
-fn key_of(text: &str, line: usize) -> Option<String> {
-    let mut header = "";
-    let mut own = None;
-    for text in text.lines().take(line) {
-        let text = text.trim();
-        if let Some(named) = text.strip_prefix('[') {
-            (header, own) = (named.trim_start_matches('[').split(']').next().unwrap_or("").trim(), None);
-        } else {
-            own = text.split_once('=').map(|(key, _)| key.trim());
-        }
-    }
-    match (header, own) {
-        ("", own) => own.map(str::to_owned),
-        (header, None) => Some(header.to_owned()),
-        (header, Some(own)) => Some(format!("{header}.{own}")),
-    }
 }
 
 /// The error of an engine without its Python half: the package is not whole.
