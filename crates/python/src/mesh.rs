@@ -33,6 +33,9 @@ pub fn word(kind: CellKind) -> &'static str {
 type Blocks<'py> = Vec<(String, PyReadonlyArray2<'py, u32>)>;
 type Data<'py> = Vec<(String, PyReadonlyArray2<'py, f64>)>;
 
+/// A name, a kind of cells, and a value for each of them.
+type CellData<'py> = (String, &'static str, Bound<'py, PyArray2<f64>>);
+
 #[pymethods]
 impl Mesh {
     /// From arrays that Python has checked.
@@ -117,10 +120,7 @@ impl Mesh {
     }
 
     /// By name, one array for each kind of cells that has it.
-    fn cell_data<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<Vec<(String, &'static str, Bound<'py, PyArray2<f64>>)>> {
+    fn cell_data<'py>(&self, py: Python<'py>) -> PyResult<Vec<CellData<'py>>> {
         let mut data = Vec::new();
         for block in &self.0.blocks {
             for (name, values) in &block.data {

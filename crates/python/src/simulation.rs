@@ -50,6 +50,8 @@ enum Slot {
 /// The memory of a run that is over: views still look at it.
 type Kept = Option<Box<Running>>;
 
+/// A grip: nodes with weights, place [m], stiffness [N/m].
+type Held = (Vec<(u32, f64)>, [f64; 3], f64);
 /// A pose: place [m] and quaternion (x, y, z, w).
 type Posed = ([f64; 3], [f64; 4]);
 /// A pose, an opening [rad], a force [N] and a moment [N m].
@@ -307,7 +309,7 @@ impl Simulation {
     }
 
     /// Replaces all grips: nodes with weights, place [m], stiffness [N/m], at most the stable one of each. The stiffnesses taken.
-    fn hold(&self, grips: Vec<(Vec<(u32, f64)>, [f64; 3], f64)>) -> PyResult<Vec<f64>> {
+    fn hold(&self, grips: Vec<Held>) -> PyResult<Vec<f64>> {
         let taken = self.quick(|running| {
             let nodes = running.nodes() as u32;
             if grips.iter().flat_map(|(nodes, ..)| nodes).any(|&(node, _)| node >= nodes) {
