@@ -273,7 +273,7 @@ mod tests {
     #[test]
     fn displacements_keep_their_address_as_long_as_the_run_lives() {
         let solvers = [
-            ("", "single"),
+            ("precision = 'single'", "single"),
             ("solver = 'explicit'\nprecision = 'double'", "double"),
             ("solver = 'quasi-static'\nload-steps = 4\nprecision = 'double'", "double"),
         ];
