@@ -57,8 +57,10 @@ def test_runs_with_files_are_those_of_the_command_line(scene: pliant.Scene, tmp_
     assert scene.run(f"{tmp_path}/out", force=True).status == "done"
 
 
-def test_an_interrupted_run_goes_on_from_its_checkpoint(scene: pliant.Scene, tmp_path: object) -> None:
-    scene.run_table["checkpoint"] = {"every": 0.01}
+def test_an_interrupted_run_goes_on_from_its_checkpoint(tmp_path: object) -> None:
+    # It takes longer than the tenth of a second between two reports.
+    scene = cube(12, **{"scene.until": 2.0})
+    scene.run_table["checkpoint"] = {"every": 0.1}
     model, out = scene.build(), f"{tmp_path}/out"
 
     def stop(now: pliant.Progress) -> None:
