@@ -182,10 +182,23 @@ def test_files_of_a_scene_travel(tmp_path: Path) -> None:
     assert row["status"] == "done", row
 
 
+def test_parts_of_the_command_line_are_put_together(tmp_path: Path, expected: list[dict[str, Any]]) -> None:
+    own = scene()
+    own.save(tmp_path / "scene.toml")
+    sets = [f"--set={key}={','.join(str(value) for value in values)}" for key, values in VALUES.items() if "young" in key]
+    for part in ("1/2", "2/2"):
+        words = ["sweep", str(tmp_path / "scene.toml"), *sets, "--set=law.tissue.poisson-ratio=0.2", "--out", str(tmp_path), "--part", part]
+        assert pliant._native.main(["pliant", *words]) == 0
+    table = pliant.merge(tmp_path)
+    assert not table.missing
+    found = [(row["law.tissue.young-modulus"], row["reaction.base.z"]) for row in table]
+    assert found == [(row["law.tissue.young-modulus"], row["reaction.base.z"]) for row in expected[::2]]
+
+
 def test_parts_are_put_together(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="no parts"):
         pliant.merge(tmp_path)
-    row = {"run": 1, "runs": 3, "keys": ["a"], "a": 2.0, "status": "done", "error": ""}
+    row = {"row": {"whole": [1]}, "run": 1, "runs": 3, "keys": ["a"], "a": 2.0, "status": "done", "error": ""}
     (tmp_path / "rows-2-of-3.jsonl").write_text(json.dumps(row) + "\n")
     with pytest.warns(pliant.PliantWarning, match="2 of 3"):
         table = pliant.merge(tmp_path)

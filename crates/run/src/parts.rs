@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::Mutex;
 
+use pliant_mechanics::Energies;
 use serde_json::{Map, Value as Json, json};
 
-use crate::output::{AXES, OutputError, replace};
+use crate::output::{AXES, ENERGIES, OutputError, replace};
 use crate::sweep::{Row, SWEEP, Sweep, SweepOptions, in_parallel, lock};
 
 /// A part of a sweep: every `of`-th combination.
@@ -167,6 +168,11 @@ impl Sweep {
         line.insert("time".into(), json!(row.time));
         line.insert("steps".into(), json!(row.steps));
         line.insert("step".into(), json!(row.step));
+        let Energies { kinetic, internal, damping, external, hourglass, balance } = row.energies;
+        for (energy, value) in ENERGIES.iter().zip([kinetic, internal, damping, external, hourglass, balance])
+        {
+            line.insert(format!("energy.{energy}"), json!(value));
+        }
         for (name, force) in &row.reactions {
             for (axis, force) in AXES.iter().zip(force) {
                 line.insert(format!("reaction.{name}.{axis}"), json!(force));

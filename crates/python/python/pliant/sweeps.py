@@ -366,7 +366,7 @@ def _known(path: str, bundle: _Bundle) -> dict[int, dict[str, Any]]:
 
 
 def _public(row: dict[str, Any]) -> dict[str, Any]:
-    return {name: own for name, own in row.items() if name not in ("key", "keys", "runs", "version")}
+    return {name: own for name, own in row.items() if name not in ("key", "keys", "runs", "row", "version")}
 
 
 def _columns(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> list[str]:

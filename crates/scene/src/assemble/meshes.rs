@@ -441,7 +441,8 @@ mod tests {
         let mesh = block.mesh(Resolution::Edge(0.05), VolumeCell::Tet, DEFAULT_CELL_LIMIT).unwrap();
         let mesh = std::sync::Arc::new(mesh);
         let with = |table: &str, given: &str| {
-            let text = CUBE.replace("{ block = { size = [0.1, 0.1, 0.1], cells = [2, 2, 2] } }", table);
+            let text = CUBE
+                .replace("{ block = { size = [0.2, 0.1, 0.1], cells = [2, 2, 2] }, as = \"hexes\" }", table);
             assert_ne!(text, CUBE);
             let source = crate::source::Source::parse("cube.toml", text).unwrap();
             let source = source.giving([(given.to_owned(), std::sync::Arc::clone(&mesh))].into());
