@@ -442,8 +442,12 @@ mod tests {
         let mesh = std::sync::Arc::new(mesh);
         let with = |table: &str, given: &str| {
             let text = CUBE
-                .replace("{ block = { size = [0.2, 0.1, 0.1], cells = [2, 2, 2] }, as = \"hexes\" }", table);
-            assert_ne!(text, CUBE);
+                .replace("{ block = { size = [0.2, 0.1, 0.1], cells = [2, 2, 2] }, as = \"hexes\" }", table)
+                .replace(
+                    "{ set = \"z-min\" }",
+                    "{ half-space = { point = [0, 0, 0.01], normal = [0, 0, -1] } }",
+                );
+            assert!(text.contains(table) && text.contains("half-space"));
             let source = crate::source::Source::parse("cube.toml", text).unwrap();
             let source = source.giving([(given.to_owned(), std::sync::Arc::clone(&mesh))].into());
             crate::Scene::from_source(source, ".".into()).and_then(|scene| crate::build(&scene))
