@@ -10,6 +10,9 @@ const TUBE_ENDS: f64 = 30e-3;
 /// The size of the force [N] between the lens and the bag above which they touch: the lens weighs 0.14 mN.
 const TOUCHES: f64 = 1e-4;
 
+/// How far the bag gives way at least [m] where the lens lies in it.
+const GIVES: f64 = 3e-5;
+
 /// Up to 4.3 s, when the lens has left the tube and begins to unfold: 1 to 3 minutes.
 #[test]
 #[ignore = "takes 1 to 3 minutes"]
@@ -24,7 +27,7 @@ fn a_lens_is_injected_into_a_bag_that_deforms() {
     let rest = body.mesh.points.clone();
     let optic: Vec<usize> = (0..rest.len()).filter(|&node| rest[node].norm() < 3.01e-3).collect();
     let mut simulation = world.simulation().unwrap();
-    let (mut steps, mut touched, mut largest) = (0_u32, 0_u32, 0.0_f64);
+    let (mut steps, mut touched, mut largest, mut given) = (0_u32, 0_u32, 0.0_f64, 0.0);
     let mut left = f64::INFINITY;
     simulation
         .run(4.3, |frame| {
@@ -38,12 +41,16 @@ fn a_lens_is_injected_into_a_bag_that_deforms() {
             }
             let bag = frame.displacements("bag").unwrap();
             let size = |u: &[f64; 3]| u.iter().map(|x| x * x).sum::<f64>().sqrt();
-            largest = bag.iter().map(size).fold(largest, f64::max);
+            given = bag.iter().map(size).fold(0.0, f64::max);
+            largest = given.max(largest);
         })
         .unwrap_or_else(|failure| panic!("{failure}"));
     println!(
-        "{steps} states; the optic is out of the tube at {left:.2} s; lens and bag touch in {touched}, the bag gives way by {:.2} mm",
-        1e3 * largest
+        "{steps} states; the optic is out of the tube at {left:.2} s; lens and bag touch in {touched}, the bag gives way by {:.2} mm, by {:.3} mm in the end",
+        1e3 * largest,
+        1e3 * given
     );
-    assert!(steps == 431 && left < 4.3 && touched > 0 && largest > 5e-4);
+    // How far the bag gives way while the lens snaps open is decided within a step, and is not resolved: 0.1 mm in steps of 10 ms, 1 mm in
+    // steps of 5 ms. The lens that lies in it leaves 0.04 to 0.05 mm with both.
+    assert!(steps == 431 && left < 4.3 && touched > 0 && given > GIVES && largest >= given);
 }
