@@ -36,7 +36,7 @@ impl FinalPicture {
 }
 
 impl Draw for FinalPicture {
-    fn draw(&self, _mesh: &Mesh, _time: f64) -> Result<Vec<u8>, String> {
+    fn draw(&self, _mesh: &Mesh, _marks: Option<&Mesh>, _time: f64) -> Result<Vec<u8>, String> {
         match *self {}
     }
 }
