@@ -126,7 +126,7 @@ fn wrong(wanted: &str, given: &Item) -> Fault {
     Fault::new(PliantStatus::BadHandle, format!("the handle is of a {}, not of a {wanted}", given.kind()))
 }
 
-/// Holds what only one thread may use at a time; the second one is told at once.
+/// Holds what only one thread may use at a time; a second one gets an answer at once.
 pub(crate) fn hold<T>(mutex: &Mutex<T>) -> Result<MutexGuard<'_, T>, Fault> {
     mutex.try_lock().map_err(|error| match error {
         TryLockError::WouldBlock => {

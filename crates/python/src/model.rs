@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use numpy::{PyArray1, PyArray2};
 use pliant_geometry::Selection;
 use pliant_mechanics::Energies;
-use pliant_run::{Checkpoint, Options, OutputFolder, run_with};
+use pliant_run::{Checkpoint, Options, OutputFolder, run_with, sampled_columns};
 use pliant_scene::World;
 use pyo3::prelude::*;
 
@@ -102,9 +102,8 @@ impl Model {
     }
 
     /// Names and units of what is sampled.
-    fn columns(&self) -> Result<Vec<(String, &'static str)>, Trouble> {
-        let live = pliant_run::Live::new(&self.world)?;
-        Ok(live.columns().iter().map(|own| (own.name.clone(), own.unit)).collect())
+    fn columns(&self) -> Vec<(String, &'static str)> {
+        sampled_columns(&self.world).into_iter().map(|own| (own.name, own.unit)).collect()
     }
 
     fn notes(&self) -> Vec<String> {

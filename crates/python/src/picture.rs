@@ -4,12 +4,13 @@ use std::sync::Mutex;
 
 use numpy::PyArray2;
 use pliant_picture::{Graphics, Picture};
+use pliant_run::field_named;
 use pliant_scene::format::ColourBy;
 use pyo3::prelude::*;
 
 use crate::arrays::array;
 use crate::errors::Trouble;
-use crate::running::{Running, field_of};
+use crate::running::Running;
 
 /// What draws, opened once for all.
 static GRAPHICS: Mutex<Option<Graphics>> = Mutex::new(None);
@@ -23,7 +24,7 @@ pub fn draw(
 ) -> Result<Vec<u8>, Trouble> {
     let mut world = (*running.world).clone();
     if let Some(name) = field {
-        world.scene.view.colour = Some(ColourBy::Field(field_of(name)?));
+        world.scene.view.colour = Some(ColourBy::Field(field_named(name)?));
         world.scene.view.component = None;
         world.scene.view.range = None;
     }

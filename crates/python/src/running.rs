@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use pliant_geometry::{Mesh, SurfaceLocator, Vector3, patch};
 use pliant_mechanics::grip::Grip;
-use pliant_run::{FieldReader, Live};
+use pliant_run::{FieldReader, Live, field_named};
 use pliant_scene::World;
 use pliant_scene::format::{At, FieldName, VtuTable};
 use pliant_sim::{Reals, Simulation};
@@ -26,14 +26,6 @@ pub struct Running {
     pub pushed: Vec<[f64; 3]>,
     /// Hands on it.
     pub grips: Vec<Grip>,
-}
-
-/// Names of fields as scenes spell them.
-pub fn field_of(name: &str) -> Result<FieldName, Trouble> {
-    FieldName::ALL.into_iter().find(|field| field.name() == name).ok_or_else(|| {
-        let all: Vec<&str> = FieldName::ALL.iter().map(|field| field.name()).collect();
-        Trouble::Value(format!("there is no field `{name}`; there are {}", all.join(", ")))
-    })
 }
 
 impl Running {
@@ -153,9 +145,10 @@ impl Running {
         }
     }
 
-    /// A field of a body or a surface: numbers, and how many each point or cell has.
-    pub fn field(&mut self, name: &str, on: &str, at: At) -> Result<(Vec<f64>, usize), Trouble> {
-        let field = field_of(name)?;
+    /// A field of a body or a surface: numbers, and how many each point or cell has; where it is, if no place is given.
+    pub fn field(&mut self, name: &str, on: &str, at: Option<At>) -> Result<(Vec<f64>, usize), Trouble> {
+        let field = field_named(name)?;
+        let at = at.unwrap_or(if field.is_nodal() { At::Points } else { At::Cells });
         let has = self.world.scene.fields_on(Some(on));
         if !has.contains(&field) {
             let has: Vec<&str> = has.iter().map(|field| field.name()).collect();

@@ -9,7 +9,7 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use numpy::ndarray::ArrayView2;
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray2};
 use pliant_mechanics::grip::Grip;
-use pliant_run::Live;
+use pliant_run::{Live, field_named};
 use pliant_scene::format::At;
 use pliant_sim::Reals;
 use pliant_sim::contact::pose::Pose;
@@ -20,7 +20,7 @@ use crate::errors::{Trouble, broken, told};
 use crate::jobs::on_pool;
 use crate::mesh::Mesh;
 use crate::model::{Model, in_order};
-use crate::running::{Running, field_of};
+use crate::running::Running;
 use crate::state::State;
 
 /// A simulation. One call at a time: a second one is told so at once.
@@ -222,15 +222,15 @@ impl Simulation {
         fill(&mut out, &values)
     }
 
-    /// A field of a body or a surface, (n, numbers of each).
+    /// A field of a body or a surface, (n, numbers of each), at cells, at points, or where it is.
     fn field<'py>(
         &self,
         py: Python<'py>,
         name: String,
         on: String,
-        cells: bool,
+        cells: Option<bool>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let at = if cells { At::Cells } else { At::Points };
+        let at = cells.map(|cells| if cells { At::Cells } else { At::Points });
         let (values, columns) = self.work(py, move |running, _| running.field(&name, &on, at))?;
         Ok(array(py, values, columns))
     }
@@ -411,7 +411,7 @@ impl Simulation {
     fn mesh(&self, py: Python<'_>, fields: Vec<String>, on: Option<String>, cells: bool) -> PyResult<Mesh> {
         let at = if cells { At::Cells } else { At::Points };
         self.work(py, move |running, _| {
-            let fields = fields.iter().map(|name| field_of(name)).collect::<Result<Vec<_>, _>>()?;
+            let fields = fields.iter().map(|name| field_named(name)).collect::<Result<Vec<_>, _>>()?;
             Ok(Mesh(Arc::new(running.mesh(&fields, on.as_deref(), at)?.clone())))
         })
     }

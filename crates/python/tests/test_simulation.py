@@ -293,6 +293,7 @@ def test_shells_fields_and_pictures_are_reached(tmp_path: object) -> None:
     sim = pliant.load(ROOT / "scenes/colon").build().simulate()
     sim.step(2)
     assert sim.field("membrane-force", on="colon").shape[1:] == (3, 3)
+    assert sim.field("constraint").shape == (len(sim.model.rest),)
     mesh = sim.mesh(["displacement"])
     assert mesh.point_data["displacement"].shape == mesh.points.shape
     picture = sim.picture(size=(320, 240))

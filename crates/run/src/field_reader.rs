@@ -8,6 +8,17 @@ use pliant_sim::{Failure, Simulation};
 
 use crate::output::{FieldMesh, frames};
 
+/// A field by its name in outputs (`von-mises`).
+///
+/// # Errors
+/// If there is no such field.
+pub fn field_named(name: &str) -> Result<FieldName, Failure> {
+    FieldName::ALL.into_iter().find(|field| field.name() == name).ok_or_else(|| {
+        let all: Vec<&str> = FieldName::ALL.iter().map(|field| field.name()).collect();
+        Failure::input(&format_args!("there is no field `{name}`; there are {}", all.join(", ")))
+    })
+}
+
 /// Reads one field at instants.
 pub struct FieldReader {
     mesh: FieldMesh,
@@ -20,14 +31,7 @@ impl FieldReader {
     /// # Errors
     /// If there is no such body or field, or the body doesn't have it.
     pub fn new(world: &World, on: Option<&str>, field: &str, at: At) -> Result<Self, Failure> {
-        let known = |field: &FieldName| field.name();
-        let Some(name) = FieldName::ALL.iter().copied().find(|known| known.name() == field) else {
-            let all: Vec<&str> = FieldName::ALL.iter().map(known).collect();
-            return Err(Failure::input(&format_args!(
-                "there is no field `{field}`; there are {}",
-                all.join(", ")
-            )));
-        };
+        let name = field_named(field)?;
         if !world.participants.iter().any(|part| part.shows(on)) {
             let on = on.unwrap_or_default();
             return Err(Failure::input(&format_args!("there is no body or surface `{on}`")));

@@ -50,11 +50,11 @@ mod sweep;
 mod testing;
 
 pub use checkpoint::{Checkpoint, ResumeError};
-pub use field_reader::FieldReader;
+pub use field_reader::{FieldReader, field_named};
 pub use live::Live;
 pub use output::{
     AddedMass, BodySummary, Column, GuestSummary, OutputError, OutputFolder, ParticipantSummary,
-    StabilitySummary, Summary, TieSummary, failed_input, failed_output,
+    StabilitySummary, Summary, TieSummary, failed_input, failed_output, sampled_columns,
 };
 pub use overview::overview;
 pub use parts::{MergedSweep, PartSummary, SweepPart};

@@ -7,11 +7,10 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::Mutex;
 
-use pliant_mechanics::Energies;
 use serde_json::{Map, Value as Json, json};
 
-use crate::output::{AXES, ENERGIES, OutputError, replace};
-use crate::sweep::{Row, SWEEP, Sweep, SweepOptions, in_parallel, lock};
+use crate::output::{AXES, ENERGIES, OutputError, in_columns, replace};
+use crate::sweep::{Row, SWEEP, Sweep, SweepOptions, failures, in_parallel, lock};
 
 /// A part of a sweep: every `of`-th combination.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -135,10 +134,7 @@ impl Sweep {
         replace(&table, |file| file.write_all(self.table(&rows).as_bytes()))
             .map_err(|error| OutputError::new(&table, error))?;
         let missing = rows.iter().enumerate().filter(|(_, row)| row.is_none()).map(|(run, _)| run).collect();
-        let failures = rows.iter().enumerate().filter_map(|(run, row)| {
-            row.as_ref().filter(|row| row.status == "failed").map(|row| (run, row.message.clone()))
-        });
-        Ok(MergedSweep { table, missing, failures: failures.collect() })
+        Ok(MergedSweep { table, missing, failures: failures(&rows) })
     }
 
     /// Whole rows of this sweep in a text of lines, by the numbers of their runs.
@@ -168,9 +164,7 @@ impl Sweep {
         line.insert("time".into(), json!(row.time));
         line.insert("steps".into(), json!(row.steps));
         line.insert("step".into(), json!(row.step));
-        let Energies { kinetic, internal, damping, external, hourglass, balance } = row.energies;
-        for (energy, value) in ENERGIES.iter().zip([kinetic, internal, damping, external, hourglass, balance])
-        {
+        for (energy, value) in ENERGIES.iter().zip(in_columns(&row.energies)) {
             line.insert(format!("energy.{energy}"), json!(value));
         }
         for (name, force) in &row.reactions {

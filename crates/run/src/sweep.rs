@@ -12,7 +12,7 @@ use pliant_sim::number;
 use serde::{Deserialize, Serialize};
 
 use crate::output::{
-    AXES, ENERGIES, MOST_CURVES, OutputError, OutputFolder, Reactions, Summary, check_own_folder,
+    AXES, ENERGIES, MOST_CURVES, OutputError, OutputFolder, Reactions, Summary, check_own_folder, in_columns,
     plot_of_sweep,
 };
 use crate::run::{Options, run_with};
@@ -40,7 +40,7 @@ pub struct Sweep {
 
 /// A key with its values, in the order given.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Axis {
+struct Axis {
     key: String,
     values: Vec<String>,
 }
@@ -254,13 +254,10 @@ impl Sweep {
             return Err(error);
         }
         let rows = rows.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let failed = |(run, row): (usize, &Option<Row>)| {
-            row.as_ref().filter(|row| row.status == "failed").map(|row| (run, row.message.clone()))
-        };
         Ok(SweepSummary {
             table: folder.path().join(SWEEP),
             plot: self.plot(folder, runs)?,
-            failures: rows.iter().enumerate().filter_map(failed).collect(),
+            failures: failures(&rows),
             runs,
             interrupted: rows.iter().any(|row| row.as_ref().is_none_or(|row| row.status == "interrupted")),
         })
@@ -347,9 +344,8 @@ impl Sweep {
             cells.extend([row.status.clone(), quoted(&row.message)]);
             cells.extend([format!("{:e}", row.time), row.steps.to_string(), format!("{:e}", row.step)]);
             let good = row.status == "done";
-            let Energies { kinetic, internal, damping, external, hourglass, balance } = row.energies;
             let value = |x: f64| if good { format!("{x:e}") } else { String::new() };
-            cells.extend([kinetic, internal, damping, external, hourglass, balance].map(value));
+            cells.extend(in_columns(&row.energies).map(value));
             for name in &reactions {
                 let found = row.reactions.iter().find(|(other, _)| good && other == *name);
                 cells.extend([0, 1, 2].map(|c| found.map_or(String::new(), |(_, f)| format!("{:e}", f[c]))));
@@ -395,6 +391,14 @@ impl Row {
             wall_seconds: 0.0,
         }
     }
+}
+
+/// Runs that failed: number and reason.
+pub(crate) fn failures(rows: &[Option<Row>]) -> Vec<(usize, String)> {
+    let failed = |(run, row): (usize, &Option<Row>)| {
+        row.as_ref().filter(|row| row.status == "failed").map(|row| (run, row.message.clone()))
+    };
+    rows.iter().enumerate().filter_map(failed).collect()
 }
 
 /// The tables that a run has written, by the names of their outputs.

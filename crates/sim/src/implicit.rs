@@ -774,10 +774,6 @@ impl Participant for Implicit {
         Kept::Implicit(Box::new(self.snapshot()))
     }
 
-    fn encode(&self) -> postcard::Result<Vec<u8>> {
-        postcard::to_stdvec(&self.snapshot())
-    }
-
     fn fingerprint(&self) -> u64 {
         let bits = |numbers: &[f64]| -> Vec<u64> { numbers.iter().map(|x| x.to_bits()).collect() };
         let positions = self.state.position.iter().flat_map(|x| bits(x.as_slice()));

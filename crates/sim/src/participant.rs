@@ -88,12 +88,6 @@ pub(crate) trait Participant: Instant + Send {
     /// The state and what a restart needs beside it, after [`advance`](Self::advance).
     fn kept(&self) -> Kept;
 
-    /// The same as bytes of a checkpoint.
-    ///
-    /// # Errors
-    /// If it can't be encoded.
-    fn encode(&self) -> postcard::Result<Vec<u8>>;
-
     /// How its steps are counted, of a stepper whose increments tell velocities.
     fn clock(&self) -> Option<Clock> {
         None

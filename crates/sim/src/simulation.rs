@@ -581,15 +581,8 @@ impl Simulation {
     /// # Errors
     /// If a device fails, or a state can't be encoded.
     pub fn encode(&mut self) -> Result<Vec<Vec<u8>>, Failure> {
-        self.bring_back()?;
-        let own = self.participants.iter().enumerate().map(|(index, now)| match self.met() {
-            Some(met) => met[index].encode(),
-            None => now.encode(),
-        });
-        let alone = self.springs.is_empty() && self.meetings.is_empty();
-        let between = (!alone).then(|| postcard::to_stdvec(&self.between()));
-        let failed = |error: postcard::Error| Failure::new("output", error.to_string(), Some(self.time()));
-        own.chain(between).collect::<postcard::Result<_>>().map_err(failed)
+        let state = self.state()?;
+        state.encode().map_err(|error| Failure::new("output", error.to_string(), Some(self.time())))
     }
 
     fn between(&self) -> Between {

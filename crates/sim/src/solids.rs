@@ -328,10 +328,6 @@ impl<R: Numeric> Participant for Solids<R> {
         R::keep(self.state.clone(), self.solver.memory())
     }
 
-    fn encode(&self) -> postcard::Result<Vec<u8>> {
-        postcard::to_stdvec(&(&self.state, self.solver.memory()))
-    }
-
     fn clock(&self) -> Option<Clock> {
         self.solver.clock(&self.state)
     }

@@ -265,10 +265,7 @@ class Simulation:
             raise ValueError(f"a field is at points or cells, not {at!r}")
         if on is None:
             return np.concatenate([self.field(name, on=body, at=at) for body in self._model.bodies])
-        cells = at == "cells"
-        if at is None:
-            cells = name not in _NODAL
-        values = self._own.field(name, on, cells)
+        values = self._own.field(name, on, None if at is None else at == "cells")
         if values.shape[1] == 1:
             return values[:, 0]
         return values.reshape(-1, 3, 3) if values.shape[1] == 9 else values
@@ -546,19 +543,6 @@ class Simulation:
 
     def __repr__(self) -> str:
         return f"Simulation({self.time:g} s, {self.steps} steps, {len(self._model.rest)} nodes, {self.device})"
-
-
-_NODAL = {
-    "displacement",
-    "velocity",
-    "rotation",
-    "reaction",
-    "reaction-moment",
-    "contact-force",
-    "contact-pressure",
-    "gap",
-    "slip",
-}
 
 
 def _kind(table: Any) -> str | None:

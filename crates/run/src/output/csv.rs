@@ -41,6 +41,11 @@ pub struct Column {
     pub unit: &'static str,
 }
 
+/// Names and units of what a live run of a world samples.
+pub fn sampled_columns(world: &World) -> Vec<Column> {
+    Samples::new(world, &world.scene.sampled()).columns
+}
+
 /// The samples of a table at an instant: energies of several participants together, then those of each participant.
 pub(crate) struct Samples {
     columns: Vec<Column>,
@@ -76,7 +81,8 @@ impl Samples {
     }
 }
 
-fn in_columns(e: &Energies) -> [f64; 6] {
+/// Energies [J] in the order of [`ENERGIES`], and the balance.
+pub(crate) fn in_columns(e: &Energies) -> [f64; 6] {
     [e.kinetic, e.internal, e.damping, e.external, e.hourglass, e.balance]
 }
 

@@ -44,17 +44,17 @@ fn held(model: &Model) -> Vec<f64> {
 impl<'f, 'p> OfNodes<'f, 'p> {
     /// Finds those that are wanted.
     pub fn new(frame: &'f Frame<'p>, wanted: impl Iterator<Item = FieldName>) -> Self {
+        let (model, now, wanted) = (&frame.built().model, frame.now, wanted.collect::<Vec<_>>());
         let mut found = Self { frame, touching: Vec::new(), loads: Vec::new(), held: Vec::new() };
-        let (model, now) = (&frame.built().model, frame.now);
-        for field in wanted {
-            if field.is_of_contact() && found.touching.is_empty() {
-                found.touching = now.contact_nodes();
-            } else if field == FieldName::Constraint {
-                found.held = held(model);
-            } else if field == FieldName::Load {
-                let moved: Vec<_> = (0..model.node_count()).map(|node| now.displacement(node)).collect();
-                found.loads = model.load_forces(now.time(), &moved);
-            }
+        if wanted.iter().any(|field| field.is_of_contact()) {
+            found.touching = now.contact_nodes();
+        }
+        if wanted.contains(&FieldName::Constraint) {
+            found.held = held(model);
+        }
+        if wanted.contains(&FieldName::Load) {
+            let moved: Vec<_> = (0..model.node_count()).map(|node| now.displacement(node)).collect();
+            found.loads = model.load_forces(now.time(), &moved);
         }
         found
     }

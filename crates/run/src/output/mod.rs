@@ -29,8 +29,8 @@ pub(crate) use strains::ShellStrains;
 pub use strains::StrainSummary;
 pub use summary::{BodySummary, ParticipantSummary, Summary, failed_input, failed_output};
 
-pub use csv::Column;
-pub(crate) use csv::{AXES, ENERGIES, Samples};
+pub(crate) use csv::{AXES, ENERGIES, Samples, in_columns};
+pub use csv::{Column, sampled_columns};
 pub(crate) use field_mesh::{FieldMesh, carried_on_shell};
 pub(crate) use plot::{MOST_CURVES, Reactions, constraints, plot, plot_of_sweep};
 pub(crate) use summary::{bodies, interrupted, markdown, output_failure, summarise, told_limit};
