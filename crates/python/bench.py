@@ -46,6 +46,24 @@ def main() -> None:
         one = median(sim.step, 2000)
         many = median(lambda sim=sim: sim.step(1000), 50) / 1000
         print(f"step() beyond its step, {threads} threads: {1e6 * (one - many):.1f} µs")
+    # The block of crates/c/tests/times.rs, whose step in Rust that test prints.
+    known = pliant.Scene(until=1e6, gravity=(0, 0, -9.81), run={"threads": 1, "step": 1e-4, "on-unstable": "report"})
+    known.law["tissue"] = {"type": "neo-hookean", "young-modulus": 3e3, "poisson-ratio": 0.45}
+    mesh = {"block": {"size": [0.1, 0.1, 0.1], "cells": [2, 2, 2]}, "as": "hexes"}
+    known.body["block"] = {"mesh": mesh, "law": "tissue", "density": 1000.0, "damping": 50.0}
+    known.constraint["base"] = {"type": "fix", "body": "block", "nodes": {"set": "z-min"}}
+    sim = known.build().simulate()
+    print(f"a step of 8 hexes by step(1000): {1e3 * median(lambda: sim.step(1000), 50):.2f} µs")
+    cubes = [block(8).build().simulate() for _ in range(2)]
+    alone = median(lambda: cubes[0].step(500), 5)
+
+    def both() -> None:
+        other = threading.Thread(target=cubes[1].step, args=(500,))
+        other.start()
+        cubes[0].step(500)
+        other.join()
+
+    print(f"two simulations on two threads: {2 * alone / median(both, 5):.2f} × as fast as one after the other")
     sim = small.simulate()
     print(f"sim.displacement: {1e6 * median(lambda: sim.displacement, 20_000):.2f} µs, sim.time: {1e6 * median(lambda: sim.time, 20_000):.2f} µs")
     for precision in ("double", "single"):

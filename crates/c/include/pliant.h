@@ -127,7 +127,7 @@ typedef struct PliantCells {
     const int32_t *labels;
 } PliantCells;
 
-/* Opens a scene: the path of a scene file, or of a folder with a `scene.toml`. Mistakes in its values are told when a simulation is made of it. */
+/* Opens a scene: the path of a scene file, or of a folder with a `scene.toml`. A simulation that is made of it reports mistakes in its values. */
 PliantStatus pliant_scene_load(const PliantContext *context, const char *path, PliantScene *scene, PliantError *error);
 
 /* Opens a scene from its text, of so many bytes. Files that it names are relative to `folder`; null is the folder of the process. `name` is what
@@ -138,7 +138,7 @@ PliantStatus pliant_scene_parse(const PliantContext *context, const char *scene_
 PliantStatus pliant_scene_set(const PliantContext *context, PliantScene scene, const char *assignment, PliantError *error);
 
 /* Gives a scene a mesh from memory: bodies take it with `mesh = { given = "NAME" }`. `points` has three numbers [m] a point. Nodes without a cell are a mistake
- * that is told when a simulation is made. A mesh of the same name takes its place. */
+ * that the simulation reports when it is made. A mesh of the same name takes its place. */
 PliantStatus pliant_scene_give_mesh(const PliantContext *context, PliantScene scene, const char *name, const double *points, size_t point_count, const PliantCells *cells, size_t kinds, PliantError *error);
 
 /* Closes a scene. Simulations that were made of it stay. */
@@ -176,7 +176,7 @@ PliantStatus pliant_step(const PliantContext *context, PliantSimulation simulati
 /* Goes on until a time [s], to the instant nearest to it; else as `pliant_step`. A time that has passed takes no step. */
 PliantStatus pliant_run_until(const PliantContext *context, PliantSimulation simulation, double time, uint64_t *done, PliantError *error);
 
-/* Asks the thread that steps a simulation to stop after the step under way; without one the next call that steps returns at once. Any thread may ask. */
+/* Asks the thread that steps a simulation to stop: after the step under way, or before it where that is a long one. Without such a thread the next call that steps returns at once. Any thread may ask. */
 PliantStatus pliant_stop(const PliantContext *context, PliantSimulation simulation, PliantError *error);
 
 /* Pushes nodes with forces [N], three numbers a node, in the order of `pliant_body`, until they are replaced; their work is external. `count` is the

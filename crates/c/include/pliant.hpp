@@ -42,6 +42,12 @@ void call(Function function, Arguments... arguments) {
     if (function(arguments..., &error) != PLIANT_STATUS_OK) throw Error(error);
 }
 
+// How many triples of numbers there are.
+inline std::size_t triples(const std::vector<double> &numbers, const char *name) {
+    if (numbers.size() % 3 != 0) throw std::invalid_argument(std::string(name) + " are three numbers each");
+    return numbers.size() / 3;
+}
+
 struct Close {
     void operator()(PliantContext *context) const { pliant_context_close(context); }
 };
@@ -128,6 +134,13 @@ public:
         detail::call(pliant_surface_normals, context_, simulation_, surface_.number, to);
     }
 
+    // Positions [m] and unit normals without a copy, three numbers a vertex: they stay as they are until they are lent again.
+    std::pair<const double *, const double *> lend() const {
+        std::pair<const double *, const double *> lent;
+        detail::call(pliant_surface_lend, context_, simulation_, surface_.number, &lent.first, &lent.second);
+        return lent;
+    }
+
     std::uint32_t number() const { return surface_.number; }
 
 private:
@@ -210,6 +223,27 @@ public:
         return energies;
     }
 
+    // The same bits of the motion have the same one.
+    std::uint64_t fingerprint() const {
+        std::uint64_t fingerprint = 0;
+        detail::call(pliant_fingerprint, context(), id(), &fingerprint);
+        return fingerprint;
+    }
+
+    // Names of a kind (PLIANT_BODIES, ...).
+    std::vector<std::string> names(std::uint32_t kind) const {
+        std::vector<std::string> all;
+        PliantError error;
+        std::size_t length = 0;
+        while (pliant_name(context(), id(), kind, all.size(), nullptr, 0, &length, &error) == PLIANT_STATUS_OK) {
+            std::vector<char> name(length + 1);
+            detail::call(pliant_name, context(), id(), kind, all.size(), name.data(), name.size(), nullptr);
+            all.emplace_back(name.data());
+        }
+        if (error.status != PLIANT_STATUS_UNKNOWN) throw Error(error);
+        return all;
+    }
+
     // Leads a tool to a pose within a time [s]; when it is there [s].
     double lead(const std::string &tool, const Vector &position, const Rotation &rotation, double within) {
         double arrival = 0;
@@ -241,6 +275,12 @@ public:
         detail::call(pliant_grip_surface, context(), id(), surface.number(), point.data(), radius, stiffness, &grip);
         return grip;
     }
+    // By their mean.
+    std::uint32_t grip(const std::vector<std::uint32_t> &nodes, double stiffness) {
+        std::uint32_t grip = 0;
+        detail::call(pliant_grip_nodes, context(), id(), nodes.data(), nullptr, nodes.size(), stiffness, &grip);
+        return grip;
+    }
     void move(std::uint32_t grip, const Vector &place) {
         detail::call(pliant_grip_move, context(), id(), grip, place.data());
     }
@@ -253,7 +293,7 @@ public:
 
     // Forces [N] on all nodes, three numbers a node, until they are replaced; none ends them.
     void push(const std::vector<double> &forces) {
-        detail::call(pliant_push, context(), id(), forces.data(), forces.size() / 3);
+        detail::call(pliant_push, context(), id(), forces.data(), detail::triples(forces, "forces"));
     }
 
     Snapshot snapshot() const {
@@ -287,7 +327,7 @@ public:
 
     // A mesh from memory: bodies take it with `mesh = { given = "NAME" }`. Three numbers [m] a point.
     void give_mesh(const std::string &name, const std::vector<double> &points, const std::vector<PliantCells> &cells) {
-        detail::call(pliant_scene_give_mesh, context(), id(), name.c_str(), points.data(), points.size() / 3, cells.data(),
+        detail::call(pliant_scene_give_mesh, context(), id(), name.c_str(), points.data(), detail::triples(points, "points"), cells.data(),
                      cells.size());
     }
 

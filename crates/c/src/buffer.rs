@@ -36,7 +36,7 @@ impl<const N: usize> Writer<N> {
     /// Writes an item.
     #[inline(always)]
     pub(crate) fn put(&self, item: usize, value: [f64; N]) {
-        assert!(item < self.items, "an item of those that were told");
+        assert!(item < self.items, "an item beyond those announced");
         // SAFETY: the item is within the memory that the caller promised, as checked when this was made.
         unsafe {
             let to = self.data.add(item * self.stride);

@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use crate::scene::OpenScene;
 use crate::simulation::Shared;
 use crate::snapshot::OpenSnapshot;
-use crate::status::{Fault, PliantError, PliantStatus, told};
+use crate::status::{Fault, PliantError, PliantStatus, reported};
 
 /// All that a program has open. Opened by `pliant_context_open`.
 pub struct PliantContext {
@@ -138,7 +138,7 @@ pub(crate) fn hold<T>(mutex: &Mutex<T>) -> Result<MutexGuard<'_, T>, Fault> {
     })
 }
 
-/// The border: what a call does, with its errors and panics told to the caller. A panic closes the handle that it was about.
+/// The border: what a call does, with its errors and panics reported to the caller. A panic closes the handle that it was about.
 ///
 /// # Safety
 /// `context` and `error` are null or point to what they say.
@@ -151,7 +151,7 @@ pub(crate) unsafe fn call(
     // SAFETY: as the caller promises.
     let (context, error) = unsafe { (context.as_ref(), error.cast::<MaybeUninit<PliantError>>().as_mut()) };
     let Some(context) = context else {
-        return told(Err(Fault::new(PliantStatus::Null, "the context is null")), error);
+        return reported(Err(Fault::new(PliantStatus::Null, "the context is null")), error);
     };
     let result = catch_unwind(AssertUnwindSafe(|| what(context))).unwrap_or_else(|panic| {
         let _ = context.close(handle);
@@ -160,7 +160,7 @@ pub(crate) unsafe fn call(
             format!("Pliant panicked: {}; the handle is closed", words(&*panic)),
         ))
     });
-    told(result, error)
+    reported(result, error)
 }
 
 /// What a panic says.

@@ -1,5 +1,7 @@
 //! Hands and pins: springs between a part of a body and a place that the program moves.
 
+use std::collections::BTreeMap;
+
 use pliant_mechanics::grip::Grip;
 use pliant_sim::Simulation;
 
@@ -10,13 +12,15 @@ use crate::status::{Fault, PliantError, PliantStatus};
 /// What a program holds.
 #[derive(Default)]
 pub(crate) struct Held {
-    /// Grips by their number; none where one was released.
-    grips: Vec<Option<Grip>>,
+    /// Grips by their number.
+    grips: BTreeMap<u32, Grip>,
+    /// The number of the next one: those of grips that were released are not used again.
+    next: u32,
 }
 
 impl Held {
     fn all(&self) -> Vec<Grip> {
-        self.grips.iter().flatten().cloned().collect()
+        self.grips.values().cloned().collect()
     }
 
     /// Lets all grips act.
@@ -31,22 +35,21 @@ impl Held {
     }
 
     fn get(&mut self, number: u32) -> Result<&mut Grip, Fault> {
-        let found = self.grips.get_mut(number as usize);
-        match found {
-            Some(Some(grip)) => Ok(grip),
-            Some(None) => Err(Fault::new(PliantStatus::Closed, format!("the grip {number} is released"))),
+        match self.grips.get_mut(&number) {
+            Some(grip) => Ok(grip),
+            None if number < self.next => {
+                Err(Fault::new(PliantStatus::Closed, format!("the grip {number} is released")))
+            }
             None => Err(Fault::new(PliantStatus::BadHandle, format!("there is no grip {number}"))),
         }
     }
 
     /// Takes one more grip; its number.
     fn add(&mut self, grip: Grip) -> u32 {
-        let free = self.grips.iter().position(Option::is_none).unwrap_or(self.grips.len());
-        if free == self.grips.len() {
-            self.grips.push(None);
-        }
-        self.grips[free] = Some(grip);
-        free as u32
+        let number = self.next;
+        self.next += 1;
+        self.grips.insert(number, grip);
+        number
     }
 }
 
@@ -67,7 +70,7 @@ impl Running {
         [grip.place, _] = self.simulation.pulled(&grip);
         let number = self.held.add(grip);
         if let Err(fault) = self.held.put_on(&mut self.simulation) {
-            self.held.grips[number as usize] = None;
+            self.held.grips.remove(&number);
             let _ = self.held.put_on(&mut self.simulation);
             return Err(fault);
         }
@@ -219,7 +222,7 @@ pub unsafe extern "C" fn pliant_grip_release(
     unsafe {
         running(context, simulation, error, |own| {
             own.held.get(grip)?;
-            own.held.grips[grip as usize] = None;
+            own.held.grips.remove(&grip);
             own.held.put_on(&mut own.simulation)
         })
     }

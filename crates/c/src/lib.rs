@@ -5,8 +5,8 @@
 //! [`Skin`](pliant_run::Skin) and [`FieldReader`](pliant_run::FieldReader).
 //!
 //! **What a caller owes** to every function, and what the `unsafe` here rests on:
-//! * A pointer is null, or points to what its type says, as long as the call lasts: texts end with a zero, arrays have the items that are told,
-//!   buffers the room that is told. Null is answered by `PLIANT_STATUS_NULL`, unless the function gives it a meaning.
+//! * A pointer is null, or points to what its type says, as long as the call lasts: texts end with a zero, arrays have the items,
+//!   and buffers the room, that the call says. Null is answered by `PLIANT_STATUS_NULL`, unless the function gives it a meaning.
 //! * A context is one that `pliant_context_open` gave, and is closed only while no call on it is under way. After that it must not be used.
 //!
 //! All else is checked: handles are numbers in the table of their context, so one that is closed, of another kind, of another context or made up is answered by

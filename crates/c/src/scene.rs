@@ -1,12 +1,11 @@
 //! Scenes: from a file or a text, with other values and meshes of the program, until simulations are made of them.
 
-use std::collections::BTreeMap;
 use std::ffi::c_char;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
-use pliant_scene::source::Source;
+use pliant_scene::source::{Given, Source};
 use pliant_scene::{Scene, World};
 
 use crate::context::{Item, PliantContext, array, call, finite, give, hold, needed, some_text, text};
@@ -44,24 +43,24 @@ pub struct PliantCells {
 pub(crate) struct OpenScene {
     source: Source,
     folder: PathBuf,
-    given: BTreeMap<String, Arc<Mesh>>,
+    given: Given,
 }
 
 impl OpenScene {
     pub(crate) fn new(source: Source, folder: PathBuf) -> Self {
-        Self { source, folder, given: BTreeMap::new() }
+        Self { source, folder, given: Given::default() }
     }
 
     /// The world of the scene as it is now.
     pub(crate) fn world(&self) -> Result<World, Fault> {
         let source = self.source.clone().giving(self.given.clone());
-        let told = |errors| Fault::scene(&errors, Some(&source));
-        let scene = Scene::from_source(source.clone(), self.folder.clone()).map_err(told)?;
-        World::new(&scene).map_err(told)
+        let fault = |errors| Fault::scene(&errors, Some(&source));
+        let scene = Scene::from_source(source.clone(), self.folder.clone()).map_err(fault)?;
+        World::new(&scene).map_err(fault)
     }
 }
 
-/// Opens a scene: the path of a scene file, or of a folder with a `scene.toml`. Mistakes in its values are told when a simulation is made of it.
+/// Opens a scene: the path of a scene file, or of a folder with a `scene.toml`. A simulation that is made of it reports mistakes in its values.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_scene_load(
     context: *const PliantContext,
@@ -139,7 +138,7 @@ pub unsafe extern "C" fn pliant_scene_set(
 }
 
 /// Gives a scene a mesh from memory: bodies take it with `mesh = { given = "NAME" }`. `points` has three numbers [m] a point. Nodes without a cell are a mistake
-/// that is told when a simulation is made. A mesh of the same name takes its place.
+/// that the simulation reports when it is made. A mesh of the same name takes its place.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_scene_give_mesh(
     context: *const PliantContext,
@@ -169,7 +168,7 @@ pub unsafe extern "C" fn pliant_scene_give_mesh(
                 }
                 mesh.blocks.push(block);
             }
-            scene.given.insert(name.to_owned(), Arc::new(mesh));
+            scene.given.meshes.insert(name.to_owned(), Arc::new(mesh));
             Ok(())
         })
     }

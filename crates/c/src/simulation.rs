@@ -1,11 +1,10 @@
 //! Simulations under way: made of a scene, stepped, and asked for numbers.
 
 use std::ffi::c_char;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 use pliant_scene::World;
-use pliant_sim::Simulation;
+use pliant_sim::{Simulation, StopFlag};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::context::{Item, PliantContext, array, call, finite, give, hold, needed};
@@ -21,12 +20,23 @@ pub type PliantSimulation = u64;
 /// What threads share of a simulation: one of them runs it, any of them stops it.
 pub(crate) struct Shared {
     running: Mutex<Running>,
-    stopped: AtomicBool,
+    stopped: StopFlag,
+    /// The process that made it: its threads don't come along into a fork.
+    process: u32,
 }
 
 impl Shared {
+    /// The simulation, for the one thread that uses it now.
+    fn hold(&self) -> Result<MutexGuard<'_, Running>, Fault> {
+        if std::process::id() != self.process {
+            let message = "the simulation was opened before a fork, which leaves its threads behind: open it in the new process";
+            return Err(Fault::new(PliantStatus::Busy, message));
+        }
+        hold(&self.running)
+    }
+
     pub(crate) fn stop(&self) {
-        self.stopped.store(true, Ordering::Relaxed);
+        self.stopped.ask();
     }
 }
 
@@ -39,8 +49,6 @@ pub(crate) struct Running {
     pub(crate) surfaces: Vec<OpenSurface>,
     pub(crate) fields: Vec<OpenField>,
     pub(crate) held: Held,
-    /// Forces [N] on the nodes; empty for none.
-    pub(crate) pushes: Vec<[f64; 3]>,
 }
 
 impl Running {
@@ -72,13 +80,6 @@ impl Running {
         if self.is_on_device() { self.look() } else { Ok(()) }
     }
 
-    /// Puts hands and forces on a simulation that has none yet.
-    pub(crate) fn put_on(&mut self) -> Result<(), Fault> {
-        self.held.put_on(&mut self.simulation)?;
-        self.simulation.push(&self.pushes)?;
-        Ok(())
-    }
-
     pub(crate) fn nodes(&self) -> usize {
         self.simulation.world().parts.iter().map(|part| part.model.node_count()).sum()
     }
@@ -105,7 +106,7 @@ pub(crate) unsafe fn running(
     unsafe {
         call(context, simulation, error, |context| {
             let shared = context.simulation(simulation)?;
-            let mut running = hold(&shared.running)?;
+            let mut running = shared.hold()?;
             what(&mut running)
         })
     }
@@ -130,7 +131,9 @@ pub unsafe extern "C" fn pliant_simulation_open(
             let threads = if threads == 0 { world.scene.run.threads as usize } else { threads as usize };
             let pool = ThreadPoolBuilder::new().num_threads(threads).build();
             let pool = pool.map_err(|error| Fault::new(PliantStatus::Unsupported, error.to_string()))?;
-            let made = pool.install(|| world.simulation())?;
+            let mut made = pool.install(|| world.simulation())?;
+            let stopped = StopFlag::default();
+            made.stop_on(&stopped);
             let running = Running {
                 world,
                 simulation: made,
@@ -138,9 +141,8 @@ pub unsafe extern "C" fn pliant_simulation_open(
                 surfaces: Vec::new(),
                 fields: Vec::new(),
                 held: Held::default(),
-                pushes: Vec::new(),
             };
-            let shared = Shared { running: Mutex::new(running), stopped: AtomicBool::new(false) };
+            let shared = Shared { running: Mutex::new(running), stopped, process: std::process::id() };
             give(simulation, "simulation", context.open(Item::Simulation(Arc::new(shared))))
         })
     }
@@ -221,14 +223,13 @@ pub unsafe extern "C" fn pliant_run_until(
     unsafe {
         go(context, simulation, done, error, |now, _| {
             finite(&[time], "time")?;
-            let steps = (time - now.time()) / now.step_length();
-            Ok((steps + 0.5).clamp(0.0, MOST_STEPS) as u64)
+            Ok(now.steps_until(time).min(MOST_STEPS))
         })
     }
 }
 
 /// Steps at most between two looks at the stop flag where many are taken at once: on a GPU.
-const MOST_STEPS: f64 = 1e4;
+const MOST_STEPS: u64 = 10_000;
 
 /// Takes steps until none are left.
 ///
@@ -246,23 +247,30 @@ unsafe fn go(
     let status = unsafe {
         call(context, simulation, error, |context| {
             let shared = context.simulation(simulation)?;
-            let mut running = hold(&shared.running)?;
+            let mut running = shared.hold()?;
             let stopped = &shared.stopped;
             let (now, result) = running.compute(|own| {
                 let mut taken = 0;
+                let halted = || Fault::new(PliantStatus::Stopped, "another thread asked to stop");
                 let mut step = || {
                     while let more @ 1.. = left(own.simulation, taken)? {
-                        if stopped.swap(false, Ordering::Relaxed) {
-                            return Err(Fault::new(PliantStatus::Stopped, "another thread asked to stop"));
+                        if stopped.is_asked() {
+                            return Err(halted());
                         }
                         if own.simulation.ended().is_some() {
                             break;
                         }
-                        taken += own.simulation.step(more)?;
+                        taken += own.simulation.step(more).map_err(|failure| {
+                            if failure.is_interrupted() { halted() } else { failure.into() }
+                        })?;
                     }
                     Ok(())
                 };
                 let result = step();
+                // Who asked while this call took its last step meant this call.
+                if taken > 0 || result.is_err() {
+                    stopped.clear();
+                }
                 (taken, result)
             });
             taken = now;
@@ -276,7 +284,8 @@ unsafe fn go(
     status
 }
 
-/// Asks the thread that steps a simulation to stop after the step under way; without one the next call that steps returns at once. Any thread may ask.
+/// Asks the thread that steps a simulation to stop after its step. A step that takes long is given up: it is not taken. Without such a thread, the next call
+/// that steps returns at once. Any thread may ask.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_stop(
     context: *const PliantContext,
@@ -314,10 +323,7 @@ pub unsafe extern "C" fn pliant_push(
             }
             own.simulation
                 .push(forces)
-                .map_err(|failure| Fault::new(PliantStatus::Unsupported, failure.message))?;
-            own.pushes.clear();
-            own.pushes.extend_from_slice(forces);
-            Ok(())
+                .map_err(|failure| Fault::new(PliantStatus::Unsupported, failure.message))
         })
     }
 }

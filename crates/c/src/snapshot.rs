@@ -66,7 +66,7 @@ pub unsafe extern "C" fn pliant_snapshot_restore(
                     .map_err(|failure| Fault::new(PliantStatus::BadSnapshot, failure.message))?;
             }
             own.compute(|now| now.simulation.restore(snapshot.state.clone()))?;
-            own.put_on()
+            own.held.put_on(&mut own.simulation)
         })
     }
 }

@@ -1,4 +1,4 @@
-//! Status codes, and what is told of an error.
+//! Status codes, and the report of an error.
 
 use std::ffi::c_char;
 use std::mem::MaybeUninit;
@@ -182,7 +182,10 @@ fn text<const N: usize>(text: &str) -> [c_char; N] {
 }
 
 /// The code of a result; its error goes where the caller wants it.
-pub(crate) fn told(result: Result<(), Fault>, error: Option<&mut MaybeUninit<PliantError>>) -> PliantStatus {
+pub(crate) fn reported(
+    result: Result<(), Fault>,
+    error: Option<&mut MaybeUninit<PliantError>>,
+) -> PliantStatus {
     let fault = match result {
         Ok(()) => Fault::new(PliantStatus::Ok, ""),
         Err(fault) => fault,
@@ -197,7 +200,7 @@ pub(crate) fn told(result: Result<(), Fault>, error: Option<&mut MaybeUninit<Pli
     fault.status
 }
 
-/// Says that all is well: code and the beginnings of texts.
+/// Reports that all is well: `status`, and empty texts of kind, key and message. Other fields are not written.
 fn clear(to: &mut MaybeUninit<PliantError>) {
     let to = to.as_mut_ptr();
     // SAFETY: `to` points to a whole `PliantError` of the caller, and only places within it are written.

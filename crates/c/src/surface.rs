@@ -9,9 +9,18 @@ use crate::context::{PliantContext, give, needed, some_text};
 use crate::simulation::{PLIANT_BODIES, PLIANT_SURFACES, PliantSimulation, Running, names, running};
 use crate::status::{Fault, PliantError, PliantStatus};
 
-/// A surface with what was last lent of it.
+/// A surface with places and normals of its vertices.
 pub(crate) struct OpenSurface {
     pub(crate) skin: Skin,
+    /// Those that were lent: they change when they are lent again.
+    lent: Vertices,
+    /// Those that normals are copied from.
+    own: Vertices,
+}
+
+/// Places [m] and unit normals.
+#[derive(Clone)]
+struct Vertices {
     places: Vec<[f64; 3]>,
     normals: Vec<[f64; 3]>,
 }
@@ -25,17 +34,22 @@ impl Running {
         })
     }
 
-    /// Brings the places of a surface to the instant, and its normals if they are wanted.
-    fn bring(&mut self, number: u32, normals: bool) -> Result<&OpenSurface, Fault> {
+    /// Brings places of a surface to the instant, and its normals if they are wanted: those that are chosen.
+    fn bring(
+        &mut self,
+        number: u32,
+        normals: bool,
+        choose: impl FnOnce(&mut OpenSurface) -> (&Skin, &mut Vertices),
+    ) -> Result<&Vertices, Fault> {
         self.see_places()?;
         self.surface(number)?;
         let Self { world, simulation, surfaces, .. } = self;
-        let OpenSurface { skin, places, normals: own } = &mut surfaces[number as usize];
-        skin.positions(world, simulation, |vertex, place| places[vertex] = place);
+        let (skin, chosen) = choose(&mut surfaces[number as usize]);
+        skin.positions(world, simulation, |vertex, place| chosen.places[vertex] = place);
         if normals {
-            skin.normals(places, own);
+            skin.normals(&chosen.places, &mut chosen.normals);
         }
-        Ok(&surfaces[number as usize])
+        Ok(chosen)
     }
 }
 
@@ -77,14 +91,15 @@ pub unsafe extern "C" fn pliant_surface_open(
                 ));
             };
             let (vertices, triangles) = (skin.rest().len(), skin.triangles().len());
-            let told = PliantSurface {
+            let found = PliantSurface {
                 number: own.surfaces.len() as u32,
                 vertices: vertices as u32,
                 triangles: triangles as u32,
             };
             let zeros = || vec![[0.0; 3]; vertices];
-            own.surfaces.push(OpenSurface { skin, places: zeros(), normals: zeros() });
-            give(surface, "surface", told)
+            let vertices = Vertices { places: zeros(), normals: zeros() };
+            own.surfaces.push(OpenSurface { skin, lent: vertices.clone(), own: vertices });
+            give(surface, "surface", found)
         })
     }
 }
@@ -151,9 +166,9 @@ pub unsafe extern "C" fn pliant_surface_normals(
     // SAFETY: pointers are what the caller owes.
     unsafe {
         running(context, simulation, error, |own| {
-            let open = own.bring(surface, true)?;
-            let writer = buffer.writer(open.normals.len())?;
-            open.normals.iter().enumerate().for_each(|(vertex, &normal)| writer.put(vertex, normal));
+            let found = own.bring(surface, true, |open| (&open.skin, &mut open.own))?;
+            let writer = buffer.writer(found.normals.len())?;
+            found.normals.iter().enumerate().for_each(|(vertex, &normal)| writer.put(vertex, normal));
             Ok(())
         })
     }
@@ -174,9 +189,9 @@ pub unsafe extern "C" fn pliant_surface_lend(
     unsafe {
         running(context, simulation, error, |own| {
             needed(positions, "positions")?;
-            let open = own.bring(surface, !normals.is_null())?;
-            give(positions, "positions", open.places.as_ptr().cast())?;
-            if normals.is_null() { Ok(()) } else { give(normals, "normals", open.normals.as_ptr().cast()) }
+            let lent = own.bring(surface, !normals.is_null(), |open| (&open.skin, &mut open.lent))?;
+            give(positions, "positions", lent.places.as_ptr().cast())?;
+            if normals.is_null() { Ok(()) } else { give(normals, "normals", lent.normals.as_ptr().cast()) }
         })
     }
 }

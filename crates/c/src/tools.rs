@@ -106,14 +106,14 @@ pub unsafe extern "C" fn pliant_tool(
             let name = text(tool, "tool")?;
             own.look()?;
             let found = own.simulation.tool(name).ok_or_else(|| unknown(own, PLIANT_TOOLS, "tool", name))?;
-            let told = PliantTool {
+            let found = PliantTool {
                 position: found.pose.translation.vector.into(),
                 rotation: found.pose.rotation.coords.into(),
                 opening: found.opening,
                 force: found.force,
                 torque: found.torque.unwrap_or([f64::NAN; 3]),
             };
-            give(now, "now", told)
+            give(now, "now", found)
         })
     }
 }

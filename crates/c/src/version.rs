@@ -4,7 +4,7 @@ use std::ffi::c_char;
 use std::mem::MaybeUninit;
 
 use crate::context::{PliantContext, give, needed};
-use crate::status::{Fault, PliantError, PliantStatus, told};
+use crate::status::{Fault, PliantError, PliantStatus, reported};
 
 /// The version of this interface: a program passes `PLIANT_ABI` of the header that it was built with to `pliant_context_open`. It grows where a change
 /// breaks programs.
@@ -42,7 +42,7 @@ pub unsafe extern "C" fn pliant_context_open(
         unsafe { give(context, "context", Box::into_raw(Box::new(PliantContext::new()))) }
     };
     // SAFETY: pointers are what the caller owes.
-    told(open(), unsafe { error.cast::<MaybeUninit<PliantError>>().as_mut() })
+    reported(open(), unsafe { error.cast::<MaybeUninit<PliantError>>().as_mut() })
 }
 
 /// Closes a context with all that is open in it. No call on it may be under way, and none may come after; null does nothing.

@@ -100,5 +100,5 @@ fn every_bad_input_is_answered_by_its_code() {
     let folder = tempfile::tempdir().unwrap();
     let more = [sanitizers("cc", folder.path()), &["-D_POSIX_C_SOURCE=200809L"]].concat();
     let program = build("cc", "-std=c11", &Path::new(OWN).join("tests/c/bad_input.c"), folder.path(), &more);
-    assert_eq!(run(&program, &[]), "all as told\n");
+    assert_eq!(run(&program, &[]), "all as expected\n");
 }

@@ -1,18 +1,17 @@
 //! `pliant bench`: the cost of a step on this machine.
 
-use std::process::ExitCode;
-
 use pliant_bench::{BenchError, Case, Instructions, Place, Settings, cases, find, measure};
 use serde_json::json;
 
+use crate::SUCCESS;
 use crate::arguments::Bench;
 use crate::page::Page;
 use crate::report::{Bar, Failure, say};
 
-pub fn bench(arguments: &Bench) -> Result<ExitCode, Failure> {
+pub fn bench(arguments: &Bench) -> Result<u8, Failure> {
     if arguments.list {
         say(list())?;
-        return Ok(ExitCode::SUCCESS);
+        return Ok(SUCCESS);
     }
     let cases = chosen(arguments)?;
     let page = arguments.table.as_deref().map(|path| Page::read(path, "bench")).transpose()?;
@@ -33,7 +32,7 @@ pub fn bench(arguments: &Bench) -> Result<ExitCode, Failure> {
             if arguments.json {
                 say(json!({ "error": error.to_string() }))?;
             }
-            return Ok(ExitCode::from(1));
+            return Ok(1);
         }
     };
     if arguments.json {
@@ -44,7 +43,7 @@ pub fn bench(arguments: &Bench) -> Result<ExitCode, Failure> {
     if let Some(page) = page {
         page.renew(&format!("\n{}\n\n", report.table()))?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(SUCCESS)
 }
 
 /// Largest number of cells that `--designs` measures without `--full`.

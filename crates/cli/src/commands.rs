@@ -2,7 +2,6 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use pliant_gpu::{Adapter, GpuError};
@@ -12,6 +11,7 @@ use pliant_scene::{Reads, Scene, World, reference, registry};
 use pliant_sim::number;
 use serde_json::{Value as Json, json};
 
+use crate::SUCCESS;
 use crate::arguments::{self, Check, Command, Run};
 use crate::bench::bench;
 use crate::haptics::haptics;
@@ -23,7 +23,7 @@ use crate::report::{self, Bar, Failure, say};
 use crate::reproduce::reproduce;
 use crate::signals;
 
-pub fn execute(command: Command) -> Result<ExitCode, Failure> {
+pub fn execute(command: Command) -> Result<u8, Failure> {
     match command {
         Command::Run(arguments) => run(&arguments),
         Command::Sweep(arguments) => sweep(&arguments),
@@ -36,7 +36,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
                 (_, true) => say(reference::python(&sections).trim_end())?,
                 _ => say(format_args!("{:#}", registry::scene_schema()))?,
             }
-            Ok(ExitCode::SUCCESS)
+            Ok(SUCCESS)
         }
         Command::Info(arguments) => info(&arguments),
         Command::Labels(arguments) => mesh::labels(&arguments),
@@ -58,7 +58,7 @@ fn fresh_folder(arguments: &Run, scene: &Scene) -> Result<OutputFolder, Failure>
     OutputFolder::prepare(path, scene, arguments.force).map_err(|error| Failure::plain(&error, error.remedy))
 }
 
-fn run(arguments: &Run) -> Result<ExitCode, Failure> {
+fn run(arguments: &Run) -> Result<u8, Failure> {
     let checkpoint = arguments.resume.as_deref().map(Checkpoint::read).transpose()?;
     let mut world = prepare(&arguments.scene, &arguments.overrides)?;
     if let Some(checkpoint) = &checkpoint {
@@ -108,9 +108,9 @@ fn run(arguments: &Run) -> Result<ExitCode, Failure> {
     if let Some(message) = failure {
         eprintln!("error: {message}");
         // This error matters more than failed standard output.
-        return Ok(ExitCode::from(if interrupted { signals::exit_code() } else { 1 }));
+        return Ok(if interrupted { signals::exit_code() } else { 1 });
     }
-    told.map(|()| ExitCode::SUCCESS)
+    told.map(|()| SUCCESS)
 }
 
 /// A run with fewer steps takes less than a day on any machine.
@@ -162,7 +162,7 @@ fn seconds_of_a_step(world: &World) -> Option<f64> {
 }
 
 /// Lists the GPUs.
-fn devices(json: bool) -> Result<ExitCode, Failure> {
+fn devices(json: bool) -> Result<u8, Failure> {
     let found = pliant_gpu::adapters();
     if json {
         let object = |a: &Adapter| {
@@ -178,10 +178,10 @@ fn devices(json: bool) -> Result<ExitCode, Failure> {
     } else {
         say(report::adapters(&found))?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(SUCCESS)
 }
 
-fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
+fn sweep(arguments: &arguments::Sweep) -> Result<u8, Failure> {
     let Opened { source, folder, _translated, .. } = open(&arguments.scene, arguments.sandbox, false)?;
     let sweep = Sweep::new(source, folder, &arguments.set)?.with_cache(mesh_cache(arguments.no_cache));
     let (runs, threads) = (sweep.runs(), arguments.threads.into());
@@ -189,7 +189,7 @@ fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
     if arguments.dry_run {
         let lines: Vec<String> = (0..runs).map(|run| format!("run-{run:04}  {}", sweep.title(run))).collect();
         say(lines.join("\n"))?;
-        return Ok(ExitCode::SUCCESS);
+        return Ok(SUCCESS);
     }
     let path = arguments.out.clone().unwrap_or_else(|| {
         let mut path = OutputFolder::default_for(&pliant_scene::scene_file(&arguments.scene));
@@ -212,20 +212,20 @@ fn sweep(arguments: &arguments::Sweep) -> Result<ExitCode, Failure> {
         Ok(summary) => summary,
         Err(error) => {
             eprintln!("error: {error}; {}", error.remedy);
-            return Ok(ExitCode::from(1));
+            return Ok(1);
         }
     };
     say(summary.words())?;
     told_failures(&sweep, &summary.failures);
     if summary.interrupted {
         eprintln!("error: the sweep was interrupted; the table contains the finished runs");
-        return Ok(ExitCode::from(signals::exit_code()));
+        return Ok(signals::exit_code());
     }
     if summary.failures.is_empty() {
-        return Ok(ExitCode::SUCCESS);
+        return Ok(SUCCESS);
     }
     eprintln!("error: {} of {runs} runs failed", summary.failures.len());
-    Ok(ExitCode::from(1))
+    Ok(1)
 }
 
 /// Runs a part of a sweep.
@@ -235,7 +235,7 @@ fn sweep_part(
     part: SweepPart,
     threads: usize,
     keep_fields: bool,
-) -> Result<ExitCode, Failure> {
+) -> Result<u8, Failure> {
     let options = SweepOptions { threads, keep_fields, stop: Some(signals::stop()) };
     let found = sweep.run_part(folder, part, options, &|_| {});
     let summary = found.map_err(|error| Failure::plain(&error, error.remedy))?;
@@ -245,13 +245,13 @@ fn sweep_part(
     told_failures(sweep, &summary.failures);
     if summary.interrupted {
         eprintln!("error: the part was interrupted; the same command again runs what is missing");
-        return Ok(ExitCode::from(signals::exit_code()));
+        return Ok(signals::exit_code());
     }
-    Ok(ExitCode::from(u8::from(failed > 0)))
+    Ok(u8::from(failed > 0))
 }
 
 /// Puts the parts of a sweep together.
-fn merge(sweep: &Sweep, folder: &Path) -> Result<ExitCode, Failure> {
+fn merge(sweep: &Sweep, folder: &Path) -> Result<u8, Failure> {
     let merged = sweep.merge(folder).map_err(|error| Failure::plain(&error, error.remedy))?;
     let there = sweep.runs() - merged.missing.len();
     say(format_args!("{there} of {} runs\nwrote {}", sweep.runs(), merged.table.display()))?;
@@ -259,7 +259,7 @@ fn merge(sweep: &Sweep, folder: &Path) -> Result<ExitCode, Failure> {
     for &run in &merged.missing {
         eprintln!("error: run-{run:04} ({}) is missing", sweep.title(run));
     }
-    Ok(ExitCode::from(u8::from(!(merged.missing.is_empty() && merged.failures.is_empty()))))
+    Ok(u8::from(!(merged.missing.is_empty() && merged.failures.is_empty())))
 }
 
 fn told_failures(sweep: &Sweep, failures: &[(usize, String)]) {
@@ -287,13 +287,13 @@ fn refuse_mistakes(sweep: &Sweep, threads: usize) -> Result<(), Failure> {
     Err(Failure::plain(message, "correct the values above, or sweep without them"))
 }
 
-fn check(arguments: &Check) -> Result<ExitCode, Failure> {
+fn check(arguments: &Check) -> Result<u8, Failure> {
     let world = prepare(&arguments.scene, &arguments.overrides)?;
     say(pliant_run::overview(&world).trim_end())?;
-    Ok(ExitCode::SUCCESS)
+    Ok(SUCCESS)
 }
 
-fn new(name: &Path) -> Result<ExitCode, Failure> {
+fn new(name: &Path) -> Result<u8, Failure> {
     let file = name.join("scene.toml");
     if file.exists() {
         return Err(Failure::plain(format!("`{}` exists already", file.display()), "choose another name"));
@@ -306,15 +306,15 @@ fn new(name: &Path) -> Result<ExitCode, Failure> {
         },
     )?;
     say(format_args!("wrote {}; try: pliant run {}", file.display(), name.display()))?;
-    Ok(ExitCode::SUCCESS)
+    Ok(SUCCESS)
 }
 
-fn import(model: &Path, out: &Path, allow_partial: bool) -> Result<ExitCode, Failure> {
+fn import(model: &Path, out: &Path, allow_partial: bool) -> Result<u8, Failure> {
     let is_file = out.extension().is_some_and(|ending| ending == "toml");
     let file = if is_file { out.to_owned() } else { out.join("scene.toml") };
     for note in translate(model, &Reads::anywhere(), &file, allow_partial)? {
         eprintln!("note: {note}");
     }
     say(format_args!("wrote {}; try: pliant run {}", file.display(), out.display()))?;
-    Ok(ExitCode::SUCCESS)
+    Ok(SUCCESS)
 }

@@ -4,12 +4,12 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use clap::Parser;
 use pliant_picture::Graphics;
 use sha2::{Digest, Sha256};
 
+use crate::SUCCESS;
 use crate::arguments::{Arguments, Command, Render};
 use crate::pictures::{claim, is_folder_of_run, render, run_scene, save};
 use crate::report::{Failure, say};
@@ -125,7 +125,7 @@ fn outdated(folder: &Path) -> Result<Vec<Entry>, Failure> {
 }
 
 /// Makes the pictures anew that do not fit their scenes.
-pub fn renew(folder: &Path) -> Result<ExitCode, Failure> {
+pub fn renew(folder: &Path) -> Result<u8, Failure> {
     let old = outdated(folder)?;
     let space =
         tempfile::tempdir().map_err(|error| Failure::plain(error, "check the free space, or set TMPDIR"))?;
@@ -133,7 +133,7 @@ pub fn renew(folder: &Path) -> Result<ExitCode, Failure> {
         let out = space.path().join(index.to_string());
         let command = entry.command(folder, &out)?;
         let code = render(&command)?;
-        if code != ExitCode::SUCCESS {
+        if code != SUCCESS {
             return Ok(code);
         }
         let file = folder.join(&entry.file);
@@ -151,7 +151,7 @@ pub fn renew(folder: &Path) -> Result<ExitCode, Failure> {
         say(format_args!("made {}", file.display()))?;
     }
     say(format_args!("{} pictures were made anew, all others fit their scenes", old.len()))?;
-    Ok(ExitCode::SUCCESS)
+    Ok(SUCCESS)
 }
 
 /// Width of a picture in a gallery [pixels].
@@ -170,7 +170,7 @@ pub fn scenes_in(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Runs scenes and makes a page with the last picture of each.
-pub fn page(arguments: &Render, scenes: &[PathBuf]) -> Result<ExitCode, Failure> {
+pub fn page(arguments: &Render, scenes: &[PathBuf]) -> Result<u8, Failure> {
     if arguments.film.is_some() || arguments.frames.is_some() || arguments.series.is_some() {
         let message = "a gallery has the last picture of each scene";
         return Err(Failure::plain(message, "omit `--film`, `--frames` and `--series`, or give one scene"));
@@ -185,7 +185,7 @@ pub fn page(arguments: &Render, scenes: &[PathBuf]) -> Result<ExitCode, Failure>
     let mut failed = false;
     for scene in scenes {
         let Some(mut shown) = run_scene(scene, arguments)? else {
-            return Ok(ExitCode::from(signals::exit_code()));
+            return Ok(signals::exit_code());
         };
         failed |= shown.failed;
         let name = scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -209,7 +209,7 @@ pub fn page(arguments: &Render, scenes: &[PathBuf]) -> Result<ExitCode, Failure>
     }
     let path = folder.write("README.md", &page).map_err(|error| Failure::plain(&error, error.remedy))?;
     say(format_args!("wrote {} ({})", path.display(), graphics.adapter()))?;
-    Ok(ExitCode::from(u8::from(failed)))
+    Ok(u8::from(failed))
 }
 
 #[cfg(test)]

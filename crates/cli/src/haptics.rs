@@ -2,8 +2,6 @@
 //! contact becomes a local model: the tangent planes of the tool at the nearest points of the surfaces that it can touch, the mean
 //! force of the period at its mean place, and the compliance that the last periods tell.
 
-use std::process::ExitCode;
-use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use nalgebra::{Isometry3, Vector3};
@@ -23,6 +21,7 @@ use pliant_scene::{Scene, World};
 use pliant_sim::contact::touch::{With, lattice};
 use pliant_sim::{Frame, Simulation};
 
+use crate::SUCCESS;
 use crate::arguments::Haptics;
 use crate::prepare::prepare;
 use crate::report::{Failure, say};
@@ -54,7 +53,7 @@ struct Period {
     planes: Vec<Plane>,
 }
 
-pub fn haptics(arguments: &Haptics) -> Result<ExitCode, Failure> {
+pub fn haptics(arguments: &Haptics) -> Result<u8, Failure> {
     let trace = arguments.replay.as_deref().map(Trace::of_file).transpose().map_err(refused)?;
     let settings = settings(arguments);
     let world = prepare(&arguments.scene, &arguments.overrides)?;
@@ -99,7 +98,7 @@ fn run(
     tool: &str,
     trace: Option<Trace>,
     settings: Settings,
-) -> Result<ExitCode, Failure> {
+) -> Result<u8, Failure> {
     let failed = |failure: pliant_sim::Failure| Failure::plain(failure.message, "");
     let mut simulation = world.simulation().map_err(failed)?;
     let around = Around { tool, samples: face_samples() };
@@ -131,7 +130,7 @@ fn run(
     let mut pressed: Option<LocalModel> = None;
     let stop = signals::stop();
     let mut ended = None;
-    while !thread.is_over() && !stop.load(Ordering::Relaxed) {
+    while !thread.is_over() && !stop.is_asked() {
         let state = thread.state();
         if state.ticks > 0 {
             last = state.proxy;
@@ -166,9 +165,9 @@ fn run(
     match ended {
         Some(failure) => {
             eprintln!("error: {failure}");
-            Ok(ExitCode::from(1))
+            Ok(1)
         }
-        None => Ok(ExitCode::SUCCESS),
+        None => Ok(SUCCESS),
     }
 }
 

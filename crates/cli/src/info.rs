@@ -1,7 +1,6 @@
 //! `pliant info`: contents, quality and defects of a mesh file, the shape of its surface, and its distance from another mesh.
 
 use std::path::Path;
-use std::process::ExitCode;
 
 use pliant_geometry::io::{self, MeshFile};
 use pliant_geometry::{CellKind, Mesh, QualityReport, Spread, Vector3, boundary, diagnose};
@@ -10,6 +9,7 @@ use pliant_scene::SizeDoubt;
 use pliant_sim::number;
 use serde_json::{Map, Value as Json, json};
 
+use crate::SUCCESS;
 use crate::arguments::Info;
 use crate::report::{Failure, say};
 
@@ -34,7 +34,7 @@ struct Against {
     diagonal: f64,
 }
 
-pub fn info(arguments: &Info) -> Result<ExitCode, Failure> {
+pub fn info(arguments: &Info) -> Result<u8, Failure> {
     let file = read(&arguments.mesh, arguments.scale, "--scale")?;
     let shape = Shape::of(&file.mesh);
     let other_scale = arguments.against_scale.unwrap_or(arguments.scale);
@@ -57,7 +57,7 @@ pub fn info(arguments: &Info) -> Result<ExitCode, Failure> {
         io::write(target, &file.mesh).map_err(|error| Failure::plain(error, ""))?;
         eprintln!("wrote {}", target.display());
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(SUCCESS)
 }
 
 /// A mesh file in metres.

@@ -3,7 +3,7 @@
 //!
 //! ```
 //! let words = ["pliant", "schema", "--markdown"].map(std::ffi::OsString::from);
-//! assert_eq!(pliant_command::main(words), std::process::ExitCode::SUCCESS);
+//! assert_eq!(pliant_command::main(words), pliant_command::SUCCESS);
 //! ```
 
 /// A line on standard error. A full disk or a closed pipe must not end a run: unlike the standard library's macro, this one
@@ -33,16 +33,18 @@ mod signals;
 mod view;
 
 use std::ffi::OsString;
-use std::process::ExitCode;
 
 use clap::Parser;
 
 #[cfg(feature = "viewer")]
 pub use pictures::{FinalPicture, look_of_world};
 
+/// The code of a process that did what it was to do.
+pub const SUCCESS: u8 = 0;
+
 /// Does what a command line says, whose first word is the program: prints, writes files, opens a window. The code that the process is to
 /// end with.
-pub fn main(words: impl IntoIterator<Item = OsString>) -> ExitCode {
+pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     let words: Vec<OsString> = words.into_iter().collect();
     let arguments = match arguments::Arguments::try_parse_from(&words) {
         Ok(arguments) => arguments,
@@ -56,11 +58,11 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> ExitCode {
 }
 
 /// An invalid command line, or a request for help.
-fn mistyped(error: &clap::Error, words: &[OsString]) -> ExitCode {
+fn mistyped(error: &clap::Error, words: &[OsString]) -> u8 {
     if error.use_stderr() && words.iter().any(|word| word == "--json") {
         report::refused(error.to_string().trim_end());
     }
     // A closed terminal is not an error.
     let _ = error.print();
-    ExitCode::from(error.exit_code() as u8)
+    error.exit_code() as u8
 }

@@ -1,7 +1,5 @@
 //! Replaces pictures in a build without the feature `viewer`.
 
-use std::process::ExitCode;
-
 use pliant_geometry::Mesh;
 use pliant_run::Draw;
 use pliant_scene::World;
@@ -17,11 +15,11 @@ fn missing() -> Failure {
     )
 }
 
-pub fn render(_arguments: &Render) -> Result<ExitCode, Failure> {
+pub fn render(_arguments: &Render) -> Result<u8, Failure> {
     Err(missing())
 }
 
-pub fn view(_arguments: &View) -> Result<ExitCode, Failure> {
+pub fn view(_arguments: &View) -> Result<u8, Failure> {
     Err(missing())
 }
 

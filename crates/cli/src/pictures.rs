@@ -1,7 +1,6 @@
 //! `pliant render`, and the picture of `pliant run --picture`.
 
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use pliant_geometry::{CellLabel, Labels, Mesh, RegionNames, Vector3, io};
 use pliant_picture::{
@@ -14,6 +13,7 @@ use pliant_scene::registry::OutputTable;
 use pliant_scene::{Scene, World};
 use pliant_viewer::{coat_of, regions_of};
 
+use crate::SUCCESS;
 use crate::arguments::{Frames, Overrides, Render};
 use crate::gallery;
 use crate::look::{background_of, colour_by_name, look_of, map_of, texture_of};
@@ -106,7 +106,7 @@ impl Draw for FinalPicture {
     }
 }
 
-pub fn render(arguments: &Render) -> Result<ExitCode, Failure> {
+pub fn render(arguments: &Render) -> Result<u8, Failure> {
     let film = arguments.film.as_deref().map(film_kind).transpose()?;
     if arguments.gallery {
         return gallery::renew(&arguments.what);
@@ -141,11 +141,11 @@ pub fn render(arguments: &Render) -> Result<ExitCode, Failure> {
         return portrait(arguments, &mesh, &graphics, &folder);
     }
     let Some(shown) = run_scene(&arguments.what, arguments)? else {
-        return Ok(ExitCode::from(signals::exit_code()));
+        return Ok(signals::exit_code());
     };
     let code = shoot(arguments, &shown.look, &graphics, &shown.series, &folder, film)?;
     // The pictures of a failed run are still useful.
-    Ok(if shown.failed { ExitCode::from(1) } else { code })
+    Ok(if shown.failed { 1 } else { code })
 }
 
 /// What the view of a scene hides, and what has a look of its own.
@@ -190,7 +190,7 @@ fn portrait(
     mesh: &Mesh,
     graphics: &Graphics,
     folder: &OutputFolder,
-) -> Result<ExitCode, Failure> {
+) -> Result<u8, Failure> {
     let cells: usize = mesh.blocks.iter().map(|block| block.len()).sum();
     let note = format!("{} nodes, {cells} cells", mesh.points.len());
     let title =
@@ -203,7 +203,7 @@ fn portrait(
     let picture = look.picture(graphics, mesh, None, 0.0)?;
     save(folder, &picture_name(0), &picture)?;
     say(format_args!("wrote {} in {} ({})", picture_name(0), folder.path().display(), graphics.adapter()))?;
-    Ok(ExitCode::SUCCESS)
+    Ok(SUCCESS)
 }
 
 pub(crate) fn claim(arguments: &Render, own: fn(&str) -> bool) -> Result<OutputFolder, Failure> {
@@ -390,7 +390,7 @@ fn shoot(
     series: &Series,
     folder: &OutputFolder,
     film: Option<FilmKind>,
-) -> Result<ExitCode, Failure> {
+) -> Result<u8, Failure> {
     let frames = chosen(arguments, series)?;
     let (mut reel, path) = start_film(arguments, look, series, &frames, film)?;
     let bar = Bar::new();
@@ -411,7 +411,7 @@ fn shoot(
     if let Some(path) = path {
         say(format_args!("wrote {}", path.display()))?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(SUCCESS)
 }
 
 /// Writes a picture into the folder.

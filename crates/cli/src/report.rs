@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{self, IsTerminal, Write};
-use std::process::ExitCode;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -58,7 +57,7 @@ impl From<ResumeError> for Failure {
 }
 
 /// Prints the error; exit code 2 for invalid input.
-pub fn failure(failure: &Failure, json: bool) -> ExitCode {
+pub fn failure(failure: &Failure, json: bool) -> u8 {
     let text = match failure {
         Failure::Scene(errors) => {
             show(errors);
@@ -73,13 +72,13 @@ pub fn failure(failure: &Failure, json: bool) -> ExitCode {
         }
         Failure::Output(error) => {
             eprintln!("error: standard output cannot be written: {error}; check the free space");
-            return ExitCode::from(1);
+            return 1;
         }
     };
     if json {
         refused(text.trim_end());
     }
-    ExitCode::from(2)
+    2
 }
 
 /// Prints the JSON object of invalid input.
@@ -89,12 +88,12 @@ pub fn refused(message: &str) {
 }
 
 /// Prints that a mesh could not be written; exit code 1.
-pub fn failed_output(error: &MeshFileError, json: bool) -> Result<ExitCode, Failure> {
+pub fn failed_output(error: &MeshFileError, json: bool) -> Result<u8, Failure> {
     eprintln!("error: {error}");
     if json {
         say(json!({ "status": "failed", "error": { "kind": "output", "message": error.to_string() } }))?;
     }
-    Ok(ExitCode::from(1))
+    Ok(1)
 }
 
 /// Prints errors or warnings with the user's own lines underlined.

@@ -1,20 +1,20 @@
 //! `pliant reproduce`: results of the literature, computed, judged and written to a page.
 
-use std::process::ExitCode;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use pliant_reproduce::{CASES, Case, Report, find, is_own_file};
 use pliant_run::OutputFolder;
 
+use crate::SUCCESS;
 use crate::arguments::Reproduce;
 use crate::page::Page;
 use crate::report::{Failure, say};
 
-pub fn reproduce(arguments: &Reproduce) -> Result<ExitCode, Failure> {
+pub fn reproduce(arguments: &Reproduce) -> Result<u8, Failure> {
     if arguments.list {
         say(list())?;
-        return Ok(ExitCode::SUCCESS);
+        return Ok(SUCCESS);
     }
     let cases = chosen(&arguments.only)?;
     let page = arguments.table.as_deref().map(|path| Page::read(path, "reproduce")).transpose()?;
@@ -31,7 +31,7 @@ pub fn reproduce(arguments: &Reproduce) -> Result<ExitCode, Failure> {
     }
     say(verdict(&report))?;
     let [_, failed] = report.counts();
-    Ok(ExitCode::from(u8::from(failed > 0)))
+    Ok(u8::from(failed > 0))
 }
 
 /// The requested cases, in the order of the page; by default all.

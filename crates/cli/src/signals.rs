@@ -1,22 +1,24 @@
-//! Signals that stop a run: Ctrl-C, and on Unix SIGTERM and SIGHUP. The run stops after its step and writes its final outputs.
+//! Signals that stop a run: Ctrl-C, and on Unix SIGTERM and SIGHUP. The run stops after its step, or within a long one, and writes its final outputs.
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock};
+
+use pliant_sim::StopFlag;
 
 /// The number of Ctrl-C's signal.
 const INTERRUPT: usize = 2;
 
 struct Asked {
-    stop: Arc<AtomicBool>,
+    stop: StopFlag,
     signal: Arc<AtomicUsize>,
 }
 
 static ASKED: LazyLock<Asked> = LazyLock::new(|| {
-    let asked = Asked { stop: Arc::default(), signal: Arc::new(AtomicUsize::new(INTERRUPT)) };
+    let asked = Asked { stop: StopFlag::default(), signal: Arc::new(AtomicUsize::new(INTERRUPT)) };
     let stop = asked.stop.clone();
     // Without a handler, Ctrl-C ends the process as usual, and written files stay readable.
     let _ = ctrlc::set_handler(move || {
-        if stop.swap(true, Ordering::Relaxed) {
+        if stop.ask() {
             std::process::exit(128 + INTERRUPT as i32);
         }
     });
@@ -26,7 +28,7 @@ static ASKED: LazyLock<Asked> = LazyLock::new(|| {
 });
 
 /// Set by a stop signal. A second Ctrl-C or SIGTERM ends the process immediately.
-pub fn stop() -> &'static AtomicBool {
+pub fn stop() -> &'static StopFlag {
     &ASKED.stop
 }
 
@@ -47,13 +49,13 @@ mod unix {
     /// Handles SIGTERM and SIGHUP in the same way. Without a handler, they end the process as usual.
     pub fn heed(asked: &Asked) {
         // A closing terminal may send SIGHUP twice; a second SIGTERM is deliberate.
-        let _ = flag::register_conditional_shutdown(SIGTERM, 128 + SIGTERM, asked.stop.clone());
+        let _ = flag::register_conditional_shutdown(SIGTERM, 128 + SIGTERM, asked.stop.shared());
         for signal in [SIGTERM, SIGHUP] {
             if signal == SIGHUP && !is_heeded(signal) {
                 continue;
             }
             let _ = flag::register_usize(signal, asked.signal.clone(), signal as usize);
-            let _ = flag::register(signal, asked.stop.clone());
+            let _ = flag::register(signal, asked.stop.shared());
         }
     }
 

@@ -1,7 +1,6 @@
 //! `pliant view`: input of the window, and its final message.
 
 use std::path::Path;
-use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -13,6 +12,7 @@ use pliant_viewer::{
     replay_in_real_time,
 };
 
+use crate::SUCCESS;
 use crate::arguments::View;
 use crate::look::look_of;
 use crate::prepare::prepare;
@@ -24,13 +24,13 @@ impl From<WindowError> for Failure {
     }
 }
 
-pub fn view(arguments: &View) -> Result<ExitCode, Failure> {
+pub fn view(arguments: &View) -> Result<u8, Failure> {
     let began = Instant::now();
     if let Some(run) = finished_run(arguments)? {
         if let Some(told) = open_finished(run)? {
             say(told)?;
         }
-        return Ok(ExitCode::SUCCESS);
+        return Ok(SUCCESS);
     }
     let world = prepare(&arguments.scene, &arguments.overrides)?;
     for note in world.notes() {
@@ -61,7 +61,7 @@ pub fn view(arguments: &View) -> Result<ExitCode, Failure> {
     if let Some(told) = told {
         say(told)?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(SUCCESS)
 }
 
 /// A finished run: a folder with series of frames and no scene, or one of its series (`.pvd`).
@@ -102,7 +102,7 @@ fn self_test(arguments: &View) -> Option<SelfTest> {
 }
 
 /// Replays a recording without a window and prints the result; optionally also in real time, to measure the input lag.
-fn repeat(world: &World, file: &Path, real_time: bool) -> Result<ExitCode, Failure> {
+fn repeat(world: &World, file: &Path, real_time: bool) -> Result<u8, Failure> {
     let wrong = |error: &dyn std::fmt::Display| {
         Failure::plain(
             format!("`{}` is not a recording: {error}", file.display()),
@@ -127,11 +127,11 @@ fn repeat(world: &World, file: &Path, real_time: bool) -> Result<ExitCode, Failu
                     number(*back)
                 );
             }
-            Ok(if replayed.breaks.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
+            Ok(if replayed.breaks.is_empty() { SUCCESS } else { 1 })
         }
         Err(message) => {
             eprintln!("error: {message}");
-            Ok(ExitCode::from(1))
+            Ok(1)
         }
     }
 }

@@ -20,10 +20,10 @@
 
 use std::sync::Arc;
 
-use pliant_mechanics::Energies;
 use pliant_mechanics::load::Load;
 use pliant_mechanics::model::{Constraint, Contradiction, Enclosed, FREE, Model};
 use pliant_mechanics::tensor::{Vector, add, cast, scale, sub};
+use pliant_mechanics::{Energies, StopFlag};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -159,6 +159,12 @@ pub enum RelaxationError {
         /// Time [s].
         time: f64,
     },
+    /// Someone [asked](DynamicRelaxation::stop_on) for it.
+    #[error("the search for the equilibrium at t = {time:.6} s was stopped")]
+    Stopped {
+        /// Time [s].
+        time: f64,
+    },
 }
 
 impl RelaxationError {
@@ -176,6 +182,7 @@ impl RelaxationError {
             }
             Self::Inverted { .. } => "try more load steps, a smaller motion, or a finer mesh there",
             Self::NotFinite { .. } => "try more load steps; a body that nothing holds has no equilibrium",
+            Self::Stopped { .. } => "the state is that of the equilibrium before",
         }
     }
 }
@@ -315,6 +322,7 @@ pub struct DynamicRelaxation<R> {
     sums: Vec<Extremes>,
     /// The first hexahedron of the last trial of which a corner is turned inside out, as (solid, cell).
     folded: Option<(usize, usize)>,
+    stop: StopFlag,
     energies: Energies,
     way: Way<R>,
 }
@@ -399,6 +407,7 @@ impl<R: Scalar> DynamicRelaxation<R> {
             residual_before: vec![[R::ZERO; 3]; nodes],
             sums: vec![Extremes::default(); nodes.div_ceil(CHUNK)],
             folded: None,
+            stop: StopFlag::default(),
             energies: Energies::default(),
             way: Way::default(),
             model,
@@ -442,6 +451,11 @@ impl<R: Scalar> DynamicRelaxation<R> {
         state.displacement.fill([R::ZERO; 3]);
         self.approach(state, LoadPath::Start, [0.0, 1.0], &mut Convergence::default(), &mut |_| ())
             .inspect_err(|_| state.displacement.copy_from_slice(&before))
+    }
+
+    /// Looks at a flag from now on, every few iterations, and stops where it asks.
+    pub fn stop_on(&mut self, flag: &StopFlag) {
+        self.stop = flag.clone();
     }
 
     /// Brings a state to the equilibrium at a later time [s]. On failure the state is that of the last equilibrium.
@@ -492,6 +506,9 @@ impl<R: Scalar> DynamicRelaxation<R> {
                 }
                 Err(error) => {
                     state.displacement.copy_from_slice(&before);
+                    if matches!(error, RelaxationError::Stopped { .. }) {
+                        return Err(error);
+                    }
                     self.slowness *= 2.0;
                     size = 0.5 * (end - reached);
                     if size < least * (1.0 - 1e-9) {
@@ -560,6 +577,9 @@ impl<R: Scalar> DynamicRelaxation<R> {
                 let fraction = ((greatest / reached).ln() / (greatest / tolerance).ln()).clamp(0.0, 1.0);
                 let (span, residual) = ([state.time, end.time], convergence.residual);
                 watch(Iteration { span, number: iteration, residual, fraction });
+                if self.stop.is_asked() {
+                    return Err(RelaxationError::Stopped { time: end.time });
+                }
             }
             let damping = if ramped {
                 slowest = follow(slowest, &sums);

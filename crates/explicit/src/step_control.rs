@@ -2,6 +2,7 @@
 
 use pliant_mechanics::model::Model;
 use pliant_mechanics::tensor::{Vector, cast};
+use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
 use crate::critical_step::limit_about;
@@ -33,7 +34,7 @@ impl Lengths {
 }
 
 /// How a run goes on with steps of another length.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Clock {
     /// Time [s] from which whole steps are counted …
     pub since: f64,

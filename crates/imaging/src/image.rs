@@ -174,6 +174,30 @@ pub struct Image {
 }
 
 impl Image {
+    /// An image from memory: numbers of a type as little-endian bytes, i fastest, and names of its labels. `None` where these are not as many numbers
+    /// as the grid has points.
+    ///
+    /// ```
+    /// use pliant_geometry::{Grid, Vector3};
+    /// use pliant_imaging::{Image, LabelNames, Scalar};
+    ///
+    /// let grid = Grid::along_axes([2, 2, 1], Vector3::zeros(), [1e-3; 3])?;
+    /// let image = Image::new(grid, Scalar::U8, vec![0, 1, 1, 0], LabelNames::default()).unwrap();
+    /// assert_eq!(image.labels()?.present(), [1]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn new(grid: Grid, scalar: Scalar, bytes: Vec<u8>, names: LabelNames) -> Option<Self> {
+        let numbers = Numbers { scalar, order: Order::Little, bytes };
+        (numbers.bytes.len() == grid.len() * scalar.size()).then(|| Self {
+            grid,
+            format: "given by the program".to_owned(),
+            notes: Vec::new(),
+            names,
+            numbers,
+            scale: [1.0, 0.0],
+        })
+    }
+
     /// Type of the numbers in the file.
     pub fn scalar(&self) -> Scalar {
         self.numbers.scalar

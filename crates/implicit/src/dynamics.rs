@@ -11,6 +11,7 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use pliant_mechanics::StopFlag;
 use pliant_mechanics::model::Solid;
 
 use crate::assembly::{Assembly, Spring};
@@ -240,6 +241,11 @@ impl BackwardEuler {
         self.system.take_pairs(pairs)
     }
 
+    /// Looks at a flag from now on, before each solution, and stops where it asks.
+    pub fn stop_on(&mut self, flag: &StopFlag) {
+        self.system.stop = flag.clone();
+    }
+
     /// Takes hold of nodes, as [`Forces::hold`](crate::Forces::hold).
     pub fn hold(&mut self, springs: &[Spring]) {
         self.system.hold(springs);
@@ -298,7 +304,7 @@ impl BackwardEuler {
                 }
                 Err(error) => {
                     state.clone_from(&self.start);
-                    if halvings == self.settings.halvings || matches!(error, SolveError::Crossed { .. }) {
+                    if halvings == self.settings.halvings || error.is_final() {
                         return Err(error);
                     }
                     halvings += 1;

@@ -244,6 +244,9 @@ pub enum SolveError {
         /// Corners of the triangle it goes through.
         triangle: [u32; 3],
     },
+    /// Someone asked for it.
+    #[error("the search for the state at the end of a step was stopped")]
+    Stopped,
     /// A balloon that is not closed.
     #[error(transparent)]
     Open(#[from] ModelError),
@@ -253,6 +256,11 @@ pub enum SolveError {
 }
 
 impl SolveError {
+    /// Whether smaller steps can't help.
+    pub(crate) fn is_final(&self) -> bool {
+        matches!(self, Self::Crossed { .. } | Self::Stopped)
+    }
+
     /// The element that is broken, or was in a larger step, by its number in the model.
     pub fn broken(&self) -> Option<(usize, Broken)> {
         match self {

@@ -7,6 +7,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Matrix6, RowVector6, SymmetricEigen, Vector3};
+use pliant_mechanics::StopFlag;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::Motion;
 use pliant_mechanics::tie::Tie;
@@ -212,6 +213,22 @@ impl Statics {
         self.system.take_pairs(pairs)
     }
 
+    /// The direction in which a path by arc length goes on, six components a node: the translations [m] of the last step.
+    pub fn direction(&self) -> &[f64] {
+        &self.direction
+    }
+
+    /// Takes up the [direction](Self::direction) of another solver of the same model; without one, that in which the load grows.
+    pub fn go_on_along(&mut self, direction: &[f64]) {
+        self.direction.fill(0.0);
+        self.direction[..direction.len()].copy_from_slice(direction);
+    }
+
+    /// Looks at a flag from now on, before each solution, and stops where it asks.
+    pub fn stop_on(&mut self, flag: &StopFlag) {
+        self.system.stop = flag.clone();
+    }
+
     /// Takes hold of nodes, as [`Forces::hold`](crate::Forces::hold).
     pub fn hold(&mut self, springs: &[Spring]) {
         self.system.hold(springs);
@@ -276,7 +293,7 @@ impl Statics {
                 }
                 Err(Attempt { error, retry }) => {
                     *state = before;
-                    if !retry || halvings == self.settings.halvings {
+                    if !retry || error.is_final() || halvings == self.settings.halvings {
                         return Err(error.after(broken));
                     }
                     broken = error.broken().or(broken);
@@ -324,7 +341,7 @@ impl Statics {
                 }
                 Ok(Step { parts: 1, ..step })
             }
-            Err(Attempt { retry: true, error: larger }) if halvings > 0 => {
+            Err(Attempt { retry: true, error: larger }) if halvings > 0 && !larger.is_final() => {
                 *state = before;
                 let [first, second] = self.halves(control, state);
                 let told = |Attempt { error, retry }| Attempt { error: error.after(larger.broken()), retry };
@@ -462,7 +479,7 @@ impl Statics {
                 error: SolveError::NotConverged { time, node, residuals, broken },
                 retry: true,
             }),
-            Err(error) => Err(Attempt { retry: !matches!(error, SolveError::Crossed { .. }), error }),
+            Err(error) => Err(Attempt { retry: true, error }),
         }
     }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::{SMatrix, SVector, Vector3};
+use pliant_mechanics::StopFlag;
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE, Spread, face_areas};
 use pliant_mechanics::mapping::{Configuration, Mapping};
 use pliant_mechanics::model::{Constraint, Enclosed, Motion, Solid};
@@ -109,6 +110,8 @@ pub(crate) struct System {
     pub(crate) touching: Option<Box<TouchingSystem>>,
     /// The stiffness at the start of a step that damps it; empty without such damping.
     pub(crate) damper: Vec<f64>,
+    /// Ends steps under way, before the next solution.
+    pub(crate) stop: StopFlag,
 }
 
 /// Pressures on a facet [Pa], each fixed and controlled.
@@ -319,6 +322,7 @@ impl System {
             solver: LinearSolver::Direct,
             touching: None,
             damper: Vec::new(),
+            stop: StopFlag::default(),
             model,
         }
     }
@@ -868,6 +872,9 @@ impl System {
 
     /// Takes the matrix as it now is for the coming solutions; returns its negative pivots.
     pub(crate) fn prepare(&mut self) -> Result<usize, SolveError> {
+        if self.stop.is_asked() {
+            return Err(SolveError::Stopped);
+        }
         let start = Instant::now();
         self.conditions.pin(&mut self.matrix);
         let Some(workspace) = &mut self.workspace else { return Ok(0) };

@@ -30,6 +30,7 @@ pub mod order;
 pub mod prony;
 mod real;
 pub mod rotation;
+mod stop;
 pub mod tensor;
 pub mod tie;
 
@@ -37,3 +38,4 @@ pub use energies::Energies;
 pub use fingerprint::fingerprint;
 pub use model::Model;
 pub use real::{Number, Real, closer_to_inverse_cbrt};
+pub use stop::StopFlag;

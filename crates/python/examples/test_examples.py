@@ -86,3 +86,32 @@ def test_retraction() -> None:
     module = example("11_retraction")
     check_env(module.Retraction(), skip_render_check=True)
     assert module.main() > 5e-3
+
+
+def test_meshes() -> None:
+    module = example("12_meshes")
+    counts = module.main()
+    assert counts["fewer triangles"] <= 400 and counts["curved shells"] <= 80 and min(counts.values()) > 0
+    pytest.importorskip("meshio")
+    pytest.importorskip("pyvista")
+    plate = module.Mesh.plate([0.1, 0.05], edge=0.01)
+    assert np.allclose(module.other_packages(plate).points, plate.points)
+
+
+def test_scene() -> None:
+    result = example("13_scene").main()
+    assert result.status == "done" and len(result.history["time"]) > 5
+
+
+@pytest.mark.skipif(not os.environ.get("PLIANT_REQUIRE_GPU"), reason="pictures need an adapter")
+def test_saved_picture(tmp_path: Path) -> None:
+    module = example("13_scene")
+    pixels = module.picture(module.pliant.Scene.from_toml(module.TEXT).build().simulate(), str(tmp_path / "picture.png"))
+    assert pixels.shape == (720, 960, 4) and (tmp_path / "picture.png").stat().st_size > 1000
+
+
+def test_read() -> None:
+    module = example("14_read")
+    assert module.main() < 0.95
+    volume, pressure = module.balloon()
+    assert volume > 1.4e-4 and pressure > 1e3

@@ -39,6 +39,9 @@ pub fn vectors(array: &PyReadonlyArray2<'_, f64>) -> Result<Vec<[f64; 3]>, Troub
             "an array of shape ({rows}, {columns}) is given, (n, 3) is wanted"
         )));
     }
+    if let Ok(numbers) = array.as_slice() {
+        return Ok(numbers.as_chunks().0.to_vec());
+    }
     let view = array.as_array();
     Ok(view.rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())
 }

@@ -1,13 +1,60 @@
-//! Segmented images from files.
+//! Segmented images, from files and from arrays.
 
 use std::path::PathBuf;
 
+use std::sync::Arc;
+
+use nalgebra::Matrix3;
 use numpy::PyArray1;
+use pliant_geometry::{Grid, Vector3};
+use pliant_imaging::{LabelNames, Scalar};
 use pyo3::prelude::*;
 
 use crate::arrays::array1;
 use crate::errors::Trouble;
 use crate::jobs::on_thread;
+
+/// An image, shared with the engine.
+#[pyclass(frozen, module = "pliant._native")]
+pub struct Image(pub Arc<pliant_imaging::Image>);
+
+/// Types of numbers by the words of NumPy.
+const NUMBERS: [(&str, Scalar); 10] = [
+    ("int8", Scalar::I8),
+    ("uint8", Scalar::U8),
+    ("int16", Scalar::I16),
+    ("uint16", Scalar::U16),
+    ("int32", Scalar::I32),
+    ("uint32", Scalar::U32),
+    ("int64", Scalar::I64),
+    ("uint64", Scalar::U64),
+    ("float32", Scalar::F32),
+    ("float64", Scalar::F64),
+];
+
+#[pymethods]
+impl Image {
+    /// From little-endian bytes, i fastest, of numbers of a type, the affine matrix to metres row by row, and names of labels.
+    #[new]
+    fn new(
+        bytes: Vec<u8>,
+        numbers: &str,
+        dims: [usize; 3],
+        affine: [[f64; 4]; 3],
+        names: Vec<(i32, String)>,
+    ) -> Result<Self, Trouble> {
+        let known = NUMBERS.iter().find(|(word, _)| *word == numbers);
+        let (_, scalar) = known.ok_or_else(|| Trouble::Value(format!("images hold no {numbers}")))?;
+        let axes = Matrix3::from_fn(|row, column| affine[row][column]);
+        let grid = Grid::new(dims, Vector3::from_fn(|row, _| affine[row][3]), axes)
+            .map_err(|error| Trouble::Mesh(None, error.to_string()))?;
+        let mut own = LabelNames::default();
+        names.iter().for_each(|(label, name)| own.insert(*label, name));
+        let image = pliant_imaging::Image::new(grid, *scalar, bytes, own);
+        let image = image.ok_or_else(|| Trouble::Value("an image has other bytes than voxels".into()))?;
+        Ok(Self(Arc::new(image)))
+    }
+}
 
 /// Values (i fastest), their numbers along i, j and k, the affine matrix to metres row by row, and names of labels.
 type Read<'py> = (Bound<'py, PyArray1<f64>>, [usize; 3], [[f64; 4]; 3], Vec<(i32, String)>);

@@ -1,11 +1,11 @@
 //! Work that takes a while: it runs on threads of the engine, without the interpreter, and signals are looked at.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, channel};
 use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use pliant_sim::StopFlag;
 use pyo3::prelude::*;
 
 use crate::errors::{Trouble, told};
@@ -17,10 +17,10 @@ const SLICE: Duration = Duration::from_millis(50);
 pub fn on_pool<T: Send + 'static>(
     py: Python<'_>,
     pool: &rayon::ThreadPool,
-    stop: &AtomicBool,
+    stop: &StopFlag,
     job: impl FnOnce() -> T + Send + 'static,
 ) -> Result<(T, PyResult<()>), Trouble> {
-    stop.store(false, Ordering::Relaxed);
+    stop.clear();
     let (sender, receiver) = channel();
     let receiver = Mutex::new(receiver);
     pool.spawn(move || {
@@ -28,14 +28,15 @@ pub fn on_pool<T: Send + 'static>(
         let _ = sender.send(job());
     });
     let mut signal = Ok(());
+    let mut awake = AWAKE;
     loop {
-        match wait(py, &receiver) {
+        match wait(py, &receiver, std::mem::take(&mut awake)) {
             Ok(result) => return Ok((result, signal)),
             Err(RecvTimeoutError::Timeout) => {
                 if signal.is_ok()
                     && let Err(raised) = py.check_signals()
                 {
-                    stop.store(true, Ordering::Relaxed);
+                    stop.ask();
                     signal = Err(raised);
                 }
             }
@@ -46,20 +47,20 @@ pub fn on_pool<T: Send + 'static>(
     }
 }
 
-/// Runs a job on a thread of its own. After a signal it goes on alone, and its result is dropped.
+/// Runs a job on threads of its own, so that it runs in a fork, too. After a signal it goes on alone, and its result is dropped.
 pub fn on_thread<T: Send + 'static>(
     py: Python<'_>,
     job: impl FnOnce() -> Result<T, Trouble> + Send + 'static,
 ) -> PyResult<T> {
     let (sender, receiver) = channel();
     let receiver = Mutex::new(receiver);
-    let run = move || {
+    let pool = rayon::ThreadPoolBuilder::new().thread_name(|_| "pliant".into()).build();
+    pool.map_err(crate::errors::broken)?.spawn(move || {
         let done = catch_unwind(AssertUnwindSafe(job));
         let _ = sender.send(done.unwrap_or_else(|panic| Err(Trouble::Internal(told(&*panic)))));
-    };
-    std::thread::Builder::new().name("pliant".into()).spawn(run).map_err(crate::errors::broken)?;
+    });
     loop {
-        match wait(py, &receiver) {
+        match wait(py, &receiver, Duration::ZERO) {
             Ok(result) => return Ok(result?),
             Err(RecvTimeoutError::Timeout) => py.check_signals()?,
             Err(RecvTimeoutError::Disconnected) => {
@@ -69,7 +70,27 @@ pub fn on_thread<T: Send + 'static>(
     }
 }
 
-/// Waits for a slice of time without the interpreter.
-fn wait<T: Send>(py: Python<'_>, receiver: &Mutex<Receiver<T>>) -> Result<T, RecvTimeoutError> {
-    py.detach(|| receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(SLICE))
+/// Time for which the result of a call is awaited awake at first: to wake a thread takes longer than a short step, and that of the pool goes to sleep
+/// meanwhile.
+const AWAKE: Duration = Duration::from_micros(200);
+
+/// Waits for a slice of time without the interpreter, at first awake.
+fn wait<T: Send>(
+    py: Python<'_>,
+    receiver: &Mutex<Receiver<T>>,
+    awake: Duration,
+) -> Result<T, RecvTimeoutError> {
+    py.detach(|| {
+        let receiver = receiver.lock().unwrap_or_else(PoisonError::into_inner);
+        let since = Instant::now();
+        while since.elapsed() < awake {
+            match receiver.try_recv() {
+                Ok(result) => return Ok(result),
+                // Others that wait for this core go first.
+                Err(TryRecvError::Empty) => std::thread::yield_now(),
+                Err(TryRecvError::Disconnected) => return Err(RecvTimeoutError::Disconnected),
+            }
+        }
+        receiver.recv_timeout(SLICE)
+    })
 }

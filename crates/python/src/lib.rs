@@ -21,10 +21,8 @@ use pyo3::prelude::*;
 
 /// Does what a command line says; the code that the process is to end with.
 #[pyfunction]
-fn main(py: Python<'_>, words: Vec<OsString>) -> i32 {
-    let code = py.detach(|| pliant_command::main(words));
-    // An exit code has no number to ask for; all that are not success are told apart by what was printed.
-    i32::from(code != std::process::ExitCode::SUCCESS)
+fn main(py: Python<'_>, words: Vec<OsString>) -> u8 {
+    py.detach(|| pliant_command::main(words))
 }
 
 #[pymodule]
@@ -41,6 +39,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(image::read_image, module)?)?;
     module.add_function(wrap_pyfunction!(picture::pixels, module)?)?;
     module.add_class::<mesh::Mesh>()?;
+    module.add_class::<image::Image>()?;
     module.add_class::<model::Model>()?;
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<state::State>()

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use numpy::{PyArray1, PyArray2};
 use pliant_geometry::Selection;
 use pliant_mechanics::Energies;
 use pliant_run::{Checkpoint, Options, OutputFolder, run_with, sampled_columns};
 use pliant_scene::World;
+use pliant_sim::StopFlag;
 use pyo3::prelude::*;
 
 use crate::arrays::{array1, array3};
@@ -141,8 +141,8 @@ impl Model {
         let mut world = until.map_or_else(|| (*self.world).clone(), |until| self.world.lasting(until));
         world.scene.run.threads = threads;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(crate::errors::broken)?;
-        let stop = Arc::new(AtomicBool::new(false));
-        let (flag, raised) = (Arc::clone(&stop), Arc::new(std::sync::Mutex::new(None::<PyErr>)));
+        let stop = StopFlag::default();
+        let (flag, raised) = (stop.clone(), Arc::new(std::sync::Mutex::new(None::<PyErr>)));
         let kept = Arc::clone(&raised);
         let job = move || -> Result<_, Trouble> {
             let checkpoint = resume.then(|| Checkpoint::read(&out)).transpose()?;
@@ -167,7 +167,7 @@ impl Model {
                     each.call1(py, (progress.time, progress.until, progress.wall.as_secs_f64())).map(drop)
                 });
                 if let Err(error) = called {
-                    flag.store(true, Ordering::Relaxed);
+                    flag.ask();
                     *kept.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(error);
                 }
             };

@@ -22,8 +22,6 @@ pub struct Running {
     shown: VtuTable,
     /// Readers of the fields that were asked for.
     readers: Vec<((FieldName, String, At), FieldReader)>,
-    /// Forces on nodes [N], until replaced; empty for none.
-    pub pushed: Vec<[f64; 3]>,
     /// Hands on it.
     pub grips: Vec<Grip>,
 }
@@ -31,16 +29,8 @@ pub struct Running {
 impl Running {
     pub fn new(live: Live, world: Arc<World>) -> Self {
         let shown = world.scene.shown(1.0);
-        let mut running = Self {
-            live,
-            world,
-            own: None,
-            address: 0,
-            shown,
-            readers: Vec::new(),
-            pushed: Vec::new(),
-            grips: Vec::new(),
-        };
+        let mut running =
+            Self { live, world, own: None, address: 0, shown, readers: Vec::new(), grips: Vec::new() };
         if running.stepper_s_own().is_none() {
             running.own = Some(vec![[0.0; 3]; running.nodes()]);
         }
@@ -212,9 +202,8 @@ impl Running {
         })
     }
 
-    /// Takes hold of all that is gripped, and pushes as before.
+    /// Takes hold of all that is gripped.
     pub fn hold(&mut self) -> Result<(), Trouble> {
-        self.live.simulation.push(&self.pushed)?;
         if self.live.simulation.hold(&self.grips) {
             return Ok(());
         }

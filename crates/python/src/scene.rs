@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use pliant_scene::source::{Node, Source, Value};
+use pliant_scene::source::{Given, Node, Source, Value};
 use pliant_scene::{MeshCache, Scene, World, scene_file};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::errors::{Trouble, diagnostics};
+use crate::image::Image;
 use crate::jobs::on_thread;
 use crate::mesh::Mesh;
 use crate::model::Model;
@@ -17,59 +18,60 @@ use crate::model::Model;
 /// Longest text of a scene [bytes], as of files.
 const LONGEST: usize = 1 << 26;
 
-/// A scene as Python hands it over: text, its name, the folder of its files, values that are set, and meshes from memory.
-pub struct Given {
+/// A scene as Python hands it over: text, its name, the folder of its files, values that are set, meshes and images from memory.
+type Handed<'py> = (String, String, PathBuf, Vec<String>, Meshes<'py>, BTreeMap<String, Bound<'py, Image>>);
+
+type Meshes<'py> = BTreeMap<String, Bound<'py, Mesh>>;
+
+/// The same, to be read on another thread.
+struct Taken {
     text: String,
     name: String,
     folder: PathBuf,
     set: Vec<String>,
-    meshes: BTreeMap<String, Arc<pliant_geometry::Mesh>>,
+    given: Given,
     /// Bodies whose meshes another model lends.
     lent: BTreeMap<String, Arc<pliant_geometry::Mesh>>,
 }
-
-type Meshes<'py> = BTreeMap<String, Bound<'py, Mesh>>;
 
 /// Meshes as the engine shares them.
 fn shared(meshes: Meshes<'_>) -> BTreeMap<String, Arc<pliant_geometry::Mesh>> {
     meshes.into_iter().map(|(name, mesh)| (name, Arc::clone(&mesh.get().0))).collect()
 }
 
-impl Given {
-    fn new(
-        (text, name, folder, set): (String, String, PathBuf, Vec<String>),
-        meshes: Meshes<'_>,
-        lent: Meshes<'_>,
-    ) -> Result<Self, Trouble> {
+impl Taken {
+    fn new((text, name, folder, set, meshes, images): Handed<'_>, lent: Meshes<'_>) -> Result<Self, Trouble> {
         if text.len() > LONGEST {
             let size = text.len() >> 20;
             return Err(Trouble::Value(format!(
                 "the text of the scene has {size} MiB, and 64 are the most; give large tables as meshes or files"
             )));
         }
-        Ok(Self { text, name, folder, set, meshes: shared(meshes), lent: shared(lent) })
+        let images = images.into_iter().map(|(name, image)| (name, Arc::clone(&image.get().0))).collect();
+        let given = Given { meshes: shared(meshes), images };
+        Ok(Self { text, name, folder, set, given, lent: shared(lent) })
     }
 
     fn scene(self) -> Result<Scene, Trouble> {
         let mut source = Source::parse(self.name, self.text)?;
         let mut mistakes: Vec<_> =
             self.set.iter().filter_map(|set| source.assign(set).err()).map(|mistake| *mistake).collect();
-        let mut meshes = self.meshes;
+        let mut given = self.given;
         for (body, mesh) in self.lent {
             let name = format!("{body}, lent");
-            let given = Node {
+            let node = Node {
                 place: source.span(&["body", &body, "mesh"]),
                 key_span: None,
                 value: Value::String(name.clone()),
             };
-            let table = Value::Table(vec![("given".to_owned(), given)]);
+            let table = Value::Table(vec![("given".to_owned(), node)]);
             mistakes.extend(source.set(&["body", &body, "mesh"], table).err().map(|mistake| *mistake));
-            meshes.insert(name, mesh);
+            given.meshes.insert(name, mesh);
         }
         if !mistakes.is_empty() {
             return Err(source.errors(mistakes).into());
         }
-        Ok(Scene::from_source(source.giving(meshes), self.folder)?)
+        Ok(Scene::from_source(source.giving(given), self.folder)?)
     }
 }
 
@@ -122,14 +124,10 @@ fn plain<'py>(py: Python<'py>, node: &Node) -> PyResult<Bound<'py, PyAny>> {
 
 /// Builds a scene and forgets the model: its warnings.
 #[pyfunction]
-pub fn check<'py>(
-    py: Python<'py>,
-    given: (String, String, PathBuf, Vec<String>),
-    meshes: Meshes<'py>,
-) -> PyResult<Vec<Bound<'py, PyAny>>> {
-    let given = Given::new(given, meshes, Meshes::new())?;
+pub fn check<'py>(py: Python<'py>, scene: Handed<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    let taken = Taken::new(scene, Meshes::new())?;
     let errors = on_thread(py, move || {
-        let scene = given.scene()?;
+        let scene = taken.scene()?;
         let world = World::assemble(&scene, &MeshCache::of_user(), &|_| {})?;
         Ok(scene.source.errors(world.warnings().cloned().collect()))
     })?;
@@ -138,15 +136,10 @@ pub fn check<'py>(
 
 /// The mesh of a body of a scene, and remarks on how it was made.
 #[pyfunction]
-pub fn mesh(
-    py: Python<'_>,
-    given: (String, String, PathBuf, Vec<String>),
-    meshes: Meshes<'_>,
-    body: String,
-) -> PyResult<(Mesh, Vec<String>)> {
-    let given = Given::new(given, meshes, Meshes::new())?;
+pub fn mesh(py: Python<'_>, scene: Handed<'_>, body: String) -> PyResult<(Mesh, Vec<String>)> {
+    let taken = Taken::new(scene, Meshes::new())?;
     let (mesh, notes) = on_thread(py, move || {
-        let scene = given.scene()?;
+        let scene = taken.scene()?;
         Ok(pliant_scene::mesh_of(&scene, &body, &MeshCache::of_user(), &|_| {})?)
     })?;
     Ok((Mesh(Arc::new(mesh)), notes))
@@ -154,17 +147,11 @@ pub fn mesh(
 
 /// Builds a scene.
 #[pyfunction]
-pub fn build(
-    py: Python<'_>,
-    given: (String, String, PathBuf, Vec<String>),
-    meshes: Meshes<'_>,
-    lent: Meshes<'_>,
-    cache: bool,
-) -> PyResult<Model> {
-    let given = Given::new(given, meshes, lent)?;
+pub fn build(py: Python<'_>, scene: Handed<'_>, lent: Meshes<'_>, cache: bool) -> PyResult<Model> {
+    let taken = Taken::new(scene, lent)?;
     let world = on_thread(py, move || {
         let cache = if cache { MeshCache::of_user() } else { MeshCache::off() };
-        Ok(World::assemble(&given.scene()?, &cache, &|_| {})?)
+        Ok(World::assemble(&taken.scene()?, &cache, &|_| {})?)
     })?;
     Ok(Model::new(world))
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
@@ -11,11 +11,11 @@ use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray2};
 use pliant_mechanics::grip::Grip;
 use pliant_run::{Live, field_named};
 use pliant_scene::format::At;
-use pliant_sim::Reals;
 use pliant_sim::contact::pose::Pose;
+use pliant_sim::{Reals, StopFlag};
 use pyo3::prelude::*;
 
-use crate::arrays::{array, vectors};
+use crate::arrays::{array, array3, vectors};
 use crate::errors::{Trouble, broken, told};
 use crate::jobs::on_pool;
 use crate::mesh::Mesh;
@@ -23,15 +23,20 @@ use crate::model::{Model, in_order};
 use crate::running::Running;
 use crate::state::State;
 
-/// A simulation. One call at a time: a second one is told so at once.
+/// A simulation. One call at a time: a second one fails at once.
 #[pyclass(frozen, weakref, module = "pliant._native")]
 pub struct Simulation {
     slot: Mutex<Slot>,
     pool: rayon::ThreadPool,
-    stop: Arc<AtomicBool>,
+    stop: StopFlag,
+    /// Bits of the time [s], to be read without a look at the slot; NaN where nothing is here.
+    time: AtomicU64,
     /// The process that made it: threads don't come along into a fork.
     process: u32,
 }
+
+/// The time of a simulation that is not here.
+const AWAY: u64 = f64::NAN.to_bits();
 
 /// Where the run is.
 enum Slot {
@@ -68,30 +73,45 @@ impl Simulation {
 
     /// Reads something that needs no computation.
     fn quick<T>(&self, read: impl FnOnce(&mut Running) -> T) -> Result<T, Trouble> {
-        match &mut *self.slot()? {
-            Slot::Here(running) => Ok(read(running)),
-            other => Err(other.trouble()),
-        }
+        let mut slot = self.slot()?;
+        let done = match &mut *slot {
+            Slot::Here(running) => catch_unwind(AssertUnwindSafe(|| read(running))),
+            other => return Err(other.trouble()),
+        };
+        done.map_err(|panic| {
+            let message = told(&*panic);
+            self.time.store(AWAY, Ordering::Release);
+            *slot = match std::mem::replace(&mut *slot, Slot::Away) {
+                Slot::Here(running) => Slot::Broken { _kept: Some(running), message: message.clone() },
+                other => other,
+            };
+            Trouble::Internal(message)
+        })
     }
 
     /// Computes on the simulation's threads, without the interpreter.
     fn work<T: Send + 'static>(
         &self,
         py: Python<'_>,
-        job: impl FnOnce(&mut Running, &AtomicBool) -> Result<T, Trouble> + Send + 'static,
+        job: impl FnOnce(&mut Running, &StopFlag) -> Result<T, Trouble> + Send + 'static,
     ) -> PyResult<T> {
         let taken = {
             let mut slot = self.slot()?;
             match std::mem::replace(&mut *slot, Slot::Away) {
-                Slot::Here(running) => running,
+                Slot::Here(running) => {
+                    self.time.store(AWAY, Ordering::Release);
+                    running
+                }
                 other => {
                     let trouble = other.trouble();
                     *slot = other;
+                    // To make an exception gives up the interpreter: who takes it up must find the slot open.
+                    drop(slot);
                     return Err(trouble.into());
                 }
             }
         };
-        let stop = Arc::clone(&self.stop);
+        let stop = self.stop.clone();
         let done = on_pool(py, &self.pool, &self.stop, move || {
             let mut running = taken;
             let done = catch_unwind(AssertUnwindSafe(|| {
@@ -102,27 +122,30 @@ impl Simulation {
             (running, done)
         });
         let ((running, done), signal) = done?;
+        let broken = match &done {
+            Ok(_) if running.is_in_place() => None,
+            Ok(_) => Some(
+                "displacements have moved in memory: this is a mistake of Pliant, please report it"
+                    .to_owned(),
+            ),
+            Err(panic) => Some(told(&**panic)),
+        };
         let mut slot = self.slot()?;
-        let done = match done {
-            Ok(_) if !running.is_in_place() => {
-                let message =
-                    "displacements have moved in memory: this is a mistake of Pliant, please tell it";
-                *slot = Slot::Broken { _kept: Some(running), message: message.to_owned() };
-                return Err(Trouble::Internal(message.into()).into());
-            }
-            Ok(done) => {
-                *slot = Slot::Here(running);
-                done
-            }
-            Err(panic) => {
-                let message = told(&*panic);
-                *slot = Slot::Broken { _kept: Some(running), message: message.clone() };
-                return Err(Trouble::Internal(message).into());
+        *slot = match &broken {
+            Some(message) => Slot::Broken { _kept: Some(running), message: message.clone() },
+            None => {
+                self.time.store(running.simulation().time().to_bits(), Ordering::Release);
+                Slot::Here(running)
             }
         };
         drop(slot);
-        signal?;
-        Ok(done?)
+        match (broken, done) {
+            (None, Ok(done)) => {
+                signal?;
+                Ok(done?)
+            }
+            (broken, _) => Err(Trouble::Internal(broken.unwrap_or_default()).into()),
+        }
     }
 }
 
@@ -150,20 +173,27 @@ impl Simulation {
             .thread_name(|_| "pliant".into())
             .build()
             .map_err(broken)?;
-        let (world, stop) = (Arc::clone(&model.world), Arc::new(AtomicBool::new(false)));
+        let (world, stop) = (Arc::clone(&model.world), StopFlag::default());
+        let flag = stop.clone();
         let made = on_pool(py, &pool, &stop, move || {
-            catch_unwind(AssertUnwindSafe(|| Ok(Running::new(Live::new(&world)?, world))))
-                .unwrap_or_else(|panic| Err(Trouble::Internal(told(&*panic))))
+            catch_unwind(AssertUnwindSafe(|| {
+                let mut live = Live::new(&world)?;
+                live.simulation.stop_on(&flag);
+                Ok(Running::new(live, world))
+            }))
+            .unwrap_or_else(|panic| Err(Trouble::Internal(told(&*panic))))
         })?;
         made.1?;
-        let slot = Mutex::new(Slot::Here(Box::new(made.0?)));
-        Ok(Self { slot, pool, stop, process: std::process::id() })
+        let running = Box::new(made.0?);
+        let time = AtomicU64::new(running.simulation().time().to_bits());
+        Ok(Self { slot: Mutex::new(Slot::Here(running)), pool, stop, time, process: std::process::id() })
     }
 
     /// Time [s].
     #[getter]
     fn time(&self) -> Result<f64, Trouble> {
-        self.quick(|running| running.simulation().time())
+        let time = f64::from_bits(self.time.load(Ordering::Acquire));
+        if time.is_nan() { self.quick(|running| running.simulation().time()) } else { Ok(time) }
     }
 
     #[getter]
@@ -292,18 +322,16 @@ impl Simulation {
                 let simulation = &mut running.live.simulation;
                 let left = match (steps, until) {
                     (Some(steps), _) => steps - done,
-                    (None, Some(until)) => {
-                        // As the schedules of outputs count.
-                        let (time, length) = (simulation.time(), simulation.step_length());
-                        let left = ((until - time) / length - 0.5 - 1e-6).ceil().max(1.0) as u64;
-                        if time + 0.5 * length < until { left } else { 0 }
-                    }
-                    (None, None) => 0,
+                    (None, until) => until.map_or(0, |until| simulation.steps_until(until)),
                 };
-                if left == 0 || simulation.ended().is_some() || stop.load(Ordering::Relaxed) {
+                if left == 0 || simulation.ended().is_some() || stop.is_asked() {
                     return Ok(done);
                 }
-                done += simulation.step(left)?;
+                match simulation.step(left) {
+                    Ok(steps) => done += steps,
+                    Err(failure) if failure.is_interrupted() => return Ok(done),
+                    Err(failure) => return Err(failure.into()),
+                }
             }
         })
     }
@@ -367,14 +395,15 @@ impl Simulation {
         })
     }
 
+    /// The forces on nodes [N] that were pushed, (nodes, 3); none without any.
+    fn pushed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        Ok(array3(py, self.quick(|running| running.simulation().pushed().as_flattened().to_vec())?))
+    }
+
     /// Forces on nodes [N], (nodes, 3), until replaced; `None` takes them away.
     fn push(&self, forces: Option<PyReadonlyArray2<'_, f64>>) -> PyResult<()> {
         let forces = forces.as_ref().map(vectors).transpose()?.unwrap_or_default();
-        self.quick(|running| {
-            running.live.simulation.push(&forces)?;
-            running.pushed = forces;
-            Ok::<(), Trouble>(())
-        })??;
+        self.quick(|running| running.live.simulation.push(&forces))?.map_err(Trouble::from)?;
         Ok(())
     }
 
@@ -431,7 +460,10 @@ impl Simulation {
     fn close(&self) -> Result<(), Trouble> {
         let mut slot = self.slot()?;
         *slot = match std::mem::replace(&mut *slot, Slot::Away) {
-            Slot::Here(running) => Slot::Closed { _kept: Some(running) },
+            Slot::Here(running) => {
+                self.time.store(AWAY, Ordering::Release);
+                Slot::Closed { _kept: Some(running) }
+            }
             Slot::Away => return Err(Slot::Away.trouble()),
             other => other,
         };

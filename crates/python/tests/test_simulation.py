@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import os
 import pickle
 import signal
+import subprocess
+import sys
 import threading
 import time
+from collections.abc import Callable
 from multiprocessing import get_context
 
 import numpy as np
@@ -301,3 +305,130 @@ def test_shells_fields_and_pictures_are_reached(tmp_path: object) -> None:
     pixels = picture.to_numpy()
     assert pixels.shape == (240, 320, 4) and pixels[..., :3].std() > 5
     assert picture._repr_png_()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+@pytest.mark.parametrize("solver", ["quasi-static", "static"])
+def test_ctrl_c_ends_a_long_load_step_that_is_then_not_taken(solver: str) -> None:
+    scene = cube(14, **{"run.solver": solver, "run.load-steps": 1})
+    if solver == "static":
+        scene["run.linear"] = "direct"
+    model = scene.build()
+    sim, whole = model.simulate(), model.simulate()
+    timer = threading.Timer(0.25, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    begin = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        sim.step()
+    assert time.monotonic() - begin < 0.25 + 1.0
+    assert (sim.steps, sim.time) == (0, 0.0)
+    assert sim.step() == 1 == whole.step()
+    assert sim.fingerprint() == whole.fingerprint()
+
+
+def test_a_state_of_another_step_length_goes_on_in_its_own_time(scene: pliant.Scene) -> None:
+    sim = scene.build().simulate()
+    sim.step(10)
+    sim.set({"law.tissue.young-modulus": 40e3})
+    sim.step(10)
+    time, state = sim.time, sim.state()
+    sim.step(10)
+    end, wanted = sim.time, sim.fingerprint()
+    for kept in (state, pickle.loads(pickle.dumps(state))):
+        sim.restore(kept)
+        assert sim.time == time
+        sim.step(10)
+        assert (sim.time, sim.fingerprint()) == (end, wanted)
+
+
+def test_models_and_simulations_show_themselves(scene: pliant.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = scene.build()
+    sim = model.simulate()
+    if os.environ.get("PLIANT_REQUIRE_GPU"):
+        png = sim._repr_png_()
+        assert png is not None and png.startswith(b"\x89PNG") and pliant.Picture(png).size == (960, 720)
+        assert "image/png;base64" in model._repr_html_()
+
+    def no_adapter(*_: object, **__: object) -> None:
+        raise pliant.DeviceError("there is no adapter")
+
+    monkeypatch.setattr(pliant.Simulation, "picture", no_adapter)
+    with pytest.warns(pliant.PliantWarning, match="adapter"):
+        assert sim._repr_png_() is None
+    with pytest.warns(pliant.PliantWarning, match="adapter"):
+        assert "<table>" in model._repr_html_()
+
+
+def test_the_command_ends_with_its_own_code() -> None:
+    command = os.path.join(os.path.dirname(sys.executable), "pliant")
+    if not os.path.exists(command):
+        pytest.skip("the command is not installed")
+    run = lambda *words: subprocess.run([command, *words], capture_output=True).returncode  # noqa: E731
+    assert [run("--version"), run("check", "nowhere"), run("no-such-command")] == [0, 2, 2]
+
+
+def test_threads_that_read_and_step_one_simulation_never_wait_for_each_other_for_ever() -> None:
+    sim = cube(4).build().simulate()
+    until = time.monotonic() + 1.0
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+
+    def again(call: Callable[[], object]) -> None:
+        while time.monotonic() < until:
+            with contextlib.suppress(pliant.BusyError):
+                call()
+
+    calls: list[Callable[[], object]] = [sim.step, lambda: sim.energies, lambda: sim.energies, lambda: sim.steps, lambda: sim.time]
+    threads = [threading.Thread(target=again, args=(call,)) for call in calls]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(timeout=30)
+    sys.setswitchinterval(interval)
+    assert not any(thread.is_alive() for thread in threads) and sim.step() == 1
+
+
+def test_hands_stay_stable_where_steps_grow_and_where_another_hand_fails(scene: pliant.Scene) -> None:
+    sim = scene.replace({"law.tissue.young-modulus": 100e3}).build().simulate()
+    hand = sim.grip(at=(0.1, 0.1, 0.1), stiffness=1e9)
+    firm = hand.stiffness
+    hand.place = hand.point + (0.0, 0.0, 0.002)
+    sim.step(20)
+    sim.set({"law.tissue.young-modulus": 1e3})
+    assert hand.stiffness < firm
+    sim.step(200)
+    with pytest.raises(ValueError, match="nodes"):
+        sim.grip(nodes=[10**6])
+    assert np.isfinite(hand.force).all()
+
+
+def test_a_fork_meshes_anew() -> None:
+    def volume() -> int:
+        i, j, k = np.mgrid[0:12, 0:12, 0:12]
+        ball = ((i - 5.5) ** 2 + (j - 5.5) ** 2 + (k - 5.5) ** 2 < 25).astype(np.uint8)
+        image = pliant.Image(ball, np.diag([2e-3, 2e-3, 2e-3, 1.0]))
+        return len(pliant.Mesh.of_image(image, 1, edge=5e-3).cells["tetra"])
+
+    count = volume()
+    child = os.fork()
+    if child == 0:
+        os._exit(0 if volume() == count else 1)
+    until = time.monotonic() + 30
+    while time.monotonic() < until:
+        done, status = os.waitpid(child, os.WNOHANG)
+        if done:
+            assert os.waitstatus_to_exitcode(status) == 0
+            return
+        time.sleep(0.02)
+    os.kill(child, signal.SIGKILL)
+    raise AssertionError("the child hangs")
+
+
+def test_a_driven_tool_moves_after_a_look_also_where_bodies_touch() -> None:
+    scene = pliant.load(ROOT / "scenes/retraction")
+    sim = scene.build().simulate()
+    name = sim.model.tools[0]
+    sim.contacts()
+    begin = sim.tool(name).place
+    sim.drive(name, begin + (0.0, 0.0, 0.001))
+    sim.step(2)
+    assert np.allclose(sim.tool(name).place, begin + (0.0, 0.0, 0.001), atol=1e-6)

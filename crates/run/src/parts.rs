@@ -108,7 +108,7 @@ impl Sweep {
             return Err(failed(error));
         }
         failures.sort_unstable();
-        let interrupted = options.stop.is_some_and(|stop| stop.load(std::sync::atomic::Ordering::Relaxed));
+        let interrupted = options.stop.is_some_and(pliant_sim::StopFlag::is_asked);
         Ok(PartSummary { rows: path, runs: own.len(), known: known.len(), failures, interrupted })
     }
 

@@ -2,12 +2,11 @@
 
 use std::fmt;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use pliant_explicit::Wanted;
 use pliant_geometry::Mesh;
-use pliant_sim::{Failure, LoadStepProgress, Observer, Schedule, Simulation};
+use pliant_sim::{Failure, LoadStepProgress, Observer, Schedule, Simulation, StopFlag};
 
 use crate::advice::remedy;
 use crate::checkpoint::{Checkpoint, Checkpoints, Progressed};
@@ -47,8 +46,8 @@ pub struct Options<'a> {
     /// Where to go on, in a folder that was [reopened](OutputFolder::reopen) for it and with the plan by which it
     /// [continues](Checkpoint::continues); at the start of the scene if not given.
     pub resume: Option<&'a Checkpoint>,
-    /// Ends the run after the current step once it is true, with a checkpoint if the scene asks for some.
-    pub stop: Option<&'a AtomicBool>,
+    /// Ends the run once it is asked, with a checkpoint if the scene asks for some: after the current step, or before it if that takes long.
+    pub stop: Option<&'a StopFlag>,
     /// Draws the last instant, as the scene's `[view]` shows it, into `picture.png`.
     pub picture: Option<&'a dyn Draw>,
 }
@@ -138,6 +137,9 @@ fn go(
         Ok(simulation) => simulation,
         Err(failure) => return Ok(Outcome::not_begun(failure, world)),
     };
+    if let Some(stop) = options.stop {
+        simulation.stop_on(stop);
+    }
     let mut run = Run::new(world, folder, options, &simulation, report)?;
     let failure = simulation.observe(world.scene.scene.until, &mut run).err();
     let failure = failure.map(|failure| run.advised(failure, &simulation));
@@ -178,8 +180,8 @@ struct Run<'a> {
     checkpoints: Option<Checkpoints<'a>>,
     /// Whether the last instant becomes a picture.
     pictured: bool,
-    /// Ends the run after the current step once it is true.
-    stop: Option<&'a AtomicBool>,
+    /// Ends the run once it is asked.
+    stop: Option<&'a StopFlag>,
     report: &'a mut (dyn FnMut(Progress) + Send),
     /// When progress was last reported.
     reported: Instant,
@@ -326,7 +328,7 @@ impl Observer for Run<'_> {
     /// Writes a checkpoint where one is due or the run is to stop.
     fn stepped(&mut self, simulation: &mut Simulation, last: bool) -> Result<(), Failure> {
         let (time, step) = (simulation.time(), simulation.step_length());
-        let stop = self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed));
+        let stop = self.stop.is_some_and(StopFlag::is_asked);
         let due = self.checkpoints.as_mut().is_some_and(|all| all.is_due(time, step, last || stop));
         if due && let Some(checkpoints) = &self.checkpoints {
             let states = simulation.encode()?;

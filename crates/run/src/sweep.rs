@@ -4,11 +4,11 @@
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use pliant_mechanics::{Energies, fingerprint};
-use pliant_sim::number;
+use pliant_sim::{StopFlag, number};
 use serde::{Deserialize, Serialize};
 
 use crate::output::{
@@ -52,8 +52,8 @@ pub struct SweepOptions<'a> {
     pub threads: usize,
     /// Whether the series of fields are written, too.
     pub keep_fields: bool,
-    /// Ends the sweep once it is true.
-    pub stop: Option<&'a AtomicBool>,
+    /// Ends the sweep once it is asked.
+    pub stop: Option<&'a StopFlag>,
 }
 
 /// How far a sweep is.
@@ -465,18 +465,13 @@ fn quoted(text: &str) -> String {
 
 /// Does the work of all runs on some threads, each run on one; after `stop` none is begun. A run's own pool is inside
 /// its thread: a worker of rayon's that waits for it would begin another run meanwhile.
-pub(crate) fn in_parallel(
-    runs: usize,
-    threads: usize,
-    stop: Option<&AtomicBool>,
-    work: impl Fn(usize) + Sync,
-) {
+pub(crate) fn in_parallel(runs: usize, threads: usize, stop: Option<&StopFlag>, work: impl Fn(usize) + Sync) {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = if threads == 0 { cores } else { threads }.min(runs.max(1));
     let next = AtomicUsize::new(0);
     let take = || {
         let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-        while !stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+        while !stop.is_some_and(StopFlag::is_asked) {
             let run = next.fetch_add(1, Ordering::Relaxed);
             if run >= runs {
                 break;

@@ -8,6 +8,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use pliant_geometry::Mesh;
+use pliant_imaging::Image;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -28,7 +29,16 @@ pub struct Source {
     root: Node,
     assignments: Vec<String>,
     reads: Reads,
-    given: BTreeMap<String, Arc<Mesh>>,
+    given: Given,
+}
+
+/// Meshes and images of the program that reads a scene, by the names that its tables call them.
+#[derive(Clone, Debug, Default)]
+pub struct Given {
+    /// Of bodies: `mesh = { given = "NAME" }`.
+    pub meshes: BTreeMap<String, Arc<Mesh>>,
+    /// In place of the file of this name wherever a scene names an image: `image = "NAME"`.
+    pub images: BTreeMap<String, Arc<Image>>,
 }
 
 /// What the user types before an assignment.
@@ -213,7 +223,7 @@ impl Source {
                 root: Node { place: Place::File(0..0), key_span: None, value },
                 assignments: Vec::new(),
                 reads: Reads::anywhere(),
-                given: BTreeMap::new(),
+                given: Given::default(),
             }),
             _ => Err(SceneErrors::new(name, text, diagnostics)),
         }
@@ -224,13 +234,13 @@ impl Source {
         Self { reads, ..self }
     }
 
-    /// The same, with meshes of the program that reads it: bodies take them by their names, `mesh = { given = "NAME" }`.
-    pub fn giving(self, given: BTreeMap<String, Arc<Mesh>>) -> Self {
+    /// The same, with meshes and images of the program that reads it.
+    pub fn giving(self, given: Given) -> Self {
         Self { given, ..self }
     }
 
-    /// The meshes that the program gives, by name.
-    pub fn given(&self) -> &BTreeMap<String, Arc<Mesh>> {
+    /// The meshes and images that the program gives.
+    pub fn given(&self) -> &Given {
         &self.given
     }
 

@@ -121,6 +121,10 @@ impl Solver<f32> for GpuStepper {
         GpuStepper::go_on(self, clock, step, state);
     }
 
+    fn goes_back(&self) -> bool {
+        false
+    }
+
     fn balance_floor(&self) -> f64 {
         GpuStepper::balance_floor(self)
     }

@@ -5,6 +5,11 @@ use std::fmt;
 use pliant_explicit::{RelaxationError, StepError};
 use serde::Serialize;
 
+use crate::words::number;
+
+/// The kind of a run that someone stopped.
+pub const INTERRUPTED: &str = "interrupted";
+
 /// A failure, with its place and time.
 #[derive(Clone, Debug, Serialize)]
 pub struct Failure {
@@ -59,6 +64,17 @@ impl Failure {
         Self::new("input", error.to_string(), None)
     }
 
+    /// A step that was stopped before its end, at the time [s] of its start.
+    pub(crate) fn stopped(time: f64) -> Self {
+        let message = format!("stopped within the step after t = {} s, which was not taken", number(time));
+        Self::new(INTERRUPTED, message, Some(time))
+    }
+
+    /// Whether someone asked for it.
+    pub fn is_interrupted(&self) -> bool {
+        self.kind == INTERRUPTED
+    }
+
     /// The same failure with another remedy.
     #[must_use]
     pub fn advised(mut self, remedy: &str) -> Self {
@@ -77,6 +93,7 @@ impl Failure {
         };
         let message = format!("{which}: {error}; {}", error.remedy());
         let (kind, body, element, node, time, iterations, residual) = match error {
+            RelaxationError::Stopped { time } => return Self::new(INTERRUPTED, message, Some(*time)),
             RelaxationError::NotFinite { body, node, iterations, time, .. } => {
                 ("not-finite", body, None, *node, *time, *iterations, None)
             }

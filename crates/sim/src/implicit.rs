@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use pliant_contact::lag::Lag;
 use pliant_contact::pose::Leg;
 use pliant_contact::pressure::{faces, pressures};
-use pliant_explicit::{NodeContact, Wanted};
+use pliant_explicit::{Clock, NodeContact, Wanted};
 use pliant_implicit::{
     Assembly, BackwardEuler, DynamicSettings, Explicit, Forces, Phases, SolveError, Spring, State, Statics,
     TouchingNow, TouchingSystem,
@@ -17,7 +17,8 @@ use pliant_mechanics::grip::{Grip, ROOM};
 use pliant_mechanics::mapping::Mapping;
 use pliant_mechanics::model::{Enclosed, Motion};
 use pliant_mechanics::tensor::Vector;
-use pliant_mechanics::{Energies, fingerprint};
+use pliant_mechanics::{Energies, StopFlag, fingerprint};
+use serde::{Deserialize, Serialize};
 
 use crate::bodies::{ImplicitBodies, RunControl, Stop};
 use crate::failure::Failure;
@@ -80,8 +81,8 @@ pub(crate) struct Implicit {
 }
 
 /// How far a run by arc length is.
-#[derive(Default)]
-struct Path {
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Path {
     /// Load factor at the step before.
     factor: f64,
     /// Its last change.
@@ -89,6 +90,8 @@ struct Path {
     limit_points: u32,
     /// Why it ended before its last step.
     ended: Option<String>,
+    /// Of a path that is kept, [where it goes on](Statics::direction).
+    direction: Vec<f64>,
 }
 
 /// A solver, and the forces at an instant: an explicit one finds them anyway.
@@ -418,6 +421,11 @@ fn keep(all: &mut VecDeque<Iterated>, more: impl Iterator<Item = Iterated>) {
 }
 
 impl Path {
+    /// Whether it is one of so many nodes.
+    pub(crate) fn fits(&self, nodes: usize) -> bool {
+        self.direction.is_empty() || self.direction.len() == 6 * nodes
+    }
+
     /// Takes the load factor of the next equilibrium.
     fn go_on(&mut self, factor: f64) {
         let change = factor - self.factor;
@@ -483,6 +491,8 @@ impl Implicit {
             effort,
             convergence,
             contact,
+            legs,
+            path,
             entered,
         } = remembered;
         (self.done, self.time) = (done, time);
@@ -491,18 +501,23 @@ impl Implicit {
         if let SolverMethod::Implicit(solver, _) = &mut self.method {
             solver.go_on_from(previous.map(|previous| previous.state()));
         }
+        if let SolverMethod::Static(solver, _) = &mut self.method {
+            solver.go_on_along(&path.direction);
+        }
+        self.path = path;
         self.before = before.map(|(forces, state)| (forces, state.state()));
         self.energies = energies;
         (self.effort, self.effort_before) = (effort.clone(), effort);
         (self.evaluated, self.entered) = (false, entered);
-        let Some(ContactState { forces, totals, moments, energy, touches, pairs, legs, lags }) = contact
-        else {
+        if let Some(own) = self.method.touching_mut() {
+            *own.legs_mut() = legs.into_iter().collect();
+        }
+        let Some(ContactState { forces, totals, moments, energy, touches, pairs, lags }) = contact else {
             return Ok(());
         };
         let gap = touches.iter().map(|own| own.gap).reduce(f64::min);
         if let Some(own) = self.method.touching_mut() {
             own.go_on_from(touches.clone(), lags);
-            *own.legs_mut() = legs.into_iter().collect();
         }
         self.touching = Some(TouchingNow { forces, totals, moments, energy, gap, nodes: touches });
         let taken = self.method.take_contact_pairs(pairs);
@@ -522,7 +537,7 @@ impl Implicit {
             previous,
             energies: self.energies,
             effort: self.effort.clone(),
-            convergence: self.convergence.clone(),
+            convergence: VecDeque::new(),
             contact: self.touching.as_ref().zip(self.method.touching()).map(|(now, own)| ContactState {
                 forces: now.forces.clone(),
                 totals: now.totals.clone(),
@@ -530,9 +545,20 @@ impl Implicit {
                 energy: now.energy,
                 touches: now.nodes.clone(),
                 pairs: own.pairs().to_vec(),
-                legs: own.legs().iter().map(|(&rigid, &leg)| (rigid, leg)).collect(),
                 lags: own.lags().to_vec(),
             }),
+            legs: (self.method.touching().into_iter())
+                .flat_map(|own| own.legs().iter().map(|(&rigid, &leg)| (rigid, leg)))
+                .collect(),
+            path: Path {
+                direction: match &self.method {
+                    SolverMethod::Static(solver, _) if self.bodies.control.is_some() => {
+                        solver.direction().to_vec()
+                    }
+                    _ => Vec::new(),
+                },
+                ..self.path.clone()
+            },
             entered: self.entered,
         }
     }
@@ -762,16 +788,37 @@ impl Participant for Implicit {
     }
 
     /// What was spent since then counts.
-    fn go_back(&mut self, kept: &Kept) -> Result<(), Failure> {
+    fn goes_back_to(&self, kept: &Kept) -> bool {
+        // What is touched at the start is not known before contacts are looked at.
+        matches!(kept, Kept::Implicit(state) if state.contact.is_some() || self.method.touching().is_none())
+    }
+
+    fn go_back(&mut self, kept: &Kept, _steps: Option<(Clock, f64)>) -> Result<(), Failure> {
         let Kept::Implicit(state) = kept else { return Ok(()) };
-        let (effort, before) = (self.effort.clone(), self.effort_before.clone());
+        let spent = (self.effort.clone(), self.effort_before.clone());
+        let convergence = std::mem::take(&mut self.convergence);
         self.resume((**state).clone())?;
-        (self.effort, self.effort_before) = (effort, before);
+        (self.effort, self.effort_before) = spent;
+        self.convergence = convergence;
         Ok(())
+    }
+
+    fn stop_on(&mut self, flag: &StopFlag) {
+        match &mut self.method {
+            SolverMethod::Static(solver, _) => solver.stop_on(flag),
+            SolverMethod::Implicit(solver, _) => solver.stop_on(flag),
+            SolverMethod::Explicit(_) => {}
+        }
     }
 
     fn kept(&self) -> Kept {
         Kept::Implicit(Box::new(self.snapshot()))
+    }
+
+    fn add_log(&self, kept: &mut Kept) {
+        if let Kept::Implicit(state) = kept {
+            state.convergence.clone_from(&self.convergence);
+        }
     }
 
     fn fingerprint(&self) -> u64 {
@@ -812,6 +859,7 @@ fn failure(
         }
         SolveError::Indefinite { .. } => ("unstable", None, None),
         SolveError::Broken { cell, .. } => ("inverted", None, bodies.cell(*cell)),
+        SolveError::Stopped => return Failure::stopped(time),
         SolveError::Open(_) | SolveError::Impossible(_) => ("input", None, None),
     };
     let owner = node.and_then(body_of);

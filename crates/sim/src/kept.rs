@@ -14,6 +14,7 @@ use pliant_mechanics::{Energies, Model};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use crate::implicit::Path;
 use crate::instant::Effort;
 use crate::part::{Method, Part, Precision};
 use crate::solver::Memory;
@@ -55,6 +56,18 @@ impl Kept {
         }
     }
 
+    /// Drives a tool or a jaw from the step on that follows.
+    pub fn drive(&mut self, rigid: usize, leg: Leg) {
+        match self {
+            Self::Single(state, _) => state.drive(rigid, leg),
+            Self::Double(state, _) => state.drive(rigid, leg),
+            Self::Implicit(state) => {
+                state.legs.retain(|(own, _)| *own as usize != rigid);
+                state.legs.push((rigid as u32, leg));
+            }
+        }
+    }
+
     /// Whether it has the sizes of a participant's model, and is of its method.
     pub fn fits(&self, part: &Part) -> bool {
         match self {
@@ -79,6 +92,9 @@ pub(crate) struct ImplicitState {
     pub effort: Effort,
     pub convergence: VecDeque<Iterated>,
     pub contact: Option<ContactState>,
+    /// Where tools go that are driven from outside.
+    pub legs: Vec<(u32, Leg)>,
+    pub path: Path,
     /// Whether forces were found at the instant, so that their work is entered.
     pub entered: bool,
 }
@@ -97,8 +113,6 @@ pub(crate) struct ContactState {
     pub touches: Vec<NodeTouch>,
     /// Pairs of nodes in the pattern of the equations beside those of cells: the order of sums depends on it.
     pub pairs: Vec<[u32; 2]>,
-    /// Where tools go that are driven from outside.
-    pub legs: Vec<(u32, Leg)>,
     /// How far tools whose force is limited are behind their trajectories.
     pub lags: Vec<Lag>,
 }
@@ -113,7 +127,6 @@ impl ContactState {
             && self.touches.is_sorted_by(|a, b| a.node < b.node)
             && self.touches.iter().all(|own| known(own.node) && own.slip.is_finite())
             && self.pairs.iter().flatten().all(|&node| known(node))
-            && self.legs.iter().all(|(_, leg)| leg.is_finite())
             && self.lags.iter().map(Lag::rigid).eq(limited.map(|(number, _)| number))
             && self.lags.iter().all(Lag::is_finite)
     }
@@ -130,7 +143,12 @@ impl ImplicitState {
             (Some(contact), Some(contacts)) => contact.fits(nodes, contacts),
             (Some(_), None) => false,
         };
-        before && contact && self.previous.iter().all(|state| state.fits(model)) && self.state.fits(model)
+        before
+            && contact
+            && self.path.fits(nodes)
+            && self.legs.iter().all(|(_, leg)| leg.is_finite())
+            && self.previous.iter().all(|state| state.fits(model))
+            && self.state.fits(model)
     }
 }
 

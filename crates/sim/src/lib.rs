@@ -61,7 +61,7 @@ mod words;
 pub use bodies::{BodyCells, ImplicitBodies, RunControl, Stop};
 #[cfg(feature = "gpu")]
 pub use device::{MappedPoint, OnDevice};
-pub use failure::{FailedLoadStep, Failure};
+pub use failure::{FailedLoadStep, Failure, INTERRUPTED};
 pub use guests::{Guests, GuestsNow};
 pub use instant::{CellsNow, Effort, Instant};
 pub use part::{Explicit, Method, Part, Precision};
@@ -73,6 +73,9 @@ pub use solver::{Equilibria, LoadStepProgress};
 pub use steps::{Critical, SAFETY, Steps};
 pub use tools::ToolNow;
 pub use words::{counted, number};
+
+/// Ends long work early.
+pub use pliant_mechanics::StopFlag;
 
 /// Obstacles, tools, and bodies that touch them.
 pub use pliant_contact as contact;

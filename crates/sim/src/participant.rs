@@ -6,6 +6,7 @@ use pliant_explicit::State;
 use pliant_explicit::{Clock, Wanted};
 #[cfg(feature = "gpu")]
 use pliant_gpu::GpuStepper;
+use pliant_mechanics::StopFlag;
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::tensor::Vector;
 
@@ -71,11 +72,17 @@ pub(crate) trait Participant: Instant + Send {
         None
     }
 
-    /// Goes back to a state that it was in.
+    /// Whether it can go back to a state of its part; else it is made anew for that.
+    fn goes_back_to(&self, kept: &Kept) -> bool;
+
+    /// Goes back to a state that it [can](Self::goes_back_to), with the clock of explicit steps and their length [s].
     ///
     /// # Errors
     /// If equations are too many.
-    fn go_back(&mut self, kept: &Kept) -> Result<(), Failure>;
+    fn go_back(&mut self, kept: &Kept, steps: Option<(Clock, f64)>) -> Result<(), Failure>;
+
+    /// Looks at a flag within steps that take long; such a step fails as [interrupted](crate::INTERRUPTED).
+    fn stop_on(&mut self, _flag: &StopFlag) {}
 
     /// Brings the state back to ordinary memory, whole.
     ///
@@ -87,6 +94,9 @@ pub(crate) trait Participant: Instant + Send {
 
     /// The state and what a restart needs beside it, after [`advance`](Self::advance).
     fn kept(&self) -> Kept;
+
+    /// Adds what a checkpoint has beside that: the residuals of iterations so far.
+    fn add_log(&self, _kept: &mut Kept) {}
 
     /// How its steps are counted, of a stepper whose increments tell velocities.
     fn clock(&self) -> Option<Clock> {

@@ -366,6 +366,11 @@ impl Method {
         matches!(self, Self::Implicit(..))
     }
 
+    /// Whether a step may take so long that one waits for it.
+    pub(crate) fn takes_long(&self) -> bool {
+        self.solves_steps() || matches!(self, Self::Static(..) | Self::QuasiStatic { .. })
+    }
+
     /// Why no tie to another participant holds bodies that are stepped by it; `None` if one does.
     pub fn untied(&self) -> Option<&'static str> {
         match self {

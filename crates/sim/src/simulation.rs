@@ -7,7 +7,7 @@ use pliant_explicit::{Clock, Wanted};
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::model::Enclosed;
 use pliant_mechanics::tensor::Vector;
-use pliant_mechanics::{Energies, Model, fingerprint};
+use pliant_mechanics::{Energies, Model, StopFlag, fingerprint};
 use serde::{Deserialize, Serialize};
 
 #[cfg(feature = "gpu")]
@@ -103,6 +103,13 @@ struct OwnState {
     step: f64,
 }
 
+impl OwnState {
+    /// How its steps are counted, and their length [s].
+    fn steps(&self) -> Option<(Clock, f64)> {
+        self.clock.map(|clock| (clock, self.step))
+    }
+}
+
 impl State {
     /// The state of each participant as bytes, as [`Simulation::encode`] has it.
     ///
@@ -112,7 +119,23 @@ impl State {
         let Self(parts, between) = self;
         let alone = between.is_empty();
         let between = (!alone).then(|| postcard::to_stdvec(between));
-        parts.iter().map(|own| own.kept.encode()).chain(between).collect()
+        let of = |own: &OwnState| {
+            let steps = postcard::to_stdvec(&own.steps())?;
+            Ok([steps, own.kept.encode()?].concat())
+        };
+        parts.iter().map(of).chain(between).collect()
+    }
+
+    /// Whether it is one of a world.
+    ///
+    /// # Errors
+    /// If not.
+    fn check(&self, world: &World) -> Result<(), Failure> {
+        let Self(parts, between) = self;
+        let is_own = parts.len() == world.parts.len()
+            && between.fits(world)
+            && parts.iter().zip(&world.parts).all(|(own, part)| own.kept.fits(part));
+        if is_own { Ok(()) } else { Err(Failure::input(&"the state is of another model")) }
     }
 
     /// The state whose participants were [encoded](Simulation::encode); `None` where these bytes are none of this world.
@@ -124,8 +147,13 @@ impl State {
             _ => return None,
         };
         let of = |(part, bytes): (&Part, &B)| {
-            let kept = Kept::decode(part, bytes.as_ref())?;
-            Some(OwnState { kept, clock: None, step: part.steps.step })
+            let (steps, bytes) = postcard::take_from_bytes::<Option<(Clock, f64)>>(bytes.as_ref()).ok()?;
+            let kept = Kept::decode(part, bytes)?;
+            Some(OwnState {
+                kept,
+                clock: steps.map(|of| of.0),
+                step: steps.map_or(part.steps.step, |of| of.1),
+            })
         };
         let parts = world.parts.iter().zip(participants).map(of).collect::<Option<_>>()?;
         between.fits(world).then_some(Self(parts, between))
@@ -175,10 +203,14 @@ pub struct Simulation {
     hands: Vec<Vec<Grip>>,
     springs: Springs,
     meetings: Meetings,
+    /// Forces [N] on all nodes that [`push`](Self::push) gave; empty without any.
+    pushed: Vec<Vector<f64>>,
     /// States at the common instant before the step, where participants touch each other.
-    before: Vec<Kept>,
+    before: Vec<OwnState>,
     /// Whether forces, energies and reactions belong to the instant.
     evaluated: bool,
+    /// Ends long steps; the state before such a step is then kept.
+    stop: Option<StopFlag>,
 }
 
 impl Simulation {
@@ -199,14 +231,13 @@ impl Simulation {
     ///
     /// # Errors
     /// If a stepper can't be made, or the state is of another world.
-    pub fn resumed(world: impl Into<Arc<World>>, State(state, between): State) -> Result<Self, Failure> {
-        let (world, other) = (world.into(), || Failure::input(&"the state is of another model"));
-        if state.is_empty() || state.len() != world.parts.len() || !between.fits(&world) {
-            return Err(other());
-        }
+    pub fn resumed(world: impl Into<Arc<World>>, state: State) -> Result<Self, Failure> {
+        let world = world.into();
+        state.check(&world)?;
+        let State(state, between) = state;
         let mut participants = Vec::new();
         for (part, own) in world.parts.iter().zip(state) {
-            participants.push(go_on(part, own.kept, None)?.ok_or_else(other)?);
+            participants.push(resume(part, own)?);
         }
         Self::of(world, participants, between)
     }
@@ -231,9 +262,9 @@ impl Simulation {
             if !same_mesh(before, part) {
                 return Ok(None);
             }
-            let OwnState { kept, clock, step } = own;
-            let steps = clock.map(|clock| Before { clock, step, model: &before.model });
-            match go_on(part, kept, steps)? {
+            let model = Some(&*before.model);
+            let steps = own.steps().map(|(clock, step)| Before { clock, step, model });
+            match go_on(part, own.kept, steps)? {
                 Some(participant) => participants.push(participant),
                 None => return Ok(None),
             }
@@ -271,8 +302,10 @@ impl Simulation {
             hands,
             springs,
             meetings,
+            pushed: Vec::new(),
             before,
             evaluated: false,
+            stop: None,
         })
     }
 
@@ -329,26 +362,36 @@ impl Simulation {
     /// If forces can't be found, a step can't be taken, or the observer ends the run. The simulation stays at the last good instant.
     pub fn observe(&mut self, until: f64, observer: &mut dyn Observer) -> Result<(), Failure> {
         loop {
-            let last = self.is_last(until);
+            let to_the_end = self.steps_until(until);
+            let last = to_the_end == 0;
             self.evaluate(observer.wanted(self, last))?;
             observer.see(self, last)?;
             if last {
                 return Ok(());
             }
-            let to_the_end = steps_to(until, self.time(), self.step_length());
             let steps = observer.stride(self).min(to_the_end).min(self.stride());
-            if let Err(failure) = self.advance(steps, &mut |progress| observer.watch(progress)) {
-                observer.step_failed(self);
-                return Err(failure);
+            match self.advance(steps, &mut |progress| observer.watch(progress)) {
+                // Who asked for the stop says what becomes of the run.
+                Err(failure) if failure.is_interrupted() => {
+                    observer.stepped(self, false)?;
+                    return Err(failure);
+                }
+                Err(failure) => {
+                    observer.step_failed(self);
+                    return Err(failure);
+                }
+                Ok(()) => {}
             }
-            let last = self.is_last(until);
+            let last = self.steps_until(until) == 0;
             observer.stepped(self, last)?;
         }
     }
 
-    /// Whether a run until a time [s] ends here.
-    fn is_last(&self, until: f64) -> bool {
-        self.time() + 0.5 * self.step_length() >= until || self.ended().is_some()
+    /// Common steps from here to the instant nearest to a time [s]; 0 where it has passed, or the run has [ended](Self::ended).
+    pub fn steps_until(&self, time: f64) -> u64 {
+        let (now, step) = (self.time(), self.step_length());
+        let is_last = now + 0.5 * step >= time || self.ended().is_some();
+        if is_last { 0 } else { steps_to(time, now, step) }
     }
 
     /// All that can be read at the instant; its forces are found. The next step goes on from it.
@@ -368,7 +411,13 @@ impl Simulation {
         if !self.evaluated {
             if !self.meetings.is_empty() {
                 self.before.clear();
-                self.before.extend(self.participants.iter().map(|own| own.kept()));
+                let parts = self.participants.iter().zip(&self.world.parts);
+                let own = |(now, part): (&Box<dyn Participant>, &Part)| OwnState {
+                    kept: now.kept(),
+                    clock: None,
+                    step: part.steps.step,
+                };
+                self.before.extend(parts.map(own));
             }
             if !(self.springs.is_empty() && self.meetings.is_empty()) {
                 self.springs.meet(&self.participants);
@@ -394,17 +443,43 @@ impl Simulation {
     /// # Errors
     /// If a step of a participant can't be taken.
     pub fn advance(&mut self, steps: u64, watch: &mut dyn FnMut(LoadStepProgress)) -> Result<(), Failure> {
-        if !self.meetings.is_empty() {
-            self.advance_in_contact(watch)?;
-        } else if !self.springs.is_empty() {
-            self.advance_tied(watch)?;
-        } else {
-            for part in 0..self.participants.len() {
-                self.advance_apart(part, steps, watch)?;
+        let before = self.can_stop_within().then(|| self.motion()).transpose()?;
+        let result = self.pass(steps, watch);
+        match (result, before) {
+            (Err(failure), Some(before)) if failure.is_interrupted() => {
+                self.go_back(before)?;
+                (0..self.participants.len()).for_each(|part| {
+                    self.take_hold(part);
+                });
+                Err(Failure::stopped(self.time()))
+            }
+            (result, _) => {
+                self.evaluated &= result.is_err();
+                result
             }
         }
-        self.evaluated = false;
-        Ok(())
+    }
+
+    /// Looks at a flag from now on within load steps and steps whose equations are solved. A step that it ends fails as
+    /// [interrupted](Failure::is_interrupted), and the simulation stays at the instant before, with the same bits as if the step had never begun.
+    pub fn stop_on(&mut self, flag: &StopFlag) {
+        self.participants.iter_mut().for_each(|participant| participant.stop_on(flag));
+        self.stop = Some(flag.clone());
+    }
+
+    /// Whether a flag may end steps before their end.
+    fn can_stop_within(&self) -> bool {
+        self.stop.is_some() && self.world.parts.iter().any(|part| part.method.takes_long())
+    }
+
+    fn pass(&mut self, steps: u64, watch: &mut dyn FnMut(LoadStepProgress)) -> Result<(), Failure> {
+        if !self.meetings.is_empty() {
+            self.advance_in_contact(watch)
+        } else if !self.springs.is_empty() {
+            self.advance_tied(watch)
+        } else {
+            (0..self.participants.len()).try_for_each(|part| self.advance_apart(part, steps, watch))
+        }
     }
 
     fn advance_apart(
@@ -456,12 +531,11 @@ impl Simulation {
     fn advance_in_contact(&mut self, watch: &mut dyn FnMut(LoadStepProgress)) -> Result<(), Failure> {
         for pass in 0.. {
             self.done.fill(0);
-            for (part, before) in self.before.iter().enumerate() {
-                // Forces of a host were found with guests where they were expected.
-                if pass > 0 || self.meetings.is_host(part) {
-                    self.participants[part].go_back(before)?;
-                }
-            }
+            let before = std::mem::take(&mut self.before);
+            // Forces of a host were found with guests where they were expected.
+            let back = self.put_back(&before, |own, part| pass > 0 || own.meetings.is_host(part));
+            self.before = before;
+            back?;
             while let Some(part) = self.hindmost() {
                 // Who has not gone back has found the forces of the first step where all met.
                 if pass > 0 || self.done[part] > 0 || self.meetings.is_host(part) {
@@ -502,6 +576,12 @@ impl Simulation {
     /// Drives a tool or a jaw of a participant.
     pub(crate) fn lead_part(&mut self, part: usize, rigid: usize, leg: Leg) {
         self.participants[part].drive(rigid, leg);
+        // A step in contact begins at the instant before forces were found.
+        if self.evaluated
+            && let Some(before) = self.before.get_mut(part)
+        {
+            before.kept.drive(rigid, leg);
+        }
     }
 
     /// The ties between participants at the instant last evaluated.
@@ -526,40 +606,76 @@ impl Simulation {
     /// # Errors
     /// If a device fails.
     pub fn state(&mut self) -> Result<State, Failure> {
+        let mut state = self.motion()?;
+        state.0.iter_mut().zip(&self.participants).for_each(|(own, now)| now.add_log(&mut own.kept));
+        Ok(state)
+    }
+
+    /// The state without what participants note of their iterations.
+    fn motion(&mut self) -> Result<State, Failure> {
         self.bring_back()?;
         let parts = self.world.parts.iter().zip(&self.participants).enumerate();
         let own = parts.map(|(index, (part, now))| {
-            let kept = self.met().map_or_else(|| now.kept(), |met| met[index].clone());
+            let kept = self.met().map_or_else(|| now.kept(), |met| met[index].kept.clone());
             OwnState { clock: now.clock(), kept, step: part.steps.step }
         });
         Ok(State(own.collect(), self.between()))
     }
 
     /// The states at the instant before its forces were found, where participants touch each other and forces are found.
-    fn met(&self) -> Option<&[Kept]> {
+    fn met(&self) -> Option<&[OwnState]> {
         (self.evaluated && !self.meetings.is_empty()).then_some(&self.before[..])
     }
 
-    /// Goes back, or on, to a state of this world. Hands let go.
+    /// Goes back, or on, to a state of this world. Hands let go; forces of [`push`](Self::push) stay.
     ///
     /// # Errors
     /// If it is of another world, or a device fails. The simulation then stays as it was.
     pub fn restore(&mut self, state: State) -> Result<(), Failure> {
-        let before = std::mem::replace(self, Self::resumed(Arc::clone(&self.world), state)?);
-        self.take_place_of(before);
+        state.check(&self.world)?;
+        self.go_back(state)?;
+        self.hold(&[]);
         Ok(())
     }
 
-    /// Keeps displacements at the addresses where those of another simulation of the same meshes were.
-    fn take_place_of(&mut self, mut before: Self) {
-        for (own, before) in self.participants.iter_mut().zip(&mut before.participants) {
-            if let (Some(here), Some(there)) = (own.displacements_mut(), before.displacements_mut()) {
-                here.take_place_of(there);
-            }
-        }
+    /// Goes back to a state that fits the world.
+    fn go_back(&mut self, State(parts, between): State) -> Result<(), Failure> {
+        let springs = Springs::new(&self.world.ties, &self.world.parts, between.ties)?;
+        let meetings = Meetings::new(&self.world.guests, &self.world.parts, &self.ratios, between.guests)?;
+        self.put_back(&parts, |_, _| true)?;
+        (self.springs, self.meetings, self.evaluated) = (springs, meetings, false);
+        Ok(())
     }
 
-    /// Goes on with other numbers (laws, loads, steps) from the present state. False, and nothing changes, where the other world has other
+    /// Brings some participants back to states of their parts; those that can't go back are made anew. Where one can't be made, nothing changes.
+    fn put_back(
+        &mut self,
+        states: &[OwnState],
+        chosen: impl Fn(&Self, usize) -> bool,
+    ) -> Result<(), Failure> {
+        let mut made = Vec::new();
+        for (part, state) in states.iter().enumerate() {
+            if chosen(self, part) && !self.participants[part].goes_back_to(&state.kept) {
+                made.push((part, resume(&self.world.parts[part], state.clone())?));
+            }
+        }
+        for (part, state) in states.iter().enumerate() {
+            if chosen(self, part) && self.participants[part].goes_back_to(&state.kept) {
+                self.participants[part].go_back(&state.kept, state.steps())?;
+            }
+        }
+        for (part, anew) in made {
+            let mut before = std::mem::replace(&mut self.participants[part], anew);
+            take_place_of(&mut self.participants[part], &mut before);
+            if let Some(flag) = &self.stop {
+                self.participants[part].stop_on(flag);
+            }
+            self.push_part(part);
+        }
+        Ok(())
+    }
+
+    /// Goes on with other numbers (laws, loads, steps) from the present state. Hands let go; forces of [`push`](Self::push) stay. False, and nothing changes, where the other world has other
     /// meshes, solvers or number types.
     ///
     /// # Errors
@@ -568,8 +684,15 @@ impl Simulation {
         let state = self.state()?;
         match Self::continued(world, state, &self.world)? {
             Some(other) => {
-                let before = std::mem::replace(self, other);
-                self.take_place_of(before);
+                let mut before = std::mem::replace(self, other);
+                for (own, before) in self.participants.iter_mut().zip(&mut before.participants) {
+                    take_place_of(own, before);
+                }
+                if let Some(flag) = &before.stop {
+                    self.stop_on(flag);
+                }
+                self.pushed = before.pushed;
+                (0..self.participants.len()).for_each(|part| self.push_part(part));
                 Ok(true)
             }
             None => Ok(false),
@@ -681,12 +804,22 @@ impl Simulation {
                 "forces on nodes act on the CPU only: choose `device = \"cpu\"`, or hold nodes by grips";
             return Err(Failure::new("device", remedy.to_owned(), Some(self.time())));
         }
-        for (part, &first) in self.first_nodes.iter().enumerate() {
-            let first = (first as usize).min(forces.len());
-            let own = &forces[first..(first + self.world.parts[part].model.node_count()).min(forces.len())];
-            self.participants[part].push(own);
-        }
+        self.pushed.clear();
+        self.pushed.extend_from_slice(forces);
+        (0..self.participants.len()).for_each(|part| self.push_part(part));
         Ok(())
+    }
+
+    /// Gives a participant what its nodes are pushed with.
+    fn push_part(&mut self, part: usize) {
+        let first = (self.first_nodes[part] as usize).min(self.pushed.len());
+        let end = (first + self.world.parts[part].model.node_count()).min(self.pushed.len());
+        self.participants[part].push(&self.pushed[first..end]);
+    }
+
+    /// The forces [N] that [`push`](Self::push) gave, one a node; none without any.
+    pub fn pushed(&self) -> &[Vector<f64>] {
+        &self.pushed
     }
 
     /// The stiffness [N/m] up to which a grip leaves steps stable; infinite where steps are stable with any.
@@ -771,7 +904,7 @@ pub trait Observer {
     /// Whatever shall end the run.
     fn see(&mut self, simulation: &Simulation, last: bool) -> Result<(), Failure>;
 
-    /// Follows a step. Forces are not found yet.
+    /// Follows a step, or one that was stopped before its end and not taken. Forces are not found yet.
     ///
     /// # Errors
     /// Whatever shall end the run.
@@ -793,6 +926,19 @@ impl Simulation {
         let [only] = &mut self.participants[..] else { return None };
         let (stepper, state) = only.on_device()?;
         Some(OnDevice { stepper, state, evaluated: &mut self.evaluated })
+    }
+}
+
+/// A participant that goes on from a state of its part.
+fn resume(part: &Part, own: OwnState) -> Result<Box<dyn Participant>, Failure> {
+    let steps = own.steps().map(|(clock, step)| Before { clock, step, model: None });
+    go_on(part, own.kept, steps)?.ok_or_else(|| Failure::input(&"the state is of another model"))
+}
+
+/// Keeps displacements of a participant at the addresses where those of another one of the same meshes were.
+fn take_place_of(own: &mut Box<dyn Participant>, before: &mut Box<dyn Participant>) {
+    if let (Some(here), Some(there)) = (own.displacements_mut(), before.displacements_mut()) {
+        here.take_place_of(there);
     }
 }
 

@@ -9,6 +9,7 @@ use pliant_explicit::stability::{Stability, cell_limit};
 use pliant_explicit::{Clock, NodeContact, Scalar, State, Wanted};
 #[cfg(feature = "gpu")]
 use pliant_gpu::GpuStepper;
+use pliant_mechanics::StopFlag;
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::mapping::{Displaced, Mapping};
 use pliant_mechanics::model::Enclosed;
@@ -310,14 +311,22 @@ impl<R: Numeric> Participant for Solids<R> {
         Some(R::reals_mut(&mut self.state.displacement))
     }
 
-    fn go_back(&mut self, kept: &Kept) -> Result<(), Failure> {
-        if let Some((state, memory)) = R::kept(kept) {
-            let mut displacement = std::mem::take(&mut self.state.displacement);
-            displacement.copy_from_slice(&state.displacement);
-            self.state = State { displacement, ..state.clone() };
-            self.solver.resume(memory.clone());
-        }
+    fn goes_back_to(&self, kept: &Kept) -> bool {
+        R::kept(kept).is_some() && self.solver.goes_back()
+    }
+
+    fn go_back(&mut self, kept: &Kept, steps: Option<(Clock, f64)>) -> Result<(), Failure> {
+        let Some((state, memory)) = R::kept(kept) else { return Ok(()) };
+        // The vector keeps its address.
+        let mut displacement = std::mem::take(&mut self.state.displacement);
+        displacement.copy_from_slice(&state.displacement);
+        self.state = State { displacement, ..state.clone() };
+        self.resume(memory.clone(), steps);
         Ok(())
+    }
+
+    fn stop_on(&mut self, flag: &StopFlag) {
+        self.solver.stop_on(flag);
     }
 
     fn bring_back(&mut self) -> Result<(), Failure> {

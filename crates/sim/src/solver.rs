@@ -8,6 +8,7 @@ use pliant_explicit::{
 };
 #[cfg(feature = "gpu")]
 use pliant_gpu::GpuStepper;
+use pliant_mechanics::StopFlag;
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::model::Contradiction;
 use pliant_mechanics::tensor::Vector;
@@ -112,8 +113,16 @@ pub(crate) trait Solver<R>: Send {
     /// Energy [J] above which the balance is judged.
     fn balance_floor(&self) -> f64;
 
+    /// Looks at a flag within steps that take long.
+    fn stop_on(&mut self, _flag: &StopFlag) {}
+
     /// As what an observer may ask.
     fn observable(&self) -> &dyn Observable<R>;
+
+    /// Whether it goes on from any state of ordinary memory.
+    fn goes_back(&self) -> bool {
+        true
+    }
 
     /// What a restart needs beside the state, after [`advance`](Self::advance): nothing where
     /// [`evaluate`](Self::evaluate) finds everything anew.
@@ -260,6 +269,10 @@ impl<R: Scalar> Solver<R> for LoadSteps<R> {
 
     fn push(&mut self, forces: &[Vector<f64>]) {
         self.relaxation.push(forces);
+    }
+
+    fn stop_on(&mut self, flag: &StopFlag) {
+        self.relaxation.stop_on(flag);
     }
 
     fn balance_floor(&self) -> f64 {

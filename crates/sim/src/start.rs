@@ -44,7 +44,8 @@ fn at_start<R: Numeric>(part: &Part) -> Result<State<R>, Failure> {
 pub(crate) struct Before<'a> {
     pub clock: Clock,
     pub step: f64,
-    pub model: &'a Model,
+    /// That of the run before, where it is another one.
+    pub model: Option<&'a Model>,
 }
 
 /// A participant that goes on from a state of a run of the same mesh, of explicit steps with what they were. `None` where this one has
@@ -78,10 +79,10 @@ fn resumed<R: Numeric>(
     memory: Memory<R>,
     before: Option<Before<'_>>,
 ) -> Result<Box<dyn Participant>, Failure> {
-    if let Some(before) = &before
-        && before.model.fingerprints() != part.model.fingerprints()
+    if let Some(Before { model: Some(model), clock, .. }) = &before
+        && model.fingerprints() != part.model.fingerprints()
     {
-        state.change_model(before.model, &part.model, before.clock.before);
+        state.change_model(model, &part.model, clock.before);
     }
     let mut solids = Solids::new(part, state)?;
     solids.resume(memory, before.map(|before| (before.clock, before.step)));

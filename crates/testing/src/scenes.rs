@@ -13,7 +13,7 @@ use pliant_run::{
 use pliant_scene::diagnostic::{Diagnostic, MOST_SHOWN, SceneErrors};
 use pliant_scene::source::Source;
 use pliant_scene::{MeshCache, Scene, World};
-use pliant_sim::{Simulation, State};
+use pliant_sim::{Simulation, State, StopFlag};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -346,7 +346,8 @@ pub fn resumes(text: &str) {
     assert_eq!(a.lines().last(), b.lines().last(), "{text}");
 }
 
-/// A run that goes on from states taken at instants whose forces are found ends in the same bits as one at which nobody looks.
+/// A run that goes on from states taken at instants whose forces are found, and after steps that were stopped, ends in the same bits as one at
+/// which nobody looks.
 pub fn looks_change_nothing(world: &World) {
     let mut whole = world.simulation().unwrap();
     let steps = world.steps();
@@ -354,6 +355,8 @@ pub fn looks_change_nothing(world: &World) {
         whole.step(1).unwrap();
     }
     let mut looked = world.simulation().unwrap();
+    let stop = StopFlag::default();
+    looked.stop_on(&stop);
     let every = (steps / 8).max(1);
     for step in 0..steps {
         if step % every == 0 {
@@ -369,7 +372,15 @@ pub fn looks_change_nothing(world: &World) {
             } else {
                 let state = State::decode(looked.world(), &bytes).unwrap();
                 looked = Simulation::resumed(looked.world().clone(), state).unwrap();
+                looked.stop_on(&stop);
             }
+            assert_eq!(seen(&mut looked), first, "at t = {} s", looked.time());
+            // Only steps that take long are stopped within, and not taken then.
+            stop.ask();
+            let stopped = looked.step(1);
+            stop.clear();
+            let Err(failure) = stopped else { continue };
+            assert!(failure.is_interrupted(), "{failure}");
             assert_eq!(seen(&mut looked), first, "at t = {} s", looked.time());
         }
         looked.step(1).unwrap();

@@ -114,7 +114,7 @@ int main(void) {
     EXPECT(pliant_scene_set(context, 0, "a.b=1", &error), PLIANT_STATUS_BAD_HANDLE, "no handle");
     EXPECT(pliant_scene_set(context, ~scene, "a.b=1", &error), PLIANT_STATUS_BAD_HANDLE, "no handle");
 
-    /* Mistakes of values are told when a simulation is made, with their place. */
+    /* Mistakes of values are reported when a simulation is made, with their place. */
     char *wrong = strdup(BLOCK);
     memcpy(strstr(wrong, "10e3"), "-1e3", 4);
     OK(pliant_scene_parse(context, wrong, strlen(wrong), NULL, "wrong.toml", &other, &error));
@@ -293,7 +293,7 @@ int main(void) {
     EXPECT(pliant_snapshot_close(context, snapshot, &error), PLIANT_STATUS_CLOSED, "closed");
     free(bytes);
 
-    /* A second thread is told that the first one steps, and stops it. */
+    /* A second thread finds that the first one steps, and stops it. */
     pthread_t thread;
     PliantStatus status = PLIANT_STATUS_OK;
     if (pthread_create(&thread, NULL, long_run, &status)) return 1;
@@ -334,6 +334,6 @@ int main(void) {
     free(numbers);
     pliant_context_close(context);
     if (failures) printf("%d failures\n", failures);
-    else printf("all as told\n");
+    else printf("all as expected\n");
     return failures ? 1 : 0;
 }

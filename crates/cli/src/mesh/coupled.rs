@@ -2,13 +2,13 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use pliant_geometry::Vector3;
 use pliant_imaging::LabelChoice;
 use pliant_scene::OrganScene;
 
 use super::input::{image, is_mesh_file, label_failure, regions_in};
+use crate::SUCCESS;
 use crate::arguments::{MeshCells, MeshImage};
 use crate::report::{Bar, Failure, say};
 
@@ -18,7 +18,7 @@ pub fn is_scene(arguments: &MeshImage) -> bool {
 }
 
 /// Writes the scene; images are meshed when it runs.
-pub fn scene(arguments: &MeshImage) -> Result<ExitCode, Failure> {
+pub fn scene(arguments: &MeshImage) -> Result<u8, Failure> {
     let Some(edge) = arguments.edge else {
         return Err(Failure::plain("the edge of the cells is missing", "for example `--edge 8mm`"));
     };
@@ -88,7 +88,7 @@ pub fn scene(arguments: &MeshImage) -> Result<ExitCode, Failure> {
     })?;
     let out = arguments.out.display();
     say(format_args!("wrote {out}; try: pliant check {out} && pliant run {out}"))?;
-    Ok(ExitCode::SUCCESS)
+    Ok(SUCCESS)
 }
 
 /// Corners of the box that holds all but one in two hundred of the places at either end of each axis: loose voxels do not count.

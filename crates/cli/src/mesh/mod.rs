@@ -6,7 +6,6 @@ mod input;
 mod skin;
 
 use std::collections::BTreeMap;
-use std::process::ExitCode;
 
 use pliant_bench::{elastic, law, liver_matrix, soft_tissue};
 use pliant_geometry::io::{self, Format};
@@ -24,10 +23,11 @@ use self::input::{
     PARTS, Segmented, Source, anatomy, cell_limit, image_line, image_object, is_mesh_file, label_failure,
     mesh_file, meshing_failure, protected, regions, tets,
 };
+use crate::SUCCESS;
 use crate::arguments::{Labels, MeshCells, MeshImage, Tissue};
 use crate::report::{Bar, Failure, failed_output, say};
 
-pub fn labels(arguments: &Labels) -> Result<ExitCode, Failure> {
+pub fn labels(arguments: &Labels) -> Result<u8, Failure> {
     let bar = Bar::new();
     let source = Source {
         files: std::iter::once(&arguments.image).chain(&arguments.masks).collect(),
@@ -55,10 +55,10 @@ pub fn labels(arguments: &Labels) -> Result<ExitCode, Failure> {
         }
         say(lines.join("\n"))?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(SUCCESS)
 }
 
-pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
+pub fn mesh(arguments: &MeshImage) -> Result<u8, Failure> {
     if let Some(scale) = arguments.scale.filter(|scale| !(scale.is_finite() && *scale > 0.0)) {
         let message = format!("`--scale` is {scale}; it must be positive and finite");
         return Err(Failure::plain(message, "for example `--scale 0.001` for a file in millimetres"));
@@ -88,7 +88,7 @@ pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
         object["files"] = json!([arguments.out]);
         say(object)?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(SUCCESS)
 }
 
 /// Rejects options without effect.

@@ -1,7 +1,6 @@
 //! `pliant mesh --as surface` and `--as shells`: triangles and curved shells of an image or of a mesh file.
 
 use std::path::Path;
-use std::process::ExitCode;
 
 use pliant_geometry::io::{self, Format};
 use pliant_geometry::{CellKind, Mesh, Vector3, diagnose};
@@ -12,6 +11,7 @@ use pliant_meshing::{
 use serde_json::{Value as Json, json};
 
 use super::input::{Segmented, anatomy, cell_limit, is_mesh_file, mesh_file, meshing_failure, regions};
+use crate::SUCCESS;
 use crate::arguments::{MeshCells, MeshImage};
 use crate::report::{Bar, Failure, failed_output, say};
 
@@ -29,7 +29,7 @@ struct InputSurface {
     warnings: Vec<String>,
 }
 
-pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
+pub fn mesh(arguments: &MeshImage) -> Result<u8, Failure> {
     let goal = goal(arguments)?;
     require_surface_format(&arguments.out)?;
     arguments.error_map.as_deref().map(require_surface_format).transpose()?;
@@ -60,7 +60,7 @@ pub fn mesh(arguments: &MeshImage) -> Result<ExitCode, Failure> {
         object["files"] = json!(files.iter().map(|(path, _)| path).collect::<Vec<_>>());
         say(object)?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(SUCCESS)
 }
 
 /// The requested resolution.

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["fixed", "indices", "numbers"]
+__all__ = ["fixed", "indices", "numbers", "shaped"]
 
 
 def _plain(value: ArrayLike, what: str) -> NDArray[Any]:
@@ -17,14 +17,19 @@ def _plain(value: ArrayLike, what: str) -> NDArray[Any]:
     return array
 
 
-def numbers(value: ArrayLike, what: str, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
-    """Finite numbers as float64 of a shape, in which `None` stands for any length."""
+def shaped(value: ArrayLike, what: str, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
+    """Numbers as float64 of a shape, in which `None` stands for any length."""
     array = _plain(value, what)
     wrong = len(array.shape) != len(shape) or any(w not in (None, h) for h, w in zip(array.shape, shape, strict=False))
     if wrong:
         wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
         raise ValueError(f"{what} have shape {array.shape}, expected {wanted}")
-    result = np.ascontiguousarray(array, dtype=np.float64)
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def numbers(value: ArrayLike, what: str, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
+    """Finite numbers as float64 of a shape, in which `None` stands for any length."""
+    result = shaped(value, what, shape)
     if not np.isfinite(result).all():
         at = np.argwhere(~np.isfinite(result))[0]
         raise ValueError(f"{what} are not finite at {tuple(int(k) for k in at)}")

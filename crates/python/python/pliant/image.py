@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import struct
-import tempfile
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pliant import _native
-from pliant._arrays import numbers
+from pliant._arrays import fixed, numbers
 from pliant.mesh import Mesh, _meshed
 
 __all__ = ["Image", "Label"]
@@ -56,7 +55,7 @@ class Image:
             raise ValueError(f"an image holds {values.dtype}, numbers are wanted")
         if values.ndim != 3 or 0 in values.shape:
             raise ValueError(f"an image has shape {values.shape}, expected (i, j, k)")
-        self.array: NDArray[Any] = values
+        self.array: NDArray[Any] = fixed(np.array(values))
         self.affine: NDArray[np.float64] = numbers(affine, "the affine matrix", (4, 4))
         if not np.allclose(self.affine[3], [0, 0, 0, 1]):
             raise ValueError(f"the last row of the affine matrix is {self.affine[3]}, expected (0, 0, 0, 1)")
@@ -99,19 +98,32 @@ class Image:
         return {label: Label(self._names.get(label), count, count * size) for label, count in all_labels}
 
     def _mesh(self, labels: Sequence[int], edge: float, kind: str, clean: Mapping[str, Any] | None) -> Mesh:
-        table: dict[str, Any] = {"image": "image.nii", "labels": [int(label) for label in labels]}
+        table: dict[str, Any] = {"image": self, "labels": [int(label) for label in labels]}
         table |= {"edge": float(edge), "as": kind}
         if clean is not None:
             table["clean"] = dict(clean)
-        with tempfile.TemporaryDirectory() as folder:
-            self._write(os.path.join(folder, "image.nii"))
-            return _meshed(table, {}, folder=folder)
+        return _meshed(table, {})
 
-    def _write(self, path: str) -> None:
-        """As NIfTI-1 of 32-bit integers, the affine matrix in millimetres (`sform`)."""
+    @property
+    def _own(self) -> _native.Image:
+        """A copy of the engine's."""
+        number = self.array.dtype
+        if number.kind == "b":
+            number = np.dtype(np.uint8)
+        elif number.kind == "f" and number.itemsize not in (4, 8):
+            number = np.dtype(np.float64)
+        values = self.array.astype(number.newbyteorder("<"), copy=False)
+        affine = [[float(x) for x in row] for row in self.affine[:3]]
+        names = list(self._names.items())
+        return _native.Image(values.tobytes(order="F"), number.name, self.array.shape, affine, names)
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Writes it as NIfTI-1 of 32-bit integers, whole numbers only, the affine matrix in millimetres (`sform`)."""
         whole = np.rint(self.array)
-        if not np.array_equal(whole, self.array):
-            raise ValueError("the image holds values between whole numbers: labels are wanted")
+        if not np.array_equal(whole, self.array) or np.abs(whole).max() >= 2**31:
+            raise ValueError("the image holds other values than whole numbers below 2³¹: labels are wanted")
+        if max(self.array.shape) >= 2**15:
+            raise ValueError(f"NIfTI-1 takes 32,767 voxels along an axis at most, not {max(self.array.shape)}")
         header = bytearray(352)
         struct.pack_into("<i", header, 0, 348)
         struct.pack_into("<8h", header, 40, 3, *self.array.shape, 1, 1, 1, 1)

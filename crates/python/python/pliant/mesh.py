@@ -243,7 +243,7 @@ class Mesh:
         for kind, corners in self.cells.items():
             cells.append(np.hstack([np.full((len(corners), 1), corners.shape[1]), corners]).ravel())
             kinds.append(np.full(len(corners), _VTK[kind], dtype=np.uint8))
-        grid = pv.UnstructuredGrid(np.concatenate(cells), np.concatenate(kinds), self.points.copy())
+        grid: pyvista.UnstructuredGrid = pv.UnstructuredGrid(np.concatenate(cells), np.concatenate(kinds), self.points.copy())
         for name, values in self.point_data.items():
             grid.point_data[name] = values.reshape(len(values), -1).squeeze().copy()
         for name, values in self.cell_data.items():
@@ -324,14 +324,14 @@ def _dashed(shape: Any) -> Any:
     return shape
 
 
-def _meshed(table: Mapping[str, Any], meshes: Mapping[str, Mesh], *, shell: bool = False, folder: str = ".") -> Mesh:
+def _meshed(table: Mapping[str, Any], meshes: Mapping[str, Mesh], *, shell: bool = False) -> Mesh:
     """The mesh that a body of a scene would have by a table."""
     from pliant.scene import Scene
 
-    scene = Scene(until=1.0, folder=folder)
+    scene = Scene(until=1.0)
     body: dict[str, Any] = {"mesh": dict(table), "law": "tissue", "density": 1000.0}
     scene.body["mesh"] = body | ({"model": "shell", "thickness": 1e-3} if shell else {})
-    scene._meshes.update(meshes)
+    scene._given.update(meshes)
     return scene._mesh_of("mesh")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 import warnings
@@ -261,6 +262,10 @@ class Model:
             table = _get(body, "mesh")
             if known is None or table is None or isinstance(table, Mesh) or _get(known, "mesh") != table:
                 continue
+            if not isinstance(table, Mapping) or any(
+                scene._given.get(own) is not self._scene._given.get(own) for own in _images_of(table) if isinstance(own, str)
+            ):
+                continue
             if isinstance(table, Mapping) and ("given" in table or "fix" in table or ("file" in table and "as" not in table)):
                 continue
             lent[name] = self._body_mesh(name)
@@ -276,7 +281,13 @@ class Model:
     def _repr_html_(self) -> str:
         rows: dict[str, Any] = {"bodies": ", ".join(self.bodies), "nodes": len(self.rest), "mass [kg]": f"{self.mass.sum():.4g}"}
         rows |= {"step [s]": f"{self.step:.3g}", "steps": self.steps, "device": self.device}
-        return _table("Model", rows)
+        # More takes longer than one waits for.
+        if len(self.rest) > 50_000:
+            return _table("Model", rows)
+        with self.simulate() as simulation:
+            png = simulation._repr_png_()
+        picture = "" if png is None else f'<img src="data:image/png;base64,{base64.b64encode(png).decode()}" width="480">'
+        return _table("Model", rows) + picture
 
 
 def _built_again(scene: Scene) -> Model:
@@ -284,6 +295,11 @@ def _built_again(scene: Scene) -> Model:
         # They were shown when the model was built first.
         warnings.simplefilter("ignore", PliantWarning)
         return scene.build()
+
+
+def _images_of(table: Mapping[str, Any]) -> list[Any]:
+    """What a table of a mesh is made of: names of files or of given images, or images."""
+    return [table.get("image"), table.get("add"), *(table.get("masks") or ())]
 
 
 def _get(body: Any, key: str) -> Any:

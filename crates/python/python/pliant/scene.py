@@ -14,6 +14,7 @@ from pliant import _native, _toml
 from pliant._arrays import numbers
 from pliant._table import Table
 from pliant.errors import Diagnostic
+from pliant.image import Image
 from pliant.mesh import Mesh, _table
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ class Scene:
         self._origin: tuple[str, str] | None = None
         self._pristine: dict[str, Any] = {}
         self._set: dict[str, Any] = {}
-        self._meshes: dict[str, Mesh] = {}
+        self._given: dict[str, Mesh | Image] = {}
         self.folder = os.fspath(folder)
 
     @classmethod
@@ -98,7 +99,7 @@ class Scene:
         scene._data = _native.parse(text, name)
         scene._origin = (text, name)
         scene._pristine = deepcopy(scene._data)
-        scene._set, scene._meshes = {}, {}
+        scene._set, scene._given = {}, {}
         scene.folder = os.fspath(folder)
         return scene
 
@@ -110,7 +111,7 @@ class Scene:
         'fix'
         """
         scene = cls.from_toml(_native.scene_of_mesh(mesh._own, "mesh"))
-        scene._meshes["mesh"] = mesh
+        scene._given["mesh"] = mesh
         return scene
 
     def _tables(self, kind: str) -> MutableMapping[str, Any]:
@@ -126,7 +127,7 @@ class Scene:
 
     @property
     def body(self) -> MutableMapping[str, Any]:
-        """Bodies, by name; ``mesh`` may be a `Mesh`."""
+        """Bodies, by name; ``mesh`` may be a `Mesh`, and its ``image`` an `Image`."""
         return self._tables("body")
 
     @property
@@ -205,7 +206,7 @@ class Scene:
 
     def __setitem__(self, key: str, value: object) -> None:
         parts = _path(key)
-        plain = _plain(value, self._meshes, key)
+        plain = _plain(value, self._given, key)
         for tree in (self._data, self._pristine):
             if tree is self._pristine and self._origin is None:
                 continue
@@ -235,56 +236,68 @@ class Scene:
         return copy
 
     def copy(self) -> Scene:
-        """A copy that shares meshes, which do not change."""
+        """A copy that shares meshes and images."""
         copy = Scene.__new__(Scene)
-        memo = {id(mesh): mesh for mesh in _meshes_in(self._data)}
+        memo = {id(own): own for own in _given_in(self._data)}
         copy._data = deepcopy(self._data, memo)
         copy._pristine = deepcopy(self._pristine, memo)
-        copy._origin, copy._set, copy._meshes = self._origin, dict(self._set), dict(self._meshes)
+        copy._origin, copy._set, copy._given = self._origin, dict(self._set), dict(self._given)
         copy.folder = self.folder
         return copy
 
-    def _given(self) -> tuple[tuple[str, str, str, list[str]], dict[str, Mesh]]:
-        """What the engine reads: text, its name, the folder, what is set; and the meshes from memory."""
-        meshes = dict(self._meshes)
+    def _handed(self) -> _native._Scene:
+        """What the engine reads: text, its name, the folder, what is set; and the meshes and images from memory."""
+        given = dict(self._given)
         if self._origin is not None and self._data == self._pristine:
             text, name = self._origin
             sets = [f"{key} = {_toml.value(value)}" for key, value in self._set.items()]
-            return (text, name, self.folder, sets), meshes
-        plain = {kind: _plain(table, meshes, kind) for kind, table in self._data.items()}
-        name = "scene.toml" if self._origin is None else self._origin[1]
-        return (_toml.document({k: v for k, v in plain.items() if v}, _NAMED), name, self.folder, []), meshes
+        else:
+            plain = {kind: _plain(table, given, kind) for kind, table in self._data.items()}
+            name, sets = "scene.toml" if self._origin is None else self._origin[1], []
+            text = _toml.document({k: v for k, v in plain.items() if v}, _NAMED)
+        meshes = {name: own._own for name, own in given.items() if isinstance(own, Mesh)}
+        images = {name: own._own for name, own in given.items() if isinstance(own, Image)}
+        return text, name, self.folder, sets, meshes, images
 
     def to_toml(self) -> str:
-        """The text of the scene; meshes from memory stand as ``{ given = "NAME" }``.
+        """The text of the scene; meshes from memory stand as ``{ given = "NAME" }``, images as their names.
 
         >>> print(Scene(until=1.0, title="a block").to_toml(), end="")
         [scene]
         title = "a block"
         until = 1.0
         """
-        plain = {kind: _plain(table, dict(self._meshes), kind) for kind, table in self._data.items()}
+        plain = {kind: _plain(table, dict(self._given), kind) for kind, table in self._data.items()}
         return _toml.document({kind: table for kind, table in plain.items() if table}, _NAMED)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes it to a file; meshes from memory are written beside it, as VTU."""
+        """Writes it to a file; meshes and images from memory are written beside it, as VTU and NIfTI."""
         path = os.fspath(path)
-        meshes = dict(self._meshes)
-        plain = {kind: _plain(table, meshes, kind) for kind, table in self._data.items()}
+        given = dict(self._given)
+        plain = {kind: _plain(table, given, kind) for kind, table in self._data.items()}
         stem, folder = os.path.splitext(os.path.basename(path))[0], os.path.dirname(path)
+
+        def written(name: str) -> str:
+            own = given[name]
+            file = f"{stem}-{name}.{'vtu' if isinstance(own, Mesh) else 'nii'}"
+            own.write(os.path.join(folder, file))
+            return file
+
         for body in plain.get("body", {}).values():
             table = body.get("mesh", {})
             if "given" in table:
-                name = f"{stem}-{table.pop('given')}.vtu"
-                meshes[name[len(stem) + 1 : -4]].write(os.path.join(folder, name))
-                body["mesh"] = {"file": name, "scale": 1.0, **table}
+                body["mesh"] = {"file": written(table.pop("given")), "scale": 1.0, **table}
+            for key in ("image", "add"):
+                if table.get(key) in given:
+                    table[key] = written(table[key])
+            if "masks" in table:
+                table["masks"] = [written(own) if own in given else own for own in table["masks"]]
         with open(path, "w", encoding="utf-8") as file:
             file.write(_toml.document({kind: table for kind, table in plain.items() if table}, _NAMED))
 
     def check(self) -> list[Diagnostic]:
         """Builds the model and forgets it: the warnings. Raises `SceneError` with all mistakes."""
-        given, meshes = self._given()
-        return _native.check(given, {name: mesh._own for name, mesh in meshes.items()})
+        return _native.check(self._handed())
 
     def build(self, *, cache: bool = True, like: Model | None = None) -> Model:
         """Makes the model: meshes, masses, the critical time step.
@@ -298,14 +311,8 @@ class Scene:
         """
         from pliant.model import Model
 
-        given, meshes = self._given()
         lent = {} if like is None else like._lends(self)
-        native = _native.build(
-            given,
-            {name: mesh._own for name, mesh in meshes.items()},
-            {name: mesh._own for name, mesh in lent.items()},
-            cache,
-        )
+        native = _native.build(self._handed(), {name: mesh._own for name, mesh in lent.items()}, cache)
         return Model._of(self.copy(), native)
 
     def run(self, out: str | os.PathLike[str] | None = None, **options: Any) -> Result:
@@ -313,8 +320,7 @@ class Scene:
         return self.build().run(out, **options)
 
     def _mesh_of(self, body: str) -> Mesh:
-        given, meshes = self._given()
-        native, _ = _native.mesh(given, {name: mesh._own for name, mesh in meshes.items()}, body)
+        native, _ = _native.mesh(self._handed(), body)
         return Mesh._of(native)
 
     def _counts(self) -> Iterator[tuple[int, str]]:
@@ -358,35 +364,37 @@ def _path(key: str) -> list[str]:
     return parts
 
 
-def _plain(value: Any, meshes: dict[str, Mesh], name: str) -> Any:
-    """Plain data: tables as dictionaries, meshes as their names."""
-    if isinstance(value, Mesh):
-        own = name.split(".")[-2] if name.endswith(".mesh") else name.split(".")[-1]
-        taken = next((known for known, mesh in meshes.items() if mesh is value), None)
+def _plain(value: Any, given: dict[str, Mesh | Image], name: str) -> Any:
+    """Plain data: tables as dictionaries, meshes and images as their names."""
+    if isinstance(value, (Mesh, Image)):
+        own = name.removesuffix(".image").removesuffix(".mesh").split(".")[-1]
+        taken = next((known for known, other in given.items() if other is value), None)
         if taken is None:
             taken, count = own, 2
-            while taken in meshes:
+            while taken in given:
                 taken, count = f"{own}-{count}", count + 1
-            meshes[taken] = value
-        return {"given": taken, "scale": 1.0}
+            given[taken] = value
+        return {"given": taken, "scale": 1.0} if isinstance(value, Mesh) else taken
     if isinstance(value, Table):
-        return _plain(value.to_dict(), meshes, name)
+        return _plain(value.to_dict(), given, name)
     if isinstance(value, Mapping):
-        return {str(key): _plain(own, meshes, f"{name}.{key}") for key, own in value.items() if own is not None}
+        return {str(key): _plain(own, given, f"{name}.{key}") for key, own in value.items() if own is not None}
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, (list, tuple)):
-        return [_plain(own, meshes, name) for own in value]
+        return [_plain(own, given, name) for own in value]
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
-    raise TypeError(f"`{name}`: a scene holds numbers, texts, lists, tables and meshes, not {type(value).__name__}")
+    raise TypeError(f"`{name}`: a scene holds numbers, texts, lists, tables, meshes and images, not {type(value).__name__}")
 
 
-def _meshes_in(value: Any) -> Iterator[Mesh]:
-    if isinstance(value, Mesh):
+def _given_in(value: Any) -> Iterator[Mesh | Image]:
+    if isinstance(value, (Mesh, Image)):
         yield value
-    elif isinstance(value, Mapping):
-        for own in value.values():
-            yield from _meshes_in(own)
+    elif isinstance(value, Table):
+        yield from _given_in(value.to_dict())
+    elif isinstance(value, (Mapping, list, tuple)):
+        for own in value.values() if isinstance(value, Mapping) else value:
+            yield from _given_in(own)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import warnings
+import zipfile
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -10,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pliant import _native
-from pliant._arrays import indices, numbers
-from pliant.errors import BusyError, ResumeError
+from pliant._arrays import indices, numbers, shaped
+from pliant.errors import BusyError, Error, InternalError, PliantWarning, ResumeError
 from pliant.mesh import Mesh
 from pliant.result import History
 
@@ -86,7 +89,7 @@ class State:
             with np.load(path, allow_pickle=False) as file:
                 parts = [file[f"part{k}"].tobytes() for k in range(sum(name.startswith("part") for name in file.files))]
                 return _state(parts, float(file["time"]), int(file["steps"]), file["moved"].tolist())
-        except (KeyError, ValueError) as error:
+        except (KeyError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
             raise ResumeError(f"`{os.fspath(path)}` is no state of a simulation: {error}", path=os.fspath(path)) from error
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -129,7 +132,8 @@ class Grip:
     def _pulled(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         simulation = self._held()
         found = simulation._own.pulled(simulation._grips.index(self))
-        assert found is not None
+        if found is None:
+            raise InternalError("the engine holds fewer grips than were taken")
         return np.array(found[0]), np.array(found[1])
 
     @property
@@ -181,13 +185,11 @@ class Simulation:
         simulation._own = _native.Simulation(model._own, threads)
         simulation._threads = threads
         simulation._grips = []
-        simulation._pushed = None
         simulation._calling = False
         return simulation
 
     _threads: int
     _grips: list[Grip]
-    _pushed: NDArray[np.float64] | None
     _calling: bool
 
     @property
@@ -404,20 +406,19 @@ class Simulation:
     def push(self, forces: ArrayLike | None, *, body: str | None = None) -> None:
         """Forces on all nodes [N], (nodes, 3), or on those of a body; they stay until replaced. `None` ends them."""
         if forces is None:
-            self._pushed = None
             self._own.push(None)
             return
         count = len(self._model.rest)
         if body is None:
-            self._pushed = numbers(forces, "forces", (count, 3))
-        else:
-            if body not in self._model.bodies:
-                raise KeyError(f"there is no body `{body}`; there are {', '.join(self._model.bodies)}")
-            own = self._model.bodies[body].nodes
-            before = np.zeros((count, 3)) if self._pushed is None else self._pushed.copy()
-            before[own] = numbers(forces, f"forces on `{body}`", (own.stop - own.start, 3))
-            self._pushed = before
-        self._own.push(self._pushed)
+            # The engine looks for forces that are not finite.
+            self._own.push(shaped(forces, "forces", (count, 3)))
+            return
+        if body not in self._model.bodies:
+            raise KeyError(f"there is no body `{body}`; there are {', '.join(self._model.bodies)}")
+        own, before = self._model.bodies[body].nodes, self._own.pushed()
+        every = before if len(before) else np.zeros((count, 3))
+        every[own] = numbers(forces, f"forces on `{body}`", (own.stop - own.start, 3))
+        self._own.push(every)
 
     def grip(
         self,
@@ -461,6 +462,7 @@ class Simulation:
             self._hold()
         except Exception:
             self._grips.remove(grip)
+            self._hold()
             raise
         return grip
 
@@ -476,6 +478,8 @@ class Simulation:
         if not self._own.exchange(model._own):
             raise ValueError(f"{', '.join(values)}: the mesh, the solver or the precision would be another; build a new model")
         self._model = model
+        # Steps of another length are stable with other stiffnesses.
+        self._hold()
 
     def state(self) -> State:
         """A snapshot. Hands, pushed forces and the numbers of `set` are not part of it."""
@@ -530,6 +534,13 @@ class Simulation:
             raise ValueError(f"a picture of {size} pixels can't be drawn; each side has 1 to 8192")
         png = self._own.picture(field, [int(size[0]), int(size[1])], None if camera is None else list(camera))
         return Picture(bytes(png))
+
+    def _repr_png_(self) -> bytes | None:
+        try:
+            return self.picture().png
+        except Error as error:
+            warnings.warn(f"no picture: {error}", PliantWarning, stacklevel=2)
+            return None
 
     def close(self) -> None:
         """Ends it. Views stay readable; everything else raises `ClosedError`."""

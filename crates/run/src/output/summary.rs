@@ -5,7 +5,7 @@ use std::path::Path;
 
 use pliant_mechanics::Energies;
 use pliant_mechanics::model::{Constraint, Enclosed};
-use pliant_sim::{Critical, Effort, Equilibria, Failure, number};
+use pliant_sim::{Critical, Effort, Equilibria, Failure, INTERRUPTED, number};
 use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
 
@@ -13,9 +13,6 @@ use super::stability::{AddedMass, StabilitySummary, doubts};
 use super::{GuestSummary, History, Outcome, PartOutcome, TieSummary};
 use super::{OutputError, StrainSummary, constraints};
 use pliant_scene::{Built, LimitingElement, Limits, Part, World, printable};
-
-/// The status of a stopped run.
-pub(crate) const INTERRUPTED: &str = "interrupted";
 
 /// The result of a run.
 #[derive(Clone, Debug, Serialize)]
@@ -235,7 +232,7 @@ pub(crate) fn summarise(world: &World, outcome: &Outcome) -> Summary {
     Summary {
         status: match &outcome.failure {
             None => "done",
-            Some(failure) if failure.kind == INTERRUPTED => INTERRUPTED,
+            Some(failure) if failure.is_interrupted() => INTERRUPTED,
             Some(_) => "failed",
         },
         error: outcome.failure.clone(),
@@ -297,7 +294,7 @@ fn write_page(page: &mut String, world: &World, outcome: &Outcome, summary: &Sum
                 writeln!(page, "The run ended before its last step: {why}.\n")?;
             }
         }
-        Some(failure) if failure.kind == INTERRUPTED => {
+        Some(failure) if failure.is_interrupted() => {
             writeln!(page, "**Interrupted**: {}\n", failure.message)?;
         }
         Some(failure) => writeln!(page, "**Failed** ({}): {}\n", failure.kind, failure.message)?,

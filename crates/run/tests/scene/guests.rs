@@ -1,5 +1,8 @@
 //! Contact between participants: an explicit solid and implicit shells (S14), from the text of a scene to its outputs, and what is refused.
 
+use nalgebra::UnitQuaternion;
+use pliant_sim::Simulation;
+use pliant_sim::contact::pose::Pose;
 use pliant_testing::scenes::{last_row_in, resumes, run, world};
 
 /// A plate of 353 mN, of a shell, a little above a held block of soft tissue.
@@ -68,6 +71,32 @@ fn a_plate_lies_on_a_block_of_another_participant() {
 #[test]
 fn a_resumed_run_of_participants_in_contact_has_the_same_bits() {
     resumes(&pressed(0.01, 1.0, "[run]\ncheckpoint = { every = 0.4 }\n"));
+}
+
+/// A step in contact is one step from the start on, and a tool that was driven after a look goes where it is driven.
+#[test]
+fn a_tool_on_a_guest_goes_where_it_is_driven() {
+    let ball = "[tool.ball]\nshape = { sphere = { radius = 0.01 } }\nat = [0.02, 0.02, 0.04]\n\
+                [contact.tap]\nbetween = ['plate', 'ball']\n";
+    let world = world(&pressed(0.01, 1.0, ball)).unwrap();
+    let mut simulation = world.simulation().unwrap();
+    let start = simulation.state().unwrap();
+    for _ in 0..2 {
+        simulation.step(1).unwrap();
+        assert!((simulation.time() - 0.01).abs() < 1e-12, "{}", simulation.time());
+        simulation.restore(start.clone()).unwrap();
+    }
+    simulation.step(1).unwrap();
+    let ball = |simulation: &mut Simulation| {
+        simulation.frame().unwrap();
+        simulation.tool("ball").unwrap().pose.translation.vector
+    };
+    let mut place = ball(&mut simulation);
+    place.z -= 0.002;
+    simulation.drive("ball", Pose::from_parts(place.into(), UnitQuaternion::identity()), 0.0).unwrap();
+    simulation.step(2).unwrap();
+    simulation.step(1).unwrap();
+    assert!((ball(&mut simulation) - place).norm() < 1e-9, "{:?}", ball(&mut simulation));
 }
 
 /// A block that is thrown at a free plate of another participant gives it the momentum that it loses.

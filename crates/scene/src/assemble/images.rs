@@ -167,7 +167,11 @@ impl Builder<'_> {
         let files = table.masks.as_ref().map_or(1, Vec::len).max(1) + usize::from(table.add.is_some());
         let each = DONE[0] / files as f64;
         let before = Cell::new(0.0);
+        let given = &self.source().given().images;
         let read = |key, file: &Path| {
+            if let Some(image) = file.to_str().and_then(|name| given.get(name)) {
+                return Ok((**image).clone());
+            }
             let progress = |done: f64| watch(before.get() + each * done, "reading the image");
             let image = allowed(file).and_then(|path| pliant_imaging::read_with(&path, &options, &progress));
             before.set(before.get() + each);

@@ -114,7 +114,7 @@ impl Builder<'_> {
     }
 
     fn given_mesh(&self, name: &str) -> Result<Mesh, MeshFault> {
-        let given = self.source().given();
+        let given = &self.source().given().meshes;
         given.get(name).map(|mesh| mesh.as_ref().clone()).ok_or_else(|| {
             let known: Vec<String> = given.keys().map(|name| format!("`{name}`")).collect();
             let help = match known.is_empty() {

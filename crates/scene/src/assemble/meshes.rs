@@ -449,7 +449,8 @@ mod tests {
                 );
             assert!(text.contains(table) && text.contains("half-space"));
             let source = crate::source::Source::parse("cube.toml", text).unwrap();
-            let source = source.giving([(given.to_owned(), std::sync::Arc::clone(&mesh))].into());
+            let meshes = [(given.to_owned(), std::sync::Arc::clone(&mesh))].into();
+            let source = source.giving(crate::source::Given { meshes, ..Default::default() });
             crate::Scene::from_source(source, ".".into()).and_then(|scene| crate::build(&scene))
         };
         let built = with("{ given = 'mine' }", "mine").unwrap_or_else(|error| panic!("{}", error.plain()));

@@ -1,0 +1,134 @@
+"""Meshes and images to and from other packages, and images that never touch a disk."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+import pliant
+from pliant import Image, Mesh
+
+
+def ball(labels: type = np.uint8) -> Image:
+    """A ball of label 2 with a core of label 5, voxels of 2 mm, turned and shifted."""
+    i, j, k = np.mgrid[0:20, 0:18, 0:22]
+    square = (i - 9.5) ** 2 + (j - 8.5) ** 2 + (k - 10.5) ** 2
+    values = np.where(square < 64, 2, 0)
+    values[square < 9] = 5
+    affine = np.diag([-2e-3, 2e-3, 2e-3, 1.0])
+    affine[:3, 3] = (0.05, -0.01, 0.02)
+    return Image(values.astype(labels), affine)
+
+
+def same(a: Mesh, b: Mesh) -> bool:
+    return np.array_equal(a.points, b.points) and all(np.array_equal(a.cells[kind], b.cells[kind]) for kind in a.cells)
+
+
+@pytest.mark.parametrize("kind", [bool, np.int8, np.uint8, np.int16, np.uint16, np.int32, np.uint32, np.int64, np.uint64, np.float16, np.float32, np.float64])
+def test_images_of_any_numbers_are_meshed_alike(kind: type) -> None:
+    whole = ball()
+    label = 1 if kind is bool else 2
+    image = Image((whole.array == 2).astype(kind) if kind is bool else whole.array.astype(kind), whole.affine)
+    wanted = Image(np.where(whole.array == 2, label, 0 if kind is bool else whole.array), whole.affine)
+    assert same(Mesh.of_image(image, label, edge=6e-3), Mesh.of_image(wanted, label, edge=6e-3))
+
+
+def test_images_of_scenes_stay_in_memory_and_travel(tmp_path: object) -> None:
+    scene = pliant.Scene(until=0.01, gravity=(0, 0, -9.81))
+    scene.law["tissue"] = {"type": "neo-hookean", "young-modulus": 10e3, "poisson-ratio": 0.3}
+    mesh = {"image": ball(), "labels": [2, 5], "edge": 6e-3}
+    scene.body["ball"] = {"mesh": mesh, "law": "tissue", "density": 1000.0}
+    model = scene.build(cache=False)
+    assert set(np.unique(model.bodies["ball"].mesh.cell_data["label"])) == {2.0, 5.0}
+    again = pickle.loads(pickle.dumps(scene)).build(cache=False)
+    assert np.array_equal(again.rest, model.rest)
+    path = f"{tmp_path}/scene.toml"
+    scene.save(path)
+    saved = pliant.load(path).build(cache=False)
+    assert np.allclose(saved.rest, model.rest, atol=1e-9)
+    other = scene.replace({"body.ball.mesh.edge": 8e-3}).build(like=model)
+    assert len(other.rest) < len(model.rest)
+    with pytest.raises(pliant.SceneError, match="label"):
+        scene.replace({"body.ball.mesh.labels": [7]}).build()
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: Image(np.zeros((2, 2)), np.eye(4)), r"\(i, j, k\)"),
+        (lambda: Image(np.zeros((2, 0, 2)), np.eye(4)), "shape"),
+        (lambda: Image(np.zeros((2, 2, 2), dtype=complex), np.eye(4)), "complex"),
+        (lambda: Image(np.zeros((2, 2, 2)), np.eye(3)), r"\(4, 4\)"),
+        (lambda: Image(np.zeros((2, 2, 2)), np.full((4, 4), np.nan)), "finite"),
+        (lambda: Image(np.zeros((2, 2, 2)), np.ones((4, 4))), "last row"),
+        (lambda: Mesh.of_image(Image(np.ones((4, 4, 4)), np.diag([1.0, 1.0, 0.0, 1.0])), 1, edge=1.0), "plane|steps"),
+        (lambda: Mesh.of_image(Image(np.full((4, 4, 4), np.nan), np.diag([1e-3] * 3 + [1.0])), 1, edge=1e-3), "is NaN"),
+    ],
+)
+def test_images_that_are_none(make: object, says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        make()  # type: ignore[operator]
+
+
+def test_images_of_nibabel_and_simpleitk_lie_where_theirs_do() -> None:
+    image = ball(np.int16)
+    nib = pytest.importorskip("nibabel")
+    millimetres = np.diag([1e3, 1e3, 1e3, 1.0]) @ image.affine
+    found = Image.from_nibabel(nib.Nifti1Image(image.array, millimetres))
+    assert np.array_equal(found.array, image.array) and np.allclose(found.affine, image.affine, atol=1e-9)
+    sitk = pytest.importorskip("SimpleITK")
+    volume = sitk.GetImageFromArray(np.transpose(image.array))
+    lps = np.diag([-1.0, -1.0, 1.0, 1.0]) @ millimetres
+    volume.SetSpacing([2.0, 2.0, 2.0])
+    volume.SetDirection((lps[:3, :3] / 2.0).ravel().tolist())
+    volume.SetOrigin(lps[:3, 3].tolist())
+    found = Image.from_sitk(volume)
+    assert np.array_equal(found.array, image.array) and np.allclose(found.affine, image.affine, atol=1e-9)
+    for (i, j, k), voxel in (((0, 0, 0), (0, 0, 0)), ((3, 5, 7), (3, 5, 7))):
+        point = np.array(volume.TransformIndexToPhysicalPoint(voxel)) * (-1e-3, -1e-3, 1e-3)
+        assert np.allclose(point, (image.affine @ (i, j, k, 1.0))[:3], atol=1e-9)
+
+
+def test_meshes_of_meshio_and_pyvista_come_back_the_same() -> None:
+    mesh = Mesh.block([0.1, 0.05, 0.05], edge=0.025)
+    mesh = Mesh(mesh.points, mesh.cells, point_data={"height": mesh.points[:, 2]}, cell_data={"label": np.arange(len(mesh.cells["tetra"]))})
+    pytest.importorskip("meshio")
+    back = Mesh.from_meshio(mesh.to_meshio())
+    assert same(back, mesh) and np.array_equal(back.point_data["height"], mesh.point_data["height"])
+    pytest.importorskip("pyvista")
+    grid = mesh.to_pyvista()
+    assert grid.n_cells == len(mesh.cells["tetra"]) and np.isclose(grid.volume, 0.1 * 0.05 * 0.05)
+    assert np.array_equal(grid.cell_data["label"], mesh.cell_data["label"])
+    back = Mesh.from_pyvista(grid)
+    assert same(back, mesh) and np.array_equal(back.point_data["height"], mesh.point_data["height"])
+    surface = Mesh.from_pyvista(grid.extract_surface(algorithm=None) if "algorithm" in grid.extract_surface.__doc__ else grid.extract_surface())
+    assert set(surface.cells) == {"triangle"}
+
+
+def test_models_lend_meshes_of_the_same_image_only() -> None:
+    scene = pliant.Scene(until=0.01)
+    scene.law["tissue"] = {"type": "neo-hookean", "young-modulus": 10e3, "poisson-ratio": 0.3}
+    scene.body["ball"] = {"mesh": {"image": ball(), "labels": [2, 5], "edge": 6e-3}, "law": "tissue", "density": 1000.0}
+    scene["body.ball.mesh"] = {"image": ball(), "labels": [2, 5], "edge": 6e-3}
+    model = scene.build()
+    assert np.array_equal(scene.replace({"law.tissue.young-modulus": 8e3}).build(like=model).rest, model.rest)
+    smaller = Image(np.where(ball().array == 5, 5, 0), ball().affine)
+    other = scene.copy()
+    other["body.ball.mesh"] = {"image": smaller, "labels": [5], "edge": 6e-3}
+    assert other.build(like=model).mass.sum() < 0.5 * model.mass.sum()
+    with pytest.raises(ValueError, match="read-only"):
+        smaller.array[0, 0, 0] = 5
+    with pytest.raises(ValueError, match="whole numbers"):
+        Image(np.full((2, 2, 2), 2**31 + 5), np.eye(4)).write("nowhere.nii")
+
+
+def test_masks_from_memory_are_saved_beside_the_scene(tmp_path: object) -> None:
+    whole = ball()
+    masks = [Image((whole.array == label).astype(np.uint8), whole.affine) for label in (2, 5)]
+    scene = pliant.Scene(until=0.01)
+    scene.law["tissue"] = {"type": "neo-hookean", "young-modulus": 10e3, "poisson-ratio": 0.3}
+    scene.body["ball"] = {"mesh": {"masks": masks, "edge": 6e-3}, "law": "tissue", "density": 1000.0}
+    scene.save(f"{tmp_path}/scene.toml")
+    assert np.allclose(pliant.load(f"{tmp_path}/scene.toml").build().rest, scene.build().rest, atol=1e-9)

@@ -1,0 +1,63 @@
+"""Calls in any order leave the bits that a fresh run has."""
+
+from __future__ import annotations
+
+import pytest
+
+import pliant
+from conftest import cube
+
+hypothesis = pytest.importorskip("hypothesis")
+given, settings, st = hypothesis.given, hypothesis.settings, pytest.importorskip("hypothesis.strategies")
+
+MODELS = {
+    "explicit": cube().build(),
+    "implicit": cube(**{"run.solver": "implicit", "run.step": 0.01}).build(),
+    "quasi-static": cube(**{"run.solver": "quasi-static", "run.load-steps": 40}).build(),
+}
+PULLS = ((0.0, 0.0, 0.01), (0.01, 0.0, 0.0))
+
+CALLS = st.one_of(
+    st.tuples(st.just("step"), st.integers(1, 3)),
+    st.tuples(st.just("set"), st.sampled_from([8e3, 10e3, 12e3])),
+    st.tuples(st.just("grip"), st.sampled_from(PULLS)),
+    st.tuples(st.sampled_from(["state", "restore", "release", "look", "view"]), st.none()),
+)
+
+
+def replayed(model: pliant.Model, calls: list[tuple[str, object]], looks: bool) -> int:
+    """The fingerprint after calls; without `looks`, only what moves the body is called, and ways that were given up are left out."""
+    sim = model.simulate(threads=1 if looks else 2)
+    grips: list[pliant.Grip] = []
+    kept: tuple[pliant.State, list[tuple[str, object]]] | None = None
+    for name, value in calls:
+        if name == "step":
+            sim.step(value)  # type: ignore[arg-type]
+        elif name == "set":
+            sim.set({"law.tissue.young-modulus": value})  # type: ignore[dict-item]
+        elif name == "grip" and model is not MODELS["quasi-static"]:
+            grips.append(sim.grip(at=(0.1, 0.1, 0.1), stiffness=20.0))
+            grips[-1].place = grips[-1].point + value
+        elif name == "release" and grips:
+            grips.pop().release()
+        elif looks and name == "look":
+            sim.sample()
+            sim.field("von-mises")
+        elif looks and name == "view":
+            assert abs(sim.displacement).max() < 1.0
+        elif looks and name == "state":
+            kept = sim.state(), []
+        elif looks and name == "restore":
+            here = sim.state()
+            sim.restore(here if kept is None else kept[0])
+            sim.step()
+            sim.restore(here)
+    return sim.fingerprint()
+
+
+@pytest.mark.parametrize("solver", MODELS)
+@settings(max_examples=25, deadline=None)
+@given(calls=st.lists(CALLS, max_size=12))
+def test_looks_snapshots_and_detours_change_no_bit(solver: str, calls: list[tuple[str, object]]) -> None:
+    model = MODELS[solver]
+    assert replayed(model, calls, looks=True) == replayed(model, calls, looks=False)
