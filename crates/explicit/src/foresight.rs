@@ -1,9 +1,11 @@
-//! Checks of the critical time step that can be passed over. A check ranks all cells, which takes as long as nine steps of a CPU, so a
-//! GPU makes only those that can cut its steps otherwise, at the instants of the CPU.
+//! Checks of the critical time step that can be passed over. A check ranks all cells, which takes as long as nine steps of a CPU, so only those
+//! are made that can cut steps otherwise.
 //!
 //! From one check to the next, steps keep their parts while the limit stays in a band. The rate at which it changed says when it leaves the
 //! band; up to half of the way there checks are passed over, and near the edge every one is made. Not foreseen: a limit that falls while
 //! neither the least J nor the largest stretch changes by [`CALM`], within [`LONGEST`] steps.
+
+use serde::{Deserialize, Serialize};
 
 use crate::forces::Deformed;
 use crate::stability::margin;
@@ -14,12 +16,12 @@ const CALM: f64 = 1.02;
 const LONGEST: u64 = 1000;
 
 /// The last check, and how fast the limit changed up to it.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Foresight {
     last: Option<Check>,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Check {
     /// [s].
     limit: f64,

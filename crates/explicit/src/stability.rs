@@ -12,7 +12,7 @@
 //! `validation/tests/stability.rs`.
 //!
 //! *When.* Every [`CHECK_EVERY`] steps, and at once where the least J or the largest stretch √(1 + |C − I|) has changed by [`CHANGE`]. The
-//! force pass finds both at no cost. A GPU passes over checks that leave the parts as they are (`foresight.rs`).
+//! force pass finds both at no cost. Checks that leave the parts as they are, as far as can be foreseen, are passed over (`foresight.rs`).
 //!
 //! *Which cells.* Stiffness is computed for the first cells of two cheap orders, one by an isotropic guess of their speed
 //! and one by stretch: 18 stresses and the eigenvalue problems cost far more than a step of a cell.

@@ -4,6 +4,7 @@ use pliant_mechanics::model::Model;
 use serde::{Deserialize, Serialize};
 
 use crate::forces::Deformed;
+use crate::foresight::Foresight;
 
 /// The most substeps a step is cut into.
 pub const MOST_SUBSTEPS: u32 = 100;
@@ -42,6 +43,8 @@ pub struct Stability {
     pub(crate) deformed: Deformed,
     /// Steps done at the last check.
     pub(crate) checked_at: u64,
+    /// Which checks are passed over.
+    pub(crate) foresight: Foresight,
 }
 
 impl Default for Stability {
@@ -62,6 +65,7 @@ impl Default for Stability {
             extra_steps: 0,
             deformed: Deformed::default(),
             checked_at: 0,
+            foresight: Foresight::default(),
         }
     }
 }
@@ -84,11 +88,13 @@ impl Stability {
         (self.checks, self.last, self.smallest) = (unseen.checks, unseen.last, unseen.smallest);
         (self.reference, self.deformed, self.checked_at) =
             (unseen.reference, unseen.deformed, unseen.checked_at);
+        self.foresight = unseen.foresight;
     }
 
     /// Records a check and the deformation it was made at.
     pub(crate) fn note(&mut self, limit: StepLimit, deformed: Deformed, steps: u64) {
         self.checks += 1;
+        self.foresight.note(limit.limit, steps, deformed);
         (self.last, self.deformed, self.checked_at) = (Some(limit), deformed, steps);
         if self.smallest.is_none_or(|smallest| limit.limit < smallest.limit) {
             self.smallest = Some(limit);

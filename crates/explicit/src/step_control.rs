@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 use crate::Scalar;
 use crate::critical_step::limit_about;
 use crate::forces::Deformed;
-use crate::foresight::Foresight;
 use crate::stability::{CHANGE, CHECK_EVERY, Monitor, OnUnstable, StepLimit, substeps};
 use crate::state::State;
 use crate::step_error::StepError;
@@ -52,8 +51,6 @@ pub struct StepControl {
     /// The length [s] of the (sub)step before, where it was no part of such a step.
     before: Option<f64>,
     monitor: Option<Monitor>,
-    /// Of a control that passes over checks.
-    foresight: Option<Foresight>,
     /// Parts of the step to come.
     substeps: u32,
 }
@@ -61,7 +58,7 @@ pub struct StepControl {
 impl StepControl {
     /// Steps of `step` seconds, not watched.
     pub fn new(step: f64) -> Self {
-        Self { step, since: (0.0, 0), before: None, monitor: None, foresight: None, substeps: 1 }
+        Self { step, since: (0.0, 0), before: None, monitor: None, substeps: 1 }
     }
 
     /// How another control goes on from a state.
@@ -81,16 +78,10 @@ impl StepControl {
         self.monitor = Some(monitor);
     }
 
-    /// Passes over checks from now on, where [`pass`](Self::pass) is asked.
-    #[must_use]
-    pub fn sparing(self) -> Self {
-        Self { foresight: Some(Foresight::default()), ..self }
-    }
-
     /// Passes over a check that is due, if it would leave the steps as they are.
     pub fn pass<R>(&self, state: &mut State<R>, deformed: &Deformed) -> bool {
-        let (Some(monitor), Some(foresight)) = (&self.monitor, &self.foresight) else { return false };
-        let plain = foresight.covers(state.steps, deformed, self.step, self.substeps)
+        let Some(monitor) = &self.monitor else { return false };
+        let plain = state.stability.foresight.covers(state.steps, deformed, self.step, self.substeps)
             && state
                 .stability
                 .last
@@ -174,9 +165,6 @@ impl StepControl {
             }
             let look = StepLimit { time: state.time, limit, solid, cell };
             state.stability.note(look, *deformed, state.steps);
-            if let Some(foresight) = &mut self.foresight {
-                foresight.note(limit, state.steps, *deformed);
-            }
         }
     }
 

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use pliant_geometry::io::{
-    Format, MeshFile, MeshFileError, MeshFileProblem, Place, VtuOptions, read, read_bytes, save_vtu, write,
-    write_pvd, write_vtu,
+    Format, MeshFile, MeshFileError, MeshFileProblem, Place, VtuOptions, VtuSeries, read, read_bytes,
+    save_vtu, write, write_pvd, write_vtu,
 };
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use pliant_testing::Random;
@@ -761,6 +761,22 @@ fn vtu_round_trip_is_exact() {
     let file = read_bytes(&bytes, Format::Vtu).unwrap();
     assert_eq!(file.mesh, with_sets());
     assert_eq!(file.time, None);
+}
+
+#[test]
+fn frames_of_a_series_are_files_of_their_own() {
+    let mut mesh = with_sets();
+    for compress in [false, true] {
+        let mut series = VtuSeries::default();
+        for frame in 0..3 {
+            let options = VtuOptions { compress, single: true, time: Some(f64::from(frame)) };
+            mesh.point_data.values_mut().flat_map(|data| &mut data.values).for_each(|value| *value += 0.5);
+            let (mut alone, mut of_series) = (Vec::new(), Vec::new());
+            write_vtu(&mut alone, &mesh, &options).unwrap();
+            series.write(&mut of_series, &mesh, &options).unwrap();
+            assert_eq!(alone, of_series, "frame {frame}");
+        }
+    }
 }
 
 #[test]

@@ -246,7 +246,7 @@ impl GpuStepper {
         let ties = nodes.followers.as_ref().zip(paths.giving.as_ref()).map(|(followers, giving)| {
             DeviceTies::new(device, &instants.bound, followers, giving, &nodes.displacement)
         });
-        let control = StepControl::new(step).sparing();
+        let control = StepControl::new(step);
         Ok(Self {
             device: device.clone(),
             model: Arc::clone(model),

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::path::PathBuf;
+use std::thread::Scope;
 use std::time::{Duration, Instant};
 
 use pliant_explicit::Wanted;
@@ -11,9 +12,9 @@ use pliant_sim::{Failure, LoadStepProgress, Observer, Schedule, Simulation, Stop
 use crate::advice::remedy;
 use crate::checkpoint::{Checkpoint, Checkpoints, Progressed};
 use crate::output::{
-    CONVERGENCE, FieldMesh, GuestSummary, History, Outcome, OutputError, OutputFolder, PICTURE, PLOT,
-    PartOutcome, SUMMARY, Scheduled, Summary, TieSummary, Watched, frames, interrupted, markdown,
-    output_failure, outputs, plot, summarise,
+    CONVERGENCE, FieldMesh, GuestSummary, History, Outcome, OutputError, OutputFolder, Outputs, PICTURE,
+    PLOT, PartOutcome, SUMMARY, Summary, TieSummary, Watched, frames, interrupted, markdown, output_failure,
+    plot, summarise,
 };
 use pliant_scene::World;
 
@@ -140,39 +141,23 @@ fn go(
     if let Some(stop) = options.stop {
         simulation.stop_on(stop);
     }
-    let mut run = Run::new(world, folder, options, &simulation, report)?;
-    let failure = simulation.observe(world.scene.scene.until, &mut run).err();
-    let failure = failure.map(|failure| run.advised(failure, &simulation));
-    let picture = options.picture.filter(|_| failure.is_none());
-    let (drawn, failure) = match picture.map(|picture| run.draw(&simulation, picture, folder)).transpose() {
-        Ok(drawn) => (drawn, failure),
-        Err(error) => (None, Some(output_failure(&error, Some(simulation.time())))),
-    };
-    let wall_seconds = run.wall_seconds();
-    let Run { watched, history, files, kept, .. } = run;
-    let parts = world.participants.iter().zip(simulation.instants()).zip(watched);
-    Ok(Outcome {
-        failure,
-        steps: simulation.steps(),
-        time: simulation.time(),
-        wall_seconds,
-        energies: simulation.energies(),
-        parts: parts.map(|((part, own), watched)| PartOutcome::new(part, own, watched)).collect(),
-        ties: simulation.ties().map(|tie| TieSummary::new(world, tie)).collect(),
-        guests: simulation.guests().map(|now| GuestSummary::new(world, now)).collect(),
-        ended: simulation.ended().map(ToOwned::to_owned),
-        history,
-        files: files.into_iter().chain(kept).chain(drawn.clone()).collect(),
-        picture: drawn,
-        threads: rayon::current_num_threads(),
-        resumed: options.resume.map(|checkpoint| (checkpoint.path().to_owned(), checkpoint.time())),
+    std::thread::scope(|scope| {
+        // States on a GPU are read back only where an output is due.
+        let spare = rayon::current_num_threads() > 1 && !is_on_device(world);
+        let run = Run::new(world, folder, options, &simulation, report, spare.then_some(scope))?;
+        Ok(run.take_all(simulation, folder, options))
     })
+}
+
+/// Whether states lie on a GPU.
+fn is_on_device(world: &World) -> bool {
+    world.participants.iter().any(|part| part.plan.target.is_gpu())
 }
 
 /// What is seen, written and kept of a run.
 struct Run<'a> {
     world: &'a World,
-    outputs: Vec<Scheduled>,
+    outputs: Outputs<'a>,
     history: History,
     sampling: Schedule,
     /// The worst of each participant.
@@ -202,17 +187,17 @@ impl<'a> Run<'a> {
         options: Options<'a>,
         simulation: &Simulation,
         report: &'a mut (dyn FnMut(Progress) + Send),
+        spare: Option<&'a Scope<'a, '_>>,
     ) -> Result<Self, OutputError> {
         let mut files = Vec::new();
         let before = options.resume.map(|checkpoint| &checkpoint.progressed);
-        let on_device = world.participants.iter().any(|part| part.plan.target.is_gpu());
-        let samples = if on_device { SAMPLES_ON_DEVICE } else { SAMPLES };
+        let samples = if is_on_device(world) { SAMPLES_ON_DEVICE } else { SAMPLES };
         let sampling = Schedule::new(world.scene.scene.until / samples);
         let written = before.map(|before| before.outputs.as_slice());
         if before.is_some() {
             folder.go_on(&world.scene)?;
         }
-        let outputs = outputs(world, folder.path(), &mut files, written)?;
+        let outputs = Outputs::new(world, folder.path(), &mut files, written, spare)?;
         let fresh = || vec![Watched::default(); world.participants.len()];
         let started = Instant::now();
         Ok(Self {
@@ -231,6 +216,44 @@ impl<'a> Run<'a> {
             files,
             kept: None,
         })
+    }
+
+    /// All steps, and what is known at their end.
+    fn take_all(
+        mut self,
+        mut simulation: Simulation,
+        folder: &OutputFolder,
+        options: Options<'_>,
+    ) -> Outcome {
+        let failure = simulation.observe(self.world.scene.scene.until, &mut self).err();
+        // What the run has failed at counts before what its outputs have.
+        let failure = failure.or(self.outputs.end().err());
+        let failure = failure.map(|failure| self.advised(failure, &simulation));
+        let picture = options.picture.filter(|_| failure.is_none());
+        let (drawn, failure) =
+            match picture.map(|picture| self.draw(&simulation, picture, folder)).transpose() {
+                Ok(drawn) => (drawn, failure),
+                Err(error) => (None, Some(output_failure(&error, Some(simulation.time())))),
+            };
+        let wall_seconds = self.wall_seconds();
+        let Self { world, watched, history, files, kept, .. } = self;
+        let parts = world.participants.iter().zip(simulation.instants()).zip(watched);
+        Outcome {
+            failure,
+            steps: simulation.steps(),
+            time: simulation.time(),
+            wall_seconds,
+            energies: simulation.energies(),
+            parts: parts.map(|((part, own), watched)| PartOutcome::new(part, own, watched)).collect(),
+            ties: simulation.ties().map(|tie| TieSummary::new(world, tie)).collect(),
+            guests: simulation.guests().map(|now| GuestSummary::new(world, now)).collect(),
+            ended: simulation.ended().map(ToOwned::to_owned),
+            history,
+            files: files.into_iter().chain(kept).chain(drawn.clone()).collect(),
+            picture: drawn,
+            threads: rayon::current_num_threads(),
+            resumed: options.resume.map(|checkpoint| (checkpoint.path().to_owned(), checkpoint.time())),
+        }
     }
 
     fn wall_seconds(&self) -> f64 {
@@ -289,7 +312,7 @@ impl Observer for Run<'_> {
     /// The steps to the next instant at which there is something to do.
     fn stride(&self, simulation: &Simulation) -> u64 {
         let (time, step) = (simulation.time(), simulation.step_length());
-        (self.outputs.iter().map(|(schedule, _)| schedule))
+        (self.outputs.schedules().iter())
             .chain([&self.sampling])
             .map(|schedule| schedule.stride(time, step))
             .chain(self.checkpoints.as_ref().map(|checkpoints| checkpoints.stride(time, step)))
@@ -298,7 +321,7 @@ impl Observer for Run<'_> {
 
     fn wanted(&self, simulation: &Simulation, last: bool) -> Wanted {
         let (time, step) = (simulation.time(), simulation.step_length());
-        let is_read = self.outputs.iter().any(|(schedule, _)| schedule.awaits(time, step, last));
+        let is_read = self.outputs.reads(time, step, last);
         if is_read || (last && self.pictured) { Wanted::Everything } else { Wanted::Energies }
     }
 
@@ -310,18 +333,8 @@ impl Observer for Run<'_> {
             self.history.sample(&frames(self.world, simulation));
             self.look_at_strains(simulation);
         }
-        let failed = |error| output_failure(&error, Some(time));
-        // Frames are made where an output is due, once for all.
-        let (world, mut shown) = (self.world, None);
-        for (schedule, output) in &mut self.outputs {
-            if schedule.is_due(time, step, last) {
-                output.see(shown.get_or_insert_with(|| frames(world, simulation))).map_err(failed)?;
-            }
-        }
+        self.outputs.see(simulation, last)?;
         self.tell(time, None, last);
-        if last {
-            self.outputs.iter_mut().try_for_each(|(_, output)| output.finish()).map_err(failed)?;
-        }
         Ok(())
     }
 
@@ -339,7 +352,7 @@ impl Observer for Run<'_> {
                 watched: self.watched.clone(),
                 history: self.history.clone(),
                 sampling: self.sampling,
-                outputs: self.outputs.iter().map(|(schedule, o)| (*schedule, o.written())).collect(),
+                outputs: self.outputs.written()?,
             };
             let written = checkpoints.write(&progressed, &states);
             self.kept = Some(written.map_err(|error| output_failure(&error, Some(time)))?);
@@ -354,7 +367,7 @@ impl Observer for Run<'_> {
 
     /// Shows what was found until then to those who have not looked at it.
     fn step_failed(&mut self, simulation: &mut Simulation) {
-        let (seen, step) = (simulation.time(), simulation.step_length());
+        let seen = simulation.time();
         if !simulation.keeps_what_it_found() {
             return;
         }
@@ -364,12 +377,7 @@ impl Observer for Run<'_> {
         if time > seen {
             self.history.sample(&now);
         }
-        for (schedule, output) in &mut self.outputs {
-            if (time > seen || !schedule.has_seen(time)) && schedule.is_due(time, step, true) {
-                // The failure of the step is reported.
-                let _ = output.see(&now);
-            }
-        }
+        self.outputs.see_found(simulation, seen);
     }
 
     fn watch(&mut self, progress: LoadStepProgress) {

@@ -614,12 +614,17 @@ impl Simulation {
     /// The state without what participants note of their iterations.
     fn motion(&mut self) -> Result<State, Failure> {
         self.bring_back()?;
+        Ok(self.snapshot())
+    }
+
+    /// The state as it lies in ordinary memory, without what participants note of their iterations: that of a GPU is the one last read back.
+    pub fn snapshot(&self) -> State {
         let parts = self.world.parts.iter().zip(&self.participants).enumerate();
         let own = parts.map(|(index, (part, now))| {
             let kept = self.met().map_or_else(|| now.kept(), |met| met[index].kept.clone());
             OwnState { clock: now.clock(), kept, step: part.steps.step }
         });
-        Ok(State(own.collect(), self.between()))
+        State(own.collect(), self.between())
     }
 
     /// The states at the instant before its forces were found, where participants touch each other and forces are found.

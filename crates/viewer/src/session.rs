@@ -17,7 +17,7 @@ use pliant_run::{Column, Live};
 use pliant_scene::World;
 use pliant_scene::format::ViewTable;
 use pliant_sim::gpu::{DevicePoints, PointValue};
-use pliant_sim::{Failure, State, number};
+use pliant_sim::{Failure, State, StopFlag, number};
 
 use crate::device::{Seen, point_value};
 use crate::followed::{Followed, FollowedPoint};
@@ -157,6 +157,8 @@ impl Frame {
 pub struct Session {
     orders: Sender<(Instant, Order)>,
     frames: triple_buffer::Output<Frame>,
+    /// Ends a step that takes long.
+    stop: StopFlag,
     thread: Option<JoinHandle<Recording>>,
 }
 
@@ -183,9 +185,11 @@ impl Session {
         let threads = world.scene.run.threads as usize;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(std::io::Error::other)?;
-        let run = move || pool.install(move || play(world, &inbox, input, &wake));
+        let stop = StopFlag::default();
+        let asked = stop.clone();
+        let run = move || pool.install(move || play(world, &inbox, input, &wake, asked));
         let thread = std::thread::Builder::new().name("solver".into()).spawn(run)?;
-        Ok(Self { orders, frames, thread: Some(thread) })
+        Ok(Self { orders, frames, stop, thread: Some(thread) })
     }
 
     /// Gives an order; it is forgotten where the solver has ended.
@@ -208,6 +212,7 @@ impl Session {
     /// Ends it; what was done since it was told to record or was last reset. `None` after a panic, which was told there.
     pub fn end(&mut self) -> Option<Recording> {
         self.order(Order::Quit);
+        self.stop.ask();
         self.thread.take()?.join().ok()
     }
 }
@@ -255,6 +260,8 @@ impl Pace {
 /// What of a run lasts when it goes on as another world.
 struct Playback {
     hold: Hold,
+    /// Ends a step that takes long.
+    stop: StopFlag,
     /// What is shown, and the view that the scene opened with.
     view: ViewTable,
     usual: Surface,
@@ -324,8 +331,9 @@ fn play(
     inbox: &Receiver<(Instant, Order)>,
     mut frames: triple_buffer::Input<Frame>,
     wake: &(impl Fn() + Send),
+    stop: StopFlag,
 ) -> Recording {
-    let mut playback = Playback::new(&world);
+    let mut playback = Playback { stop, ..Playback::new(&world) };
     let mut from = None;
     let mut subject = None;
     loop {
@@ -373,6 +381,7 @@ impl Playback {
     fn new(world: &World) -> Self {
         Self {
             hold: Hold::default(),
+            stop: StopFlag::default(),
             view: world.scene.view.clone(),
             usual: Surface::of(&world.scene.view),
             field: None,
@@ -466,6 +475,7 @@ impl<'s> Player<'s> {
         mut playback: Playback,
     ) -> Result<Self, String> {
         let (mut live, goes_on) = enter(world, from)?;
+        live.simulation.stop_on(&playback.stop);
         if !goes_on && playback.steps > 0 {
             playback.start_anew();
             playback.note = Some("the mesh or the solver is another one: it starts anew".into());
@@ -700,6 +710,8 @@ impl<'s> Player<'s> {
                 self.keep_sound();
                 self.playback.hold.follow(&mut self.live);
             }
+            // Nobody looks any more.
+            Err(failure) if failure.is_interrupted() => {}
             Err(failure) => self.go_back(failure.message),
         }
         let playback = &mut self.playback;

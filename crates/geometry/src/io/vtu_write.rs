@@ -52,6 +52,58 @@ pub fn save_vtu(path: &Path, mesh: &Mesh, options: &VtuOptions) -> Result<(), Me
     save(path, |out| write(out, mesh, options))
 }
 
+/// Writes a mesh again and again with other data: points, cells and sets, which stay, are encoded once. Each file is as [`write_vtu`] writes it.
+#[derive(Clone, Debug, Default)]
+pub struct VtuSeries(Option<Lasting>);
+
+impl VtuSeries {
+    /// Writes the next frame into `writer`. Points, cells and sets are those of the first frame, of which they are checked.
+    pub fn write(
+        &mut self,
+        mut writer: impl Write,
+        mesh: &Mesh,
+        options: &VtuOptions,
+    ) -> Result<(), MeshFileError> {
+        let path = Path::new("stream.vtu");
+        let failed = |source| MeshFileError::Write { path: path.to_owned(), source };
+        let lasting = match &mut self.0 {
+            Some(lasting) => lasting,
+            first => {
+                check(path, mesh)?;
+                first.insert(Lasting::of(mesh, options).map_err(failed)?)
+            }
+        };
+        write_with(&mut writer, mesh, options, lasting).map_err(failed)
+    }
+}
+
+/// What frames of a mesh have in common, encoded.
+#[derive(Clone, Debug)]
+struct Lasting {
+    point_sets: Vec<u8>,
+    cell_sets: Vec<u8>,
+    /// Points and cells.
+    shape: Vec<u8>,
+}
+
+impl Lasting {
+    fn of(mesh: &Mesh, options: &VtuOptions) -> io::Result<Self> {
+        let parts = || Parts { xml: Vec::new(), compress: options.compress };
+        let (mut point_sets, mut cell_sets, mut shape) = (parts(), parts(), parts());
+        for (name, set) in &mesh.point_sets {
+            point_sets.set(name, set.iter().map(|&point| point as usize), mesh.points.len())?;
+        }
+        write_cell_sets(&mut cell_sets, mesh)?;
+        shape.push("      <Points>\n");
+        let coordinates: Vec<f64> = mesh.points.iter().flat_map(|x| [x.x, x.y, x.z]).collect();
+        let fits = coordinates.iter().all(|&x| (x as f32).is_finite());
+        shape.reals("Points", 3, &coordinates, options.single && fits)?;
+        shape.push("      </Points>\n");
+        write_cells(&mut shape, mesh)?;
+        Ok(Self { point_sets: point_sets.xml, cell_sets: cell_sets.xml, shape: shape.xml })
+    }
+}
+
 /// Writes the list of the files of a series, `(time [s], file)`, in place of an older one only once it is
 /// complete. File names are relative to the list.
 pub fn write_pvd(path: &Path, files: &[(f64, String)]) -> Result<(), MeshFileError> {
@@ -156,6 +208,10 @@ impl Parts {
 
 /// Writes a mesh that was checked before.
 pub(super) fn write(out: &mut dyn Write, mesh: &Mesh, options: &VtuOptions) -> io::Result<()> {
+    write_with(out, mesh, options, &Lasting::of(mesh, options)?)
+}
+
+fn write_with(out: &mut dyn Write, mesh: &Mesh, options: &VtuOptions, lasting: &Lasting) -> io::Result<()> {
     let mut parts = Parts { xml: Vec::new(), compress: options.compress };
     let cells: usize = mesh.blocks.iter().map(|block| block.len()).sum();
     let compressor = if options.compress { " compressor=\"vtkZLibDataCompressor\"" } else { "" };
@@ -167,14 +223,9 @@ pub(super) fn write(out: &mut dyn Write, mesh: &Mesh, options: &VtuOptions) -> i
     write_field_data(&mut parts, mesh, options)?;
     let points = mesh.points.len();
     writeln!(parts.xml, "    <Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">")?;
-    write_point_data(&mut parts, mesh, options)?;
-    write_cell_data(&mut parts, mesh, options, cells)?;
-    parts.push("      <Points>\n");
-    let coordinates: Vec<f64> = mesh.points.iter().flat_map(|x| [x.x, x.y, x.z]).collect();
-    let fits = coordinates.iter().all(|&x| (x as f32).is_finite());
-    parts.reals("Points", 3, &coordinates, options.single && fits)?;
-    parts.push("      </Points>\n");
-    write_cells(&mut parts, mesh)?;
+    write_point_data(&mut parts, mesh, options, &lasting.point_sets)?;
+    write_cell_data(&mut parts, mesh, options, cells, &lasting.cell_sets)?;
+    parts.xml.extend_from_slice(&lasting.shape);
     parts.push("    </Piece>\n  </UnstructuredGrid>\n</VTKFile>\n");
     out.write_all(&parts.xml)
 }
@@ -205,28 +256,31 @@ fn write_field_data(parts: &mut Parts, mesh: &Mesh, options: &VtuOptions) -> io:
     Ok(())
 }
 
-fn write_point_data(parts: &mut Parts, mesh: &Mesh, options: &VtuOptions) -> io::Result<()> {
-    if mesh.point_data.is_empty() && mesh.point_sets.is_empty() {
+fn write_point_data(parts: &mut Parts, mesh: &Mesh, options: &VtuOptions, sets: &[u8]) -> io::Result<()> {
+    if mesh.point_data.is_empty() && sets.is_empty() {
         return Ok(());
     }
     parts.push("      <PointData>\n");
     for (name, array) in &mesh.point_data {
         parts.data(name, array, options.single)?;
     }
-    for (name, set) in &mesh.point_sets {
-        parts.set(name, set.iter().map(|&point| point as usize), mesh.points.len())?;
-    }
+    parts.xml.extend_from_slice(sets);
     parts.push("      </PointData>\n");
     Ok(())
 }
 
-fn write_cell_data(parts: &mut Parts, mesh: &Mesh, options: &VtuOptions, cells: usize) -> io::Result<()> {
+fn write_cell_data(
+    parts: &mut Parts,
+    mesh: &Mesh,
+    options: &VtuOptions,
+    cells: usize,
+    sets: &[u8],
+) -> io::Result<()> {
     let names: BTreeMap<&String, usize> = mesh
         .blocks
         .iter()
         .flat_map(|block| block.data.iter().map(|(name, array)| (name, array.components)))
         .collect();
-    let sets: BTreeSet<&String> = mesh.blocks.iter().flat_map(|block| block.sets.keys()).collect();
     if names.is_empty() && sets.is_empty() {
         return Ok(());
     }
@@ -241,6 +295,14 @@ fn write_cell_data(parts: &mut Parts, mesh: &Mesh, options: &VtuOptions, cells: 
         }
         parts.data(name, &joined, options.single)?;
     }
+    parts.xml.extend_from_slice(sets);
+    parts.push("      </CellData>\n");
+    Ok(())
+}
+
+fn write_cell_sets(parts: &mut Parts, mesh: &Mesh) -> io::Result<()> {
+    let cells = mesh.blocks.iter().map(|block| block.len()).sum();
+    let sets: BTreeSet<&String> = mesh.blocks.iter().flat_map(|block| block.sets.keys()).collect();
     for name in sets {
         let starts = mesh.blocks.iter().scan(0, |next, block| {
             let start = *next;
@@ -252,7 +314,6 @@ fn write_cell_data(parts: &mut Parts, mesh: &Mesh, options: &VtuOptions, cells: 
         });
         parts.set(name, members, cells)?;
     }
-    parts.push("      </CellData>\n");
     Ok(())
 }
 

@@ -8,6 +8,7 @@ mod file;
 mod folder;
 mod merged;
 mod outcome;
+mod outputs;
 mod plot;
 mod stability;
 mod strains;
@@ -16,7 +17,7 @@ mod vtu;
 
 use std::path::{Path, PathBuf};
 
-use pliant_sim::{Instant, Schedule, Simulation};
+use pliant_sim::{Instant, Simulation};
 use serde::{Deserialize, Serialize};
 
 pub(crate) use file::{check_own_folder, replace};
@@ -32,10 +33,10 @@ pub use summary::{BodySummary, ParticipantSummary, Summary, failed_input, failed
 pub(crate) use csv::{AXES, ENERGIES, Samples, in_columns};
 pub use csv::{Column, sampled_columns};
 pub(crate) use field_mesh::{FieldMesh, carried_on_shell};
+pub(crate) use outputs::Outputs;
 pub(crate) use plot::{MOST_CURVES, Reactions, constraints, plot, plot_of_sweep};
 pub(crate) use summary::{bodies, interrupted, markdown, output_failure, summarise, told_limit};
 
-use pliant_scene::registry::OutputTable;
 use pliant_scene::{Built, Part, World};
 
 /// An output that could not be written.
@@ -87,7 +88,7 @@ pub(crate) fn time_of(frames: &[Frame<'_>]) -> f64 {
 }
 
 /// Writes instants of a run.
-pub(crate) trait Output {
+pub(crate) trait Output: Send {
     /// Writes down an instant of all participants.
     fn see(&mut self, frames: &[Frame<'_>]) -> Result<(), OutputError>;
 
@@ -110,42 +111,4 @@ pub(crate) enum Written {
     },
     /// Frames of a series: their times [s].
     Frames(Vec<f64>),
-}
-
-/// An output with its schedule.
-pub(crate) type Scheduled = (Schedule, Box<dyn Output>);
-
-/// The outputs of a scene. Their files are opened here; all paths go to `files`. Those of a run that goes
-/// on take up what is `written`.
-pub(crate) fn outputs(
-    world: &World,
-    folder: &Path,
-    files: &mut Vec<PathBuf>,
-    written: Option<&[(Schedule, Written)]>,
-) -> Result<Vec<Scheduled>, OutputError> {
-    let mut all: Vec<Scheduled> = Vec::new();
-    for (index, (name, table)) in world.scene.outputs.iter().enumerate() {
-        let before = written.and_then(|written| written.get(index));
-        let (every, output): (f64, Box<dyn Output>) = match table {
-            OutputTable::Vtu(table) => {
-                let mut series = vtu::Series::new(world, table, folder, name)?;
-                if let Some((_, Written::Frames(times))) = before {
-                    series.take_up(times);
-                }
-                files.push(series.index().to_owned());
-                (table.every, Box::new(series))
-            }
-            OutputTable::Csv(table) => {
-                let mut rows = csv::Rows::new(world, table, folder, name);
-                match before {
-                    Some((_, Written::Rows { bytes, crc })) => rows.take_up(*bytes, *crc)?,
-                    _ => rows.start()?,
-                }
-                files.push(rows.path().to_owned());
-                (table.every, Box::new(rows))
-            }
-        };
-        all.push((before.map_or(Schedule::new(every), |(schedule, _)| *schedule), output));
-    }
-    Ok(all)
 }

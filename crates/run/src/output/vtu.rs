@@ -5,7 +5,7 @@ use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use pliant_geometry::io::{MeshFileError, VtuOptions, read_pvd, write_pvd, write_vtu};
+use pliant_geometry::io::{MeshFileError, VtuOptions, VtuSeries, read_pvd, write_pvd};
 
 use super::field_mesh::FieldMesh;
 use super::file::{check_own_folder, replace};
@@ -21,6 +21,7 @@ pub(super) struct Series {
     /// Times of the frames that an interrupted run had written beyond these; their files stay until they are replaced.
     beyond: Vec<f64>,
     shown: FieldMesh,
+    frames: VtuSeries,
 }
 
 impl Series {
@@ -41,6 +42,7 @@ impl Series {
             times: Vec::new(),
             beyond: Vec::new(),
             shown: FieldMesh::new(world, table),
+            frames: VtuSeries::default(),
         })
     }
 
@@ -78,7 +80,8 @@ impl Output for Series {
         };
         let written = replace(&path, |file| {
             let mut writer = BufWriter::new(file);
-            write_vtu(&mut writer, self.shown.mesh(), &options).map_err(|error| match error {
+            let frame = self.frames.write(&mut writer, self.shown.mesh(), &options);
+            frame.map_err(|error| match error {
                 MeshFileError::Write { source, .. } => source,
                 other => io::Error::other(other),
             })?;
