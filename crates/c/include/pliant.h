@@ -176,7 +176,8 @@ PliantStatus pliant_step(const PliantContext *context, PliantSimulation simulati
 /* Goes on until a time [s], to the instant nearest to it; else as `pliant_step`. A time that has passed takes no step. */
 PliantStatus pliant_run_until(const PliantContext *context, PliantSimulation simulation, double time, uint64_t *done, PliantError *error);
 
-/* Asks the thread that steps a simulation to stop: after the step under way, or before it where that is a long one. Without such a thread the next call that steps returns at once. Any thread may ask. */
+/* Asks the thread that steps a simulation to stop after its step. A step that takes long is given up: it is not taken. Without such a thread, the next call
+ * that steps returns at once. Any thread may ask. */
 PliantStatus pliant_stop(const PliantContext *context, PliantSimulation simulation, PliantError *error);
 
 /* Pushes nodes with forces [N], three numbers a node, in the order of `pliant_body`, until they are replaced; their work is external. `count` is the
