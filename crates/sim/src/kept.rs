@@ -79,6 +79,8 @@ pub(crate) struct ImplicitState {
     pub effort: Effort,
     pub convergence: VecDeque<Iterated>,
     pub contact: Option<ContactState>,
+    /// How far moved nodes whose force is limited are behind their motion.
+    pub lags: Vec<Lag>,
     /// Whether forces were found at the instant, so that their work is entered.
     pub entered: bool,
 }
@@ -114,7 +116,7 @@ impl ContactState {
             && self.touches.iter().all(|own| known(own.node) && own.slip.is_finite())
             && self.pairs.iter().flatten().all(|&node| known(node))
             && self.legs.iter().all(|(_, leg)| leg.is_finite())
-            && self.lags.iter().map(Lag::rigid).eq(limited.map(|(number, _)| number))
+            && self.lags.iter().map(Lag::number).eq(limited.map(|(number, _)| number))
             && self.lags.iter().all(Lag::is_finite)
     }
 }
@@ -130,7 +132,17 @@ impl ImplicitState {
             (Some(contact), Some(contacts)) => contact.fits(nodes, contacts),
             (Some(_), None) => false,
         };
-        before && contact && self.previous.iter().all(|state| state.fits(model)) && self.state.fits(model)
+        let limited = match &part.method {
+            Method::Static(bodies, _) | Method::Implicit(bodies, _) => Some(&bodies.model.force_limits),
+            _ => None,
+        };
+        let limited = limited.into_iter().flat_map(|limits| limits.keys().copied());
+        let lags = self.lags.iter().map(Lag::number).eq(limited) && self.lags.iter().all(Lag::is_finite);
+        before
+            && contact
+            && lags
+            && self.previous.iter().all(|state| state.fits(model))
+            && self.state.fits(model)
     }
 }
 
@@ -217,7 +229,7 @@ fn fits<R: Scalar>(state: &State<R>, memory: &Memory<R>, part: &Part) -> bool {
     }
     let things = part.method.contacts().map_or(0, |contacts| contacts.rigids.len());
     let led = state.driven.iter().all(|(rigid, leg)| (*rigid as usize) < things && leg.is_finite());
-    let lags = state.lags.iter().all(|lag| lag.rigid() < things && lag.is_finite());
+    let lags = state.lags.iter().all(|lag| lag.number() < things && lag.is_finite());
     let grips = |held: &Gripped| {
         (held.rigid as usize) < things
             && (held.node as usize) < model.node_count()
