@@ -247,8 +247,9 @@ struct Shown {
     frame: Frame,
     /// The smallest stable step of a cell [s] if that cell is marked.
     step: Option<f64>,
-    /// Forces of contacts, if they are drawn.
+    /// Forces of contacts, if they are drawn, and the least gap [m] with them.
     forces: Vec<PointForce>,
+    gap: Option<f64>,
     /// Constraints and loads, if they are marked.
     marks: Vec<Mark>,
 }
@@ -295,9 +296,12 @@ impl Look {
             true => contact_forces(mesh, &points).ok_or(SeriesError::NoContacts)?,
             false => Vec::new(),
         };
+        let gaps = mesh.point_data.get("gap").filter(|_| self.style.contacts);
+        let gap =
+            gaps.and_then(|gaps| gaps.values.iter().copied().filter(|gap| gap.is_finite()).reduce(f64::min));
         let marks = marks.map(|mesh| marks_of(mesh, &deformed_points(mesh)).ok_or(SeriesError::NoMarks));
         let marks = marks.transpose()?.unwrap_or_default();
-        Ok(Shown { frame: Frame { points, values, critical }, step, forces, marks })
+        Ok(Shown { frame: Frame { points, values, critical }, step, forces, gap, marks })
     }
 
     /// The same with the labels of a mesh in its legend.
@@ -364,9 +368,16 @@ impl Look {
                 note.push_str(&format!(", {}{of}", arrow_note(*largest)));
             }
         }
+        if let Some(gap) = shown.gap {
+            let (unit, factor) = readable("m", gap.abs().max(1e-6));
+            note.push_str(&format!(", least gap {:.3} {unit}", gap * factor));
+        }
         if let Some(step) = shown.step {
             let (unit, factor) = readable("s", step);
             note.push_str(&format!(", smallest element step {:.3} {unit} (marked)", step * factor));
+        }
+        if self.legend.unconverged > 0 {
+            note.push_str(&format!(", steps that did not converge: {}", self.legend.unconverged));
         }
         Legend { note, missing: *missing, ..self.legend.clone() }.write(&mut picture, style);
         picture

@@ -246,14 +246,15 @@ impl Scene {
     pub fn shown_as(&self, view: &ViewTable, every: f64) -> VtuTable {
         let mut data = vec![FieldName::Displacement];
         data.extend(self.field_of(view).filter(|field| *field != FieldName::Displacement));
-        if view.contacts && !data.contains(&FieldName::ContactForce) {
-            data.push(FieldName::ContactForce);
-        }
-        if view.critical && !data.contains(&FieldName::ElementStep) {
-            data.push(FieldName::ElementStep);
-        }
-        if view.fibres && !data.contains(&FieldName::Fibre) {
-            data.push(FieldName::Fibre);
+        for (drawn, field) in [
+            (view.contacts, FieldName::ContactForce),
+            (view.contacts, FieldName::Gap),
+            (view.critical, FieldName::ElementStep),
+            (view.fibres, FieldName::Fibre),
+        ] {
+            if drawn && !data.contains(&field) {
+                data.push(field);
+            }
         }
         let on = view.on.as_ref();
         let mut models = self.bodies.iter().filter(|(name, _)| on.is_none_or(|on| on == name));

@@ -1036,6 +1036,8 @@ class Move(Table):
         Rotation of nodes of a solid about an axis, reached along the curve; each node stays on its circle all the way. Takes { axis = …, centre = …, angle = … }.
     components
         Components prescribed; if not given, all three of the displacement, and with `turn` the rotations. A rotation takes all three. Takes an array of texts ("x", "y", "z", "rx", "ry" or "rz").
+    force_limit
+        The force [N] that they push with at most, as their reaction tells. From half of it on they give way together, and lag behind their motion; when nothing is in their way any more, they catch up. With the solvers `implicit` and `static`. Takes a number, greater than 0.
     curve
         The form of the growth. Takes "ramp", "smooth-step", "polynomial-10-15-6" or "hold", { wave = … } or { table = … }.
     from_
@@ -1045,7 +1047,7 @@ class Move(Table):
     """
 
     _type: ClassVar[str | None] = "move"
-    _keys: ClassVar[dict[str, str]] = {"body": "body", "nodes": "nodes", "by": "by", "velocity": "velocity", "turn": "turn", "rotate": "rotate", "components": "components", "curve": "curve", "from_": "from", "to": "to"}
+    _keys: ClassVar[dict[str, str]] = {"body": "body", "nodes": "nodes", "by": "by", "velocity": "velocity", "turn": "turn", "rotate": "rotate", "components": "components", "force_limit": "force-limit", "curve": "curve", "from_": "from", "to": "to"}
 
     body: str
     nodes: Any
@@ -1054,6 +1056,7 @@ class Move(Table):
     turn: Sequence[float] | None = None
     rotate: Any | None = None
     components: Any | None = None
+    force_limit: float | None = None
     curve: Any | None = None
     from_: float | None = None
     to: float | None = None
