@@ -34,13 +34,42 @@ fn entry(line: &str) -> Option<Entry> {
     Some(Entry { file: words.next()?, words: words.collect() })
 }
 
+/// The word before the folder, in the list, of pictures that the renderer is tested by: where these change, it draws otherwise.
+const LOOK: &str = "look";
+
 fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     fs::read(path).map_err(|error| Failure::plain(format!("`{}`: {error}", path.display()), "check the path"))
 }
 
-fn entries(folder: &Path) -> Result<Vec<Entry>, Failure> {
+/// The pictures of the list, and a hash of how the renderer draws.
+fn entries(folder: &Path) -> Result<(Vec<Entry>, Sha256), Failure> {
     let list = read(&folder.join(LIST))?;
-    Ok(String::from_utf8_lossy(&list).lines().filter_map(entry).collect())
+    let lines = String::from_utf8_lossy(&list).lines().filter_map(entry).collect::<Vec<_>>();
+    let (looks, entries): (Vec<_>, Vec<_>) = lines.into_iter().partition(|entry| entry.file == LOOK);
+    let mut look = Sha256::new();
+    for path in looks.iter().flat_map(|look| &look.words) {
+        add_files(&mut look, &folder.join(path), &["md"])?;
+    }
+    Ok((entries, look))
+}
+
+/// Adds the files of a folder to a hash, but for those of some endings.
+fn add_files(hash: &mut Sha256, folder: &Path, without: &[&str]) -> Result<(), Failure> {
+    let listed = fs::read_dir(folder).map_err(|error| {
+        Failure::plain(format!("`{}`: {error}", folder.display()), format!("mend the list `{LIST}`"))
+    })?;
+    let mut files: Vec<PathBuf> =
+        listed.flatten().map(|file| file.path()).filter(|path| path.is_file()).collect();
+    files.retain(|path| {
+        path.extension().and_then(|end| end.to_str()).is_none_or(|end| !without.contains(&end))
+    });
+    files.sort_unstable();
+    for path in files {
+        let content = read(&path)?;
+        hash.update(format!("{} {}\0", path.file_name().unwrap_or_default().display(), content.len()));
+        hash.update(content);
+    }
+    Ok(())
 }
 
 fn hex(hash: Sha256) -> String {
@@ -48,23 +77,11 @@ fn hex(hash: Sha256) -> String {
 }
 
 impl Entry {
-    /// A hash of all that it is made of: options, and files of the scene but pictures and texts on it.
-    fn source(&self, folder: &Path) -> Result<String, Failure> {
-        let mut hash = Sha256::new();
+    /// A hash of all that it is made of: how the renderer draws, options, and files of the scene but pictures and texts on it.
+    fn source(&self, folder: &Path, look: &Sha256) -> Result<String, Failure> {
+        let mut hash = look.clone();
         self.words.iter().for_each(|word| hash.update(format!("{word}\0")));
-        let scene = folder.join(self.words.first().map_or("", String::as_str));
-        let listed = fs::read_dir(&scene).map_err(|error| {
-            Failure::plain(format!("`{}`: {error}", scene.display()), format!("mend the list `{LIST}`"))
-        })?;
-        let mut files: Vec<PathBuf> =
-            listed.flatten().map(|file| file.path()).filter(|path| path.is_file()).collect();
-        files.retain(|path| !matches!(path.extension().and_then(|end| end.to_str()), Some("md" | "png")));
-        files.sort_unstable();
-        for path in files {
-            let content = read(&path)?;
-            hash.update(format!("{} {}\0", path.file_name().unwrap_or_default().display(), content.len()));
-            hash.update(content);
-        }
+        add_files(&mut hash, &folder.join(self.words.first().map_or("", String::as_str)), &["md", "png"])?;
         Ok(hex(hash))
     }
 
@@ -108,17 +125,18 @@ fn hash_of(file: &Path) -> Option<String> {
     Some(hex(hash))
 }
 
-/// Pictures that are not made of what the list has now, or that are other files than were made.
-fn outdated(folder: &Path) -> Result<Vec<Entry>, Failure> {
+/// Pictures that are not made of what the list has now, or that are other files than were made; each with the hash of what it is made of.
+fn outdated(folder: &Path) -> Result<Vec<(Entry, String)>, Failure> {
     let sums = sums(folder);
     let mut old = Vec::new();
-    for entry in entries(folder)? {
+    let (entries, look) = entries(folder)?;
+    for entry in entries {
         let made = sums.get(&entry.file);
-        let source = entry.source(folder)?;
+        let source = entry.source(folder, &look)?;
         if made.is_none_or(|made| {
             made[0] != source || hash_of(&folder.join(&entry.file)).as_ref() != Some(&made[1])
         }) {
-            old.push(entry);
+            old.push((entry, source));
         }
     }
     Ok(old)
@@ -129,7 +147,7 @@ pub fn renew(folder: &Path) -> Result<u8, Failure> {
     let old = outdated(folder)?;
     let space =
         tempfile::tempdir().map_err(|error| Failure::plain(error, "check the free space, or set TMPDIR"))?;
-    for (index, entry) in old.iter().enumerate() {
+    for (index, (entry, source)) in old.iter().enumerate() {
         let out = space.path().join(index.to_string());
         let command = entry.command(folder, &out)?;
         let code = render(&command)?;
@@ -145,7 +163,7 @@ pub fn renew(folder: &Path) -> Result<u8, Failure> {
             taken.map_or(Ok(0), |taken| fs::copy(taken.path(), &file)).map_err(unwritable)?;
         }
         let mut sums = sums(folder);
-        sums.insert(entry.file.clone(), [entry.source(folder)?, hash_of(&file).unwrap_or_default()]);
+        sums.insert(entry.file.clone(), [source.clone(), hash_of(&file).unwrap_or_default()]);
         let lines = sums.iter().map(|(file, [source, picture])| format!("{source} {picture} {file}\n"));
         fs::write(folder.join(SUMS), lines.collect::<String>()).map_err(unwritable)?;
         say(format_args!("made {}", file.display()))?;
@@ -237,7 +255,7 @@ mod tests {
     #[test]
     fn pictures_of_this_repository_fit_their_scenes() {
         let old = outdated(&repository().join("scenes")).unwrap();
-        let files: Vec<&str> = old.iter().map(|entry| entry.file.as_str()).collect();
+        let files: Vec<&str> = old.iter().map(|(entry, _)| entry.file.as_str()).collect();
         assert!(
             files.is_empty(),
             "older than their scenes: {files:?}; make them by `pliant render scenes --gallery`"
@@ -254,7 +272,8 @@ mod tests {
         fs::write(at("ball.png"), "a picture").unwrap();
         let old = || outdated(folder.path()).unwrap().len();
         assert_eq!(old(), 1, "never made");
-        let source = entries(folder.path()).unwrap()[0].source(folder.path()).unwrap();
+        let (listed, look) = entries(folder.path()).unwrap();
+        let source = listed[0].source(folder.path(), &look).unwrap();
         fs::write(at(SUMS), format!("{source} {} ball.png\n", hash_of(&at("ball.png")).unwrap())).unwrap();
         assert_eq!(old(), 0);
         fs::write(at("ball/README.md"), "a text").unwrap();
@@ -268,10 +287,27 @@ mod tests {
         assert_eq!(old(), 1);
     }
 
+    #[test]
+    fn a_renderer_that_draws_otherwise_outdates_all_pictures() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("ball")).unwrap();
+        fs::create_dir(at("stored")).unwrap();
+        fs::write(at(LIST), "look stored\nball.png ball").unwrap();
+        let source = || {
+            let (listed, look) = entries(folder.path()).unwrap();
+            assert_eq!(listed.len(), 1);
+            listed[0].source(folder.path(), &look).unwrap()
+        };
+        let before = source();
+        fs::write(at("stored/bodies.png"), "darker").unwrap();
+        assert_ne!(source(), before);
+    }
+
     /// All pictures that texts show are listed, but those of the window and of data that is not here; and so is each scene.
     #[test]
     fn pictures_in_texts_are_listed() {
-        let listed = entries(&repository().join("scenes")).unwrap();
+        let (listed, _) = entries(&repository().join("scenes")).unwrap();
         let listed_scenes: Vec<String> = listed.iter().map(|entry| entry.words[0].clone()).collect();
         let listed: Vec<PathBuf> = listed
             .iter()

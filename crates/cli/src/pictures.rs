@@ -262,6 +262,7 @@ pub(crate) fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>
     if scene.view.marks {
         look.marks = Some(Series::find(run.path(), Some("marks"))?);
     }
+    look.legend.unconverged = summary.solver.as_ref().map_or(0, |effort| effort.unconverged);
     let failed = summary.error.is_some();
     Ok(Some(Shown { look, series, title: scene.scene.title.clone(), failed, _space: space }))
 }

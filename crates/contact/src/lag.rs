@@ -1,4 +1,4 @@
-//! Tools that push with no more than a force: how far they lag behind their trajectory.
+//! Tools and moved nodes that push with no more than a force: how far they lag behind their trajectory.
 //!
 //! A hand that meets something stiffer than it can bear comes to rest there, and goes along again when it is called back. So does a tool with a
 //! limit: of the way that it would go against what it pushes, it goes a part that falls from 1 at half of the limit over 0 at the limit to −1.
@@ -28,10 +28,10 @@ const CATCHES_UP: f64 = 0.3;
 /// Time [s] over which forces are averaged: those of single steps jump where nodes come and go.
 const FELT: f64 = 0.01;
 
-/// The lag of a rigid thing behind its trajectory.
+/// The lag of a rigid thing or of moved nodes behind their trajectory.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Lag {
-    rigid: u32,
+    number: u32,
     /// From its place on the trajectory to where it is [m], now and after the step.
     ways: [[f64; 3]; 2],
     /// The force [N] with which it pushes: on average until the step before, and in this one.
@@ -43,14 +43,14 @@ pub struct Lag {
 }
 
 impl Lag {
-    /// Of a thing, by its place among the rigid things of the contacts.
-    pub fn new(rigid: u32) -> Self {
-        Self { rigid, ways: [[0.0; 3]; 2], forces: [[0.0; 3]; 2], step: 0.0, longest: (0.0, 0.0) }
+    /// Of a thing, by its place among the rigid things of the contacts, or of moved nodes, by that of their constraint in its model.
+    pub fn new(number: u32) -> Self {
+        Self { number, ways: [[0.0; 3]; 2], forces: [[0.0; 3]; 2], step: 0.0, longest: (0.0, 0.0) }
     }
 
-    /// The thing.
-    pub fn rigid(&self) -> usize {
-        self.rigid as usize
+    /// The place of the thing or of the constraint.
+    pub fn number(&self) -> usize {
+        self.number as usize
     }
 
     /// From its place on the trajectory to where it is [m].

@@ -106,7 +106,7 @@ impl<R: Scalar> State<R> {
 
     /// How far a rigid thing lags behind its trajectory, if its force is limited.
     pub fn lag(&self, rigid: usize) -> Option<&Lag> {
-        self.lags.iter().find(|lag| lag.rigid() == rigid)
+        self.lags.iter().find(|lag| lag.number() == rigid)
     }
 
     /// Drives a tool or a jaw from the step on that follows.

@@ -680,7 +680,7 @@ impl<R: Scalar> CentralDifference<R> {
         touching.lag(&mut lags, times, |rigid| state.leg(rigid));
         let postures = |number: usize, rigid: &Rigid| {
             let leg = state.leg(number);
-            let lag = lags.iter().find(|lag| lag.rigid() == number);
+            let lag = lags.iter().find(|lag| lag.number() == number);
             let ways = lag.map_or([Vector3::zeros(); 2], |lag| [lag.now(), lag.next()]);
             let stance = |k: usize| {
                 let Stance { pose, growth } = rigid.stance(times[k], leg);

@@ -239,8 +239,8 @@ impl<R: Scalar> Touching<R> {
             lags.extend(limited.map(|(_, number)| Lag::new(number)));
         }
         for lag in lags {
-            let rigid = &rigids[lag.rigid()];
-            let place = |time| rigid.posture(time, leg(lag.rigid())).0.translation.vector;
+            let rigid = &rigids[lag.number()];
+            let place = |time| rigid.posture(time, leg(lag.number())).0.translation.vector;
             let way = place(times[1]) - place(times[0]);
             lag.follow(rigid.trajectory.limit().unwrap_or(f64::INFINITY), way, times[1] - times[0]);
         }
@@ -250,7 +250,7 @@ impl<R: Scalar> Touching<R> {
     pub fn bear_on(&self, lags: &mut [Lag]) {
         let Contacts { rigids, contacts, .. } = &*self.contacts;
         for lag in lags {
-            let tool = rigids[lag.rigid()].tool();
+            let tool = rigids[lag.number()].tool();
             let on = |(contact, force): (&Contact, &Vector<f64>)| {
                 let of_tool = matches!(contact.with, With::Rigid(rigid) if rigids[rigid].tool() == tool);
                 of_tool.then(|| Vector3::from(*force))

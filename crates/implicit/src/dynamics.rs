@@ -11,6 +11,7 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use pliant_contact::lag::Lag;
 use pliant_mechanics::StopFlag;
 use pliant_mechanics::model::Solid;
 
@@ -246,6 +247,16 @@ impl BackwardEuler {
         self.system.stop = flag.clone();
     }
 
+    /// How far moved nodes whose force is limited are behind their motion, by their constraints.
+    pub fn lags(&self) -> &[Lag] {
+        &self.system.lags
+    }
+
+    /// Takes lags of another solver, to go on where that one stood.
+    pub fn take_lags(&mut self, lags: Vec<Lag>) {
+        self.system.lags = lags;
+    }
+
     /// Takes hold of nodes, as [`Forces::hold`](crate::Forces::hold).
     pub fn hold(&mut self, springs: &[Spring]) {
         self.system.hold(springs);
@@ -318,14 +329,32 @@ impl BackwardEuler {
         let time = state.time + h;
         self.system.prescribed(state.time, time, &mut self.pending);
         self.system.begin_step(&state.history, h);
-        self.moved.fill(0.0);
         if self.system.touching.is_some() {
             return self.newton_in_contact(state, h);
         }
         let mut residuals = Vec::with_capacity(self.settings.iterations + 1);
+        let converged = within_limits(self, state, time, |solver, state| {
+            solver.newton_without_contact(state, h, &mut residuals)
+        })?;
+        self.end(state, time);
+        Ok(DynamicStep { residuals, linear: self.system.last_solution, parts: 0, converged })
+    }
+
+    /// [`newton`](Self::newton) without contact; whether the residual has come below the tolerance, or was not asked for.
+    fn newton_without_contact(
+        &mut self,
+        state: &mut State,
+        h: f64,
+        residuals: &mut Vec<f64>,
+    ) -> Result<bool, SolveError> {
+        let time = state.time + h;
+        self.moved.fill(0.0);
         let mut converged = true;
         for iteration in 0..=self.settings.iterations {
             if iteration == 1 && self.settings.iterations == 1 {
+                if !self.system.lags.is_empty() {
+                    self.system.evaluate(state, time, None)?;
+                }
                 break;
             }
             self.system.evaluate(state, time, Some((self.settings.tangent, &self.pending)))?;
@@ -348,6 +377,7 @@ impl BackwardEuler {
             }
             if iteration == self.settings.iterations || !norm.is_finite() {
                 let node = self.worst_node();
+                let residuals = std::mem::take(residuals);
                 return Err(SolveError::NotConverged { time, node, residuals, broken: None });
             }
             // The motion goes on, to begin with.
@@ -369,13 +399,13 @@ impl BackwardEuler {
             self.system.advance(state, &self.increment, 1.0);
             self.find_motion(state);
         }
-        self.end(state, time);
-        Ok(DynamicStep { residuals, linear: self.system.last_solution, parts: 0, converged })
+        Ok(converged)
     }
 
     /// [`newton`](Self::newton) in contact, from the motion of before.
     fn newton_in_contact(&mut self, state: &mut State, h: f64) -> Result<DynamicStep, SolveError> {
         let time = state.time + h;
+        self.moved.fill(0.0);
         if !self.system.damper.is_empty() {
             self.system.evaluate(state, time, Some((self.settings.tangent, &self.pending)))?;
             self.system.take_damper();

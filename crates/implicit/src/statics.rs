@@ -7,6 +7,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Matrix6, RowVector6, SymmetricEigen, Vector3};
+use pliant_contact::lag::Lag;
 use pliant_mechanics::StopFlag;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::Motion;
@@ -229,6 +230,16 @@ impl Statics {
         self.system.stop = flag.clone();
     }
 
+    /// How far moved nodes whose force is limited are behind their motion, by their constraints.
+    pub fn lags(&self) -> &[Lag] {
+        &self.system.lags
+    }
+
+    /// Takes lags of another solver, to go on where that one stood.
+    pub fn take_lags(&mut self, lags: Vec<Lag>) {
+        self.system.lags = lags;
+    }
+
     /// Takes hold of nodes, as [`Forces::hold`](crate::Forces::hold).
     pub fn hold(&mut self, springs: &[Spring]) {
         self.system.hold(springs);
@@ -378,7 +389,6 @@ impl Statics {
     }
 
     fn iterate(&mut self, state: &mut State, time: f64, control: Option<Control>) -> Result<Step, Attempt> {
-        let failed = |error| Attempt { error, retry: true };
         let start = state.clone();
         self.system.prescribed(state.time, time, &mut self.pending);
         self.system.begin_step(&start.history, time - start.time);
@@ -387,7 +397,25 @@ impl Statics {
             self.system.end_step(Some(&start), state, time - start.time);
             return Ok(step);
         }
-        let mut residuals: Vec<f64> = Vec::new();
+        let mut residuals = Vec::new();
+        let negative_pivots = within_limits(self, state, time, |solver, state| {
+            solver.iterate_without_contact(state, time, control, &mut residuals)
+        })?;
+        self.system.end_step(Some(&start), state, time - start.time);
+        state.time = time;
+        Ok(Step { time, residuals, negative_pivots, parts: 0 })
+    }
+
+    /// [`iterate`](Self::iterate) without contact; the negative pivots of the last stiffness.
+    fn iterate_without_contact(
+        &mut self,
+        state: &mut State,
+        time: f64,
+        control: Option<Control>,
+        residuals: &mut Vec<f64>,
+    ) -> Result<usize, Attempt> {
+        let failed = |error| Attempt { error, retry: true };
+        let start = state.clone();
         let mut negative_pivots = 0;
         for iteration in 0..=self.settings.iterations {
             self.system
@@ -403,9 +431,7 @@ impl Statics {
             let complete = self.pending.iter().all(|&p| p == 0.0) && self.system.conditions.are_closed();
             let controlled = gap.abs() <= self.allowed_gap(control);
             if iteration > 0 && complete && controlled && norm <= allowed {
-                self.system.end_step(Some(&start), state, time - start.time);
-                state.time = time;
-                return Ok(Step { time, residuals, negative_pivots, parts: 0 });
+                return Ok(negative_pivots);
             }
             if !norm.is_finite() || iteration == self.settings.iterations {
                 break;
@@ -435,8 +461,8 @@ impl Statics {
                 self.shorten(state, time)?;
             }
         }
-        let node = self.worst_node();
-        Err(Attempt { error: SolveError::NotConverged { time, node, residuals, broken: None }, retry: true })
+        let (node, residuals) = (self.worst_node(), std::mem::take(residuals));
+        Err(failed(SolveError::NotConverged { time, node, residuals, broken: None }))
     }
 
     /// [`iterate`](Self::iterate) in contact.

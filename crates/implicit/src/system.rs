@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::{SMatrix, SVector, Vector3};
+use pliant_contact::lag::Lag;
 use pliant_mechanics::StopFlag;
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE, Spread, face_areas};
 use pliant_mechanics::mapping::{Configuration, Mapping};
@@ -106,6 +107,8 @@ pub(crate) struct System {
     followers: Option<Followers>,
     pub(crate) conditions: Conditions,
     solver: LinearSolver,
+    /// How far moved nodes whose force is limited are behind their motion, by their constraints; a system of forces alone has none.
+    pub(crate) lags: Vec<Lag>,
     /// Contacts; a system of forces alone has none.
     pub(crate) touching: Option<Box<TouchingSystem>>,
     /// The stiffness at the start of a step that damps it; empty without such damping.
@@ -138,6 +141,7 @@ impl System {
         system.conditions = Conditions::of(&model, &system.equations, system.surface.as_ref());
         system.solver = solver;
         system.touching = model.touching.as_ref().map(|own| Box::new(TouchingSystem::new(own, &model)));
+        system.lags = model.force_limits.keys().map(|&constraint| Lag::new(constraint as u32)).collect();
         system.coupling = vec![0.0; system.equations.len()];
         system.find_pattern()?;
         if model.stiffness_damping > 0.0 {
@@ -320,6 +324,7 @@ impl System {
             phases: Phases::default(),
             last_solution: LinearReport::default(),
             solver: LinearSolver::Direct,
+            lags: Vec::new(),
             touching: None,
             damper: Vec::new(),
             stop: StopFlag::default(),
@@ -357,8 +362,12 @@ impl System {
 
     /// Ends a step [s]: the history of a state is advanced from the state before, or from rest.
     pub(crate) fn end_step(&mut self, before: Option<&State>, state: &mut State, step: f64) {
-        if let (Some(touching), Some(before)) = (&mut self.touching, before) {
-            touching.end_step(before.time + step);
+        if let Some(before) = before {
+            let time = before.time + step;
+            self.lags.iter_mut().for_each(|lag| lag.advance(time));
+            if let Some(touching) = &mut self.touching {
+                touching.end_step(time);
+            }
         }
         if !self.relaxes() {
             return;

@@ -241,7 +241,7 @@ impl TouchingSystem {
     /// [`now`](Self::now) at a state that no step led to: without friction.
     pub fn at(&mut self, state: &State) -> TouchingNow {
         let still = vec![0.0; self.forces.len()];
-        let shifts = self.lags.iter().map(|lag| (lag.rigid() as u32, [lag.now(); 2]));
+        let shifts = self.lags.iter().map(|lag| (lag.number() as u32, [lag.now(); 2]));
         *self.barriers.shifts_mut() = shifts.collect();
         self.begin(state, &still, [state.time; 2]);
         self.share = 1.0;
@@ -282,7 +282,7 @@ impl TouchingSystem {
 
     /// The force [N] that the tool of a lag pushes with at most.
     pub(crate) fn limit(&self, lag: &Lag) -> f64 {
-        self.barriers.contacts().rigids[lag.rigid()].trajectory.limit().unwrap_or(f64::INFINITY)
+        self.barriers.contacts().rigids[lag.number()].trajectory.limit().unwrap_or(f64::INFINITY)
     }
 
     /// Finds where tools whose force is limited go between two times [s]: each a part of its way along a force [N]; how long [m] the whole of
@@ -295,9 +295,9 @@ impl TouchingSystem {
         let mut lags = std::mem::take(&mut self.lags);
         self.barriers.shifts_mut().clear();
         for (lag, (ahead, part, into)) in lags.iter_mut().zip(parts) {
-            let number = lag.rigid() as u32;
+            let number = lag.number() as u32;
             let leg = self.barriers.legs().get(&number);
-            let rigid = &self.barriers.contacts().rigids[lag.rigid()];
+            let rigid = &self.barriers.contacts().rigids[lag.number()];
             let place = |time| rigid.posture(time, leg).0.translation.vector;
             *into = lag.go(ahead, part, place(to) - place(from), to - from);
             self.barriers.shifts_mut().push((number, [lag.now(), lag.next()]));
@@ -309,7 +309,7 @@ impl TouchingSystem {
     pub(crate) fn bear_on(&mut self) -> Vec<Vector3<f64>> {
         let Contacts { rigids, contacts, .. } = self.barriers.contacts();
         let force = |lag: &mut Lag| {
-            let tool = rigids[lag.rigid()].tool();
+            let tool = rigids[lag.number()].tool();
             let on = |(contact, force): (&Contact, &Vector3<f64>)| {
                 let of_tool = matches!(contact.with, With::Rigid(rigid) if rigids[rigid].tool() == tool);
                 of_tool.then_some(*force)

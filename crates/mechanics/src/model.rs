@@ -9,7 +9,7 @@ use crate::element::{
     Cord, GaussPoints, HEX_EDGES, Hex8, Rest, Sheet, bar, gauss_points, hex8, membrane, tet4,
 };
 use crate::law::AnyLaw;
-use crate::load::{Face, Load, face_areas};
+use crate::load::{Face, Load, LoadKind, face_areas};
 use crate::mapping::{Displaced, Weights};
 use crate::order::order;
 use crate::prony::Prony;
@@ -946,6 +946,20 @@ impl Model {
             load.add_forces(time, points, &state, &mut forces);
         }
         forces
+    }
+
+    /// The weight [N] of each node at a time [s].
+    pub fn weights(&self, time: f64) -> Vec<Vector<f64>> {
+        let mut weights = vec![[0.0; 3]; self.node_count()];
+        for load in &self.loads {
+            let LoadKind::Gravity { body, acceleration } = load.kind else { continue };
+            let acceleration = scale(acceleration, load.curve.value(time));
+            for node in self.bodies[body].nodes.clone() {
+                let own = &mut weights[node as usize];
+                *own = add(*own, scale(acceleration, self.mass[node as usize]));
+            }
+        }
+        weights
     }
 
     /// The constraint on each component of each node, [`FREE`] where there is none. Two constraints may prescribe the

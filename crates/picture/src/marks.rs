@@ -1,7 +1,7 @@
-//! Marks of constraints and loads, drawn over a picture as forces of contacts are: a square where a node is held, a dot where it is moved, an
-//! arrow along the force of loads.
+//! Marks of constraints and loads, drawn over a picture as forces of contacts are: a square where a node is held, a dot where it is moved, a bar
+//! where it is under a plate, an arrow along the force of loads, and one along the weight of all from its centre.
 
-use pliant_geometry::{Mesh, Vector3};
+use pliant_geometry::{DataArray, Mesh, Vector3};
 
 use crate::arrows::{Arrow, DOT, PALE, RIM, pixels};
 use crate::camera::Camera;
@@ -14,6 +14,10 @@ pub enum Marked {
     Held,
     /// A node that is moved.
     Moved,
+    /// A node under a plate, of which only the mean is moved.
+    Plate,
+    /// The weight of all [N], at its centre.
+    Weight(Vector3),
     /// A load's force on a node [N].
     Loaded(Vector3),
 }
@@ -29,8 +33,8 @@ impl Marked {
     pub const fn colour(self) -> [u8; 3] {
         match self {
             Self::Held => [40, 44, 52],
-            Self::Moved => [206, 112, 20],
-            Self::Loaded(_) => [24, 128, 80],
+            Self::Moved | Self::Plate => [206, 112, 20],
+            Self::Loaded(_) | Self::Weight(_) => [24, 128, 80],
         }
     }
 }
@@ -41,11 +45,13 @@ pub fn some_of(marks: Vec<Mark>) -> Vec<Mark> {
         Marked::Held => 0,
         Marked::Moved => 1,
         Marked::Loaded(_) => 2,
+        Marked::Plate => 3,
+        Marked::Weight(_) => 4,
     };
-    let mut counts = [0; 3];
+    let mut counts = [0; 5];
     marks.iter().for_each(|mark| counts[kind(mark)] += 1);
     let every = counts.map(|count: usize| count.div_ceil(MOST).max(1));
-    let mut seen = [0; 3];
+    let mut seen = [0; 5];
     let is_kept = |mark: &Mark| {
         let kind = kind(mark);
         seen[kind] += 1;
@@ -62,7 +68,21 @@ pub fn largest_load(marks: &[Mark]) -> f64 {
     marks.iter().map(force).fold(0.0, f64::max)
 }
 
-/// The marks of a mesh whose points are at some places [m]: those of its fields `constraint` and `load`. `None` without them.
+/// The mark of weights [N] at places [m]; `None` where nothing weighs.
+pub fn weight_of(weights: impl Iterator<Item = (Vector3, Vector3)>) -> Option<Mark> {
+    let (mut sum, mut moment, mut total) = (Vector3::zeros(), Vector3::zeros(), 0.0);
+    for (place, weight) in weights.filter(|(_, weight)| weight.iter().all(|x| x.is_finite())) {
+        sum += weight;
+        moment += place * weight.norm();
+        total += weight.norm();
+    }
+    (total > 0.0).then(|| (moment / total, Marked::Weight(sum)))
+}
+
+/// Length of the arrow of a weight over the height of the view.
+pub const WEIGHT: f64 = 0.12;
+
+/// The marks of a mesh whose points are at some places [m]: those of its fields `constraint`, `load` and `weight`. `None` without the first two.
 pub fn marks_of(mesh: &Mesh, points: &[Vector3]) -> Option<Vec<Mark>> {
     let held = mesh.point_data.get("constraint").filter(|array| array.components == 1);
     let loads = mesh.point_data.get("load").filter(|array| array.components == 3);
@@ -74,12 +94,19 @@ pub fn marks_of(mesh: &Mesh, points: &[Vector3]) -> Option<Vec<Mark>> {
         .filter_map(|(point, &held)| match held {
             1.0 => Some((*point, Marked::Held)),
             2.0 => Some((*point, Marked::Moved)),
+            3.0 => Some((*point, Marked::Plate)),
             _ => None,
         })
         .collect();
-    let loads = loads.into_iter().flat_map(|array| points.iter().zip(array.values.chunks_exact(3)));
-    let loads = loads.map(|(point, force)| (*point, Vector3::new(force[0], force[1], force[2])));
-    let loads = loads.filter(|(_, force)| force.iter().all(|x| x.is_finite()) && force.norm() > 0.0);
+    let forces = |array: Option<&DataArray>| -> Vec<(Vector3, Vector3)> {
+        let each = array.into_iter().flat_map(|array| points.iter().zip(array.values.chunks_exact(3)));
+        each.map(|(point, force)| (*point, Vector3::new(force[0], force[1], force[2]))).collect()
+    };
+    let weights = mesh.point_data.get("weight").filter(|array| array.components == 3);
+    marks.extend(weight_of(forces(weights).into_iter()));
+    let loads = forces(loads)
+        .into_iter()
+        .filter(|(_, force)| force.iter().all(|x| x.is_finite()) && force.norm() > 0.0);
     marks.extend(loads.map(|(point, force)| (point, Marked::Loaded(force))));
     Some(some_of(marks))
 }
@@ -92,8 +119,17 @@ pub(crate) fn draw(picture: &mut Picture, camera: &Camera, marks: &[Mark], unit:
         let Some(at) = pixel(place) else { continue };
         match marked {
             Marked::Held => {
-                square(picture, at, (DOT + RIM) * height, PALE);
-                square(picture, at, DOT * height, marked.colour());
+                bar(picture, at, [(DOT + RIM) * height; 2], PALE);
+                bar(picture, at, [DOT * height; 2], marked.colour());
+            }
+            Marked::Plate => {
+                bar(picture, at, [2.0 * DOT + RIM, 0.5 * DOT + RIM].map(|half| half * height), PALE);
+                bar(picture, at, [2.0 * DOT, 0.5 * DOT].map(|half| half * height), marked.colour());
+            }
+            Marked::Weight(force) => {
+                let reach = force.normalize() * (WEIGHT * camera.height);
+                let Some(to) = pixel(&(place + reach)) else { continue };
+                Arrow::new(at, to, height).draw(picture, marked.colour());
             }
             Marked::Moved => Arrow::new(at, at, height).draw(picture, marked.colour()),
             Marked::Loaded(force) => {
@@ -104,14 +140,15 @@ pub(crate) fn draw(picture: &mut Picture, camera: &Camera, marks: &[Mark], unit:
     }
 }
 
-/// Fills a square of half a width around a pixel, with smooth edges.
-fn square(picture: &mut Picture, [x, y]: [f32; 2], half: f32, colour: [u8; 3]) {
-    let range = |at: f32| (at - half - 1.0) as i64..=(at + half + 1.0) as i64;
-    let cover = |pixel: i64, at: f32| (0.5 + half - (pixel as f32 + 0.5 - at).abs()).clamp(0.0, 1.0);
+/// Fills a bar of half a width and half a height around a pixel, with smooth edges.
+fn bar(picture: &mut Picture, [x, y]: [f32; 2], [wide, high]: [f32; 2], colour: [u8; 3]) {
+    let range = |at: f32, half: f32| (at - half - 1.0) as i64..=(at + half + 1.0) as i64;
+    let cover =
+        |pixel: i64, at: f32, half: f32| (0.5 + half - (pixel as f32 + 0.5 - at).abs()).clamp(0.0, 1.0);
     // Pixels outside of the picture are left out by it.
-    for row in range(y) {
-        for column in range(x) {
-            picture.mix(column, row, colour, cover(column, x) * cover(row, y));
+    for row in range(y, high) {
+        for column in range(x, wide) {
+            picture.mix(column, row, colour, cover(column, x, wide) * cover(row, y, high));
         }
     }
 }
@@ -119,7 +156,6 @@ fn square(picture: &mut Picture, [x, y]: [f32; 2], half: f32, colour: [u8; 3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pliant_geometry::DataArray;
 
     #[test]
     fn fields_of_constraints_and_loads_become_marks() {
@@ -135,6 +171,13 @@ mod tests {
             [(Vector3::zeros(), Marked::Held), (Vector3::y(), Marked::Moved), (Vector3::x(), load)]
         );
         assert_eq!(largest_load(&marks), 2.0);
+        // The weight of all acts at its centre, whatever weighs nothing.
+        let values = vec![0.0, 0.0, -1.0, 0.0, 0.0, -3.0, 0.0, 0.0, 0.0];
+        mesh.point_data.insert("weight".into(), DataArray { components: 3, values });
+        mesh.point_data.insert("constraint".into(), DataArray::scalar(vec![3.0, 0.0, 0.0]));
+        let marks = marks_of(&mesh, &mesh.points).unwrap();
+        let weight = (Vector3::x() * 0.75, Marked::Weight(-Vector3::z() * 4.0));
+        assert_eq!(marks[..2], [(Vector3::zeros(), Marked::Plate), weight]);
         let many = some_of(vec![(Vector3::zeros(), Marked::Held); 1000]);
         assert_eq!(many.len(), 250);
     }

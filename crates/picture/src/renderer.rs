@@ -1,5 +1,7 @@
 //! Draws subjects into any render pass: a window's or one off screen.
 
+use std::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 use pliant_geometry::Vector3;
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
@@ -8,6 +10,7 @@ use crate::camera::{Camera, Projection};
 use crate::colour::{ColourMap, linear};
 use crate::layers::Layers;
 use crate::lines::{Line, MOST_EDGES};
+use crate::occlusion::{Occlusion, OcclusionMap, REACH, ROWS, textures};
 use crate::regions::{Kind as CellKind, Regions, light};
 use crate::section::{Corner, Section};
 use crate::style::{MISSING, PLAIN, Style, Texture};
@@ -28,7 +31,9 @@ pub struct Target {
 /// The pipelines.
 #[derive(Debug)]
 pub struct Renderer {
+    device: wgpu::Device,
     target: Target,
+    occlusion: Occlusion,
     view: wgpu::BindGroupLayout,
     shape: wgpu::BindGroupLayout,
     normals: wgpu::BindGroupLayout,
@@ -63,6 +68,7 @@ struct View {
     edge: [f32; 4],
     line: [f32; 4],
     skin: [f32; 4],
+    occlusion: [f32; 4],
 }
 
 /// Cover of the edges of cells.
@@ -103,10 +109,15 @@ impl Renderer {
         let shape = layout(device, &[(ShaderStages::VERTEX, read); 7]);
         let normals =
             layout(device, &[read, read, read, write, read, read].map(|kind| (ShaderStages::COMPUTE, kind)));
-        let module = device.create_shader_module(wgpu::include_wgsl!("shader.wgsl"));
+        let source = concat!(include_str!("shader.wgsl"), include_str!("occlusion.wgsl"));
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("shader"),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        });
+        let occlusion = Occlusion::new(device, &module, &view, &shape);
         let pipelines = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("surface"),
-            bind_group_layouts: &[Some(&view), Some(&shape)],
+            bind_group_layouts: &[Some(&view), Some(&shape), Some(&textures(device, 1))],
             immediate_size: 0,
         });
         let pipeline = |vertex: &str, fragment: &str, kind: Kind| {
@@ -178,7 +189,9 @@ impl Renderer {
             cache: None,
         });
         Self {
+            device: device.clone(),
             target,
+            occlusion,
             background: pipeline("background", "sky", Kind::Behind),
             opaque: pipeline("surface", "opaque", Kind::Solid),
             clipped: pipeline("surface", "clipped", Kind::Solid),
@@ -229,6 +242,7 @@ pub struct Drawn {
     labels: bool,
     /// Where one sees through something.
     layers: Option<Layers>,
+    occlusion: OcclusionMap,
     view_group: wgpu::BindGroup,
     map: ColourMap,
     section: wgpu::Buffer,
@@ -351,6 +365,7 @@ impl Drawn {
             regions,
             labels: false,
             layers: None,
+            occlusion: OcclusionMap::new(device, &renderer.occlusion, 1.0),
             view_group,
             map,
             section,
@@ -496,12 +511,35 @@ impl Drawn {
             let place = before * size_of::<[u32; 4]>() as u64;
             queue.write_buffer(&self.triangles, place, bytemuck::cast_slice(glass));
         }
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        pass.set_pipeline(&renderer.compute);
-        let poses = if style.ghost { 2 } else { 1 };
-        for pose in &self.poses[..poses] {
-            pass.set_bind_group(0, &pose.compute, &[]);
-            pass.dispatch_workgroups(self.vertex_count.div_ceil(GROUP), 1, 1);
+        {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            pass.set_pipeline(&renderer.compute);
+            let poses = if style.ghost { 2 } else { 1 };
+            for pose in &self.poses[..poses] {
+                pass.set_bind_group(0, &pose.compute, &[]);
+                pass.dispatch_workgroups(self.vertex_count.div_ceil(GROUP), 1, 1);
+            }
+        }
+        if style.is_occluded() {
+            if !self.occlusion.fits(aspect) {
+                self.occlusion = OcclusionMap::new(&renderer.device, &renderer.occlusion, aspect);
+            }
+            let section = if style.clip.is_some() { self.section_corners } else { 0 };
+            let [opaque, _] = self.opaque_and_glass();
+            let shape = &self.poses[0].draw;
+            self.occlusion.make(encoder, &renderer.occlusion, &self.view_group, shape, [opaque, 0..section]);
+        }
+    }
+
+    /// Corners of the surface that hide what is behind, and of those that one sees through.
+    fn opaque_and_glass(&self) -> [Range<u32>; 2] {
+        let list = 3 * self.triangle_count;
+        match &self.layers {
+            None => [0..self.corners, 0..0],
+            Some(layers) => {
+                let middle = list + 3 * layers.opaque as u32;
+                [list..middle, middle..list + 3 * layers.list.len() as u32]
+            }
         }
     }
 
@@ -509,16 +547,10 @@ impl Drawn {
     pub fn draw(&self, renderer: &Renderer, pass: &mut wgpu::RenderPass<'_>, style: &Style) {
         pass.set_bind_group(0, &self.view_group, &[]);
         pass.set_bind_group(1, &self.poses[0].draw, &[]);
+        pass.set_bind_group(2, &self.occlusion.group, &[]);
         pass.set_pipeline(&renderer.background);
         pass.draw(0..3, 0..1);
-        let list = 3 * self.triangle_count;
-        let (opaque, glass) = match &self.layers {
-            None => (0..self.corners, 0..0),
-            Some(layers) => {
-                let middle = list + 3 * layers.opaque as u32;
-                (list..middle, middle..list + 3 * layers.list.len() as u32)
-            }
-        };
+        let [opaque, glass] = self.opaque_and_glass();
         let solid = if style.wireframe {
             &renderer.wireframe
         } else if style.clip.is_some() {
@@ -582,6 +614,19 @@ fn lights_of(kinds: &[CellKind], regions: &Regions, labels: bool) -> Vec<[[f32; 
     kinds.iter().map(|&kind| light(kind, regions.coat(kind), labels)).collect()
 }
 
+/// Strength of the occlusion, its reach [m], the pixels of the map that it has at a metre's distance (everywhere in parallel projection), and
+/// the distance of the target over it.
+fn occlusion(camera: &Camera, style: &Style) -> [f32; 4] {
+    let reach = REACH * camera.height;
+    let pixels = REACH * f64::from(ROWS);
+    let pixels = match camera.projection {
+        Projection::Perspective => pixels * camera.distance(),
+        Projection::Orthographic => pixels,
+    };
+    let strength = f64::from(u8::from(style.is_occluded()));
+    [strength, reach, pixels, camera.distance() / reach].map(|x| x as f32)
+}
+
 /// The uniforms of a picture.
 fn view(camera: &Camera, style: &Style, aspect: f64, reach: f64, code: bool) -> View {
     let [right, up, towards] = camera.axes();
@@ -620,5 +665,6 @@ fn view(camera: &Camera, style: &Style, aspect: f64, reach: f64, code: bool) -> 
             Texture::None => [0.0; 4],
             Texture::Skin => [0.0, SKIN[usize::from(style.tells())], 0.0, 0.0],
         },
+        occlusion: occlusion(camera, style),
     }
 }

@@ -14,6 +14,7 @@ use crate::graphics::Graphics;
 use crate::legend::{Legend, readable};
 use crate::marks::{self, Mark, largest_load, marks_of};
 use crate::offscreen::{Frame, Offscreen};
+use crate::outermost::Outermost;
 use crate::picture::Picture;
 use crate::regions::Regions;
 use crate::style::Style;
@@ -233,8 +234,8 @@ pub struct Look {
 #[derive(Default)]
 struct Common {
     extremes: Extremes,
-    /// The middle of the points is enough for the camera: corners of the boxes around them.
-    points: Vec<Vector3>,
+    /// Of the surface, in all frames.
+    points: Outermost,
     /// The largest force of a contact and of a load [N].
     largest: [f64; 2],
     /// Whether a part of a body has no value.
@@ -246,8 +247,9 @@ struct Shown {
     frame: Frame,
     /// The smallest stable step of a cell [s] if that cell is marked.
     step: Option<f64>,
-    /// Forces of contacts, if they are drawn.
+    /// Forces of contacts, if they are drawn, and the least gap [m] with them.
     forces: Vec<PointForce>,
+    gap: Option<f64>,
     /// Constraints and loads, if they are marked.
     marks: Vec<Mark>,
 }
@@ -269,33 +271,11 @@ impl Common {
         self.missing |= subject.lacks_value(&frame.values);
         let surface = subject.surface_points();
         self.extremes.add(surface.iter().filter_map(|&point| frame.values.get(point as usize)).copied());
-        self.points.extend(surface.iter().map(|&point| frame.points[point as usize]));
+        self.points.add(surface.iter().map(|&point| frame.points[point as usize]));
         if ghost {
-            self.points.extend(surface.iter().map(|&point| subject.points[point as usize]));
-        }
-        // Enough to include the outermost points: inner points do not change a camera.
-        if self.points.len() > MOST_POINTS {
-            let directions = spread_directions();
-            let outermost = directions.iter().filter_map(|direction| {
-                self.points.iter().copied().max_by(|a, b| direction.dot(a).total_cmp(&direction.dot(b)))
-            });
-            self.points = outermost.collect();
+            self.points.add(surface.iter().map(|&point| subject.points[point as usize]));
         }
     }
-}
-
-/// Points kept for the camera.
-const MOST_POINTS: usize = 100_000;
-
-/// Directions all around, about 8° apart (a spiral with the golden angle).
-fn spread_directions() -> Vec<Vector3> {
-    let count = 1000;
-    let direction = |index: i32| {
-        let z = 1.0 - (2.0 * f64::from(index) + 1.0) / f64::from(count);
-        let (angle, r) = (f64::from(index) * 2.399_963_229_728_653, (1.0 - z * z).sqrt());
-        Vector3::new(r * angle.cos(), r * angle.sin(), z)
-    };
-    (0..count).map(direction).collect()
 }
 
 impl Look {
@@ -316,9 +296,12 @@ impl Look {
             true => contact_forces(mesh, &points).ok_or(SeriesError::NoContacts)?,
             false => Vec::new(),
         };
+        let gaps = mesh.point_data.get("gap").filter(|_| self.style.contacts);
+        let gap =
+            gaps.and_then(|gaps| gaps.values.iter().copied().filter(|gap| gap.is_finite()).reduce(f64::min));
         let marks = marks.map(|mesh| marks_of(mesh, &deformed_points(mesh)).ok_or(SeriesError::NoMarks));
         let marks = marks.transpose()?.unwrap_or_default();
-        Ok(Shown { frame: Frame { points, values, critical }, step, forces, marks })
+        Ok(Shown { frame: Frame { points, values, critical }, step, forces, gap, marks })
     }
 
     /// The same with the labels of a mesh in its legend.
@@ -362,7 +345,7 @@ impl Look {
         // The colour scale is beside the body, not on it.
         let taken = self.legend.width(&style, self.size);
         let mut camera = self.camera;
-        camera.fit(&common.points, width * (1.0 - taken) / height);
+        camera.fit(common.points.points(), width * (1.0 - taken) / height);
         if let Some(target) = self.target {
             camera.target = target;
         }
@@ -370,7 +353,7 @@ impl Look {
             camera.zoom(1.0 / self.zoom);
         }
         camera.pan(-0.5 * taken * width / height, 0.0);
-        let arrows = common.largest.map(|largest| [arrow_unit(&common.points, largest), largest]);
+        let arrows = common.largest.map(|largest| [arrow_unit(common.points.points(), largest), largest]);
         Settled { camera, style, arrows, missing: common.missing }
     }
 
@@ -385,9 +368,16 @@ impl Look {
                 note.push_str(&format!(", {}{of}", arrow_note(*largest)));
             }
         }
+        if let Some(gap) = shown.gap {
+            let (unit, factor) = readable("m", gap.abs().max(1e-6));
+            note.push_str(&format!(", least gap {:.3} {unit}", gap * factor));
+        }
         if let Some(step) = shown.step {
             let (unit, factor) = readable("s", step);
             note.push_str(&format!(", smallest element step {:.3} {unit} (marked)", step * factor));
+        }
+        if self.legend.unconverged > 0 {
+            note.push_str(&format!(", steps that did not converge: {}", self.legend.unconverged));
         }
         Legend { note, missing: *missing, ..self.legend.clone() }.write(&mut picture, style);
         picture

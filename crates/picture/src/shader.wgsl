@@ -23,6 +23,8 @@ struct View {
     line: vec4<f32>,
     // Of the texture: 1 / size of the body [1/m], strength.
     skin: vec4<f32>,
+    // Strength, reach [m], pixels of the map that the reach has at the eye's unit of distance, depth of the target over the reach.
+    occlusion: vec4<f32>,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -169,12 +171,13 @@ fn opacity_at(at: Corner, facing: f32) -> f32 {
 }
 
 // A key light over the left shoulder, a fill from the right, sky above and ground below (all of them turn with the camera).
-fn lit(albedo: vec3<f32>, normal: vec3<f32>, eye: vec3<f32>, finish: vec2<f32>) -> vec3<f32> {
+fn lit(albedo: vec3<f32>, normal: vec3<f32>, eye: vec3<f32>, finish: vec2<f32>, light: f32) -> vec3<f32> {
     let key = normalize(view.right.xyz * -0.45 + view.up.xyz * 0.65 + view.towards.xyz * 0.75);
     let fill = normalize(view.right.xyz * 0.8 + view.up.xyz * 0.05 + view.towards.xyz * 0.5);
     let sky = 0.5 + 0.5 * dot(normal, view.up.xyz);
-    let direct = max(dot(normal, key), 0.0) * 0.62 + max(dot(normal, fill), 0.0) * 0.16;
-    let ambient = mix(0.22, 0.40, sky);
+    // The fill is wide, and the key has a size, too: what lies in a fold sees less of both.
+    let direct = max(dot(normal, key), 0.0) * 0.62 * (0.5 + 0.5 * light) + max(dot(normal, fill), 0.0) * 0.16 * light;
+    let ambient = mix(0.22, 0.40, sky) * light;
     let half_way = normalize(key + eye);
     let shine = pow(max(dot(normal, half_way), 0.0), finish.y) * finish.x;
     let grazing = 1.0 - max(dot(normal, eye), 0.0);
@@ -212,11 +215,12 @@ fn shade(at: Corner) -> vec4<f32> {
     normal = select(-normal, normal, dot(normal, eye) >= 0.0);
     let albedo = colour_at(at);
     let finish = kinds[at.edges >> 8u].finish;
-    var colour = lit(albedo, normal, eye, finish.xy);
+    let light = light_at(at.place);
+    var colour = lit(albedo, normal, eye, finish.xy, light);
     // Derivatives over pixels are taken where all pixels pass.
     let bumpy = uneven(at, normal);
     if view.skin.y > 0.0 && !is_thing(at) {
-        colour = moist(albedo * mottled(at.rest, is_tissue(at), finish.z), bumpy, eye, finish.xy);
+        colour = moist(albedo * mottled(at.rest, is_tissue(at), finish.z), bumpy, eye, finish.xy, light);
     }
     let edges = edge_cover(at.corner, at.edges) * view.edge.a;
     return vec4(coded(mix(colour, view.edge.rgb, edges)), opacity_at(at, dot(normal, eye)));
@@ -455,11 +459,11 @@ fn mottled(rest: vec3<f32>, tissue: bool, perfusion: f32) -> vec3<f32> {
 }
 
 // Sharp reflections on what is uneven, and a film that shines where it is seen from the side.
-fn moist(albedo: vec3<f32>, normal: vec3<f32>, eye: vec3<f32>, finish: vec2<f32>) -> vec3<f32> {
+fn moist(albedo: vec3<f32>, normal: vec3<f32>, eye: vec3<f32>, finish: vec2<f32>, light: f32) -> vec3<f32> {
     let key = normalize(view.right.xyz * -0.45 + view.up.xyz * 0.65 + view.towards.xyz * 0.75);
     let facing = max(dot(normal, normalize(key + eye)), 0.0);
     let glint = pow(facing, 180.0) * 0.50 + pow(facing, 28.0) * 0.09;
     let grazing = 1.0 - max(dot(normal, eye), 0.0);
     let film = 0.16 * grazing * grazing * grazing * grazing;
-    return lit(albedo, normal, eye, finish) + vec3((glint + film) * view.skin.y);
+    return lit(albedo, normal, eye, finish, light) + vec3((glint + film) * view.skin.y);
 }

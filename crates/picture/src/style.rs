@@ -159,7 +159,7 @@ impl Material {
 }
 
 /// How a body is shown.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Style {
     /// Colours of values.
     pub map: ColourMap,
@@ -179,6 +179,8 @@ pub struct Style {
     pub contacts: bool,
     /// Whether the cell with the smallest stable step is marked.
     pub critical: bool,
+    /// Whether folds and contacts are darker, where less light arrives.
+    pub occlusion: bool,
     /// The texture of the surface.
     pub texture: Texture,
     /// Shows only the part behind a plane, and its section.
@@ -187,7 +189,32 @@ pub struct Style {
     pub background: Background,
 }
 
+impl Default for Style {
+    fn default() -> Self {
+        Self {
+            map: ColourMap::default(),
+            range: None,
+            labels: false,
+            edges: false,
+            wireframe: false,
+            ghost: false,
+            fibres: false,
+            contacts: false,
+            critical: false,
+            occlusion: true,
+            texture: Texture::default(),
+            clip: None,
+            background: Background::default(),
+        }
+    }
+}
+
 impl Style {
+    /// Whether surfaces take light from each other: edges alone do not.
+    pub(crate) fn is_occluded(&self) -> bool {
+        self.occlusion && !self.wireframe
+    }
+
     /// Whether colours tell something.
     pub(crate) fn tells(&self) -> bool {
         self.labels || self.range.is_some()

@@ -295,10 +295,15 @@ fn forces_of_contacts_are_drawn_where_they_act_and_told_in_the_note() {
     // One upright arrow, of the one force.
     println!("{} pixels, {} wide and {} high", changed.len(), span(0), span(1));
     assert!(changed.len() > 100 && span(0) < 12 && (20..120).contains(&span(1)), "{changed:?}");
-    assert!(
-        with.rgba[4 * above as usize..] != without.rgba[4 * above as usize..],
-        "what it stands for is told"
-    );
+    let note = |picture: &Picture| picture.rgba[4 * above as usize..].to_vec();
+    assert!(note(&with) != note(&without), "what it stands for is in the note");
+    let gaps = (0..mesh.points.len()).map(|node| if node == 3 { 2e-5 } else { f64::NAN });
+    mesh.point_data.insert("gap".into(), DataArray::scalar(gaps.collect()));
+    let near = look.picture(&graphics, &mesh, None, 0.25).unwrap();
+    assert!(note(&near) != note(&with), "the least gap is in the note");
+    let legend = Legend { unconverged: 2, ..look.legend.clone() };
+    let cut = Look { legend, ..look }.picture(&graphics, &mesh, None, 0.25).unwrap();
+    assert!(note(&cut) != note(&near), "steps that did not converge are in the note");
 }
 
 /// Dark red reflects 3 % of blue light: what is brighter on a liver is its highlight, which bone lacks.

@@ -1,5 +1,6 @@
 //! A scene that is played: it goes on as long as someone looks, is pulled at, and shows what its `[view]` asks.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::Point3;
@@ -13,6 +14,20 @@ use pliant_sim::{Failure, Simulation, State};
 use crate::output::{Column, FieldMesh, Frame, Samples, frames};
 use pliant_scene::World;
 use pliant_scene::format::VtuTable;
+
+/// Instants at which ways are looked at, after the start.
+const INSTANTS: u32 = 32;
+
+/// The least and the greatest coordinates of points [m].
+type Extent = [Vector3; 2];
+
+fn extent(points: impl Iterator<Item = Vector3>) -> Option<Extent> {
+    points.map(|point| [point; 2]).reduce(|[a, b], [c, d]| [a.inf(&c), b.sup(&d)])
+}
+
+fn corners(extent: Extent) -> impl Iterator<Item = Vector3> {
+    (0..8).map(move |corner| Vector3::from_fn(|axis, _| extent[corner >> axis & 1][axis]))
+}
 
 /// A world under way, and what is shown and sampled of it.
 pub struct Live {
@@ -145,6 +160,45 @@ impl Live {
             Some((to.pose * from.pose.inverse() * Point3::from(grown)).coords)
         });
         moved.unwrap_or(*start)
+    }
+
+    /// Where obstacles, tools and driven nodes come on their way to the end of the scene [m]: corners of the box around each, at some instants.
+    pub fn ways(&self) -> Vec<Vector3> {
+        let mut things: BTreeMap<(usize, usize), Vec<Vector3>> = BTreeMap::new();
+        for (index, &point) in (0..).zip(&self.shown.mesh().points) {
+            if let Some(thing) = self.shown.thing_of(index) {
+                things.entry(thing).or_default().push(point);
+            }
+        }
+        let parts = &self.world.participants;
+        let boxes = things.into_iter().filter_map(|((part, number), points)| {
+            let rigid = parts[part].built.contacts.as_ref()?.rigids.get(number)?;
+            Some((rigid, rigid.stance(0.0, None), extent(points.into_iter())?))
+        });
+        let boxes: Vec<_> = boxes.collect();
+        let mut ways = Vec::new();
+        for instant in 0..=INSTANTS {
+            let time = self.world.scene.scene.until * f64::from(instant) / f64::from(INSTANTS);
+            for (rigid, from, [low, high]) in &boxes {
+                let to = rigid.stance(time, None);
+                let (motion, grown) = (to.pose * from.pose.inverse(), to.growth - from.growth);
+                let around = corners([low.add_scalar(-grown), high.add_scalar(grown)]);
+                ways.extend(around.map(|corner| (motion * Point3::from(corner)).coords));
+            }
+            for model in parts.iter().map(|part| &part.built.model) {
+                for constraint in model.constraints.iter().filter(|own| !own.motion.is_collective()) {
+                    let place = |(index, &node): (usize, &u32)| {
+                        let moved = Vector3::from(constraint.motion.displacement(index, time, 1.0));
+                        let is_driven = |axis: usize| f64::from(u8::from(constraint.components[axis]));
+                        let moved = Vector3::from_fn(|axis, _| moved[axis] * is_driven(axis));
+                        Vector3::from(model.rest[node as usize]) + moved
+                    };
+                    let around = extent(constraint.nodes.iter().enumerate().map(place));
+                    ways.extend(around.into_iter().flat_map(corners));
+                }
+            }
+        }
+        ways
     }
 
     /// Shows another series.

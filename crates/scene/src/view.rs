@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 
 use pliant_geometry::{CellLabel, Labels, Region, RegionNames};
+use pliant_mechanics::load::{LoadKind, NO_NODE, face_areas};
+use pliant_mechanics::tensor::{add, scale};
 
 use crate::assemble::{Built, labels_of, touches};
 use crate::diagnostic::Diagnostic;
@@ -33,6 +35,25 @@ impl ViewTable {
 }
 
 impl Built {
+    /// The forces [N] of loads on each node at a time [s] and displacements [m], without weights. Pressures on shells give a third of their force
+    /// to each corner of a facet.
+    pub fn load_forces(&self, time: f64, displacement: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let mut forces = self.model.load_forces(time, displacement);
+        let Some(implicit) = &self.implicit else { return forces };
+        for load in &self.model.loads {
+            let LoadKind::ShellPressure { facets, pressure, .. } = &load.kind else { continue };
+            let place = |node: u32| add(self.model.rest[node as usize], displacement[node as usize]);
+            let factor = pressure * load.curve.value(time);
+            for &facet in facets {
+                let [a, b, c] = implicit.model.facets[facet as usize].nodes;
+                for (node, area) in face_areas(&[a, b, c, NO_NODE], place) {
+                    forces[node as usize] = add(forces[node as usize], scale(area, factor));
+                }
+            }
+        }
+        forces
+    }
+
     /// Whether a body of a name, or any one, touches something.
     pub fn touches(&self, on: Option<&str>) -> bool {
         let Some(contacts) = &self.contacts else { return false };
@@ -215,7 +236,7 @@ impl Scene {
 
     /// A series of constraints and loads, where the view marks them: those of the body that carries a surface which is shown.
     pub fn shown_marks(&self, every: f64) -> Option<VtuTable> {
-        let data = vec![FieldName::Displacement, FieldName::Constraint, FieldName::Load];
+        let data = vec![FieldName::Displacement, FieldName::Constraint, FieldName::Load, FieldName::Weight];
         let on = self.carrier(self.view.on.as_deref()).map(|(body, _)| body.clone());
         let on = on.or_else(|| self.view.on.clone());
         self.view.marks.then_some(VtuTable { on, every, data, at: At::Points, curved: None })
@@ -225,14 +246,15 @@ impl Scene {
     pub fn shown_as(&self, view: &ViewTable, every: f64) -> VtuTable {
         let mut data = vec![FieldName::Displacement];
         data.extend(self.field_of(view).filter(|field| *field != FieldName::Displacement));
-        if view.contacts && !data.contains(&FieldName::ContactForce) {
-            data.push(FieldName::ContactForce);
-        }
-        if view.critical && !data.contains(&FieldName::ElementStep) {
-            data.push(FieldName::ElementStep);
-        }
-        if view.fibres && !data.contains(&FieldName::Fibre) {
-            data.push(FieldName::Fibre);
+        for (drawn, field) in [
+            (view.contacts, FieldName::ContactForce),
+            (view.contacts, FieldName::Gap),
+            (view.critical, FieldName::ElementStep),
+            (view.fibres, FieldName::Fibre),
+        ] {
+            if drawn && !data.contains(&field) {
+                data.push(field);
+            }
         }
         let on = view.on.as_ref();
         let mut models = self.bodies.iter().filter(|(name, _)| on.is_none_or(|on| on == name));
@@ -249,7 +271,7 @@ impl Scene {
 mod tests {
     use super::*;
     use crate::source::Source;
-    use crate::testing::{built, labelled, mistakes, scene};
+    use crate::testing::{built, built_alone, labelled, mistakes, scene};
 
     #[test]
     fn a_surface_has_the_fields_of_its_body_and_a_section_shows_that_body() {
@@ -264,6 +286,24 @@ mod tests {
         assert_eq!(scene.shown_as(&scene.view, 0.1).on.as_deref(), Some("skin"));
         let world = World::new(&scene).unwrap_or_else(|error| panic!("{}", error.plain()));
         assert_eq!(world.body_names(Some("skin")), [(0, "skin".to_owned())].into());
+    }
+
+    #[test]
+    fn shells_are_loaded_by_pressures_and_have_a_weight() {
+        let built = built_alone(
+            "[scene]\nuntil = 1\ngravity = [0, 0, -10]\n[run]\nsolver = 'static'\n[law.wall]\ntype = 'st-venant-kirchhoff'\n\
+             young-modulus = 1e6\npoisson-ratio = 0.3\n[body.wall]\nmodel = 'shell'\n\
+             mesh = { plate = { size = [0.2, 0.1], cells = [4, 2] } }\nlaw = 'wall'\ndensity = 1000\nthickness = 0.002\n\
+             [constraint.base]\ntype = 'fix'\nbody = 'wall'\nnodes = { set = 'x-min' }\n\
+             [load.push]\ntype = 'pressure'\non = 'wall'\nfaces = 'all'\npressure = 50\ncurve = 'hold'\n",
+        );
+        let at_rest = vec![[0.0; 3]; built.model.node_count()];
+        let sum = |forces: Vec<[f64; 3]>| forces.into_iter().fold([0.0; 3], add);
+        let [x, y, z] = sum(built.load_forces(1.0, &at_rest));
+        // 50 Pa on 0.02 m².
+        assert!(x == 0.0 && y == 0.0 && (z.abs() - 1.0).abs() < 1e-12, "{z}");
+        // 40 g.
+        assert!((sum(built.model.weights(1.0))[2] + 0.4).abs() < 1e-12);
     }
 
     #[test]

@@ -101,6 +101,7 @@ impl ImplicitBodies {
         vec![
             ("the mesh, thickness or material of shells".into(), fingerprint(&model.facets)),
             ("springs".into(), fingerprint(&model.springs)),
+            ("limits of forces".into(), fingerprint(&model.force_limits)),
             ("the control of a load".into(), fingerprint(&self.control)),
             ("creases".into(), fingerprint(&(&model.normals, &model.corner_normals))),
             (

@@ -127,6 +127,23 @@ impl SolverMethod {
         }
     }
 
+    /// How far moved nodes whose force is limited are behind their motion.
+    fn lags(&self) -> &[Lag] {
+        match self {
+            Self::Static(solver, _) => solver.lags(),
+            Self::Implicit(solver, _) => solver.lags(),
+            Self::Explicit(_) => &[],
+        }
+    }
+
+    fn take_lags(&mut self, lags: Vec<Lag>) {
+        match self {
+            Self::Static(solver, _) => solver.take_lags(lags),
+            Self::Implicit(solver, _) => solver.take_lags(lags),
+            Self::Explicit(_) => {}
+        }
+    }
+
     fn take_contact_pairs(&mut self, pairs: Vec<[u32; 2]>) -> Result<(), SolveError> {
         match self {
             Self::Static(solver, _) => solver.take_contact_pairs(pairs),
@@ -493,8 +510,10 @@ impl Implicit {
             contact,
             legs,
             path,
+            lags,
             entered,
         } = remembered;
+        self.method.take_lags(lags);
         (self.done, self.time) = (done, time);
         self.convergence = convergence;
         self.state = state.state();
@@ -559,6 +578,7 @@ impl Implicit {
                 },
                 ..self.path.clone()
             },
+            lags: self.method.lags().to_vec(),
             entered: self.entered,
         }
     }
@@ -639,7 +659,11 @@ impl Instant for Implicit {
     }
 
     fn lag(&self, rigid: usize) -> Option<&Lag> {
-        self.method.touching()?.lags().iter().find(|lag| lag.rigid() == rigid)
+        self.method.touching()?.lags().iter().find(|lag| lag.number() == rigid)
+    }
+
+    fn lag_of_nodes(&self, constraint: usize) -> Option<&Lag> {
+        self.method.lags().iter().find(|lag| lag.number() == constraint)
     }
 
     fn energies(&self) -> Energies {

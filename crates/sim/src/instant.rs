@@ -80,6 +80,11 @@ pub trait Instant {
         None
     }
 
+    /// How far the nodes of a constraint lag behind their motion since their force is limited.
+    fn lag_of_nodes(&self, _constraint: usize) -> Option<&Lag> {
+        None
+    }
+
     /// The pose of a rigid thing, of a jaw that of its tool, and the angle [rad] between the jaws.
     fn posture(&self, number: usize, rigid: &Rigid) -> (Pose, f64) {
         let (pose, opening) = rigid.posture(self.time(), self.leg(number));

@@ -95,6 +95,8 @@ pub(crate) struct ImplicitState {
     /// Where tools go that are driven from outside.
     pub legs: Vec<(u32, Leg)>,
     pub path: Path,
+    /// How far moved nodes whose force is limited are behind their motion.
+    pub lags: Vec<Lag>,
     /// Whether forces were found at the instant, so that their work is entered.
     pub entered: bool,
 }
@@ -127,7 +129,7 @@ impl ContactState {
             && self.touches.is_sorted_by(|a, b| a.node < b.node)
             && self.touches.iter().all(|own| known(own.node) && own.slip.is_finite())
             && self.pairs.iter().flatten().all(|&node| known(node))
-            && self.lags.iter().map(Lag::rigid).eq(limited.map(|(number, _)| number))
+            && self.lags.iter().map(Lag::number).eq(limited.map(|(number, _)| number))
             && self.lags.iter().all(Lag::is_finite)
     }
 }
@@ -143,8 +145,15 @@ impl ImplicitState {
             (Some(contact), Some(contacts)) => contact.fits(nodes, contacts),
             (Some(_), None) => false,
         };
+        let limited = match &part.method {
+            Method::Static(bodies, _) | Method::Implicit(bodies, _) => Some(&bodies.model.force_limits),
+            _ => None,
+        };
+        let limited = limited.into_iter().flat_map(|limits| limits.keys().copied());
+        let lags = self.lags.iter().map(Lag::number).eq(limited) && self.lags.iter().all(Lag::is_finite);
         before
             && contact
+            && lags
             && self.path.fits(nodes)
             && self.legs.iter().all(|(_, leg)| leg.is_finite())
             && self.previous.iter().all(|state| state.fits(model))
@@ -235,7 +244,7 @@ fn fits<R: Scalar>(state: &State<R>, memory: &Memory<R>, part: &Part) -> bool {
     }
     let things = part.method.contacts().map_or(0, |contacts| contacts.rigids.len());
     let led = state.driven.iter().all(|(rigid, leg)| (*rigid as usize) < things && leg.is_finite());
-    let lags = state.lags.iter().all(|lag| lag.rigid() < things && lag.is_finite());
+    let lags = state.lags.iter().all(|lag| lag.number() < things && lag.is_finite());
     let grips = |held: &Gripped| {
         (held.rigid as usize) < things
             && (held.node as usize) < model.node_count()

@@ -2,7 +2,7 @@
 
 use pliant_geometry::Vector3;
 use pliant_mechanics::model::Motion;
-use pliant_picture::{Mark, Marked, some_of};
+use pliant_picture::{Mark, Marked, some_of, weight_of};
 use pliant_run::Live;
 use pliant_scene::World;
 
@@ -16,11 +16,16 @@ pub(crate) fn marks(world: &World, live: &Live) -> Vec<Mark> {
         let place =
             |node: u32| Vector3::from(model.rest[node as usize]) + Vector3::from(displacement[node as usize]);
         for constraint in &model.constraints {
-            let is_fixed = matches!(constraint.motion, Motion::Fixed);
-            let marked = if is_fixed { Marked::Held } else { Marked::Moved };
+            let marked = match constraint.motion {
+                Motion::Fixed => Marked::Held,
+                Motion::Mean { .. } => Marked::Plate,
+                _ => Marked::Moved,
+            };
             all.extend(constraint.nodes.iter().map(|&node| (place(node), marked)));
         }
-        let forces = (0..).zip(model.load_forces(time, &displacement));
+        let weights = (0..).zip(model.weights(time));
+        all.extend(weight_of(weights.map(|(node, weight)| (place(node), Vector3::from(weight)))));
+        let forces = (0..).zip(part.built.load_forces(time, &displacement));
         let loaded = forces.map(|(node, force)| (node, Vector3::from(force)));
         let loaded = loaded.filter(|(_, force)| force.norm() > 0.0);
         all.extend(loaded.map(|(node, force)| (place(node), Marked::Loaded(force))));

@@ -74,6 +74,8 @@ pub struct Frame {
     pub number: u64,
     /// What is drawn: points and triangles at rest. Another one where another surface is shown.
     pub subject: Arc<Subject>,
+    /// Where obstacles, tools and driven nodes come [m], see [`Live::ways`].
+    pub ways: Arc<Vec<Vector3>>,
     /// Simulated time [s].
     pub time: f64,
     /// Steps done.
@@ -313,6 +315,7 @@ enum Left {
 struct Player<'s> {
     world: &'s World,
     subject: Arc<Subject>,
+    ways: Arc<Vec<Vector3>>,
     /// Whether each triangle of the subject can be taken hold of.
     movable: Arc<[bool]>,
     /// A triangle of each tool.
@@ -487,6 +490,7 @@ impl<'s> Player<'s> {
         let mut player = Self {
             world,
             subject: known.unwrap_or_default(),
+            ways: Arc::default(),
             movable: Arc::default(),
             tool_triangles: Arc::default(),
             hidden: Vec::new(),
@@ -676,7 +680,9 @@ impl<'s> Player<'s> {
         Ok(())
     }
 
+    /// Finds what can be taken hold of, and what will move by itself.
     fn find_movable(&mut self) {
+        self.ways = Arc::new(self.live.ways());
         let corners: Vec<u32> = self.subject.triangles().map(|corners| corners[0]).collect();
         self.movable = corners.iter().map(|&corner| self.live.is_movable(corner)).collect();
         // Jaws are two things and one tool.
@@ -881,6 +887,7 @@ impl<'s> Player<'s> {
         }
         frame.number = playback.frames;
         frame.subject = self.subject.clone();
+        frame.ways = Arc::clone(&self.ways);
         frame.movable = Arc::clone(&self.movable);
         frame.tool_triangles = Arc::clone(&self.tool_triangles);
         frame.tools = playback.hold.tools().map(|tool| tool.map(str::to_owned));

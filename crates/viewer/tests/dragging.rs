@@ -13,10 +13,12 @@ use std::time::{Duration, Instant};
 use pliant_geometry::Vector3;
 use pliant_testing::Random;
 use pliant_viewer::{Frame, Hand, Order, Point, Session};
-use support::{BALL, LIVER, subject, wait, world};
+use support::{BALL, LIVER, subject, wait, wait_up_to, world};
 
 /// Pulls of a drag, a sixtieth of a second each.
 const PULLS: u32 = 60;
+/// A drag takes that long at most, on a machine that does much else.
+const PATIENCE: Duration = Duration::from_secs(900);
 /// Bytes by which the most that is allocated may differ: lists of held nodes are some KB long, and a leak of 100 bytes a drag would show
 /// within 700.
 const GROWTH: usize = 64 << 10;
@@ -123,7 +125,7 @@ fn drag(text: &str, until: &Until) -> [u64; 2] {
             total += steps;
         }
         let ends = |frame: &Frame| frame.steps >= goal || frame.breaks > broken || frame.failure.is_some();
-        let frame = wait(&mut session, ends);
+        let frame = wait_up_to(PATIENCE, &mut session, ends);
         assert_eq!(frame.failure, None, "in drag {drag}");
         assert!(frame.points.iter().flat_map(|point| point.iter()).all(|x| x.is_finite()));
         assert!(frame.values.iter().chain(&frame.sample).all(|x| x.is_finite()));

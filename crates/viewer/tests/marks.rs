@@ -14,7 +14,12 @@ const BAR: &str = include_str!("support/bar.toml");
 fn held_moved_and_loaded_nodes_are_marked_where_they_are() {
     let mut session = Session::start(world(BAR), || ()).unwrap();
     session.order(Order::Step(1));
-    assert!(wait(&mut session, |frame| frame.steps >= 1).marks.is_empty());
+    let frame = wait(&mut session, |frame| frame.steps >= 1);
+    assert!(frame.marks.is_empty());
+    // Where the driven end will be is known at once.
+    let at_rest = frame.subject.points.iter().map(|point| point.x).fold(f64::NEG_INFINITY, f64::max);
+    let farthest = frame.ways.iter().map(|point| point.x).fold(f64::NEG_INFINITY, f64::max);
+    assert!((farthest - at_rest - 0.02).abs() < 1e-12, "{farthest} after {at_rest}");
     session.order(Order::Marks(true));
     session.order(Order::Step(2000));
     let frame = wait(&mut session, |frame| frame.time > 0.1 && !frame.marks.is_empty());
@@ -26,6 +31,10 @@ fn held_moved_and_loaded_nodes_are_marked_where_they_are() {
     let [low, high] = [&held, &moved].map(|marks| marks.iter().map(|(place, _)| place.x).collect::<Vec<_>>());
     assert!(low.iter().all(|x| (x - low[0]).abs() < 1e-12));
     assert!(high.iter().all(|x| (x - low[0] - 0.22).abs() < 1e-6), "{high:?}");
+    let weight: Vec<(Vector3, Marked)> = of(|m| matches!(m, Marked::Weight(_)));
+    let [(middle, Marked::Weight(weight))] = weight[..] else { panic!("{weight:?}") };
+    // 2 kg under 0.01 m/s², in the middle of the bar, which is longer by a tenth.
+    assert!((weight.z + 0.02).abs() < 1e-12 && (middle.x - low[0] - 0.11).abs() < 2e-3, "{middle:?}");
     let force: Vector3 = (of(|m| matches!(m, Marked::Loaded(_))).iter())
         .map(|(_, marked)| if let Marked::Loaded(force) = marked { *force } else { Vector3::zeros() })
         .sum();

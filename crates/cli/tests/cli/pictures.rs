@@ -220,7 +220,7 @@ mod with_pictures {
             return;
         }
         let bar = include_str!("../../../viewer/tests/support/bar.toml");
-        let more = "[output.marks]\ntype = 'vtu'\nevery = 0.05\ndata = ['displacement', 'constraint', 'load']\n\
+        let more = "[output.marks]\ntype = 'vtu'\nevery = 0.05\ndata = ['displacement', 'constraint', 'load', 'weight']\n\
                     [surface.skin]\non = 'bar'\nmesh = { block = { size = [0.2, 0.1, 0.1], cells = [3, 2, 2] } }\n\
                     [view]\nsize = [600, 400]\ncolour = 'none'\nmarks = true\n";
         let workshop = Workshop::new(&format!("{bar}{more}"));
@@ -232,6 +232,8 @@ mod with_pictures {
         let pressed: f64 = mesh.point_data["load"].values.chunks(3).map(|force| force[2]).sum();
         // The pressure times the area of the upper side, which the pull stretches by a tenth and thins.
         assert!(pressed < -0.9 && pressed > -1.2, "{pressed} N");
+        let weight: f64 = mesh.point_data["weight"].values.chunks(3).map(|force| force[2]).sum();
+        assert!((weight + 0.02).abs() < 1e-9, "{weight} N of 2 kg under 0.01 m/s²");
 
         let has = |name: &str| {
             let picture = Picture::from_png(&fs::read(workshop.path(name)).unwrap()).unwrap();

@@ -1036,6 +1036,8 @@ class Move(Table):
         Rotation of nodes of a solid about an axis, reached along the curve; each node stays on its circle all the way. Takes { axis = …, centre = …, angle = … }.
     components
         Components prescribed; if not given, all three of the displacement, and with `turn` the rotations. A rotation takes all three. Takes an array of texts ("x", "y", "z", "rx", "ry" or "rz").
+    force_limit
+        The force [N] that they push with at most, as their reaction tells. From half of it on they give way together, and lag behind their motion; when nothing is in their way any more, they catch up. With the solvers `implicit` and `static`. Takes a number, greater than 0.
     curve
         The form of the growth. Takes "ramp", "smooth-step", "polynomial-10-15-6" or "hold", { wave = … } or { table = … }.
     from_
@@ -1045,7 +1047,7 @@ class Move(Table):
     """
 
     _type: ClassVar[str | None] = "move"
-    _keys: ClassVar[dict[str, str]] = {"body": "body", "nodes": "nodes", "by": "by", "velocity": "velocity", "turn": "turn", "rotate": "rotate", "components": "components", "curve": "curve", "from_": "from", "to": "to"}
+    _keys: ClassVar[dict[str, str]] = {"body": "body", "nodes": "nodes", "by": "by", "velocity": "velocity", "turn": "turn", "rotate": "rotate", "components": "components", "force_limit": "force-limit", "curve": "curve", "from_": "from", "to": "to"}
 
     body: str
     nodes: Any
@@ -1054,6 +1056,7 @@ class Move(Table):
     turn: Sequence[float] | None = None
     rotate: Any | None = None
     components: Any | None = None
+    force_limit: float | None = None
     curve: Any | None = None
     from_: float | None = None
     to: float | None = None
@@ -1530,7 +1533,7 @@ class Vtu(Table):
     every
         Time between frames [s]; the first and the last instant are always written. Takes a number, greater than 0.
     data
-        The fields. Tensors have nine components xx, xy, xz, yx, yy, yz, zx, zy, zz in this order; `[view]` colours by one of them with `component`, and probes of a `csv` output write each into a column. Takes an array of texts ("displacement", "velocity", "rotation", "reaction", "reaction-moment", "deformation-gradient", "cauchy-stress", "pk2-stress", "von-mises", "green-strain", "fibre", "fibre-stretch", "pressure", "J", "cell-J", "energy-density", "element-step", "membrane-force", "bending-moment", "stress-top", "stress-middle", "stress-bottom", "membrane-energy", "bending-energy", "drilling-energy", "thickness", "current-thickness", "axial-stretch", "axial-force", "surface-strain", "contact-force", "contact-pressure", "gap", "slip", "constraint" or "load"); ["displacement","von-mises"] if not given.
+        The fields. Tensors have nine components xx, xy, xz, yx, yy, yz, zx, zy, zz in this order; `[view]` colours by one of them with `component`, and probes of a `csv` output write each into a column. Takes an array of texts ("displacement", "velocity", "rotation", "reaction", "reaction-moment", "deformation-gradient", "cauchy-stress", "pk2-stress", "von-mises", "green-strain", "fibre", "fibre-stretch", "pressure", "J", "cell-J", "energy-density", "element-step", "membrane-force", "bending-moment", "stress-top", "stress-middle", "stress-bottom", "membrane-energy", "bending-energy", "drilling-energy", "thickness", "current-thickness", "axial-stretch", "axial-force", "surface-strain", "contact-force", "contact-pressure", "gap", "slip", "constraint", "load" or "weight"); ["displacement","von-mises"] if not given.
     at
         Where fields of cells are written. Takes "cells" or "points"; "cells" if not given.
     curved
@@ -1584,7 +1587,7 @@ class View(Table):
     on
         The body or the carried surface that is shown; if not given, all bodies together. Takes a text.
     colour
-        What the colours tell; `label`: the labels of the elements, each in a colour of its own; `none`: the colour of tissue. If not given, `von-mises`, and `displacement` on surfaces that shells carry. Takes one of "none", "label", "displacement", "velocity", "rotation", "reaction", "reaction-moment", "deformation-gradient", "cauchy-stress", "pk2-stress", "von-mises", "green-strain", "fibre", "fibre-stretch", "pressure", "J", "cell-J", "energy-density", "element-step", "membrane-force", "bending-moment", "stress-top", "stress-middle", "stress-bottom", "membrane-energy", "bending-energy", "drilling-energy", "thickness", "current-thickness", "axial-stretch", "axial-force", "surface-strain", "contact-force", "contact-pressure", "gap", "slip", "constraint", "load".
+        What the colours tell; `label`: the labels of the elements, each in a colour of its own; `none`: the colour of tissue. If not given, `von-mises`, and `displacement` on surfaces that shells carry. Takes one of "none", "label", "displacement", "velocity", "rotation", "reaction", "reaction-moment", "deformation-gradient", "cauchy-stress", "pk2-stress", "von-mises", "green-strain", "fibre", "fibre-stretch", "pressure", "J", "cell-J", "energy-density", "element-step", "membrane-force", "bending-moment", "stress-top", "stress-middle", "stress-bottom", "membrane-energy", "bending-energy", "drilling-energy", "thickness", "current-thickness", "axial-stretch", "axial-force", "surface-strain", "contact-force", "contact-pressure", "gap", "slip", "constraint", "load", "weight".
     hide
         What is left out, so that what lies inside or behind is seen: labels of elements by number, name or range, and bodies, obstacles and tools by name, as `[2, "tumour", "5-8", "grasper"]`. A name that both have is that of the label. Takes an array of whole numbers or texts; [] if not given.
     look
@@ -1606,9 +1609,11 @@ class View(Table):
     contacts
         Whether the forces of contacts are drawn, through the bodies: a dot at each node that touches something, and an arrow along the force on it. The note tells what the longest one stands for. Takes true or false; false if not given.
     marks
-        Whether constraints and loads are marked, through the bodies: squares where nodes are held, dots where they are moved, arrows along the forces of loads. At most 300 of each kind are drawn. Takes true or false; false if not given.
+        Whether constraints and loads are marked, through the bodies: squares where nodes are held, dots where they are moved, bars under plates, arrows along the forces of loads, and one along the weight of all. At most 300 of each kind are drawn. Takes true or false; false if not given.
     critical
         Whether the element with the smallest `element-step` is marked, through the body. Shells are then shown flat. Takes true or false; false if not given.
+    occlusion
+        Whether folds and contacts are darker, where less light from all sides arrives. Takes true or false; true if not given.
     texture
         What the surface is like; a texture stays where it is in the body at rest, and moves with it. Takes "none" or "skin"; "none" if not given.
     clip
@@ -1626,7 +1631,7 @@ class View(Table):
     """
 
     _type: ClassVar[str | None] = None
-    _keys: ClassVar[dict[str, str]] = {"on": "on", "colour": "colour", "hide": "hide", "look": "look", "component": "component", "map": "map", "range": "range", "edges": "edges", "wireframe": "wireframe", "ghost": "ghost", "fibres": "fibres", "contacts": "contacts", "marks": "marks", "critical": "critical", "texture": "texture", "clip": "clip", "at": "at", "camera": "camera", "background": "background", "size": "size", "curved": "curved"}
+    _keys: ClassVar[dict[str, str]] = {"on": "on", "colour": "colour", "hide": "hide", "look": "look", "component": "component", "map": "map", "range": "range", "edges": "edges", "wireframe": "wireframe", "ghost": "ghost", "fibres": "fibres", "contacts": "contacts", "marks": "marks", "critical": "critical", "occlusion": "occlusion", "texture": "texture", "clip": "clip", "at": "at", "camera": "camera", "background": "background", "size": "size", "curved": "curved"}
 
     on: str | None = None
     colour: str | None = None
@@ -1642,6 +1647,7 @@ class View(Table):
     contacts: bool | None = None
     marks: bool | None = None
     critical: bool | None = None
+    occlusion: bool | None = None
     texture: Any | None = None
     clip: Any | None = None
     at: float | None = None

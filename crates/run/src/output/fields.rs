@@ -21,19 +21,26 @@ pub(super) struct OfNodes<'f, 'p> {
     touching: Vec<NodeContact>,
     /// Forces of loads [N]; empty where they are not wanted.
     loads: Vec<[f64; 3]>,
-    /// Whether each node is free, held or moved; empty where that is not wanted.
+    /// Weights [N]; empty where they are not wanted.
+    weights: Vec<[f64; 3]>,
+    /// Whether each node is free, held, moved or under a plate; empty where that is not wanted.
     held: Vec<f64>,
 }
 
-/// What the field `constraint` is of a node that is held and of one that is moved.
+/// What the field `constraint` is of a node that is held, of one that is moved, and of one under a plate.
 const HELD: f64 = 1.0;
 const MOVED: f64 = 2.0;
+const PLATE: f64 = 3.0;
 
 /// The field `constraint` of all nodes.
 fn held(model: &Model) -> Vec<f64> {
     let mut held = vec![0.0; model.node_count()];
     for constraint in &model.constraints {
-        let own = if matches!(constraint.motion, Motion::Fixed) { HELD } else { MOVED };
+        let own = match constraint.motion {
+            Motion::Fixed => HELD,
+            Motion::Mean { .. } => PLATE,
+            _ => MOVED,
+        };
         for &node in &constraint.nodes {
             held[node as usize] = own.max(held[node as usize]);
         }
@@ -45,7 +52,8 @@ impl<'f, 'p> OfNodes<'f, 'p> {
     /// Finds those that are wanted.
     pub fn new(frame: &'f Frame<'p>, wanted: impl Iterator<Item = FieldName>) -> Self {
         let (model, now, wanted) = (&frame.built().model, frame.now, wanted.collect::<Vec<_>>());
-        let mut found = Self { frame, touching: Vec::new(), loads: Vec::new(), held: Vec::new() };
+        let mut found =
+            Self { frame, touching: Vec::new(), loads: Vec::new(), weights: Vec::new(), held: Vec::new() };
         if wanted.iter().any(|field| field.is_of_contact()) {
             found.touching = now.contact_nodes();
         }
@@ -54,7 +62,10 @@ impl<'f, 'p> OfNodes<'f, 'p> {
         }
         if wanted.contains(&FieldName::Load) {
             let moved: Vec<_> = (0..model.node_count()).map(|node| now.displacement(node)).collect();
-            found.loads = model.load_forces(now.time(), &moved);
+            found.loads = frame.built().load_forces(now.time(), &moved);
+        }
+        if wanted.contains(&FieldName::Weight) {
+            found.weights = model.weights(now.time());
         }
         found
     }
@@ -69,6 +80,7 @@ impl<'f, 'p> OfNodes<'f, 'p> {
             FieldName::Rotation => padded(&now.rotation(node)),
             FieldName::Constraint => padded(&[self.held[node]]),
             FieldName::Load => padded(&self.loads[node]),
+            FieldName::Weight => padded(&self.weights[node]),
             _ if field.is_of_contact() => self.of_contact(field, node),
             _ => padded(&now.displacement(node)),
         }

@@ -83,7 +83,7 @@ pub(crate) struct PartOutcome {
     pub reactions: Vec<[f64; 3]>,
     /// What constraints of volume enclose.
     pub enclosed: Vec<Option<Enclosed>>,
-    /// The tools that were held back, each with its longest lag [m] and when that was [s].
+    /// The tools and the constraints that were held back, each with its longest lag [m] and when that was [s].
     pub held_back: Vec<(String, f64, f64)>,
 }
 
@@ -109,7 +109,7 @@ impl PartOutcome {
     }
 }
 
-/// Tools that were held back by the limits of their forces.
+/// Tools, and constraints that move nodes, that were held back by the limits of their forces.
 fn held_back(part: &Part, now: &dyn Instant) -> Vec<(String, f64, f64)> {
     let rigids = part.built.contacts.iter().flat_map(|all| &all.rigids).enumerate();
     let mut held: Vec<(String, f64, f64)> = rigids
@@ -120,6 +120,11 @@ fn held_back(part: &Part, now: &dyn Instant) -> Vec<(String, f64, f64)> {
         .collect();
     // Jaws lag together.
     held.dedup();
+    let constraints = part.built.model.constraints.iter().enumerate();
+    held.extend(constraints.filter_map(|(number, own)| {
+        let (lag, time) = now.lag_of_nodes(number)?.longest();
+        (lag > 0.0).then(|| (own.name.clone(), lag, time))
+    }));
     held
 }
 

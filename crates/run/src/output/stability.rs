@@ -156,7 +156,7 @@ pub(crate) fn doubts(
         .collect()
 }
 
-/// That a tool was held back, by how far at most [m] and when [s].
+/// That a tool or moved nodes were held back, by how far at most [m] and when [s].
 fn held_back((tool, lag, time): &(String, f64, f64)) -> String {
     let [lag, time] = [*lag, *time].map(number);
     format!(

@@ -1,4 +1,4 @@
-//! Tools that push with no more than a force.
+//! Tools and moved nodes that push with no more than a force.
 
 use pliant_run::OutputFolder;
 use pliant_testing::scenes::{last_row, resumes, run, world};
@@ -63,6 +63,22 @@ fn a_resumed_run_with_a_limit_ends_in_the_same_bits() {
     resumes(&text.replace("[run]\n", "[run]\nstep = 2e-3\ncheckpoint = { every = 0.35 }\n"));
 }
 
+/// The largest and the last number of a column.
+fn most_and_last(text: &str, column: &str) -> (pliant_run::Summary, f64, f64) {
+    let out = tempfile::tempdir().unwrap();
+    let summary = run(text, &out.path().join("out"));
+    let table = std::fs::read_to_string(out.path().join("out/history.csv")).unwrap();
+    let mut rows = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let column = rows.next().unwrap().iter().position(|name| *name == column).unwrap();
+    let all: Vec<f64> = rows.map(|row| row[column].parse::<f64>().unwrap()).collect();
+    (summary, all.iter().copied().map(f64::abs).fold(0.0, f64::max), all[all.len() - 1].abs())
+}
+
+/// What tells that something was held back.
+fn told(summary: &pliant_run::Summary) -> Vec<&String> {
+    summary.warnings.iter().filter(|text| text.contains("was held back by its `force-limit`")).collect()
+}
+
 /// The same by a barrier, in time and as equilibria: in no step the force is above the limit, and nothing is in anything.
 #[test]
 fn a_tool_stops_at_its_limit_under_a_barrier() {
@@ -71,21 +87,11 @@ fn a_tool_stops_at_its_limit_under_a_barrier() {
             .replace("[run]\n", &format!("[run]\n{run_table}\n"))
             .replace("['block', 'finger']\n", "['block', 'finger']\ncheck-intersections = true\n")
             .replace("every = 1.2", "every = 0.02");
-        let out = tempfile::tempdir().unwrap();
-        let summary = run(&text, &out.path().join("out"));
-        let told: Vec<&String> = summary
-            .warnings
-            .iter()
-            .filter(|text| text.contains("was held back by its `force-limit`"))
-            .collect();
+        let (summary, most, last) = most_and_last(&text, "contact.feels.z");
+        let told = told(&summary);
         assert!(told.len() == 1 && told[0].contains("`finger`"), "{:?}", summary.warnings);
-        let table = std::fs::read_to_string(out.path().join("out/history.csv")).unwrap();
-        let mut rows = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
-        let column = rows.next().unwrap().iter().position(|name| *name == "contact.feels.z").unwrap();
-        let forces: Vec<f64> = rows.map(|row| row[column].parse().unwrap()).collect();
-        let most = forces.iter().copied().fold(0.0, f64::max);
-        println!("{run_table}: {} N in the end, {most} N at most; {}", forces[forces.len() - 1], told[0]);
-        assert!((forces[forces.len() - 1] / 2.0 - 1.0).abs() < 0.015 && most < 2.04, "{forces:?}");
+        println!("{run_table}: {last} N in the end, {most} N at most; {}", told[0]);
+        assert!((last / 2.0 - 1.0).abs() < 0.015 && most < 2.04, "{last} {most}");
     }
 }
 
@@ -117,6 +123,74 @@ fn a_resumed_run_with_a_limit_under_a_barrier_ends_in_the_same_bits() {
     );
 }
 
+/// A plate whose upper nodes are moved 30 mm down onto a block of 20 mm, by these keys.
+fn driven(run: &str, push: &str, until: f64) -> String {
+    format!(
+        "[scene]\nuntil = {until}\n[run]\n{run}\n[law.soft]\ntype = 'neo-hookean'\nyoung-modulus = 3e3\npoisson-ratio = 0.3\n\
+         [law.hard]\ntype = 'neo-hookean'\nyoung-modulus = 3e4\npoisson-ratio = 0.3\n\
+         [body.block]\nmesh = {{ block = {{ size = [0.04, 0.04, 0.02], cells = [4, 4, 2] }} }}\nlaw = 'soft'\ndensity = 1000\ndamping = 20\n\
+         [body.plate]\nmesh = {{ block = {{ size = [0.03, 0.03, 0.005], cells = [3, 3, 1] }}, at = [0.0051, 0.0052, 0.021] }}\nlaw = 'hard'\n\
+         density = 1000\ndamping = 20\n\
+         [constraint.base]\ntype = 'fix'\nbody = 'block'\nnodes = {{ set = 'z-min' }}\n\
+         [constraint.push]\ntype = 'move'\nbody = 'plate'\nnodes = {{ set = 'z-max' }}\nby = [0, 0, -0.03]\n{push}\n\
+         [contact.feels]\nbetween = ['block', 'plate']\ncheck-intersections = true\n\
+         [output.history]\ntype = 'csv'\nevery = 0.02\nprobes.top = {{ on = 'plate', at = [0.0051, 0.0052, 0.026], data = ['displacement'] }}\n"
+    )
+}
+
+/// Moved nodes that press a body onto another stop where their reaction is the limit, in time and as equilibria. Without a limit they squash it.
+#[test]
+fn moved_nodes_stop_at_their_limit_under_a_barrier() {
+    for run_table in ["solver = 'implicit'\nstep = 0.02", "solver = 'static'\nload-steps = 50"] {
+        let text = driven(run_table, "to = 0.5\nforce-limit = 0.5", 1.0);
+        let (summary, most, last) = most_and_last(&text, "reaction.push.z");
+        let told = told(&summary);
+        assert!(told.len() == 1 && told[0].contains("`push`"), "{:?}", summary.warnings);
+        println!("{run_table}: {last} N in the end, {most} N at most; {}", told[0]);
+        assert!((last / 0.5 - 1.0).abs() < 0.015 && most < 0.51, "{last} {most}");
+    }
+}
+
+/// The same without anything to touch, in steps that are not iterated, too: nodes that stretch a body.
+#[test]
+fn moved_nodes_that_stretch_a_body_stop_at_their_limit() {
+    for run_table in [
+        "solver = 'implicit'\nstep = 0.02",
+        "solver = 'implicit'\nstep = 0.01\niterations = 1",
+        "solver = 'static'\nload-steps = 50",
+    ] {
+        let text = driven(run_table, "to = 0.5\nforce-limit = 0.5", 1.0)
+            .replace("body = 'plate'\nnodes", "body = 'block'\nnodes")
+            .replace("by = [0, 0, -0.03]", "by = [0, 0, 0.03]");
+        let (from, to) = (text.find("[body.plate]").unwrap(), text.find("[constraint.base]").unwrap());
+        let text = text
+            .replace(&text[from..to], "")
+            .replace("probes.top = { on = 'plate'", "probes.top = { on = 'block'");
+        let (from, to) = (text.find("[contact.feels]").unwrap(), text.find("[output.history]").unwrap());
+        let (_, most, last) = most_and_last(&text.replace(&text[from..to], ""), "reaction.push.z");
+        println!("{run_table}: {last} N in the end, {most} N at most");
+        assert!((last / 0.5 - 1.0).abs() < 0.015 && most < 0.515, "{last} {most}");
+    }
+}
+
+/// Called back they are where their motion leads, a limit that is far away changes no bit, and a resumed run has the same ones.
+#[test]
+fn moved_nodes_with_a_limit_are_called_back_and_resumed() {
+    let implicit = "solver = 'implicit'\nstep = 0.02";
+    let table = "curve = { table = [[0, 0], [0.3, 1], [0.4, 1], [0.7, 0]] }\nforce-limit = 0.5";
+    let row = last_row(&driven(implicit, table, 2.5));
+    assert!(row["probe.top.displacement.z"].abs() < 1e-4 && row["contact.feels.z"] == 0.0, "{row:?}");
+    let gentle = |limit: &str| {
+        last_row(&driven(implicit, limit, 0.4).replace("by = [0, 0, -0.03]", "by = [0, 0, -0.003]"))
+    };
+    assert_eq!(gentle("force-limit = 50"), gentle(""));
+    resumes(&driven(
+        &format!("{implicit}\ncheckpoint = {{ every = 0.34 }}"),
+        "to = 0.5\nforce-limit = 0.5",
+        0.8,
+    ));
+}
+
 /// Without a limit a cell is inverted, and the message names the tool.
 #[test]
 fn the_failure_of_a_body_that_a_tool_goes_through_names_the_tool() {
@@ -126,6 +200,17 @@ fn the_failure_of_a_body_that_a_tool_goes_through_names_the_tool() {
     let summary = pliant_run::run(&world, &folder, &mut |_| ()).unwrap();
     let failure = summary.error.unwrap().to_string();
     assert!(failure.contains("where `finger` pushes too hard, give it a `force-limit`"), "{failure}");
+}
+
+/// Explicit runs limit the forces of tools alone, and nodes that lag are no other constraint's.
+#[test]
+fn limits_of_moved_nodes_that_cannot_be_kept_are_refused() {
+    let error = world(&driven("solver = 'explicit'", "force-limit = 2", 1.0)).unwrap_err();
+    assert!(error.contains("`push` is limited in an explicit run"), "{error}");
+    let text = driven("solver = 'static'", "force-limit = 2", 1.0);
+    let shared = "[constraint.also]\ntype = 'fix'\nbody = 'plate'\nnodes = { set = 'x-min' }\n";
+    let error = world(&format!("{text}{shared}")).unwrap_err();
+    assert!(error.contains("`push`") && error.contains("`also`"), "{error}");
 }
 
 #[test]

@@ -49,6 +49,9 @@ impl Builder<'_> {
                 _ => Some(Motion::Fixed),
             };
             if let (Some(motion), Some(components), Some(nodes)) = (motion, components, nodes) {
+                if let ConstraintTable::Move(MoveTable { force_limit: Some(limit), .. }) = table {
+                    self.limit(&path, *limit);
+                }
                 self.assembly.model_mut().constraints.push(Constraint {
                     name: name.clone(),
                     nodes,
@@ -80,6 +83,44 @@ impl Builder<'_> {
                 .at(second, label)
                 .also(first, "contradicts the other")
                 .help(help);
+            self.out.push(diagnostic);
+        }
+        self.check_limited();
+    }
+
+    /// Limits the force [N] of the constraint that is added next.
+    fn limit(&mut self, path: &[&str; 2], limit: f64) {
+        if !self.scene.run.solver.solves_equations() {
+            let message = format!("the force of `{}` is limited in an explicit run", path[1]);
+            let help = "take the solver `implicit` or `static`, or push with a tool, which can have a `force-limit` here";
+            self.error(&[path[0], path[1], "force-limit"], message, "not with this solver", help);
+        }
+        let number = self.assembly.constraints.len();
+        self.assembly.force_limits.insert(number, limit);
+    }
+
+    /// Refuses constraints on components of nodes that another one moves with a limited force: these lag.
+    fn check_limited(&mut self) {
+        for &limited in self.assembly.force_limits.keys() {
+            let own = &self.assembly.constraints[limited];
+            let shares = |other: &Constraint| {
+                let component = (0..3).any(|c| own.components[c] && other.components[c]);
+                component && other.nodes.iter().any(|node| own.nodes.contains(node))
+            };
+            let others = self.assembly.constraints.iter().enumerate();
+            let Some((_, other)) = others.filter(|(number, _)| *number != limited).find(|(_, o)| shares(o))
+            else {
+                continue;
+            };
+            let diagnostic = Diagnostic::error(format!(
+                "`{}` prescribes nodes that lag where the force of `{}` reaches its limit",
+                other.name, own.name
+            ));
+            let place = self.source().key_span(&["constraint", &other.name]);
+            let limit = self.source().span(&["constraint", &own.name, "force-limit"]);
+            let help = "take the shared nodes out of one of them with `{ difference = [ …, … ] }`, or limit `components`";
+            let diagnostic =
+                diagnostic.at(place, "has nodes of the other").also(limit, "this limit").help(help);
             self.out.push(diagnostic);
         }
     }

@@ -160,6 +160,11 @@ pub struct MoveTable {
     /// Components prescribed; if not given, all three of the displacement, and with `turn` the rotations. A rotation takes all three.
     #[serde(default)]
     pub components: Option<Vec<Axis>>,
+    /// The force [N] that they push with at most, as their reaction tells. From half of it on they give way together, and lag behind their motion; when
+    /// nothing is in their way any more, they catch up. With the solvers `implicit` and `static`.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub force_limit: Option<f64>,
     /// Its curve over time.
     #[serde(flatten)]
     pub timing: Timing,

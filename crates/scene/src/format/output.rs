@@ -89,15 +89,17 @@ pub enum FieldName {
     Gap,
     /// How far [m] a node has slid on what it touches since its touch began; not a number where it touches nothing.
     Slip,
-    /// Whether constraints hold a node: 0 where it is free, 1 where it stays where it is at rest, 2 where it is moved.
+    /// Whether constraints hold a node: 0 where it is free, 1 where it stays where it is at rest, 2 where it is moved, 3 under a plate.
     Constraint,
-    /// Force [N] of loads on a node, without weights; zero on shells.
+    /// Force [N] of loads on a node, without weights. Pressures on shells give a third of their force to each corner.
     Load,
+    /// Weight [N] of a node: its mass times the acceleration of gravity.
+    Weight,
 }
 
 impl FieldName {
     /// All of them.
-    pub const ALL: [Self; 36] = [
+    pub const ALL: [Self; 37] = [
         Self::Displacement,
         Self::Velocity,
         Self::Rotation,
@@ -134,6 +136,7 @@ impl FieldName {
         Self::Slip,
         Self::Constraint,
         Self::Load,
+        Self::Weight,
     ];
 
     /// The name in files.
@@ -175,6 +178,7 @@ impl FieldName {
             Self::Slip => "slip",
             Self::Constraint => "constraint",
             Self::Load => "load",
+            Self::Weight => "weight",
         }
     }
 
@@ -189,7 +193,7 @@ impl FieldName {
             Self::Displacement | Self::Thickness | Self::CurrentThickness | Self::Gap | Self::Slip => "m",
             Self::Velocity => "m/s",
             Self::Rotation => "rad",
-            Self::Reaction | Self::AxialForce | Self::ContactForce | Self::Load => "N",
+            Self::Reaction | Self::AxialForce | Self::ContactForce | Self::Load | Self::Weight => "N",
             Self::ReactionMoment => "N m",
             Self::CauchyStress
             | Self::Pk2Stress
@@ -255,6 +259,7 @@ impl FieldName {
             Self::Slip => "slip",
             Self::Constraint => "constraint",
             Self::Load => "load",
+            Self::Weight => "weight",
         }
     }
 
@@ -268,7 +273,8 @@ impl FieldName {
             | Self::ReactionMoment
             | Self::Fibre
             | Self::ContactForce
-            | Self::Load => 3,
+            | Self::Load
+            | Self::Weight => 3,
             Self::CauchyStress
             | Self::Pk2Stress
             | Self::GreenStrain
@@ -311,7 +317,7 @@ impl FieldName {
 
     /// True for fields of what holds, moves and loads nodes.
     pub fn is_of_marks(self) -> bool {
-        matches!(self, Self::Constraint | Self::Load)
+        matches!(self, Self::Constraint | Self::Load | Self::Weight)
     }
 
     /// True for fields of bodies that touch something.
@@ -338,7 +344,8 @@ impl FieldName {
             | Self::Gap
             | Self::Slip
             | Self::Constraint
-            | Self::Load => true,
+            | Self::Load
+            | Self::Weight => true,
             Self::CauchyStress
             | Self::EnergyDensity
             | Self::Pk2Stress

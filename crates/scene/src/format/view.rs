@@ -82,13 +82,16 @@ pub struct ViewTable {
     /// note tells what the longest one stands for.
     #[serde(default)]
     pub contacts: bool,
-    /// Whether constraints and loads are marked, through the bodies: squares where nodes are held, dots where they are moved, arrows along the forces of
-    /// loads. At most 300 of each kind are drawn.
+    /// Whether constraints and loads are marked, through the bodies: squares where nodes are held, dots where they are moved, bars under plates, arrows along
+    /// the forces of loads, and one along the weight of all. At most 300 of each kind are drawn.
     #[serde(default)]
     pub marks: bool,
     /// Whether the element with the smallest `element-step` is marked, through the body. Shells are then shown flat.
     #[serde(default)]
     pub critical: bool,
+    /// Whether folds and contacts are darker, where less light from all sides arrives.
+    #[serde(default = "yes")]
+    pub occlusion: bool,
     /// What the surface is like; a texture stays where it is in the body at rest, and moves with it.
     #[serde(default)]
     pub texture: TextureName,
@@ -324,6 +327,10 @@ fn azimuth() -> f64 {
 
 fn elevation() -> f64 {
     22.0
+}
+
+fn yes() -> bool {
+    true
 }
 
 fn one() -> f64 {

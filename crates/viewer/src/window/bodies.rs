@@ -62,13 +62,9 @@ fn list(ui: &mut egui::Ui, names: &RegionNames, hide: &mut Vec<CellLabel>, looks
                     hidden.extend((!shown).then_some(*region));
                 }
             });
-            let name = name.to_string();
-            let mut look = looks.get(&name).copied().unwrap_or_default();
-            let edited = ui.horizontal(|ui| edit_look(ui, text, &mut look)).inner;
-            if edited && look == LookTable::default() {
-                looks.remove(&name);
-            } else if edited {
-                looks.insert(name, look);
+            let mut look = look_of(names, looks, *region).map(|(_, look)| look).unwrap_or_default();
+            if ui.horizontal(|ui| edit_look(ui, text, &mut look)).inner {
+                set_look(names, looks, *region, name, look);
             }
         }
     });
@@ -85,6 +81,36 @@ fn list(ui: &mut egui::Ui, names: &RegionNames, hide: &mut Vec<CellLabel>, looks
         *hide = rows.into_iter().filter(|row| hidden.contains(&row.region)).map(|row| row.name).collect();
     }
     changed
+}
+
+/// The look of a region with the name that gives it: the first one, as in pictures.
+fn look_of(names: &RegionNames, looks: &Looks, region: Region) -> Option<(String, LookTable)> {
+    let gives = |name: &String| regions_named(names, name).contains(&region);
+    looks.iter().find(|(name, _)| gives(name)).map(|(name, look)| (name.clone(), *look))
+}
+
+fn regions_named(names: &RegionNames, name: &str) -> Vec<Region> {
+    names.find(&CellLabel::Name(name.to_owned())).unwrap_or_default()
+}
+
+/// Gives a region a look, by the name that has given it one so far. A name of several labels is replaced by the numbers of the others.
+fn set_look(names: &RegionNames, looks: &mut Looks, region: Region, own: &CellLabel, look: LookTable) {
+    let mut key = own.to_string();
+    while let Some((name, shared)) = look_of(names, looks, region) {
+        looks.remove(&name);
+        let regions = regions_named(names, &name);
+        if regions.len() == 1 {
+            key = name;
+        }
+        for other in regions.into_iter().filter(|other| *other != region) {
+            if let Region::Label(label) = other {
+                looks.entry(label.to_string()).or_insert(shared);
+            }
+        }
+    }
+    if look != LookTable::default() {
+        looks.insert(key, look);
+    }
 }
 
 /// Opacity and colour; whether they were changed.
@@ -140,5 +166,30 @@ impl Listed {
             regions.into_iter().map(move |region| (region, coat))
         };
         Regions { hidden: Vec::new(), coats: hidden.chain(looks).flat_map(found).collect() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_look_given_by_name_or_range_is_that_of_the_row_and_is_changed_there() {
+        let named = [(1, None), (2, Some("tumour".to_owned())), (3, None), (4, None)];
+        let names =
+            RegionNames { labels: named.into_iter().collect(), bodies: [(1, "liver".to_owned())].into() };
+        let look = |opacity| LookTable { opacity, ..LookTable::default() };
+        let mut looks: Looks = [("tumour", 0.5), ("3-4", 0.3), ("liver", 0.2)]
+            .map(|(name, o)| (name.to_owned(), look(o)))
+            .into();
+        let opacity = |looks: &Looks, region| look_of(&names, looks, region).map(|(_, look)| look.opacity);
+        assert_eq!(opacity(&looks, Region::Label(2)), Some(0.5));
+        assert_eq!(opacity(&looks, Region::Label(3)), Some(0.3));
+        assert_eq!(opacity(&looks, Region::Label(1)), None);
+        set_look(&names, &mut looks, Region::Label(2), &CellLabel::Number(2), look(0.6));
+        set_look(&names, &mut looks, Region::Label(3), &CellLabel::Number(3), look(0.7));
+        set_look(&names, &mut looks, Region::Body(1), &CellLabel::Name("liver".into()), look(1.0));
+        let expected = [("3", 0.7), ("4", 0.3), ("tumour", 0.6)];
+        assert_eq!(looks, expected.map(|(name, o)| (name.to_owned(), look(o))).into());
     }
 }

@@ -10,7 +10,7 @@ use eframe::egui::{self, Align2, Key, PointerButton, vec2};
 use eframe::egui_wgpu::WgpuConfiguration;
 use pliant_geometry::{CellKind, Mesh, RegionNames, Vector3};
 use pliant_picture::{
-    Camera, ColourMap, Extremes, Series, SeriesError, Style, Subject, Texture, deformed_points,
+    Camera, ColourMap, Extremes, Outermost, Series, SeriesError, Style, Subject, Texture, deformed_points,
     field_choices, nodal_values,
 };
 use pliant_scene::format::FieldName;
@@ -18,7 +18,7 @@ use pliant_scene::format::FieldName;
 use super::bodies::Listed;
 use super::keep::Taking;
 use super::told::{Told, tell};
-use super::viewport::Viewport;
+use super::viewport::{OCCLUSION, Viewport};
 use super::{Outcome, WindowError, run_window};
 
 /// A finished run to be looked at.
@@ -81,6 +81,23 @@ fn read_frames(asked: &Receiver<Asked>, found: &Sender<Result<Loaded, String>>, 
         }
         wake();
     }
+}
+
+/// Finds the outermost points of all frames, each of which is read once.
+fn survey(series: &Series, context: &egui::Context) -> Result<Receiver<Vec<Vector3>>, String> {
+    let (send, receive) = channel();
+    let (frames, context) = (series.frames.clone(), context.clone());
+    let work = move || {
+        let mut all = Outermost::default();
+        // A frame that cannot be read is told where it is shown.
+        let meshes = frames.iter().filter_map(|(_, file)| pliant_geometry::io::read(file).ok());
+        meshes.for_each(|file| all.add(deformed_points(&file.mesh)));
+        // Another series may be shown by now.
+        let _ = send.send(all.points().to_vec());
+        context.request_repaint();
+    };
+    let thread = std::thread::Builder::new().name("survey".into()).spawn(work);
+    thread.map(|_| receive).map_err(|error| error.to_string())
 }
 
 fn loaded(mesh: &Mesh, asked: Asked, before: &mut Option<Shape>) -> Loaded {
@@ -164,6 +181,8 @@ struct Finished {
     listed: Listed,
     asks: Sender<Asked>,
     found: Receiver<Result<Loaded, String>>,
+    /// Where the frames reach, once all are known.
+    surveyed: Receiver<Vec<Vector3>>,
     /// What was asked for last, and what is shown.
     asked: Option<Asked>,
     shown: Option<Asked>,
@@ -189,6 +208,7 @@ impl Finished {
         let work = move || read_frames(&asked, &found, &|| woken.request_repaint());
         std::thread::Builder::new().name("frames".into()).spawn(work).map_err(|error| error.to_string())?;
         context.egui_ctx.set_visuals(egui::Visuals::light());
+        let surveyed = survey(&series, &context.egui_ctx)?;
         let field = series.first_field(&["von-mises", "displacement"]).ok().flatten().map(str::to_owned);
         let mut timeline = Timeline::of(&series);
         match &run.portrait {
@@ -206,6 +226,7 @@ impl Finished {
             listed: Listed::default(),
             asks,
             found: receive,
+            surveyed,
             asked: None,
             shown: None,
             message: None,
@@ -230,6 +251,9 @@ impl Finished {
                 Ok(loaded) => self.show(loaded),
                 Err(message) => self.message = Some(Told::failure(message)),
             }
+        }
+        if let Ok(reach) = self.surveyed.try_recv() {
+            self.port.learn(Arc::new(reach));
         }
     }
 
@@ -330,7 +354,7 @@ impl Finished {
                 }
             });
             if name != before {
-                self.take_series(&name);
+                self.take_series(&name, ui.ctx());
             }
         }
         let word = |field: &Option<String>| field.as_deref().map_or("tissue".into(), |field| words(field).0);
@@ -361,21 +385,24 @@ impl Finished {
         ui.checkbox(&mut style.wireframe, "Wireframe").on_hover_text("only the edges of the elements");
         let mut skin = style.texture == Texture::Skin;
         ui.checkbox(&mut skin, "Skin").on_hover_text("moist tissue");
+        ui.checkbox(&mut style.occlusion, "Occlusion").on_hover_text(OCCLUSION);
         style.texture = if skin { Texture::Skin } else { Texture::None };
         self.port.cut.edit(ui, self.port.style.clip);
     }
 
     /// Shows another series of the run, at the same instant.
-    fn take_series(&mut self, name: &str) {
-        match Series::find(&self.run.folder, Some(name)) {
-            Ok(series) => {
+    fn take_series(&mut self, name: &str, context: &egui::Context) {
+        let found = Series::find(&self.run.folder, Some(name)).map_err(|error| error.to_string());
+        match found.and_then(|series| Ok((survey(&series, context)?, series))) {
+            Ok((surveyed, series)) => {
+                self.surveyed = surveyed;
                 let timeline = Timeline::of(&series);
                 let at = self.timeline.at.clamp(timeline.ends[0], timeline.ends[1]);
                 self.timeline = Timeline { at, ends: timeline.ends, ..self.timeline };
                 self.series = series;
                 self.shown = None;
             }
-            Err(error) => self.message = Some(Told::failure(error.to_string())),
+            Err(error) => self.message = Some(Told::failure(error)),
         }
     }
 

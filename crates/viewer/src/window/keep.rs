@@ -133,6 +133,9 @@ fn view_text(view: &ViewTable, style: &Style, camera: &Camera, cut: Option<Plane
         ("critical", view.critical),
     ];
     switches.into_iter().filter(|(_, on)| *on).for_each(|(key, _)| put(key, "true".into()));
+    if !view.occlusion {
+        put("occlusion", "false".into());
+    }
     if style.texture == Texture::Skin {
         put("texture", toml_text("skin"));
     }
@@ -261,7 +264,7 @@ mod tests {
 
     #[test]
     fn a_copied_view_is_the_view_of_the_scene_that_it_is_pasted_into() {
-        let asked = "[view]\non = 'cube'\ncolour = 'displacement'\ncomponent = 'z'\nhide = ['cube']\n\
+        let asked = "[view]\non = 'cube'\ncolour = 'displacement'\ncomponent = 'z'\nhide = ['cube']\nocclusion = false\n\
             look.cube = { opacity = 0.25, colour = 'liver' }\n";
         let view = scene(&format!("{SCENE}{asked}")).view;
         let style = Style {
@@ -284,8 +287,8 @@ mod tests {
         let read = scene(&format!("{SCENE}{text}")).view;
         assert_eq!((read.on, read.colour, read.component), (view.on, view.colour, view.component), "{text}");
         assert_eq!(
-            (read.range, read.edges, read.ghost, read.wireframe),
-            (Some([-1e-3, 0.25]), true, true, false)
+            (read.range, read.edges, read.ghost, read.wireframe, read.occlusion),
+            (Some([-1e-3, 0.25]), true, true, false, false)
         );
         assert_eq!((read.hide, read.look), (view.hide, view.look));
         assert_eq!(read.clip.map(|clip| (clip.point, clip.normal)), Some(([0.5, 0.0, 0.0], [1.0, 0.0, 0.0])));

@@ -331,6 +331,9 @@ impl App {
             self.port.set(&frame.points, &frame.values);
         }
         self.frame = frame.clone();
+        if !Arc::ptr_eq(&self.port.reach, &self.frame.ways) {
+            self.port.learn(Arc::clone(&self.frame.ways));
+        }
         self.port.fit_range();
         let hands = Which::BOTH.into_iter().filter_map(|which| self.frame.hand(which));
         let strongest = hands.map(|[_, force]| Vector3::from(force).norm()).fold(0.0, f64::max);

@@ -7,6 +7,7 @@ use pliant_scene::Part;
 use pliant_scene::format::{BodyModel, ColourBy, Component, FieldName, Labels, Nothing, SolverName};
 
 use super::App;
+use super::viewport::OCCLUSION;
 use crate::hand::{Hand, Which};
 use crate::recording::Surface;
 use crate::session::Order;
@@ -203,7 +204,7 @@ impl App {
             ui.checkbox(&mut self.view.contacts, "Forces of contacts");
         }
         let mut marks = self.view.marks;
-        let told = "M: squares where nodes are held, dots where they are moved, arrows of loads";
+        let told = "M: squares where nodes are held, dots where they are moved, bars under plates, arrows of loads and weights";
         if ui.checkbox(&mut marks, "Constraints and loads").on_hover_text(told).changed() {
             self.show_marks(marks);
         }
@@ -211,6 +212,9 @@ impl App {
         let mut skin = self.port.style.texture == Texture::Skin;
         if ui.checkbox(&mut skin, "Skin").changed() {
             self.port.style.texture = if skin { Texture::Skin } else { Texture::None };
+        }
+        if ui.checkbox(&mut self.port.style.occlusion, "Occlusion").on_hover_text(OCCLUSION).changed() {
+            self.view.occlusion = self.port.style.occlusion;
         }
         (self.port.style.fibres, self.port.style.critical) = (self.view.fibres, self.view.critical);
         before != (Surface::of(&self.view), self.view.contacts, self.port.cut.on)

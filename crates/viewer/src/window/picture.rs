@@ -2,7 +2,7 @@
 
 use eframe::egui::{self, Align2, Color32, CursorIcon, FontId, Key, PointerButton, Pos2, Rect, Stroke, vec2};
 use pliant_geometry::Vector3;
-use pliant_picture::{Camera, Marked, arrow_note, arrow_unit, largest_force, largest_load};
+use pliant_picture::{Camera, Marked, WEIGHT, arrow_note, arrow_unit, largest_force, largest_load};
 
 use super::App;
 use super::viewport::scrolled;
@@ -191,7 +191,7 @@ impl App {
         }
     }
 
-    /// Squares where nodes are held, dots where they are moved, arrows of loads.
+    /// Squares where nodes are held, dots where they are moved, bars under plates, arrows of loads and weights.
     fn draw_marks(&self, painter: &egui::Painter) {
         let unit = arrow_unit(&self.frame.points, largest_load(&self.frame.marks));
         for (place, marked) in &self.frame.marks {
@@ -206,6 +206,17 @@ impl App {
                 }
                 Marked::Moved => {
                     painter.circle(at, DOT, colour, Stroke::new(1.0, Color32::WHITE));
+                }
+                Marked::Plate => {
+                    let bar = Rect::from_center_size(at, vec2(4.0 * DOT, DOT));
+                    painter.rect_filled(bar.expand(1.0), 0.0, Color32::WHITE);
+                    painter.rect_filled(bar, 0.0, colour);
+                }
+                Marked::Weight(force) => {
+                    let reach = force.normalize() * (WEIGHT * self.port.camera.height);
+                    let Some(to) = self.port.to_screen(&(place + reach)) else { continue };
+                    painter.arrow(at, to - at, Stroke::new(5.0, Color32::WHITE));
+                    painter.arrow(at, to - at, Stroke::new(3.0, colour));
                 }
                 Marked::Loaded(force) => {
                     let Some(to) = self.port.to_screen(&(place + force * unit)) else { continue };

@@ -16,6 +16,8 @@ use pliant_picture::{
 
 use super::paint::{Paint, SAMPLES, place};
 
+/// What occlusion does.
+pub(super) const OCCLUSION: &str = "folds and contacts are darker, where less light arrives";
 /// Width of the scale of colours on the screen.
 const SCALE: f32 = 110.0;
 /// Height of the figures on the screen.
@@ -116,6 +118,8 @@ pub(super) struct Viewport {
     pub cut: Cut,
     /// Points on the surface, increasing.
     pub surface: Vec<u32>,
+    /// Where something will be or has been [m], as far as it is known.
+    pub reach: Arc<Vec<Vector3>>,
     /// Where the picture is in the window, in egui's points.
     pub rect: Rect,
 }
@@ -125,8 +129,10 @@ impl Viewport {
     ///
     /// # Errors
     /// If the window has no GPU.
-    pub fn new(context: &CreationContext<'_>, style: Style, camera: Camera) -> Result<Self, String> {
+    pub fn new(context: &CreationContext<'_>, mut style: Style, camera: Camera) -> Result<Self, String> {
         let state = context.wgpu_render_state.as_ref().ok_or("wgpu did not start")?;
+        // Software takes a twentieth longer for a frame with it.
+        style.occlusion &= state.adapter.get_info().device_type != wgpu::DeviceType::Cpu;
         let target = Target {
             format: state.target_format,
             depth: wgpu::TextureFormat::Depth32Float,
@@ -148,6 +154,7 @@ impl Viewport {
             patient: false,
             missing: false,
             surface: Vec::new(),
+            reach: Arc::default(),
             rect: Rect::ZERO,
         })
     }
@@ -252,10 +259,20 @@ impl Viewport {
         let scale = f64::from(SCALE / height);
         let figures = f64::from(FIGURES / height).min(0.4);
         let aspect = ((self.aspect() - scale) / (1.0 - figures)).max(0.5);
-        camera.fit(self.surface.iter().map(|&point| &self.points[point as usize]), aspect);
+        let now = self.surface.iter().map(|&point| &self.points[point as usize]);
+        camera.fit(now.chain(&*self.reach), aspect);
         camera.height /= 1.0 - figures;
         camera.pan(-0.5 * scale, -0.5 * figures);
         camera
+    }
+
+    /// Learns where something will be or has been; goes on to see all, if it did.
+    pub fn learn(&mut self, reach: Arc<Vec<Vector3>>) {
+        let saw_all = self.camera == self.fitted();
+        self.reach = reach;
+        if saw_all {
+            self.fit();
+        }
     }
 
     pub fn fit(&mut self) {

@@ -80,15 +80,25 @@ pub fn subject(world: &World) -> Subject {
     Subject::new(live.mesh().unwrap())
 }
 
-/// The first frame that is as wanted.
+/// The first frame that is as wanted, within a minute.
 pub fn wait(session: &mut Session, wanted: impl Fn(&Frame) -> bool) -> Frame {
+    wait_up_to(Duration::from_secs(60), session, wanted)
+}
+
+/// The first frame that is as wanted.
+pub fn wait_up_to(limit: Duration, session: &mut Session, wanted: impl Fn(&Frame) -> bool) -> Frame {
     let started = Instant::now();
     loop {
         let (_, frame) = session.look();
         if wanted(frame) {
             return frame.clone();
         }
-        assert!(started.elapsed() < Duration::from_secs(60), "no such frame: {frame:?}");
+        assert!(
+            started.elapsed() < limit,
+            "no such frame in {limit:?}: t = {} s, {:?}",
+            frame.time,
+            frame.failure.as_ref().or(frame.note.as_ref())
+        );
         assert!(!session.has_ended(), "the solver's thread has ended");
         std::thread::sleep(Duration::from_millis(2));
     }

@@ -1,0 +1,56 @@
+//! The outermost of many points: those that a camera has to see.
+
+use pliant_geometry::Vector3;
+
+/// Points of which no more are kept than a camera needs: inner ones do not change where it stands.
+#[derive(Clone, Debug, Default)]
+pub struct Outermost {
+    points: Vec<Vector3>,
+}
+
+/// Points that are kept.
+const MOST: usize = 100_000;
+
+impl Outermost {
+    /// Takes more points [m].
+    pub fn add(&mut self, points: impl IntoIterator<Item = Vector3>) {
+        self.points.extend(points);
+        if self.points.len() > MOST {
+            let outermost = directions().into_iter().filter_map(|direction| {
+                self.points.iter().copied().max_by(|a, b| direction.dot(a).total_cmp(&direction.dot(b)))
+            });
+            self.points = outermost.collect();
+        }
+    }
+
+    /// Those that are kept.
+    pub fn points(&self) -> &[Vector3] {
+        &self.points
+    }
+}
+
+/// Directions all around, about 8° apart (a spiral with the golden angle).
+fn directions() -> Vec<Vector3> {
+    let count = 1000;
+    let direction = |index: i32| {
+        let z = 1.0 - (2.0 * f64::from(index) + 1.0) / f64::from(count);
+        let (angle, r) = (f64::from(index) * 2.399_963_229_728_653, (1.0 - z * z).sqrt());
+        Vector3::new(r * angle.cos(), r * angle.sin(), z)
+    };
+    (0..count).map(direction).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_outermost_points_stay_among_many() {
+        let mut all = Outermost::default();
+        let far = Vector3::new(0.0, 3.0, 0.0);
+        all.add([far]);
+        let directions = directions();
+        all.add((0..2 * MOST).map(|index| directions[index % 1000] * 0.5));
+        assert!(all.points().len() <= 1000 && all.points().contains(&far));
+    }
+}
