@@ -120,7 +120,7 @@ class Image:
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes it as NIfTI-1 of 32-bit integers, whole numbers only, the affine matrix in millimetres (`sform`)."""
         whole = np.rint(self.array)
-        if not np.array_equal(whole, self.array) or np.abs(whole).max() >= 2**31:
+        if not np.array_equal(whole, self.array) or float(np.abs(whole).max()) >= 2**31:
             raise ValueError("the image holds other values than whole numbers below 2³¹: labels are wanted")
         if max(self.array.shape) >= 2**15:
             raise ValueError(f"NIfTI-1 takes 32,767 voxels along an axis at most, not {max(self.array.shape)}")
