@@ -34,9 +34,9 @@ fn solid_cut(at: Corner) -> Solid {
 // Samples on a spiral, and the cosine and sine of the angle from one to the next (five turns in all).
 const SAMPLES: i32 = 12;
 const ONWARD: vec2<f32> = vec2(-0.8660254, 0.5);
-// Cosine and sine of the angles by which the spiral is turned in four by four pixels, over which it is smoothed.
+// Angle from the spiral of a pixel to that of the next one, of four by four over which the light is smoothed.
 const TURN: f32 = 0.39269908;
-// So that a wall takes away half of all light at its foot.
+// Chosen by eye, in the pictures of the gallery.
 const STRENGTH: f32 = 8.0;
 // Slope below which a surface hides nothing: triangles of a round surface meet at such angles.
 const FLAT: f32 = 0.2;

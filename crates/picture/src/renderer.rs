@@ -484,7 +484,7 @@ impl Drawn {
         self.bind_shape(device, renderer);
     }
 
-    /// Computes normals and writes the view, for a picture with this ratio of width to height.
+    /// Computes normals, writes the view and finds where less light arrives, for a picture with this ratio of width to height.
     pub fn prepare(
         &mut self,
         renderer: &Renderer,

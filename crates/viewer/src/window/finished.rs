@@ -181,8 +181,8 @@ struct Finished {
     listed: Listed,
     asks: Sender<Asked>,
     found: Receiver<Result<Loaded, String>>,
-    /// Where the frames reach, once all are known.
-    surveyed: Receiver<Vec<Vector3>>,
+    /// Where the frames reach, once all are known; `None` after that.
+    surveyed: Option<Receiver<Vec<Vector3>>>,
     /// What was asked for last, and what is shown.
     asked: Option<Asked>,
     shown: Option<Asked>,
@@ -226,7 +226,7 @@ impl Finished {
             listed: Listed::default(),
             asks,
             found: receive,
-            surveyed,
+            surveyed: Some(surveyed),
             asked: None,
             shown: None,
             message: None,
@@ -252,8 +252,9 @@ impl Finished {
                 Err(message) => self.message = Some(Told::failure(message)),
             }
         }
-        if let Ok(reach) = self.surveyed.try_recv() {
+        if let Some(Ok(reach)) = self.surveyed.as_ref().map(Receiver::try_recv) {
             self.port.learn(Arc::new(reach));
+            self.surveyed = None;
         }
     }
 
@@ -395,7 +396,7 @@ impl Finished {
         let found = Series::find(&self.run.folder, Some(name)).map_err(|error| error.to_string());
         match found.and_then(|series| Ok((survey(&series, context)?, series))) {
             Ok((surveyed, series)) => {
-                self.surveyed = surveyed;
+                self.surveyed = Some(surveyed);
                 let timeline = Timeline::of(&series);
                 let at = self.timeline.at.clamp(timeline.ends[0], timeline.ends[1]);
                 self.timeline = Timeline { at, ends: timeline.ends, ..self.timeline };
@@ -449,7 +450,7 @@ impl Finished {
         };
         context.request_repaint();
         let failed = self.message.as_ref().map(|told| Err(told.text.clone()));
-        let is_there = self.shown.is_some() && self.shown == self.asked;
+        let is_there = self.shown.is_some() && self.shown == self.asked && self.surveyed.is_none();
         self.posed += u32::from(is_there);
         if self.posed == 10 {
             self.taking.ask(context);
@@ -486,6 +487,8 @@ impl eframe::App for Finished {
 
 #[cfg(test)]
 mod tests {
+    use pliant_geometry::DataArray;
+
     use super::*;
 
     fn series() -> Series {
@@ -511,6 +514,24 @@ mod tests {
         timeline = Timeline { speed: 0.5, ..timeline };
         timeline.go_on(0.2);
         assert_eq!(timeline.at, 0.1);
+    }
+
+    #[test]
+    fn a_survey_knows_the_places_of_all_frames() {
+        let folder = tempfile::tempdir().unwrap();
+        let frames = [0.0, 3.0].map(|moved| {
+            let mut mesh = Mesh { points: vec![Vector3::zeros(), Vector3::x()], ..Mesh::default() };
+            let values = vec![moved, 0.0, 0.0, 0.0, moved, 0.0];
+            mesh.point_data.insert("displacement".into(), DataArray { components: 3, values });
+            mesh.block_mut(CellKind::Line).nodes.extend([0, 1]);
+            let file = folder.path().join(format!("{moved}.vtu"));
+            pliant_geometry::io::write(&file, &mesh).unwrap();
+            (moved, file)
+        });
+        let series = Series { name: "fields".into(), frames: frames.to_vec() };
+        let reach = survey(&series, &egui::Context::default()).unwrap().recv().unwrap();
+        let moved = Vector3::new(1.0, 3.0, 0.0);
+        assert_eq!(reach, [Vector3::zeros(), Vector3::x(), Vector3::x() * 3.0, moved]);
     }
 
     #[test]

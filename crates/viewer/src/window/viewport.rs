@@ -131,7 +131,7 @@ impl Viewport {
     /// If the window has no GPU.
     pub fn new(context: &CreationContext<'_>, mut style: Style, camera: Camera) -> Result<Self, String> {
         let state = context.wgpu_render_state.as_ref().ok_or("wgpu did not start")?;
-        // Software takes a twentieth longer for a frame with it.
+        // Software takes a twelfth longer for a frame with it.
         style.occlusion &= state.adapter.get_info().device_type != wgpu::DeviceType::Cpu;
         let target = Target {
             format: state.target_format,
