@@ -202,7 +202,7 @@ pub enum SolveError {
     /// A tool or a prescribed motion that cannot go on.
     #[error(
         "a tool or a prescribed motion is blocked at t = {time:.6}: after {iterations} iterations it has gone {:.1} % of its way in the step, with a gap of \
-         {gap:.1e} m left; nothing is in anything else. Let it go less far or more slowly, or take smaller steps",
+         {gap:.1e} m left; nothing is in anything else. Give it a `force-limit`, let it go less far or more slowly, or take smaller steps",
         100.0 * part
     )]
     Blocked {

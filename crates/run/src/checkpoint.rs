@@ -594,7 +594,7 @@ mod tests {
     /// The layout of [`State`] and [`Progressed`] decides what a checkpoint can be read with: whoever changes it gives
     /// [`FORMAT`] the next number, and this test the new bytes.
     #[test]
-    fn the_layout_of_format_15_is_as_it_was() {
+    fn the_layout_of_format_16_is_as_it_was() {
         let bytes = |run: &str| {
             let world = World::new(&scene(run)).unwrap();
             world.simulation().unwrap().encode().unwrap()[0].len()
@@ -611,6 +611,6 @@ mod tests {
         let shell = shell.simulation().unwrap().encode().unwrap()[0].len();
         let explicit = bytes("[run]\nprecision = 'single'\n");
         let quasi_static = bytes("[run]\nprecision = 'single'\nsolver = 'quasi-static'\n");
-        assert_eq!((FORMAT, explicit, quasi_static, shell), (15, 1089, 1473, 1068));
+        assert_eq!((FORMAT, explicit, quasi_static, shell), (16, 1089, 1473, 1069));
     }
 }

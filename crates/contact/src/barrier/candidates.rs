@@ -7,7 +7,7 @@ use super::distance::Mollifier;
 use super::law::{Barrier, Slip};
 use super::rows::{Mollified, Row, Stencil};
 use super::surfaces::BarrierSide;
-use super::wide::{Apart, ROUND_OFF, Sort, Wide, bound, common, other};
+use super::wide::{Apart, ROUND_OFF, Sort, Wide, common, other};
 
 /// Rest distances, over the reach, up to which parts of one surface never touch each other.
 const AT_REST: f64 = 1.02;
@@ -178,16 +178,13 @@ impl Group {
     fn find(&mut self, place: &[Vector3<f64>], within: f64) {
         let Self { sides, skin, apart, unsorted, wide, action, .. } = self;
         unsorted.clear();
-        let most = |nodes: &[u32]| nodes.iter().map(|&node| skin[node as usize]).fold(0.0, f64::max);
-        wide.each(sides, apart, place, skin, [within, action.law.distance], |sides, sort, numbers| {
+        wide.each(sides, apart, place, skin, [within, action.law.distance], |sides, sort, numbers, limit| {
             let (kind, nodes) = (sort.kind(), sort.nodes(sides, numbers));
-            let (first, second) = nodes.split_at(kind.split());
-            let limit = within + most(first) + most(second);
-            let points = nodes.map(|node| place[node as usize]);
-            if bound(&points, kind) >= limit * (1.0 + ROUND_OFF) {
+            let points = nodes.map(|node| &place[node as usize]);
+            if kind.is_beyond(points, limit * (1.0 + ROUND_OFF)) {
                 return;
             }
-            let distance = kind.distance(&points);
+            let distance = kind.distance(&points.map(|point| *point));
             if distance >= limit {
                 return;
             }
@@ -297,6 +294,9 @@ impl Group {
         let reach = self.action.reach();
         for one in self.nearer_than(reach) {
             if one.distance - self.moved(one) >= reach {
+                continue;
+            }
+            if one.kind.is_beyond(one.nodes.map(|node| &place[node as usize]), reach * (1.0 + ROUND_OFF)) {
                 continue;
             }
             let points = one.nodes.map(|node| place[node as usize]);

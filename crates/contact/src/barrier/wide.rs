@@ -13,8 +13,11 @@ const MORE: f64 = 10.0;
 const LEAST: f64 = 4.0;
 /// The part of the wide skin of before that it is at least.
 const KEPT: f64 = 0.5;
-/// What round-off takes of a distance at most, over it.
+/// What round-off takes of a distance at most, over it; and a number of single precision.
 pub(super) const ROUND_OFF: f64 = 1e-9;
+const SINGLE: f64 = 2e-7;
+/// Pairs that are compared at once.
+const BLOCK: usize = 16;
 
 /// Pairs of numbers, by the first.
 #[derive(Clone, Debug, Default)]
@@ -56,19 +59,70 @@ pub(super) enum Sort {
     Edges,
 }
 
-/// A pair by the numbers of its primitives, and a bound [m] from below of its distance when it was found.
-#[derive(Clone, Copy, Debug)]
-struct Pair {
-    numbers: [u32; 2],
-    distance: f64,
+/// Pairs of a sort, by their first numbers.
+#[derive(Clone, Debug, Default)]
+struct Pairs {
+    /// Where those of each first number end.
+    ends: Vec<u32>,
+    /// Second numbers, increasing for each first one.
+    second: Vec<u32>,
+    /// Bounds [m] from below of their distances when they were found.
+    distance: Vec<f32>,
+}
+
+impl Pairs {
+    fn clear(&mut self) {
+        self.ends.clear();
+        self.second.clear();
+        self.distance.clear();
+    }
+
+    /// Adds those of the next first number: second numbers in any order, with bounds [m] from below of their distances.
+    fn add(&mut self, own: &mut Vec<(u32, f64)>) {
+        own.sort_unstable_by_key(|pair| pair.0);
+        self.second.extend(own.iter().map(|pair| pair.0));
+        self.distance.extend(own.drain(..).map(|pair| (pair.1 * (1.0 - SINGLE)) as f32));
+        self.ends.push(self.second.len() as u32);
+    }
+
+    /// Calls back with the pairs that may be within a distance [m] and the reaches [m] of both of their primitives.
+    fn within(&self, within: f64, [first, second]: [&[f64]; 2], mut found: impl FnMut([u32; 2])) {
+        let most = second.iter().copied().fold(0.0, f64::max);
+        let mut from = 0;
+        for ((number, reach), &end) in (0..).zip(first).zip(&self.ends) {
+            let (limit, range) = (within + reach, from as usize..end as usize);
+            from = end;
+            // Most are seen to be too far apart many at once.
+            let limit_of_all = ((limit + most) * (1.0 + SINGLE)) as f32;
+            let blocks = self.second[range.clone()].chunks(BLOCK).zip(self.distance[range].chunks(BLOCK));
+            for (numbers, distances) in blocks {
+                if !distances.iter().fold(false, |any, distance| any | (*distance < limit_of_all)) {
+                    continue;
+                }
+                for (&other, &distance) in numbers.iter().zip(distances) {
+                    if f64::from(distance) < (limit + second[other as usize]) * (1.0 + ROUND_OFF) {
+                        found([number, other]);
+                    }
+                }
+            }
+        }
+    }
+
+    /// All of them.
+    fn all(&self) -> impl Iterator<Item = [u32; 2]> {
+        let starts = std::iter::once(&0).chain(&self.ends);
+        let ranges = starts.zip(&self.ends).map(|(&from, &end)| from as usize..end as usize);
+        ranges
+            .zip(0..)
+            .flat_map(|(range, first)| self.second[range].iter().map(move |&second| [first, second]))
+    }
 }
 
 /// Pairs of the sides of a contact.
 #[derive(Clone, Debug)]
 pub(super) struct Wide {
-    /// Points of the first side, of the second, and edges; where each sort ends.
-    pairs: Vec<Pair>,
-    ends: [usize; 3],
+    /// Points of the first side, of the second, and edges.
+    pairs: [Pairs; 3],
     /// Of all nodes: skins [m], and places [m] when pairs were found; none before that.
     skin: Vec<f64>,
     place: Vec<Vector3<f64>>,
@@ -76,11 +130,43 @@ pub(super) struct Wide {
     within: f64,
     /// Of each face or edge the number, from 1 on, of the point or edge for which it was last left out.
     left_out: Vec<u32>,
-    /// How far [m] nodes have gone since, with the skins of a list; the same of the primitives of both sides.
+    /// How far [m] nodes have gone since, with the skins of a list; the same of primitives, and the skins of these.
     reach: Vec<f64>,
-    of_points: [Vec<f64>; 2],
-    of_faces: [Vec<f64>; 2],
-    of_edges: [Vec<f64>; 2],
+    reaches: Lengths,
+    skins: Lengths,
+}
+
+/// The largest of some lengths [m] of nodes on each primitive of both sides.
+#[derive(Clone, Debug, Default)]
+struct Lengths {
+    points: [Vec<f64>; 2],
+    faces: [Vec<f64>; 2],
+    edges: [Vec<f64>; 2],
+}
+
+impl Lengths {
+    /// Takes those of nodes.
+    fn take(&mut self, sides: &[BarrierSide], of: &[f64]) {
+        let most = |nodes: &[u32]| nodes.iter().map(|&node| of[node as usize]).fold(0.0, f64::max);
+        for (number, side) in sides.iter().enumerate() {
+            let [points, faces, edges] =
+                [&mut self.points[number], &mut self.faces[number], &mut self.edges[number]];
+            points.clear();
+            points.extend(side.points.iter().map(|&node| of[node as usize]));
+            faces.clear();
+            faces.extend(side.faces.iter().map(|corners| most(corners)));
+            edges.clear();
+            edges.extend(side.edges.iter().map(|ends| most(ends)));
+        }
+    }
+
+    /// Those of the first and of the second primitives of a sort, of one or two sides.
+    fn of(&self, sort: Sort, sides: usize) -> [&[f64]; 2] {
+        match sort {
+            Sort::Point(side) => [&self.points[side], &self.faces[if sides == 1 { 0 } else { 1 - side }]],
+            Sort::Edges => [&self.edges[0], &self.edges[sides - 1]],
+        }
+    }
 }
 
 /// The surface on the other side of one.
@@ -102,16 +188,14 @@ impl Wide {
     pub fn new(sides: &[BarrierSide], nodes: usize) -> Self {
         let most = sides.iter().map(|side| side.faces.len().max(side.edges.len())).max().unwrap_or(0);
         Self {
-            pairs: Vec::new(),
-            ends: [0; 3],
+            pairs: Default::default(),
             skin: vec![0.0; nodes],
             place: Vec::new(),
             within: 0.0,
             left_out: vec![0; most],
             reach: vec![0.0; nodes],
-            of_points: Default::default(),
-            of_faces: Default::default(),
-            of_edges: Default::default(),
+            reaches: Lengths::default(),
+            skins: Lengths::default(),
         }
     }
 
@@ -124,23 +208,20 @@ impl Wide {
     ) -> [Vec<[u32; 2]>; 2] {
         self.skin.fill(0.0);
         self.find(sides, &Default::default(), place, within);
-        let near = |sort: Sort, own: &[Pair]| {
-            let distance = |pair: &&Pair| {
-                let points = sort.nodes(sides, pair.numbers).map(|node| place[node as usize]);
+        let near = |sort: Sort, own: &Pairs| {
+            let distance = |numbers: &[u32; 2]| {
+                let points = sort.nodes(sides, *numbers).map(|node| place[node as usize]);
                 sort.kind().nearest(&points).distance < within
             };
-            own.iter().filter(distance).map(|pair| pair.numbers).collect()
+            own.all().filter(distance).collect()
         };
-        let found = [
-            near(Sort::Point(0), &self.pairs[..self.ends[0]]),
-            near(Sort::Edges, &self.pairs[self.ends[1]..]),
-        ];
+        let found = [near(Sort::Point(0), &self.pairs[0]), near(Sort::Edges, &self.pairs[2])];
         self.place.clear();
         found
     }
 
     /// Calls back with the pairs that may be within a distance [m] and the skins [m] of their nodes at places [m], sort by sort in the order of
-    /// their numbers, and with more. Finds pairs anew if nodes have gone too far, with wide skins by the distance
+    /// their numbers, with these lengths together, and with more. Finds pairs anew if nodes have gone too far, with wide skins by the distance
     /// of the barrier [m].
     pub fn each(
         &mut self,
@@ -149,7 +230,7 @@ impl Wide {
         place: &[Vector3<f64>],
         skin: &[f64],
         [within, barrier]: [f64; 2],
-        mut found: impl FnMut(&[BarrierSide], Sort, [u32; 2]),
+        mut found: impl FnMut(&[BarrierSide], Sort, [u32; 2], f64),
     ) {
         if !self.holds(sides, place, skin, within) {
             for &node in sides.iter().flat_map(|side| &side.points) {
@@ -159,32 +240,16 @@ impl Wide {
             }
             self.find(sides, apart, place, within);
         }
-        let Self { reach, of_points, of_faces, of_edges, .. } = self;
-        let most = |nodes: &[u32]| nodes.iter().map(|&node| reach[node as usize]).fold(0.0, f64::max);
-        for (number, side) in sides.iter().enumerate() {
-            let [points, faces, edges] =
-                [&mut of_points[number], &mut of_faces[number], &mut of_edges[number]];
-            points.clear();
-            points.extend(side.points.iter().map(|&node| reach[node as usize]));
-            faces.clear();
-            faces.extend(side.faces.iter().map(|corners| most(corners)));
-            edges.clear();
-            edges.extend(side.edges.iter().map(|ends| most(ends)));
-        }
-        let second = sides.len() - 1;
-        let [points, others, edges] = self.ends;
-        let sorts = [
-            (Sort::Point(0), 0..points, &of_points[0], &of_faces[second]),
-            (Sort::Point(1), points..others, &of_points[second], &of_faces[0]),
-            (Sort::Edges, others..edges, &of_edges[0], &of_edges[second]),
-        ];
-        for (sort, range, first, second) in sorts {
-            for Pair { numbers, distance } in &self.pairs[range] {
-                let reach = first[numbers[0] as usize] + second[numbers[1] as usize];
-                if *distance < (within + reach) * (1.0 + ROUND_OFF) {
-                    found(sides, sort, *numbers);
-                }
-            }
+        self.reaches.take(sides, &self.reach);
+        self.skins.take(sides, skin);
+        // The same surface has one sort of points.
+        let sorts = [Sort::Point(0), Sort::Point(sides.len() - 1), Sort::Edges];
+        for (own, sort) in self.pairs.iter().zip(sorts) {
+            let [first, second] = self.skins.of(sort, sides.len());
+            own.within(within, self.reaches.of(sort, sides.len()), |numbers| {
+                let [a, b] = numbers.map(|number| number as usize);
+                found(sides, sort, numbers, within + first[a] + second[b]);
+            });
         }
     }
 
@@ -207,9 +272,9 @@ impl Wide {
 
     /// Finds the pairs within a distance [m] and the wide skins of both.
     fn find(&mut self, sides: &mut [BarrierSide], apart: &[Apart; 2], place: &[Vector3<f64>], within: f64) {
-        let Self { pairs, ends, skin, left_out, .. } = self;
-        pairs.clear();
-        *ends = [0; 3];
+        let Self { pairs, skin, left_out, skins, .. } = self;
+        skins.take(sides, skin);
+        pairs.iter_mut().for_each(Pairs::clear);
         self.place.clear();
         self.place.extend_from_slice(place);
         self.within = within;
@@ -227,12 +292,12 @@ impl Wide {
         }
         sides.iter_mut().for_each(|side| side.refit(at, margin));
         let sides = &*sides;
-        let most = |nodes: &[u32]| nodes.iter().map(|&node| skin[node as usize]).fold(0.0, f64::max);
-        let mut met = Vec::new();
+        let (mut met, mut own) = (Vec::new(), Vec::new());
         // Neighbours at rest are most of what boxes meet: they are marked, and seen no further.
         left_out.fill(0);
         for (number, side) in sides.iter().enumerate() {
             let against = other(sides, number);
+            let [_, of_faces] = skins.of(Sort::Point(number), sides.len());
             for (&node, point) in side.points.iter().zip(0..) {
                 let wanted = around([node], &at, &margin);
                 met.clear();
@@ -243,26 +308,24 @@ impl Wide {
                         met.push(face);
                     }
                 });
-                let first = pairs.len();
                 for &face in &met {
                     let corners = against.faces[face as usize];
                     if corners.contains(&node) {
                         continue;
                     }
-                    let limit = within + skin[node as usize] + most(&corners);
-                    let points = Sort::Point(number).nodes(sides, [point, face]).map(at);
-                    let distance = bound(&points, Kind::PointTriangle);
-                    if distance < limit {
-                        pairs.push(Pair { numbers: [point, face], distance });
+                    let limit = within + skin[node as usize] + of_faces[face as usize];
+                    let [b, c, d] = corners.map(|node| &place[node as usize]);
+                    let points = [&place[node as usize], b, c, d];
+                    if !Kind::PointTriangle.is_beyond(points, limit * (1.0 + ROUND_OFF)) {
+                        own.push((face, Kind::PointTriangle.bound(points)));
                     }
                 }
-                pairs[first..].sort_unstable_by_key(|pair| pair.numbers[1]);
+                pairs[number].add(&mut own);
             }
-            ends[number] = pairs.len();
         }
-        ends[1] = pairs.len();
         left_out.fill(0);
         let (side, against) = (&sides[0], other(sides, 0));
+        let [own_skins, of_others] = skins.of(Sort::Edges, sides.len());
         for (edge, number) in side.edges.iter().zip(0..) {
             let wanted = side.edge_boxes[number as usize];
             met.clear();
@@ -276,22 +339,19 @@ impl Wide {
                     met.push(other);
                 }
             });
-            let first = pairs.len();
             for &second in &met {
                 let ends = against.edges[second as usize];
                 if edge.iter().any(|end| ends.contains(end)) {
                     continue;
                 }
-                let limit = within + most(edge) + most(&ends);
-                let points = Sort::Edges.nodes(sides, [number, second]).map(at);
-                let distance = bound(&points, Kind::EdgeEdge);
-                if distance < limit {
-                    pairs.push(Pair { numbers: [number, second], distance });
+                let limit = within + own_skins[number as usize] + of_others[second as usize];
+                let points = [edge[0], edge[1], ends[0], ends[1]].map(|node| &place[node as usize]);
+                if !Kind::EdgeEdge.is_beyond(points, limit * (1.0 + ROUND_OFF)) {
+                    own.push((second, Kind::EdgeEdge.bound(points)));
                 }
             }
-            pairs[first..].sort_unstable_by_key(|pair| pair.numbers[1]);
+            pairs[2].add(&mut own);
         }
-        ends[2] = pairs.len();
     }
 }
 
@@ -317,49 +377,5 @@ impl Sort {
                 [a, b, c, d]
             }
         }
-    }
-}
-
-/// A bound [m] from below of the distance of two primitives, the first of so many points: the gap between their shadows on the line through
-/// their middles. A tenth of the work of the distance.
-pub(super) fn bound(points: &[Vector3<f64>; 4], kind: Kind) -> f64 {
-    let [a, b, c, d] = points;
-    match kind {
-        Kind::PointTriangle => {
-            let way = a - (b + c + d) / 3.0;
-            let most = way.dot(b).max(way.dot(c)).max(way.dot(d));
-            shadow(way.dot(a) - most, &way)
-        }
-        Kind::EdgeEdge => {
-            let way = (a + b) - (c + d);
-            let half = 0.5 * (way.dot(&(b - a)).abs() + way.dot(&(d - c)).abs());
-            shadow(0.5 * way.norm_squared() - half, &way)
-        }
-    }
-}
-
-/// A gap along a way over the length of the way; zero where there is none.
-fn shadow(gap: f64, way: &Vector3<f64>) -> f64 {
-    if gap > 0.0 { gap / way.norm() } else { 0.0 }
-}
-
-#[cfg(test)]
-mod tests {
-    use pliant_testing::Random;
-
-    use super::*;
-
-    /// Never more than the distance, and exact where the middles face each other.
-    #[test]
-    fn bounds_are_below_distances() {
-        let mut random = Random::new(4);
-        for number in 0..100_000 {
-            let kind = if number % 2 == 0 { Kind::PointTriangle } else { Kind::EdgeEdge };
-            let points: [Vector3<f64>; 4] = std::array::from_fn(|_| Vector3::from(random.vector()));
-            let (bound, distance) = (bound(&points, kind), kind.nearest(&points).distance);
-            assert!(bound <= distance * (1.0 + 1e-12), "{number}: {bound} {distance}");
-        }
-        let crossed = [[-1.0, 0.0, 0.5], [1.0, 0.0, 0.5], [0.0, -1.0, 0.0], [0.0, 1.0, 0.0]];
-        assert_eq!(bound(&crossed.map(Vector3::from), Kind::EdgeEdge), 0.5);
     }
 }

@@ -137,6 +137,14 @@ fn cloth_drapes_over_a_sphere() {
     }
 }
 
+/// S6: the border of draped cloth lies as far from the axis on a finer mesh, within 5 %.
+#[test]
+#[ignore = "a minute"]
+fn the_drape_depends_little_on_the_mesh() {
+    let [coarse, fine] = [20, 30].map(|cells| draped(cells, 0.5, 1.5));
+    assert!((fine / coarse - 1.0).abs() < 0.05, "{coarse} m, {fine} m");
+}
+
 /// The iterations and the time of a step of `scenes/cloth-on-sphere`.
 #[test]
 #[ignore = "prints times: a quarter of a minute"]
@@ -192,5 +200,5 @@ fn a_twisted_strip_does_not_go_through_itself() {
         "strip: {:.1} ms a step, {touched} steps in contact, {halved} halved",
         10.0 * start.elapsed().as_secs_f64()
     );
-    assert!(touched > 10);
+    assert!(touched > 10 && halved == 0, "{touched} {halved}");
 }

@@ -177,11 +177,12 @@ fn dropped(integrator: Integrator, step: f64) -> Rebound {
     let mut last = first;
     let (mut iterations, mut steps) = (0, 0);
     let mut rebound = Rebound { grown: 0.0, drift: 0.0, touched: 0, speed: 0.0 };
-    // Until it flies up; on its way down it may leave the floor for some steps.
-    let flies_up = |state: &State, solver: &BackwardEuler| {
-        solver.touching().unwrap().now().gap.is_none() && mean(&model, &state.velocity).z > 0.0
+    // Until it is a millimetre above the floor on its way up: it trembles, and leaves the floor for some steps before.
+    let flies_up = |state: &State| {
+        let lowest = state.position.iter().map(|x| x.z).fold(f64::INFINITY, f64::min);
+        lowest + RADIUS + 3e-3 > 1e-3 && mean(&model, &state.velocity).z > 0.0
     };
-    while state.time < 0.2 && !flies_up(&state, &solver) {
+    while state.time < 0.2 && !flies_up(&state) {
         iterations += solver.advance(&mut state).unwrap().residuals.len();
         steps += 1;
         let now = solver.touching().unwrap().now();
@@ -216,4 +217,12 @@ fn a_dropped_ring_gains_no_energy_and_rebounds_higher_by_differences_of_two_step
         assert!(second.drift > 0.5 * first.drift, "{} {}", second.drift, first.drift);
         assert!(second.speed > first.speed && second.speed < 0.5, "{} {}", second.speed, first.speed);
     }
+}
+
+/// What is lost goes into vibrations that steps do not resolve, so it falls with the step, below the 10 % of A6 in the end.
+#[test]
+#[ignore = "half a minute"]
+fn what_a_rebound_loses_falls_with_the_step() {
+    let drifts = [1e-3, 1e-4, 1e-5].map(|step| dropped(Integrator::Bdf2, step).drift);
+    assert!(drifts.is_sorted() && drifts[2] > -0.1, "{drifts:?}");
 }

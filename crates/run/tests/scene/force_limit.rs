@@ -185,9 +185,9 @@ fn moved_nodes_with_a_limit_are_called_back_and_resumed() {
     };
     assert_eq!(gentle("force-limit = 50"), gentle(""));
     resumes(&driven(
-        &format!("{implicit}\ncheckpoint = {{ every = 0.34 }}"),
+        &format!("{implicit}\ncheckpoint = {{ every = 0.4 }}"),
         "to = 0.5\nforce-limit = 0.5",
-        0.8,
+        1.0,
     ));
 }
 
