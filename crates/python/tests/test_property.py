@@ -34,12 +34,19 @@ def replayed(model: pliant.Model, calls: list[tuple[str, object]], looks: bool) 
         if name == "step":
             sim.step(value)  # type: ignore[arg-type]
         elif name == "set":
+            # At the start of a quasi-static run a look finds the equilibrium of these numbers.
+            sim.sample()
             sim.set({"law.tissue.young-modulus": value})  # type: ignore[dict-item]
         elif name == "grip" and model is not MODELS["quasi-static"]:
+            # After a look a hand acts one step later.
+            sim.sample()
             grips.append(sim.grip(at=(0.1, 0.1, 0.1), stiffness=20.0))
             grips[-1].place = grips[-1].point + value
+            sim.step()
         elif name == "release" and grips:
+            sim.sample()
             grips.pop().release()
+            sim.step()
         elif looks and name == "look":
             sim.sample()
             sim.field("von-mises")
