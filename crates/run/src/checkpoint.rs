@@ -611,6 +611,6 @@ mod tests {
         let shell = shell.simulation().unwrap().encode().unwrap()[0].len();
         let explicit = bytes("[run]\nprecision = 'single'\n");
         let quasi_static = bytes("[run]\nprecision = 'single'\nsolver = 'quasi-static'\n");
-        assert_eq!((FORMAT, explicit, quasi_static, shell), (16, 1089, 1473, 1069));
+        assert_eq!((FORMAT, explicit, quasi_static, shell), (16, 1116, 1475, 1090));
     }
 }

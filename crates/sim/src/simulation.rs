@@ -412,12 +412,11 @@ impl Simulation {
             if !self.meetings.is_empty() {
                 self.before.clear();
                 let parts = self.participants.iter().zip(&self.world.parts);
-                let own = |(now, part): (&Box<dyn Participant>, &Part)| OwnState {
+                self.before.extend(parts.map(|(now, part)| OwnState {
                     kept: now.kept(),
                     clock: None,
                     step: part.steps.step,
-                };
-                self.before.extend(parts.map(own));
+                }));
             }
             if !(self.springs.is_empty() && self.meetings.is_empty()) {
                 self.springs.meet(&self.participants);
