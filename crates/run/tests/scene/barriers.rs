@@ -202,3 +202,59 @@ fn mistakes_are_refused() {
         assert!(pieces.iter().all(|piece| told.contains(piece)), "{told}");
     }
 }
+
+/// S5: a block at 10 m/s meets two to four thin walls a millimetre apart, all of which it would pass in a step. Nothing passes anything: what lies below
+/// stays below.
+#[test]
+fn a_fast_block_passes_no_wall() {
+    let wall = |k: usize| {
+        let z = -0.001 * k as f64;
+        let held = (0..4).map(|side: usize| {
+            let (point, normal) = [
+                ("[0.001, 0, 0]", "[-1, 0, 0]"),
+                ("[0.099, 0, 0]", "[1, 0, 0]"),
+                ("[0, 0.001, 0]", "[0, -1, 0]"),
+                ("[0, 0.099, 0]", "[0, 1, 0]"),
+            ][side];
+            format!(
+                "[constraint.w{k}{side}]\ntype = 'fix'\nbody = 'wall{k}'\nnodes = {{ half-space = {{ point = {point}, normal = {normal} }} }}\n"
+            )
+        });
+        format!(
+            "[body.wall{k}]\nmodel = 'shell'\nmesh = {{ plate = {{ size = [0.1, 0.1], cells = [8, 8] }}, at = [0, 0, {z}] }}\n\
+             law = 'wall'\ndensity = 1000\nthickness = 5e-4\n{}",
+            held.collect::<String>()
+        )
+    };
+    for walls in 2..=4 {
+        let text = format!(
+            "[scene]\nuntil = 0.006\n[run]\nsolver = 'implicit'\nstep = 0.001\n\
+             [law.tissue]\ntype = 'neo-hookean'\nyoung-modulus = 1e5\npoisson-ratio = 0.4\n\
+             [law.wall]\ntype = 'neo-hookean'\nyoung-modulus = 1e8\npoisson-ratio = 0.4\n\
+             [body.block]\nmesh = {{ block = {{ size = [0.02, 0.02, 0.02], cells = [2, 2, 2] }}, as = 'hexes', at = [0.041, 0.039, 0.005] }}\n\
+             law = 'tissue'\ndensity = 1000\nvelocity = [0, 0, -10]\n{}\
+             [contact.every]\nbetween = ['all', 'all']\ncheck-intersections = true\n",
+            (0..walls).map(wall).collect::<String>()
+        );
+        let world = world(&text).unwrap_or_else(|error| panic!("{error}"));
+        let mut simulation = world.simulation().unwrap();
+        let names: Vec<String> =
+            std::iter::once("block".to_owned()).chain((0..walls).map(|k| format!("wall{k}"))).collect();
+        let mut deepest = 0.0_f64;
+        for _ in 0..6 {
+            simulation.step(1).unwrap();
+            let frame = simulation.frame().unwrap();
+            let lowest: Vec<f64> = (names.iter().enumerate())
+                .map(|(at, name)| {
+                    let moved = frame.displacements(name).unwrap().into_iter().map(|u| u[2]);
+                    moved.fold(f64::INFINITY, f64::min)
+                        + if at == 0 { 0.005 } else { -0.001 * (at - 1) as f64 }
+                })
+                .collect();
+            assert!(lowest.windows(2).all(|pair| pair[0] > pair[1] + 1e-4), "{walls} walls: {lowest:?}");
+            deepest = deepest.min(lowest[0]);
+        }
+        println!("{walls} walls: the block comes to {deepest} m");
+        assert!(deepest < -0.002, "{walls} walls are hit: {deepest}");
+    }
+}

@@ -461,9 +461,16 @@ impl Builder<'_> {
         let wanted = &table.between[side];
         let bodies = self.bodies.iter().zip(0..);
         if wanted == "all" {
-            let solids = bodies.filter(|(body, _)| body.mesh.volume_blocks().any(|block| !block.is_empty()));
-            let solids = solids.map(|(_, index)| Partner::Body(index));
-            return Some(solids.chain((0..rigids.len()).map(Partner::Rigid)).collect());
+            let is_solid = |body: &BuiltBody| body.mesh.volume_blocks().any(|block| !block.is_empty());
+            // Under barriers thin walls touch, too; one on the boundary of a solid touches with that.
+            let is_barrier = self.scene.run.solver.solves_equations();
+            let on_solid =
+                |name: &str| self.scene.bodies.iter().any(|(own, table)| own == name && table.on.is_some());
+            let is_wall = |index: usize| is_barrier && self.shell_cells(index).is_some();
+            let touching =
+                bodies.filter(|&(body, index)| is_solid(body) || is_wall(index) && !on_solid(&body.name));
+            let touching: Vec<Partner> = touching.map(|(_, index)| Partner::Body(index)).collect();
+            return Some(touching.into_iter().chain((0..rigids.len()).map(Partner::Rigid)).collect());
         }
         let own = |rigid: &Rigid| rigid.name == *wanted || rigid.tool() == wanted;
         let found: Vec<Partner> =

@@ -268,8 +268,8 @@ impl ImageTool {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ContactTable {
-    /// The body, and what it touches: `between = ["liver", "probe"]`. The same body twice: itself. `"all"`: all solids, obstacles and tools, each
-    /// pair with an entry of its own, `contact.NAME.liver-probe`.
+    /// The body, and what it touches: `between = ["liver", "probe"]`. The same body twice: itself. `"all"`: all solids, obstacles and tools; with the solvers
+    /// `implicit` and `static` also shells and membranes that are not `on` a solid. Each pair has an entry of its own, `contact.NAME.liver-probe`.
     pub between: [String; 2],
     /// The faces of the first that touch; if not given, all of its boundary.
     #[serde(default)]
