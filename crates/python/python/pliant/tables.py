@@ -1483,7 +1483,7 @@ class Contact(Table):
     Parameters
     ----------
     between
-        The body, and what it touches: `between = ["liver", "probe"]`. The same body twice: itself. `"all"`: all solids, obstacles and tools, each pair with an entry of its own, `contact.NAME.liver-probe`. Takes 2 texts.
+        The body, and what it touches: `between = ["liver", "probe"]`. The same body twice: itself. `"all"`: all solids, obstacles and tools; with the solvers `implicit` and `static` also shells and membranes that are not `on` a solid. Each pair has an entry of its own, `contact.NAME.liver-probe`. Takes 2 texts.
     faces
         The faces of the first that touch; if not given, all of its boundary. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     other_faces
