@@ -54,13 +54,13 @@ def main() -> None:
     known.constraint["base"] = {"type": "fix", "body": "block", "nodes": {"set": "z-min"}}
     sim = known.build().simulate()
     print(f"a step of 8 hexes by step(1000): {1e3 * median(lambda: sim.step(1000), 50):.2f} µs")
-    cubes = [block(8).build().simulate() for _ in range(2)]
-    alone = median(lambda: cubes[0].step(500), 5)
+    cubes = [block(12).build().simulate() for _ in range(2)]
+    alone = median(lambda: cubes[0].step(1000), 5)
 
     def both() -> None:
-        other = threading.Thread(target=cubes[1].step, args=(500,))
+        other = threading.Thread(target=cubes[1].step, args=(1000,))
         other.start()
-        cubes[0].step(500)
+        cubes[0].step(1000)
         other.join()
 
     print(f"two simulations on two threads: {2 * alone / median(both, 5):.2f} × as fast as one after the other")

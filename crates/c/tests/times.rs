@@ -97,6 +97,25 @@ fn the_border_costs_less_than_a_microsecond_a_step() {
     }
     let [ours, theirs] = [ours, theirs].map(median);
     println!("a step of 8 elements on a thread of its own: {ours:.2} µs through C, {theirs:.2} µs in Rust");
+    let mut thousand_through_c = || unsafe {
+        // SAFETY: the context is open.
+        let status = pliant_step(context, simulation, 1000, ptr::null_mut(), ptr::null_mut());
+        assert_eq!(status, PliantStatus::Ok);
+    };
+    let mut thousand_in_rust = || {
+        pool.install(|| {
+            for _ in 0..1000 {
+                own.step(1).unwrap();
+            }
+        });
+    };
+    let (mut ours_of_many, mut theirs_of_many) = (Vec::new(), Vec::new());
+    for _ in 0..200 {
+        ours_of_many.push(timed(&mut thousand_through_c) / 1000.0);
+        theirs_of_many.push(timed(&mut thousand_in_rust) / 1000.0);
+    }
+    let [many, same] = [ours_of_many, theirs_of_many].map(median);
+    println!("one of a thousand in a call: {many:.3} µs through C, {same:.3} µs in Rust");
     // What is left without a step: the handle, the lock and the error.
     let now = &mut PliantNow { time: 0.0, step: 0.0, steps: 0, nodes: 0 };
     let looks = (0..20_000).map(|_| {
