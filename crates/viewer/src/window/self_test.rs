@@ -419,8 +419,38 @@ fn following() -> Vec<Cue> {
             move |app| vec![button(inside(app), left, false)],
             |app| Ok(app.read_points().len() == 1 && !app.frame.followed[0].about.is_empty()),
         ),
+        Cue::new(
+            "the mouse goes elsewhere on the body",
+            |app| known_pixel(app, PICKS).map(|(place, _)| Event::PointerMoved(place)).into_iter().collect(),
+            |_| Ok(true),
+        ),
+        Cue::new("a press", move |app| elsewhere(app, left, true), |_| Ok(true)),
+        Cue::new(
+            "a second point has its distance from the first",
+            move |app| elsewhere(app, left, false),
+            |app| {
+                let [one, two] = &app.frame.followed[..] else { return Ok(false) };
+                let metres = (two.place - one.place).norm();
+                let lines = app.read_points();
+                let told = lines[0].strip_prefix("1 to 2: ").and_then(|text| text.split_once(' '));
+                let Some((number, unit)) = told else { return Err(lines[0].clone()) };
+                let factor = if unit == "mm" { 1e-3 } else { 1.0 };
+                let read = number.parse::<f64>().map_err(|error| error.to_string())? * factor;
+                let off = (read / metres - 1.0).abs();
+                if lines.len() == 3 && metres > 0.0 && off < 0.01 {
+                    Ok(true)
+                } else {
+                    Err(format!("{lines:?}"))
+                }
+            },
+        ),
         holding(Modifiers::NONE),
     ]
+}
+
+/// A button at a second place on the body.
+fn elsewhere(app: &App, which: PointerButton, pressed: bool) -> Vec<Event> {
+    known_pixel(app, PICKS).map(|(place, _)| button(place, which, pressed)).into_iter().collect()
 }
 
 /// Pulls while the run is paused, and plays; Ctrl and Z goes back to before the pull.
