@@ -252,7 +252,7 @@ impl BackwardEuler {
         &self.system.lags
     }
 
-    /// Takes lags of another solver, to go on where that one stood.
+    /// Takes the lags of another solver, whose run this one continues.
     pub fn take_lags(&mut self, lags: Vec<Lag>) {
         self.system.lags = lags;
     }

@@ -214,7 +214,7 @@ impl Statics {
         self.system.take_pairs(pairs)
     }
 
-    /// The direction in which a path by arc length goes on, six components a node: the translations [m] of the last step.
+    /// The translations [m] of the last step, six components a node: the next arc length follows them.
     pub fn direction(&self) -> &[f64] {
         &self.direction
     }
@@ -235,7 +235,7 @@ impl Statics {
         &self.system.lags
     }
 
-    /// Takes lags of another solver, to go on where that one stood.
+    /// Takes the lags of another solver, whose run this one continues.
     pub fn take_lags(&mut self, lags: Vec<Lag>) {
         self.system.lags = lags;
     }

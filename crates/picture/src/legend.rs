@@ -18,7 +18,7 @@ pub struct Legend {
     pub note: String,
     /// Labels with their names, or empty: each has a swatch if colours show labels.
     pub labels: Vec<(i32, String)>,
-    /// Steps of the run that did not converge and were taken as they were: the note tells of them.
+    /// Steps of the run that did not converge and were accepted all the same. The note counts them.
     pub unconverged: u64,
     /// Whether a part of what is drawn has no value: its grey then has a swatch.
     pub missing: bool,

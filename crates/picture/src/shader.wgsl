@@ -175,7 +175,7 @@ fn lit(albedo: vec3<f32>, normal: vec3<f32>, eye: vec3<f32>, finish: vec2<f32>, 
     let key = normalize(view.right.xyz * -0.45 + view.up.xyz * 0.65 + view.towards.xyz * 0.75);
     let fill = normalize(view.right.xyz * 0.8 + view.up.xyz * 0.05 + view.towards.xyz * 0.5);
     let sky = 0.5 + 0.5 * dot(normal, view.up.xyz);
-    // The fill is wide, and the key has a size, too: what lies in a fold sees less of both.
+    // Both lights have a size, the fill a large one: folds receive less of them.
     let direct = max(dot(normal, key), 0.0) * 0.62 * (0.5 + 0.5 * light) + max(dot(normal, fill), 0.0) * 0.16 * light;
     let ambient = mix(0.22, 0.40, sky) * light;
     let half_way = normalize(key + eye);

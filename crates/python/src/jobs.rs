@@ -47,7 +47,7 @@ pub fn on_pool<T: Send + 'static>(
     }
 }
 
-/// Runs a job on threads of its own, so that it runs in a fork, too. After a signal it goes on alone, and its result is dropped.
+/// Runs a job on new threads, which a fork has, too. After a signal the job continues, and its result is dropped.
 pub fn on_thread<T: Send + 'static>(
     py: Python<'_>,
     job: impl FnOnce() -> Result<T, Trouble> + Send + 'static,

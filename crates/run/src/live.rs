@@ -15,7 +15,7 @@ use crate::output::{Column, FieldMesh, Frame, Samples, frames};
 use pliant_scene::World;
 use pliant_scene::format::VtuTable;
 
-/// Instants at which ways are looked at, after the start.
+/// Instants after the start at which ways are sampled.
 const INSTANTS: u32 = 32;
 
 /// The least and the greatest coordinates of points [m].

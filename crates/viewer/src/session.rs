@@ -501,10 +501,11 @@ impl<'s> Player<'s> {
         };
         player.keep_sound();
         player.show_as_viewed();
-        if !is_known {
+        if is_known {
+            player.find_movable();
+        } else {
             player.renew_subject()?;
         }
-        player.find_movable();
         player.name_columns();
         Ok(player)
     }

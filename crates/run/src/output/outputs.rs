@@ -23,8 +23,6 @@ pub(crate) struct Outputs<'scope> {
     /// Those that work within the run, by their place in the scene.
     near: Vec<Own>,
     far: Option<Far<'scope>>,
-    /// When the last one was seen [s].
-    time: f64,
 }
 
 /// An output by its place in the scene.
@@ -84,7 +82,7 @@ impl<'scope> Outputs<'scope> {
             schedules.push(before.map_or(Schedule::new(every), |(schedule, _)| *schedule));
         }
         let far = spare.filter(|_| !far.is_empty()).map(|scope| Far::new(world, far, scope));
-        Ok(Self { world, schedules, near, far, time: 0.0 })
+        Ok(Self { world, schedules, near, far })
     }
 
     /// The schedules, in the order of the scene.
@@ -126,7 +124,6 @@ impl<'scope> Outputs<'scope> {
     }
 
     fn show(&mut self, simulation: &Simulation, due: &[bool]) -> Result<(), Failure> {
-        self.time = simulation.time();
         let (world, mut shown) = (self.world, None);
         for (_, output) in self.near.iter_mut().filter(|(place, _)| due[*place]) {
             let seen = output.see(shown.get_or_insert_with(|| frames(world, simulation)));
