@@ -13,6 +13,9 @@ pub trait Timed {
     /// Why a step can fail.
     type Error;
 
+    /// How long to step before times count [s].
+    const WARM_UP: f64;
+
     /// Takes some steps, at least one; returns the wall time of one [s].
     ///
     /// # Errors
@@ -65,6 +68,7 @@ impl<R: Scalar> Clocked<R> {
 /// On the current rayon pool.
 impl<R: Scalar> Timed for Clocked<R> {
     type Error = StepError;
+    const WARM_UP: f64 = 0.0;
 
     fn seconds_per_step(&mut self, steps: usize) -> Result<f64, StepError> {
         let steps = steps.max(1);
@@ -105,6 +109,7 @@ impl ClockedOnDevice {
 /// The stepper's occasional read-backs are part of the cost of steps.
 impl Timed for ClockedOnDevice {
     type Error = StepFailure;
+    const WARM_UP: f64 = 2.0;
 
     fn seconds_per_step(&mut self, steps: usize) -> Result<f64, StepFailure> {
         let steps = steps.max(1);

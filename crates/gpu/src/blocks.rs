@@ -1,14 +1,17 @@
 //! Blocks of neighbouring cells or nodes, small enough for the memory that a group of invocations shares.
 
 use pliant_mechanics::model::{Cells, Model, Solid};
-use pliant_mechanics::tensor::{Vector, add, scale, sub};
+use pliant_mechanics::tensor::{Vector, add, cross, dot, scale, sub};
 
-use crate::kernel::{Binding, Bound, GROUP, Memory};
+use crate::kernel::{Binding, Bound, GROUP, GROUP_NAME, Memory};
 use crate::loads::DeviceLoads;
 use crate::{Device, GpuError};
 
 /// Most nodes of a block: a corner takes one byte.
 const MOST_NODES: usize = 255;
+
+/// Tetrahedra of a block of cells, one an invocation: more than [`GROUP`], since they share more of their nodes.
+const TETS: usize = 256;
 
 /// A block; twin of those in block_cells.wgsl and node_blocks.wgsl.
 #[repr(C)]
@@ -89,7 +92,11 @@ impl DeviceBlocks {
         let cells = &solid.cells;
         let per_cell = cells.nodes_per_cell();
         // Displacements and places at rest of all nodes, forces and energies of all cells.
-        device.shares(4 * (2 * 3 * MOST_NODES + (3 * per_cell + 1) * GROUP as usize))?;
+        let group = match cells {
+            Cells::Tet4(_) if device.adapter().group_size >= TETS as u32 => TETS,
+            _ => GROUP as usize,
+        };
+        device.shares(4 * (2 * 3 * MOST_NODES + (3 * per_cell + 1) * group + 4))?;
         let centre = |cell: usize| {
             let sum =
                 cells.nodes(cell).iter().fold([0.0; 3], |sum, &node| add(sum, model.rest[node as usize]));
@@ -99,7 +106,7 @@ impl DeviceBlocks {
         let mut order: Vec<u32> = (0..cells.len() as u32).collect();
         let mut ends = Vec::new();
         let fits = |block: &[u32]| nodes_of(cells, block).len() <= MOST_NODES;
-        Bisection { places: &centres, whole: GROUP as usize, fits: &fits }.cut(&mut order, 0, &mut ends);
+        Bisection { places: &centres, whole: group, fits: &fits }.cut(&mut order, 0, &mut ends);
         let mut blocks = Vec::new();
         let (mut nodes, mut rest, mut offsets, mut given) = (Vec::new(), Vec::new(), vec![0_u32], Vec::new());
         let mut corners = vec![[0_u8; 4]; cells.len() * per_cell.div_ceil(4)];
@@ -113,7 +120,7 @@ impl DeviceBlocks {
                 for (a, node) in cells.nodes(cell as usize).iter().enumerate() {
                     let local = own.partition_point(|known| known < node);
                     corners[a / 4 * cells.len() + first + place][a % 4] = local as u8;
-                    at_nodes[local].push((a * GROUP as usize + place) as u16);
+                    at_nodes[local].push((a * group + place) as u16);
                 }
             }
             let origin = model.rest[own[0] as usize];
@@ -122,7 +129,8 @@ impl DeviceBlocks {
             );
             for at_node in at_nodes {
                 given.extend(at_node);
-                offsets.push(given.len() as u32);
+                given.resize(given.len().next_multiple_of(8), (per_cell * group) as u16);
+                offsets.push((given.len() / 8) as u32);
             }
             blocks.push(Block {
                 first_cell: first as u32,
@@ -133,7 +141,6 @@ impl DeviceBlocks {
             nodes.extend(own);
             first = end;
         }
-        given.resize(given.len().next_multiple_of(2), 0);
         let arrays = [
             memory.filled("the blocks of cells", &blocks)?,
             memory.filled("the nodes of blocks", &nodes)?,
@@ -143,7 +150,7 @@ impl DeviceBlocks {
             memory.filled("the nodes of blocks", &rest)?,
         ];
         let bound = Bound::new(device, &arrays.each_ref().map(Binding::Read));
-        let constants = vec![("MOST_NODES", MOST_NODES), ("CORNERS", per_cell)];
+        let constants = vec![("MOST_NODES", MOST_NODES), ("CORNERS", per_cell), (GROUP_NAME, group)];
         Ok(Self { bound, count: blocks.len(), order, nodes, constants })
     }
 
@@ -188,7 +195,16 @@ const LEAVES: u32 = 1 << 30;
 
 /// Shared memory of a block of nodes [B]: what adds up work, a whole force of each node it moves, and displacements.
 fn shared_memory(nodes: usize) -> usize {
-    16 * GROUP as usize + 16 * MOST_OWN + 12 * nodes
+    16 * GROUP as usize + 16 * MOST_OWN + 16 + 12 * nodes
+}
+
+/// Whether the shapes of cells at rest are found from the places of their nodes: those of linear tetrahedra that are full.
+pub(crate) fn finds_shapes(cells: &Cells) -> bool {
+    let Cells::Tet4(block) = cells else { return false };
+    block.rest.iter().all(|rest| {
+        let [_, a, b, c] = rest.gradient;
+        (6.0 * rest.volume * dot(a, cross(b, c)) - 1.0).abs() < 1e-9
+    })
 }
 
 /// The nodes of a solid, cut into blocks with all cells at them.

@@ -10,6 +10,9 @@ use crate::{Device, GpuError};
 /// Invocations in a group.
 pub(crate) const GROUP: u32 = 128;
 
+/// Its name in kernels. One of the constants of a kernel may have this name and another number.
+pub(crate) const GROUP_NAME: &str = "GROUP";
+
 /// Most groups along one dimension of a dispatch.
 const MOST_GROUPS: u32 = 65_535;
 
@@ -237,18 +240,20 @@ impl Kernel {
         bound: &[&Bound],
         invocations: usize,
     ) -> Result<Self, GpuError> {
-        device.allows(bound.iter().map(|bound| bound.arrays).sum(), GROUP)?;
-        let mut source = format!("const GROUP = {GROUP}u;\n");
+        let own_group = constants.iter().find(|(name, _)| *name == GROUP_NAME);
+        let group = own_group.map_or(GROUP, |&(_, group)| group as u32);
+        device.allows(bound.iter().map(|bound| bound.arrays).sum(), group)?;
+        let mut source = match own_group {
+            Some(_) => String::new(),
+            None => format!("const {GROUP_NAME} = {GROUP}u;\n"),
+        };
         for (name, value) in constants {
             source += &format!("const {name} = {value}u;\n");
         }
         source += include_str!("shaders/number.wgsl");
         source += &snippets.join("\n");
         let gpu = &device.device;
-        let module = gpu.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(name),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
-        });
+        let module = trusted(gpu, name, source);
         let layouts: Vec<_> = bound.iter().map(|bound| Some(&bound.layout)).collect();
         let layout = gpu.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(name),
@@ -260,7 +265,11 @@ impl Kernel {
             layout: Some(&layout),
             module: &module,
             entry_point: Some("main"),
-            compilation_options: Default::default(),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                // Every kernel writes what it reads of the memory that a group shares.
+                zero_initialize_workgroup_memory: false,
+                ..Default::default()
+            },
             cache: None,
         });
         let bound = [0, 1].map(|side| bound.iter().skip(1).map(|bound| bound.groups[side].clone()).collect());
@@ -293,6 +302,17 @@ impl Kernel {
         }
         pass.dispatch_workgroups(self.dispatch[0], self.dispatch[1], 1);
     }
+}
+
+/// A module without the checks that wgpu adds for programs of strangers: of places in arrays, and counters that end every loop. Without
+/// them steps of tetrahedra take 10 to 20 % less time on an NVIDIA H100.
+#[expect(unsafe_code, reason = "wgpu has checked and unchecked modules, and no third kind")]
+fn trusted(gpu: &wgpu::Device, name: &str, source: String) -> wgpu::ShaderModule {
+    let source = wgpu::ShaderSource::Wgsl(source.into());
+    let descriptor = wgpu::ShaderModuleDescriptor { label: Some(name), source };
+    // SAFETY: the text is Pliant's own. Its loops have ends that the CPU or the kernel has counted, its places in arrays come from
+    // lists of the CPU, whose arrays have their size, and no whole number is divided by zero.
+    unsafe { gpu.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked()) }
 }
 
 #[cfg(test)]

@@ -2,14 +2,14 @@
 //!
 //! What an elastic `tet4` moves and computes in a step, counted from the arrays below for six cells a node, each number read once
 //! from memory; operations are those of a prototype's PTX (sm_90, neo-Hookean). The node itself (u, Δu read and written, its
-//! constants) is 80 B, 13 a cell. No times on GPUs are measured yet.
+//! constants) is 80 B, 13 a cell. Times are in docs/performance.md.
 //!
 //! | design | bytes | operations | where they go |
 //! |---|---|---|---|
 //! | `gather` | 230 | 260 | cell: nodes 16, shape 48, u 3, forces written 64; node: forces 64, their places 17 |
 //! | `blocks` | 120 | 475 | 1.78 × (shape 48, corners 4), 3.4 × nodes around 11; no second kernel |
 //! | `float-atomics`, `fixed-atomics` | 90 | 260 | nodes 16, shape 48, u 3, sums 8; twelve atomic additions |
-//! | `fast` | 50 | 325 | corners 4, places of corners 8, 2.2 × nodes of blocks 20; shapes found again |
+//! | `fast` | 50 | 325 | corners 4, places of corners 14, 2.0 × nodes of blocks 20; shapes found again |
 
 use pliant_mechanics::model::{CellBlock, Cells, Model, Solid};
 use pliant_mechanics::tensor::dot;

@@ -6,6 +6,7 @@ use pliant_mechanics::law::Shader;
 use pliant_mechanics::model::{Averaging, CellBlock, Cells, LocalNodes, Solid};
 use pliant_mechanics::tensor::{Vector, dot};
 
+use crate::blocks::finds_shapes;
 use crate::kernel::{Binding, Bound, Kernel, Memory};
 use crate::paths::Paths;
 use crate::solid_kernels::{SolidKernels, constants_of, rows_of_series};
@@ -107,7 +108,7 @@ impl DeviceSolid {
         let names_nodes = blocks.is_none() || averages.is_some();
         let nodes = if names_nodes { rows_of_nodes(cells, &order) } else { vec![] };
         let nodes = memory.filled("the cells", &nodes)?;
-        let finds_shapes = paths.finds_shapes && matches!(cells, Cells::Tet4(_));
+        let finds_shapes = paths.finds_shapes && finds_shapes(cells);
         let shapes = if finds_shapes { vec![] } else { rows_at_rest(solid, &order) };
         let fibre_row = shapes.len() / order.len().max(1);
         let rest = memory

@@ -17,16 +17,18 @@ struct Block {
 @group(3) @binding(2) var<storage, read> corners: array<u32>;
 // First entry of each node of a block …
 @group(3) @binding(3) var<storage, read> given_offsets: array<u32>;
-// … in the corners there: corner × GROUP + cell, two to a number.
-@group(3) @binding(4) var<storage, read> given: array<u32>;
+// … in the corners there: corner × GROUP + cell, eight to an entry; places left over name the last force, which is zero.
+@group(3) @binding(4) var<storage, read> given: array<vec4u>;
 
 var<workgroup> moved: array<f32, 3u * MOST_NODES>;
-var<workgroup> forces: array<f32, 3u * CORNERS * GROUP>;
+var<workgroup> forces: array<f32, 3u * (CORNERS * GROUP + 1u)>;
 var<workgroup> energies: array<f32, GROUP>;
 var<private> place: u32;
+// The corners of its cell.
+var<private> own_corners: vec2u;
 
 fn local_node(cell: u32, corner: u32) -> u32 {
-    return extractBits(corners[corner / 4u * CELLS + cell], 8u * (corner % 4u), 8u);
+    return extractBits(select(own_corners.x, own_corners.y, corner >= 4u), 8u * (corner % 4u), 8u);
 }
 
 fn displacement_of(cell: u32, corner: u32) -> vec3f {
@@ -45,6 +47,19 @@ fn give(cell: u32, corner: u32, force: vec4f) {
     }
 }
 
+fn force_at(corner: u32) -> vec3f {
+    return vec3f(forces[3u * corner], forces[3u * corner + 1u], forces[3u * corner + 2u]);
+}
+
+// The sum of the forces at two corners.
+fn of_two(corners: u32) -> vec3f {
+    return force_at(corners & 0xffffu) + force_at(corners >> 16u);
+}
+
+fn of_eight(corners: vec4u) -> vec3f {
+    return (of_two(corners.x) + of_two(corners.y)) + (of_two(corners.z) + of_two(corners.w));
+}
+
 @compute @workgroup_size(GROUP)
 fn main(
     @builtin(workgroup_id) group: vec3u,
@@ -57,6 +72,24 @@ fn main(
     if index < arrayLength(&blocks) {
         block = blocks[index];
     }
+    // What is read later is asked for at once.
+    if local < block.cells {
+        own_corners.x = corners[block.first_cell + local];
+        if CORNERS > 4u {
+            own_corners.y = corners[CELLS + block.first_cell + local];
+        }
+    }
+    var ends_of_given = vec2u(0u);
+    var first_given = vec4u(0u);
+    if local < block.nodes {
+        let node = block.first_node + local;
+        ends_of_given = vec2u(given_offsets[node], given_offsets[node + 1u]);
+        first_given = given[ends_of_given.x];
+    }
+    let is_sound = group_end(local) >= instant.index;
+    if local < 3u {
+        forces[3u * CORNERS * GROUP + local] = 0.0;
+    }
     for (var n = local; n < block.nodes; n += GROUP) {
         let u = displacement[block_nodes[block.first_node + n]];
         moved[3u * n] = u.x;
@@ -65,16 +98,19 @@ fn main(
         load_rest(n, block.first_node + n);
     }
     workgroupBarrier();
-    if local < block.cells && end() >= instant.index {
+    if local < block.cells && is_sound {
         compute(block.first_cell + local);
     }
     workgroupBarrier();
     for (var n = local; n < block.nodes; n += GROUP) {
         let node = block.first_node + n;
-        var sum = vec4f(0.0);
-        for (var k = given_offsets[node]; k < given_offsets[node + 1u]; k++) {
-            let at = 3u * extractBits(given[k / 2u], 16u * (k % 2u), 16u);
-            sum += vec4f(forces[at], forces[at + 1u], forces[at + 2u], 0.0);
+        if n != local {
+            ends_of_given = vec2u(given_offsets[node], given_offsets[node + 1u]);
+            first_given = given[ends_of_given.x];
+        }
+        var sum = vec4f(of_eight(first_given), 0.0);
+        for (var k = ends_of_given.x + 1u; k < ends_of_given.y; k++) {
+            sum += vec4f(of_eight(given[k]), 0.0);
         }
         if n == 0u && does(MEASURES) {
             for (var cell = 0u; cell < block.cells; cell++) {

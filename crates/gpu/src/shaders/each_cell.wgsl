@@ -7,7 +7,7 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let cell = number(group, groups, local);
-    if cell >= CELLS || end() < instant.index {
+    if group_end(local) < instant.index || cell >= CELLS {
         return;
     }
     compute(cell);

@@ -61,6 +61,16 @@ fn end() -> u32 {
     return min(sound, max(atomicLoad(&findings[UNLISTED]), 1u) - 1u);
 }
 
+var<workgroup> ends: u32;
+
+// The same for all invocations of a group, of which one reads it.
+fn group_end(local: u32) -> u32 {
+    if local == 0u {
+        ends = end();
+    }
+    return workgroupUniformLoad(&ends);
+}
+
 fn does(flag: u32) -> bool {
     return (instant.flags & flag) != 0u;
 }

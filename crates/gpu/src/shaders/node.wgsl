@@ -14,7 +14,7 @@ fn main(
     let is_counted = local == 0u && GROUP * index < NODES;
     var first = vec4f(0.0);
     var second = vec4f(0.0);
-    if node < NODES && end() > instant.index {
+    if group_end(local) > instant.index && node < NODES {
         let gathered = internal_force(node);
         let m = motion(node, gathered.xyz);
         if does(MOVES) {

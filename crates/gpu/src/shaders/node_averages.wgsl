@@ -7,7 +7,7 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let node = number(group, groups, local);
-    if node >= LOCAL_NODES || end() < instant.index {
+    if group_end(local) < instant.index || node >= LOCAL_NODES {
         return;
     }
     var sum = 0.0;

@@ -70,6 +70,8 @@ fn main(
     if index < BLOCKS {
         block = blocks[index];
     }
+    // Where an earlier instant is not sound all stands still; one that is found not to be so now is whole on its own side.
+    let is_sound = group_end(local) >= instant.index;
     let all = extractBits(block.nodes, 0u, 16u);
     own = extractBits(block.nodes, 16u, 16u);
     for (var n = local; n < all; n += GROUP) {
@@ -82,8 +84,6 @@ fn main(
         atomicStore(&forces[k], 0);
     }
     workgroupBarrier();
-    // Where an earlier instant is not sound all stands still; one that is found not to be so now is whole on its own side.
-    let is_sound = end() >= instant.index;
     if is_sound {
         for (var k = local; k < block.cells; k += GROUP) {
             compute(block.first_cell + k);

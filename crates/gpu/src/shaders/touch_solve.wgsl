@@ -18,6 +18,7 @@ fn largest(local: u32, own: f32) -> f32 {
 @compute @workgroup_size(SOLVERS)
 fn main(@builtin(local_invocation_index) local: u32) {
     if local == 0u {
+        atomicStore(&change, 0u);
         told = select(0u, atomicLoad(&queue[DEEPEST]), end() > instant.index);
     }
     let deepest = bitcast<f32>(workgroupUniformLoad(&told));

@@ -61,7 +61,12 @@ fn cells_filled_in_part_of_every_element() {
         let solid = &mut model.solids[0];
         let fractions: Vec<f64> = (0..solid.cells.len()).map(|cell| 0.2 + 0.1 * (cell % 8) as f64).collect();
         solid.cells = solid.cells.clone().filled(&fractions);
-        compare(&device, &format!("{element} in part"), &model, &[Design::Gather, Design::Blocks]);
+        compare(
+            &device,
+            &format!("{element} in part"),
+            &model,
+            &[Design::Gather, Design::Blocks, Design::Fast],
+        );
     }
 }
 
