@@ -31,6 +31,7 @@
 //! ```
 
 mod applied;
+mod awake;
 mod collective;
 pub mod critical_step;
 mod dynamic_relaxation;

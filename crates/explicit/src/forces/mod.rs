@@ -26,7 +26,6 @@ mod tests;
 use averaged::AveragedTets;
 use bar::Bars;
 pub(crate) use batch::pressure;
-pub(crate) use blocks::BLOCK;
 use std::ops::Range;
 
 use pliant_mechanics::Real;
@@ -39,7 +38,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::history::History;
 use crate::lanes::{Lanes, Local, PACK, Pack, Processor, WideF32, WideF64, load_vector};
-use blocks::{Blocks, Quad, Shares};
+use blocks::{Blocks, Quad, Shares, packs_of_block};
 use full_hex::FullHexes;
 use membrane::Membranes;
 use plain::SolidForces;
@@ -187,7 +186,8 @@ impl<R: Scalar, const N: usize> PackedCells<R, N> {
     /// The packs of a block.
     #[inline(always)]
     fn packs_of(&self, block: usize) -> Range<usize> {
-        block * BLOCK..self.packs().end.min((block + 1) * BLOCK)
+        let packs = packs_of_block(self.count);
+        block * packs..self.packs().end.min((block + 1) * packs)
     }
 
     /// A number of each cell of a pack; zero beyond the last one.
