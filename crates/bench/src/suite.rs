@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use pliant_explicit::{MissingInstructions, Scalar, State, StepError};
 use pliant_gpu::{Device, DeviceRates, GpuError, StepFailure};
+use pliant_implicit::SolveError;
 use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::model::Contradiction;
@@ -56,6 +57,9 @@ pub enum BenchError {
     /// The CPU lacks the requested instructions.
     #[error(transparent)]
     Lanes(#[from] MissingInstructions),
+    /// An implicit step of shells failed.
+    #[error("shells: {0}")]
+    Shells(#[from] SolveError),
     /// No threads.
     #[error("{0}")]
     Threads(#[from] ThreadPoolBuildError),

@@ -431,6 +431,7 @@ Examples:
   pliant bench                                   two minutes: all laws and elements, the thesis's series of meshes
   pliant bench --full                            also meshes up to two million elements
   pliant bench --designs                         the kernel designs on a GPU
+  pliant bench --shells                          implicit steps of shells, on the CPU and on a GPU
   pliant bench --list
   pliant bench --only tet4-nh-55566 --only tet4-nh-55566-all
   pliant bench --json > bench.json
@@ -446,6 +447,9 @@ pub struct Bench {
     /// Measure the kernel designs on the best GPU instead; with `--full` also on large meshes.
     #[arg(long, conflicts_with = "only")]
     pub designs: bool,
+    /// Measure implicit steps of 800 to 50,000 shells instead, on the CPU and with the best GPU for their equations.
+    #[arg(long, conflicts_with_all = ["full", "designs", "list", "only", "lanes", "json", "table"])]
+    pub shells: bool,
     /// List the rows without measuring.
     #[arg(long)]
     pub list: bool,

@@ -1,6 +1,6 @@
 //! `pliant bench`: the cost of a step on this machine.
 
-use pliant_bench::{BenchError, Case, Instructions, Place, Settings, cases, find, measure};
+use pliant_bench::{BenchError, Case, Instructions, Place, Settings, cases, find, measure, measure_shells};
 use serde_json::json;
 
 use crate::SUCCESS;
@@ -12,6 +12,9 @@ pub fn bench(arguments: &Bench) -> Result<u8, Failure> {
     if arguments.list {
         say(list())?;
         return Ok(SUCCESS);
+    }
+    if arguments.shells {
+        return shells();
     }
     let cases = chosen(arguments)?;
     let page = arguments.table.as_deref().map(|path| Page::read(path, "bench")).transpose()?;
@@ -44,6 +47,20 @@ pub fn bench(arguments: &Bench) -> Result<u8, Failure> {
         page.renew(&format!("\n{}\n\n", report.table()))?;
     }
     Ok(SUCCESS)
+}
+
+/// Implicit steps of shells, on the CPU and on a GPU.
+fn shells() -> Result<u8, Failure> {
+    let bar = Bar::new();
+    let result = measure_shells(&mut |progress| bar.update_bench(&progress));
+    bar.finish();
+    match result {
+        Ok(report) => say(report.table()).map(|()| SUCCESS),
+        Err(error) => {
+            eprintln!("error: {error}");
+            Ok(1)
+        }
+    }
 }
 
 /// Largest number of cells that `--designs` measures without `--full`.

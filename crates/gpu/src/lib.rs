@@ -1,4 +1,5 @@
-//! Explicit dynamics of solids on any GPU, through wgpu: Vulkan, Metal or Direct3D 12, found at run time. Single precision.
+//! Explicit dynamics of solids, and the linear equations of implicit steps, on any GPU, through wgpu: Vulkan, Metal or Direct3D 12, found at
+//! run time. Single precision.
 //!
 //! ```
 //! for adapter in pliant_gpu::adapters() {
@@ -88,10 +89,15 @@
 //! it follows into a slot of its own, which that node gathers like those of its cells; with atomic additions it adds the part. Another kernel after
 //! each motion places them, u = Σ w u. `blocks` moves nodes while it finds forces, and refuses ties.
 //!
+//! # Equations of implicit steps
+//!
+//! [`Device`] is a `LinearDevice` of `pliant-implicit`: it solves block matrices by conjugate gradients (`gradients.rs`). What it finds are corrections
+//! under a residual in double precision on the CPU.
+//!
 //! # Tests
 //!
 //! `tests/gpu/stepper/` compares with double precision on the CPU: displacements differ by at most 1e-5 after 200 steps, with every law, element
-//! and load on unordered meshes deformed at random. Tests also run devices opened with
+//! and load on unordered meshes deformed at random. `tests/gpu/gradients.rs` compares solutions and pulsing tubes with the CPU. Tests also run devices opened with
 //! lower limits (`Device::open_within`) and devices destroyed during a run. The gate runs
 //! all of them on Mesa's software Vulkan (`PLIANT_REQUIRE_GPU=1`); elsewhere they report when they are skipped.
 
@@ -100,6 +106,7 @@ mod contacts;
 mod design;
 mod device;
 mod error;
+mod gradients;
 mod grips;
 mod kernel;
 mod loads;

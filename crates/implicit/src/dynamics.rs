@@ -21,7 +21,7 @@ use crate::error::SolveError;
 use crate::facet::Tangent;
 use crate::forces::Forces;
 use crate::limited::within_limits;
-use crate::linear::{LinearReport, LinearSolver, dot};
+use crate::linear::{LinearDevice, LinearReport, LinearSolver, dot};
 use crate::rotation::{exponential, logarithm, spin_to_vector};
 use crate::solid::highest_frequency_squared;
 use crate::state::State;
@@ -197,8 +197,21 @@ impl BackwardEuler {
     /// # Errors
     /// If the equations are too many for the solver chosen.
     pub fn new(model: impl Into<Arc<Assembly>>, settings: DynamicSettings) -> Result<Self, SolveError> {
+        Self::on(None, model, settings)
+    }
+
+    /// The same with a device, if one is given, that solves the equations by conjugate gradients with blocks or aggregates. Their tolerance
+    /// holds in double precision.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), and if the device fails or has no room, or another linear solver is set.
+    pub fn on(
+        device: Option<Arc<dyn LinearDevice>>,
+        model: impl Into<Arc<Assembly>>,
+        settings: DynamicSettings,
+    ) -> Result<Self, SolveError> {
         let model = model.into();
-        let system = System::new(Arc::clone(&model), settings.linear)?;
+        let system = System::on(device, Arc::clone(&model), settings.linear)?;
         let (all, free) = (6 * model.rest.len(), system.equations.len());
         Ok(Self {
             settings,

@@ -1,6 +1,7 @@
 //! What can be wrong with a model and why a solver stops.
 
 use crate::facet::Broken;
+use crate::linear::DeviceError;
 
 /// Why a part could not be added to a model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -244,6 +245,9 @@ pub enum SolveError {
         /// Corners of the triangle it goes through.
         triangle: [u32; 3],
     },
+    /// A device that solves the equations failed.
+    #[error("the equations could not be solved on the GPU: {0}")]
+    Device(DeviceError),
     /// Someone asked for it.
     #[error("the search for the state at the end of a step was stopped")]
     Stopped,
@@ -258,7 +262,7 @@ pub enum SolveError {
 impl SolveError {
     /// Whether smaller steps can't help.
     pub(crate) fn is_final(&self) -> bool {
-        matches!(self, Self::Crossed { .. } | Self::Stopped)
+        matches!(self, Self::Crossed { .. } | Self::Stopped | Self::Device(_))
     }
 
     /// The element that is broken, or was in a larger step, by its number in the model.

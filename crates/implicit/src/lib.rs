@@ -78,7 +78,10 @@ pub use element::Wall;
 pub use error::{ModelError, SolveError};
 pub use facet::{Broken, Facet, Resultants, ShellEnergy, Tangent};
 pub use forces::Forces;
-pub use linear::{LinearReport, LinearSolver, Preconditioner};
+pub use linear::{
+    BlockPattern, BlockValues, DeviceError, DeviceSolver, DeviceTimes, LinearDevice, LinearReport,
+    LinearSolver, Pass, PassEnd, Preconditioner,
+};
 
 pub use mapping::CarriedPoints;
 pub use patch::{Carried, EdgeRule, Patch, Place};

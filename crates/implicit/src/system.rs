@@ -21,7 +21,9 @@ use crate::facet::{Broken, Facet, Matrix18, Tangent, symmetrise};
 use crate::facets::{FacetPack, Work};
 use crate::followers::{Followers, carried_turns};
 use crate::lanes::PACK;
-use crate::linear::{LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT};
+use crate::linear::{
+    DeviceTimes, LinearDevice, LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT,
+};
 use crate::mapping::CarriedPoints;
 use crate::patch::Vector18;
 use crate::patch::{EdgeRule, Patch};
@@ -53,6 +55,33 @@ pub struct Phases {
     pub solutions: usize,
     /// Iterations of conjugate gradients.
     pub iterations: usize,
+    /// What a device took of preparation and solution, where one solves the equations.
+    pub device: DeviceTimes,
+    /// Solutions that single precision on the device could not find, and that the CPU finished.
+    pub left_to_cpu: usize,
+}
+
+impl Phases {
+    /// What was spent since an earlier time.
+    #[must_use]
+    pub fn since(&self, earlier: &Self) -> Self {
+        let (now, then) = (self.device, earlier.device);
+        Self {
+            cells: self.cells - earlier.cells,
+            contact: self.contact - earlier.contact,
+            preparation: self.preparation - earlier.preparation,
+            solution: self.solution - earlier.solution,
+            evaluations: self.evaluations - earlier.evaluations,
+            solutions: self.solutions - earlier.solutions,
+            iterations: self.iterations - earlier.iterations,
+            device: DeviceTimes {
+                upload: now.upload - then.upload,
+                iterations: now.iterations - then.iterations,
+                read_back: now.read_back - then.read_back,
+            },
+            left_to_cpu: self.left_to_cpu - earlier.left_to_cpu,
+        }
+    }
 }
 
 /// A model's equations with the forces and the stiffness last found.
@@ -107,6 +136,8 @@ pub(crate) struct System {
     followers: Option<Followers>,
     pub(crate) conditions: Conditions,
     solver: LinearSolver,
+    /// What solves the equations in place of the CPU.
+    device: Option<Arc<dyn LinearDevice>>,
     /// How far moved nodes whose force is limited are behind their motion, by their constraints; a system of forces alone has none.
     pub(crate) lags: Vec<Lag>,
     /// Contacts; a system of forces alone has none.
@@ -136,7 +167,22 @@ struct FacetResult {
 
 impl System {
     pub(crate) fn new(model: Arc<Assembly>, solver: LinearSolver) -> Result<Self, SolveError> {
+        Self::on(None, model, solver)
+    }
+
+    /// The same with a device that solves the equations.
+    pub(crate) fn on(
+        device: Option<Arc<dyn LinearDevice>>,
+        model: Arc<Assembly>,
+        solver: LinearSolver,
+    ) -> Result<Self, SolveError> {
+        if device.is_some() && !solver.suits_devices() {
+            return Err(SolveError::Impossible(
+                "a GPU solves equations by conjugate gradients with blocks or aggregates; take these, or the CPU",
+            ));
+        }
         let mut system = Self::forces_only(Arc::clone(&model));
+        system.device = device;
         system.followers = Followers::of(&model, true);
         system.conditions = Conditions::of(&model, &system.equations, system.surface.as_ref());
         system.solver = solver;
@@ -206,13 +252,13 @@ impl System {
         };
         system.face_places = pressing(&model).map(of_load).collect();
         system.solid_places = model.solids.iter().zip(&system.stars).map(of_solid).collect();
-        system.workspace = Workspace::new(system.solver, &system.equations, matrix);
-        match system.workspace {
-            Some(_) => Ok(()),
-            None => Err(SolveError::Impossible(
-                "the equations are too many for the direct solver; use conjugate gradients",
-            )),
+        let workspace = Workspace::new(system.solver, system.device.as_ref(), &system.equations, matrix);
+        let mut workspace = workspace.map_err(linear_error)?;
+        if let Some(before) = &system.workspace {
+            workspace.count_on(before.of_device());
         }
+        system.workspace = Some(workspace);
+        Ok(())
     }
 
     /// Makes room in the pattern for the contacts that act or soon may.
@@ -324,6 +370,7 @@ impl System {
             phases: Phases::default(),
             last_solution: LinearReport::default(),
             solver: LinearSolver::Direct,
+            device: None,
             lags: Vec::new(),
             touching: None,
             damper: Vec::new(),
@@ -943,9 +990,10 @@ impl System {
         let start = Instant::now();
         let Some(workspace) = &mut self.workspace else { return Ok(()) };
         let result = workspace.solve(&self.matrix, right, solution);
-        if let Ok(report) | Err(LinearError::Stalled(report)) = result {
-            self.last_solution = report;
+        if let Ok(report) | Err(LinearError::Stalled(report)) = &result {
+            self.last_solution = *report;
         }
+        (self.phases.device, self.phases.left_to_cpu) = workspace.of_device();
         self.phases.solution += start.elapsed();
         self.phases.solutions += 1;
         self.phases.iterations += self.last_solution.iterations;
@@ -1046,6 +1094,10 @@ fn corners(face: &Face) -> &[u32] {
 
 fn linear_error(error: LinearError) -> SolveError {
     match error {
+        LinearError::TooLarge => SolveError::Impossible(
+            "the equations are too many for the direct solver; use conjugate gradients",
+        ),
+        LinearError::Device(error) => SolveError::Device(error),
         LinearError::NotFinite => SolveError::Impossible("the stiffness is not finite; use smaller steps"),
         LinearError::Indefinite(iterations) => SolveError::Indefinite { iterations },
         LinearError::Stalled(LinearReport { iterations, residual }) => {

@@ -3,11 +3,10 @@
 use std::sync::Arc;
 
 use pliant_implicit::{DynamicSettings, Integrator, LinearSolver, Preconditioner, StaticSettings};
-use pliant_sim::{Explicit, ImplicitBodies, Method};
+use pliant_sim::{Explicit, ImplicitBodies, LongSteps, Method};
 
-use crate::format::{
-    IntegratorName, LinearName, LinearTable, LinearWay, PreconditionerName, RunTable, SolverName,
-};
+use crate::format::{IntegratorName, LinearName, LinearTable, PreconditionerName, RunTable, SolverName};
+use crate::plan::Plan;
 use crate::world::Part;
 
 /// Iterations of Newton's method at most in contact, if none are given. The longest step of a lens that snaps out of its tube takes 160 to 210;
@@ -22,7 +21,7 @@ impl Part {
         let Self { name, scene, built, plan } = self;
         let (run, precision) = (&scene.run, plan.target.precision);
         let method = match &built.implicit {
-            Some(bodies) => method_of(bodies, run, plan.steps.step),
+            Some(bodies) => method_of(bodies, run, plan),
             None if run.solver == SolverName::QuasiStatic => {
                 Method::QuasiStatic { precision, tolerance: run.tolerance }
             }
@@ -51,12 +50,9 @@ impl Part {
 }
 
 /// How shells, and solids whose equations are solved, are stepped.
-fn method_of(bodies: &Arc<ImplicitBodies>, run: &RunTable, step: f64) -> Method {
+fn method_of(bodies: &Arc<ImplicitBodies>, run: &RunTable, plan: &Plan) -> Method {
     let bodies = Arc::clone(bodies);
-    let table = match &run.linear {
-        LinearWay::Named(name) => LinearTable::usual(*name),
-        LinearWay::Set(table) => table.clone(),
-    };
+    let table = run.linear.table();
     let linear = linear_solver(&table);
     match run.solver {
         SolverName::Static => {
@@ -66,7 +62,7 @@ fn method_of(bodies: &Arc<ImplicitBodies>, run: &RunTable, step: f64) -> Method 
             Method::Static(bodies, settings)
         }
         SolverName::Implicit => {
-            let mut settings = DynamicSettings { linear, ..DynamicSettings::new(step) };
+            let mut settings = DynamicSettings { linear, ..DynamicSettings::new(plan.steps.step) };
             settings.tolerance = run.tolerance.unwrap_or(settings.tolerance);
             settings.iterations = iterations(&bodies, run, settings.iterations);
             settings.speed_tolerance = run.speed_tolerance;
@@ -79,7 +75,12 @@ fn method_of(bodies: &Arc<ImplicitBodies>, run: &RunTable, step: f64) -> Method 
                 IntegratorName::BackwardEuler => Integrator::BackwardEuler,
                 IntegratorName::Bdf2 => Integrator::Bdf2,
             };
-            Method::Implicit(bodies, settings)
+            let steps = LongSteps {
+                settings,
+                #[cfg(feature = "gpu")]
+                device: plan.target.device.clone(),
+            };
+            Method::Implicit(bodies, steps)
         }
         SolverName::Explicit | SolverName::QuasiStatic => Method::ExplicitShells(bodies),
     }

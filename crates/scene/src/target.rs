@@ -6,7 +6,7 @@ use pliant_sim::gpu::{Design, Device, GpuError, Kind};
 
 use crate::assemble::Built;
 use crate::diagnostic::Diagnostic;
-use crate::format::{DeviceName, FieldName, RunTable, SolverName};
+use crate::format::{DeviceName, FieldName, LinearName, PreconditionerName, RunTable, SolverName};
 use crate::registry::OutputTable;
 use crate::scene::Scene;
 
@@ -70,7 +70,7 @@ impl Target {
                         device.adapter().name
                     )
                 });
-                Ok(Self { device: Some(device), precision: Precision::Single, note })
+                Ok(Self::on(device, built, note))
             }
             Err(error) => {
                 let key = if run.adapter.is_some() { "adapter" } else { "device" };
@@ -99,8 +99,9 @@ impl Target {
                 Self::processor(run, Some(note))
             }
             Ok(device) => {
-                let note = Some(format!("it runs on `{}`", device.adapter().name));
-                Self { device: Some(device), precision: Precision::Single, note }
+                let what = if built.implicit.is_some() { "its equations are solved" } else { "it runs" };
+                let note = Some(format!("{what} on `{}`", device.adapter().name));
+                Self::on(device, built, note)
             }
             Err(error) => Self::processor(run, Some(format!("{error}: it runs on the CPU"))),
         })
@@ -109,6 +110,13 @@ impl Target {
     #[cfg(not(feature = "gpu"))]
     fn best(scene: &Scene, _built: &Built) -> Result<Self, Box<Diagnostic>> {
         Ok(Self::processor(&scene.run, Some(format!("{WITHOUT}: it runs on the CPU"))))
+    }
+
+    /// Solids in single precision; equations, whose device works for a state in double precision.
+    #[cfg(feature = "gpu")]
+    fn on(device: Device, built: &Built, note: Option<String>) -> Self {
+        let precision = if built.implicit.is_some() { Precision::Double } else { Precision::Single };
+        Self { device: Some(device), precision, note }
     }
 
     fn processor(run: &RunTable, note: Option<String>) -> Self {
@@ -156,13 +164,17 @@ fn key_of_gpu(run: &RunTable) -> Option<&'static str> {
 /// Whether the design that the scene asks for, if it does, has what the scene needs.
 #[cfg(feature = "gpu")]
 fn with_design(scene: &Scene, built: &Built) -> Result<(), Box<Diagnostic>> {
+    let place = scene.source.span(&scene.run_at("design"));
+    if scene.run.design.is_some() && built.implicit.is_some() {
+        let message = "`design` is given, but it is about explicit steps, and the solver is `implicit`";
+        return Err(Box::new(Diagnostic::error(message).at(place, "not used").help("leave `design` out")));
+    }
     let Some(design @ Design::Blocks) = scene.run.design else { return Ok(()) };
     let error = match (&built.contacts, built.model.ties.is_empty()) {
         (Some(_), _) => GpuError::NoContact { design: design.to_string() },
         (None, false) => GpuError::NoTies { design: design.to_string() },
         (None, true) => return Ok(()),
     };
-    let place = scene.source.span(&scene.run_at("design"));
     Err(Box::new(Diagnostic::error(error.to_string()).at(place, "").help(error.remedy())))
 }
 
@@ -194,8 +206,7 @@ fn processor_only(scene: &Scene, built: &Built) -> Option<(&'static str, String,
     let run = &scene.run;
     let leave_out = "set `device = \"cpu\"`, or leave it out";
     if built.implicit.is_some() {
-        let what = "the model of shells, `implicit` and `static`";
-        return Some(("device", what.into(), leave_out));
+        return equations_only(run);
     }
     if let Some(what) = contact_only(built) {
         return Some(("device", what, leave_out));
@@ -211,6 +222,33 @@ fn processor_only(scene: &Scene, built: &Built) -> Option<(&'static str, String,
     if run.precision == Some(Precision::Double) {
         let help = "set `device = \"cpu\"`, or leave `precision` out";
         return Some(("precision", "double precision".into(), help));
+    }
+    None
+}
+
+/// The same of shells, and of solids whose equations are solved: a GPU solves those of implicit steps by conjugate gradients.
+fn equations_only(run: &RunTable) -> Option<(&'static str, String, &'static str)> {
+    let help = "set `device = \"cpu\"`, or `solver = \"implicit\"` with `linear = \"conjugate-gradients\"`";
+    match run.solver {
+        SolverName::Implicit => {}
+        SolverName::Static => return Some(("solver", "the solver `static`".into(), help)),
+        SolverName::Explicit | SolverName::QuasiStatic => {
+            return Some(("device", "the explicit solver of shells".into(), help));
+        }
+    }
+    let table = run.linear.table();
+    let by = match table.by {
+        LinearName::ConjugateGradients => None,
+        LinearName::Direct => Some("`direct`"),
+        LinearName::Unsymmetric => Some("`unsymmetric`"),
+    };
+    if let Some(by) = by {
+        let help = "set `device = \"cpu\"`, or `linear = \"conjugate-gradients\"`";
+        return Some(("linear", format!("the linear solver {by}"), help));
+    }
+    if table.preconditioner == PreconditionerName::LaggedFactors {
+        let help = "set `device = \"cpu\"`, or the preconditioner `aggregates` or `block-jacobi`";
+        return Some(("linear", "the preconditioner `lagged-factors`".into(), help));
     }
     None
 }

@@ -203,9 +203,10 @@ impl World {
 
 #[cfg(feature = "gpu")]
 impl World {
-    /// The GPU of the scene, where all bodies go together on one.
+    /// The GPU of the scene, where all bodies move together on one. A GPU that solves the equations of implicit steps moves none.
     pub fn device(&self) -> Option<&Device> {
-        self.only()?.plan.target.device.as_ref()
+        let part = self.only().filter(|part| part.built.implicit.is_none())?;
+        part.plan.target.device.as_ref()
     }
 
     /// Goes on on a device that is open, where that is the one it asks for.

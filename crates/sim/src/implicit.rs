@@ -9,6 +9,8 @@ use pliant_contact::lag::Lag;
 use pliant_contact::pose::Leg;
 use pliant_contact::pressure::{faces, pressures};
 use pliant_explicit::{Clock, NodeContact, Wanted};
+#[cfg(feature = "gpu")]
+use pliant_implicit::LinearDevice;
 use pliant_implicit::{
     Assembly, BackwardEuler, DynamicSettings, Explicit, Forces, Phases, SolveError, Spring, State, Statics,
     TouchingNow, TouchingSystem,
@@ -172,9 +174,13 @@ impl Implicit {
         let method = match &part.method {
             part::Method::Static(_, settings) => Statics::new(model.clone(), *settings)
                 .map(|solver| SolverMethod::Static(Box::new(solver), forces())),
-            part::Method::Implicit(_, settings) => {
-                let settings = DynamicSettings { step: part.steps.step, ..*settings };
-                BackwardEuler::new(model.clone(), settings)
+            part::Method::Implicit(_, own) => {
+                let settings = DynamicSettings { step: part.steps.step, ..own.settings };
+                #[cfg(feature = "gpu")]
+                let device = own.device.clone().map(|device| Arc::new(device) as Arc<dyn LinearDevice>);
+                #[cfg(not(feature = "gpu"))]
+                let device = None;
+                BackwardEuler::on(device, model.clone(), settings)
                     .map(|solver| SolverMethod::Implicit(Box::new(solver), forces()))
             }
             part::Method::Explicit(_)
@@ -884,6 +890,7 @@ fn failure(
         SolveError::Indefinite { .. } => ("unstable", None, None),
         SolveError::Broken { cell, .. } => ("inverted", None, bodies.cell(*cell)),
         SolveError::Stopped => return Failure::stopped(time),
+        SolveError::Device(_) => ("device", None, None),
         SolveError::Open(_) | SolveError::Impossible(_) => ("input", None, None),
     };
     let owner = node.and_then(body_of);

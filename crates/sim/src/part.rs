@@ -65,7 +65,28 @@ pub enum Method {
     /// Equilibria of shells and solids at the ends of load steps, by Newton's method.
     Static(Arc<ImplicitBodies>, StaticSettings),
     /// Shells and solids with inertia in long steps; the length of [`Part::steps`] counts.
-    Implicit(Arc<ImplicitBodies>, DynamicSettings),
+    Implicit(Arc<ImplicitBodies>, LongSteps),
+}
+
+/// Settings of implicit steps.
+#[derive(Clone, Debug)]
+pub struct LongSteps {
+    /// How they are solved.
+    pub settings: DynamicSettings,
+    /// The GPU that solves their linear equations; `None`: the CPU.
+    #[cfg(feature = "gpu")]
+    pub device: Option<Device>,
+}
+
+impl From<DynamicSettings> for LongSteps {
+    /// On the CPU.
+    fn from(settings: DynamicSettings) -> Self {
+        Self {
+            settings,
+            #[cfg(feature = "gpu")]
+            device: None,
+        }
+    }
 }
 
 /// Settings of central differences.
@@ -184,7 +205,7 @@ impl Part {
         let model = Arc::clone(&assembly.model);
         let bodies = ImplicitBodies::alone(assembly);
         let steps = Steps::within(duration, step);
-        let method = Method::Implicit(Arc::new(bodies), DynamicSettings::new(steps.step));
+        let method = Method::Implicit(Arc::new(bodies), DynamicSettings::new(steps.step).into());
         Self { name: name.into(), model, method, steps }
     }
 }

@@ -2,6 +2,7 @@
 
 mod compute;
 mod devices;
+mod gradients;
 mod laws;
 mod shapes;
 mod stepper;

@@ -6,6 +6,7 @@
 use nalgebra::{Cholesky, Matrix3, SMatrix, Vector3};
 use rayon::prelude::*;
 
+use super::device::BlockPattern;
 use super::factors::Factors;
 use super::report::{LinearError, LinearReport};
 use crate::rotation::skew;
@@ -20,8 +21,8 @@ const SHARE: usize = 4;
 /// Nodes of an aggregate. On 20,000 shells 16 take less processor time than 8, 32 (9 %) or 64; on 4,000 these are within 5 % of each other.
 const AGGREGATE: usize = 16;
 
-type Block = SMatrix<f64, 6, 6>;
-type Node = [f64; 6];
+pub(super) type Block = SMatrix<f64, 6, 6>;
+pub(super) type Node = [f64; 6];
 
 /// Both halves of a symmetric matrix as 6 × 6 blocks, row by row; nodes in an order of their own, aggregate by aggregate. Components
 /// without an equation are 0.
@@ -42,7 +43,8 @@ pub(crate) struct BlockMatrix {
 }
 
 impl BlockMatrix {
-    pub(crate) fn new(equations: &Equations, matrix: &LowerMatrix) -> Self {
+    /// The pattern of a matrix, with at most about `most` aggregates.
+    pub(crate) fn new(equations: &Equations, matrix: &LowerMatrix, most: usize) -> Self {
         let mut own: Vec<(u32, [u32; 6])> = Vec::new();
         // Of each node of the model, its place among those with equations.
         let mut place = vec![NONE; equations.number.len() / 6];
@@ -70,7 +72,7 @@ impl BlockMatrix {
             neighbours.sort_unstable();
             neighbours.dedup();
         }
-        let (order, aggregate_start) = aggregates(&around);
+        let (order, aggregate_start) = aggregates(&around, AGGREGATE.max(around.len().div_ceil(most)));
         let mut position = vec![0; own.len()];
         for (at, &old) in order.iter().enumerate() {
             position[old as usize] = at as u32;
@@ -105,8 +107,26 @@ impl BlockMatrix {
         blocks
     }
 
-    fn nodes(&self) -> usize {
+    pub(super) fn nodes(&self) -> usize {
         self.equations.len()
+    }
+
+    /// Where everything is, for a device; with the pairs of touching aggregates where they are wanted.
+    pub(super) fn pattern<'a>(&'a self, coarse: Option<&Coarse>) -> BlockPattern<'a> {
+        let bit = |(c, &equation): (usize, &u32)| u32::from(equation != NONE) << c;
+        BlockPattern {
+            row_start: &self.row_start,
+            column: &self.column,
+            source: self.source.as_flattened(),
+            free: self.equations.iter().map(|own| own.iter().enumerate().map(bit).sum()).collect(),
+            aggregate_start: &self.aggregate_start,
+            touching: coarse.map(|own| own.pairs.iter().map(|(row, column, _)| [*row, *column]).collect()),
+        }
+    }
+
+    /// Inverses of the diagonal blocks.
+    pub(super) fn inverse(&self) -> &[Block] {
+        &self.inverse
     }
 
     fn row(&self, node: usize) -> std::ops::Range<usize> {
@@ -184,9 +204,9 @@ impl BlockMatrix {
     }
 }
 
-/// Groups of neighbouring nodes, each grown from the first node left: the nodes in their order, and where each group starts. Crumbs
+/// Groups of `size` neighbouring nodes, each grown from the first node left: the nodes in their order, and where each group starts. Crumbs
 /// join the group before them, or a neighbour's.
-fn aggregates(around: &[Vec<u32>]) -> (Vec<u32>, Vec<u32>) {
+fn aggregates(around: &[Vec<u32>], size: usize) -> (Vec<u32>, Vec<u32>) {
     let mut group = vec![NONE; around.len()];
     let mut groups: Vec<Vec<u32>> = Vec::new();
     for seed in 0..around.len() as u32 {
@@ -197,9 +217,9 @@ fn aggregates(around: &[Vec<u32>]) -> (Vec<u32>, Vec<u32>) {
         let mut members = vec![seed];
         group[seed as usize] = number;
         let mut next = 0;
-        while next < members.len() && members.len() < AGGREGATE {
+        while next < members.len() && members.len() < size {
             for &node in &around[members[next] as usize] {
-                if group[node as usize] == NONE && members.len() < AGGREGATE {
+                if group[node as usize] == NONE && members.len() < size {
                     group[node as usize] = number;
                     members.push(node);
                 }
@@ -209,7 +229,7 @@ fn aggregates(around: &[Vec<u32>]) -> (Vec<u32>, Vec<u32>) {
         let beside =
             members.iter().flat_map(|&node| &around[node as usize]).map(|&node| group[node as usize]);
         match beside.filter(|&other| other != number && other != NONE).min() {
-            Some(other) if members.len() < AGGREGATE / 4 => {
+            Some(other) if members.len() < size / 4 => {
                 members.iter().for_each(|&node| group[node as usize] = other);
                 groups[other as usize].append(&mut members);
             }
@@ -283,8 +303,8 @@ impl Coarse {
         }
     }
 
-    /// Takes the fine matrix; false if it is not finite.
-    pub(crate) fn update(&mut self, fine: &BlockMatrix) -> bool {
+    /// Takes the fine matrix.
+    pub(crate) fn update(&mut self, fine: &BlockMatrix) {
         let arm = &self.arm;
         let row_of = |at: u32| fine.row_start.partition_point(|&start| start <= at) - 1;
         self.value.par_iter_mut().zip(&self.pairs).for_each(|(value, (_, _, blocks))| {
@@ -294,6 +314,15 @@ impl Coarse {
                 *value += BlockMatrix::rigid(&fine.value[at as usize], &arm[row], &arm[column]);
             }
         });
+    }
+
+    /// Arms of the nodes [m], and the blocks between aggregates.
+    pub(super) fn parts(&self) -> (&[Vector3<f64>], &[Block]) {
+        (&self.arm, &self.value)
+    }
+
+    /// Factors the coarse matrix; false if it is not finite.
+    pub(crate) fn factorise(&mut self) -> bool {
         for ((row, column, _), value) in self.pairs.iter().zip(&self.value) {
             for j in 0..6 {
                 let (start, rows) =
@@ -476,26 +505,15 @@ impl KrylovVectors {
     ) -> Result<LinearReport, LinearError> {
         // Within the threads' pool, so that no part waits for another thread to take it up.
         let result = rayon::scope(|_| self.iterate(matrix, &mut inverse, b, x, tolerance, iterations));
-        matrix.scatter(&self.x, x);
+        self.take(matrix, x);
         result
     }
 
-    fn iterate(
-        &mut self,
-        matrix: &BlockMatrix,
-        inverse: &mut Approximation<'_>,
-        b: &[f64],
-        x: &[f64],
-        tolerance: f64,
-        iterations: usize,
-    ) -> Result<LinearReport, LinearError> {
+    /// r ← b − A x from the x given or, if that is nearer, from 0; |b|.
+    pub(super) fn begin(&mut self, matrix: &BlockMatrix, b: &[f64], x: &[f64]) -> f64 {
         matrix.gather(b, &mut self.r);
         matrix.gather(x, &mut self.x);
-        let squared = |v: &[Node]| v.iter().map(|v| product(v, v)).sum::<f64>();
         let size = squared(&self.r);
-        let blocks = !matches!(inverse, Approximation::Factors(_));
-        self.p.fill([0.0; 6]);
-        self.ap.fill([0.0; 6]);
         if self.x.iter().any(|x| *x != [0.0; 6]) {
             self.multiply(matrix, true);
             let near: f64 = self
@@ -512,7 +530,52 @@ impl KrylovVectors {
                 self.x.fill([0.0; 6]);
             }
         }
-        let size = size.sqrt();
+        size.sqrt()
+    }
+
+    /// x ← x + `scale` d; then r ← b − A x. The residual |r|.
+    pub(super) fn correct(&mut self, matrix: &BlockMatrix, b: &[f64], scale: f64, d: &[f32]) -> f64 {
+        for (x, d) in self.x.as_flattened_mut().iter_mut().zip(d) {
+            *x += scale * f64::from(*d);
+        }
+        self.multiply(matrix, true);
+        matrix.gather(b, &mut self.r);
+        for (r, ax) in self.r.iter_mut().zip(&self.ap) {
+            (0..6).for_each(|c| r[c] -= ax[c]);
+        }
+        self.residual()
+    }
+
+    /// |r|.
+    pub(super) fn residual(&self) -> f64 {
+        squared(&self.r).sqrt()
+    }
+
+    /// r over its size, in single precision.
+    pub(super) fn direction(&self, size: f64, to: &mut [f32]) {
+        for (to, r) in to.iter_mut().zip(self.r.as_flattened()) {
+            *to = (r / size) as f32;
+        }
+    }
+
+    /// The x that was found, by equations.
+    pub(super) fn take(&self, matrix: &BlockMatrix, x: &mut [f64]) {
+        matrix.scatter(&self.x, x);
+    }
+
+    fn iterate(
+        &mut self,
+        matrix: &BlockMatrix,
+        inverse: &mut Approximation<'_>,
+        b: &[f64],
+        x: &[f64],
+        tolerance: f64,
+        iterations: usize,
+    ) -> Result<LinearReport, LinearError> {
+        let size = self.begin(matrix, b, x);
+        let blocks = !matches!(inverse, Approximation::Factors(_));
+        self.p.fill([0.0; 6]);
+        self.ap.fill([0.0; 6]);
         let mut report = LinearReport { iterations: 0, residual: 0.0 };
         if size == 0.0 {
             return Ok(report);
@@ -544,6 +607,10 @@ impl KrylovVectors {
         }
         Ok(report)
     }
+}
+
+fn squared(v: &[Node]) -> f64 {
+    v.iter().map(|v| product(v, v)).sum()
 }
 
 fn product(a: &Node, b: &Node) -> f64 {

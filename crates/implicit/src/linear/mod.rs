@@ -1,6 +1,7 @@
 //! Linear equations with a sparse matrix: factors L D Lᵀ (`factors.rs`) or L U (`unsymmetric.rs`), or conjugate gradients
-//! (`gradients.rs`). Factors are found on one thread, so results do not depend on the number of threads.
+//! (`gradients.rs`), also on a device (`device.rs`). Factors are found on one thread, so results do not depend on the number of threads.
 
+mod device;
 mod factors;
 mod fronts;
 mod gradients;
@@ -8,8 +9,14 @@ mod report;
 mod supernodes;
 mod unsymmetric;
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
+pub use self::device::{
+    BlockPattern, BlockValues, DeviceError, DeviceSolver, DeviceTimes, LinearDevice, Pass, PassEnd,
+};
+use self::device::{Found, OnDevice};
 pub(crate) use self::factors::{Factors, Pivots, ZERO_PIVOT};
 use self::gradients::{Approximation, BlockMatrix, Coarse, KrylovVectors};
 pub(crate) use self::report::LinearError;
@@ -35,6 +42,14 @@ pub enum LinearSolver {
         /// What the residual is multiplied by.
         preconditioner: Preconditioner,
     },
+}
+
+impl LinearSolver {
+    /// Whether a device can do it.
+    pub(crate) fn suits_devices(self) -> bool {
+        let Self::ConjugateGradients { preconditioner, .. } = self else { return false };
+        !matches!(preconditioner, Preconditioner::LaggedFactors { .. })
+    }
 }
 
 /// An approximate inverse for conjugate gradients.
@@ -63,12 +78,22 @@ pub(crate) struct Workspace {
     blocks: Option<BlockMatrix>,
     coarse: Option<Coarse>,
     vectors: KrylovVectors,
+    /// Where conjugate gradients run on a device.
+    on_device: Option<OnDevice>,
+    /// Solutions that the device left to the CPU, and the time of the devices of earlier patterns.
+    left_to_cpu: usize,
+    times_before: DeviceTimes,
     pivots: Pivots,
 }
 
 impl Workspace {
-    /// A solver for matrices of one pattern; `None` if the equations are too many for factors.
-    pub(crate) fn new(solver: LinearSolver, equations: &Equations, matrix: &LowerMatrix) -> Option<Self> {
+    /// A solver for matrices of one pattern, on a device if one is given.
+    pub(crate) fn new(
+        solver: LinearSolver,
+        device: Option<&Arc<dyn LinearDevice>>,
+        equations: &Equations,
+        matrix: &LowerMatrix,
+    ) -> Result<Self, LinearError> {
         let (direct, preconditioner) = match solver {
             LinearSolver::Direct => (true, None),
             LinearSolver::Unsymmetric => (false, None),
@@ -78,18 +103,31 @@ impl Workspace {
         };
         let whole = solver == LinearSolver::Unsymmetric;
         let empty = matrix.len() == 0;
-        let blocks = preconditioner.map(|_| BlockMatrix::new(equations, matrix));
+        let most = device.map_or(usize::MAX, |device| device.aggregates());
+        let blocks = preconditioner.map(|_| BlockMatrix::new(equations, matrix, most));
         let coarse = blocks.as_ref().filter(|_| preconditioner == Some(Preconditioner::Aggregates));
-        Some(Self {
+        let coarse = coarse.map(Coarse::new).map(|coarse| coarse.ok_or(LinearError::TooLarge)).transpose()?;
+        let on_device = match (device, &blocks) {
+            (Some(device), Some(blocks)) if !empty => {
+                Some(OnDevice::new(&**device, matrix, blocks, coarse.as_ref()).map_err(LinearError::Device)?)
+            }
+            _ => None,
+        };
+        let too_large = |_| LinearError::TooLarge;
+        Ok(Self {
             solver,
-            factors: if direct && !empty { Some(Factors::new(matrix).ok()?) } else { None },
-            unsymmetric: if whole && !empty { Some(LuFactors::new(matrix).ok()?) } else { None },
+            factors: if direct && !empty { Some(Factors::new(matrix).map_err(too_large)?) } else { None },
+            unsymmetric: if whole && !empty {
+                Some(LuFactors::new(matrix).map_err(too_large)?)
+            } else {
+                None
+            },
             current: false,
             fresh: false,
-            coarse: match coarse {
-                Some(blocks) => Some(Coarse::new(blocks)?),
-                None => None,
-            },
+            coarse,
+            on_device,
+            left_to_cpu: 0,
+            times_before: DeviceTimes::default(),
             vectors: blocks
                 .as_ref()
                 .map(|blocks| KrylovVectors::new(blocks, matrix.len()))
@@ -117,10 +155,15 @@ impl Workspace {
         {
             return Err(LinearError::Indefinite(0));
         }
-        if let (Some(coarse), Some(blocks)) = (&mut self.coarse, &self.blocks)
-            && !coarse.update(blocks)
-        {
-            return Err(LinearError::NotFinite);
+        if let (Some(coarse), Some(blocks)) = (&mut self.coarse, &self.blocks) {
+            coarse.update(blocks);
+            // A device inverts it itself.
+            if self.on_device.is_none() && !coarse.factorise() {
+                return Err(LinearError::NotFinite);
+            }
+        }
+        if let (Some(on_device), Some(blocks)) = (&mut self.on_device, &self.blocks) {
+            on_device.take(matrix, blocks, self.coarse.as_ref()).map_err(LinearError::Device)?;
         }
         if self.factors.is_some() && !(self.blocks.is_some() && self.current) {
             self.factorise(matrix)?;
@@ -171,7 +214,7 @@ impl Workspace {
                         x.fill(0.0);
                         report = self.conjugate_gradients(b, x, tolerance, iterations);
                     }
-                    self.current = report.is_ok_and(|report| report.iterations < renew_after);
+                    self.current = report.as_ref().is_ok_and(|report| report.iterations < renew_after);
                 }
                 report
             }
@@ -185,15 +228,44 @@ impl Workspace {
         tolerance: f64,
         iterations: usize,
     ) -> Result<LinearReport, LinearError> {
+        let mut done = 0;
+        if let (Some(on_device), Some(blocks)) = (&mut self.on_device, &self.blocks) {
+            match on_device.solve(&mut self.vectors, blocks, b, x, tolerance, iterations) {
+                Found::Solution(result) => return result,
+                Found::Rest(iterations) => done = iterations,
+            }
+            self.left_to_cpu += 1;
+            if self.coarse.as_mut().is_some_and(|coarse| !coarse.factorise()) {
+                return Err(LinearError::NotFinite);
+            }
+        }
         let inverse = match (&mut self.factors, &mut self.coarse) {
             (Some(factors), _) => Approximation::Factors(factors),
             (None, Some(coarse)) => Approximation::Aggregates(coarse),
             (None, None) => Approximation::Blocks,
         };
         match &self.blocks {
-            Some(blocks) => self.vectors.solve(blocks, inverse, b, x, tolerance, iterations),
+            Some(blocks) => {
+                let report = self.vectors.solve(blocks, inverse, b, x, tolerance, iterations - done);
+                let all = |own: LinearReport| LinearReport { iterations: own.iterations + done, ..own };
+                report.map(all).map_err(|error| match error {
+                    LinearError::Stalled(report) => LinearError::Stalled(all(report)),
+                    other => other,
+                })
+            }
             None => Ok(LinearReport::default()),
         }
+    }
+
+    /// Time of the device so far, and how many solutions it left to the CPU.
+    pub(crate) fn of_device(&self) -> (DeviceTimes, usize) {
+        let own = self.on_device.as_ref().map(OnDevice::times).unwrap_or_default();
+        (self.times_before.plus(own), self.left_to_cpu)
+    }
+
+    /// Counts on from a solver of an earlier pattern.
+    pub(crate) fn count_on(&mut self, (times, left): (DeviceTimes, usize)) {
+        (self.times_before, self.left_to_cpu) = (times, left);
     }
 }
 

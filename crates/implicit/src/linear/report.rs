@@ -1,5 +1,7 @@
 //! What a solution of linear equations took, or why there is none.
 
+use super::device::DeviceError;
+
 /// What a solution took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LinearReport {
@@ -10,8 +12,11 @@ pub struct LinearReport {
 }
 
 /// Why a linear solve failed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) enum LinearError {
+    /// More equations than factors can number.
+    TooLarge,
+    Device(DeviceError),
     NotFinite,
     Indefinite(usize),
     Stalled(LinearReport),

@@ -2,25 +2,20 @@
 //! machine. A tube like a bowel (radius 20 mm, length 200 mm, wall 2 mm, E = 0.1 MPa, ν = 0.45, both ends fixed) under a pressure that
 //! pulses between 0 and 1 kPa twice a second; one linear solution per step.
 
-use std::f64::consts::TAU;
-use std::time::{Duration, Instant};
-
+use pliant_bench::{SHELL_STEP, ShellRun, tube};
 use pliant_geometry::Vector3;
 use pliant_implicit::element::Elasticity;
 use pliant_implicit::{
-    Assembly, BackwardEuler, DynamicSettings, LinearSolver, Preconditioner, Shell, State, StaticSettings,
-    Statics, Wall,
+    Assembly, DynamicSettings, LinearSolver, Phases, Preconditioner, Shell, State, StaticSettings, Statics,
+    Wall,
 };
-use pliant_mechanics::curve::{Curve as LoadCurve, Shape};
-use pliant_mechanics::load::{Load, LoadKind, Spread};
+use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::{Constraint, Motion};
 
 use crate::case::{Case, CaseError, Findings, Row};
 use crate::plot::{Curve, Key, Pen, Plot};
-use crate::shells::{FLAT, ramp};
+use crate::shells::ramp;
 
-/// Length of a step [s].
-const STEP: f64 = 0.04;
 /// Residual over the loads at which conjugate gradients stop.
 const TOLERANCE: f64 = 1e-3;
 /// Elements of figure 9.4.
@@ -42,90 +37,13 @@ pub const CASE: Case = Case {
     compute,
 };
 
-/// The tube, with about this number of shells.
-fn tube(shells: usize) -> Result<Assembly, CaseError> {
-    // Cells about as long as wide: 2 a n = shells with n/a = 200/(40 π).
-    let around = ((shells as f64 / 2.0) * (0.02 * TAU) / 0.2).sqrt().round().max(3.0) as usize;
-    let along = (shells / 2 / around).max(1);
-    let point = |i: usize| {
-        let angle = TAU * (i % around) as f64 / around as f64;
-        Vector3::new(0.02 * angle.cos(), 0.02 * angle.sin(), 0.2 * (i / around) as f64 / along as f64)
-    };
-    let node = |i: usize, j: usize| (i % around + around * j) as u32;
-    let cell = |c: usize| {
-        let (i, j) = (c % around, c / around);
-        let [a, b, c, d] = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
-        [[a, b, c], [a, c, d]]
-    };
-    let mut model = Assembly::new("shell", (0..around * (along + 1)).map(point));
-    let material = Wall { elastic: Elasticity { young: 1e5, poisson: 0.45 }, density: 1000.0 };
-    let cells = (0..around * along).flat_map(cell).collect();
-    model.add_shell(&Shell { formulation: FLAT, ..Shell::new("tube", cells, 0.002, material) })?;
-    let last = (around * (along + 1)) as u32;
-    model.model_mut().constraints.push(Constraint {
-        name: "ends".into(),
-        nodes: (0..around as u32).chain(last - around as u32..last).collect(),
-        components: [true; 6],
-        motion: Motion::Fixed,
-    });
-    let kind = LoadKind::ShellPressure {
-        facets: (0..model.facets.len() as u32).collect(),
-        pressure: 1000.0,
-        spread: Spread::Lumped,
-    };
-    let pulse = (0..40).map(|i| (0.25 * f64::from(i), f64::from(i % 2))).collect();
-    let curve = LoadCurve { shape: Shape::Table(pulse), from: 0.0, to: 1.0 };
-    model.model_mut().loads.push(Load::new("pressure", kind, curve));
-    model.model_mut().bodies[0].damping = 1.0;
-    Ok(model)
-}
-
 fn gradients(tolerance: f64, preconditioner: Preconditioner) -> LinearSolver {
     LinearSolver::ConjugateGradients { tolerance, iterations: 5000, preconditioner }
 }
 
-/// What steps took.
-struct Measured {
-    /// Shells.
-    shells: usize,
-    /// Wall times of steps [s]: median, least, most.
-    time: [f64; 3],
-    /// Means [s] of cells, preparation and solution.
-    phases: [f64; 3],
-    /// Mean.
-    iterations: f64,
-    /// Largest.
-    residual: f64,
-    /// Where it ended.
-    last: State,
-}
-
-fn measure(shells: usize, settings: DynamicSettings, steps: usize) -> Result<Measured, CaseError> {
-    let model = tube(shells)?;
-    let mut solver = BackwardEuler::new(model.clone(), settings)?;
-    let mut state = State::at_rest(&model);
-    let (mut times, mut residual) = (Vec::new(), 0.0_f64);
-    for _ in 0..steps {
-        let start = Instant::now();
-        residual = residual.max(solver.advance(&mut state)?.linear.residual);
-        times.push(start.elapsed().as_secs_f64());
-    }
-    times.sort_unstable_by(f64::total_cmp);
-    let phases = solver.phases();
-    let mean = |part: Duration| part.as_secs_f64() / steps as f64;
-    Ok(Measured {
-        shells: model.facets.len(),
-        time: [times[steps / 2], times[0], times[steps - 1]],
-        phases: [phases.cells, phases.preparation, phases.solution].map(mean),
-        iterations: phases.iterations as f64 / steps as f64,
-        residual,
-        last: state,
-    })
-}
-
 /// One linear solution a step.
 fn real_time(linear: LinearSolver) -> DynamicSettings {
-    DynamicSettings::new(STEP).real_time(linear)
+    DynamicSettings::new(SHELL_STEP).real_time(linear)
 }
 
 /// The thesis's two settings: residual 5 %, and 100 iterations.
@@ -201,11 +119,11 @@ fn compute() -> Result<Findings, CaseError> {
     {
         let mut points = Vec::new();
         for shells in PRINTED {
-            let found = measure(shells, settings, 40)?;
-            points.push((found.shells as f64, 1e3 * found.time[0]));
+            let found = ShellRun::measure(shells, settings, None, [0, 40])?;
+            points.push((found.shells as f64, 1e3 * found.time.median));
             if shells == [800, 1000][colour] {
                 let quantity = format!("{shells} shells, {name}: a step");
-                findings.rows.push(Row::timed(quantity, "ms", Some(40.0), 1e3 * found.time[0], thesis));
+                findings.rows.push(Row::timed(quantity, "ms", Some(40.0), 1e3 * found.time.median, thesis));
                 let quantity = format!("{shells} shells, {name}: largest residual");
                 findings.rows.push(Row::timed(quantity, "", None, found.residual, ""));
             }
@@ -227,8 +145,8 @@ fn compute() -> Result<Findings, CaseError> {
     for (colour, (name, linear)) in solvers().into_iter().enumerate() {
         let mut points = Vec::new();
         for (shells, steps) in SIZES {
-            let found = measure(shells, real_time(linear), steps)?;
-            points.push((found.shells as f64, 1e3 * found.time[0]));
+            let found = ShellRun::measure(shells, real_time(linear), None, [0, steps])?;
+            points.push((found.shells as f64, 1e3 * found.time.median));
             if matches!(shells, 800 | 4000 | 20_000) {
                 add_rows(&mut findings, shells, name, &found);
             }
@@ -243,7 +161,8 @@ fn compute() -> Result<Findings, CaseError> {
     let quantity = "469 nodes: factorisation and solution";
     findings.rows.push(Row::timed(quantity, "ms", Some(4.0), 1e3 * hexagon()?, "required of this machine"));
     let [loose, _] = printed();
-    let [loose, exact] = [loose, real_time(LinearSolver::Direct)].map(|settings| measure(800, settings, 19));
+    let [loose, exact] = [loose, real_time(LinearSolver::Direct)]
+        .map(|settings| ShellRun::measure(800, settings, None, [0, 19]));
     let (loose, exact) = (loose?.last, exact?.last);
     let tube = tube(800)?;
     let rest = State::at_rest(&tube).position;
@@ -256,8 +175,8 @@ fn compute() -> Result<Findings, CaseError> {
     Ok(findings)
 }
 
-fn add_rows(findings: &mut Findings, shells: usize, name: &str, found: &Measured) {
-    let [median, least, most] = found.time.map(|t| 1e3 * t);
+fn add_rows(findings: &mut Findings, shells: usize, name: &str, found: &ShellRun) {
+    let [median, least, most] = [found.time.median, found.time.least, found.time.most].map(|t| 1e3 * t);
     let asked = match shells {
         4000 => (Some(40.0), "required of this machine"),
         20_000 => (Some(40.0), "goal on this machine"),
@@ -275,11 +194,14 @@ fn add_rows(findings: &mut Findings, shells: usize, name: &str, found: &Measured
     add("a step, median", "ms", asked.0, median, asked.1);
     add("least", "ms", None, least, "");
     add("most", "ms", None, most, "");
-    for (what, time) in ["cells, mean", "preparation, mean", "solution, mean"].into_iter().zip(found.phases) {
-        add(what, "ms", None, 1e3 * time, "");
+    let Phases { cells, preparation, solution, iterations, .. } = found.phases;
+    for (what, time) in
+        [("cells, mean", cells), ("preparation, mean", preparation), ("solution, mean", solution)]
+    {
+        add(what, "ms", None, 1e3 * time.as_secs_f64() / found.steps as f64, "");
     }
-    if found.iterations > 0.0 {
-        add("iterations, mean", "", None, found.iterations, "");
+    if iterations > 0 {
+        add("iterations, mean", "", None, iterations as f64 / found.steps as f64, "");
         add("residual, largest", "", None, found.residual, "");
     }
 }

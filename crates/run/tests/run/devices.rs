@@ -129,6 +129,104 @@ fn organs_and_a_grasper_touch_on_a_device_as_on_the_processor() {
     assert!(apart < 1e-3, "displacements are {apart} apart");
 }
 
+/// A tube under a pressure that sets in at once, in implicit steps.
+const TUBE: &str = r#"[scene]
+until = 0.4
+
+[run]
+solver = "implicit"
+step = 0.04
+linear = "conjugate-gradients"
+
+[law.wall]
+type = "st-venant-kirchhoff"
+young-modulus = 1e5
+poisson-ratio = 0.45
+
+[body.tube]
+model = "shell"
+mesh = { cylinder = { radius = 0.02, length = 0.1 }, edge = 0.008 }
+law = "wall"
+density = 1000
+thickness = 0.002
+
+[constraint.ends]
+type = "fix"
+body = "tube"
+nodes = { union = [{ set = "z-min" }, { set = "z-max" }] }
+
+[load.push]
+type = "pressure"
+on = "tube"
+faces = "all"
+pressure = 500
+
+[output.fields]
+type = "vtu"
+every = 0.4
+"#;
+
+fn tube(run: &str) -> Workshop {
+    Workshop::new(&changed(TUBE, "step = 0.04", &format!("step = 0.04\n{run}")))
+}
+
+/// Solutions to a residual of 1e-6 on both; Newton's method ends at 1e-6, too.
+#[test]
+fn equations_of_shells_are_solved_on_a_device_as_on_the_processor() {
+    if !pliant_testing::has_gpu(adapters().len()) {
+        return;
+    }
+    let linear = "run.linear={ by = \"conjugate-gradients\", tolerance = 1e-6 }";
+    let [cpu, gpu] = ["device = \"cpu\"", "device = \"gpu\""].map(tube);
+    let reference = cpu.run(&[linear]).done();
+    let json = gpu.run(&[linear]).done();
+    assert_eq!(json["device"], adapters()[0].name);
+    assert_eq!((&json["precision"], &reference["precision"]), (&"double".into(), &"double".into()));
+    assert!(json["solver"]["linear_iterations"].as_u64() > Some(0), "{json}");
+    let apart = apart(&cpu, &gpu);
+    println!("displacements are {apart:.1e} apart");
+    assert!(apart < 1e-5, "displacements are {apart} apart");
+}
+
+#[test]
+fn equations_that_a_device_does_not_solve_are_refused_by_name() {
+    let linear = |table: &str| format!("run.linear={table}");
+    let lagged = linear("{ by = \"conjugate-gradients\", preconditioner = \"lagged-factors\" }");
+    for (given, says, help) in [
+        (
+            linear("direct"),
+            "the linear solver `direct` runs on the CPU only",
+            "`linear = \"conjugate-gradients\"`",
+        ),
+        (linear("unsymmetric"), "the linear solver `unsymmetric` runs on the CPU only", "device = \"cpu\""),
+        (
+            lagged,
+            "the preconditioner `lagged-factors` runs on the CPU only",
+            "`aggregates` or `block-jacobi`",
+        ),
+    ] {
+        let told = tube("device = \"gpu\"").check(&[&given]);
+        assert_eq!(told.status(), "invalid", "{}", told.err);
+        assert!(told.words().contains(says) && told.words().contains(help), "{given}: {}", told.err);
+    }
+    let explicit = changed(TUBE, "linear = \"conjugate-gradients\"", "device = \"gpu\"");
+    let told = Workshop::new(&explicit).check(&["run.solver=explicit", "run.step=1e-6"]);
+    assert!(told.words().contains("the explicit solver of shells runs on the CPU only"), "{}", told.err);
+    let told = tube("device = \"auto\"").run(&["run.linear=direct"]);
+    assert_eq!(told.done()["device"], "cpu");
+    assert!(told.words().contains("the linear solver `direct` runs on the CPU only"), "{}", told.err);
+    if !pliant_testing::has_gpu(adapters().len()) {
+        return;
+    }
+    let told = tube("device = \"gpu\"\ndesign = \"gather\"").check(&[]);
+    assert_eq!(told.status(), "invalid", "{}", told.err);
+    assert!(
+        told.underlines("design = \"gather\"") && told.words().contains("about explicit steps"),
+        "{}",
+        told.err
+    );
+}
+
 #[test]
 fn a_checkpoint_goes_from_device_to_processor_and_back() {
     if !pliant_testing::has_gpu(adapters().len()) {

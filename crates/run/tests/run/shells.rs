@@ -621,10 +621,7 @@ fn wrong_combinations_of_models_solvers_and_keys_are_refused() {
         &["is above the critical time step", "`solver = \"implicit\"` for long steps"],
     );
     for (changes, pieces) in [
-        (
-            run("device = \"gpu\""),
-            ["the model of shells, `implicit` and `static` runs on the CPU only", "`device = \"cpu\"`"],
-        ),
+        (run("device = \"gpu\""), ["the solver `static` runs on the CPU only", "`solver = \"implicit\"`"]),
         (
             run("precision = \"single\""),
             ["shells are computed in double precision only", "leave `precision` out"],

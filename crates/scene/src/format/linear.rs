@@ -21,6 +21,16 @@ impl Default for LinearWay {
     }
 }
 
+impl LinearWay {
+    /// Its settings.
+    pub fn table(&self) -> LinearTable {
+        match self {
+            Self::Named(name) => LinearTable::usual(*name),
+            Self::Set(table) => table.clone(),
+        }
+    }
+}
+
 /// A way to solve linear equations.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
