@@ -36,7 +36,7 @@ impl Design {
     ///
     /// On software adapters `gather` measured best (Mesa's llvmpipe, 55,566 tetrahedra: 78 ns of CPU time per cell and
     /// step, 113 to 161 for the others). On GPUs `fast` moves the fewest bytes, needs no atomics and has forces of any size. On
-    /// an NVIDIA H200 only `blocks` is faster (0.34 ns for 0.55 ns), which has no contact and forces of a limited range.
+    /// an NVIDIA H100 only `blocks` is faster (0.32 ns for 0.40 ns), which has no contact and forces of a limited range.
     pub fn usual(kind: Kind) -> Self {
         match kind {
             Kind::Software => Self::Gather,
