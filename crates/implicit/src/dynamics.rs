@@ -247,7 +247,8 @@ impl BackwardEuler {
         self.system.stop = flag.clone();
     }
 
-    /// How far moved nodes whose force is limited are behind their motion, by their constraints.
+    /// How far moved nodes whose force is limited are behind their motion, and volumes [m³] whose pressure is limited behind theirs, along the first axis, by
+    /// their constraints.
     pub fn lags(&self) -> &[Lag] {
         &self.system.lags
     }
@@ -354,6 +355,7 @@ impl BackwardEuler {
             if iteration == 1 && self.settings.iterations == 1 {
                 if !self.system.lags.is_empty() {
                     self.system.evaluate(state, time, None)?;
+                    self.find_residual(state);
                 }
                 break;
             }

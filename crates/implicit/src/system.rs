@@ -107,7 +107,8 @@ pub(crate) struct System {
     followers: Option<Followers>,
     pub(crate) conditions: Conditions,
     solver: LinearSolver,
-    /// How far moved nodes whose force is limited are behind their motion, by their constraints; a system of forces alone has none.
+    /// How far moved nodes whose force is limited are behind their motion, and volumes [m³] whose pressure is limited behind theirs, along the first axis, by
+    /// their constraints; a system of forces alone has none.
     pub(crate) lags: Vec<Lag>,
     /// Contacts; a system of forces alone has none.
     pub(crate) touching: Option<Box<TouchingSystem>>,
@@ -498,6 +499,7 @@ impl System {
         if tangent.is_some() && !self.matrix.mirror.is_empty() {
             self.turn_moments(state.load_factor);
         }
+        self.conditions.press(&self.equations, &mut self.external);
         self.phases.cells += start.elapsed() - of_contact;
         self.phases.evaluations += 1;
         Ok(())
@@ -899,7 +901,7 @@ impl System {
                 pivot: pivots.smallest,
             });
         }
-        if !self.conditions.is_empty() {
+        if self.conditions.has_rows() {
             let mut conditions = std::mem::take(&mut self.conditions);
             let prepared = conditions.prepare(|right, solution| self.solve_pinned(right, solution));
             self.conditions = conditions;

@@ -662,7 +662,7 @@ impl Instant for Implicit {
         self.method.touching()?.lags().iter().find(|lag| lag.number() == rigid)
     }
 
-    fn lag_of_nodes(&self, constraint: usize) -> Option<&Lag> {
+    fn lag_of_constraint(&self, constraint: usize) -> Option<&Lag> {
         self.method.lags().iter().find(|lag| lag.number() == constraint)
     }
 

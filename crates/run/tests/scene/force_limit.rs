@@ -206,7 +206,7 @@ fn the_failure_of_a_body_that_a_tool_goes_through_names_the_tool() {
 #[test]
 fn limits_of_moved_nodes_that_cannot_be_kept_are_refused() {
     let error = world(&driven("solver = 'explicit'", "force-limit = 2", 1.0)).unwrap_err();
-    assert!(error.contains("`push` is limited in an explicit run"), "{error}");
+    assert!(error.contains("the solver `explicit` keeps no limit of the force of `push`"), "{error}");
     let text = driven("solver = 'static'", "force-limit = 2", 1.0);
     let shared = "[constraint.also]\ntype = 'fix'\nbody = 'plate'\nnodes = { set = 'x-min' }\n";
     let error = world(&format!("{text}{shared}")).unwrap_err();
