@@ -317,7 +317,7 @@ impl BackwardEuler {
                 Err(error) => {
                     state.clone_from(&self.start);
                     if halvings == self.settings.halvings || error.is_final() {
-                        return Err(error);
+                        return Err(self.system.blocked_at(state, error));
                     }
                     halvings += 1;
                     size *= 0.5;

@@ -312,7 +312,7 @@ impl Statics {
                 Err(Attempt { error, retry }) => {
                     *state = before;
                     if !retry || error.is_final() || halvings == self.settings.halvings {
-                        return Err(error.after(broken));
+                        return Err(self.system.blocked_at(state, error.after(broken)));
                     }
                     broken = error.broken().or(broken);
                     halvings += 1;
