@@ -69,7 +69,7 @@ typedef struct PliantError {
     int64_t element;
     /* Time [s] of the simulation; NaN if it is about none. */
     double time;
-    /* Of `PLIANT_STATUS_FAILED`: `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `intersecting`, `device`, `output` or `input`. */
+    /* Of `PLIANT_STATUS_FAILED`: `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `blocked`, `intersecting`, `device`, `output` or `input`. */
     char kind[32];
     /* The body that it is about. */
     char body[64];

@@ -68,7 +68,7 @@ pub struct PliantError {
     pub element: i64,
     /// Time [s] of the simulation; NaN if it is about none.
     pub time: f64,
-    /// Of `PLIANT_STATUS_FAILED`: `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `intersecting`, `device`, `output` or `input`.
+    /// Of `PLIANT_STATUS_FAILED`: `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `blocked`, `intersecting`, `device`, `output` or `input`.
     pub kind: [c_char; 32],
     /// The body that it is about.
     pub body: [c_char; 64],
@@ -166,7 +166,7 @@ impl Fault {
 impl From<Failure> for Fault {
     fn from(failure: Failure) -> Self {
         let Failure { kind, body, element, node, time, message, .. } = failure;
-        let body = body.unwrap_or_default();
+        let body = body.map(String::from).unwrap_or_default();
         let place = Place { kind, body, node, element, time, ..Place::default() };
         Self { status: PliantStatus::Failed, message, place: Some(Box::new(place)) }
     }

@@ -95,6 +95,11 @@ impl Lag {
         into
     }
 
+    /// Stands by a way [m] off the trajectory after the step.
+    pub fn stand(&mut self, way: Vector3<f64>) {
+        self.ways[1] = way.into();
+    }
+
     /// Takes the force [N] with which it pushes in this step.
     pub fn found(&mut self, force: Vector3<f64>) {
         self.forces[1] = force.into();

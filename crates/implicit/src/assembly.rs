@@ -41,8 +41,8 @@ pub struct Assembly {
     pub springs: Vec<Spring>,
     /// The points of each surface of the model that shells carry.
     pub carried: BTreeMap<usize, Vec<Carried>>,
-    /// The force [N] with which constraints that move nodes push at most, by their numbers. Their nodes lag behind their motion together, as the static
-    /// and the implicit solver find.
+    /// The force [N] with which constraints that move nodes push at most, and the pressure [Pa] of constraints of volume, by their numbers. Their nodes lag
+    /// behind their motion together, and their volumes behind their growth, as the static and the implicit solver find.
     pub force_limits: BTreeMap<usize, f64>,
     /// Contacts, which the static and the implicit solver keep.
     pub touching: Option<Touching>,

@@ -3,7 +3,8 @@
 //! holds it, and is taken back with λ by one small system (Woodbury): two more solutions with K' for each row.
 //!
 //! Of a volume a is the gradient where the nodes are, and λ the pressure, whose change with the nodes belongs to K
-//! ([`System`](crate::system::System) adds it with the pressure that balances what elements and loads leave, by least squares).
+//! ([`System`](crate::system::System) adds it with the pressure that balances what elements and loads leave, by least squares). Where a pressure has come to
+//! its limit it is a load, λ a with λ given, and the volume follows.
 
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 use pliant_mechanics::model::{Constraint, Enclosure, Motion};
@@ -20,7 +21,10 @@ const CLOSED: f64 = 1e-10;
 /// The means and the volumes that a model prescribes.
 #[derive(Default)]
 pub(crate) struct Conditions {
+    /// Those of constraints, in their order.
     rows: Vec<Row>,
+    /// Volumes whose pressure [Pa] is given.
+    loose: Vec<(Row, f64)>,
     /// Whether the springs are in the matrix.
     pinned: bool,
     small: Option<LU<f64, Dyn, Dyn>>,
@@ -47,6 +51,8 @@ struct Row {
     /// How far the mean has yet to go [m], or the volume to grow [m³], and what counts as nothing.
     gap: f64,
     closed: f64,
+    /// What was taken from the last residual along the row, of a volume minus the pressure [Pa].
+    force: f64,
     /// K'⁻¹ a and K'⁻¹ e.
     answers: [Vec<f64>; 2],
 }
@@ -56,8 +62,18 @@ impl Conditions {
         let mut rows = Vec::new();
         let mut add = |constraint: usize, kind: Kind, dense: Vec<f64>, closed: f64| {
             let answers = [vec![0.0; dense.len()], vec![0.0; dense.len()]];
-            let mut row =
-                Row { constraint, kind, dense, squared: 0.0, pin: 0, spring: 0.0, gap: 0.0, closed, answers };
+            let mut row = Row {
+                constraint,
+                kind,
+                dense,
+                squared: 0.0,
+                pin: 0,
+                spring: 0.0,
+                gap: 0.0,
+                closed,
+                force: 0.0,
+                answers,
+            };
             row.find_pin();
             if row.squared > 0.0 {
                 rows.push(row);
@@ -90,8 +106,55 @@ impl Conditions {
         Self { rows, ..Self::default() }
     }
 
+    /// Whether there are rows beside the equations.
+    pub(crate) fn has_rows(&self) -> bool {
+        !self.rows.is_empty()
+    }
+
+    /// Whether nothing is prescribed.
     pub(crate) fn is_empty(&self) -> bool {
-        self.rows.is_empty()
+        self.rows.is_empty() && self.loose.is_empty()
+    }
+
+    /// Prescribes the pressure [Pa] of a constraint's volume from now on, or the volume itself.
+    pub(crate) fn give_pressure(&mut self, constraint: usize, given: Option<f64>) {
+        let at = self.loose.iter().position(|(row, _)| row.constraint == constraint);
+        if at.is_some() != given.is_some() {
+            self.small = None;
+        }
+        match (at, given) {
+            (Some(at), Some(pressure)) => self.loose[at].1 = pressure,
+            (Some(at), None) => {
+                let (row, _) = self.loose.remove(at);
+                let place = self.rows.partition_point(|own| own.constraint < constraint);
+                self.rows.insert(place, row);
+            }
+            (None, Some(pressure)) => {
+                if let Some(at) = self.rows.iter().position(|row| row.constraint == constraint) {
+                    self.loose.push((self.rows.remove(at), pressure));
+                }
+            }
+            (None, None) => {}
+        }
+    }
+
+    /// The pressure [Pa] of a constraint's volume at the residual last found, how far the volume has yet to grow [m³], and how large it is at rest [m³].
+    pub(crate) fn enclosed(&self, constraint: usize) -> Option<[f64; 3]> {
+        let given = self.loose.iter().map(|(row, pressure)| (row, *pressure));
+        let all = self.rows.iter().map(|row| (row, -row.force)).chain(given);
+        all.filter(|(row, _)| row.constraint == constraint).find_map(|(row, pressure)| match row.kind {
+            Kind::Volume(rest) => Some([pressure, row.gap, rest]),
+            Kind::Mean(_) => None,
+        })
+    }
+
+    /// Adds the forces of pressures that are given to loads, six a node.
+    pub(crate) fn press(&self, equations: &Equations, loads: &mut [f64]) {
+        for (row, pressure) in &self.loose {
+            for (g, &component) in row.dense.iter().zip(&equations.component) {
+                loads[component as usize] += pressure * g;
+            }
+        }
     }
 
     /// Finds how far means and volumes have yet to go to where they are at a time [s], and the gradients of volumes.
@@ -103,7 +166,7 @@ impl Conditions {
         state: &State,
         time: f64,
     ) {
-        for row in &mut self.rows {
+        for row in self.rows.iter_mut().chain(self.loose.iter_mut().map(|(row, _)| row)) {
             let own = &model.constraints[row.constraint];
             match (&own.motion, &row.kind) {
                 (Motion::Mean { weights, by, curve }, &Kind::Mean(component)) => {
@@ -132,21 +195,24 @@ impl Conditions {
         self.pinned = false;
     }
 
-    /// Each volume with the pressure [Pa] that balances forces [N] of elements beyond loads, six a node, by least squares.
+    /// Each volume with the pressure [Pa] that is given, or balances forces [N] of elements beyond loads, six a node, by least squares.
     pub(crate) fn pressures<'a>(
         &self,
         model: &'a Assembly,
         equations: &Equations,
         resisting: impl Fn(usize) -> f64,
     ) -> Vec<(&'a Constraint, &'a Enclosure, f64)> {
-        let of = |row: &Row| {
+        let of = |(row, given): (&Row, Option<f64>)| {
             let own = &model.constraints[row.constraint];
             let Motion::Volume { enclosure, .. } = &own.motion else { return None };
-            let along = row.dense.iter().zip(&equations.component);
-            let along: f64 = along.map(|(g, &component)| g * resisting(component as usize)).sum();
-            Some((own, enclosure, along / row.squared))
+            let along = || {
+                let along = row.dense.iter().zip(&equations.component);
+                along.map(|(g, &component)| g * resisting(component as usize)).sum::<f64>() / row.squared
+            };
+            Some((own, enclosure, given.unwrap_or_else(along)))
         };
-        self.rows.iter().filter_map(of).collect()
+        let loose = self.loose.iter().map(|(row, pressure)| (row, Some(*pressure)));
+        self.rows.iter().map(|row| (row, None)).chain(loose).filter_map(of).collect()
     }
 
     /// Whether every mean and every volume is where it should be.
@@ -155,10 +221,10 @@ impl Conditions {
     }
 
     /// Takes from a residual the forces of means and volumes, by the least squares of what is left.
-    pub(crate) fn relieve(&self, residual: &mut [f64]) {
-        for Row { dense, squared, .. } in &self.rows {
-            let force = dot(dense, residual) / squared;
-            residual.iter_mut().zip(dense).for_each(|(residual, weight)| *residual -= force * weight);
+    pub(crate) fn relieve(&mut self, residual: &mut [f64]) {
+        for Row { dense, squared, force, .. } in &mut self.rows {
+            *force = dot(dense, residual) / *squared;
+            residual.iter_mut().zip(&*dense).for_each(|(residual, weight)| *residual -= *force * weight);
         }
     }
 

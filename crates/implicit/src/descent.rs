@@ -191,6 +191,9 @@ pub(crate) fn descend(
         if complete && (last || before.along.abs() <= ROUND_OFF * before.size) {
             return check(solver, time).map(|()| true);
         }
+        if !complete {
+            return Err(not_found(solver, time, iteration + 1));
+        }
         let node = solver.worst();
         return Err(SolveError::Uphill { time, node, iterations: iteration + 1 });
     }
@@ -454,10 +457,14 @@ fn check(solver: &mut impl Contacting, time: f64) -> Result<(), SolveError> {
 /// Why a step was not found.
 fn not_found(solver: &mut impl Contacting, time: f64, iterations: usize) -> SolveError {
     let blocked = !is_complete(solver);
-    let touching = solver.system().touching.as_ref();
-    if let (true, Some(touching)) = (blocked, touching) {
-        let gap = touching.barriers.least_gap().unwrap_or(f64::INFINITY);
-        return SolveError::Blocked { time, part: touching.share, gap, iterations };
+    if let (true, Some(touching)) = (blocked, &solver.system().touching) {
+        return SolveError::Blocked {
+            time,
+            driver: None,
+            part: touching.share,
+            gap: f64::INFINITY,
+            iterations,
+        };
     }
     SolveError::NotConverged { time, node: solver.worst(), residuals: Vec::new(), broken: None }
 }

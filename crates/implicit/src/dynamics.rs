@@ -260,7 +260,8 @@ impl BackwardEuler {
         self.system.stop = flag.clone();
     }
 
-    /// How far moved nodes whose force is limited are behind their motion, by their constraints.
+    /// How far moved nodes whose force is limited are behind their motion, and volumes [m³] whose pressure is limited behind theirs, along the first axis, by
+    /// their constraints.
     pub fn lags(&self) -> &[Lag] {
         &self.system.lags
     }
@@ -329,7 +330,7 @@ impl BackwardEuler {
                 Err(error) => {
                     state.clone_from(&self.start);
                     if halvings == self.settings.halvings || error.is_final() {
-                        return Err(error);
+                        return Err(self.system.blocked_at(state, error));
                     }
                     halvings += 1;
                     size *= 0.5;
@@ -367,6 +368,7 @@ impl BackwardEuler {
             if iteration == 1 && self.settings.iterations == 1 {
                 if !self.system.lags.is_empty() {
                     self.system.evaluate(state, time, None)?;
+                    self.find_residual(state);
                 }
                 break;
             }

@@ -202,16 +202,19 @@ pub enum SolveError {
     },
     /// A tool or a prescribed motion that cannot go on.
     #[error(
-        "a tool or a prescribed motion is blocked at t = {time:.6}: after {iterations} iterations it has gone {:.1} % of its way in the step, with a gap of \
-         {gap:.1e} m left; nothing is in anything else. Give it a `force-limit`, let it go less far or more slowly, or take smaller steps",
-        100.0 * part
+        "{}, with a gap of {gap:.1e} m left: on to t = {time:.6} it has gone {:.1} % of its way after {iterations} iterations; nothing is in anything else. \
+         Give it a `force-limit`, let it go less far or more slowly, or take smaller steps",
+        blocked(driver.as_ref()), 100.0 * part
     )]
     Blocked {
         /// Time of the step that failed.
         time: f64,
+        /// Of the tools and constraints that move in the step the one that pushes hardest, and its force [N] where the step began, without friction; none where
+        /// a volume is to change.
+        driver: Option<(String, f64)>,
         /// Part of the way that it went, from 0 to 1.
         part: f64,
-        /// The least gap [m].
+        /// The least gap [m] where the step began.
         gap: f64,
         /// Iterations of the last attempt.
         iterations: usize,
@@ -291,6 +294,13 @@ fn in_larger_steps(found: Option<(usize, Broken)>) -> String {
         Broken::Folded(_) => "folds over",
     };
     format!("; in a larger step element {cell} {what}")
+}
+
+fn blocked(driver: Option<&(String, f64)>) -> String {
+    match driver {
+        Some((name, force)) => format!("`{name}` is blocked, pushing with {force:.3e} N"),
+        None => "a prescribed volume is blocked".into(),
+    }
 }
 
 fn broken(why: Broken) -> String {

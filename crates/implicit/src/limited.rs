@@ -2,11 +2,15 @@
 //! 1 at half of its limit over 0 at the limit to −1 ([`Lag`]), as in explicit steps; but the force is that at the end of the step, so that long steps do not go beyond
 //! the limit. The part is found by solving the step again: the force grows with it, so a root lies between −1 and 1. Moved nodes of a constraint do the same
 //! together: their force is its reaction, their way the mean of theirs.
+//!
+//! The pressure in a volume goes up to its limit, and no further: the step is solved with the volume prescribed, or with the limit as a load, whichever holds.
 
 use nalgebra::Vector3;
 use pliant_contact::lag::Lag;
 
+use crate::assembly::Assembly;
 use crate::descent::{Contacting, Vectors};
+use crate::error::SolveError;
 use crate::state::State;
 use crate::system::System;
 
@@ -14,6 +18,12 @@ use crate::system::System;
 const TRIES: usize = 12;
 /// How far a part may be off: by this the force is off by half as much of its limit.
 const FOUND: f64 = 0.02;
+
+/// How far a pressure or a volume may be beyond its limit, over it, to begin with: a step ends with a residual. Ten times as far each time that the other was
+/// prescribed in vain.
+const BEYOND: f64 = 1e-6;
+/// How often the other may be prescribed.
+const CHANGES: i32 = 3;
 
 /// The part that a tool or moved nodes go, as it is found.
 struct Guess {
@@ -61,16 +71,52 @@ impl Guess {
     }
 }
 
-/// Solves a step to a time [s] with tools and moved nodes whose force is limited; `solve` solves it from its start with these at their assumed
-/// places.
-pub(crate) fn within_limits<S: Contacting, T, E>(
+/// A volume whose pressure is limited.
+struct Valve {
+    constraint: usize,
+    /// The limit [Pa].
+    limit: f64,
+    /// The pressure [Pa] that is prescribed in place of the volume.
+    given: Option<f64>,
+    /// How often the other was prescribed.
+    changes: i32,
+}
+
+impl Valve {
+    /// Takes a pressure [Pa], how far the volume has yet to grow, and the volume at rest [m³]; whether what is prescribed holds.
+    fn take(&mut self, [pressure, gap, rest]: [f64; 3]) -> bool {
+        let beyond = BEYOND * 10.0_f64.powi(self.changes);
+        let holds = match self.given {
+            None => pressure.abs() <= self.limit * (1.0 + beyond),
+            Some(given) => -gap * given.signum() <= beyond * rest.abs(),
+        };
+        if !holds {
+            self.given = if self.given.is_some() { None } else { Some(self.limit.copysign(pressure)) };
+            self.changes += 1;
+        }
+        holds
+    }
+
+    /// How far the volume is from where it should be [m³].
+    fn lag(&self, gap: f64) -> f64 {
+        match self.given {
+            Some(given) if gap * given > 0.0 => -gap,
+            _ => 0.0,
+        }
+    }
+}
+
+/// Solves a step to a time [s] with tools and moved nodes whose force is limited, and volumes whose pressure is; `solve` solves it from its start with these
+/// at their assumed places.
+pub(crate) fn within_limits<S: Contacting, T, E: From<SolveError>>(
     solver: &mut S,
     state: &mut State,
     time: f64,
     mut solve: impl FnMut(&mut S, &mut State) -> Result<T, E>,
 ) -> Result<T, E> {
     let mut guesses = solver.system().guesses();
-    if guesses.is_empty() {
+    let mut valves = solver.system().valves();
+    if guesses.is_empty() && valves.is_empty() {
         return solve(solver, state);
     }
     let start = state.clone();
@@ -80,8 +126,19 @@ pub(crate) fn within_limits<S: Contacting, T, E>(
         let Vectors { system, pending, .. } = solver.vectors();
         pending.copy_from_slice(&whole);
         system.hold_back([start.time, time], &mut guesses, pending);
+        valves.iter().for_each(|own| system.conditions.give_pressure(own.constraint, own.given));
         let solved = solve(solver, state)?;
-        let mut agree = true;
+        if !valves.is_empty() && solver.system().touching.is_some() {
+            // The last motion of a step in contact was made without a look at what is left.
+            solver.find_residual(state);
+        }
+        let mut agree = solver.system().valves_hold(&mut valves);
+        if valves.iter().any(|own| own.changes > CHANGES) {
+            return Err(SolveError::Impossible(
+                "neither the volume nor the limit of its pressure can be kept: the surface snaps open; take smaller steps, or a higher `pressure-limit`",
+            )
+            .into());
+        }
         for (guess, force) in guesses.iter_mut().zip(solver.system().bear_on()) {
             agree &= guess.take(force);
         }
@@ -97,18 +154,45 @@ impl System {
     /// What tools, and then moved nodes, whose force is limited are to go.
     fn guesses(&self) -> Vec<Guess> {
         let tools = self.touching.iter().flat_map(|own| own.lags().iter().map(|lag| (lag, own.limit(lag))));
-        let nodes = self.lags.iter().map(|lag| (lag, self.model.force_limits[&lag.number()]));
+        let nodes = self.lags.iter().filter(|lag| !encloses(&self.model, lag));
+        let nodes = nodes.map(|lag| (lag, self.model.force_limits[&lag.number()]));
         tools.chain(nodes).map(|(lag, limit)| Guess::new(lag.force(), limit)).collect()
+    }
+
+    /// Volumes whose pressure is limited: those that lag have it as a load.
+    fn valves(&self) -> Vec<Valve> {
+        let own = self.lags.iter().filter(|lag| encloses(&self.model, lag));
+        own.map(|lag| {
+            let (constraint, behind) = (lag.number(), -lag.now().x);
+            let limit = self.model.force_limits[&constraint];
+            let given = (behind != 0.0).then(|| limit.copysign(behind));
+            Valve { constraint, limit, given, changes: 0 }
+        })
+        .collect()
+    }
+
+    /// Takes pressures and volumes at the residual last found, and how far volumes lag; whether what is prescribed holds.
+    fn valves_hold(&mut self, valves: &mut [Valve]) -> bool {
+        let lags = self.lags.iter_mut().filter(|lag| encloses(&self.model, lag));
+        let mut hold = true;
+        for (lag, valve) in lags.zip(valves) {
+            let Some(found) = self.conditions.enclosed(valve.constraint) else { continue };
+            lag.stand(Vector3::x() * valve.lag(found[1]));
+            hold &= valve.take(found);
+        }
+        hold
     }
 
     /// Finds where they go between two times [s]; increments of prescribed components, six a node, are those without limits before.
     fn hold_back(&mut self, [from, to]: [f64; 2], guesses: &mut [Guess], pending: &mut [f64]) {
-        let (tools, nodes) = guesses.split_at_mut(guesses.len() - self.lags.len());
+        let moving = self.lags.iter().filter(|lag| !encloses(&self.model, lag)).count();
+        let (tools, nodes) = guesses.split_at_mut(guesses.len() - moving);
         if let Some(touching) = &mut self.touching {
             let parts = tools.iter_mut().map(|guess| (guess.ahead, guess.part, &mut guess.into));
             touching.follow([from, to], parts);
         }
-        for (lag, guess) in self.lags.iter_mut().zip(nodes) {
+        let lags = self.lags.iter_mut().filter(|lag| !encloses(&self.model, lag));
+        for (lag, guess) in lags.zip(nodes) {
             let own = &self.model.constraints[lag.number()];
             let held = || (0..3).filter(|&c| own.components[c]);
             let mut way = Vector3::zeros();
@@ -127,7 +211,7 @@ impl System {
     /// Gives each lag the force [N] with which its tool or its nodes push at the state last evaluated; these forces.
     fn bear_on(&mut self) -> Vec<Vector3<f64>> {
         let mut forces = self.touching.as_mut().map(|own| own.bear_on()).unwrap_or_default();
-        for lag in &mut self.lags {
+        for lag in self.lags.iter_mut().filter(|lag| !encloses(&self.model, lag)) {
             let own = &self.model.constraints[lag.number()];
             let mut force = Vector3::zeros();
             for at in own.nodes.iter().map(|&node| 6 * node as usize) {
@@ -139,4 +223,9 @@ impl System {
         }
         forces
     }
+}
+
+/// Whether a lag is that of a volume.
+fn encloses(model: &Assembly, lag: &Lag) -> bool {
+    model.constraints[lag.number()].motion.encloses()
 }

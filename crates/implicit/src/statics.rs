@@ -158,6 +158,12 @@ struct Attempt {
     retry: bool,
 }
 
+impl From<SolveError> for Attempt {
+    fn from(error: SolveError) -> Self {
+        Self { error, retry: true }
+    }
+}
+
 impl Statics {
     /// A solver for a model.
     ///
@@ -230,7 +236,8 @@ impl Statics {
         self.system.stop = flag.clone();
     }
 
-    /// How far moved nodes whose force is limited are behind their motion, by their constraints.
+    /// How far moved nodes whose force is limited are behind their motion, and volumes [m³] whose pressure is limited behind theirs, along the first axis, by
+    /// their constraints.
     pub fn lags(&self) -> &[Lag] {
         &self.system.lags
     }
@@ -305,7 +312,7 @@ impl Statics {
                 Err(Attempt { error, retry }) => {
                     *state = before;
                     if !retry || error.is_final() || halvings == self.settings.halvings {
-                        return Err(error.after(broken));
+                        return Err(self.system.blocked_at(state, error.after(broken)));
                     }
                     broken = error.broken().or(broken);
                     halvings += 1;

@@ -138,7 +138,8 @@ pub(crate) struct System {
     solver: LinearSolver,
     /// What solves the equations in place of the CPU.
     device: Option<Arc<dyn LinearDevice>>,
-    /// How far moved nodes whose force is limited are behind their motion, by their constraints; a system of forces alone has none.
+    /// How far moved nodes whose force is limited are behind their motion, and volumes [m³] whose pressure is limited behind theirs, along the first axis, by
+    /// their constraints; a system of forces alone has none.
     pub(crate) lags: Vec<Lag>,
     /// Contacts; a system of forces alone has none.
     pub(crate) touching: Option<Box<TouchingSystem>>,
@@ -545,6 +546,7 @@ impl System {
         if tangent.is_some() && !self.matrix.mirror.is_empty() {
             self.turn_moments(state.load_factor);
         }
+        self.conditions.press(&self.equations, &mut self.external);
         self.phases.cells += start.elapsed() - of_contact;
         self.phases.evaluations += 1;
         Ok(())
@@ -866,6 +868,49 @@ impl System {
         Some((Enclosed { volume, pressure }, all))
     }
 
+    /// An error of a step that began at a state; where the step is blocked, with what drives it there, its force and the gap.
+    pub(crate) fn blocked_at(&mut self, state: &State, error: SolveError) -> SolveError {
+        let SolveError::Blocked { time, part, iterations, .. } = error else { return error };
+        self.stand(&state.history);
+        if let Some(touching) = &mut self.touching {
+            touching.stand(state);
+        }
+        if self.evaluate(state, state.time, None).is_err() {
+            return error;
+        }
+        let gap = self.touching.as_ref().and_then(|own| own.barriers.least_gap()).unwrap_or(f64::INFINITY);
+        let driver = self.hardest_driver([state.time, time]);
+        SolveError::Blocked { time, driver, part, gap, iterations }
+    }
+
+    /// Of tools and constraints that move between two times [s] the one that pushes hardest, with its force [N] at the state last evaluated.
+    fn hardest_driver(&self, [from, to]: [f64; 2]) -> Option<(String, f64)> {
+        let resisting = |at: usize| self.internal[at] - self.external[at];
+        let held = |own: &Constraint| {
+            let goes = |index: usize| own.motion.increment(index, from, to) != [0.0; 6];
+            if matches!(own.motion, Motion::Fixed) || !(0..own.nodes.len()).any(goes) {
+                return None;
+            }
+            let along = |c: usize| own.nodes.iter().map(|&node| resisting(6 * node as usize + c)).sum();
+            let force = Vector3::from_fn(|c, _| if own.components[c] { along(c) } else { 0.0 });
+            Some((own.name.clone(), force.norm()))
+        };
+        let constraints = self.model.constraints.iter().filter_map(|own| match &own.motion {
+            Motion::Mean { by, curve, .. } => {
+                let goes = *by != [0.0; 3] && curve.value(from) != curve.value(to);
+                let force = own.mean_force(|node| [0, 1, 2].map(|c| resisting(6 * node as usize + c)));
+                goes.then(|| (own.name.clone(), Vector3::from(force).norm()))
+            }
+            motion if motion.is_collective() => None,
+            _ => held(own),
+        });
+        let tools = self.touching.iter().flat_map(|own| own.pushing([from, to]));
+        constraints.chain(tools).fold(None, |hardest: Option<(String, f64)>, next| match hardest {
+            Some(own) if own.1 >= next.1 => Some(own),
+            _ => Some(next),
+        })
+    }
+
     fn add_forces(&mut self, nodes: &[u32], forces: &[f64]) {
         for (&node, force) in nodes.iter().zip(forces.chunks_exact(3)) {
             for (own, force) in self.internal[6 * node as usize..].iter_mut().zip(force) {
@@ -946,7 +991,7 @@ impl System {
                 pivot: pivots.smallest,
             });
         }
-        if !self.conditions.is_empty() {
+        if self.conditions.has_rows() {
             let mut conditions = std::mem::take(&mut self.conditions);
             let prepared = conditions.prepare(|right, solution| self.solve_pinned(right, solution));
             self.conditions = conditions;

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use pliant_contact::barrier::{BarrierSettings, Barriers, Matrix12, Meeting, NodeTouch};
 use pliant_contact::lag::Lag;
 use pliant_contact::pose::Leg;
-use pliant_contact::touch::{Contact, Contacts, With};
+use pliant_contact::touch::{Contact, Contacts, Rigid, With};
 
 use crate::assembly::Assembly;
 use crate::error::SolveError;
@@ -240,14 +240,19 @@ impl TouchingSystem {
 
     /// [`now`](Self::now) at a state that no step led to: without friction.
     pub fn at(&mut self, state: &State) -> TouchingNow {
+        self.stand(state);
+        self.evaluate(state, None);
+        self.touches = self.touched();
+        self.now()
+    }
+
+    /// Evaluates a state by itself from now on, without friction.
+    pub(crate) fn stand(&mut self, state: &State) {
         let still = vec![0.0; self.forces.len()];
         let shifts = self.lags.iter().map(|lag| (lag.number() as u32, [lag.now(); 2]));
         *self.barriers.shifts_mut() = shifts.collect();
         self.begin(state, &still, [state.time; 2]);
         self.share = 1.0;
-        self.evaluate(state, None);
-        self.touches = self.touched();
-        self.now()
     }
 
     /// Ends a step at the state last evaluated, a time [s]: nodes have slid in it, and tools are where they lag.
@@ -307,18 +312,30 @@ impl TouchingSystem {
 
     /// Gives each lag the force [N] with which its tool pushes at the state last evaluated; these forces.
     pub(crate) fn bear_on(&mut self) -> Vec<Vector3<f64>> {
+        let rigids = &self.barriers.contacts().rigids;
+        let forces: Vec<_> = self.lags.iter().map(|lag| self.push(rigids[lag.number()].tool())).collect();
+        self.lags.iter_mut().zip(&forces).for_each(|(lag, force)| lag.found(*force));
+        forces
+    }
+
+    /// The force [N] with which a tool pushes at the state last evaluated.
+    fn push(&self, tool: &str) -> Vector3<f64> {
         let Contacts { rigids, contacts, .. } = self.barriers.contacts();
-        let force = |lag: &mut Lag| {
-            let tool = rigids[lag.number()].tool();
-            let on = |(contact, force): (&Contact, &Vector3<f64>)| {
-                let of_tool = matches!(contact.with, With::Rigid(rigid) if rigids[rigid].tool() == tool);
-                of_tool.then_some(*force)
-            };
-            let force = -contacts.iter().zip(&self.totals).filter_map(on).sum::<Vector3<f64>>();
-            lag.found(force);
-            force
+        let on = |(contact, force): (&Contact, &Vector3<f64>)| {
+            let of_tool = matches!(contact.with, With::Rigid(rigid) if rigids[rigid].tool() == tool);
+            of_tool.then_some(*force)
         };
-        self.lags.iter_mut().map(force).collect()
+        -contacts.iter().zip(&self.totals).filter_map(on).sum::<Vector3<f64>>()
+    }
+
+    /// Tools and obstacles that move between two times [s], with the size of the force [N] with which they push at the state last evaluated.
+    pub(crate) fn pushing(&self, [from, to]: [f64; 2]) -> impl Iterator<Item = (String, f64)> {
+        let moves = move |(rigid, number): (&Rigid, u32)| {
+            let leg = self.barriers.legs().get(&number);
+            let goes = rigid.stance(from, leg) != rigid.stance(to, leg);
+            goes.then(|| (rigid.tool().to_owned(), self.push(rigid.tool()).norm()))
+        };
+        self.barriers.contacts().rigids.iter().zip(0..).filter_map(moves)
     }
 
     /// Where rigid things go that are driven from outside, by their number.

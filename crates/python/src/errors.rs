@@ -78,7 +78,7 @@ impl Trouble {
             }
             Self::Failure(failure) => {
                 fields.set_item("kind", failure.kind)?;
-                fields.set_item("body", &failure.body)?;
+                fields.set_item("body", failure.body.as_deref())?;
                 fields.set_item("element", failure.element)?;
                 fields.set_item("node", failure.node)?;
                 fields.set_item("time", failure.time)?;
@@ -88,6 +88,12 @@ impl Trouble {
                         fields.set_item("load_step", step.map(|step| step.number))?;
                         fields.set_item("residual", step.and_then(|step| step.residual))?;
                         "ConvergenceError"
+                    }
+                    "blocked" => {
+                        let blocked = failure.blocked.as_deref();
+                        fields.set_item("driver", blocked.map(|own| own.driver.clone()))?;
+                        fields.set_item("force", blocked.map(|own| own.force))?;
+                        "BlockedError"
                     }
                     "not-finite" | "inverted" | "unbalanced" | "unstable" => "UnstableError",
                     _ => "SimulationError",

@@ -169,6 +169,9 @@ def test_errors_travel() -> None:
     error = pliant.ConvergenceError("no", kind="not-converged", body="b", element=None, node=3, time=0.5, load_step=2, residual=0.1)
     again = pickle.loads(pickle.dumps(error))
     assert (again.node, again.residual, str(again)) == (3, 0.1, "no")
+    blocked = pickle.loads(pickle.dumps(pliant.BlockedError("no", kind="blocked", driver="push", force=2.5)))
+    assert (blocked.driver, blocked.force, blocked.node) == ("push", 2.5, None)
+    assert isinstance(blocked, pliant.ConvergenceError)
 
 
 def test_what_is_not_installed_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -72,7 +72,7 @@ fn pushing(part: &Part, now: &dyn Instant) -> String {
 
 /// That damping is what the steps are too long for, where it is so.
 fn too_much_damping(failure: &Failure, built: &Built, plan: &Plan) -> Option<String> {
-    let body = built.model.bodies.iter().find(|body| failure.body.as_ref() == Some(&body.name))?;
+    let body = built.model.bodies.iter().find(|body| failure.body.as_deref() == Some(&body.name))?;
     (body.damping * plan.steps.step > RESOLVED).then(|| {
         format!(
             "the damping of `{}`, {} 1/s, is too strong for steps of {} s: it turns velocities round; take `damping` below {} 1/s or a \

@@ -103,7 +103,9 @@ fn write_pages(world: &World, folder: &OutputFolder, outcome: &mut Outcome) -> R
         let Some(table) = &own.convergence else { continue };
         let file = part.prefix().map_or(CONVERGENCE.to_owned(), |name| format!("convergence-{name}.csv"));
         outcome.files.push(folder.write(&file, table)?);
-        if let Some(failure) = outcome.failure.as_mut().filter(|failure| failure.kind == "not-converged") {
+        if let Some(failure) =
+            outcome.failure.as_mut().filter(|failure| matches!(failure.kind, "not-converged" | "blocked"))
+        {
             failure.message.push_str(&format!("; the residuals of all iterations are in `{file}`"));
         }
     }

@@ -13,10 +13,10 @@ pub const INTERRUPTED: &str = "interrupted";
 /// A failure, with its place and time.
 #[derive(Clone, Debug, Serialize)]
 pub struct Failure {
-    /// `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `intersecting`, `device`, `output`, `input` or `interrupted`.
+    /// `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `blocked`, `intersecting`, `device`, `output`, `input` or `interrupted`.
     pub kind: &'static str,
     /// The body, where it is about one.
-    pub body: Option<String>,
+    pub body: Option<Box<str>>,
     /// The element, counted from 0.
     pub element: Option<u32>,
     /// The node, counted from 0.
@@ -25,6 +25,8 @@ pub struct Failure {
     pub time: Option<f64>,
     /// The load step of a quasi-static run.
     pub load_step: Option<Box<FailedLoadStep>>,
+    /// What could not go on, where it is `blocked`.
+    pub blocked: Option<Box<BlockedDriver>>,
     /// What happened and what to try.
     pub message: String,
     /// What to try, as the message says it at its end; empty where it says it otherwise.
@@ -45,6 +47,19 @@ pub struct FailedLoadStep {
     pub residual: Option<f64>,
 }
 
+/// A tool or a constraint that stands where something is in its way.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BlockedDriver {
+    /// Its name.
+    pub driver: String,
+    /// The force [N] with which it pushes there.
+    pub force: f64,
+    /// The part of its way in the step that it could go, from 0 to 1.
+    pub part: f64,
+    /// The least gap [m].
+    pub gap: f64,
+}
+
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.message)
@@ -56,7 +71,17 @@ impl std::error::Error for Failure {}
 impl Failure {
     /// A failure of a kind, at a time [s] of the simulation.
     pub fn new(kind: &'static str, message: String, time: Option<f64>) -> Self {
-        Self { kind, body: None, element: None, node: None, time, load_step: None, message, remedy: "" }
+        Self {
+            kind,
+            body: None,
+            element: None,
+            node: None,
+            time,
+            load_step: None,
+            blocked: None,
+            message,
+            remedy: "",
+        }
     }
 
     /// An input that can't be simulated.
@@ -105,7 +130,7 @@ impl Failure {
             }
         };
         Self {
-            body: Some(body.clone()),
+            body: Some(body.as_str().into()),
             element,
             node: Some(node),
             load_step: Some(Box::new(FailedLoadStep { number, of, iterations, residual })),
@@ -128,7 +153,7 @@ impl From<&StepError> for Failure {
             StepError::Unbalanced { body, node, time, .. } => ("unbalanced", body, None, *node, *time),
         };
         Self {
-            body: Some(body.clone()),
+            body: Some(body.as_str().into()),
             element,
             node: Some(node),
             remedy: error.remedy(),

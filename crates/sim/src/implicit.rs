@@ -23,7 +23,7 @@ use pliant_mechanics::{Energies, StopFlag, fingerprint};
 use serde::{Deserialize, Serialize};
 
 use crate::bodies::{ImplicitBodies, RunControl, Stop};
-use crate::failure::Failure;
+use crate::failure::{BlockedDriver, Failure};
 use crate::instant::{CellsNow, Effort, Instant};
 use crate::kept::{ContactState, ImplicitState, Iterated, Kept, PlainState};
 use crate::part::{self, Part};
@@ -668,7 +668,7 @@ impl Instant for Implicit {
         self.method.touching()?.lags().iter().find(|lag| lag.number() == rigid)
     }
 
-    fn lag_of_nodes(&self, constraint: usize) -> Option<&Lag> {
+    fn lag_of_constraint(&self, constraint: usize) -> Option<&Lag> {
         self.method.lags().iter().find(|lag| lag.number() == constraint)
     }
 
@@ -882,7 +882,8 @@ fn failure(
     let (kind, node, cell) = match error {
         SolveError::NotConverged { node, .. } => ("not-converged", Some(*node), None),
         SolveError::Uphill { node, .. } => ("not-converged", Some(*node), None),
-        SolveError::Stalled { .. } | SolveError::Blocked { .. } => ("not-converged", None, None),
+        SolveError::Stalled { .. } => ("not-converged", None, None),
+        SolveError::Blocked { .. } => ("blocked", None, None),
         SolveError::Crossed { edge, .. } => ("intersecting", Some(edge[0]), None),
         SolveError::Singular { node, .. } | SolveError::FreeBody { node, .. } => {
             ("singular", Some(*node), None)
@@ -911,7 +912,14 @@ fn failure(
     let message =
         format!("after t = {} s{place}: {told}{hint}; what was written before stays readable", number(time));
     let element = cell.map(|(_, cell)| cell);
-    Failure { body, element, node: own_node, ..Failure::new(kind, message, Some(time)) }
+    let blocked = match error {
+        SolveError::Blocked { driver: Some((driver, force)), part, gap, .. } => {
+            Some(Box::new(BlockedDriver { driver: driver.clone(), force: *force, part: *part, gap: *gap }))
+        }
+        _ => None,
+    };
+    let body = body.map(String::into_boxed_str);
+    Failure { body, element, node: own_node, blocked, ..Failure::new(kind, message, Some(time)) }
 }
 
 /// An error with the numbers that a node and a cell have in their body.

@@ -80,8 +80,8 @@ pub trait Instant {
         None
     }
 
-    /// How far the nodes of a constraint lag behind their motion since their force is limited.
-    fn lag_of_nodes(&self, _constraint: usize) -> Option<&Lag> {
+    /// How far the nodes of a constraint lag behind their motion since their force is limited, or its volume [m³], along the first axis, since its pressure is.
+    fn lag_of_constraint(&self, _constraint: usize) -> Option<&Lag> {
         None
     }
 

@@ -95,7 +95,7 @@ pub(crate) struct ImplicitState {
     /// Where tools go that are driven from outside.
     pub legs: Vec<(u32, Leg)>,
     pub path: Path,
-    /// How far moved nodes whose force is limited are behind their motion.
+    /// How far moved nodes whose force is limited are behind their motion, and volumes whose pressure is limited behind their growth.
     pub lags: Vec<Lag>,
     /// Whether forces were found at the instant, so that their work is entered.
     pub entered: bool,

@@ -61,7 +61,7 @@ mod words;
 pub use bodies::{BodyCells, ImplicitBodies, RunControl, Stop};
 #[cfg(feature = "gpu")]
 pub use device::{MappedPoint, OnDevice};
-pub use failure::{FailedLoadStep, Failure, INTERRUPTED};
+pub use failure::{BlockedDriver, FailedLoadStep, Failure, INTERRUPTED};
 pub use guests::{Guests, GuestsNow};
 pub use instant::{CellsNow, Effort, Instant};
 pub use part::{Explicit, LongSteps, Method, Part, Precision};

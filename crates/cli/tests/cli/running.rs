@@ -76,7 +76,7 @@ fn json_has_exactly_the_promised_keys() {
 
     let refused = Workshop::block("density = 1000", "density = 0").run(&[]).json();
     assert_eq!(keys(&refused), KEYS);
-    let error = ["kind", "body", "element", "node", "time", "load_step", "message"];
+    let error = ["kind", "body", "element", "node", "time", "load_step", "blocked", "message"];
     assert_eq!(keys(&refused["error"]), error);
 }
 

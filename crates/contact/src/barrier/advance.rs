@@ -78,6 +78,13 @@ impl Kind {
         let most = |of: &[f64]| of.iter().copied().fold(0.0, f64::max);
         most(first) + most(second)
     }
+
+    /// A bound [m] of how far both primitives go towards each other when their points go by some ways [m].
+    #[inline]
+    pub(super) fn nearing(self, ways: [&Vector3<f64>; 4]) -> f64 {
+        let mean = (ways[0] + ways[1] + ways[2] + ways[3]) / 4.0;
+        self.reach(ways.map(|way| (way - mean).norm()))
+    }
 }
 
 /// Advances at most; where they end is safe, too.

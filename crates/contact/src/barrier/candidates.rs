@@ -11,12 +11,13 @@ use super::wide::{Apart, ROUND_OFF, Sort, Wide, common, other};
 
 /// Rest distances, over the reach, up to which parts of one surface never touch each other.
 const AT_REST: f64 = 1.02;
-/// The skin of a node over the motion that it is to make.
-const SKIN: f64 = 1.25;
+/// The skin of a node beside the motion that it is to make, over that motion; and of a node of a rigid thing, which may turn: no arc up to half a turn is further
+/// from its chord than half of that.
+const SKIN: [f64; 2] = [0.25, 0.55];
 /// Width of the bins that pairs are sorted into by their distance, over the distance of the barrier.
 const BIN: f64 = 0.2;
-/// The least and the largest skin, over the distance of the barrier. The largest is a mean edge if that is more, and that of a surface which touches
-/// itself always: all its parts are near others, and their lists would grow with the square of a skin over an edge.
+/// The least skin and the longest motion, over the distance of the barrier. The longest is a mean edge if that is more, and that of a surface which touches
+/// itself always: all its parts are near others, and their lists would grow with the square of a motion over an edge.
 const SKINS: [f64; 2] = [0.5, 20.0];
 
 /// A pair that may come near.
@@ -30,6 +31,8 @@ struct Candidate {
     threshold: f64,
     /// The distance [m] when it was listed.
     distance: f64,
+    /// A bound [m] of how far both primitives go towards each other on the course of the list.
+    nearing: f64,
     in_order: bool,
 }
 
@@ -105,14 +108,20 @@ pub(super) struct Group {
     unsorted: Vec<Candidate>,
     /// Pairs that candidates are chosen from.
     wide: Wide,
-    /// Skins [m] of all nodes, how far [m] they have gone since pairs were listed, and how far [m] they go in a motion.
+    /// The course [m] for which pairs were listed: a motion of all nodes, less what they have in common; and how much of it they have gone.
+    course: Vec<Vector3<f64>>,
+    gone: f64,
+    /// Of all nodes: skins [m] around the course, and with it; how far [m] they are off the course, and how far [m] they go in a motion.
     skin: Vec<f64>,
+    whole: Vec<f64>,
     moved: Vec<f64>,
     way: Vec<f64>,
     /// How far [m] two primitives have come nearer at most since pairs were listed.
     nearer: f64,
-    /// The largest skin [m].
-    largest: f64,
+    /// The largest bound [m] of how far primitives in the list go towards each other on the course.
+    nearing: f64,
+    /// The longest motion [m] for which pairs are listed.
+    longest: f64,
 }
 
 impl Group {
@@ -125,7 +134,7 @@ impl Group {
     ) -> Self {
         let place = |node: u32| rest[node as usize];
         let edge = sides[0].mean_edge(place);
-        let largest = if sides.len() == 1 { edge } else { (SKINS[1] * action.law.distance).max(edge) };
+        let longest = if sides.len() == 1 { edge } else { (SKINS[1] * action.law.distance).max(edge) };
         let wide = Wide::new(&sides, rest.len());
         let mut group = Self {
             number,
@@ -139,11 +148,15 @@ impl Group {
             bins: Vec::new(),
             unsorted: Vec::new(),
             wide,
+            course: vec![Vector3::zeros(); rest.len()],
+            gone: 0.0,
             skin: vec![0.0; rest.len()],
+            whole: vec![0.0; rest.len()],
             moved: vec![0.0; rest.len()],
             way: vec![0.0; rest.len()],
             nearer: 0.0,
-            largest,
+            nearing: 0.0,
+            longest,
         };
         if group.sides.len() == 1 {
             let near = AT_REST * group.action.reach();
@@ -159,27 +172,39 @@ impl Group {
         self.apart.iter().map(Apart::len).sum()
     }
 
-    /// Lists what may come near while nodes go by a motion [m] from their places [m].
-    pub fn list(&mut self, place: &[Vector3<f64>], motion: &[Vector3<f64>]) {
+    /// Lists what may come near while nodes go by a motion [m] from their places [m], or by so much of it as no node goes too far in; this part.
+    pub fn list(&mut self, place: &[Vector3<f64>], motion: &[Vector3<f64>]) -> f64 {
         let common = common(&self.sides, |node| motion[node as usize]);
+        let Self { sides, course, skin, whole, .. } = self;
+        let nodes = || {
+            let of = |side: &BarrierSide| if side.is_rigid { SKIN[1] } else { SKIN[0] };
+            sides.iter().flat_map(move |side| side.points.iter().map(move |&node| (node as usize, of(side))))
+        };
+        let longest = nodes().map(|(node, _)| (motion[node] - common).norm()).fold(0.0, f64::max);
+        let part = if longest > self.longest { self.longest / longest } else { 1.0 };
         let least = SKINS[0] * self.action.law.distance;
-        for side in &self.sides {
-            for &node in &side.points {
-                let way = (motion[node as usize] - common).norm();
-                self.skin[node as usize] = (SKIN * way).clamp(least, self.largest);
-            }
+        for (node, times) in nodes() {
+            course[node] = (motion[node] - common) * part;
+            let way = course[node].norm();
+            skin[node] = (times * way).max(least);
+            whole[node] = way + skin[node];
         }
         self.moved.fill(0.0);
-        self.nearer = 0.0;
+        (self.gone, self.nearer) = (0.0, 0.0);
         self.find(place, self.action.reach() + self.rise.max(0.0));
+        part
     }
 
     /// Lists what is within a distance [m] and the skins of both.
     fn find(&mut self, place: &[Vector3<f64>], within: f64) {
-        let Self { sides, skin, apart, unsorted, wide, action, .. } = self;
+        let Self { sides, course, skin, whole, apart, unsorted, wide, action, .. } = self;
         unsorted.clear();
-        wide.each(sides, apart, place, skin, [within, action.law.distance], |sides, sort, numbers, limit| {
+        let mut largest: f64 = 0.0;
+        wide.each(sides, apart, place, whole, [within, action.law.distance], |sides, sort, numbers, most| {
             let (kind, nodes) = (sort.kind(), sort.nodes(sides, numbers));
+            // Neighbours go along with each other, whatever the length of their course.
+            let nearing = kind.nearing(nodes.map(|node| &course[node as usize]));
+            let limit = most.min(within + nearing + kind.reach(nodes.map(|node| skin[node as usize])));
             let points = nodes.map(|node| &place[node as usize]);
             if kind.is_beyond(points, limit * (1.0 + ROUND_OFF)) {
                 return;
@@ -203,8 +228,10 @@ impl Group {
                 }
             };
             let in_order = sort != Sort::Point(1);
-            unsorted.push(Candidate { kind, nodes, area, threshold, distance, in_order });
+            largest = largest.max(nearing);
+            unsorted.push(Candidate { kind, nodes, area, threshold, distance, nearing, in_order });
         });
+        self.nearing = largest;
         self.sort();
     }
 
@@ -257,36 +284,43 @@ impl Group {
 impl Group {
     /// Takes the places [m] of all nodes; whether no node has left its skin.
     pub fn take(&mut self, place: &[Vector3<f64>], listed: &[Vector3<f64>]) -> bool {
+        let mut moved = std::mem::take(&mut self.moved);
         let way = |node: u32| place[node as usize] - listed[node as usize];
-        let common = common(&self.sides, way);
-        let Self { sides, skin, moved, .. } = self;
-        let mut holds = true;
-        for &node in sides.iter().flat_map(|side| &side.points) {
-            let own = (way(node) - common).norm();
-            moved[node as usize] = own;
-            holds &= own <= skin[node as usize];
-        }
-        self.nearer = self.largest_of(&self.moved);
+        let (gone, holds) = self.off_course(way, |node, off| moved[node as usize] = off);
+        (self.gone, self.moved) = (gone, moved);
+        self.nearer = self.largest_of(&self.moved) + gone * self.nearing;
         holds
     }
 
-    /// The part of a motion [m] in which no node leaves its skin.
-    pub fn within_skins(&self, motion: &[Vector3<f64>]) -> f64 {
-        let common = common(&self.sides, |node| motion[node as usize]);
-        let nodes = self.sides.iter().flat_map(|side| &side.points);
-        let part = nodes.map(|&node| {
-            let (left, way) = (
-                self.skin[node as usize] - self.moved[node as usize],
-                (motion[node as usize] - common).norm(),
-            );
-            if way > left { (left / way).max(0.0) } else { 1.0 }
-        });
-        part.fold(1.0, f64::min)
+    /// Whether no node leaves its skin in a motion [m] from the places [m] last taken. On the way there it does not either: the skin around the course is convex.
+    pub fn has(&self, place: &[Vector3<f64>], listed: &[Vector3<f64>], motion: &[Vector3<f64>]) -> bool {
+        let way = |node: u32| place[node as usize] + motion[node as usize] - listed[node as usize];
+        self.off_course(way, |_, _| ()).1
+    }
+
+    /// How much of the course nodes have gone that went some ways [m], and whether they are within skins around it; calls back with how far [m] each is off.
+    fn off_course(&self, way: impl Fn(u32) -> Vector3<f64>, mut off: impl FnMut(u32, f64)) -> (f64, bool) {
+        let common = common(&self.sides, &way);
+        let nodes = || self.sides.iter().flat_map(|side| &side.points);
+        let (mut along, mut squared) = (0.0, 0.0);
+        for &node in nodes() {
+            let course = self.course[node as usize];
+            along += course.dot(&(way(node) - common));
+            squared += course.norm_squared();
+        }
+        let gone = if squared > 0.0 { (along / squared).clamp(0.0, 1.0) } else { 0.0 };
+        let mut holds = true;
+        for &node in nodes() {
+            let own = (way(node) - common - self.course[node as usize] * gone).norm();
+            off(node, own);
+            holds &= own <= self.skin[node as usize];
+        }
+        (gone, holds)
     }
 
     /// A bound [m] of what both primitives have gone towards each other since they were listed.
     fn moved(&self, one: &Candidate) -> f64 {
-        one.kind.reach(one.nodes.map(|node| self.moved[node as usize]))
+        one.kind.reach(one.nodes.map(|node| self.moved[node as usize])) + self.gone * one.nearing
     }
 
     /// Adds what acts with nodes at the places [m] last taken; false if there is no gap somewhere.

@@ -247,20 +247,23 @@ impl Barriers {
         }
     }
 
-    /// Lists what may come near in a part of a motion, and while rigid things go on from a share to the end of the step.
-    fn list(&mut self, motion: &[f64], part: f64, share: f64) {
+    /// Lists what may come near in a part of a motion, and while rigid things go on from a share to the end of the step; the part of that motion for which
+    /// the lists hold.
+    fn list(&mut self, motion: &[f64], part: f64, share: f64) -> f64 {
         self.set_motion(motion, part, if share < 1.0 { 1.0 } else { share });
         self.listed.copy_from_slice(&self.place);
         self.listed_stances.clone_from(&self.stances[2]);
         let Self { groups, place, motion, wall_distances, contacts, stances, .. } = self;
+        let mut holds: f64 = 1.0;
         for (group, distances) in groups.iter_mut().zip(wall_distances) {
-            group.list(place, motion);
+            holds = holds.min(group.list(place, motion));
             let Some(wall) = group.wall else { continue };
             let (rigid, stance) = (&contacts.rigids[wall as usize], &stances[2][wall as usize]);
             for (distance, &node) in distances.iter_mut().zip(&group.sides[0].points) {
                 *distance = rigid.near(stance, &place[node as usize]).distance;
             }
         }
+        holds
     }
 
     /// How far [m] a rigid thing has gone since pairs were listed.
@@ -572,14 +575,11 @@ impl Barriers {
         for group in &mut self.groups {
             group.take(&self.place, &self.listed);
         }
-        let within =
-            |own: &Self| own.groups.iter().map(|group| group.within_skins(&own.motion)).fold(1.0, f64::min);
-        let mut part = within(self);
-        if part < 1.0 {
-            self.list(motion, most, share);
-            part = within(self);
+        let has = |group: &Group| group.has(&self.place, &self.listed, &self.motion);
+        let mut part = most;
+        if !self.groups.iter().all(has) {
+            part *= self.list(motion, most, share);
         }
-        part *= most;
         let [from, to, _] = &self.stances;
         let turns =
             share < 1.0 && from.iter().zip(to).any(|(from, to)| from.pose.rotation != to.pose.rotation);

@@ -19,8 +19,8 @@ const GAP: f64 = 1e-4;
 /// Speed [m/s] up to which friction lets it creep.
 const CREEP: f64 = 1e-4;
 
-/// A block of 2 × 2 × 2 cubes of 10 mm, its underside at z = 0, 1,000 kg/m³.
-fn block() -> (Assembly, Vec<[u32; 3]>) {
+/// A block of 2 × 2 × 2 cubes of 10 mm with a Young's modulus [Pa], its underside at z = 0, 1,000 kg/m³.
+pub fn block(young: f64) -> (Assembly, Vec<[u32; 3]>) {
     let number = |i: u32, j: u32, k: u32| i + 3 * (j + 3 * k);
     let points =
         (0..27_u32).map(|k| Vector3::new(f64::from(k % 3), f64::from(k / 3 % 3), f64::from(k / 9)) * 0.01);
@@ -30,7 +30,7 @@ fn block() -> (Assembly, Vec<[u32; 3]>) {
         let [i, j, k] = [c % 2, c / 2 % 2, c / 4];
         corners.map(|[x, y, z]| number(i + x, j + y, k + z))
     };
-    let shear = YOUNG / 2.0;
+    let shear = young / 2.0;
     let law = AnyLaw::NeoHookean(NeoHookean { shear, volumetric: Volumetric::quadratic(2.0 * shear / 3.0) });
     let cells = Cells::full_hex8((0..8).map(cell).collect(), &model.rest);
     model.add_solid("block", Solid::new(0, Material::elastic(law, 1000.0), cells)).unwrap();
@@ -42,7 +42,7 @@ fn block() -> (Assembly, Vec<[u32; 3]>) {
 }
 
 /// An acceleration that sets in at a time [s].
-fn weigh(model: &mut Assembly, acceleration: [f64; 3], from: f64) {
+pub fn weigh(model: &mut Assembly, acceleration: [f64; 3], from: f64) {
     let curve = Curve { shape: CurveShape::Ramp, from: from - 1e-9, to: from };
     let kind = LoadKind::Gravity { body: 0, acceleration };
     model.model_mut().loads.push(Load::new("weight", kind, curve));
@@ -55,7 +55,7 @@ fn settings(step: f64) -> DynamicSettings {
 /// A block that settles on a plane for 0.2 s, which is then an incline; after another 0.1 s, in which shear waves in it die down, its
 /// acceleration [m/s²] and its way [m] over 0.9 s.
 fn slid(friction: f64, step: f64) -> [f64; 2] {
-    let (mut model, under) = block();
+    let (mut model, under) = block(YOUNG);
     weigh(&mut model, [0.0, 0.0, -9.81 * 0.8_f64.sqrt()], 0.0);
     weigh(&mut model, [9.81 * 0.2_f64.sqrt(), 0.0, 0.0], 0.2 + 0.5 * step);
     let floor = fixed("floor", Shape::HalfSpace, [0.0, 0.0, -0.8 * GAP], [0.0; 3]);
@@ -112,7 +112,7 @@ fn friction_is_mu_times_the_normal_force_in_every_direction() {
     for number in 0..4 {
         let angle = TAU * (f64::from(number) + 0.3) / 8.0;
         let along = Vector3::new(angle.cos(), angle.sin(), 0.0);
-        let (mut model, under) = block();
+        let (mut model, under) = block(YOUNG);
         weigh(&mut model, [0.0, 0.0, -9.81], 0.0);
         let floor = fixed("floor", Shape::HalfSpace, [0.0, 0.0, -0.8 * GAP], [0.0; 3]);
         let contacts = at_rigid(&surface(under), vec![floor], 0.3, 0.0);

@@ -1,5 +1,6 @@
 //! Shells and solids in contact by a barrier, held to closed forms; every state that is accepted is searched for crossings.
 
+mod arch;
 mod blocks;
 mod bodies;
 mod cards;
@@ -7,6 +8,7 @@ mod cloth;
 mod degenerate;
 mod funnel;
 mod ring;
+mod stick_slip;
 
 use std::sync::Arc;
 

@@ -14,6 +14,7 @@ A `Scene` says what is simulated, as plain data. It is built into a `Model`, whi
 from pliant import errors, tables
 from pliant._native import __version__, devices
 from pliant.errors import (
+    BlockedError,
     BusyError,
     ClosedError,
     ClusterError,
@@ -40,6 +41,7 @@ from pliant.simulation import Energies, Grip, Simulation, State, Tool
 from pliant.sweeps import Sweep, merge, sweep
 
 __all__ = [
+    "BlockedError",
     "Body",
     "BusyError",
     "ClosedError",

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 __all__ = [
+    "BlockedError",
     "BusyError",
     "ClosedError",
     "ClusterError",
@@ -111,6 +112,14 @@ class ConvergenceError(SimulationError):
     _fields: tuple[str, ...] = (*SimulationError._fields, "load_step", "residual")
     load_step: int | None
     residual: float | None
+
+
+class BlockedError(ConvergenceError):
+    """A tool or moved nodes that can't go on since something is in their way: `driver` is the name, `force` what it pushed with last, in N."""
+
+    _fields: tuple[str, ...] = (*ConvergenceError._fields, "driver", "force")
+    driver: str | None
+    force: float | None
 
 
 class DeviceError(Error, RuntimeError):

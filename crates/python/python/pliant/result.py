@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pliant.errors import ConvergenceError, SimulationError, UnstableError
+from pliant.errors import BlockedError, ConvergenceError, SimulationError, UnstableError
 from pliant.mesh import Mesh, _extra, _table
 
 if TYPE_CHECKING:
@@ -214,11 +214,12 @@ class Result:
 def _failure(told: Mapping[str, Any]) -> SimulationError:
     kinds: dict[str, type[SimulationError]]
     kinds = {"not-finite": UnstableError, "inverted": UnstableError, "unbalanced": UnstableError, "unstable": UnstableError}
-    kinds |= {"not-converged": ConvergenceError, "singular": ConvergenceError}
-    step = told.get("load_step") or {}
+    kinds |= {"not-converged": ConvergenceError, "singular": ConvergenceError, "blocked": BlockedError}
+    step, blocked = told.get("load_step") or {}, told.get("blocked") or {}
     kind = kinds.get(told["kind"], SimulationError)
     fields = {name: told.get(name) for name in ("kind", "body", "element", "node", "time")}
-    return kind(told["message"], **fields, load_step=step.get("number"), residual=step.get("residual"))
+    fields |= {"load_step": step.get("number"), "residual": step.get("residual")}
+    return kind(told["message"], **fields, driver=blocked.get("driver"), force=blocked.get("force"))
 
 
 def _read_tables(files: Sequence[str], units: Mapping[str, str]) -> History:

@@ -1152,6 +1152,8 @@ class Volume(Table):
         Which of its faces; if not given, all of its boundary. They close, and may be those of a cavity. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     by
         By how much the enclosed volume grows from that at rest [m³], along the curve; 0 keeps it, less than 0 empties it. Takes a number.
+    pressure_limit
+        The pressure [Pa] that it takes at most, of suction likewise. There the volume lags behind its curve; when less is needed, it catches up. With the solvers `implicit` and `static`. Takes a number, greater than 0.
     curve
         The form of the growth. Takes "ramp", "smooth-step", "polynomial-10-15-6" or "hold", { wave = … } or { table = … }.
     from_
@@ -1161,11 +1163,12 @@ class Volume(Table):
     """
 
     _type: ClassVar[str | None] = "volume"
-    _keys: ClassVar[dict[str, str]] = {"body": "body", "faces": "faces", "by": "by", "curve": "curve", "from_": "from", "to": "to"}
+    _keys: ClassVar[dict[str, str]] = {"body": "body", "faces": "faces", "by": "by", "pressure_limit": "pressure-limit", "curve": "curve", "from_": "from", "to": "to"}
 
     body: str
     by: float
     faces: Any | None = None
+    pressure_limit: float | None = None
     curve: Any | None = None
     from_: float | None = None
     to: float | None = None

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use pliant_explicit::stability::Stability;
 use pliant_mechanics::Energies;
 use pliant_mechanics::model::Enclosed;
+use pliant_sim::contact::lag::Lag;
 use pliant_sim::{Effort, Equilibria, Failure, GuestsNow, Instant, TieNow};
 use serde::{Deserialize, Serialize};
 
@@ -83,8 +84,21 @@ pub(crate) struct PartOutcome {
     pub reactions: Vec<[f64; 3]>,
     /// What constraints of volume enclose.
     pub enclosed: Vec<Option<Enclosed>>,
-    /// The tools and the constraints that were held back, each with its longest lag [m] and when that was [s].
-    pub held_back: Vec<(String, f64, f64)>,
+    /// The tools and the constraints that were held back.
+    pub held_back: Vec<HeldBack>,
+}
+
+/// Something that was held back by a limit of its force or its pressure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeldBack {
+    /// The tool or the constraint.
+    pub name: String,
+    /// Whether it is a volume.
+    pub is_volume: bool,
+    /// Its longest lag [m, of a volume m³].
+    pub lag: f64,
+    /// When that was [s].
+    pub time: f64,
 }
 
 impl PartOutcome {
@@ -109,22 +123,22 @@ impl PartOutcome {
     }
 }
 
-/// Tools, and constraints that move nodes, that were held back by the limits of their forces.
-fn held_back(part: &Part, now: &dyn Instant) -> Vec<(String, f64, f64)> {
+/// Tools, and constraints that move nodes or fill volumes, that were held back by the limits of their forces and pressures.
+fn held_back(part: &Part, now: &dyn Instant) -> Vec<HeldBack> {
+    let of = |name: &str, is_volume: bool, lag: &Lag| {
+        let (lag, time) = lag.longest();
+        (lag > 0.0).then(|| HeldBack { name: name.to_owned(), is_volume, lag, time })
+    };
     let rigids = part.built.contacts.iter().flat_map(|all| &all.rigids).enumerate();
-    let mut held: Vec<(String, f64, f64)> = rigids
-        .filter_map(|(number, rigid)| {
-            let (lag, time) = now.lag(number)?.longest();
-            (lag > 0.0).then(|| (rigid.tool().to_owned(), lag, time))
-        })
-        .collect();
+    let mut held: Vec<HeldBack> =
+        rigids.filter_map(|(number, rigid)| of(rigid.tool(), false, now.lag(number)?)).collect();
     // Jaws lag together.
     held.dedup();
     let constraints = part.built.model.constraints.iter().enumerate();
-    held.extend(constraints.filter_map(|(number, own)| {
-        let (lag, time) = now.lag_of_nodes(number)?.longest();
-        (lag > 0.0).then(|| (own.name.clone(), lag, time))
-    }));
+    held.extend(
+        constraints
+            .filter_map(|(number, own)| of(&own.name, own.motion.encloses(), now.lag_of_constraint(number)?)),
+    );
     held
 }
 

@@ -9,6 +9,7 @@ use pliant_sim::{counted, number};
 use serde::Serialize;
 
 use super::PartOutcome;
+use super::outcome::HeldBack;
 use pliant_scene::{Built, Part};
 
 /// Hourglass energy, as a fraction of the internal one, above which a run gives a warning.
@@ -156,12 +157,17 @@ pub(crate) fn doubts(
         .collect()
 }
 
-/// That a tool or moved nodes were held back, by how far at most [m] and when [s].
-fn held_back((tool, lag, time): &(String, f64, f64)) -> String {
+/// That a tool, moved nodes or a volume were held back, by how much at most and when.
+fn held_back(HeldBack { name, is_volume, lag, time }: &HeldBack) -> String {
     let [lag, time] = [*lag, *time].map(number);
-    format!(
-        "`{tool}` was held back by its `force-limit`: it was up to {lag} m behind its trajectory, at t = {time} s"
-    )
+    match is_volume {
+        false => format!(
+            "`{name}` was held back by its `force-limit`: it was up to {lag} m behind its trajectory, at t = {time} s"
+        ),
+        true => format!(
+            "`{name}` was held back by its `pressure-limit`: its volume was up to {lag} m³ off its curve, at t = {time} s"
+        ),
+    }
 }
 
 /// Estimated error of displacements, over the largest one, above which equilibria give a warning.

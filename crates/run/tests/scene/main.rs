@@ -20,6 +20,7 @@ mod niftysim_contact;
 mod obstacles;
 mod participants;
 mod penalty;
+mod pressure_limit;
 mod static_solids;
 mod ties;
 mod torques;

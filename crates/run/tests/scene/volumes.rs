@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use pliant_testing::scenes::{assert_rows_agree, last_row, resumes, run, world};
 
 /// A balloon of 30 mm that is held at its neck, with a constraint on its volume; at rest it encloses 1.07e-4 m³.
-fn balloon(model: &str, solver: &str, volume: &str, more: &str) -> String {
+pub fn balloon(model: &str, solver: &str, volume: &str, more: &str) -> String {
     format!(
         "[scene]\nuntil = 1\n[run]\n{solver}\n\
          [law.rubber]\ntype = 'neo-hookean'\nyoung-modulus = 1e6\npoisson-ratio = 0.4\n\
@@ -18,7 +18,7 @@ fn balloon(model: &str, solver: &str, volume: &str, more: &str) -> String {
     )
 }
 
-const FILLED: &str = "by = 4e-5\nto = 0.5";
+pub const FILLED: &str = "by = 4e-5\nto = 0.5";
 
 /// Compares runs of one scene: displacements and pressures to 1e-5 of the largest, volumes to 1e-9.
 fn agree(first: &str, others: &[String]) {

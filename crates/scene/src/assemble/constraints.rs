@@ -50,7 +50,7 @@ impl Builder<'_> {
             };
             if let (Some(motion), Some(components), Some(nodes)) = (motion, components, nodes) {
                 if let ConstraintTable::Move(MoveTable { force_limit: Some(limit), .. }) = table {
-                    self.limit(&path, *limit);
+                    self.limit(&[path[0], path[1], "force-limit"], *limit);
                 }
                 self.assembly.model_mut().constraints.push(Constraint {
                     name: name.clone(),
@@ -88,12 +88,20 @@ impl Builder<'_> {
         self.check_limited();
     }
 
-    /// Limits the force [N] of the constraint that is added next.
-    fn limit(&mut self, path: &[&str; 2], limit: f64) {
+    /// Limits the force [N] or the pressure [Pa] of the constraint that is added next, by this key.
+    fn limit(&mut self, path: &[&str; 3], limit: f64) {
+        let [_, name, key] = *path;
         if !self.scene.run.solver.solves_equations() {
-            let message = format!("the force of `{}` is limited in an explicit run", path[1]);
-            let help = "take the solver `implicit` or `static`, or push with a tool, which can have a `force-limit` here";
-            self.error(&[path[0], path[1], "force-limit"], message, "not with this solver", help);
+            let (what, help) = match key {
+                "force-limit" => (
+                    "force",
+                    "take the solver `implicit` or `static`, or push with a tool, which can have a `force-limit` here",
+                ),
+                _ => ("pressure", "take the solver `implicit` or `static`, or a load of type `pressure`"),
+            };
+            let solver = self.scene.run.solver.word();
+            let message = format!("the solver `{solver}` keeps no limit of the {what} of `{name}`");
+            self.error(path, message, "not with this solver", help);
         }
         let number = self.assembly.constraints.len();
         self.assembly.force_limits.insert(number, limit);
@@ -193,6 +201,9 @@ impl Builder<'_> {
                 "take a change above minus that volume",
             );
             return;
+        }
+        if let Some(limit) = table.pressure_limit {
+            self.limit(&at("pressure-limit"), limit);
         }
         self.assembly.model_mut().constraints.push(Constraint {
             name: name.to_owned(),

@@ -115,6 +115,11 @@ pub struct VolumeTable {
     pub faces: Option<Selection>,
     /// By how much the enclosed volume grows from that at rest [m³], along the curve; 0 keeps it, less than 0 empties it.
     pub by: f64,
+    /// The pressure [Pa] that it takes at most, of suction likewise. There the volume lags behind its curve; when less is needed, it catches up. With the
+    /// solvers `implicit` and `static`.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub pressure_limit: Option<f64>,
     /// Its curve over time.
     #[serde(flatten)]
     pub timing: Timing,
