@@ -238,15 +238,15 @@ fn explicit_tube(run: &str) -> String {
     changed(&text, "[load.push]", &format!("{moved}[load.push]")) + history
 }
 
-/// Displacements to 1e-5, the round-off of single precision; reactions and energies of each instant to 1e-4 of the largest.
+/// 2500 steps. Displacements to 1e-5, the round-off of single precision; reactions and energies of each instant to 1e-4 of the largest.
 #[test]
 fn explicit_shells_run_on_a_device_as_on_the_processor() {
     if !pliant_testing::has_gpu(adapters().len()) {
         return;
     }
     let [cpu, gpu] = ["device = \"cpu\"", "device = \"gpu\""].map(|run| Workshop::new(&explicit_tube(run)));
-    let reference = cpu.run(&[]).done();
-    let json = gpu.run(&[]).done();
+    let reference = cpu.run(&["run.step=4e-6"]).done();
+    let json = gpu.run(&["run.step=4e-6"]).done();
     assert_eq!(json["device"], adapters()[0].name);
     assert_eq!((&json["precision"], &reference["precision"]), (&"single".into(), &"double".into()));
     let apart = apart(&cpu, &gpu);
