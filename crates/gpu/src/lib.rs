@@ -1,4 +1,4 @@
-//! Explicit dynamics of solids, and the linear equations of implicit steps, on any GPU, through wgpu: Vulkan, Metal or Direct3D 12, found at
+//! Explicit dynamics of solids and shells, and the linear equations of implicit steps, on any GPU, through wgpu: Vulkan, Metal or Direct3D 12, found at
 //! run time. Single precision.
 //!
 //! ```
@@ -94,10 +94,15 @@
 //! [`Device`] is a `LinearDevice` of `pliant-implicit`: it solves block matrices by conjugate gradients (`gradients.rs`). What it finds are corrections
 //! under a residual in double precision on the CPU.
 //!
+//! # Shells
+//!
+//! [`GpuShells`] advances shells as `pliant_implicit::Explicit` does (`shells.rs`). A state is read back after each call; whoever wants forces,
+//! energies or reactions there finds them on the CPU.
+//!
 //! # Tests
 //!
 //! `tests/gpu/stepper/` compares with double precision on the CPU: displacements differ by at most 1e-5 after 200 steps, with every law, element
-//! and load on unordered meshes deformed at random. `tests/gpu/gradients.rs` compares solutions and pulsing tubes with the CPU. Tests also run devices opened with
+//! and load on unordered meshes deformed at random. `tests/gpu/shells.rs` holds shells to the same, with their rotations and the work of loads. `tests/gpu/gradients.rs` compares solutions and pulsing tubes with the CPU. Tests also run devices opened with
 //! lower limits (`Device::open_within`) and devices destroyed during a run. The gate runs
 //! all of them on Mesa's software Vulkan (`PLIANT_REQUIRE_GPU=1`); elsewhere they report when they are skipped.
 
@@ -116,6 +121,7 @@ mod pairs;
 mod paths;
 mod rates;
 mod run;
+mod shells;
 mod solid_kernels;
 mod solids;
 mod stepper;
@@ -129,4 +135,5 @@ pub use error::GpuError;
 pub use mapping::{DeviceMapping, DevicePoints, PointValue};
 pub use rates::DeviceRates;
 pub use run::StepFailure;
+pub use shells::{GpuShells, ShellsMoved};
 pub use stepper::GpuStepper;

@@ -69,6 +69,21 @@ pub struct Facet {
     tension: (Vector18, f64),
 }
 
+/// What a facet has at rest, for whoever finds its forces elsewhere.
+#[derive(Clone, Copy, Debug)]
+pub struct FacetAtRest<'a> {
+    /// Its axes as columns; the third is the normal.
+    pub axes: Matrix3<f64>,
+    /// Corners in them, relative to the centroid [m].
+    pub corners: Corners,
+    /// Gradients of the shape functions there [1/m].
+    pub gradient: [Vector2<f64>; 3],
+    /// Stiffness over (u, v, w, θx, θy, θz) of three nodes.
+    pub stiffness: &'a Matrix18,
+    /// Nodal forces of its tension.
+    pub tension: &'a Vector18,
+}
+
 /// Energy of a shell in its parts [J].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ShellEnergy {
@@ -302,6 +317,17 @@ impl Facet {
             }
         }
         Ok(Placed { axes, local, trace, theta, deformation })
+    }
+
+    /// What it has at rest.
+    pub fn at_rest(&self) -> FacetAtRest<'_> {
+        FacetAtRest {
+            axes: self.axes.to_rotation_matrix().into_inner(),
+            corners: self.corners,
+            gradient: self.gradient,
+            stiffness: &self.stiffness,
+            tension: &self.tension.0,
+        }
     }
 
     /// Stiffness of all, in the facet's axes.

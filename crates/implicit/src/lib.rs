@@ -76,7 +76,7 @@ pub use creases::Normal;
 pub use dynamics::{BackwardEuler, DynamicSettings, DynamicStep, Explicit, Integrator};
 pub use element::Wall;
 pub use error::{ModelError, SolveError};
-pub use facet::{Broken, Facet, Resultants, ShellEnergy, Tangent};
+pub use facet::{Broken, Facet, FacetAtRest, Resultants, ShellEnergy, Tangent};
 pub use forces::Forces;
 pub use linear::{
     BlockPattern, BlockValues, DeviceError, DeviceSolver, DeviceTimes, LinearDevice, LinearReport,

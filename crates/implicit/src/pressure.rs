@@ -43,6 +43,11 @@ static PAIRS: LazyLock<[[f64; 9]; 36]> = LazyLock::new(|| {
 });
 
 impl Patch {
+    /// Weights of the products b_b × b_c of control points, for the pairs b < c of nine in their order, in ∫ F_a n dA on each.
+    pub fn pressure_weights() -> &'static [[f64; 9]; 36] {
+        &PAIRS
+    }
+
     /// Nodal forces [m²] and moments [m³] of a pressure of 1: ∫ Jᵀ n dA.
     pub fn pressure_forces(&self) -> Vector18 {
         let forces = self.control_forces();

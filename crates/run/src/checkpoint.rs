@@ -258,7 +258,9 @@ impl OwnOrigin {
         }
         parts.push(("`run.iterations`".into(), fingerprint(&scene.run.iterations)));
         parts.push(("`run.linear`".into(), fingerprint(&scene.run.linear)));
-        let (precision, solver, step) = (plan.target.precision, scene.run.solver, plan.steps.step);
+        // Shells are kept in double precision, whatever their steps are taken in.
+        let precision = if built.implicit.is_some() { Precision::Double } else { plan.target.precision };
+        let (solver, step) = (scene.run.solver, plan.steps.step);
         Self { name: name.clone(), precision, solver, step, parts }
     }
 }

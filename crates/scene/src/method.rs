@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use pliant_implicit::{DynamicSettings, Integrator, LinearSolver, Preconditioner, StaticSettings};
-use pliant_sim::{Explicit, ImplicitBodies, LongSteps, Method};
+use pliant_sim::{Explicit, ImplicitBodies, LongSteps, Method, ShortSteps};
 
 use crate::format::{IntegratorName, LinearName, LinearTable, PreconditionerName, RunTable, SolverName};
 use crate::plan::Plan;
@@ -82,7 +82,13 @@ fn method_of(bodies: &Arc<ImplicitBodies>, run: &RunTable, plan: &Plan) -> Metho
             };
             Method::Implicit(bodies, steps)
         }
-        SolverName::Explicit | SolverName::QuasiStatic => Method::ExplicitShells(bodies),
+        SolverName::Explicit | SolverName::QuasiStatic => {
+            let steps = ShortSteps {
+                #[cfg(feature = "gpu")]
+                device: plan.target.device.clone(),
+            };
+            Method::ExplicitShells(bodies, steps)
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use pliant_sim::Precision;
 #[cfg(feature = "gpu")]
-use pliant_sim::gpu::{Design, Device, GpuError, Kind};
+use pliant_sim::gpu::{Design, Device, GpuError, GpuShells, Kind};
 
 use crate::assemble::Built;
 use crate::diagnostic::Diagnostic;
@@ -70,7 +70,7 @@ impl Target {
                         device.adapter().name
                     )
                 });
-                Ok(Self::on(device, built, note))
+                Ok(Self::on(device, run, note))
             }
             Err(error) => {
                 let key = if run.adapter.is_some() { "adapter" } else { "device" };
@@ -99,9 +99,10 @@ impl Target {
                 Self::processor(run, Some(note))
             }
             Ok(device) => {
-                let what = if built.implicit.is_some() { "its equations are solved" } else { "it runs" };
+                let solved = built.implicit.is_some() && run.solver == SolverName::Implicit;
+                let what = if solved { "its equations are solved" } else { "it runs" };
                 let note = Some(format!("{what} on `{}`", device.adapter().name));
-                Self::on(device, built, note)
+                Self::on(device, run, note)
             }
             Err(error) => Self::processor(run, Some(format!("{error}: it runs on the CPU"))),
         })
@@ -112,10 +113,11 @@ impl Target {
         Ok(Self::processor(&scene.run, Some(format!("{WITHOUT}: it runs on the CPU"))))
     }
 
-    /// Solids in single precision; equations, whose device works for a state in double precision.
+    /// Explicit steps in single precision; equations, whose device works for a state in double precision.
     #[cfg(feature = "gpu")]
-    fn on(device: Device, built: &Built, note: Option<String>) -> Self {
-        let precision = if built.implicit.is_some() { Precision::Double } else { Precision::Single };
+    fn on(device: Device, run: &RunTable, note: Option<String>) -> Self {
+        let solved = run.solver == SolverName::Implicit;
+        let precision = if solved { Precision::Double } else { Precision::Single };
         Self { device: Some(device), precision, note }
     }
 
@@ -166,7 +168,8 @@ fn key_of_gpu(run: &RunTable) -> Option<&'static str> {
 fn with_design(scene: &Scene, built: &Built) -> Result<(), Box<Diagnostic>> {
     let place = scene.source.span(&scene.run_at("design"));
     if scene.run.design.is_some() && built.implicit.is_some() {
-        let message = "`design` is given, but it is about explicit steps, and the solver is `implicit`";
+        let message =
+            "`design` is given, but it is about explicit solids, and these are shells or solved equations";
         return Err(Box::new(Diagnostic::error(message).at(place, "not used").help("leave `design` out")));
     }
     let Some(design @ Design::Blocks) = scene.run.design else { return Ok(()) };
@@ -206,7 +209,10 @@ fn processor_only(scene: &Scene, built: &Built) -> Option<(&'static str, String,
     let run = &scene.run;
     let leave_out = "set `device = \"cpu\"`, or leave it out";
     if built.implicit.is_some() {
-        return equations_only(run);
+        return match run.solver {
+            SolverName::Explicit => shells_only(run, built),
+            _ => equations_only(run),
+        };
     }
     if let Some(what) = contact_only(built) {
         return Some(("device", what, leave_out));
@@ -226,15 +232,34 @@ fn processor_only(scene: &Scene, built: &Built) -> Option<(&'static str, String,
     None
 }
 
+/// The same of explicit shells.
+fn shells_only(run: &RunTable, built: &Built) -> Option<(&'static str, String, &'static str)> {
+    let help = "set `device = \"cpu\"`, or leave it out";
+    if !built.meets.is_empty() {
+        return Some(("device", "contact between participants".into(), help));
+    }
+    if run.precision == Some(Precision::Double) {
+        return Some((
+            "precision",
+            "double precision".into(),
+            "set `device = \"cpu\"`, or leave `precision` out",
+        ));
+    }
+    #[cfg(feature = "gpu")]
+    if let Some(what) = built.implicit.as_ref().and_then(|bodies| GpuShells::unsupported(&bodies.model)) {
+        return Some(("device", what, help));
+    }
+    None
+}
+
 /// The same of shells, and of solids whose equations are solved: a GPU solves those of implicit steps by conjugate gradients.
 fn equations_only(run: &RunTable) -> Option<(&'static str, String, &'static str)> {
     let help = "set `device = \"cpu\"`, or `solver = \"implicit\"` with `linear = \"conjugate-gradients\"`";
     match run.solver {
         SolverName::Implicit => {}
         SolverName::Static => return Some(("solver", "the solver `static`".into(), help)),
-        SolverName::Explicit | SolverName::QuasiStatic => {
-            return Some(("device", "the explicit solver of shells".into(), help));
-        }
+        SolverName::QuasiStatic => return Some(("solver", "the solver `quasi-static`".into(), help)),
+        SolverName::Explicit => return None,
     }
     let table = run.linear.table();
     let by = match table.by {

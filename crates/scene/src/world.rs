@@ -203,7 +203,8 @@ impl World {
 
 #[cfg(feature = "gpu")]
 impl World {
-    /// The GPU of the scene, where all bodies move together on one. A GPU that solves the equations of implicit steps moves none.
+    /// The GPU of the scene, where all bodies move together on one and stay there. A GPU that solves the equations of implicit steps moves none,
+    /// and explicit shells are read back whenever somebody looks.
     pub fn device(&self) -> Option<&Device> {
         let part = self.only().filter(|part| part.built.implicit.is_none())?;
         part.plan.target.device.as_ref()

@@ -4,11 +4,15 @@ use std::collections::VecDeque;
 use std::fmt::Write;
 use std::sync::Arc;
 
+#[cfg(feature = "gpu")]
+use nalgebra::UnitQuaternion;
 use nalgebra::Vector3;
 use pliant_contact::lag::Lag;
 use pliant_contact::pose::Leg;
 use pliant_contact::pressure::{faces, pressures};
 use pliant_explicit::{Clock, NodeContact, Wanted};
+#[cfg(feature = "gpu")]
+use pliant_gpu::GpuShells;
 #[cfg(feature = "gpu")]
 use pliant_implicit::LinearDevice;
 use pliant_implicit::{
@@ -80,7 +84,21 @@ pub(crate) struct Implicit {
     touching: Option<TouchingNow>,
     /// Displacements of the solids at the instant last evaluated; `None` without solids.
     solids: Option<pliant_explicit::State<f64>>,
+    /// What takes explicit steps; `None`: the CPU. Forces at instants are found on the CPU, as are energies and reactions.
+    #[cfg(feature = "gpu")]
+    device: Option<ShellsOnDevice>,
 }
+
+/// Explicit shells on a GPU, and the forces [N] on their nodes from outside.
+#[cfg(feature = "gpu")]
+struct ShellsOnDevice {
+    stepper: GpuShells,
+    pushed: Vec<(u32, [f64; 3])>,
+}
+
+/// Most steps that a GPU takes before a run reports progress and can be stopped.
+#[cfg(feature = "gpu")]
+const STRIDE: u64 = 1024;
 
 /// How far a run by arc length is.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -185,7 +203,7 @@ impl Implicit {
             }
             part::Method::Explicit(_)
             | part::Method::QuasiStatic { .. }
-            | part::Method::ExplicitShells(_) => Explicit::new(model.clone(), part.steps.step)
+            | part::Method::ExplicitShells(..) => Explicit::new(model.clone(), part.steps.step)
                 .map(|solver| SolverMethod::Explicit(Box::new(solver))),
         };
         let mut prescribed = vec![false; 6 * model.rest.len()];
@@ -221,9 +239,54 @@ impl Implicit {
             springs: Vec::new(),
             touching: None,
             solids: (!own.solids.is_empty()).then(|| pliant_explicit::State::at_rest(own)),
+            #[cfg(feature = "gpu")]
+            device: match &part.method {
+                part::Method::ExplicitShells(_, part::ShortSteps { device: Some(device) }) => {
+                    let stepper = GpuShells::new(device, model.clone(), part.steps.step)
+                        .map_err(|error| Failure::device(&error, None))?;
+                    Some(ShellsOnDevice { stepper, pushed: Vec::new() })
+                }
+                _ => None,
+            },
             model: Arc::clone(own),
             bodies: Arc::clone(bodies),
         })
+    }
+
+    /// So many steps on the device, from an evaluated instant. It sums the work of forces from outside but for what those at the end do in
+    /// the last step: they are found at the next evaluation, so the instant before is one step back, without forces.
+    #[cfg(feature = "gpu")]
+    fn advance_on_device(&mut self, steps: u64) -> Result<(), Failure> {
+        let Some(ShellsOnDevice { stepper, pushed }) = &mut self.device else { return Ok(()) };
+        let pull = |spring: &Spring| {
+            let stretch = spring.anchor - self.state.position[spring.node as usize];
+            (spring.node, (stretch * spring.stiffness).into())
+        };
+        let acting: Vec<_> = pushed.iter().copied().chain(self.springs.iter().map(pull)).collect();
+        stepper.push(&acting);
+        let moved = stepper
+            .advance(&mut self.state, steps)
+            .map_err(|error| Failure::device(&error, Some(self.time)))?;
+        self.energies.external += moved.work;
+        if let Some((forces, state)) = self.before.as_mut().filter(|_| moved.steps > 0) {
+            forces.fill(0.0);
+            state.clone_from(&self.state);
+            for node in 0..state.position.len() {
+                state.position[node] -= self.step * state.velocity[node];
+                let turn = UnitQuaternion::from_scaled_axis(-self.step * state.spin[node]);
+                state.rotation[node] = turn * state.rotation[node];
+            }
+        }
+        self.done += moved.steps;
+        self.time = self.state.time;
+        (self.evaluated, self.entered) = (false, false);
+        if !moved.broken {
+            return Ok(());
+        }
+        match self.method.evaluate(&self.state) {
+            Err(error) => Err(failure(&error, &self.model, &self.bodies, self.time)),
+            Ok(()) => Err(Failure::device(&stepper.disagrees(), Some(self.time))),
+        }
     }
 
     /// Finds the forces from outside: loads on free components, what holds or moves the others.
@@ -523,6 +586,10 @@ impl Implicit {
         (self.done, self.time) = (done, time);
         self.convergence = convergence;
         self.state = state.state();
+        #[cfg(feature = "gpu")]
+        if let Some(device) = &mut self.device {
+            device.stepper.upload(&self.state);
+        }
         if let SolverMethod::Implicit(solver, _) = &mut self.method {
             solver.go_on_from(previous.map(|previous| previous.state()));
         }
@@ -758,14 +825,25 @@ impl Participant for Implicit {
         Ok(())
     }
 
-    fn advance(&mut self, _steps: u64, _watch: &mut dyn FnMut(LoadStepProgress)) -> Result<(), Failure> {
+    fn advance(&mut self, steps: u64, _watch: &mut dyn FnMut(LoadStepProgress)) -> Result<(), Failure> {
+        debug_assert!(steps <= self.stride(), "{steps} steps in one go");
         let number = self.done + 1;
         self.put_springs();
+        #[cfg(feature = "gpu")]
+        if self.device.is_some() {
+            return self.advance_on_device(steps);
+        }
         self.go(number).map_err(|error| failure(&error, &self.model, &self.bodies, self.state.time))?;
         (self.done, self.time) = (number, self.state.time);
         self.touching = self.method.touching().map(TouchingSystem::now);
         (self.evaluated, self.entered) = (false, false);
         Ok(())
+    }
+
+    /// A grip pulls by where its nodes are at each step.
+    #[cfg(feature = "gpu")]
+    fn stride(&self) -> u64 {
+        if self.device.is_some() && self.grips.is_empty() { STRIDE } else { 1 }
     }
 
     fn hold(&mut self, grips: &[Grip]) -> bool {
@@ -788,6 +866,10 @@ impl Participant for Implicit {
                 forces.push(&acting);
             }
             SolverMethod::Explicit(solver) => solver.push(&acting),
+        }
+        #[cfg(feature = "gpu")]
+        if let Some(device) = &mut self.device {
+            device.pushed = acting;
         }
         self.evaluated = false;
     }
@@ -966,7 +1048,7 @@ mod tests {
         let Method::Implicit(bodies, _) = &part.method else { panic!("an implicit part") };
         let step = 0.9 * Explicit::stable_step(&bodies.model);
         let part = Part {
-            method: Method::ExplicitShells(Arc::clone(bodies)),
+            method: Method::ExplicitShells(Arc::clone(bodies), crate::ShortSteps::default()),
             steps: Steps::within(0.1, step),
             ..part.clone()
         };

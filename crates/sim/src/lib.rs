@@ -64,7 +64,7 @@ pub use device::{MappedPoint, OnDevice};
 pub use failure::{BlockedDriver, FailedLoadStep, Failure, INTERRUPTED};
 pub use guests::{Guests, GuestsNow};
 pub use instant::{CellsNow, Effort, Instant};
-pub use part::{Explicit, LongSteps, Method, Part, Precision};
+pub use part::{Explicit, LongSteps, Method, Part, Precision, ShortSteps};
 pub use penalty::{PenaltyTie, TieNow};
 pub use reals::Reals;
 pub use schedule::Schedule;

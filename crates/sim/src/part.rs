@@ -61,11 +61,19 @@ pub enum Method {
         tolerance: Option<f64>,
     },
     /// Shells with inertia, by central differences.
-    ExplicitShells(Arc<ImplicitBodies>),
+    ExplicitShells(Arc<ImplicitBodies>, ShortSteps),
     /// Equilibria of shells and solids at the ends of load steps, by Newton's method.
     Static(Arc<ImplicitBodies>, StaticSettings),
     /// Shells and solids with inertia in long steps; the length of [`Part::steps`] counts.
     Implicit(Arc<ImplicitBodies>, LongSteps),
+}
+
+/// Settings of explicit steps of shells.
+#[derive(Clone, Debug, Default)]
+pub struct ShortSteps {
+    /// The GPU that takes them in single precision; `None`: the CPU, in double.
+    #[cfg(feature = "gpu")]
+    pub device: Option<Device>,
 }
 
 /// Settings of implicit steps.
@@ -121,7 +129,7 @@ impl Method {
     /// Shells, and solids whose equations are solved, with all they need beside the model.
     pub fn bodies(&self) -> Option<&Arc<ImplicitBodies>> {
         match self {
-            Self::ExplicitShells(bodies) | Self::Static(bodies, _) | Self::Implicit(bodies, _) => {
+            Self::ExplicitShells(bodies, _) | Self::Static(bodies, _) | Self::Implicit(bodies, _) => {
                 Some(bodies)
             }
             Self::Explicit(_) | Self::QuasiStatic { .. } => None,
@@ -152,7 +160,9 @@ impl Method {
     pub fn precision(&self) -> Precision {
         match self {
             Self::Explicit(Explicit { precision, .. }) | Self::QuasiStatic { precision, .. } => *precision,
-            Self::ExplicitShells(_) | Self::Static(..) | Self::Implicit(..) => Precision::Double,
+            #[cfg(feature = "gpu")]
+            Self::ExplicitShells(_, ShortSteps { device: Some(_) }) => Precision::Single,
+            Self::ExplicitShells(..) | Self::Static(..) | Self::Implicit(..) => Precision::Double,
         }
     }
 }

@@ -176,7 +176,7 @@ pub(crate) fn on_cpu<R: Scalar>(part: &Part) -> Result<Box<dyn Solver<R>>, Failu
                 tolerance,
             })
         }
-        Method::ExplicitShells(_) | Method::Static(..) | Method::Implicit(..) => {
+        Method::ExplicitShells(..) | Method::Static(..) | Method::Implicit(..) => {
             return Err(Failure::input(&"shells and solved equations have a participant of their own"));
         }
     })

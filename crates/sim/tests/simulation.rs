@@ -11,7 +11,7 @@ use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_mechanics::model::{Cells, Material, Motion, Solid};
 use pliant_mechanics::prony::{self, Prony, PronyTerm, PronyUpdate};
 use pliant_mechanics::{Energies, Model};
-use pliant_sim::{Method, Part, Precision, Simulation, State, World};
+use pliant_sim::{Method, Part, Precision, ShortSteps, Simulation, State, World};
 
 /// Duration of a run [s].
 const DURATION: f64 = 0.1;
@@ -56,7 +56,8 @@ fn parts(shear: f64) -> Vec<Part> {
     let equilibria = Part::equilibria("strip", strip(), DURATION, 4);
     let implicit = Part::implicit("strip", strip(), DURATION, 0.01);
     let Method::Implicit(bodies, _) = &implicit.method else { unreachable!("an implicit part") };
-    let shells = Part { method: Method::ExplicitShells(bodies.clone()), ..implicit.clone() };
+    let shells =
+        Part { method: Method::ExplicitShells(bodies.clone(), ShortSteps::default()), ..implicit.clone() };
     let stable = pliant_implicit::Explicit::stable_step(&bodies.model);
     let shells = Part { steps: pliant_sim::Steps::within(DURATION, 0.9 * stable), ..shells };
     vec![explicit, single, quasi_static, equilibria, implicit, shells, relaxing(shear)]
@@ -336,7 +337,7 @@ fn pushed_nodes_are_borne_in_equilibrium() {
 /// Nothing takes the work of forces on explicit shells but motion and strain.
 #[test]
 fn forces_on_explicit_shells_do_work() {
-    let part = parts(1e5).into_iter().find(|part| matches!(part.method, Method::ExplicitShells(_))).unwrap();
+    let part = parts(1e5).into_iter().find(|part| matches!(part.method, Method::ExplicitShells(..))).unwrap();
     let mut simulation = Simulation::new(part).unwrap();
     let forces = on(&simulation, &[2, 3], [1e-3, 0.0, 5e-3]);
     simulation.push(&forces).unwrap();

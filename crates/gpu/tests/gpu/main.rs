@@ -5,5 +5,6 @@ mod devices;
 mod gradients;
 mod laws;
 mod shapes;
+mod shells;
 mod stepper;
 mod support;

@@ -1,8 +1,9 @@
 //! Scenes on a GPU: the same result as on the CPU, rejections and messages. Without an adapter, the tests that need one are skipped with
 //! a notice; with `PLIANT_REQUIRE_GPU=1` they fail.
 
+use pliant_mechanics::grip::Grip;
 use pliant_sim::gpu::adapters;
-use pliant_testing::scenes::{BLOCK, Workshop, changed};
+use pliant_testing::scenes::{BLOCK, Workshop, changed, world};
 
 /// [`BLOCK`] on a device.
 fn on(device: &str) -> Workshop {
@@ -209,9 +210,6 @@ fn equations_that_a_device_does_not_solve_are_refused_by_name() {
         assert_eq!(told.status(), "invalid", "{}", told.err);
         assert!(told.words().contains(says) && told.words().contains(help), "{given}: {}", told.err);
     }
-    let explicit = changed(TUBE, "linear = \"conjugate-gradients\"", "device = \"gpu\"");
-    let told = Workshop::new(&explicit).check(&["run.solver=explicit", "run.step=1e-6"]);
-    assert!(told.words().contains("the explicit solver of shells runs on the CPU only"), "{}", told.err);
     let told = tube("device = \"auto\"").run(&["run.linear=direct"]);
     assert_eq!(told.done()["device"], "cpu");
     assert!(told.words().contains("the linear solver `direct` runs on the CPU only"), "{}", told.err);
@@ -221,10 +219,137 @@ fn equations_that_a_device_does_not_solve_are_refused_by_name() {
     let told = tube("device = \"gpu\"\ndesign = \"gather\"").check(&[]);
     assert_eq!(told.status(), "invalid", "{}", told.err);
     assert!(
-        told.underlines("design = \"gather\"") && told.words().contains("about explicit steps"),
+        told.underlines("design = \"gather\"") && told.words().contains("about explicit solids"),
         "{}",
         told.err
     );
+}
+
+/// [`TUBE`] in explicit steps of 0.24 ms, whose end is moved and turned, with more lines in `[run]`.
+fn explicit_tube(run: &str) -> String {
+    let text = changed(TUBE, "solver = \"implicit\"", "solver = \"explicit\"");
+    let text = changed(&text, "step = 0.04\nlinear = \"conjugate-gradients\"", run);
+    let text = changed(&text, "until = 0.4", "until = 0.01").replace("every = 0.4", "every = 0.005");
+    let text =
+        changed(&text, "{ union = [{ set = \"z-min\" }, { set = \"z-max\" }] }", "{ set = \"z-min\" }");
+    let moved = "[constraint.head]\ntype = \"move\"\nbody = \"tube\"\nnodes = { set = \"z-max\" }\nby = [0, 0.001, 0.002]\n\
+        turn = [0, 0, 0.17]\n\n";
+    let history = "\n[output.history]\ntype = \"csv\"\nevery = 0.0005\nenergy = true\nreactions = [\"head\", \"ends\"]\n";
+    changed(&text, "[load.push]", &format!("{moved}[load.push]")) + history
+}
+
+/// 2500 steps. Displacements to 1e-5, the round-off of single precision; reactions and energies of each instant to 1e-4 of the largest.
+#[test]
+fn explicit_shells_run_on_a_device_as_on_the_processor() {
+    if !pliant_testing::has_gpu(adapters().len()) {
+        return;
+    }
+    let [cpu, gpu] = ["device = \"cpu\"", "device = \"gpu\""].map(|run| Workshop::new(&explicit_tube(run)));
+    let reference = cpu.run(&["run.step=4e-6"]).done();
+    let json = gpu.run(&["run.step=4e-6"]).done();
+    assert_eq!(json["device"], adapters()[0].name);
+    assert_eq!((&json["precision"], &reference["precision"]), (&"single".into(), &"double".into()));
+    let apart = apart(&cpu, &gpu);
+    println!("displacements are {apart:.1e} apart");
+    assert!(apart < 1e-5, "displacements are {apart} apart");
+    let [(names, a), (_, b)] = [&cpu, &gpu].map(|workshop| workshop.table("out/case/history.csv"));
+    assert_eq!(a.len(), b.len());
+    for (column, name) in names.iter().enumerate() {
+        let largest = a.iter().map(|row| row[column].abs()).fold(0.0, f64::max);
+        let off = a.iter().zip(&b).map(|(a, b)| (a[column] - b[column]).abs()).fold(0.0, f64::max);
+        println!("{name}: {off:.1e} of {largest:.1e}");
+        // Forces that vanish by symmetry are round-off.
+        assert!(off < 1e-4 * largest || largest < 1e-3, "{name}: {off:e} of {largest:e}");
+    }
+    assert!(gpu.read("out/case/summary.md").contains(json["device"].as_str().unwrap()));
+}
+
+#[test]
+fn explicit_shells_that_only_the_processor_has_are_refused_by_name() {
+    let told = Workshop::new(&explicit_tube("device = \"gpu\"\nprecision = \"double\"")).check(&[]);
+    assert!(told.underlines("precision = \"double\"") || told.underlines("device = \"gpu\""), "{}", told.err);
+    assert!(told.words().contains("double precision runs on the CPU only"), "{}", told.err);
+    let spring = "\n[constraint.bed]\ntype = \"spring\"\nbody = \"tube\"\nnodes = \"all\"\nstiffness = 1\n";
+    let sprung = |device: &str| Workshop::new(&(explicit_tube(device) + spring));
+    let told = sprung("device = \"gpu\"").check(&[]);
+    assert_eq!(told.status(), "invalid", "{}", told.err);
+    assert!(told.underlines("device = \"gpu\""), "{}", told.err);
+    assert!(told.words().contains("a spring on explicit shells runs on the CPU only"), "{}", told.err);
+    let told = sprung("device = \"auto\"").run(&["scene.until=1e-4"]);
+    assert_eq!(told.done()["device"], "cpu");
+    assert!(told.words().contains("a spring on explicit shells runs on the CPU only"), "{}", told.err);
+}
+
+/// A hand and a force from outside move them as on the processor, and again from a snapshot: 1e-5 of the largest displacement and of the work.
+#[test]
+fn hands_and_forces_move_explicit_shells_on_a_device() {
+    if !pliant_testing::has_gpu(adapters().len()) {
+        return;
+    }
+    let run = |device: &str| {
+        let world = world(&explicit_tube(&format!("device = \"{device}\""))).unwrap();
+        let mut simulation = world.simulation().unwrap();
+        let nodes = simulation.world().parts[0].model.node_count();
+        let (held, pushed) = (nodes as u32 / 2, nodes / 2 + 1);
+        let [x, y, z] = simulation.rest(held);
+        let grip = Grip { nodes: vec![(held, 1.0)], place: [x, y, z + 0.005], stiffness: 5.0 };
+        let mut forces = vec![[0.0; 3]; nodes];
+        forces[pushed] = [0.01, 0.0, 0.0];
+        assert!(simulation.hold(std::slice::from_ref(&grip)));
+        simulation.push(&forces).unwrap();
+        simulation.run(1e-3, |_| ()).unwrap();
+        let snapshot = simulation.state().unwrap();
+        let mut ends = Vec::new();
+        for _ in 0..2 {
+            simulation.run(2e-3, |_| ()).unwrap();
+            let frame = simulation.frame().unwrap();
+            ends.push((frame.displacements("tube").unwrap(), frame.energies().external));
+            simulation.restore(snapshot.clone()).unwrap();
+            assert!(simulation.hold(std::slice::from_ref(&grip)));
+            simulation.push(&forces).unwrap();
+        }
+        ends
+    };
+    let cpu = &run("cpu")[0];
+    let largest = cpu.0.as_flattened().iter().fold(0.0, |most: f64, u| most.max(u.abs()));
+    for gpu in run("gpu") {
+        let pairs = cpu.0.as_flattened().iter().zip(gpu.0.as_flattened());
+        let off = pairs.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+        println!("off by {off:.1e} of {largest:.1e} m, {:e} and {:e} J", cpu.1, gpu.1);
+        assert!(off < 1e-5 * largest && (gpu.1 - cpu.1).abs() < 1e-5 * cpu.1.abs());
+    }
+}
+
+/// Displacements of a run that goes on elsewhere are those of one that does not, to 1e-5.
+#[test]
+fn a_checkpoint_of_explicit_shells_goes_from_device_to_processor_and_back() {
+    if !pliant_testing::has_gpu(adapters().len()) {
+        return;
+    }
+    let with = |device: &str| {
+        Workshop::new(&explicit_tube(&format!("device = \"{device}\"\ncheckpoint = {{ every = 0.005 }}")))
+    };
+    let whole = with("cpu");
+    whole.run(&[]).done();
+    for (begun, then) in [("gpu", "cpu"), ("cpu", "gpu"), ("gpu", "gpu")] {
+        let workshop = with(begun);
+        workshop.run(&[]).done();
+        let files = std::fs::read_dir(workshop.path("out/case")).unwrap();
+        let names = files.map(|file| file.unwrap().file_name().into_string().unwrap());
+        let first = names.filter(|name| name.ends_with(".pliant")).min().expect("a checkpoint");
+        let resumed = workshop.resume(&format!("out/case/{first}"), &[&format!("run.device={then}")]);
+        let json = resumed.done();
+        assert_eq!(json["device"] == "cpu", then == "cpu", "{}", resumed.err);
+        let apart = apart(&whole, &workshop);
+        assert!(apart < 1e-5, "from {begun} to {then} displacements are {apart} apart");
+        // The work of loads and motions goes on, too.
+        let [a, b] = [&whole, &workshop].map(|workshop| {
+            let (names, rows) = workshop.table("out/case/history.csv");
+            let column = names.iter().position(|name| name == "energy.external").expect("a column");
+            rows.last().expect("a row")[column]
+        });
+        assert!((a - b).abs() < 1e-4 * a.abs(), "from {begun} to {then}: {a} J, {b} J");
+    }
 }
 
 #[test]

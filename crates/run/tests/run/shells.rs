@@ -624,7 +624,7 @@ fn wrong_combinations_of_models_solvers_and_keys_are_refused() {
         (run("device = \"gpu\""), ["the solver `static` runs on the CPU only", "`solver = \"implicit\"`"]),
         (
             run("precision = \"single\""),
-            ["shells are computed in double precision only", "leave `precision` out"],
+            ["shells are computed in double precision only on the CPU", "leave `precision` out"],
         ),
         (run("mass-scaling = { target-step = 1e-3 }"), ["mass is not scaled for shells", "leave it out"]),
         (

@@ -9,7 +9,7 @@ use pliant_implicit::State;
 use pliant_sim::{Precision, counted};
 
 use crate::assemble::Builder;
-use crate::format::{BodyModel, BodyTable, Element, SolverName};
+use crate::format::{BodyModel, BodyTable, DeviceName, Element, SolverName};
 use crate::registry::OutputTable;
 
 impl Builder<'_> {
@@ -49,8 +49,9 @@ impl Builder<'_> {
             Some(_) => "shells".to_owned(),
             None => format!("runs with `solver = \"{solver}\"`"),
         };
-        if scene.run.precision == Some(Precision::Single) {
-            let message = format!("{what} are computed in double precision only");
+        let on_gpu = scene.run.solver == SolverName::Explicit && scene.run.device == DeviceName::Gpu;
+        if scene.run.precision == Some(Precision::Single) && !on_gpu {
+            let message = format!("{what} are computed in double precision only on the CPU");
             self.error(&scene.run_at("precision"), message, "not for these bodies", "leave `precision` out");
         }
         if scene.run.checkpoint.is_some()
