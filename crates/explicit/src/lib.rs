@@ -31,7 +31,6 @@
 //! ```
 
 mod applied;
-mod awake;
 mod collective;
 pub mod critical_step;
 mod dynamic_relaxation;

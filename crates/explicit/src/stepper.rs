@@ -23,7 +23,6 @@ use rayon::prelude::*;
 
 use crate::Scalar;
 use crate::applied::{AppliedForces, BLOCK};
-use crate::awake::Awake;
 use crate::collective::{Collective, Predicted, enclosed};
 use crate::energies::{Sums, model_balance_floor};
 use crate::forces::{Deformed, Found, InternalForces};
@@ -35,16 +34,8 @@ use crate::step_control::{Clock, Lengths, StepControl};
 use crate::step_error::StepError;
 use crate::touching::{Free, NodeContact, Nodes, Posture, Touching};
 
-/// Most nodes of a parallel task.
-const MOST_NODES: usize = 512;
-
-/// Tasks that the nodes of a small model are cut into, so that there is work for several threads.
-const FEWEST_TASKS: usize = 8;
-
-/// Nodes of a parallel task, whole [`BLOCK`]s: which sums go together depends on the model alone.
-fn nodes_of_task(nodes: usize) -> usize {
-    nodes.div_ceil(FEWEST_TASKS).next_multiple_of(BLOCK).clamp(4 * BLOCK, MOST_NODES)
-}
+/// Nodes per parallel task.
+const CHUNK: usize = 512;
 
 /// The results of an evaluated instant that a caller needs. A GPU reads back only these.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -180,7 +171,6 @@ pub struct CentralDifference<R> {
     next: Vec<Vector<R>>,
     reaction: Vec<Vector<R>>,
     sums: Vec<Sums>,
-    awake: Awake,
     energies: Energies,
     balance_floor: f64,
 }
@@ -454,8 +444,7 @@ impl<R: Scalar> CentralDifference<R> {
             factors: vec![[[0.0; 2]; 2]; model.constraints.len()],
             next: vec![[R::ZERO; 3]; nodes],
             reaction: vec![[R::ZERO; 3]; nodes],
-            awake: Awake::default(),
-            sums: vec![Sums::default(); nodes.div_ceil(nodes_of_task(nodes))],
+            sums: vec![Sums::default(); nodes.div_ceil(CHUNK)],
             energies: Energies::default(),
             balance_floor: model_balance_floor::<R>(&model),
             model,
@@ -535,7 +524,6 @@ impl<R: Scalar> CentralDifference<R> {
     /// If the state is not finite, a cell is inverted, the energies do not balance, or the step is above the limit and
     /// must not be cut.
     pub fn evaluate(&mut self, state: &mut State<R>) -> Result<(), StepError> {
-        self.awake.keep();
         self.control.keep(state);
         self.lengths = self.control.lengths(state);
         let relaxing = self.control.relaxing(state);
@@ -582,10 +570,9 @@ impl<R: Scalar> CentralDifference<R> {
     /// Moves to the next instant, at the end of the step or of a part of it; [`evaluate`](Self::evaluate) has gone before.
     pub fn advance(&mut self, state: &mut State<R>) {
         std::mem::swap(&mut state.increment, &mut self.next);
-        let each = nodes_of_task(state.displacement.len());
-        let chunks = state.displacement.par_chunks_mut(each).zip(state.increment.par_chunks(each));
+        let chunks = state.displacement.par_chunks_mut(CHUNK).zip(state.increment.par_chunks(CHUNK));
         chunks.enumerate().for_each(|(task, (displacement, increment))| {
-            let first = task * each;
+            let first = task * CHUNK;
             self.processor.run(Add { increment, to: displacement });
             for held in self.held_in(first..first + displacement.len()) {
                 for (c, constraint) in held.components() {
@@ -739,14 +726,13 @@ impl<R: Scalar> CentralDifference<R> {
         let mut next = std::mem::take(&mut self.next);
         let mut reaction = std::mem::take(&mut self.reaction);
         let mut sums = std::mem::take(&mut self.sums);
-        let each = nodes_of_task(next.len());
-        let increment = state.increment.par_chunks(each);
-        (next.par_chunks_mut(each).zip(reaction.par_chunks_mut(each)).zip(increment).zip(&mut sums))
+        let increment = state.increment.par_chunks(CHUNK);
+        (next.par_chunks_mut(CHUNK).zip(reaction.par_chunks_mut(CHUNK)).zip(increment).zip(&mut sums))
             .enumerate()
             .for_each(|(task, (((next, reaction), before), sums))| {
                 *sums = self.processor.run(NodePass {
                     stepper: self,
-                    first: task * each,
+                    first: task * CHUNK,
                     before,
                     next,
                     reaction,

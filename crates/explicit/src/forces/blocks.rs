@@ -13,16 +13,8 @@ use super::Findings;
 use crate::Scalar;
 use crate::lanes::{PACK, Pack};
 
-/// Most packs of cells in a block. Of 55,566 tets on one thread 32 take 3 % longer; with 128 hexes leave the first cache.
-const MOST_PACKS: usize = 64;
-
-/// Blocks that a small solid is cut into, so that there is work for several threads.
-const FEWEST_BLOCKS: usize = 8;
-
-/// Packs in a block of a solid of so many cells.
-pub(super) fn packs_of_block(cells: usize) -> usize {
-    cells.div_ceil(PACK).div_ceil(FEWEST_BLOCKS).clamp(4, MOST_PACKS)
-}
+/// Packs of cells in a block. Of 55,566 tets on one thread 32 take 3 % longer; with 128 hexes leave the first cache.
+pub(crate) const BLOCK: usize = 64;
 
 /// Three components and a fourth number, read and written at once.
 pub type Quad<R> = [R; 4];
@@ -34,8 +26,6 @@ pub struct Blocks {
     nodes: Vec<u32>,
     /// First entry of `nodes` of each block, one more than there are blocks.
     offsets: Vec<u32>,
-    /// Packs of cells in a block.
-    packs: usize,
     /// The most nodes of a block: each has room for so many.
     stride: usize,
 }
@@ -43,10 +33,9 @@ pub struct Blocks {
 impl Blocks {
     /// Of cells in their order, and the number of each cell's nodes in its block.
     pub(super) fn new<const N: usize>(cells: &[[u32; N]]) -> (Self, Vec<[u16; N]>) {
-        let packs = packs_of_block(cells.len());
-        let mut blocks = Self { nodes: Vec::new(), offsets: vec![0], packs, stride: 0 };
+        let mut blocks = Self { nodes: Vec::new(), offsets: vec![0], stride: 0 };
         let mut local = Vec::with_capacity(cells.len());
-        for cells in cells.chunks(packs * PACK) {
+        for cells in cells.chunks(BLOCK * PACK) {
             let first = blocks.nodes.len();
             let mut own: Vec<u32> = cells.as_flattened().to_vec();
             own.sort_unstable();
@@ -200,7 +189,7 @@ impl<R: Scalar> Moved<R> {
     ) {
         let Self { blocks, vectors } = self;
         let (count, stride) = (blocks.len(), blocks.stride.max(1));
-        let history = in_blocks(history, count, blocks.packs).zip(in_blocks(pressures, count, blocks.packs));
+        let history = in_blocks(history, count).zip(in_blocks(pressures, count));
         let rows = vectors.par_chunks_mut(stride).zip(forces.par_chunks_mut(stride));
         rows.zip(history).zip(findings).enumerate().for_each(
             |(block, (((moved, forces), (history, pressures)), findings))| {
@@ -216,11 +205,10 @@ impl<R: Scalar> Moved<R> {
 fn in_blocks<R: Scalar>(
     (history, per_pack): (&mut [Pack<R>], usize),
     blocks: usize,
-    packs: usize,
 ) -> impl IndexedParallelIterator<Item = &mut [Pack<R>]> {
     if history.is_empty() {
         Either::Left(repeat_n((), blocks).map(|()| <&mut [Pack<R>]>::default()))
     } else {
-        Either::Right(history.par_chunks_mut(packs * per_pack))
+        Either::Right(history.par_chunks_mut(BLOCK * per_pack))
     }
 }

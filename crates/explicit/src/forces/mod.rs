@@ -26,6 +26,7 @@ mod tests;
 use averaged::AveragedTets;
 use bar::Bars;
 pub(crate) use batch::pressure;
+pub(crate) use blocks::BLOCK;
 use std::ops::Range;
 
 use pliant_mechanics::Real;
@@ -38,7 +39,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::history::History;
 use crate::lanes::{Lanes, Local, PACK, Pack, Processor, WideF32, WideF64, load_vector};
-use blocks::{Blocks, Quad, Shares, packs_of_block};
+use blocks::{Blocks, Quad, Shares};
 use full_hex::FullHexes;
 use membrane::Membranes;
 use plain::SolidForces;
@@ -186,8 +187,7 @@ impl<R: Scalar, const N: usize> PackedCells<R, N> {
     /// The packs of a block.
     #[inline(always)]
     fn packs_of(&self, block: usize) -> Range<usize> {
-        let packs = packs_of_block(self.count);
-        block * packs..self.packs().end.min((block + 1) * packs)
+        block * BLOCK..self.packs().end.min((block + 1) * BLOCK)
     }
 
     /// A number of each cell of a pack; zero beyond the last one.
