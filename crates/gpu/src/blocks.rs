@@ -91,12 +91,18 @@ impl DeviceBlocks {
     ) -> Result<Self, GpuError> {
         let cells = &solid.cells;
         let per_cell = cells.nodes_per_cell();
-        // Displacements and places at rest of all nodes, forces and energies of all cells.
+        // Displacements and places at rest of all nodes, forces and energies of all cells, and a force that is zero.
+        let needed = |group: usize| 4 * (2 * 3 * MOST_NODES + (3 * per_cell + 1) * group + 4);
+        let adapter = device.adapter();
         let group = match cells {
-            Cells::Tet4(_) if device.adapter().group_size >= TETS as u32 => TETS,
+            Cells::Tet4(_)
+                if adapter.group_size as usize >= TETS && adapter.shared_memory as usize >= needed(TETS) =>
+            {
+                TETS
+            }
             _ => GROUP as usize,
         };
-        device.shares(4 * (2 * 3 * MOST_NODES + (3 * per_cell + 1) * group + 4))?;
+        device.shares(needed(group))?;
         let centre = |cell: usize| {
             let sum =
                 cells.nodes(cell).iter().fold([0.0; 3], |sum, &node| add(sum, model.rest[node as usize]));

@@ -310,8 +310,8 @@ impl Kernel {
 fn trusted(gpu: &wgpu::Device, name: &str, source: String) -> wgpu::ShaderModule {
     let source = wgpu::ShaderSource::Wgsl(source.into());
     let descriptor = wgpu::ShaderModuleDescriptor { label: Some(name), source };
-    // SAFETY: the text is Pliant's own. Its loops have ends that the CPU or the kernel has counted, its places in arrays come from
-    // lists of the CPU, whose arrays have their size, and no whole number is divided by zero.
+    // SAFETY: the text is Pliant's own. Loops end at counts, and places in arrays come from lists, that the CPU has made, or that kernels have made of
+    // them: queues of contact hold each row, face and node once and have room for all. No whole number is divided by zero.
     unsafe { gpu.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked()) }
 }
 

@@ -132,8 +132,9 @@ pub(crate) fn within_limits<S: Contacting, T, E: From<SolveError>>(
             // The last motion of a step in contact was made without a look at what is left.
             solver.find_residual(state);
         }
-        let mut agree = solver.system().valves_hold(&mut valves);
-        if valves.iter().any(|own| own.changes > CHANGES) {
+        let valves_hold = solver.system().valves_hold(&mut valves);
+        let mut agree = valves_hold;
+        if valves.iter().any(|own| own.changes > CHANGES) || tries == 0 && !valves_hold {
             return Err(SolveError::Impossible(
                 "neither the volume nor the limit of its pressure can be kept: the surface snaps open; take smaller steps, or a higher `pressure-limit`",
             )

@@ -880,6 +880,10 @@ impl System {
         }
         let gap = self.touching.as_ref().and_then(|own| own.barriers.least_gap()).unwrap_or(f64::INFINITY);
         let driver = self.hardest_driver([state.time, time]);
+        if driver.is_none() && self.conditions.are_closed() {
+            // Nothing is driven: loads press what does not come to rest.
+            return SolveError::NotConverged { time, node: 0, residuals: Vec::new(), broken: None };
+        }
         SolveError::Blocked { time, driver, part, gap, iterations }
     }
 

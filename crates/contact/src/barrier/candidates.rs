@@ -11,8 +11,8 @@ use super::wide::{Apart, ROUND_OFF, Sort, Wide, common, other};
 
 /// Rest distances, over the reach, up to which parts of one surface never touch each other.
 const AT_REST: f64 = 1.02;
-/// The skin of a node beside the motion that it is to make, over that motion; and of a node of a rigid thing, which may turn: no arc up to half a turn is further
-/// from its chord than half of that.
+/// The skin of a node beside the motion that it is to make, over that motion; and of a node of a rigid thing, which may turn: an arc of up to half a turn about the
+/// origin of the thing is no further from its chord than half of that. Lists are made anew where another arc leaves its skin.
 const SKIN: [f64; 2] = [0.25, 0.55];
 /// Width of the bins that pairs are sorted into by their distance, over the distance of the barrier.
 const BIN: f64 = 0.2;

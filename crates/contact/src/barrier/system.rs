@@ -251,6 +251,11 @@ impl Barriers {
     /// the lists hold.
     fn list(&mut self, motion: &[f64], part: f64, share: f64) -> f64 {
         self.set_motion(motion, part, if share < 1.0 { 1.0 } else { share });
+        self.list_motion()
+    }
+
+    /// The same of the motion that is set.
+    fn list_motion(&mut self) -> f64 {
         self.listed.copy_from_slice(&self.place);
         self.listed_stances.clone_from(&self.stances[2]);
         let Self { groups, place, motion, wall_distances, contacts, stances, .. } = self;
@@ -264,6 +269,17 @@ impl Barriers {
             }
         }
         holds
+    }
+
+    /// Takes the places of all nodes; whether no node has left its skin.
+    fn lists_hold(&mut self) -> bool {
+        let Self { groups, place, listed, .. } = self;
+        groups.iter_mut().fold(true, |holds, group| group.take(place, listed) && holds)
+    }
+
+    /// Whether no node leaves its skin in the motion that is set.
+    fn lists_have_motion(&self) -> bool {
+        self.groups.iter().all(|group| group.has(&self.place, &self.listed, &self.motion))
     }
 
     /// How far [m] a rigid thing has gone since pairs were listed.
@@ -280,10 +296,13 @@ impl Barriers {
         }
         let mut rows = std::mem::take(&mut self.rows);
         rows.clear();
+        if !self.lists_hold() {
+            // Rigid things that turn go on arcs, and line searches stop anywhere on them.
+            self.motion.fill(Vector3::zeros());
+            self.list_motion();
+        }
         let mut apart = true;
         for number in 0..self.groups.len() {
-            let group = &mut self.groups[number];
-            group.take(&self.place, &self.listed);
             apart = apart
                 && self.groups[number].act(&self.place, &mut rows)
                 && self.act_at_wall(number, &mut rows);
@@ -572,12 +591,8 @@ impl Barriers {
     ) -> f64 {
         self.put(position, share);
         self.set_motion(motion, most, 1.0);
-        for group in &mut self.groups {
-            group.take(&self.place, &self.listed);
-        }
-        let has = |group: &Group| group.has(&self.place, &self.listed, &self.motion);
         let mut part = most;
-        if !self.groups.iter().all(has) {
+        if !self.lists_hold() || !self.lists_have_motion() {
             part *= self.list(motion, most, share);
         }
         let [from, to, _] = &self.stances;
@@ -586,6 +601,10 @@ impl Barriers {
         for _ in 0..TURNS {
             // Things that turn do not move on a straight way: the way to where they really come is searched.
             self.set_motion(motion, part, share + part * (1.0 - share));
+            if turns && !self.lists_have_motion() {
+                part *= SHORTER;
+                continue;
+            }
             let gone = self.filtered(keep, share, part);
             part *= gone;
             if !turns || gone == 1.0 || part == 0.0 {

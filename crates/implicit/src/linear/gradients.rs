@@ -607,7 +607,7 @@ impl KrylovVectors {
             self.find_residual(matrix, b);
             report.residual = self.residual() / size;
             match found {
-                Ok(()) if report.residual <= tolerance => return Ok(report),
+                _ if report.residual <= tolerance => return Ok(report),
                 Err(LinearError::Stalled(_)) => return Err(LinearError::Stalled(report)),
                 Err(LinearError::NotFinite) => return Err(LinearError::NotFinite),
                 _ => {}

@@ -47,14 +47,19 @@ fn product(l: Block, r: Block) -> Block {
     return Block(l.a * r.a + l.b * r.c, l.a * r.b + l.b * r.d, l.c * r.a + l.d * r.c, l.c * r.b + l.d * r.d);
 }
 
-// The inverse of a symmetric matrix by L D Lᵀ.
-fn inverse_of_part(m: mat3x3f) -> mat3x3f {
-    let d = 1.0 / m[0].x;
+// The inverse of a pivot; zero where nothing but round-off is left of it, as about axes without stiffness.
+fn over(pivot: f32, whole: f32) -> f32 {
+    return select(0.0, 1.0 / pivot, pivot > 1e-6 * whole);
+}
+
+// The inverse of a symmetric matrix by L D Lᵀ; `whole` has its diagonal before other parts were taken off.
+fn inverse_of_part(m: mat3x3f, whole: vec3f) -> mat3x3f {
+    let d = over(m[0].x, whole.x);
     let l = m[0].y * d;
     let k = m[0].z * d;
-    let e = 1.0 / (m[1].y - l * m[0].y);
+    let e = over(m[1].y - l * m[0].y, whole.y);
     let n = (m[1].z - k * m[0].y) * e;
-    let f = 1.0 / (m[2].z - k * m[0].z - n * (m[1].z - k * m[0].y));
+    let f = over(m[2].z - k * m[0].z - n * (m[1].z - k * m[0].y), whole.z);
     // L⁻¹ = [1 0 0; −l 1 0; q −n 1].
     let q = l * n - k;
     let xy = -l * e - q * n * f;
@@ -63,10 +68,14 @@ fn inverse_of_part(m: mat3x3f) -> mat3x3f {
     return mat3x3f(d + l * l * e + q * q * f, xy, xz, xy, e + n * n * f, yz, xz, yz, f);
 }
 
+fn diagonal(m: mat3x3f) -> vec3f {
+    return vec3f(m[0].x, m[1].y, m[2].z);
+}
+
 fn inverse(m: Block) -> Block {
-    let a = inverse_of_part(m.a);
+    let a = inverse_of_part(m.a, diagonal(m.a));
     let ab = a * m.b;
-    let s = inverse_of_part(m.d - m.c * ab);
+    let s = inverse_of_part(m.d - m.c * ab, diagonal(m.d));
     let b = -1.0 * (ab * s);
     return Block(a - b * transpose(ab), b, transpose(b), s);
 }

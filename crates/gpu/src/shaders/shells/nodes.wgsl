@@ -61,8 +61,11 @@ fn main(
     for (var k = load_starts[node]; k < load_starts[node + 1u]; k++) {
         let own = loads[2u * k];
         let factor = table[instant.row + bitcast<u32>(own.w)];
-        force += factor * own.xyz;
-        moment += factor * loads[2u * k + 1u].xyz;
+        // A load of any size does nothing while its factor is zero.
+        if factor != 0.0 {
+            force += factor * own.xyz;
+            moment += factor * loads[2u * k + 1u].xyz;
+        }
     }
     var velocity_held = vec3f();
     var spin_held = vec3f();

@@ -25,8 +25,11 @@ fn press(facet: u32, placed: Placed, corner: array<vec2f, 3>) {
     for (var k = starts[facet]; k < starts[facet + 1u]; k++) {
         let own = pressures[k];
         let factor = table[instant.row + bitcast<u32>(own.x)];
-        flat += factor * own.y;
-        curved += factor * own.z;
+        // A load of any size does nothing while its factor is zero.
+        if factor != 0.0 {
+            flat += factor * own.y;
+            curved += factor * own.z;
+        }
     }
     var points: array<vec3f, 9>;
     var force: array<vec3f, 3>;

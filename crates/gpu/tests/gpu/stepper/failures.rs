@@ -146,7 +146,6 @@ fn a_model_too_large_for_a_buffer_is_refused_with_both_sizes() {
 
 #[test]
 fn what_a_device_lacks_is_named_with_what_it_has() {
-    type Lessen = fn(&mut wgpu::Limits, &mut wgpu::Features);
     let cases: [(Lessen, Design, &str); 4] = [
         (
             |_, features| features.remove(wgpu::Features::SHADER_FLOAT32_ATOMIC),
@@ -168,6 +167,21 @@ fn what_a_device_lacks_is_named_with_what_it_has() {
         let GpuError::Lacks { what, .. } = &error else { panic!("{error:?}") };
         assert!(what.contains(named), "{error}");
         assert!(error.remedy().contains("another design"));
+    }
+}
+
+/// What a device has less of.
+type Lessen = fn(&mut wgpu::Limits, &mut wgpu::Features);
+
+#[test]
+fn blocks_of_cells_shrink_to_the_groups_and_the_shared_memory_there_are() {
+    let lessen: [Lessen; 2] = [
+        |limits, _| limits.max_compute_invocations_per_workgroup = 128,
+        |limits, _| limits.max_compute_workgroup_storage_size = 16_384,
+    ];
+    for lessen in lessen {
+        let Some(device) = lessened(lessen) else { return };
+        compare(&device, "in small groups", &moved_cube("tet4", elastic(neo_hookean())), &[Design::Fast]);
     }
 }
 
