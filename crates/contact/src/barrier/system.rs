@@ -273,8 +273,11 @@ impl Barriers {
 
     /// Takes the places of all nodes; whether no node has left its skin.
     fn lists_hold(&mut self) -> bool {
-        let Self { groups, place, listed, .. } = self;
-        groups.iter_mut().fold(true, |holds, group| group.take(place, listed) && holds)
+        let mut holds = true;
+        for group in &mut self.groups {
+            holds &= group.take(&self.place, &self.listed);
+        }
+        holds
     }
 
     /// Whether no node leaves its skin in the motion that is set.
