@@ -353,50 +353,6 @@ fn threads_change_no_bit_of_conjugate_gradients() {
     assert!(aggregates.1 < blocks.1);
 }
 
-/// To a coarse tolerance blocks are read in single precision: in any number of threads with the same bits, to a residual of the exact matrix, and near the
-/// solution to a fine one. A strip that is too stiff for single precision reaches it, too.
-#[test]
-fn rounded_blocks_reach_the_residual_of_the_exact_matrix() {
-    let tolerance = 1e-3;
-    let linear = |tolerance, preconditioner| LinearSolver::ConjugateGradients {
-        tolerance,
-        iterations: 5000,
-        preconditioner,
-    };
-    for preconditioner in [
-        Preconditioner::BlockJacobi,
-        Preconditioner::Aggregates,
-        Preconditioner::LaggedFactors { renew_after: 20 },
-    ] {
-        let model = balloon(4, 50.0);
-        let run = |threads, tolerance| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| {
-                let mut state = State { load_factor: 1.0, ..State::at_rest(&model) };
-                let settings = DynamicSettings::new(0.04).real_time(linear(tolerance, preconditioner));
-                let step = BackwardEuler::new(model.clone(), settings).unwrap().advance(&mut state).unwrap();
-                (state, step.linear)
-            })
-        };
-        let (state, report) = run(1, tolerance);
-        assert_eq!((state.clone(), report), run(3, tolerance));
-        assert!(report.residual <= tolerance, "{report:?}");
-        let (fine, rest) = (run(1, 1e-10).0, State::at_rest(&model));
-        let apart = |one: &State, other: &State| {
-            one.position.iter().zip(&other.position).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
-        };
-        let off = apart(&state, &fine) / apart(&fine, &rest);
-        println!("{preconditioner:?}: {report:?}, off by {off:.1e}");
-        assert!(off < 2e-2, "{off:e}");
-
-        let model = cantilever();
-        let settings =
-            StaticSettings { linear: linear(tolerance, preconditioner), ..StaticSettings::default() };
-        let solved = Statics::new(model.clone(), settings).unwrap().linear(&State::at_rest(&model), 1.0);
-        assert!(solved.is_ok(), "{solved:?}");
-    }
-}
-
 /// Iterations that run out are an error, or taken as they are with their residual.
 #[test]
 fn iterations_that_run_out_are_taken_if_told_so() {

@@ -1,12 +1,9 @@
 //! Conjugate gradients (Hestenes and Stiefel 1952) on the blocks of the nodes. Preconditioners: inverted diagonal blocks; these with a
 //! coarse correction by the rigid motions of aggregates, groups of neighbouring nodes (additive two-level Schwarz after Nicolaides
 //! 1987, SIAM J. Numer. Anal. 24:355); or older factors.
-//! Iterations to a residual of [`ROUNDED`] or more read blocks in single precision, half the bytes; vectors and sums are in double precision, and the
-//! residual of the exact matrix decides.
 //! Rows are shared between threads; sums over them run in one order, so the number of threads changes no bit.
 
 use nalgebra::{Cholesky, Matrix3, SMatrix, Vector3};
-use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::device::BlockPattern;
@@ -24,9 +21,6 @@ const SHARE: usize = 4;
 /// Nodes of an aggregate. On 20,000 shells 16 take less processor time than 8, 32 (9 %) or 64; on 4,000 these are within 5 % of each other.
 const AGGREGATE: usize = 16;
 
-/// The least tolerance for which blocks in single precision are read.
-const ROUNDED: f64 = 1e-4;
-
 pub(super) type Block = SMatrix<f64, 6, 6>;
 pub(super) type Node = [f64; 6];
 
@@ -42,13 +36,10 @@ pub(crate) struct BlockMatrix {
     row_start: Vec<u32>,
     column: Vec<u32>,
     value: Vec<Block>,
-    /// The values and the inverses of the diagonal blocks in single precision.
-    rounded: [Vec<[f32; 36]>; 2],
     /// Where the entries come from in the lower half.
     source: Vec<[u32; 36]>,
     /// Inverses of the diagonal blocks.
     inverse: Vec<Block>,
-    arch: Arch,
 }
 
 impl BlockMatrix {
@@ -98,10 +89,8 @@ impl BlockMatrix {
             number: order.iter().map(|&old| own[old as usize].0).collect(),
             aggregate_start,
             value: vec![Block::zeros(); column.len()],
-            rounded: [vec![[0.0; 36]; column.len()], vec![[0.0; 36]; order.len()]],
             source: vec![[NONE; 36]; column.len()],
             inverse: vec![Block::identity(); order.len()],
-            arch: Arch::new(),
             row_start,
             column,
         };
@@ -152,44 +141,31 @@ impl BlockMatrix {
     /// Takes the values of a matrix and inverts the diagonal blocks; false if one is not positive definite.
     pub(crate) fn update(&mut self, matrix: &LowerMatrix) -> bool {
         let entry = |&at: &u32| if at == NONE { 0.0 } else { matrix.value[at as usize] };
-        let round = |to: &mut [f32; 36], from: &Block| {
-            to.iter_mut().zip(from.iter()).for_each(|(to, from)| *to = *from as f32);
-        };
-        let [values, inverses] = &mut self.rounded;
-        let all = self.value.par_iter_mut().zip(values).zip(&self.source).with_min_len(64);
-        all.for_each(|((value, rounded), source)| {
+        self.value.par_iter_mut().zip(&self.source).with_min_len(64).for_each(|(value, source)| {
             value.iter_mut().zip(source).for_each(|(value, at)| *value = entry(at));
-            round(rounded, value);
         });
-        let (mut inverse, mut inverses) = (std::mem::take(&mut self.inverse), std::mem::take(inverses));
-        let all = inverse.par_iter_mut().zip(&mut inverses).enumerate().with_min_len(64);
-        let sound = all.map(|(node, (inverse, rounded))| {
+        let mut inverse = std::mem::take(&mut self.inverse);
+        let sound = inverse.par_iter_mut().enumerate().with_min_len(64).map(|(node, inverse)| {
             let mut block = self.value[self.find(node as u32, node as u32)];
             for (c, _) in self.equations[node].iter().enumerate().filter(|(_, e)| **e == NONE) {
                 block[(c, c)] = 1.0;
             }
-            let factor = Cholesky::new(block);
-            if let Some(factor) = &factor {
-                *inverse = factor.inverse();
-                round(rounded, inverse);
-            }
-            factor.is_some()
+            Cholesky::new(block).map(|factor| *inverse = factor.inverse()).is_some()
         });
         let sound = sound.reduce(|| true, |a, b| a && b);
-        (self.inverse, self.rounded[1]) = (inverse, inverses);
+        self.inverse = inverse;
         sound
     }
 
-    /// A row times a vector, with the blocks as they are or rounded.
-    #[inline(always)]
-    fn times(&self, node: usize, x: &[Node], rounded: bool) -> Node {
+    /// A row times a vector.
+    fn times(&self, node: usize, x: &[Node]) -> Node {
         let mut sum = [0.0; 6];
         for at in self.row(node) {
-            let x = &x[self.column[at] as usize];
-            if rounded {
-                add_rounded(&mut sum, &self.rounded[0][at], x);
-            } else {
-                add_product(&mut sum, &self.value[at], x);
+            let (block, x) = (self.value[at].as_slice(), &x[self.column[at] as usize]);
+            for (column, x) in block.chunks_exact(6).zip(x) {
+                for (sum, entry) in sum.iter_mut().zip(column) {
+                    *sum += entry * x;
+                }
             }
         }
         sum
@@ -441,18 +417,22 @@ impl KrylovVectors {
     }
 
     /// ap ← A p or, to start with, A x; its products with that vector.
-    fn multiply(&mut self, matrix: &BlockMatrix, start: bool, rounded: bool) -> f64 {
+    fn multiply(&mut self, matrix: &BlockMatrix, start: bool) -> f64 {
         let from = if start { &self.x } else { &self.p };
         let chunks = self.ap.par_chunks_mut(CHUNK).zip(&mut self.parts).enumerate().with_min_len(SHARE);
         chunks.for_each(|(chunk, (ap, part))| {
-            let product = Product { matrix, first: chunk * CHUNK, from, to: ap, rounded };
-            *part = [matrix.arch.dispatch(product), 0.0];
+            let mut sum = 0.0;
+            for (node, ap) in (chunk * CHUNK..).zip(ap) {
+                *ap = matrix.times(node, from);
+                sum += product(ap, &from[node]);
+            }
+            *part = [sum, 0.0];
         });
         self.sums()[0]
     }
 
     /// x += α p, r −= α A p; then z = M r but for the coarse part, and (r·r, r·z).
-    fn advance(&mut self, matrix: &BlockMatrix, alpha: f64, blocks: bool, rounded: bool) -> [f64; 2] {
+    fn advance(&mut self, matrix: &BlockMatrix, alpha: f64, blocks: bool) -> [f64; 2] {
         let chunks = self.x.par_chunks_mut(CHUNK).zip(self.r.par_chunks_mut(CHUNK));
         let chunks = chunks.zip(self.z.par_chunks_mut(CHUNK)).zip(&mut self.parts).enumerate();
         let (p, ap) = (&self.p, &self.ap);
@@ -465,12 +445,13 @@ impl KrylovVectors {
                 }
                 part[0] += product(r, r);
                 if blocks {
-                    *z = [0.0; 6];
-                    if rounded {
-                        add_rounded(z, &matrix.rounded[1][node], r);
-                    } else {
-                        add_product(z, &matrix.inverse[node], r);
+                    let mut own = [0.0; 6];
+                    for (column, r) in matrix.inverse[node].as_slice().chunks_exact(6).zip(&*r) {
+                        for (own, entry) in own.iter_mut().zip(column) {
+                            *own += entry * r;
+                        }
                     }
+                    *z = own;
                     part[1] += product(z, r);
                 }
             }
@@ -534,7 +515,7 @@ impl KrylovVectors {
         matrix.gather(x, &mut self.x);
         let size = squared(&self.r);
         if self.x.iter().any(|x| *x != [0.0; 6]) {
-            self.multiply(matrix, true, false);
+            self.multiply(matrix, true);
             let near: f64 = self
                 .r
                 .iter()
@@ -557,17 +538,12 @@ impl KrylovVectors {
         for (x, d) in self.x.as_flattened_mut().iter_mut().zip(d) {
             *x += scale * f64::from(*d);
         }
-        self.find_residual(matrix, b);
-        self.residual()
-    }
-
-    /// r ← b − A x.
-    fn find_residual(&mut self, matrix: &BlockMatrix, b: &[f64]) {
-        self.multiply(matrix, true, false);
+        self.multiply(matrix, true);
         matrix.gather(b, &mut self.r);
         for (r, ax) in self.r.iter_mut().zip(&self.ap) {
             (0..6).for_each(|c| r[c] -= ax[c]);
         }
+        self.residual()
     }
 
     /// |r|.
@@ -597,58 +573,30 @@ impl KrylovVectors {
         iterations: usize,
     ) -> Result<LinearReport, LinearError> {
         let size = self.begin(matrix, b, x);
+        let blocks = !matches!(inverse, Approximation::Factors(_));
+        self.p.fill([0.0; 6]);
+        self.ap.fill([0.0; 6]);
         let mut report = LinearReport { iterations: 0, residual: 0.0 };
         if size == 0.0 {
             return Ok(report);
         }
-        if tolerance >= ROUNDED {
-            let found = self.search(matrix, inverse, size, tolerance, iterations, true, &mut report);
-            // What is left follows from the rounded matrix.
-            self.find_residual(matrix, b);
-            report.residual = self.residual() / size;
-            match found {
-                _ if report.residual <= tolerance => return Ok(report),
-                Err(LinearError::Stalled(_)) => return Err(LinearError::Stalled(report)),
-                Err(LinearError::NotFinite) => return Err(LinearError::NotFinite),
-                _ => {}
-            }
-        }
-        self.search(matrix, inverse, size, tolerance, iterations, false, &mut report)?;
-        Ok(report)
-    }
-
-    /// Goes on from r and x, with the blocks as they are or rounded, until r is small enough.
-    #[expect(clippy::too_many_arguments, reason = "what the caller has, and one switch")]
-    fn search(
-        &mut self,
-        matrix: &BlockMatrix,
-        inverse: &mut Approximation<'_>,
-        size: f64,
-        tolerance: f64,
-        iterations: usize,
-        rounded: bool,
-        report: &mut LinearReport,
-    ) -> Result<(), LinearError> {
-        let blocks = !matches!(inverse, Approximation::Factors(_));
-        self.p.fill([0.0; 6]);
-        self.ap.fill([0.0; 6]);
-        let [left, so_far] = self.advance(matrix, 0.0, blocks, rounded);
+        let [left, so_far] = self.advance(matrix, 0.0, blocks);
         report.residual = left.sqrt() / size;
         let mut rz = self.precondition(matrix, inverse, so_far);
         let mut beta = 0.0;
         while report.residual > tolerance {
             if report.iterations == iterations {
-                return Err(LinearError::Stalled(*report));
+                return Err(LinearError::Stalled(report));
             }
             self.turn(matrix, inverse, beta);
-            let curvature = self.multiply(matrix, false, rounded);
+            let curvature = self.multiply(matrix, false);
             if !curvature.is_finite() {
                 return Err(LinearError::NotFinite);
             }
             if curvature <= 0.0 {
                 return Err(LinearError::Indefinite(report.iterations));
             }
-            let [left, so_far] = self.advance(matrix, rz / curvature, blocks, rounded);
+            let [left, so_far] = self.advance(matrix, rz / curvature, blocks);
             report.iterations += 1;
             report.residual = left.sqrt() / size;
             if report.residual > tolerance {
@@ -657,52 +605,7 @@ impl KrylovVectors {
                 rz = new;
             }
         }
-        Ok(())
-    }
-}
-
-/// Rows of a matrix times a vector.
-struct Product<'a> {
-    matrix: &'a BlockMatrix,
-    first: usize,
-    from: &'a [Node],
-    to: &'a mut [Node],
-    rounded: bool,
-}
-
-impl WithSimd for Product<'_> {
-    /// The product with the vector.
-    type Output = f64;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> f64 {
-        let Self { matrix, first, from, to, rounded } = self;
-        let mut sum = 0.0;
-        for (node, to) in (first..).zip(to) {
-            *to = matrix.times(node, from, rounded);
-            sum += product(to, &from[node]);
-        }
-        sum
-    }
-}
-
-/// Adds a block times a vector.
-#[inline(always)]
-fn add_product(sum: &mut Node, block: &Block, x: &Node) {
-    for (column, x) in block.as_slice().chunks_exact(6).zip(x) {
-        for (sum, entry) in sum.iter_mut().zip(column) {
-            *sum += entry * x;
-        }
-    }
-}
-
-/// Adds a rounded block times a vector.
-#[inline(always)]
-fn add_rounded(sum: &mut Node, block: &[f32; 36], x: &Node) {
-    for (column, x) in block.chunks_exact(6).zip(x) {
-        for (sum, entry) in sum.iter_mut().zip(column) {
-            *sum += f64::from(*entry) * x;
-        }
+        Ok(report)
     }
 }
 
