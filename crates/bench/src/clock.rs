@@ -13,7 +13,7 @@ pub trait Timed {
     /// Why a step can fail.
     type Error;
 
-    /// Steps before times count go on until one batch takes a quarter of so long [s].
+    /// The warm-up steps until a batch takes a quarter of this time [s].
     const WARM_UP: f64;
 
     /// Takes some steps, at least one; returns the wall time of one [s].

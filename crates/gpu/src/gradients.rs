@@ -42,7 +42,7 @@ fn failed(error: GpuError) -> DeviceError {
     DeviceError(format!("{error}; {}", error.remedy()))
 }
 
-/// How far a pass is, as its kernels see it.
+/// How far a pass is, as its kernels see it; twin of progress.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 struct Progress {

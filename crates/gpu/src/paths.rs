@@ -201,11 +201,12 @@ impl Paths {
         let listed = |(offsets, slots): (Vec<u32>, Vec<u32>)| -> Result<[wgpu::Buffer; 2], GpuError> {
             Ok([memory.filled(lists, &offsets)?, memory.filled(lists, &slots)?])
         };
-        let [offsets, of_node] = listed(by_node(nodes.count, taken))?;
+        let turned = |(slot, node): (u32, u32)| (node, slot);
+        let [offsets, of_node] = listed(by_rows(nodes.count, taken.map(turned)))?;
         let giving = match followers {
             Some(followers) => {
                 let own = slots.filter_map(|(slot, node)| Some((slot, number(node)?)));
-                let lists = listed(by_node(followers.count, own))?;
+                let lists = listed(by_rows(followers.count, own.map(turned)))?;
                 Some(followers.among_slots(device, &forces, &lists, first_given))
             }
             None => None,
@@ -313,19 +314,22 @@ fn force_at_unit_strain(solid: &Solid, cell: usize) -> f64 {
     area * solid.longitudinal_modulus()
 }
 
-/// First entry of each of so many nodes, and the slots there in their order, from slots with their nodes.
-fn by_node(count: usize, slots: impl Iterator<Item = (u32, u32)> + Clone) -> (Vec<u32>, Vec<u32>) {
-    let mut offsets = vec![0_u32; count + 1];
-    slots.clone().for_each(|(_, node)| offsets[node as usize + 1] += 1);
-    for node in 0..count {
-        offsets[node + 1] += offsets[node];
+/// First entry of each of so many rows, and the entries of the rows in their order, from entries with their rows.
+pub(crate) fn by_rows<T: Copy + Default>(
+    rows: usize,
+    entries: impl Iterator<Item = (u32, T)> + Clone,
+) -> (Vec<u32>, Vec<T>) {
+    let mut starts = vec![0_u32; rows + 1];
+    entries.clone().for_each(|(row, _)| starts[row as usize + 1] += 1);
+    for row in 0..rows {
+        starts[row + 1] += starts[row];
     }
-    let mut next = offsets.clone();
-    let mut of_node = vec![0; offsets[count] as usize];
-    for (slot, node) in slots {
-        let place = &mut next[node as usize];
-        of_node[*place as usize] = slot;
+    let mut next = starts.clone();
+    let mut of_rows = vec![T::default(); starts[rows] as usize];
+    for (row, entry) in entries {
+        let place = &mut next[row as usize];
+        of_rows[*place as usize] = entry;
         *place += 1;
     }
-    (offsets, of_node)
+    (starts, of_rows)
 }

@@ -17,6 +17,7 @@ use pliant_mechanics::load::{LoadKind, Spread};
 use pliant_mechanics::model::Motion;
 
 use crate::kernel::{Binding, Bound, Kernel, Memory};
+use crate::paths::by_rows;
 use crate::run::MOST;
 use crate::transfer::{Four, Transfer};
 use crate::{Device, GpuError};
@@ -272,7 +273,7 @@ impl GpuShells {
         self.pushed = !forces.is_empty();
     }
 
-    /// Takes so many steps and reads the state back. The first state is uploaded; [`upload`](Self::upload) takes up another one.
+    /// Takes `steps` steps and reads the state back. The first call uploads the state; [`upload`](Self::upload) uploads another one.
     ///
     /// # Errors
     /// If the device fails.
@@ -369,18 +370,6 @@ impl GpuShells {
     }
 }
 
-/// Entries of rows: where each row begins, and its entries in their order.
-fn by_rows<T: Copy>(rows: usize, entries: impl Iterator<Item = (u32, T)>) -> (Vec<u32>, Vec<T>) {
-    let mut sorted: Vec<(u32, T)> = entries.collect();
-    sorted.sort_by_key(|&(row, _)| row);
-    let mut starts = vec![0; rows + 1];
-    sorted.iter().for_each(|&(row, _)| starts[row as usize + 1] += 1);
-    for row in 0..rows {
-        starts[row + 1] += starts[row];
-    }
-    (starts, sorted.into_iter().map(|(_, entry)| entry).collect())
-}
-
 /// The nodes that constraints move, and of every node where its motion is in a row of the table.
 fn moved_nodes(model: &Assembly) -> (Vec<Moved>, Vec<u32>) {
     let mut places = vec![NONE; model.rest.len()];
@@ -440,7 +429,7 @@ fn kinds(model: &Assembly, step: f64) -> Vec<Four> {
 }
 
 /// Forces and moments of loads on nodes, and weights; with each its load.
-fn nodal_loads(model: &Assembly) -> impl Iterator<Item = (u32, [Four; 2])> {
+fn nodal_loads(model: &Assembly) -> impl Iterator<Item = (u32, [Four; 2])> + Clone {
     let entry = |load: usize, force: [f64; 3], moment: [f64; 3]| {
         let [x, y, z] = force.map(|f| f as f32);
         let [mx, my, mz] = moment.map(|m| m as f32);
@@ -489,7 +478,7 @@ impl Pressed {
         if entries.is_empty() {
             return Ok(None);
         }
-        let (starts, entries) = by_rows::<Four>(model.facets.len(), entries.into_iter());
+        let (starts, entries) = by_rows(model.facets.len(), entries.into_iter());
         let starts = memory.filled("the pressures of facets", &starts)?;
         let entries = memory.filled("the pressures of facets", &entries)?;
         let normals = memory.filled("the normals of facets", &normals(model))?;

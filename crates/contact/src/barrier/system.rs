@@ -247,14 +247,14 @@ impl Barriers {
         }
     }
 
-    /// Lists what may come near in a part of a motion, and while rigid things go on from a share to the end of the step; the part of that motion for which
-    /// the lists hold.
+    /// Lists pairs that may come near in a part of a motion, while rigid things go on from a share to the end of the step. Returns the part of that motion
+    /// for which the lists hold.
     fn list(&mut self, motion: &[f64], part: f64, share: f64) -> f64 {
         self.set_motion(motion, part, if share < 1.0 { 1.0 } else { share });
         self.list_motion()
     }
 
-    /// The same of the motion that is set.
+    /// Lists pairs for the motion that is set. Returns the part of it for which the lists hold.
     fn list_motion(&mut self) -> f64 {
         self.listed.copy_from_slice(&self.place);
         self.listed_stances.clone_from(&self.stances[2]);
@@ -300,7 +300,7 @@ impl Barriers {
         let mut rows = std::mem::take(&mut self.rows);
         rows.clear();
         if !self.lists_hold() {
-            // Rigid things that turn go on arcs, and line searches stop anywhere on them.
+            // A rigid thing turns on an arc, and a line search may stop on it outside of the lists.
             self.motion.fill(Vector3::zeros());
             self.list_motion();
         }
