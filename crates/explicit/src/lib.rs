@@ -34,6 +34,7 @@ mod applied;
 mod collective;
 pub mod critical_step;
 mod dynamic_relaxation;
+mod eigenvalues;
 mod energies;
 mod forces;
 mod foresight;

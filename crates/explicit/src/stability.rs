@@ -28,15 +28,17 @@
 //! The state holds all that monitoring needs to resume ([`Stability`] and [`State::reference`]). Stiffnesses in the reference state are computed
 //! from it again, so a resumed run has the same bits. A new reference allocates memory; nothing else in a step does.
 
+use pliant_mechanics::Number;
 use pliant_mechanics::law::plane_stress::InPlane;
 use pliant_mechanics::model::{Cells, Model, Solid, with_cells};
-use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, cast, dot, sub};
+use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cast, dot, sub};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
 use crate::critical_step::{limit_alone, scaled_bound};
+use crate::lanes::{LaneWork, Lanes, PACK, Pack, Processor, load_symmetric, load_tensor};
 pub use crate::stability_record::{MOST_SUBSTEPS, Stability, StepLimit};
 use crate::state::State;
 use crate::tangent::{Stiffness, gradient_square, stiffness};
@@ -106,14 +108,14 @@ struct Watch {
     reference: Vec<Option<Stiffness>>,
     /// λ of hourglass control alone, over V [Pa/m²].
     hourglass: Vec<f64>,
-    /// Σ B_a ⊗ B_a [1/m²], as [`gradient_square_of`]: found once, a check would spend much of its time there.
-    square: Vec<Symmetric<f64>>,
+    /// Σ B_a ⊗ B_a [1/m²] of packs of cells, as [`gradient_square_of`]: found once, a check would spend much of its time there.
+    square: Vec<Symmetric<Pack<f64>>>,
     /// 1/(|G| (λ+2μ) max(Δt_e, L)²) with the element bound Δt_e at rest: brings the guesses of all cells to one scale.
     weight: Vec<f64>,
-    /// What stands first in the two orders.
-    rank: Vec<[f64; 2]>,
-    order: [Vec<u32>; 2],
-    /// Limit [s] and reference of the cells checked closely.
+    /// The cells with their ranks in two orders; once they are picked, those that stand first come first.
+    order: [Vec<Ranked>; 2],
+    /// The cells that are checked closely, their limits [s] and references.
+    picked: Vec<u32>,
     found: Vec<(f64, Stiffness)>,
 }
 
@@ -183,11 +185,29 @@ impl Monitor {
         let solids = self.solids.iter().zip(&model.solids).enumerate();
         solids
             .filter_map(|(index, (watch, solid))| {
-                let limit = |cell: usize| (watch.check(model, solid, displacement, reference, cell).0, cell);
-                let all = (0..solid.cells.len()).into_par_iter().map(limit).map(finite);
-                all.reduce(|| None, smaller).map(|(limit, cell)| (limit, index, cell))
+                let all: Vec<u32> = (0..solid.cells.len() as u32).collect();
+                let least = |cells: &[u32]| {
+                    let found = watch.check(model, solid, displacement, reference, cells);
+                    smallest(&found, cells)
+                };
+                let least = all.par_chunks(PACK).map(least).reduce(|| None, smaller);
+                least.map(|(limit, cell)| (limit, index, cell))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+}
+
+/// A cell with its rank.
+#[derive(Clone, Copy, Debug, Default)]
+struct Ranked {
+    rank: f64,
+    cell: u32,
+}
+
+impl Ranked {
+    /// The larger rank first; cells of equal rank by number, so that the choice does not depend on what came before.
+    fn first(a: &Self, b: &Self) -> std::cmp::Ordering {
+        b.rank.total_cmp(&a.rank).then(a.cell.cmp(&b.cell))
     }
 }
 
@@ -195,21 +215,30 @@ impl Watch {
     fn new(model: &Model, solid: &Solid, limit: f64) -> Self {
         let count = solid.cells.len();
         let modulus = solid.longitudinal_modulus();
+        let square: Vec<Symmetric<f64>> = (0..count).map(|cell| gradient_square_of(solid, cell)).collect();
         let weight = |cell: usize| {
-            let square = gradient_square_of(solid, cell);
             let slowest = scaled_bound(model, solid, cell).max(limit);
-            1.0 / (product_square(&square, &Symmetric::IDENTITY).sqrt() * modulus * slowest * slowest)
+            1.0 / (product_square(&square[cell], &Symmetric::IDENTITY).sqrt() * modulus * slowest * slowest)
         };
         Self {
             limit,
             reference: vec![None; count],
             hourglass: (0..count).map(|cell| hourglass_modulus(solid, cell)).collect(),
-            square: (0..count).map(|cell| gradient_square_of(solid, cell)).collect(),
             weight: (0..count).map(weight).collect(),
-            rank: vec![[0.0; 2]; count],
-            order: [(0..count as u32).collect(), (0..count as u32).collect()],
+            square: square.chunks(PACK).map(packed).collect(),
+            order: [vec![Ranked::default(); count], vec![Ranked::default(); count]],
+            picked: Vec::with_capacity(picked(count)),
             found: vec![(0.0, Stiffness::default()); picked(count)],
         }
+    }
+
+    /// Σ B_a ⊗ B_a [1/m²] of a cell.
+    fn square(&self, cell: usize) -> Symmetric<f64> {
+        let mut square = Symmetric::ZERO;
+        for (own, pack) in square.0.iter_mut().zip(&self.square[cell / PACK].0) {
+            *own = pack.0[cell % PACK];
+        }
+        square
     }
 
     /// Finds both ranks of every cell: the squared speed by an isotropic guess, and the squared stretch.
@@ -220,36 +249,39 @@ impl Watch {
             Cells::Membrane(..) | Cells::Bar(..) => 0.0,
             _ => solid.material.law.small_strain().bulk,
         };
-        let (weight, squares) = (&self.weight, &self.square);
-        self.rank.par_iter_mut().enumerate().with_min_len(256).for_each(|(cell, rank)| {
-            let (h, square) = (displacement_gradient(solid, cell, displacement), squares[cell]);
-            let strain = Symmetric::green_lagrange_twice(&h);
-            let c = strain + Symmetric::IDENTITY;
-            let j = 1.0 + h.trace() + h.second_invariant() + h.determinant();
-            let mean = c.trace() / 3.0;
-            let stretch = match &*solid.law_fibres(cell) {
-                [] => mean,
-                fibres => fibres.iter().map(|&fibre| c.quadratic(fibre)).fold(0.0, f64::max),
-            };
-            // κ J² + |p| J, and the rest of λ + 2μ grown with the mean squared stretch (spec of the current bound).
-            let modulus = bulk * j * (j + (j - 1.0).abs()) + (rest - bulk) * mean;
-            // |G C⁻¹| over |G|: how much closer the deformed faces lie, the closest pair counting most.
-            let closeness = product_square(&square, &(c.cofactor() * (1.0 / (j * j)))).sqrt();
-            *rank = [closeness * modulus * weight[cell], stretch];
+        let processor = Processor::detect();
+        let [speeds, stretches] = &mut self.order;
+        let packs = speeds.par_chunks_mut(PACK).zip(stretches.par_chunks_mut(PACK)).zip(&self.square);
+        packs.enumerate().with_min_len(16).for_each(|(pack, ((speeds, stretches), square))| {
+            let mut gradient = Tensor([[Pack::ZERO; 3]; 3]);
+            let (mut speed, mut stretch) = (Pack::ZERO, Pack::ZERO);
+            for (lane, cell) in (pack * PACK..).take(speeds.len()).enumerate() {
+                let h = displacement_gradient(solid, cell, displacement);
+                for (to, entry) in gradient.0.as_flattened_mut().iter_mut().zip(h.0.as_flattened()) {
+                    to.0[lane] = *entry;
+                }
+            }
+            let (speed_found, stretch_found) = (&mut speed, &mut stretch);
+            processor.run(Ranks { gradient: &gradient, square, bulk, rest, speed_found, stretch_found });
+            for (lane, cell) in (pack * PACK..).take(speeds.len()).enumerate() {
+                let number = cell as u32;
+                speeds[lane] = Ranked { rank: speed.0[lane] * self.weight[cell], cell: number };
+                let along = largest_fibre_stretch(solid, cell, &gradient, lane);
+                stretches[lane] = Ranked { rank: along.unwrap_or(stretch.0[lane]), cell: number };
+            }
         });
     }
 
     /// Brings the cells that stand first to the front of each order.
     fn pick(&mut self) {
-        let (rank, picked) = (&self.rank, self.found.len());
-        for (by, order) in self.order.iter_mut().enumerate() {
-            // Cells of equal rank go by number, so that the choice does not depend on what came before.
-            let first =
-                |a: &u32, b: &u32| rank[*b as usize][by].total_cmp(&rank[*a as usize][by]).then(a.cmp(b));
+        let picked = self.found.len();
+        let pick = |order: &mut Vec<Ranked>| {
             if picked < order.len() {
-                order.select_nth_unstable_by(picked, first);
+                order.select_nth_unstable_by(picked, Ranked::first);
             }
-        }
+        };
+        let [speeds, stretches] = &mut self.order;
+        rayon::join(|| pick(speeds), || pick(stretches));
     }
 
     /// The smallest limit [s] of the cells that stand first in an order, and its cell.
@@ -261,48 +293,65 @@ impl Watch {
         reference: &[Vector<R>],
         by: usize,
     ) -> Option<(f64, usize)> {
-        let mut found = std::mem::take(&mut self.found);
-        found.par_iter_mut().zip(&self.order[by]).with_min_len(8).for_each(|(found, &cell)| {
-            *found = self.check(model, solid, displacement, reference, cell as usize);
+        let (mut found, mut picked) = (std::mem::take(&mut self.found), std::mem::take(&mut self.picked));
+        picked.clear();
+        picked.extend(self.order[by][..found.len()].iter().map(|own| own.cell));
+        let chunks = found.par_chunks_mut(PACK).zip(picked.par_chunks(PACK));
+        chunks.for_each(|(found, cells)| {
+            found.copy_from_slice(&self.check(model, solid, displacement, reference, cells)[..found.len()]);
         });
-        let mut least = None;
-        for (&(limit, before), &cell) in found.iter().zip(&self.order[by]) {
+        for (&(_, before), &cell) in found.iter().zip(&picked) {
             self.reference[cell as usize] = Some(before);
-            least = smaller(least, finite((limit, cell as usize)));
         }
-        self.found = found;
+        let least = smallest(&found, &picked);
+        (self.found, self.picked) = (found, picked);
         least
     }
 
-    /// The limit [s] that a cell sets, and its stiffness in the reference state.
+    /// The limits [s] that some cells set, at most [`PACK`], and their stiffnesses in the reference state.
     fn check<R: Scalar>(
         &self,
         model: &Model,
         solid: &Solid,
         displacement: &[Vector<R>],
         reference: &[Vector<R>],
-        cell: usize,
-    ) -> (f64, Stiffness) {
+        cells: &[u32],
+    ) -> [(f64, Stiffness); PACK] {
         let in_state = |displacement: &[Vector<R>]| {
-            let h = displacement_gradient(solid, cell, displacement);
-            let Stiffness { mode, wave } = stiffness(solid, cell, &h, &self.square[cell]);
-            Stiffness { mode: mode.max(self.hourglass[cell]), wave }
+            let state = |cell: usize| (displacement_gradient(solid, cell, displacement), self.square(cell));
+            let mut found = stiffness(solid, cells, state);
+            for (own, &cell) in found.iter_mut().zip(cells) {
+                own.mode = own.mode.max(self.hourglass[cell as usize]);
+            }
+            found
         };
         let now = in_state(displacement);
-        let before = self.reference[cell].unwrap_or_else(|| in_state(reference));
-        let [mode, wave] = [before.mode / now.mode, before.wave / now.wave].map(f64::sqrt);
-        let own = limit_alone(model, solid, cell, now.mode);
-        (own.max(self.limit * mode.min(wave)), before)
+        let known = cells.iter().all(|&cell| self.reference[cell as usize].is_some());
+        let found_before = if known { now } else { in_state(reference) };
+        let mut limits = [(f64::NAN, Stiffness::default()); PACK];
+        for (lane, &cell) in cells.iter().enumerate() {
+            let before = self.reference[cell as usize].unwrap_or(found_before[lane]);
+            let [mode, wave] = [before.mode / now[lane].mode, before.wave / now[lane].wave].map(f64::sqrt);
+            let own = limit_alone(model, solid, cell as usize, now[lane].mode);
+            limits[lane] = (own.max(self.limit * mode.min(wave)), before);
+        }
+        limits
     }
+}
+
+/// The smallest limit [s] of some cells, and its cell.
+fn smallest(found: &[(f64, Stiffness)], cells: &[u32]) -> Option<(f64, usize)> {
+    let limits = found.iter().zip(cells).map(|(&(limit, _), &cell)| (limit, cell as usize));
+    limits.map(finite).fold(None, smaller)
 }
 
 /// The limit [s] of a cell alone in a deformed state, Δt_e above: no assembly is unstable at the smallest one. Displacements
 /// [m], one per node.
 pub fn cell_limit<R: Scalar>(model: &Model, solid: usize, cell: usize, displacement: &[Vector<R>]) -> f64 {
     let solid = &model.solids[solid];
-    let h = displacement_gradient(solid, cell, displacement);
-    let square = gradient_square_of(solid, cell);
-    let mode = stiffness(solid, cell, &h, &square).mode;
+    let state =
+        |cell: usize| (displacement_gradient(solid, cell, displacement), gradient_square_of(solid, cell));
+    let mode = stiffness(solid, &[cell as u32], state)[0].mode;
     limit_alone(model, solid, cell, mode.max(hourglass_modulus(solid, cell)))
 }
 
@@ -358,11 +407,79 @@ fn displacement_gradient<R: Scalar>(solid: &Solid, cell: usize, displacement: &[
     plane.displacement_gradient(plane.incompressible())
 }
 
-/// tr (A B A B).
-fn product_square(a: &Symmetric<f64>, b: &Symmetric<f64>) -> f64 {
-    let (product, transposed) = {
-        let product = a.full().times_symmetric(b);
-        (product, product.transpose())
+/// The largest squared stretch of the fibres of a cell, from a pack of displacement gradients; `None` without fibres.
+fn largest_fibre_stretch(
+    solid: &Solid,
+    cell: usize,
+    gradient: &Tensor<Pack<f64>>,
+    lane: usize,
+) -> Option<f64> {
+    let fibres = solid.law_fibres(cell);
+    let mut h = Tensor::ZERO;
+    for (own, pack) in h.0.as_flattened_mut().iter_mut().zip(gradient.0.as_flattened()) {
+        *own = pack.0[lane];
+    }
+    let stretch = |&fibre: &Vector<f64>| {
+        let deformed = add(fibre, h.apply(fibre));
+        dot(deformed, deformed)
     };
-    (0..3).map(|i| dot(product.0[i], transposed.0[i])).sum()
+    fibres.iter().map(stretch).reduce(f64::max)
+}
+
+/// Symmetric tensors side by side; zero beyond the last.
+fn packed(tensors: &[Symmetric<f64>]) -> Symmetric<Pack<f64>> {
+    let mut packed = Symmetric([Pack::ZERO; 6]);
+    for (lane, tensor) in tensors.iter().enumerate() {
+        for (pack, &entry) in packed.0.iter_mut().zip(&tensor.0) {
+            pack.0[lane] = entry;
+        }
+    }
+    packed
+}
+
+/// A pack of cells with their displacement gradients, to be ranked.
+struct Ranks<'a> {
+    gradient: &'a Tensor<Pack<f64>>,
+    /// Σ B_a ⊗ B_a [1/m²].
+    square: &'a Symmetric<Pack<f64>>,
+    /// κ and λ + 2μ at rest [Pa].
+    bulk: f64,
+    rest: f64,
+    /// The squared speed by an isotropic guess, but for the weight of the cell.
+    speed_found: &'a mut Pack<f64>,
+    /// The mean squared stretch.
+    stretch_found: &'a mut Pack<f64>,
+}
+
+impl LaneWork<f64> for Ranks<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes<f64>>(self) {
+        let (bulk, rest) = (L::of(self.bulk), L::of(self.rest));
+        for at in (0..PACK).step_by(L::WIDTH) {
+            let (h, square): (Tensor<L>, _) =
+                (load_tensor(self.gradient, at), load_symmetric(self.square, at));
+            let c = Symmetric::green_lagrange_twice(&h) + Symmetric::IDENTITY;
+            let change = h.trace() + h.second_invariant() + h.determinant();
+            let j = L::ONE + change;
+            let mean = c.trace() * L::of(1.0 / 3.0);
+            // κ J² + |p| J, and the rest of λ + 2μ grown with the mean squared stretch (spec of the current bound).
+            let modulus = bulk * j * (j + change.max(-change)) + (rest - bulk) * mean;
+            // |G C⁻¹| over |G|: how much closer the deformed faces lie, the closest pair counting most.
+            let closeness = product_square(&square, &(c.cofactor() * (L::ONE / (j * j)))).sqrt();
+            (closeness * modulus).store(self.speed_found, at);
+            mean.store(self.stretch_found, at);
+        }
+    }
+}
+
+/// tr (A B A B).
+#[inline(always)]
+fn product_square<N: Number>(a: &Symmetric<N>, b: &Symmetric<N>) -> N {
+    let product = a.full().times_symmetric(b);
+    let transposed = product.transpose();
+    dot(product.0[0], transposed.0[0])
+        + dot(product.0[1], transposed.0[1])
+        + dot(product.0[2], transposed.0[2])
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::Scalar;
 use crate::critical_step::limit_about;
 use crate::forces::Deformed;
-use crate::stability::{CHANGE, CHECK_EVERY, Monitor, OnUnstable, StepLimit, substeps};
+use crate::stability::{CHANGE, CHECK_EVERY, Monitor, OnUnstable, RESERVE, StepLimit, substeps};
 use crate::state::State;
 use crate::step_error::StepError;
 
@@ -161,7 +161,7 @@ impl StepControl {
         monitor.refer_to(state);
         if let Some((mut limit, solid, cell)) = monitor.limit(model, &state.displacement, &state.reference) {
             if monitor.doubts(state, limit, self.step, self.substeps) {
-                limit = take_as_reference(model, owners, state);
+                limit = take_as_reference(model, owners, state, self.step / RESERVE);
             }
             let look = StepLimit { time: state.time, limit, solid, cell };
             state.stability.note(look, *deformed, state.steps);
@@ -213,10 +213,15 @@ impl StepControl {
     }
 }
 
-/// Finds the critical time step [s] of a state and makes it the reference of what follows.
-fn take_as_reference<R: Scalar>(model: &Model, owners: &[[u32; 3]], state: &mut State<R>) -> f64 {
+/// Finds the critical time step [s] of a state, at least whether it is `enough`, and makes it the reference of what follows.
+fn take_as_reference<R: Scalar>(
+    model: &Model,
+    owners: &[[u32; 3]],
+    state: &mut State<R>,
+    enough: f64,
+) -> f64 {
     let displacement: Vec<Vector<f64>> = state.displacement.iter().map(|&u| cast(u)).collect();
-    let limit = limit_about(model, owners, &displacement).step;
+    let limit = limit_about(model, owners, &displacement, enough);
     state.reference.clone_from(&state.displacement);
     state.stability.reference = Some((limit, state.steps));
     state.stability.critical_steps += 1;

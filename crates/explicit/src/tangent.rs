@@ -1,16 +1,21 @@
-//! The stiffest modes of a cell in a deformed state. With one evaluation point K_ab = V B_aᵀ A B_b, A = ∂P/∂F, and the
+//! The stiffest modes of cells in a deformed state. With one evaluation point K_ab = V B_aᵀ A B_b, A = ∂P/∂F, and the
 //! eigenvalues of K other than zero are those of V Lᵀ A L, where L Lᵀ = G = Σ B_a⊗B_a: a 9×9 problem for any number
 //! of nodes. A comes from the law's stress by central differences, so that it is right for every law: nothing about
 //! stiffening is assumed. The instantaneous response bounds that of a relaxing law. A triangle of a membrane is taken in its own frame,
-//! where it has no gradient across: of the nine modes those have no stiffness.
+//! where it has no gradient across: of the nine modes those have no stiffness. A pack of cells is taken at once, in lanes.
 
-use nalgebra::{SMatrix, SVector};
+use std::array::from_fn;
 
+use pliant_mechanics::Number;
 use pliant_mechanics::element::{Cord, Pull, Rest};
-use pliant_mechanics::law::Deformation;
+use pliant_mechanics::law::MOST_FAMILIES;
 use pliant_mechanics::law::plane_stress::InPlane;
 use pliant_mechanics::model::{Cells, Solid};
-use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, scale};
+use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, dot, scale};
+
+use crate::eigenvalues::{ROWS, eigenvector, largest_of_nine, largest_of_three};
+use crate::forces::Batch;
+use crate::lanes::{LaneWork, Lanes, PACK, Pack, Processor, load_symmetric, load_tensor};
 
 /// Size of the differences of F: truncation and round-off both near 1e-10.
 const DIFFERENCE: f64 = 1e-5;
@@ -30,44 +35,33 @@ pub(crate) struct Stiffness {
     pub wave: f64,
 }
 
-/// How stiff a cell with displacement gradient `h` and Σ B_a ⊗ B_a = `square` is. Not a number where the law is not
-/// defined.
-pub(crate) fn stiffness(solid: &Solid, cell: usize, h: &Tensor<f64>, square: &Symmetric<f64>) -> Stiffness {
-    let size = square.trace();
+/// How stiff some cells are, at most [`PACK`], each with its displacement gradient and its Σ B_a ⊗ B_a [1/m²]; entries beyond them
+/// mean nothing. Not a number where the law is not defined.
+pub(crate) fn stiffness(
+    solid: &Solid,
+    cells: &[u32],
+    state: impl Fn(usize) -> (Tensor<f64>, Symmetric<f64>),
+) -> [Stiffness; PACK] {
+    let cells: [usize; PACK] = from_fn(|lane| cells[lane.min(cells.len() - 1)] as usize);
+    let states = cells.map(state);
     if let Cells::Bar(block, cord) = &solid.cells {
-        return of_bar(solid, &block.rest[cell], cord, h);
+        return from_fn(|lane| of_bar(solid, &block.rest[cells[lane]], cord, &states[lane].0));
     }
-    let columns = cholesky_columns(&(*square * (1.0 / size)));
-    let mut matrix = SMatrix::<f64, 9, 9>::zeros();
-    for i in 0..3 {
-        for (p, &column) in columns.iter().enumerate().filter(|(_, column)| **column != [0.0; 3]) {
-            let moved = |by: f64| {
-                let mut moved = *h;
-                moved.0[i] = add(moved.0[i], scale(column, by));
-                first_piola_kirchhoff(solid, cell, &moved)
-            };
-            let (ahead, behind) = (moved(DIFFERENCE), moved(-DIFFERENCE));
-            for k in 0..3 {
-                for (q, column) in columns.iter().enumerate() {
-                    let change = |c: usize| (ahead.0[k][c] - behind.0[k][c]) * column[c];
-                    matrix[(3 * k + q, 3 * i + p)] = (change(0) + change(1) + change(2)) / (2.0 * DIFFERENCE);
-                }
-            }
+    let entry = |i: usize, k: usize| Pack::from_fn(|lane| states[lane].0.0[i][k]);
+    let mut fibres = [[Pack::ZERO; 3]; MOST_FAMILIES];
+    for (lane, &cell) in cells.iter().enumerate() {
+        for (to, fibre) in fibres.iter_mut().zip(&*solid.law_fibres(cell)) {
+            (0..3).for_each(|k| to[k].0[lane] = fibre[k]);
         }
     }
-    if matrix.iter().any(|x| !x.is_finite()) {
-        return Stiffness { mode: f64::NAN, wave: f64::NAN };
-    }
-    let symmetric = (matrix + matrix.transpose()) * 0.5;
-    let mode = match solid.cells {
-        // Without the modes that have a gradient across.
-        Cells::Membrane(..) => {
-            let own = |k: usize| 3 * (k / 2) + k % 2;
-            SMatrix::<f64, 6, 6>::from_fn(|i, k| symmetric[(own(i), own(k))]).symmetric_eigenvalues().max()
-        }
-        _ => symmetric.symmetric_eigenvalues().max(),
-    };
-    Stiffness { mode: size * mode, wave: size * stiffest_wave(&symmetric) }
+    let (mode, wave) = Processor::detect().run(Tangents {
+        solid,
+        cells: &cells,
+        gradient: &Tensor(from_fn(|i| from_fn(|k| entry(i, k)))),
+        square: &Symmetric(from_fn(|k| Pack::from_fn(|lane| states[lane].1.0[k]))),
+        fibres: &fibres,
+    });
+    from_fn(|lane| Stiffness { mode: mode.0[lane], wave: wave.0[lane] })
 }
 
 /// Of a bar, as if it were taut: E/(λ₀ L²) along it, or P/(λ L²) across, twice for its two nodes, with λ₀ the slack.
@@ -91,79 +85,189 @@ const BEGINNINGS: [Vector<f64>; 9] = [
     [1.0, 1.0, 0.0],
     [1.0, -1.0, 0.0],
 ];
+/// Rows and columns of the entries of a symmetric tensor.
+const ENTRIES: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [0, 1], [1, 2], [0, 2]];
 /// Turns of the search.
 const TURNS: usize = 4;
 
+/// A pack of cells, with what [`stiffness`] is given of them.
+struct Tangents<'a> {
+    solid: &'a Solid,
+    cells: &'a [usize; PACK],
+    gradient: &'a Tensor<Pack<f64>>,
+    square: &'a Symmetric<Pack<f64>>,
+    fibres: &'a [Vector<Pack<f64>>; MOST_FAMILIES],
+}
+
+/// Lᵀ A L, rows and columns by direction of displacement, then by column of L.
+type Matrix<N> = [[N; ROWS]; ROWS];
+
+impl LaneWork<f64> for Tangents<'_> {
+    /// The largest eigenvalues over all modes and over plane waves.
+    type Output = (Pack<f64>, Pack<f64>);
+
+    #[inline(always)]
+    fn run<L: Lanes<f64>>(self) -> Self::Output {
+        let mut batch = Batch::new();
+        let mut matrix: Matrix<Pack<f64>> = [[Pack::ZERO; ROWS]; ROWS];
+        for i in 0..3 {
+            for p in 0..3 {
+                self.displace::<L>(&mut batch, i, p);
+                self.stresses::<L>(&mut batch);
+                self.fill_column::<L>(&batch, &mut matrix, 3 * i + p);
+            }
+        }
+        let (mut mode, mut wave) = (Pack::ZERO, Pack::ZERO);
+        for at in (0..PACK).step_by(L::WIDTH) {
+            let size = load_symmetric::<f64, L>(self.square, at).trace();
+            let mut symmetric = [[L::ZERO; ROWS]; ROWS];
+            // What is no number stays none: maxima on the way may lose it.
+            let mut sound = L::ZERO;
+            for i in 0..ROWS {
+                for k in 0..ROWS {
+                    symmetric[i][k] = L::of(0.5) * (L::load(&matrix[i][k], at) + L::load(&matrix[k][i], at));
+                    sound += L::ZERO * symmetric[i][k];
+                }
+            }
+            (size * stiffest_wave(&symmetric) + sound).store(&mut wave, at);
+            (size * largest_of_nine(&mut { symmetric }) + sound).store(&mut mode, at);
+        }
+        (mode, wave)
+    }
+}
+
+impl Tangents<'_> {
+    /// The columns of L over √|G|.
+    #[inline(always)]
+    fn columns<L: Lanes<f64>>(&self, at: usize) -> [Vector<L>; 3] {
+        let square: Symmetric<L> = load_symmetric(self.square, at);
+        cholesky_columns(&(square * (L::ONE / square.trace())))
+    }
+
+    /// Moves row `i` of the displacement gradient along column `p`, ahead and behind.
+    #[inline(always)]
+    fn displace<L: Lanes<f64>>(&self, batch: &mut Batch<f64>, i: usize, p: usize) {
+        for at in (0..PACK).step_by(L::WIDTH) {
+            let (h, columns): (Tensor<L>, _) = (load_tensor(self.gradient, at), self.columns::<L>(at));
+            for (pack, by) in [DIFFERENCE, -DIFFERENCE].into_iter().enumerate() {
+                let mut moved = h;
+                for (entry, c) in moved.0[i].iter_mut().zip(scale(columns[p], L::of(by))) {
+                    *entry += c;
+                }
+                batch.set(pack, at, &moved);
+            }
+        }
+    }
+
+    /// The elastic stresses ahead and behind.
+    #[inline(always)]
+    fn stresses<L: Lanes<f64>>(&self, batch: &mut Batch<f64>) {
+        match &self.solid.cells {
+            Cells::Membrane(..) => plane_stresses(self.solid, self.cells, batch),
+            _ => batch.evaluate::<L>(&self.solid.material.law, 2, 2, self.fibres),
+        }
+    }
+
+    /// A column of Lᵀ A L from the stresses ahead and behind.
+    #[inline(always)]
+    fn fill_column<L: Lanes<f64>>(&self, batch: &Batch<f64>, matrix: &mut Matrix<Pack<f64>>, column: usize) {
+        for at in (0..PACK).step_by(L::WIDTH) {
+            let columns = self.columns::<L>(at);
+            let [ahead, behind] =
+                [first_piola_kirchhoff::<L>(batch, 0, at), first_piola_kirchhoff(batch, 1, at)];
+            let change = ahead.plus_scaled(&behind, -L::ONE).scaled(L::of(0.5 / DIFFERENCE));
+            for (k, row) in change.0.into_iter().enumerate() {
+                for (q, &own) in columns.iter().enumerate() {
+                    dot(row, own).store(&mut matrix[3 * k + q][column], at);
+                }
+            }
+        }
+    }
+}
+
+/// F S [Pa].
+#[inline(always)]
+fn first_piola_kirchhoff<L: Lanes<f64>>(batch: &Batch<f64>, pack: usize, at: usize) -> Tensor<L> {
+    let stress = batch.elastic::<L>(pack, at);
+    batch.deformation_gradient::<L>(pack, at).times_symmetric(&(stress.isochoric + stress.volumetric))
+}
+
+/// The stresses of the triangles of a membrane, at the first two packs.
+fn plane_stresses(solid: &Solid, cells: &[usize; PACK], batch: &mut Batch<f64>) {
+    for pack in 0..2 {
+        for (lane, &cell) in cells.iter().enumerate() {
+            // Columns of H are the changes of the axes of the frame.
+            let changes = [0, 1].map(|i| [0, 1, 2].map(|k| batch.gradient[pack].0[k][i].0[lane]));
+            let plane = InPlane::from_changes(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], &changes);
+            let found = solid.material.law.plane_stress(plane.strain_twice, &solid.law_fibres(cell));
+            let [xx, yy, xy] = found.stress;
+            for (to, s) in batch.elastic[pack].isochoric.0.iter_mut().zip([xx, yy, 0.0, xy, 0.0, 0.0]) {
+                to.0[lane] = s;
+            }
+        }
+    }
+}
+
 /// max (n⊗y):A:(n⊗y) over unit n and y, by turns: for one of them kept, the other is an eigenvector of a 3×3 matrix.
-fn stiffest_wave(a: &SMatrix<f64, 9, 9>) -> f64 {
-    let along = |y: &SVector<f64, 3>| {
-        SMatrix::<f64, 3, 3>::from_fn(|i, k| {
-            (0..3).map(|p| (0..3).map(|q| a[(3 * i + p, 3 * k + q)] * y[p] * y[q]).sum::<f64>()).sum()
-        })
-    };
-    let across = |n: &SVector<f64, 3>| {
-        SMatrix::<f64, 3, 3>::from_fn(|p, q| {
-            (0..3).map(|i| (0..3).map(|k| a[(3 * i + p, 3 * k + q)] * n[i] * n[k]).sum::<f64>()).sum()
-        })
-    };
-    let begin = BEGINNINGS.map(|y| SVector::from(y).normalize());
-    let sizes = begin.map(|y| largest_eigenvalue(&along(&y)));
-    let best = (0..begin.len()).max_by(|&a, &b| sizes[a].total_cmp(&sizes[b])).unwrap_or(0);
-    let (mut y, mut largest) = (begin[best], sizes[best]);
+#[inline(always)]
+fn stiffest_wave<N: Number>(a: &Matrix<N>) -> N {
+    let mut y = [N::ONE, N::ZERO, N::ZERO];
+    let mut largest = largest_of_three(&along(a, y));
+    for other in &BEGINNINGS[1..] {
+        let length = dot(*other, *other).sqrt();
+        let other = [N::of(other[0] / length), N::of(other[1] / length), N::of(other[2] / length)];
+        let own = largest_of_three(&along(a, other));
+        // One where it is larger, and zero elsewhere.
+        let better = N::of(0.5) * (N::ONE + N::ONE.copysign(own - largest));
+        for (y, other) in y.iter_mut().zip(other) {
+            *y += better * (other - *y);
+        }
+        largest = largest.max(own);
+    }
+    let mut n = y;
     for _ in 0..TURNS {
-        let matrix = along(&y);
-        let n = eigenvector(&matrix, largest_eigenvalue(&matrix));
-        let matrix = across(&n);
-        let value = largest_eigenvalue(&matrix);
-        y = eigenvector(&matrix, value);
+        let matrix = along(a, y);
+        n = eigenvector(&matrix, largest_of_three(&matrix), n);
+        let matrix = across(a, n);
+        let value = largest_of_three(&matrix);
+        y = eigenvector(&matrix, value, y);
         largest = largest.max(value);
     }
     largest
 }
 
-/// The largest root of the characteristic polynomial by Cardano's formula in cosines.
-fn largest_eigenvalue(a: &SMatrix<f64, 3, 3>) -> f64 {
-    let mean = a.trace() / 3.0;
-    let deviator = a - SMatrix::identity() * mean;
-    let size = (deviator.norm_squared() / 6.0).sqrt();
-    if size <= f64::EPSILON * mean.abs() {
-        return mean;
+/// y·A·y, over displacements.
+#[inline(always)]
+fn along<N: Number>(a: &Matrix<N>, y: Vector<N>) -> Symmetric<N> {
+    let mut found = Symmetric::ZERO;
+    for (entry, [i, k]) in found.0.iter_mut().zip(ENTRIES) {
+        for (p, &own) in y.iter().enumerate() {
+            *entry += own * dot([a[3 * i + p][3 * k], a[3 * i + p][3 * k + 1], a[3 * i + p][3 * k + 2]], y);
+        }
     }
-    let half_determinant = (deviator / size).determinant() / 2.0;
-    mean + 2.0 * size * (half_determinant.clamp(-1.0, 1.0).acos() / 3.0).cos()
+    found
 }
 
-/// A unit eigenvector: what the two rows of A − λ I that differ most in direction leave over.
-fn eigenvector(a: &SMatrix<f64, 3, 3>, eigenvalue: f64) -> SVector<f64, 3> {
-    let left = a - SMatrix::identity() * eigenvalue;
-    let row = |i: usize| left.column(i).into_owned();
-    let crosses = [row(0).cross(&row(1)), row(1).cross(&row(2)), row(2).cross(&row(0))];
-    let longest = crosses.into_iter().max_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()));
-    // Of an eigenvalue met twice any vector across the one row serves; the search goes on from an axis.
-    longest.and_then(|v| v.try_normalize(f64::MIN_POSITIVE)).unwrap_or_else(SVector::x)
-}
-
-fn first_piola_kirchhoff(solid: &Solid, cell: usize, h: &Tensor<f64>) -> Tensor<f64> {
-    let law = &solid.material.law;
-    if let Cells::Membrane(..) = &solid.cells {
-        // Columns of H are the changes of the axes of the frame.
-        let changes = [0, 1].map(|i| [0, 1, 2].map(|k| h.0[k][i]));
-        let plane = InPlane::from_changes(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], &changes);
-        let [xx, yy, xy] = law.plane_stress(plane.strain_twice, &solid.law_fibres(cell)).stress;
-        let stress = Symmetric([xx, yy, 0.0, xy, 0.0, 0.0]);
-        return Tensor::IDENTITY.plus_scaled(h, 1.0).times_symmetric(&stress);
+/// n·A·n, over gradients.
+#[inline(always)]
+fn across<N: Number>(a: &Matrix<N>, n: Vector<N>) -> Symmetric<N> {
+    let mut found = Symmetric::ZERO;
+    for (entry, [p, q]) in found.0.iter_mut().zip(ENTRIES) {
+        for (i, &own) in n.iter().enumerate() {
+            *entry += own * dot([a[3 * i + p][q], a[3 * i + p][3 + q], a[3 * i + p][6 + q]], n);
+        }
     }
-    let deformation = Deformation::from_displacement_gradient(h);
-    let stress = law.stress(&deformation, solid.fibres(cell));
-    deformation.gradient.times_symmetric(&(stress.isochoric + stress.volumetric))
+    found
 }
 
-/// The columns of the lower triangle L with L Lᵀ = S.
-fn cholesky_columns(s: &Symmetric<f64>) -> [Vector<f64>; 3] {
+/// The columns of the lower triangle L with L Lᵀ = S; of a plane S the last one is zero.
+#[inline(always)]
+fn cholesky_columns<N: Number>(s: &Symmetric<N>) -> [Vector<N>; 3] {
     let [xx, yy, zz, xy, yz, xz] = s.0;
     let a = xx.sqrt();
     let (b, c) = (xy / a, xz / a);
     let d = (yy - b * b).sqrt();
     let e = (yz - b * c) / d;
-    [[a, b, c], [0.0, d, e], [0.0, 0.0, (zz - c * c - e * e).max(0.0).sqrt()]]
+    let o = N::ZERO;
+    [[a, b, c], [o, d, e], [o, o, (zz - c * c - e * e).max(o).sqrt()]]
 }

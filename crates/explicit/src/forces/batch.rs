@@ -16,7 +16,7 @@ use crate::lanes::{
 pub(super) const PACKS: usize = 4;
 
 /// Displacement gradients of up to [`PACKS`] packs of points, and what the law finds there.
-pub(super) struct Batch<R> {
+pub(crate) struct Batch<R> {
     /// ∂u/∂X.
     pub gradient: [Tensor<Pack<R>>; PACKS],
     /// Elastic second Piola–Kirchhoff stress [Pa].
@@ -28,7 +28,7 @@ pub(super) struct Batch<R> {
 }
 
 impl<R: Scalar> Batch<R> {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let stress = Symmetric([Pack::ZERO; 6]);
         Self {
             gradient: [Tensor([[Pack::ZERO; 3]; 3]); PACKS],
@@ -40,7 +40,7 @@ impl<R: Scalar> Batch<R> {
 
     /// Sets ∂u/∂X of the points from lane `at` of a pack on.
     #[inline(always)]
-    pub(super) fn set<L: Lanes<R>>(&mut self, pack: usize, at: usize, h: &Tensor<L>) {
+    pub(crate) fn set<L: Lanes<R>>(&mut self, pack: usize, at: usize, h: &Tensor<L>) {
         for (row, to) in h.0.into_iter().zip(&mut self.gradient[pack].0) {
             store_vector(row, to, at);
         }
@@ -48,7 +48,7 @@ impl<R: Scalar> Batch<R> {
 
     /// J and |C − I|² of the first packs.
     #[inline(always)]
-    pub(super) fn measure<L: Lanes<R>>(&mut self, packs: usize) {
+    pub(crate) fn measure<L: Lanes<R>>(&mut self, packs: usize) {
         for pack in 0..packs {
             for at in (0..PACK).step_by(L::WIDTH) {
                 let h: Tensor<L> = load_tensor(&self.gradient[pack], at);
@@ -61,7 +61,7 @@ impl<R: Scalar> Batch<R> {
 
     /// The stresses of the first packs. `fibres` has the directions of each cell, which has `points` points one after the other.
     #[inline(always)]
-    pub(super) fn evaluate<L: Lanes<R>>(
+    pub(crate) fn evaluate<L: Lanes<R>>(
         &mut self,
         law: &AnyLaw,
         packs: usize,
@@ -73,14 +73,14 @@ impl<R: Scalar> Batch<R> {
 
     /// The elastic stress of the points from lane `at` of a pack on.
     #[inline(always)]
-    pub(super) fn elastic<L: Lanes<R>>(&self, pack: usize, at: usize) -> Split<Symmetric<L>> {
+    pub(crate) fn elastic<L: Lanes<R>>(&self, pack: usize, at: usize) -> Split<Symmetric<L>> {
         let Split { isochoric, volumetric } = &self.elastic[pack];
         Split { isochoric: load_symmetric(isochoric, at), volumetric: load_symmetric(volumetric, at) }
     }
 
     /// F of the points from lane `at` of a pack on.
     #[inline(always)]
-    pub(super) fn deformation_gradient<L: Lanes<R>>(&self, pack: usize, at: usize) -> Tensor<L> {
+    pub(crate) fn deformation_gradient<L: Lanes<R>>(&self, pack: usize, at: usize) -> Tensor<L> {
         let mut f: Tensor<L> = load_tensor(&self.gradient[pack], at);
         for i in 0..3 {
             f.0[i][i] += L::ONE;
@@ -91,7 +91,7 @@ impl<R: Scalar> Batch<R> {
     /// Notes how far the points of a pack of cells are deformed, and which cell is the first whose det F is not above
     /// zero.
     #[inline(always)]
-    pub(super) fn note(&self, pack: usize, first_cell: usize, findings: &mut Findings<R>) {
+    pub(crate) fn note(&self, pack: usize, first_cell: usize, findings: &mut Findings<R>) {
         let (ratios, strains) = (&self.volume_ratio[pack].0, &self.strain[pack].0);
         let mut sound = true;
         for lane in 0..PACK {

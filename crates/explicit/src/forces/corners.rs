@@ -9,6 +9,7 @@
 use pliant_mechanics::Number;
 use pliant_mechanics::element::{FLAT_HEX, HEX_EDGES};
 use pliant_mechanics::tensor::{Vector, add, cross, dot, sub};
+use rayon::prelude::*;
 
 use super::{PackedCells, relative};
 use crate::Scalar;
@@ -26,7 +27,7 @@ impl<R: Scalar> PackedCorners<R> {
         };
         let of_pack =
             |pack| Self(std::array::from_fn(|a| [0, 1, 2].map(|component| number(pack, a + 1, component))));
-        packed.packs().map(of_pack).collect()
+        packed.packs().into_par_iter().map(of_pack).collect()
     }
 
     /// The least determinant of the edges at a corner, with its sign turned, of the cells from lane `at` on. `u` are the

@@ -5,6 +5,7 @@
 
 use pliant_mechanics::model::Hourglass;
 use pliant_mechanics::tensor::{Tensor, Vector, add, cast, dot, scale, sub};
+use rayon::prelude::*;
 
 use super::PackedCells;
 use crate::Scalar;
@@ -27,7 +28,7 @@ impl<R: Scalar> PackedHourglass<R> {
             stiffness: packed.pack(pack, |cell| R::of(control.stiffness[cell])),
             reach: packed.pack(pack, |cell| R::of((1.5 * control.corner_reach[cell]).min(1e30))),
         };
-        packed.packs().map(of_pack).collect()
+        packed.packs().into_par_iter().map(of_pack).collect()
     }
 }
 

@@ -25,7 +25,7 @@ mod tests;
 
 use averaged::AveragedTets;
 use bar::Bars;
-pub(crate) use batch::pressure;
+pub(crate) use batch::{Batch, pressure};
 pub(crate) use blocks::BLOCK;
 use std::ops::Range;
 
@@ -35,6 +35,7 @@ use pliant_mechanics::prony::Prony;
 use pliant_mechanics::tensor::{Tensor, Vector, add, cast, sub};
 use pliant_mechanics::tie::Tie;
 use pulp::Simd;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::history::History;
@@ -225,7 +226,7 @@ impl<R: Scalar, const M: usize> PackedRest<R, M> {
             }),
             volume: packed.pack(pack, |cell| R::of(cells.rest[cell].volume)),
         };
-        packed.packs().map(rest).collect()
+        packed.packs().into_par_iter().map(rest).collect()
     }
 }
 
