@@ -120,7 +120,7 @@ impl Skin {
     ) {
         let part = &world.participants[self.part];
         let mapping = &part.built.model.surfaces[number].mapping;
-        let on_shell = carried_on_shell(&Frame { part, now }, number);
+        let on_shell = carried_on_shell(&Frame::new(part, now), number);
         for (vertex, rest) in self.rest.iter().enumerate() {
             let mut place = *rest;
             match &on_shell {

@@ -34,6 +34,10 @@ const BLOCK: usize = 1 << 17;
 /// times the time.
 const LEVEL: u32 = 1;
 
+/// A block of real numbers is stored as it is where fewer than one in so many of its numbers is met again: zlib would take a tenth off
+/// such fields, and as long as the recovery of stresses.
+const REPEATED: usize = 8;
+
 /// Writes a mesh as a `.vtu` file into `writer`, as one piece with all its cells.
 ///
 /// Sets become arrays `set:NAME` of 0 and 1. Cell data that a kind of cells does not have are NaN there.
@@ -107,20 +111,27 @@ impl Lasting {
 /// Writes the list of the files of a series, `(time [s], file)`, in place of an older one only once it is
 /// complete. File names are relative to the list.
 pub fn write_pvd(path: &Path, files: &[(f64, String)]) -> Result<(), MeshFileError> {
-    if let Some((time, file)) = files.iter().find(|(time, _)| !time.is_finite()) {
-        let problem = format!("the time of `{file}` is {time}; times must be finite");
-        return Err(MeshFileError::Mesh { path: path.to_owned(), problem });
+    let entries: Result<String, String> = files.iter().map(|(time, file)| pvd_entry(*time, file)).collect();
+    let entries = entries.map_err(|problem| MeshFileError::Mesh { path: path.to_owned(), problem })?;
+    save(path, |out| write!(out, "{PVD_HEAD}{entries}{PVD_TAIL}"))
+}
+
+/// The text of such a list before its entries …
+pub const PVD_HEAD: &str = "<?xml version=\"1.0\"?>\n\
+    <VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n  <Collection>\n";
+/// … and after them.
+pub const PVD_TAIL: &str = "  </Collection>\n</VTKFile>\n";
+
+/// One of the entries: a file at a time [s].
+///
+/// # Errors
+/// A sentence, if the time is not finite.
+pub fn pvd_entry(time: f64, file: &str) -> Result<String, String> {
+    if !time.is_finite() {
+        return Err(format!("the time of `{file}` is {time}; times must be finite"));
     }
-    save(path, |out| {
-        writeln!(out, "<?xml version=\"1.0\"?>")?;
-        writeln!(out, "<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">")?;
-        writeln!(out, "  <Collection>")?;
-        for (time, file) in files {
-            let file = escaped(file);
-            writeln!(out, "    <DataSet timestep=\"{time:?}\" group=\"\" part=\"0\" file=\"{file}\"/>")?;
-        }
-        writeln!(out, "  </Collection>\n</VTKFile>")
-    })
+    let file = escaped(file);
+    Ok(format!("    <DataSet timestep=\"{time:?}\" group=\"\" part=\"0\" file=\"{file}\"/>\n"))
 }
 
 /// The file as it grows.
@@ -134,7 +145,15 @@ impl Parts {
         self.xml.extend_from_slice(text.as_bytes());
     }
 
-    fn array(&mut self, kind: &str, name: &str, components: usize, raw: &[u8]) -> io::Result<()> {
+    /// `width` is that of real numbers, of which some arrays are not worth compressing; `None` of integers.
+    fn array(
+        &mut self,
+        kind: &str,
+        name: &str,
+        components: usize,
+        raw: &[u8],
+        width: Option<usize>,
+    ) -> io::Result<()> {
         let name = escaped(name);
         write!(self.xml, "        <DataArray type=\"{kind}\" Name=\"{name}\"")?;
         if components != 1 {
@@ -149,7 +168,9 @@ impl Parts {
             let mut compressed = Vec::with_capacity(raw.len() / 2);
             for block in raw.chunks(BLOCK) {
                 let before = compressed.len();
-                let mut encoder = ZlibEncoder::new(&mut compressed, Compression::new(LEVEL));
+                let stored = width.is_some_and(|width| !repeats(block, width));
+                let level = if stored { Compression::none() } else { Compression::new(LEVEL) };
+                let mut encoder = ZlibEncoder::new(&mut compressed, level);
                 encoder.write_all(block)?;
                 encoder.finish()?;
                 head.push((compressed.len() - before) as u64);
@@ -171,10 +192,10 @@ impl Parts {
     fn reals(&mut self, name: &str, components: usize, values: &[f64], single: bool) -> io::Result<()> {
         if single {
             let raw: Vec<u8> = values.iter().flat_map(|&value| (value as f32).to_le_bytes()).collect();
-            self.array("Float32", name, components, &raw)
+            self.array("Float32", name, components, &raw, Some(4))
         } else {
             let raw: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
-            self.array("Float64", name, components, &raw)
+            self.array("Float64", name, components, &raw, Some(8))
         }
     }
 
@@ -182,10 +203,10 @@ impl Parts {
     fn indices(&mut self, name: &str, indices: impl Iterator<Item = usize>, limit: usize) -> io::Result<()> {
         if i32::try_from(limit).is_ok() {
             let raw: Vec<u8> = indices.flat_map(|index| (index as i32).to_le_bytes()).collect();
-            self.array("Int32", name, 1, &raw)
+            self.array("Int32", name, 1, &raw, None)
         } else {
             let raw: Vec<u8> = indices.flat_map(|index| (index as i64).to_le_bytes()).collect();
-            self.array("Int64", name, 1, &raw)
+            self.array("Int64", name, 1, &raw, None)
         }
     }
 
@@ -193,7 +214,7 @@ impl Parts {
         let is_integer = |&value: &f64| value.fract() == 0.0 && f64::from(value as i32) == value;
         if name == "label" && array.values.iter().all(is_integer) {
             let raw: Vec<u8> = array.values.iter().flat_map(|&value| (value as i32).to_le_bytes()).collect();
-            return self.array("Int32", name, array.components, &raw);
+            return self.array("Int32", name, array.components, &raw, None);
         }
         self.reals(name, array.components, &array.values, single)
     }
@@ -202,8 +223,24 @@ impl Parts {
     fn set(&mut self, name: &str, members: impl Iterator<Item = usize>, items: usize) -> io::Result<()> {
         let mut raw = vec![0; items];
         members.for_each(|member| raw[member] = 1);
-        self.array("UInt8", &format!("{SET_PREFIX}{name}"), 1, &raw)
+        self.array("UInt8", &format!("{SET_PREFIX}{name}"), 1, &raw, None)
     }
+}
+
+/// Whether at least one in [`REPEATED`] numbers of a block was met shortly before, as zlib needs it to save space.
+fn repeats(block: &[u8], width: usize) -> bool {
+    const SLOTS: usize = 1024;
+    let mut seen = [u64::MAX; SLOTS];
+    let mut again = 0;
+    for number in block.chunks_exact(width) {
+        let mut bits = [0; 8];
+        bits[..width].copy_from_slice(number);
+        let bits = u64::from_le_bytes(bits);
+        // Fibonacci hashing.
+        let slot = (bits.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 54) as usize % SLOTS;
+        again += usize::from(std::mem::replace(&mut seen[slot], bits) == bits);
+    }
+    again * REPEATED >= block.len() / width
 }
 
 /// Writes a mesh that was checked before.
@@ -333,7 +370,7 @@ fn write_cells(parts: &mut Parts, mesh: &Mesh) -> io::Result<()> {
         .iter()
         .flat_map(|block| std::iter::repeat_n(type_number(block.kind), block.len()))
         .collect();
-    parts.array("UInt8", "types", 1, &types)?;
+    parts.array("UInt8", "types", 1, &types, None)?;
     parts.push("      </Cells>\n");
     Ok(())
 }

@@ -11,11 +11,11 @@ use pliant_mechanics::model::Enclosed;
 use pliant_mechanics::tensor::add;
 
 use crc32fast::Hasher;
+use pliant_sim::BodyCells;
 use pliant_sim::contact::touch::With;
-use pliant_sim::{BodyCells, CellsNow};
 
 use super::file::{create, reopen};
-use super::{Frame, Output, OutputError, Written, fields, time_of};
+use super::{Frame, Output, OutputError, Recovered, Written, fields, time_of};
 use pliant_scene::format::{CsvTable, FieldName, ProbeTable};
 use pliant_scene::{Built, Part, World};
 
@@ -239,15 +239,14 @@ impl Columns {
         let of_cells: Vec<FieldName> =
             self.probes.iter().flat_map(|probe| &probe.fields).filter(|f| !f.is_nodal()).copied().collect();
         let cells_wanted = !of_cells.is_empty();
-        let cells =
-            cells_wanted.then(|| frame.now.cells(of_cells.contains(&FieldName::ElementStep))).flatten();
+        let cells = cells_wanted.then(|| frame.cells(of_cells.contains(&FieldName::ElementStep))).flatten();
         if let (true, Some(part), Some(state)) = (cells_wanted, &frame.built().implicit, frame.now.shells()) {
             self.shells.fill(&part.model, state, &of_cells);
         }
         let of_nodes =
             fields::OfNodes::new(frame, self.probes.iter().flat_map(|probe| &probe.fields).copied());
         for probe in &self.probes {
-            probe.read(frame, &of_nodes, cells.as_deref(), &self.shells, row);
+            probe.read(frame, &of_nodes, cells, &self.shells, row);
         }
     }
 }
@@ -469,7 +468,7 @@ impl Probe {
         &self,
         frame: &Frame<'_>,
         of_nodes: &fields::OfNodes<'_, '_>,
-        cells: Option<&dyn CellsNow>,
+        cells: Option<&Recovered<'_>>,
         shells: &fields::OfShells,
         row: &mut Vec<f64>,
     ) {

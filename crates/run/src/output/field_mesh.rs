@@ -7,7 +7,6 @@ use pliant_mechanics::model::{Cells, Solid};
 use pliant_sim::contact::pose::Pose;
 use pliant_sim::contact::touch::Rigid;
 use pliant_sim::{BodyCells, ImplicitBodies};
-use rayon::prelude::*;
 
 use super::merged::merged;
 use super::{Frame, fields};
@@ -297,12 +296,10 @@ fn fill_surface(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], surfac
     if of_cells.is_empty() {
         return;
     }
-    let Some(fields_of) = frame.now.cells(of_cells.contains(&FieldName::ElementStep)) else { return };
+    let Some(recovered) = frame.cells(of_cells.contains(&FieldName::ElementStep)) else { return };
     let mut averages = Averages::new(model.node_count(), &of_cells);
     for (index, solid) in model.solids.iter().enumerate() {
-        let cells: Vec<_> =
-            (0..solid.cells.len()).into_par_iter().map(|cell| fields_of.at(index, cell)).collect();
-        for (cell, found) in cells.iter().enumerate() {
+        for (cell, found) in recovered.of(model, index).iter().enumerate() {
             let volume = solid.cells.volume(cell);
             for (slot, &field) in of_cells.iter().enumerate() {
                 let value = &fields::of_cell(found, field)[..field.components()];
@@ -312,14 +309,13 @@ fn fill_surface(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], surfac
     }
     for (field, means) in of_cells.iter().zip(averages.means(&of_cells)) {
         let components = field.components();
-        let carried = |point: usize| {
-            let row: Vec<(u32, f64)> = mapping.inner_row(point).collect();
-            let mean = |c: usize| {
-                row.iter().map(|&(node, w)| w * means[node as usize * components + c]).sum::<f64>()
-            };
-            (0..components).map(mean).collect::<Vec<f64>>()
-        };
-        let values = (0..mapping.len()).flat_map(carried).collect();
+        let mut values = vec![0.0; mapping.len() * components];
+        for (point, value) in values.chunks_exact_mut(components).enumerate() {
+            for (node, weight) in mapping.inner_row(point) {
+                let mean = &means[node as usize * components..][..components];
+                value.iter_mut().zip(mean).for_each(|(sum, mean)| *sum += weight * mean);
+            }
+        }
         mesh.point_data.insert(field.name().into(), DataArray { components, values });
     }
 }
@@ -464,8 +460,7 @@ fn fill_shells(
         for (slot, &field) in wanted.iter().enumerate() {
             let components = field.components();
             if at == At::Cells {
-                let value = |&facet: &u32| found.of(model, facet, field).into_iter().take(components);
-                let values = facets.iter().flat_map(value).collect();
+                let values = joined(facets, components, |&facet| found.of(model, facet, field));
                 block.data.insert(field.name().into(), DataArray { components, values });
                 continue;
             }
@@ -484,8 +479,7 @@ fn fill_nodal(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], nodes: &
     let of_nodes = fields::OfNodes::new(frame, wanted.iter().copied());
     for &field in wanted.iter().filter(|field| field.is_nodal()) {
         let components = field.components();
-        let value = |&node: &u32| of_nodes.value(field, node as usize).into_iter().take(components);
-        let values = nodes.iter().flat_map(value).collect();
+        let values = joined(nodes, components, |&node| of_nodes.value(field, node as usize));
         mesh.point_data.insert(field.name().into(), DataArray { components, values });
     }
 }
@@ -496,28 +490,34 @@ fn fill_cells(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], at: At, 
         return;
     }
     let model = &frame.built().model;
-    let Some(fields_of) = frame.now.cells(wanted.contains(&FieldName::ElementStep)) else { return };
+    let Some(recovered) = frame.cells(wanted.contains(&FieldName::ElementStep)) else { return };
+    let found = |&(solid, cell): &(u32, u32)| &recovered.of(model, solid as usize)[cell as usize];
     let mut averages = Averages::new(mesh.points.len(), &wanted);
     for (block, places) in mesh.blocks.iter_mut().zip(cells) {
-        let recovered: Vec<_> =
-            (places.par_iter()).map(|&(solid, cell)| fields_of.at(solid as usize, cell as usize)).collect();
         for (slot, &field) in wanted.iter().enumerate() {
             let components = field.components();
             if at == At::Cells {
-                let value = |cell| fields::of_cell(cell, field).into_iter().take(components);
-                let values = recovered.iter().flat_map(value).collect();
+                let values = joined(places, components, |place| fields::of_cell(found(place), field));
                 block.data.insert(field.name().into(), DataArray { components, values });
                 continue;
             }
-            for (index, (cell, &(solid, own))) in recovered.iter().zip(places).enumerate() {
-                let volume = model.solids[solid as usize].cells.volume(own as usize);
-                averages.add(slot, block.cell(index), &fields::of_cell(cell, field)[..components], volume);
+            for (index, place) in places.iter().enumerate() {
+                let volume = model.solids[place.0 as usize].cells.volume(place.1 as usize);
+                let value = &fields::of_cell(found(place), field)[..components];
+                averages.add(slot, block.cell(index), value, volume);
             }
         }
     }
     if at == At::Points {
         averages.write(&mut mesh.point_data, &wanted);
     }
+}
+
+/// The first components of the values of some items, one after another.
+fn joined<T>(items: &[T], components: usize, value: impl Fn(&T) -> fields::Value) -> Vec<f64> {
+    let mut values = Vec::with_capacity(items.len() * components);
+    items.iter().for_each(|item| values.extend_from_slice(&value(item)[..components]));
+    values
 }
 
 /// Volume-weighted means of cell values at the points.

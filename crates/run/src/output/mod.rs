@@ -15,9 +15,13 @@ mod strains;
 mod summary;
 mod vtu;
 
+use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 
-use pliant_sim::{Instant, Simulation};
+use pliant_explicit::recover::CellFields;
+use pliant_mechanics::Model;
+use pliant_sim::{CellsNow, Instant, Simulation};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use file::{check_own_folder, replace};
@@ -60,13 +64,24 @@ impl OutputError {
 }
 
 /// One participant at an instant, seen between the two halves of a step.
-#[derive(Clone, Copy)]
 pub(crate) struct Frame<'a> {
     pub part: &'a Part,
     pub now: &'a dyn Instant,
+    /// Fields of its cells, without and with stable steps, once an output has asked for them.
+    cells: [OnceCell<Option<Recovered<'a>>>; 2],
 }
 
-impl Frame<'_> {
+impl<'a> Frame<'a> {
+    pub(crate) fn new(part: &'a Part, now: &'a dyn Instant) -> Self {
+        Self { part, now, cells: Default::default() }
+    }
+
+    /// Fields of the cells of its solids, with their stable steps if these are wanted; `None` where it has none.
+    fn cells(&self, steps: bool) -> Option<&Recovered<'a>> {
+        let find = || Some(Recovered::new(self.now.cells(steps)?, self.built().model.solids.len()));
+        self.cells[usize::from(steps)].get_or_init(find).as_ref()
+    }
+
     fn built(&self) -> &Built {
         &self.part.built
     }
@@ -77,9 +92,35 @@ impl Frame<'_> {
     }
 }
 
+/// Fields of cells, found once for all outputs that show the instant.
+struct Recovered<'a> {
+    now: Box<dyn CellsNow + 'a>,
+    solids: Vec<OnceCell<Vec<(CellFields, Option<f64>)>>>,
+}
+
+impl<'a> Recovered<'a> {
+    fn new(now: Box<dyn CellsNow + 'a>, solids: usize) -> Self {
+        Self { now, solids: vec![OnceCell::new(); solids] }
+    }
+
+    /// Those of one cell of a solid.
+    fn at(&self, solid: usize, cell: usize) -> (CellFields, Option<f64>) {
+        self.now.at(solid, cell)
+    }
+
+    /// Those of all cells of a solid of a model.
+    fn of(&self, model: &Model, solid: usize) -> &[(CellFields, Option<f64>)] {
+        let now = &*self.now;
+        self.solids[solid].get_or_init(|| {
+            let cells = (0..model.solids[solid].cells.len()).into_par_iter();
+            cells.map(|cell| now.at(solid, cell)).collect()
+        })
+    }
+}
+
 /// All participants of a simulation of a world as outputs read them.
 pub(crate) fn frames<'a>(world: &'a World, simulation: &'a Simulation) -> Vec<Frame<'a>> {
-    world.participants.iter().zip(simulation.instants()).map(|(part, now)| Frame { part, now }).collect()
+    world.participants.iter().zip(simulation.instants()).map(|(part, now)| Frame::new(part, now)).collect()
 }
 
 /// Time of the instant of frames [s].

@@ -104,7 +104,7 @@ pub struct HeldBack {
 impl PartOutcome {
     pub fn new(part: &Part, participant: &dyn Instant, watched: Watched) -> Self {
         let watches = part.plan.limits.is_some() && part.scene.run.solver == SolverName::Explicit;
-        let frame = Frame { part, now: participant };
+        let frame = Frame::new(part, participant);
         Self {
             steps: participant.steps(),
             energies: participant.energies(),

@@ -1,14 +1,14 @@
-//! A ParaView series: `X/000000.vtu`, … and `X.pvd`, rewritten after each frame, so that a killed run leaves a series
+//! A ParaView series: `X/000000.vtu`, … and `X.pvd`, whole after each frame, so that a killed run leaves a series
 //! that can be read. Points are at rest; `displacement` warps them.
 
-use std::fs;
-use std::io::{self, BufWriter, Write};
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use pliant_geometry::io::{MeshFileError, VtuOptions, VtuSeries, read_pvd, write_pvd};
+use pliant_geometry::io::{MeshFileError, PVD_HEAD, PVD_TAIL, VtuOptions, VtuSeries, pvd_entry, read_pvd};
 
 use super::field_mesh::FieldMesh;
-use super::file::{check_own_folder, replace};
+use super::file::{check_own_folder, is_at, reopen, replace};
 use super::{Frame, Output, OutputError, Written, time_of};
 use pliant_scene::World;
 use pliant_scene::format::VtuTable;
@@ -16,6 +16,8 @@ use pliant_scene::format::VtuTable;
 pub(super) struct Series {
     folder: PathBuf,
     index: PathBuf,
+    /// The index as it was written last, and where its entries end.
+    open: Option<(File, u64)>,
     name: String,
     times: Vec<f64>,
     /// Times of the frames that an interrupted run had written beyond these; their files stay until they are replaced.
@@ -38,6 +40,7 @@ impl Series {
         Ok(Self {
             folder: own,
             index: folder.join(format!("{name}.pvd")),
+            open: None,
             name: name.into(),
             times: Vec::new(),
             beyond: Vec::new(),
@@ -57,14 +60,49 @@ impl Series {
         self.beyond = listed(&self.index).unwrap_or_default().into_iter().skip(times.len()).collect();
     }
 
-    /// Writes the list of all frames.
-    fn list(&self) -> Result<(), OutputError> {
-        let file = |(index, &time): (usize, &f64)| (time, format!("{}/{}", self.name, frame_name(index)));
-        let all: Vec<(f64, String)> = self.times.iter().chain(&self.beyond).enumerate().map(file).collect();
-        write_pvd(&self.index, &all).map_err(|error| match error {
-            MeshFileError::Write { path, source } => OutputError::new(&path, source),
-            other => OutputError::new(&self.index, other),
-        })
+    /// The entry of a frame in the index.
+    fn entry(&self, index: usize, time: f64) -> io::Result<String> {
+        pvd_entry(time, &format!("{}/{}", self.name, frame_name(index))).map_err(io::Error::other)
+    }
+
+    /// Adds the last frame to the index.
+    fn list(&mut self) -> Result<(), OutputError> {
+        let open = self.open.take();
+        let listed = match (open, self.times.last()) {
+            (Some((file, end)), Some(&time)) if self.beyond.is_empty() => self.append(file, end, time),
+            _ => self.list_all(),
+        };
+        self.open = listed.map_err(|error| OutputError::new(&self.index, error))?;
+        Ok(())
+    }
+
+    /// Writes an entry and the end of the list over its old end, at once: who reads finds it whole before and after.
+    fn append(&self, mut file: File, end: u64, time: f64) -> io::Result<Option<(File, u64)>> {
+        if !is_at(&file, &self.index)? {
+            return self.list_all();
+        }
+        let entry = self.entry(self.times.len() - 1, time)?;
+        let mut write = |text: &str| {
+            file.seek(SeekFrom::Start(end))?;
+            file.write_all(text.as_bytes())?;
+            file.set_len(end + text.len() as u64)
+        };
+        let written = write(&format!("{entry}{PVD_TAIL}"));
+        if written.is_err() {
+            // The old end has its place on the disk.
+            let _ = write(PVD_TAIL);
+        }
+        written.map(|()| Some((file, end + entry.len() as u64)))
+    }
+
+    /// Writes the list of all frames in place of the old one; returns it and where its entries end, if it can be written on.
+    fn list_all(&self) -> io::Result<Option<(File, u64)>> {
+        let all = self.times.iter().chain(&self.beyond).enumerate();
+        let entries: String = all.map(|(index, &time)| self.entry(index, time)).collect::<io::Result<_>>()?;
+        replace(&self.index, |file| file.write_all(format!("{PVD_HEAD}{entries}{PVD_TAIL}").as_bytes()))?;
+        let end = (PVD_HEAD.len() + entries.len()) as u64;
+        // Frames of an interrupted run are to go from it.
+        self.beyond.is_empty().then(|| Ok((reopen(&self.index)?, end))).transpose()
     }
 }
 
