@@ -81,7 +81,8 @@ fn at_nodes(cells: &Cells, nodes: usize, values: &[f64]) -> Vec<f64> {
     sums.into_iter().map(|[sum, volume]| if volume > 0.0 { sum / volume } else { 0.0 }).collect()
 }
 
-fn scene() -> Result<Scene, CaseError> {
+/// The scene of the liver that is pulled.
+pub(super) fn scene() -> Result<Scene, CaseError> {
     let text = include_str!("../../../../scenes/liver/scene.toml");
     Ok(Scene::from_source(Source::parse("scenes/liver/scene.toml", text)?, ".".into())?)
 }
