@@ -963,7 +963,9 @@ fn failure(
     let body_of = |node: u32| model.bodies.iter().find(|body| body.nodes.contains(&node));
     let (kind, node, cell) = match error {
         SolveError::NotConverged { node, .. } => ("not-converged", Some(*node), None),
-        SolveError::Uphill { node, .. } => ("not-converged", Some(*node), None),
+        SolveError::Uphill { node, .. } | SolveError::Snaps { node, .. } => {
+            ("not-converged", Some(*node), None)
+        }
         SolveError::Stalled { .. } => ("not-converged", None, None),
         SolveError::Blocked { .. } => ("blocked", None, None),
         SolveError::Crossed { edge, .. } => ("intersecting", Some(edge[0]), None),
