@@ -541,6 +541,7 @@ impl Effort {
     fn take(&mut self, phases: Phases, before: &Self) {
         self.solutions = before.solutions + phases.solutions as u64;
         self.linear_iterations = before.linear_iterations + phases.iterations as u64;
+        self.left_to_cpu = before.left_to_cpu + phases.left_to_cpu as u64;
         self.seconds_cells = before.seconds_cells + phases.cells.as_secs_f64();
         self.seconds_contact = before.seconds_contact + phases.contact.as_secs_f64();
         self.seconds_factors = before.seconds_factors + phases.preparation.as_secs_f64();

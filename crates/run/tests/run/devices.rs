@@ -184,9 +184,25 @@ fn equations_of_shells_are_solved_on_a_device_as_on_the_processor() {
     assert_eq!(json["device"], adapters()[0].name);
     assert_eq!((&json["precision"], &reference["precision"]), (&"double".into(), &"double".into()));
     assert!(json["solver"]["linear_iterations"].as_u64() > Some(0), "{json}");
+    assert_eq!(json["solver"]["left_to_cpu"], 0, "{json}");
     let apart = apart(&cpu, &gpu);
     println!("displacements are {apart:.1e} apart");
     assert!(apart < 1e-5, "displacements are {apart} apart");
+}
+
+/// Residuals in double precision end near 1e-15: the rest of the way to 1e-17 is the CPU's, whose residual is carried on from step to step.
+#[test]
+fn solutions_that_a_device_leaves_to_the_processor_are_counted() {
+    if !pliant_testing::has_gpu(adapters().len()) {
+        return;
+    }
+    let linear = "run.linear={ by = \"conjugate-gradients\", tolerance = 1e-17 }";
+    let gpu = tube("device = \"gpu\"");
+    let json = gpu.run(&[linear]).done();
+    let [left, all] = ["left_to_cpu", "solutions"].map(|key| json["solver"][key].as_u64().unwrap());
+    assert!(left > 0 && left <= all, "{json}");
+    let told = format!("| solutions that the GPU left to the CPU | {left} of {all} |");
+    assert!(gpu.read("out/case/summary.md").contains(&told), "{told}");
 }
 
 #[test]
