@@ -50,6 +50,18 @@ fn an_adapter_that_is_not_there_or_not_used_is_refused_in_the_users_line() {
     }
 }
 
+#[test]
+fn a_design_that_is_not_there_is_answered_with_those_that_are() {
+    let line = "design = \"fixed-atomics\"";
+    let unknown = on(&format!("device = \"gpu\"\n{line}")).check(&[]);
+    assert_eq!(unknown.status(), "invalid", "{}", unknown.err);
+    assert!(unknown.underlines(line), "{}", unknown.err);
+    let names = r#"expected one of "gather", "blocks", "float-atomics", "fast""#;
+    for piece in [names, "the ways that measured best: `fast`, and `gather` on adapters that are software"] {
+        assert!(unknown.words().contains(piece), "no `{piece}` in:\n{}", unknown.err);
+    }
+}
+
 /// How far two series of displacements are apart at their ends, over the size of the first.
 fn apart(a: &Workshop, b: &Workshop) -> f64 {
     apart_in([(a, "out/case/fields.pvd"), (b, "out/case/fields.pvd")])
