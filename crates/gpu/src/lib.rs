@@ -102,7 +102,7 @@
 //! # Tests
 //!
 //! `tests/gpu/stepper/` compares with double precision on the CPU: displacements differ by at most 1e-5 after 200 steps, with every law, element
-//! and load on unordered meshes deformed at random. `tests/gpu/shells.rs` holds shells to the same, with their rotations and the work of loads. `tests/gpu/gradients.rs` compares solutions and pulsing tubes with the CPU. Tests also run devices opened with
+//! and load on unordered meshes deformed at random. `tests/gpu/shells.rs` holds shells to the same, with their rotations and the work of loads. `tests/gpu/gradients.rs` compares solutions, pulsing tubes, contact, ties and volumes with the CPU. Tests also run devices opened with
 //! lower limits (`Device::open_within`) and devices destroyed during a run. The gate runs
 //! all of them on Mesa's software Vulkan (`PLIANT_REQUIRE_GPU=1`); elsewhere they report when they are skipped.
 
