@@ -7,7 +7,6 @@ use std::fmt::Write;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use pliant_geometry::Vector3;
 use pliant_gpu::{Device, GpuError, Kind};
 use pliant_implicit::element::{Bending, Elasticity, Formulation, Membrane};
 use pliant_implicit::{
@@ -17,6 +16,7 @@ use pliant_implicit::{
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_mechanics::model::{Constraint, Motion};
+use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet};
 
 use crate::suite::{BenchError, Progress};
 use crate::{Machine, Spread as Times};
@@ -36,23 +36,19 @@ const ON_SOFTWARE: usize = 4000;
 ///
 /// # Errors
 /// If the walls can't be made, which a number of at least 6 rules out.
+///
+/// # Panics
+/// If there are more triangles than a mesh has.
 pub fn tube(shells: usize) -> Result<Assembly, ModelError> {
     // Cells about as long as wide: 2 a n = shells with n/a = 200/(40 π).
     let around = ((shells as f64 / 2.0) * (0.02 * TAU) / 0.2).sqrt().round().max(3.0) as usize;
     let along = (shells / 2 / around).max(1);
-    let point = |i: usize| {
-        let angle = TAU * (i % around) as f64 / around as f64;
-        Vector3::new(0.02 * angle.cos(), 0.02 * angle.sin(), 0.2 * (i / around) as f64 / along as f64)
-    };
-    let node = |i: usize, j: usize| (i % around + around * j) as u32;
-    let cell = |c: usize| {
-        let (i, j) = (c % around, c / around);
-        let [a, b, c, d] = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
-        [[a, b, c], [a, c, d]]
-    };
-    let mut model = Assembly::new("shell", (0..around * (along + 1)).map(point));
+    let cylinder = Sheet::Cylinder { radius: 0.02, length: 0.2, from: 0.0, span: TAU };
+    let mesh = cylinder.mesh([around, along], Pattern::Diagonal, None, DEFAULT_CELL_LIMIT);
+    let mesh = mesh.unwrap_or_else(|error| panic!("{error}"));
+    let cells = mesh.blocks[0].cells().map(|cell| [cell[0], cell[1], cell[2]]).collect();
     let material = Wall { elastic: Elasticity { young: 1e5, poisson: 0.45 }, density: 1000.0 };
-    let cells = (0..around * along).flat_map(cell).collect();
+    let mut model = Assembly::new("shell", mesh.points);
     let formulation = Formulation { membrane: Membrane::Opt { adaptation: 10.0 }, bending: Bending::Dkt };
     model.add_shell(&Shell { formulation, ..Shell::new("tube", cells, 0.002, material) })?;
     let last = (around * (along + 1)) as u32;

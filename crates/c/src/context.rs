@@ -1,13 +1,14 @@
 //! The context: a table of what a program has open. A handle is a place in the table and how often the place was used, so that a closed handle is known
 //! as one, however often its place was used again.
 
-use std::any::Any;
 use std::ffi::CStr;
 use std::ffi::c_char;
 use std::mem::MaybeUninit;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::slice;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+
+use pliant_sim::panicked;
 
 use crate::scene::OpenScene;
 use crate::simulation::Shared;
@@ -157,16 +158,10 @@ pub(crate) unsafe fn call(
         let _ = context.close(handle);
         Err(Fault::new(
             PliantStatus::Internal,
-            format!("Pliant panicked: {}; the handle is closed", words(&*panic)),
+            format!("Pliant panicked: {}; the handle is closed", panicked(&*panic)),
         ))
     });
     reported(result, error)
-}
-
-/// What a panic says.
-pub(crate) fn words(panic: &(dyn Any + Send)) -> &str {
-    let text = panic.downcast_ref::<String>().map(String::as_str);
-    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message")
 }
 
 fn null(what: &str) -> Fault {

@@ -20,8 +20,6 @@ pub enum Design {
     /// Cells add their forces to those of the nodes by floating-point atomics, in any order: the last bits vary from run to
     /// run.
     FloatAtomics,
-    /// Cells add their forces as whole multiples of a small force: the same bits every time, forces of a limited range.
-    FixedAtomics,
     /// Blocks of neighbouring cells add their forces up in shared memory, nodes gather the sums of their blocks; shapes of
     /// plain tetrahedra at rest are found again from their nodes. The same bits every time.
     Fast,
@@ -29,8 +27,7 @@ pub enum Design {
 
 impl Design {
     /// All of them.
-    pub const ALL: &[Self] =
-        &[Self::Gather, Self::Blocks, Self::FloatAtomics, Self::FixedAtomics, Self::Fast];
+    pub const ALL: &[Self] = &[Self::Gather, Self::Blocks, Self::FloatAtomics, Self::Fast];
 
     /// The default.
     ///
@@ -51,7 +48,6 @@ impl fmt::Display for Design {
             Self::Gather => "gather",
             Self::Blocks => "blocks",
             Self::FloatAtomics => "float-atomics",
-            Self::FixedAtomics => "fixed-atomics",
             Self::Fast => "fast",
         })
     }

@@ -107,6 +107,7 @@ pub struct Device {
     handle: wgpu::Adapter,
     faults: Faults,
     read_backs: Arc<AtomicU64>,
+    kernels: Arc<AtomicU64>,
 }
 
 /// What went wrong with a device since it was opened.
@@ -192,7 +193,16 @@ impl Device {
         device.set_device_lost_callback(move |_, reason| {
             on_loss.note(GpuError::Lost { adapter: on_loss.adapter.clone(), reason });
         });
-        Ok(Self { adapter, device, queue, instance, handle, faults, read_backs: Arc::default() })
+        Ok(Self {
+            adapter,
+            device,
+            queue,
+            instance,
+            handle,
+            faults,
+            read_backs: Arc::default(),
+            kernels: Arc::default(),
+        })
     }
 
     /// The adapter.
@@ -217,6 +227,15 @@ impl Device {
 
     pub(crate) fn count_read_back(&self) {
         self.read_backs.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// The number of kernels compiled since the device was opened, for any user of it.
+    pub fn kernels(&self) -> u64 {
+        self.kernels.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn count_kernel(&self) {
+        self.kernels.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Handles an error as if the driver had reported it.

@@ -1,6 +1,6 @@
 //! Conjugate gradients of implicit steps, in single precision: inverted blocks of the nodes, and with them rigid motions of aggregates.
 //!
-//! The CPU sends the lower half of the matrix; a kernel makes rows of blocks of it. The coarse matrix is inverted in full, pivot by pivot. An
+//! Kernels are compiled once; another pattern changes sizes and arrays. The CPU sends the lower half of the matrix; a kernel makes rows of blocks of it. The coarse matrix is inverted in full, pivot by pivot. An
 //! iteration takes four kernels (three without aggregates): A p; x, r and z = D⁻¹ r with the forces on aggregates; their motions; p.
 //! Sums are found group by group, and every group that needs a sum adds up those of the groups in the same order. The device itself decides
 //! where to stop: what was submitted after that does nothing. So bits depend on no number of submissions.
@@ -14,7 +14,7 @@ use pliant_implicit::{
 };
 use wgpu::{BufferAddress, BufferUsages};
 
-use crate::kernel::{Binding, Bound, GROUP, Kernel, Memory, Sides};
+use crate::kernel::{Binding, Bound, GROUP, Growing, Kernel, Memory, Sides};
 use crate::transfer::Transfer;
 use crate::{Device, GpuError};
 
@@ -28,13 +28,27 @@ const MOST: usize = 64;
 /// Bytes of a place in the uniform of pivots: what offsets are multiples of.
 const PLACE: usize = 256;
 
+const SIZES: &str = include_str!("shaders/gradients/sizes.wgsl");
+const SUMS: &str =
+    concat!(include_str!("shaders/gradients/progress.wgsl"), include_str!("shaders/gradients/sum.wgsl"));
+/// Names, what comes before, and texts: a matrix, the inverse of its coarse part, an iteration.
+const KERNELS: [[&str; 3]; 7] = [
+    ["expand", "", include_str!("shaders/gradients/expand.wgsl")],
+    ["scatter", "", include_str!("shaders/gradients/scatter.wgsl")],
+    ["invert", "", include_str!("shaders/gradients/invert.wgsl")],
+    ["multiply", SUMS, include_str!("shaders/gradients/multiply.wgsl")],
+    ["update", SUMS, include_str!("shaders/gradients/update.wgsl")],
+    ["coarse", SUMS, include_str!("shaders/gradients/coarse.wgsl")],
+    ["turn", SUMS, include_str!("shaders/gradients/turn.wgsl")],
+];
+
 impl LinearDevice for Device {
     fn aggregates(&self) -> usize {
         AGGREGATES
     }
 
-    fn solver(&self, pattern: &BlockPattern<'_>) -> Result<Box<dyn DeviceSolver>, DeviceError> {
-        Ok(Box::new(Gradients::new(self, pattern).map_err(failed)?))
+    fn solver(&self) -> Result<Box<dyn DeviceSolver>, DeviceError> {
+        Ok(Box::new(Gradients::new(self).map_err(failed)?))
     }
 }
 
@@ -56,36 +70,216 @@ struct Progress {
     unused: u32,
 }
 
-/// The arrays of the preconditioner's coarse part.
-#[derive(Debug)]
-struct CoarseArrays {
-    blocks: wgpu::Buffer,
-    arm: wgpu::Buffer,
-    inverse: Sides,
+/// What belongs to a pattern, and a pivot; twin of sizes.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+struct Sizes {
+    pivot: u32,
+    nodes: u32,
+    aggregates: u32,
+    chunks: u32,
+    entries: u32,
+    lower: u32,
+    pairs: u32,
+    coarse: u32,
 }
 
-/// Equations of a pattern on a device.
+impl Sizes {
+    fn of(pattern: &BlockPattern<'_>) -> Self {
+        let nodes = pattern.nodes() as u32;
+        let last = pattern.source.iter().filter(|&&at| at != u32::MAX).max();
+        Self {
+            pivot: 0,
+            nodes,
+            aggregates: pattern.aggregates() as u32,
+            chunks: (6 * nodes).div_ceil(GROUP),
+            entries: pattern.source.len() as u32,
+            lower: last.map_or(1, |&last| last + 1),
+            pairs: pattern.touching.as_ref().map_or(0, Vec::len) as u32,
+            coarse: u32::from(pattern.touching.is_some()),
+        }
+    }
+
+    /// What all kernels read: these sizes with each pivot.
+    fn bind(self, device: &Device, memory: &Memory<'_>) -> Bound {
+        let place = |pivot: u32| {
+            let mut place = [0_u32; PLACE / 4];
+            place[..8].copy_from_slice(&bytemuck::cast::<Self, [u32; 8]>(Self { pivot, ..self }));
+            place
+        };
+        let places: Vec<_> = (0..self.aggregates.max(1)).map(place).collect();
+        let uniform = memory.uniform("the sizes", PLACE * places.len());
+        device.queue.write_buffer(&uniform, 0, bytemuck::cast_slice(&places));
+        Bound::new(device, &[Binding::Moving(&uniform, size_of::<Self>() as u64)])
+    }
+
+    /// Invocations of each of the [`KERNELS`].
+    fn invocations(self) -> [usize; 7] {
+        let [nodes, aggregates, entries, pairs] =
+            [self.nodes, self.aggregates, self.entries, self.pairs].map(|count| count as usize);
+        let groups = aggregates * GROUP as usize;
+        [entries, 36 * pairs, aggregates * aggregates, 6 * nodes, groups, groups, 6 * nodes]
+    }
+
+    /// Bytes of a matrix on its way.
+    fn upload(self) -> u64 {
+        let [nodes, lower, pairs] = [self.nodes, self.lower, self.pairs].map(u64::from);
+        4 * lower + (144 + 16) * nodes + 144 * pairs
+    }
+}
+
+/// What the kernels work on.
+struct Arrays {
+    lower: Growing,
+    source: Growing,
+    value: Growing,
+    row_start: Growing,
+    column: Growing,
+    inverse: Growing,
+    start: Growing,
+    home: Growing,
+    arm: Growing,
+    x: Growing,
+    r: Growing,
+    z: Growing,
+    p: Growing,
+    ap: Growing,
+    curvatures: Growing,
+    products: Growing,
+    force: Growing,
+    motion: Growing,
+    powers: Growing,
+    blocks: Growing,
+    pairs: Growing,
+    coarse: [Growing; 2],
+    progress: Sides,
+}
+
+impl Arrays {
+    /// Of no pattern so far.
+    fn new(memory: &Memory<'_>) -> Result<Self, GpuError> {
+        let new = |what| Growing::new(memory, what);
+        let coarse = || new("the inverse of the aggregates");
+        Ok(Self {
+            lower: new("the entries of the matrix")?,
+            source: new("the places of the matrix")?,
+            value: new("the blocks of the matrix")?,
+            row_start: new("the rows of the matrix")?,
+            column: new("the columns of the matrix")?,
+            inverse: new("the inverses of the nodes")?,
+            start: new("the aggregates")?,
+            home: new("the aggregates of the nodes")?,
+            arm: new("the arms of the nodes")?,
+            x: new("the solution")?,
+            r: new("the residual")?,
+            z: new("its correction")?,
+            p: new("the direction")?,
+            ap: new("its product")?,
+            curvatures: new("the curvatures")?,
+            products: new("the products")?,
+            force: new("the forces on the aggregates")?,
+            motion: new("the motions of the aggregates")?,
+            powers: new("the powers of the aggregates")?,
+            blocks: new("the blocks of the aggregates")?,
+            pairs: new("the pairs of aggregates")?,
+            coarse: [coarse()?, coarse()?],
+            progress: memory.sides("the progress", size_of::<Progress>(), true)?,
+        })
+    }
+
+    /// Takes a pattern.
+    ///
+    /// # Errors
+    /// If an array is too large.
+    fn take(
+        &mut self,
+        memory: &Memory<'_>,
+        pattern: &BlockPattern<'_>,
+        sizes: Sizes,
+    ) -> Result<(), GpuError> {
+        let [nodes, aggregates] = [pattern.nodes(), pattern.aggregates()];
+        self.source.fill(memory, pattern.source)?;
+        self.row_start.fill(memory, pattern.row_start)?;
+        self.column.fill(memory, pattern.column)?;
+        self.start.fill(memory, pattern.aggregate_start)?;
+        self.home.fill(memory, &homes(pattern))?;
+        self.lower.reserve(memory, 4 * sizes.lower as usize)?;
+        self.value.reserve(memory, 4 * pattern.source.len())?;
+        self.inverse.reserve(memory, 144 * nodes)?;
+        self.arm.reserve(memory, 16 * nodes)?;
+        for vector in [&mut self.x, &mut self.r, &mut self.z, &mut self.p, &mut self.ap] {
+            vector.reserve(memory, 24 * nodes)?;
+        }
+        self.curvatures.reserve(memory, 4 * sizes.chunks as usize)?;
+        self.products.reserve(memory, 8 * aggregates)?;
+        for six in [&mut self.force, &mut self.motion] {
+            six.reserve(memory, 24 * aggregates)?;
+        }
+        self.powers.reserve(memory, 4 * aggregates)?;
+        let Some(pairs) = &pattern.touching else { return Ok(()) };
+        self.pairs.fill(memory, pairs)?;
+        self.blocks.reserve(memory, 144 * pairs.len())?;
+        for side in &mut self.coarse {
+            side.reserve(memory, 144 * aggregates * aggregates)?;
+        }
+        Ok(())
+    }
+
+    /// What each of the [`KERNELS`] works on, beside the sizes.
+    fn bind(&self, device: &Device, sizes: Sizes) -> [Vec<Bound>; 7] {
+        let bind = |bindings: &[Binding<'_>]| Bound::new(device, bindings);
+        let read = |array| Binding::Read(Growing::buffer(array));
+        let write = |array| Binding::Write(Growing::buffer(array));
+        let now = || bind(&[Binding::ReadNow(&self.progress)]);
+        let coarse = self.coarse.each_ref().map(|side| side.buffer().clone());
+        let last = &coarse[sizes.aggregates as usize % 2];
+        let expand = bind(&[read(&self.lower), read(&self.source), write(&self.value)]);
+        let scatter = bind(&[read(&self.blocks), read(&self.pairs), Binding::Write(&coarse[0])]);
+        let invert = bind(&[Binding::ReadNow(&coarse), Binding::WriteNext(&coarse)]);
+        let multiply = bind(&[
+            read(&self.row_start),
+            read(&self.column),
+            read(&self.value),
+            read(&self.p),
+            write(&self.ap),
+            write(&self.curvatures),
+        ]);
+        let update = bind(&[
+            read(&self.curvatures),
+            read(&self.start),
+            read(&self.inverse),
+            read(&self.p),
+            read(&self.ap),
+            write(&self.x),
+            write(&self.r),
+            write(&self.z),
+            write(&self.products),
+        ]);
+        let forces = bind(&[read(&self.arm), write(&self.force)]);
+        let solve = bind(&[Binding::Read(last), read(&self.force), write(&self.motion), write(&self.powers)]);
+        let both = bind(&[Binding::ReadNow(&self.progress), Binding::WriteNext(&self.progress)]);
+        let turn = bind(&[read(&self.curvatures), read(&self.products), read(&self.z), write(&self.p)]);
+        let motions = bind(&[read(&self.arm), read(&self.motion), read(&self.powers), read(&self.home)]);
+        [
+            vec![expand],
+            vec![scatter],
+            vec![invert],
+            vec![now(), multiply],
+            vec![now(), update, forces],
+            vec![now(), solve],
+            vec![both, turn, motions],
+        ]
+    }
+}
+
+/// Equations on a device: one pattern after the other, by kernels that are compiled once.
 struct Gradients {
     device: Device,
-    nodes: usize,
-    aggregates: usize,
-    lower: wgpu::Buffer,
-    inverse: wgpu::Buffer,
-    coarse: Option<CoarseArrays>,
-    x: wgpu::Buffer,
-    r: wgpu::Buffer,
-    p: wgpu::Buffer,
-    ap: wgpu::Buffer,
-    progress: Sides,
-    /// Pivots, and nothing for kernels without one.
+    sizes: Sizes,
+    arrays: Arrays,
+    /// The sizes with each pivot.
     pivots: Bound,
-    expand: Kernel,
-    scatter: Option<Kernel>,
-    invert: Option<Kernel>,
-    multiply: Kernel,
-    update: Kernel,
-    solve_coarse: Option<Kernel>,
-    turn: Kernel,
+    kernels: [Kernel; 7],
     upload: Upload,
     transfer: Transfer,
     /// Iterations of the last pass.
@@ -100,198 +294,73 @@ impl std::fmt::Debug for Gradients {
 }
 
 impl Gradients {
-    fn new(device: &Device, pattern: &BlockPattern<'_>) -> Result<Self, GpuError> {
+    fn new(device: &Device) -> Result<Self, GpuError> {
         let memory = Memory::new(device);
-        device.fill(|| memory.bytes(), || Self::make(device, &memory, pattern))
+        device.fill(|| memory.bytes(), || Self::make(device, &memory))
     }
 
-    fn make(device: &Device, memory: &Memory<'_>, pattern: &BlockPattern<'_>) -> Result<Self, GpuError> {
-        let (nodes, aggregates) = (pattern.nodes(), pattern.aggregates());
-        let chunks = (6 * nodes).div_ceil(GROUP as usize);
-        let entries = pattern.source.len();
-        let most = pattern.source.iter().filter(|&&at| at != u32::MAX).max();
-        let lower_entries = most.map_or(1, |&last| last as usize + 1);
-        let pairs = pattern.touching.as_deref().unwrap_or_default();
-
-        let vector = |what| memory.zeros(what, 24 * nodes);
-        let lower = memory.zeros("the entries of the matrix", 4 * lower_entries)?;
-        let value = memory.zeros("the blocks of the matrix", 4 * entries)?;
-        let source = memory.filled("the places of the matrix", pattern.source)?;
-        let row_start = memory.filled("the rows of the matrix", pattern.row_start)?;
-        let column = memory.filled("the columns of the matrix", pattern.column)?;
-        let inverse = memory.zeros("the inverses of the nodes", 144 * nodes)?;
-        let start = memory.filled("the aggregates", pattern.aggregate_start)?;
-        let [x, r, z] = [vector("the solution")?, vector("the residual")?, vector("its correction")?];
-        let [p, ap] = [vector("the direction")?, vector("its product")?];
-        let curvatures = memory.zeros("the curvatures", 4 * chunks)?;
-        let products = memory.zeros("the products", 8 * aggregates)?;
-        let force = memory.zeros("the forces on the aggregates", 24 * aggregates)?;
-        let motion = memory.zeros("the motions of the aggregates", 24 * aggregates)?;
-        let powers = memory.zeros("the powers of the aggregates", 4 * aggregates)?;
-        let home = memory.filled("the aggregates of the nodes", &homes(pattern))?;
-        let progress = memory.sides("the progress", size_of::<Progress>(), true)?;
-        let arm = memory.zeros("the arms of the nodes", 16 * nodes)?;
-        let coarse = match &pattern.touching {
-            None => None,
-            Some(pairs) => Some(CoarseArrays {
-                blocks: memory.zeros("the blocks of the aggregates", 144 * pairs.len())?,
-                arm: arm.clone(),
-                inverse: memory.sides(
-                    "the inverse of the aggregates",
-                    144 * aggregates * aggregates,
-                    true,
-                )?,
-            }),
-        };
-
-        let pivot = memory.uniform("the pivots", PLACE * aggregates);
-        let numbers: Vec<[u32; PLACE / 4]> = (0..aggregates as u32).map(|own| [own; PLACE / 4]).collect();
-        device.queue.write_buffer(&pivot, 0, bytemuck::cast_slice(&numbers));
-        let bind = |bindings: &[Binding<'_>]| Bound::new(device, bindings);
-        let pivots = bind(&[Binding::Moving(&pivot, 16)]);
-        let now = bind(&[Binding::ReadNow(&progress)]);
-        let constants = [
-            ("NODES", nodes),
-            ("AGGREGATES", aggregates),
-            ("CHUNKS", chunks),
-            ("ENTRIES", entries),
-            ("LOWER", lower_entries),
-            ("PAIRS", pairs.len()),
-            ("COARSE", usize::from(coarse.is_some())),
-        ];
-        let plain = |name, snippet, arrays: &Bound, count| {
-            Kernel::new(device, name, &constants, &[snippet], &[&pivots, arrays], count)
-        };
-        let summing = |name, snippet, arrays: &[&Bound], count| {
-            let snippets = [
-                include_str!("shaders/gradients/progress.wgsl"),
-                include_str!("shaders/gradients/sum.wgsl"),
-                snippet,
-            ];
-            Kernel::new(device, name, &constants, &snippets, &[&[&pivots], arrays].concat(), count)
-        };
-        let expand = plain(
-            "expand",
-            include_str!("shaders/gradients/expand.wgsl"),
-            &bind(&[Binding::Read(&lower), Binding::Read(&source), Binding::Write(&value)]),
-            entries,
-        )?;
-        let (mut scatter, mut invert, mut solve_coarse) = (None, None, None);
-        if let Some(CoarseArrays { blocks, inverse, .. }) = &coarse {
-            let (count, pairs) = (pairs.len(), memory.filled("the pairs of aggregates", pairs)?);
-            scatter = Some(plain(
-                "scatter",
-                include_str!("shaders/gradients/scatter.wgsl"),
-                &bind(&[Binding::Read(blocks), Binding::Read(&pairs), Binding::Write(&inverse[0])]),
-                36 * count,
-            )?);
-            invert = Some(plain(
-                "invert",
-                include_str!("shaders/gradients/invert.wgsl"),
-                &bind(&[Binding::ReadNow(inverse), Binding::WriteNext(inverse)]),
-                aggregates * aggregates,
-            )?);
-            let last = &inverse[aggregates % 2];
-            let arrays = bind(&[
-                Binding::Read(last),
-                Binding::Read(&force),
-                Binding::Write(&motion),
-                Binding::Write(&powers),
-            ]);
-            let mut kernel =
-                summing("coarse", include_str!("shaders/gradients/coarse.wgsl"), &[&now, &arrays], 1)?;
-            kernel.dispatch_groups(aggregates as u32);
-            solve_coarse = Some(kernel);
-        }
-        let arrays = bind(&[
-            Binding::Read(&row_start),
-            Binding::Read(&column),
-            Binding::Read(&value),
-            Binding::Read(&p),
-            Binding::Write(&ap),
-            Binding::Write(&curvatures),
-        ]);
-        let multiply = summing(
-            "multiply",
-            include_str!("shaders/gradients/multiply.wgsl"),
-            &[&now, &arrays],
-            6 * nodes,
-        )?;
-        let arrays = bind(&[
-            Binding::Read(&curvatures),
-            Binding::Read(&start),
-            Binding::Read(&inverse),
-            Binding::Read(&p),
-            Binding::Read(&ap),
-            Binding::Write(&x),
-            Binding::Write(&r),
-            Binding::Write(&z),
-            Binding::Write(&products),
-        ]);
-        let forces = bind(&[Binding::Read(&arm), Binding::Write(&force)]);
-        let mut update =
-            summing("update", include_str!("shaders/gradients/update.wgsl"), &[&now, &arrays, &forces], 1)?;
-        update.dispatch_groups(aggregates as u32);
-        let both = bind(&[Binding::ReadNow(&progress), Binding::WriteNext(&progress)]);
-        let arrays = bind(&[
-            Binding::Read(&curvatures),
-            Binding::Read(&products),
-            Binding::Read(&z),
-            Binding::Write(&p),
-        ]);
-        let motions = bind(&[
-            Binding::Read(&arm),
-            Binding::Read(&motion),
-            Binding::Read(&powers),
-            Binding::Read(&home),
-        ]);
-        let snippet = include_str!("shaders/gradients/turn.wgsl");
-        let turn = summing("turn", snippet, &[&both, &arrays, &motions], 6 * nodes)?;
-        let bytes = 4 * lower_entries + 144 * nodes + 16 * nodes + 144 * pairs.len();
+    fn make(device: &Device, memory: &Memory<'_>) -> Result<Self, GpuError> {
+        let (sizes, arrays) = (Sizes::default(), Arrays::new(memory)?);
+        let pivots = sizes.bind(device, memory);
+        let bound = arrays.bind(device, sizes);
+        let [expand, scatter, invert, multiply, update, coarse, turn] = std::array::from_fn(|number| {
+            let [name, before, own] = KERNELS[number];
+            let bound: Vec<&Bound> = std::iter::once(&pivots).chain(&bound[number]).collect();
+            Kernel::new(device, name, &[], &[SIZES, before, own], &bound, 0)
+        });
         Ok(Self {
-            upload: Upload::new(device, bytes as u64),
+            kernels: [expand?, scatter?, invert?, multiply?, update?, coarse?, turn?],
+            upload: Upload::new(device, sizes.upload()),
             device: device.clone(),
-            nodes,
-            aggregates,
-            lower,
-            inverse,
-            coarse,
-            x,
-            r,
-            p,
-            ap,
-            progress,
+            sizes,
+            arrays,
             pivots,
-            expand,
-            scatter,
-            invert,
-            multiply,
-            update,
-            solve_coarse,
-            turn,
             transfer: Transfer::default(),
             last: FIRST,
             times: DeviceTimes::default(),
         })
     }
 
+    fn take_pattern(&mut self, pattern: &BlockPattern<'_>) -> Result<(), GpuError> {
+        let device = self.device.clone();
+        let memory = Memory::new(&device);
+        let arrange = || {
+            self.sizes = Sizes::of(pattern);
+            self.arrays.take(&memory, pattern, self.sizes)?;
+            self.pivots = self.sizes.bind(&device, &memory);
+            let bound = self.arrays.bind(&device, self.sizes);
+            for ((kernel, bound), count) in self.kernels.iter_mut().zip(&bound).zip(self.sizes.invocations())
+            {
+                (1..).zip(bound).for_each(|(group, bound)| kernel.rebind(group, bound));
+                kernel.resize(count);
+            }
+            if self.upload.size() < self.sizes.upload() {
+                self.upload = Upload::new(&device, self.sizes.upload());
+            }
+            Ok(())
+        };
+        device.fill(|| memory.bytes(), arrange)
+    }
+
     fn take_values(&mut self, values: &BlockValues<'_>) -> Result<(), GpuError> {
+        let Arrays { lower, inverse, arm, blocks, coarse, .. } = &self.arrays;
         let mut encoder = self.device.device.create_command_encoder(&Default::default());
         let mut parts = vec![
-            (&self.lower, bytemuck::cast_slice(values.lower)),
-            (&self.inverse, bytemuck::cast_slice(values.inverse)),
+            (lower.buffer(), bytemuck::cast_slice(values.lower)),
+            (inverse.buffer(), bytemuck::cast_slice(values.inverse)),
         ];
-        if let Some(CoarseArrays { blocks, arm, inverse }) = &self.coarse {
-            parts.push((arm, bytemuck::cast_slice(values.arm)));
-            parts.push((blocks, bytemuck::cast_slice(values.coarse)));
-            encoder.clear_buffer(&inverse[0], 0, None);
+        if self.is_coarse() {
+            parts.push((arm.buffer(), bytemuck::cast_slice(values.arm)));
+            parts.push((blocks.buffer(), bytemuck::cast_slice(values.coarse)));
+            encoder.clear_buffer(coarse[0].buffer(), 0, None);
         }
         self.upload.copy(&self.device, &mut encoder, &parts)?;
+        let [expand, scatter, invert, ..] = &self.kernels;
         let mut pass = encoder.begin_compute_pass(&Default::default());
-        self.expand.run(&mut pass, &self.pivots, 0, 0);
-        if let (Some(scatter), Some(invert)) = (&self.scatter, &self.invert) {
+        expand.run(&mut pass, &self.pivots, 0, 0);
+        if self.is_coarse() {
             scatter.run(&mut pass, &self.pivots, 0, 0);
-            for pivot in 0..self.aggregates {
+            for pivot in 0..self.sizes.aggregates as usize {
                 invert.run(&mut pass, &self.pivots, (PLACE * pivot) as u32, pivot % 2);
             }
         }
@@ -301,13 +370,19 @@ impl Gradients {
         self.device.check()
     }
 
+    /// Whether the motions of aggregates are solved for.
+    fn is_coarse(&self) -> bool {
+        self.sizes.coarse != 0
+    }
+
     /// The kernels after A p.
     fn finish_iteration(&self, pass: &mut wgpu::ComputePass<'_>, side: usize) {
-        self.update.run(pass, &self.pivots, 0, side);
-        if let Some(coarse) = &self.solve_coarse {
+        let [.., update, coarse, turn] = &self.kernels;
+        update.run(pass, &self.pivots, 0, side);
+        if self.is_coarse() {
             coarse.run(pass, &self.pivots, 0, side);
         }
-        self.turn.run(pass, &self.pivots, 0, side);
+        turn.run(pass, &self.pivots, 0, side);
     }
 
     fn pass(
@@ -320,11 +395,13 @@ impl Gradients {
         let mut begun = Instant::now();
         let most = u32::try_from(iterations).unwrap_or(u32::MAX);
         let start = Progress { goal: goal * goal, most, ..Progress::default() };
-        self.device.queue.write_buffer(&self.r, 0, bytemuck::cast_slice(right));
-        self.device.queue.write_buffer(&self.progress[0], 0, bytemuck::bytes_of(&start));
+        let Arrays { x, r, p, ap, progress: places, .. } = &self.arrays;
+        let [_, _, _, multiply, ..] = &self.kernels;
+        self.device.queue.write_buffer(r.buffer(), 0, bytemuck::cast_slice(right));
+        self.device.queue.write_buffer(&places[0], 0, bytemuck::bytes_of(&start));
         let mut encoder = self.device.device.create_command_encoder(&Default::default());
-        for vector in [&self.x, &self.p, &self.ap] {
-            encoder.clear_buffer(vector, 0, None);
+        for vector in [x, p, ap] {
+            encoder.clear_buffer(vector.buffer(), 0, None);
         }
         let (mut side, mut count) = (0, (self.last + self.last / 8 + 1).clamp(LEAST, MOST));
         let mut first = true;
@@ -336,7 +413,7 @@ impl Gradients {
                 first = false;
             }
             for _ in 0..count {
-                self.multiply.run(&mut pass, &self.pivots, 0, side);
+                multiply.run(&mut pass, &self.pivots, 0, side);
                 self.finish_iteration(&mut pass, side);
                 side = 1 - side;
             }
@@ -346,8 +423,8 @@ impl Gradients {
             let read = Instant::now();
             self.times.iterations += read - begun;
             let mut progress = Progress::default();
-            let bytes = (24 * self.nodes) as BufferAddress;
-            let parts = [(&self.progress[side], size_of::<Progress>() as BufferAddress), (&self.x, bytes)];
+            let bytes = 24 * BufferAddress::from(self.sizes.nodes);
+            let parts = [(&places[side], size_of::<Progress>() as BufferAddress), (x.buffer(), bytes)];
             self.transfer.read_all(&self.device, &parts, |parts| {
                 progress = bytemuck::pod_read_unaligned(parts[0]);
                 solution.copy_from_slice(bytemuck::cast_slice(parts[1]));
@@ -371,6 +448,10 @@ impl Gradients {
 }
 
 impl DeviceSolver for Gradients {
+    fn arrange(&mut self, pattern: &BlockPattern<'_>) -> Result<(), DeviceError> {
+        self.take_pattern(pattern).map_err(failed)
+    }
+
     fn take(&mut self, values: &BlockValues<'_>) -> Result<(), DeviceError> {
         let begun = Instant::now();
         self.take_values(values).map_err(failed)?;
@@ -414,6 +495,11 @@ impl Upload {
             mapped_at_creation: true,
         });
         Self { staging }
+    }
+
+    /// What fits in [B].
+    fn size(&self) -> u64 {
+        self.staging.size()
     }
 
     /// Copies to the starts of arrays, once the commands are submitted.

@@ -100,6 +100,50 @@ impl<'d> Memory<'d> {
     }
 }
 
+/// An array whose contents change with their number: it grows by half at least, and never shrinks.
+pub(crate) struct Growing {
+    what: &'static str,
+    buffer: wgpu::Buffer,
+}
+
+impl Growing {
+    /// # Errors
+    /// As [`Memory::zeros`].
+    pub(crate) fn new(memory: &Memory<'_>, what: &'static str) -> Result<Self, GpuError> {
+        Ok(Self { what, buffer: memory.zeros(what, 0)? })
+    }
+
+    /// The array as it is until it grows.
+    pub(crate) fn buffer(&self) -> &wgpu::Buffer {
+        &self.buffer
+    }
+
+    /// Has room for so many bytes; what it held is lost where it grows.
+    ///
+    /// # Errors
+    /// As [`Memory::zeros`].
+    pub(crate) fn reserve(&mut self, memory: &Memory<'_>, bytes: usize) -> Result<(), GpuError> {
+        let needed = array_size(bytes);
+        memory.count(self.what, needed)?;
+        if self.buffer.size() < needed {
+            let roomy = array_size(self.buffer.size() as usize * 3 / 2);
+            let size = roomy.min(memory.device.adapter().largest_buffer).max(needed);
+            self.buffer = memory.buffer(self.what, size, ARRAY, false);
+        }
+        Ok(())
+    }
+
+    /// Holds contents at its start.
+    ///
+    /// # Errors
+    /// As [`Memory::zeros`].
+    pub(crate) fn fill<T: NoUninit>(&mut self, memory: &Memory<'_>, contents: &[T]) -> Result<(), GpuError> {
+        self.reserve(memory, size_of_val(contents))?;
+        memory.device.queue.write_buffer(&self.buffer, 0, bytemuck::cast_slice(contents));
+        Ok(())
+    }
+}
+
 /// What arrays are for.
 const ARRAY: BufferUsages = BufferUsages::STORAGE.union(BufferUsages::COPY_DST).union(BufferUsages::COPY_SRC);
 
@@ -253,6 +297,7 @@ impl Kernel {
         source += include_str!("shaders/number.wgsl");
         source += &snippets.join("\n");
         let gpu = &device.device;
+        device.count_kernel();
         let module = trusted(gpu, name, source);
         let layouts: Vec<_> = bound.iter().map(|bound| Some(&bound.layout)).collect();
         let layout = gpu.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -328,6 +373,18 @@ mod tests {
         let needed = (limit + 16).next_multiple_of(16);
         assert_eq!(refused, Some(GpuError::TooLarge { adapter, what: "the cells", needed, limit }));
         assert_eq!(device.check(), Ok(()));
+    }
+
+    #[test]
+    fn an_array_grows_by_half_at_least_and_never_shrinks() {
+        let Ok(device) = Device::open(None) else { return };
+        let memory = Memory::new(&device);
+        let mut array = Growing::new(&memory, "the cells").unwrap();
+        let mut size_for = |bytes| {
+            array.reserve(&memory, bytes).unwrap();
+            array.buffer().size()
+        };
+        assert_eq!([1600, 1616, 16, 2400, 1 << 20].map(&mut size_for), [1600, 2400, 2400, 2400, 1 << 20]);
     }
 
     #[test]

@@ -41,7 +41,7 @@
 //! [`Design`] lists them, and `paths.rs` counts bytes and operations of each. All but `float-atomics` give the same bits every time, however
 //! the steps are divided. A force beyond the range of whole numbers is an error and never wraps around.
 //!
-//! `blocks` adds forces as `fixed-atomics` does; a group owns up to 64 nodes. Every block at a border cell computes this cell with the same
+//! `blocks` adds forces as whole multiples of a small one, in shared memory; a group owns up to 64 nodes. Every block at a border cell computes this cell with the same
 //! numbers and its own copy of the history; any copy can be read back. Displacements and increments have two sides: a kernel reads *now* and
 //! writes *next*, so blocks do not wait for each other, and the instant of a failure stays intact on its side. Each solid has a kernel: the
 //! last one at a node moves it, earlier ones leave their forces. When an instant is evaluated, the forces are left for the node pass.
@@ -102,7 +102,7 @@
 //! # Tests
 //!
 //! `tests/gpu/stepper/` compares with double precision on the CPU: displacements differ by at most 1e-5 after 200 steps, with every law, element
-//! and load on unordered meshes deformed at random. `tests/gpu/shells.rs` holds shells to the same, with their rotations and the work of loads. `tests/gpu/gradients.rs` compares solutions and pulsing tubes with the CPU. Tests also run devices opened with
+//! and load on unordered meshes deformed at random. `tests/gpu/shells.rs` holds shells to the same, with their rotations and the work of loads. `tests/gpu/gradients.rs` compares solutions, pulsing tubes, contact, ties and volumes with the CPU. Tests also run devices opened with
 //! lower limits (`Device::open_within`) and devices destroyed during a run. The gate runs
 //! all of them on Mesa's software Vulkan (`PLIANT_REQUIRE_GPU=1`); elsewhere they report when they are skipped.
 

@@ -8,12 +8,11 @@
 //! |---|---|---|---|
 //! | `gather` | 230 | 260 | cell: nodes 16, shape 48, u 3, forces written 64; node: forces 64, their places 17 |
 //! | `blocks` | 120 | 475 | 1.78 × (shape 48, corners 4), 3.4 × nodes around 11; no second kernel |
-//! | `float-atomics`, `fixed-atomics` | 90 | 260 | nodes 16, shape 48, u 3, sums 8; twelve atomic additions |
+//! | `float-atomics` | 90 | 260 | nodes 16, shape 48, u 3, sums 8; twelve atomic additions |
 //! | `fast` | 50 | 325 | corners 4, places of corners 14, 2.0 × nodes of blocks 20; shapes found again |
 
 use pliant_mechanics::model::{CellBlock, Cells, Model, Solid};
 use pliant_mechanics::tensor::dot;
-use pliant_mechanics::tie::Tie;
 
 use crate::blocks::{DeviceBlocks, NodeBlocks};
 use crate::kernel::{Binding, Bound, Memory};
@@ -79,16 +78,7 @@ impl Paths {
                 if !device.adapter().float_atomics {
                     return Err(device.lacks("floating-point atomics".to_owned()));
                 }
-                let cells = include_str!("shaders/float_cells.wgsl").to_owned();
-                let gather = include_str!("shaders/float_nodes.wgsl").to_owned();
-                Self::atomics(memory, device, model, nodes, (design, [cells, gather]))
-            }
-            Design::FixedAtomics => {
-                let scale = Scale::new(model).constants();
-                let snippets =
-                    [include_str!("shaders/fixed_cells.wgsl"), include_str!("shaders/fixed_nodes.wgsl")];
-                let snippets = snippets.map(|snippet| [&scale, FIXED, snippet].join("\n"));
-                Self::atomics(memory, device, model, nodes, (design, snippets))
+                Self::atomics(memory, device, model, nodes)
             }
         }
     }
@@ -231,16 +221,14 @@ impl Paths {
         device: &Device,
         model: &Model,
         nodes: &DeviceNodes,
-        (design, [cells, gather]): (Design, [String; 2]),
     ) -> Result<Self, GpuError> {
         let forces = memory.zeros("the forces on nodes", model.node_count() * size_of::<Four>())?;
         Ok(Self {
             cells: Bound::new(device, &[Binding::ReadNow(&nodes.displacement), Binding::Write(&forces)]),
-            cell_snippet: [CORNERS, &cells, EACH_CELL].join("\n"),
+            cell_snippet: [CORNERS, include_str!("shaders/float_cells.wgsl"), EACH_CELL].join("\n"),
             nodes: Bound::new(device, &[Binding::Write(&forces)]),
-            node_snippet: gather,
-            giving: (nodes.followers.as_ref())
-                .map(|followers| followers.among_sums(device, &forces, design == Design::FixedAtomics)),
+            node_snippet: include_str!("shaders/float_nodes.wgsl").to_owned(),
+            giving: nodes.followers.as_ref().map(|followers| followers.among_sums(device, &forces)),
             first_slot: vec![0; model.solids.len()],
             blocks: vec![],
             finds_shapes: false,
@@ -261,7 +249,7 @@ impl Paths {
 }
 
 /// The units of forces and energies that are added up as whole numbers of 32 bits. A cell gives at most 2³¹ over the most
-/// cells at a node, with its share of those at nodes that follow it, so that no sum leaves the range; that much is the force of the stiffest cell at a strain of 1,
+/// cells at a node, so that no sum leaves the range; that much is the force of the stiffest cell at a strain of 1,
 /// V (λ+2μ) |B|. What is more is cut off and reported.
 struct Scale {
     limit: f32,
@@ -279,10 +267,6 @@ impl Scale {
                 force = force.max(force_at_unit_strain(solid, cell));
                 length = length.max(solid.cells.volume(cell).cbrt());
             }
-        }
-        for (node, row) in model.ties.iter().flat_map(Tie::rows) {
-            let own = cells_at[node as usize];
-            row.for_each(|(followed, weight)| cells_at[followed as usize] += weight.abs() * own);
         }
         let most = cells_at.into_iter().fold(1.0, f64::max);
         // A little less: a limit that is rounded must not be above.

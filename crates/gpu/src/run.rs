@@ -1,5 +1,6 @@
 //! Instants of a run as the device sees them, and their submission.
 
+use std::marker::PhantomData;
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
@@ -15,7 +16,15 @@ use crate::transfer::Four;
 use crate::{Device, GpuError};
 
 /// Most instants in a submission.
-pub(crate) const MOST: usize = 128;
+const MOST: usize = 128;
+
+/// A submission takes about this long [s] at most: systems reset a device that a program occupies for seconds.
+const LONGEST_SUBMISSION: f64 = 0.2;
+
+/// How many instants a submission takes, by the time [s] that one takes, once it is known.
+pub(crate) fn room(pace: Option<f64>) -> usize {
+    pace.map_or(16.0, |pace| LONGEST_SUBMISSION / pace).clamp(1.0, MOST as f64) as usize
+}
 
 /// Why steps could not be taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -79,22 +88,94 @@ impl Instant {
     }
 }
 
-/// Instants of the next submission, with the factors of constraints and loads, and the ways of obstacles and tools, at each.
-pub(crate) struct Instants {
-    /// What all kernels read.
-    pub bound: Bound,
+/// Instants of the next submission, each with its row of a table of what is found in double precision on the CPU.
+pub(crate) struct Rows<I> {
     instants: wgpu::Buffer,
     table: wgpu::Buffer,
-    pub findings: wgpu::Buffer,
-    grips: wgpu::Buffer,
     /// Bytes from one instant to the next.
     spacing: usize,
     bytes: Vec<u8>,
     numbers: Vec<f32>,
     /// Numbers in a row of the table.
-    stride: usize,
-    contacts: Option<Arc<Contacts>>,
+    pub stride: usize,
     count: usize,
+    kind: PhantomData<I>,
+}
+
+impl<I: Pod> Rows<I> {
+    /// With so many numbers in a row.
+    ///
+    /// # Errors
+    /// If the table is too large.
+    pub(crate) fn new(memory: &Memory<'_>, device: &Device, stride: usize) -> Result<Self, GpuError> {
+        let alignment = device.device.limits().min_uniform_buffer_offset_alignment as usize;
+        let spacing = size_of::<I>().next_multiple_of(alignment);
+        Ok(Self {
+            instants: memory.uniform("the instants", spacing * MOST),
+            table: memory.zeros("the factors of motions and loads", stride * MOST * size_of::<f32>())?,
+            spacing,
+            bytes: vec![],
+            numbers: vec![],
+            stride,
+            count: 0,
+            kind: PhantomData,
+        })
+    }
+
+    /// The instant as a kernel sees it.
+    pub(crate) fn instant(&self) -> Binding<'_> {
+        Binding::Moving(&self.instants, size_of::<I>() as u64)
+    }
+
+    /// The table as a kernel sees it.
+    pub(crate) fn table(&self) -> Binding<'_> {
+        Binding::Read(&self.table)
+    }
+
+    /// Adds an instant, made from where its row begins; `fill` adds the numbers of the row.
+    pub(crate) fn push(&mut self, instant: impl FnOnce(u32) -> I, fill: impl FnOnce(&mut Vec<f32>)) {
+        let row = self.numbers.len();
+        fill(&mut self.numbers);
+        debug_assert_eq!(self.numbers.len(), row + self.stride);
+        self.bytes.resize(self.count * self.spacing, 0);
+        self.bytes.extend_from_slice(bytemuck::bytes_of(&instant(row as u32)));
+        self.count += 1;
+    }
+
+    /// How many there are.
+    pub(crate) fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Submits them: `encode` adds the kernels of each to the pass, from its place and the offset of its numbers.
+    pub(crate) fn submit(
+        &mut self,
+        device: &Device,
+        mut encode: impl FnMut(&mut wgpu::ComputePass<'_>, usize, u32),
+    ) -> wgpu::SubmissionIndex {
+        device.queue.write_buffer(&self.instants, 0, &self.bytes);
+        device.queue.write_buffer(&self.table, 0, bytemuck::cast_slice(&self.numbers));
+        let mut encoder = device.device.create_command_encoder(&Default::default());
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        for place in 0..self.count {
+            encode(&mut pass, place, (place * self.spacing) as u32);
+        }
+        drop(pass);
+        self.bytes.clear();
+        self.numbers.clear();
+        self.count = 0;
+        device.queue.submit([encoder.finish()])
+    }
+}
+
+/// Instants of solids, with the factors of constraints and loads, and the ways of obstacles and tools, at each.
+pub(crate) struct Instants {
+    /// What all kernels read.
+    pub bound: Bound,
+    rows: Rows<Instant>,
+    pub findings: wgpu::Buffer,
+    grips: wgpu::Buffer,
+    contacts: Option<Arc<Contacts>>,
 }
 
 /// Places of numbers in a row of the table.
@@ -105,16 +186,8 @@ pub(crate) fn table_constants(model: &Model) -> [(&'static str, usize); 3] {
 }
 
 /// What all kernels read.
-fn bind(
-    device: &Device,
-    instants: &wgpu::Buffer,
-    findings: &wgpu::Buffer,
-    table: &wgpu::Buffer,
-    grips: &wgpu::Buffer,
-) -> Bound {
-    let size = size_of::<Instant>() as u64;
-    let arrays = [Binding::Write(findings), Binding::Read(table), Binding::Write(grips)];
-    Bound::new(device, &[&[Binding::Moving(instants, size)], &arrays[..]].concat())
+fn bind(device: &Device, rows: &Rows<Instant>, findings: &wgpu::Buffer, grips: &wgpu::Buffer) -> Bound {
+    Bound::new(device, &[rows.instant(), Binding::Write(findings), rows.table(), Binding::Write(grips)])
 }
 
 /// What is found at all instants, before any.
@@ -132,28 +205,13 @@ impl Instants {
         model: &Model,
         contacts: Option<Arc<Contacts>>,
     ) -> Result<Self, GpuError> {
-        let alignment = device.device.limits().min_uniform_buffer_offset_alignment as usize;
-        let spacing = size_of::<Instant>().next_multiple_of(alignment);
         let stride = 4 * model.constraints.len() + model.loads.len() + 3 * model.bodies.len();
         let stride = stride + passage_numbers(contacts.as_deref());
-        let instants = memory.uniform("the instants", spacing * MOST);
-        let table = memory.zeros("the factors of motions and loads", stride * MOST * size_of::<f32>())?;
+        let rows = Rows::new(memory, device, stride)?;
         let findings = memory.filled("the findings", &NOTHING)?;
         let grips = memory.zeros("the grips", 0)?;
-        let bound = bind(device, &instants, &findings, &table, &grips);
-        Ok(Self {
-            bound,
-            instants,
-            table,
-            findings,
-            grips,
-            spacing,
-            bytes: vec![],
-            numbers: vec![],
-            stride,
-            contacts,
-            count: 0,
-        })
+        let bound = bind(device, &rows, &findings, &grips);
+        Ok(Self { bound, rows, findings, grips, contacts })
     }
 
     /// Takes grips as instant.wgsl reads them.
@@ -163,7 +221,7 @@ impl Instants {
     pub(crate) fn hold(&mut self, device: &Device, grips: &[Four]) -> Result<(), GpuError> {
         if self.grips.size() < size_of_val(grips) as u64 {
             self.grips = Memory::new(device).filled("the grips", grips)?;
-            self.bound = bind(device, &self.instants, &self.findings, &self.table, &self.grips);
+            self.bound = bind(device, &self.rows, &self.findings, &self.grips);
         } else {
             device.queue.write_buffer(&self.grips, 0, bytemuck::cast_slice(grips));
         }
@@ -192,38 +250,37 @@ impl Instants {
         (model, driven): (&Model, &[(u32, Leg)]),
         time: f64,
         next: f64,
-        mut instant: Instant,
+        instant: Instant,
     ) {
-        instant.row = self.numbers.len() as u32;
-        for constraint in &model.constraints {
-            let [now, then] = [time, time + next].map(|t| constraint.motion.factors(t));
-            for (now, then) in now.into_iter().zip(then) {
-                self.numbers.extend([(then - now) as f32, then as f32]);
-            }
-        }
-        let mut gravity = vec![[0.0; 3]; model.bodies.len()];
-        for load in &model.loads {
-            let factor = load.curve.value(time);
-            self.numbers.push(factor as f32);
-            if let LoadKind::Gravity { body, acceleration } = load.kind {
-                for (sum, a) in gravity[body].iter_mut().zip(acceleration) {
-                    *sum += factor * a;
+        let Self { rows, contacts, .. } = self;
+        let fill = |numbers: &mut Vec<f32>| {
+            for constraint in &model.constraints {
+                let [now, then] = [time, time + next].map(|t| constraint.motion.factors(t));
+                for (now, then) in now.into_iter().zip(then) {
+                    numbers.extend([(then - now) as f32, then as f32]);
                 }
             }
-        }
-        self.numbers.extend(gravity.as_flattened().iter().map(|&g| g as f32));
-        if let Some(contacts) = &self.contacts {
-            add_passages(contacts, driven, [time, time + next], &mut self.numbers);
-        }
-        debug_assert_eq!(self.numbers.len() % self.stride.max(1), 0);
-        self.bytes.resize(self.count * self.spacing, 0);
-        self.bytes.extend_from_slice(bytemuck::bytes_of(&instant));
-        self.count += 1;
+            let mut gravity = vec![[0.0; 3]; model.bodies.len()];
+            for load in &model.loads {
+                let factor = load.curve.value(time);
+                numbers.push(factor as f32);
+                if let LoadKind::Gravity { body, acceleration } = load.kind {
+                    for (sum, a) in gravity[body].iter_mut().zip(acceleration) {
+                        *sum += factor * a;
+                    }
+                }
+            }
+            numbers.extend(gravity.as_flattened().iter().map(|&g| g as f32));
+            if let Some(contacts) = contacts {
+                add_passages(contacts, driven, [time, time + next], numbers);
+            }
+        };
+        rows.push(|row| Instant { row, ..instant }, fill);
     }
 
     /// How many there are.
     pub(crate) fn len(&self) -> usize {
-        self.count
+        self.rows.len()
     }
 
     /// Submits them: `encode` adds the kernels of each to the pass, from what they read, its place and the offset of its numbers.
@@ -232,17 +289,7 @@ impl Instants {
         device: &Device,
         mut encode: impl FnMut(&mut wgpu::ComputePass<'_>, &Bound, usize, u32),
     ) -> wgpu::SubmissionIndex {
-        device.queue.write_buffer(&self.instants, 0, &self.bytes);
-        device.queue.write_buffer(&self.table, 0, bytemuck::cast_slice(&self.numbers));
-        let mut encoder = device.device.create_command_encoder(&Default::default());
-        let mut pass = encoder.begin_compute_pass(&Default::default());
-        for place in 0..self.count {
-            encode(&mut pass, &self.bound, place, (place * self.spacing) as u32);
-        }
-        drop(pass);
-        self.bytes.clear();
-        self.numbers.clear();
-        self.count = 0;
-        device.queue.submit([encoder.finish()])
+        let Self { rows, bound, .. } = self;
+        rows.submit(device, |pass, place, offset| encode(pass, bound, place, offset))
     }
 }

@@ -8,7 +8,7 @@
 //! work of forces from outside is summed on the device, so none of it is lost in between.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant as Clock};
+use std::time::Instant as Clock;
 
 use bytemuck::{Pod, Zeroable};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -18,15 +18,9 @@ use pliant_mechanics::model::Motion;
 
 use crate::kernel::{Binding, Bound, Kernel, Memory};
 use crate::paths::by_rows;
-use crate::run::MOST;
+use crate::run::{Rows, room};
 use crate::transfer::{Four, Transfer};
 use crate::{Device, GpuError};
-
-/// A submission takes about this long [s] at most: systems reset a device that a program occupies for seconds.
-const LONGEST_SUBMISSION: f64 = 0.2;
-
-/// Instants of the first submission, before their pace is known.
-const FIRST: usize = 8;
 
 /// Numbers of a facet at rest: half of the stiffness, tension, gradients, corners, axes.
 const AT_REST: usize = 171 + 18 + 6 + 6 + 9;
@@ -51,7 +45,8 @@ pub struct ShellsMoved {
     pub steps: u64,
     /// Work [J] of forces from outside on the way, by the trapezoidal rule, less what those at the end do: half of their power × step.
     pub work: f64,
-    /// Whether a facet was broken before all steps were taken. The state is that of this instant; the CPU's forces there name the facet.
+    /// Whether a facet was broken, in single precision, before all steps were taken. The state is that of this instant; the CPU's forces there
+    /// tell whether it is, and name it.
     pub broken: bool,
 }
 
@@ -62,12 +57,7 @@ pub struct GpuShells {
     step: f64,
     /// The nodes that constraints move, in the order of the constraints.
     moved: Vec<Moved>,
-    /// Numbers in a row of the table.
-    stride: usize,
-    table: wgpu::Buffer,
-    instants: wgpu::Buffer,
-    /// Bytes from one instant to the next.
-    spacing: usize,
+    rows: Rows<Instant>,
     bound: Bound,
     broken: wgpu::Buffer,
     places: wgpu::Buffer,
@@ -81,8 +71,6 @@ pub struct GpuShells {
     loaded: bool,
     /// Seconds that an instant takes, once known.
     pace: Option<f64>,
-    numbers: Vec<f32>,
-    bytes: Vec<u8>,
 }
 
 /// A node that a constraint moves.
@@ -143,19 +131,9 @@ impl GpuShells {
         let stride = model.loads.len() + 6 * motions.iter().filter(|&&place| place != NONE).count();
         let places = memory.zeros("the places of nodes", nodes * 32)?;
         let rates = memory.zeros("the velocities of nodes", nodes * 32)?;
-        let table = memory.zeros("the factors of motions and loads", stride * MOST * 4)?;
+        let rows = Rows::new(memory, device, stride)?;
         let broken = memory.filled("the findings", &[NONE])?;
-        let alignment = device.device.limits().min_uniform_buffer_offset_alignment as usize;
-        let spacing = size_of::<Instant>().next_multiple_of(alignment);
-        let instants = memory.uniform("the instants", spacing * MOST);
-        let bound = Bound::new(
-            device,
-            &[
-                Binding::Moving(&instants, size_of::<Instant>() as u64),
-                Binding::Write(&broken),
-                Binding::Read(&table),
-            ],
-        );
+        let bound = Bound::new(device, &[rows.instant(), Binding::Write(&broken), rows.table()]);
         let constants = [("FACETS", facets), ("NODES", nodes)];
         let head =
             concat!(include_str!("shaders/shells/instant.wgsl"), include_str!("shaders/shells/facets.wgsl"));
@@ -217,10 +195,7 @@ impl GpuShells {
             device: device.clone(),
             step,
             moved,
-            stride,
-            table,
-            instants,
-            spacing,
+            rows,
             bound,
             broken,
             places,
@@ -232,8 +207,6 @@ impl GpuShells {
             transfer: Transfer::default(),
             loaded: false,
             pace: None,
-            numbers: Vec::new(),
-            bytes: Vec::new(),
             model,
         })
     }
@@ -285,10 +258,7 @@ impl GpuShells {
         let mut times = vec![state.time];
         while (times.len() as u64) <= steps {
             let left = steps + 1 - times.len() as u64;
-            let room = self
-                .pace
-                .map_or(FIRST, |pace| ((LONGEST_SUBMISSION / pace.max(1e-9)) as usize).clamp(1, MOST));
-            let count = room.min(usize::try_from(left).unwrap_or(MOST));
+            let count = left.min(room(self.pace) as u64);
             for _ in 0..count {
                 let index = times.len() as u32 - 1;
                 let time = times[index as usize];
@@ -296,9 +266,9 @@ impl GpuShells {
                 times.push(time + self.step);
             }
             let begun = Clock::now();
-            let submission = self.submit(count);
+            let submission = self.submit();
             self.device.wait_for(submission)?;
-            self.pace = Some(begun.elapsed().max(Duration::from_nanos(1)).as_secs_f64() / count as f64);
+            self.pace = Some(begun.elapsed().as_secs_f64() / count as f64);
         }
         let (broken, work) = self.read(state)?;
         let taken = u64::from(broken).min(steps);
@@ -306,45 +276,30 @@ impl GpuShells {
         Ok(ShellsMoved { steps: taken, work, broken: taken < steps })
     }
 
-    /// The error of a facet that is broken on the device alone.
-    pub fn disagrees(&self) -> GpuError {
-        let reason = "a facet that it reports as broken is valid on the CPU".to_owned();
-        GpuError::Internal { adapter: self.device.adapter().name.clone(), reason }
-    }
-
     /// Adds an instant at a time [s].
     fn add_instant(&mut self, index: u32, time: f64) {
-        let row = self.numbers.len();
-        self.numbers.extend(self.model.loads.iter().map(|load| load.curve.value(time) as f32));
-        self.numbers.resize(row + self.stride, 0.0);
-        for Moved { constraint, index, components, place } in &self.moved {
-            let motion = &self.model.constraints[*constraint].motion;
-            let by = motion.increment(*index, time, time + self.step);
-            for c in (0..6).filter(|&c| components[c]) {
-                self.numbers[row + place + c] = (by[c] / self.step) as f32;
+        let Self { rows, model, moved, step, .. } = self;
+        let stride = rows.stride;
+        let fill = |numbers: &mut Vec<f32>| {
+            let row = numbers.len();
+            numbers.extend(model.loads.iter().map(|load| load.curve.value(time) as f32));
+            numbers.resize(row + stride, 0.0);
+            for Moved { constraint, index, components, place } in moved {
+                let by = model.constraints[*constraint].motion.increment(*index, time, time + *step);
+                for c in (0..6).filter(|&c| components[c]) {
+                    numbers[row + *place + c] = (by[c] / *step) as f32;
+                }
             }
-        }
-        let instant =
-            Instant { index, row: row as u32, first: u32::from(index == 0), step: self.step as f32 };
-        self.bytes.extend_from_slice(bytemuck::bytes_of(&instant));
-        self.bytes.resize(self.bytes.len().next_multiple_of(self.spacing), 0);
+        };
+        rows.push(|row| Instant { index, row, first: u32::from(index == 0), step: *step as f32 }, fill);
     }
 
-    fn submit(&mut self, count: usize) -> wgpu::SubmissionIndex {
-        let Device { queue, device, .. } = &self.device;
-        queue.write_buffer(&self.instants, 0, &self.bytes);
-        queue.write_buffer(&self.table, 0, bytemuck::cast_slice(&self.numbers));
-        self.bytes.clear();
-        self.numbers.clear();
-        let mut encoder = device.create_command_encoder(&Default::default());
-        let mut pass = encoder.begin_compute_pass(&Default::default());
-        for place in 0..count {
-            let offset = (place * self.spacing) as u32;
-            self.facets.run(&mut pass, &self.bound, offset, 0);
-            self.nodes.run(&mut pass, &self.bound, offset, 0);
-        }
-        drop(pass);
-        queue.submit([encoder.finish()])
+    fn submit(&mut self) -> wgpu::SubmissionIndex {
+        let Self { rows, facets, nodes, bound, .. } = self;
+        rows.submit(&self.device, |pass, _, offset| {
+            facets.run(pass, bound, offset, 0);
+            nodes.run(pass, bound, offset, 0);
+        })
     }
 
     /// Reads the state back: the first instant at which a facet was broken, and the work of forces from outside [J].
@@ -354,6 +309,11 @@ impl GpuShells {
         let mut read = (NONE, 0.0);
         let arrays = [(&self.places, bytes), (&self.rates, bytes), (&self.broken, 4)];
         self.transfer.read_all(&self.device, &arrays, |parts| {
+            read.0 = bytemuck::cast_slice::<u8, u32>(parts[2])[0];
+            if read.0 == 0 {
+                // Nothing has moved: the state keeps its digits, and the sums are those of the call before.
+                return;
+            }
             let three = |v: Four| Vector3::new(v[0], v[1], v[2]).map(f64::from);
             let places = bytemuck::cast_slice::<u8, [Four; 2]>(parts[0]);
             let rates = bytemuck::cast_slice::<u8, [Four; 2]>(parts[1]);
@@ -364,7 +324,6 @@ impl GpuShells {
                 (state.velocity[node], state.spin[node]) = (three(velocity), three(spin));
                 read.1 += f64::from(spin[3]);
             }
-            read.0 = bytemuck::cast_slice::<u8, u32>(parts[2])[0];
         })?;
         Ok(read)
     }

@@ -24,7 +24,7 @@ use crate::loads::DeviceLoads;
 use crate::mapping::{DeviceMapping, PointValue};
 use crate::nodes::{DeviceNodes, NodeKernels, SUMS, fours};
 use crate::paths::Paths;
-use crate::run::{Instant, Instants, MOST, StepFailure, UNLISTED, flags, table_constants};
+use crate::run::{Instant, Instants, StepFailure, UNLISTED, flags, room, table_constants};
 use crate::solids::DeviceSolid;
 use crate::ties::DeviceTies;
 use crate::transfer::Four;
@@ -36,9 +36,6 @@ const EVALUATE_EVERY: u64 = 100;
 
 /// Evaluations are more frequent where the deformation changes by more than this factor from one to the next.
 const CALM: f64 = 1.02;
-
-/// A submission takes at most this long [s]: systems reset a device that a program occupies for seconds.
-const LONGEST_SUBMISSION: f64 = 0.2;
 
 /// Where a state was when it was evaluated.
 #[derive(Clone, Copy)]
@@ -568,8 +565,7 @@ impl GpuStepper {
         let mut running: Option<(wgpu::SubmissionIndex, usize)> = None;
         let mut begun = Clock::now();
         while state.steps < end {
-            let most =
-                self.pace.map_or(16.0, |pace| LONGEST_SUBMISSION / pace).clamp(1.0, MOST as f64) as usize;
+            let most = room(self.pace);
             while state.steps < end && self.instants.len() < most {
                 let lengths = match self.since {
                     0 => self.lengths,

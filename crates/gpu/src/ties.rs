@@ -83,14 +83,10 @@ impl Followers {
         Giving { bound, snippet }
     }
 
-    /// What gives forces on where cells have added them up, as whole numbers or floating-point ones.
-    pub(crate) fn among_sums(&self, device: &Device, forces: &wgpu::Buffer, whole: bool) -> Giving {
+    /// What gives forces on where cells have added them up.
+    pub(crate) fn among_sums(&self, device: &Device, forces: &wgpu::Buffer) -> Giving {
         let bound = Bound::new(device, &[&[Binding::Write(forces)], &self.bindings()[..]].concat());
-        let kind = match whole {
-            true => "alias Sum = i32;\nfn part(force: f32) -> i32 {\n    return i32(round(force));\n}\n",
-            false => "alias Sum = f32;\nfn part(force: f32) -> f32 {\n    return force;\n}\n",
-        };
-        Giving { bound, snippet: [kind, include_str!("shaders/give_sums.wgsl")].concat() }
+        Giving { bound, snippet: include_str!("shaders/give_sums.wgsl").to_owned() }
     }
 
     fn bindings(&self) -> [Binding<'_>; 3] {

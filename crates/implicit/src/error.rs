@@ -219,6 +219,25 @@ pub enum SolveError {
         /// Iterations of the last attempt.
         iterations: usize,
     },
+    /// A volume and the limit of its pressure that cannot both be kept: the state leaps from one side of them to the other.
+    #[error(
+        "neither the volume of `{constraint}` nor its `pressure-limit` can be kept at t = {time:.6}: the volume takes {pressure:.4e} Pa of {limit:.4e} Pa, \
+         and at the limit it is {ahead:.1e} m³ beyond its curve: the surface snaps; try the solver `implicit`, smaller steps or a higher `pressure-limit`"
+    )]
+    Snaps {
+        /// Time of the step that failed.
+        time: f64,
+        /// Name of the constraint.
+        constraint: String,
+        /// The first node of its surface.
+        node: u32,
+        /// The limit [Pa].
+        limit: f64,
+        /// The pressure [Pa] in the prescribed volume.
+        pressure: f64,
+        /// How far [m³] the volume is beyond the prescribed one at the limit.
+        ahead: f64,
+    },
     /// No lower energy along a direction that should have one.
     #[error(
         "the energy does not fall any more at t = {time:.6} after {iterations} iterations in contact, largest residual at node {node}; try smaller steps"

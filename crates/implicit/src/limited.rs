@@ -80,6 +80,8 @@ struct Valve {
     given: Option<f64>,
     /// How often the other was prescribed.
     changes: i32,
+    /// What did not hold: the pressure [Pa] in the volume, and how far [m³] the volume was beyond its curve at the limit.
+    beyond: [f64; 2],
 }
 
 impl Valve {
@@ -91,10 +93,23 @@ impl Valve {
             Some(given) => -gap * given.signum() <= beyond * rest.abs(),
         };
         if !holds {
-            self.given = if self.given.is_some() { None } else { Some(self.limit.copysign(pressure)) };
+            match self.given.take() {
+                Some(_) => self.beyond[1] = -gap,
+                None => {
+                    self.beyond[0] = pressure;
+                    self.given = Some(self.limit.copysign(pressure));
+                }
+            }
             self.changes += 1;
         }
         holds
+    }
+
+    /// That at a time [s] neither the volume nor the limit holds.
+    fn snaps(&self, model: &Assembly, time: f64) -> SolveError {
+        let own = &model.constraints[self.constraint];
+        let ([pressure, ahead], limit) = (self.beyond, self.limit);
+        SolveError::Snaps { time, constraint: own.name.clone(), node: own.nodes[0], limit, pressure, ahead }
     }
 
     /// How far the volume is from where it should be [m³].
@@ -132,13 +147,10 @@ pub(crate) fn within_limits<S: Contacting, T, E: From<SolveError>>(
             // The last motion of a step in contact was made without a look at what is left.
             solver.find_residual(state);
         }
-        let valves_hold = solver.system().valves_hold(&mut valves);
-        let mut agree = valves_hold;
-        if valves.iter().any(|own| own.changes > CHANGES) || tries == 0 && !valves_hold {
-            return Err(SolveError::Impossible(
-                "neither the volume nor the limit of its pressure can be kept: the surface snaps open; take smaller steps, or a higher `pressure-limit`",
-            )
-            .into());
+        let unkept = solver.system().unkept(&mut valves);
+        let mut agree = unkept.is_none();
+        if let Some(own) = unkept.filter(|own| own.changes > CHANGES || tries == 0) {
+            return Err(own.snaps(&solver.system().model, time).into());
         }
         for (guess, force) in guesses.iter_mut().zip(solver.system().bear_on()) {
             agree &= guess.take(force);
@@ -167,21 +179,23 @@ impl System {
             let (constraint, behind) = (lag.number(), -lag.now().x);
             let limit = self.model.force_limits[&constraint];
             let given = (behind != 0.0).then(|| limit.copysign(behind));
-            Valve { constraint, limit, given, changes: 0 }
+            Valve { constraint, limit, given, changes: 0, beyond: [0.0; 2] }
         })
         .collect()
     }
 
-    /// Takes pressures and volumes at the residual last found, and how far volumes lag; whether what is prescribed holds.
-    fn valves_hold(&mut self, valves: &mut [Valve]) -> bool {
+    /// Takes pressures and volumes at the residual last found, and how far volumes lag; where what is prescribed does not hold, most often so.
+    fn unkept<'v>(&mut self, valves: &'v mut [Valve]) -> Option<&'v Valve> {
         let lags = self.lags.iter_mut().filter(|lag| encloses(&self.model, lag));
-        let mut hold = true;
+        let mut unkept: Option<&Valve> = None;
         for (lag, valve) in lags.zip(valves) {
             let Some(found) = self.conditions.enclosed(valve.constraint) else { continue };
             lag.stand(Vector3::x() * valve.lag(found[1]));
-            hold &= valve.take(found);
+            if !valve.take(found) && unkept.is_none_or(|other| valve.changes > other.changes) {
+                unkept = Some(valve);
+            }
         }
-        hold
+        unkept
     }
 
     /// Finds where they go between two times [s]; increments of prescribed components, six a node, are those without limits before.

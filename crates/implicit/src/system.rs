@@ -253,12 +253,9 @@ impl System {
         };
         system.face_places = pressing(&model).map(of_load).collect();
         system.solid_places = model.solids.iter().zip(&system.stars).map(of_solid).collect();
-        let workspace = Workspace::new(system.solver, system.device.as_ref(), &system.equations, matrix);
-        let mut workspace = workspace.map_err(linear_error)?;
-        if let Some(before) = &system.workspace {
-            workspace.count_on(before.of_device());
-        }
-        system.workspace = Some(workspace);
+        let (device, before) = (system.device.as_ref(), system.workspace.as_mut());
+        let workspace = Workspace::new(system.solver, device, &system.equations, matrix, before);
+        system.workspace = Some(workspace.map_err(linear_error)?);
         Ok(())
     }
 

@@ -120,12 +120,6 @@ impl Trouble {
     }
 }
 
-/// A panic: what it said.
-pub fn told(panic: &(dyn std::any::Any + Send)) -> String {
-    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
-    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default()
-}
-
 /// The mistakes of a scene with its lines underlined, without colours.
 fn underlined(errors: &SceneErrors) -> String {
     let mut text = String::new();

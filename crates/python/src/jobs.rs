@@ -5,10 +5,10 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, channel};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use pliant_sim::StopFlag;
+use pliant_sim::{StopFlag, panicked};
 use pyo3::prelude::*;
 
-use crate::errors::{Trouble, told};
+use crate::errors::Trouble;
 
 /// Time between two looks at signals.
 const SLICE: Duration = Duration::from_millis(50);
@@ -57,7 +57,8 @@ pub fn on_thread<T: Send + 'static>(
     let pool = rayon::ThreadPoolBuilder::new().thread_name(|_| "pliant".into()).build();
     pool.map_err(crate::errors::broken)?.spawn(move || {
         let done = catch_unwind(AssertUnwindSafe(job));
-        let _ = sender.send(done.unwrap_or_else(|panic| Err(Trouble::Internal(told(&*panic)))));
+        let _ =
+            sender.send(done.unwrap_or_else(|panic| Err(Trouble::Internal(panicked(&*panic).to_owned()))));
     });
     loop {
         match wait(py, &receiver, Duration::ZERO) {

@@ -10,11 +10,11 @@ use pliant_geometry::Selection;
 use pliant_mechanics::Energies;
 use pliant_run::{Checkpoint, Options, OutputFolder, run_with, sampled_columns};
 use pliant_scene::World;
-use pliant_sim::StopFlag;
+use pliant_sim::{StopFlag, panicked};
 use pyo3::prelude::*;
 
 use crate::arrays::{array1, array3};
-use crate::errors::{Trouble, diagnostics, told};
+use crate::errors::{Trouble, diagnostics};
 use crate::jobs::on_pool;
 use crate::mesh::Mesh;
 
@@ -178,7 +178,7 @@ impl Model {
         };
         let job = || {
             let done = catch_unwind(AssertUnwindSafe(job));
-            done.unwrap_or_else(|panic| Err(Trouble::Internal(told(&*panic))))
+            done.unwrap_or_else(|panic| Err(Trouble::Internal(panicked(&*panic).to_owned())))
         };
         let (summary, signal) = on_pool(py, &pool, &stop, job)?;
         signal?;

@@ -12,11 +12,11 @@ use pliant_mechanics::grip::Grip;
 use pliant_run::{Live, field_named};
 use pliant_scene::format::At;
 use pliant_sim::contact::pose::Pose;
-use pliant_sim::{Reals, StopFlag};
+use pliant_sim::{Reals, StopFlag, panicked};
 use pyo3::prelude::*;
 
 use crate::arrays::{array, array3, vectors};
-use crate::errors::{Trouble, broken, told};
+use crate::errors::{Trouble, broken};
 use crate::jobs::on_pool;
 use crate::mesh::Mesh;
 use crate::model::{Model, in_order};
@@ -79,7 +79,7 @@ impl Simulation {
             other => return Err(other.trouble()),
         };
         done.map_err(|panic| {
-            let message = told(&*panic);
+            let message = panicked(&*panic).to_owned();
             self.time.store(AWAY, Ordering::Release);
             *slot = match std::mem::replace(&mut *slot, Slot::Away) {
                 Slot::Here(running) => Slot::Broken { _kept: Some(running), message: message.clone() },
@@ -128,7 +128,7 @@ impl Simulation {
                 "displacements have moved in memory: this is a mistake of Pliant, please report it"
                     .to_owned(),
             ),
-            Err(panic) => Some(told(&**panic)),
+            Err(panic) => Some(panicked(&**panic).to_owned()),
         };
         let mut slot = self.slot()?;
         *slot = match &broken {
@@ -181,7 +181,7 @@ impl Simulation {
                 live.simulation.stop_on(&flag);
                 Ok(Running::new(live, world))
             }))
-            .unwrap_or_else(|panic| Err(Trouble::Internal(told(&*panic))))
+            .unwrap_or_else(|panic| Err(Trouble::Internal(panicked(&*panic).to_owned())))
         })?;
         made.1?;
         let running = Box::new(made.0?);

@@ -166,6 +166,8 @@ pub struct Effort {
     pub solutions: u64,
     /// Iterations of conjugate gradients in all; 0 with factors.
     pub linear_iterations: u64,
+    /// Linear equations that single precision on a GPU could not solve, and that the CPU finished.
+    pub left_to_cpu: u64,
     /// Residual of the last solution by conjugate gradients over its right-hand side; 0 with factors.
     pub linear_residual: f64,
     /// Residual of the last step over the largest of loads, internal and inertial forces; `None` where it was not checked.

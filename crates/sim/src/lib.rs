@@ -72,7 +72,7 @@ pub use simulation::{Frame, Observer, Simulation, State, World};
 pub use solver::{Equilibria, LoadStepProgress};
 pub use steps::{Critical, SAFETY, Steps};
 pub use tools::ToolNow;
-pub use words::{counted, number};
+pub use words::{counted, number, panicked};
 
 /// Ends long work early.
 pub use pliant_mechanics::StopFlag;

@@ -4,37 +4,23 @@ use std::f64::consts::{PI, TAU};
 use std::time::Instant;
 
 use nalgebra::{UnitQuaternion, Vector3};
+use pliant_geometry::Mesh;
 use pliant_gpu::{Device, GpuError, GpuShells};
 use pliant_implicit::element::{Elasticity, Formulation, Membrane};
-use pliant_implicit::{Assembly, Explicit, Shell, Spring, State, Wall};
+use pliant_implicit::{Assembly, Explicit, Spring, State, Wall};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_mechanics::model::{Constraint, Motion};
+use pliant_meshing::{Pattern, Sheet};
 use pliant_testing::Random;
 
 use crate::support;
 
 const WALL: Wall = Wall { elastic: Elasticity { young: 1e5, poisson: 0.4 }, density: 1000.0 };
 
-/// A surface of `columns` × `rows` pairs of triangles; a closed one joins its last column to its first.
-fn surface(
-    [columns, rows]: [u32; 2],
-    closed: bool,
-    thickness: f64,
-    membrane: Membrane,
-    place: impl Fn(u32, u32) -> Vector3<f64>,
-) -> Assembly {
-    let width = columns + u32::from(!closed);
-    let node = |i: u32, j: u32| i % width + width * j;
-    let points = (0..=rows).flat_map(|j| (0..width).map(move |i| (i, j))).map(|(i, j)| place(i, j));
-    let cells = (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))).flat_map(|(i, j)| {
-        let [a, b, c, d] = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
-        if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
-    });
-    let mut model = Assembly::new("wall", points);
-    let formulation = Formulation { membrane, ..Formulation::default() };
-    let shell = Shell::new("wall", cells.collect(), thickness, WALL);
-    model.add_shell(&Shell { formulation, ..shell }).unwrap();
+/// A damped shell of a thickness [m].
+fn wall(mesh: &Mesh, thickness: f64, membrane: Membrane) -> Assembly {
+    let mut model = support::shell(mesh, thickness, WALL, Formulation { membrane, ..Formulation::default() });
     model.model_mut().bodies[0].damping = 5.0;
     model
 }
@@ -67,11 +53,9 @@ fn step(model: &Assembly) -> f64 {
 
 /// A tube under pressure and its weight, clamped at one end; the other one is moved and turned.
 fn tube(size: [u32; 2]) -> Assembly {
-    let place = |i: u32, j: u32| {
-        let angle = TAU * f64::from(i) / f64::from(size[0]);
-        Vector3::new(0.02 * angle.cos(), 0.02 * angle.sin(), 0.1 * f64::from(j) / f64::from(size[1]))
-    };
-    let mut model = surface(size, true, 0.002, Membrane::default(), place);
+    let cylinder = Sheet::Cylinder { radius: 0.02, length: 0.1, from: 0.0, span: TAU };
+    let mesh = support::triangles(cylinder, size.map(|count| count as usize), Pattern::UnionJack);
+    let mut model = wall(&mesh, 0.002, Membrane::default());
     let last = size[0] * size[1];
     model.model_mut().fix("foot", (0..size[0]).collect());
     turn(&mut model, (last..last + size[0]).collect(), [0.002, 0.0, 0.004], [0.0, 0.0, 0.2]);
@@ -82,8 +66,8 @@ fn tube(size: [u32; 2]) -> Assembly {
 
 /// A plate, clamped along one side and hinged along the other, under lumped pressure, forces and moments.
 fn plate() -> Assembly {
-    let place = |i: u32, j: u32| Vector3::new(0.01 * f64::from(i), 0.01 * f64::from(j), 0.0);
-    let mut model = surface([12, 8], false, 0.001, Membrane::Opt { adaptation: 10.0 }, place);
+    let mesh = support::triangles(Sheet::Plate { size: [0.12, 0.08] }, [12, 8], Pattern::UnionJack);
+    let mut model = wall(&mesh, 0.001, Membrane::Opt { adaptation: 10.0 });
     model.model_mut().fix("clamp", (0..9).map(|j| 13 * j).collect());
     model.model_mut().fix("hinge", (0..9).map(|j| 13 * j + 12).collect());
     model.model_mut().constraints[1].components = [true, true, true, false, false, false];
@@ -96,13 +80,12 @@ fn plate() -> Assembly {
 /// A wavy patch with nodes at random, free but for a corner, flying and spinning.
 fn patch() -> (Assembly, State) {
     let mut random = Random::new(7);
-    let mut offsets = Vec::new();
-    offsets.resize_with(110, || Vector3::from_fn(|_, _| 0.002 * random.number()));
-    let place = |i: u32, j: u32| {
-        let [x, y] = [i, j].map(|i| 0.01 * f64::from(i));
-        Vector3::new(x, y, 0.01 * (60.0 * x).sin() * (50.0 * y).cos()) + offsets[(i + 11 * j) as usize]
-    };
-    let mut model = surface([10, 9], false, 0.0015, Membrane::default(), place);
+    let mut mesh = support::triangles(Sheet::Plate { size: [0.1, 0.09] }, [10, 9], Pattern::UnionJack);
+    for x in &mut mesh.points {
+        x.z = 0.01 * (60.0 * x.x).sin() * (50.0 * x.y).cos();
+        *x += Vector3::from_fn(|_, _| 0.002 * random.number());
+    }
+    let mut model = wall(&mesh, 0.0015, Membrane::default());
     model.model_mut().fix("corner", vec![0]);
     model.model_mut().constraints[0].components = [true, true, true, false, false, false];
     press(&mut model, 30.0, Spread::Curved);

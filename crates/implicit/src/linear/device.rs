@@ -30,11 +30,11 @@ pub trait LinearDevice: Debug + Send + Sync {
     /// The number of aggregates that suits it: it solves for their motions with a full inverse.
     fn aggregates(&self) -> usize;
 
-    /// A solver of the equations with a pattern.
+    /// A solver, which has no equations so far.
     ///
     /// # Errors
-    /// If the device fails or has no room.
-    fn solver(&self, pattern: &BlockPattern<'_>) -> Result<Box<dyn DeviceSolver>, DeviceError>;
+    /// If the device fails or lacks something.
+    fn solver(&self) -> Result<Box<dyn DeviceSolver>, DeviceError>;
 }
 
 /// Where the blocks of a symmetric matrix are, row by row. Nodes go aggregate by aggregate, each with six components.
@@ -99,8 +99,14 @@ pub enum PassEnd {
     Indefinite,
 }
 
-/// Equations of one pattern on a device.
+/// Equations on a device.
 pub trait DeviceSolver: Debug + Send + Sync {
+    /// Takes the pattern of the matrices to come, in place of any before.
+    ///
+    /// # Errors
+    /// If the device fails or has no room.
+    fn arrange(&mut self, pattern: &BlockPattern<'_>) -> Result<(), DeviceError>;
+
     /// Takes a matrix.
     ///
     /// # Errors
@@ -134,17 +140,6 @@ pub struct DeviceTimes {
     pub read_back: Duration,
 }
 
-impl DeviceTimes {
-    /// The sums.
-    pub(super) fn plus(self, other: Self) -> Self {
-        Self {
-            upload: self.upload + other.upload,
-            iterations: self.iterations + other.iterations,
-            read_back: self.read_back + other.read_back,
-        }
-    }
-}
-
 /// Equations on a device, with what they are handed over in.
 #[derive(Debug)]
 pub(super) struct OnDevice {
@@ -165,16 +160,18 @@ pub(super) enum Found {
 }
 
 impl OnDevice {
+    /// The equations of a pattern, on a solver that may have had others before.
     pub(super) fn new(
-        device: &dyn LinearDevice,
+        mut solver: Box<dyn DeviceSolver>,
         matrix: &LowerMatrix,
         blocks: &BlockMatrix,
         coarse: Option<&Coarse>,
     ) -> Result<Self, DeviceError> {
+        solver.arrange(&blocks.pattern(coarse))?;
         let numbers = 6 * blocks.nodes();
         let [nodes, pairs] = coarse.map_or([0; 2], |own| [own.parts().0.len(), own.parts().1.len()]);
         Ok(Self {
-            solver: device.solver(&blocks.pattern(coarse))?,
+            solver,
             lower: vec![0.0; matrix.value.len()],
             inverse: vec![0.0; 6 * numbers],
             arm: vec![[0.0; 4]; nodes],
@@ -182,6 +179,11 @@ impl OnDevice {
             right: vec![0.0; numbers],
             solution: vec![0.0; numbers],
         })
+    }
+
+    /// The solver, for another pattern.
+    pub(super) fn into_solver(self) -> Box<dyn DeviceSolver> {
+        self.solver
     }
 
     /// Hands over a matrix.
@@ -310,12 +312,16 @@ mod tests {
             4
         }
 
-        fn solver(&self, _pattern: &BlockPattern<'_>) -> Result<Box<dyn DeviceSolver>, DeviceError> {
+        fn solver(&self) -> Result<Box<dyn DeviceSolver>, DeviceError> {
             Ok(Box::new(*self))
         }
     }
 
     impl DeviceSolver for Fault {
+        fn arrange(&mut self, _pattern: &BlockPattern<'_>) -> Result<(), DeviceError> {
+            Ok(())
+        }
+
         fn take(&mut self, _values: &BlockValues<'_>) -> Result<(), DeviceError> {
             Ok(())
         }

@@ -72,7 +72,7 @@ impl BlockMatrix {
             neighbours.sort_unstable();
             neighbours.dedup();
         }
-        let (order, aggregate_start) = aggregates(&around, AGGREGATE.max(around.len().div_ceil(most)));
+        let (order, aggregate_start) = aggregates(&around, most);
         let mut position = vec![0; own.len()];
         for (at, &old) in order.iter().enumerate() {
             position[old as usize] = at as u32;
@@ -204,9 +204,10 @@ impl BlockMatrix {
     }
 }
 
-/// Groups of `size` neighbouring nodes, each grown from the first node left: the nodes in their order, and where each group starts. Crumbs
-/// join the group before them, or a neighbour's.
-fn aggregates(around: &[Vec<u32>], size: usize) -> (Vec<u32>, Vec<u32>) {
+/// Groups of neighbouring nodes, at most about `most`, each grown from the first node left: the nodes in their order, and where each group
+/// starts. Crumbs join the group before them, or a neighbour's. Of more groups those that are a loose part join each other.
+fn aggregates(around: &[Vec<u32>], most: usize) -> (Vec<u32>, Vec<u32>) {
+    let size = AGGREGATE.max(around.len().div_ceil(most));
     let mut group = vec![NONE; around.len()];
     let mut groups: Vec<Vec<u32>> = Vec::new();
     for seed in 0..around.len() as u32 {
@@ -236,11 +237,34 @@ fn aggregates(around: &[Vec<u32>], size: usize) -> (Vec<u32>, Vec<u32>) {
             _ => groups.push(members),
         }
     }
+    if groups.len() > most {
+        groups = joined(groups, size, |node, number| {
+            around[node as usize].iter().all(|&other| group[other as usize] == number)
+        });
+    }
     let mut start = vec![0];
     for members in &groups {
         start.push(start[start.len() - 1] + members.len() as u32);
     }
     (groups.into_iter().flatten().collect(), start)
+}
+
+/// Groups among which loose parts of fewer than `size` nodes go together until they have as many; `is_within` tells whether a node has
+/// neighbours in the group of a number alone.
+fn joined(groups: Vec<Vec<u32>>, size: usize, is_within: impl Fn(u32, u32) -> bool) -> Vec<Vec<u32>> {
+    let mut all: Vec<Vec<u32>> = Vec::new();
+    let mut open = None;
+    for (number, members) in (0..).zip(groups) {
+        let loose = members.len() < size && members.iter().all(|&node| is_within(node, number));
+        match open.filter(|&at: &usize| loose && all[at].len() < size) {
+            Some(at) => all[at].extend(members),
+            None => {
+                open = if loose { Some(all.len()) } else { open };
+                all.push(members);
+            }
+        }
+    }
+    all
 }
 
 /// Rigid motions of the aggregates.
@@ -615,4 +639,42 @@ fn squared(v: &[Node]) -> f64 {
 
 fn product(a: &Node, b: &Node) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Parts of a number of nodes each, in chains.
+    fn chains(parts: u32, nodes: u32) -> Vec<Vec<u32>> {
+        let beside = |node: u32| {
+            let own = node / nodes * nodes..(node / nodes + 1) * nodes;
+            (node.saturating_sub(1)..node + 2).filter(|other| own.contains(other)).collect()
+        };
+        (0..parts * nodes).map(beside).collect()
+    }
+
+    fn lengths(start: &[u32]) -> Vec<u32> {
+        start.windows(2).map(|ends| ends[1] - ends[0]).collect()
+    }
+
+    #[test]
+    fn many_loose_parts_share_aggregates_where_their_number_is_limited() {
+        let around = chains(1000, 4);
+        let (order, start) = aggregates(&around, 160);
+        let mut all = order.clone();
+        all.sort_unstable();
+        assert!(all.into_iter().eq(0..4000));
+        // Seven parts each, the first number with 4000/160 nodes.
+        let sizes = lengths(&start);
+        assert!(sizes.len() <= 160 && sizes[..sizes.len() - 1].iter().all(|&size| size == 28), "{sizes:?}");
+        // No part is divided.
+        assert!(order.chunks(4).all(|part| part.iter().all(|node| node / 4 == part[0] / 4)));
+        assert_eq!(lengths(&aggregates(&around, usize::MAX).1), [4; 1000]);
+    }
+
+    #[test]
+    fn larger_parts_keep_their_aggregates_where_their_number_is_limited() {
+        assert_eq!(lengths(&aggregates(&chains(60, 40), 100).1), [24, 16].repeat(60));
+    }
 }

@@ -80,19 +80,19 @@ pub(crate) struct Workspace {
     vectors: KrylovVectors,
     /// Where conjugate gradients run on a device.
     on_device: Option<OnDevice>,
-    /// Solutions that the device left to the CPU, and the time of the devices of earlier patterns.
+    /// Solutions that the device left to the CPU.
     left_to_cpu: usize,
-    times_before: DeviceTimes,
     pivots: Pivots,
 }
 
 impl Workspace {
-    /// A solver for matrices of one pattern, on a device if one is given.
+    /// A solver for matrices of one pattern, on a device if one is given. It goes on with what one for another pattern has of the device.
     pub(crate) fn new(
         solver: LinearSolver,
         device: Option<&Arc<dyn LinearDevice>>,
         equations: &Equations,
         matrix: &LowerMatrix,
+        mut before: Option<&mut Self>,
     ) -> Result<Self, LinearError> {
         let (direct, preconditioner) = match solver {
             LinearSolver::Direct => (true, None),
@@ -109,7 +109,10 @@ impl Workspace {
         let coarse = coarse.map(Coarse::new).map(|coarse| coarse.ok_or(LinearError::TooLarge)).transpose()?;
         let on_device = match (device, &blocks) {
             (Some(device), Some(blocks)) if !empty => {
-                Some(OnDevice::new(&**device, matrix, blocks, coarse.as_ref()).map_err(LinearError::Device)?)
+                let kept = before.as_mut().and_then(|before| before.on_device.take());
+                let solver = kept.map_or_else(|| device.solver(), |kept| Ok(kept.into_solver()));
+                let made = solver.and_then(|solver| OnDevice::new(solver, matrix, blocks, coarse.as_ref()));
+                Some(made.map_err(LinearError::Device)?)
             }
             _ => None,
         };
@@ -126,8 +129,7 @@ impl Workspace {
             fresh: false,
             coarse,
             on_device,
-            left_to_cpu: 0,
-            times_before: DeviceTimes::default(),
+            left_to_cpu: before.map_or(0, |before| before.left_to_cpu),
             vectors: blocks
                 .as_ref()
                 .map(|blocks| KrylovVectors::new(blocks, matrix.len()))
@@ -259,13 +261,8 @@ impl Workspace {
 
     /// Time of the device so far, and how many solutions it left to the CPU.
     pub(crate) fn of_device(&self) -> (DeviceTimes, usize) {
-        let own = self.on_device.as_ref().map(OnDevice::times).unwrap_or_default();
-        (self.times_before.plus(own), self.left_to_cpu)
-    }
-
-    /// Counts on from a solver of an earlier pattern.
-    pub(crate) fn count_on(&mut self, (times, left): (DeviceTimes, usize)) {
-        (self.times_before, self.left_to_cpu) = (times, left);
+        let times = self.on_device.as_ref().map(OnDevice::times).unwrap_or_default();
+        (times, self.left_to_cpu)
     }
 }
 

@@ -26,7 +26,7 @@ class Run(Table):
     adapter
         The GPU, by a part of its name in `pliant devices`; if not given, the best one. Takes a text.
     design
-        How the kernels of a GPU bring forces from cells to nodes; if not given, the way that measured best. Takes one of "gather", "blocks", "float-atomics", "fixed-atomics", "fast".
+        How the kernels of a GPU bring forces from cells to nodes; if not given, the ways that measured best: `fast`, and `gather` on adapters that are software. Takes one of "gather", "blocks", "float-atomics", "fast".
     precision
         Number type of the solver; if not given, `double` on the CPU and `single` on a GPU, which has no other. Takes "single" or "double".
     solver
@@ -121,7 +121,7 @@ class Participant(Table):
     adapter
         As in `[run]`. Takes a text.
     design
-        As in `[run]`. Takes one of "gather", "blocks", "float-atomics", "fixed-atomics", "fast".
+        As in `[run]`. Takes one of "gather", "blocks", "float-atomics", "fast".
     """
 
     _type: ClassVar[str | None] = None

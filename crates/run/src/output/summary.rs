@@ -401,6 +401,10 @@ fn write_effort(page: &mut String, effort: &Effort, steps: u64) -> std::fmt::Res
             "| iterations of conjugate gradients | {iterations}, {} per step |",
             per_step(iterations)
         )?;
+        if effort.left_to_cpu > 0 {
+            let part = format!("{} of {}", effort.left_to_cpu, effort.solutions);
+            writeln!(page, "| solutions that the GPU left to the CPU | {part} |")?;
+        }
         writeln!(
             page,
             "| last residual of conjugate gradients, relative | {} |",

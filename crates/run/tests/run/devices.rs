@@ -50,6 +50,18 @@ fn an_adapter_that_is_not_there_or_not_used_is_refused_in_the_users_line() {
     }
 }
 
+#[test]
+fn a_design_that_is_not_there_is_answered_with_those_that_are() {
+    let line = "design = \"fixed-atomics\"";
+    let unknown = on(&format!("device = \"gpu\"\n{line}")).check(&[]);
+    assert_eq!(unknown.status(), "invalid", "{}", unknown.err);
+    assert!(unknown.underlines(line), "{}", unknown.err);
+    let names = r#"expected one of "gather", "blocks", "float-atomics", "fast""#;
+    for piece in [names, "the ways that measured best: `fast`, and `gather` on adapters that are software"] {
+        assert!(unknown.words().contains(piece), "no `{piece}` in:\n{}", unknown.err);
+    }
+}
+
 /// How far two series of displacements are apart at their ends, over the size of the first.
 fn apart(a: &Workshop, b: &Workshop) -> f64 {
     apart_in([(a, "out/case/fields.pvd"), (b, "out/case/fields.pvd")])
@@ -184,9 +196,25 @@ fn equations_of_shells_are_solved_on_a_device_as_on_the_processor() {
     assert_eq!(json["device"], adapters()[0].name);
     assert_eq!((&json["precision"], &reference["precision"]), (&"double".into(), &"double".into()));
     assert!(json["solver"]["linear_iterations"].as_u64() > Some(0), "{json}");
+    assert_eq!(json["solver"]["left_to_cpu"], 0, "{json}");
     let apart = apart(&cpu, &gpu);
     println!("displacements are {apart:.1e} apart");
     assert!(apart < 1e-5, "displacements are {apart} apart");
+}
+
+/// Residuals in double precision end near 1e-15: the rest of the way to 1e-17 is the CPU's, whose residual is carried on from step to step.
+#[test]
+fn solutions_that_a_device_leaves_to_the_processor_are_counted() {
+    if !pliant_testing::has_gpu(adapters().len()) {
+        return;
+    }
+    let linear = "run.linear={ by = \"conjugate-gradients\", tolerance = 1e-17 }";
+    let gpu = tube("device = \"gpu\"");
+    let json = gpu.run(&[linear]).done();
+    let [left, all] = ["left_to_cpu", "solutions"].map(|key| json["solver"][key].as_u64().unwrap());
+    assert!(left > 0 && left <= all, "{json}");
+    let told = format!("| solutions that the GPU left to the CPU | {left} of {all} |");
+    assert!(gpu.read("out/case/summary.md").contains(&told), "{told}");
 }
 
 #[test]

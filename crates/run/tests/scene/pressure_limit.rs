@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use pliant_testing::scenes::{self, last_row, last_row_in, resumes, world};
+use pliant_testing::scenes::{self, Workshop, last_row, last_row_in, resumes, world};
 
 use super::volumes::{FILLED, balloon};
 
@@ -129,6 +129,34 @@ fn a_balloon_that_is_pressed_lets_out_what_its_limit_does_not_hold() {
         let row = last_row(&text(&limited, "curve = { table = [[0, 0], [0.2, 1], [0.4, 0]] }"));
         assert!((row["volume.air"] / rest - 1.0).abs() < 1e-9, "{model}: {} of {rest}", row["volume.air"]);
     }
+}
+
+/// A load helps a balloon past the largest pressure that its wall bears, and falls. The pressure from then on comes to its limit where the wall gives way
+/// to more air, so that the balloon holds too little pressure or too much volume: no equilibrium keeps both.
+#[test]
+fn a_balloon_that_snaps_at_its_limit_ends_the_run_with_pressure_and_volume() {
+    let volume = "by = 3e-4\ncurve = { table = [[0, 0], [0.5, 1]] }\npressure-limit = 11000";
+    let load = "[load.help]\ntype = 'pressure'\non = 'balloon'\nfaces = 'all'\npressure = -6000\ncurve = { table = [[0, 0], [0.5, 1], [1, 0]] }\n";
+    let text = |solver: &str| balloon("membrane", solver, volume, load);
+    let told = Workshop::new(&text("solver = 'static'\nload-steps = 10\ntolerance = 1e-8")).run(&[]);
+    assert_eq!(told.status(), "failed", "{}", told.err);
+    let error = &told.json()["error"];
+    assert_eq!((&error["kind"], &error["body"]), (&"not-converged".into(), &"balloon".into()), "{error}");
+    // Without a limit the pressure is 11 kPa at 0.89 s.
+    assert!((error["time"].as_f64().unwrap() - 0.89).abs() < 0.01, "{error}");
+    let words = [
+        "in `balloon`",
+        "neither the volume of `air` nor its `pressure-limit` can be kept",
+        "Pa of 1.1000e4 Pa",
+        "m³ beyond its curve: the surface snaps",
+        "try the solver `implicit`",
+    ];
+    for word in words {
+        assert!(told.words().contains(word), "{}", told.err);
+    }
+    let (told, most, row) = run(&text(IMPLICIT));
+    assert!(!told.is_empty() && most < 1.02 * 11000.0, "{most} {told}");
+    assert!(row["volume.air"] < at_rest("membrane") + 1e-4, "{}", row["volume.air"]);
 }
 
 /// Other solvers have no such limit, and one that is none is refused.

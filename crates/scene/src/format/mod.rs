@@ -70,7 +70,8 @@ pub struct RunTable {
     /// The GPU, by a part of its name in `pliant devices`; if not given, the best one.
     #[serde(default)]
     pub adapter: Option<String>,
-    /// How the kernels of a GPU bring forces from cells to nodes; if not given, the way that measured best.
+    /// How the kernels of a GPU bring forces from cells to nodes; if not given, the ways that measured best: `fast`, and `gather` on
+    /// adapters that are software.
     #[cfg(feature = "gpu")]
     #[serde(default)]
     pub design: Option<Design>,

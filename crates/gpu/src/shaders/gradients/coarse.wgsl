@@ -12,15 +12,15 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let aggregate = group.y * groups.x + group.x;
-    let going = now.end == 0u && aggregate < AGGREGATES;
-    let stride = AGGREGATES * AGGREGATES;
+    let going = now.end == 0u && aggregate < sizes.aggregates;
+    let stride = sizes.aggregates * sizes.aggregates;
     var shift = vec3f();
     var turn = vec3f();
     if going {
-        for (var other = local; other < AGGREGATES; other += GROUP) {
+        for (var other = local; other < sizes.aggregates; other += GROUP) {
             for (var j = 0u; j < 6u; j++) {
                 let f = force[6u * other + j];
-                let at = 6u * j * stride + aggregate * AGGREGATES + other;
+                let at = 6u * j * stride + aggregate * sizes.aggregates + other;
                 shift += f * vec3f(inverse[at], inverse[at + stride], inverse[at + 2u * stride]);
                 turn += f * vec3f(inverse[at + 3u * stride], inverse[at + 4u * stride], inverse[at + 5u * stride]);
             }

@@ -12,8 +12,8 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let at = number(group, groups, local);
-    if at < ENTRIES {
+    if at < sizes.entries {
         let base = place[at];
-        value[at] = select(lower[min(base, LOWER - 1u)], 0.0, base == NONE);
+        value[at] = select(lower[min(base, sizes.lower - 1u)], 0.0, base == NONE);
     }
 }

@@ -1,8 +1,4 @@
 // One pivot of the inversion of the coarse matrix in place, block by block (Gauss and Jordan), without exchanges: it is positive definite.
-struct Pivot {
-    number: vec4u,
-}
-@group(0) @binding(0) var<uniform> pivot: Pivot;
 @group(1) @binding(0) var<storage, read> now: array<f32>;
 @group(1) @binding(1) var<storage, read_write> next: array<f32>;
 
@@ -14,33 +10,38 @@ struct Block {
     d: mat3x3f,
 }
 
-const STRIDE = AGGREGATES * AGGREGATES;
+// From one entry of a block to the next.
+fn stride() -> u32 {
+    return sizes.aggregates * sizes.aggregates;
+}
 
 fn part(at: u32, row: u32, column: u32) -> mat3x3f {
-    let base = at + (6u * column + row) * STRIDE;
+    let next_entry = stride();
+    let base = at + (6u * column + row) * next_entry;
     return mat3x3f(
-        now[base], now[base + STRIDE], now[base + 2u * STRIDE],
-        now[base + 6u * STRIDE], now[base + 7u * STRIDE], now[base + 8u * STRIDE],
-        now[base + 12u * STRIDE], now[base + 13u * STRIDE], now[base + 14u * STRIDE],
+        now[base], now[base + next_entry], now[base + 2u * next_entry],
+        now[base + 6u * next_entry], now[base + 7u * next_entry], now[base + 8u * next_entry],
+        now[base + 12u * next_entry], now[base + 13u * next_entry], now[base + 14u * next_entry],
     );
 }
 
 fn block(row: u32, column: u32) -> Block {
-    let at = row * AGGREGATES + column;
+    let at = row * sizes.aggregates + column;
     return Block(part(at, 0u, 0u), part(at, 0u, 3u), part(at, 3u, 0u), part(at, 3u, 3u));
 }
 
 fn put_part(at: u32, row: u32, column: u32, m: mat3x3f) {
-    let to = at + (6u * column + row) * STRIDE;
+    let next_entry = stride();
+    let to = at + (6u * column + row) * next_entry;
     next[to] = m[0].x;
-    next[to + STRIDE] = m[0].y;
-    next[to + 2u * STRIDE] = m[0].z;
-    next[to + 6u * STRIDE] = m[1].x;
-    next[to + 7u * STRIDE] = m[1].y;
-    next[to + 8u * STRIDE] = m[1].z;
-    next[to + 12u * STRIDE] = m[2].x;
-    next[to + 13u * STRIDE] = m[2].y;
-    next[to + 14u * STRIDE] = m[2].z;
+    next[to + next_entry] = m[0].y;
+    next[to + 2u * next_entry] = m[0].z;
+    next[to + 6u * next_entry] = m[1].x;
+    next[to + 7u * next_entry] = m[1].y;
+    next[to + 8u * next_entry] = m[1].z;
+    next[to + 12u * next_entry] = m[2].x;
+    next[to + 13u * next_entry] = m[2].y;
+    next[to + 14u * next_entry] = m[2].z;
 }
 
 fn product(l: Block, r: Block) -> Block {
@@ -87,12 +88,12 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let at = number(group, groups, local);
-    if at >= STRIDE {
+    if at >= stride() {
         return;
     }
-    let row = at / AGGREGATES;
-    let column = at % AGGREGATES;
-    let own = pivot.number.x;
+    let row = at / sizes.aggregates;
+    let column = at % sizes.aggregates;
+    let own = sizes.pivot;
     let p = inverse(block(own, own));
     var result = p;
     if row == own && column != own {

@@ -15,7 +15,7 @@ fn main(
 ) {
     let index = number(group, groups, local);
     var own = 0.0;
-    if now.end == 0u && index < 6u * NODES {
+    if now.end == 0u && index < 6u * sizes.nodes {
         let node = index / 6u;
         var all = 0.0;
         for (var at = row_start[node]; at < row_start[node + 1u]; at++) {
@@ -29,7 +29,7 @@ fn main(
     }
     let whole = sum(local, vec4f(own, 0.0, 0.0, 0.0)).x;
     let chunk = group.y * groups.x + group.x;
-    if local == 0u && chunk < CHUNKS && now.end == 0u {
+    if local == 0u && chunk < sizes.chunks && now.end == 0u {
         curvatures[chunk] = whole;
     }
 }

@@ -10,13 +10,13 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let at = number(group, groups, local);
-    if at < 36u * PAIRS {
+    if at < 36u * sizes.pairs {
         let pair = pairs[at / 36u];
         let i = at % 6u;
         let j = (at / 6u) % 6u;
-        coarse[((6u * j + i) * AGGREGATES + pair.x) * AGGREGATES + pair.y] = blocks[at];
+        coarse[((6u * j + i) * sizes.aggregates + pair.x) * sizes.aggregates + pair.y] = blocks[at];
         if pair.x != pair.y {
-            coarse[((6u * i + j) * AGGREGATES + pair.y) * AGGREGATES + pair.x] = blocks[at];
+            coarse[((6u * i + j) * sizes.aggregates + pair.y) * sizes.aggregates + pair.x] = blocks[at];
         }
     }
 }

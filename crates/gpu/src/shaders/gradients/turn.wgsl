@@ -19,14 +19,14 @@ fn main(
 ) {
     let index = number(group, groups, local);
     var share = vec4f();
-    for (var chunk = local; chunk < CHUNKS; chunk += GROUP) {
+    for (var chunk = local; chunk < sizes.chunks; chunk += GROUP) {
         share.x += curvatures[chunk];
     }
-    for (var aggregate = local; aggregate < AGGREGATES; aggregate += GROUP) {
+    for (var aggregate = local; aggregate < sizes.aggregates; aggregate += GROUP) {
         let own = products[aggregate];
         share.y += own.x;
         share.z += own.y;
-        if COARSE != 0u {
+        if sizes.coarse != 0u {
             share.z += powers[aggregate];
         }
     }
@@ -49,12 +49,12 @@ fn main(
         }
         next = after;
     }
-    if now.end == 0u && index < 6u * NODES {
+    if now.end == 0u && index < 6u * sizes.nodes {
         let node = index / 6u;
         let c = index % 6u;
         let beta = select(0.0, all.z / now.product, now.started != 0u);
         var own = z[index];
-        if COARSE != 0u {
+        if sizes.coarse != 0u {
             let place = home[node];
             if ((place.y >> c) & 1u) != 0u {
                 let base = 6u * place.x;

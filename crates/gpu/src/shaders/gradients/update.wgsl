@@ -19,9 +19,9 @@ fn main(
     @builtin(local_invocation_index) local: u32,
 ) {
     let aggregate = group.y * groups.x + group.x;
-    let going = now.end == 0u && aggregate < AGGREGATES;
+    let going = now.end == 0u && aggregate < sizes.aggregates;
     var share = 0.0;
-    for (var chunk = local; chunk < CHUNKS; chunk += GROUP) {
+    for (var chunk = local; chunk < sizes.chunks; chunk += GROUP) {
         share += curvatures[chunk];
     }
     let curvature = sum(local, vec4f(share, 0.0, 0.0, 0.0)).x;
@@ -53,7 +53,7 @@ fn main(
             z[at + c] = own[c];
             preconditioned += own[c] * left[c];
         }
-        if COARSE != 0u {
+        if sizes.coarse != 0u {
             let f = vec3f(left[0], left[1], left[2]);
             pushed += f;
             turned += vec3f(left[3], left[4], left[5]) + cross(arm[node].xyz, f);
@@ -63,7 +63,7 @@ fn main(
     let b = sum(local, vec4f(turned, preconditioned));
     if local == 0u && going {
         products[aggregate] = vec2f(a.w, b.w);
-        if COARSE != 0u {
+        if sizes.coarse != 0u {
             for (var c = 0u; c < 3u; c++) {
                 force[6u * aggregate + c] = a[c];
                 force[6u * aggregate + 3u + c] = b[c];

@@ -20,14 +20,12 @@ fn a_force_out_of_the_range_of_whole_numbers_is_told_and_never_wraps() {
     let Some(device) = support::device() else { return };
     let mut model = moved_cube("tet4", elastic(every_law().remove(9)));
     model.constraints[1].motion = Motion::Displacement([0.0, 0.0, 3.0 * EDGE], smooth(0.5));
-    for design in [Design::FixedAtomics, Design::Blocks] {
-        let mut state = State::<f32>::at_rest(&model);
-        let mut stepper = stepper(&device, &model, 0.1 * step_of(&model), design);
-        let error = stepper.advance(&mut state, 4000).expect_err("the force is too large");
-        let StepFailure::Device(GpuError::Overflow { time, .. }) = &error else { panic!("{error:?}") };
-        assert!(*time > 0.0 && *time == state.time, "{error}");
-        assert!(state.displacement.as_flattened().iter().all(|u| u.is_finite()), "{design}");
-    }
+    let mut state = State::<f32>::at_rest(&model);
+    let mut stepper = stepper(&device, &model, 0.1 * step_of(&model), Design::Blocks);
+    let error = stepper.advance(&mut state, 4000).expect_err("the force is too large");
+    let StepFailure::Device(GpuError::Overflow { time, .. }) = &error else { panic!("{error:?}") };
+    assert!(*time > 0.0 && *time == state.time, "{error}");
+    assert!(state.displacement.as_flattened().iter().all(|u| u.is_finite()));
 }
 
 /// Runs on the processor until it fails.
