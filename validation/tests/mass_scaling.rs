@@ -4,18 +4,21 @@ use pliant_explicit::critical_step::assembled;
 use pliant_explicit::mass_scaling::{Goal, scale_mass};
 use pliant_explicit::stability::OnUnstable;
 use pliant_mechanics::Model;
-use pliant_mechanics::model::Motion;
-use pliant_mechanics::tensor::{Vector, dot, sub};
+use pliant_mechanics::element::Cord;
+use pliant_mechanics::mapping::Weights;
+use pliant_mechanics::model::{Cells, Motion, Solid};
+use pliant_mechanics::tensor::{Vector, add, dot, scale, sub};
 use pliant_meshing::{Organ, Phantom, Stuffing, VolumeCell};
 use pliant_validation::{
-    Hexes, Specimen, Tets, claim, elastic, liver, run_watched, settle, smooth_step, soft_tissue,
+    Hexes, Specimen, Tets, claim, elastic, law, liver, run_watched, settle, smooth_step, soft_tissue,
 };
+use serde_json::json;
 
 /// An organ in stuffed tets, held where a coordinate lies below a place [m].
 fn organ(organ: Organ, edge: f64, (axis, below): (usize, f64)) -> Specimen {
     let mesh = Stuffing::new(edge).mesh(&Phantom::new(organ, 1.0).unwrap()).unwrap().mesh;
-    let law = if organ == Organ::Liver { liver() } else { soft_tissue() };
-    let mut specimen = Specimen::new(mesh, &elastic(law), [0.0, 1.0, 0.0]);
+    let tissue = if organ == Organ::Liver { liver() } else { soft_tissue() };
+    let mut specimen = Specimen::new(mesh, &elastic(tissue), [0.0, 1.0, 0.0]);
     let held = nodes(&specimen.model, |x| x[axis] < below);
     specimen.model.fix("base", held);
     specimen
@@ -104,6 +107,33 @@ fn a_goal_that_is_reached_and_a_body_without_freedom_get_no_mass() {
     held.fix("all", nodes(&held, |_| true));
     for model in [easy, scaled(&held, Goal::TargetStep(1.0)), scaled(&held, Goal::Share(0.1))] {
         assert_eq!(model.mass_scaling.as_ref().unwrap().nodes(), 0);
+    }
+}
+
+#[test]
+fn a_stiff_bar_whose_nodes_follow_a_cell_from_outside_gets_its_step() {
+    let mut model = block(VolumeCell::Tet).model;
+    let before = limit(&model);
+    let rows = {
+        let cells = &model.solids[0].cells;
+        let inner = |cell: &usize| cells.nodes(*cell).iter().all(|&node| model.rest[node as usize][0] > 0.04);
+        let cell = (0..cells.len()).find(inner).unwrap();
+        let row = |weights: [f64; 4]| cells.nodes(cell).iter().copied().zip(weights).collect::<Vec<_>>();
+        [row([1.4, -0.2, -0.1, -0.1]), row([-0.2, 1.4, -0.1, -0.1])]
+    };
+    let place = |row: &Vec<(u32, f64)>| {
+        row.iter().fold([0.0; 3], |sum, &(node, weight)| add(sum, scale(model.rest[node as usize], weight)))
+    };
+    let places = [place(&rows[0]), place(&rows[1])];
+    let first = model.node_count() as u32;
+    let bar = model.add_body("bar", &places);
+    let stiff = elastic(law("neo-hookean", json!({ "young-modulus": 1e9, "poisson-ratio": 0.45 })));
+    let cells = Cells::bar(vec![[first, first + 1]], &model.rest, 1e-6, Cord::default());
+    model.add_solid(Solid::new(bar, stiff, cells));
+    model.tie("outside", vec![first, first + 1], Weights::from_rows(rows.iter().map(Vec::as_slice))).unwrap();
+    assert!(limit(&model) < 0.5 * before);
+    for target in [0.8 * before, before] {
+        assert!(limit(&scaled(&model, Goal::TargetStep(target))) >= target);
     }
 }
 

@@ -48,7 +48,7 @@ pub fn scale_mass(model: &mut Model, goal: Goal) -> Result<(), Contradiction> {
             };
             nodes.threshold_of_step(target, is_reached)
         }
-        Goal::TargetStep(_) => nodes.smallest(),
+        Goal::TargetStep(_) => 0.0,
         Goal::Share(share) => nodes.threshold_of_share(share),
     };
     model.mass_scaling = Some(scaling(threshold));
@@ -59,7 +59,7 @@ pub fn scale_mass(model: &mut Model, goal: Goal) -> Result<(), Contradiction> {
 struct NodalSteps {
     /// Mass of the material [kg].
     mass: Vec<f64>,
-    /// k_a [N/m]; 0 where a node is held along all axes, follows others or has no cells.
+    /// k_a [N/m]; 0 where a node is held along all axes, has no mass or no cells.
     stiffness: Vec<f64>,
 }
 
@@ -67,16 +67,16 @@ impl NodalSteps {
     fn of(model: &Model, owners: &[[u32; 3]]) -> Self {
         let mut stiffness = vec![0.0; model.node_count()];
         model.solids.iter().for_each(|solid| add_stiffness(solid, &mut stiffness));
-        model.give_down(&mut stiffness);
-        for (stiffness, owner) in stiffness.iter_mut().zip(owners) {
-            if !owner.contains(&FREE) {
+        give_down(model, &mut stiffness);
+        for ((stiffness, mass), owner) in stiffness.iter_mut().zip(&model.mass).zip(owners) {
+            if !owner.contains(&FREE) || *mass <= 0.0 {
                 *stiffness = 0.0;
             }
         }
         Self { mass: model.mass.clone(), stiffness }
     }
 
-    /// The smallest nodal time step [s], a threshold that adds nothing; 0 if no node can move.
+    /// The smallest nodal time step [s], the largest threshold that adds nothing; 0 if no node can move.
     fn smallest(&self) -> f64 {
         let steps = self.mass.iter().zip(&self.stiffness).filter(|(_, k)| **k > 0.0);
         steps.map(|(m, k)| 2.0 * (m / k).sqrt()).reduce(f64::min).unwrap_or(0.0)
@@ -104,7 +104,7 @@ impl NodalSteps {
         if stiffness == 0.0 {
             return 0.0;
         }
-        // Here nodes of stiffness need so much more than they have, all together.
+        // For this one all nodes together need that share at least.
         let enough = 2.0 * ((1.0 + share) * mass / stiffness).sqrt();
         let is_beyond = |threshold: f64| self.added(threshold).iter().sum::<f64>() > share * mass;
         narrowed([self.smallest(), enough], SHARE_TOLERANCE, is_beyond)[0]
@@ -124,6 +124,20 @@ fn add_stiffness(solid: &Solid, stiffness: &mut [f64]) {
             }
         }
     });
+}
+
+/// Gives the stiffness of nodes that follow others to these: |J_ai| Σ_j |J_aj| k_a, a bound of Jᵀ K J as above. Weights of points outside
+/// are negative in part.
+fn give_down(model: &Model, stiffness: &mut [f64]) {
+    for tie in &model.ties {
+        for (point, &node) in tie.nodes.iter().enumerate() {
+            let own = std::mem::take(&mut stiffness[node as usize]);
+            let sum: f64 = tie.mapping.row(point).map(|(_, weight)| weight.abs()).sum();
+            for (followed, weight) in tie.mapping.row(point) {
+                stiffness[followed as usize] += weight.abs() * sum * own;
+            }
+        }
+    }
 }
 
 /// An interval of thresholds within a tolerance, at whose second end alone something holds, from a wider one.
