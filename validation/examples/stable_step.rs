@@ -25,6 +25,9 @@ const WAYS: [(&str, &[&str]); 6] = [
     ("`tet4-anp`, 1 % added", &["body.BODY.element=tet4-anp", "run.mass-scaling.share=0.01"]),
 ];
 
+/// Displacements [m] of the nodes at each look.
+type Motion = Vec<Vec<[f64; 3]>>;
+
 /// A scene of one body.
 struct Organ {
     /// What it is, in words.
@@ -86,8 +89,8 @@ fn world(organ: &Organ, assignments: &[&str]) -> Result<World, Box<dyn Error>> {
     Ok(World::new(&scene)?.lasting(EVERY))
 }
 
-/// Displacements [m] at each look, and the wall time of the run [s].
-fn motion(world: &World, organ: &Organ) -> Result<(Vec<Vec<[f64; 3]>>, f64), Box<dyn Error>> {
+/// A motion, and the wall time of the run [s].
+fn motion(world: &World, organ: &Organ) -> Result<(Motion, f64), Box<dyn Error>> {
     let mut simulation = world.simulation()?;
     let (mut seen, mut wall) = (Vec::new(), 0.0);
     while simulation.time() < organ.until - 0.5 * EVERY {
@@ -112,8 +115,7 @@ fn farthest<'a>(pairs: impl Iterator<Item = (&'a [f64; 3], &'a [f64; 3])>) -> f6
 struct Measured {
     way: &'static str,
     world: World,
-    /// Displacements [m] at each look.
-    motion: Vec<Vec<[f64; 3]>>,
+    motion: Motion,
     /// Wall times of a simulated second [s], one per turn.
     times: Vec<f64>,
 }
