@@ -14,6 +14,7 @@ mod failures;
 mod immersed_hexes;
 mod lens_bag;
 mod loads;
+mod mass_scaling;
 mod material_points;
 mod momentum;
 mod niftysim;

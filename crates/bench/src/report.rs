@@ -66,6 +66,8 @@ pub struct Row {
     pub critical_step_from: Limit,
     /// The critical step over the wall time of a step.
     pub real_time_factor: f64,
+    /// Wall time of a simulated second [s].
+    pub seconds_per_second: f64,
     /// The case.
     #[serde(skip)]
     pub case: Case,
@@ -117,6 +119,7 @@ impl Row {
             critical_step: step,
             critical_step_from,
             real_time_factor: step / seconds.median,
+            seconds_per_second: seconds.median / step,
             case,
         }
     }
@@ -367,6 +370,7 @@ impl Report {
                 format!("{:.3}", 1e3 * row.critical_step),
                 format!("{:.3}", 1e-6 * row.ns_per_element_step * row.cells as f64),
                 format!("{:.2}", row.real_time_factor),
+                format!("{:.3}", row.seconds_per_second),
             ]
         });
         let header = [
@@ -380,6 +384,7 @@ impl Report {
             "Δt ms",
             "step takes ms",
             "× real time",
+            "a second takes s",
         ];
         markdown(header, rows.collect())
     }
@@ -404,6 +409,7 @@ fn rows_table(rows: &[Row]) -> String {
             format!("{:.1} %", 100.0 * row.flop_fraction),
             format!("{:.4}{star}", 1e3 * row.critical_step),
             format!("{:.3}", row.real_time_factor),
+            format!("{:.3}", row.seconds_per_second),
         ]
     });
     let header = [
@@ -422,6 +428,7 @@ fn rows_table(rows: &[Row]) -> String {
         "mul-add",
         "Δt ms",
         "× real time",
+        "a second takes s",
     ];
     markdown(header, rows.collect())
 }

@@ -6,7 +6,7 @@
 //! power iteration: the same operator calls, far fewer of them. K v = (f(hv) − f(−hv))/2h, and during a run (f(u + hv) − f(u))/h, which takes
 //! half of the force evaluations.
 
-use pliant_mechanics::model::{Contradiction, FREE, MassScaling, Model, Solid};
+use pliant_mechanics::model::{Contradiction, FREE, Model, Solid};
 use pliant_mechanics::tensor::Vector;
 use rayon::prelude::*;
 
@@ -33,39 +33,19 @@ pub fn cell_bound(solid: &Solid, cell: usize) -> f64 {
     2.0 / (n * wave * solid.cells.gradient_square_sum(cell)).sqrt()
 }
 
-fn mass_factor(solid: &Solid, cell: usize, target_step: f64) -> f64 {
-    (target_step / cell_bound(solid, cell)).powi(2).max(1.0)
-}
-
-/// The factor by which mass scaling makes a cell heavier.
-fn scaled_mass_factor(model: &Model, solid: &Solid, cell: usize) -> f64 {
-    model.mass_scaling.as_ref().map_or(1.0, |scaling| mass_factor(solid, cell, scaling.target_step))
-}
-
-/// Makes every cell whose element bound lies below `target_step` [s] so much heavier that its bound equals it, once all solids are
-/// there. Added mass counts for inertia (and with it for mass-proportional damping) only: loads and gravity act on the mass of the
-/// material, so that equilibria and their reactions stay as they are.
-pub fn scale_mass(model: &mut Model, target_step: f64) {
-    let mut added = vec![0.0; model.node_count()];
-    let mut cells = 0;
-    for solid in &model.solids {
-        for cell in 0..solid.cells.len() {
-            let factor = mass_factor(solid, cell, target_step);
-            if factor > 1.0 {
-                let nodes = solid.cells.nodes(cell);
-                let share = solid.material.density * solid.cells.volume(cell) / nodes.len() as f64;
-                nodes.iter().for_each(|&node| added[node as usize] += (factor - 1.0) * share);
-                cells += 1;
-            }
-        }
-    }
-    model.give_down(&mut added);
-    model.mass_scaling = Some(MassScaling { target_step, added, cells });
+/// The least factor by which mass scaling makes a node of a cell heavier; one that follows others has no mass and counts as it is.
+fn mass_factor(model: &Model, solid: &Solid, cell: usize) -> f64 {
+    let Some(scaling) = &model.mass_scaling else { return 1.0 };
+    let factor = |&node: &u32| {
+        let (mass, added) = (model.mass[node as usize], scaling.added[node as usize]);
+        if mass > 0.0 { 1.0 + added / mass } else { 1.0 }
+    };
+    solid.cells.nodes(cell).iter().map(factor).fold(f64::INFINITY, f64::min)
 }
 
 /// The bound [s] of one cell with what mass scaling adds to it.
 pub(crate) fn scaled_bound(model: &Model, solid: &Solid, cell: usize) -> f64 {
-    cell_bound(solid, cell) * scaled_mass_factor(model, solid, cell).sqrt()
+    cell_bound(solid, cell) * mass_factor(model, solid, cell).sqrt()
 }
 
 /// The smallest bound over all cells; `None` without cells.
@@ -84,7 +64,7 @@ pub fn element_bound(model: &Model) -> Option<ElementBound> {
 
 /// The limit [s] of a cell alone, from the largest eigenvalue of its stiffness over its volume [Pa/m²].
 pub(crate) fn limit_alone(model: &Model, solid: &Solid, cell: usize, stiffness: f64) -> f64 {
-    let density = solid.material.density * scaled_mass_factor(model, solid, cell);
+    let density = solid.material.density * mass_factor(model, solid, cell);
     2.0 / (solid.cells.nodes_per_cell() as f64 * stiffness / density).sqrt()
 }
 

@@ -40,6 +40,7 @@ mod forces;
 mod foresight;
 mod history;
 mod lanes;
+pub mod mass_scaling;
 pub mod recover;
 mod relaxation;
 pub mod stability;

@@ -41,22 +41,24 @@ pub struct Model {
     pub initial_velocity: Vec<Vector<f64>>,
 }
 
-/// Mass that is added to the fastest cells so that none has an element bound below a step; `pliant-explicit` finds it
-/// (`critical_step::scale_mass`).
+/// Mass that is added to nodes for a larger critical time step; `pliant-explicit` finds it (`mass_scaling.rs`).
 #[derive(Clone, Debug, PartialEq)]
 pub struct MassScaling {
-    /// The smallest element bound with it [s].
-    pub target_step: f64,
+    /// The critical time step of the assembled model without it [s].
+    pub unscaled_critical_step: f64,
     /// Mass added to each node [kg].
     pub added: Vec<f64>,
-    /// How many cells were made heavier.
-    pub cells: usize,
 }
 
 impl MassScaling {
     /// Added mass in all [kg].
     pub fn total(&self) -> f64 {
         self.added.iter().sum()
+    }
+
+    /// How many nodes are heavier.
+    pub fn nodes(&self) -> usize {
+        self.added.iter().filter(|&&added| added > 0.0).count()
     }
 }
 

@@ -231,13 +231,10 @@ fn write_step(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) -> f
     if let Some(note) = &plan.note {
         writeln!(page, "  {note}")?;
     }
-    if let Some(AddedMass { mass, percent, elements, .. }) = AddedMass::new(built) {
-        let mass = number(mass);
-        writeln!(
-            page,
-            "  mass scaling  adds {mass} kg, {percent:.2} %, to {}",
-            counted(elements, "element")
-        )?;
+    if let Some(AddedMass { mass, percent, nodes, unscaled_critical_step }) = AddedMass::new(built) {
+        let (mass, nodes) = (number(mass), counted(nodes, "node"));
+        let before = told_limit(unscaled_critical_step);
+        writeln!(page, "  mass scaling  adds {mass} kg, {percent:.2} %, to {nodes}; without it {before}")?;
     }
     writeln!(
         page,

@@ -3,7 +3,7 @@
 use crate::support::{Workshop, has_gpu};
 use serde_json::Value;
 
-const KEYS: [&str; 16] = [
+const KEYS: [&str; 17] = [
     "mesh",
     "cells",
     "element",
@@ -20,6 +20,7 @@ const KEYS: [&str; 16] = [
     "flop_fraction",
     "critical_step",
     "real_time_factor",
+    "seconds_per_second",
 ];
 
 #[test]
@@ -52,6 +53,7 @@ fn a_row_has_the_promised_keys_with_numbers_that_agree() {
     let same = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
     same(number("elements_per_second"), 1e9 / ns);
     same(number("real_time_factor"), number("critical_step") / (1e-9 * ns * 1000.0));
+    same(number("seconds_per_second"), 1.0 / number("real_time_factor"));
     let rates = &report["rates"][0];
     let share = |count: &str, rate: &str| number(count) / (1e-9 * ns) / rates[rate].as_f64().unwrap();
     same(number("bandwidth_fraction"), share("bytes_per_element", "copy"));

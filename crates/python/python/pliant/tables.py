@@ -36,7 +36,7 @@ class Run(Table):
     on_unstable
         What an explicit run does when the largest stable step of the deformed model, watched during the run, falls below its step; if not given, `substep`. Takes one of "substep", "stop", "report".
     mass_scaling
-        Makes the elements that limit an explicit step heavier. Takes { target-step = … }.
+        Makes the nodes that limit an explicit step heavier. Takes { target-step = … } or { share = … }.
     load_steps
         Load steps of a quasi-static or static run with `step = "auto"`: so many equal ones, or the times at which they end. Takes a whole number or { times = … }, at least 1 and at most 1000000; 10 if not given.
     tolerance
@@ -97,7 +97,7 @@ class Participant(Table):
     on_unstable
         As in `[run]`. Takes one of "substep", "stop", "report".
     mass_scaling
-        As in `[run]`. Takes { target-step = … }.
+        As in `[run]`. Takes { target-step = … } or { share = … }.
     load_steps
         As in `[run]`. Takes a whole number or { times = … }, at least 1 and at most 1000000.
     tolerance

@@ -109,10 +109,10 @@ pub struct AddedMass {
     pub mass: f64,
     /// In percent of the mass of the materials.
     pub percent: f64,
-    /// Elements made heavier.
-    pub elements: usize,
-    /// The smallest element bound with it [s].
-    pub target_step: f64,
+    /// Nodes made heavier.
+    pub nodes: usize,
+    /// The critical time step without it [s]; `null` if every node is held.
+    pub unscaled_critical_step: f64,
 }
 
 impl AddedMass {
@@ -120,7 +120,8 @@ impl AddedMass {
         let scaling = built.model.mass_scaling.as_ref()?;
         let (mass, whole) = (scaling.total(), built.model.mass.iter().sum::<f64>());
         let percent = mass / whole * 100.0;
-        Some(Self { mass, percent, elements: scaling.cells, target_step: scaling.target_step })
+        let (nodes, unscaled_critical_step) = (scaling.nodes(), scaling.unscaled_critical_step);
+        Some(Self { mass, percent, nodes, unscaled_critical_step })
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use pliant_mechanics::Energies;
 use pliant_mechanics::model::{Constraint, Enclosed};
-use pliant_sim::{Critical, Effort, Equilibria, Failure, INTERRUPTED, number};
+use pliant_sim::{Critical, Effort, Equilibria, Failure, INTERRUPTED, counted, number};
 use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
 
@@ -372,9 +372,10 @@ fn write_part(page: &mut String, part: &Part, outcome: &PartOutcome) -> std::fmt
         writeln!(page, "| element bound | {} s, set by {limiting} |", number(bound.step))?;
         writeln!(page, "| critical time step (assembled model) | {} |", told_limit(limit.step))?;
     }
-    if let Some(AddedMass { mass, percent, elements, .. }) = AddedMass::new(built) {
-        let mass = number(mass);
-        writeln!(page, "| mass added by scaling | {mass} kg, {percent:.2} %, to {elements} elements |")?;
+    if let Some(AddedMass { mass, percent, nodes, unscaled_critical_step }) = AddedMass::new(built) {
+        let (mass, nodes) = (number(mass), counted(nodes, "node"));
+        writeln!(page, "| mass added by scaling | {mass} kg, {percent:.2} %, to {nodes} |")?;
+        writeln!(page, "| critical time step without it | {} |", told_limit(unscaled_critical_step))?;
     }
     if let Some(note) = &plan.note {
         writeln!(page, "\n{note}.")?;

@@ -109,6 +109,16 @@ fn a_resumed_run_ends_in_the_same_bits_for_every_law_with_history() {
 }
 
 #[test]
+fn a_resumed_run_with_mass_scaling_ends_in_the_same_bits_and_refuses_another_one() {
+    let scene = resumable("tet4", "step = 5e-4\nmass-scaling = { share = 0.02 }", true);
+    assert_resumes(&scene, ["1", "2", "1"], "mass scaling");
+    let workshop = Workshop::new(&scene);
+    workshop.run(&[]).done();
+    let told = workshop.resume("out/case", &["run.mass-scaling.share=0.03", "scene.until=0.2"]);
+    refused(&told, &["`run.mass-scaling` differs"]);
+}
+
+#[test]
 fn a_resumed_quasi_static_run_ends_in_the_same_bits() {
     for (element, precision) in [("tet4-anp", "double"), ("hex8", "single"), ("hex8-full", "double")] {
         let run = format!("solver = \"quasi-static\"\nload-steps = 10\nprecision = \"{precision}\"");

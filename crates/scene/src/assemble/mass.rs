@@ -1,11 +1,11 @@
 //! Mass scaling, and the keys of `[run]` that are for dynamics only.
 
-use pliant_explicit::critical_step;
+use pliant_explicit::mass_scaling::{self, Goal};
 use pliant_sim::{counted, number};
 
 use super::Builder;
 use crate::diagnostic::Diagnostic;
-use crate::format::{LoadSteps, LoadTimes, SolverName, StepChoice};
+use crate::format::{LoadSteps, LoadTimes, MassScalingTable, SolverName, StepChoice};
 
 /// Added mass, as a fraction, above which a scene gives a warning.
 const MUCH: f64 = 0.05;
@@ -61,23 +61,32 @@ impl Builder<'_> {
         }
     }
 
+    /// Makes the nodes heavier that limit the step, and tells what is added.
     pub(super) fn scale_mass(&mut self) {
         let Some(table) = self.scene.run.mass_scaling else { return };
-        critical_step::scale_mass(self.assembly.model_mut(), table.target_step);
+        let goal = match table {
+            MassScalingTable::TargetStep(step) => Goal::TargetStep(step),
+            MassScalingTable::Share(share) => Goal::Share(share),
+        };
+        if let Err(contradiction) = mass_scaling::scale_mass(self.assembly.model_mut(), goal) {
+            self.out.push(Diagnostic::error(contradiction.to_string()));
+        }
         let Some(scaling) = &self.assembly.mass_scaling else { return };
         let (added, mass) = (scaling.total(), self.assembly.mass.iter().sum::<f64>());
         let share = added / mass;
-        let told = format!(
-            "mass scaling to {} s makes {} of {} heavier: {} kg or {:.2} % of the mass is added",
-            number(table.target_step),
-            scaling.cells,
-            counted(self.assembly.cell_count(), "element"),
-            number(added),
-            share * 100.0
-        );
+        let told = match scaling.nodes() {
+            0 => "mass scaling adds nothing: the critical time step is long enough without it".to_owned(),
+            nodes => format!(
+                "mass scaling adds {} kg or {:.2} % of the mass, to {nodes} of {}; without it the critical time step is {} s",
+                number(added),
+                share * 100.0,
+                counted(self.assembly.node_count(), "node"),
+                number(scaling.unscaled_critical_step)
+            ),
+        };
         if share > MUCH {
             let place = self.source().span(&self.scene.run_at("mass-scaling"));
-            let help = "motions become slower than they are; take a smaller `target-step`, or remove it to see what it changes";
+            let help = "motions become slower than they are; add less, or remove it to see what it changes";
             self.out.push(Diagnostic::warning(told).at(place, "more than 5 %").help(help));
         } else {
             self.notes.push(told);

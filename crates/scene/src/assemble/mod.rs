@@ -220,7 +220,6 @@ pub fn build_watched(
     if builder.failed() {
         return Err(scene.source.errors(builder.out));
     }
-    builder.scale_mass();
     builder.add_surfaces();
     builder.add_constraints();
     builder.check_turns();
@@ -232,6 +231,9 @@ pub fn build_watched(
     builder.check_view();
     builder.check_free_bodies();
     builder.check_held();
+    if !builder.failed() {
+        builder.scale_mass();
+    }
     let start = if builder.failed() { None } else { builder.start() };
     let pushed = if builder.failed() { None } else { builder.separate(contacts.as_deref()) };
     if let (Some(contacts), Some(barriers), Some(start), true) =

@@ -90,7 +90,7 @@ pub struct RunTable {
     /// its step; if not given, `substep`.
     #[serde(default)]
     pub on_unstable: Option<OnUnstable>,
-    /// Makes the elements that limit an explicit step heavier.
+    /// Makes the nodes that limit an explicit step heavier.
     #[serde(default)]
     pub mass_scaling: Option<MassScalingTable>,
     /// Load steps of a quasi-static or static run with `step = "auto"`: so many equal ones, or the times at which they end.
@@ -143,14 +143,17 @@ pub struct CheckpointTable {
     pub every: f64,
 }
 
-/// Mass added for a larger step. It resists acceleration (and so damping acts on it); gravity and other loads act on the
-/// mass of the material, so that equilibria and their forces do not change.
+/// Mass added at the start for a larger critical time step: exactly one of `target-step` and `share`. It resists acceleration (and so
+/// damping acts on it); gravity and other loads act on the mass of the material, so that equilibria and their forces do not change.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub struct MassScalingTable {
-    /// Elements whose bound of the critical step is below this [s] become so heavy that they reach it.
-    #[schemars(extend("exclusiveMinimum" = 0.0))]
-    pub target_step: f64,
+pub enum MassScalingTable {
+    /// Critical time step [s] of the assembled model at rest that is reached at least, with little more mass than it needs. The automatic
+    /// `step` is 0.9 × as long.
+    TargetStep(#[schemars(extend("exclusiveMinimum" = 0.0))] f64),
+    /// The most mass that is added, as a part of the mass of the materials: 0.01 is 1 %. The critical time step becomes as long as it
+    /// allows.
+    Share(#[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0))] f64),
 }
 
 /// The load steps of a quasi-static or static run.
