@@ -536,20 +536,16 @@ impl WithSimd for Invert<'_> {
         for k in 0..6 {
             let row = a[k];
             sound &= row[k].iter().all(|&pivot| pivot > 0.0);
-            for i in 0..6 {
-                let factor: Pack = std::array::from_fn(|lane| a[i][k][lane] / row[k][lane]);
-                for j in 0..6 {
-                    for lane in 0..PACK {
-                        a[i][j][lane] -= factor[lane] * row[j][lane];
-                    }
+            for own in &mut a {
+                let factor: Pack = std::array::from_fn(|lane| own[k][lane] / row[k][lane]);
+                for (own, row) in own.iter_mut().zip(&row) {
+                    let lanes = own.iter_mut().zip(row).zip(&factor);
+                    lanes.for_each(|((own, row), factor)| *own -= factor * row);
                 }
-                a[i][k] = factor.map(|factor| -factor);
+                own[k] = factor.map(|factor| -factor);
             }
-            for lane in 0..PACK {
-                let pivot = 1.0 / row[k][lane];
-                (0..6).for_each(|j| a[k][j][lane] = row[j][lane] * pivot);
-                a[k][k][lane] = pivot;
-            }
+            a[k] = row.map(|entry| std::array::from_fn(|lane| entry[lane] / row[k][lane]));
+            a[k][k] = row[k].map(|pivot| 1.0 / pivot);
         }
         for (lane, block) in self.0.iter_mut().enumerate() {
             for (i, j) in (0..6).flat_map(|i| (0..=i).map(move |j| (i, j))) {
