@@ -18,7 +18,6 @@ use pliant_mechanics::model::Solid;
 use crate::assembly::{Assembly, Spring};
 use crate::descent::{Contacting, Limits, Vectors, descend};
 use crate::error::SolveError;
-use crate::facet::Tangent;
 use crate::forces::Forces;
 use crate::limited::within_limits;
 use crate::linear::{LinearDevice, LinearReport, LinearSolver, dot};
@@ -58,8 +57,6 @@ pub struct DynamicSettings {
     pub accept_unconverged: bool,
     /// How often a step that fails is halved.
     pub halvings: usize,
-    /// Which stiffness.
-    pub tangent: Tangent,
     /// Solver of the linear equations.
     pub linear: LinearSolver,
     /// Whether what conjugate gradients have reached when their iterations run out is taken as it is: bounded time, accuracy unchecked
@@ -78,16 +75,15 @@ impl DynamicSettings {
             speed_tolerance: None,
             accept_unconverged: false,
             halvings: 6,
-            tangent: Tangent::Full,
             linear: LinearSolver::Direct,
             accept_stalled: false,
         }
     }
 
-    /// One linear solution a step, with the tangent that costs less. (Iterated, that one converges linearly under large moments.)
+    /// One linear solution a step.
     #[must_use]
     pub fn real_time(self, linear: LinearSolver) -> Self {
-        Self { iterations: 1, tangent: Tangent::Symmetric, linear, ..self }
+        Self { iterations: 1, linear, ..self }
     }
 }
 
@@ -372,7 +368,7 @@ impl BackwardEuler {
                 }
                 break;
             }
-            self.system.evaluate(state, time, Some((self.settings.tangent, &self.pending)))?;
+            self.system.evaluate(state, time, Some(&self.pending))?;
             if iteration == 0 {
                 self.system.take_damper();
             }
@@ -399,7 +395,7 @@ impl BackwardEuler {
             let going_on = if iteration == 0 { h } else { 0.0 };
             match self.find_direction(going_on) {
                 Err(error) if self.system.gives_way(&error) => {
-                    let tangent = Some((self.settings.tangent, &self.pending[..]));
+                    let tangent = Some(&self.pending[..]);
                     self.system.evaluate(state, time, tangent)?;
                     self.find_residual(state);
                     let found = self.find_direction(going_on);
@@ -422,7 +418,7 @@ impl BackwardEuler {
         let time = state.time + h;
         self.moved.fill(0.0);
         if !self.system.damper.is_empty() {
-            self.system.evaluate(state, time, Some((self.settings.tangent, &self.pending)))?;
+            self.system.evaluate(state, time, Some(&self.pending))?;
             self.system.take_damper();
         }
         let rates = state.velocity.iter().zip(&state.spin);
@@ -593,7 +589,7 @@ impl Contacting for BackwardEuler {
 
     fn evaluate(&mut self, state: &State, time: f64, tangent: bool) -> Result<(), SolveError> {
         self.find_motion(state);
-        self.system.evaluate(state, time, tangent.then_some((self.settings.tangent, &self.pending[..])))
+        self.system.evaluate(state, time, tangent.then_some(&self.pending[..]))
     }
 
     fn find_residual(&mut self, state: &State) -> (f64, f64) {

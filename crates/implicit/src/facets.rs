@@ -1,4 +1,4 @@
-//! Forces and stiffness of eight facets at a time: what [`Facet::force`] and [`Facet::hessian`] find one by one, in blocks of 3 × 3. Of the
+//! Forces and stiffness of eight facets at a time: what `facet/single.rs` finds one by one, in blocks of 3 × 3. Of the
 //! change of the force only the symmetric part is made. With G the spin of the frame over translations, S the lever arms, K the
 //! stiffness over spins and R = K Ψ what rigid turns make of it, its blocks of translations (T) and turns (R) are
 //!

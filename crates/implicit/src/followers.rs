@@ -13,7 +13,7 @@ use pliant_mechanics::tie::Tie;
 
 use crate::Assembly;
 use crate::rotation::skew;
-use crate::sparse::{Equations, LowerMatrix, NONE};
+use crate::sparse::{Cell, Equations, LowerMatrix, NONE};
 use crate::state::State;
 use crate::turns::{CarriedTurn, Turn};
 
@@ -400,7 +400,7 @@ impl Followers {
                 None => (nodes, 3, change),
             };
             let places = matrix.places(equations, &own, components);
-            matrix.add(equations, &own, components, &places, &whole);
+            matrix.add(equations, &Cell { nodes: &own, components, places: &places, entries: &whole });
         }
     }
 
@@ -449,7 +449,8 @@ impl Followers {
                 turns += axis * axis.transpose() * (matrix.diagonal(number as usize).abs() * size * size);
             }
             let places = matrix.places(equations, &[*first], 6);
-            matrix.add(equations, &[*first], 6, &places, block.as_slice());
+            let entries = block.as_slice();
+            matrix.add(equations, &Cell { nodes: &[*first], components: 6, places: &places, entries });
         }
     }
 }

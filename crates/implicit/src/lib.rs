@@ -44,6 +44,7 @@ mod facet;
 mod facets;
 mod followers;
 mod forces;
+mod gathering;
 mod initial;
 mod lanes;
 mod limited;
@@ -76,7 +77,7 @@ pub use creases::Normal;
 pub use dynamics::{BackwardEuler, DynamicSettings, DynamicStep, Explicit, Integrator};
 pub use element::Wall;
 pub use error::{ModelError, SolveError};
-pub use facet::{Broken, Facet, FacetAtRest, Resultants, ShellEnergy, Tangent};
+pub use facet::{Broken, Facet, FacetAtRest, Resultants, ShellEnergy};
 pub use forces::Forces;
 pub use linear::{
     BlockPattern, BlockValues, DeviceError, DeviceSolver, DeviceTimes, LinearDevice, LinearReport,

@@ -90,6 +90,7 @@ pub(crate) fn spin_to_vector(theta: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 /// ∂(Hᵀ m)/∂θ H for a fixed m: how a moment that is conjugate to spins changes with the spin.
+#[cfg(test)]
 pub(crate) fn moment_correction(theta: &Vector3<f64>, moment: &Vector3<f64>) -> Matrix3<f64> {
     let s = skew(theta);
     let angle = theta.norm();

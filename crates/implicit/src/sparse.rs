@@ -1,5 +1,10 @@
 //! The lower half of a symmetric sparse matrix, filled by cells whose places in it are found once.
 
+use rayon::prelude::*;
+
+/// Values that a thread clears at once.
+const CLEARED: usize = 1 << 15;
+
 /// No equation: the component is held or has no stiffness.
 pub(crate) const NONE: u32 = u32::MAX;
 
@@ -37,10 +42,94 @@ impl Equations {
         self.component.len()
     }
 
+    /// How many equations the nodes before one have.
+    pub(crate) fn before(&self, node: u32) -> usize {
+        self.component.partition_point(|&component| component < 6 * node)
+    }
+
+    /// Those of the first components of a node.
+    fn of<const C: usize>(&self, node: u32) -> &[u32; C] {
+        self.number[6 * node as usize..].first_chunk().expect("a node has six components")
+    }
+
     /// The first equation of a node, if any.
     fn first(&self, node: u32) -> u32 {
         let own = &self.number[6 * node as usize..6 * node as usize + 6];
         own.iter().copied().min().unwrap_or(NONE)
+    }
+}
+
+/// A cell's matrix on its way into a larger one.
+pub(crate) struct Cell<'a> {
+    pub(crate) nodes: &'a [u32],
+    /// Components of each node.
+    pub(crate) components: usize,
+    /// Its [places](LowerMatrix::places).
+    pub(crate) places: &'a [u32],
+    /// Column by column.
+    pub(crate) entries: &'a [f64],
+}
+
+/// The values of consecutive columns.
+pub(crate) struct Values<'a> {
+    /// The place of the first.
+    first: usize,
+    value: &'a mut [f64],
+    mirror: &'a mut [f64],
+}
+
+impl Values<'_> {
+    /// Those before a place and those from there on.
+    pub(crate) fn split_at(self, place: usize) -> (Self, Self) {
+        let Self { first, value, mirror } = self;
+        let (value, after) = value.split_at_mut(place - first);
+        let (mirror, mirror_after) = mirror.split_at_mut(value.len().min(mirror.len()));
+        (Self { first, value, mirror }, Self { first: place, value: after, mirror: mirror_after })
+    }
+
+    /// Adds the columns of one of a cell's nodes.
+    pub(crate) fn add(&mut self, equations: &Equations, cell: &Cell<'_>, node: usize) {
+        match cell.components {
+            6 => self.add_columns::<6>(equations, cell, node),
+            _ => self.add_columns::<3>(equations, cell, node),
+        }
+    }
+
+    fn add_columns<const C: usize>(&mut self, equations: &Equations, cell: &Cell<'_>, node: usize) {
+        let &Cell { nodes, places, entries, .. } = cell;
+        let size = nodes.len() * C;
+        let columns = equations.of::<C>(nodes[node]);
+        for (a, &row_node) in nodes.iter().enumerate().filter(|(_, row)| **row >= nodes[node]) {
+            let first = equations.first(row_node);
+            let rows = equations.of::<C>(row_node);
+            let all_free = self.mirror.is_empty() && !rows.contains(&NONE);
+            for (c, &column) in columns.iter().enumerate().filter(|(_, column)| **column != NONE) {
+                let base = places[(a * nodes.len() + node) * C + c];
+                let place = |row: u32| base.wrapping_add(row - first) as usize - self.first;
+                let j = node * C + c;
+                if all_free {
+                    // Nearly all nodes: their rows follow one another, those of the column's own node from the diagonal on.
+                    let own: &[f64; C] =
+                        entries[j * size + a * C..].first_chunk().expect("a cell has all rows");
+                    let add = |(value, own): (&mut f64, &f64)| *value += own;
+                    if a == node {
+                        let values = &mut self.value[place(column)..][..C - c];
+                        values.iter_mut().zip(&own[c..]).for_each(add);
+                    } else {
+                        let values = &mut self.value[place(rows[0])..][..C];
+                        values.iter_mut().zip(own).for_each(add);
+                    }
+                    continue;
+                }
+                for (r, &row) in rows.iter().enumerate().filter(|(_, row)| **row != NONE && **row >= column) {
+                    let (at, i) = (place(row), a * C + r);
+                    self.value[at] += entries[j * size + i];
+                    if let Some(mirror) = self.mirror.get_mut(at) {
+                        *mirror += entries[i * size + j];
+                    }
+                }
+            }
+        }
     }
 }
 
@@ -103,8 +192,14 @@ impl LowerMatrix {
     }
 
     pub(crate) fn clear(&mut self) {
-        self.value.fill(0.0);
+        self.value.par_chunks_mut(CLEARED).for_each(|values| values.fill(0.0));
         self.mirror.fill(0.0);
+    }
+
+    /// All values, and where each column starts.
+    pub(crate) fn values(&mut self) -> (Values<'_>, &[u32]) {
+        let Self { column_start, value, mirror, .. } = self;
+        (Values { first: 0, value, mirror }, column_start)
     }
 
     /// Where in the values the rows of node `row` in an equation's column start, had the row node's first equation a place
@@ -136,52 +231,10 @@ impl LowerMatrix {
         places
     }
 
-    /// Adds a cell's matrix, stored column by column; of a symmetric one the lower half.
-    pub(crate) fn add(
-        &mut self,
-        equations: &Equations,
-        nodes: &[u32],
-        components: usize,
-        places: &[u32],
-        cell: &[f64],
-    ) {
-        let size = nodes.len() * components;
-        for (a, &row_node) in nodes.iter().enumerate() {
-            let first = equations.first(row_node);
-            let rows = &equations.number[6 * row_node as usize..6 * row_node as usize + components];
-            let all_free = self.mirror.is_empty() && rows.iter().all(|&row| row != NONE);
-            for (b, &column_node) in nodes.iter().enumerate() {
-                if row_node < column_node {
-                    continue;
-                }
-                for c in 0..components {
-                    let column = equations.number[6 * column_node as usize + c];
-                    if column == NONE {
-                        continue;
-                    }
-                    let base = places[(a * nodes.len() + b) * components + c];
-                    if all_free {
-                        // Nearly all nodes: their rows follow one another, those of the column's own node from the diagonal on.
-                        let from = if row_node == column_node { c } else { 0 };
-                        let at = base.wrapping_add(rows[from] - first) as usize;
-                        let own = &cell[(b * components + c) * size + a * components..][from..components];
-                        let values = &mut self.value[at..at + own.len()];
-                        values.iter_mut().zip(own).for_each(|(value, own)| *value += own);
-                        continue;
-                    }
-                    for (r, &row) in rows.iter().enumerate() {
-                        if row != NONE && row >= column {
-                            let at = base.wrapping_add(row - first) as usize;
-                            let (i, j) = (a * components + r, b * components + c);
-                            self.value[at] += cell[j * size + i];
-                            if !self.mirror.is_empty() {
-                                self.mirror[at] += cell[i * size + j];
-                            }
-                        }
-                    }
-                }
-            }
-        }
+    /// Adds a cell's matrix; of a symmetric one the lower half.
+    pub(crate) fn add(&mut self, equations: &Equations, cell: &Cell<'_>) {
+        let (mut values, _) = self.values();
+        (0..cell.nodes.len()).for_each(|node| values.add(equations, cell, node));
     }
 
     /// Whether the pattern couples the translations of two nodes, the lower number first, or one of them has none that is free.

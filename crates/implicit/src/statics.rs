@@ -16,7 +16,6 @@ use pliant_mechanics::tie::Tie;
 use crate::assembly::{Assembly, Spring};
 use crate::descent::{Contacting, Limits, Vectors, descend};
 use crate::error::SolveError;
-use crate::facet::Tangent;
 use crate::limited::within_limits;
 use crate::linear::{LinearSolver, dot};
 use crate::sparse::NONE;
@@ -40,8 +39,6 @@ pub struct StaticSettings {
     /// Whether iterations that make the residual along them ten times as large are shortened, but for the first two: thin
     /// shells overshoot there and then converge quadratically.
     pub line_search: bool,
-    /// Which stiffness.
-    pub tangent: Tangent,
     /// Solver of the linear equations.
     pub linear: LinearSolver,
 }
@@ -55,7 +52,6 @@ impl Default for StaticSettings {
             floor: 1e-7,
             rotation_limit: 0.7,
             line_search: true,
-            tangent: Tangent::Full,
             linear: LinearSolver::Direct,
         }
     }
@@ -277,7 +273,7 @@ impl Statics {
     pub fn linear(&mut self, state: &State, time: f64) -> Result<Vec<[f64; 6]>, SolveError> {
         self.system.prescribed(state.time, time, &mut self.pending);
         self.system.begin_step(&state.history, time - state.time);
-        self.system.evaluate(state, state.time, Some((self.settings.tangent, &self.pending)))?;
+        self.system.evaluate(state, state.time, Some(&self.pending))?;
         self.system.evaluate(state, time, None)?;
         self.find_residual(state);
         self.system.prepare()?;
@@ -425,9 +421,7 @@ impl Statics {
         let start = state.clone();
         let mut negative_pivots = 0;
         for iteration in 0..=self.settings.iterations {
-            self.system
-                .evaluate(state, time, Some((self.settings.tangent, &self.pending)))
-                .map_err(failed)?;
+            self.system.evaluate(state, time, Some(&self.pending)).map_err(failed)?;
             let (norm, allowed) = self.find_residual(state);
             residuals.push(norm);
             if let Some(attempt) = self.attempts.last_mut() {
@@ -445,7 +439,7 @@ impl Statics {
             }
             negative_pivots = match self.find_direction() {
                 Err(error) if self.system.gives_way(&error) => {
-                    let tangent = Some((self.settings.tangent, &self.pending[..]));
+                    let tangent = Some(&self.pending[..]);
                     self.system.evaluate(state, time, tangent).map_err(failed)?;
                     self.find_residual(state);
                     let pivots = self.find_direction();
@@ -696,7 +690,7 @@ impl Contacting for Statics {
     }
 
     fn evaluate(&mut self, state: &State, time: f64, tangent: bool) -> Result<(), SolveError> {
-        self.system.evaluate(state, time, tangent.then_some((self.settings.tangent, &self.pending[..])))
+        self.system.evaluate(state, time, tangent.then_some(&self.pending[..]))
     }
 
     fn find_residual(&mut self, state: &State) -> (f64, f64) {

@@ -1,15 +1,16 @@
-//! Conjugate gradients (Hestenes and Stiefel 1952) on the blocks of the nodes. Preconditioners: inverted diagonal blocks; these with a
-//! coarse correction by the rigid motions of aggregates, groups of neighbouring nodes (additive two-level Schwarz after Nicolaides
-//! 1987, SIAM J. Numer. Anal. 24:355); or older factors.
+//! Conjugate gradients (Hestenes and Stiefel 1952) on the blocks of the nodes. Preconditioners: inverted diagonal blocks; these, deflated
+//! by the rigid motions of aggregates, groups of neighbouring nodes (Nicolaides 1987, SIAM J. Numer. Anal. 24:355; the variant A-DEF2 of
+//! Tang et al. 2009, J. Sci. Comput. 39:340); or older factors.
 //! Rows are shared between threads; sums over them run in one order, so the number of threads changes no bit.
 
-use nalgebra::{Cholesky, Matrix3, SMatrix, Vector3};
+use nalgebra::{SMatrix, Vector3};
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::device::BlockPattern;
 use super::factors::Factors;
 use super::report::{LinearError, LinearReport};
-use crate::rotation::skew;
+use crate::lanes::{PACK, Pack};
 use crate::sparse::{Equations, LowerMatrix, NONE};
 
 /// Nodes whose products are summed up by themselves.
@@ -40,6 +41,8 @@ pub(crate) struct BlockMatrix {
     source: Vec<[u32; 36]>,
     /// Inverses of the diagonal blocks.
     inverse: Vec<Block>,
+    /// The instructions of the processor.
+    arch: Arch,
 }
 
 impl BlockMatrix {
@@ -93,6 +96,7 @@ impl BlockMatrix {
             inverse: vec![Block::identity(); order.len()],
             row_start,
             column,
+            arch: Arch::new(),
         };
         for equation in 0..matrix.len() as u32 {
             let (node, j) = home(equation);
@@ -145,30 +149,28 @@ impl BlockMatrix {
             value.iter_mut().zip(source).for_each(|(value, at)| *value = entry(at));
         });
         let mut inverse = std::mem::take(&mut self.inverse);
-        let sound = inverse.par_iter_mut().enumerate().with_min_len(64).map(|(node, inverse)| {
-            let mut block = self.value[self.find(node as u32, node as u32)];
-            for (c, _) in self.equations[node].iter().enumerate().filter(|(_, e)| **e == NONE) {
-                block[(c, c)] = 1.0;
+        let packs = inverse.par_chunks_mut(PACK).enumerate().with_min_len(8);
+        let sound = packs.map(|(pack, inverse)| {
+            let mut blocks = [Block::identity(); PACK];
+            for (node, block) in (pack * PACK..).zip(&mut blocks[..inverse.len()]) {
+                *block = self.diagonal(node);
             }
-            Cholesky::new(block).map(|factor| *inverse = factor.inverse()).is_some()
+            let sound = self.arch.dispatch(Invert(&mut blocks));
+            inverse.copy_from_slice(&blocks[..inverse.len()]);
+            sound
         });
         let sound = sound.reduce(|| true, |a, b| a && b);
         self.inverse = inverse;
         sound
     }
 
-    /// A row times a vector.
-    fn times(&self, node: usize, x: &[Node]) -> Node {
-        let mut sum = [0.0; 6];
-        for at in self.row(node) {
-            let (block, x) = (self.value[at].as_slice(), &x[self.column[at] as usize]);
-            for (column, x) in block.chunks_exact(6).zip(x) {
-                for (sum, entry) in sum.iter_mut().zip(column) {
-                    *sum += entry * x;
-                }
-            }
+    /// The diagonal block of a node, with ones where it has no equation.
+    fn diagonal(&self, node: usize) -> Block {
+        let mut block = self.value[self.find(node as u32, node as u32)];
+        for (c, _) in self.equations[node].iter().enumerate().filter(|(_, e)| **e == NONE) {
+            block[(c, c)] = 1.0;
         }
-        sum
+        block
     }
 
     fn gather(&self, equations: &[f64], nodes: &mut [Node]) {
@@ -187,20 +189,6 @@ impl BlockMatrix {
                 }
             }
         }
-    }
-
-    /// The matrix between rigid motions of two nodes with arms: P_iᵀ B P_j with P = [I −S(d); 0 I].
-    fn rigid(block: &Block, own: &Vector3<f64>, other: &Vector3<f64>) -> Block {
-        let part = |i: usize, j: usize| -> Matrix3<f64> { block.fixed_view::<3, 3>(3 * i, 3 * j).into() };
-        let (left, right) = (skew(own), skew(other));
-        let (a, c) = (part(0, 0), part(1, 0));
-        let (b, d) = (part(0, 1) - a * right, part(1, 1) - c * right);
-        let mut result = Block::zeros();
-        result.fixed_view_mut::<3, 3>(0, 0).copy_from(&a);
-        result.fixed_view_mut::<3, 3>(0, 3).copy_from(&b);
-        result.fixed_view_mut::<3, 3>(3, 0).copy_from(&(c + left * a));
-        result.fixed_view_mut::<3, 3>(3, 3).copy_from(&(d + left * b));
-        result
     }
 }
 
@@ -267,20 +255,80 @@ fn joined(groups: Vec<Vec<u32>>, size: usize, is_within: impl Fn(u32, u32) -> bo
     all
 }
 
-/// Rigid motions of the aggregates.
+/// Rigid motions of the aggregates: with P that of the nodes by those of aggregates, the coarse matrix is Pᵀ A P.
 pub(crate) struct Coarse {
     /// Arm of each node from the middle of its aggregate [m].
     arm: Vec<Vector3<f64>>,
     /// The aggregate of each node.
     aggregate: Vec<u32>,
+    projected: Projected,
     matrix: LowerMatrix,
     factors: Factors,
-    /// Pairs of aggregates (row, column) that touch, with their blocks in the fine matrix …
+    /// Pairs of aggregates (row, column) that touch, with the blocks of Pᵀ A between them …
     pairs: Vec<(u32, u32, Vec<u32>)>,
     /// … and the coarse ones.
     value: Vec<Block>,
     motion: Vec<f64>,
     force: Vec<f64>,
+}
+
+/// Pᵀ A: with what forces on aggregates the motion of a node is resisted.
+struct Projected {
+    /// Where the blocks of each aggregate start, and the end of the last.
+    start: Vec<u32>,
+    /// Aggregate and node of each block, increasing.
+    aggregate: Vec<u32>,
+    node: Vec<u32>,
+    value: Vec<Block>,
+}
+
+impl Projected {
+    fn new(fine: &BlockMatrix) -> Self {
+        let (mut start, mut aggregates, mut nodes) = (vec![0], Vec::new(), Vec::new());
+        for (aggregate, ends) in fine.aggregate_start.windows(2).enumerate() {
+            let rows = fine.row_start[ends[0] as usize] as usize..fine.row_start[ends[1] as usize] as usize;
+            let mut own = fine.column[rows].to_vec();
+            own.sort_unstable();
+            own.dedup();
+            nodes.append(&mut own);
+            aggregates.resize(nodes.len(), aggregate as u32);
+            start.push(nodes.len() as u32);
+        }
+        let value = vec![Block::zeros(); nodes.len()];
+        Self { start, aggregate: aggregates, node: nodes, value }
+    }
+
+    fn of(&self, aggregate: usize) -> std::ops::Range<usize> {
+        self.start[aggregate] as usize..self.start[aggregate + 1] as usize
+    }
+
+    /// Takes the fine matrix, with the aggregates of nodes and their arms.
+    fn update(&mut self, fine: &BlockMatrix, home: &[u32], arm: &[Vector3<f64>]) {
+        let ends = self.aggregate.par_iter().zip(&self.node);
+        self.value.par_iter_mut().zip(ends).with_min_len(64).for_each(|(value, (&aggregate, &node))| {
+            let mut sum = Block::zeros();
+            for at in fine.row(node as usize) {
+                let other = fine.column[at] as usize;
+                if home[other] == aggregate {
+                    add_rigid(&fine.value[at], &arm[other], &mut sum);
+                }
+            }
+            *value = sum.transpose();
+        });
+    }
+}
+
+/// Adds B P of a node with an arm d, P = [I −S(d); 0 I].
+#[inline(always)]
+fn add_rigid(block: &Block, arm: &Vector3<f64>, to: &mut Block) {
+    let (block, to) = (block.as_slice(), to.as_mut_slice());
+    (0..36).for_each(|at| to[at] += block[at]);
+    for row in 0..6 {
+        let [x, y, z] = [block[row], block[6 + row], block[12 + row]];
+        to[18 + row] += z * arm.y - y * arm.z;
+        to[24 + row] += x * arm.z - z * arm.x;
+        to[30 + row] += y * arm.x - x * arm.y;
+    }
 }
 
 impl Coarse {
@@ -290,14 +338,13 @@ impl Coarse {
         for (number, ends) in fine.aggregate_start.windows(2).enumerate() {
             aggregate[ends[0] as usize..ends[1] as usize].fill(number as u32);
         }
+        let projected = Projected::new(fine);
         let mut touching: std::collections::BTreeMap<(u32, u32), Vec<u32>> =
             std::collections::BTreeMap::new();
-        for node in 0..fine.nodes() {
-            for at in fine.row(node) {
-                let (row, column) = (aggregate[node], aggregate[fine.column[at] as usize]);
-                if row >= column {
-                    touching.entry((column, row)).or_default().push(at as u32);
-                }
+        for (at, (&row, &node)) in (0..).zip(projected.aggregate.iter().zip(&projected.node)) {
+            let column = aggregate[node as usize];
+            if row >= column {
+                touching.entry((column, row)).or_default().push(at);
             }
         }
         let pairs: Vec<(u32, u32, Vec<u32>)> =
@@ -308,6 +355,7 @@ impl Coarse {
         Some(Self {
             arm: vec![Vector3::zeros(); fine.nodes()],
             aggregate,
+            projected,
             factors: Factors::new(&matrix).ok()?,
             matrix,
             value: vec![Block::zeros(); pairs.len()],
@@ -329,13 +377,12 @@ impl Coarse {
 
     /// Takes the fine matrix.
     pub(crate) fn update(&mut self, fine: &BlockMatrix) {
-        let arm = &self.arm;
-        let row_of = |at: u32| fine.row_start.partition_point(|&start| start <= at) - 1;
-        self.value.par_iter_mut().zip(&self.pairs).for_each(|(value, (_, _, blocks))| {
+        let Self { arm, aggregate, projected, value, pairs, .. } = self;
+        projected.update(fine, aggregate, arm);
+        value.par_iter_mut().zip(&*pairs).with_min_len(16).for_each(|(value, (_, _, blocks))| {
             *value = Block::zeros();
-            for &at in blocks {
-                let (row, column) = (row_of(at), fine.column[at as usize] as usize);
-                *value += BlockMatrix::rigid(&fine.value[at as usize], &arm[row], &arm[column]);
+            for at in blocks.iter().map(|&at| at as usize) {
+                add_rigid(&projected.value[at], &arm[projected.node[at] as usize], value);
             }
         });
     }
@@ -361,30 +408,24 @@ impl Coarse {
         self.factors.factorise(&self.matrix).is_some()
     }
 
-    /// Solves for the rigid motions under the forces on the nodes; the power of these.
-    fn solve(&mut self, fine: &BlockMatrix, r: &[Node]) -> f64 {
-        let arm = &self.arm;
-        self.force
-            .par_chunks_exact_mut(6)
-            .zip(fine.aggregate_start.par_windows(2))
-            .with_min_len(16)
-            .for_each(|(force, ends)| {
-                force.fill(0.0);
-                for node in ends[0] as usize..ends[1] as usize {
-                    let [f, m] = halves(&r[node]);
-                    let moment = m + arm[node].cross(&f);
-                    for c in 0..3 {
-                        force[c] += f[c];
-                        force[3 + c] += moment[c];
-                    }
-                }
-            });
-        self.motion.copy_from_slice(&self.force);
+    /// Finds the rigid motions c = (Pᵀ A P)⁻¹ Pᵀ (r − A z); r · P c.
+    fn solve(&mut self, fine: &BlockMatrix, r: &[Node], z: &[Node]) -> f64 {
+        let Self { arm, projected, force, motion, .. } = self;
+        let aggregates = force.par_chunks_exact_mut(6).zip(motion.par_chunks_exact_mut(6)).enumerate();
+        aggregates.with_min_len(16).for_each(|(number, (force, motion))| {
+            let nodes = fine.aggregate_start[number] as usize..fine.aggregate_start[number + 1] as usize;
+            force.copy_from_slice(&resultant(&r[nodes.clone()], &arm[nodes]));
+            let own = projected.of(number);
+            let blocks = &projected.value[own.clone()];
+            let resisted = fine.arch.dispatch(BlockRow { blocks, columns: &projected.node[own], x: z });
+            (0..6).for_each(|c| motion[c] = force[c] - resisted[c]);
+        });
         self.factors.solve(&mut self.motion);
         self.force.iter().zip(&self.motion).map(|(f, m)| f * m).sum()
     }
 
     /// What the rigid motion does to a node.
+    #[inline(always)]
     fn motion(&self, node: usize) -> Node {
         let own = 6 * self.aggregate[node] as usize;
         let [t, w] = [0, 3]
@@ -394,8 +435,149 @@ impl Coarse {
     }
 }
 
+/// Resultant and moment of forces on nodes with arms.
+fn resultant(forces: &[Node], arms: &[Vector3<f64>]) -> Node {
+    let mut sum = [0.0; 6];
+    for (node, arm) in forces.iter().zip(arms) {
+        let [f, m] = halves(node);
+        let moment = m + arm.cross(&f);
+        for c in 0..3 {
+            sum[c] += f[c];
+            sum[3 + c] += moment[c];
+        }
+    }
+    sum
+}
+
 fn halves(node: &Node) -> [Vector3<f64>; 2] {
     [Vector3::new(node[0], node[1], node[2]), Vector3::new(node[3], node[4], node[5])]
+}
+
+/// A row of blocks times a vector.
+struct BlockRow<'a> {
+    blocks: &'a [Block],
+    columns: &'a [u32],
+    x: &'a [Node],
+}
+
+impl WithSimd for BlockRow<'_> {
+    type Output = Node;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Node {
+        let mut sum = [0.0; 6];
+        for (block, &column) in self.blocks.iter().zip(self.columns) {
+            add_times(block, &self.x[column as usize], &mut sum);
+        }
+        sum
+    }
+}
+
+/// ap ← A p of the rows from one on; p · A p.
+struct Multiply<'a> {
+    matrix: &'a BlockMatrix,
+    from: &'a [Node],
+    first: usize,
+    ap: &'a mut [Node],
+}
+
+impl WithSimd for Multiply<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> f64 {
+        let mut sum = 0.0;
+        for (node, ap) in (self.first..).zip(self.ap) {
+            let own = self.matrix.row(node);
+            let (blocks, columns) = (&self.matrix.value[own.clone()], &self.matrix.column[own]);
+            *ap = BlockRow { blocks, columns, x: self.from }.with_simd(simd);
+            sum += product(ap, &self.from[node]);
+        }
+        sum
+    }
+}
+
+/// x += α p, r −= α A p and, with inverted blocks, z of the nodes from one on; (r · r, r · z).
+struct Advance<'a> {
+    alpha: f64,
+    p: &'a [Node],
+    ap: &'a [Node],
+    x: &'a mut [Node],
+    r: &'a mut [Node],
+    z: &'a mut [Node],
+    inverse: Option<&'a [Block]>,
+    first: usize,
+}
+
+impl WithSimd for Advance<'_> {
+    type Output = [f64; 2];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> [f64; 2] {
+        let mut sums = [0.0; 2];
+        for (at, (x, r)) in self.x.iter_mut().zip(self.r).enumerate() {
+            for c in 0..6 {
+                x[c] += self.alpha * self.p[at][c];
+                r[c] -= self.alpha * self.ap[at][c];
+            }
+            sums[0] += product(r, r);
+            if let Some(inverse) = self.inverse {
+                self.z[at] = [0.0; 6];
+                add_times(&inverse[self.first + at], r, &mut self.z[at]);
+                sums[1] += product(&self.z[at], r);
+            }
+        }
+        sums
+    }
+}
+
+/// Adds B x.
+#[inline(always)]
+fn add_times(block: &Block, x: &Node, to: &mut Node) {
+    let block = block.as_slice();
+    for column in 0..6 {
+        for row in 0..6 {
+            to[row] += block[6 * column + row] * x[column];
+        }
+    }
+}
+
+/// Inverts symmetric blocks side by side, by Gauss and Jordan's elimination; false if one is not positive definite.
+struct Invert<'a>(&'a mut [Block; PACK]);
+
+impl WithSimd for Invert<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> bool {
+        let mut a = [[[0.0; PACK]; 6]; 6];
+        for (lane, block) in self.0.iter().enumerate() {
+            for (i, j) in (0..6).flat_map(|i| (0..6).map(move |j| (i, j))) {
+                a[i][j][lane] = block[(i, j)];
+            }
+        }
+        let mut sound = true;
+        for k in 0..6 {
+            let row = a[k];
+            sound &= row[k].iter().all(|&pivot| pivot > 0.0);
+            for own in &mut a {
+                let factor: Pack = std::array::from_fn(|lane| own[k][lane] / row[k][lane]);
+                for (own, row) in own.iter_mut().zip(&row) {
+                    let lanes = own.iter_mut().zip(row).zip(&factor);
+                    lanes.for_each(|((own, row), factor)| *own -= factor * row);
+                }
+                own[k] = factor.map(|factor| -factor);
+            }
+            a[k] = row.map(|entry| std::array::from_fn(|lane| entry[lane] / row[k][lane]));
+            a[k][k] = row[k].map(|pivot| 1.0 / pivot);
+        }
+        for (lane, block) in self.0.iter_mut().enumerate() {
+            for (i, j) in (0..6).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+                (block[(i, j)], block[(j, i)]) = (a[i][j][lane], a[i][j][lane]);
+            }
+        }
+        sound
+    }
 }
 
 /// An approximate inverse.
@@ -445,12 +627,7 @@ impl KrylovVectors {
         let from = if start { &self.x } else { &self.p };
         let chunks = self.ap.par_chunks_mut(CHUNK).zip(&mut self.parts).enumerate().with_min_len(SHARE);
         chunks.for_each(|(chunk, (ap, part))| {
-            let mut sum = 0.0;
-            for (node, ap) in (chunk * CHUNK..).zip(ap) {
-                *ap = matrix.times(node, from);
-                sum += product(ap, &from[node]);
-            }
-            *part = [sum, 0.0];
+            *part = [matrix.arch.dispatch(Multiply { matrix, from, first: chunk * CHUNK, ap }), 0.0];
         });
         self.sums()[0]
     }
@@ -461,24 +638,9 @@ impl KrylovVectors {
         let chunks = chunks.zip(self.z.par_chunks_mut(CHUNK)).zip(&mut self.parts).enumerate();
         let (p, ap) = (&self.p, &self.ap);
         chunks.with_min_len(SHARE).for_each(|(chunk, (((x, r), z), part))| {
-            *part = [0.0; 2];
-            for (node, ((x, r), z)) in (chunk * CHUNK..).zip(x.iter_mut().zip(r).zip(z)) {
-                for c in 0..6 {
-                    x[c] += alpha * p[node][c];
-                    r[c] -= alpha * ap[node][c];
-                }
-                part[0] += product(r, r);
-                if blocks {
-                    let mut own = [0.0; 6];
-                    for (column, r) in matrix.inverse[node].as_slice().chunks_exact(6).zip(&*r) {
-                        for (own, entry) in own.iter_mut().zip(column) {
-                            *own += entry * r;
-                        }
-                    }
-                    *z = own;
-                    part[1] += product(z, r);
-                }
-            }
+            let (first, inverse) = (chunk * CHUNK, blocks.then_some(&matrix.inverse[..]));
+            let [p, ap] = [&p[first..], &ap[first..]];
+            *part = matrix.arch.dispatch(Advance { alpha, p, ap, x, r, z, inverse, first });
         });
         self.sums()
     }
@@ -487,7 +649,7 @@ impl KrylovVectors {
     fn precondition(&mut self, matrix: &BlockMatrix, inverse: &mut Approximation<'_>, so_far: f64) -> f64 {
         match inverse {
             Approximation::Blocks => so_far,
-            Approximation::Aggregates(coarse) => so_far + coarse.solve(matrix, &self.r),
+            Approximation::Aggregates(coarse) => so_far + coarse.solve(matrix, &self.r, &self.z),
             Approximation::Factors(factors) => {
                 matrix.scatter(&self.r, &mut self.equations);
                 factors.solve(&mut self.equations);
@@ -495,6 +657,14 @@ impl KrylovVectors {
                 self.r.iter().zip(&self.z).map(|(r, z)| product(r, z)).sum()
             }
         }
+    }
+
+    /// p ← P c, a step that leaves r no force along rigid motions, and ap ← A p.
+    fn deflate(&mut self, matrix: &BlockMatrix, inverse: &mut Approximation<'_>) {
+        self.z.fill([0.0; 6]);
+        self.precondition(matrix, inverse, 0.0);
+        self.turn(matrix, inverse, 0.0);
+        self.multiply(matrix, false);
     }
 
     /// p ← z + β p.
@@ -604,7 +774,11 @@ impl KrylovVectors {
         if size == 0.0 {
             return Ok(report);
         }
-        let [left, so_far] = self.advance(matrix, 0.0, blocks);
+        let deflated = matches!(inverse, Approximation::Aggregates(_));
+        if deflated {
+            self.deflate(matrix, inverse);
+        }
+        let [left, so_far] = self.advance(matrix, if deflated { 1.0 } else { 0.0 }, blocks);
         report.residual = left.sqrt() / size;
         let mut rz = self.precondition(matrix, inverse, so_far);
         let mut beta = 0.0;
@@ -637,12 +811,15 @@ fn squared(v: &[Node]) -> f64 {
     v.iter().map(|v| product(v, v)).sum()
 }
 
+#[inline(always)]
 fn product(a: &Node, b: &Node) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
 }
 
 #[cfg(test)]
 mod tests {
+    use pliant_testing::Random;
+
     use super::*;
 
     /// Parts of a number of nodes each, in chains.
@@ -676,5 +853,23 @@ mod tests {
     #[test]
     fn larger_parts_keep_their_aggregates_where_their_number_is_limited() {
         assert_eq!(lengths(&aggregates(&chains(60, 40), 100).1), [24, 16].repeat(60));
+    }
+
+    /// Blocks Bᵀ B + I times their inverses are I to 1e-12; one with a negative eigenvalue is told.
+    #[test]
+    fn blocks_are_inverted_side_by_side() {
+        let mut random = Random::new(11);
+        let blocks: [Block; PACK] = std::array::from_fn(|_| {
+            let own = Block::from_fn(|_, _| random.number());
+            own.transpose() * own + Block::identity()
+        });
+        let mut inverse = blocks;
+        assert!(Arch::new().dispatch(Invert(&mut inverse)));
+        for (block, inverse) in blocks.iter().zip(&inverse) {
+            assert!((block * inverse - Block::identity()).amax() < 1e-12);
+        }
+        let mut indefinite = blocks;
+        indefinite[PACK - 1] -= Block::identity() * (2.0 * blocks[PACK - 1].amax());
+        assert!(!Arch::new().dispatch(Invert(&mut indefinite)));
     }
 }

@@ -57,7 +57,7 @@ impl LinearSolver {
 pub enum Preconditioner {
     /// The inverse of each node's diagonal block.
     BlockJacobi,
-    /// This, and a solution for the rigid motions of groups of some thirty neighbouring nodes: far fewer iterations on many elements.
+    /// These inverses, deflated by the rigid motions of groups of some sixteen neighbouring nodes: far fewer iterations on many elements.
     Aggregates,
     /// The factors of an older matrix, made anew once this many iterations were needed.
     LaggedFactors {

@@ -11,7 +11,6 @@ use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
 use pliant_testing::Random;
 use serde_json::json;
 
-use crate::facet::Tangent;
 use crate::linear::LinearSolver;
 use crate::system::System;
 use crate::tests::bar;
@@ -114,7 +113,7 @@ fn assert_derivatives(what: &str, system: &mut System, state: &State) {
     let nodes = state.position.len();
     let mut random = Random::new(5);
     let still = vec![0.0; 6 * nodes];
-    system.evaluate(state, 0.0, Some((Tangent::Full, &still))).unwrap();
+    system.evaluate(state, 0.0, Some(&still)).unwrap();
     let (force, size) = (system.internal.clone(), system.equations.len());
     let along: Vec<f64> = (0..size).map(|_| random.number()).collect();
     let mut predicted = vec![0.0; size];
@@ -164,7 +163,7 @@ fn pressures_on_faces_have_their_stiffness() {
         let stiffness = |model: &Assembly, state: &State| {
             let mut system = System::new(model.clone().into(), LinearSolver::Direct).unwrap();
             let still = vec![0.0; 6 * model.rest.len()];
-            system.evaluate(state, 1.0, Some((Tangent::Full, &still))).unwrap();
+            system.evaluate(state, 1.0, Some(&still)).unwrap();
             system
         };
         let mut random = Random::new(3);
@@ -225,7 +224,7 @@ fn loads_on_carried_surfaces_act_through_their_mapping() {
         state.position.iter_mut().for_each(|x| *x += 0.01 * Vector3::from(random.vector()));
         let mut system = System::new(model.clone().into(), LinearSolver::Direct).unwrap();
         let still = vec![0.0; 6 * model.rest.len()];
-        system.evaluate(&state, 1.0, Some((Tangent::Full, &still))).unwrap();
+        system.evaluate(&state, 1.0, Some(&still)).unwrap();
         system.external
     };
     let load = |kind| Load::new("load", kind, Curve { shape: Shape::Hold, from: 0.0, to: 0.0 });
