@@ -6,8 +6,8 @@
 //! `CentralDifference::in_lanes` chooses other instructions. Lanes never mix: with AVX-512 and AVX2 results are the same to the bit
 //! (tested for every law and element in `forces/tests.rs`), elsewhere to round-off.
 //!
-//! This file holds all `unsafe` code of the crate: registers read from and written to arrays, and nodes of a block read without a
-//! comparison each, since all are compared once.
+//! This file holds all `unsafe` code of the crate: registers read from and written to arrays, and nodes of a block read and written
+//! without a comparison each, since all are compared once.
 #![allow(unsafe_code)]
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -56,11 +56,11 @@ pub trait Lanes<R>: Number {
     fn load(pack: &Pack<R>, at: usize) -> Self;
     /// Writes them into a pack from lane `at` on.
     fn store(self, pack: &mut Pack<R>, at: usize);
-    /// The four components of the vectors at some places, for lanes `at` and on.
+    /// The four components of the vectors at some offsets of [`Places`], for lanes `at` and on.
     ///
     /// # Safety
-    /// All places lie inside.
-    unsafe fn gather(vectors: &[[R; 4]], places: &[u16; PACK], at: usize) -> [Self; 4];
+    /// All offsets lie inside.
+    unsafe fn gather(vectors: &[[R; 4]], offsets: &[u16; PACK], at: usize) -> [Self; 4];
     /// Writes vectors from lane `at` on, each where [`row_of_lane`](Self::row_of_lane) tells.
     fn spread(components: [Self; 4], to: &mut Pack<[R; 4]>, at: usize);
     /// Where the vector of a lane of a pack is written: the order in which registers hold them.
@@ -98,6 +98,18 @@ pub(crate) fn load_symmetric<R: Scalar, L: Lanes<R>>(from: &Symmetric<Pack<R>>, 
         *number = L::load(pack, at);
     }
     symmetric
+}
+
+/// Writes a symmetric tensor into packs.
+#[inline(always)]
+pub(crate) fn store_symmetric<R: Scalar, L: Lanes<R>>(
+    symmetric: Symmetric<L>,
+    to: &mut Symmetric<Pack<R>>,
+    at: usize,
+) {
+    for (number, pack) in symmetric.0.into_iter().zip(&mut to.0) {
+        number.store(pack, at);
+    }
 }
 
 /// Work that is written for any lanes. Every function that it calls must be `#[inline(always)]`, or it is not compiled for these instructions.
@@ -247,42 +259,89 @@ unsafe fn proof<S: Simd>() -> S {
     unsafe { std::mem::transmute_copy(&()) }
 }
 
-/// The vectors and sums of some nodes, and packs of cells that know their nodes by their places among them. That all places
-/// lie inside is found once for all packs: a comparison for each access costs a tet 1 ns of 9.
-pub(crate) struct Local<'a, R, const N: usize> {
-    vectors: &'a [[R; 4]],
-    sums: &'a mut [[R; 4]],
-    places: &'a [[[u16; PACK]; N]],
+/// Where packs of cells have their nodes in an array of vectors of their block. Numbers are kept as offsets, which the processor adds to an
+/// address without a shift, and the largest of a block is found once for all steps: a comparison for each access costs a tet 1 ns of 9.
+pub(crate) struct Places<R, const N: usize> {
+    /// In [`Unit`]s, multiples of a vector.
+    offsets: Vec<[[u16; PACK]; N]>,
+    /// The largest of each block.
+    most: Vec<u16>,
+    /// Packs of a block.
+    per_block: usize,
+    of: std::marker::PhantomData<R>,
 }
 
-impl<'a, R: Scalar, const N: usize> Local<'a, R, N> {
+/// The unit of an offset, as long as the largest factor of an index in an address.
+type Unit = [u8; 8];
+
+/// Units of a vector.
+const fn units<R>() -> usize {
+    size_of::<[R; 4]>() / size_of::<Unit>()
+}
+
+impl<R: Scalar, const N: usize> Places<R, N> {
+    /// From the numbers of the nodes of packs of cells, and how many packs a block has.
+    pub(crate) fn new(packs: impl Iterator<Item = [[u16; PACK]; N]>, per_block: usize) -> Self {
+        let offset = |place: u16| place * units::<R>() as u16;
+        let offsets: Vec<_> = packs.map(|pack| pack.map(|places| places.map(offset))).collect();
+        let most = |block: &[[[u16; PACK]; N]]| {
+            block.as_flattened().as_flattened().iter().copied().max().unwrap_or_default()
+        };
+        Self {
+            most: offsets.chunks(per_block).map(most).collect(),
+            offsets,
+            per_block,
+            of: std::marker::PhantomData,
+        }
+    }
+
+    /// The vectors and sums of the nodes of a block, at work with its cells.
+    ///
     /// # Panics
     /// If there are not as many sums as vectors, or a place lies beyond.
     #[inline(always)]
-    pub(crate) fn new(vectors: &'a [[R; 4]], sums: &'a mut [[R; 4]], places: &'a [[[u16; PACK]; N]]) -> Self {
+    pub(crate) fn at_work<'a>(
+        &'a self,
+        block: usize,
+        vectors: &'a [[R; 4]],
+        sums: &'a mut [[R; 4]],
+    ) -> Local<'a, R, N> {
         assert_eq!(vectors.len(), sums.len());
-        let most = places.as_flattened().as_flattened().iter().fold(0, |most, &place| most.max(place));
-        assert!(usize::from(most) < vectors.len());
-        Self { vectors, sums, places }
+        assert!(usize::from(self.most[block]) < vectors.len() * units::<R>());
+        let first = block * self.per_block;
+        let offsets = &self.offsets[first..self.offsets.len().min(first + self.per_block)];
+        Local { vectors, sums, offsets }
     }
+}
 
+/// The vectors and sums of the nodes of a block, and the offsets of its packs in them, which lie inside.
+pub(crate) struct Local<'a, R, const N: usize> {
+    vectors: &'a [[R; 4]],
+    sums: &'a mut [[R; 4]],
+    offsets: &'a [[[u16; PACK]; N]],
+}
+
+impl<R: Scalar, const N: usize> Local<'_, R, N> {
     /// The vectors of a node of each cell of a pack, from lane `at` on, component by component.
     #[inline(always)]
     pub(crate) fn gather<L: Lanes<R>>(&self, pack: usize, node: usize, at: usize) -> [L; 4] {
-        // SAFETY: `new` has found all places inside.
-        unsafe { L::gather(self.vectors, &self.places[pack][node], at) }
+        // SAFETY: `Places` has found all offsets inside.
+        unsafe { L::gather(self.vectors, &self.offsets[pack][node], at) }
     }
 
     /// Adds the vectors of a pack of cells, as [`Lanes::spread`] has written them, to the sums of their nodes, cell by cell.
     #[inline(always)]
     pub(crate) fn add<L: Lanes<R>>(&mut self, pack: usize, vectors: &[Pack<[R; 4]>; N]) {
-        let places = &self.places[pack];
-        for lane in 0..PACK {
-            let row = L::row_of_lane(lane);
-            for (vectors, places) in vectors.iter().zip(places) {
-                // SAFETY: `new` has found all places inside.
-                let sum = unsafe { self.sums.get_unchecked_mut(usize::from(places[lane])) };
-                *sum = plus(*sum, vectors.0[row]);
+        let offsets = &self.offsets[pack];
+        // By fours, which the compiler writes out, so that rows lie at fixed distances.
+        for first in (0..PACK).step_by(4) {
+            for lane in first..first + 4 {
+                let row = L::row_of_lane(lane);
+                for (vectors, offsets) in vectors.iter().zip(offsets) {
+                    // SAFETY: `Places` has found all offsets inside, and nothing else refers to the sums.
+                    let sum = unsafe { &mut *at_offset_mut(self.sums, offsets[lane]) };
+                    *sum = plus(*sum, vectors.0[row]);
+                }
             }
         }
     }
@@ -290,20 +349,40 @@ impl<'a, R: Scalar, const N: usize> Local<'a, R, N> {
     /// Adds a number of each cell of a pack to the first component of the sums of all its nodes, cell by cell.
     #[inline(always)]
     pub(crate) fn add_number(&mut self, pack: usize, numbers: &Pack<R>) {
-        let places = &self.places[pack];
+        let offsets = &self.offsets[pack];
         for lane in 0..PACK {
-            for places in places {
-                // SAFETY: `new` has found all places inside.
-                let sum = unsafe { self.sums.get_unchecked_mut(usize::from(places[lane])) };
+            for offsets in offsets {
+                // SAFETY: as above.
+                let sum = unsafe { &mut *at_offset_mut(self.sums, offsets[lane]) };
                 sum[0] += numbers.0[lane];
             }
         }
     }
 }
 
+/// The vector at an offset of [`Places`].
+///
+/// # Safety
+/// The offset lies inside.
+#[inline(always)]
+unsafe fn at_offset<R: Copy>(vectors: &[[R; 4]], offset: u16) -> [R; 4] {
+    // SAFETY: the caller's.
+    unsafe { *vectors.as_ptr().cast::<Unit>().add(usize::from(offset)).cast() }
+}
+
+/// Where it lies.
+///
+/// # Safety
+/// The offset lies inside.
+#[inline(always)]
+unsafe fn at_offset_mut<R>(vectors: &mut [[R; 4]], offset: u16) -> *mut [R; 4] {
+    // SAFETY: the caller's.
+    unsafe { vectors.as_mut_ptr().cast::<Unit>().add(usize::from(offset)).cast() }
+}
+
 /// a + b. Both are read before anything is written, or the compiler takes number by number.
 #[inline(always)]
-fn plus<R: Scalar>(a: [R; 4], b: [R; 4]) -> [R; 4] {
+pub(crate) fn plus<R: Scalar>(a: [R; 4], b: [R; 4]) -> [R; 4] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
 }
 
@@ -394,11 +473,11 @@ macro_rules! wide {
                 S::$slice_mut(&mut pack.0).0[at / Self::WIDTH] = self.0;
             }
             #[inline(always)]
-            unsafe fn gather(vectors: &[[$type; 4]], places: &[u16; PACK], at: usize) -> [Self; 4] {
+            unsafe fn gather(vectors: &[[$type; 4]], offsets: &[u16; PACK], at: usize) -> [Self; 4] {
                 let mut rows = [[0.0; 4]; PACK];
                 for (row, to) in rows[..Self::WIDTH].iter_mut().enumerate() {
                     // SAFETY: the caller's.
-                    *to = unsafe { *vectors.get_unchecked(usize::from(places[at + Self::lane_of_row(row)])) };
+                    *to = unsafe { at_offset(vectors, offsets[at + Self::lane_of_row(row)]) };
                 }
                 Self::to_components(&rows)
             }
@@ -536,8 +615,9 @@ macro_rules! wide {
                 pack.0[at] = self;
             }
             #[inline(always)]
-            unsafe fn gather(vectors: &[[$type; 4]], places: &[u16; PACK], at: usize) -> [Self; 4] {
-                vectors[usize::from(places[at])]
+            unsafe fn gather(vectors: &[[$type; 4]], offsets: &[u16; PACK], at: usize) -> [Self; 4] {
+                // SAFETY: the caller's.
+                unsafe { at_offset(vectors, offsets[at]) }
             }
             #[inline(always)]
             fn spread(components: [Self; 4], to: &mut Pack<[$type; 4]>, at: usize) {

@@ -37,6 +37,9 @@ use crate::touching::{Free, NodeContact, Nodes, Posture, Touching};
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
 
+/// Tasks that a thread takes at least: fewer take less time than waking another thread.
+const LEAST_CHUNKS: usize = 4;
+
 /// The results of an evaluated instant that a caller needs. A GPU reads back only these.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wanted {
@@ -279,9 +282,9 @@ impl<R: Scalar> LaneWork<R> for NodePass<'_, R> {
                     *to = stepper.applied.at(node);
                 }
             }
-            block.before[..before.len()].copy_from_slice(before);
-            block.mass[..before.len()].copy_from_slice(&stepper.mass[nodes.clone()]);
-            block.damping[..before.len()].copy_from_slice(&stepper.damping[nodes.clone()]);
+            copy_in(before, &mut block.before);
+            copy_in(&stepper.mass[nodes.clone()], &mut block.mass);
+            copy_in(&stepper.damping[nodes.clone()], &mut block.damping);
             block.move_freely(&pace);
             while let Some(held) = held.next_if(|held| (held.node as usize) < nodes.end) {
                 let node = held.node as usize;
@@ -298,11 +301,23 @@ impl<R: Scalar> LaneWork<R> for NodePass<'_, R> {
                 block.add_push(&mut sums);
                 block.external = [[R::ZERO; 3]; BLOCK];
             }
-            next.copy_from_slice(&block.next[..next.len()]);
+            match next.first_chunk_mut() {
+                Some(next) => *next = block.next,
+                None => next.copy_from_slice(&block.next[..next.len()]),
+            }
         }
         let [kinetic, damping_power, internal_before, internal_after, external_before, external_after] =
             sums.map(|lanes| lanes.iter().sum());
         Sums { kinetic, damping_power, internal_before, internal_after, external_before, external_after }
+    }
+}
+
+/// Copies the first entries of a block in, mostly all of them: then without a call.
+#[inline(always)]
+fn copy_in<T: Copy>(from: &[T], to: &mut [T; BLOCK]) {
+    match from.first_chunk() {
+        Some(from) => *to = *from,
+        None => to[..from.len()].copy_from_slice(from),
     }
 }
 
@@ -571,7 +586,7 @@ impl<R: Scalar> CentralDifference<R> {
     pub fn advance(&mut self, state: &mut State<R>) {
         std::mem::swap(&mut state.increment, &mut self.next);
         let chunks = state.displacement.par_chunks_mut(CHUNK).zip(state.increment.par_chunks(CHUNK));
-        chunks.enumerate().for_each(|(task, (displacement, increment))| {
+        chunks.enumerate().with_min_len(LEAST_CHUNKS).for_each(|(task, (displacement, increment))| {
             let first = task * CHUNK;
             self.processor.run(Add { increment, to: displacement });
             for held in self.held_in(first..first + displacement.len()) {
@@ -729,6 +744,7 @@ impl<R: Scalar> CentralDifference<R> {
         let increment = state.increment.par_chunks(CHUNK);
         (next.par_chunks_mut(CHUNK).zip(reaction.par_chunks_mut(CHUNK)).zip(increment).zip(&mut sums))
             .enumerate()
+            .with_min_len(LEAST_CHUNKS)
             .for_each(|(task, (((next, reaction), before), sums))| {
                 *sums = self.processor.run(NodePass {
                     stepper: self,

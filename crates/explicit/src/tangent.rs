@@ -14,7 +14,7 @@ use pliant_mechanics::model::{Cells, Solid};
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, dot, scale};
 
 use crate::eigenvalues::{ROWS, eigenvector, largest_of_nine, largest_of_three};
-use crate::forces::Batch;
+use crate::forces::{Batch, Wanted};
 use crate::lanes::{LaneWork, Lanes, PACK, Pack, Processor, load_symmetric, load_tensor};
 
 /// Size of the differences of F: truncation and round-off both near 1e-10.
@@ -164,7 +164,7 @@ impl Tangents<'_> {
     fn stresses<L: Lanes<f64>>(&self, batch: &mut Batch<f64>) {
         match &self.solid.cells {
             Cells::Membrane(..) => plane_stresses(self.solid, self.cells, batch),
-            _ => batch.evaluate::<L>(&self.solid.material.law, 2, 2, self.fibres),
+            _ => batch.evaluate::<L>(&self.solid.material.law, Wanted::Whole, 2, 2, self.fibres),
         }
     }
 
@@ -188,8 +188,7 @@ impl Tangents<'_> {
 /// F S [Pa].
 #[inline(always)]
 fn first_piola_kirchhoff<L: Lanes<f64>>(batch: &Batch<f64>, pack: usize, at: usize) -> Tensor<L> {
-    let stress = batch.elastic::<L>(pack, at);
-    batch.deformation_gradient::<L>(pack, at).times_symmetric(&(stress.isochoric + stress.volumetric))
+    batch.deformation_gradient::<L>(pack, at).times_symmetric(&batch.stress::<L>(pack, at))
 }
 
 /// The stresses of the triangles of a membrane, at the first two packs.
@@ -201,7 +200,7 @@ fn plane_stresses(solid: &Solid, cells: &[usize; PACK], batch: &mut Batch<f64>) 
             let plane = InPlane::from_changes(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], &changes);
             let found = solid.material.law.plane_stress(plane.strain_twice, &solid.law_fibres(cell));
             let [xx, yy, xy] = found.stress;
-            for (to, s) in batch.elastic[pack].isochoric.0.iter_mut().zip([xx, yy, 0.0, xy, 0.0, 0.0]) {
+            for (to, s) in batch.stress[pack].0.iter_mut().zip([xx, yy, 0.0, xy, 0.0, 0.0]) {
                 to.0[lane] = s;
             }
         }

@@ -2,7 +2,7 @@
 //! Only what laws and elements need; everything is inlined. Written out component by component: `array::map` is
 //! often left as a call in the inner loop, which costs a third of the speed of a tet.
 
-use std::ops::{Add, Mul, Sub};
+use std::ops::{Add, Mul, Neg, Sub};
 
 use serde::{Deserialize, Serialize};
 
@@ -229,6 +229,13 @@ impl<R: Number> Symmetric<R> {
         sum
     }
 
+    /// S + s I.
+    #[inline(always)]
+    pub fn plus_isotropic(&self, s: R) -> Self {
+        let [xx, yy, zz, xy, yz, xz] = self.0;
+        Self([xx + s, yy + s, zz + s, xy, yz, xz])
+    }
+
     /// A : B.
     #[inline(always)]
     pub fn double_dot(&self, b: &Self) -> R {
@@ -275,6 +282,15 @@ impl<R: Number> Sub for Symmetric<R> {
     fn sub(self, b: Self) -> Self {
         let (a, b) = (self.0, b.0);
         Self([a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3], a[4] - b[4], a[5] - b[5]])
+    }
+}
+
+impl<R: Number> Neg for Symmetric<R> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        let a = self.0;
+        Self([-a[0], -a[1], -a[2], -a[3], -a[4], -a[5]])
     }
 }
 

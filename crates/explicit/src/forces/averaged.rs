@@ -15,7 +15,7 @@ use pliant_mechanics::prony::Prony;
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector};
 use rayon::prelude::*;
 
-use super::batch::{Batch, PACKS, pressures, volume_change};
+use super::batch::{Batch, PACKS, Wanted, pressures, volume_change};
 use super::blocks::{Blocks, Moved, Quad, Shares, Task};
 use super::{
     Findings, ForceField, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, own_packs,
@@ -145,7 +145,7 @@ impl<R: Scalar> LaneWork<R> for VolumeChanges<'_, R> {
         task.copy_in(displacement);
         task.forces.fill([R::ZERO; 4]);
         let packs = cells.packs_of(task.block);
-        let mut local = Local::new(task.moved, task.forces, &cells.nodes[packs.clone()]);
+        let mut local = cells.places.at_work(task.block, task.moved, task.forces);
         let mut values = Pack::ZERO;
         for pack in packs.clone() {
             for at in (0..PACK).step_by(L::WIDTH) {
@@ -176,7 +176,7 @@ impl<R: Scalar> LaneWork<R> for CellPressures<'_, R> {
         sums.fill([R::ZERO; 4]);
         let mut batch = Batch::new();
         let packs = cells.packs_of(block);
-        let mut local = Local::new(moved, sums, &cells.nodes[packs.clone()]);
+        let mut local = cells.places.at_work(block, moved, sums);
         for first in packs.clone().step_by(PACKS) {
             let mut values = [Pack::ZERO; PACKS];
             let values = &mut values[..PACKS.min(packs.end - first)];
@@ -264,13 +264,14 @@ impl<R: Scalar> LaneWork<R> for AveragedPass<'_, R> {
         let Task { block, moved, forces: sums, history, .. } = task;
         let per_pack = 6 * constants.cell_slots();
         let of_deformation = constants.averaging == Averaging::NiftySim;
+        let wanted = if of_deformation { Wanted::Parts } else { Wanted::Isochoric };
         sums.fill([R::ZERO; 4]);
         let mut findings = Findings::default();
         let mut batch = Batch::new();
         let mut averages = [Pack::ZERO; PACKS];
         let mut forces = [Pack([[R::ZERO; 4]; PACK]); 4];
         let packs = cells.packs_of(block);
-        let mut local = Local::new(moved, sums, &cells.nodes[packs.clone()]);
+        let mut local = cells.places.at_work(block, moved, sums);
         for first in packs.clone().step_by(PACKS) {
             let count = PACKS.min(packs.end - first);
             for (index, average) in averages[..count].iter_mut().enumerate() {
@@ -293,7 +294,7 @@ impl<R: Scalar> LaneWork<R> for AveragedPass<'_, R> {
                     }
                 }
             }
-            batch.evaluate::<L>(law, count, 1, cells.fibres(first, count));
+            batch.evaluate::<L>(law, wanted, count, 1, cells.fibres(first, count));
             for (index, average) in averages[..count].iter().enumerate() {
                 let pack = first + index;
                 if !of_deformation {
@@ -301,7 +302,10 @@ impl<R: Scalar> LaneWork<R> for AveragedPass<'_, R> {
                 }
                 let own = own_packs(pack - packs.start, per_pack, history.len());
                 for at in (0..PACK).step_by(L::WIDTH) {
-                    let elastic = batch.elastic::<L>(index, at);
+                    let elastic = match wanted {
+                        Wanted::Parts => batch.parts::<L>(index, at),
+                        _ => Split { isochoric: batch.stress(index, at), volumetric: Symmetric::ZERO },
+                    };
                     let f = batch.deformation_gradient::<L>(index, at);
                     let average = L::load(average, at);
                     let piola = constants.piola(&f, elastic, average, &mut history[own.clone()], at);

@@ -11,7 +11,7 @@ use super::blocks::Task;
 use super::one_pass::{Element, OnePass};
 use super::{Findings, PackedCells, by_cell, own_packs, relative};
 use crate::Scalar;
-use crate::lanes::{Lanes, Local, PACK, Pack, load_vector};
+use crate::lanes::{Lanes, PACK, Pack, load_vector};
 use crate::relaxation::Relaxation;
 
 /// Bars of one solid.
@@ -83,7 +83,7 @@ impl<R: Scalar> Element<R> for BarConstants<R> {
         sums.fill([R::ZERO; 4]);
         let mut forces = [Pack([[R::ZERO; 4]; PACK]); 2];
         let packs = cells.packs_of(block);
-        let mut local = Local::new(moved, sums, &cells.nodes[packs.clone()]);
+        let mut local = cells.places.at_work(block, moved, sums);
         for pack in packs.clone() {
             let own = own_packs(pack - packs.start, *per_pack, history.len());
             let bar = &rest[pack];

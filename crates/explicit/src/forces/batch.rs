@@ -9,18 +9,32 @@ use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, dot};
 use super::Findings;
 use crate::Scalar;
 use crate::lanes::{
-    LaneWork, Lanes, PACK, Pack, Processor, load_symmetric, load_tensor, load_vector, store_vector,
+    LaneWork, Lanes, PACK, Pack, Processor, load_symmetric, load_tensor, load_vector, store_symmetric,
+    store_vector,
 };
 
 /// Packs of points in a batch: few enough for the first cache.
 pub(super) const PACKS: usize = 4;
 
+/// What a law is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Wanted {
+    /// The whole stress.
+    Whole,
+    /// The isochoric part of it.
+    Isochoric,
+    /// Both parts.
+    Parts,
+}
+
 /// Displacement gradients of up to [`PACKS`] packs of points, and what the law finds there.
 pub(crate) struct Batch<R> {
     /// ∂u/∂X.
     pub gradient: [Tensor<Pack<R>>; PACKS],
-    /// Elastic second Piola–Kirchhoff stress [Pa].
-    pub elastic: [Split<Symmetric<Pack<R>>>; PACKS],
+    /// Elastic second Piola–Kirchhoff stress [Pa], the whole or its isochoric part.
+    pub stress: [Symmetric<Pack<R>>; PACKS],
+    /// The volumetric part, where parts are wanted.
+    volumetric: [Symmetric<Pack<R>>; PACKS],
     /// J.
     pub volume_ratio: [Pack<R>; PACKS],
     /// |C − I|².
@@ -32,7 +46,8 @@ impl<R: Scalar> Batch<R> {
         let stress = Symmetric([Pack::ZERO; 6]);
         Self {
             gradient: [Tensor([[Pack::ZERO; 3]; 3]); PACKS],
-            elastic: [Split { isochoric: stress, volumetric: stress }; PACKS],
+            stress: [stress; PACKS],
+            volumetric: [stress; PACKS],
             volume_ratio: [Pack::ZERO; PACKS],
             strain: [Pack::ZERO; PACKS],
         }
@@ -59,23 +74,29 @@ impl<R: Scalar> Batch<R> {
         }
     }
 
-    /// The stresses of the first packs. `fibres` has the directions of each cell, which has `points` points one after the other.
+    /// What is wanted of the stresses of the first packs. `fibres` has the directions of each cell, which has `points` points one after the other.
     #[inline(always)]
     pub(crate) fn evaluate<L: Lanes<R>>(
         &mut self,
         law: &AnyLaw,
+        wanted: Wanted,
         packs: usize,
         points: usize,
         fibres: &[Vector<Pack<R>>],
     ) {
-        with_law!(law, law => L::call(Stresses { law: *law, batch: self, packs, points, fibres }));
+        with_law!(law, law => L::call(Stresses { law: *law, wanted, batch: self, packs, points, fibres }));
     }
 
-    /// The elastic stress of the points from lane `at` of a pack on.
+    /// The stress of the points from lane `at` of a pack on: the whole or its isochoric part, as wanted.
     #[inline(always)]
-    pub(crate) fn elastic<L: Lanes<R>>(&self, pack: usize, at: usize) -> Split<Symmetric<L>> {
-        let Split { isochoric, volumetric } = &self.elastic[pack];
-        Split { isochoric: load_symmetric(isochoric, at), volumetric: load_symmetric(volumetric, at) }
+    pub(crate) fn stress<L: Lanes<R>>(&self, pack: usize, at: usize) -> Symmetric<L> {
+        load_symmetric(&self.stress[pack], at)
+    }
+
+    /// Both parts of it.
+    #[inline(always)]
+    pub(super) fn parts<L: Lanes<R>>(&self, pack: usize, at: usize) -> Split<Symmetric<L>> {
+        Split { isochoric: self.stress(pack, at), volumetric: load_symmetric(&self.volumetric[pack], at) }
     }
 
     /// F of the points from lane `at` of a pack on.
@@ -121,6 +142,7 @@ fn square<L: Number>(s: &Symmetric<L>) -> L {
 /// The stresses of a law at the points of a batch.
 struct Stresses<'a, R, T> {
     law: T,
+    wanted: Wanted,
     batch: &'a mut Batch<R>,
     packs: usize,
     points: usize,
@@ -132,7 +154,7 @@ impl<R: Scalar, T: Law> LaneWork<R> for Stresses<'_, R, T> {
 
     #[inline(always)]
     fn run<L: Lanes<R>>(self) {
-        let Self { law, batch, packs, points, fibres } = self;
+        let Self { law, wanted, batch, packs, points, fibres } = self;
         let families = law.families();
         for pack in 0..packs {
             let own = &fibres[pack / points * families..][..families];
@@ -143,11 +165,17 @@ impl<R: Scalar, T: Law> LaneWork<R> for Stresses<'_, R, T> {
                 for (direction, fibre) in directions.iter_mut().zip(own) {
                     *direction = load_vector(fibre, at);
                 }
-                let Split { isochoric, volumetric } = law.stress(&deformation, &directions[..families]);
-                for k in 0..6 {
-                    isochoric.0[k].store(&mut batch.elastic[pack].isochoric.0[k], at);
-                    volumetric.0[k].store(&mut batch.elastic[pack].volumetric.0[k], at);
-                }
+                let directions = &directions[..families];
+                let stress = match wanted {
+                    Wanted::Whole => law.whole_stress(&deformation, directions),
+                    Wanted::Isochoric => law.stress(&deformation, directions).isochoric,
+                    Wanted::Parts => {
+                        let Split { isochoric, volumetric } = law.stress(&deformation, directions);
+                        store_symmetric(volumetric, &mut batch.volumetric[pack], at);
+                        isochoric
+                    }
+                };
+                store_symmetric(stress, &mut batch.stress[pack], at);
                 deformation.volume_ratio.store(&mut batch.volume_ratio[pack], at);
                 square(&deformation.strain_twice).store(&mut batch.strain[pack], at);
             }
@@ -169,12 +197,12 @@ pub(super) fn pressures<R: Scalar, L: Lanes<R>>(law: &AnyLaw, values: &mut [Pack
         }
     }
     let any = [R::ONE, R::ZERO, R::ZERO].map(|a| Pack([a; PACK]));
-    batch.evaluate::<L>(law, values.len(), PACKS, &[any; MOST_FAMILIES]);
+    batch.evaluate::<L>(law, Wanted::Parts, values.len(), PACKS, &[any; MOST_FAMILIES]);
     for (pack, pressure) in values.iter_mut().enumerate() {
         for at in (0..PACK).step_by(L::WIDTH) {
             // S = J U' C⁻¹ with C⁻¹ = c⁻² I and J = c³.
             let c = L::ONE + L::load(&batch.gradient[pack].0[0][0], at);
-            let stress = L::load(&batch.elastic[pack].volumetric.0[0], at);
+            let stress = L::load(&batch.volumetric[pack].0[0], at);
             (stress / c).store(pressure, at);
         }
     }

@@ -7,13 +7,13 @@ use pliant_mechanics::model::{CellBlock, Solid};
 use pliant_mechanics::tensor::{Vector, add, cast};
 
 use super::averaged::relaxed_pressures;
-use super::batch::{Batch, PACKS, volume_change};
+use super::batch::{Batch, PACKS, Wanted, volume_change};
 use super::blocks::Task;
 use super::corners::{CornerCheck, PackedCorners, is_flat};
 use super::one_pass::{Element, OnePass};
 use super::{Findings, PackedCells, by_cell, displacement_gradient, own_packs, relative};
 use crate::Scalar;
-use crate::lanes::{Lanes, Local, PACK, Pack, load_vector, store_vector};
+use crate::lanes::{Lanes, PACK, Pack, load_vector, store_vector};
 use crate::relaxation::Relaxation;
 
 pub(super) type FullHexes<R> = OnePass<R, FullHexConstants<R>>;
@@ -86,7 +86,7 @@ impl<R: Scalar> Element<R> for FullHexConstants<R> {
         let mut nodal = [[Pack::ZERO; 3]; 7];
         let mut forces = [Pack([[R::ZERO; 4]; PACK]); 8];
         let packs = cells.packs_of(block);
-        let mut local = Local::new(moved, sums, &cells.nodes[packs.clone()]);
+        let mut local = cells.places.at_work(block, moved, sums);
         for pack in packs.clone() {
             let mut pressure = Pack::ZERO;
             for at in (0..PACK).step_by(L::WIDTH) {
@@ -130,13 +130,13 @@ impl<R: Scalar> Element<R> for FullHexConstants<R> {
                         batch.set(index, at, &displacement_gradient(&relative, &point.gradient, at));
                     }
                 }
-                batch.evaluate::<L>(law, PACKS, PACKS, cells.fibres(pack, 1));
+                batch.evaluate::<L>(law, Wanted::Isochoric, PACKS, PACKS, cells.fibres(pack, 1));
                 for (index, point) in points.iter().enumerate() {
                     batch.note(index, pack * PACK, &mut findings);
                     let number = (pack - packs.start) * 8 + part * PACKS + index;
                     let own = own_packs(number, per_point, history.len());
                     for at in (0..PACK).step_by(L::WIDTH) {
-                        let isochoric = batch.elastic::<L>(index, at).isochoric;
+                        let isochoric = batch.stress::<L>(index, at);
                         let stress = relaxation.advance_isochoric(isochoric, &mut history[own.clone()], at);
                         let f = batch.deformation_gradient::<L>(index, at);
                         let piola = f.times_symmetric(&stress);

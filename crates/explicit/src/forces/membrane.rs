@@ -15,12 +15,12 @@ use pliant_mechanics::law::plane_stress::{
 use pliant_mechanics::model::{CellBlock, Solid};
 use pliant_mechanics::tensor::{Symmetric, Vector, add, cast, dot, scale};
 
-use super::batch::{Batch, PACKS};
+use super::batch::{Batch, PACKS, Wanted};
 use super::blocks::Task;
 use super::one_pass::{Element, OnePass};
 use super::{Findings, PackedCells, by_cell, own_packs, relative};
 use crate::Scalar;
-use crate::lanes::{Lanes, Local, PACK, Pack, load_vector};
+use crate::lanes::{Lanes, PACK, Pack, load_vector};
 use crate::relaxation::Relaxation;
 
 /// Where a search ends: a step of so many units in the last place of λ₃ − 1.
@@ -173,7 +173,7 @@ impl<R: Scalar> Walls<R> {
                     self.set(batch, pack, at, change);
                 }
             }
-            batch.evaluate::<L>(&constants.law, packs, 1, fibres);
+            batch.evaluate::<L>(&constants.law, Wanted::Isochoric, packs, 1, fibres);
             return;
         }
         for pack in 0..packs {
@@ -191,7 +191,7 @@ impl<R: Scalar> Walls<R> {
                     self.set(batch, pack, at, change);
                 }
             }
-            batch.evaluate::<L>(&constants.law, packs, 1, fibres);
+            batch.evaluate::<L>(&constants.law, Wanted::Whole, packs, 1, fibres);
             let mut found = true;
             for pack in 0..packs {
                 let mut steps = Pack::ZERO;
@@ -203,8 +203,7 @@ impl<R: Scalar> Walls<R> {
                         L::load(last, at),
                         L::load(moved, at),
                     ]);
-                    let Split { isochoric, volumetric } = batch.elastic::<L>(pack, at);
-                    let stress = isochoric + volumetric;
+                    let stress = batch.stress::<L>(pack, at);
                     search.improve(kirchhoff_across(&stress, search.change)).store(&mut steps, at);
                     for (part, to) in search.parts().into_iter().zip(&mut self.search[pack]) {
                         part.store(to, at);
@@ -231,10 +230,8 @@ impl<R: Scalar> Walls<R> {
         pack: usize,
         at: usize,
     ) -> [L; 3] {
-        let Split { isochoric, volumetric } = batch.elastic::<L>(pack, at);
-        let whole = if constants.across.modulus.is_infinite() { isochoric } else { isochoric + volumetric };
-        let change = L::load(&self.change[pack], at);
-        self.plane::<L>(pack, at).without_stress_across(&whole, change, L::of(constants.across.coupling))
+        let (stress, change) = (batch.stress(pack, at), L::load(&self.change[pack], at));
+        self.plane::<L>(pack, at).without_stress_across(&stress, change, L::of(constants.across.coupling))
     }
 }
 
@@ -319,7 +316,7 @@ impl<R: Scalar> Element<R> for MembraneConstants<R> {
         let mut walls = Walls::new();
         let mut forces = [Pack([[R::ZERO; 4]; PACK]); 3];
         let packs = cells.packs_of(block);
-        let mut local = Local::new(moved, sums, &cells.nodes[packs.clone()]);
+        let mut local = cells.places.at_work(block, moved, sums);
         for first in packs.clone().step_by(PACKS) {
             let count = PACKS.min(packs.end - first);
             if let Some(shear) = self.neo_hookean {

@@ -25,7 +25,7 @@ mod tests;
 
 use averaged::AveragedTets;
 use bar::Bars;
-pub(crate) use batch::{Batch, pressure};
+pub(crate) use batch::{Batch, Wanted, pressure};
 pub(crate) use blocks::BLOCK;
 use std::ops::Range;
 
@@ -38,8 +38,9 @@ use pulp::Simd;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::applied;
 use crate::history::History;
-use crate::lanes::{Lanes, Local, PACK, Pack, Processor, WideF32, WideF64, load_vector};
+use crate::lanes::{Lanes, Local, PACK, Pack, Places, Processor, WideF32, WideF64, load_vector, plus};
 use blocks::{Blocks, Quad, Shares};
 use full_hex::FullHexes;
 use membrane::Membranes;
@@ -154,8 +155,8 @@ fn own_packs(point: usize, each: usize, all: usize) -> Range<usize> {
 /// What all elements need of their cells, in packs.
 struct PackedCells<R, const N: usize> {
     count: usize,
-    /// Nodes of packs of cells, numbered in their block.
-    nodes: Vec<[[u16; PACK]; N]>,
+    /// Nodes of packs of cells in their block.
+    places: Places<R, N>,
     /// Directions of the families.
     fibre: Vec<Vector<Pack<R>>>,
     families: usize,
@@ -164,16 +165,18 @@ struct PackedCells<R, const N: usize> {
 impl<R: Scalar, const N: usize> PackedCells<R, N> {
     fn new(solid: &Solid, cells: &CellBlock<N>) -> (Self, Blocks) {
         let (blocks, local) = Blocks::new(&cells.nodes);
+        let last = local.len().max(1) - 1;
+        let nodes = |pack: usize| {
+            let node = |a: usize| std::array::from_fn(|lane| local[last.min(pack * PACK + lane)][a]);
+            std::array::from_fn(node)
+        };
         let mut packed = Self {
             count: local.len(),
-            nodes: Vec::new(),
+            places: Places::new((0..local.len().div_ceil(PACK)).map(nodes), BLOCK),
             fibre: Vec::new(),
             families: solid.material.law.families(),
         };
         for pack in packed.packs() {
-            let last = packed.count - 1;
-            let node = |a: usize| std::array::from_fn(|lane| local[last.min(pack * PACK + lane)][a]);
-            packed.nodes.push(std::array::from_fn(node));
             for family in 0..packed.families {
                 packed.fibre.push(packed.vector(pack, |cell| cast(solid.law_fibres(cell)[family])));
             }
@@ -496,13 +499,15 @@ impl<R: Scalar> InternalForces<R> {
         force[0]
     }
 
-    /// The same of some nodes.
+    /// The same of some nodes, at most a block of them.
     #[inline(always)]
     pub(crate) fn at_nodes(&self, nodes: Range<usize>, to: &mut [Vector<R>]) {
-        let part = |place: usize| {
-            let [x, y, z, _] = self.forces[place];
-            [x, y, z]
-        };
-        self.shares.visit(nodes, to, part, |sum, place| *sum = add(*sum, part(place)));
+        let mut all = [[R::ZERO; 4]; applied::BLOCK];
+        let sums = &mut all[..nodes.len()];
+        let part = |place: usize| self.forces[place];
+        self.shares.visit(nodes, sums, part, |sum, place| *sum = plus(*sum, part(place)));
+        for (to, &mut [x, y, z, _]) in to.iter_mut().zip(sums) {
+            *to = [x, y, z];
+        }
     }
 }

@@ -4,7 +4,7 @@ use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::{CellBlock, Solid};
 use pliant_mechanics::tensor::Vector;
 
-use super::batch::{Batch, PACKS};
+use super::batch::{Batch, PACKS, Wanted};
 use super::blocks::Task;
 use super::corners::{CornerCheck, PackedCorners, flatness, may_fold};
 use super::hourglass::{PackedHourglass, Resistance};
@@ -13,7 +13,7 @@ use super::{
     Findings, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, own_packs, relative,
 };
 use crate::Scalar;
-use crate::lanes::{Lanes, Local, PACK, Pack};
+use crate::lanes::{Lanes, PACK, Pack};
 use crate::relaxation::Relaxation;
 
 /// Cells of `N` nodes with one evaluation point; `M` is one less.
@@ -67,13 +67,15 @@ impl<R: Scalar, const N: usize, const M: usize> Element<R> for PlainConstants<R,
         task.copy_in(displacement);
         let Task { block, moved, forces: sums, history, .. } = task;
         sums.fill([R::ZERO; 4]);
+        let relaxes = !history.is_empty();
+        let wanted = if relaxes { Wanted::Parts } else { Wanted::Whole };
         let mut findings = Findings::default();
         let mut batch = Batch::new();
         let mut resistance = [Resistance::new(); PACKS];
         let mut reach = [Pack::ZERO; PACKS];
         let mut forces = [Pack([[R::ZERO; 4]; PACK]); N];
         let packs = cells.packs_of(block);
-        let mut local = Local::new(moved, sums, &cells.nodes[packs.clone()]);
+        let mut local = cells.places.at_work(block, moved, sums);
         for first in packs.clone().step_by(PACKS) {
             let count = PACKS.min(packs.end - first);
             for (index, resistance) in resistance[..count].iter_mut().enumerate() {
@@ -89,7 +91,7 @@ impl<R: Scalar, const N: usize, const M: usize> Element<R> for PlainConstants<R,
                     }
                 }
             }
-            batch.evaluate::<L>(law, count, 1, cells.fibres(first, count));
+            batch.evaluate::<L>(law, wanted, count, 1, cells.fibres(first, count));
             for (index, resistance) in resistance[..count].iter().enumerate() {
                 let pack = first + index;
                 batch.note(index, pack * PACK, &mut findings);
@@ -107,8 +109,10 @@ impl<R: Scalar, const N: usize, const M: usize> Element<R> for PlainConstants<R,
                 }
                 let own = own_packs(pack - packs.start, *per_pack, history.len());
                 for at in (0..PACK).step_by(L::WIDTH) {
-                    let elastic = batch.elastic::<L>(index, at);
-                    let stress = relaxation.advance(elastic, &mut history[own.clone()], at);
+                    let stress = match relaxes {
+                        true => relaxation.advance(batch.parts(index, at), &mut history[own.clone()], at),
+                        false => batch.stress::<L>(index, at),
+                    };
                     let piola = batch.deformation_gradient::<L>(index, at).times_symmetric(&stress);
                     let mut piola = piola.scaled(L::load(&rest[pack].volume, at));
                     if let Some(control) = hourglass {

@@ -30,6 +30,20 @@ fn total_stress(law: &AnyLaw, h: &Tensor<f64>) -> Symmetric<f64> {
     isochoric + volumetric
 }
 
+#[test]
+fn the_whole_stress_is_the_sum_of_its_parts() {
+    for law in every_law() {
+        for h in GRADIENTS.map(Tensor) {
+            let deformation = Deformation::from_displacement_gradient(&h);
+            let fibres = &FIBRES[..law.families()];
+            let whole = with_law!(law, law => law.whole_stress(&deformation, fibres));
+            let size = whole.0.iter().fold(1.0_f64, |a, b| a.max(b.abs()));
+            let difference = whole - total_stress(&law, &h);
+            assert!(difference.0.iter().all(|d| d.abs() < 1e-14 * size), "{law:?}: {difference:?}");
+        }
+    }
+}
+
 /// A rotation by Rodrigues' formula, minus the identity applied to F: returns R F − I.
 fn rotated(h: &Tensor<f64>) -> Tensor<f64> {
     let (axis, angle) = ([1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0], 0.9_f64);

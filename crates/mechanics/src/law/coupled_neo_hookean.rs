@@ -45,12 +45,10 @@ impl Law for CoupledNeoHookean {
 
     #[inline(always)]
     fn stress<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<Symmetric<R>> {
-        // I − C⁻¹ = C⁻¹ (C − I).
         let inverse = deformation.inverse_cauchy_green;
-        let shape = inverse.commuting_product(&deformation.strain_twice);
         let pressure = R::of(self.lame) * deformation.volume_change;
         Split {
-            isochoric: shape * R::of(self.shear),
+            isochoric: deformation.inverse_strain * R::of(self.shear),
             volumetric: inverse * (deformation.volume_ratio * pressure),
         }
     }

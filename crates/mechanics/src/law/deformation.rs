@@ -4,7 +4,8 @@
 //! A bar is the isochoric measure: C̄ = q C, q = J^(−2/3); Ī₁ = tr C̄, Ī₂ = ½ (Ī₁² − tr C̄²), Ī₄ = a·C̄a, Ī₅ = a·C̄²a.
 //! An energy Ψ(Ī₁, Ī₂, Ī₄, Ī₅) with the derivatives Wₖ = ∂Ψ/∂Īₖ has the stress S = q (Φ − ⅓ (Φ:C) C⁻¹) with
 //! Φ = 2 (W₁ + Ī₁ W₂) I − 2 W₂ C̄ + 2 W₄ a⊗a + 2 W₅ (a⊗C̄a + C̄a⊗a). Here it is put together from terms that vanish at
-//! rest: the isotropic part is C⁻¹ dev M with M a polynomial of C − I.
+//! rest: the isotropic part is C⁻¹ dev M with M a polynomial of X = C − I. By E = I − C⁻¹ it is C⁻¹ X = E and C⁻¹ X² = X − E, so that
+//! no tensors are multiplied. E itself is ((J² − 1 − tr X) I + X − cof X)/J², as cof C = (1 + tr X) I − X + cof X.
 
 use crate::Number;
 use crate::tensor::{Symmetric, Tensor, Vector, dot};
@@ -16,6 +17,8 @@ pub struct Deformation<R> {
     pub gradient: Tensor<R>,
     /// Twice the Green–Lagrange strain: C − I.
     pub strain_twice: Symmetric<R>,
+    /// I − C⁻¹, without cancellation.
+    pub inverse_strain: Symmetric<R>,
     /// C⁻¹.
     pub inverse_cauchy_green: Symmetric<R>,
     /// J = det F.
@@ -39,21 +42,24 @@ impl<R: Number> Deformation<R> {
         let strain_twice = Symmetric::green_lagrange_twice(h);
         let x = h.trace() + h.second_invariant() + h.determinant();
         let j = R::ONE + x;
-        let cauchy_green = strain_twice + Symmetric::IDENTITY;
         // y = J^(−1/3), and 1/J from its cube, once corrected.
         let y = j.inverse_cbrt();
         let cube = y * y * y;
         let inverse = cube * (-j).mul_add(cube, R::of(2.0));
-        let inverse_cauchy_green = cauchy_green.cofactor() * (inverse * inverse);
+        // J² − 1 = x (2 + x).
+        let isotropic = x.mul_add(x, x + x) - strain_twice.trace();
+        let shape = (strain_twice - strain_twice.cofactor()).plus_isotropic(isotropic);
+        let inverse_strain = shape * (inverse * inverse);
         // y³ − 1 = −x y³, hence q − 1 = (y − 1)(y + 1) = −x y³ (y + 1)/(y² + y + 1).
         let isochoric_change = -x * inverse * (y + R::ONE) / (y * y + y + R::ONE);
         Self {
             gradient,
             strain_twice,
-            inverse_cauchy_green,
+            inverse_strain,
+            inverse_cauchy_green: (-inverse_strain).plus_isotropic(R::ONE),
             volume_ratio: j,
             volume_change: x,
-            isochoric_factor: R::ONE + isochoric_change,
+            isochoric_factor: y * y,
             isochoric_change,
         }
     }
@@ -67,7 +73,7 @@ impl<R: Number> Deformation<R> {
     /// C̄ − I.
     #[inline(always)]
     pub fn isochoric_strain_twice(&self) -> Symmetric<R> {
-        self.strain_twice * self.isochoric_factor + Symmetric::IDENTITY * self.isochoric_change
+        (self.strain_twice * self.isochoric_factor).plus_isotropic(self.isochoric_change)
     }
 
     /// Ī₁ − 3 and Ī₂ − 3. With B = C̄ − I and t = tr B = Ī₁ − 3: Ī₂ − 3 = 2t + ½ (t² − B:B).
@@ -75,7 +81,7 @@ impl<R: Number> Deformation<R> {
     pub fn isochoric_invariants_minus_3(&self) -> [R; 2] {
         let t = self.isochoric_first_invariant_minus_3();
         let b = self.isochoric_strain_twice();
-        [t, R::of(2.0) * t + R::of(0.5) * (t * t - b.commuting_product(&b).trace())]
+        [t, R::of(2.0) * t + R::of(0.5) * (t * t - b.double_dot(&b))]
     }
 
     /// Ī₄ − 1 of the unit fibre `a`.
@@ -92,20 +98,35 @@ impl<R: Number> Deformation<R> {
         [strain, R::of(2.0) * strain + dot(ba, ba)]
     }
 
-    /// S of an energy of Ī₁: 2 W₁ q (I − I₁/3 C⁻¹).
+    /// S of an energy of Ī₁: 2 W₁ q (E − ⅓ tr X C⁻¹).
     #[inline(always)]
     pub fn first_invariant_stress(&self, w1: R) -> Symmetric<R> {
-        self.inverse_times_deviator(&self.strain_twice) * (R::of(2.0) * w1 * self.isochoric_factor)
+        let factor = R::of(2.0) * w1 * self.isochoric_factor;
+        let mean = factor * self.strain_twice.trace() * R::of(1.0 / 3.0);
+        (self.inverse_strain * (factor + mean)).plus_isotropic(-mean)
     }
 
-    /// S of an energy of Ī₁ and Ī₂: with X = C − I and C² − I = 2X + X²,
-    /// M = 2 (W₁ + Ī₁ W₂) q X − 2 W₂ q² (2X + X²).
+    /// S of an energy of Ī₁ and Ī₄ of the unit fibre `a`, the multiples of C⁻¹ taken together.
+    #[inline(always)]
+    pub fn fibre_reinforced_stress(&self, w1: R, a: Vector<R>, w4: R) -> Symmetric<R> {
+        let factor = R::of(2.0) * self.isochoric_factor;
+        let (matrix, fibre) = (factor * w1, factor * w4);
+        let i4 = R::ONE + self.strain_twice.quadratic(a);
+        let mean = (matrix * self.strain_twice.trace() + fibre * i4) * R::of(1.0 / 3.0);
+        let shape = (self.inverse_strain * (matrix + mean)).plus_isotropic(-mean);
+        shape.plus_scaled(&Symmetric::dyad(a), fibre)
+    }
+
+    /// S of an energy of Ī₁ and Ī₂: with C² − I = 2X + X², M = 2 (W₁ + Ī₁ W₂) q X − 2 W₂ q² (2X + X²).
     #[inline(always)]
     pub fn isotropic_stress(&self, w1: R, w2: R) -> Symmetric<R> {
-        let (q, x, two) = (self.isochoric_factor, &self.strain_twice, R::of(2.0));
+        let (q, x) = (self.isochoric_factor, &self.strain_twice);
         let i1 = R::of(3.0) + self.isochoric_first_invariant_minus_3();
-        let m = *x * (w1 + (i1 - two * q) * w2) - x.commuting_product(x) * (q * w2);
-        self.inverse_times_deviator(&m) * (two * q)
+        let factor = R::of(2.0) * q;
+        let (linear, square) = (factor * (w1 + (i1 - factor) * w2), factor * q * w2);
+        let mean = (linear * x.trace() - square * x.double_dot(x)) * R::of(1.0 / 3.0);
+        let shape = (self.inverse_strain * (linear + square + mean)).plus_scaled(x, -square);
+        shape.plus_isotropic(-mean)
     }
 
     /// S of an energy of Ī₄ of the unit fibre `a`: 2 W₄ q (a⊗a − I₄/3 C⁻¹).
@@ -123,13 +144,6 @@ impl<R: Number> Deformation<R> {
         let ca = [a[0] + x[0], a[1] + x[1], a[2] + x[2]];
         let pull = self.inverse_cauchy_green * (dot(ca, ca) * R::of(2.0 / 3.0));
         self.fibre_stress(a, w4) + (twice_symmetrised(a, ca) - pull) * (R::of(2.0) * w5 * q * q)
-    }
-
-    /// C⁻¹ (M − ⅓ tr M I) for a polynomial M of C.
-    #[inline(always)]
-    fn inverse_times_deviator(&self, m: &Symmetric<R>) -> Symmetric<R> {
-        let inverse = &self.inverse_cauchy_green;
-        inverse.commuting_product(m).plus_scaled(inverse, m.trace() * R::of(-1.0 / 3.0))
     }
 }
 
@@ -160,10 +174,22 @@ mod tests {
         let relative = |a: f64, b: f32| ((a - f64::from(b)) / a).abs();
         assert!(relative(fine.volume_change, coarse.volume_change) < 1e-6);
         assert!(relative(fine.isochoric_change, coarse.isochoric_change) < 1e-6);
+        for k in 0..6 {
+            let (fine, coarse) = (fine.inverse_strain.0[k], f64::from(coarse.inverse_strain.0[k]));
+            assert!((fine - coarse).abs() < 1e-6 * 1e-4, "component {k} of I − C⁻¹");
+        }
         let unit = [0.6, 0.0, 0.8];
         let stresses = [
             (fine.first_invariant_stress(0.5), coarse.first_invariant_stress(0.5)),
             (fine.isotropic_stress(0.2, 0.3), coarse.isotropic_stress(0.2, 0.3)),
+            (
+                fine.fibre_reinforced_stress(0.5, unit, fine.fibre_strain(unit)),
+                coarse.fibre_reinforced_stress(
+                    0.5,
+                    unit.map(|x| x as f32),
+                    coarse.fibre_strain(unit.map(|x| x as f32)),
+                ),
+            ),
             (
                 fine.fibre_stresses(unit, fine.fibre_strains(unit)),
                 coarse.fibre_stresses(unit.map(|x| x as f32), coarse.fibre_strains(unit.map(|x| x as f32))),
@@ -183,6 +209,8 @@ mod tests {
         let j = d.gradient.determinant();
         assert!((d.volume_ratio - j).abs() < 1e-15);
         assert!((d.isochoric_factor - j.powf(-2.0 / 3.0)).abs() < 1e-15);
+        let difference = d.inverse_strain + d.inverse_cauchy_green - Symmetric::IDENTITY;
+        assert!(difference.0.iter().all(|entry| entry.abs() < 1e-15));
         let c = (d.strain_twice + Symmetric::IDENTITY).full();
         let product = Tensor(c.0.map(|row| d.inverse_cauchy_green.full().transpose().apply(row)));
         for (i, row) in product.0.iter().enumerate() {
@@ -190,6 +218,10 @@ mod tests {
                 assert!((entry - f64::from(u8::from(i == k))).abs() < 1e-14);
             }
         }
+        let a = [0.6, 0.0, 0.8];
+        let apart = d.first_invariant_stress(0.7) + d.fibre_stress(a, 0.3);
+        let together = d.fibre_reinforced_stress(0.7, a, 0.3);
+        assert!((apart - together).0.iter().all(|entry| entry.abs() < 1e-15));
         let bar = c.0.map(|row| row.map(|x| x * d.isochoric_factor));
         let squared =
             [0, 1, 2].map(|i| [0, 1, 2].map(|k| (0..3).map(|l| bar[i][l] * bar[l][k]).sum::<f64>()));
@@ -198,7 +230,6 @@ mod tests {
         let [first, second] = d.isochoric_invariants_minus_3();
         assert!((first - (i1 - 3.0)).abs() < 1e-14);
         assert!((second - (0.5 * (i1 * i1 - trace(&squared)) - 3.0)).abs() < 1e-14);
-        let a = [0.6, 0.0, 0.8];
         let along = |t: [[f64; 3]; 3]| dot(a, Tensor(t).apply(a)) - 1.0;
         let [fourth, fifth] = d.fibre_strains(a);
         assert!((fourth - along(bar)).abs() < 1e-14 && (fourth - d.fibre_strain(a)).abs() < 1e-14);

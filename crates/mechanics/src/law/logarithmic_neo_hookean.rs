@@ -45,10 +45,9 @@ impl Law for LogarithmicNeoHookean {
 
     #[inline(always)]
     fn stress<R: Number>(&self, deformation: &Deformation<R>, _fibres: &[Vector<R>]) -> Split<Symmetric<R>> {
-        // I − C⁻¹ = C⁻¹ (C − I).
         let inverse = deformation.inverse_cauchy_green;
         Split {
-            isochoric: inverse.commuting_product(&deformation.strain_twice) * R::of(self.shear),
+            isochoric: deformation.inverse_strain * R::of(self.shear),
             volumetric: inverse * (R::of(self.lame) * deformation.volume_change.ln_1p()),
         }
     }

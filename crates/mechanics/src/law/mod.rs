@@ -140,6 +140,13 @@ pub trait Law: Copy + Send + Sync + 'static {
     /// Second Piola–Kirchhoff stress [Pa].
     fn stress<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Split<Symmetric<R>>;
 
+    /// The whole of it.
+    #[inline(always)]
+    fn whole_stress<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Symmetric<R> {
+        let Split { isochoric, volumetric } = self.stress(deformation, fibres);
+        isochoric + volumetric
+    }
+
     /// The stress in WGSL, its text in the file beside the law's; `None` of a law for the CPU only.
     fn shader(&self) -> Option<Shader>;
 

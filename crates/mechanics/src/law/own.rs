@@ -110,14 +110,14 @@ impl PartialEq for Own {
 const GIVEN: usize = 25 + 3 * MOST_FAMILIES;
 
 fn given<R: Number>(deformation: &Deformation<R>, fibres: &[Vector<R>]) -> [R; GIVEN] {
-    let Deformation { gradient, strain_twice, inverse_cauchy_green, .. } = deformation;
+    let Deformation { gradient, strain_twice, inverse_strain, .. } = deformation;
     let measures = [
         deformation.volume_ratio,
         deformation.volume_change,
         deformation.isochoric_factor,
         deformation.isochoric_change,
     ];
-    let tensors = gradient.0.iter().flatten().chain(&strain_twice.0).chain(&inverse_cauchy_green.0);
+    let tensors = gradient.0.iter().flatten().chain(&strain_twice.0).chain(&inverse_strain.0);
     let mut all = [R::ZERO; GIVEN];
     let numbers = tensors.chain(&measures).chain(fibres.iter().flatten());
     all.iter_mut().zip(numbers).for_each(|(to, from)| *to = *from);
@@ -127,10 +127,12 @@ fn given<R: Number>(deformation: &Deformation<R>, fibres: &[Vector<R>]) -> [R; G
 fn taken(all: &[f64; GIVEN]) -> (Deformation<f64>, [Vector<f64>; MOST_FAMILIES]) {
     let three = |at: usize| [all[at], all[at + 1], all[at + 2]];
     let six = |at: usize| Symmetric(std::array::from_fn(|k| all[at + k]));
+    let inverse_strain = six(15);
     let deformation = Deformation {
         gradient: Tensor([three(0), three(3), three(6)]),
         strain_twice: six(9),
-        inverse_cauchy_green: six(15),
+        inverse_strain,
+        inverse_cauchy_green: (-inverse_strain).plus_isotropic(1.0),
         volume_ratio: all[21],
         volume_change: all[22],
         isochoric_factor: all[23],

@@ -83,6 +83,12 @@ impl<L: SplitLaw> Law for L {
         }
     }
 
+    #[inline(always)]
+    fn whole_stress<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> Symmetric<R> {
+        let pressure = self.volumetric().kirchhoff_pressure(deformation);
+        self.isochoric_stress(deformation, fibres).plus_scaled(&deformation.inverse_cauchy_green, pressure)
+    }
+
     fn shader(&self) -> Option<Shader> {
         Some(self.volumetric().shader(&[L::WGSL, include_str!("split.wgsl")], &self.shader_parameters()))
     }

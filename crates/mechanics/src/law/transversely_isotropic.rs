@@ -76,8 +76,8 @@ impl SplitLaw for TransverselyIsotropic {
         deformation: &Deformation<R>,
         fibres: &[Vector<R>],
     ) -> Symmetric<R> {
-        deformation.first_invariant_stress(R::of(0.5 * self.shear))
-            + deformation.fibre_stress(fibres[0], R::of(self.fibre) * deformation.fibre_strain(fibres[0]))
+        let w4 = R::of(self.fibre) * deformation.fibre_strain(fibres[0]);
+        deformation.fibre_reinforced_stress(R::of(0.5 * self.shear), fibres[0], w4)
     }
 
     fn shader_parameters(&self) -> Vec<f64> {
