@@ -101,12 +101,20 @@ pub fn assembled(model: &Model) -> Result<CriticalStep, Contradiction> {
 /// # Errors
 /// If constraints contradict each other.
 pub fn assembled_at(model: &Model, displacement: &[Vector<f64>]) -> Result<CriticalStep, Contradiction> {
-    let owners = model.constrained_components()?;
-    let mut operator = Operator::new(model, &owners, displacement, CENTRAL);
+    Ok(assembled_about(model, &model.constrained_components()?, displacement))
+}
+
+/// The same where the owner of each component is known.
+pub(crate) fn assembled_about(
+    model: &Model,
+    owners: &[[u32; 3]],
+    displacement: &[Vector<f64>],
+) -> CriticalStep {
+    let mut operator = Operator::new(model, owners, displacement, CENTRAL);
     let started = std::time::Instant::now();
     let (eigenvalue, error) = largest_eigenvalue(&mut operator, None);
     let seconds_per_call = started.elapsed().as_secs_f64() / operator.calls.max(1) as f64;
-    Ok(CriticalStep { step: step_of(eigenvalue), error, force_calls: operator.calls, seconds_per_call })
+    CriticalStep { step: step_of(eigenvalue), error, force_calls: operator.calls, seconds_per_call }
 }
 
 /// The critical time step [s] about a deformed state of a run, where the owner of each component is known. Once it is found to be at least

@@ -11,7 +11,7 @@
 use pliant_mechanics::model::{Contradiction, FREE, MassScaling, Model, Solid, with_cells};
 use pliant_mechanics::tensor::dot;
 
-use crate::critical_step::limit_about;
+use crate::critical_step::assembled_about;
 
 /// How close to the smallest threshold a search ends, as a fraction, where each look needs the critical time step …
 const STEP_TOLERANCE: f64 = 0.01;
@@ -37,14 +37,14 @@ pub fn scale_mass(model: &mut Model, goal: Goal) -> Result<(), Contradiction> {
     let owners = model.constrained_components()?;
     let at_rest = vec![[0.0; 3]; model.node_count()];
     model.mass_scaling = None;
-    let unscaled_critical_step = limit_about(model, &owners, &at_rest).step;
+    let unscaled_critical_step = assembled_about(model, &owners, &at_rest).step;
     let nodes = NodalSteps::of(model, &owners);
     let scaling = |threshold: f64| MassScaling { unscaled_critical_step, added: nodes.added(threshold) };
     let threshold = match goal {
         Goal::TargetStep(target) if unscaled_critical_step < target => {
             let is_reached = |threshold: f64| {
                 model.mass_scaling = Some(scaling(threshold));
-                limit_about(model, &owners, &at_rest).step >= target
+                assembled_about(model, &owners, &at_rest).step >= target
             };
             nodes.threshold_of_step(target, is_reached)
         }
