@@ -140,7 +140,7 @@ type Difference = (&'static [[f64; 2]], f64);
 /// At rest, where fibres that carry tension only have two slopes, the mean of both.
 const CENTRAL: Difference = (&[[1.0, 0.5], [-1.0, -0.5]], 1e-6);
 /// From the forces of the state itself.
-const FORWARD: Difference = (&[[1.0, 1.0]], 1e-8);
+const FORWARD: Difference = (&[[1.0, 1.0]], 1e-7);
 
 /// The symmetric operator M^(−1/2) K M^(−1/2) on the free components.
 struct Operator<'a> {

@@ -15,7 +15,7 @@
 //! force pass finds both at no cost. Checks that leave the parts as they are, as far as can be foreseen, are passed over (`foresight.rs`).
 //!
 //! *Which cells.* Stiffness is computed for the first cells of two cheap orders, one by an isotropic guess of their speed
-//! and one by stretch: 18 stresses and the eigenvalue problems cost far more than a step of a cell.
+//! and one by stretch: 18 stresses and the eigenvalue problems, a pack of cells at a time, cost more than steps of these cells.
 //! Averaged tets and full hexes are taken at their mean deformation with a pressure of their own. Hourglass control
 //! does not change with deformation. Loads that follow the surface do not count.
 //!
