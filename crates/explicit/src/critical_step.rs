@@ -117,15 +117,18 @@ pub(crate) fn assembled_about(
     CriticalStep { step: step_of(eigenvalue), error, force_calls: operator.calls, seconds_per_call }
 }
 
-/// The critical time step [s] about a deformed state of a run, where the owner of each component is known. Once it is found to be at least
-/// `enough` [s], it may be up to half of [`ROUGH`] too small.
+/// The critical time step [s] about a deformed state of a run, where the owner of each component is known. Once two looks at Lanczos'
+/// iteration agree to [`ROUGH`] that it is at least `enough` [s], the iteration ends.
 pub(crate) fn limit_about(
     model: &Model,
     owners: &[[u32; 3]],
     displacement: &[Vector<f64>],
     enough: f64,
 ) -> f64 {
-    let mut operator = Operator::new(model, owners, displacement, FORWARD);
+    // Fibres that carry tension only have two slopes where they are slack.
+    let smooth = model.solids.iter().all(|solid| solid.material.law.is_isotropic());
+    let difference = if smooth { FORWARD } else { CENTRAL };
+    let mut operator = Operator::new(model, owners, displacement, difference);
     step_of(largest_eigenvalue(&mut operator, Some(enough)).0)
 }
 
@@ -134,19 +137,19 @@ fn step_of(eigenvalue: f64) -> f64 {
     2.0 / eigenvalue.sqrt()
 }
 
-/// Moves of a difference over its size, with their weights in the stiffness, and that size over the one of a cell. Far from
+/// A difference has moves over its size, with their weights in the stiffness, and that size over the one of a cell. It is far from
 /// round-off and from the law's curvature.
 type Difference = (&'static [[f64; 2]], f64);
-/// At rest, where fibres that carry tension only have two slopes, the mean of both.
+/// This one takes the mean of two slopes.
 const CENTRAL: Difference = (&[[1.0, 0.5], [-1.0, -0.5]], 1e-6);
-/// From the forces of the state itself.
+/// This one starts from the forces of the state itself.
 const FORWARD: Difference = (&[[1.0, 1.0]], 1e-7);
 
 /// The symmetric operator M^(−1/2) K M^(−1/2) on the free components.
 struct Operator<'a> {
     model: &'a Model,
-    /// The state about which the model vibrates.
-    about: &'a [Vector<f64>],
+    /// The displacements [m] about which the model vibrates, tied nodes where their ties put them.
+    about: Vec<Vector<f64>>,
     difference: Difference,
     forces: InternalForces<f64>,
     /// Forces [N] of the state, where a difference is taken from them.
@@ -161,7 +164,9 @@ struct Operator<'a> {
 }
 
 impl<'a> Operator<'a> {
-    fn new(model: &'a Model, owners: &[[u32; 3]], about: &'a [Vector<f64>], difference: Difference) -> Self {
+    fn new(model: &'a Model, owners: &[[u32; 3]], about: &[Vector<f64>], difference: Difference) -> Self {
+        let mut about = about.to_vec();
+        model.follow(&mut about);
         let inverse_root_mass = (owners.iter().enumerate())
             .map(|(node, owner)| (model.inertia(node), owner))
             .map(|(m, owner)| owner.map(|o| if o == FREE && m > 0.0 { 1.0 / m.sqrt() } else { 0.0 }))
@@ -184,8 +189,10 @@ impl<'a> Operator<'a> {
             calls: 0,
         };
         if difference == FORWARD {
-            operator.evaluate(about);
+            let about = std::mem::take(&mut operator.about);
+            operator.evaluate(&about);
             operator.before = (0..about.len()).map(|node| operator.forces.at(node)).collect();
+            operator.about = about;
         }
         operator
     }
@@ -208,7 +215,7 @@ impl<'a> Operator<'a> {
             let moves = v.par_iter().zip(&self.inverse_root_mass);
             moved
                 .par_iter_mut()
-                .zip(self.about)
+                .zip(&self.about)
                 .zip(moves)
                 .with_min_len(SHARE)
                 .for_each(|((u, about), (v, w))| *u = [0, 1, 2].map(|c| about[c] + side * h * v[c] * w[c]));
@@ -228,8 +235,8 @@ impl<'a> Operator<'a> {
     }
 }
 
-/// Largest eigenvalue by Lanczos, with its residual added, and the relative residual; of an assembly whose step is known to be at
-/// least `enough` [s], a rough one.
+/// Largest eigenvalue by Lanczos, with its residual added, and the relative residual; of an assembly whose step is at least `enough` [s],
+/// a rough one.
 fn largest_eigenvalue(operator: &mut Operator<'_>, enough: Option<f64>) -> (f64, f64) {
     let nodes = operator.inverse_root_mass.len();
     let mut v: Vec<Vector<f64>> = start_vector(nodes, &operator.inverse_root_mass);
@@ -240,6 +247,7 @@ fn largest_eigenvalue(operator: &mut Operator<'_>, enough: Option<f64>) -> (f64,
         return (0.0, 0.0);
     }
     let look_every = if enough.is_some() { 5 } else { 10 };
+    let mut ritz_before = 0.0;
     loop {
         operator.apply(&v, &mut w);
         let alpha = inner(&w, &v);
@@ -256,9 +264,12 @@ fn largest_eigenvalue(operator: &mut Operator<'_>, enough: Option<f64>) -> (f64,
             let (ritz, last) = largest_ritz_pair(&alphas, &betas);
             let residual = beta * last.abs();
             let is_enough = enough.is_some_and(|enough| step_of(ritz + residual) >= enough);
-            if finished || residual < TOLERANCE * ritz || is_enough && residual < ROUGH * ritz {
+            // A residual says that some eigenvalue is near; that it is the largest, the look before.
+            let is_rough = residual.max(ritz - ritz_before) < ROUGH * ritz;
+            if finished || residual < TOLERANCE * ritz || is_enough && is_rough {
                 return (ritz + residual, residual / ritz);
             }
+            ritz_before = ritz;
         }
         betas.push(beta);
         std::mem::swap(&mut before, &mut v);

@@ -2,7 +2,7 @@
 //!
 //! *Nine rows*: Householder's reflections leave a tridiagonal matrix. Laguerre's iteration finds the largest root of its characteristic
 //! polynomial; from above, all roots being real, it falls to that root and never below (Wilkinson, *The Algebraic Eigenvalue Problem*, 1965,
-//! ch. 7). *Three rows*: the cosine of a third of an angle, by Newton's method from above.
+//! ch. 7). *Three rows*: Newton's method finds the cosine of a third of an angle, from above.
 
 use pliant_mechanics::Number;
 use pliant_mechanics::tensor::{Symmetric, Vector, add, cross, dot, scale};
@@ -10,7 +10,7 @@ use pliant_mechanics::tensor::{Symmetric, Vector, add, cross, dot, scale};
 /// Rows of the matrix of a cell: three directions of displacement by three of its gradient.
 pub(crate) const ROWS: usize = 9;
 
-/// Turns of Laguerre's iteration. Near a simple root each cubes the error; a root met five times out of nine, the worst, leaves half of it.
+/// Turns of Laguerre's iteration. Near a simple root each cubes the error; a root met six times out of nine, the worst, leaves half of it.
 const TURNS_OF_LAGUERRE: usize = 9;
 /// Turns of Newton's method, from at most 8 % above a cosine.
 const TURNS_OF_NEWTON: usize = 4;
@@ -123,14 +123,15 @@ pub(crate) fn largest_of_three<N: Number>(tensor: &Symmetric<N>) -> N {
     // cos 3θ of the largest eigenvalue mean + 2 size cos θ.
     let [xx, yy, zz, xy, yz, xz] = unit.0;
     let determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
-    let triple = determinant * N::of(0.5);
+    let triple = (determinant * N::of(0.5)).max(-N::ONE);
     // t = cos θ is the largest root of 4t³ − 3t − cos 3θ; ½ + √((1 + cos 3θ)/6) lies above it.
     let above = (N::ONE + triple).max(N::ZERO) * N::of(1.0 / 6.0);
     let mut t = N::of(0.5) + above.sqrt();
     for _ in 0..TURNS_OF_NEWTON {
         let square = t * t;
         let value = t * (N::of(4.0) * square - N::of(3.0)) - triple;
-        t -= value / (N::of(12.0) * square - N::of(3.0)).max(N::of(1e-12));
+        // Where the two largest eigenvalues meet, value and slope are zero at ½.
+        t = (t - value / (N::of(12.0) * square - N::of(3.0)).max(N::of(1e-7))).max(N::of(0.5));
     }
     mean + (size + size) * t
 }
@@ -183,7 +184,7 @@ mod tests {
         }
     }
 
-    /// Five equal ones at the top: the worst case, above by what is left of the start.
+    /// Six equal ones at the top are the worst case, above by what is left of the start.
     #[test]
     fn one_met_several_times_is_found_from_above() {
         let mut random = random();
@@ -210,6 +211,11 @@ mod tests {
             [3.0, 3.0, 1.0, 0.0, 0.0, 0.0],
             [2.0, 2.0, 2.0, 0.0, 0.0, 0.0],
         ]);
+        // Two equal ones at the top, in any directions.
+        tensors.extend((0..200).map(|_| {
+            let axis = [random(), random(), random()];
+            Symmetric([3e4, 3e4, 3e4, 0.0, 0.0, 0.0]).plus_scaled(&Symmetric::dyad(axis), -1e4).0
+        }));
         for tensor in tensors.into_iter().map(Symmetric) {
             let full = tensor.full().0;
             let known = Matrix3::from_fn(|i, j| full[i][j]).symmetric_eigenvalues();

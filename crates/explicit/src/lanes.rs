@@ -1,9 +1,9 @@
 //! Numbers side by side: kernels written once, generic over [`Lanes`], run sixteen, eight or four cells at a time.
 //!
 //! Data lie in packs of [`PACK`] numbers whatever the width, so that files and results do not depend on it. The CPU
-//! is queried once, when a force field is made: AVX-512 (with the feature `avx512`; 16 numbers in single, 8 in double precision), AVX2 with
-//! FMA (8, 4), SSE4.2 or NEON (4, 2); without any of them the kernels run in plain numbers. Nobody needs `target-cpu=native`;
-//! `CentralDifference::in_lanes` chooses other instructions. Lanes never mix: with AVX-512 and AVX2 results are the same to the bit
+//! is queried when a force field is made, and by checks of the critical time step: AVX-512 (with the feature `avx512`; 16 numbers in single, 8 in
+//! double precision), AVX2 with FMA (8, 4), SSE4.2 or NEON (4, 2); without any of them the kernels run in plain numbers. Nobody needs
+//! `target-cpu=native`; `CentralDifference::in_lanes` chooses other instructions for forces and nodes. Lanes never mix: with AVX-512 and AVX2 results are the same to the bit
 //! (tested for every law and element in `forces/tests.rs`), elsewhere to round-off.
 //!
 //! This file holds all `unsafe` code of the crate: registers read from and written to arrays, and nodes of a block read and written
@@ -282,6 +282,7 @@ const fn units<R>() -> usize {
 impl<R: Scalar, const N: usize> Places<R, N> {
     /// From the numbers of the nodes of packs of cells, and how many packs a block has.
     pub(crate) fn new(packs: impl Iterator<Item = [[u16; PACK]; N]>, per_block: usize) -> Self {
+        const { assert!(units::<R>() * crate::forces::BLOCK * PACK * N <= 1 << 16) };
         let offset = |place: u16| place * units::<R>() as u16;
         let offsets: Vec<_> = packs.map(|pack| pack.map(|places| places.map(offset))).collect();
         let most = |block: &[[[u16; PACK]; N]]| {
@@ -352,7 +353,7 @@ impl<R: Scalar, const N: usize> Local<'_, R, N> {
         let offsets = &self.offsets[pack];
         for lane in 0..PACK {
             for offsets in offsets {
-                // SAFETY: as above.
+                // SAFETY: `Places` has found all offsets inside, and the sums are borrowed alone.
                 let sum = unsafe { &mut *at_offset_mut(self.sums, offsets[lane]) };
                 sum[0] += numbers.0[lane];
             }

@@ -348,11 +348,36 @@ fn smallest(found: &[(f64, Stiffness)], cells: &[u32]) -> Option<(f64, usize)> {
 /// The limit [s] of a cell alone in a deformed state, Δt_e above: no assembly is unstable at the smallest one. Displacements
 /// [m], one per node.
 pub fn cell_limit<R: Scalar>(model: &Model, solid: usize, cell: usize, displacement: &[Vector<R>]) -> f64 {
+    limits_alone(model, &model.solids[solid], &[cell as u32], displacement)[0]
+}
+
+/// The same of all cells of a solid.
+pub fn cell_limits<R: Scalar>(model: &Model, solid: usize, displacement: &[Vector<R>]) -> Vec<f64> {
     let solid = &model.solids[solid];
+    let cells: Vec<u32> = (0..solid.cells.len() as u32).collect();
+    let of = |cells: &[u32]| {
+        let limits = limits_alone(model, solid, cells, displacement);
+        limits.into_iter().take(cells.len())
+    };
+    cells.par_chunks(PACK).flat_map_iter(of).collect()
+}
+
+/// The same of a pack of cells.
+fn limits_alone<R: Scalar>(
+    model: &Model,
+    solid: &Solid,
+    cells: &[u32],
+    displacement: &[Vector<R>],
+) -> [f64; PACK] {
     let state =
         |cell: usize| (displacement_gradient(solid, cell, displacement), gradient_square_of(solid, cell));
-    let mode = stiffness(solid, &[cell as u32], state)[0].mode;
-    limit_alone(model, solid, cell, mode.max(hourglass_modulus(solid, cell)))
+    let found = stiffness(solid, cells, state);
+    let mut limits = [f64::NAN; PACK];
+    for (limit, (&cell, own)) in limits.iter_mut().zip(cells.iter().zip(&found)) {
+        let cell = cell as usize;
+        *limit = limit_alone(model, solid, cell, own.mode.max(hourglass_modulus(solid, cell)));
+    }
+    limits
 }
 
 /// How many of some cells are checked closely for each order.

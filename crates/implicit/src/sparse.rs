@@ -112,7 +112,7 @@ impl Values<'_> {
                     let own: &[f64; C] =
                         entries[j * size + a * C..].first_chunk().expect("a cell has all rows");
                     let add = |(value, own): (&mut f64, &f64)| *value += own;
-                    if a == node {
+                    if row_node == nodes[node] {
                         let values = &mut self.value[place(column)..][..C - c];
                         values.iter_mut().zip(&own[c..]).for_each(add);
                     } else {

@@ -659,6 +659,7 @@ impl System {
         let model = Arc::clone(&self.model);
         let mut results = std::mem::take(&mut self.results);
         let mut found = Ok(());
+        let coupled = moved.filter(|moved| moved.iter().any(|&by| by != 0.0));
         for (chunk, facets) in model.facets.chunks(FACETS).enumerate() {
             let (first, results) = (chunk * FACETS, &mut results[..facets.len()]);
             self.find_facets(first, state, moved.is_some(), results);
@@ -671,7 +672,7 @@ impl System {
                 self.energy += result.energy;
                 self.largest = self.largest.max(result.largest);
             }
-            self.gather_facets(chunk, results, moved);
+            self.gather_facets(chunk, results, moved.is_some(), coupled);
             self.add_bound_facets(first, results, moved);
         }
         self.results = results;
@@ -702,14 +703,14 @@ impl System {
         });
     }
 
-    /// Adds forces of a chunk of facets, and the stiffness of those whose nodes follow no others.
-    fn gather_facets(&mut self, chunk: usize, results: &[FacetResult], moved: Option<&[f64]>) {
-        let stiffness = moved.map(|_| {
+    /// Adds forces of a chunk of facets and, if it is wanted, the stiffness of those whose nodes follow no others; with what it makes of
+    /// prescribed motions.
+    fn gather_facets(&mut self, chunk: usize, results: &[FacetResult], tangent: bool, moved: Option<&[f64]>) {
+        let stiffness = tangent.then(|| {
             let (values, column_start) = self.matrix.values();
             ColumnSums { first: 0, coupling: &mut self.coupling, values, column_start }
         });
         let forces = [&mut self.internal[..], &mut self.external, &mut self.controlled];
-        let moved = moved.filter(|moved| moved.iter().any(|&by| by != 0.0));
         let (first, equations) = (chunk * FACETS, &self.equations);
         let (facets, pressure) = (&self.model.facets[first..], &self.pressure[first..]);
         let (places, bound) = (&self.places, &self.bound);

@@ -192,4 +192,7 @@ pub struct Effort {
 pub trait CellsNow: Sync {
     /// The fields of a cell of a solid, and its stable step [s] if it is wanted.
     fn at(&self, solid: usize, cell: usize) -> (CellFields, Option<f64>);
+
+    /// The same of all cells of a solid.
+    fn of(&self, solid: usize) -> Vec<(CellFields, Option<f64>)>;
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use pliant_contact::lag::Lag;
 use pliant_contact::pose::Leg;
 use pliant_explicit::recover::{CellFields, Recovery};
-use pliant_explicit::stability::{Stability, cell_limit};
+use pliant_explicit::stability::{Stability, cell_limit, cell_limits};
 use pliant_explicit::{Clock, NodeContact, Scalar, State, Wanted};
 #[cfg(feature = "gpu")]
 use pliant_gpu::GpuStepper;
@@ -15,6 +15,7 @@ use pliant_mechanics::mapping::{Displaced, Mapping};
 use pliant_mechanics::model::Enclosed;
 use pliant_mechanics::tensor::Vector;
 use pliant_mechanics::{Energies, Model, fingerprint};
+use rayon::prelude::*;
 
 use crate::failure::Failure;
 use crate::instant::{CellsNow, Instant};
@@ -252,6 +253,12 @@ impl<R: Scalar> CellsNow for SolidCells<'_, R> {
     fn at(&self, solid: usize, cell: usize) -> (CellFields, Option<f64>) {
         let step = self.steps.then(|| cell_limit(self.model, solid, cell, self.displacement));
         (self.recovery.cell(solid, cell), step)
+    }
+
+    fn of(&self, solid: usize) -> Vec<(CellFields, Option<f64>)> {
+        let steps = if self.steps { cell_limits(self.model, solid, self.displacement) } else { Vec::new() };
+        let cells = (0..self.model.solids[solid].cells.len()).into_par_iter();
+        cells.map(|cell| (self.recovery.cell(solid, cell), steps.get(cell).copied())).collect()
     }
 }
 

@@ -35,21 +35,22 @@ impl Blocks {
     pub(super) fn new<const N: usize>(cells: &[[u32; N]]) -> (Self, Vec<[u16; N]>) {
         let mut blocks = Self { nodes: Vec::new(), offsets: vec![0], stride: 0 };
         let mut local = Vec::with_capacity(cells.len());
-        let count = cells.as_flattened().iter().max().map_or(0, |&last| last as usize + 1);
-        // The number of each node in the last block it was seen in; u16::MAX before.
-        let mut numbers = vec![u16::MAX; count];
+        let [low, high] =
+            cells.as_flattened().iter().fold([u32::MAX, 0], |[low, high], &node| [low.min(node), high.max(node)]);
+        // The number of each node in the block, from the lowest node on; u16::MAX of others.
+        let mut numbers = vec![u16::MAX; (high + 1).saturating_sub(low) as usize];
         for cells in cells.chunks(BLOCK * PACK) {
             let first = blocks.nodes.len();
             let mut own = Vec::new();
             for &node in cells.as_flattened() {
-                if std::mem::replace(&mut numbers[node as usize], 0) == u16::MAX {
+                if std::mem::replace(&mut numbers[(node - low) as usize], 0) == u16::MAX {
                     own.push(node);
                 }
             }
             own.sort_unstable();
-            own.iter().zip(0..).for_each(|(&node, number)| numbers[node as usize] = number);
-            local.extend(cells.iter().map(|cell| cell.map(|node| numbers[node as usize])));
-            own.iter().for_each(|&node| numbers[node as usize] = u16::MAX);
+            own.iter().zip(0..).for_each(|(&node, number)| numbers[(node - low) as usize] = number);
+            local.extend(cells.iter().map(|cell| cell.map(|node| numbers[(node - low) as usize])));
+            own.iter().for_each(|&node| numbers[(node - low) as usize] = u16::MAX);
             blocks.stride = blocks.stride.max(own.len());
             blocks.nodes.extend(own);
             blocks.offsets.push(blocks.nodes.len() as u32);

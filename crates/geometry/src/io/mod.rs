@@ -36,7 +36,7 @@ pub use error::{MeshFileError, MeshFileProblem, Place};
 pub use pvd::read_pvd;
 pub use regular::{open_regular, read_limited};
 use surface_out::SurfaceOut;
-pub use vtu_write::{PVD_HEAD, PVD_TAIL, VtuOptions, VtuSeries, pvd_entry, save_vtu, write_pvd, write_vtu};
+pub use vtu_write::{PVD_TAIL, VtuOptions, VtuSeries, pvd_entry, pvd_text, save_vtu, write_vtu};
 pub use xml::{XmlError, parse_xml};
 
 /// A format of mesh files.

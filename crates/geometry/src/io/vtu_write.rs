@@ -19,7 +19,7 @@ use crate::{DataArray, Mesh};
 /// How a `.vtu` file is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VtuOptions {
-    /// Compresses the arrays with zlib.
+    /// Compresses the arrays with zlib; real numbers that it would hardly shorten are stored in its format as they are.
     pub compress: bool,
     /// Rounds coordinates and data to 32-bit floating point: half the size.
     pub single: bool,
@@ -108,18 +108,19 @@ impl Lasting {
     }
 }
 
-/// Writes the list of the files of a series, `(time [s], file)`, in place of an older one only once it is
-/// complete. File names are relative to the list.
-pub fn write_pvd(path: &Path, files: &[(f64, String)]) -> Result<(), MeshFileError> {
-    let entries: Result<String, String> = files.iter().map(|(time, file)| pvd_entry(*time, file)).collect();
-    let entries = entries.map_err(|problem| MeshFileError::Mesh { path: path.to_owned(), problem })?;
-    save(path, |out| write!(out, "{PVD_HEAD}{entries}{PVD_TAIL}"))
+/// The text of the list of the files of a series, `(time [s], file)`. File names are relative to the list.
+///
+/// # Errors
+/// A sentence, if a time is not finite.
+pub fn pvd_text(files: impl Iterator<Item = (f64, String)>) -> Result<String, String> {
+    let entries: String = files.map(|(time, file)| pvd_entry(time, &file)).collect::<Result<_, _>>()?;
+    Ok(format!(
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n  \
+         <Collection>\n{entries}{PVD_TAIL}"
+    ))
 }
 
-/// The text of such a list before its entries …
-pub const PVD_HEAD: &str = "<?xml version=\"1.0\"?>\n\
-    <VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n  <Collection>\n";
-/// … and after them.
+/// The text after the entries of such a list.
 pub const PVD_TAIL: &str = "  </Collection>\n</VTKFile>\n";
 
 /// One of the entries: a file at a time [s].
@@ -237,7 +238,7 @@ fn repeats(block: &[u8], width: usize) -> bool {
         bits[..width].copy_from_slice(number);
         let bits = u64::from_le_bytes(bits);
         // Fibonacci hashing.
-        let slot = (bits.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 54) as usize % SLOTS;
+        let slot = (bits.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - SLOTS.ilog2())) as usize;
         again += usize::from(std::mem::replace(&mut seen[slot], bits) == bits);
     }
     again * REPEATED >= block.len() / width

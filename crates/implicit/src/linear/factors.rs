@@ -17,6 +17,8 @@ pub(crate) struct Pivots {
     pub(crate) weakest: usize,
     /// That pivot over the diagonal entry.
     pub(crate) smallest: f64,
+    /// The lowest pivot over the diagonal entry, if one is negative.
+    pub(crate) lowest: f64,
 }
 
 /// Pivots below this part of the diagonal are zero but for round-off.
@@ -82,6 +84,7 @@ impl Factors {
                 return None;
             }
             pivots.negative += usize::from(pivot < 0.0);
+            pivots.lowest = pivots.lowest.min(pivot / diagonal);
             let part = pivot.abs() / diagonal;
             if part < pivots.smallest {
                 (pivots.smallest, pivots.weakest) = (part, equation as usize);

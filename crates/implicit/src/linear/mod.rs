@@ -160,8 +160,8 @@ impl Workspace {
         if let (Some(coarse), Some(blocks)) = (&mut self.coarse, &self.blocks) {
             coarse.update(blocks);
             // A device inverts it itself.
-            if self.on_device.is_none() && !coarse.factorise() {
-                return Err(LinearError::NotFinite);
+            if self.on_device.is_none() {
+                coarse.factorise()?;
             }
         }
         if let (Some(on_device), Some(blocks)) = (&mut self.on_device, &self.blocks) {
@@ -237,9 +237,7 @@ impl Workspace {
                 Found::Rest(iterations) => done = iterations,
             }
             self.left_to_cpu += 1;
-            if self.coarse.as_mut().is_some_and(|coarse| !coarse.factorise()) {
-                return Err(LinearError::NotFinite);
-            }
+            self.coarse.as_mut().map_or(Ok(()), Coarse::factorise)?;
         }
         let inverse = match (&mut self.factors, &mut self.coarse) {
             (Some(factors), _) => Approximation::Factors(factors),

@@ -299,7 +299,7 @@ fn fill_surface(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], surfac
     let Some(recovered) = frame.cells(of_cells.contains(&FieldName::ElementStep)) else { return };
     let mut averages = Averages::new(model.node_count(), &of_cells);
     for (index, solid) in model.solids.iter().enumerate() {
-        for (cell, found) in recovered.of(model, index).iter().enumerate() {
+        for (cell, found) in recovered.of(index).iter().enumerate() {
             let volume = solid.cells.volume(cell);
             for (slot, &field) in of_cells.iter().enumerate() {
                 let value = &fields::of_cell(found, field)[..field.components()];
@@ -491,7 +491,7 @@ fn fill_cells(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], at: At, 
     }
     let model = &frame.built().model;
     let Some(recovered) = frame.cells(wanted.contains(&FieldName::ElementStep)) else { return };
-    let found = |&(solid, cell): &(u32, u32)| &recovered.of(model, solid as usize)[cell as usize];
+    let found = |&(solid, cell): &(u32, u32)| &recovered.of(solid as usize)[cell as usize];
     let mut averages = Averages::new(mesh.points.len(), &wanted);
     for (block, places) in mesh.blocks.iter_mut().zip(cells) {
         for (slot, &field) in wanted.iter().enumerate() {

@@ -19,9 +19,7 @@ use std::cell::OnceCell;
 use std::path::{Path, PathBuf};
 
 use pliant_explicit::recover::CellFields;
-use pliant_mechanics::Model;
 use pliant_sim::{CellsNow, Instant, Simulation};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use file::{check_own_folder, replace};
@@ -108,13 +106,9 @@ impl<'a> Recovered<'a> {
         self.now.at(solid, cell)
     }
 
-    /// Those of all cells of a solid of a model.
-    fn of(&self, model: &Model, solid: usize) -> &[(CellFields, Option<f64>)] {
-        let now = &*self.now;
-        self.solids[solid].get_or_init(|| {
-            let cells = (0..model.solids[solid].cells.len()).into_par_iter();
-            cells.map(|cell| now.at(solid, cell)).collect()
-        })
+    /// Those of all cells of a solid.
+    fn of(&self, solid: usize) -> &[(CellFields, Option<f64>)] {
+        self.solids[solid].get_or_init(|| self.now.of(solid))
     }
 }
 

@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use pliant_geometry::io::{MeshFileError, PVD_HEAD, PVD_TAIL, VtuOptions, VtuSeries, pvd_entry, read_pvd};
+use pliant_geometry::io::{MeshFileError, PVD_TAIL, VtuOptions, VtuSeries, pvd_entry, pvd_text, read_pvd};
 
 use super::field_mesh::FieldMesh;
 use super::file::{check_own_folder, is_at, reopen, replace};
@@ -60,9 +60,9 @@ impl Series {
         self.beyond = listed(&self.index).unwrap_or_default().into_iter().skip(times.len()).collect();
     }
 
-    /// The entry of a frame in the index.
-    fn entry(&self, index: usize, time: f64) -> io::Result<String> {
-        pvd_entry(time, &format!("{}/{}", self.name, frame_name(index))).map_err(io::Error::other)
+    /// The file of a frame as the index names it.
+    fn listed_name(&self, index: usize) -> String {
+        format!("{}/{}", self.name, frame_name(index))
     }
 
     /// Adds the last frame to the index.
@@ -78,10 +78,11 @@ impl Series {
 
     /// Writes an entry and the end of the list over its old end, at once: who reads finds it whole before and after.
     fn append(&self, mut file: File, end: u64, time: f64) -> io::Result<Option<(File, u64)>> {
-        if !is_at(&file, &self.index)? {
+        // Somebody may have put another one in its place, or written in it.
+        if !is_at(&file, &self.index)? || file.metadata()?.len() != end + PVD_TAIL.len() as u64 {
             return self.list_all();
         }
-        let entry = self.entry(self.times.len() - 1, time)?;
+        let entry = pvd_entry(time, &self.listed_name(self.times.len() - 1)).map_err(io::Error::other)?;
         let mut write = |text: &str| {
             file.seek(SeekFrom::Start(end))?;
             file.write_all(text.as_bytes())?;
@@ -89,7 +90,7 @@ impl Series {
         };
         let written = write(&format!("{entry}{PVD_TAIL}"));
         if written.is_err() {
-            // The old end has its place on the disk.
+            // The old end has its place on most disks.
             let _ = write(PVD_TAIL);
         }
         written.map(|()| Some((file, end + entry.len() as u64)))
@@ -98,11 +99,11 @@ impl Series {
     /// Writes the list of all frames in place of the old one; returns it and where its entries end, if it can be written on.
     fn list_all(&self) -> io::Result<Option<(File, u64)>> {
         let all = self.times.iter().chain(&self.beyond).enumerate();
-        let entries: String = all.map(|(index, &time)| self.entry(index, time)).collect::<io::Result<_>>()?;
-        replace(&self.index, |file| file.write_all(format!("{PVD_HEAD}{entries}{PVD_TAIL}").as_bytes()))?;
-        let end = (PVD_HEAD.len() + entries.len()) as u64;
-        // Frames of an interrupted run are to go from it.
-        self.beyond.is_empty().then(|| Ok((reopen(&self.index)?, end))).transpose()
+        let list = pvd_text(all.map(|(index, &time)| (time, self.listed_name(index)))).map_err(io::Error::other)?;
+        replace(&self.index, |file| file.write_all(list.as_bytes()))?;
+        // It is listed anew as long as frames of an interrupted run are in it.
+        let file = self.beyond.is_empty().then(|| reopen(&self.index).ok()).flatten();
+        Ok(file.map(|file| (file, (list.len() - PVD_TAIL.len()) as u64)))
     }
 }
 

@@ -75,7 +75,10 @@ impl Builder<'_> {
         let (added, mass) = (scaling.total(), self.assembly.mass.iter().sum::<f64>());
         let share = added / mass;
         let told = match scaling.nodes() {
-            0 => "mass scaling adds nothing: the critical time step is long enough without it".to_owned(),
+            0 => format!(
+                "mass scaling adds nothing: the critical time step is {} s without it",
+                number(scaling.unscaled_critical_step)
+            ),
             nodes => format!(
                 "mass scaling adds {} kg or {:.2} % of the mass, to {nodes} of {}; without it the critical time step is {} s",
                 number(added),
