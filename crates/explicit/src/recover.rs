@@ -119,6 +119,12 @@ impl<'a, R: Scalar> Recovery<'a, R> {
         self.model.solids.iter().enumerate().map(of_solid).sum()
     }
 
+    /// The fields of all cells of a solid.
+    pub fn cells(&self, solid: usize) -> Vec<CellFields> {
+        let cells = (0..self.model.solids[solid].cells.len()).into_par_iter();
+        cells.map(|cell| self.cell(solid, cell)).collect()
+    }
+
     /// The fields of one cell of a solid, means over its points.
     pub fn cell(&self, solid: usize, cell: usize) -> CellFields {
         let part = &self.model.solids[solid];

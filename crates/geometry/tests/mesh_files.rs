@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use pliant_geometry::io::{
-    Format, MeshFile, MeshFileError, MeshFileProblem, Place, VtuOptions, VtuSeries, read, read_bytes,
-    pvd_text, save_vtu, write, write_vtu,
+    Format, MeshFile, MeshFileError, MeshFileProblem, Place, VtuOptions, VtuSeries, pvd_text, read,
+    read_bytes, save_vtu, write, write_vtu,
 };
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use pliant_testing::Random;

@@ -334,7 +334,8 @@ fn threads_change_no_bit_of_sums_over_facets() {
         let facets = (0..model.facets.len() as u32).collect();
         model.model_mut().loads[0].kind = LoadKind::ShellPressure { facets, pressure: 50.0, spread };
         let motion = Motion::Displacement([0.0, 0.0, 0.01], ramp());
-        let held = Constraint { name: "moved".into(), nodes: vec![40, 41, 42], components: [true; 6], motion };
+        let held =
+            Constraint { name: "moved".into(), nodes: vec![40, 41, 42], components: [true; 6], motion };
         model.model_mut().constraints.push(held);
         let solve = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

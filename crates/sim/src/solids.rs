@@ -15,7 +15,6 @@ use pliant_mechanics::mapping::{Displaced, Mapping};
 use pliant_mechanics::model::Enclosed;
 use pliant_mechanics::tensor::Vector;
 use pliant_mechanics::{Energies, Model, fingerprint};
-use rayon::prelude::*;
 
 use crate::failure::Failure;
 use crate::instant::{CellsNow, Instant};
@@ -257,8 +256,8 @@ impl<R: Scalar> CellsNow for SolidCells<'_, R> {
 
     fn of(&self, solid: usize) -> Vec<(CellFields, Option<f64>)> {
         let steps = if self.steps { cell_limits(self.model, solid, self.displacement) } else { Vec::new() };
-        let cells = (0..self.model.solids[solid].cells.len()).into_par_iter();
-        cells.map(|cell| (self.recovery.cell(solid, cell), steps.get(cell).copied())).collect()
+        let cells = self.recovery.cells(solid).into_iter().enumerate();
+        cells.map(|(cell, fields)| (fields, steps.get(cell).copied())).collect()
     }
 }
 

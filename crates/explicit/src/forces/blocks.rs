@@ -35,8 +35,10 @@ impl Blocks {
     pub(super) fn new<const N: usize>(cells: &[[u32; N]]) -> (Self, Vec<[u16; N]>) {
         let mut blocks = Self { nodes: Vec::new(), offsets: vec![0], stride: 0 };
         let mut local = Vec::with_capacity(cells.len());
-        let [low, high] =
-            cells.as_flattened().iter().fold([u32::MAX, 0], |[low, high], &node| [low.min(node), high.max(node)]);
+        let [low, high] = cells
+            .as_flattened()
+            .iter()
+            .fold([u32::MAX, 0], |[low, high], &node| [low.min(node), high.max(node)]);
         // The number of each node in the block, from the lowest node on; u16::MAX of others.
         let mut numbers = vec![u16::MAX; (high + 1).saturating_sub(low) as usize];
         for cells in cells.chunks(BLOCK * PACK) {

@@ -99,7 +99,8 @@ impl Series {
     /// Writes the list of all frames in place of the old one; returns it and where its entries end, if it can be written on.
     fn list_all(&self) -> io::Result<Option<(File, u64)>> {
         let all = self.times.iter().chain(&self.beyond).enumerate();
-        let list = pvd_text(all.map(|(index, &time)| (time, self.listed_name(index)))).map_err(io::Error::other)?;
+        let list =
+            pvd_text(all.map(|(index, &time)| (time, self.listed_name(index)))).map_err(io::Error::other)?;
         replace(&self.index, |file| file.write_all(list.as_bytes()))?;
         // It is listed anew as long as frames of an interrupted run are in it.
         let file = self.beyond.is_empty().then(|| reopen(&self.index).ok()).flatten();
