@@ -986,10 +986,8 @@ fn failure(
     let body_of = |node: u32| model.bodies.iter().find(|body| body.nodes.contains(&node));
     let (kind, node, cell) = match error {
         SolveError::NotConverged { node, .. } => ("not-converged", Some(*node), None),
-        SolveError::Uphill { node, .. } | SolveError::Snaps { node, .. } => {
-            ("not-converged", Some(*node), None)
-        }
-        SolveError::Stalled { .. } => ("not-converged", None, None),
+        SolveError::Uphill { node, .. } => ("not-converged", Some(*node), None),
+        SolveError::Snaps { .. } | SolveError::Stalled { .. } => ("not-converged", None, None),
         SolveError::Blocked { .. } => ("blocked", None, None),
         SolveError::Crossed { edge, .. } => ("intersecting", Some(edge[0]), None),
         SolveError::Singular { node, .. } | SolveError::FreeBody { node, .. } => {
@@ -1001,7 +999,10 @@ fn failure(
         SolveError::Device(_) => ("device", None, None),
         SolveError::Open(_) | SolveError::Impossible(_) => ("input", None, None),
     };
-    let owner = node.and_then(body_of);
+    let owner = match error {
+        SolveError::Snaps { node, .. } => body_of(*node),
+        _ => node.and_then(body_of),
+    };
     let own_node = node.zip(owner).map(|(node, body)| node - body.nodes.start);
     let body = owner.map(|body| body.name.clone()).or_else(|| Some(model.bodies[cell?.0].name.clone()));
     let place = body.as_ref().map(|name| format!(" in `{name}`")).unwrap_or_default();
