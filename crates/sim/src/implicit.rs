@@ -264,19 +264,22 @@ impl Implicit {
     }
 
     /// So many steps, from an evaluated instant. Where a facet is broken on the device, the CPU decides: it fails with the facet, or takes the
-    /// step that only single precision cannot.
+    /// step that only single precision cannot. The device then tries one step, and twice as many each time that it takes all.
     #[cfg(feature = "gpu")]
     fn advance_with_device(&mut self, steps: u64) -> Result<(), Failure> {
         let end = self.done + steps;
+        let mut tried = steps;
         loop {
-            self.advance_on_device(end - self.done)?;
-            if self.done == end {
-                return Ok(());
-            }
-            self.evaluate(Wanted::Energies)?;
-            self.advance_on_processor()?;
-            if let Some(device) = &mut self.device {
-                device.stepper.upload(&self.state);
+            let goal = end.min(self.done + tried);
+            self.advance_on_device(goal - self.done)?;
+            tried *= 2;
+            if self.done < goal {
+                self.evaluate(Wanted::Energies)?;
+                self.advance_on_processor()?;
+                if let Some(device) = &mut self.device {
+                    device.stepper.upload(&self.state);
+                }
+                tried = 1;
             }
             if self.done == end {
                 return Ok(());
