@@ -14,7 +14,7 @@ use pliant_implicit::{
 };
 use wgpu::{BufferAddress, BufferUsages};
 
-use crate::kernel::{Binding, Bound, GROUP, Growing, Kernel, Memory, Sides};
+use crate::kernel::{Binding, Bound, GROUP, Growing, Kernel, Memory, Sides, grown};
 use crate::transfer::Transfer;
 use crate::{Device, GpuError};
 
@@ -334,8 +334,10 @@ impl Gradients {
                 (1..).zip(bound).for_each(|(group, bound)| kernel.rebind(group, bound));
                 kernel.resize(count);
             }
-            if self.upload.size() < self.sizes.upload() {
-                self.upload = Upload::new(&device, self.sizes.upload());
+            let (size, needed) = (self.upload.size(), self.sizes.upload());
+            if size < needed {
+                let size = grown(size, needed, device.adapter().largest_buffer);
+                self.upload = Upload::new(&device, size);
             }
             Ok(())
         };

@@ -126,8 +126,7 @@ impl Growing {
         let needed = array_size(bytes);
         memory.count(self.what, needed)?;
         if self.buffer.size() < needed {
-            let roomy = array_size(self.buffer.size() as usize * 3 / 2);
-            let size = roomy.min(memory.device.adapter().largest_buffer).max(needed);
+            let size = grown(self.buffer.size(), needed, memory.device.adapter().largest_buffer);
             self.buffer = memory.buffer(self.what, size, ARRAY, false);
         }
         Ok(())
@@ -150,6 +149,12 @@ const ARRAY: BufferUsages = BufferUsages::STORAGE.union(BufferUsages::COPY_DST).
 /// Bytes of an array, at least those of the largest element of any kernel: of a node that is held.
 fn array_size(bytes: usize) -> u64 {
     (bytes as u64).max(48).next_multiple_of(16)
+}
+
+/// Bytes of a buffer, a multiple of 16, that takes the place of a smaller one: half more, up to the largest that the adapter allows, or those needed.
+pub(crate) fn grown(size: u64, needed: u64, largest: u64) -> u64 {
+    let roomy = (size * 3 / 2).next_multiple_of(16);
+    roomy.min(largest - largest % 16).max(needed.next_multiple_of(16))
 }
 
 /// An array that has two sides: at an instant one of them is now, the other one is next. Where a kernel changes it in place both
@@ -385,6 +390,13 @@ mod tests {
             array.buffer().size()
         };
         assert_eq!([1600, 1616, 16, 2400, 1 << 20].map(&mut size_for), [1600, 2400, 2400, 2400, 1 << 20]);
+    }
+
+    #[test]
+    fn a_buffer_grows_in_multiples_of_16_up_to_the_largest() {
+        let sizes = [(1600, 1616, 4001), (1600, 1616, 2005), (1600, 2000, 2005), (1600, 3201, 4001)];
+        let found = sizes.map(|(size, needed, largest)| grown(size, needed, largest));
+        assert_eq!(found, [2400, 2000, 2000, 3216]);
     }
 
     #[test]

@@ -69,7 +69,7 @@ pub struct GpuShells {
     nodes: Kernel,
     transfer: Transfer,
     loaded: bool,
-    /// Seconds that an instant takes, once known.
+    /// Seconds that an instant takes, once known; of one at which a facet is broken it is less.
     pace: Option<f64>,
 }
 
@@ -255,6 +255,7 @@ impl GpuShells {
             self.upload(state);
         }
         self.device.queue.write_buffer(&self.broken, 0, bytemuck::bytes_of(&NONE));
+        let pace = self.pace;
         let mut times = vec![state.time];
         while (times.len() as u64) <= steps {
             let left = steps + 1 - times.len() as u64;
@@ -272,6 +273,9 @@ impl GpuShells {
         }
         let (broken, work) = self.read(state)?;
         let taken = u64::from(broken).min(steps);
+        if taken < steps {
+            self.pace = pace;
+        }
         state.time = times[taken as usize];
         Ok(ShellsMoved { steps: taken, work, broken: taken < steps })
     }

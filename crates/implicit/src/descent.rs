@@ -35,6 +35,9 @@ const ROUND_OFF: f64 = 1e-12;
 
 /// What a step in contact needs of a solver.
 pub(crate) trait Contacting {
+    /// Whether steps have inertia.
+    const INERTIA: bool;
+
     /// The equations.
     fn system(&mut self) -> &mut System;
 

@@ -578,6 +578,8 @@ impl BackwardEuler {
 const LAGS: usize = 1;
 
 impl Contacting for BackwardEuler {
+    const INERTIA: bool = true;
+
     fn system(&mut self) -> &mut System {
         &mut self.system
     }

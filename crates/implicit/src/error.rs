@@ -221,8 +221,9 @@ pub enum SolveError {
     },
     /// A volume and the limit of its pressure that cannot both be kept: the state leaps from one side of them to the other.
     #[error(
-        "neither the volume of `{constraint}` nor its `pressure-limit` can be kept at t = {time:.6}: the volume takes {pressure:.4e} Pa of {limit:.4e} Pa, \
-         and at the limit it is {ahead:.1e} m³ beyond its curve: the surface snaps; try the solver `implicit`, smaller steps or a higher `pressure-limit`"
+        "neither the volume of `{constraint}` nor its `pressure-limit` of {limit:.4e} Pa can be kept at t = {time:.6}: {}: the surface snaps; \
+         try {}smaller steps or a higher `pressure-limit`",
+        in_vain(*pressure, *ahead), if *inertia { "" } else { "the solver `implicit`, " }
     )]
     Snaps {
         /// Time of the step that failed.
@@ -233,10 +234,12 @@ pub enum SolveError {
         node: u32,
         /// The limit [Pa].
         limit: f64,
-        /// The pressure [Pa] in the prescribed volume.
-        pressure: f64,
-        /// How far [m³] the volume is beyond the prescribed one at the limit.
-        ahead: f64,
+        /// The pressure [Pa] in the prescribed volume; `None` if the volume was not prescribed.
+        pressure: Option<f64>,
+        /// How far [m³] the volume is beyond the prescribed one at the limit; `None` if the limit was not prescribed.
+        ahead: Option<f64>,
+        /// Whether the step has inertia.
+        inertia: bool,
     },
     /// No lower energy along a direction that should have one.
     #[error(
@@ -313,6 +316,12 @@ fn in_larger_steps(found: Option<(usize, Broken)>) -> String {
         Broken::Folded(_) => "folds over",
     };
     format!("; in a larger step element {cell} {what}")
+}
+
+fn in_vain(pressure: Option<f64>, ahead: Option<f64>) -> String {
+    let pressure = pressure.map(|pressure| format!("the volume takes {pressure:.4e} Pa"));
+    let ahead = ahead.map(|ahead| format!("at the limit the volume is {ahead:.1e} m³ beyond its curve"));
+    pressure.into_iter().chain(ahead).collect::<Vec<_>>().join(", and ")
 }
 
 fn blocked(driver: Option<&(String, f64)>) -> String {

@@ -80,8 +80,10 @@ struct Valve {
     given: Option<f64>,
     /// How often the other was prescribed.
     changes: i32,
-    /// What did not hold: the pressure [Pa] in the volume, and how far [m³] the volume was beyond its curve at the limit.
-    beyond: [f64; 2],
+    /// The pressure [Pa] in the volume, where it was above the limit.
+    pressure: Option<f64>,
+    /// How far [m³] the volume was beyond its curve at the limit.
+    ahead: Option<f64>,
 }
 
 impl Valve {
@@ -94,9 +96,9 @@ impl Valve {
         };
         if !holds {
             match self.given.take() {
-                Some(_) => self.beyond[1] = -gap,
+                Some(_) => self.ahead = Some(gap.abs()),
                 None => {
-                    self.beyond[0] = pressure;
+                    self.pressure = Some(pressure);
                     self.given = Some(self.limit.copysign(pressure));
                 }
             }
@@ -105,11 +107,12 @@ impl Valve {
         holds
     }
 
-    /// That at a time [s] neither the volume nor the limit holds.
-    fn snaps(&self, model: &Assembly, time: f64) -> SolveError {
+    /// That at a time [s] neither the volume nor the limit holds, in a step with inertia or without.
+    fn snaps(&self, model: &Assembly, time: f64, inertia: bool) -> SolveError {
         let own = &model.constraints[self.constraint];
-        let ([pressure, ahead], limit) = (self.beyond, self.limit);
-        SolveError::Snaps { time, constraint: own.name.clone(), node: own.nodes[0], limit, pressure, ahead }
+        let (constraint, node) = (own.name.clone(), own.nodes[0]);
+        let Self { limit, pressure, ahead, .. } = *self;
+        SolveError::Snaps { time, constraint, node, limit, pressure, ahead, inertia }
     }
 
     /// How far the volume is from where it should be [m³].
@@ -150,7 +153,7 @@ pub(crate) fn within_limits<S: Contacting, T, E: From<SolveError>>(
         let unkept = solver.system().unkept(&mut valves);
         let mut agree = unkept.is_none();
         if let Some(own) = unkept.filter(|own| own.changes > CHANGES || tries == 0) {
-            return Err(own.snaps(&solver.system().model, time).into());
+            return Err(own.snaps(&solver.system().model, time, S::INERTIA).into());
         }
         for (guess, force) in guesses.iter_mut().zip(solver.system().bear_on()) {
             agree &= guess.take(force);
@@ -179,7 +182,7 @@ impl System {
             let (constraint, behind) = (lag.number(), -lag.now().x);
             let limit = self.model.force_limits[&constraint];
             let given = (behind != 0.0).then(|| limit.copysign(behind));
-            Valve { constraint, limit, given, changes: 0, beyond: [0.0; 2] }
+            Valve { constraint, limit, given, changes: 0, pressure: None, ahead: None }
         })
         .collect()
     }
@@ -243,4 +246,33 @@ impl System {
 /// Whether a lag is that of a volume.
 fn encloses(model: &Assembly, lag: &Lag) -> bool {
     model.constraints[lag.number()].motion.encloses()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A step that begins at the limit, and whose volume then takes too much: the numbers of both come one after the other.
+    #[test]
+    fn a_valve_tells_what_it_found_and_no_more() {
+        let mut model = Assembly::new("ball", [Vector3::zeros()]);
+        model.model_mut().fix("air", vec![0]);
+        let mut valve = Valve {
+            constraint: 0,
+            limit: 500.0,
+            given: Some(-500.0),
+            changes: 0,
+            pressure: None,
+            ahead: None,
+        };
+        let told = |valve: &Valve, inertia| valve.snaps(&model, 0.5, inertia).to_string();
+        assert!(!valve.take([-500.0, 1e-6, 1e-3]));
+        let start = "neither the volume of `air` nor its `pressure-limit` of 5.0000e2 Pa can be kept at t = 0.500000: ";
+        let ahead = "at the limit the volume is 1.0e-6 m³ beyond its curve: the surface snaps; try ";
+        let advice = "smaller steps or a higher `pressure-limit`";
+        assert_eq!(told(&valve, true), format!("{start}{ahead}{advice}"));
+        assert!(!valve.take([-600.0, 0.0, 1e-3]));
+        let pressure = "the volume takes -6.0000e2 Pa, and ";
+        assert_eq!(told(&valve, false), format!("{start}{pressure}{ahead}the solver `implicit`, {advice}"));
+    }
 }

@@ -680,6 +680,8 @@ impl Statics {
 const LAGS: usize = 20;
 
 impl Contacting for Statics {
+    const INERTIA: bool = false;
+
     fn system(&mut self) -> &mut System {
         &mut self.system
     }

@@ -216,6 +216,7 @@ fn describe_forms(schemas: Forms<'_>, forms: &[Form<'_>], depth: usize) -> Vec<P
                 let said = schema.get("description").is_some();
                 if let Some(doc) = form.doc.filter(|_| !said && own == 1 && !common(key)) {
                     found.description = doc.to_owned();
+                    found.unit = unit(Some(doc)).to_owned();
                 }
                 parameters.push(found);
             }

@@ -264,19 +264,22 @@ impl Implicit {
     }
 
     /// So many steps, from an evaluated instant. Where a facet is broken on the device, the CPU decides: it fails with the facet, or takes the
-    /// step that only single precision cannot.
+    /// step that only single precision cannot. The device then tries one step, and twice as many each time that it takes all.
     #[cfg(feature = "gpu")]
     fn advance_with_device(&mut self, steps: u64) -> Result<(), Failure> {
         let end = self.done + steps;
+        let mut tried = steps;
         loop {
-            self.advance_on_device(end - self.done)?;
-            if self.done == end {
-                return Ok(());
-            }
-            self.evaluate(Wanted::Energies)?;
-            self.advance_on_processor()?;
-            if let Some(device) = &mut self.device {
-                device.stepper.upload(&self.state);
+            let goal = end.min(self.done + tried);
+            self.advance_on_device(goal - self.done)?;
+            tried *= 2;
+            if self.done < goal {
+                self.evaluate(Wanted::Energies)?;
+                self.advance_on_processor()?;
+                if let Some(device) = &mut self.device {
+                    device.stepper.upload(&self.state);
+                }
+                tried = 1;
             }
             if self.done == end {
                 return Ok(());
@@ -986,10 +989,8 @@ fn failure(
     let body_of = |node: u32| model.bodies.iter().find(|body| body.nodes.contains(&node));
     let (kind, node, cell) = match error {
         SolveError::NotConverged { node, .. } => ("not-converged", Some(*node), None),
-        SolveError::Uphill { node, .. } | SolveError::Snaps { node, .. } => {
-            ("not-converged", Some(*node), None)
-        }
-        SolveError::Stalled { .. } => ("not-converged", None, None),
+        SolveError::Uphill { node, .. } => ("not-converged", Some(*node), None),
+        SolveError::Snaps { .. } | SolveError::Stalled { .. } => ("not-converged", None, None),
         SolveError::Blocked { .. } => ("blocked", None, None),
         SolveError::Crossed { edge, .. } => ("intersecting", Some(edge[0]), None),
         SolveError::Singular { node, .. } | SolveError::FreeBody { node, .. } => {
@@ -1001,7 +1002,10 @@ fn failure(
         SolveError::Device(_) => ("device", None, None),
         SolveError::Open(_) | SolveError::Impossible(_) => ("input", None, None),
     };
-    let owner = node.and_then(body_of);
+    let owner = match error {
+        SolveError::Snaps { node, .. } => body_of(*node),
+        _ => node.and_then(body_of),
+    };
     let own_node = node.zip(owner).map(|(node, body)| node - body.nodes.start);
     let body = owner.map(|body| body.name.clone()).or_else(|| Some(model.bodies[cell?.0].name.clone()));
     let place = body.as_ref().map(|name| format!(" in `{name}`")).unwrap_or_default();

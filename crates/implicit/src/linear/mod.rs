@@ -58,6 +58,7 @@ pub enum Preconditioner {
     /// The inverse of each node's diagonal block.
     BlockJacobi,
     /// These inverses, deflated by the rigid motions of groups of some sixteen neighbouring nodes: far fewer iterations on many elements.
+    /// A GPU takes about 160 larger groups in all, and adds their correction in place of deflating.
     Aggregates,
     /// The factors of an older matrix, made anew once this many iterations were needed.
     LaggedFactors {

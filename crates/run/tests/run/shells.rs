@@ -626,7 +626,10 @@ fn wrong_combinations_of_models_solvers_and_keys_are_refused() {
             run("precision = \"single\""),
             ["shells are computed in double precision only on the CPU", "leave `precision` out"],
         ),
-        (run("mass-scaling = { target-step = 1e-3 }"), ["mass is not scaled for shells", "leave it out"]),
+        (
+            run("mass-scaling = { target-step = 1e-3 }"),
+            ["mass is not scaled for shells", "leave it out: the solver `static` has no critical time step"],
+        ),
         (
             run("on-unstable = \"stop\""),
             ["the critical time step of shells is not monitored", "leave it out"],

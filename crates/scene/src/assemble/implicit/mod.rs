@@ -63,8 +63,14 @@ impl Builder<'_> {
         }
         if scene.run.mass_scaling.is_some() {
             let message = format!("mass is not scaled for {what}");
-            let help = "leave it out, or take `solver = \"implicit\"`, which has no critical time step";
-            self.error(&scene.run_at("mass-scaling"), message, "not for these bodies", help);
+            let help = match scene.run.solver {
+                SolverName::Explicit => {
+                    "leave it out, or take `solver = \"implicit\"`, which has no critical time step"
+                        .to_owned()
+                }
+                _ => format!("leave it out: the solver `{solver}` has no critical time step"),
+            };
+            self.error(&scene.run_at("mass-scaling"), message, "not for these bodies", &help);
         }
         if scene.run.on_unstable.is_some() {
             let message = format!("the critical time step of {what} is not monitored");
