@@ -1,5 +1,5 @@
-//! Checks of the critical time step that can be passed over. A check ranks all cells, which takes as long as nine steps of a CPU, so only those
-//! are made that can cut steps otherwise.
+//! Checks of the critical time step that can be passed over. A check ranks all cells and finds the stiffest modes of some, which takes longer than a
+//! step, so only those are made that can cut steps otherwise.
 //!
 //! From one check to the next, steps keep their parts while the limit stays in a band. The rate at which it changed says when it leaves the
 //! band; up to half of the way there checks are passed over, and near the edge every one is made. Not foreseen: a limit that falls while

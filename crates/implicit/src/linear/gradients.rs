@@ -394,8 +394,9 @@ impl Coarse {
         (&self.arm, &self.value)
     }
 
-    /// Factors the coarse matrix. As deflated directions have no part in it, negative stiffness there is found here.
-    pub(crate) fn factorise(&mut self) -> Result<(), LinearError> {
+    /// Factors the coarse matrix; its negative pivots. As deflated directions have no part in it, iterations do not meet negative stiffness
+    /// there.
+    pub(crate) fn factorise(&mut self) -> Result<usize, LinearError> {
         for ((row, column, _), value) in self.pairs.iter().zip(&self.value) {
             for j in 0..6 {
                 let (start, rows) =
@@ -409,7 +410,7 @@ impl Coarse {
         }
         let pivots = self.factors.factorise(&self.matrix).ok_or(LinearError::NotFinite)?;
         // Motions that no node of an aggregate has leave pivots of round-off.
-        if pivots.lowest < -ROUND_OFF { Err(LinearError::Indefinite(0)) } else { Ok(()) }
+        Ok(if pivots.lowest < -ROUND_OFF { pivots.negative } else { 0 })
     }
 
     /// Finds the rigid motions c = (Pᵀ A P)⁻¹ Pᵀ (r − A z); r · P c.

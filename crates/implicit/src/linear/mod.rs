@@ -162,7 +162,7 @@ impl Workspace {
             coarse.update(blocks);
             // A device inverts it itself.
             if self.on_device.is_none() {
-                coarse.factorise()?;
+                self.pivots.negative = coarse.factorise()?;
             }
         }
         if let (Some(on_device), Some(blocks)) = (&mut self.on_device, &self.blocks) {
@@ -238,7 +238,7 @@ impl Workspace {
                 Found::Rest(iterations) => done = iterations,
             }
             self.left_to_cpu += 1;
-            self.coarse.as_mut().map_or(Ok(()), Coarse::factorise)?;
+            self.coarse.as_mut().map(Coarse::factorise).transpose()?;
         }
         let inverse = match (&mut self.factors, &mut self.coarse) {
             (Some(factors), _) => Approximation::Factors(factors),

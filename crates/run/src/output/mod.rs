@@ -90,10 +90,13 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// Fields of cells, found once for all outputs that show the instant.
+/// Fields of cells, with their stable steps [s] if these are wanted.
+type OfCells = Vec<(CellFields, Option<f64>)>;
+
+/// Those of solids, found once for all outputs that show the instant.
 struct Recovered<'a> {
     now: Box<dyn CellsNow + 'a>,
-    solids: Vec<OnceCell<Vec<(CellFields, Option<f64>)>>>,
+    solids: Vec<OnceCell<OfCells>>,
 }
 
 impl<'a> Recovered<'a> {
