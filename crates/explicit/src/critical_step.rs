@@ -110,7 +110,7 @@ pub(crate) fn assembled_about(
     owners: &[[u32; 3]],
     displacement: &[Vector<f64>],
 ) -> CriticalStep {
-    let mut operator = Operator::new(model, owners, displacement, CENTRAL);
+    let mut operator = Operator::new(model, owners, displacement.to_vec(), CENTRAL);
     let started = std::time::Instant::now();
     let (eigenvalue, error) = largest_eigenvalue(&mut operator, None);
     let seconds_per_call = started.elapsed().as_secs_f64() / operator.calls.max(1) as f64;
@@ -122,7 +122,7 @@ pub(crate) fn assembled_about(
 pub(crate) fn limit_about(
     model: &Model,
     owners: &[[u32; 3]],
-    displacement: &[Vector<f64>],
+    displacement: Vec<Vector<f64>>,
     enough: f64,
 ) -> f64 {
     // Fibres that carry tension only have two slopes where they are slack.
@@ -164,8 +164,12 @@ struct Operator<'a> {
 }
 
 impl<'a> Operator<'a> {
-    fn new(model: &'a Model, owners: &[[u32; 3]], about: &[Vector<f64>], difference: Difference) -> Self {
-        let mut about = about.to_vec();
+    fn new(
+        model: &'a Model,
+        owners: &[[u32; 3]],
+        mut about: Vec<Vector<f64>>,
+        difference: Difference,
+    ) -> Self {
         model.follow(&mut about);
         let inverse_root_mass = (owners.iter().enumerate())
             .map(|(node, owner)| (model.inertia(node), owner))
@@ -176,30 +180,25 @@ impl<'a> Operator<'a> {
                 (0..solid.cells.len()).map(|c| solid.cells.gradient_square_sum(c).sqrt().recip())
             })
             .fold(f64::INFINITY, f64::min);
-        let mut operator = Self {
+        let mut forces = InternalForces::new(&model.with_taut_threads(), 1.0);
+        let mut history = vec![History::default(); model.solids.len()];
+        let mut before = Vec::new();
+        if difference == FORWARD {
+            forces.evaluate(&about, &mut history);
+            before.extend((0..about.len()).map(|node| forces.at(node)));
+        }
+        Self {
             model,
             about,
             difference,
-            forces: InternalForces::new(&model.with_taut_threads(), 1.0),
-            before: Vec::new(),
-            history: vec![History::default(); model.solids.len()],
+            forces,
+            before,
+            history,
             inverse_root_mass,
             displacement: vec![[0.0; 3]; model.node_count()],
             amplitude: difference.1 * smallest,
             calls: 0,
-        };
-        if difference == FORWARD {
-            let about = std::mem::take(&mut operator.about);
-            operator.evaluate(&about);
-            operator.before = (0..about.len()).map(|node| operator.forces.at(node)).collect();
-            operator.about = about;
         }
-        operator
-    }
-
-    fn evaluate(&mut self, displacement: &[Vector<f64>]) {
-        self.forces.evaluate(displacement, &mut self.history);
-        self.calls += 1;
     }
 
     fn apply(&mut self, v: &[Vector<f64>], out: &mut [Vector<f64>]) {
@@ -211,17 +210,12 @@ impl<'a> Operator<'a> {
         let h = self.amplitude / largest;
         out.fill([0.0; 3]);
         for &[side, weight] in self.difference.0 {
-            let mut moved = std::mem::take(&mut self.displacement);
             let moves = v.par_iter().zip(&self.inverse_root_mass);
-            moved
-                .par_iter_mut()
-                .zip(&self.about)
-                .zip(moves)
-                .with_min_len(SHARE)
-                .for_each(|((u, about), (v, w))| *u = [0, 1, 2].map(|c| about[c] + side * h * v[c] * w[c]));
-            self.model.follow(&mut moved);
-            self.evaluate(&moved);
-            self.displacement = moved;
+            let nodes = self.displacement.par_iter_mut().zip(&self.about).zip(moves).with_min_len(SHARE);
+            nodes.for_each(|((u, about), (v, w))| *u = [0, 1, 2].map(|c| about[c] + side * h * v[c] * w[c]));
+            self.model.follow(&mut self.displacement);
+            self.forces.evaluate(&self.displacement, &mut self.history);
+            self.calls += 1;
             let (forces, before, scale) = (&self.forces, &self.before, weight / h);
             out.par_iter_mut().zip(&self.inverse_root_mass).enumerate().with_min_len(SHARE).for_each(
                 |(node, (out, w))| {

@@ -334,7 +334,7 @@ impl<R: Scalar, const N: usize> Local<'_, R, N> {
     #[inline(always)]
     pub(crate) fn add<L: Lanes<R>>(&mut self, pack: usize, vectors: &[Pack<[R; 4]>; N]) {
         let offsets = &self.offsets[pack];
-        // By fours, which the compiler writes out, so that rows lie at fixed distances.
+        // The compiler unrolls loops of four lanes, and rows then lie at fixed distances.
         for first in (0..PACK).step_by(4) {
             for lane in first..first + 4 {
                 let row = L::row_of_lane(lane);

@@ -254,9 +254,10 @@ impl Watch {
         let packs = speeds.par_chunks_mut(PACK).zip(stretches.par_chunks_mut(PACK)).zip(&self.square);
         packs.enumerate().with_min_len(16).for_each(|(pack, ((speeds, stretches), square))| {
             let mut gradient = Tensor([[Pack::ZERO; 3]; 3]);
-            let (mut speed, mut stretch) = (Pack::ZERO, Pack::ZERO);
+            let (mut speed, mut stretch, mut along) = (Pack::ZERO, Pack::ZERO, [None; PACK]);
             for (lane, cell) in (pack * PACK..).take(speeds.len()).enumerate() {
                 let h = displacement_gradient(solid, cell, displacement);
+                along[lane] = largest_fibre_stretch(solid, cell, &h);
                 for (to, entry) in gradient.0.as_flattened_mut().iter_mut().zip(h.0.as_flattened()) {
                     to.0[lane] = *entry;
                 }
@@ -266,8 +267,7 @@ impl Watch {
             for (lane, cell) in (pack * PACK..).take(speeds.len()).enumerate() {
                 let number = cell as u32;
                 speeds[lane] = Ranked { rank: speed.0[lane] * self.weight[cell], cell: number };
-                let along = largest_fibre_stretch(solid, cell, &gradient, lane);
-                stretches[lane] = Ranked { rank: along.unwrap_or(stretch.0[lane]), cell: number };
+                stretches[lane] = Ranked { rank: along[lane].unwrap_or(stretch.0[lane]), cell: number };
             }
         });
     }
@@ -432,23 +432,13 @@ fn displacement_gradient<R: Scalar>(solid: &Solid, cell: usize, displacement: &[
     plane.displacement_gradient(plane.incompressible())
 }
 
-/// The largest squared stretch of the fibres of a cell, from a pack of displacement gradients; `None` without fibres.
-fn largest_fibre_stretch(
-    solid: &Solid,
-    cell: usize,
-    gradient: &Tensor<Pack<f64>>,
-    lane: usize,
-) -> Option<f64> {
-    let fibres = solid.law_fibres(cell);
-    let mut h = Tensor::ZERO;
-    for (own, pack) in h.0.as_flattened_mut().iter_mut().zip(gradient.0.as_flattened()) {
-        *own = pack.0[lane];
-    }
+/// The largest squared stretch of the fibres of a cell with a displacement gradient; `None` without fibres.
+fn largest_fibre_stretch(solid: &Solid, cell: usize, h: &Tensor<f64>) -> Option<f64> {
     let stretch = |&fibre: &Vector<f64>| {
         let deformed = add(fibre, h.apply(fibre));
         dot(deformed, deformed)
     };
-    fibres.iter().map(stretch).reduce(f64::max)
+    solid.law_fibres(cell).iter().map(stretch).reduce(f64::max)
 }
 
 /// Symmetric tensors side by side; zero beyond the last.

@@ -235,25 +235,26 @@ fn stiffest_wave<N: Number>(a: &Matrix<N>) -> N {
     largest
 }
 
-/// y·A·y, over displacements.
+/// Contracted with y twice over columns of L, which leaves displacements.
 #[inline(always)]
 fn along<N: Number>(a: &Matrix<N>, y: Vector<N>) -> Symmetric<N> {
-    let mut found = Symmetric::ZERO;
-    for (entry, [i, k]) in found.0.iter_mut().zip(ENTRIES) {
-        for (p, &own) in y.iter().enumerate() {
-            *entry += own * dot([a[3 * i + p][3 * k], a[3 * i + p][3 * k + 1], a[3 * i + p][3 * k + 2]], y);
-        }
-    }
-    found
+    contracted(a, y, 3, 1)
 }
 
-/// n·A·n, over gradients.
+/// Contracted with n twice over displacements, which leaves columns of L.
 #[inline(always)]
 fn across<N: Number>(a: &Matrix<N>, n: Vector<N>) -> Symmetric<N> {
+    contracted(a, n, 1, 3)
+}
+
+/// Contracted twice with a vector over indices that lie `over` rows apart; those that stay lie `kept` rows apart.
+#[inline(always)]
+fn contracted<N: Number>(a: &Matrix<N>, with: Vector<N>, kept: usize, over: usize) -> Symmetric<N> {
     let mut found = Symmetric::ZERO;
-    for (entry, [p, q]) in found.0.iter_mut().zip(ENTRIES) {
-        for (i, &own) in n.iter().enumerate() {
-            *entry += own * dot([a[3 * i + p][q], a[3 * i + p][3 + q], a[3 * i + p][6 + q]], n);
+    for (entry, [i, k]) in found.0.iter_mut().zip(ENTRIES) {
+        for (p, &own) in with.iter().enumerate() {
+            let (row, first) = (&a[kept * i + over * p], kept * k);
+            *entry += own * dot([row[first], row[first + over], row[first + 2 * over]], with);
         }
     }
     found

@@ -1,5 +1,5 @@
-//! Sums over the facets of a chunk, node by node: threads share the nodes, and each node takes up the corners that meet there in the order
-//! of the facets, so the number of threads changes no bit.
+//! Sums over the facets of a chunk, node by node. Threads share the nodes. Each node adds the corners that meet there in the order of the
+//! facets, so the number of threads changes no bit.
 
 use crate::sparse::{Equations, Values};
 

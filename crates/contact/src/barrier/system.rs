@@ -247,8 +247,8 @@ impl Barriers {
         }
     }
 
-    /// Lists pairs that may come near in a part of a motion, while rigid things go on from a share to the end of the step. Returns the part of that motion
-    /// for which the lists hold.
+    /// Lists pairs that may come near during a part of a motion. Rigid things move from this share of the step to its end. Returns the part of
+    /// the motion for which the lists hold.
     fn list(&mut self, motion: &[f64], part: f64, share: f64) -> f64 {
         self.set_motion(motion, part, if share < 1.0 { 1.0 } else { share });
         self.list_motion()

@@ -146,16 +146,14 @@ impl Parts {
         self.xml.extend_from_slice(text.as_bytes());
     }
 
-    /// `width` is that of real numbers, of which some arrays are not worth compressing; `None` of integers.
-    fn array(
-        &mut self,
-        kind: &str,
-        name: &str,
-        components: usize,
-        raw: &[u8],
-        width: Option<usize>,
-    ) -> io::Result<()> {
+    fn array(&mut self, kind: &str, name: &str, components: usize, raw: &[u8]) -> io::Result<()> {
         let name = escaped(name);
+        // Of real numbers some arrays are not worth compressing.
+        let width = match kind {
+            "Float32" => Some(4),
+            "Float64" => Some(8),
+            _ => None,
+        };
         write!(self.xml, "        <DataArray type=\"{kind}\" Name=\"{name}\"")?;
         if components != 1 {
             write!(self.xml, " NumberOfComponents=\"{components}\"")?;
@@ -193,10 +191,10 @@ impl Parts {
     fn reals(&mut self, name: &str, components: usize, values: &[f64], single: bool) -> io::Result<()> {
         if single {
             let raw: Vec<u8> = values.iter().flat_map(|&value| (value as f32).to_le_bytes()).collect();
-            self.array("Float32", name, components, &raw, Some(4))
+            self.array("Float32", name, components, &raw)
         } else {
             let raw: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
-            self.array("Float64", name, components, &raw, Some(8))
+            self.array("Float64", name, components, &raw)
         }
     }
 
@@ -204,10 +202,10 @@ impl Parts {
     fn indices(&mut self, name: &str, indices: impl Iterator<Item = usize>, limit: usize) -> io::Result<()> {
         if i32::try_from(limit).is_ok() {
             let raw: Vec<u8> = indices.flat_map(|index| (index as i32).to_le_bytes()).collect();
-            self.array("Int32", name, 1, &raw, None)
+            self.array("Int32", name, 1, &raw)
         } else {
             let raw: Vec<u8> = indices.flat_map(|index| (index as i64).to_le_bytes()).collect();
-            self.array("Int64", name, 1, &raw, None)
+            self.array("Int64", name, 1, &raw)
         }
     }
 
@@ -215,7 +213,7 @@ impl Parts {
         let is_integer = |&value: &f64| value.fract() == 0.0 && f64::from(value as i32) == value;
         if name == "label" && array.values.iter().all(is_integer) {
             let raw: Vec<u8> = array.values.iter().flat_map(|&value| (value as i32).to_le_bytes()).collect();
-            return self.array("Int32", name, array.components, &raw, None);
+            return self.array("Int32", name, array.components, &raw);
         }
         self.reals(name, array.components, &array.values, single)
     }
@@ -224,7 +222,7 @@ impl Parts {
     fn set(&mut self, name: &str, members: impl Iterator<Item = usize>, items: usize) -> io::Result<()> {
         let mut raw = vec![0; items];
         members.for_each(|member| raw[member] = 1);
-        self.array("UInt8", &format!("{SET_PREFIX}{name}"), 1, &raw, None)
+        self.array("UInt8", &format!("{SET_PREFIX}{name}"), 1, &raw)
     }
 }
 
@@ -371,7 +369,7 @@ fn write_cells(parts: &mut Parts, mesh: &Mesh) -> io::Result<()> {
         .iter()
         .flat_map(|block| std::iter::repeat_n(type_number(block.kind), block.len()))
         .collect();
-    parts.array("UInt8", "types", 1, &types, None)?;
+    parts.array("UInt8", "types", 1, &types)?;
     parts.push("      </Cells>\n");
     Ok(())
 }

@@ -224,7 +224,7 @@ fn the_device_gives_the_same_bits_however_steps_are_divided() {
     assert_eq!(whole, run(&[1, 150, 149]));
 }
 
-/// A run goes on from a state that was read back: rotations and velocities with the same bits, places to their last digits.
+/// A run resumes from a state that was read back: rotations and velocities have the same bits, places agree to round-off.
 #[test]
 fn another_stepper_goes_on_from_a_state_that_was_read_back() {
     let Some(device) = support::device() else { return };

@@ -240,12 +240,11 @@ impl OnDevice {
         tolerance: f64,
         iterations: usize,
     ) -> Found {
-        let size = vectors.begin(blocks, b, x);
+        let [size, mut left] = vectors.begin(blocks, b, x);
         let mut report = LinearReport::default();
         if size == 0.0 {
             return Found::Solution(Ok(report));
         }
-        let mut left = vectors.residual();
         loop {
             report.residual = left / size;
             if report.residual <= tolerance {

@@ -708,11 +708,12 @@ impl KrylovVectors {
         result
     }
 
-    /// r ← b − A x from the x given or, if that is nearer, from 0; |b|.
-    pub(super) fn begin(&mut self, matrix: &BlockMatrix, b: &[f64], x: &[f64]) -> f64 {
+    /// r ← b − A x from the x given or, if that is nearer, from 0; |b| and |r|.
+    pub(super) fn begin(&mut self, matrix: &BlockMatrix, b: &[f64], x: &[f64]) -> [f64; 2] {
         matrix.gather(b, &mut self.r);
         matrix.gather(x, &mut self.x);
         let size = squared(&self.r);
+        let mut left = size;
         if self.x.iter().any(|x| *x != [0.0; 6]) {
             self.multiply(matrix, true);
             let near: f64 = self
@@ -722,6 +723,7 @@ impl KrylovVectors {
                 .map(|(r, ax)| (0..6).map(|c| (r[c] - ax[c]) * (r[c] - ax[c])).sum::<f64>())
                 .sum();
             if near < size {
+                left = near;
                 for (r, ax) in self.r.iter_mut().zip(&self.ap) {
                     (0..6).for_each(|c| r[c] -= ax[c]);
                 }
@@ -729,7 +731,7 @@ impl KrylovVectors {
                 self.x.fill([0.0; 6]);
             }
         }
-        size.sqrt()
+        [size.sqrt(), left.sqrt()]
     }
 
     /// x ← x + `scale` d; then r ← b − A x. The residual |r|.
@@ -742,11 +744,6 @@ impl KrylovVectors {
         for (r, ax) in self.r.iter_mut().zip(&self.ap) {
             (0..6).for_each(|c| r[c] -= ax[c]);
         }
-        self.residual()
-    }
-
-    /// |r|.
-    pub(super) fn residual(&self) -> f64 {
         squared(&self.r).sqrt()
     }
 
@@ -771,7 +768,7 @@ impl KrylovVectors {
         tolerance: f64,
         iterations: usize,
     ) -> Result<LinearReport, LinearError> {
-        let size = self.begin(matrix, b, x);
+        let [size, left] = self.begin(matrix, b, x);
         let blocks = !matches!(inverse, Approximation::Factors(_));
         self.p.fill([0.0; 6]);
         self.ap.fill([0.0; 6]);
@@ -779,8 +776,10 @@ impl KrylovVectors {
         if size == 0.0 {
             return Ok(report);
         }
-        let solved = self.residual() <= tolerance * size;
-        let deflated = !solved && matches!(inverse, Approximation::Aggregates(_));
+        if left <= tolerance * size {
+            return Ok(LinearReport { residual: left / size, ..report });
+        }
+        let deflated = matches!(inverse, Approximation::Aggregates(_));
         if deflated {
             self.deflate(matrix, inverse);
         }
@@ -788,9 +787,6 @@ impl KrylovVectors {
         report.residual = left.sqrt() / size;
         if !report.residual.is_finite() {
             return Err(LinearError::NotFinite);
-        }
-        if solved {
-            return Ok(report);
         }
         let mut rz = self.precondition(matrix, inverse, so_far);
         let mut beta = 0.0;
@@ -867,7 +863,7 @@ mod tests {
         assert_eq!(lengths(&aggregates(&chains(60, 40), 100).1), [24, 16].repeat(60));
     }
 
-    /// Blocks Bᵀ B + I times their inverses are I to 1e-12; one with a negative eigenvalue is told.
+    /// Blocks Bᵀ B + I times their inverses are I to 1e-12; a block with a negative eigenvalue is reported.
     #[test]
     fn blocks_are_inverted_side_by_side() {
         let mut random = Random::new(11);

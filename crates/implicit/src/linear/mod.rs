@@ -87,7 +87,8 @@ pub(crate) struct Workspace {
 }
 
 impl Workspace {
-    /// A solver for matrices of one pattern, on a device if one is given. It goes on with what one for another pattern has of the device.
+    /// A solver for matrices of one pattern, on a device if one is given. It takes over the device's arrays and kernels from the solver of
+    /// the pattern before.
     pub(crate) fn new(
         solver: LinearSolver,
         device: Option<&Arc<dyn LinearDevice>>,

@@ -61,7 +61,7 @@ impl Builder<'_> {
         }
     }
 
-    /// Makes the nodes heavier that limit the step, and tells what is added.
+    /// Makes the nodes that limit the step heavier, and notes how much mass that adds.
     pub(super) fn scale_mass(&mut self) {
         let Some(table) = self.scene.run.mass_scaling else { return };
         let goal = match table {
