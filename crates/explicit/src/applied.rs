@@ -11,7 +11,7 @@ use pliant_mechanics::tensor::{Vector, add};
 use crate::Scalar;
 
 /// Nodes whose forces are passed over together where nothing acts on them.
-pub(crate) const BLOCK: usize = 16;
+pub(crate) const BLOCK: usize = 128;
 
 /// Forces applied to the nodes, found anew for each instant.
 pub(crate) struct AppliedForces {

@@ -25,7 +25,7 @@ use crate::Scalar;
 use crate::applied::{AppliedForces, BLOCK};
 use crate::collective::{Collective, Predicted, enclosed};
 use crate::energies::{Sums, model_balance_floor};
-use crate::forces::{Deformed, Found, InternalForces};
+use crate::forces::{Deformed, Found, InternalForces, Quad};
 use crate::lanes::{Instructions, LaneWork, Lanes, MissingInstructions, Processor};
 use crate::recover::stored_at_start;
 use crate::stability::Monitor;
@@ -35,10 +35,13 @@ use crate::step_error::StepError;
 use crate::touching::{Free, NodeContact, Nodes, Posture, Touching};
 
 /// Nodes per parallel task.
-const CHUNK: usize = 512;
+const CHUNK: usize = 384;
+
+/// Sums of a block are kept apart in so many lanes.
+const LANES: usize = 16;
 
 /// Tasks that a thread takes at least: fewer take less time than waking another thread.
-const LEAST_CHUNKS: usize = 4;
+const LEAST_CHUNKS: usize = 5;
 
 /// The results of an evaluated instant that a caller needs. A GPU reads back only these.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -262,62 +265,52 @@ struct NodePass<'a, R> {
 impl<R: Scalar> LaneWork<R> for NodePass<'_, R> {
     type Output = Sums;
 
-    /// Plain loops over a block of components, which the compiler makes wide.
+    /// Plain loops over a block of components, which the compiler makes wide. Each loop goes over a whole block: a wide read of numbers that were
+    /// written one by one waits until they have left the processor's queue.
     #[inline(always)]
     fn run<L: Lanes<R>>(self) -> Sums {
         let Self { stepper, first, before, next, reaction } = self;
         let mut held = stepper.held_in(first..first + before.len()).iter().peekable();
         let pace = Pace::new(stepper.lengths);
-        let mut sums = [[0.0; BLOCK]; 6];
+        let mut sums = [[0.0; LANES]; 6];
         let mut block = Block::at_rest();
+        let mut end = Known::at_rest();
         for (index, (before, next)) in before.chunks(BLOCK).zip(next.chunks_mut(BLOCK)).enumerate() {
             let nodes = first + index * BLOCK..first + index * BLOCK + before.len();
             if before.len() < BLOCK {
                 block = Block::at_rest();
             }
-            stepper.forces.at_nodes(nodes.clone(), &mut block.internal);
+            stepper.forces.at_nodes(nodes.clone(), &mut block.parts, &mut block.internal);
             let mut pushed = stepper.applied.acts_at(nodes.start);
             if pushed {
                 for (to, node) in block.external.iter_mut().zip(nodes.clone()) {
                     *to = stepper.applied.at(node);
                 }
             }
-            copy_in(before, &mut block.before);
-            copy_in(&stepper.mass[nodes.clone()], &mut block.mass);
-            copy_in(&stepper.damping[nodes.clone()], &mut block.damping);
-            block.move_freely(&pace);
+            let (mass, damping) = (&stepper.mass[nodes.clone()], &stepper.damping[nodes.clone()]);
+            let known = Known { before, mass, damping }.filled_up(&mut end);
+            block.move_freely(&known, &pace);
             while let Some(held) = held.next_if(|held| (held.node as usize) < nodes.end) {
                 let node = held.node as usize;
                 let to = node - nodes.start;
                 for (c, constraint) in held.components() {
                     let places = stepper.factors[constraint].map(|factors| held.place(c, factors));
-                    (block.next[to][c], reaction[node - first][c]) = block.prescribe(to, c, &pace, places);
+                    (block.next[to][c], reaction[node - first][c]) =
+                        block.prescribe(&known, [to, c], &pace, places);
                     block.external[to][c] += reaction[node - first][c];
                 }
                 pushed = true;
             }
-            block.add_motion(&mut sums, &pace);
+            block.add_motion(&known, &mut sums, &pace);
             if pushed {
-                block.add_push(&mut sums);
+                block.add_push(&known, &mut sums);
                 block.external = [[R::ZERO; 3]; BLOCK];
             }
-            match next.first_chunk_mut() {
-                Some(next) => *next = block.next,
-                None => next.copy_from_slice(&block.next[..next.len()]),
-            }
+            next.copy_from_slice(&block.next[..next.len()]);
         }
         let [kinetic, damping_power, internal_before, internal_after, external_before, external_after] =
             sums.map(|lanes| lanes.iter().sum());
         Sums { kinetic, damping_power, internal_before, internal_after, external_before, external_after }
-    }
-}
-
-/// Copies the first entries of a block in, mostly all of them: then without a call.
-#[inline(always)]
-fn copy_in<T: Copy>(from: &[T], to: &mut [T; BLOCK]) {
-    match from.first_chunk() {
-        Some(from) => *to = *from,
-        None => to[..from.len()].copy_from_slice(from),
     }
 }
 
@@ -338,31 +331,66 @@ impl<R: Scalar> LaneWork<R> for Add<'_, R> {
     }
 }
 
-/// What is known of a block of nodes; beyond the last node, of nodes at rest.
+/// What a block of nodes comes with.
+#[derive(Clone, Copy)]
+struct Known<T> {
+    before: T,
+    mass: T,
+    damping: T,
+}
+
+/// That of whole blocks.
+type Whole<'a, R> = Known<&'a [Vector<R>; BLOCK]>;
+
+impl<R: Scalar> Known<[Vector<R>; BLOCK]> {
+    fn at_rest() -> Self {
+        let zero = [[R::ZERO; 3]; BLOCK];
+        Self { before: zero, mass: [[R::ONE; 3]; BLOCK], damping: zero }
+    }
+}
+
+impl<'a, R: Scalar> Known<&'a [Vector<R>]> {
+    /// With nodes at rest beyond the last one, for which there is room.
+    #[inline(always)]
+    fn filled_up(self, room: &'a mut Known<[Vector<R>; BLOCK]>) -> Whole<'a, R> {
+        let fill = |own: &'a [Vector<R>], room: &'a mut [Vector<R>; BLOCK]| match own.first_chunk() {
+            Some(whole) => whole,
+            None => {
+                room[..own.len()].copy_from_slice(own);
+                &*room
+            }
+        };
+        Known {
+            before: fill(self.before, &mut room.before),
+            mass: fill(self.mass, &mut room.mass),
+            damping: fill(self.damping, &mut room.damping),
+        }
+    }
+}
+
+/// What is found of a block of nodes; zero beyond the last node.
 struct Block<R> {
-    before: [Vector<R>; BLOCK],
     next: [Vector<R>; BLOCK],
     internal: [Vector<R>; BLOCK],
+    /// The same with what blocks of cells leave beside it.
+    parts: [Quad<R>; BLOCK],
     /// Zero but for what pushes now.
     external: [Vector<R>; BLOCK],
-    mass: [Vector<R>; BLOCK],
-    damping: [Vector<R>; BLOCK],
 }
 
 impl<R: Scalar> Block<R> {
     #[inline(always)]
     fn at_rest() -> Self {
         let zero = [[R::ZERO; 3]; BLOCK];
-        let mass = [[R::ONE; 3]; BLOCK];
-        Self { before: zero, next: zero, internal: zero, external: zero, mass, damping: zero }
+        Self { next: zero, internal: zero, parts: [[R::ZERO; 4]; BLOCK], external: zero }
     }
 
     /// The increments of nodes that nothing holds.
     #[inline(always)]
-    fn move_freely(&mut self, &Pace { ratio, half_mean, step_squared, .. }: &Pace<R>) {
-        let (before, next) = (self.before.as_flattened(), self.next.as_flattened_mut());
+    fn move_freely(&mut self, known: &Whole<'_, R>, &Pace { ratio, half_mean, step_squared, .. }: &Pace<R>) {
+        let (before, next) = (known.before.as_flattened(), self.next.as_flattened_mut());
         let (internal, external) = (self.internal.as_flattened(), self.external.as_flattened());
-        let (mass, damping) = (self.mass.as_flattened(), self.damping.as_flattened());
+        let (mass, damping) = (known.mass.as_flattened(), known.damping.as_flattened());
         for i in 0..3 * BLOCK {
             let a = damping[i] * half_mean;
             let kept = (R::ONE - a) * (before[i] * ratio) * mass[i];
@@ -372,12 +400,18 @@ impl<R: Scalar> Block<R> {
 
     /// The increment and the reaction [N] of a component whose displacement [m] is prescribed now and after the step.
     #[inline(always)]
-    fn prescribe(&self, node: usize, c: usize, pace: &Pace<R>, [now, then]: [f64; 2]) -> (R, R) {
-        let same_speed = self.before[node][c] * pace.ratio;
+    fn prescribe(
+        &self,
+        known: &Whole<'_, R>,
+        [node, c]: [usize; 2],
+        pace: &Pace<R>,
+        [now, then]: [f64; 2],
+    ) -> (R, R) {
+        let same_speed = known.before[node][c] * pace.ratio;
         let next = R::of(then - now);
         let velocity = (same_speed + next) * pace.per_two_steps;
         let acceleration = (next - same_speed) * pace.per_step_squared;
-        let inertia = self.mass[node][c] * (acceleration + self.damping[node][c] * velocity);
+        let inertia = known.mass[node][c] * (acceleration + known.damping[node][c] * velocity);
         (next, inertia + self.internal[node][c] - self.external[node][c])
     }
 
@@ -385,39 +419,46 @@ impl<R: Scalar> Block<R> {
     /// three components are summed as they come, in the precision of the forces; all else in double precision.
     #[allow(clippy::needless_range_loop)]
     #[inline(always)]
-    fn add_motion(&self, sums: &mut [[f64; BLOCK]; 6], &Pace { ratio, per_two_steps, .. }: &Pace<R>) {
+    fn add_motion(
+        &self,
+        known: &Whole<'_, R>,
+        sums: &mut [[f64; LANES]; 6],
+        &Pace { ratio, per_two_steps, .. }: &Pace<R>,
+    ) {
         let (before, next, internal) =
-            (self.before.as_flattened(), self.next.as_flattened(), self.internal.as_flattened());
-        let (mass, damping) = (self.mass.as_flattened(), self.damping.as_flattened());
-        let mut parts = [[R::ZERO; BLOCK]; 4];
-        for part in 0..3 {
-            for lane in 0..BLOCK {
-                let i = part * BLOCK + lane;
-                let velocity = (before[i] * ratio + next[i]) * per_two_steps;
-                let twice_kinetic = mass[i] * velocity * velocity;
-                parts[0][lane] += twice_kinetic;
-                parts[1][lane] += damping[i] * twice_kinetic;
-                parts[2][lane] += internal[i] * before[i];
-                parts[3][lane] += internal[i] * next[i];
+            (known.before.as_flattened(), self.next.as_flattened(), self.internal.as_flattened());
+        let (mass, damping) = (known.mass.as_flattened(), known.damping.as_flattened());
+        for first in (0..3 * BLOCK).step_by(3 * LANES) {
+            let mut parts = [[R::ZERO; LANES]; 4];
+            for part in 0..3 {
+                for lane in 0..LANES {
+                    let i = first + part * LANES + lane;
+                    let velocity = (before[i] * ratio + next[i]) * per_two_steps;
+                    let twice_kinetic = mass[i] * velocity * velocity;
+                    parts[0][lane] += twice_kinetic;
+                    parts[1][lane] += damping[i] * twice_kinetic;
+                    parts[2][lane] += internal[i] * before[i];
+                    parts[3][lane] += internal[i] * next[i];
+                }
             }
-        }
-        for lane in 0..BLOCK {
-            sums[0][lane] += 0.5 * parts[0][lane].to_f64();
-            sums[1][lane] += parts[1][lane].to_f64();
-            sums[2][lane] += 0.5 * parts[2][lane].to_f64();
-            sums[3][lane] += 0.5 * parts[3][lane].to_f64();
+            for lane in 0..LANES {
+                sums[0][lane] += 0.5 * parts[0][lane].to_f64();
+                sums[1][lane] += parts[1][lane].to_f64();
+                sums[2][lane] += 0.5 * parts[2][lane].to_f64();
+                sums[3][lane] += 0.5 * parts[3][lane].to_f64();
+            }
         }
     }
 
     /// Adds the halves of the external work.
     #[allow(clippy::needless_range_loop)]
     #[inline(always)]
-    fn add_push(&self, sums: &mut [[f64; BLOCK]; 6]) {
-        let (before, next) = (self.before.as_flattened(), self.next.as_flattened());
+    fn add_push(&self, known: &Whole<'_, R>, sums: &mut [[f64; LANES]; 6]) {
+        let (before, next) = (known.before.as_flattened(), self.next.as_flattened());
         let external = self.external.as_flattened();
-        for part in 0..3 {
-            for lane in 0..BLOCK {
-                let i = part * BLOCK + lane;
+        for first in (0..3 * BLOCK).step_by(LANES) {
+            for lane in 0..LANES {
+                let i = first + lane;
                 sums[4][lane] += 0.5 * external[i].to_f64() * before[i].to_f64();
                 sums[5][lane] += 0.5 * external[i].to_f64() * next[i].to_f64();
             }
@@ -586,7 +627,7 @@ impl<R: Scalar> CentralDifference<R> {
     pub fn advance(&mut self, state: &mut State<R>) {
         std::mem::swap(&mut state.increment, &mut self.next);
         let chunks = state.displacement.par_chunks_mut(CHUNK).zip(state.increment.par_chunks(CHUNK));
-        chunks.enumerate().with_min_len(LEAST_CHUNKS).for_each(|(task, (displacement, increment))| {
+        chunks.enumerate().with_min_len(self.least_chunks()).for_each(|(task, (displacement, increment))| {
             let first = task * CHUNK;
             self.processor.run(Add { increment, to: displacement });
             for held in self.held_in(first..first + displacement.len()) {
@@ -737,6 +778,11 @@ impl<R: Scalar> CentralDifference<R> {
         self.collectives = collectives;
     }
 
+    /// Tasks over nodes that a thread takes at least: one where threads have just shared the cells, so that they are awake.
+    fn least_chunks(&self) -> usize {
+        if self.forces.is_shared() { 1 } else { LEAST_CHUNKS }
+    }
+
     fn pass_over_nodes(&mut self, state: &State<R>) {
         let mut next = std::mem::take(&mut self.next);
         let mut reaction = std::mem::take(&mut self.reaction);
@@ -744,7 +790,7 @@ impl<R: Scalar> CentralDifference<R> {
         let increment = state.increment.par_chunks(CHUNK);
         (next.par_chunks_mut(CHUNK).zip(reaction.par_chunks_mut(CHUNK)).zip(increment).zip(&mut sums))
             .enumerate()
-            .with_min_len(LEAST_CHUNKS)
+            .with_min_len(self.least_chunks())
             .for_each(|(task, (((next, reaction), before), sums))| {
                 *sums = self.processor.run(NodePass {
                     stepper: self,

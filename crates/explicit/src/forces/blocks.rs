@@ -10,11 +10,23 @@ use rayon::iter::{Either, repeat_n};
 use rayon::prelude::*;
 
 use super::Findings;
+use super::batch::PACKS;
 use crate::Scalar;
 use crate::lanes::{PACK, Pack};
 
-/// Packs of cells in a block. Of 55,566 tets on one thread 32 take 3 % longer; with 128 hexes leave the first cache.
+/// The most packs of cells in a block. Of 55,566 tets on one thread 32 take 3 % longer; with 128 hexes leave the first cache.
 pub(crate) const BLOCK: usize = 64;
+
+/// Nodes of packs of cells, each pack with its own, that are worth a second thread: fewer take less time than waking it.
+const SHARED: usize = 256;
+
+/// Packs of each block of so many packs of cells with `nodes` nodes: two blocks where a whole one would leave a thread without work.
+fn packs_per_block(packs: usize, nodes: usize) -> usize {
+    match packs * nodes < SHARED {
+        true => BLOCK,
+        false => packs.div_ceil(2).next_multiple_of(PACKS).min(BLOCK),
+    }
+}
 
 /// Three components and a fourth number, read and written at once.
 pub type Quad<R> = [R; 4];
@@ -28,12 +40,15 @@ pub struct Blocks {
     offsets: Vec<u32>,
     /// The most nodes of a block: each has room for so many.
     stride: usize,
+    /// Packs of cells in each block but the last.
+    packs: usize,
 }
 
 impl Blocks {
     /// Of cells in their order, and the number of each cell's nodes in its block.
     pub(super) fn new<const N: usize>(cells: &[[u32; N]]) -> (Self, Vec<[u16; N]>) {
-        let mut blocks = Self { nodes: Vec::new(), offsets: vec![0], stride: 0 };
+        let packs = packs_per_block(cells.len().div_ceil(PACK), N);
+        let mut blocks = Self { nodes: Vec::new(), offsets: vec![0], stride: 0, packs };
         let mut local = Vec::with_capacity(cells.len());
         let [low, high] = cells
             .as_flattened()
@@ -41,7 +56,7 @@ impl Blocks {
             .fold([u32::MAX, 0], |[low, high], &node| [low.min(node), high.max(node)]);
         // The number of each node in the block, from the lowest node on; u16::MAX of others.
         let mut numbers = vec![u16::MAX; (high + 1).saturating_sub(low) as usize];
-        for cells in cells.chunks(BLOCK * PACK) {
+        for cells in cells.chunks(packs * PACK) {
             let first = blocks.nodes.len();
             let mut own = Vec::new();
             for &node in cells.as_flattened() {
@@ -64,6 +79,11 @@ impl Blocks {
     /// Number of blocks.
     pub(super) fn len(&self) -> usize {
         self.offsets.len() - 1
+    }
+
+    /// Packs of cells in each block but the last.
+    pub(super) fn packs(&self) -> usize {
+        self.packs
     }
 
     /// The nodes of a block.
@@ -200,7 +220,8 @@ impl<R: Scalar> Moved<R> {
     ) {
         let Self { blocks, vectors } = self;
         let (count, stride) = (blocks.len(), blocks.stride.max(1));
-        let history = in_blocks(history, count).zip(in_blocks(pressures, count));
+        let of_blocks = |(all, per_pack)| in_blocks(all, per_pack * blocks.packs, count);
+        let history = of_blocks(history).zip(of_blocks(pressures));
         let rows = vectors.par_chunks_mut(stride).zip(forces.par_chunks_mut(stride));
         rows.zip(history).zip(findings).enumerate().for_each(
             |(block, (((moved, forces), (history, pressures)), findings))| {
@@ -214,12 +235,13 @@ impl<R: Scalar> Moved<R> {
 
 /// The history of each block; where there is none, none for each.
 fn in_blocks<R: Scalar>(
-    (history, per_pack): (&mut [Pack<R>], usize),
+    history: &mut [Pack<R>],
+    per_block: usize,
     blocks: usize,
 ) -> impl IndexedParallelIterator<Item = &mut [Pack<R>]> {
     if history.is_empty() {
         Either::Left(repeat_n((), blocks).map(|()| <&mut [Pack<R>]>::default()))
     } else {
-        Either::Right(history.par_chunks_mut(BLOCK * per_pack))
+        Either::Right(history.par_chunks_mut(per_block))
     }
 }

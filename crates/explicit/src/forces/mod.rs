@@ -38,10 +38,10 @@ use pulp::Simd;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::applied;
 use crate::history::History;
 use crate::lanes::{Lanes, Local, PACK, Pack, Places, Processor, WideF32, WideF64, load_vector, plus};
-use blocks::{Blocks, Quad, Shares};
+pub(crate) use blocks::Quad;
+use blocks::{Blocks, Shares};
 use full_hex::FullHexes;
 use membrane::Membranes;
 use plain::SolidForces;
@@ -157,6 +157,8 @@ struct PackedCells<R, const N: usize> {
     count: usize,
     /// Nodes of packs of cells in their block.
     places: Places<R, N>,
+    /// Packs of a block.
+    per_block: usize,
     /// Directions of the families.
     fibre: Vec<Vector<Pack<R>>>,
     families: usize,
@@ -172,7 +174,8 @@ impl<R: Scalar, const N: usize> PackedCells<R, N> {
         };
         let mut packed = Self {
             count: local.len(),
-            places: Places::new((0..local.len().div_ceil(PACK)).map(nodes), BLOCK),
+            places: Places::new((0..local.len().div_ceil(PACK)).map(nodes), blocks.packs()),
+            per_block: blocks.packs(),
             fibre: Vec::new(),
             families: solid.material.law.families(),
         };
@@ -191,7 +194,7 @@ impl<R: Scalar, const N: usize> PackedCells<R, N> {
     /// The packs of a block.
     #[inline(always)]
     fn packs_of(&self, block: usize) -> Range<usize> {
-        block * BLOCK..self.packs().end.min((block + 1) * BLOCK)
+        block * self.per_block..self.packs().end.min((block + 1) * self.per_block)
     }
 
     /// A number of each cell of a pack; zero beyond the last one.
@@ -455,6 +458,11 @@ impl<R: Scalar> InternalForces<R> {
         }
     }
 
+    /// Whether there is work for several threads.
+    pub(crate) fn is_shared(&self) -> bool {
+        self.findings.iter().map(Vec::len).sum::<usize>() > 1
+    }
+
     /// Evaluates all cells. `history` has one entry per solid, each empty for the instantaneous elastic response.
     pub(crate) fn evaluate(&mut self, displacement: &[Vector<R>], history: &mut [History<R>]) -> Found {
         let mut found = Found::default();
@@ -494,16 +502,15 @@ impl<R: Scalar> InternalForces<R> {
     /// The internal force [N] on a node from the last evaluation.
     #[inline(always)]
     pub(crate) fn at(&self, node: usize) -> Vector<R> {
-        let mut force = [[R::ZERO; 3]];
-        self.at_nodes(node..node + 1, &mut force);
+        let (mut parts, mut force) = ([[R::ZERO; 4]], [[R::ZERO; 3]]);
+        self.at_nodes(node..node + 1, &mut parts, &mut force);
         force[0]
     }
 
-    /// The same of some nodes, at most a block of them.
+    /// The same of some nodes, with room for as many sums.
     #[inline(always)]
-    pub(crate) fn at_nodes(&self, nodes: Range<usize>, to: &mut [Vector<R>]) {
-        let mut all = [[R::ZERO; 4]; applied::BLOCK];
-        let sums = &mut all[..nodes.len()];
+    pub(crate) fn at_nodes(&self, nodes: Range<usize>, sums: &mut [Quad<R>], to: &mut [Vector<R>]) {
+        let sums = &mut sums[..nodes.len()];
         let part = |place: usize| self.forces[place];
         self.shares.visit(nodes, sums, part, |sum, place| *sum = plus(*sum, part(place)));
         for (to, &mut [x, y, z, _]) in to.iter_mut().zip(sums) {
