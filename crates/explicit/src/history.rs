@@ -26,12 +26,18 @@ impl<R: Scalar> History<R> {
         }
     }
 
-    /// The tensors of a cell.
-    pub(crate) fn of_cell(&self, solid: &Solid, cell: usize) -> Vec<Symmetric<f64>> {
+    /// The tensors of a point of a cell.
+    pub(crate) fn of_point(
+        &self,
+        solid: &Solid,
+        cell: usize,
+        point: usize,
+    ) -> impl Iterator<Item = Symmetric<f64>> + '_ {
         let slots = Self::slots(solid);
-        let number =
-            |slot: usize, k: usize| self.cells[(cell / PACK * slots + slot) * 6 + k].0[cell % PACK].to_f64();
-        (0..slots).map(|slot| Symmetric([0, 1, 2, 3, 4, 5].map(|k| number(slot, k)))).collect()
+        let own = slots / solid.cells.points();
+        let packs = cell / PACK * slots + point * own..cell / PACK * slots + (point + 1) * own;
+        let tensors = self.cells[6 * packs.start..6 * packs.end].chunks_exact(6);
+        tensors.map(move |packs| Symmetric(std::array::from_fn(|k| packs[k].0[cell % PACK].to_f64())))
     }
 
     /// Takes on the tensors of a cell.

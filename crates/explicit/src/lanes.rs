@@ -282,7 +282,7 @@ const fn units<R>() -> usize {
 impl<R: Scalar, const N: usize> Places<R, N> {
     /// From the numbers of the nodes of packs of cells, and how many packs a block has.
     pub(crate) fn new(packs: impl Iterator<Item = [[u16; PACK]; N]>, per_block: usize) -> Self {
-        const { assert!(units::<R>() * crate::forces::BLOCK * PACK * N <= 1 << 16) };
+        const { assert!(units::<R>() * crate::forces::MOST_PACKS * PACK * N <= 1 << 16) };
         let offset = |place: u16| place * units::<R>() as u16;
         let offsets: Vec<_> = packs.map(|pack| pack.map(|places| places.map(offset))).collect();
         let most = |block: &[[[u16; PACK]; N]]| {

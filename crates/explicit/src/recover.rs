@@ -1,8 +1,11 @@
-//! Fields recovered from a state: strains, stresses and energies of the cells, in double precision.
+//! Fields recovered from a state: strains, stresses and energies of the cells, in double precision. Points of solid cells are taken a pack at a
+//! time, in lanes; triangles of membranes and bars one by one.
+
+use std::array::from_fn;
 
 use pliant_mechanics::element::{Cord, Rest, Sheet};
 use pliant_mechanics::law::plane_stress::InPlane;
-use pliant_mechanics::law::{Deformation, Split};
+use pliant_mechanics::law::{Deformation, Law, MOST_FAMILIES, Split, with_law};
 use pliant_mechanics::model::{Averaging, Cells, FREE, LocalNodes, Material, Model, Solid, with_cells};
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cast, cross, dot, scale, sub};
 use rayon::prelude::*;
@@ -10,6 +13,10 @@ use rayon::prelude::*;
 use crate::Scalar;
 use crate::forces::pressure;
 use crate::history::History;
+use crate::lanes::{
+    LaneWork, Lanes, PACK, Pack, Processor, load_symmetric, load_tensor, load_vector, store_symmetric,
+    store_vector,
+};
 use crate::state::State;
 
 /// The state of one cell.
@@ -38,6 +45,8 @@ pub struct CellFields {
     pub thickness: Option<[f64; 2]>,
     /// Length of a bar over that without force, and its force [N]; `None` of others.
     pub axial: Option<[f64; 2]>,
+    /// Largest stable step [s] of the cell alone; `None` where nobody has asked for it.
+    pub stable_step: Option<f64>,
 }
 
 impl CellFields {
@@ -112,47 +121,226 @@ impl<'a, R: Scalar> Recovery<'a, R> {
     /// Σ V ψ over all cells [J], without what hourglass control holds. The number of threads never changes a bit.
     pub fn stored_energy(&self) -> f64 {
         let of_solid = |(index, solid): (usize, &Solid)| {
-            let stored = |cell: usize| solid.cells.volume(cell) * self.cell(index, cell).energy_density;
-            let energies: Vec<f64> = (0..solid.cells.len()).into_par_iter().map(stored).collect();
-            energies.iter().sum::<f64>()
+            let stored =
+                |(cell, fields): (usize, CellFields)| solid.cells.volume(cell) * fields.energy_density;
+            self.cells(index).into_iter().enumerate().map(stored).sum::<f64>()
         };
         self.model.solids.iter().enumerate().map(of_solid).sum()
     }
 
     /// The fields of all cells of a solid.
     pub fn cells(&self, solid: usize) -> Vec<CellFields> {
-        let cells = (0..self.model.solids[solid].cells.len()).into_par_iter();
-        cells.map(|cell| self.cell(solid, cell)).collect()
+        let part = &self.model.solids[solid];
+        let count = part.cells.len();
+        if part.cells.points() > 1 || matches!(part.cells, Cells::Membrane(..) | Cells::Bar(..)) {
+            return (0..count).into_par_iter().map(|cell| self.cell(solid, cell)).collect();
+        }
+        let of_pack = |pack: usize| self.pack(solid, |lane| (pack * PACK + lane).min(count - 1));
+        let packs: Vec<_> = (0..count.div_ceil(PACK)).into_par_iter().map(of_pack).collect();
+        let of_cell = |cell: usize| packs[cell / PACK].fields(part, cell, cell % PACK);
+        (0..count).into_par_iter().map(of_cell).collect()
     }
 
     /// The fields of one cell of a solid, means over its points.
     pub fn cell(&self, solid: usize, cell: usize) -> CellFields {
         let part = &self.model.solids[solid];
-        let nodes = part.cells.nodes(cell);
-        let origin: Vector<f64> = cast(self.state.displacement[nodes[0] as usize]);
-        let u: Vec<Vector<f64>> =
-            nodes.iter().map(|&node| sub(cast(self.state.displacement[node as usize]), origin)).collect();
-        let history = self.state.history[solid].of_cell(part, cell);
-        let fibres = part.fibres(cell);
-        let averages = &self.averages[solid];
         match &part.cells {
             Cells::FullHex8(_, points) => {
-                let slots = history.len() / 8;
-                let at = |point: usize| {
-                    let h = gradient(&u, &points[cell].gradient[point]);
-                    let own = &history[point * slots..(point + 1) * slots];
-                    (point_fields(part, &h, fibres, averages, cell, own), points[cell].weight[point])
-                };
-                mean((0..8).map(at), part.cells.volume(cell))
+                let own = &points[cell];
+                let at = |point: usize| (cell, point, self.gradient(solid, cell, &own.gradient[point]));
+                let found = self.points(solid, &from_fn(|lane| at(lane % own.weight.len())));
+                let points = own.weight.iter().enumerate();
+                mean(points.map(|(lane, &w)| (found.fields(part, cell, lane), w)), part.cells.volume(cell))
             }
             Cells::Membrane(block, sheets) => {
-                let h = gradient(&u, &block.rest[cell].gradient);
-                membrane_fields(part, &h, cell, &sheets[cell], &history)
+                let h = self.gradient(solid, cell, &block.rest[cell].gradient);
+                membrane_fields(part, &h, cell, &sheets[cell], &self.history(solid, cell))
             }
-            Cells::Bar(block, cord) => bar_fields(part, &block.rest[cell], cord, u[1], &history),
-            cells => {
-                let h = with_cells!(cells, block => gradient(&u, &block.rest[cell].gradient));
-                point_fields(part, &h, fibres, averages, cell, &history)
+            Cells::Bar(block, cord) => {
+                let [_, moved] = self.moved(solid, cell);
+                bar_fields(part, &block.rest[cell], cord, moved, &self.history(solid, cell))
+            }
+            _ => self.pack(solid, |_| cell).fields(part, cell, 0),
+        }
+    }
+
+    /// A pack of cells with one point.
+    fn pack(&self, solid: usize, cell: impl Fn(usize) -> usize) -> Found {
+        with_cells!(&self.model.solids[solid].cells, block => self.points(solid, &from_fn(|lane| {
+            let cell = cell(lane);
+            (cell, 0, self.gradient(solid, cell, &block.rest[cell].gradient))
+        })))
+    }
+
+    /// ∂u/∂X of a cell from the gradients of its shape functions [1/m].
+    fn gradient<const N: usize>(&self, solid: usize, cell: usize, shape: &[Vector<f64>; N]) -> Tensor<f64> {
+        gradient(&self.moved::<N>(solid, cell), shape)
+    }
+
+    /// How far the nodes of a cell have moved beyond its first node [m].
+    fn moved<const N: usize>(&self, solid: usize, cell: usize) -> [Vector<f64>; N] {
+        let nodes = self.model.solids[solid].cells.nodes(cell);
+        let at = |a: usize| -> Vector<f64> { cast(self.state.displacement[nodes[a] as usize]) };
+        let origin = at(0);
+        from_fn(|a| sub(at(a), origin))
+    }
+
+    /// What a cell with one point remembers [Pa].
+    fn history(&self, solid: usize, cell: usize) -> Vec<Symmetric<f64>> {
+        self.state.history[solid].of_point(&self.model.solids[solid], cell, 0).collect()
+    }
+
+    /// A pack of points, each with its cell, its number there and its ∂u/∂X.
+    fn points(&self, solid: usize, points: &[(usize, usize, Tensor<f64>); PACK]) -> Found {
+        let part = &self.model.solids[solid];
+        let Material { law, prony, .. } = &part.material;
+        let (history, averages) = (&self.state.history[solid], &self.averages[solid]);
+        let mut given = Given {
+            gradient: NO_TENSOR,
+            fibres: [[Pack::ZERO; 3]; MOST_FAMILIES],
+            remaining: prony.remaining(),
+            lag: NO_SYMMETRIC,
+            pressure: None,
+        };
+        for (lane, (cell, point, h)) in points.iter().enumerate() {
+            let fill = |to: &mut [Pack<f64>], from: &[f64]| {
+                to.iter_mut().zip(from).for_each(|(to, &number)| to.0[lane] = number);
+            };
+            let seen = match averages {
+                Averages::VolumeChange(changes) => &dilated(h, changes[*cell]),
+                Averages::None | Averages::Volumetric(_) => h,
+            };
+            fill(given.gradient.0.as_flattened_mut(), seen.0.as_flattened());
+            fill(given.fibres.as_flattened_mut(), part.fibres(*cell).as_flattened());
+            if !prony.is_elastic() {
+                fill(&mut given.lag.0, &prony.lag(history.of_point(part, *cell, *point)).0);
+            }
+            if let Averages::Volumetric(cells) = averages {
+                given.pressure.get_or_insert(Pack::ZERO).0[lane] = cells[*cell].pressure;
+            }
+        }
+        let mut found = Found {
+            gradient: NO_TENSOR,
+            volume_ratio: Pack::ZERO,
+            cell_volume_ratio: Pack::ZERO,
+            green_strain: NO_SYMMETRIC,
+            pk2_stress: NO_SYMMETRIC,
+            cauchy_stress: NO_SYMMETRIC,
+            energy: Split { isochoric: Pack::ZERO, volumetric: Pack::ZERO },
+            fibre_stretch: Pack::ZERO,
+        };
+        with_law!(law, law => Processor::detect().run(AtPoints { law: *law, given: &given, found: &mut found }));
+        found.cell_volume_ratio = found.volume_ratio;
+        for (lane, (cell, _, h)) in points.iter().enumerate() {
+            match averages {
+                Averages::Volumetric(cells) => {
+                    let Dilatation { change, energy, .. } = cells[*cell];
+                    found.volume_ratio.0[lane] = 1.0 + change;
+                    found.energy.volumetric.0[lane] = energy;
+                }
+                Averages::VolumeChange(_) => found.cell_volume_ratio.0[lane] = 1.0 + volume_change(h),
+                Averages::None => {}
+            }
+        }
+        found
+    }
+}
+
+const NO_TENSOR: Tensor<Pack<f64>> = Tensor([[Pack::ZERO; 3]; 3]);
+const NO_SYMMETRIC: Symmetric<Pack<f64>> = Symmetric([Pack::ZERO; 6]);
+
+/// What is known of a pack of points.
+struct Given {
+    /// ∂u/∂X that the law sees.
+    gradient: Tensor<Pack<f64>>,
+    fibres: [Vector<Pack<f64>>; MOST_FAMILIES],
+    /// Parts of the elastic stress that do not relax.
+    remaining: Split<f64>,
+    /// What relaxing parts remember [Pa].
+    lag: Symmetric<Pack<f64>>,
+    /// U' [Pa] in place of the volumetric stress of the law.
+    pressure: Option<Pack<f64>>,
+}
+
+/// What is found of a pack of points; see [`CellFields`].
+struct Found {
+    gradient: Tensor<Pack<f64>>,
+    volume_ratio: Pack<f64>,
+    cell_volume_ratio: Pack<f64>,
+    green_strain: Symmetric<Pack<f64>>,
+    pk2_stress: Symmetric<Pack<f64>>,
+    cauchy_stress: Symmetric<Pack<f64>>,
+    energy: Split<Pack<f64>>,
+    fibre_stretch: Pack<f64>,
+}
+
+impl Found {
+    /// The fields of a lane, which has a cell.
+    fn fields(&self, solid: &Solid, cell: usize, lane: usize) -> CellFields {
+        let symmetric = |of: &Symmetric<Pack<f64>>| Symmetric(of.0.each_ref().map(|entry| entry.0[lane]));
+        let fibre = solid.fibres(cell).first().copied();
+        CellFields {
+            gradient: Tensor(self.gradient.0.each_ref().map(|row| row.each_ref().map(|entry| entry.0[lane]))),
+            volume_ratio: self.volume_ratio.0[lane],
+            cell_volume_ratio: self.cell_volume_ratio.0[lane],
+            green_strain: symmetric(&self.green_strain),
+            pk2_stress: symmetric(&self.pk2_stress),
+            cauchy_stress: symmetric(&self.cauchy_stress),
+            energy_density: self.energy.isochoric.0[lane] + self.energy.volumetric.0[lane],
+            fibre,
+            fibre_stretch: fibre.map(|_| self.fibre_stretch.0[lane]),
+            thickness: None,
+            axial: None,
+            stable_step: None,
+        }
+    }
+}
+
+/// A law at a pack of points.
+struct AtPoints<'a, T> {
+    law: T,
+    given: &'a Given,
+    found: &'a mut Found,
+}
+
+impl<T: Law> LaneWork<f64> for AtPoints<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes<f64>>(self) {
+        let Self { law, given, found } = self;
+        for at in (0..PACK).step_by(L::WIDTH) {
+            let deformation = Deformation::<L>::from_displacement_gradient(&load_tensor(&given.gradient, at));
+            let mut directions = [[L::ZERO; 3]; MOST_FAMILIES];
+            for (direction, fibre) in directions.iter_mut().zip(&given.fibres) {
+                *direction = load_vector(fibre, at);
+            }
+            let directions = &directions[..law.families()];
+            let energy = law.energy(&deformation, directions);
+            let elastic = law.stress(&deformation, directions);
+            let volumetric = match &given.pressure {
+                Some(pressure) => {
+                    let ratio = deformation.volume_ratio;
+                    deformation.inverse_cauchy_green * (ratio * L::load(pressure, at))
+                }
+                None => elastic.volumetric * L::splat(given.remaining.volumetric),
+            };
+            let isochoric = elastic.isochoric * L::splat(given.remaining.isochoric);
+            let stress = isochoric + volumetric + load_symmetric(&given.lag, at);
+            let gradient = &deformation.gradient;
+            let spatial = stress.push_forward(gradient) * (L::ONE / deformation.volume_ratio);
+            for (row, to) in gradient.0.into_iter().zip(&mut found.gradient.0) {
+                store_vector(row, to, at);
+            }
+            deformation.volume_ratio.store(&mut found.volume_ratio, at);
+            store_symmetric(deformation.strain_twice * L::of(0.5), &mut found.green_strain, at);
+            store_symmetric(stress, &mut found.pk2_stress, at);
+            store_symmetric(spatial, &mut found.cauchy_stress, at);
+            energy.isochoric.store(&mut found.energy.isochoric, at);
+            energy.volumetric.store(&mut found.energy.volumetric, at);
+            if let Some(fibre) = directions.first() {
+                let deformed = gradient.apply(*fibre);
+                dot(deformed, deformed).sqrt().store(&mut found.fibre_stretch, at);
             }
         }
     }
@@ -165,53 +353,6 @@ fn gradient(u: &[Vector<f64>], shape: &[Vector<f64>]) -> Tensor<f64> {
         h.add_outer(u, b);
     }
     h
-}
-
-fn point_fields(
-    solid: &Solid,
-    h: &Tensor<f64>,
-    fibres: &[Vector<f64>],
-    averages: &Averages,
-    cell: usize,
-    history: &[Symmetric<f64>],
-) -> CellFields {
-    let Material { law, prony, .. } = &solid.material;
-    let deformation = match averages {
-        Averages::VolumeChange(changes) => {
-            Deformation::from_displacement_gradient(&dilated(h, changes[cell]))
-        }
-        Averages::None | Averages::Volumetric(_) => Deformation::from_displacement_gradient(h),
-    };
-    let Split { isochoric, volumetric } = law.energy(&deformation, fibres);
-    let elastic = law.stress(&deformation, fibres);
-    let (pk2_stress, volume_ratio, volumetric) = match averages {
-        Averages::Volumetric(cells) => {
-            let Dilatation { change, pressure, energy } = cells[cell];
-            let stress = deformation.inverse_cauchy_green * (deformation.volume_ratio * pressure);
-            let isochoric = Split { isochoric: elastic.isochoric, volumetric: Symmetric::ZERO };
-            (prony.stress(isochoric, history) + stress, 1.0 + change, energy)
-        }
-        Averages::None | Averages::VolumeChange(_) => {
-            (prony.stress(elastic, history), deformation.volume_ratio, volumetric)
-        }
-    };
-    let stretch = |a: Vector<f64>| {
-        let deformed = deformation.gradient.apply(a);
-        dot(deformed, deformed).sqrt()
-    };
-    CellFields {
-        gradient: deformation.gradient,
-        volume_ratio,
-        cell_volume_ratio: 1.0 + volume_change(h),
-        green_strain: deformation.strain_twice * 0.5,
-        pk2_stress,
-        cauchy_stress: pk2_stress.push_forward(&deformation.gradient) * (1.0 / deformation.volume_ratio),
-        energy_density: isochoric + volumetric,
-        fibre: fibres.first().copied(),
-        fibre_stretch: fibres.first().copied().map(stretch),
-        thickness: None,
-        axial: None,
-    }
 }
 
 /// Fields of a triangle of a membrane, in space: across it F has the stretch that plane stress asks for.
@@ -258,6 +399,7 @@ fn membrane_fields(
         }),
         thickness: Some([sheet.thickness, sheet.thickness * stretch]),
         axial: None,
+        stable_step: None,
     }
 }
 
@@ -294,6 +436,7 @@ fn bar_fields(
         fibre_stretch: None,
         thickness: None,
         axial: Some([pull.stretch, stress * rest.area()]),
+        stable_step: None,
     }
 }
 
@@ -325,6 +468,7 @@ fn mean(points: impl Iterator<Item = (CellFields, f64)>, volume: f64) -> CellFie
         fibre_stretch: point.fibre_stretch.map(|stretch| sum.fibre_stretch.unwrap_or(0.0) + w * stretch),
         thickness: None,
         axial: None,
+        stable_step: None,
     };
     let nothing = CellFields {
         gradient: Tensor::ZERO,
@@ -338,6 +482,7 @@ fn mean(points: impl Iterator<Item = (CellFields, f64)>, volume: f64) -> CellFie
         fibre_stretch: None,
         thickness: None,
         axial: None,
+        stable_step: None,
     };
     weighted.fold(nothing, add_up)
 }

@@ -141,19 +141,26 @@ impl Prony {
 
     /// The total stress [Pa] at the instant the history belongs to: (1 − Σ aᵢ) Φ + Σ hᵢ of each part.
     pub fn stress(&self, elastic: Split<Symmetric<f64>>, history: &[Symmetric<f64>]) -> Symmetric<f64> {
-        let part = |elastic: Symmetric<f64>, series: &[(f64, f64)], history: &[Symmetric<f64>]| {
-            let remaining = 1.0 - series.iter().map(|(weight, _)| weight).sum::<f64>();
-            history.iter().skip(1).fold(elastic * remaining, |sum, h| sum + *h)
-        };
-        let (isochoric, volumetric) = history.split_at(self.isochoric_slots());
-        part(elastic.isochoric, &self.isochoric, isochoric)
-            + part(elastic.volumetric, &self.volumetric, volumetric)
+        let Split { isochoric, volumetric } = self.remaining();
+        elastic.isochoric * isochoric + elastic.volumetric * volumetric + self.lag(history.iter().copied())
+    }
+
+    /// 1 − Σ aᵢ of each part.
+    pub fn remaining(&self) -> Split<f64> {
+        let of = |series: &[(f64, f64)]| 1.0 - series.iter().map(|(weight, _)| weight).sum::<f64>();
+        Split { isochoric: of(&self.isochoric), volumetric: of(&self.volumetric) }
+    }
+
+    /// Σ hᵢ [Pa] of both parts, from the tensors that a point remembers.
+    pub fn lag(&self, history: impl Iterator<Item = Symmetric<f64>>) -> Symmetric<f64> {
+        // Each part begins with Φⁿ⁻¹.
+        let own = history.enumerate().filter(|(slot, _)| ![0, self.isochoric_slots()].contains(slot));
+        own.fold(Symmetric::ZERO, |sum, (_, h)| sum + h)
     }
 
     /// The averaged pressure [Pa] at the instant the history belongs to.
     pub fn pressure(&self, elastic: f64, history: &[f64]) -> f64 {
-        let remaining = 1.0 - self.volumetric.iter().map(|(weight, _)| weight).sum::<f64>();
-        history.iter().skip(1).fold(elastic * remaining, |sum, h| sum + h)
+        history.iter().skip(1).fold(elastic * self.remaining().volumetric, |sum, h| sum + h)
     }
 
     /// Symmetric tensors of history per cell: for each part that relaxes, Φⁿ⁻¹ and one h per term.

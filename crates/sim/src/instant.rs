@@ -190,9 +190,9 @@ pub struct Effort {
 
 /// Finds fields of cells at an instant.
 pub trait CellsNow: Sync {
-    /// The fields of a cell of a solid, and its stable step [s] if it is wanted.
-    fn at(&self, solid: usize, cell: usize) -> (CellFields, Option<f64>);
+    /// The fields of a cell of a solid, with its stable step [s] if it is wanted.
+    fn at(&self, solid: usize, cell: usize) -> CellFields;
 
     /// The same of all cells of a solid.
-    fn of(&self, solid: usize) -> Vec<(CellFields, Option<f64>)>;
+    fn of(&self, solid: usize) -> Vec<CellFields>;
 }

@@ -249,15 +249,18 @@ impl<'a, R: Scalar> SolidCells<'a, R> {
 }
 
 impl<R: Scalar> CellsNow for SolidCells<'_, R> {
-    fn at(&self, solid: usize, cell: usize) -> (CellFields, Option<f64>) {
-        let step = self.steps.then(|| cell_limit(self.model, solid, cell, self.displacement));
-        (self.recovery.cell(solid, cell), step)
+    fn at(&self, solid: usize, cell: usize) -> CellFields {
+        let stable_step = self.steps.then(|| cell_limit(self.model, solid, cell, self.displacement));
+        CellFields { stable_step, ..self.recovery.cell(solid, cell) }
     }
 
-    fn of(&self, solid: usize) -> Vec<(CellFields, Option<f64>)> {
-        let steps = if self.steps { cell_limits(self.model, solid, self.displacement) } else { Vec::new() };
-        let cells = self.recovery.cells(solid).into_iter().enumerate();
-        cells.map(|(cell, fields)| (fields, steps.get(cell).copied())).collect()
+    fn of(&self, solid: usize) -> Vec<CellFields> {
+        let mut cells = self.recovery.cells(solid);
+        if self.steps {
+            let steps = cell_limits(self.model, solid, self.displacement);
+            cells.iter_mut().zip(steps).for_each(|(cell, step)| cell.stable_step = Some(step));
+        }
+        cells
     }
 }
 

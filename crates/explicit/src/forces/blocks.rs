@@ -14,18 +14,25 @@ use super::batch::PACKS;
 use crate::Scalar;
 use crate::lanes::{PACK, Pack};
 
-/// The most packs of cells in a block. Of 55,566 tets on one thread 32 take 3 % longer; with 128 hexes leave the first cache.
-pub(crate) const BLOCK: usize = 64;
+/// Packs of cells in a block of a large model. Of 55,566 tets on one thread 32 take 3 % longer; with 128 hexes leave the first cache.
+const BLOCK: usize = 64;
+
+/// Packs that a block may have more, in place of two further blocks.
+const SPARE: usize = 8;
+
+/// The most packs of a block.
+pub(crate) const MOST_PACKS: usize = BLOCK + SPARE;
 
 /// Nodes of packs of cells, each pack with its own, that are worth a second thread: fewer take less time than waking it.
 const SHARED: usize = 256;
 
-/// Packs of each block of so many packs of cells with `nodes` nodes: two blocks where a whole one would leave a thread without work.
+/// Packs of each block of so many packs of cells with `nodes` nodes: an even number of blocks, so that two threads have as much to do.
 fn packs_per_block(packs: usize, nodes: usize) -> usize {
-    match packs * nodes < SHARED {
-        true => BLOCK,
-        false => packs.div_ceil(2).next_multiple_of(PACKS).min(BLOCK),
+    if packs * nodes < SHARED {
+        return BLOCK;
     }
+    let pairs = packs.saturating_sub(2 * SPARE).div_ceil(2 * BLOCK).max(1);
+    packs.div_ceil(2 * pairs).next_multiple_of(PACKS)
 }
 
 /// Three components and a fourth number, read and written at once.
@@ -243,5 +250,18 @@ fn in_blocks<R: Scalar>(
         Either::Left(repeat_n((), blocks).map(|()| <&mut [Pack<R>]>::default()))
     } else {
         Either::Right(history.par_chunks_mut(per_block))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_threads_have_as_much_to_do() {
+        for (packs, nodes, each) in [(63, 4, 64), (129, 4, 68), (160, 4, 40), (375, 4, 64), (63, 8, 32)] {
+            assert_eq!(packs_per_block(packs, nodes), each, "{packs}");
+        }
+        assert!((64..5000).all(|packs| packs_per_block(packs, 4) <= MOST_PACKS));
     }
 }

@@ -26,7 +26,7 @@ mod tests;
 use averaged::AveragedTets;
 use bar::Bars;
 pub(crate) use batch::{Batch, Wanted, pressure};
-pub(crate) use blocks::BLOCK;
+pub(crate) use blocks::MOST_PACKS;
 use std::ops::Range;
 
 use pliant_mechanics::Real;

@@ -100,9 +100,9 @@ impl<'f, 'p> OfNodes<'f, 'p> {
 }
 
 /// The value of a cell field; the first `components` numbers count.
-pub(super) fn of_cell((fields, step): &(CellFields, Option<f64>), field: FieldName) -> Value {
+pub(super) fn of_cell(fields: &CellFields, field: FieldName) -> Value {
     match field {
-        FieldName::ElementStep => padded(&[step.unwrap_or(f64::NAN)]),
+        FieldName::ElementStep => padded(&[fields.stable_step.unwrap_or(f64::NAN)]),
         FieldName::CauchyStress => tensor(&fields.cauchy_stress),
         FieldName::Pk2Stress => tensor(&fields.pk2_stress),
         FieldName::GreenStrain => tensor(&fields.green_strain),

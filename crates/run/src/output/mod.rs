@@ -90,13 +90,10 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// Fields of cells, with their stable steps [s] if these are wanted.
-type OfCells = Vec<(CellFields, Option<f64>)>;
-
-/// Those of solids, found once for all outputs that show the instant.
+/// Fields of cells of solids, found once for all outputs that show the instant.
 struct Recovered<'a> {
     now: Box<dyn CellsNow + 'a>,
-    solids: Vec<OnceCell<OfCells>>,
+    solids: Vec<OnceCell<Vec<CellFields>>>,
 }
 
 impl<'a> Recovered<'a> {
@@ -105,12 +102,12 @@ impl<'a> Recovered<'a> {
     }
 
     /// Those of one cell of a solid.
-    fn at(&self, solid: usize, cell: usize) -> (CellFields, Option<f64>) {
+    fn at(&self, solid: usize, cell: usize) -> CellFields {
         self.now.at(solid, cell)
     }
 
     /// Those of all cells of a solid.
-    fn of(&self, solid: usize) -> &[(CellFields, Option<f64>)] {
+    fn of(&self, solid: usize) -> &[CellFields] {
         self.solids[solid].get_or_init(|| self.now.of(solid))
     }
 }
