@@ -691,8 +691,7 @@ impl KrylovVectors {
         });
     }
 
-    /// x ← A⁻¹ b to a residual of `tolerance` |b|, from the x given or, if that is nearer, from 0. What was reached stays in x where
-    /// the iterations run out.
+    /// x ← A⁻¹ b to a residual of `tolerance` |b|, from a multiple of the x given. What was reached stays in x where the iterations run out.
     pub(crate) fn solve(
         &mut self,
         matrix: &BlockMatrix,
@@ -708,30 +707,29 @@ impl KrylovVectors {
         result
     }
 
-    /// r ← b − A x from the x given or, if that is nearer, from 0; |b| and |r|.
+    /// x ← the multiple of the x given that leaves the smallest residual, r ← b − A x; |b| and |r|. So motion that goes on slower, or turns
+    /// back, is a good start, too.
     pub(super) fn begin(&mut self, matrix: &BlockMatrix, b: &[f64], x: &[f64]) -> [f64; 2] {
         matrix.gather(b, &mut self.r);
         matrix.gather(x, &mut self.x);
-        let size = squared(&self.r);
-        let mut left = size;
-        if self.x.iter().any(|x| *x != [0.0; 6]) {
-            self.multiply(matrix, true);
-            let near: f64 = self
-                .r
-                .iter()
-                .zip(&self.ap)
-                .map(|(r, ax)| (0..6).map(|c| (r[c] - ax[c]) * (r[c] - ax[c])).sum::<f64>())
-                .sum();
-            if near < size {
-                left = near;
-                for (r, ax) in self.r.iter_mut().zip(&self.ap) {
-                    (0..6).for_each(|c| r[c] -= ax[c]);
-                }
-            } else {
-                self.x.fill([0.0; 6]);
+        let size = squared(&self.r).sqrt();
+        if self.x.iter().all(|x| *x == [0.0; 6]) {
+            return [size, size];
+        }
+        self.multiply(matrix, true);
+        let along: f64 = self.r.iter().zip(&self.ap).map(|(r, ax)| product(r, ax)).sum();
+        let scale = along / squared(&self.ap);
+        if !scale.is_finite() {
+            self.x.fill([0.0; 6]);
+            return [size, size];
+        }
+        for ((x, r), ax) in self.x.iter_mut().zip(&mut self.r).zip(&self.ap) {
+            for c in 0..6 {
+                x[c] *= scale;
+                r[c] -= scale * ax[c];
             }
         }
-        [size.sqrt(), left.sqrt()]
+        [size, squared(&self.r).sqrt()]
     }
 
     /// x ← x + `scale` d; then r ← b − A x. The residual |r|.
@@ -861,6 +859,27 @@ mod tests {
     #[test]
     fn larger_parts_keep_their_aggregates_where_their_number_is_limited() {
         assert_eq!(lengths(&aggregates(&chains(60, 40), 100).1), [24, 16].repeat(60));
+    }
+
+    /// A start at a multiple of the solution is at the solution, and one that is not finite is at 0.
+    #[test]
+    fn starts_are_scaled_to_the_smallest_residual() {
+        let equations = Equations::new(&[true; 12]);
+        let mut lower = LowerMatrix::new(&equations, [&[0, 1][..]].into_iter(), &[]);
+        (0..12).for_each(|at| lower.add_diagonal(at, 1.0 + at as f64));
+        let mut matrix = BlockMatrix::new(&equations, &lower, usize::MAX);
+        assert!(matrix.update(&lower));
+        let mut vectors = KrylovVectors::new(&matrix, lower.len());
+        let solution: Vec<f64> = (0..12).map(|at| f64::from(at) - 4.0).collect();
+        let b: Vec<f64> = (1..13).zip(&solution).map(|(diagonal, x)| f64::from(diagonal) * x).collect();
+        let mut x: Vec<f64> = solution.iter().map(|x| -2.0 * x).collect();
+        let report = vectors.solve(&matrix, Approximation::Blocks, &b, &mut x, 1e-12, 0).unwrap();
+        assert_eq!(report.iterations, 0);
+        assert!(x.iter().zip(&solution).all(|(x, exact)| (x - exact).abs() < 1e-12), "{x:?}");
+        x.fill(0.0);
+        (x[0], x[4]) = (1.0, f64::INFINITY);
+        let [size, left] = vectors.begin(&matrix, &b, &x);
+        assert_eq!(size, left);
     }
 
     /// Blocks Bᵀ B + I times their inverses are I to 1e-12; a block with a negative eigenvalue is reported.
