@@ -52,7 +52,8 @@ pub(crate) struct BlockMatrix {
     single: Vec<SingleBlock>,
     /// Where the entries come from in the lower half.
     source: Vec<[u32; 36]>,
-    /// Inverses of the diagonal blocks.
+    /// Places of the diagonal blocks, and their inverses.
+    diagonal: Vec<u32>,
     inverse: Vec<SingleBlock>,
     /// The instructions of the processor.
     arch: Arch,
@@ -66,14 +67,13 @@ const fn place(row: usize, column: usize) -> usize {
     if row < 4 { 4 * column + row } else { 24 + 2 * column + row - 4 }
 }
 
-fn round(block: &Block) -> SingleBlock {
-    let mut single = [0.0; 36];
-    for (column, entries) in block.as_slice().chunks_exact(6).enumerate() {
-        for (row, entry) in entries.iter().enumerate() {
-            single[place(row, column)] = *entry as f32;
+fn round(block: &Block, to: &mut SingleBlock) {
+    let block = block.as_slice();
+    for column in 0..6 {
+        for row in 0..6 {
+            to[place(row, column)] = block[6 * column + row] as f32;
         }
     }
-    single
 }
 
 impl BlockMatrix {
@@ -125,11 +125,13 @@ impl BlockMatrix {
             value: vec![Block::zeros(); column.len()],
             single: vec![[0.0; 36]; if column.len() < MANY { 0 } else { column.len() }],
             source: vec![[NONE; 36]; column.len()],
+            diagonal: Vec::new(),
             inverse: vec![[0.0; 36]; order.len()],
             row_start,
             column,
             arch: Arch::new(),
         };
+        blocks.diagonal = (0..order.len() as u32).map(|node| blocks.find(node, node) as u32).collect();
         for equation in 0..matrix.len() as u32 {
             let (node, j) = home(equation);
             for (at, &row) in (matrix.column_start[equation as usize]..).zip(matrix.rows(equation)) {
@@ -190,32 +192,16 @@ impl BlockMatrix {
         } else {
             blocks.zip(&mut self.single).for_each(|((value, source), single)| {
                 take(value, source);
-                *single = round(value);
+                round(value, single);
             });
         }
         let mut inverse = std::mem::take(&mut self.inverse);
         let packs = inverse.par_chunks_mut(PACK).enumerate().with_min_len(8);
-        let sound = packs.map(|(pack, inverse)| {
-            let mut blocks = [Block::identity(); PACK];
-            for (node, block) in (pack * PACK..).zip(&mut blocks[..inverse.len()]) {
-                *block = self.diagonal(node);
-            }
-            let sound = self.arch.dispatch(Invert(&mut blocks));
-            inverse.iter_mut().zip(&blocks).for_each(|(inverse, block)| *inverse = round(block));
-            sound
-        });
+        let sound = packs
+            .map(|(pack, inverse)| self.arch.dispatch(Invert { matrix: self, first: pack * PACK, inverse }));
         let sound = sound.reduce(|| true, |a, b| a && b);
         self.inverse = inverse;
         sound
-    }
-
-    /// The diagonal block of a node, with ones where it has no equation.
-    fn diagonal(&self, node: usize) -> Block {
-        let mut block = self.value[self.find(node as u32, node as u32)];
-        for (c, _) in self.equations[node].iter().enumerate().filter(|(_, e)| **e == NONE) {
-            block[(c, c)] = 1.0;
-        }
-        block
     }
 
     fn gather(&self, equations: &[f64], nodes: &mut [Node]) {
@@ -354,16 +340,63 @@ impl Projected {
         let ends = self.aggregate.par_iter().zip(&self.node);
         let blocks = self.value.par_iter_mut().zip(&mut self.single).zip(ends);
         blocks.with_min_len(64).for_each(|((value, single), (&aggregate, &node))| {
-            let mut sum = Block::zeros();
-            for at in fine.row(node as usize) {
-                let other = fine.column[at] as usize;
-                if home[other] == aggregate {
-                    add_rigid(&fine.value[at], &arm[other], &mut sum);
-                }
-            }
-            *value = sum.transpose();
-            *single = round(value);
+            fine.arch.dispatch(Project { fine, home, arm, aggregate, node, value, single });
         });
+    }
+}
+
+/// The block of Pᵀ A between an aggregate and a node.
+struct Project<'a> {
+    fine: &'a BlockMatrix,
+    home: &'a [u32],
+    arm: &'a [Vector3<f64>],
+    aggregate: u32,
+    node: u32,
+    value: &'a mut Block,
+    single: &'a mut SingleBlock,
+}
+
+impl WithSimd for Project<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { fine, home, arm, aggregate, node, value, single } = self;
+        let mut sum = Block::zeros();
+        for at in fine.row(node as usize) {
+            let other = fine.column[at] as usize;
+            if home[other] == aggregate {
+                add_rigid(&fine.value[at], &arm[other], &mut sum);
+            }
+        }
+        let (sum, value) = (sum.as_slice(), value.as_mut_slice());
+        for row in 0..6 {
+            for column in 0..6 {
+                value[6 * column + row] = sum[6 * row + column];
+                single[place(row, column)] = sum[6 * row + column] as f32;
+            }
+        }
+    }
+}
+
+/// The block of Pᵀ A P of two aggregates, from some of Pᵀ A.
+struct Condense<'a> {
+    projected: &'a Projected,
+    arm: &'a [Vector3<f64>],
+    blocks: &'a [u32],
+    value: &'a mut Block,
+}
+
+impl WithSimd for Condense<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { projected, arm, blocks, value } = self;
+        value.fill(0.0);
+        for at in blocks.iter().map(|&at| at as usize) {
+            add_rigid(&projected.value[at], &arm[projected.node[at] as usize], value);
+        }
     }
 }
 
@@ -429,10 +462,7 @@ impl Coarse {
         let Self { arm, aggregate, projected, value, pairs, .. } = self;
         projected.update(fine, aggregate, arm);
         value.par_iter_mut().zip(&*pairs).with_min_len(16).for_each(|(value, (_, _, blocks))| {
-            *value = Block::zeros();
-            for at in blocks.iter().map(|&at| at as usize) {
-                add_rigid(&projected.value[at], &arm[projected.node[at] as usize], value);
-            }
+            fine.arch.dispatch(Condense { projected, arm, blocks, value });
         });
     }
 
@@ -648,42 +678,64 @@ fn added([even, odd, last]: &[[f64; 4]; 3]) -> Node {
     [first[0], first[1], first[2], first[3], last[0] + last[2], last[1] + last[3]]
 }
 
-/// Inverts symmetric blocks side by side, by Gauss and Jordan's elimination; false if one is not positive definite.
-struct Invert<'a>(&'a mut [Block; PACK]);
+/// Inverts the diagonal blocks of some nodes from one on, with ones where these have no equation; false if one is not positive definite.
+struct Invert<'a> {
+    matrix: &'a BlockMatrix,
+    first: usize,
+    inverse: &'a mut [SingleBlock],
+}
 
 impl WithSimd for Invert<'_> {
     type Output = bool;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> bool {
+        let Self { matrix, first, inverse } = self;
         let mut a = [[[0.0; PACK]; 6]; 6];
-        for (lane, block) in self.0.iter().enumerate() {
-            for (i, j) in (0..6).flat_map(|i| (0..6).map(move |j| (i, j))) {
-                a[i][j][lane] = block[(i, j)];
-            }
-        }
-        let mut sound = true;
-        for k in 0..6 {
-            let row = a[k];
-            sound &= row[k].iter().all(|&pivot| pivot > 0.0);
-            for own in &mut a {
-                let factor: Pack = std::array::from_fn(|lane| own[k][lane] / row[k][lane]);
-                for (own, row) in own.iter_mut().zip(&row) {
-                    let lanes = own.iter_mut().zip(row).zip(&factor);
-                    lanes.for_each(|((own, row), factor)| *own -= factor * row);
+        (0..6).for_each(|k| a[k][k] = [1.0; PACK]);
+        let diagonal = matrix.equations[first..].iter().zip(&matrix.diagonal[first..]);
+        for (lane, (equations, &at)) in diagonal.take(inverse.len()).enumerate() {
+            let block = matrix.value[at as usize].as_slice();
+            for (i, row) in a.iter_mut().enumerate() {
+                for (j, entry) in row.iter_mut().enumerate() {
+                    entry[lane] = block[6 * j + i];
                 }
-                own[k] = factor.map(|factor| -factor);
+                if equations[i] == NONE {
+                    row[i][lane] = 1.0;
+                }
             }
-            a[k] = row.map(|entry| std::array::from_fn(|lane| entry[lane] / row[k][lane]));
-            a[k][k] = row[k].map(|pivot| 1.0 / pivot);
         }
-        for (lane, block) in self.0.iter_mut().enumerate() {
-            for (i, j) in (0..6).flat_map(|i| (0..=i).map(move |j| (i, j))) {
-                (block[(i, j)], block[(j, i)]) = (a[i][j][lane], a[i][j][lane]);
+        let sound = invert(&mut a);
+        for (lane, inverse) in inverse.iter_mut().enumerate() {
+            for i in 0..6 {
+                for j in 0..6 {
+                    inverse[place(i, j)] = a[i.max(j)][i.min(j)][lane] as f32;
+                }
             }
         }
         sound
     }
+}
+
+/// Inverts symmetric matrices side by side, by Gauss and Jordan's elimination; false if one is not positive definite.
+#[inline(always)]
+fn invert(a: &mut [[Pack; 6]; 6]) -> bool {
+    let mut sound = true;
+    for k in 0..6 {
+        let row = a[k];
+        sound &= row[k].iter().all(|&pivot| pivot > 0.0);
+        for own in &mut *a {
+            let factor: Pack = std::array::from_fn(|lane| own[k][lane] / row[k][lane]);
+            for (own, row) in own.iter_mut().zip(&row) {
+                let lanes = own.iter_mut().zip(row).zip(&factor);
+                lanes.for_each(|((own, row), factor)| *own -= factor * row);
+            }
+            own[k] = factor.map(|factor| -factor);
+        }
+        a[k] = row.map(|entry| std::array::from_fn(|lane| entry[lane] / row[k][lane]));
+        a[k][k] = row[k].map(|pivot| 1.0 / pivot);
+    }
+    sound
 }
 
 /// That of the blocks that products read.
@@ -1071,13 +1123,17 @@ mod tests {
             let own = Block::from_fn(|_, _| random.number());
             own.transpose() * own + Block::identity()
         });
-        let mut inverse = blocks;
-        assert!(Arch::new().dispatch(Invert(&mut inverse)));
-        for (block, inverse) in blocks.iter().zip(&inverse) {
+        let pack = |blocks: &[Block; PACK]| -> [[Pack; 6]; 6] {
+            std::array::from_fn(|i| std::array::from_fn(|j| std::array::from_fn(|lane| blocks[lane][(i, j)])))
+        };
+        let mut inverse = pack(&blocks);
+        assert!(invert(&mut inverse));
+        for (lane, block) in blocks.iter().enumerate() {
+            let inverse = Block::from_fn(|i, j| inverse[i.max(j)][i.min(j)][lane]);
             assert!((block * inverse - Block::identity()).amax() < 1e-12);
         }
         let mut indefinite = blocks;
         indefinite[PACK - 1] -= Block::identity() * (2.0 * blocks[PACK - 1].amax());
-        assert!(!Arch::new().dispatch(Invert(&mut indefinite)));
+        assert!(!invert(&mut pack(&indefinite)));
     }
 }
