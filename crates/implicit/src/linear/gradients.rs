@@ -180,8 +180,13 @@ impl BlockMatrix {
         range.start + self.column[range].partition_point(|&c| c < column)
     }
 
-    /// Takes the values of a matrix and inverts the diagonal blocks; false if one is not positive definite.
-    pub(crate) fn update(&mut self, matrix: &LowerMatrix) -> bool {
+    /// Takes the values of a matrix and inverts the diagonal blocks, while something else is done with the values; whether all are positive
+    /// definite, and what came of that.
+    pub(crate) fn update<T: Send>(
+        &mut self,
+        matrix: &LowerMatrix,
+        beside: impl FnOnce(&Self) -> T + Send,
+    ) -> (bool, T) {
         let entry = |&at: &u32| if at == NONE { 0.0 } else { matrix.value[at as usize] };
         let take = |value: &mut Block, source: &[u32; 36]| {
             value.iter_mut().zip(source).for_each(|(value, at)| *value = entry(at));
@@ -196,12 +201,17 @@ impl BlockMatrix {
             });
         }
         let mut inverse = std::mem::take(&mut self.inverse);
+        let own = &*self;
+        let (done, sound) = rayon::join(|| beside(own), || own.invert(&mut inverse));
+        self.inverse = inverse;
+        (sound, done)
+    }
+
+    fn invert(&self, inverse: &mut [SingleBlock]) -> bool {
         let packs = inverse.par_chunks_mut(PACK).enumerate().with_min_len(8);
         let sound = packs
             .map(|(pack, inverse)| self.arch.dispatch(Invert { matrix: self, first: pack * PACK, inverse }));
-        let sound = sound.reduce(|| true, |a, b| a && b);
-        self.inverse = inverse;
-        sound
+        sound.reduce(|| true, |a, b| a && b)
     }
 
     fn gather(&self, equations: &[f64], nodes: &mut [Node]) {
@@ -1077,7 +1087,7 @@ mod tests {
         let mut lower = LowerMatrix::new(&equations, [&[0, 1][..]].into_iter(), &[]);
         (0..12).for_each(|at| lower.add_diagonal(at, 1.0 + at as f64));
         let mut matrix = BlockMatrix::new(&equations, &lower, usize::MAX);
-        assert!(matrix.update(&lower));
+        assert!(matrix.update(&lower, |_| ()).0);
         let mut vectors = KrylovVectors::new(&matrix, lower.len());
         let solution: Vec<f64> = (0..12).map(|at| f64::from(at) - 4.0).collect();
         let b: Vec<f64> = (1..13).zip(&solution).map(|(diagonal, x)| f64::from(diagonal) * x).collect();
@@ -1104,7 +1114,7 @@ mod tests {
         }
         let mut matrix = BlockMatrix::new(&equations, &lower, usize::MAX);
         matrix.single = vec![[0.0; 36]; matrix.column.len()];
-        assert!(matrix.update(&lower));
+        assert!(matrix.update(&lower, |_| ()).0);
         let mut vectors = KrylovVectors::new(&matrix, lower.len());
         let b: Vec<f64> = (0..12).map(|at| f64::from(at) - 4.0).collect();
         let (mut x, mut product) = (vec![0.0; 12], vec![0.0; 12]);
