@@ -12,7 +12,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use crate::facet::{Facet, Matrix18, Placed};
 use crate::lanes::{
-    Lane, PACK, Pack, Square, Three, add_half_skew, apply, difference, dot, sum, symmetric, times,
+    Lane, PACK, Pack, Square, Three, add_half_skew, apply, difference, dot, sum, symmetric, three, times,
     times_transposed, transpose,
 };
 use crate::patch::Vector18;
@@ -179,9 +179,9 @@ impl<S: Simd> Sparse<S> {
     #[inline(always)]
     fn transposed_before(&self, m: &Square<S>) -> Square<S> {
         [
-            m[2].map(|m| m * self.zx),
-            m[2].map(|m| m * self.zy),
-            [0, 1, 2].map(|j: usize| (m[0][j] * self.xz).plus(m[1][j], self.yz)),
+            three(|j| m[2][j] * self.zx),
+            three(|j| m[2][j] * self.zy),
+            three(|j| (m[0][j] * self.xz).plus(m[1][j], self.yz)),
         ]
     }
 }
@@ -205,7 +205,7 @@ struct Now<S: Simd> {
 
 #[inline(always)]
 fn load3<S: Simd>(simd: S, from: &[Pack], at: usize, register: usize) -> Three<S> {
-    [0, 1, 2].map(|k: usize| Lane::load(simd, &from[at + k], register))
+    three(|k| Lane::load(simd, &from[at + k], register))
 }
 
 /// Three rows and columns of the stiffness at rest.
@@ -226,7 +226,7 @@ impl<S: Simd> Now<S> {
     #[inline(always)]
     fn new(simd: S, pack: &FacetPack, work: &Work, register: usize) -> Self {
         let load = |from: &Pack| Lane::load(simd, from, register);
-        let axes = [0, 3, 6].map(|at| load3(simd, &work.axes, at, register));
+        let axes = three(|row| load3(simd, &work.axes, 3 * row, register));
         let (mut raw, mut energy) = ([[Lane::splat(simd, 0.0); 3]; 6], Lane::splat(simd, 0.0));
         let d = |i: usize| load(&work.deformation[i]);
         for i in 0..18 {
@@ -248,14 +248,17 @@ impl<S: Simd> Now<S> {
             // I − S/2 + η S², S² = θ θᵀ − |θ|² I.
             let [xx, yy, zz] = [x * x, y * y, z * z];
             let square = [[-(yy + zz), x * y, x * z], [x * y, -(xx + zz), y * z], [x * z, y * z, -(xx + yy)]];
-            let mut h = square.map(|row| row.map(|entry| entry * eta));
+            let mut h = three(|i| three(|j| square[i][j] * eta));
             (0..3).for_each(|k| h[k][k] = h[k][k] + one);
             add_half_skew(&mut h, &[-x, -y, -z]);
             spun[2 * node + 1] = apply(&transpose(&h), &raw[2 * node + 1]);
             turn[node] = h;
         }
-        let local = [0, 1, 2].map(|i: usize| [load(&work.local[2 * i]), load(&work.local[2 * i + 1])]);
-        let arm = local.map(|[x, y]| Sparse { xz: y, yz: -x, zx: -y, zy: x });
+        let local = three(|i| [load(&work.local[2 * i]), load(&work.local[2 * i + 1])]);
+        let arm = three(|i| {
+            let [x, y] = local[i];
+            Sparse { xz: y, yz: -x, zx: -y, zy: x }
+        });
         let trace = load(&work.trace);
         let mut spin = arm;
         let [p, q, r] = [local[0], local[1], local[2]];
@@ -273,8 +276,8 @@ impl<S: Simd> Now<S> {
             };
         }
         let third = Lane::splat(simd, 1.0 / 3.0);
-        let mean = [0, 1, 2].map(|c: usize| (spun[0][c] + spun[2][c] + spun[4][c]) * third);
-        let mut moment = [0, 1, 2].map(|c: usize| spun[1][c] + spun[3][c] + spun[5][c]);
+        let mean = three(|c| (spun[0][c] + spun[2][c] + spun[4][c]) * third);
+        let mut moment = three(|c| spun[1][c] + spun[3][c] + spun[5][c]);
         for (i, [x, y]) in local.into_iter().enumerate() {
             let f = spun[2 * i];
             moment[0] = moment[0].plus(y, f[2]);
@@ -306,7 +309,8 @@ impl<S: Simd> Now<S> {
     #[inline(always)]
     fn correction(&self, node: usize, work: &Work, register: usize) -> Square<S> {
         let theta = load3(self.simd, &work.theta, 3 * node, register);
-        let [eta, mu] = [&work.eta[node], &work.mu[node]].map(|of| Lane::load(self.simd, of, register));
+        let eta = Lane::load(self.simd, &work.eta[node], register);
+        let mu = Lane::load(self.simd, &work.mu[node], register);
         let m = &self.raw[2 * node + 1];
         let along = dot(&theta, m);
         let squared = dot(&theta, &theta);
@@ -329,17 +333,19 @@ impl<S: Simd> Now<S> {
     fn tangent(&self, pack: &FacetPack, work: &mut Work, register: usize) {
         let zero = Lane::splat(self.simd, 0.0);
         let none = [[zero; 3]; 3];
-        let block = |a: usize, b: usize| block(self.simd, pack, register, [a, b]);
         // Over spins: Hᵀ K H. Blocks of turns and translations, and of turns. In loops: closures of `map` are left as calls, without the
         // instructions of this kernel, and take most of its time.
         let (mut mixed, mut turned, mut corrections) = ([[none; 3]; 3], [none; 6], [none; 3]);
         for i in 0..3 {
             let back = transpose(&self.turn[i]);
             for (j, mixed) in mixed[i].iter_mut().enumerate() {
-                *mixed = times(&back, &block(2 * i + 1, 2 * j));
+                *mixed = times(&back, &block(self.simd, pack, register, [2 * i + 1, 2 * j]));
             }
             for j in 0..=i {
-                turned[place(i, j)] = times(&times(&back, &block(2 * i + 1, 2 * j + 1)), &self.turn[j]);
+                turned[place(i, j)] = times(
+                    &times(&back, &block(self.simd, pack, register, [2 * i + 1, 2 * j + 1])),
+                    &self.turn[j],
+                );
             }
             corrections[i] = self.correction(i, work, register);
         }
@@ -353,7 +359,10 @@ impl<S: Simd> Now<S> {
             for (j, arm) in self.arm.iter().enumerate() {
                 let turns = difference(&of_turns(i, j), &arm.after(&mixed[i][j]));
                 of_rigid[2 * i + 1] = if j == 0 { turns } else { sum(&of_rigid[2 * i + 1], &turns) };
-                let ways = difference(&transpose(&mixed[j][i]), &arm.after(&block(2 * i, 2 * j)));
+                let ways = difference(
+                    &transpose(&mixed[j][i]),
+                    &arm.after(&block(self.simd, pack, register, [2 * i, 2 * j])),
+                );
                 of_rigid[2 * i] = if j == 0 { ways } else { sum(&of_rigid[2 * i], &ways) };
             }
         }
@@ -386,7 +395,10 @@ impl<S: Simd> Now<S> {
         }
         for i in 0..3 {
             for j in 0..=i {
-                let mut own = difference(&block(2 * i, 2 * j), &self.spin[j].after(&left[i]));
+                let mut own = difference(
+                    &block(self.simd, pack, register, [2 * i, 2 * j]),
+                    &self.spin[j].after(&left[i]),
+                );
                 own = difference(&own, &transpose(&self.spin[i].after(&left[j])));
                 self.add_frame_change(&mut own, i, j);
                 self.write(work, register, [2 * i, 2 * j], &own);
@@ -414,7 +426,7 @@ impl<S: Simd> Now<S> {
     /// Adds ½ (Bᵢⱼ + Bⱼᵢᵀ), Bᵢⱼ = e_z nᵢᵀ (Mx nⱼy − My nⱼx) + Mz hᵢ rⱼᵀ/tr.
     #[inline(always)]
     fn add_frame_change(&self, own: &mut Square<S>, i: usize, j: usize) {
-        let [mx, my, mz] = self.moment.map(Lane::half);
+        let [mx, my, mz] = three(|k| self.moment[k].half());
         let (a, b) = (&self.spin[i], &self.spin[j]);
         let tilt = |g: &Sparse<S>| (mx * g.xz).plus(my, g.yz);
         let (tilt_a, tilt_b) = (tilt(a), tilt(b));

@@ -100,6 +100,12 @@ pub(crate) type Three<S> = [Lane<S>; 3];
 /// A 3 × 3 matrix of them, row by row.
 pub(crate) type Square<S> = [Three<S>; 3];
 
+/// Three of anything, by their numbers. The closures of `map` and `from_fn` would stay calls, without the instructions of a kernel.
+#[inline(always)]
+pub(crate) fn three<T>(of: impl Fn(usize) -> T) -> [T; 3] {
+    [of(0), of(1), of(2)]
+}
+
 /// A B.
 #[inline(always)]
 pub(crate) fn times<S: Simd>(a: &Square<S>, b: &Square<S>) -> Square<S> {
@@ -151,14 +157,15 @@ pub(crate) fn difference<S: Simd>(a: &Square<S>, b: &Square<S>) -> Square<S> {
 /// (A + Aᵀ)/2.
 #[inline(always)]
 pub(crate) fn symmetric<S: Simd>(a: &Square<S>) -> Square<S> {
-    let [xy, xz, yz] = [[0, 1], [0, 2], [1, 2]].map(|[i, j]: [usize; 2]| (a[i][j] + a[j][i]).half());
+    let mean = |i: usize, j: usize| (a[i][j] + a[j][i]).half();
+    let (xy, xz, yz) = (mean(0, 1), mean(0, 2), mean(1, 2));
     [[a[0][0], xy, xz], [xy, a[1][1], yz], [xz, yz, a[2][2]]]
 }
 
 /// Adds half of S(v), S(v) b = v × b.
 #[inline(always)]
 pub(crate) fn add_half_skew<S: Simd>(a: &mut Square<S>, v: &Three<S>) {
-    let [x, y, z] = v.map(Lane::half);
+    let [x, y, z] = three(|k| v[k].half());
     (a[0][1], a[1][0]) = (a[0][1] - z, a[1][0] + z);
     (a[0][2], a[2][0]) = (a[0][2] + y, a[2][0] - y);
     (a[1][2], a[2][1]) = (a[1][2] - x, a[2][1] + x);

@@ -35,6 +35,7 @@ const BERNOULLI: [f64; 8] = [
 const SERIES: f64 = 0.6;
 
 /// Σ cₖ xᵏ.
+#[inline(always)]
 fn series(x: f64, coefficients: impl DoubleEndedIterator<Item = f64>) -> f64 {
     coefficients.rev().fold(0.0, |sum, c| sum * x + c)
 }

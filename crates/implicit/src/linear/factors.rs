@@ -1,6 +1,7 @@
 //! L D Lᵀ of a symmetric matrix by fronts (multifrontal; Duff and Reid 1983): each supernode adds up its entries of the matrix and what others
 //! have left to it, eliminates its columns and leaves the rest to its parent. Without pivoting: matrices are positive definite or nearly so, and
-//! the signs of pivots are wanted. One thread, so bits do not depend on how many there are.
+//! the signs of pivots are wanted. They are found on one thread; solutions share two parts of the assembly tree between threads. Bits do not
+//! depend on how many there are.
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -24,9 +25,14 @@ pub(crate) struct Pivots {
 /// Pivots below this part of the diagonal are zero but for round-off.
 pub(crate) const ZERO_PIVOT: f64 = 1e-14;
 
+/// Numbers of factors from which on solutions are shared: they take some 15 µs.
+const SHARED: usize = 1 << 15;
+
 /// L D Lᵀ of a matrix.
 pub(crate) struct Factors {
     supernodes: Supernodes,
+    /// The supernodes up to the first number and from there up to the second have nothing to do with each other; the rest waits for both.
+    shares: [usize; 2],
     /// L, panel by panel.
     value: Vec<f64>,
     /// D, and the diagonal of the matrix without signs, 1 where it is zero, by columns.
@@ -45,15 +51,25 @@ struct Memory {
     stacks: [Vec<f64>; 2],
     /// The supernodes that left it, of both.
     waiting: Vec<usize>,
-    /// The right-hand side by columns, and numbers of the rows below a supernode.
+    /// The right-hand side by columns; of each share numbers of the rows below a supernode, and what it takes off the columns of the rest.
     right: Vec<f64>,
-    below: Vec<f64>,
+    below: [Vec<f64>; 2],
+    taken: [Vec<f64>; 2],
 }
 
 impl Factors {
     pub(crate) fn new(matrix: &LowerMatrix) -> Result<Self, faer::sparse::FaerError> {
+        Self::shared_from(matrix, SHARED)
+    }
+
+    /// Factors whose solutions are shared if they have at least so many numbers.
+    fn shared_from(matrix: &LowerMatrix, least: usize) -> Result<Self, faer::sparse::FaerError> {
         let supernodes = Supernodes::new(matrix)?;
+        let shares =
+            if supernodes.values < least { [supernodes.nodes.len(); 2] } else { supernodes.shares() };
+        let rest = matrix.len() - supernodes.column(shares[1]);
         Ok(Self {
+            shares,
             value: vec![0.0; supernodes.values],
             pivot: vec![0.0; matrix.len()],
             diagonal: vec![0.0; matrix.len()],
@@ -62,7 +78,8 @@ impl Factors {
                 stacks: supernodes.stacks.map(|numbers| vec![0.0; numbers]),
                 waiting: Vec::with_capacity(supernodes.nodes.len()),
                 right: vec![0.0; matrix.len()],
-                below: vec![0.0; padded(supernodes.most_below)],
+                below: [(); 2].map(|()| vec![0.0; padded(supernodes.most_below)]),
+                taken: [(); 2].map(|()| vec![0.0; rest]),
             },
             arch: Arch::new(),
             supernodes,
@@ -95,13 +112,45 @@ impl Factors {
 
     /// x ← A⁻¹ x.
     pub(crate) fn solve(&mut self, x: &mut [f64]) {
-        for (own, &equation) in self.memory.right.iter_mut().zip(&self.supernodes.order) {
+        let Self { supernodes, shares: [middle, end], value, pivot, memory, arch, .. } = self;
+        let Memory { right, below: [below, below_other], taken: [taken, taken_other], .. } = memory;
+        for (own, &equation) in right.iter_mut().zip(&supernodes.order) {
             *own = x[equation as usize];
         }
-        self.arch.dispatch(Solve { own: self });
-        for (own, &equation) in self.memory.right.iter().zip(&self.supernodes.order) {
+        let (arch, all, count) = (*arch, supernodes.nodes.len(), right.len());
+        let [first, beyond] = [*middle, *end].map(|node| supernodes.column(node));
+        let (shared, rest) = right.split_at_mut(beyond);
+        let (one, other) = shared.split_at_mut(first);
+        let share = |nodes, beyond| Share { supernodes, value, pivot, nodes, beyond };
+        let (a, b, last) =
+            (share([0, *middle], beyond), share([*middle, *end], beyond), share([*end, all], count));
+        join(
+            *middle < *end,
+            || arch.dispatch(Forward { share: &a, right: one, rest: taken, below }),
+            || arch.dispatch(Forward { share: &b, right: other, rest: taken_other, below: below_other }),
+        );
+        for ((own, one), other) in rest.iter_mut().zip(&*taken).zip(&*taken_other) {
+            *own -= one + other;
+        }
+        arch.dispatch(Forward { share: &last, right: rest, rest: &mut [], below });
+        arch.dispatch(Backward { share: &last, right: rest, rest: &[], below });
+        join(
+            *middle < *end,
+            || arch.dispatch(Backward { share: &a, right: one, rest, below }),
+            || arch.dispatch(Backward { share: &b, right: other, rest, below: below_other }),
+        );
+        for (own, &equation) in right.iter().zip(&supernodes.order) {
             x[equation as usize] = *own;
         }
+    }
+}
+
+/// Calls two functions, on two threads where there is something to share.
+fn join(shared: bool, one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
+    if shared {
+        rayon::join(one, other);
+    } else {
+        one();
     }
 }
 
@@ -175,20 +224,47 @@ fn fill(supernodes: &Supernodes, node: &Supernode, matrix: &LowerMatrix, panel: 
     }
 }
 
-struct Solve<'a> {
-    own: &'a mut Factors,
+/// Some supernodes that follow one another.
+struct Share<'a> {
+    supernodes: &'a Supernodes,
+    value: &'a [f64],
+    pivot: &'a [f64],
+    /// Where they begin and end.
+    nodes: [usize; 2],
+    /// The first column of the rest.
+    beyond: usize,
 }
 
-impl WithSimd for Solve<'_> {
+impl<'a> Share<'a> {
+    fn nodes(&self) -> &'a [Supernode] {
+        &self.supernodes.nodes[self.nodes[0]..self.nodes[1]]
+    }
+
+    fn first(&self) -> usize {
+        self.supernodes.column(self.nodes[0])
+    }
+}
+
+/// Solves L D y = b for the columns of a share; with what its rows take off the rest.
+struct Forward<'a> {
+    share: &'a Share<'a>,
+    right: &'a mut [f64],
+    rest: &'a mut [f64],
+    below: &'a mut [f64],
+}
+
+impl WithSimd for Forward<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Factors { supernodes, value, pivot, memory: Memory { right, below, .. }, .. } = self.own;
-        for node in &supernodes.nodes {
+        let Self { share, right, rest, below } = self;
+        let (first, beyond) = (share.first(), share.beyond);
+        rest.fill(0.0);
+        for node in share.nodes() {
             let (width, height, edge) = (node.width, node.height(), padded(node.width));
-            let panel = &value[node.value..node.value + height * width];
-            let own = &mut right[node.first..node.first + width];
+            let panel = &share.value[node.value..node.value + height * width];
+            let own = &mut right[node.first - first..][..width];
             for (c, column) in panel.chunks_exact(height).enumerate() {
                 let (before, after) = own.split_at_mut(c + 1);
                 let lower = &column[c + 1..width];
@@ -196,20 +272,42 @@ impl WithSimd for Solve<'_> {
             }
             let sums = &mut below[..height - edge];
             multiply(simd, panel, own, edge, sums);
-            for (&row, sum) in supernodes.rows(node).iter().zip(&*sums) {
-                right[row as usize] -= sum;
+            for (row, sum) in share.supernodes.rows(node).iter().map(|&row| row as usize).zip(&*sums) {
+                if row < beyond {
+                    right[row - first] -= sum;
+                } else {
+                    rest[row - beyond] += sum;
+                }
             }
         }
-        right.iter_mut().zip(&*pivot).for_each(|(own, pivot)| *own /= pivot);
-        for node in supernodes.nodes.iter().rev() {
+        right.iter_mut().zip(&share.pivot[first..]).for_each(|(own, pivot)| *own /= pivot);
+    }
+}
+
+/// Solves Lᵀ x = y for the columns of a share, with x of the rest.
+struct Backward<'a> {
+    share: &'a Share<'a>,
+    right: &'a mut [f64],
+    rest: &'a [f64],
+    below: &'a mut [f64],
+}
+
+impl WithSimd for Backward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { share, right, rest, below } = self;
+        let (first, beyond) = (share.first(), share.beyond);
+        for node in share.nodes().iter().rev() {
             let (width, height, edge) = (node.width, node.height(), padded(node.width));
-            let panel = &value[node.value..node.value + height * width];
+            let panel = &share.value[node.value..node.value + height * width];
             let below = &mut below[..height - edge];
             below.fill(0.0);
-            for (&row, below) in supernodes.rows(node).iter().zip(&mut *below) {
-                *below = right[row as usize];
+            for (row, below) in share.supernodes.rows(node).iter().map(|&row| row as usize).zip(&mut *below) {
+                *below = if row < beyond { right[row - first] } else { rest[row - beyond] };
             }
-            let own = &mut right[node.first..node.first + width];
+            let own = &mut right[node.first - first..][..width];
             for (c, column) in panel.chunks_exact(height).enumerate().rev() {
                 let lower = column[c + 1..width].iter().zip(&own[c + 1..]);
                 own[c] -= dot(simd, &column[edge..], below) + lower.map(|(l, x)| l * x).sum::<f64>();

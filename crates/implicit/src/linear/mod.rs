@@ -154,16 +154,19 @@ impl Workspace {
         if let Some(factors) = &mut self.unsymmetric {
             factors.factorise(matrix).ok_or(LinearError::NotFinite)?;
         }
-        if let Some(blocks) = &mut self.blocks
-            && !blocks.update(matrix)
-        {
-            return Err(LinearError::Indefinite(0));
-        }
-        if let (Some(coarse), Some(blocks)) = (&mut self.coarse, &self.blocks) {
-            coarse.update(blocks);
-            // A device inverts it itself.
-            if self.on_device.is_none() {
-                self.pivots.negative = coarse.factorise()?;
+        if let Some(blocks) = &mut self.blocks {
+            let (coarse, on_device) = (self.coarse.as_mut(), self.on_device.is_some());
+            let (sound, negative) = blocks.update(matrix, |blocks| {
+                let Some(coarse) = coarse else { return Ok(None) };
+                coarse.update(blocks);
+                // A device inverts it itself.
+                if on_device { Ok(None) } else { coarse.factorise().map(Some) }
+            });
+            if !sound {
+                return Err(LinearError::Indefinite(0));
+            }
+            if let Some(negative) = negative? {
+                self.pivots.negative = negative;
             }
         }
         if let (Some(on_device), Some(blocks)) = (&mut self.on_device, &self.blocks) {

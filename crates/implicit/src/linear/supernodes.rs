@@ -341,6 +341,39 @@ impl Supernodes {
         Ok(own)
     }
 
+    /// The first column of a supernode, or the end of all.
+    pub(super) fn column(&self, node: usize) -> usize {
+        self.nodes.get(node).map_or(self.order.len(), |node| node.first)
+    }
+
+    /// Two numbers: the supernodes up to the first and from there up to the second are whole subtrees, and all others come after them. So two
+    /// threads that take a subtree each, and then one of them the rest, have the least to do.
+    pub(super) fn shares(&self) -> [usize; 2] {
+        let count = self.nodes.len();
+        // What there is to do before each, and the first of its subtree.
+        let (mut work, mut begin) = (vec![0], Vec::with_capacity(count));
+        for (number, node) in self.nodes.iter().enumerate() {
+            work.push(work[number] + node.height() * node.width);
+            begin.push((0..node.children).fold(number, |end, _| begin[end - 1]));
+        }
+        let (mut least, mut shares) = (work[count], [count; 2]);
+        for end in (1..=count).rev() {
+            let rest = work[count] - work[end];
+            if rest >= least {
+                break;
+            }
+            let mut middle = begin[end - 1];
+            while middle > 0 {
+                let all = rest + work[middle].max(work[end] - work[middle]);
+                if all < least {
+                    (least, shares) = (all, [middle, end]);
+                }
+                middle = begin[middle - 1];
+            }
+        }
+        shares
+    }
+
     pub(super) fn rows(&self, node: &Supernode) -> &[u32] {
         &self.rows[node.rows[0]..node.rows[1]]
     }

@@ -52,13 +52,13 @@ fn factors_solve_and_count_negative_eigenvalues() {
                 let sign = if negative > 0 && equation % 7 < negative { -1.0 } else { 1.0 };
                 matrix.add_diagonal(equation, sign * (sum + 1.0) - matrix.diagonal(equation));
             }
-            let mut factors = Factors::new(&matrix).unwrap();
+            let mut factors = Factors::shared_from(&matrix, 0).unwrap();
             let pivots = factors.factorise(&matrix).unwrap();
             let all = dense(&matrix);
             let eigenvalues = SymmetricEigen::new(all.clone()).eigenvalues;
             assert_eq!(pivots.negative, eigenvalues.iter().filter(|value| **value < 0.0).count());
             assert!(pivots.smallest > 0.0 && pivots.smallest <= 1.0, "{pivots:?}");
-            let right = DVector::from_fn(matrix.len(), |_, _| random.number());
+            let mut right = DVector::from_fn(matrix.len(), |_, _| random.number());
             let mut solution = right.clone();
             factors.solve(solution.as_mut_slice());
             let error = (&all * &solution - &right).amax() / (all.amax() * solution.amax());
@@ -68,6 +68,15 @@ fn factors_solve_and_count_negative_eigenvalues() {
             assert_eq!(factors.factorise(&matrix), Some(pivots));
             factors.solve(again.as_mut_slice());
             assert_eq!(again, solution);
+            // On one thread, too, and but for round-off by the parts of the tree one after the other.
+            let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+            again.copy_from(&right);
+            alone.install(|| factors.solve(again.as_mut_slice()));
+            assert_eq!(again, solution);
+            let mut factors = Factors::new(&matrix).unwrap();
+            factors.factorise(&matrix).unwrap();
+            factors.solve(right.as_mut_slice());
+            assert!((right - &solution).amax() < 1e-12 * solution.amax(), "{nodes} nodes");
         }
     }
 }
