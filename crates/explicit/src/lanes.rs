@@ -1,7 +1,7 @@
 //! Numbers side by side: kernels written once, generic over [`Lanes`], run sixteen, eight or four cells at a time.
 //!
 //! Data lie in packs of [`PACK`] numbers whatever the width, so that files and results do not depend on it. The CPU
-//! is queried when a force field is made, and by checks of the critical time step: AVX-512 (with the feature `avx512`; 16 numbers in single, 8 in
+//! is queried when a force field is made, by checks of the critical time step and by the recovery of fields: AVX-512 (with the feature `avx512`; 16 numbers in single, 8 in
 //! double precision), AVX2 with FMA (8, 4), SSE4.2 or NEON (4, 2); without any of them the kernels run in plain numbers. Nobody needs
 //! `target-cpu=native`; `CentralDifference::in_lanes` chooses other instructions for forces and nodes. Lanes never mix: with AVX-512 and AVX2 results are the same to the bit
 //! (tested for every law and element in `forces/tests.rs`), elsewhere to round-off.

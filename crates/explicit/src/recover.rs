@@ -121,9 +121,13 @@ impl<'a, R: Scalar> Recovery<'a, R> {
     /// Σ V ψ over all cells [J], without what hourglass control holds. The number of threads never changes a bit.
     pub fn stored_energy(&self) -> f64 {
         let of_solid = |(index, solid): (usize, &Solid)| {
-            let stored =
-                |(cell, fields): (usize, CellFields)| solid.cells.volume(cell) * fields.energy_density;
-            self.cells(index).into_iter().enumerate().map(stored).sum::<f64>()
+            let densities = if takes_packs(&solid.cells) {
+                self.packs(index, |found| found.energy_densities()).into_flattened()
+            } else {
+                let cells = (0..solid.cells.len()).into_par_iter();
+                cells.map(|cell| self.cell(index, cell).energy_density).collect()
+            };
+            (0..solid.cells.len()).map(|cell| solid.cells.volume(cell) * densities[cell]).sum::<f64>()
         };
         self.model.solids.iter().enumerate().map(of_solid).sum()
     }
@@ -131,14 +135,20 @@ impl<'a, R: Scalar> Recovery<'a, R> {
     /// The fields of all cells of a solid.
     pub fn cells(&self, solid: usize) -> Vec<CellFields> {
         let part = &self.model.solids[solid];
-        let count = part.cells.len();
-        if part.cells.points() > 1 || matches!(part.cells, Cells::Membrane(..) | Cells::Bar(..)) {
-            return (0..count).into_par_iter().map(|cell| self.cell(solid, cell)).collect();
+        let cells = (0..part.cells.len()).into_par_iter();
+        if takes_packs(&part.cells) {
+            let packs = self.packs(solid, |found| found);
+            cells.map(|cell| packs[cell / PACK].fields(part, cell, cell % PACK)).collect()
+        } else {
+            cells.map(|cell| self.cell(solid, cell)).collect()
         }
-        let of_pack = |pack: usize| self.pack(solid, |lane| (pack * PACK + lane).min(count - 1));
-        let packs: Vec<_> = (0..count.div_ceil(PACK)).into_par_iter().map(of_pack).collect();
-        let of_cell = |cell: usize| packs[cell / PACK].fields(part, cell, cell % PACK);
-        (0..count).into_par_iter().map(of_cell).collect()
+    }
+
+    /// All packs of cells with one point, made something of.
+    fn packs<T: Send>(&self, solid: usize, of: impl Fn(Found) -> T + Sync) -> Vec<T> {
+        let count = self.model.solids[solid].cells.len();
+        let pack = |pack: usize| self.pack(solid, |lane| (pack * PACK + lane).min(count - 1));
+        (0..count.div_ceil(PACK)).into_par_iter().map(|number| of(pack(number))).collect()
     }
 
     /// The fields of one cell of a solid, means over its points.
@@ -275,6 +285,11 @@ struct Found {
 }
 
 impl Found {
+    /// Strain energy per reference volume [J/m³].
+    fn energy_densities(&self) -> [f64; PACK] {
+        from_fn(|lane| self.energy.isochoric.0[lane] + self.energy.volumetric.0[lane])
+    }
+
     /// The fields of a lane, which has a cell.
     fn fields(&self, solid: &Solid, cell: usize, lane: usize) -> CellFields {
         let symmetric = |of: &Symmetric<Pack<f64>>| Symmetric(of.0.each_ref().map(|entry| entry.0[lane]));
@@ -286,7 +301,7 @@ impl Found {
             green_strain: symmetric(&self.green_strain),
             pk2_stress: symmetric(&self.pk2_stress),
             cauchy_stress: symmetric(&self.cauchy_stress),
-            energy_density: self.energy.isochoric.0[lane] + self.energy.volumetric.0[lane],
+            energy_density: self.energy_densities()[lane],
             fibre,
             fibre_stretch: fibre.map(|_| self.fibre_stretch.0[lane]),
             thickness: None,
@@ -344,6 +359,11 @@ impl<T: Law> LaneWork<f64> for AtPoints<'_, T> {
             }
         }
     }
+}
+
+/// Whether cells are solid, with one point each.
+fn takes_packs(cells: &Cells) -> bool {
+    cells.points() == 1 && !matches!(cells, Cells::Membrane(..) | Cells::Bar(..))
 }
 
 /// ∂u/∂X.

@@ -265,10 +265,11 @@ struct NodePass<'a, R> {
 impl<R: Scalar> LaneWork<R> for NodePass<'_, R> {
     type Output = Sums;
 
-    /// Plain loops over a block of components, which the compiler makes wide. Each loop goes over a whole block: a wide read of numbers that were
-    /// written one by one waits until they have left the processor's queue.
+    /// Plain loops over a block of components, which the compiler makes wide. Each loop goes over a whole block. Numbers that were written
+    /// one by one have then left the processor's queue, or a wide read would wait for them.
     #[inline(always)]
     fn run<L: Lanes<R>>(self) -> Sums {
+        const { assert!(CHUNK.is_multiple_of(BLOCK) && BLOCK.is_multiple_of(LANES)) };
         let Self { stepper, first, before, next, reaction } = self;
         let mut held = stepper.held_in(first..first + before.len()).iter().peekable();
         let pace = Pace::new(stepper.lengths);

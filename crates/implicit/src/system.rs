@@ -1051,7 +1051,7 @@ impl System {
         Ok(())
     }
 
-    /// Solves with the matrix prepared; conjugate gradients start from the solution given, and leave what they reached there if
+    /// Solves with the matrix prepared; conjugate gradients start from a multiple of the solution given, and leave what they reached there if
     /// iterations run out.
     pub(crate) fn solve_from(&mut self, right: &[f64], solution: &mut [f64]) -> Result<(), SolveError> {
         let result = self.solve_pinned(right, solution);

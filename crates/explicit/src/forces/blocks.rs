@@ -26,10 +26,11 @@ pub(crate) const MOST_PACKS: usize = BLOCK + SPARE;
 /// Nodes of packs of cells, each pack with its own, that are worth a second thread: fewer take less time than waking it.
 const SHARED: usize = 256;
 
-/// Packs of each block of so many packs of cells with `nodes` nodes: an even number of blocks, so that two threads have as much to do.
+/// Packs of each block of so many packs of cells with `nodes` nodes. A small model has two, four or six blocks, so that two threads have
+/// as much to do.
 fn packs_per_block(packs: usize, nodes: usize) -> usize {
-    if packs * nodes < SHARED {
-        return BLOCK;
+    if packs <= MOST_PACKS && packs * nodes < SHARED {
+        return MOST_PACKS;
     }
     let pairs = packs.saturating_sub(2 * SPARE).div_ceil(2 * BLOCK).max(1);
     packs.div_ceil(2 * pairs).next_multiple_of(PACKS)
@@ -259,7 +260,9 @@ mod tests {
 
     #[test]
     fn two_threads_have_as_much_to_do() {
-        for (packs, nodes, each) in [(63, 4, 64), (129, 4, 68), (160, 4, 40), (375, 4, 64), (63, 8, 32)] {
+        for (packs, nodes, each) in
+            [(63, 4, MOST_PACKS), (100, 2, 52), (129, 4, 68), (160, 4, 40), (375, 4, 64), (63, 8, 32)]
+        {
             assert_eq!(packs_per_block(packs, nodes), each, "{packs}");
         }
         assert!((64..5000).all(|packs| packs_per_block(packs, 4) <= MOST_PACKS));

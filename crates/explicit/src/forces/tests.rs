@@ -407,6 +407,45 @@ fn energy_densities_sum_to_the_energy_that_the_forces_come_from() {
     }
 }
 
+/// Fields of all cells, a pack at a time, are those of single cells to the bit, and their stress is that of the law and of what it remembers.
+#[test]
+fn cells_in_lanes_are_recovered_as_one_by_one() {
+    let mut random = Random::new(37);
+    for model in every_kernel().chain(every_element_full_or_not()) {
+        let mut state = State::<f64>::at_rest(&model);
+        state.displacement.iter_mut().for_each(|u| *u = vector(&mut random, 0.01));
+        let history = &mut state.history[0];
+        for pack in history.cells.iter_mut().chain(&mut history.pressures) {
+            pack.0.iter_mut().for_each(|number| *number = 100.0 * random.number());
+        }
+        let (recovery, solid) = (Recovery::new(&model, &state), &model.solids[0]);
+        let name = format!("{} {}", solid.material.law.name(), solid.cells.element());
+        let numbers = |fields: &CellFields| {
+            let tensors = [fields.green_strain, fields.pk2_stress, fields.cauchy_stress];
+            let other = [fields.volume_ratio, fields.cell_volume_ratio, fields.energy_density];
+            let all = fields.gradient.0.into_iter().flatten().chain(tensors.into_iter().flat_map(|s| s.0));
+            all.chain(other).chain(fields.fibre_stretch).map(f64::to_bits).collect::<Vec<_>>()
+        };
+        let cells = recovery.cells(0);
+        assert_eq!(cells.len(), solid.cells.len());
+        for (cell, fields) in cells.iter().enumerate() {
+            assert_eq!(numbers(fields), numbers(&recovery.cell(0, cell)), "{name} {cell}");
+            if !matches!(solid.cells, Cells::Tet4(_) | Cells::Hex8(_)) {
+                continue;
+            }
+            let mut h = fields.gradient;
+            (0..3).for_each(|i| h.0[i][i] -= 1.0);
+            let elastic =
+                solid.material.law.stress(&Deformation::from_displacement_gradient(&h), solid.fibres(cell));
+            let history: Vec<_> = state.history[0].of_point(solid, cell, 0).collect();
+            let expected = solid.material.prony.stress(elastic, &history);
+            let size = expected.0.iter().fold(1.0, |most: f64, s| most.max(s.abs()));
+            let apart = (fields.pk2_stress + expected * -1.0).0;
+            assert!(apart.iter().all(|s| s.abs() < 1e-9 * size), "{name} {cell}: {apart:?} of {size}");
+        }
+    }
+}
+
 #[test]
 fn the_pressure_written_is_the_one_of_the_volume_ratio_written() {
     let mut random = Random::new(31);

@@ -205,7 +205,7 @@ impl OnDevice {
             });
         };
         round(&mut self.lower, &matrix.value);
-        blocks.inverse(&mut self.inverse);
+        blocks.write_inverses(&mut self.inverse);
         if let Some(coarse) = coarse {
             let (arms, values) = coarse.parts();
             let four = |arm: &Vector3<f64>| [arm.x as f32, arm.y as f32, arm.z as f32, 0.0];

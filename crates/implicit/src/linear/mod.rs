@@ -107,6 +107,12 @@ impl Workspace {
         let empty = matrix.len() == 0;
         let most = device.map_or(usize::MAX, |device| device.aggregates());
         let blocks = preconditioner.map(|_| BlockMatrix::new(equations, matrix, most));
+        let blocks = match solver {
+            LinearSolver::ConjugateGradients { tolerance, .. } if device.is_none() && !direct => {
+                blocks.map(|blocks| blocks.read_for(tolerance))
+            }
+            _ => blocks,
+        };
         let coarse = blocks.as_ref().filter(|_| preconditioner == Some(Preconditioner::Aggregates));
         let coarse = coarse.map(Coarse::new).map(|coarse| coarse.ok_or(LinearError::TooLarge)).transpose()?;
         let on_device = match (device, &blocks) {
@@ -187,7 +193,8 @@ impl Workspace {
         Ok(())
     }
 
-    /// x ← A⁻¹ b for the matrix that was prepared; conjugate gradients start from the x given.
+    /// x ← A⁻¹ b for the matrix that was prepared; conjugate gradients start from the multiple of
+    /// the x given that leaves the smallest residual.
     pub(crate) fn solve(
         &mut self,
         matrix: &LowerMatrix,

@@ -346,8 +346,8 @@ impl Supernodes {
         self.nodes.get(node).map_or(self.order.len(), |node| node.first)
     }
 
-    /// Two numbers: the supernodes up to the first and from there up to the second are whole subtrees, and all others come after them. So two
-    /// threads that take a subtree each, and then one of them the rest, have the least to do.
+    /// Two numbers: the supernodes up to the first and from there up to the second are whole subtrees, and all others come after them. Two
+    /// threads take a subtree each, and then one of them the rest; the larger subtree and the rest are together as small as they can be.
     pub(super) fn shares(&self) -> [usize; 2] {
         let count = self.nodes.len();
         // What there is to do before each, and the first of its subtree.

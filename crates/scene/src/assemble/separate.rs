@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3 as Vector;
 use pliant_explicit::State;
-use pliant_explicit::recover::Recovery;
+use pliant_explicit::recover::{CellFields, Recovery};
 use pliant_geometry::{Locator, SurfaceLocator, Vector3};
 use pliant_mechanics::model::FREE;
 use pliant_sim::contact::pairs::{Pairs, Surface};
@@ -204,12 +204,11 @@ impl Builder<'_> {
         let model = Arc::clone(&self.assembly.model);
         let state = State { displacement: displacement.to_vec(), ..start };
         let recovery = Recovery::new(&model, &state);
-        let all = model.solids.iter().enumerate();
-        let mut cells = all.flat_map(|(index, solid)| (0..solid.cells.len()).map(move |cell| (index, cell)));
         // Of bars it is not a number.
-        let inverted = cells.find(|&(solid, cell)| recovery.cell(solid, cell).cell_volume_ratio <= 0.0);
-        let Some((solid, cell)) = inverted else { return Some(()) };
-        let own = &model.solids[solid];
+        let is_inverted = |fields: &CellFields| fields.cell_volume_ratio <= 0.0;
+        let inverted = |(index, own)| Some((own, recovery.cells(index).iter().position(is_inverted)?));
+        let found = model.solids.iter().enumerate().find_map(inverted);
+        let Some((own, cell)) = found else { return Some(()) };
         let message = format!(
             "pushing bodies apart would invert element {} of `{}`",
             own.original[cell], model.bodies[own.body].name
