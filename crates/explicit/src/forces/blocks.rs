@@ -261,9 +261,15 @@ mod tests {
 
     #[test]
     fn two_threads_have_as_much_to_do() {
-        for (packs, nodes, each) in
-            [(63, 4, MOST_PACKS), (100, 2, 52), (129, 4, 68), (160, 4, 40), (375, 4, 64), (63, 8, MOST_PACKS), (70, 8, 36)]
-        {
+        for (packs, nodes, each) in [
+            (63, 4, MOST_PACKS),
+            (100, 2, 52),
+            (129, 4, 68),
+            (160, 4, 40),
+            (375, 4, 64),
+            (63, 8, MOST_PACKS),
+            (70, 8, 36),
+        ] {
             assert_eq!(packs_per_block(packs, nodes), each, "{packs}");
         }
         assert!((64..5000).all(|packs| packs_per_block(packs, 4) <= MOST_PACKS));
