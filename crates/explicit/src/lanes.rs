@@ -10,7 +10,7 @@
 //! without a comparison each, since all are compared once.
 #![allow(unsafe_code)]
 
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Range, Sub, SubAssign};
 
 use pulp::{Simd, WithSimd};
 use serde::{Deserialize, Serialize};
@@ -309,9 +309,14 @@ impl<R: Scalar, const N: usize> Places<R, N> {
     ) -> Local<'a, R, N> {
         assert_eq!(vectors.len(), sums.len());
         assert!(usize::from(self.most[block]) < vectors.len() * units::<R>());
+        Local { vectors, sums, offsets: &self.offsets[self.packs_of(block)] }
+    }
+
+    /// The packs of a block.
+    #[inline(always)]
+    pub(crate) fn packs_of(&self, block: usize) -> Range<usize> {
         let first = block * self.per_block;
-        let offsets = &self.offsets[first..self.offsets.len().min(first + self.per_block)];
-        Local { vectors, sums, offsets }
+        first..self.offsets.len().min(first + self.per_block)
     }
 }
 
@@ -334,7 +339,7 @@ impl<R: Scalar, const N: usize> Local<'_, R, N> {
     #[inline(always)]
     pub(crate) fn add<L: Lanes<R>>(&mut self, pack: usize, vectors: &[Pack<[R; 4]>; N]) {
         let offsets = &self.offsets[pack];
-        // The compiler unrolls loops of four lanes, and rows then lie at fixed distances.
+        // The compiler unrolls a loop over four lanes, so that the places of their rows are constants.
         for first in (0..PACK).step_by(4) {
             for lane in first..first + 4 {
                 let row = L::row_of_lane(lane);

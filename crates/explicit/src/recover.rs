@@ -122,7 +122,8 @@ impl<'a, R: Scalar> Recovery<'a, R> {
     pub fn stored_energy(&self) -> f64 {
         let of_solid = |(index, solid): (usize, &Solid)| {
             let densities = if takes_packs(&solid.cells) {
-                self.packs(index, |found| found.energy_densities()).into_flattened()
+                let of_pack = |found: Found| from_fn::<_, PACK, _>(|lane| found.energy_density(lane));
+                self.packs(index, of_pack).into_flattened()
             } else {
                 let cells = (0..solid.cells.len()).into_par_iter();
                 cells.map(|cell| self.cell(index, cell).energy_density).collect()
@@ -285,9 +286,9 @@ struct Found {
 }
 
 impl Found {
-    /// Strain energy per reference volume [J/m³].
-    fn energy_densities(&self) -> [f64; PACK] {
-        from_fn(|lane| self.energy.isochoric.0[lane] + self.energy.volumetric.0[lane])
+    /// Strain energy per reference volume [J/m³] of a lane.
+    fn energy_density(&self, lane: usize) -> f64 {
+        self.energy.isochoric.0[lane] + self.energy.volumetric.0[lane]
     }
 
     /// The fields of a lane, which has a cell.
@@ -301,7 +302,7 @@ impl Found {
             green_strain: symmetric(&self.green_strain),
             pk2_stress: symmetric(&self.pk2_stress),
             cauchy_stress: symmetric(&self.cauchy_stress),
-            energy_density: self.energy_densities()[lane],
+            energy_density: self.energy_density(lane),
             fibre,
             fibre_stretch: fibre.map(|_| self.fibre_stretch.0[lane]),
             thickness: None,

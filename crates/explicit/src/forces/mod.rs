@@ -157,8 +157,6 @@ struct PackedCells<R, const N: usize> {
     count: usize,
     /// Nodes of packs of cells in their block.
     places: Places<R, N>,
-    /// Packs of a block.
-    per_block: usize,
     /// Directions of the families.
     fibre: Vec<Vector<Pack<R>>>,
     families: usize,
@@ -175,7 +173,6 @@ impl<R: Scalar, const N: usize> PackedCells<R, N> {
         let mut packed = Self {
             count: local.len(),
             places: Places::new((0..local.len().div_ceil(PACK)).map(nodes), blocks.packs()),
-            per_block: blocks.packs(),
             fibre: Vec::new(),
             families: solid.material.law.families(),
         };
@@ -194,7 +191,7 @@ impl<R: Scalar, const N: usize> PackedCells<R, N> {
     /// The packs of a block.
     #[inline(always)]
     fn packs_of(&self, block: usize) -> Range<usize> {
-        block * self.per_block..self.packs().end.min((block + 1) * self.per_block)
+        self.places.packs_of(block)
     }
 
     /// A number of each cell of a pack; zero beyond the last one.

@@ -906,8 +906,8 @@ impl KrylovVectors {
         result
     }
 
-    /// x ← the multiple of the x given that leaves the smallest residual, r ← b − A x; |b| and |r|. So motion that goes on slower, or turns
-    /// back, is a good start, too.
+    /// x ← the multiple of the x given that leaves the smallest residual, r ← b − A x; |b| and |r|. The motion before is then a good start for
+    /// a step that is slower or goes back, too.
     pub(super) fn begin(&mut self, matrix: &BlockMatrix, b: &[f64], x: &[f64]) -> [f64; 2] {
         matrix.gather(b, &mut self.r);
         matrix.gather(x, &mut self.x);
@@ -981,11 +981,10 @@ impl KrylovVectors {
             let end = self.go_on(matrix, inverse, Precision::Single, [size, goal], iterations, &mut report);
             report.residual = self.find_residual(matrix, b) / size;
             match end {
-                Ok(()) if report.residual.is_finite() => {}
                 Err(LinearError::Stalled(_)) if report.residual > tolerance => {
                     return Err(LinearError::Stalled(report));
                 }
-                Err(LinearError::Stalled(_)) if report.residual <= tolerance => {}
+                Ok(()) | Err(LinearError::Stalled(_)) if report.residual.is_finite() => {}
                 // In single precision this matrix may be indefinite where it is not: double precision decides.
                 _ => {
                     let [_, left] = self.begin(matrix, b, x);

@@ -54,7 +54,7 @@ impl Stretched {
         let force = frame.reaction("pull").ok_or_else(none)?;
         Ok(Self {
             displacement: (0..part.model.node_count()).map(|node| now.displacement(node)).collect(),
-            stress: (0..part.model.cell_count()).map(|cell| cells.at(0, cell).von_mises()).collect(),
+            stress: cells.of(0).iter().map(|fields| fields.von_mises()).collect(),
             force: force.iter().map(|f| f * f).sum::<f64>().sqrt(),
         })
     }

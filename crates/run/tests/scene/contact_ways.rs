@@ -3,6 +3,7 @@
 use pliant_testing::scenes::{last_row, run, world};
 
 use super::contact::{pressed, stacked};
+use super::guests::column;
 
 /// The force of the tool comes out on the floor, in balance, in the mean of the last 0.2 s: nodes of averaged tets tremble in contact, so that
 /// the two forces of an instant differ by up to 9 %.
@@ -10,18 +11,10 @@ fn goes_through(what: &str, text: &str) -> f64 {
     let out = tempfile::tempdir().unwrap();
     let folder = out.path().join("out");
     let balance = run(&text.replace("every = 0.5", "every = 0.005"), &folder).energy_balance.unwrap();
-    let table = std::fs::read_to_string(folder.join("history.csv")).unwrap();
-    let names: Vec<&str> = table.lines().next().unwrap().split(',').collect();
-    let column = |name: &str| names.iter().position(|own| *own == name).unwrap();
-    let columns = ["time", "contact.above.z", "contact.below.z"].map(column);
-    let rows = table.lines().skip(1).map(|row| {
-        let numbers: Vec<f64> = row.split(',').map(|number| number.parse().unwrap()).collect();
-        columns.map(|at| numbers[at])
-    });
-    let last: Vec<_> = rows.filter(|[time, ..]| *time > 0.3).collect();
-    let [up, down] = [1, 2].map(|at| last.iter().map(|row| row[at]).sum::<f64>() / last.len() as f64);
+    let columns = ["contact.above.z", "contact.below.z"].map(|name| column(&folder, name, 0.3));
+    assert!(columns[0].len() >= 40, "{}", columns[0].len());
+    let [up, down] = columns.map(|forces| forces.iter().sum::<f64>() / forces.len() as f64);
     println!("{what}: {up} N on the tool, {down} N on the floor, energies balance to {balance:.1e}");
-    assert!(last.len() >= 40, "{}", last.len());
     assert!(up > 0.01 && (up / -down - 1.0).abs() < 0.02, "{what}: {up} N and {down} N");
     assert!(balance < 0.01, "{what}: {balance}");
     up

@@ -28,7 +28,7 @@ const WEIGHT: f64 = 0.03 * 0.03 * 0.002 * 20_000.0 * 9.81;
 const BLOCK: f64 = 0.04 * 0.04 * 0.02 * 1000.0 * 9.81;
 
 /// Values of a column of `history.csv` from a time [s] on.
-fn column(out: &std::path::Path, name: &str, from: f64) -> Vec<f64> {
+pub(super) fn column(out: &std::path::Path, name: &str, from: f64) -> Vec<f64> {
     let text = std::fs::read_to_string(out.join("history.csv")).unwrap();
     let mut rows = text.lines();
     let head: Vec<&str> = rows.next().unwrap().split(',').collect();
