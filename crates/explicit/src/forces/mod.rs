@@ -21,7 +21,7 @@ mod membrane;
 mod one_pass;
 mod plain;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use averaged::AveragedTets;
 use bar::Bars;

@@ -28,7 +28,7 @@ fn vector(random: &mut Random, size: f64) -> Vector<f64> {
 const CELLS: u32 = 3;
 
 /// A cube of 3×3×3 cells of edge 0.1, interior nodes moved by up to 12 % of an edge.
-fn distorted_cube(element: &str, law: AnyLaw) -> Model {
+pub(crate) fn distorted_cube(element: &str, law: AnyLaw) -> Model {
     filled_cube(element, law, 700.0, 1000.0, |_| 1.0)
 }
 
@@ -101,7 +101,7 @@ fn filled_cube(
     model
 }
 
-fn laws() -> [AnyLaw; 2] {
+pub(crate) fn laws() -> [AnyLaw; 2] {
     let (shear, volumetric) = (700.0, Volumetric::quadratic(5000.0));
     [
         AnyLaw::NeoHookean(NeoHookean { shear, volumetric }),
