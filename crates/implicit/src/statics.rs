@@ -97,7 +97,8 @@ pub struct Step {
     pub time: f64,
     /// Norm of the residual [N] before each iteration and at the end; moments are divided by the mean edge.
     pub residuals: Vec<f64>,
-    /// Negative pivots of the last stiffness: above 0 the equilibrium is unstable. Always 0 with conjugate gradients.
+    /// Negative pivots of the last stiffness: above 0 the equilibrium is unstable. With conjugate gradients those that
+    /// factors in their preconditioner show.
     pub negative_pivots: usize,
     /// Load steps that it took: 1, or more where it was halved.
     pub parts: usize,

@@ -1064,6 +1064,7 @@ fn product(a: &Node, b: &Node) -> f64 {
 mod tests {
     use pliant_testing::Random;
 
+    use super::super::{LinearSolver, Preconditioner, Workspace, dot};
     use super::*;
 
     /// Parts of a number of nodes each, in chains.
@@ -1224,5 +1225,60 @@ mod tests {
         let mut indefinite = blocks;
         indefinite[PACK - 1] -= Block::identity() * (2.0 * blocks[PACK - 1].amax());
         assert!(!invert(&mut pack(&indefinite)));
+    }
+
+    /// A free chain of springs on soil of negative stiffness k: its diagonal blocks are positive definite. Its waves have stiffness
+    /// 4 sin²(nπ/120) − k. With k < 0.0027 only the three translations are negative. The factors of the coarse matrix report them, and
+    /// deflation finds the solution, since it takes them out. With a larger k the iterations meet another one.
+    #[test]
+    fn negative_stiffness_of_the_coarse_matrix_alone_is_reported_and_solved() {
+        const NODES: usize = 60;
+        let is_free: Vec<bool> = (0..6 * NODES).map(|component| component % 6 < 3).collect();
+        let equations = Equations::new(&is_free);
+        let pairs: Vec<[u32; 2]> = (1..NODES as u32).map(|node| [node - 1, node]).collect();
+        let places: Vec<Vector3<f64>> = (0..NODES).map(|node| Vector3::x() * node as f64).collect();
+        let mut random = Random::new(3);
+        let b: Vec<f64> = (0..3 * NODES).map(|_| random.number()).collect();
+        let solve = |soil: f64, preconditioner: Preconditioner| {
+            let mut lower = LowerMatrix::new(&equations, pairs.iter().map(<[u32; 2]>::as_slice), &[]);
+            for column in 0..3 * NODES as u32 {
+                let springs = if (3..3 * (NODES as u32 - 1)).contains(&column) { 2.0 } else { 1.0 };
+                lower.add_diagonal(column as usize, springs - soil);
+                let rows = lower.rows(column);
+                if let Some(at) = rows.iter().position(|&row| row == column + 3) {
+                    lower.value[lower.column_start[column as usize] as usize + at] = -1.0;
+                }
+            }
+            let solver =
+                LinearSolver::ConjugateGradients { tolerance: 1e-8, iterations: 500, preconditioner };
+            let mut workspace = Workspace::new(solver, None, &equations, &lower, None).unwrap();
+            workspace.place(&places);
+            let negative = workspace.prepare(&lower).unwrap().negative;
+            let (mut x, mut left) = (vec![0.0; b.len()], vec![0.0; b.len()]);
+            let report = workspace.solve(&lower, &b, &mut x);
+            lower.multiply_values(&lower.value, &x, &mut left);
+            left.iter_mut().zip(&b).for_each(|(left, b)| *left -= b);
+            (negative, report, dot(&left, &left).sqrt() / dot(&b, &b).sqrt())
+        };
+        for soil in [2e-3, 1e-4, 1e-6] {
+            let (negative, report, left) = solve(soil, Preconditioner::Aggregates);
+            assert!(
+                negative == 3 && report.is_ok() && left < 1.01e-8,
+                "{soil}: {negative}, {report:?}, {left:e}"
+            );
+        }
+        let (negative, ..) = solve(1e-2, Preconditioner::Aggregates);
+        assert!(negative > 3, "{negative}");
+        for (soil, preconditioner) in [
+            (1e-2, Preconditioner::Aggregates),
+            (1e-2, Preconditioner::BlockJacobi),
+            (1e-4, Preconditioner::BlockJacobi),
+        ] {
+            let (_, report, _) = solve(soil, preconditioner);
+            assert!(
+                matches!(report, Err(LinearError::Indefinite(_))),
+                "{soil}, {preconditioner:?}: {report:?}"
+            );
+        }
     }
 }
