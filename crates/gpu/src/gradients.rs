@@ -451,7 +451,14 @@ impl Gradients {
 
 impl DeviceSolver for Gradients {
     fn arrange(&mut self, pattern: &BlockPattern<'_>) -> Result<(), DeviceError> {
-        self.take_pattern(pattern).map_err(failed)
+        let taken = self.take_pattern(pattern);
+        // Some arrays may have found no room: none of them is used again.
+        if taken.is_err()
+            && let Ok(fresh) = Self::new(&self.device)
+        {
+            *self = Self { times: self.times, ..fresh };
+        }
+        taken.map_err(failed)
     }
 
     fn take(&mut self, values: &BlockValues<'_>) -> Result<(), DeviceError> {

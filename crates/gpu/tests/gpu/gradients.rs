@@ -297,7 +297,8 @@ fn chain(solver: &mut dyn DeviceSolver, nodes: u32) -> Vec<f32> {
     solution
 }
 
-/// A solver that had a larger and a smaller matrix before gives the bits of a fresh one; in the middle of a chain x = 1/2.
+/// A solver that had a larger and a smaller matrix before, and a pattern that found no room, gives the bits of a fresh one; in the middle of a
+/// chain x = 1/2.
 #[test]
 fn another_pattern_leaves_nothing_behind() {
     let Some(device) = support::device() else { return };
@@ -308,6 +309,17 @@ fn another_pattern_leaves_nothing_behind() {
         let fresh = chain(&mut *device.solver().unwrap(), nodes);
         assert_eq!(solution, fresh, "{nodes}");
     }
+    let huge = BlockPattern {
+        row_start: &[0],
+        column: &[],
+        source: &[],
+        free: Vec::new(),
+        aggregate_start: &[0; 20_001],
+        touching: Some(Vec::new()),
+    };
+    let error = reused.arrange(&huge).unwrap_err();
+    assert!(error.0.contains("the inverse of the aggregates"), "{error}");
+    assert_eq!(chain(&mut *reused, 40), chain(&mut *device.solver().unwrap(), 40));
 }
 
 /// Six hundred loose pieces of four nodes, each held at one of them, under their weight: their aggregates are limited, and their solution to

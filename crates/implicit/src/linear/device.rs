@@ -101,7 +101,7 @@ pub enum PassEnd {
 
 /// Equations on a device.
 pub trait DeviceSolver: Debug + Send + Sync {
-    /// Takes the pattern of the matrices to come, in place of any before.
+    /// Takes the pattern of the matrices to come, in place of any before. After an error it has none, and may be given one again.
     ///
     /// # Errors
     /// If the device fails or has no room.
@@ -144,6 +144,8 @@ pub struct DeviceTimes {
 #[derive(Debug)]
 pub(super) struct OnDevice {
     solver: Box<dyn DeviceSolver>,
+    /// Whether the solver has the pattern.
+    is_arranged: bool,
     lower: Vec<f32>,
     inverse: Vec<f32>,
     arm: Vec<[f32; 4]>,
@@ -160,30 +162,43 @@ pub(super) enum Found {
 }
 
 impl OnDevice {
-    /// The equations of a pattern, on a solver that may have had others before.
+    /// The equations of a pattern, on a solver that may have had others before. It gets the pattern with the first matrix at the latest.
     pub(super) fn new(
-        mut solver: Box<dyn DeviceSolver>,
+        solver: Box<dyn DeviceSolver>,
         matrix: &LowerMatrix,
         blocks: &BlockMatrix,
         coarse: Option<&Coarse>,
-    ) -> Result<Self, DeviceError> {
-        solver.arrange(&blocks.pattern(coarse))?;
+    ) -> Self {
         let numbers = 6 * blocks.nodes();
         let [nodes, pairs] = coarse.map_or([0; 2], |own| [own.parts().0.len(), own.parts().1.len()]);
-        Ok(Self {
+        Self {
             solver,
+            is_arranged: false,
             lower: vec![0.0; matrix.value.len()],
             inverse: vec![0.0; 6 * numbers],
             arm: vec![[0.0; 4]; nodes],
             coarse: vec![0.0; 36 * pairs],
             right: vec![0.0; numbers],
             solution: vec![0.0; numbers],
-        })
+        }
     }
 
     /// The solver, for another pattern.
     pub(super) fn into_solver(self) -> Box<dyn DeviceSolver> {
         self.solver
+    }
+
+    /// Hands over the pattern, unless the device has it.
+    pub(super) fn arrange(
+        &mut self,
+        blocks: &BlockMatrix,
+        coarse: Option<&Coarse>,
+    ) -> Result<(), DeviceError> {
+        if !self.is_arranged {
+            self.solver.arrange(&blocks.pattern(coarse))?;
+            self.is_arranged = true;
+        }
+        Ok(())
     }
 
     /// Hands over a matrix.
@@ -194,6 +209,7 @@ impl OnDevice {
         coarse: Option<&Coarse>,
     ) -> Result<(), DeviceError> {
         const SHARE: usize = 1 << 14;
+        self.arrange(blocks, coarse)?;
         let round = |to: &mut [f32], from: &[f64]| {
             let parts = to.par_chunks_mut(SHARE).zip(from.par_chunks(SHARE));
             parts.for_each(|(to, from)| to.iter_mut().zip(from).for_each(|(to, from)| *to = *from as f32));
@@ -289,8 +305,10 @@ impl OnDevice {
 mod tests {
     use std::sync::Arc;
 
+    use super::super::Workspace;
     use super::*;
     use crate::element::Elasticity;
+    use crate::sparse::Equations;
     use crate::{
         Assembly, BackwardEuler, DynamicSettings, LinearSolver, Phases, Preconditioner, Shell, SolveError,
         State, Wall,
@@ -399,5 +417,82 @@ mod tests {
             Err(SolveError::Device(error)) => assert_eq!(error.0, "it is unplugged; plug it in"),
             other => panic!("{:?}", other.map(|_| ())),
         }
+    }
+
+    /// A device whose solver finds no room for its second pattern the first time, and leaves each solution to the CPU. Each pattern takes it
+    /// a second.
+    #[derive(Debug, Default)]
+    struct Narrow {
+        calls: u32,
+        /// Nodes of the pattern that it has.
+        nodes: Option<usize>,
+    }
+
+    impl LinearDevice for Narrow {
+        fn aggregates(&self) -> usize {
+            4
+        }
+
+        fn solver(&self) -> Result<Box<dyn DeviceSolver>, DeviceError> {
+            Ok(Box::new(Self::default()))
+        }
+    }
+
+    impl DeviceSolver for Narrow {
+        fn arrange(&mut self, pattern: &BlockPattern<'_>) -> Result<(), DeviceError> {
+            self.calls += 1;
+            self.nodes = (self.calls != 2).then(|| pattern.nodes());
+            self.nodes.map(|_| ()).ok_or(DeviceError("its memory is full; use a coarser mesh".into()))
+        }
+
+        fn take(&mut self, values: &BlockValues<'_>) -> Result<(), DeviceError> {
+            assert_eq!(self.nodes, Some(values.inverse.len() / 36));
+            Ok(())
+        }
+
+        fn solve(
+            &mut self,
+            right: &[f32],
+            solution: &mut [f32],
+            _goal: f32,
+            _iterations: usize,
+        ) -> Result<Pass, DeviceError> {
+            assert_eq!(self.nodes, Some(right.len() / 6));
+            solution.fill(0.0);
+            Ok(Pass { iterations: 1, end: PassEnd::Indefinite })
+        }
+
+        fn times(&self) -> DeviceTimes {
+            DeviceTimes { upload: Duration::from_secs(self.calls.into()), ..DeviceTimes::default() }
+        }
+    }
+
+    /// Springs to the ground at some nodes, on the device of the workspace before.
+    fn grounded(nodes: usize, before: Option<&mut Workspace>) -> (Workspace, LowerMatrix) {
+        let equations = Equations::new(&vec![true; 6 * nodes]);
+        let all: Vec<[u32; 1]> = (0..nodes as u32).map(|node| [node]).collect();
+        let mut matrix = LowerMatrix::new(&equations, all.iter().map(<[u32; 1]>::as_slice), &[]);
+        (0..6 * nodes).for_each(|at| matrix.add_diagonal(at, 2.0));
+        let preconditioner = Preconditioner::BlockJacobi;
+        let solver = LinearSolver::ConjugateGradients { tolerance: 1e-10, iterations: 100, preconditioner };
+        let device: Arc<dyn LinearDevice> = Arc::new(Narrow::default());
+        (Workspace::new(solver, Some(&device), &equations, &matrix, before).unwrap(), matrix)
+    }
+
+    #[test]
+    fn a_device_without_room_for_a_pattern_is_not_used_until_it_has_taken_it() {
+        let (mut small, matrix) = grounded(3, None);
+        assert!(small.prepare(&matrix).is_ok());
+        let (mut large, matrix) = grounded(5, Some(&mut small));
+        let full = DeviceError("its memory is full; use a coarser mesh".into());
+        assert_eq!(large.prepare(&matrix).unwrap_err(), LinearError::Device(full));
+        assert!(large.prepare(&matrix).is_ok());
+        let mut solution = [0.0; 30];
+        large.solve(&matrix, &[1.0; 30], &mut solution).unwrap();
+        assert!(solution.iter().all(|x| (x - 0.5).abs() < 1e-9), "{solution:?}");
+        assert_eq!(
+            large.of_device(),
+            (DeviceTimes { upload: Duration::from_secs(3), ..DeviceTimes::default() }, 1)
+        );
     }
 }

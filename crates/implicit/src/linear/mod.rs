@@ -119,8 +119,13 @@ impl Workspace {
             (Some(device), Some(blocks)) if !empty => {
                 let kept = before.as_mut().and_then(|before| before.on_device.take());
                 let solver = kept.map_or_else(|| device.solver(), |kept| Ok(kept.into_solver()));
-                let made = solver.and_then(|solver| OnDevice::new(solver, matrix, blocks, coarse.as_ref()));
-                Some(made.map_err(LinearError::Device)?)
+                let solver = solver.map_err(LinearError::Device)?;
+                let mut own = OnDevice::new(solver, matrix, blocks, coarse.as_ref());
+                // What is too large from the start is refused before a run begins.
+                if before.is_none() {
+                    own.arrange(blocks, coarse.as_ref()).map_err(LinearError::Device)?;
+                }
+                Some(own)
             }
             _ => None,
         };
