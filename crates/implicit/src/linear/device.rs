@@ -201,7 +201,7 @@ impl OnDevice {
         Ok(())
     }
 
-    /// Hands over a matrix.
+    /// Hands over a matrix, unless it is empty.
     pub(super) fn take(
         &mut self,
         matrix: &LowerMatrix,
@@ -209,6 +209,9 @@ impl OnDevice {
         coarse: Option<&Coarse>,
     ) -> Result<(), DeviceError> {
         const SHARE: usize = 1 << 14;
+        if self.lower.is_empty() {
+            return Ok(());
+        }
         self.arrange(blocks, coarse)?;
         let round = |to: &mut [f32], from: &[f64]| {
             let parts = to.par_chunks_mut(SHARE).zip(from.par_chunks(SHARE));
@@ -494,5 +497,16 @@ mod tests {
             large.of_device(),
             (DeviceTimes { upload: Duration::from_secs(3), ..DeviceTimes::default() }, 1)
         );
+    }
+
+    #[test]
+    fn a_pattern_without_equations_keeps_the_times_of_a_device() {
+        let (mut some, matrix) = grounded(3, None);
+        assert!(some.prepare(&matrix).is_ok());
+        let times = some.of_device();
+        assert_eq!(times.0.upload, Duration::from_secs(1));
+        let (mut none, matrix) = grounded(0, Some(&mut some));
+        assert!(none.prepare(&matrix).is_ok() && none.solve(&matrix, &[], &mut []).is_ok());
+        assert_eq!(none.of_device(), times);
     }
 }

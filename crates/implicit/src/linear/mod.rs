@@ -116,13 +116,13 @@ impl Workspace {
         let coarse = blocks.as_ref().filter(|_| preconditioner == Some(Preconditioner::Aggregates));
         let coarse = coarse.map(Coarse::new).map(|coarse| coarse.ok_or(LinearError::TooLarge)).transpose()?;
         let on_device = match (device, &blocks) {
-            (Some(device), Some(blocks)) if !empty => {
+            (Some(device), Some(blocks)) => {
                 let kept = before.as_mut().and_then(|before| before.on_device.take());
                 let solver = kept.map_or_else(|| device.solver(), |kept| Ok(kept.into_solver()));
                 let solver = solver.map_err(LinearError::Device)?;
                 let mut own = OnDevice::new(solver, matrix, blocks, coarse.as_ref());
                 // What is too large from the start is refused before a run begins.
-                if before.is_none() {
+                if before.is_none() && !empty {
                     own.arrange(blocks, coarse.as_ref()).map_err(LinearError::Device)?;
                 }
                 Some(own)
