@@ -1,4 +1,7 @@
-//! Bytes and floating-point operations of a step, counted by hand from the formulas.
+//! Bytes and floating-point operations of a step on the CPU, counted by hand from the formulas.
+//!
+//! Left out: GPUs. Each design has arrays and passes of its own for every element, `blocks` finds cells at the borders of blocks several
+//! times, and `fast` finds shapes at rest again. These counts say nothing about them.
 //!
 //! **Operations**: every +, −, × and ÷ on real numbers in the formulas of `law/`, `forces/` and the node pass of
 //! `stepper.rs`; a multiply-add is two. Not counted: index arithmetic, comparisons, and repeated subexpressions. With
@@ -155,7 +158,7 @@ const fn of_law(law: LawKind) -> OfLaw {
 }
 
 impl Count {
-    /// Of a case.
+    /// Of a case on the CPU.
     pub fn of(case: &Case) -> Self {
         let (element, law) = (of_element(case.element), of_law(case.law));
         let nodes_per_cell = case.nodes() as f64 / case.cells() as f64;
@@ -203,7 +206,7 @@ mod tests {
 
     #[test]
     fn every_case_is_counted_and_richer_ones_count_more() {
-        for case in cases() {
+        for case in cases().into_iter().filter(|case| !case.is_on_device()) {
             let count = Count::of(&case);
             assert!(count.bytes > 50.0 && count.flops > 300.0, "{}", case.id());
             let richer = Count::of(&Case { law: LawKind::FibresProny, ..case });

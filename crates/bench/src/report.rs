@@ -52,14 +52,14 @@ pub struct Row {
     pub ns_most: f64,
     /// Elements stepped in a second.
     pub elements_per_second: f64,
-    /// Bytes to and from memory per element and step, as counted.
-    pub bytes_per_element: f64,
-    /// Operations per element and step, as counted.
-    pub flops_per_element: f64,
-    /// Bytes per second over the copy rate of these threads.
-    pub bandwidth_fraction: f64,
-    /// Operations per second over the multiply-add rate of these threads.
-    pub flop_fraction: f64,
+    /// Bytes to and from memory per element and step, as counted; `null` on a GPU.
+    pub bytes_per_element: Option<f64>,
+    /// Operations per element and step, as counted; `null` on a GPU.
+    pub flops_per_element: Option<f64>,
+    /// Bytes per second over the copy rate of these threads; `null` on a GPU.
+    pub bandwidth_fraction: Option<f64>,
+    /// Operations per second over the multiply-add rate of these threads; `null` on a GPU.
+    pub flop_fraction: Option<f64>,
     /// The step [s] that a run would take: 0.9 × the limit at rest.
     pub critical_step: f64,
     /// The limit: that of the assembled model, or for large meshes the element bound.
@@ -73,17 +73,15 @@ pub struct Row {
     pub case: Case,
 }
 
-/// The place of a case and its peak rates.
+/// The place of a case.
 #[derive(Clone, Debug)]
 pub(crate) struct Measured {
     pub adapter: String,
     pub threads: Option<usize>,
     pub design: String,
     pub lanes: Option<Instructions>,
-    /// Bytes read and written in copying [1/s].
-    pub copy: f64,
-    /// Operations in multiply-adds [1/s].
-    pub multiply_add: f64,
+    /// Bytes read and written in copying [1/s] and operations in multiply-adds [1/s], if those of a step are counted.
+    pub peaks: Option<[f64; 2]>,
 }
 
 impl Row {
@@ -94,7 +92,8 @@ impl Row {
         seconds: Spread,
         (step, critical_step_from): (f64, Limit),
     ) -> Self {
-        let (cells, count) = (case.cells() as f64, Count::of(&case));
+        let cells = case.cells() as f64;
+        let count = place.peaks.map(|peaks| (Count::of(&case), peaks));
         let ns = |seconds: f64| 1e9 * seconds / cells;
         let elements_per_second = cells / seconds.median;
         Self {
@@ -112,10 +111,11 @@ impl Row {
             ns_least: ns(seconds.least),
             ns_most: ns(seconds.most),
             elements_per_second,
-            bytes_per_element: count.bytes,
-            flops_per_element: count.flops,
-            bandwidth_fraction: elements_per_second * count.bytes / place.copy,
-            flop_fraction: elements_per_second * count.flops / place.multiply_add,
+            bytes_per_element: count.map(|(count, _)| count.bytes),
+            flops_per_element: count.map(|(count, _)| count.flops),
+            bandwidth_fraction: count.map(|(count, [copy, _])| elements_per_second * count.bytes / copy),
+            flop_fraction: count
+                .map(|(count, [_, multiply_add])| elements_per_second * count.flops / multiply_add),
             critical_step: step,
             critical_step_from,
             real_time_factor: step / seconds.median,
@@ -303,8 +303,8 @@ impl Report {
                 self.settings.repeats, self.settings.seconds, self.settings.lanes
             ),
             self.rates_table(),
-            "Bytes and operations are counted per element and step; \"copy\" and \"mul-add\" are their shares of the rates \
-             above. Δt is 0.9 × the critical time step of the assembled model (* of the element bound)."
+            "Bytes and operations on the CPU are counted per element and step; \"copy\" and \"mul-add\" are their shares of the \
+             rates above. Δt is 0.9 × the critical time step of the assembled model (* of the element bound)."
                 .to_owned(),
             rows_table(&self.rows),
         ];
@@ -391,6 +391,7 @@ impl Report {
 }
 
 fn rows_table(rows: &[Row]) -> String {
+    let told = |number: Option<f64>, words: fn(f64) -> String| number.map_or_else(|| "–".to_owned(), words);
     let rows = rows.iter().map(|row| {
         let star = if row.critical_step_from == Limit::True { "" } else { "*" };
         [
@@ -403,10 +404,10 @@ fn rows_table(rows: &[Row]) -> String {
             format!("{:.2}", row.ns_per_element_step),
             format!("{:.2}–{:.2}", row.ns_least, row.ns_most),
             format!("{:.2}", 1e-6 * row.elements_per_second),
-            format!("{:.0}", row.bytes_per_element),
-            format!("{:.0}", row.flops_per_element),
-            format!("{:.1} %", 100.0 * row.bandwidth_fraction),
-            format!("{:.1} %", 100.0 * row.flop_fraction),
+            told(row.bytes_per_element, |bytes| format!("{bytes:.0}")),
+            told(row.flops_per_element, |flops| format!("{flops:.0}")),
+            told(row.bandwidth_fraction, |part| format!("{:.1} %", 100.0 * part)),
+            told(row.flop_fraction, |part| format!("{:.1} %", 100.0 * part)),
             format!("{:.4}{star}", 1e3 * row.critical_step),
             format!("{:.3}", row.real_time_factor),
             format!("{:.3}", row.seconds_per_second),
@@ -441,8 +442,9 @@ fn markdown<const N: usize>(header: [&str; N], rows: Vec<[String; N]>) -> String
             rows.iter().map(|row| wide(&row[column])).chain([wide(title), 3]).max().unwrap_or(3)
         })
         .collect();
-    let is_number =
-        |column: usize| rows.iter().all(|row| row[column].starts_with(|c: char| c.is_ascii_digit()));
+    let is_number = |column: usize| {
+        rows.iter().all(|row| row[column].starts_with(|c: char| c.is_ascii_digit() || c == '–'))
+    };
     let line = |cells: &mut dyn Iterator<Item = &str>| {
         let padded = cells.zip(&widths).enumerate().map(|(column, (text, width))| {
             let space = " ".repeat(width - wide(text));
@@ -467,16 +469,35 @@ fn today() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::find;
 
     #[test]
     fn tables_are_aligned_with_numbers_to_the_right() {
-        let rows = vec![["tet4".into(), "7.60".into()], ["hex8-full".into(), "104.00".into()]];
+        let rows = [["tet4", "7.60"], ["hex8-full", "104.00"], ["tet4-anp", "–"]];
         let lines = [
             "| element   |     ns |",
             "|:----------|-------:|",
             "| tet4      |   7.60 |",
             "| hex8-full | 104.00 |",
+            "| tet4-anp  |      – |",
         ];
+        let rows = rows.map(|row| row.map(String::from)).to_vec();
         assert_eq!(markdown(["element", "ns"], rows), lines.join("\n"));
+    }
+
+    #[test]
+    fn bytes_and_operations_are_told_of_the_cpu_alone() {
+        let row = |id: &str, peaks| {
+            let (adapter, design) = (String::new(), String::new());
+            let place = Measured { adapter, threads: None, design, lanes: None, peaks };
+            let spread = Spread { median: 1e-3, least: 1e-3, most: 1e-3 };
+            Row::new(find(id).unwrap(), place, spread, (1e-3, Limit::True))
+        };
+        let rows = [row("hex8-nh-27000", Some([1e10, 1e11])), row("hex8-nh-27000-fast", None)];
+        let json = json!(rows);
+        let counted = ["bytes_per_element", "flops_per_element", "bandwidth_fraction", "flop_fraction"];
+        assert!(counted.iter().all(|key| json[0][key].is_f64() && json[1][key].is_null()), "{json}");
+        let dashes = |line: &str| line.matches(" – ").count();
+        assert_eq!(rows_table(&rows).lines().map(dashes).collect::<Vec<_>>(), [0, 0, 0, 4]);
     }
 }

@@ -179,14 +179,13 @@ impl Bench {
                     Precision::Single => on_processor::<f32>(case, &model, step, settings),
                     Precision::Double => on_processor::<f64>(case, &model, step, settings),
                 })?;
-                let multiply_add = rates.multiply_add(case.precision);
+                let peaks = Some([rates.copy, rates.multiply_add(case.precision)]);
                 let threads = Some(rates.threads);
-                let design = "cpu".to_owned();
-                let (lanes, copy) = (Some(settings.lanes), rates.copy);
-                (seconds, Measured { adapter: processor, threads, design, lanes, copy, multiply_add })
+                let (design, lanes) = ("cpu".to_owned(), Some(settings.lanes));
+                (seconds, Measured { adapter: processor, threads, design, lanes, peaks })
             }
             Place::Device(design) => {
-                let (device, rates) = self.device()?;
+                let (device, _) = self.device()?;
                 let start = start::<f32>(&model);
                 let mut clocked = ClockedOnDevice::new(device, model, step, design, start)?;
                 let seconds = repeats(&mut clocked, settings).map_err(|failure| match failure {
@@ -194,8 +193,7 @@ impl Bench {
                     StepFailure::Device(error) => error.into(),
                 })?;
                 let (adapter, design) = (device.adapter().name.clone(), design.to_string());
-                let DeviceRates { copy, multiply_add, .. } = *rates;
-                (seconds, Measured { adapter, threads: None, design, lanes: None, copy, multiply_add })
+                (seconds, Measured { adapter, threads: None, design, lanes: None, peaks: None })
             }
         };
         Ok(Row::new(*case, place, Spread::of(seconds), (PART_OF_LIMIT * limit, from)))
@@ -284,8 +282,7 @@ mod tests {
             threads,
             design: "cpu".into(),
             lanes: Some(Instructions::Plain),
-            copy: 1e10,
-            multiply_add: 1e11,
+            peaks: Some([1e10, 1e11]),
         };
         let seconds = 1e-9 * ns * case.cells() as f64;
         let spread = Spread { median: seconds, least: seconds, most: seconds };
