@@ -33,7 +33,7 @@ use std::path::Path;
 use crate::Mesh;
 pub use base64::encode as encode_base64;
 pub use error::{MeshFileError, MeshFileProblem, Place};
-pub use pvd::read_pvd;
+pub use pvd::{read_pvd, read_torn_pvd};
 pub use regular::{open_regular, read_limited};
 use surface_out::SurfaceOut;
 pub use vtu_write::{PVD_TAIL, VtuOptions, VtuSeries, pvd_entry, pvd_text, save_vtu, write_vtu};

@@ -5,14 +5,31 @@ use std::path::{Path, PathBuf};
 
 use roxmltree::Node;
 
-use super::{MeshFileError, MeshFileProblem, Place, parse_xml};
+use super::{MeshFileError, MeshFileProblem, PVD_TAIL, Place, parse_xml};
 
 /// Reads the list of the files of a series: time [s] and file of each frame. Files are relative to the folder of the
 /// list.
+///
+/// # Errors
+/// If it cannot be read, or where it is malformed.
 pub fn read_pvd(path: &Path) -> Result<Vec<(f64, PathBuf)>, MeshFileError> {
-    let text =
-        fs::read_to_string(path).map_err(|source| MeshFileError::Open { path: path.to_owned(), source })?;
-    parse(path, &text)
+    parse(path, &text(path)?)
+}
+
+/// The same of a list whose writer may have been stopped: where its end is torn, the frames of its whole entries.
+///
+/// # Errors
+/// As [`read_pvd`], if more than its end is torn.
+pub fn read_torn_pvd(path: &Path) -> Result<Vec<(f64, PathBuf)>, MeshFileError> {
+    let text = text(path)?;
+    parse(path, &text).or_else(|error| {
+        let end = text.rfind("/>").ok_or(error)? + 2;
+        parse(path, &format!("{}\n{PVD_TAIL}", &text[..end]))
+    })
+}
+
+fn text(path: &Path) -> Result<String, MeshFileError> {
+    fs::read_to_string(path).map_err(|source| MeshFileError::Open { path: path.to_owned(), source })
 }
 
 fn parse(path: &Path, text: &str) -> Result<Vec<(f64, PathBuf)>, MeshFileError> {

@@ -5,7 +5,9 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use pliant_geometry::io::{MeshFileError, PVD_TAIL, VtuOptions, VtuSeries, pvd_entry, pvd_text, read_pvd};
+use pliant_geometry::io::{
+    MeshFileError, PVD_TAIL, VtuOptions, VtuSeries, pvd_entry, pvd_text, read_pvd, read_torn_pvd,
+};
 
 use super::field_mesh::FieldMesh;
 use super::file::{check_own_folder, is_at, reopen, replace};
@@ -171,17 +173,17 @@ fn frame_name(index: usize) -> String {
     format!("{index:06}.vtu")
 }
 
-/// The times that a list of frames names.
+/// The times that a list of frames names; where a run was stopped as it wrote there, those of whole entries.
 fn listed(index: &Path) -> Result<Vec<f64>, String> {
-    let frames = read_pvd(index).map_err(|error| error.to_string())?;
+    let frames = read_torn_pvd(index).map_err(|error| error.to_string())?;
     Ok(frames.into_iter().map(|(time, _)| time).collect())
 }
 
-/// The time [s] of the last frame of a series, if it is there.
+/// The time [s] of the last frame of a series, if it is there and the list is whole.
 pub(super) fn last_time(folder: &Path, name: &str) -> Option<f64> {
-    let times = listed(&folder.join(format!("{name}.pvd"))).ok()?;
-    let there = folder.join(name).join(frame_name(times.len().checked_sub(1)?)).is_file();
-    times.last().copied().filter(|_| there)
+    let frames = read_pvd(&folder.join(format!("{name}.pvd"))).ok()?;
+    let there = folder.join(name).join(frame_name(frames.len().checked_sub(1)?)).is_file();
+    frames.last().map(|(time, _)| *time).filter(|_| there)
 }
 
 /// Whether a series begins with frames of these times; the reason if not.

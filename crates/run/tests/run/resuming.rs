@@ -297,6 +297,64 @@ fn a_failing_resumed_run_loses_nothing() {
     assert_eq!(before.len(), after.len());
 }
 
+/// The list of a series that ends within an entry, or that has lost its end to an entry that was not finished, is whole after the next frame.
+/// One that ends before the frames of the checkpoint, or is broken elsewhere, is refused.
+#[test]
+fn a_list_of_frames_that_is_torn_is_made_whole() {
+    let workshop = Workshop::new(&resumable("hex8", "", true));
+    workshop.run_into("out/whole", &[]).done();
+    let list = workshop.read("out/whole/fields.pvd");
+    let entries: Vec<usize> = list.match_indices("    <DataSet").map(|(at, _)| at).collect();
+    let (last, tail) = (entries[8], list.find("  </Collection>").unwrap());
+    // Six frames belong to the last checkpoint but one, and three are beyond.
+    let stopped_run = |folder: &str, list: &str| {
+        workshop.run_into(folder, &[]).done();
+        workshop.write(&format!("{folder}/fields.pvd"), list);
+        workshop.checkpoints(folder)[0].to_str().unwrap().to_owned()
+    };
+    let times = |name: &str| -> Vec<f64> { workshop.series(name).iter().map(|frame| frame.0).collect() };
+    let wanted = times("out/whole/fields.pvd");
+    let half_written = format!("{}{}", &list[..last + 10], &list[tail + 10..]);
+    let torn = [
+        (9, &list[..tail]),
+        (9, &list[..tail + 5]),
+        (8, &list[..last + 40]),
+        (8, &half_written),
+        (7, &list[..entries[6] + 40]),
+    ];
+    for (number, (frames, torn)) in torn.into_iter().enumerate() {
+        let folder = format!("out/{number}");
+        let checkpoint = stopped_run(&folder, torn);
+        // The second frame cannot be written: the first one has made the list whole, and kept what is beyond.
+        let blocked = workshop.path(&format!("{folder}/fields/000007.vtu.tmp"));
+        fs::create_dir(&blocked).unwrap();
+        assert_eq!(workshop.resume(&checkpoint, &[]).status(), "failed");
+        fs::remove_dir(&blocked).unwrap();
+        assert_eq!(times(&format!("{folder}/fields.pvd")), wanted[..frames], "{torn}");
+        workshop.resume(&checkpoint, &[]).done();
+        workshop.assert_same_files("out/whole", &folder, torn);
+    }
+    let checkpoint = stopped_run("out/refused", &list[..entries[5] + 40]);
+    let told = workshop.resume(&checkpoint, &[]);
+    refused(&told, &["it does not list the frames of the interrupted run"]);
+    workshop.write("out/refused/fields.pvd", list.replacen("timestep=\"0.0", "timestep=0.0", 1));
+    refused(&workshop.resume(&checkpoint, &[]), &["not XML"]);
+}
+
+/// A run that has written everything but the end of the list gets it, too.
+#[test]
+fn a_list_that_is_torn_at_the_end_of_a_run_is_made_whole() {
+    let scene = changed(&resumable("hex8", "", true), "every = 0.013", "every = 0.02");
+    let workshop = Workshop::new(&scene);
+    workshop.run_into("out/whole", &[]).done();
+    workshop.run_into("out/parts", &[]).done();
+    let list = workshop.read("out/parts/fields.pvd");
+    workshop.write("out/parts/fields.pvd", &list[..list.len() - 12]);
+    workshop.resume("out/parts", &[]).done();
+    workshop.assert_same_files("out/whole", "out/parts", "torn at the end");
+    refused(&workshop.resume("out/parts", &[]), &["the run has finished"]);
+}
+
 /// Asserts that a run was rejected in these words.
 #[track_caller]
 fn refused(told: &Told, pieces: &[&str]) {
