@@ -1,53 +1,64 @@
-//! The forces of loads and gravity on the nodes of a model at one instant.
+//! The forces of loads and gravity on the nodes of a model at one instant. Weights stay as they are until an acceleration changes.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::load::LoadKind;
 use pliant_mechanics::mapping::Displaced;
 use pliant_mechanics::model::Model;
-use pliant_mechanics::tensor::{Vector, add};
+use pliant_mechanics::tensor::{Vector, add, scale};
+use rayon::prelude::*;
 
 use crate::Scalar;
 
 /// Nodes whose forces are passed over together where nothing acts on them.
 pub(crate) const BLOCK: usize = 128;
 
+/// Nodes that a thread weighs at least.
+const WEIGHED: usize = 4096;
+
 /// Forces applied to the nodes, found anew for each instant.
-pub(crate) struct AppliedForces {
+pub(crate) struct AppliedForces<R> {
     model: Arc<Model>,
     /// Forces of loads [N], one per node.
     nodal: Vec<Vector<f64>>,
     /// Acceleration [m/s²] by gravity, one per body.
     gravity: Vec<Vector<f64>>,
+    /// Weights [N], one per node; empty without gravity.
+    weight: Vec<Vector<R>>,
     body_of: Vec<u16>,
     grips: Vec<Grip>,
     /// Forces [N] from outside that stay, one a node; empty for none.
     given: Vec<Vector<f64>>,
-    /// Whether loads, grips or given forces act, on any node.
+    /// Whether loads other than gravity, grips or given forces act, on any node.
     loaded: bool,
     /// The blocks of nodes that forces were added to at this instant, and a mark of each block.
     added: Vec<u32>,
     pushed: Vec<bool>,
 }
 
-impl AppliedForces {
+impl<R: Scalar> AppliedForces<R> {
     pub(crate) fn new(model: Arc<Model>) -> Self {
+        let weighs = model.loads.iter().any(|load| matches!(load.kind, LoadKind::Gravity { .. }));
         let mut body_of = vec![0; model.node_count()];
         for (index, body) in model.bodies.iter().enumerate() {
             body_of[body.nodes.start as usize..body.nodes.end as usize].fill(index as u16);
         }
-        Self {
+        let mut own = Self {
             nodal: vec![[0.0; 3]; model.node_count()],
             gravity: vec![[0.0; 3]; model.bodies.len()],
-            loaded: !model.loads.is_empty(),
+            weight: vec![[R::ZERO; 3]; if weighs { model.node_count() } else { 0 }],
+            loaded: false,
             added: Vec::new(),
             pushed: vec![false; model.node_count().div_ceil(BLOCK)],
             model,
             body_of,
             grips: Vec::new(),
             given: Vec::new(),
-        }
+        };
+        own.see_whether_loaded();
+        own
     }
 
     /// Takes other grips.
@@ -66,13 +77,23 @@ impl AppliedForces {
 
     fn see_whether_loaded(&mut self) {
         self.nodal.fill([0.0; 3]);
-        self.loaded = !(self.grips.is_empty() && self.given.is_empty() && self.model.loads.is_empty());
+        let mut loads = self.model.loads.iter();
+        let falls_only = loads.all(|load| matches!(load.kind, LoadKind::Gravity { .. }));
+        self.loaded = !(self.grips.is_empty() && self.given.is_empty() && falls_only);
     }
 
-    /// Whether any force acts on the block of a node.
+    /// Writes the forces [N] on a block of nodes, if any act.
     #[inline(always)]
-    pub(crate) fn acts_at(&self, node: usize) -> bool {
-        self.loaded || self.pushed[node / BLOCK]
+    pub(crate) fn act_at(&self, nodes: Range<usize>, to: &mut [Vector<R>]) -> bool {
+        if self.loaded || self.pushed[nodes.start / BLOCK] {
+            to.iter_mut().zip(nodes).for_each(|(to, node)| *to = self.at(node));
+            return true;
+        }
+        match self.weight.get(nodes) {
+            Some(weights) => to[..weights.len()].copy_from_slice(weights),
+            None => return false,
+        }
+        true
     }
 
     /// Adds a force [N] on a node to those of the instant.
@@ -85,24 +106,20 @@ impl AppliedForces {
     }
 
     /// Finds the forces at a time [s] and in a deformed place.
-    pub(crate) fn update<R: Scalar>(&mut self, time: f64, displacement: &[Vector<R>]) {
+    pub(crate) fn update(&mut self, time: f64, displacement: &[Vector<R>]) {
         for block in self.added.drain(..).map(|block| block as usize) {
             self.pushed[block] = false;
             let end = self.nodal.len().min((block + 1) * BLOCK);
             self.nodal[block * BLOCK..end].fill([0.0; 3]);
         }
+        self.weigh(time);
         if !self.loaded {
             return;
         }
         self.nodal.fill([0.0; 3]);
-        self.gravity.fill([0.0; 3]);
         let model = &self.model;
         let state = Displaced { rest: &model.rest, displacement, velocity: &[] };
         for load in &model.loads {
-            if let LoadKind::Gravity { body, acceleration } = load.kind {
-                let factor = load.curve.value(time);
-                self.gravity[body] = add(self.gravity[body], acceleration.map(|a| a * factor));
-            }
             let points = load.surface.map(|index| &model.surfaces[index].mapping);
             load.add_forces(time, points, &state, &mut self.nodal);
         }
@@ -115,12 +132,34 @@ impl AppliedForces {
         model.give_back(&mut self.nodal);
     }
 
+    /// Finds the weights at a time [s], where they differ.
+    fn weigh(&mut self, time: f64) {
+        let mut differs = false;
+        for (number, gravity) in self.gravity.iter_mut().enumerate() {
+            let mut now = [0.0; 3];
+            for load in &self.model.loads {
+                if let LoadKind::Gravity { body, acceleration } = load.kind
+                    && body == number
+                {
+                    now = add(now, scale(acceleration, load.curve.value(time)));
+                }
+            }
+            differs |= now != std::mem::replace(gravity, now);
+        }
+        if differs {
+            let nodes = self.weight.par_iter_mut().zip(&self.model.mass).zip(&self.body_of);
+            nodes.with_min_len(WEIGHED).for_each(|((weight, &mass), &body)| {
+                *weight = scale(self.gravity[usize::from(body)], mass).map(R::of);
+            });
+        }
+    }
+
     /// The force [N] on a node.
     #[inline(always)]
-    pub(crate) fn at<R: Scalar>(&self, node: usize) -> Vector<R> {
+    pub(crate) fn at<N: Scalar>(&self, node: usize) -> Vector<N> {
         let gravity = self.gravity[self.body_of[node] as usize];
         let mass = self.model.mass[node];
-        let force = |c: usize| R::of(self.nodal[node][c] + mass * gravity[c]);
+        let force = |c: usize| N::of(self.nodal[node][c] + mass * gravity[c]);
         [force(0), force(1), force(2)]
     }
 }

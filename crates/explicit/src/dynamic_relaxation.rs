@@ -309,7 +309,7 @@ pub struct DynamicRelaxation<R> {
     mass: Vec<R>,
     /// Factor on them.
     slowness: f64,
-    applied: AppliedForces,
+    applied: AppliedForces<R>,
     collectives: Vec<Collective>,
     /// Forces [N] of the constraints that bind nodes to each other, on every node; empty without any.
     bound: Vec<Vector<R>>,

@@ -55,8 +55,8 @@ pub const KEEP: f64 = 0.97;
 pub const REFERENCE_EVERY: u64 = 1000;
 /// One in this many cells is checked closely, for each of the two orders …
 const SHARE: usize = 256;
-/// … and at least this many.
-const LEAST: usize = 16;
+/// … and so many or a multiple: those of both orders fill a pack.
+const LEAST: usize = PACK / 2;
 
 /// What a run does when the limit falls below its step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
@@ -114,7 +114,7 @@ struct Watch {
     weight: Vec<f64>,
     /// The cells with their ranks in two orders; once they are picked, those that stand first come first.
     order: [Vec<Ranked>; 2],
-    /// The cells that are checked closely, their limits [s] and references.
+    /// The cells that are checked closely, those of the first order before those of the second, their limits [s] and references.
     picked: Vec<u32>,
     found: Vec<(f64, Stiffness)>,
 }
@@ -169,8 +169,8 @@ impl Monitor {
             .filter_map(|(index, (watch, solid))| {
                 watch.rank(solid, displacement);
                 watch.pick();
-                let found = [0, 1].map(|by| watch.smallest(model, solid, displacement, reference, by));
-                smaller(found[0], found[1]).map(|(limit, cell)| (limit, index, cell))
+                let found = watch.smallest(model, solid, displacement, reference);
+                found.map(|(limit, cell)| (limit, index, cell))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))
     }
@@ -227,8 +227,8 @@ impl Watch {
             weight: (0..count).map(weight).collect(),
             square: square.chunks(PACK).map(packed).collect(),
             order: [vec![Ranked::default(); count], vec![Ranked::default(); count]],
-            picked: Vec::with_capacity(picked(count)),
-            found: vec![(0.0, Stiffness::default()); picked(count)],
+            picked: vec![0; 2 * picked(count)],
+            found: vec![(0.0, Stiffness::default()); 2 * picked(count)],
         }
     }
 
@@ -251,60 +251,56 @@ impl Watch {
         };
         let processor = Processor::detect();
         let [speeds, stretches] = &mut self.order;
-        let packs = speeds.par_chunks_mut(PACK).zip(stretches.par_chunks_mut(PACK)).zip(&self.square);
-        packs.enumerate().with_min_len(16).for_each(|(pack, ((speeds, stretches), square))| {
-            let mut gradient = Tensor([[Pack::ZERO; 3]; 3]);
-            let (mut speed, mut stretch, mut along) = (Pack::ZERO, Pack::ZERO, [None; PACK]);
-            for (lane, cell) in (pack * PACK..).take(speeds.len()).enumerate() {
-                let h = displacement_gradient(solid, cell, displacement);
-                along[lane] = largest_fibre_stretch(solid, cell, &h);
-                for (to, entry) in gradient.0.as_flattened_mut().iter_mut().zip(h.0.as_flattened()) {
-                    to.0[lane] = *entry;
-                }
-            }
-            let (speed_found, stretch_found) = (&mut speed, &mut stretch);
-            processor.run(Ranks { gradient: &gradient, square, bulk, rest, speed_found, stretch_found });
-            for (lane, cell) in (pack * PACK..).take(speeds.len()).enumerate() {
-                let number = cell as u32;
-                speeds[lane] = Ranked { rank: speed.0[lane] * self.weight[cell], cell: number };
-                stretches[lane] = Ranked { rank: along[lane].unwrap_or(stretch.0[lane]), cell: number };
-            }
+        let packs = speeds.par_chunks_mut(PACK).zip(stretches.par_chunks_mut(PACK));
+        let packs = packs.zip(self.weight.par_chunks(PACK)).zip(&self.square);
+        packs.enumerate().with_min_len(16).for_each(|(pack, (((speeds, stretches), weight), square))| {
+            let first = pack * PACK;
+            processor.run(Ranks {
+                solid,
+                displacement,
+                first,
+                square,
+                weight,
+                bulk,
+                rest,
+                speeds,
+                stretches,
+            });
         });
     }
 
-    /// Brings the cells that stand first to the front of each order.
+    /// Picks the cells that stand first in each order.
     fn pick(&mut self) {
-        let picked = self.found.len();
-        let pick = |order: &mut Vec<Ranked>| {
-            if picked < order.len() {
-                order.select_nth_unstable_by(picked, Ranked::first);
+        let half = self.picked.len() / 2;
+        let pick = |order: &mut Vec<Ranked>, picked: &mut [u32]| {
+            if half < order.len() {
+                order.select_nth_unstable_by(half, Ranked::first);
             }
+            picked.iter_mut().zip(order).for_each(|(picked, own)| *picked = own.cell);
         };
         let [speeds, stretches] = &mut self.order;
-        rayon::join(|| pick(speeds), || pick(stretches));
+        let (before, after) = self.picked.split_at_mut(half);
+        rayon::join(|| pick(speeds, before), || pick(stretches, after));
     }
 
-    /// The smallest limit [s] of the cells that stand first in an order, and its cell.
+    /// The smallest limit [s] of the cells that were picked, and its cell.
     fn smallest<R: Scalar>(
         &mut self,
         model: &Model,
         solid: &Solid,
         displacement: &[Vector<R>],
         reference: &[Vector<R>],
-        by: usize,
     ) -> Option<(f64, usize)> {
-        let (mut found, mut picked) = (std::mem::take(&mut self.found), std::mem::take(&mut self.picked));
-        picked.clear();
-        picked.extend(self.order[by][..found.len()].iter().map(|own| own.cell));
-        let chunks = found.par_chunks_mut(PACK).zip(picked.par_chunks(PACK));
+        let mut found = std::mem::take(&mut self.found);
+        let chunks = found.par_chunks_mut(PACK).zip(self.picked.par_chunks(PACK));
         chunks.for_each(|(found, cells)| {
             found.copy_from_slice(&self.check(model, solid, displacement, reference, cells)[..found.len()]);
         });
-        for (&(_, before), &cell) in found.iter().zip(&picked) {
+        for (&(_, before), &cell) in found.iter().zip(&self.picked) {
             self.reference[cell as usize] = Some(before);
         }
-        let least = smallest(&found, &picked);
-        (self.found, self.picked) = (found, picked);
+        let least = smallest(&found, &self.picked);
+        self.found = found;
         least
     }
 
@@ -382,7 +378,7 @@ fn limits_alone<R: Scalar>(
 
 /// How many of some cells are checked closely for each order.
 fn picked(count: usize) -> usize {
-    (count / SHARE).max(LEAST).min(count)
+    (count / SHARE).max(1).next_multiple_of(LEAST).min(count)
 }
 
 /// A limit that is a number, with its cell.
@@ -417,15 +413,22 @@ fn gradient_square_of(solid: &Solid, cell: usize) -> Symmetric<f64> {
 }
 
 /// ∂u/∂X, the mean over the cell; of a membrane in the frame of the triangle, thinned as if it kept its volume.
+#[inline(always)]
 fn displacement_gradient<R: Scalar>(solid: &Solid, cell: usize, displacement: &[Vector<R>]) -> Tensor<f64> {
-    let mut h = Tensor::ZERO;
+    // Four columns at once, of which the last has no meaning. Behind the gradient of each node but the last there is another one to read, so
+    // the last is the origin.
+    let mut rows = [[0.0; 4]; 3];
     with_cells!(&solid.cells, block => {
-        let (nodes, gradient) = (&block.nodes[cell], &block.rest[cell].gradient);
-        let origin: Vector<f64> = cast(displacement[nodes[0] as usize]);
-        for (&node, &b) in nodes.iter().zip(gradient).skip(1) {
-            h.add_outer(sub(cast(displacement[node as usize]), origin), b);
+        let ([nodes @ .., last], gradient) = (&block.nodes[cell], block.rest[cell].gradient.as_flattened());
+        let origin: Vector<f64> = cast(displacement[*last as usize]);
+        for (&node, b) in nodes.iter().zip(gradient.windows(4).step_by(3)) {
+            for (row, u) in rows.iter_mut().zip(sub(cast(displacement[node as usize]), origin)) {
+                row.iter_mut().zip(b).for_each(|(entry, b)| *entry += u * b);
+            }
         }
     });
+    let [[xx, xy, xz, _], [yx, yy, yz, _], [zx, zy, zz, _]] = rows;
+    let h = Tensor([[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]]);
     let Cells::Membrane(_, sheets) = &solid.cells else { return h };
     let axes = sheets[cell].axes;
     let plane = InPlane::from_changes(&axes, &axes.map(|axis| h.apply(axis)));
@@ -433,6 +436,7 @@ fn displacement_gradient<R: Scalar>(solid: &Solid, cell: usize, displacement: &[
 }
 
 /// The largest squared stretch of the fibres of a cell with a displacement gradient; `None` without fibres.
+#[inline(always)]
 fn largest_fibre_stretch(solid: &Solid, cell: usize, h: &Tensor<f64>) -> Option<f64> {
     let stretch = |&fibre: &Vector<f64>| {
         let deformed = add(fibre, h.apply(fibre));
@@ -452,29 +456,41 @@ fn packed(tensors: &[Symmetric<f64>]) -> Symmetric<Pack<f64>> {
     packed
 }
 
-/// A pack of cells with their displacement gradients, to be ranked.
-struct Ranks<'a> {
-    gradient: &'a Tensor<Pack<f64>>,
+/// A pack of cells, to be ranked.
+struct Ranks<'a, R> {
+    solid: &'a Solid,
+    displacement: &'a [Vector<R>],
+    /// The first of the cells.
+    first: usize,
     /// Σ B_a ⊗ B_a [1/m²].
     square: &'a Symmetric<Pack<f64>>,
+    /// What brings guesses to one scale.
+    weight: &'a [f64],
     /// κ and λ + 2μ at rest [Pa].
     bulk: f64,
     rest: f64,
-    /// The squared speed by an isotropic guess, but for the weight of the cell.
-    speed_found: &'a mut Pack<f64>,
-    /// The mean squared stretch.
-    stretch_found: &'a mut Pack<f64>,
+    /// By the squared speed of an isotropic guess, and by the squared stretch.
+    speeds: &'a mut [Ranked],
+    stretches: &'a mut [Ranked],
 }
 
-impl LaneWork<f64> for Ranks<'_> {
+impl<R: Scalar> LaneWork<f64> for Ranks<'_, R> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes<f64>>(self) {
+        let (mut gradient, mut along) = (Tensor([[Pack::ZERO; 3]; 3]), [None; PACK]);
+        for (lane, along) in along[..self.speeds.len()].iter_mut().enumerate() {
+            let h = displacement_gradient(self.solid, self.first + lane, self.displacement);
+            *along = largest_fibre_stretch(self.solid, self.first + lane, &h);
+            for (to, entry) in gradient.0.as_flattened_mut().iter_mut().zip(h.0.as_flattened()) {
+                to.0[lane] = *entry;
+            }
+        }
+        let (mut speed, mut stretch) = (Pack::ZERO, Pack::ZERO);
         let (bulk, rest) = (L::of(self.bulk), L::of(self.rest));
         for at in (0..PACK).step_by(L::WIDTH) {
-            let (h, square): (Tensor<L>, _) =
-                (load_tensor(self.gradient, at), load_symmetric(self.square, at));
+            let (h, square): (Tensor<L>, _) = (load_tensor(&gradient, at), load_symmetric(self.square, at));
             let c = Symmetric::green_lagrange_twice(&h) + Symmetric::IDENTITY;
             let change = h.trace() + h.second_invariant() + h.determinant();
             let j = L::ONE + change;
@@ -483,8 +499,13 @@ impl LaneWork<f64> for Ranks<'_> {
             let modulus = bulk * j * (j + change.max(-change)) + (rest - bulk) * mean;
             // |G C⁻¹| over |G|: how much closer the deformed faces lie, the closest pair counting most.
             let closeness = product_square(&square, &(c.cofactor() * (L::ONE / (j * j)))).sqrt();
-            (closeness * modulus).store(self.speed_found, at);
-            mean.store(self.stretch_found, at);
+            (closeness * modulus).store(&mut speed, at);
+            mean.store(&mut stretch, at);
+        }
+        for (lane, (speeds, stretches)) in self.speeds.iter_mut().zip(self.stretches).enumerate() {
+            let cell = (self.first + lane) as u32;
+            *speeds = Ranked { rank: speed.0[lane] * self.weight[lane], cell };
+            *stretches = Ranked { rank: along[lane].unwrap_or(stretch.0[lane]), cell };
         }
     }
 }

@@ -166,7 +166,7 @@ pub struct CentralDifference<R> {
     mass: Vec<Vector<R>>,
     /// α of each component [1/s].
     damping: Vec<Vector<R>>,
-    applied: AppliedForces,
+    applied: AppliedForces<R>,
     /// Nodes that are bound to each other.
     collectives: Vec<Collective>,
     /// Contacts with rigid things.
@@ -282,12 +282,7 @@ impl<R: Scalar> LaneWork<R> for NodePass<'_, R> {
                 block = Block::at_rest();
             }
             stepper.forces.at_nodes(nodes.clone(), &mut block.parts, &mut block.internal);
-            let mut pushed = stepper.applied.acts_at(nodes.start);
-            if pushed {
-                for (to, node) in block.external.iter_mut().zip(nodes.clone()) {
-                    *to = stepper.applied.at(node);
-                }
-            }
+            let mut pushed = stepper.applied.act_at(nodes.clone(), &mut block.external);
             let (mass, damping) = (&stepper.mass[nodes.clone()], &stepper.damping[nodes.clone()]);
             let known = Known { before, mass, damping }.filled_up(&mut end);
             block.move_freely(&known, &pace);
