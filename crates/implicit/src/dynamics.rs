@@ -14,6 +14,7 @@ use nalgebra::Vector3;
 use pliant_contact::lag::Lag;
 use pliant_mechanics::StopFlag;
 use pliant_mechanics::model::Solid;
+use rayon::prelude::*;
 
 use crate::assembly::{Assembly, Spring};
 use crate::descent::{Contacting, Limits, Vectors, descend};
@@ -23,7 +24,7 @@ use crate::limited::within_limits;
 use crate::linear::{LinearDevice, LinearReport, LinearSolver, dot};
 use crate::rotation::{exponential, logarithm, spin_to_vector};
 use crate::solid::highest_frequency_squared;
-use crate::state::State;
+use crate::state::{NODES, State};
 use crate::system::{Phases, System};
 use crate::touching::TouchingSystem;
 
@@ -483,11 +484,12 @@ impl BackwardEuler {
 
     /// Translations and rotation vectors since the start of the step.
     fn find_motion(&mut self, state: &State) {
-        for (node, moved) in self.moved.chunks_exact_mut(6).enumerate() {
-            moved[..3].copy_from_slice((state.position[node] - self.start.position[node]).as_slice());
-            let turn = state.rotation[node] * self.start.rotation[node].inverse();
+        let Self { moved, start, .. } = self;
+        moved.par_chunks_exact_mut(6).enumerate().with_min_len(NODES).for_each(|(node, moved)| {
+            moved[..3].copy_from_slice((state.position[node] - start.position[node]).as_slice());
+            let turn = state.rotation[node] * start.rotation[node].inverse();
             moved[3..].copy_from_slice(logarithm(&turn).as_slice());
-        }
+        });
     }
 
     /// Loads less internal, inertial and damping forces on the free components; its norm and that of the largest of them.
@@ -551,15 +553,15 @@ impl BackwardEuler {
         let (model, h) = (Arc::clone(&self.system.model), self.differences.step);
         let factor = model.stiffness_damping / h;
         self.system.matrix.value.iter_mut().zip(&self.system.damper).for_each(|(k, d)| *k += factor * d);
-        for (equation, &component) in self.system.equations.component.iter().enumerate() {
-            let node = component as usize / 6;
-            let rate = 1.0 / (h * h) + self.damping[node] / h;
-            let mass = if component % 6 < 3 { model.mass[node] } else { model.rotary_inertia[node] };
-            self.system.matrix.add_diagonal(equation, rate * mass);
-        }
         let Self { system, differences, start, moved, damping, .. } = self;
         let momentum = Momentum { model: &model, differences, start, moved, damping };
         let rate = |node: u32| 1.0 / (h * h) + damping[node as usize] / h;
+        let components = &system.equations.component;
+        system.matrix.add_to_diagonal(&|equation| {
+            let (node, component) = (components[equation] / 6, components[equation] % 6);
+            let masses = if component < 3 { &model.mass } else { &model.rotary_inertia };
+            rate(node) * masses[node as usize]
+        });
         system.add_bound_masses(
             |node| (rate(node) * model.mass[node as usize], momentum.of(node as usize, 0)),
             |node| rate(node) * model.rotary_inertia[node as usize],

@@ -122,11 +122,7 @@ pub(crate) struct Placed {
     pub(crate) axes: Matrix3<f64>,
     /// Corners in them, relative to the centroid.
     pub(crate) local: [Vector2<f64>; 3],
-    /// F11 + F22 in them.
-    pub(crate) trace: f64,
-    /// Rotations of the nodes relative to the facet [rad].
-    pub(crate) theta: [Vector3<f64>; 3],
-    /// Displacements and rotations in the axes.
+    /// Displacements, and rotations of the nodes relative to the facet [rad], in the axes.
     pub(crate) deformation: Vector18,
 }
 
@@ -276,9 +272,7 @@ impl Facet {
         let centroid = (x[0] + x[1] + x[2]) / 3.0;
         let cross = (x[1] - x[0]).cross(&(x[2] - x[0]));
         let double_area = cross.norm();
-        if !(double_area > 0.0 && double_area.is_finite()) {
-            return Err(Broken::Area(0.5 * double_area));
-        }
+        has_area(double_area)?;
         let normal = cross / double_area;
         let side = (x[1] - x[0]).normalize();
         let plane = Matrix3x2::from_columns(&[side, normal.cross(&side)]);
@@ -304,13 +298,8 @@ impl Facet {
             deformation[6 * i + 1] = moved.y;
             deformation.fixed_rows_mut::<3>(6 * i + 3).copy_from(&theta[i]);
         }
-        for turned in &theta {
-            // Written so that NaN is found too.
-            if !(turned.xy().norm() < FOLDED && turned.norm() < FULL) {
-                return Err(Broken::Folded(turned.norm()));
-            }
-        }
-        Ok(Placed { axes, local, trace, theta, deformation })
+        theta.iter().try_for_each(not_folded)?;
+        Ok(Placed { axes, local, deformation })
     }
 
     /// What it has at rest.
@@ -332,6 +321,16 @@ impl Facet {
     /// Nodal forces of its tension at rest.
     pub(crate) fn tension(&self) -> &Vector18 {
         &self.tension.0
+    }
+
+    /// Corners at rest in the facet's axes, relative to the centroid [m].
+    pub(crate) fn corners(&self) -> &Corners {
+        &self.corners
+    }
+
+    /// The rotation to the axes at rest.
+    pub(crate) fn turn(&self) -> &UnitQuaternion<f64> {
+        &self.axes
     }
 
     /// Gradients of the shape functions at rest [1/m].
@@ -485,6 +484,19 @@ pub(crate) fn symmetrise(k: &mut Matrix18) {
     }
 }
 
+/// An error if twice an area [m²] is none.
+pub(crate) fn has_area(double_area: f64) -> Result<(), Broken> {
+    let is_some = double_area > 0.0 && double_area.is_finite();
+    if is_some { Ok(()) } else { Err(Broken::Area(0.5 * double_area)) }
+}
+
+/// An error if a node has turned too far against its facet [rad].
+pub(crate) fn not_folded(theta: &Vector3<f64>) -> Result<(), Broken> {
+    // Written so that NaN is found too.
+    let is_safe = theta.xy().norm() < FOLDED && theta.norm() < FULL;
+    if is_safe { Ok(()) } else { Err(Broken::Folded(theta.norm())) }
+}
+
 fn quaternion(axes: Matrix3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes))
 }
@@ -635,14 +647,12 @@ mod tests {
                 (0..11).map(|k| facet(orders[k % 3]).under_tension(10.0 * k as f64)).collect();
             for (pack, own) in FacetPack::all(&facets).iter().zip(facets.chunks(PACK)) {
                 let mut work = Work::new();
-                let mut place = |facet: &Facet| {
-                    let (x, rotation) = pose(&mut random, size);
-                    facet.place(&x, &rotation).unwrap()
-                };
-                let placed: Vec<Placed> = own.iter().map(&mut place).collect();
-                placed.iter().enumerate().for_each(|(lane, placed)| work.put(lane, placed, true));
-                work.find(Arch::new(), pack, true);
-                for (lane, (facet, placed)) in own.iter().zip(&placed).enumerate() {
+                let poses: Vec<Pose> = own.iter().map(|_| pose(&mut random, size)).collect();
+                poses.iter().enumerate().for_each(|(lane, (x, rotation))| work.put(lane, x, rotation));
+                work.find(Arch::new(), pack, own.len(), true);
+                for (lane, (facet, (x, rotation))) in own.iter().zip(&poses).enumerate() {
+                    let placed = &facet.place(x, rotation).unwrap();
+                    assert_eq!(work.broken(lane), None);
                     let ((energy, force), mut tangent) = (work.force(lane), Matrix18::zeros());
                     work.take_tangent(lane, &mut tangent);
                     let (single_energy, single_force) = facet.force(placed);

@@ -8,15 +8,19 @@
 //! with forces f, those left without their resultant p and m, the symmetric parts c of the change of moments that are conjugate to spins, and B with
 //! t of the change of G. A facet takes about 2,500 fused multiplications and reads 1.6 kB.
 
+mod placing;
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use pulp::{Arch, Simd, WithSimd};
 
-use crate::facet::{Facet, Matrix18, Placed};
+use crate::facet::{Broken, Facet, Matrix18, has_area, not_folded};
 use crate::lanes::{
     Lane, PACK, Pack, Square, Three, add_half_skew, apply, difference, dot, sum, symmetric, three, times,
     times_transposed, transpose,
 };
 use crate::patch::Vector18;
-use crate::rotation::{eta, mu};
+use crate::rotation::{SMALL, eta, logarithm, mu};
+use placing::Placing;
 
 /// Entries of half of a symmetric matrix of eighteen rows.
 const HALF: usize = 171;
@@ -32,6 +36,9 @@ pub(crate) struct FacetPack {
     stiffness: [Pack; HALF],
     tension: [Pack; 18],
     gradient: [Pack; 6],
+    corners: [Pack; 6],
+    /// The rotation to the axes, (w, x, y, z).
+    turn: [Pack; 4],
 }
 
 impl FacetPack {
@@ -41,8 +48,14 @@ impl FacetPack {
     }
 
     fn of(facets: &[Facet]) -> Self {
-        let mut pack =
-            Self { stiffness: [[0.0; PACK]; HALF], tension: [[0.0; PACK]; 18], gradient: [[1.0; PACK]; 6] };
+        let none = [0.0; PACK];
+        let mut pack = Self {
+            stiffness: [none; HALF],
+            tension: [none; 18],
+            gradient: [none; 6],
+            corners: [none; 6],
+            turn: [none; 4],
+        };
         for (lane, facet) in facets.iter().enumerate() {
             for (row, column) in (0..18).flat_map(|row| (0..=row).map(move |column| (row, column))) {
                 pack.stiffness[place(row, column)][lane] = facet.stiffness()[(row, column)];
@@ -50,17 +63,34 @@ impl FacetPack {
             for (entry, own) in pack.tension.iter_mut().zip(facet.tension().iter()) {
                 entry[lane] = *own;
             }
-            for (k, entry) in pack.gradient.iter_mut().enumerate() {
-                entry[lane] = facet.gradient()[k / 2][k % 2];
+            for (k, (gradient, corner)) in pack.gradient.iter_mut().zip(&mut pack.corners).enumerate() {
+                gradient[lane] = facet.gradient()[k / 2][k % 2];
+                corner[lane] = facet.corners()[k / 2][k % 2];
             }
+            put_turn(&mut pack.turn, lane, facet.turn());
         }
         pack
+    }
+}
+
+/// Puts (w, x, y, z) into a lane.
+fn put_turn(to: &mut [Pack], lane: usize, turn: &UnitQuaternion<f64>) {
+    for (entry, own) in to.iter_mut().zip([turn.w, turn.i, turn.j, turn.k]) {
+        entry[lane] = own;
     }
 }
 
 /// Where eight facets are, and what comes of it.
 #[derive(Clone, Debug)]
 pub(crate) struct Work {
+    /// Of the nodes.
+    position: [Pack; 9],
+    rotation: [Pack; 12],
+    double_area: Pack,
+    /// Rotations of the nodes relative to the facet, and the share of the vector in their squares: the sine squared of half the angle.
+    relative: [Pack; 12],
+    share: [Pack; 3],
+    broken: [Option<Broken>; PACK],
     axes: [Pack; 9],
     local: [Pack; 6],
     trace: Pack,
@@ -78,9 +108,15 @@ impl Work {
     pub(crate) fn new() -> Self {
         let none = [0.0; PACK];
         Self {
+            position: [none; 9],
+            rotation: [none; 12],
+            double_area: none,
+            relative: [none; 12],
+            share: [none; 3],
+            broken: [None; PACK],
             axes: [none; 9],
             local: [none; 6],
-            trace: [1.0; PACK],
+            trace: none,
             theta: [none; 9],
             eta: [none; 3],
             mu: [none; 3],
@@ -91,33 +127,49 @@ impl Work {
         }
     }
 
-    /// Puts a facet into a lane, for its stiffness, too, if that is wanted.
-    pub(crate) fn put(&mut self, lane: usize, placed: &Placed, tangent: bool) {
-        for (k, entry) in self.axes.iter_mut().enumerate() {
-            entry[lane] = placed.axes[(k / 3, k % 3)];
-        }
-        for (k, entry) in self.local.iter_mut().enumerate() {
-            entry[lane] = placed.local[k / 2][k % 2];
-        }
-        self.trace[lane] = 1.0 / placed.trace;
-        for (node, theta) in placed.theta.iter().enumerate() {
-            let angle = theta.norm();
-            self.eta[node][lane] = eta(angle);
-            if tangent {
-                self.mu[node][lane] = mu(angle);
-            }
-            for c in 0..3 {
-                self.theta[3 * node + c][lane] = theta[c];
-            }
-        }
-        for (entry, own) in self.deformation.iter_mut().zip(placed.deformation.iter()) {
+    /// Puts the nodes of a facet into a lane: positions [m] and rotations from rest.
+    pub(crate) fn put(&mut self, lane: usize, x: &[Vector3<f64>; 3], rotation: &[UnitQuaternion<f64>; 3]) {
+        for (entry, own) in self.position.iter_mut().zip(x.iter().flatten()) {
             entry[lane] = *own;
+        }
+        for (to, rotation) in self.rotation.chunks_mut(4).zip(rotation) {
+            put_turn(to, lane, rotation);
         }
     }
 
-    /// Finds energies and forces of a pack, and the stiffness if it is wanted.
-    pub(crate) fn find(&mut self, arch: Arch, pack: &FacetPack, tangent: bool) {
+    /// Finds energies and forces of the first facets of a pack, and the stiffness if it is wanted.
+    pub(crate) fn find(&mut self, arch: Arch, pack: &FacetPack, facets: usize, tangent: bool) {
+        arch.dispatch(Placing { pack, work: self });
+        for lane in 0..facets {
+            self.broken[lane] = self.turn_far(lane).err();
+        }
         arch.dispatch(Kernel { pack, work: self, tangent });
+    }
+
+    /// Finds the nodes of a lane that have turned far.
+    fn turn_far(&mut self, lane: usize) -> Result<(), Broken> {
+        has_area(self.double_area[lane])?;
+        for node in 0..3 {
+            // Written so that NaN is found too.
+            if self.share[node][lane] < SMALL {
+                continue;
+            }
+            let [w, x, y, z] = [0, 1, 2, 3].map(|k| self.relative[4 * node + k][lane]);
+            let theta = logarithm(&UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z)));
+            not_folded(&theta)?;
+            let angle = theta.norm();
+            (self.eta[node][lane], self.mu[node][lane]) = (eta(angle), mu(angle));
+            for c in 0..3 {
+                self.theta[3 * node + c][lane] = theta[c];
+                self.deformation[6 * node + 3 + c][lane] = theta[c];
+            }
+        }
+        Ok(())
+    }
+
+    /// Why the facet in a lane has no force.
+    pub(crate) fn broken(&self, lane: usize) -> Option<Broken> {
+        self.broken[lane]
     }
 
     /// Energy [J] and forces [N, N m] in a lane.

@@ -49,6 +49,19 @@ impl<S: Simd> Lane<S> {
         Self { simd: self.simd, own: self.simd.div_f64s(self.own, other.own) }
     }
 
+    /// Its square root.
+    #[inline(always)]
+    pub(crate) fn sqrt(self) -> Self {
+        Self { simd: self.simd, own: self.simd.sqrt_f64s(self.own) }
+    }
+
+    /// Where this is less than another number, the first of two, and else the second.
+    #[inline(always)]
+    pub(crate) fn if_less(self, than: Self, then: Self, other: Self) -> Self {
+        let mask = self.simd.less_than_f64s(self.own, than.own);
+        Self { simd: self.simd, own: self.simd.select_f64s(mask, then.own, other.own) }
+    }
+
     /// a b + this.
     #[inline(always)]
     pub(crate) fn plus(self, a: Self, b: Self) -> Self {
@@ -131,6 +144,13 @@ pub(crate) fn apply<S: Simd>(a: &Square<S>, v: &Three<S>) -> Three<S> {
 #[inline(always)]
 pub(crate) fn dot<S: Simd>(a: &Three<S>, b: &Three<S>) -> Lane<S> {
     (a[0] * b[0]).plus(a[1], b[1]).plus(a[2], b[2])
+}
+
+/// a × b.
+#[inline(always)]
+pub(crate) fn cross<S: Simd>(a: &Three<S>, b: &Three<S>) -> Three<S> {
+    let entry = |i: usize, j: usize| (a[i] * b[j]).less(a[j], b[i]);
+    [entry(1, 2), entry(2, 0), entry(0, 1)]
 }
 
 /// Aᵀ.

@@ -9,7 +9,7 @@ pub(crate) fn skew(a: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 /// Coefficients of the series of arcsin(x)/x in x².
-const ARCSINE: [f64; 13] = {
+pub(crate) const ARCSINE: [f64; 13] = {
     let (mut all, mut k) = ([1.0; 13], 0);
     while k < 12 {
         let odd = (2 * k + 1) as f64;
@@ -20,7 +20,7 @@ const ARCSINE: [f64; 13] = {
 };
 
 /// |B₂ₙ|/(2n)! from n = 1 on, with Bernoulli's numbers.
-const BERNOULLI: [f64; 8] = [
+pub(crate) const BERNOULLI: [f64; 8] = [
     1.0 / 12.0,
     1.0 / 720.0,
     1.0 / 30_240.0,
@@ -34,6 +34,10 @@ const BERNOULLI: [f64; 8] = [
 /// The angle [rad] below which the series of [`eta`] and [`mu`] leave out less than a rounding.
 const SERIES: f64 = 0.6;
 
+/// The sine squared of half the angle below which [`logarithm`] takes a series, as of most nodes of shells: in a third of the time of an
+/// arctangent. The angle is then below half a radian.
+pub(crate) const SMALL: f64 = 0.06;
+
 /// Σ cₖ xᵏ.
 #[inline(always)]
 fn series(x: f64, coefficients: impl DoubleEndedIterator<Item = f64>) -> f64 {
@@ -46,8 +50,7 @@ pub(crate) fn logarithm(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
     let (vector, scalar) = (sign * rotation.imag(), sign * rotation.w);
     let squared = vector.norm_squared();
     let size = squared + scalar * scalar;
-    // A turn by less than half a radian, as of most nodes of shells: in a third of the time of an arctangent.
-    if squared < 0.06 * size {
+    if squared < SMALL * size {
         return vector * (2.0 * series(squared / size, ARCSINE.into_iter()) / size.sqrt());
     }
     let sine = squared.sqrt();

@@ -1,9 +1,13 @@
 //! The lower half of a symmetric sparse matrix, filled by cells whose places in it are found once.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 /// Values that a thread clears at once.
 const CLEARED: usize = 1 << 15;
+/// Diagonal entries that it adds to at least.
+const ADDED: usize = 4096;
 
 /// No equation: the component is held or has no stiffness.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -131,6 +135,31 @@ impl Values<'_> {
             }
         }
     }
+}
+
+/// Adds a value to the diagonal entries of some columns.
+fn add_to_diagonal(
+    values: Values<'_>,
+    column_start: &[u32],
+    columns: Range<usize>,
+    value: &(impl Fn(usize) -> f64 + Sync),
+) {
+    if columns.len() <= ADDED {
+        for column in columns {
+            let (at, own) = (column_start[column] as usize - values.first, value(column));
+            values.value[at] += own;
+            if let Some(mirror) = values.mirror.get_mut(at) {
+                *mirror += own;
+            }
+        }
+        return;
+    }
+    let middle = columns.start.midpoint(columns.end);
+    let (before, after) = values.split_at(column_start[middle] as usize);
+    rayon::join(
+        || add_to_diagonal(before, column_start, columns.start..middle, value),
+        || add_to_diagonal(after, column_start, middle..columns.end, value),
+    );
 }
 
 impl LowerMatrix {
@@ -307,6 +336,13 @@ impl LowerMatrix {
         if !self.mirror.is_empty() {
             self.mirror[at] += value;
         }
+    }
+
+    /// Adds a value to each diagonal entry.
+    pub(crate) fn add_to_diagonal(&mut self, value: &(impl Fn(usize) -> f64 + Sync)) {
+        let equations = 0..self.len();
+        let (values, column_start) = self.values();
+        add_to_diagonal(values, column_start, equations, value);
     }
 
     /// Adds to an entry of a matrix that is not symmetric, if the pattern has it.

@@ -3,9 +3,13 @@
 use nalgebra::{UnitQuaternion, Vector3};
 
 use pliant_mechanics::Model;
+use rayon::prelude::*;
 
 use crate::relaxation::History;
 use crate::rotation::exponential;
+
+/// Nodes that a thread takes at least.
+pub(crate) const NODES: usize = 1024;
 
 /// Where a model is.
 #[derive(Debug, Default, PartialEq)]
@@ -68,14 +72,14 @@ impl State {
 
     /// Moves and turns all nodes by a part of (translation, spin) increments, six a node.
     pub(crate) fn advance(&mut self, increment: &[f64], part: f64) {
-        let nodes = self.position.iter_mut().zip(&mut self.rotation).zip(increment.chunks_exact(6));
-        for ((position, rotation), d) in nodes {
+        let nodes = self.position.par_iter_mut().zip(&mut self.rotation).zip(increment.par_chunks_exact(6));
+        nodes.with_min_len(NODES).for_each(|((position, rotation), d)| {
             *position += Vector3::new(d[0], d[1], d[2]) * part;
             let spin = Vector3::new(d[3], d[4], d[5]) * part;
             if spin != Vector3::zeros() {
                 *rotation = exponential(&spin) * *rotation;
             }
-        }
+        });
     }
 
     /// The nodes of a facet: positions and rotations.

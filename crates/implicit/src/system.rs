@@ -39,7 +39,7 @@ use crate::touching::TouchingSystem;
 /// Cells of solids computed side by side before they are added up.
 const CHUNK: usize = 256;
 
-/// Facets computed side by side before their nodes take them up. Of 20,000 on two threads 384 take a sixth more time: threads wait oftener.
+/// Facets found side by side while the nodes of those before take these up.
 const FACETS: usize = 128 * PACK;
 
 /// Time spent so far in the parts of a solver.
@@ -130,8 +130,8 @@ pub(crate) struct System {
     pub(crate) energy: f64,
     /// Largest force on a node of a cell [N].
     pub(crate) largest: f64,
-    /// Of a chunk of facets.
-    results: Vec<FacetResult>,
+    /// Of a chunk of facets that is found and of the one before, whose nodes take it up.
+    results: [ChunkResults; 2],
     /// Of each chunk.
     corners: Vec<Corners>,
     /// Facets at rest.
@@ -165,16 +165,36 @@ struct Pressure {
     curved: [f64; 2],
 }
 
-#[derive(Clone)]
-struct FacetResult {
+/// What is found of the facets of a chunk.
+#[derive(Default)]
+struct ChunkResults {
+    /// Apart from the rest: one thread looks at all of them.
+    heads: Vec<FacetHead>,
+    results: Vec<FacetResult>,
+}
+
+#[derive(Clone, Copy, Default)]
+struct FacetHead {
     energy: f64,
     /// Largest force on a node [N].
     largest: f64,
+    broken: Option<Broken>,
+}
+
+#[derive(Clone)]
+struct FacetResult {
     force: Vector18,
     /// What the fixed and the controlled pressures make.
     loads: [Vector18; 2],
     tangent: Matrix18,
-    broken: Option<Broken>,
+}
+
+/// What facets are added to.
+struct FacetSums {
+    matrix: LowerMatrix,
+    coupling: Vec<f64>,
+    /// Internal forces, and fixed and controlled loads.
+    forces: [Vec<f64>; 3],
 }
 
 impl System {
@@ -377,7 +397,9 @@ impl System {
             surface: needs_surface(&model).then(|| CurvedSurface::new(&model, EdgeRule::Arc)),
             energy: 0.0,
             largest: 0.0,
-            results: vec![FacetResult::none(); FACETS.min(model.facets.len())],
+            // The second only where there is a second chunk.
+            results: [0, FACETS]
+                .map(|first| ChunkResults::new(FACETS.min(model.facets.len().saturating_sub(first)))),
             corners: model.facets.chunks(FACETS).map(corners_of).collect(),
             packs: FacetPack::all(&model.facets),
             arch: Arch::new(),
@@ -656,43 +678,78 @@ impl System {
     }
 
     fn evaluate_facets(&mut self, state: &State, moved: Option<&[f64]>) -> Result<(), SolveError> {
-        let model = Arc::clone(&self.model);
-        let mut results = std::mem::take(&mut self.results);
-        let mut found = Ok(());
-        let coupled = moved.filter(|moved| moved.iter().any(|&by| by != 0.0));
-        for (chunk, facets) in model.facets.chunks(FACETS).enumerate() {
-            let (first, results) = (chunk * FACETS, &mut results[..facets.len()]);
-            self.find_facets(first, state, moved.is_some(), results);
-            let broken = (first..).zip(&*results).find_map(|(cell, result)| Some((cell, result.broken?)));
-            if let Some((cell, why)) = broken {
-                found = Err(SolveError::Broken { cell, why });
-                break;
-            }
-            for result in &*results {
-                self.energy += result.energy;
-                self.largest = self.largest.max(result.largest);
-            }
-            self.gather_facets(chunk, results, moved.is_some(), coupled);
-            self.add_bound_facets(first, results, moved);
-        }
-        self.results = results;
+        let [mut now, mut next] = std::mem::take(&mut self.results);
+        let found = self.evaluate_chunks(state, moved, [&mut now, &mut next]);
+        self.results = [now, next];
         found
     }
 
-    /// Finds forces of the facets from one on, and their stiffness if it is wanted.
-    fn find_facets(&self, first: usize, state: &State, tangent: bool, results: &mut [FacetResult]) {
+    /// The nodes of a chunk of facets take it up while the next one is found, so that threads seldom wait for each other.
+    fn evaluate_chunks(
+        &mut self,
+        state: &State,
+        moved: Option<&[f64]>,
+        [mut now, mut next]: [&mut ChunkResults; 2],
+    ) -> Result<(), SolveError> {
         let symmetric = self.matrix.mirror.is_empty();
+        let tangent = moved.is_some();
         let wanted = Wanted { tangent, symmetric, exact_pressure: self.exact_pressure };
-        let packs = results.par_chunks_mut(PACK).enumerate().with_min_len(2);
-        packs.for_each_init(Work::new, |work, (at, results)| {
+        let coupled = moved.filter(|moved| moved.iter().any(|&by| by != 0.0));
+        let count = self.model.facets.len();
+        self.find_facets(0, state, wanted, now);
+        for first in (0..count).step_by(FACETS) {
+            let heads = &now.heads[..FACETS.min(count - first)];
+            if let Some((cell, why)) =
+                (first..).zip(heads).find_map(|(cell, head)| Some((cell, head.broken?)))
+            {
+                return Err(SolveError::Broken { cell, why });
+            }
+            for head in heads {
+                self.energy += head.energy;
+                self.largest = self.largest.max(head.largest);
+            }
+            let mut sums = self.lend_sums();
+            rayon::join(
+                || self.gather_facets(first / FACETS, &now.results, tangent, coupled, &mut sums),
+                || self.find_facets(first + FACETS, state, wanted, next),
+            );
+            self.take_back(sums);
+            self.add_bound_facets(first, &now.results, moved);
+            std::mem::swap(&mut now, &mut next);
+        }
+        Ok(())
+    }
+
+    fn lend_sums(&mut self) -> FacetSums {
+        let forces = [&mut self.internal, &mut self.external, &mut self.controlled];
+        FacetSums {
+            matrix: std::mem::take(&mut self.matrix),
+            coupling: std::mem::take(&mut self.coupling),
+            forces: forces.map(std::mem::take),
+        }
+    }
+
+    fn take_back(&mut self, FacetSums { matrix, coupling, forces }: FacetSums) {
+        (self.matrix, self.coupling) = (matrix, coupling);
+        [self.internal, self.external, self.controlled] = forces;
+    }
+
+    /// Finds forces of the facets from one on, at most a chunk, and their stiffness if it is wanted.
+    fn find_facets(&self, first: usize, state: &State, wanted: Wanted, found: &mut ChunkResults) {
+        let facets = self.model.facets.get(first..).unwrap_or_default();
+        let heads = found.heads.par_chunks_mut(PACK).zip(found.results.par_chunks_mut(PACK));
+        let packs = heads.zip(facets.par_chunks(PACK)).enumerate().with_min_len(2);
+        packs.for_each_init(Work::new, |work, (at, ((heads, results), facets))| {
             let from = first + at * PACK;
-            let facets = &self.model.facets[from..from + results.len()];
-            place(facets, state, wanted, results, work);
-            work.find(self.arch, &self.packs[from / PACK], wanted.tangent);
-            take(work, wanted, results);
-            for ((number, facet), result) in (from..).zip(facets).zip(results) {
+            for (lane, facet) in facets.iter().enumerate() {
+                let (x, rotation) = state.corners(facet.nodes);
+                work.put(lane, &x, &rotation);
+            }
+            work.find(self.arch, &self.packs[from / PACK], facets.len(), wanted.tangent);
+            take(work, wanted, heads, results);
+            for ((number, facet), (head, result)) in (from..).zip(facets).zip(heads.iter().zip(results)) {
                 let pressure = self.pressure[number];
-                if pressure != Pressure::default() && result.broken.is_none() {
+                if pressure != Pressure::default() && head.broken.is_none() {
                     let patch = || {
                         self.surface.as_ref().map(|surface| surface.patch(&self.model, state, number as u32))
                     };
@@ -705,12 +762,19 @@ impl System {
 
     /// Adds forces of a chunk of facets and, if it is wanted, the stiffness of those whose nodes follow no others; with what it makes of
     /// prescribed motions.
-    fn gather_facets(&mut self, chunk: usize, results: &[FacetResult], tangent: bool, moved: Option<&[f64]>) {
+    fn gather_facets(
+        &self,
+        chunk: usize,
+        results: &[FacetResult],
+        tangent: bool,
+        moved: Option<&[f64]>,
+        FacetSums { matrix, coupling, forces }: &mut FacetSums,
+    ) {
         let stiffness = tangent.then(|| {
-            let (values, column_start) = self.matrix.values();
-            ColumnSums { first: 0, coupling: &mut self.coupling, values, column_start }
+            let (values, column_start) = matrix.values();
+            ColumnSums { first: 0, coupling, values, column_start }
         });
-        let forces = [&mut self.internal[..], &mut self.external, &mut self.controlled];
+        let forces = forces.each_mut().map(|own| &mut own[..]);
         let (first, equations) = (chunk * FACETS, &self.equations);
         let (facets, pressure) = (&self.model.facets[first..], &self.pressure[first..]);
         let (places, bound) = (&self.places, &self.bound);
@@ -740,7 +804,7 @@ impl System {
     fn add_bound_facets(&mut self, first: usize, results: &[FacetResult], moved: Option<&[f64]>) {
         let model = Arc::clone(&self.model);
         let Some(moved) = moved else { return };
-        for (number, result) in (first..).zip(results) {
+        for (number, result) in (first..model.facets.len()).zip(results) {
             if !self.bound[number] {
                 continue;
             }
@@ -1235,11 +1299,18 @@ struct Wanted {
     exact_pressure: bool,
 }
 
+impl ChunkResults {
+    /// With room for some facets.
+    fn new(facets: usize) -> Self {
+        Self { heads: vec![FacetHead::default(); facets], results: vec![FacetResult::none(); facets] }
+    }
+}
+
 impl FacetResult {
     fn none() -> Self {
         let loads = [Vector18::zeros(); 2];
         let (force, tangent) = (Vector18::zeros(), Matrix18::zeros());
-        Self { energy: 0.0, largest: 0.0, force, loads, tangent, broken: None }
+        Self { force, loads, tangent }
     }
 
     /// Adds what a corner is given to the sums of a node, a number of nodes after the first.
@@ -1317,24 +1388,14 @@ impl FacetResult {
     }
 }
 
-/// Places facets, each in its lane.
-fn place(facets: &[Facet], state: &State, wanted: Wanted, results: &mut [FacetResult], work: &mut Work) {
-    for (lane, (facet, result)) in facets.iter().zip(results).enumerate() {
-        let (x, rotation) = state.corners(facet.nodes);
-        let placed = facet.place(&x, &rotation);
-        result.broken = placed.as_ref().err().copied();
-        if let Ok(placed) = placed {
-            work.put(lane, &placed, wanted.tangent);
-        }
-    }
-}
-
 /// Takes what was found of each lane.
-fn take(work: &Work, wanted: Wanted, results: &mut [FacetResult]) {
-    for (lane, result) in results.iter_mut().enumerate() {
-        (result.energy, result.force) = work.force(lane);
+fn take(work: &Work, wanted: Wanted, heads: &mut [FacetHead], results: &mut [FacetResult]) {
+    for (lane, (head, result)) in heads.iter_mut().zip(results).enumerate() {
+        let energy;
+        (energy, result.force) = work.force(lane);
         let forces = result.force.iter().enumerate().filter(|(i, _)| i % 6 < 3);
-        result.largest = forces.fold(0.0, |largest, (_, force)| largest.max(force.abs()));
+        let largest = forces.fold(0.0, |largest: f64, (_, force)| largest.max(force.abs()));
+        *head = FacetHead { energy, largest, broken: work.broken(lane) };
         if wanted.tangent {
             work.take_tangent(lane, &mut result.tangent);
         }

@@ -66,7 +66,7 @@ impl Facet {
             // Sᵀ = −S.
             twice += rigid[2 * i + 1] - arm[i].transposed_before(&rigid[2 * i]);
         }
-        let corrections = [0, 1, 2].map(|i| moment_correction(&placed.theta[i], &part(&raw, 2 * i + 1)));
+        let corrections = [0, 1, 2].map(|i| moment_correction(&placed.theta(i), &part(&raw, 2 * i + 1)));
         twice += corrections.iter().sum::<Matrix3<f64>>();
         let force = [0, 1, 2].map(|i| skew(&part(&spun, 2 * i)));
         // Fnᵀ Ψ.
@@ -100,11 +100,16 @@ impl Facet {
         k
     }
 
+    /// F11 + F22 in the facet's axes.
+    fn stretch_trace(&self, placed: &Placed) -> f64 {
+        placed.local.iter().zip(&self.gradient).map(|(corner, gradient)| corner.dot(gradient)).sum()
+    }
+
     /// G of each node: the spin of the frame over its translation, in the frame.
     fn frame_spins(&self, placed: &Placed) -> [Sparse; 3] {
         let now = gradients(&placed.local);
         let spin = |i: usize| {
-            let rest = self.gradient[i] / placed.trace;
+            let rest = self.gradient[i] / self.stretch_trace(placed);
             Sparse { xz: now[i].y, yz: -now[i].x, zx: -rest.y, zy: rest.x }
         };
         [spin(0), spin(1), spin(2)]
@@ -125,7 +130,8 @@ impl Facet {
             let blocks = [0, 1, 2].map(|q| {
                 let tilt = moment.x * now[q].y - moment.y * now[q].x;
                 let out_of_plane = Vector3::z() * Vector3::new(now[i].x, now[i].y, 0.0).transpose() * tilt;
-                let stretch = Vector3::new(self.gradient[q].x, self.gradient[q].y, 0.0) / placed.trace;
+                let stretch =
+                    Vector3::new(self.gradient[q].x, self.gradient[q].y, 0.0) / self.stretch_trace(placed);
                 out_of_plane + Vector3::new(g[i].zx, g[i].zy, 0.0) * stretch.transpose() * moment.z
             });
             let turned = (0..3).fold(Matrix3::zeros(), |sum, q| sum - arm[q].after(&blocks[q]));
@@ -187,11 +193,16 @@ impl Placed {
         block.copy_from(&turned);
     }
 
+    /// The rotation [rad] of a node relative to the facet.
+    fn theta(&self, node: usize) -> Vector3<f64> {
+        self.deformation.fixed_rows::<3>(6 * node + 3).into()
+    }
+
     /// Moments conjugate to rotation vectors made conjugate to spins: Hᵀ f.
     fn to_spins(&self, raw: &Vector18) -> Vector18 {
         let mut spun = *raw;
-        for (i, theta) in self.theta.iter().enumerate() {
-            let moment = spin_to_vector(theta).tr_mul(&raw.fixed_rows::<3>(6 * i + 3));
+        for i in 0..3 {
+            let moment = spin_to_vector(&self.theta(i)).tr_mul(&raw.fixed_rows::<3>(6 * i + 3));
             spun.fixed_rows_mut::<3>(6 * i + 3).copy_from(&moment);
         }
         spun
@@ -199,8 +210,8 @@ impl Placed {
 
     /// K made one of spins: Hᵀ K H.
     fn spin_stiffness(&self, k: &mut Matrix18) {
-        for (i, theta) in self.theta.iter().enumerate() {
-            let h = spin_to_vector(theta);
+        for i in 0..3 {
+            let h = spin_to_vector(&self.theta(i));
             let columns = k.fixed_columns::<3>(6 * i + 3) * h;
             k.fixed_columns_mut::<3>(6 * i + 3).copy_from(&columns);
             let rows = h.tr_mul(&k.fixed_rows::<3>(6 * i + 3));
