@@ -110,11 +110,12 @@ pub fn encode(bytes: &[u8], text: &mut Vec<u8>) {
         let bits = u32::from_be_bytes([0, a, b, c]);
         [18, 12, 6, 0].map(|shift| ALPHABET[(bits >> shift) as usize & 63])
     };
+    let (groups, rest) = bytes.as_chunks();
+    let before = text.len();
     text.reserve(bytes.len().div_ceil(3) * 4);
-    let groups = bytes.chunks_exact(3);
-    let rest = groups.remainder();
-    for three in groups {
-        text.extend_from_slice(&group(three[0], three[1], three[2]));
+    text.resize(before + 4 * groups.len(), 0);
+    for (four, &[a, b, c]) in text[before..].as_chunks_mut().0.iter_mut().zip(groups) {
+        *four = group(a, b, c);
     }
     match rest {
         [a, b] => {

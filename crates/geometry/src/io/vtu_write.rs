@@ -59,7 +59,11 @@ pub fn save_vtu(path: &Path, mesh: &Mesh, options: &VtuOptions) -> Result<(), Me
 
 /// Writes a mesh again and again with other data: points, cells and sets, which stay, are encoded once. Each file is as [`write_vtu`] writes it.
 #[derive(Clone, Debug, Default)]
-pub struct VtuSeries(Option<Lasting>);
+pub struct VtuSeries {
+    lasting: Option<Lasting>,
+    /// Room for the text of a frame.
+    text: Vec<u8>,
+}
 
 impl VtuSeries {
     /// Writes the next frame into `writer`. Points, cells and sets are those of the first frame, of which they are checked.
@@ -71,14 +75,15 @@ impl VtuSeries {
     ) -> Result<(), MeshFileError> {
         let path = Path::new("stream.vtu");
         let failed = |source| MeshFileError::Write { path: path.to_owned(), source };
-        let lasting = match &mut self.0 {
+        let Self { lasting, text } = self;
+        let lasting = match lasting {
             Some(lasting) => lasting,
             first => {
                 check(path, mesh)?;
                 first.insert(Lasting::of(mesh, options).map_err(failed)?)
             }
         };
-        write_with(&mut writer, mesh, options, lasting).map_err(failed)
+        write_with(&mut writer, mesh, options, lasting, text).map_err(failed)
     }
 }
 
@@ -193,10 +198,10 @@ impl Parts {
 
     fn reals(&mut self, name: &str, components: usize, values: &[f64], single: bool) -> io::Result<()> {
         if single {
-            let raw: Vec<u8> = values.iter().flat_map(|&value| (value as f32).to_le_bytes()).collect();
+            let raw = bytes(values.iter().map(|&value| (value as f32).to_le_bytes()));
             self.array("Float32", name, components, &raw)
         } else {
-            let raw: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+            let raw = bytes(values.iter().map(|value| value.to_le_bytes()));
             self.array("Float64", name, components, &raw)
         }
     }
@@ -204,10 +209,10 @@ impl Parts {
     /// Indices below `limit`, as narrow as VTK reads them well.
     fn indices(&mut self, name: &str, indices: impl Iterator<Item = usize>, limit: usize) -> io::Result<()> {
         if i32::try_from(limit).is_ok() {
-            let raw: Vec<u8> = indices.flat_map(|index| (index as i32).to_le_bytes()).collect();
+            let raw = bytes(indices.map(|index| (index as i32).to_le_bytes()));
             self.array("Int32", name, 1, &raw)
         } else {
-            let raw: Vec<u8> = indices.flat_map(|index| (index as i64).to_le_bytes()).collect();
+            let raw = bytes(indices.map(|index| (index as i64).to_le_bytes()));
             self.array("Int64", name, 1, &raw)
         }
     }
@@ -215,7 +220,7 @@ impl Parts {
     fn data(&mut self, name: &str, array: &DataArray, single: bool) -> io::Result<()> {
         let is_integer = |&value: &f64| value.fract() == 0.0 && f64::from(value as i32) == value;
         if name == "label" && array.values.iter().all(is_integer) {
-            let raw: Vec<u8> = array.values.iter().flat_map(|&value| (value as i32).to_le_bytes()).collect();
+            let raw = bytes(array.values.iter().map(|&value| (value as i32).to_le_bytes()));
             return self.array("Int32", name, array.components, &raw);
         }
         self.reals(name, array.components, &array.values, single)
@@ -227,6 +232,11 @@ impl Parts {
         members.for_each(|member| raw[member] = 1);
         self.array("UInt8", &format!("{SET_PREFIX}{name}"), 1, &raw)
     }
+}
+
+/// The bytes of numbers, whole numbers at a time.
+fn bytes<const N: usize>(numbers: impl Iterator<Item = [u8; N]>) -> Vec<u8> {
+    numbers.collect::<Vec<_>>().into_flattened()
 }
 
 /// Adds bytes as they are in zlib's format (RFC 1950, in stored blocks of RFC 1951): a library's level 0 takes five times as long.
@@ -260,11 +270,18 @@ fn repeats(block: &[u8], width: usize) -> bool {
 
 /// Writes a mesh that was checked before.
 pub(super) fn write(out: &mut dyn Write, mesh: &Mesh, options: &VtuOptions) -> io::Result<()> {
-    write_with(out, mesh, options, &Lasting::of(mesh, options)?)
+    write_with(out, mesh, options, &Lasting::of(mesh, options)?, &mut Vec::new())
 }
 
-fn write_with(out: &mut dyn Write, mesh: &Mesh, options: &VtuOptions, lasting: &Lasting) -> io::Result<()> {
-    let mut parts = Parts { xml: Vec::new(), compress: options.compress };
+fn write_with(
+    out: &mut dyn Write,
+    mesh: &Mesh,
+    options: &VtuOptions,
+    lasting: &Lasting,
+    text: &mut Vec<u8>,
+) -> io::Result<()> {
+    text.clear();
+    let mut parts = Parts { xml: std::mem::take(text), compress: options.compress };
     let cells: usize = mesh.blocks.iter().map(|block| block.len()).sum();
     let compressor = if options.compress { " compressor=\"vtkZLibDataCompressor\"" } else { "" };
     parts.push("<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" ");
@@ -279,7 +296,8 @@ fn write_with(out: &mut dyn Write, mesh: &Mesh, options: &VtuOptions, lasting: &
     write_cell_data(&mut parts, mesh, options, cells, &lasting.cell_sets)?;
     parts.xml.extend_from_slice(&lasting.shape);
     parts.push("    </Piece>\n  </UnstructuredGrid>\n</VTKFile>\n");
-    out.write_all(&parts.xml)
+    *text = parts.xml;
+    out.write_all(text)
 }
 
 /// The time, and the names of labels and bodies: a text such as `5 liver` for each, as byte codes ended by a 0.
