@@ -41,6 +41,7 @@ mod foresight;
 mod history;
 mod lanes;
 pub mod mass_scaling;
+mod node_pass;
 pub mod recover;
 mod relaxation;
 pub mod stability;

@@ -17,28 +17,23 @@ use pliant_contact::touch::{Contacts, Rigid};
 use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::mapping::weighted;
-use pliant_mechanics::model::{Amplitudes, Contradiction, Enclosed, FREE, Model, component, placed};
+use pliant_mechanics::model::{Contradiction, Enclosed, FREE, Model};
 use pliant_mechanics::tensor::{Vector, add};
 use rayon::prelude::*;
 
 use crate::Scalar;
-use crate::applied::{AppliedForces, BLOCK};
+use crate::applied::AppliedForces;
 use crate::collective::{Collective, Predicted, enclosed};
 use crate::energies::{Sums, model_balance_floor};
-use crate::forces::{Deformed, Found, InternalForces, Quad};
-use crate::lanes::{Instructions, LaneWork, Lanes, MissingInstructions, Processor};
+use crate::forces::{Deformed, Found, InternalForces};
+use crate::lanes::{Instructions, MissingInstructions, Processor};
+use crate::node_pass::{Add, CHUNK, Held, NodePass, Pace, held};
 use crate::recover::stored_at_start;
 use crate::stability::Monitor;
 use crate::state::State;
 use crate::step_control::{Clock, Lengths, StepControl};
 use crate::step_error::StepError;
 use crate::touching::{Free, NodeContact, Nodes, Posture, Touching};
-
-/// Nodes per parallel task.
-const CHUNK: usize = 384;
-
-/// Sums of a block are kept apart in so many lanes.
-const LANES: usize = 16;
 
 /// Tasks that a thread takes at least: fewer take less time than waking another thread.
 const LEAST_CHUNKS: usize = 5;
@@ -89,64 +84,6 @@ pub trait Observable<R> {
     /// The nodes that may touch something, increasing, with what contacts do to them.
     fn contact_nodes(&self, _state: &State<R>) -> Vec<NodeContact> {
         Vec::new()
-    }
-}
-
-/// A node of which a component moves as prescribed.
-#[derive(Clone, Copy, Debug)]
-struct Held {
-    node: u32,
-    /// The constraint of each component, or [`FREE`].
-    owner: [u32; 3],
-    /// The amplitudes of each component's motion.
-    amplitudes: Amplitudes,
-}
-
-impl Held {
-    /// The components that are prescribed, with their constraint.
-    #[inline(always)]
-    fn components(&self) -> impl Iterator<Item = (usize, usize)> {
-        let owner = self.owner;
-        (0..3).filter(move |&c| owner[c] != FREE).map(move |c| (c, owner[c] as usize))
-    }
-
-    /// The displacement [m] of a component from the factors of its constraint.
-    #[inline(always)]
-    fn place(&self, c: usize, factors: [f64; 2]) -> f64 {
-        placed(component(&self.amplitudes, c), factors)
-    }
-}
-
-fn held(owners: &[[u32; 3]], amplitudes: &[Amplitudes]) -> Vec<Held> {
-    let nodes = owners.iter().zip(amplitudes).zip(0..).filter(|((owner, _), _)| **owner != [FREE; 3]);
-    nodes.map(|((&owner, &amplitudes), node)| Held { node, owner, amplitudes }).collect()
-}
-
-/// [`Lengths`] as the nodes need them.
-#[derive(Clone, Copy, Debug)]
-struct Pace<R> {
-    /// Δt⁺/Δt⁻.
-    ratio: R,
-    /// h/2 [s].
-    half_mean: R,
-    /// Δt⁺ h [s²].
-    step_squared: R,
-    /// 1/(Δt⁺ h) [1/s²].
-    per_step_squared: R,
-    /// 1/(2 Δt⁺) [1/s].
-    per_two_steps: R,
-}
-
-impl<R: Scalar> Pace<R> {
-    fn new(lengths: Lengths) -> Self {
-        let step_squared = lengths.next * lengths.mean();
-        Self {
-            ratio: R::of(lengths.ratio()),
-            half_mean: R::of(0.5 * lengths.mean()),
-            step_squared: R::of(step_squared),
-            per_step_squared: R::of(1.0 / step_squared),
-            per_two_steps: R::of(0.5 / lengths.next),
-        }
     }
 }
 
@@ -251,215 +188,6 @@ pub(crate) fn sum_owned<R: Scalar>(
         }
     }
     sum
-}
-
-/// A pass over the nodes from `first` on: the coming increments, reactions and sums.
-struct NodePass<'a, R> {
-    stepper: &'a CentralDifference<R>,
-    first: usize,
-    before: &'a [Vector<R>],
-    next: &'a mut [Vector<R>],
-    reaction: &'a mut [Vector<R>],
-}
-
-impl<R: Scalar> LaneWork<R> for NodePass<'_, R> {
-    type Output = Sums;
-
-    /// Plain loops over a block of components, which the compiler makes wide. Each loop goes over a whole block. Numbers that were written
-    /// one by one have then left the processor's queue, or a wide read would wait for them.
-    #[inline(always)]
-    fn run<L: Lanes<R>>(self) -> Sums {
-        const { assert!(CHUNK.is_multiple_of(BLOCK) && BLOCK.is_multiple_of(LANES)) };
-        let Self { stepper, first, before, next, reaction } = self;
-        let mut held = stepper.held_in(first..first + before.len()).iter().peekable();
-        let pace = Pace::new(stepper.lengths);
-        let mut sums = [[0.0; LANES]; 6];
-        let mut block = Block::at_rest();
-        let mut end = Known::at_rest();
-        for (index, (before, next)) in before.chunks(BLOCK).zip(next.chunks_mut(BLOCK)).enumerate() {
-            let nodes = first + index * BLOCK..first + index * BLOCK + before.len();
-            if before.len() < BLOCK {
-                block = Block::at_rest();
-            }
-            stepper.forces.at_nodes(nodes.clone(), &mut block.parts, &mut block.internal);
-            let mut pushed = stepper.applied.act_at(nodes.clone(), &mut block.external);
-            let (mass, damping) = (&stepper.mass[nodes.clone()], &stepper.damping[nodes.clone()]);
-            let known = Known { before, mass, damping }.filled_up(&mut end);
-            block.move_freely(&known, &pace);
-            while let Some(held) = held.next_if(|held| (held.node as usize) < nodes.end) {
-                let node = held.node as usize;
-                let to = node - nodes.start;
-                for (c, constraint) in held.components() {
-                    let places = stepper.factors[constraint].map(|factors| held.place(c, factors));
-                    (block.next[to][c], reaction[node - first][c]) =
-                        block.prescribe(&known, [to, c], &pace, places);
-                    block.external[to][c] += reaction[node - first][c];
-                }
-                pushed = true;
-            }
-            block.add_motion(&known, &mut sums, &pace);
-            if pushed {
-                block.add_push(&known, &mut sums);
-                block.external = [[R::ZERO; 3]; BLOCK];
-            }
-            next.copy_from_slice(&block.next[..next.len()]);
-        }
-        let [kinetic, damping_power, internal_before, internal_after, external_before, external_after] =
-            sums.map(|lanes| lanes.iter().sum());
-        Sums { kinetic, damping_power, internal_before, internal_after, external_before, external_after }
-    }
-}
-
-/// u += Δu.
-struct Add<'a, R> {
-    increment: &'a [Vector<R>],
-    to: &'a mut [Vector<R>],
-}
-
-impl<R: Scalar> LaneWork<R> for Add<'_, R> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lanes<R>>(self) {
-        for (u, du) in self.to.as_flattened_mut().iter_mut().zip(self.increment.as_flattened()) {
-            *u += *du;
-        }
-    }
-}
-
-/// What a block of nodes comes with.
-#[derive(Clone, Copy)]
-struct Known<T> {
-    before: T,
-    mass: T,
-    damping: T,
-}
-
-/// That of whole blocks.
-type Whole<'a, R> = Known<&'a [Vector<R>; BLOCK]>;
-
-impl<R: Scalar> Known<[Vector<R>; BLOCK]> {
-    fn at_rest() -> Self {
-        let zero = [[R::ZERO; 3]; BLOCK];
-        Self { before: zero, mass: [[R::ONE; 3]; BLOCK], damping: zero }
-    }
-}
-
-impl<'a, R: Scalar> Known<&'a [Vector<R>]> {
-    /// With nodes at rest beyond the last one, for which there is room.
-    #[inline(always)]
-    fn filled_up(self, room: &'a mut Known<[Vector<R>; BLOCK]>) -> Whole<'a, R> {
-        let fill = |own: &'a [Vector<R>], room: &'a mut [Vector<R>; BLOCK]| match own.first_chunk() {
-            Some(whole) => whole,
-            None => {
-                room[..own.len()].copy_from_slice(own);
-                &*room
-            }
-        };
-        Known {
-            before: fill(self.before, &mut room.before),
-            mass: fill(self.mass, &mut room.mass),
-            damping: fill(self.damping, &mut room.damping),
-        }
-    }
-}
-
-/// What is found of a block of nodes; zero beyond the last node.
-struct Block<R> {
-    next: [Vector<R>; BLOCK],
-    internal: [Vector<R>; BLOCK],
-    /// The same with what blocks of cells leave beside it.
-    parts: [Quad<R>; BLOCK],
-    /// Zero but for what pushes now.
-    external: [Vector<R>; BLOCK],
-}
-
-impl<R: Scalar> Block<R> {
-    #[inline(always)]
-    fn at_rest() -> Self {
-        let zero = [[R::ZERO; 3]; BLOCK];
-        Self { next: zero, internal: zero, parts: [[R::ZERO; 4]; BLOCK], external: zero }
-    }
-
-    /// The increments of nodes that nothing holds.
-    #[inline(always)]
-    fn move_freely(&mut self, known: &Whole<'_, R>, &Pace { ratio, half_mean, step_squared, .. }: &Pace<R>) {
-        let (before, next) = (known.before.as_flattened(), self.next.as_flattened_mut());
-        let (internal, external) = (self.internal.as_flattened(), self.external.as_flattened());
-        let (mass, damping) = (known.mass.as_flattened(), known.damping.as_flattened());
-        for i in 0..3 * BLOCK {
-            let a = damping[i] * half_mean;
-            let kept = (R::ONE - a) * (before[i] * ratio) * mass[i];
-            next[i] = (kept + step_squared * (external[i] - internal[i])) / (mass[i] * (R::ONE + a));
-        }
-    }
-
-    /// The increment and the reaction [N] of a component whose displacement [m] is prescribed now and after the step.
-    #[inline(always)]
-    fn prescribe(
-        &self,
-        known: &Whole<'_, R>,
-        [node, c]: [usize; 2],
-        pace: &Pace<R>,
-        [now, then]: [f64; 2],
-    ) -> (R, R) {
-        let same_speed = known.before[node][c] * pace.ratio;
-        let next = R::of(then - now);
-        let velocity = (same_speed + next) * pace.per_two_steps;
-        let acceleration = (next - same_speed) * pace.per_step_squared;
-        let inertia = known.mass[node][c] * (acceleration + known.damping[node][c] * velocity);
-        (next, inertia + self.internal[node][c] - self.external[node][c])
-    }
-
-    /// Adds kinetic energy, damping power and the halves of the internal work to sums kept apart by lane. The products of
-    /// three components are summed as they come, in the precision of the forces; all else in double precision.
-    #[allow(clippy::needless_range_loop)]
-    #[inline(always)]
-    fn add_motion(
-        &self,
-        known: &Whole<'_, R>,
-        sums: &mut [[f64; LANES]; 6],
-        &Pace { ratio, per_two_steps, .. }: &Pace<R>,
-    ) {
-        let (before, next, internal) =
-            (known.before.as_flattened(), self.next.as_flattened(), self.internal.as_flattened());
-        let (mass, damping) = (known.mass.as_flattened(), known.damping.as_flattened());
-        for first in (0..3 * BLOCK).step_by(3 * LANES) {
-            let mut parts = [[R::ZERO; LANES]; 4];
-            for part in 0..3 {
-                for lane in 0..LANES {
-                    let i = first + part * LANES + lane;
-                    let velocity = (before[i] * ratio + next[i]) * per_two_steps;
-                    let twice_kinetic = mass[i] * velocity * velocity;
-                    parts[0][lane] += twice_kinetic;
-                    parts[1][lane] += damping[i] * twice_kinetic;
-                    parts[2][lane] += internal[i] * before[i];
-                    parts[3][lane] += internal[i] * next[i];
-                }
-            }
-            for lane in 0..LANES {
-                sums[0][lane] += 0.5 * parts[0][lane].to_f64();
-                sums[1][lane] += parts[1][lane].to_f64();
-                sums[2][lane] += 0.5 * parts[2][lane].to_f64();
-                sums[3][lane] += 0.5 * parts[3][lane].to_f64();
-            }
-        }
-    }
-
-    /// Adds the halves of the external work.
-    #[allow(clippy::needless_range_loop)]
-    #[inline(always)]
-    fn add_push(&self, known: &Whole<'_, R>, sums: &mut [[f64; LANES]; 6]) {
-        let (before, next) = (known.before.as_flattened(), self.next.as_flattened());
-        let external = self.external.as_flattened();
-        for first in (0..3 * BLOCK).step_by(LANES) {
-            for lane in 0..LANES {
-                let i = first + lane;
-                sums[4][lane] += 0.5 * external[i].to_f64() * before[i].to_f64();
-                sums[5][lane] += 0.5 * external[i].to_f64() * next[i].to_f64();
-            }
-        }
-    }
 }
 
 impl<R: Scalar> CentralDifference<R> {
@@ -783,14 +511,21 @@ impl<R: Scalar> CentralDifference<R> {
         let mut next = std::mem::take(&mut self.next);
         let mut reaction = std::mem::take(&mut self.reaction);
         let mut sums = std::mem::take(&mut self.sums);
-        let increment = state.increment.par_chunks(CHUNK);
+        let (increment, pace) = (state.increment.par_chunks(CHUNK), Pace::new(self.lengths));
         (next.par_chunks_mut(CHUNK).zip(reaction.par_chunks_mut(CHUNK)).zip(increment).zip(&mut sums))
             .enumerate()
             .with_min_len(self.least_chunks())
             .for_each(|(task, (((next, reaction), before), sums))| {
+                let first = task * CHUNK;
                 *sums = self.processor.run(NodePass {
-                    stepper: self,
-                    first: task * CHUNK,
+                    first,
+                    pace,
+                    forces: &self.forces,
+                    applied: &self.applied,
+                    mass: &self.mass,
+                    damping: &self.damping,
+                    held: self.held_in(first..first + before.len()),
+                    factors: &self.factors,
                     before,
                     next,
                     reaction,
