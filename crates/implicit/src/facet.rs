@@ -761,4 +761,25 @@ mod tests {
         let [a, b, c] = rest();
         assert!(matches!(facet.place(&[a, c, b], &none), Err(Broken::Folded(angle)) if angle > 2.0));
     }
+
+    /// Beside a facet whose rotations have the other sign, which is the same rotation.
+    #[test]
+    fn packs_find_what_is_broken_and_nothing_else() {
+        let facets = vec![facet([0, 1, 2]); 4];
+        let (x, rotation) = pose(&mut Random::new(8), 0.3);
+        let negative = rotation.map(|turn| UnitQuaternion::new_unchecked(-turn.into_inner()));
+        let none = [UnitQuaternion::identity(); 3];
+        let [a, b, c] = rest();
+        let (nowhere, flat) = ([Vector3::repeat(f64::NAN); 3], [a, b, a]);
+        let poses = [(x, negative), (flat, none), ([a, c, b], none), (nowhere, none)];
+        let mut work = Work::new();
+        poses.iter().enumerate().for_each(|(lane, (x, turn))| work.put(lane, x, turn));
+        work.find(Arch::new(), &FacetPack::all(&facets)[0], 4, true);
+        let whole = evaluate(&facets[0], &(x, rotation)).1;
+        assert!((work.force(0).1 - whole).amax() < 1e-12 * whole.amax());
+        assert_eq!(work.broken(0), None);
+        assert!(matches!(work.broken(1), Some(Broken::Area(area)) if area.abs() < 1e-20));
+        assert!(matches!(work.broken(2), Some(Broken::Folded(angle)) if angle > 2.0));
+        assert!(matches!(work.broken(3), Some(Broken::Area(area)) if area.is_nan()));
+    }
 }
