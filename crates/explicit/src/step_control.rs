@@ -221,7 +221,7 @@ fn take_as_reference<R: Scalar>(
     enough: f64,
 ) -> f64 {
     let displacement: Vec<Vector<f64>> = state.displacement.iter().map(|&u| cast(u)).collect();
-    let limit = limit_about(model, owners, displacement, enough);
+    let limit = limit_about::<R>(model, owners, &displacement, enough);
     state.reference.clone_from(&state.displacement);
     state.stability.reference = Some((limit, state.steps));
     state.stability.critical_steps += 1;

@@ -657,8 +657,10 @@ mod tests {
                     work.take_tangent(lane, &mut tangent);
                     let (single_energy, single_force) = facet.force(placed);
                     let single = facet.hessian(placed);
+                    // Places are known to round-off, along which forces work.
+                    let work = single_force.amax() * x[0].metric_distance(&x[1]);
                     let off = [
-                        (energy - single_energy).abs() / single_energy.abs().max(1e-9),
+                        (energy - single_energy).abs() / single_energy.abs().max(work).max(1e-9),
                         (force - single_force).amax() / (facet.stiffness.amax() * size).max(1.0),
                         (tangent - single).amax() / single.amax(),
                     ];
