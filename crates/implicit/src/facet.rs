@@ -323,16 +323,6 @@ impl Facet {
         &self.tension.0
     }
 
-    /// Corners at rest in the facet's axes, relative to the centroid [m].
-    pub(crate) fn corners(&self) -> &Corners {
-        &self.corners
-    }
-
-    /// The rotation to the axes at rest.
-    pub(crate) fn turn(&self) -> &UnitQuaternion<f64> {
-        &self.axes
-    }
-
     /// Gradients of the shape functions at rest [1/m].
     pub(crate) fn gradient(&self) -> &[Vector2<f64>; 3] {
         &self.gradient
@@ -645,7 +635,8 @@ mod tests {
             let orders = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
             let facets: Vec<Facet> =
                 (0..11).map(|k| facet(orders[k % 3]).under_tension(10.0 * k as f64)).collect();
-            for (pack, own) in FacetPack::all(&facets).iter().zip(facets.chunks(PACK)) {
+            let packs = FacetPack::all(Arch::new(), &facets, |node| rest()[node as usize]);
+            for (pack, own) in packs.iter().zip(facets.chunks(PACK)) {
                 let mut work = Work::new();
                 let poses: Vec<Pose> = own.iter().map(|_| pose(&mut random, size)).collect();
                 poses.iter().enumerate().for_each(|(lane, (x, rotation))| work.put(lane, x, rotation));
@@ -776,7 +767,8 @@ mod tests {
         let poses = [(x, negative), (flat, none), ([a, c, b], none), (nowhere, none)];
         let mut work = Work::new();
         poses.iter().enumerate().for_each(|(lane, (x, turn))| work.put(lane, x, turn));
-        work.find(Arch::new(), &FacetPack::all(&facets)[0], 4, true);
+        let packs = FacetPack::all(Arch::new(), &facets, |node| rest()[node as usize]);
+        work.find(Arch::new(), &packs[0], 4, true);
         let whole = evaluate(&facets[0], &(x, rotation)).1;
         assert!((work.force(0).1 - whole).amax() < 1e-12 * whole.amax());
         assert_eq!(work.broken(0), None);

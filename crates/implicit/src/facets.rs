@@ -36,26 +36,27 @@ pub(crate) struct FacetPack {
     stiffness: [Pack; HALF],
     tension: [Pack; 18],
     gradient: [Pack; 6],
+    /// Corners and the rotation to the axes, (w, x, y, z), as [`Placing`] finds them there: a facet at rest then has exactly no deformation.
     corners: [Pack; 6],
-    /// The rotation to the axes, (w, x, y, z).
     turn: [Pack; 4],
 }
 
 impl FacetPack {
-    /// The facets of a model in their order.
-    pub(crate) fn all(facets: &[Facet]) -> Vec<Self> {
-        facets.chunks(PACK).map(Self::of).collect()
+    /// Facets in their order, with the positions [m] of nodes at rest.
+    pub(crate) fn all(arch: Arch, facets: &[Facet], rest: impl Fn(u32) -> Vector3<f64>) -> Vec<Self> {
+        facets.chunks(PACK).map(|facets| Self::of(arch, facets, &rest)).collect()
     }
 
-    fn of(facets: &[Facet]) -> Self {
-        let none = [0.0; PACK];
+    fn of(arch: Arch, facets: &[Facet], rest: impl Fn(u32) -> Vector3<f64>) -> Self {
+        let (none, one) = ([0.0; PACK], [1.0; PACK]);
         let mut pack = Self {
             stiffness: [none; HALF],
             tension: [none; 18],
             gradient: [none; 6],
             corners: [none; 6],
-            turn: [none; 4],
+            turn: [one, none, none, none],
         };
+        let mut work = Work::new();
         for (lane, facet) in facets.iter().enumerate() {
             for (row, column) in (0..18).flat_map(|row| (0..=row).map(move |column| (row, column))) {
                 pack.stiffness[place(row, column)][lane] = facet.stiffness()[(row, column)];
@@ -63,12 +64,15 @@ impl FacetPack {
             for (entry, own) in pack.tension.iter_mut().zip(facet.tension().iter()) {
                 entry[lane] = *own;
             }
-            for (k, (gradient, corner)) in pack.gradient.iter_mut().zip(&mut pack.corners).enumerate() {
-                gradient[lane] = facet.gradient()[k / 2][k % 2];
-                corner[lane] = facet.corners()[k / 2][k % 2];
+            for (k, entry) in pack.gradient.iter_mut().enumerate() {
+                entry[lane] = facet.gradient()[k / 2][k % 2];
             }
-            put_turn(&mut pack.turn, lane, facet.turn());
+            work.put(lane, &facet.nodes.map(&rest), &[UnitQuaternion::identity(); 3]);
         }
+        arch.dispatch(Placing { pack: &pack, work: &mut work });
+        pack.corners = work.local;
+        let back = [0, 1, 2, 3].map(|k| work.relative[k]);
+        pack.turn = [back[0], back[1].map(|x| -x), back[2].map(|y| -y), back[3].map(|z| -z)];
         pack
     }
 }

@@ -373,6 +373,7 @@ impl System {
         for turn in carried_turns(&model) {
             free[6 * turn.node as usize + 3..6 * turn.node as usize + 6].fill(false);
         }
+        let arch = Arch::new();
         Self {
             followers: Followers::of(&model, false),
             conditions: Conditions::default(),
@@ -401,8 +402,8 @@ impl System {
             results: [0, FACETS]
                 .map(|first| ChunkResults::new(FACETS.min(model.facets.len().saturating_sub(first)))),
             corners: model.facets.chunks(FACETS).map(corners_of).collect(),
-            packs: FacetPack::all(&model.facets),
-            arch: Arch::new(),
+            packs: FacetPack::all(arch, &model.facets, |node| model.place(node as usize)),
+            arch,
             phases: Phases::default(),
             last_solution: LinearReport::default(),
             solver: LinearSolver::Direct,

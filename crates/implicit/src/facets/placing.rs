@@ -45,10 +45,7 @@ fn place_corners<S: Simd>(simd: S, pack: &FacetPack, work: &mut Work, register: 
     let upright = cross(&along, &aside);
     let double_area = dot(&upright, &upright).sqrt();
     double_area.store(&mut work.double_area, register);
-    let unit = |v: &Three<S>, length: Lane<S>| {
-        let inverse = one.over(length);
-        three(|c| v[c] * inverse)
-    };
+    let unit = |v: &Three<S>, length: Lane<S>| three(|c| v[c].over(length));
     let normal = unit(&upright, double_area);
     let side = unit(&along, dot(&along, &along).sqrt());
     let across = cross(&normal, &side);
@@ -63,10 +60,9 @@ fn place_corners<S: Simd>(simd: S, pack: &FacetPack, work: &mut Work, register: 
     };
     let (sum, difference) = (f(0, 0) + f(1, 1), f(1, 0) - f(0, 1));
     let trace = (sum * sum).plus(difference, difference).sqrt();
-    let inverse = one.over(trace);
-    inverse.store(&mut work.trace, register);
-    let sine = zero.if_less(trace, difference * inverse, zero);
-    let cosine = zero.if_less(trace, sum * inverse, one);
+    one.over(trace).store(&mut work.trace, register);
+    let sine = zero.if_less(trace, difference.over(trace), zero);
+    let cosine = zero.if_less(trace, sum.over(trace), one);
     let axes = three(|c| {
         [(side[c] * cosine).plus(across[c], sine), (across[c] * cosine).less(side[c], sine), normal[c]]
     });
@@ -104,14 +100,14 @@ fn turn_of<S: Simd>(simd: S, m: &Square<S>) -> Turn<S> {
     [best[0] * scale, best[1] * scale, best[2] * scale, best[3] * scale]
 }
 
-/// a b.
+/// a b. Not fused: a rotation and its inverse have exactly no vector.
 #[inline(always)]
-fn product<S: Simd>([aw, ax, ay, az]: &Turn<S>, [bw, bx, by, bz]: &Turn<S>) -> Turn<S> {
+fn product<S: Simd>(&[aw, ax, ay, az]: &Turn<S>, &[bw, bx, by, bz]: &Turn<S>) -> Turn<S> {
     [
-        (*aw * *bw).less(*ax, *bx).less(*ay, *by).less(*az, *bz),
-        (*aw * *bx).plus(*ax, *bw).plus(*ay, *bz).less(*az, *by),
-        (*aw * *by).less(*ax, *bz).plus(*ay, *bw).plus(*az, *bx),
-        (*aw * *bz).plus(*ax, *by).less(*ay, *bx).plus(*az, *bw),
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
     ]
 }
 
