@@ -4,7 +4,7 @@
 //! times, and `fast` finds shapes at rest again. These counts say nothing about them.
 //!
 //! **Operations**: every +, −, × and ÷ on real numbers in the formulas of `law/`, `forces/` and the node pass of
-//! `stepper.rs`; a multiply-add is two. Not counted: index arithmetic, comparisons, and repeated subexpressions. With
+//! `node_pass.rs`; a multiply-add is two. Not counted: index arithmetic, comparisons, and repeated subexpressions. With
 //! N nodes per cell and 3 numbers per node:
 //!
 //! | part | operations | |

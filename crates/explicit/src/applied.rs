@@ -27,11 +27,13 @@ pub(crate) struct AppliedForces<R> {
     gravity: Vec<Vector<f64>>,
     /// Weights [N], one per node; empty without gravity.
     weight: Vec<Vector<R>>,
+    /// Whether an acceleration has changed since they were found.
+    stale: bool,
     body_of: Vec<u16>,
     grips: Vec<Grip>,
     /// Forces [N] from outside that stay, one a node; empty for none.
     given: Vec<Vector<f64>>,
-    /// Whether loads other than gravity, grips or given forces act, on any node.
+    /// Whether more than gravity acts: other loads, grips or given forces.
     loaded: bool,
     /// The blocks of nodes that forces were added to at this instant, and a mark of each block.
     added: Vec<u32>,
@@ -49,6 +51,7 @@ impl<R: Scalar> AppliedForces<R> {
             nodal: vec![[0.0; 3]; model.node_count()],
             gravity: vec![[0.0; 3]; model.bodies.len()],
             weight: vec![[R::ZERO; 3]; if weighs { model.node_count() } else { 0 }],
+            stale: false,
             loaded: false,
             added: Vec::new(),
             pushed: vec![false; model.node_count().div_ceil(BLOCK)],
@@ -132,9 +135,8 @@ impl<R: Scalar> AppliedForces<R> {
         model.give_back(&mut self.nodal);
     }
 
-    /// Finds the weights at a time [s], where they differ.
+    /// Finds the accelerations at a time [s], and weights where they are needed and differ.
     fn weigh(&mut self, time: f64) {
-        let mut differs = false;
         for (number, gravity) in self.gravity.iter_mut().enumerate() {
             let mut now = [0.0; 3];
             for load in &self.model.loads {
@@ -144,9 +146,10 @@ impl<R: Scalar> AppliedForces<R> {
                     now = add(now, scale(acceleration, load.curve.value(time)));
                 }
             }
-            differs |= now != std::mem::replace(gravity, now);
+            self.stale |= now != std::mem::replace(gravity, now);
         }
-        if differs {
+        if self.stale && !self.loaded {
+            self.stale = false;
             let nodes = self.weight.par_iter_mut().zip(&self.model.mass).zip(&self.body_of);
             nodes.with_min_len(WEIGHED).for_each(|((weight, &mass), &body)| {
                 *weight = scale(self.gravity[usize::from(body)], mass).map(R::of);
@@ -161,5 +164,47 @@ impl<R: Scalar> AppliedForces<R> {
         let mass = self.model.mass[node];
         let force = |c: usize| N::of(self.nodal[node][c] + mass * gravity[c]);
         [force(0), force(1), force(2)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pliant_mechanics::curve::{Curve, Shape};
+    use pliant_mechanics::load::Load;
+    use pliant_mechanics::model::Body;
+
+    use super::*;
+
+    /// Two bodies that fall at times of their own, over instants, while a force comes and goes: blocks have what their nodes have.
+    #[test]
+    fn forces_of_a_block_are_those_of_its_nodes() {
+        let mut model = Model::default();
+        let count = BLOCK + 40;
+        model.rest = vec![[0.0; 3]; count];
+        model.mass = (0..count).map(|node| 0.1 + node as f64).collect();
+        for (number, nodes) in [0..50, 50..count as u32].into_iter().enumerate() {
+            model.bodies.push(Body { name: number.to_string(), nodes, shared: vec![], damping: 0.0 });
+            let kind = LoadKind::Gravity { body: number, acceleration: [1.0, 0.0, -9.81] };
+            let curve = Curve { shape: Shape::Ramp, from: 0.0, to: 1.0 + number as f64 };
+            model.loads.push(Load { name: String::new(), kind, curve, surface: None, controlled: false });
+        }
+        let mut applied = AppliedForces::<f32>::new(Arc::new(model));
+        for step in 0..12 {
+            match step {
+                3 => applied.push(&vec![[0.5, 0.0, 0.1]; count]),
+                5 => applied.push(&[]),
+                _ => {}
+            }
+            applied.update(0.25 * f64::from(step), &vec![[0.0; 3]; count]);
+            if step == 7 {
+                applied.add(BLOCK as u32 + 3, [1.0, 2.0, 3.0]);
+            }
+            for nodes in [0..BLOCK, BLOCK..count] {
+                let mut found = [[0.0; 3]; BLOCK];
+                assert!(applied.act_at(nodes.clone(), &mut found));
+                let expected: Vec<Vector<f32>> = nodes.map(|node| applied.at(node)).collect();
+                assert_eq!(found[..expected.len()], expected[..], "{step}");
+            }
+        }
     }
 }

@@ -1,5 +1,5 @@
 //! The nodes of a step: their increments from the forces of an instant, what prescribed ones take to move, and the sums of which energies
-//! come. Plain loops over blocks of components, which the compiler makes wide.
+//! come.
 
 use pliant_mechanics::model::{Amplitudes, FREE, component, placed};
 use pliant_mechanics::tensor::Vector;

@@ -55,7 +55,7 @@ pub const KEEP: f64 = 0.97;
 pub const REFERENCE_EVERY: u64 = 1000;
 /// One in this many cells is checked closely, for each of the two orders …
 const SHARE: usize = 256;
-/// … and so many or a multiple: those of both orders fill a pack.
+/// … rounded up to a multiple of this, so that both orders fill packs.
 const LEAST: usize = PACK / 2;
 
 /// What a run does when the limit falls below its step.

@@ -285,6 +285,8 @@ struct Gradients {
     /// Iterations of the last pass.
     last: usize,
     times: DeviceTimes,
+    /// Whether a pattern found no room.
+    torn: bool,
 }
 
 impl std::fmt::Debug for Gradients {
@@ -318,6 +320,7 @@ impl Gradients {
             transfer: Transfer::default(),
             last: FIRST,
             times: DeviceTimes::default(),
+            torn: false,
         })
     }
 
@@ -451,14 +454,14 @@ impl Gradients {
 
 impl DeviceSolver for Gradients {
     fn arrange(&mut self, pattern: &BlockPattern<'_>) -> Result<(), DeviceError> {
-        let taken = self.take_pattern(pattern);
         // Some arrays may have found no room: none of them is used again.
-        if taken.is_err()
-            && let Ok(fresh) = Self::new(&self.device)
-        {
-            *self = Self { times: self.times, ..fresh };
+        if self.torn {
+            *self = Self { times: self.times, ..Self::new(&self.device).map_err(failed)? };
         }
-        taken.map_err(failed)
+        self.torn = true;
+        self.take_pattern(pattern).map_err(failed)?;
+        self.torn = false;
+        Ok(())
     }
 
     fn take(&mut self, values: &BlockValues<'_>) -> Result<(), DeviceError> {

@@ -319,7 +319,7 @@ fn find_direction(solver: &mut impl Contacting, raised: &mut f64) -> Result<(f64
         let system = solver.system();
         let by = *raised - added;
         if by > 0.0 {
-            system.matrix.add_to_diagonal(&|k| by * diagonal[k]);
+            system.matrix.add_to_each_diagonal(|k| by * diagonal[k]);
             added = *raised;
         }
         let definite = match system.prepare() {

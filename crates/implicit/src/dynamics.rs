@@ -557,7 +557,7 @@ impl BackwardEuler {
         let momentum = Momentum { model: &model, differences, start, moved, damping };
         let rate = |node: u32| 1.0 / (h * h) + damping[node as usize] / h;
         let components = &system.equations.component;
-        system.matrix.add_to_diagonal(&|equation| {
+        system.matrix.add_to_each_diagonal(|equation| {
             let (node, component) = (components[equation] / 6, components[equation] % 6);
             let masses = if component < 3 { &model.mass } else { &model.rotary_inertia };
             rate(node) * masses[node as usize]

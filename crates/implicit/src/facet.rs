@@ -755,6 +755,20 @@ mod tests {
         assert!(matches!(facet.place(&[a, c, b], &none), Err(Broken::Folded(angle)) if angle > 2.0));
     }
 
+    #[test]
+    fn packs_at_rest_have_no_deformation_at_all() {
+        let mut random = Random::new(9);
+        for _ in 0..20 {
+            let (corners, _) = pose(&mut random, 1.0);
+            let facet = Facet::new([0, 1, 2], corners, 0.1, MATERIAL, Formulation::default()).unwrap();
+            let packs = FacetPack::all(Arch::new(), &[facet], |node| corners[node as usize]);
+            let mut work = Work::new();
+            work.put(0, &corners, &[UnitQuaternion::identity(); 3]);
+            work.find(Arch::new(), &packs[0], 1, false);
+            assert_eq!(work.force(0), (0.0, Vector18::zeros()));
+        }
+    }
+
     /// Beside a facet whose rotations have the other sign, which is the same rotation.
     #[test]
     fn packs_find_what_is_broken_and_nothing_else() {

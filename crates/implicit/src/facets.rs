@@ -30,7 +30,7 @@ const fn place(row: usize, column: usize) -> usize {
     row * (row + 1) / 2 + column
 }
 
-/// What eight facets have at rest; the last of a model fill up their pack.
+/// What eight facets have at rest; lanes beyond the last one mean nothing.
 #[derive(Clone, Debug)]
 pub(crate) struct FacetPack {
     stiffness: [Pack; HALF],
@@ -97,7 +97,8 @@ pub(crate) struct Work {
     broken: [Option<Broken>; PACK],
     axes: [Pack; 9],
     local: [Pack; 6],
-    trace: Pack,
+    /// 1/(F11 + F22).
+    inverse_trace: Pack,
     theta: [Pack; 9],
     /// η and μ of the turns of nodes ([`spin_to_vector`](crate::rotation::spin_to_vector)).
     eta: [Pack; 3],
@@ -120,7 +121,7 @@ impl Work {
             broken: [None; PACK],
             axes: [none; 9],
             local: [none; 6],
-            trace: none,
+            inverse_trace: none,
             theta: [none; 9],
             eta: [none; 3],
             mu: [none; 3],
@@ -315,7 +316,7 @@ impl<S: Simd> Now<S> {
             let [x, y] = local[i];
             Sparse { xz: y, yz: -x, zx: -y, zy: x }
         });
-        let trace = load(&work.trace);
+        let trace = load(&work.inverse_trace);
         let mut spin = arm;
         let [p, q, r] = [local[0], local[1], local[2]];
         let double_area = ((q[0] - p[0]) * (r[1] - p[1])).less(r[0] - p[0], q[1] - p[1]);

@@ -91,6 +91,31 @@ impl Values<'_> {
         (Self { first, value, mirror }, Self { first: place, value: after, mirror: mirror_after })
     }
 
+    /// Adds a value to the diagonal entries of some columns, which are these.
+    fn add_diagonals(
+        self,
+        column_start: &[u32],
+        columns: Range<usize>,
+        value: &(impl Fn(usize) -> f64 + Sync),
+    ) {
+        if columns.len() <= ADDED {
+            for column in columns {
+                let (at, own) = (column_start[column] as usize - self.first, value(column));
+                self.value[at] += own;
+                if let Some(mirror) = self.mirror.get_mut(at) {
+                    *mirror += own;
+                }
+            }
+            return;
+        }
+        let middle = columns.start.midpoint(columns.end);
+        let (before, after) = self.split_at(column_start[middle] as usize);
+        rayon::join(
+            || before.add_diagonals(column_start, columns.start..middle, value),
+            || after.add_diagonals(column_start, middle..columns.end, value),
+        );
+    }
+
     /// Adds the columns of one of a cell's nodes.
     pub(crate) fn add(&mut self, equations: &Equations, cell: &Cell<'_>, node: usize) {
         match cell.components {
@@ -135,31 +160,6 @@ impl Values<'_> {
             }
         }
     }
-}
-
-/// Adds a value to the diagonal entries of some columns.
-fn add_to_diagonal(
-    values: Values<'_>,
-    column_start: &[u32],
-    columns: Range<usize>,
-    value: &(impl Fn(usize) -> f64 + Sync),
-) {
-    if columns.len() <= ADDED {
-        for column in columns {
-            let (at, own) = (column_start[column] as usize - values.first, value(column));
-            values.value[at] += own;
-            if let Some(mirror) = values.mirror.get_mut(at) {
-                *mirror += own;
-            }
-        }
-        return;
-    }
-    let middle = columns.start.midpoint(columns.end);
-    let (before, after) = values.split_at(column_start[middle] as usize);
-    rayon::join(
-        || add_to_diagonal(before, column_start, columns.start..middle, value),
-        || add_to_diagonal(after, column_start, middle..columns.end, value),
-    );
 }
 
 impl LowerMatrix {
@@ -338,11 +338,11 @@ impl LowerMatrix {
         }
     }
 
-    /// Adds a value to each diagonal entry.
-    pub(crate) fn add_to_diagonal(&mut self, value: &(impl Fn(usize) -> f64 + Sync)) {
+    /// Adds a value to the diagonal entry of each equation.
+    pub(crate) fn add_to_each_diagonal(&mut self, value: impl Fn(usize) -> f64 + Sync) {
         let equations = 0..self.len();
         let (values, column_start) = self.values();
-        add_to_diagonal(values, column_start, equations, value);
+        values.add_diagonals(column_start, equations, &value);
     }
 
     /// Adds to an entry of a matrix that is not symmetric, if the pattern has it.

@@ -39,7 +39,7 @@ use crate::touching::TouchingSystem;
 /// Cells of solids computed side by side before they are added up.
 const CHUNK: usize = 256;
 
-/// Facets found side by side while the nodes of those before take these up.
+/// Facets of a chunk: they are found while nodes take up the chunk before.
 const FACETS: usize = 128 * PACK;
 
 /// Time spent so far in the parts of a solver.

@@ -53,8 +53,8 @@ pub struct Options<'a> {
     pub picture: Option<&'a dyn Draw>,
 }
 
-/// Samples in the history, one for two pixels of its plot.
-const SAMPLES: f64 = 500.0;
+/// Samples in the history.
+const SAMPLES: f64 = 1000.0;
 /// Those of a run on a GPU, which has to stop for each.
 const SAMPLES_ON_DEVICE: f64 = 250.0;
 

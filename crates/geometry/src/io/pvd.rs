@@ -1,7 +1,7 @@
 //! The list of the files of a series (`.pvd`).
 
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use roxmltree::Node;
 
@@ -13,7 +13,7 @@ use super::{MeshFileError, MeshFileProblem, PVD_TAIL, Place, parse_xml};
 /// # Errors
 /// If it cannot be read, or where it is malformed.
 pub fn read_pvd(path: &Path) -> Result<Vec<(f64, PathBuf)>, MeshFileError> {
-    parse(path, &text(path)?)
+    parse(path, &fs::read_to_string(path).map_err(unreadable(path))?)
 }
 
 /// The same of a list whose writer may have been stopped: where its end is torn, the frames of its whole entries.
@@ -21,15 +21,17 @@ pub fn read_pvd(path: &Path) -> Result<Vec<(f64, PathBuf)>, MeshFileError> {
 /// # Errors
 /// As [`read_pvd`], if more than its end is torn.
 pub fn read_torn_pvd(path: &Path) -> Result<Vec<(f64, PathBuf)>, MeshFileError> {
-    let text = text(path)?;
+    let bytes = fs::read(path).map_err(unreadable(path))?;
+    // A name may be torn within a character.
+    let text = String::from_utf8_lossy(&bytes);
     parse(path, &text).or_else(|error| {
         let end = text.rfind("/>").ok_or(error)? + 2;
         parse(path, &format!("{}\n{PVD_TAIL}", &text[..end]))
     })
 }
 
-fn text(path: &Path) -> Result<String, MeshFileError> {
-    fs::read_to_string(path).map_err(|source| MeshFileError::Open { path: path.to_owned(), source })
+fn unreadable(path: &Path) -> impl Fn(io::Error) -> MeshFileError {
+    |source| MeshFileError::Open { path: path.to_owned(), source }
 }
 
 fn parse(path: &Path, text: &str) -> Result<Vec<(f64, PathBuf)>, MeshFileError> {

@@ -60,7 +60,7 @@ fn place_corners<S: Simd>(simd: S, pack: &FacetPack, work: &mut Work, register: 
     };
     let (sum, difference) = (f(0, 0) + f(1, 1), f(1, 0) - f(0, 1));
     let trace = (sum * sum).plus(difference, difference).sqrt();
-    one.over(trace).store(&mut work.trace, register);
+    one.over(trace).store(&mut work.inverse_trace, register);
     let sine = zero.if_less(trace, difference.over(trace), zero);
     let cosine = zero.if_less(trace, sum.over(trace), one);
     let axes = three(|c| {
@@ -100,14 +100,14 @@ fn turn_of<S: Simd>(simd: S, m: &Square<S>) -> Turn<S> {
     [best[0] * scale, best[1] * scale, best[2] * scale, best[3] * scale]
 }
 
-/// a b. Not fused: a rotation and its inverse have exactly no vector.
+/// a b. Neither fused nor in another order: the product of a rotation and its inverse has exactly no vector.
 #[inline(always)]
 fn product<S: Simd>(&[aw, ax, ay, az]: &Turn<S>, &[bw, bx, by, bz]: &Turn<S>) -> Turn<S> {
     [
         aw * bw - ax * bx - ay * by - az * bz,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
+        (aw * bx + ax * bw) + (ay * bz - az * by),
+        (aw * by + ay * bw) + (az * bx - ax * bz),
+        (aw * bz + az * bw) + (ax * by - ay * bx),
     ]
 }
 
