@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use pliant_mechanics::grip::Grip;
-use pliant_mechanics::load::LoadKind;
+use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::mapping::Displaced;
 use pliant_mechanics::model::Model;
 use pliant_mechanics::tensor::{Vector, add, scale};
@@ -27,8 +27,8 @@ pub(crate) struct AppliedForces<R> {
     gravity: Vec<Vector<f64>>,
     /// Weights [N], one per node; empty without gravity.
     weight: Vec<Vector<R>>,
-    /// Whether an acceleration has changed since they were found.
-    stale: bool,
+    /// The accelerations that they were found with.
+    weighed: Vec<Vector<f64>>,
     body_of: Vec<u16>,
     grips: Vec<Grip>,
     /// Forces [N] from outside that stay, one a node; empty for none.
@@ -40,9 +40,13 @@ pub(crate) struct AppliedForces<R> {
     pushed: Vec<bool>,
 }
 
+fn is_gravity(load: &Load) -> bool {
+    matches!(load.kind, LoadKind::Gravity { .. })
+}
+
 impl<R: Scalar> AppliedForces<R> {
     pub(crate) fn new(model: Arc<Model>) -> Self {
-        let weighs = model.loads.iter().any(|load| matches!(load.kind, LoadKind::Gravity { .. }));
+        let weighs = model.loads.iter().any(is_gravity);
         let mut body_of = vec![0; model.node_count()];
         for (index, body) in model.bodies.iter().enumerate() {
             body_of[body.nodes.start as usize..body.nodes.end as usize].fill(index as u16);
@@ -51,7 +55,7 @@ impl<R: Scalar> AppliedForces<R> {
             nodal: vec![[0.0; 3]; model.node_count()],
             gravity: vec![[0.0; 3]; model.bodies.len()],
             weight: vec![[R::ZERO; 3]; if weighs { model.node_count() } else { 0 }],
-            stale: false,
+            weighed: vec![[0.0; 3]; model.bodies.len()],
             loaded: false,
             added: Vec::new(),
             pushed: vec![false; model.node_count().div_ceil(BLOCK)],
@@ -80,8 +84,7 @@ impl<R: Scalar> AppliedForces<R> {
 
     fn see_whether_loaded(&mut self) {
         self.nodal.fill([0.0; 3]);
-        let mut loads = self.model.loads.iter();
-        let falls_only = loads.all(|load| matches!(load.kind, LoadKind::Gravity { .. }));
+        let falls_only = self.model.loads.iter().all(is_gravity);
         self.loaded = !(self.grips.is_empty() && self.given.is_empty() && falls_only);
     }
 
@@ -137,19 +140,15 @@ impl<R: Scalar> AppliedForces<R> {
 
     /// Finds the accelerations at a time [s], and weights where they are needed and differ.
     fn weigh(&mut self, time: f64) {
-        for (number, gravity) in self.gravity.iter_mut().enumerate() {
-            let mut now = [0.0; 3];
-            for load in &self.model.loads {
-                if let LoadKind::Gravity { body, acceleration } = load.kind
-                    && body == number
-                {
-                    now = add(now, scale(acceleration, load.curve.value(time)));
-                }
+        self.gravity.fill([0.0; 3]);
+        for load in &self.model.loads {
+            if let LoadKind::Gravity { body, acceleration } = load.kind {
+                let now = scale(acceleration, load.curve.value(time));
+                self.gravity[body] = add(self.gravity[body], now);
             }
-            self.stale |= now != std::mem::replace(gravity, now);
         }
-        if self.stale && !self.loaded {
-            self.stale = false;
+        if !self.loaded && self.weighed != self.gravity {
+            self.weighed.clone_from(&self.gravity);
             let nodes = self.weight.par_iter_mut().zip(&self.model.mass).zip(&self.body_of);
             nodes.with_min_len(WEIGHED).for_each(|((weight, &mass), &body)| {
                 *weight = scale(self.gravity[usize::from(body)], mass).map(R::of);
@@ -170,7 +169,6 @@ impl<R: Scalar> AppliedForces<R> {
 #[cfg(test)]
 mod tests {
     use pliant_mechanics::curve::{Curve, Shape};
-    use pliant_mechanics::load::Load;
     use pliant_mechanics::model::Body;
 
     use super::*;

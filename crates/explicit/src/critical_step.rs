@@ -113,7 +113,7 @@ pub(crate) fn assembled_about(
     owners: &[[u32; 3]],
     displacement: &[Vector<f64>],
 ) -> CriticalStep {
-    let mut operator = Operator::<f64>::new(model, owners, displacement, CENTRAL);
+    let mut operator = Operator::<f64>::new(model, owners, displacement, sized(model, CENTRAL));
     let started = std::time::Instant::now();
     let (eigenvalue, error) =
         largest_eigenvalue(&mut operator, Until::Accurate).unwrap_or((f64::NAN, f64::NAN));
@@ -140,7 +140,7 @@ pub(crate) fn limit_about<R: Scalar>(
     // Fibres that carry tension only have two slopes where they are slack.
     let smooth = model.solids.iter().all(|solid| solid.material.law.is_isotropic());
     let difference = if smooth { FORWARD } else { CENTRAL };
-    let mut operator = Operator::<f64>::new(model, owners, displacement, difference);
+    let mut operator = Operator::<f64>::new(model, owners, displacement, sized(model, difference));
     let found = largest_eigenvalue(&mut operator, Until::Enough(enough));
     found.map_or(f64::NAN, |(eigenvalue, _)| step_of(eigenvalue))
 }
@@ -154,11 +154,12 @@ fn limit_if_enough<R: Scalar>(
     enough: f64,
 ) -> Option<f64> {
     let farthest = displacement.as_flattened().iter().fold(0.0, |most: f64, u| most.max(u.abs()));
+    let difference = sized(model, IN_SINGLE);
     // Of large cells, which may be the critical ones where mass is scaled, differences are small.
-    if model.mass_scaling.is_some() || farthest * R::EPSILON > NOISE * amplitude(model, IN_SINGLE) {
+    if model.mass_scaling.is_some() || farthest * R::EPSILON > NOISE * difference.1 {
         return None;
     }
-    let mut operator = Operator::<R>::new(model, owners, displacement, IN_SINGLE);
+    let mut operator = Operator::<R>::new(model, owners, displacement, difference);
     let limit = step_of(largest_eigenvalue(&mut operator, Until::Decided(enough))?.0);
     (limit >= enough).then_some(limit)
 }
@@ -180,12 +181,12 @@ const IN_SINGLE: Difference = (CENTRAL.0, 2e-3);
 /// The most that rounding of displacements may take of it.
 const NOISE: f64 = 0.01;
 
-/// The largest displacement [m] of a difference.
-fn amplitude(model: &Model, (_, size): Difference) -> f64 {
+/// A difference of a model, with its largest displacement [m].
+fn sized(model: &Model, (moves, size): Difference) -> Difference {
     let sizes = model.solids.iter().flat_map(|solid| {
         (0..solid.cells.len()).map(|cell| solid.cells.gradient_square_sum(cell).sqrt().recip())
     });
-    size * sizes.fold(f64::INFINITY, f64::min)
+    (moves, size * sizes.fold(f64::INFINITY, f64::min))
 }
 
 /// The symmetric operator M^(−1/2) K M^(−1/2) on the free components, with forces in a precision.
@@ -193,6 +194,7 @@ struct Operator<'a, R> {
     model: &'a Model,
     /// The displacements [m] about which the model vibrates, tied nodes where their ties put them.
     about: Vec<Vector<f64>>,
+    /// With its largest displacement [m].
     difference: Difference,
     forces: InternalForces<R>,
     /// Forces [N] of the state, where a difference is taken from them.
@@ -201,8 +203,6 @@ struct Operator<'a, R> {
     /// M^(−1/2), zero on held components.
     inverse_root_mass: Vec<Vector<f64>>,
     displacement: Vec<Vector<R>>,
-    /// The largest displacement [m] of a difference.
-    amplitude: f64,
     calls: usize,
 }
 
@@ -227,18 +227,7 @@ impl<'a, R: Scalar> Operator<'a, R> {
             forces.evaluate(&displacement, &mut history);
             before.extend((0..about.len()).map(|node| forces.at(node)));
         }
-        Self {
-            model,
-            about,
-            difference,
-            forces,
-            before,
-            history,
-            inverse_root_mass,
-            displacement,
-            amplitude: amplitude(model, difference),
-            calls: 0,
-        }
+        Self { model, about, difference, forces, before, history, inverse_root_mass, displacement, calls: 0 }
     }
 
     fn apply(&mut self, v: &[Vector<f64>], out: &mut [Vector<f64>]) {
@@ -247,9 +236,10 @@ impl<'a, R: Scalar> Operator<'a, R> {
         };
         let pairs = v.par_iter().zip(&self.inverse_root_mass).with_min_len(SHARE);
         let largest = pairs.map(size).reduce(|| f64::MIN_POSITIVE, f64::max);
-        let h = self.amplitude / largest;
+        let (moves, amplitude) = self.difference;
+        let h = amplitude / largest;
         out.fill([0.0; 3]);
-        for &[side, weight] in self.difference.0 {
+        for &[side, weight] in moves {
             let moves = v.par_iter().zip(&self.inverse_root_mass);
             let nodes = self.displacement.par_iter_mut().zip(&self.about).zip(moves).with_min_len(SHARE);
             nodes.for_each(|((u, about), (v, w))| {
@@ -272,14 +262,14 @@ impl<'a, R: Scalar> Operator<'a, R> {
     }
 }
 
-/// How long the search for an eigenvalue goes on.
+/// When the search for an eigenvalue ends.
 #[derive(Clone, Copy, PartialEq)]
 enum Until {
-    /// To [`TOLERANCE`].
+    /// When it is right to [`TOLERANCE`].
     Accurate,
-    /// The same, or until the step [s] is at least this one, to [`ROUGH`].
+    /// The same, or when the step [s] is at least this one, to [`ROUGH`].
     Enough(f64),
-    /// Until it is, to [`ROUGH`]; in vain where it is not, or neither shows soon.
+    /// When it is, to [`ROUGH`]; in vain where it is not, or neither shows soon.
     Decided(f64),
 }
 
@@ -443,7 +433,7 @@ mod tests {
         of_deformed_cubes(|name, model, displacement| {
             let owners = model.constrained_components().unwrap();
             let own = [f64::INFINITY, 0.0].map(|enough| {
-                let mut operator = Operator::<f64>::new(model, &owners, displacement, CENTRAL);
+                let mut operator = Operator::<f64>::new(model, &owners, displacement, sized(model, CENTRAL));
                 largest_eigenvalue(&mut operator, Until::Enough(enough));
                 operator.calls
             });

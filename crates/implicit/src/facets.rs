@@ -44,10 +44,11 @@ pub(crate) struct FacetPack {
 impl FacetPack {
     /// Facets in their order, with the positions [m] of nodes at rest.
     pub(crate) fn all(arch: Arch, facets: &[Facet], rest: impl Fn(u32) -> Vector3<f64>) -> Vec<Self> {
-        facets.chunks(PACK).map(|facets| Self::of(arch, facets, &rest)).collect()
+        let mut work = Work::new();
+        facets.chunks(PACK).map(|facets| Self::of(arch, facets, &rest, &mut work)).collect()
     }
 
-    fn of(arch: Arch, facets: &[Facet], rest: impl Fn(u32) -> Vector3<f64>) -> Self {
+    fn of(arch: Arch, facets: &[Facet], rest: impl Fn(u32) -> Vector3<f64>, work: &mut Work) -> Self {
         let (none, one) = ([0.0; PACK], [1.0; PACK]);
         let mut pack = Self {
             stiffness: [none; HALF],
@@ -56,7 +57,6 @@ impl FacetPack {
             corners: [none; 6],
             turn: [one, none, none, none],
         };
-        let mut work = Work::new();
         for (lane, facet) in facets.iter().enumerate() {
             for (row, column) in (0..18).flat_map(|row| (0..=row).map(move |column| (row, column))) {
                 pack.stiffness[place(row, column)][lane] = facet.stiffness()[(row, column)];
@@ -69,7 +69,7 @@ impl FacetPack {
             }
             work.put(lane, &facet.nodes.map(&rest), &[UnitQuaternion::identity(); 3]);
         }
-        arch.dispatch(Placing { pack: &pack, work: &mut work });
+        arch.dispatch(Placing { pack: &pack, work });
         pack.corners = work.local;
         let back = [0, 1, 2, 3].map(|k| work.relative[k]);
         pack.turn = [back[0], back[1].map(|x| -x), back[2].map(|y| -y), back[3].map(|z| -z)];
@@ -316,14 +316,17 @@ impl<S: Simd> Now<S> {
             let [x, y] = local[i];
             Sparse { xz: y, yz: -x, zx: -y, zy: x }
         });
-        let trace = load(&work.inverse_trace);
+        let inverse_trace = load(&work.inverse_trace);
         let mut spin = arm;
         let [p, q, r] = [local[0], local[1], local[2]];
         let double_area = ((q[0] - p[0]) * (r[1] - p[1])).less(r[0] - p[0], q[1] - p[1]);
         let inverse = one.over(double_area);
         for (i, spin) in spin.iter_mut().enumerate() {
             let [a, b] = [local[(i + 1) % 3], local[(i + 2) % 3]];
-            let rest = [load(&pack.gradient[2 * i]) * trace, load(&pack.gradient[2 * i + 1]) * trace];
+            let rest = [
+                load(&pack.gradient[2 * i]) * inverse_trace,
+                load(&pack.gradient[2 * i + 1]) * inverse_trace,
+            ];
             // ∇N of the present shape: (y₂ − y₃, x₃ − x₂)/2A.
             *spin = Sparse {
                 xz: (b[0] - a[0]) * inverse,

@@ -39,7 +39,7 @@ use crate::touching::TouchingSystem;
 /// Cells of solids computed side by side before they are added up.
 const CHUNK: usize = 256;
 
-/// Facets of a chunk: they are found while nodes take up the chunk before.
+/// Facets per chunk. The next chunk is computed while the current one is assembled.
 const FACETS: usize = 128 * PACK;
 
 /// Time spent so far in the parts of a solver.

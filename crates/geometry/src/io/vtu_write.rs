@@ -59,11 +59,7 @@ pub fn save_vtu(path: &Path, mesh: &Mesh, options: &VtuOptions) -> Result<(), Me
 
 /// Writes a mesh again and again with other data: points, cells and sets, which stay, are encoded once. Each file is as [`write_vtu`] writes it.
 #[derive(Clone, Debug, Default)]
-pub struct VtuSeries {
-    lasting: Option<Lasting>,
-    /// Room for the text of a frame.
-    text: Vec<u8>,
-}
+pub struct VtuSeries(Option<Lasting>);
 
 impl VtuSeries {
     /// Writes the next frame into `writer`. Points, cells and sets are those of the first frame, of which they are checked.
@@ -75,15 +71,14 @@ impl VtuSeries {
     ) -> Result<(), MeshFileError> {
         let path = Path::new("stream.vtu");
         let failed = |source| MeshFileError::Write { path: path.to_owned(), source };
-        let Self { lasting, text } = self;
-        let lasting = match lasting {
+        let lasting = match &mut self.0 {
             Some(lasting) => lasting,
             first => {
                 check(path, mesh)?;
                 first.insert(Lasting::of(mesh, options).map_err(failed)?)
             }
         };
-        write_with(&mut writer, mesh, options, lasting, text).map_err(failed)
+        write_with(&mut writer, mesh, options, lasting).map_err(failed)
     }
 }
 
@@ -270,18 +265,11 @@ fn repeats(block: &[u8], width: usize) -> bool {
 
 /// Writes a mesh that was checked before.
 pub(super) fn write(out: &mut dyn Write, mesh: &Mesh, options: &VtuOptions) -> io::Result<()> {
-    write_with(out, mesh, options, &Lasting::of(mesh, options)?, &mut Vec::new())
+    write_with(out, mesh, options, &Lasting::of(mesh, options)?)
 }
 
-fn write_with(
-    out: &mut dyn Write,
-    mesh: &Mesh,
-    options: &VtuOptions,
-    lasting: &Lasting,
-    text: &mut Vec<u8>,
-) -> io::Result<()> {
-    text.clear();
-    let mut parts = Parts { xml: std::mem::take(text), compress: options.compress };
+fn write_with(out: &mut dyn Write, mesh: &Mesh, options: &VtuOptions, lasting: &Lasting) -> io::Result<()> {
+    let mut parts = Parts { xml: Vec::new(), compress: options.compress };
     let cells: usize = mesh.blocks.iter().map(|block| block.len()).sum();
     let compressor = if options.compress { " compressor=\"vtkZLibDataCompressor\"" } else { "" };
     parts.push("<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" ");
@@ -296,8 +284,7 @@ fn write_with(
     write_cell_data(&mut parts, mesh, options, cells, &lasting.cell_sets)?;
     parts.xml.extend_from_slice(&lasting.shape);
     parts.push("    </Piece>\n  </UnstructuredGrid>\n</VTKFile>\n");
-    *text = parts.xml;
-    out.write_all(text)
+    out.write_all(&parts.xml)
 }
 
 /// The time, and the names of labels and bodies: a text such as `5 liver` for each, as byte codes ended by a 0.
