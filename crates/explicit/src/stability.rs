@@ -112,8 +112,8 @@ struct Watch {
     square: Vec<Symmetric<Pack<f64>>>,
     /// 1/(|G| (λ+2μ) max(Δt_e, L)²) with the element bound Δt_e at rest: brings the guesses of all cells to one scale.
     weight: Vec<f64>,
-    /// The cells with their ranks in two orders; once they are picked, those that stand first come first.
-    order: [Vec<Ranked>; 2],
+    /// The cells with their [ranks](ranked) in two orders; once they are picked, those that stand first come first.
+    order: [Vec<u64>; 2],
     /// The cells that are checked closely, those of the first order before those of the second, their limits [s] and references.
     picked: Vec<u32>,
     found: Vec<(f64, Stiffness)>,
@@ -197,18 +197,13 @@ impl Monitor {
     }
 }
 
-/// A cell with its rank.
-#[derive(Clone, Copy, Debug, Default)]
-struct Ranked {
-    rank: f64,
-    cell: u32,
-}
-
-impl Ranked {
-    /// The larger rank first; cells of equal rank by number, so that the choice does not depend on what came before.
-    fn first(a: &Self, b: &Self) -> std::cmp::Ordering {
-        b.rank.total_cmp(&a.rank).then(a.cell.cmp(&b.cell))
-    }
+/// A rank and its cell as one number, which is less for a larger rank; of equal ranks, in single precision, for a lower cell. So the choice
+/// does not depend on what came before.
+fn ranked(rank: f64, cell: u32) -> u64 {
+    let bits = (rank as f32).to_bits();
+    // Of negative numbers all bits count down, of others the sign stands above.
+    let grown = if bits >> 31 == 1 { !bits } else { bits | 1 << 31 };
+    u64::from(!grown) << 32 | u64::from(cell)
 }
 
 impl Watch {
@@ -226,7 +221,7 @@ impl Watch {
             hourglass: (0..count).map(|cell| hourglass_modulus(solid, cell)).collect(),
             weight: (0..count).map(weight).collect(),
             square: square.chunks(PACK).map(packed).collect(),
-            order: [vec![Ranked::default(); count], vec![Ranked::default(); count]],
+            order: [vec![0; count], vec![0; count]],
             picked: vec![0; 2 * picked(count)],
             found: vec![(0.0, Stiffness::default()); 2 * picked(count)],
         }
@@ -272,11 +267,11 @@ impl Watch {
     /// Picks the cells that stand first in each order.
     fn pick(&mut self) {
         let half = self.picked.len() / 2;
-        let pick = |order: &mut Vec<Ranked>, picked: &mut [u32]| {
+        let pick = |order: &mut Vec<u64>, picked: &mut [u32]| {
             if half < order.len() {
-                order.select_nth_unstable_by(half, Ranked::first);
+                order.select_nth_unstable(half);
             }
-            picked.iter_mut().zip(order).for_each(|(picked, own)| *picked = own.cell);
+            picked.iter_mut().zip(order).for_each(|(picked, own)| *picked = *own as u32);
         };
         let [speeds, stretches] = &mut self.order;
         let (before, after) = self.picked.split_at_mut(half);
@@ -470,8 +465,8 @@ struct Ranks<'a, R> {
     bulk: f64,
     rest: f64,
     /// By the squared speed of an isotropic guess, and by the squared stretch.
-    speeds: &'a mut [Ranked],
-    stretches: &'a mut [Ranked],
+    speeds: &'a mut [u64],
+    stretches: &'a mut [u64],
 }
 
 impl<R: Scalar> LaneWork<f64> for Ranks<'_, R> {
@@ -504,8 +499,8 @@ impl<R: Scalar> LaneWork<f64> for Ranks<'_, R> {
         }
         for (lane, (speeds, stretches)) in self.speeds.iter_mut().zip(self.stretches).enumerate() {
             let cell = (self.first + lane) as u32;
-            *speeds = Ranked { rank: speed.0[lane] * self.weight[lane], cell };
-            *stretches = Ranked { rank: along[lane].unwrap_or(stretch.0[lane]), cell };
+            *speeds = ranked(speed.0[lane] * self.weight[lane], cell);
+            *stretches = ranked(along[lane].unwrap_or(stretch.0[lane]), cell);
         }
     }
 }
@@ -518,4 +513,19 @@ fn product_square<N: Number>(a: &Symmetric<N>, b: &Symmetric<N>) -> N {
     dot(product.0[0], transposed.0[0])
         + dot(product.0[1], transposed.0[1])
         + dot(product.0[2], transposed.0[2])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn larger_ranks_come_first_and_lower_cells_of_equal_ones() {
+        // 1 + 1e-9 is 1 in single precision.
+        let ranks =
+            [f64::NAN, f64::INFINITY, 2e9, 1.0 + 1e-6, 1.0, 1.0 + 1e-9, 1e-30, 0.0, -0.0, -1e-30, -1.0];
+        let order: Vec<u64> = (0..).zip(ranks).map(|(cell, rank)| ranked(rank, cell)).collect();
+        assert!(order.is_sorted(), "{order:x?}");
+        assert!((0..).zip(&order).all(|(cell, &own)| own as u32 == cell));
+    }
 }

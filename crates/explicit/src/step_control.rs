@@ -1,12 +1,11 @@
 //! Steps against the largest stable one: watches the limit, cuts steps into parts, and keeps the clock.
 
 use pliant_mechanics::model::Model;
-use pliant_mechanics::tensor::{Vector, cast};
 use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
 use crate::critical_step::limit_about;
-use crate::forces::Deformed;
+use crate::forces::{Deformed, InternalForces};
 use crate::stability::{CHANGE, CHECK_EVERY, Monitor, OnUnstable, RESERVE, StepLimit, substeps};
 use crate::state::State;
 use crate::step_error::StepError;
@@ -157,11 +156,23 @@ impl StepControl {
         state: &mut State<R>,
         deformed: &Deformed,
     ) {
+        self.look_with(model, owners, None, state, deformed);
+    }
+
+    /// The same with what has found the forces of the state, which it still has afterwards.
+    pub(crate) fn look_with<R: Scalar>(
+        &mut self,
+        model: &Model,
+        owners: &[[u32; 3]],
+        forces: Option<&mut InternalForces<R>>,
+        state: &mut State<R>,
+        deformed: &Deformed,
+    ) {
         let Some(monitor) = &mut self.monitor else { return };
         monitor.refer_to(state);
         if let Some((mut limit, solid, cell)) = monitor.limit(model, &state.displacement, &state.reference) {
             if monitor.doubts(state, limit, self.step, self.substeps) {
-                limit = take_as_reference(model, owners, state, self.step / RESERVE);
+                limit = take_as_reference(model, owners, forces, state, self.step / RESERVE);
             }
             let look = StepLimit { time: state.time, limit, solid, cell };
             state.stability.note(look, *deformed, state.steps);
@@ -217,11 +228,11 @@ impl StepControl {
 fn take_as_reference<R: Scalar>(
     model: &Model,
     owners: &[[u32; 3]],
+    forces: Option<&mut InternalForces<R>>,
     state: &mut State<R>,
     enough: f64,
 ) -> f64 {
-    let displacement: Vec<Vector<f64>> = state.displacement.iter().map(|&u| cast(u)).collect();
-    let limit = limit_about::<R>(model, owners, &displacement, enough);
+    let limit = limit_about(model, owners, forces, &state.displacement, enough);
     state.reference.clone_from(&state.displacement);
     state.stability.reference = Some((limit, state.steps));
     state.stability.critical_steps += 1;

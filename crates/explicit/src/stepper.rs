@@ -340,7 +340,7 @@ impl<R: Scalar> CentralDifference<R> {
     /// Looks at the limit where one is due, and chooses the parts of the step to come.
     fn watch(&mut self, state: &mut State<R>, deformed: &Deformed) -> Result<(), StepError> {
         if self.control.is_due(state, deformed) && !self.control.pass(state, deformed) {
-            self.control.look(&self.model, &self.owners, state, deformed);
+            self.control.look_with(&self.model, &self.owners, Some(&mut self.forces), state, deformed);
         }
         let below = self.control.choose(&self.model, state);
         self.control.note(state);

@@ -484,6 +484,14 @@ impl<R: Scalar> InternalForces<R> {
         found
     }
 
+    /// Lends this to find other forces; afterwards the forces on nodes are those of before again.
+    pub(crate) fn lend<T>(&mut self, to: impl FnOnce(&mut Self) -> T) -> T {
+        let forces = self.forces.clone();
+        let made = to(self);
+        self.forces = forces;
+        made
+    }
+
     /// Relaxes from now on over steps of `step` seconds.
     pub(crate) fn set_step(&mut self, model: &Model, step: f64) {
         for (field, solid) in self.fields.iter_mut().zip(&model.solids) {
