@@ -121,35 +121,33 @@ impl<'a, R: Scalar> Recovery<'a, R> {
     /// Σ V ψ over all cells [J], without what hourglass control holds. The number of threads never changes a bit.
     pub fn stored_energy(&self) -> f64 {
         let of_solid = |(index, solid): (usize, &Solid)| {
-            let densities = if takes_packs(&solid.cells) {
-                let of_pack = |found: Found| from_fn::<_, PACK, _>(|lane| found.energy_density(lane));
-                self.packs(index, of_pack).into_flattened()
-            } else {
-                let cells = (0..solid.cells.len()).into_par_iter();
-                cells.map(|cell| self.cell(index, cell).energy_density).collect()
-            };
+            let densities = self.numbers(index, 1, |_, fields, to| to[0] = fields.energy_density);
             (0..solid.cells.len()).map(|cell| solid.cells.volume(cell) * densities[cell]).sum::<f64>()
         };
         self.model.solids.iter().enumerate().map(of_solid).sum()
     }
 
-    /// The fields of all cells of a solid.
-    pub fn cells(&self, solid: usize) -> Vec<CellFields> {
+    /// `width` numbers of each cell of a solid, which `of` writes from its number and fields: fields of all cells would take a lot of memory.
+    pub fn numbers(
+        &self,
+        solid: usize,
+        width: usize,
+        of: impl Fn(usize, &CellFields, &mut [f64]) + Sync,
+    ) -> Vec<f64> {
         let part = &self.model.solids[solid];
-        let cells = (0..part.cells.len()).into_par_iter();
-        if takes_packs(&part.cells) {
-            let packs = self.packs(solid, |found| found);
-            cells.map(|cell| packs[cell / PACK].fields(part, cell, cell % PACK)).collect()
-        } else {
-            cells.map(|cell| self.cell(solid, cell)).collect()
-        }
-    }
-
-    /// All packs of cells with one point, made something of.
-    fn packs<T: Send>(&self, solid: usize, of: impl Fn(Found) -> T + Sync) -> Vec<T> {
-        let count = self.model.solids[solid].cells.len();
-        let pack = |pack: usize| self.pack(solid, |lane| (pack * PACK + lane).min(count - 1));
-        (0..count.div_ceil(PACK)).into_par_iter().map(|number| of(pack(number))).collect()
+        let count = part.cells.len();
+        let mut numbers = vec![0.0; count * width];
+        numbers.par_chunks_mut(PACK * width.max(1)).enumerate().for_each(|(pack, numbers)| {
+            let first = pack * PACK;
+            let cells = (first..).zip(numbers.chunks_exact_mut(width));
+            if takes_packs(&part.cells) {
+                let found = self.pack(solid, |lane| (first + lane).min(count - 1));
+                cells.for_each(|(cell, to)| of(cell, &found.fields(part, cell, cell - first), to));
+            } else {
+                cells.for_each(|(cell, to)| of(cell, &self.cell(solid, cell), to));
+            }
+        });
+        numbers
     }
 
     /// The fields of one cell of a solid, means over its points.
@@ -286,11 +284,6 @@ struct Found {
 }
 
 impl Found {
-    /// Strain energy per reference volume [J/m³] of a lane.
-    fn energy_density(&self, lane: usize) -> f64 {
-        self.energy.isochoric.0[lane] + self.energy.volumetric.0[lane]
-    }
-
     /// The fields of a lane, which has a cell.
     fn fields(&self, solid: &Solid, cell: usize, lane: usize) -> CellFields {
         let symmetric = |of: &Symmetric<Pack<f64>>| Symmetric(of.0.each_ref().map(|entry| entry.0[lane]));
@@ -302,7 +295,7 @@ impl Found {
             green_strain: symmetric(&self.green_strain),
             pk2_stress: symmetric(&self.pk2_stress),
             cauchy_stress: symmetric(&self.cauchy_stress),
-            energy_density: self.energy_density(lane),
+            energy_density: self.energy.isochoric.0[lane] + self.energy.volumetric.0[lane],
             fibre,
             fibre_stretch: fibre.map(|_| self.fibre_stretch.0[lane]),
             thickness: None,

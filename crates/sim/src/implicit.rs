@@ -774,8 +774,8 @@ impl Instant for Implicit {
         self.energies
     }
 
-    fn cells(&self, steps: bool) -> Option<Box<dyn CellsNow + '_>> {
-        Some(Box::new(SolidCells::new(&self.model, self.solids.as_ref()?, steps)))
+    fn cells(&self) -> Option<Box<dyn CellsNow + '_>> {
+        Some(Box::new(SolidCells::new(&self.model, self.solids.as_ref()?)))
     }
 
     fn shells(&self) -> Option<&State> {

@@ -105,8 +105,8 @@ pub trait Instant {
     /// Energies [J].
     fn energies(&self) -> Energies;
 
-    /// Finds the fields of cells of solids, where there are some; their stable steps, too, if these are wanted.
-    fn cells(&self, _steps: bool) -> Option<Box<dyn CellsNow + '_>> {
+    /// Finds the fields of cells of solids, where there are some.
+    fn cells(&self) -> Option<Box<dyn CellsNow + '_>> {
         None
     }
 
@@ -190,9 +190,16 @@ pub struct Effort {
 
 /// Finds fields of cells at an instant.
 pub trait CellsNow: Sync {
-    /// The fields of a cell of a solid, with its stable step [s] if it is wanted.
-    fn at(&self, solid: usize, cell: usize) -> CellFields;
+    /// The fields of a cell of a solid; its stable step [s], too, if it is wanted.
+    fn at(&self, solid: usize, cell: usize, step: bool) -> CellFields;
 
-    /// The same of all cells of a solid.
-    fn of(&self, solid: usize) -> Vec<CellFields>;
+    /// `width` numbers of each cell of a solid, which `of` writes from its fields. Stable steps [s] are among these if `steps` are wanted; they
+    /// cost far more than the rest.
+    fn numbers(
+        &self,
+        solid: usize,
+        steps: bool,
+        width: usize,
+        of: &(dyn Fn(&CellFields, &mut [f64]) + Sync),
+    ) -> Vec<f64>;
 }

@@ -204,8 +204,8 @@ impl<R: Numeric> Instant for Solids<R> {
         *self.solver.observable().energies()
     }
 
-    fn cells(&self, steps: bool) -> Option<Box<dyn CellsNow + '_>> {
-        Some(Box::new(SolidCells::new(&self.model, &self.state, steps)))
+    fn cells(&self) -> Option<Box<dyn CellsNow + '_>> {
+        Some(Box::new(SolidCells::new(&self.model, &self.state)))
     }
 
     fn is_single(&self) -> bool {
@@ -238,29 +238,34 @@ pub(crate) struct SolidCells<'a, R> {
     recovery: Recovery<'a, R>,
     model: &'a Model,
     displacement: &'a [[R; 3]],
-    /// Whether stable steps are wanted, which cost far more than the rest.
-    steps: bool,
 }
 
 impl<'a, R: Scalar> SolidCells<'a, R> {
-    pub(crate) fn new(model: &'a Model, state: &'a State<R>, steps: bool) -> Self {
-        Self { recovery: Recovery::new(model, state), model, displacement: &state.displacement, steps }
+    pub(crate) fn new(model: &'a Model, state: &'a State<R>) -> Self {
+        Self { recovery: Recovery::new(model, state), model, displacement: &state.displacement }
     }
 }
 
 impl<R: Scalar> CellsNow for SolidCells<'_, R> {
-    fn at(&self, solid: usize, cell: usize) -> CellFields {
-        let stable_step = self.steps.then(|| cell_limit(self.model, solid, cell, self.displacement));
+    fn at(&self, solid: usize, cell: usize, step: bool) -> CellFields {
+        let stable_step = step.then(|| cell_limit(self.model, solid, cell, self.displacement));
         CellFields { stable_step, ..self.recovery.cell(solid, cell) }
     }
 
-    fn of(&self, solid: usize) -> Vec<CellFields> {
-        let mut cells = self.recovery.cells(solid);
-        if self.steps {
-            let steps = cell_limits(self.model, solid, self.displacement);
-            cells.iter_mut().zip(steps).for_each(|(cell, step)| cell.stable_step = Some(step));
+    fn numbers(
+        &self,
+        solid: usize,
+        steps: bool,
+        width: usize,
+        of: &(dyn Fn(&CellFields, &mut [f64]) + Sync),
+    ) -> Vec<f64> {
+        if !steps {
+            return self.recovery.numbers(solid, width, |_, fields, to| of(fields, to));
         }
-        cells
+        let steps = cell_limits(self.model, solid, self.displacement);
+        self.recovery.numbers(solid, width, |cell, fields, to| {
+            of(&CellFields { stable_step: Some(steps[cell]), ..*fields }, to);
+        })
     }
 }
 

@@ -150,10 +150,10 @@ impl Parts {
     fn array(&mut self, kind: &str, name: &str, components: usize, raw: &[u8]) -> io::Result<()> {
         let name = escaped(name);
         // Of real numbers some arrays are not worth compressing.
-        let width = match kind {
-            "Float32" => Some(4),
-            "Float64" => Some(8),
-            _ => None,
+        let repeats: fn(&[u8]) -> bool = match kind {
+            "Float32" => repeats::<4>,
+            "Float64" => repeats::<8>,
+            _ => |_: &[u8]| true,
         };
         write!(self.xml, "        <DataArray type=\"{kind}\" Name=\"{name}\"")?;
         if components != 1 {
@@ -168,12 +168,12 @@ impl Parts {
             let mut compressed = Vec::with_capacity(raw.len() / 2);
             for block in raw.chunks(BLOCK) {
                 let before = compressed.len();
-                if width.is_some_and(|width| !repeats(block, width)) {
-                    store(block, &mut compressed);
-                } else {
+                if repeats(block) {
                     let mut encoder = ZlibEncoder::new(&mut compressed, Compression::new(LEVEL));
                     encoder.write_all(block)?;
                     encoder.finish()?;
+                } else {
+                    store(block, &mut compressed);
                 }
                 head.push((compressed.len() - before) as u64);
             }
@@ -247,20 +247,21 @@ fn store(bytes: &[u8], to: &mut Vec<u8>) {
     to.extend(adler32(&bytes).to_be_bytes());
 }
 
-/// Whether at least one in [`REPEATED`] numbers of a block was met shortly before, as zlib needs it to save space.
-fn repeats(block: &[u8], width: usize) -> bool {
+/// Whether at least one in [`REPEATED`] numbers of so many bytes was met shortly before in a block, as zlib needs it to save space.
+fn repeats<const WIDTH: usize>(block: &[u8]) -> bool {
     const SLOTS: usize = 1024;
     let mut seen = [u64::MAX; SLOTS];
     let mut again = 0;
-    for number in block.chunks_exact(width) {
+    let (numbers, _) = block.as_chunks::<WIDTH>();
+    for number in numbers {
         let mut bits = [0; 8];
-        bits[..width].copy_from_slice(number);
+        bits[..WIDTH].copy_from_slice(number);
         let bits = u64::from_le_bytes(bits);
         // Fibonacci hashing.
         let slot = (bits.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - SLOTS.ilog2())) as usize;
         again += usize::from(std::mem::replace(&mut seen[slot], bits) == bits);
     }
-    again * REPEATED >= block.len() / width
+    again * REPEATED >= numbers.len()
 }
 
 /// Writes a mesh that was checked before.

@@ -141,7 +141,7 @@ fn sheared(fibres: &str, prony: Prony, rate: Rate) -> Result<Vec<Symmetric<f64>>
     let (step, mut stresses) = (SHEAR / (rate * steps), Vec::new());
     run(&element.model, Precision::Double, step, 1.0 / rate, |frame| {
         for now in frame.parts().map(|(_, now)| now).filter(|now| now.steps() % steps as u64 == 0) {
-            stresses.extend(now.cells(false).map(|cells| cells.at(0, 0).pk2_stress));
+            stresses.extend(now.cells().map(|cells| cells.at(0, 0, false).pk2_stress));
         }
     })?;
     Ok(stresses)

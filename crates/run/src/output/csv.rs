@@ -239,7 +239,7 @@ impl Columns {
         let of_cells: Vec<FieldName> =
             self.probes.iter().flat_map(|probe| &probe.fields).filter(|f| !f.is_nodal()).copied().collect();
         let cells_wanted = !of_cells.is_empty();
-        let cells = cells_wanted.then(|| frame.cells(of_cells.contains(&FieldName::ElementStep))).flatten();
+        let cells = cells_wanted.then(|| frame.cells()).flatten();
         if let (true, Some(part), Some(state)) = (cells_wanted, &frame.built().implicit, frame.now.shells()) {
             self.shells.fill(&part.model, state, &of_cells);
         }
@@ -473,7 +473,9 @@ impl Probe {
         row: &mut Vec<f64>,
     ) {
         let recovered = cells.zip(self.cell.as_ref()).and_then(|(cells, place)| match *place {
-            Place::Solid(solid, cell) => Some(cells.at(solid, cell)),
+            Place::Solid(solid, cell) => {
+                Some(cells.at(solid, cell, self.fields.contains(&FieldName::ElementStep)))
+            }
             Place::Facet(_) | Place::Carried(..) => None,
         });
         for &field in &self.fields {

@@ -9,7 +9,7 @@ use pliant_sim::contact::touch::Rigid;
 use pliant_sim::{BodyCells, ImplicitBodies};
 
 use super::merged::merged;
-use super::{Frame, fields};
+use super::{CellNumbers, Frame, fields};
 use pliant_scene::format::{At, BodyModel, FieldName, VtuTable};
 use pliant_scene::{Built, World};
 
@@ -296,14 +296,12 @@ fn fill_surface(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], surfac
     if of_cells.is_empty() {
         return;
     }
-    let Some(recovered) = frame.cells(of_cells.contains(&FieldName::ElementStep)) else { return };
+    let Some(recovered) = frame.cells() else { return };
     let mut averages = Averages::new(model.node_count(), &of_cells);
     for (index, solid) in model.solids.iter().enumerate() {
-        for (cell, found) in recovered.of(index).iter().enumerate() {
-            let volume = solid.cells.volume(cell);
-            for (slot, &field) in of_cells.iter().enumerate() {
-                let value = &fields::of_cell(found, field)[..field.components()];
-                averages.add(slot, solid.cells.nodes(cell), value, volume);
+        for (slot, found) in recovered.of(index, &of_cells).iter().enumerate() {
+            for cell in 0..solid.cells.len() {
+                averages.add(slot, solid.cells.nodes(cell), found.at(cell), solid.cells.volume(cell));
             }
         }
     }
@@ -490,21 +488,28 @@ fn fill_cells(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], at: At, 
         return;
     }
     let model = &frame.built().model;
-    let Some(recovered) = frame.cells(wanted.contains(&FieldName::ElementStep)) else { return };
-    let found = |&(solid, cell): &(u32, u32)| &recovered.of(solid as usize)[cell as usize];
+    let Some(recovered) = frame.cells() else { return };
+    let mut found: Vec<Vec<CellNumbers>> = vec![Vec::new(); model.solids.len()];
+    for &(solid, _) in cells.iter().flatten() {
+        let own = &mut found[solid as usize];
+        if own.is_empty() {
+            *own = recovered.of(solid as usize, &wanted);
+        }
+    }
     let mut averages = Averages::new(mesh.points.len(), &wanted);
     for (block, places) in mesh.blocks.iter_mut().zip(cells) {
         for (slot, &field) in wanted.iter().enumerate() {
             let components = field.components();
+            let value = |&(solid, cell): &(u32, u32)| found[solid as usize][slot].at(cell as usize);
             if at == At::Cells {
-                let values = joined(places, components, |place| fields::of_cell(found(place), field));
+                let mut values = Vec::with_capacity(places.len() * components);
+                places.iter().for_each(|place| values.extend_from_slice(value(place)));
                 block.data.insert(field.name().into(), DataArray { components, values });
                 continue;
             }
             for (index, place) in places.iter().enumerate() {
                 let volume = model.solids[place.0 as usize].cells.volume(place.1 as usize);
-                let value = &fields::of_cell(found(place), field)[..components];
-                averages.add(slot, block.cell(index), value, volume);
+                averages.add(slot, block.cell(index), value(place), volume);
             }
         }
     }

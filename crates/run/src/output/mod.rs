@@ -15,8 +15,10 @@ mod strains;
 mod summary;
 mod vtu;
 
-use std::cell::OnceCell;
+use std::cell::{OnceCell, RefCell};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use pliant_explicit::recover::CellFields;
 use pliant_sim::{CellsNow, Instant, Simulation};
@@ -39,6 +41,7 @@ pub(crate) use outputs::Outputs;
 pub(crate) use plot::{MOST_CURVES, Reactions, constraints, plot, plot_of_sweep};
 pub(crate) use summary::{bodies, interrupted, markdown, output_failure, summarise, told_limit};
 
+use pliant_scene::format::FieldName;
 use pliant_scene::{Built, Part, World};
 
 /// An output that could not be written.
@@ -65,19 +68,19 @@ impl OutputError {
 pub(crate) struct Frame<'a> {
     pub part: &'a Part,
     pub now: &'a dyn Instant,
-    /// Fields of its cells, without and with stable steps, once an output has asked for them.
-    cells: [OnceCell<Option<Recovered<'a>>>; 2],
+    /// Fields of its cells, once an output has asked for some.
+    cells: OnceCell<Option<Recovered<'a>>>,
 }
 
 impl<'a> Frame<'a> {
     pub(crate) fn new(part: &'a Part, now: &'a dyn Instant) -> Self {
-        Self { part, now, cells: Default::default() }
+        Self { part, now, cells: OnceCell::new() }
     }
 
-    /// Fields of the cells of its solids, with their stable steps if these are wanted; `None` where it has none.
-    fn cells(&self, steps: bool) -> Option<&Recovered<'a>> {
-        let find = || Some(Recovered::new(self.now.cells(steps)?, self.built().model.solids.len()));
-        self.cells[usize::from(steps)].get_or_init(find).as_ref()
+    /// Fields of the cells of its solids; `None` where it has none.
+    fn cells(&self) -> Option<&Recovered<'a>> {
+        let find = || Some(Recovered::new(self.now.cells()?, self.built().model.solids.len()));
+        self.cells.get_or_init(find).as_ref()
     }
 
     fn built(&self) -> &Built {
@@ -93,22 +96,65 @@ impl<'a> Frame<'a> {
 /// Fields of cells of solids, found once for all outputs that show the instant.
 struct Recovered<'a> {
     now: Box<dyn CellsNow + 'a>,
-    solids: Vec<OnceCell<Vec<CellFields>>>,
+    /// Those of each solid that were asked for.
+    solids: Vec<RefCell<Vec<(FieldName, CellNumbers)>>>,
 }
 
 impl<'a> Recovered<'a> {
     fn new(now: Box<dyn CellsNow + 'a>, solids: usize) -> Self {
-        Self { now, solids: vec![OnceCell::new(); solids] }
+        Self { now, solids: vec![RefCell::default(); solids] }
     }
 
     /// Those of one cell of a solid.
-    fn at(&self, solid: usize, cell: usize) -> CellFields {
-        self.now.at(solid, cell)
+    fn at(&self, solid: usize, cell: usize, step: bool) -> CellFields {
+        self.now.at(solid, cell, step)
     }
 
-    /// Those of all cells of a solid.
-    fn of(&self, solid: usize) -> &[CellFields] {
-        self.solids[solid].get_or_init(|| self.now.of(solid))
+    /// Some of all cells of a solid. Those that nobody has asked for before take one pass over the cells together.
+    fn of(&self, solid: usize, wanted: &[FieldName]) -> Vec<CellNumbers> {
+        let mut known = self.solids[solid].borrow_mut();
+        let mut missing: Vec<FieldName> = Vec::new();
+        for &field in wanted {
+            if !missing.contains(&field) && known.iter().all(|(known, _)| *known != field) {
+                missing.push(field);
+            }
+        }
+        if !missing.is_empty() {
+            let width = missing.iter().map(|field| field.components()).sum();
+            let steps = missing.contains(&FieldName::ElementStep);
+            let numbers = self.now.numbers(solid, steps, width, &|found, mut to| {
+                for &field in &missing {
+                    let (own, rest) = to.split_at_mut(field.components());
+                    own.copy_from_slice(&fields::of_cell(found, field)[..own.len()]);
+                    to = rest;
+                }
+            });
+            let (numbers, mut first) = (Rc::new(numbers), 0);
+            for field in missing {
+                let own = first..first + field.components();
+                first = own.end;
+                known.push((field, CellNumbers { numbers: Rc::clone(&numbers), width, own }));
+            }
+        }
+        let find = |field: &FieldName| known.iter().find(|(known, _)| known == field);
+        wanted.iter().filter_map(find).map(|(_, numbers)| numbers.clone()).collect()
+    }
+}
+
+/// A field of all cells of a solid.
+#[derive(Clone)]
+struct CellNumbers {
+    /// This field and others, cell by cell.
+    numbers: Rc<Vec<f64>>,
+    /// Numbers of a cell, and where this field is among them.
+    width: usize,
+    own: Range<usize>,
+}
+
+impl CellNumbers {
+    /// The components in a cell.
+    fn at(&self, cell: usize) -> &[f64] {
+        &self.numbers[cell * self.width..][self.own.clone()]
     }
 }
 
@@ -146,4 +192,69 @@ pub(crate) enum Written {
     },
     /// Frames of a series: their times [s].
     Frames(Vec<f64>),
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use pliant_explicit::State;
+    use pliant_explicit::recover::Recovery;
+    use pliant_scene::Scene;
+    use pliant_scene::source::Source;
+
+    use super::*;
+
+    const CUBE: &str = "[scene]\nuntil = 0.1\n[law.tissue]\ntype = \"neo-hookean\"\nyoung-modulus = 3e3\npoisson-ratio = 0.45\n[body.cube]\nmesh = \
+         { block = { size = [0.1, 0.1, 0.1], cells = [3, 3, 3] }, as = \"hexes\" }\nlaw = \"tissue\"\ndensity = 1000\n";
+
+    /// Cells of one solid, and how often all are asked.
+    struct Counted<'a>(Recovery<'a, f64>, &'a AtomicUsize);
+
+    impl CellsNow for Counted<'_> {
+        fn at(&self, solid: usize, cell: usize, step: bool) -> CellFields {
+            CellFields { stable_step: step.then_some(1e-3 * cell as f64), ..self.0.cell(solid, cell) }
+        }
+
+        fn numbers(
+            &self,
+            solid: usize,
+            steps: bool,
+            width: usize,
+            of: &(dyn Fn(&CellFields, &mut [f64]) + Sync),
+        ) -> Vec<f64> {
+            self.1.fetch_add(1, Ordering::Relaxed);
+            self.0.numbers(solid, width, |cell, _, to| of(&self.at(solid, cell, steps), to))
+        }
+    }
+
+    #[test]
+    fn fields_of_cells_are_found_once_and_in_any_order() {
+        use FieldName::{ElementStep, GreenStrain, VonMises};
+        let scene = Scene::from_source(Source::parse("cube.toml", CUBE).unwrap(), ".".into()).unwrap();
+        let built = pliant_scene::build(&scene).unwrap_or_else(|errors| panic!("{}", errors.plain()));
+        let model = &*built.model;
+        let mut state = State::<f64>::at_rest(model);
+        state
+            .displacement
+            .iter_mut()
+            .zip(&model.rest)
+            .for_each(|(u, x)| *u = [0.1 * x[1], 0.2 * x[0] * x[2], 0.0]);
+        let passes = AtomicUsize::new(0);
+        let recovered = Recovered::new(Box::new(Counted(Recovery::new(model, &state), &passes)), 1);
+        for (wanted, after) in [
+            (vec![VonMises, GreenStrain], 1),
+            (vec![ElementStep, GreenStrain, ElementStep, VonMises], 2),
+            (vec![GreenStrain, ElementStep], 2),
+        ] {
+            let found = recovered.of(0, &wanted);
+            assert_eq!((found.len(), passes.load(Ordering::Relaxed)), (wanted.len(), after));
+            for cell in 0..model.cell_count() {
+                let fields = recovered.at(0, cell, true);
+                for (field, found) in wanted.iter().zip(&found) {
+                    assert_eq!(found.at(cell), &fields::of_cell(&fields, *field)[..field.components()]);
+                }
+            }
+        }
+    }
 }

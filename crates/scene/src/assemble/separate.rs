@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3 as Vector;
 use pliant_explicit::State;
-use pliant_explicit::recover::{CellFields, Recovery};
+use pliant_explicit::recover::Recovery;
 use pliant_geometry::{Locator, SurfaceLocator, Vector3};
 use pliant_mechanics::model::FREE;
 use pliant_sim::contact::pairs::{Pairs, Surface};
@@ -204,9 +204,11 @@ impl Builder<'_> {
         let model = Arc::clone(&self.assembly.model);
         let state = State { displacement: displacement.to_vec(), ..start };
         let recovery = Recovery::new(&model, &state);
-        // Of bars it is not a number.
-        let is_inverted = |fields: &CellFields| fields.cell_volume_ratio <= 0.0;
-        let inverted = |(index, own)| Some((own, recovery.cells(index).iter().position(is_inverted)?));
+        let inverted = |(index, own)| {
+            let ratios = recovery.numbers(index, 1, |_, fields, to| to[0] = fields.cell_volume_ratio);
+            // Of bars it is not a number.
+            Some((own, ratios.iter().position(|&ratio| ratio <= 0.0)?))
+        };
         let found = model.solids.iter().enumerate().find_map(inverted);
         let Some((own, cell)) = found else { return Some(()) };
         let message = format!(
