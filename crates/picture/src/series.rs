@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use pliant_geometry::io::{MeshFileError, read, read_pvd};
+use pliant_geometry::io::{MeshFileError, read, read_torn_pvd};
 use pliant_geometry::{Labels, Mesh, RegionNames, Vector3};
 
 use crate::arrows::{self, PointForce, arrow_note, arrow_unit, contact_forces, largest_force};
@@ -153,7 +153,8 @@ impl Series {
             }
         };
         let list = folder.join(format!("{name}.pvd"));
-        let frames = read_pvd(&list)?;
+        // A run that was stopped as it wrote there left whole frames, too.
+        let frames = read_torn_pvd(&list)?;
         if frames.is_empty() {
             return Err(SeriesError::NoFrames(list));
         }
@@ -453,4 +454,24 @@ fn fields(mesh: &Mesh) -> Vec<String> {
     names.sort_unstable();
     names.dedup();
     names
+}
+
+#[cfg(test)]
+mod tests {
+    use pliant_geometry::io::pvd_text;
+
+    use super::*;
+
+    #[test]
+    fn a_list_whose_writer_was_stopped_shows_its_whole_frames() {
+        let folder = tempfile::tempdir().unwrap();
+        let files = [0.0, 0.1, 0.2].map(|time| (time, format!("fields/{time}.vtu")));
+        let list = pvd_text(files.into_iter()).unwrap();
+        let frames = |text: &str| {
+            std::fs::write(folder.path().join("fields.pvd"), text).unwrap();
+            Series::find(folder.path(), None).map(|series| series.frames.len()).ok()
+        };
+        let last = list.find("0.2.vtu").unwrap();
+        assert_eq!([frames(&list), frames(&list[..last]), frames("<VTKFile")], [Some(3), Some(2), None]);
+    }
 }
