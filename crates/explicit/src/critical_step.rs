@@ -454,6 +454,7 @@ fn largest_ritz_pair(alphas: &[f64], betas: &[f64]) -> (f64, f64) {
 mod tests {
     use pliant_mechanics::law::samples::law;
     use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
+    use pliant_mechanics::model::Material;
     use pliant_mechanics::tensor::{Tensor, scale};
     use pliant_testing::Random;
     use serde_json::json;
@@ -548,6 +549,30 @@ mod tests {
         assert!((0..).zip(&of_run).all(|(node, &force)| forces.at(node) == force), "{name}");
         assert_eq!(lent, found, "{name}");
         found
+    }
+
+    /// Beside a soft cell of a tenth of a millimetre, differences in cells of 0.1 m are below the round-off of single precision.
+    #[test]
+    fn a_small_cell_that_is_not_critical_leaves_the_search_to_double_precision() {
+        let mut model = distorted_cube("tet4", laws()[0]);
+        let first = model.node_count() as u32;
+        model.rest.extend([[1.0, 0.0, 0.0], [1.0001, 0.0, 0.0], [1.0, 0.0001, 0.0], [1.0, 0.0, 0.0001]]);
+        model.mass.resize(model.rest.len(), 0.0);
+        model.bodies[0].nodes.end += 4;
+        let cells = Cells::tet4(vec![[0, 1, 2, 3].map(|node| first + node)], &model.rest);
+        let volumetric = Volumetric::quadratic(5e-4);
+        let law = AnyLaw::NeoHookean(NeoHookean { shear: 7e-5, volumetric });
+        let material = Material { law, ..model.solids[0].material.clone() };
+        model.add_solid(Solid { body: 0, material, cells, fibre: vec![], original: vec![0] });
+        let [smallest, critical] = cell_sizes(&model);
+        assert!(smallest < 1e-4 && critical > 0.01, "{smallest} {critical}");
+        let (owners, at_rest) =
+            (model.constrained_components().unwrap(), vec![[0.0_f32; 3]; model.node_count()]);
+        let step = assembled(&model).unwrap().step;
+        let mut forces = InternalForces::new(&model, step);
+        assert_eq!(limit_if_enough(&model, &owners, &mut forces, &at_rest, 0.5 * step), None);
+        let found = limit_about(&model, &owners, Some(&mut forces), &at_rest, 1.03 * step) / step;
+        assert!((found - 1.0).abs() < TOLERANCE, "{found}");
     }
 
     #[test]
