@@ -502,8 +502,7 @@ fn fill_cells(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], at: At, 
             let components = field.components();
             let value = |&(solid, cell): &(u32, u32)| found[solid as usize][slot].at(cell as usize);
             if at == At::Cells {
-                let mut values = Vec::with_capacity(places.len() * components);
-                places.iter().for_each(|place| values.extend_from_slice(value(place)));
+                let values = joined(places, components, value);
                 block.data.insert(field.name().into(), DataArray { components, values });
                 continue;
             }
@@ -519,9 +518,9 @@ fn fill_cells(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], at: At, 
 }
 
 /// The first components of the values of some items, one after another.
-fn joined<T>(items: &[T], components: usize, value: impl Fn(&T) -> fields::Value) -> Vec<f64> {
+fn joined<T, V: AsRef<[f64]>>(items: &[T], components: usize, value: impl Fn(&T) -> V) -> Vec<f64> {
     let mut values = Vec::with_capacity(items.len() * components);
-    items.iter().for_each(|item| values.extend_from_slice(&value(item)[..components]));
+    items.iter().for_each(|item| values.extend_from_slice(&value(item).as_ref()[..components]));
     values
 }
 
