@@ -252,6 +252,16 @@ impl BackwardEuler {
         self.system.take_pairs(pairs)
     }
 
+    /// Values of the older matrix whose factors precondition the next one, if there is one: without them another solver takes other iterations.
+    pub fn factored(&self) -> Option<&[f64]> {
+        self.system.factored()
+    }
+
+    /// Takes the [factors](Self::factored) of another solver with the same [pairs](Self::take_contact_pairs): to continue with the same bits.
+    pub fn precondition_with(&mut self, values: Vec<f64>) {
+        self.system.precondition_with(values);
+    }
+
     /// Looks at a flag from now on, before each solution, and stops where it asks.
     pub fn stop_on(&mut self, flag: &StopFlag) {
         self.system.stop = flag.clone();
@@ -419,6 +429,10 @@ impl BackwardEuler {
         let time = state.time + h;
         self.moved.fill(0.0);
         if !self.system.damper.is_empty() {
+            // Without friction, which the step has yet to find.
+            if let Some(touching) = &mut self.system.touching {
+                touching.stand(state);
+            }
             self.system.evaluate(state, time, Some(&self.pending))?;
             self.system.take_damper();
         }

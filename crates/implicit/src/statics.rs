@@ -228,6 +228,16 @@ impl Statics {
         self.direction[..direction.len()].copy_from_slice(direction);
     }
 
+    /// Values of the older matrix whose factors precondition the next one, if there is one: without them another solver takes other iterations.
+    pub fn factored(&self) -> Option<&[f64]> {
+        self.system.factored()
+    }
+
+    /// Takes the [factors](Self::factored) of another solver with the same [pairs](Self::take_contact_pairs): to continue with the same bits.
+    pub fn precondition_with(&mut self, values: Vec<f64>) {
+        self.system.precondition_with(values);
+    }
+
     /// Looks at a flag from now on, before each solution, and stops where it asks.
     pub fn stop_on(&mut self, flag: &StopFlag) {
         self.system.stop = flag.clone();

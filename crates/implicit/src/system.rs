@@ -317,6 +317,18 @@ impl System {
         }
     }
 
+    /// Values of the older matrix whose factors precondition the next one, if there is one.
+    pub(crate) fn factored(&self) -> Option<&[f64]> {
+        self.workspace.as_ref()?.factored()
+    }
+
+    /// Takes the factors of a matrix with these values as preconditioner of the next one.
+    pub(crate) fn precondition_with(&mut self, values: Vec<f64>) {
+        if let Some(workspace) = &mut self.workspace {
+            workspace.precondition_with(values, &mut self.matrix);
+        }
+    }
+
     /// Takes a pattern with these pairs of nodes for contacts.
     pub(crate) fn take_pairs(&mut self, pairs: Vec<[u32; 2]>) -> Result<(), SolveError> {
         match &mut self.touching {

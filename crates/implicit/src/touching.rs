@@ -252,6 +252,7 @@ impl TouchingSystem {
         let shifts = self.lags.iter().map(|lag| (lag.number() as u32, [lag.now(); 2]));
         *self.barriers.shifts_mut() = shifts.collect();
         self.begin(state, &still, [state.time; 2]);
+        self.barriers.drop_friction();
         self.share = 1.0;
     }
 

@@ -164,6 +164,23 @@ impl SolverMethod {
         }
     }
 
+    /// Values of the older matrix whose factors precondition the next one, if there is one.
+    fn factored(&self) -> Option<&[f64]> {
+        match self {
+            Self::Static(solver, _) => solver.factored(),
+            Self::Implicit(solver, _) => solver.factored(),
+            Self::Explicit(_) => None,
+        }
+    }
+
+    fn precondition_with(&mut self, values: Vec<f64>) {
+        match self {
+            Self::Static(solver, _) => solver.precondition_with(values),
+            Self::Implicit(solver, _) => solver.precondition_with(values),
+            Self::Explicit(_) => {}
+        }
+    }
+
     fn take_contact_pairs(&mut self, pairs: Vec<[u32; 2]>) -> Result<(), SolveError> {
         match self {
             Self::Static(solver, _) => solver.take_contact_pairs(pairs),
@@ -611,6 +628,7 @@ impl Implicit {
             legs,
             path,
             lags,
+            factored,
             entered,
         } = remembered;
         self.method.take_lags(lags);
@@ -635,16 +653,19 @@ impl Implicit {
         if let Some(own) = self.method.touching_mut() {
             *own.legs_mut() = legs.into_iter().collect();
         }
-        let Some(ContactState { forces, totals, moments, energy, touches, pairs, lags }) = contact else {
-            return Ok(());
-        };
-        let gap = touches.iter().map(|own| own.gap).reduce(f64::min);
-        if let Some(own) = self.method.touching_mut() {
-            own.go_on_from(touches.clone(), lags);
+        if let Some(ContactState { forces, totals, moments, energy, touches, pairs, lags }) = contact {
+            let gap = touches.iter().map(|own| own.gap).reduce(f64::min);
+            if let Some(own) = self.method.touching_mut() {
+                own.go_on_from(touches.clone(), lags);
+            }
+            self.touching = Some(TouchingNow { forces, totals, moments, energy, gap, nodes: touches });
+            let taken = self.method.take_contact_pairs(pairs);
+            taken.map_err(|error| failure(&error, &self.model, &self.bodies, self.time))?;
         }
-        self.touching = Some(TouchingNow { forces, totals, moments, energy, gap, nodes: touches });
-        let taken = self.method.take_contact_pairs(pairs);
-        taken.map_err(|error| failure(&error, &self.model, &self.bodies, self.time))
+        if let Some(values) = factored {
+            self.method.precondition_with(values);
+        }
+        Ok(())
     }
 
     fn snapshot(&self) -> ImplicitState {
@@ -683,6 +704,7 @@ impl Implicit {
                 ..self.path.clone()
             },
             lags: self.method.lags().to_vec(),
+            factored: self.method.factored().map(<[f64]>::to_vec),
             entered: self.entered,
         }
     }

@@ -97,6 +97,8 @@ pub(crate) struct ImplicitState {
     pub path: Path,
     /// How far moved nodes whose force is limited are behind their motion, and volumes whose pressure is limited behind their growth.
     pub lags: Vec<Lag>,
+    /// Values of the older matrix whose factors precondition the next one.
+    pub factored: Option<Vec<f64>>,
     /// Whether forces were found at the instant, so that their work is entered.
     pub entered: bool,
 }

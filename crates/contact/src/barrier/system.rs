@@ -209,6 +209,11 @@ impl Barriers {
         self.hold();
     }
 
+    /// Drops friction until the next step begins: a state by itself has none.
+    pub fn drop_friction(&mut self) {
+        self.held.clear();
+    }
+
     /// Puts nodes at places [m], and rigid things where they are at a share of the step.
     fn put(&mut self, position: &[Vector3<f64>], share: f64) {
         let [from, to, now] = &mut self.stances;

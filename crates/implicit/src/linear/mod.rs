@@ -75,6 +75,8 @@ pub(crate) struct Workspace {
     /// Whether the factors are of some matrix, and so may serve as preconditioner; of the matrix prepared.
     current: bool,
     fresh: bool,
+    /// Values of the matrix whose factors serve later matrices; empty where factors are made for each.
+    factored: Vec<f64>,
     /// For conjugate gradients.
     blocks: Option<BlockMatrix>,
     coarse: Option<Coarse>,
@@ -140,6 +142,7 @@ impl Workspace {
             },
             current: false,
             fresh: false,
+            factored: Vec::new(),
             coarse,
             on_device,
             left_to_cpu: before.map_or(0, |before| before.left_to_cpu),
@@ -194,8 +197,26 @@ impl Workspace {
         if let Some(factors) = &mut self.factors {
             self.pivots = factors.factorise(matrix).ok_or(LinearError::NotFinite)?;
         }
+        if self.blocks.is_some() {
+            self.factored.clone_from(&matrix.value);
+        }
         (self.current, self.fresh) = (true, true);
         Ok(())
+    }
+
+    /// Values of the older matrix whose factors precondition the next one, if there is one.
+    pub(crate) fn factored(&self) -> Option<&[f64]> {
+        (self.current && !self.factored.is_empty()).then_some(&self.factored)
+    }
+
+    /// Takes the factors of a matrix of this pattern with other values as preconditioner of the next one. Values that have none are left.
+    pub(crate) fn precondition_with(&mut self, mut values: Vec<f64>, matrix: &mut LowerMatrix) {
+        if self.blocks.is_some() && self.factors.is_some() && values.len() == matrix.value.len() {
+            std::mem::swap(&mut matrix.value, &mut values);
+            self.current = self.factorise(matrix).is_ok();
+            self.fresh = false;
+            std::mem::swap(&mut matrix.value, &mut values);
+        }
     }
 
     /// x ← A⁻¹ b for the matrix that was prepared; conjugate gradients start from the multiple of
