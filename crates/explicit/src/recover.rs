@@ -6,7 +6,7 @@ use std::array::from_fn;
 use pliant_mechanics::element::{Cord, Rest, Sheet};
 use pliant_mechanics::law::plane_stress::InPlane;
 use pliant_mechanics::law::{Deformation, Law, MOST_FAMILIES, Split, with_law};
-use pliant_mechanics::model::{Averaging, Cells, FREE, LocalNodes, Material, Model, Solid, with_cells};
+use pliant_mechanics::model::{Averaging, Cells, LocalNodes, Material, Model, Solid, with_cells};
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cast, cross, dot, scale, sub};
 use rayon::prelude::*;
 
@@ -76,17 +76,10 @@ pub struct Recovery<'a, R> {
     averages: Vec<Averages>,
 }
 
-/// The energy [J] stored in a state whose free nodes start displaced, with that of hourglass control [J]; `owners` are the constraints of the
-/// components of nodes.
-pub fn stored_at_start<R: Scalar>(
-    model: &Model,
-    owners: &[[u32; 3]],
-    state: &State<R>,
-    hourglass: f64,
-) -> f64 {
-    let mut nodes = state.displacement.iter().zip(owners);
-    let moved = |(u, owner): (&Vector<R>, &[u32; 3])| (0..3).any(|c| owner[c] == FREE && u[c] != R::ZERO);
-    if nodes.any(moved) { Recovery::new(model, state).stored_energy() + hourglass } else { 0.0 }
+/// The energy [J] stored in a state whose nodes start displaced, with that of hourglass control [J].
+pub fn stored_at_start<R: Scalar>(model: &Model, state: &State<R>, hourglass: f64) -> f64 {
+    let is_moved = state.displacement.iter().flatten().any(|&u| u != R::ZERO);
+    if is_moved { Recovery::new(model, state).stored_energy() + hourglass } else { 0.0 }
 }
 
 /// What the cells of a solid take from averages.

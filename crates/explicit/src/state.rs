@@ -3,8 +3,8 @@
 use pliant_contact::lag::Lag;
 use pliant_contact::pose::Leg;
 use pliant_contact::touch::Gripped;
-use pliant_mechanics::model::{self, FREE, Model, placed};
-use pliant_mechanics::tensor::Vector;
+use pliant_mechanics::model::{self, Constraint, FREE, Model, Motion, fill, placed};
+use pliant_mechanics::tensor::{Vector, add};
 use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
@@ -68,20 +68,54 @@ pub struct Work {
     pub(crate) damping_power: f64,
 }
 
+/// Puts nodes with a prescribed mean or around a prescribed volume where they are at time 0, by displacements [m].
+fn place_collective(model: &Model, own: &Constraint, owners: &[[u32; 3]], displacement: &mut [Vector<f64>]) {
+    let missing = own.missing_mean(0.0, |node| displacement[node as usize]);
+    for &node in &own.nodes {
+        displacement[node as usize] = add(displacement[node as usize], missing);
+    }
+    let Motion::Volume { enclosure, by, curve } = &own.motion else { return };
+    let volume = |displacement: &[Vector<f64>], gradient: &mut [f64]| {
+        let place = |at: u32| {
+            let node = own.nodes[at as usize] as usize;
+            add(model.rest[node], displacement[node])
+        };
+        let mut along = vec![[0.0; 3]; own.nodes.len()];
+        let volume = enclosure.add_gradient(place, &mut along);
+        for ((to, from), &node) in gradient.chunks_exact_mut(3).zip(along).zip(&own.nodes) {
+            (0..3).for_each(|c| to[c] = if owners[node as usize][c] == FREE { from[c] } else { 0.0 });
+        }
+        volume
+    };
+    let advance = |displacement: &mut [Vector<f64>], gradient: &[f64], part: f64| {
+        for (by, &node) in gradient.chunks_exact(3).zip(&own.nodes) {
+            (0..3).for_each(|c| displacement[node as usize][c] += part * by[c]);
+        }
+    };
+    let mut gradient = vec![0.0; 3 * own.nodes.len()];
+    let wanted = volume(&vec![[0.0; 3]; model.node_count()], &mut gradient) + by * curve.value(0.0);
+    fill(displacement, wanted, &mut gradient, volume, advance);
+}
+
 impl<R: Scalar> State<R> {
-    /// At rest at time 0, prescribed nodes where their motion starts.
+    /// At rest at time 0, prescribed nodes and all that follows them where their motion starts. Nodes of a mean shift together, those around a
+    /// prescribed volume along its gradient.
     pub fn at_rest(model: &Model) -> Self {
-        let mut displacement = vec![[R::ZERO; 3]; model.node_count()];
+        let mut displacement = vec![[0.0; 3]; model.node_count()];
         if let Ok(owners) = model.constrained_components() {
             let amplitudes = model.amplitudes(&owners);
-            for ((u, owner), amplitudes) in displacement.iter_mut().zip(owners).zip(amplitudes) {
+            for ((u, owner), amplitudes) in displacement.iter_mut().zip(&owners).zip(amplitudes) {
                 for component in (0..3).filter(|&c| owner[c] != FREE) {
                     let motion = &model.constraints[owner[component] as usize].motion;
-                    u[component] =
-                        R::of(placed(model::component(&amplitudes, component), motion.factors(0.0)));
+                    u[component] = placed(model::component(&amplitudes, component), motion.factors(0.0));
                 }
             }
+            for own in &model.constraints {
+                place_collective(model, own, &owners, &mut displacement);
+            }
         }
+        model.follow(&mut displacement);
+        let displacement = displacement.into_iter().map(|u| u.map(R::of)).collect();
         Self {
             time: 0.0,
             steps: 0,

@@ -320,16 +320,19 @@ impl<R: Scalar> CentralDifference<R> {
         self.applied.update(state.time, &state.displacement);
         self.set_factors(state.time);
         if state.is_at_start() {
-            let stored = stored_at_start(&self.model, &self.owners, state, found.hourglass);
+            let stored = stored_at_start(&self.model, state, found.hourglass);
             self.start(state, stored);
             // Half of a step's force moves a node in the first one: its other half is in the increment before.
             if self.touch(state, 0.5) {
                 self.start(state, stored);
             }
+            if self.bind(state) {
+                self.start(state, stored);
+            }
         } else {
             self.touch(state, 1.0);
+            self.bind(state);
         }
-        self.bind(state);
         self.pass_over_nodes(state);
         let sums = self.sums.iter().fold(Sums::default(), Sums::merge);
         self.check_state(state, &sums, &found)?;
@@ -477,13 +480,19 @@ impl<R: Scalar> CentralDifference<R> {
     }
 
     /// Adds the forces of collective constraints, from where their nodes would go without them.
-    fn bind(&mut self, state: &State<R>) {
+    fn bind(&mut self, state: &State<R>) -> bool {
         let mut collectives = std::mem::take(&mut self.collectives);
+        let at_start = state.is_at_start();
         for own in &mut collectives {
             let then = self.factors[own.constraint][1][0];
             own.enclosed.pressure = 0.0;
             let predicted = |node: u32| {
                 let mut own = self.predicted(state, node);
+                if at_start {
+                    // The other half of a force is in the increment before the first step.
+                    own.mobility =
+                        0.5 * self.lengths.next * self.lengths.mean() / self.mass[node as usize][0].to_f64();
+                }
                 if own.held == [false; 3] {
                     return own;
                 }
@@ -500,6 +509,7 @@ impl<R: Scalar> CentralDifference<R> {
             }
         }
         self.collectives = collectives;
+        !self.collectives.is_empty()
     }
 
     /// Tasks over nodes that a thread takes at least: one where threads have just shared the cells, so that they are awake.

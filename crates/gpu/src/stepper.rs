@@ -390,7 +390,7 @@ impl GpuStepper {
         }
         let at_start = state.is_at_start();
         if at_start {
-            let stored = stored_at_start(&self.model, &self.owners, state, results.hourglass);
+            let stored = stored_at_start(&self.model, state, results.hourglass);
             state.work.begin(self.kinetic_at_start(), stored, results.shock);
         }
         let before = (!at_start).then_some(self.lengths.before);

@@ -121,6 +121,8 @@ pub struct BackwardEuler {
     /// Where the state was a whole step before, for differences of second order; none after a start or a step that was halved.
     previous: Option<Box<State>>,
     differences: Differences,
+    /// No step was taken so far: the state may be off the curves of prescribed components.
+    fresh: bool,
 }
 
 /// The equation of a step: positions are `shift` further on plus `step` times the new velocities, these `rate` further on plus `step`
@@ -224,6 +226,7 @@ impl BackwardEuler {
             start: State::at_rest(&model),
             previous: None,
             differences: Differences::default(),
+            fresh: true,
             system,
         })
     }
@@ -313,6 +316,9 @@ impl BackwardEuler {
         let (mut parts, mut halvings, mut converged) = (0, 0, true);
         // Of a state that was moved in between nothing is known of the step before.
         let previous = self.previous.take().filter(|before| before.time < state.time);
+        if std::mem::take(&mut self.fresh) {
+            self.system.catch_up(state, until);
+        }
         self.system.begin_history(state);
         loop {
             let rest = until - state.time;
@@ -668,6 +674,8 @@ pub struct Explicit {
     /// Mass-proportional damping [1/s] of each node.
     damping: Vec<f64>,
     pending: Vec<f64>,
+    /// No step was taken so far: the state may be off the curves of prescribed components.
+    fresh: bool,
 }
 
 impl Explicit {
@@ -720,6 +728,7 @@ impl Explicit {
             damping: model.damping(),
             forces: Forces::new(model),
             step,
+            fresh: true,
         })
     }
 
@@ -764,6 +773,9 @@ impl Explicit {
     /// The second half of a step: moves the state on with the forces that were evaluated at it.
     pub fn go(&mut self, state: &mut State) {
         let (h, model) = (self.step, Arc::clone(&self.forces.system.model));
+        if std::mem::take(&mut self.fresh) {
+            self.forces.system.catch_up(state, state.time + h);
+        }
         let system = &self.forces.system;
         system.prescribed(state.time, state.time + h, &mut self.pending);
         for (node, damping) in self.damping.iter().enumerate() {

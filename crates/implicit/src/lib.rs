@@ -52,6 +52,7 @@ mod linear;
 mod mapping;
 mod patch;
 mod picture;
+mod prescribed;
 mod pressure;
 mod recover;
 mod relaxation;

@@ -1,6 +1,6 @@
 //! Static equilibria: Newton's method with load steps; displacement control and arc length (Crisfield 1981) past limit
 //! points; a prescribed volume for balloons. A control finds the factor of the controlled loads as one more unknown.
-//! Nodes of membranes, which nothing but tension holds across, get an artificial stiffness on the diagonal that is proportional to the
+//! Nodes of membranes and bars, which nothing but tension holds across, get an artificial stiffness on the diagonal that is proportional to the
 //! largest residual on them (Levenberg 1944, Marquardt 1963): it bounds what an iteration moves them and vanishes at equilibrium.
 //! Leaves out: branch switching at bifurcations.
 
@@ -10,7 +10,7 @@ use nalgebra::{Matrix6, RowVector6, SymmetricEigen, Vector3};
 use pliant_contact::lag::Lag;
 use pliant_mechanics::StopFlag;
 use pliant_mechanics::load::{Load, LoadKind};
-use pliant_mechanics::model::Motion;
+use pliant_mechanics::model::{Cells, Motion, Solid};
 use pliant_mechanics::tie::Tie;
 
 use crate::assembly::{Assembly, Spring};
@@ -123,7 +123,7 @@ pub struct Attempted {
 pub struct Statics {
     system: System,
     settings: StaticSettings,
-    /// Equations of the translations of nodes that only membranes hold.
+    /// Equations of the translations of nodes that only membranes and bars hold.
     slack: Vec<u32>,
     /// How far a residual may move these in an iteration [m], and their least artificial stiffness [N/m].
     reach: f64,
@@ -146,6 +146,8 @@ pub struct Statics {
     gradient: Vec<f64>,
     /// The last step's translations, six a node: the direction in which arc length goes on.
     direction: Vec<f64>,
+    /// No step was taken so far: the state may be off the curves of prescribed components.
+    fresh: bool,
 }
 
 /// An attempt that failed.
@@ -172,12 +174,11 @@ impl Statics {
         let system = System::new(Arc::clone(&model), settings.linear)?;
         let (all, free) = (6 * model.rest.len(), system.equations.len());
         let (slack, extent) = slack(&model, &system);
-        let stiffest = model.facets.iter().map(|facet| facet.stiffest()).fold(0.0, f64::max);
         Ok(Self {
             settings,
             slack,
             reach: REACH * extent,
-            least: LEAST * stiffest,
+            least: LEAST * model.stiffest(),
             attempts: Vec::new(),
             length: model.mean_edge(),
             round_off: model.round_off(),
@@ -189,6 +190,7 @@ impl Statics {
             solution: vec![0.0; free],
             response: vec![0.0; free],
             controlled: vec![0.0; free],
+            fresh: true,
             system,
         })
     }
@@ -282,6 +284,7 @@ impl Statics {
     /// # Errors
     /// If the stiffness is singular or conjugate gradients fail.
     pub fn linear(&mut self, state: &State, time: f64) -> Result<Vec<[f64; 6]>, SolveError> {
+        self.begin(state, time);
         self.system.prescribed(state.time, time, &mut self.pending);
         self.system.begin_step(&state.history, time - state.time);
         self.system.evaluate(state, state.time, Some(&self.pending))?;
@@ -294,6 +297,13 @@ impl Statics {
         Ok(all.chunks_exact(6).map(|c| [c[0], c[1], c[2], c[3], c[4], c[5]]).collect())
     }
 
+    /// Begins a load step to a time [s]. In the first one comes in what the state is off its curves.
+    fn begin(&mut self, state: &State, until: f64) {
+        if std::mem::take(&mut self.fresh) {
+            self.system.catch_up(state, until);
+        }
+    }
+
     /// The equilibrium at a time. A load step that fails is halved.
     ///
     /// # Errors
@@ -304,6 +314,7 @@ impl Statics {
         let mut size = until - state.time;
         let mut halvings = 0;
         let mut broken = None;
+        self.begin(state, until);
         self.system.begin_history(state);
         loop {
             let rest = until - state.time;
@@ -329,12 +340,12 @@ impl Statics {
         }
     }
 
-    /// The next equilibrium under a control, which finds the factor of the controlled loads, at the state's time. A step that fails
-    /// is halved.
+    /// The next equilibrium under a control, which finds the factor of the controlled loads, at a time [s] that other loads and prescribed
+    /// motions reach evenly. A step that fails is halved.
     ///
     /// # Errors
     /// If no load is controlled, the controlled component is held, a balloon is open, or no equilibrium is found (the state then is as it was).
-    pub fn control(&mut self, state: &mut State, control: Control) -> Result<Step, SolveError> {
+    pub fn control(&mut self, state: &mut State, control: Control, until: f64) -> Result<Step, SolveError> {
         self.attempts.clear();
         if !self.system.model.loads.iter().any(|load| load.controlled) {
             return Err(SolveError::Impossible("no load is marked as controlled"));
@@ -346,18 +357,25 @@ impl Statics {
                 }
             }
         }
+        self.begin(state, until);
         self.system.begin_history(state);
         let before = state.clone();
-        self.halved(state, control, self.settings.halvings).map_err(|attempt| {
+        self.halved(state, control, until, self.settings.halvings).map_err(|attempt| {
             *state = before;
             attempt.error
         })
     }
 
-    /// A step under a control, in two halves if it fails as a whole and may be halved so many times.
-    fn halved(&mut self, state: &mut State, control: Control, halvings: usize) -> Result<Step, Attempt> {
+    /// A step under a control to a time [s], in two halves if it fails as a whole and may be halved so many times.
+    fn halved(
+        &mut self,
+        state: &mut State,
+        control: Control,
+        until: f64,
+        halvings: usize,
+    ) -> Result<Step, Attempt> {
         let before = state.clone();
-        match self.newton(state, before.time, Some(control)) {
+        match self.newton(state, until, Some(control)) {
             Ok(step) => {
                 for (direction, (now, then)) in
                     self.direction.chunks_exact_mut(6).zip(state.position.iter().zip(&before.position))
@@ -369,9 +387,10 @@ impl Statics {
             Err(Attempt { retry: true, error: larger }) if halvings > 0 && !larger.is_final() => {
                 *state = before;
                 let [first, second] = self.halves(control, state);
+                let middle = state.time.midpoint(until);
                 let told = |Attempt { error, retry }| Attempt { error: error.after(larger.broken()), retry };
-                let parts = self.halved(state, first, halvings - 1).map_err(told)?.parts;
-                let step = self.halved(state, second, halvings - 1).map_err(told)?;
+                let parts = self.halved(state, first, middle, halvings - 1).map_err(told)?.parts;
+                let step = self.halved(state, second, until, halvings - 1).map_err(told)?;
                 Ok(Step { parts: parts + step.parts, ..step })
             }
             Err(attempt) => Err(attempt),
@@ -731,13 +750,18 @@ impl Contacting for Statics {
     }
 }
 
-/// The equations of the translations of nodes that only membranes hold, and the extent of these nodes [m].
+/// The equations of the translations of nodes that only membranes and bars hold, and the extent of these nodes [m].
 fn slack(model: &Assembly, system: &System) -> (Vec<u32>, f64) {
     let mut slack = vec![false; model.rest.len()];
-    let mut mark = |nodes: &[u32], is: bool| nodes.iter().for_each(|&node| slack[node as usize] = is);
-    model.facets.iter().for_each(|facet| mark(&facet.nodes, true));
-    model.facets.iter().filter(|facet| facet.bends()).for_each(|facet| mark(&facet.nodes, false));
-    model.solid_cells().for_each(|nodes| mark(nodes, false));
+    let bends = |solid: &Solid| !matches!(solid.cells, Cells::Membrane(..) | Cells::Bar(..));
+    for bending in [false, true] {
+        let mut mark = |nodes: &[u32]| nodes.iter().for_each(|&node| slack[node as usize] = !bending);
+        let facets = model.facets.iter().filter(|facet| facet.bends() == bending);
+        facets.for_each(|facet| mark(&facet.nodes));
+        for solid in model.solids.iter().filter(|solid| bends(solid) == bending) {
+            (0..solid.cells.len()).for_each(|cell| mark(solid.cells.nodes(cell)));
+        }
+    }
     let nodes: Vec<usize> = (0..slack.len()).filter(|&node| slack[node]).collect();
     let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
     for &node in &nodes {

@@ -28,6 +28,7 @@ use crate::linear::{
 use crate::mapping::CarriedPoints;
 use crate::patch::Vector18;
 use crate::patch::{EdgeRule, Patch};
+use crate::prescribed::Gap;
 use crate::relaxation::{History, Relaxation};
 use crate::rotation::skew;
 use crate::solid::{Response, Stars};
@@ -156,6 +157,8 @@ pub(crate) struct System {
     pub(crate) damper: Vec<f64>,
     /// Ends steps under way, before the next solution.
     pub(crate) stop: StopFlag,
+    /// Distances of prescribed components from their curves that are still to come in.
+    gap: Option<Gap>,
 }
 
 /// Pressures on a facet [Pa], each fixed and controlled.
@@ -424,6 +427,7 @@ impl System {
             touching: None,
             damper: Vec::new(),
             stop: StopFlag::default(),
+            gap: None,
             model,
         }
     }
@@ -1163,7 +1167,19 @@ impl System {
                 }
             }
         }
+        if let Some(gap) = &self.gap {
+            gap.add(from, to, increments);
+        }
         self.follow(increments);
+    }
+
+    /// Brings prescribed components that are off their curves back to them between the time of a state and another one [s].
+    pub(crate) fn catch_up(&mut self, state: &State, until: f64) {
+        let lag = |number: usize| {
+            let own = self.lags.iter().find(|lag| lag.number() == number);
+            own.map_or_else(Vector3::zeros, Lag::now)
+        };
+        self.gap = Gap::of(&self.model, state, until, lag);
     }
 
     /// A vector of equations spread over all components; the others stay as they are.

@@ -443,7 +443,7 @@ fn a_balloon_takes_the_volume_it_is_told() {
         let rest = model.rest_volume(&cells);
         let mut state = State::at_rest(&model);
         let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
-        solver.control(&mut state, Control::Volume { volume: rest * growth.powi(3) }).unwrap();
+        solver.control(&mut state, Control::Volume { volume: rest * growth.powi(3) }, 1.0).unwrap();
         let volume = model.enclosed_volume(&cells, &state.position);
         assert!((volume / (rest * growth.powi(3)) - 1.0).abs() < 1e-8);
         let radius = (3.0 * rest / (4.0 * std::f64::consts::PI)).cbrt();
@@ -472,7 +472,7 @@ fn a_balloon_doubles_its_volume() {
         let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
         for part in 1..=10 {
             let volume = rest * (1.0 + 0.1 * f64::from(part));
-            solver.control(&mut state, Control::Volume { volume }).unwrap();
+            solver.control(&mut state, Control::Volume { volume }, 1.0).unwrap();
         }
         assert!((model.enclosed_volume(&cells, &state.position) / rest - 2.0).abs() < 1e-6);
         (state.load_factor, state.rotation.iter().map(|r| r.angle()).fold(0.0, f64::max))
@@ -493,11 +493,11 @@ fn arc_length_and_displacement_control_agree() {
     let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
     let mut state = State::at_rest(&model);
     for _ in 0..4 {
-        solver.control(&mut state, Control::ArcLength { length: 1.0 }).unwrap();
+        solver.control(&mut state, Control::ArcLength { length: 1.0 }, 1.0).unwrap();
     }
     let mut other = State::at_rest(&model);
     let by = state.position[26].z;
-    solver.control(&mut other, Control::Displacement { node: 26, component: 2, by }).unwrap();
+    solver.control(&mut other, Control::Displacement { node: 26, component: 2, by }, 1.0).unwrap();
     assert!(state.load_factor > 0.0);
     assert!(
         (state.load_factor / other.load_factor - 1.0).abs() < 1e-6,
@@ -505,8 +505,9 @@ fn arc_length_and_displacement_control_agree() {
         state.load_factor,
         other.load_factor
     );
-    let error =
-        solver.control(&mut other, Control::Displacement { node: 0, component: 2, by: 1.0 }).unwrap_err();
+    let error = solver
+        .control(&mut other, Control::Displacement { node: 0, component: 2, by: 1.0 }, 1.0)
+        .unwrap_err();
     assert!(matches!(error, SolveError::Impossible(_)), "{error}");
 }
 
@@ -881,7 +882,7 @@ fn a_balloon_must_be_closed() {
         LoadKind::ShellPressure { facets: cells, pressure: 1.0, spread: Spread::Lumped };
     let mut solver = Statics::new(model.clone(), StaticSettings::default()).unwrap();
     let mut state = State::at_rest(&model);
-    let error = solver.control(&mut state, Control::Volume { volume: 5.0 }).unwrap_err();
+    let error = solver.control(&mut state, Control::Volume { volume: 5.0 }, 1.0).unwrap_err();
     assert!(error.to_string().contains("1 open border: 3 nodes"), "{error}");
 }
 

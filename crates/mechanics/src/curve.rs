@@ -72,6 +72,21 @@ impl Curve {
         }
     }
 
+    /// The same curve from 0 on: what it has at time 0 comes in linearly up to a time [s], as a static solver needs that halves its first
+    /// load step. A curve that begins at 0 stays as it is.
+    #[must_use]
+    pub fn from_rest(self, until: f64) -> Self {
+        match self.shape {
+            Shape::Hold if self.from <= 0.0 => Self { shape: Shape::Ramp, from: 0.0, to: until },
+            Shape::Table(ref points) if self.value(0.0) != 0.0 => {
+                let later = points.iter().copied().filter(|&(time, _)| time > until);
+                let eased = [(0.0, 0.0), (until, self.value(until))].into_iter().chain(later);
+                Self { shape: Shape::Table(eased.collect()), ..self }
+            }
+            _ => self,
+        }
+    }
+
     /// The least and the largest factor of all times.
     pub fn range(&self) -> [f64; 2] {
         match &self.shape {
@@ -133,6 +148,25 @@ mod tests {
                 let sum: f64 = (0..n).map(|i| curve.value((f64::from(i) + 0.5) * h) * h).sum();
                 assert!((curve.integral(time) - sum).abs() < 1e-4, "{curve:?} at {time}");
             }
+        }
+    }
+
+    /// What is there from the start comes in within a first step; later all is as it was, and curves from 0 keep their shape.
+    #[test]
+    fn curves_from_rest_begin_at_zero_and_are_the_same_later() {
+        let table = |points: &[(f64, f64)]| Shape::Table(points.to_vec());
+        let all = [Shape::Hold, table(&[(0.0, 0.5), (0.5, 1.0), (2.0, -1.0)]), table(&[(0.7, -0.3)])];
+        for shape in all {
+            let curve = Curve { shape, from: 0.0, to: 1.25 };
+            let eased = curve.clone().from_rest(0.25);
+            assert_eq!(eased.value(0.0), 0.0);
+            assert!((eased.value(0.125) - 0.5 * curve.value(0.25)).abs() < 1e-15, "{curve:?}");
+            for time in [0.25, 0.3, 0.5, 1.0, 1.9, 3.0] {
+                assert!((eased.value(time) - curve.value(time)).abs() < 1e-15, "{curve:?} at {time}");
+            }
+        }
+        for curve in curves() {
+            assert_eq!(curve.clone().from_rest(0.25), curve);
         }
     }
 

@@ -579,6 +579,16 @@ impl Constraint {
         }
     }
 
+    /// Displacement [m] that the nodes of a mean lack at a time [s], on average; zero of other constraints. `displacement` is that of a
+    /// node [m].
+    pub fn missing_mean(&self, time: f64, displacement: impl Fn(u32) -> Vector<f64>) -> Vector<f64> {
+        let Motion::Mean { weights, by, curve } = &self.motion else { return [0.0; 3] };
+        let add_node = |sum, (&node, &weight): (&u32, &f64)| add(sum, scale(displacement(node), weight));
+        let mean = self.nodes.iter().zip(weights).fold([0.0; 3], add_node);
+        let missing = sub(scale(*by, curve.value(time)), mean);
+        [0, 1, 2].map(|c| if self.components[c] { missing[c] } else { 0.0 })
+    }
+
     /// The amplitudes of each node's motion.
     fn amplitudes(&self) -> impl Iterator<Item = Amplitudes> + '_ {
         (0..self.nodes.len()).map(|index| self.motion.amplitudes(index))
@@ -664,6 +674,31 @@ impl Enclosure {
     }
 }
 
+/// Corrections of a volume at most: six make that of a ball eightfold.
+const CORRECTIONS: usize = 50;
+
+/// A volume that is off by no more, over itself, is where it should be.
+const FILLED: f64 = 1e-12;
+
+/// Moves the components of a state along the gradient of an enclosed volume until that is `wanted` [m³] (Newton's method). `volume` finds
+/// the volume [m³] and its gradient; `advance` moves the state by so many gradients.
+pub fn fill<S: ?Sized>(
+    state: &mut S,
+    wanted: f64,
+    gradient: &mut [f64],
+    volume: impl Fn(&S, &mut [f64]) -> f64,
+    advance: impl Fn(&mut S, &[f64], f64),
+) {
+    for _ in 0..CORRECTIONS {
+        let missing = wanted - volume(state, gradient);
+        let squared: f64 = gradient.iter().map(|g| g * g).sum();
+        if missing.abs() <= FILLED * wanted.abs() || squared == 0.0 {
+            break;
+        }
+        advance(state, gradient, missing / squared);
+    }
+}
+
 /// What a constraint of volume has at an instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Enclosed {
@@ -745,6 +780,16 @@ impl Motion {
     pub fn displacement(&self, index: usize, time: f64, part: f64) -> Vector<f64> {
         let (amplitudes, factors) = (self.amplitudes(index), self.factors_of_part(time, part));
         [0, 1, 2].map(|c| placed(component(&amplitudes, c), factors))
+    }
+
+    /// Displacement [m] and rotation vector [rad] of the constraint's node at `index` at a time [s].
+    pub fn place(&self, index: usize, time: f64) -> [f64; 6] {
+        let [x, y, z] = self.displacement(index, time, 1.0);
+        let turn = match self {
+            Self::Turn { turn, curve, .. } => scale(*turn, curve.value(time)),
+            _ => [0.0; 3],
+        };
+        [x, y, z, turn[0], turn[1], turn[2]]
     }
 
     /// How far the constraint's node at `index` goes between two times [s]: its displacement [m] and its rotation vector [rad].

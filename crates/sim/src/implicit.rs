@@ -223,21 +223,28 @@ impl Implicit {
             | part::Method::ExplicitShells(..) => Explicit::new(model.clone(), part.steps.step)
                 .map(|solver| SolverMethod::Explicit(Box::new(solver))),
         };
-        let mut prescribed = vec![false; 6 * model.rest.len()];
-        for constraint in model.constraints.iter().filter(|own| !own.motion.is_collective()) {
-            for &node in &constraint.nodes {
-                for (own, held) in prescribed[6 * node as usize..].iter_mut().zip(constraint.components) {
-                    *own |= held;
-                }
-            }
+        let prescribed = model.held_components();
+        let mut state = bodies.start.clone();
+        if !matches!(method, Ok(SolverMethod::Static(..))) {
+            model.place_prescribed(&mut state);
         }
+        #[cfg(feature = "gpu")]
+        let device = match &part.method {
+            part::Method::ExplicitShells(_, part::ShortSteps { device: Some(device) }) => {
+                let mut stepper = GpuShells::new(device, model.clone(), part.steps.step)
+                    .map_err(|error| Failure::device(&error, None))?;
+                stepper.upload(&state);
+                Some(ShellsOnDevice { stepper, pushed: Vec::new() })
+            }
+            _ => None,
+        };
         Ok(Self {
             method: method.map_err(|error| failure(&error, own, bodies, 0.0))?,
             step: part.steps.step,
             planned: part.steps.number,
             time: bodies.start.time,
             done: 0,
-            state: bodies.start.clone(),
+            state,
             outside: vec![0.0; prescribed.len()],
             prescribed,
             // Contradictions were reported when the model was built.
@@ -257,14 +264,7 @@ impl Implicit {
             touching: None,
             solids: (!own.solids.is_empty()).then(|| pliant_explicit::State::at_rest(own)),
             #[cfg(feature = "gpu")]
-            device: match &part.method {
-                part::Method::ExplicitShells(_, part::ShortSteps { device: Some(device) }) => {
-                    let stepper = GpuShells::new(device, model.clone(), part.steps.step)
-                        .map_err(|error| Failure::device(&error, None))?;
-                    Some(ShellsOnDevice { stepper, pushed: Vec::new() })
-                }
-                _ => None,
-            },
+            device,
             model: Arc::clone(own),
             bodies: Arc::clone(bodies),
         })
@@ -511,16 +511,14 @@ impl Implicit {
         let control = self.bodies.control.map(|control| part_of(control, number, self.planned));
         let SolverMethod::Static(solver, _) = &mut self.method else { return Ok(()) };
         let result = match control {
-            Some(control) => solver.control(&mut self.state, control),
+            Some(control) => solver.control(&mut self.state, control, until),
             None => solver.solve(&mut self.state, until),
         };
         for (attempt, tried) in solver.attempts().iter().enumerate() {
-            // A control finds its equilibria at one time.
-            let time = if control.is_some() { until } else { tried.time };
             let iterated = |(iteration, &residual)| Iterated {
                 step: number,
                 attempt: attempt + 1,
-                time,
+                time: tried.time,
                 iteration,
                 residual,
                 allowed: tried.allowed,
@@ -535,9 +533,6 @@ impl Implicit {
         self.effort.take(phases, &self.effort_before);
         if step.negative_pivots > 0 {
             self.effort.unstable_from.get_or_insert(until);
-        }
-        if control.is_some() {
-            self.state.time = until;
         }
         if let Some(RunControl::ArcLength { stop, .. }) = self.bodies.control {
             self.path.go_on(self.state.load_factor);

@@ -150,7 +150,7 @@ impl Builder<'_> {
             None => (&Selection::All, "body"),
         };
         let faces = self.faces(Subject::Body(body), selection, &at(key));
-        let (Some(mut faces), Some(curve)) = (faces, self.curve(&table.timing, &path)) else { return };
+        let (Some(mut faces), Some(curve)) = (faces, self.course(&table.timing, &path)) else { return };
         if faces.is_empty() {
             let message = format!("`{name}` has no faces, which would enclose a volume");
             let help = "take a body of model `solid`, `membrane` or `shell`";
@@ -230,7 +230,7 @@ impl Builder<'_> {
         }
         match table {
             ConstraintTable::Mean(mean) => {
-                let curve = self.curve(&mean.timing, path)?;
+                let curve = self.course(&mean.timing, path)?;
                 Some(Motion::Mean { weights: self.shares(body, nodes), by: mean.by, curve })
             }
             _ if nodes.len() < 2 => {
@@ -262,7 +262,11 @@ impl Builder<'_> {
 
     /// The motion of some nodes of a body (`None`: they are unknown, which is already reported).
     fn motion(&mut self, table: &MoveTable, nodes: Option<(usize, &[u32])>, path: &[&str]) -> Option<Motion> {
-        let curve = self.curve(&table.timing, path);
+        // A way is the integral of a velocity, which begins at 0.
+        let curve = match table.velocity {
+            Some(_) => self.curve(&table.timing, path),
+            None => self.course(&table.timing, path),
+        };
         if let Some(rotate) = &table.rotate {
             return self.rotation(table, rotate, curve?, nodes?.1, path);
         }

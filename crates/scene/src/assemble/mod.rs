@@ -35,7 +35,7 @@ use pliant_sim::{BodyCells, ImplicitBodies, RunControl};
 
 use crate::cache::MeshCache;
 use crate::diagnostic::{Diagnostic, SceneErrors};
-use crate::format::{CurveShape, Timing};
+use crate::format::{CurveShape, SolverName, StepChoice, Timing};
 use crate::nearest::nearest;
 use crate::scene::Scene;
 use crate::source::Source;
@@ -373,6 +373,23 @@ impl<'s> Builder<'s> {
         let help = suggestion(name, &known, SCENE, "bodies and surfaces");
         self.error(path, format!("there is no body or surface `{name}`"), "no such body or surface", help);
         None
+    }
+
+    /// The curve of a motion or a load. What it has at t = 0 comes in within the first load step of a static run, so that the step can be
+    /// halved.
+    fn course(&mut self, timing: &Timing, path: &[&str]) -> Option<Curve> {
+        let curve = self.curve(timing, path)?;
+        Some(self.from_rest(curve))
+    }
+
+    /// In a static run the [same curve from rest](Curve::from_rest).
+    fn from_rest(&self, curve: Curve) -> Curve {
+        let (run, until) = (&self.scene.run, self.scene.scene.until);
+        match (run.solver, run.step) {
+            (SolverName::Static, StepChoice::Seconds(step)) => curve.from_rest(step.min(until)),
+            (SolverName::Static, StepChoice::Auto(_)) => curve.from_rest(run.load_steps.first(until)),
+            _ => curve,
+        }
     }
 
     /// The curve of a timing; diagnostics in the table at `path`. Without a shape: a smooth step.

@@ -43,7 +43,8 @@ pub enum CurveShape {
     Table(Vec<[f64; 2]>),
 }
 
-/// The curve over time: the factor goes from 0 at `from` to 1 at `to`.
+/// The curve over time: the factor goes from 0 at `from` to 1 at `to`. Where it is not 0 at t = 0, `explicit` and `implicit` runs begin with
+/// moved nodes there, at rest, and count the energy stored as external work; `static` and `quasi-static` get there in the first load step.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct Timing {

@@ -67,7 +67,7 @@ impl Builder<'_> {
             (Some(Vectors::PerNode(by)), _) => {
                 let (body, nodes) = nodes?;
                 let by = self.node_vectors(by, body, nodes, &[path[0], path[1], "by"])?;
-                let curve = self.curve(&table.timing, &path)?;
+                let curve = self.course(&table.timing, &path)?;
                 return Some(match table.turn {
                     Some(turn) => Motion::Turn { by, turn, curve },
                     None => Motion::Displacements(by, curve),
@@ -83,7 +83,7 @@ impl Builder<'_> {
                 _ => [0.0; 3],
             },
         };
-        let curve = self.curve(&table.timing, &path)?;
+        let curve = self.course(&table.timing, &path)?;
         Some(match table.turn {
             Some(turn) => Motion::turn(shift, turn, nodes?.1.len(), curve),
             None => Motion::Displacement(shift, curve),

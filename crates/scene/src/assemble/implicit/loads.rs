@@ -12,8 +12,7 @@ use pliant_sim::{BodyCells, RunControl, Stop, counted, number};
 use crate::assemble::{Builder, SCENE, Subject, suggestion};
 use crate::diagnostic::Diagnostic;
 use crate::format::{
-    Axis, ControlTable, ControlledNode, GravityTable, MomentTable, PressureTable, SolverName, SpreadName,
-    StepChoice, StopTable,
+    Axis, ControlTable, ControlledNode, GravityTable, MomentTable, PressureTable, SpreadName, StopTable,
 };
 use crate::registry::LoadTable;
 
@@ -44,21 +43,9 @@ impl Builder<'_> {
         }
     }
 
-    /// Adds loads. What acts in full from the start grows within the first step of a static run, so that it can be halved.
+    /// Adds loads.
     fn push_loads(&mut self, name: &str, kinds: Vec<Acting>, curve: Curve, controlled: bool) {
-        let run = &self.scene.run;
-        let at_once = curve.shape == Shape::Hold && curve.from <= 0.0 && !controlled;
-        let curve = match run.solver {
-            SolverName::Static if at_once => {
-                let until = self.scene.scene.until;
-                let step = match run.step {
-                    StepChoice::Seconds(step) => step.min(until),
-                    StepChoice::Auto(_) => run.load_steps.first(until),
-                };
-                Curve { shape: Shape::Ramp, from: 0.0, to: step }
-            }
-            _ => curve,
-        };
+        let curve = if controlled { curve } else { self.from_rest(curve) };
         let load = |(kind, surface)| Load { surface, controlled, ..Load::new(name, kind, curve.clone()) };
         self.assembly.model_mut().loads.extend(kinds.into_iter().map(load));
     }

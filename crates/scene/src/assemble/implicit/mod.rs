@@ -248,7 +248,12 @@ impl Builder<'_> {
         for (own, given) in start.velocity.iter_mut().zip(&assembly.initial_velocity) {
             *own = Vector3::from(*given);
         }
-        assembly.take_along(&mut start);
+        // A static run goes there in its first load step.
+        if self.scene.run.solver == SolverName::Static {
+            assembly.take_along(&mut start);
+        } else {
+            assembly.place_prescribed(&mut start);
+        }
         Some(start)
     }
 }
