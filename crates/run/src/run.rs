@@ -58,6 +58,9 @@ const SAMPLES: f64 = 1000.0;
 /// Those of a run on a GPU, which has to stop for each.
 const SAMPLES_ON_DEVICE: f64 = 250.0;
 
+/// Samples from one look at the fields of all cells of solids to the next: a look costs as much as a few steps.
+const SAMPLES_A_LOOK: usize = 50;
+
 /// Wall time between two reports of progress.
 const REPORT: Duration = Duration::from_millis(100);
 
@@ -165,8 +168,6 @@ struct Run<'a> {
     /// The worst of each participant.
     watched: Vec<Watched>,
     checkpoints: Option<Checkpoints<'a>>,
-    /// Whether the last instant becomes a picture.
-    pictured: bool,
     /// Ends the run once it is asked.
     stop: Option<&'a StopFlag>,
     report: &'a mut (dyn FnMut(Progress) + Send),
@@ -209,7 +210,6 @@ impl<'a> Run<'a> {
             sampling: before.map_or(sampling, |before| before.sampling),
             watched: before.map_or_else(fresh, |before| before.watched.clone()),
             checkpoints: Checkpoints::new(world, folder, simulation.time()),
-            pictured: options.picture.is_some(),
             stop: options.stop,
             report,
             reported: started,
@@ -271,10 +271,13 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn look_at_strains(&mut self, simulation: &Simulation) {
+    fn look_at_strains(&mut self, simulation: &Simulation, solids: bool) {
         let parts = self.world.participants.iter().zip(simulation.instants());
         for (own, (part, now)) in self.watched.iter_mut().zip(parts) {
             own.strains.look(&part.built, now.shells());
+            if solids {
+                own.solids.look(&part.built.model, now);
+            }
         }
     }
 
@@ -324,7 +327,7 @@ impl Observer for Run<'_> {
     fn wanted(&self, simulation: &Simulation, last: bool) -> Wanted {
         let (time, step) = (simulation.time(), simulation.step_length());
         let is_read = self.outputs.reads(time, step, last);
-        if is_read || (last && self.pictured) { Wanted::Everything } else { Wanted::Energies }
+        if is_read || last { Wanted::Everything } else { Wanted::Energies }
     }
 
     /// Shows an instant to all outputs that await it.
@@ -333,7 +336,9 @@ impl Observer for Run<'_> {
         self.watched.iter_mut().zip(simulation.instants()).for_each(|(own, now)| own.see(now));
         if self.sampling.is_due(time, step, last) {
             self.history.sample(&frames(self.world, simulation));
-            self.look_at_strains(simulation);
+            // A GPU brings states back at the end.
+            let looks = self.history.times.len() % SAMPLES_A_LOOK == 1 && !is_on_device(self.world);
+            self.look_at_strains(simulation, looks || last);
         }
         self.outputs.see(simulation, last)?;
         self.tell(time, None, last);
@@ -374,7 +379,7 @@ impl Observer for Run<'_> {
             return;
         }
         let time = simulation.time();
-        self.look_at_strains(simulation);
+        self.look_at_strains(simulation, true);
         let now = frames(self.world, simulation);
         if time > seen {
             self.history.sample(&now);

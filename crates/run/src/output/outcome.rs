@@ -9,7 +9,7 @@ use pliant_sim::contact::lag::Lag;
 use pliant_sim::{Effort, Equilibria, Failure, GuestsNow, Instant, TieNow};
 use serde::{Deserialize, Serialize};
 
-use super::{Frame, ShellStrains, time_of};
+use super::{Frame, ShellStrains, SolidStrains, time_of};
 use pliant_scene::format::SolverName;
 use pliant_scene::{Part, World};
 
@@ -224,6 +224,8 @@ pub(crate) struct Watched {
     pub worst_hourglass: (f64, f64),
     /// How far shells were strained.
     pub strains: ShellStrains,
+    /// Changes of volume of solids, and compression of membranes.
+    pub solids: SolidStrains,
 }
 
 impl Watched {

@@ -153,9 +153,21 @@ pub(crate) fn doubts(
     (hourglass.into_iter())
         .chain(stability.and_then(StabilitySummary::doubt))
         .chain(equilibria_doubts(outcome))
+        .chain(unstable_equilibria(built, outcome))
         .chain(outcome.watched.strains.doubts())
+        .chain(outcome.watched.solids.doubts())
         .chain(outcome.held_back.iter().map(held_back))
         .collect()
+}
+
+/// Where static equilibria lie that the body would leave. A control goes past limit points, where they are expected.
+fn unstable_equilibria(built: &Built, outcome: &PartOutcome) -> Option<String> {
+    let controlled = built.implicit.as_ref().is_some_and(|part| part.control.is_some());
+    let from = outcome.effort.as_ref().filter(|_| !controlled)?.unstable_from?;
+    Some(format!(
+        "the equilibria from t = {} s on are unstable: the body would buckle or snap there, and has another shape than this one; give it a small load or a small `initial-displacement` across, or take the solver `implicit`",
+        number(from)
+    ))
 }
 
 /// That a tool, moved nodes or a volume were held back, by how much at most and when.

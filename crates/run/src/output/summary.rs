@@ -11,7 +11,7 @@ use serde_json::{Value as Json, json};
 
 use super::stability::{AddedMass, StabilitySummary, doubts};
 use super::{GuestSummary, History, Outcome, PartOutcome, TieSummary};
-use super::{OutputError, StrainSummary, constraints};
+use super::{OutputError, StrainSummary, VolumeChange, constraints};
 use pliant_scene::{Built, LimitingElement, Limits, Part, World, printable};
 
 /// The result of a run.
@@ -51,6 +51,8 @@ pub struct Summary {
     pub ended: Option<String>,
     /// The largest strain of each shell, over up to 1000 sampled instants.
     pub shell_strains: Vec<StrainSummary>,
+    /// The largest change of volume of each nearly incompressible body and of each body with fibres.
+    pub volume_changes: Vec<VolumeChange>,
     /// The device: `cpu`, or the name of the GPU.
     pub device: String,
     /// `single` or `double`.
@@ -165,7 +167,7 @@ fn empty(status: &str, error: Failure) -> Json {
         "status": status,
         "error": error,
         "bodies": [], "nodes": null, "elements": null, "mass": null, "step": null, "element_bound": null,
-        "critical_step": null, "limiting_element": null, "participants": [], "ties": [], "guests": [], "solver": null, "equilibria": null, "ended": null, "shell_strains": [], "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
+        "critical_step": null, "limiting_element": null, "participants": [], "ties": [], "guests": [], "solver": null, "equilibria": null, "ended": null, "shell_strains": [], "volume_changes": [], "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
         "stability": null, "added_mass": null, "energy_balance": null, "reactions": {}, "volumes": {}, "warnings": [], "files": [],
     })
 }
@@ -254,6 +256,7 @@ pub(crate) fn summarise(world: &World, outcome: &Outcome) -> Summary {
         equilibria: parts().find_map(|(_, own)| own.equilibria),
         ended: outcome.ended.clone(),
         shell_strains: parts().flat_map(|(_, own)| own.watched.strains.0.clone()).collect(),
+        volume_changes: parts().flat_map(|(_, own)| own.watched.solids.volumes().cloned()).collect(),
         device: target.name().to_owned(),
         precision: target.precision.word(),
         steps: outcome.steps,
@@ -387,6 +390,7 @@ fn write_part(page: &mut String, part: &Part, outcome: &PartOutcome) -> std::fmt
         write_effort(page, effort, outcome.steps)?;
     }
     write_strains(page, &outcome.watched.strains.0)?;
+    write_volume_changes(page, outcome)?;
     write_energies(page, &of, outcome)
 }
 
@@ -432,6 +436,21 @@ fn write_effort(page: &mut String, effort: &Effort, steps: u64) -> std::fmt::Res
     writeln!(page, "| solution | {} ms per step |", milliseconds(effort.seconds_solution))?;
     if let Some(time) = effort.unstable_from {
         writeln!(page, "| unstable equilibria | from t = {} s on |", number(time))?;
+    }
+    Ok(())
+}
+
+fn write_volume_changes(page: &mut String, outcome: &PartOutcome) -> std::fmt::Result {
+    let mut all = outcome.watched.solids.volumes().peekable();
+    if all.peek().is_none() {
+        return Ok(());
+    }
+    writeln!(
+        page,
+        "\n## Largest changes of volume\n\n| body | J − 1 | element | at t [s] |\n|---|---|---|---|"
+    )?;
+    for VolumeChange { body, change, element, time } in all {
+        writeln!(page, "| {body} | {:+.2} % | {element} | {} |", 100.0 * change, number(*time))?;
     }
     Ok(())
 }
