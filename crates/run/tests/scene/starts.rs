@@ -305,3 +305,28 @@ fn impossible_starts_are_refused() {
     assert!(told.contains("contact `lid` has no gap at the start in 50 places"), "{told}");
     assert!(told.contains("scene.toml:37:11"), "{told}");
 }
+
+/// A scene whose motion is changed on the way goes to where the new one says within its next step.
+#[test]
+fn an_exchanged_motion_is_taken_up() {
+    for (solver, _) in SOLVERS {
+        let moved = |by: f64| {
+            let hand = format!(
+                "[constraint.hand]\ntype = 'move'\nbody = 'b'\nnodes = {{ set = 'z-max' }}\nby = [0, 0, {by}]\n{FROM_ZERO}\n"
+            );
+            world(&cube(solver, &hand)).unwrap()
+        };
+        let mut simulation = moved(0.001).simulation().unwrap();
+        let half = simulation.steps_until(0.5 * UNTIL);
+        (0..half).for_each(|_| drop(simulation.step(1).unwrap()));
+        let at = |simulation: &mut pliant_sim::Simulation| {
+            let frame = simulation.frame().unwrap();
+            frame.displacements("b").unwrap().iter().map(|u| u[2]).fold(0.0, f64::max)
+        };
+        assert!((at(&mut simulation) - 0.001).abs() < 1e-9, "{solver}");
+        assert!(simulation.exchange(moved(0.0012).simulated()).unwrap());
+        simulation.step(1).unwrap();
+        let found = at(&mut simulation);
+        assert!((found - 0.0012).abs() < 1e-9, "{solver}: {found}");
+    }
+}
