@@ -379,11 +379,11 @@ impl<'s> Builder<'s> {
     /// halved.
     fn course(&mut self, timing: &Timing, path: &[&str]) -> Option<Curve> {
         let curve = self.curve(timing, path)?;
-        Some(self.from_rest(curve))
+        Some(self.eased(curve))
     }
 
     /// In a static run the [same curve from rest](Curve::from_rest).
-    fn from_rest(&self, curve: Curve) -> Curve {
+    fn eased(&self, curve: Curve) -> Curve {
         let (run, until) = (&self.scene.run, self.scene.scene.until);
         match (run.solver, run.step) {
             (SolverName::Static, StepChoice::Seconds(step)) => curve.from_rest(step.min(until)),

@@ -45,7 +45,7 @@ impl Builder<'_> {
 
     /// Adds loads.
     fn push_loads(&mut self, name: &str, kinds: Vec<Acting>, curve: Curve, controlled: bool) {
-        let curve = if controlled { curve } else { self.from_rest(curve) };
+        let curve = if controlled { curve } else { self.eased(curve) };
         let load = |(kind, surface)| Load { surface, controlled, ..Load::new(name, kind, curve.clone()) };
         self.assembly.model_mut().loads.extend(kinds.into_iter().map(load));
     }
