@@ -64,7 +64,7 @@ fn blown_up(cuts: usize, membrane: Membrane, parts: u32) -> [f64; 4] {
     let rest = model.rest_volume(&cells);
     for part in 1..=parts {
         let volume = rest * (1.0 + f64::from(part) / 20.0);
-        if let Err(error) = solver.control(&mut state, Control::Volume { volume }) {
+        if let Err(error) = solver.control(&mut state, Control::Volume { volume }, 1.0) {
             println!("{membrane:?}, {} facets: fails at volume × {:.2}: {error}", cells.len(), volume / rest);
             break;
         }

@@ -202,8 +202,9 @@ fn hinged_roof(cells: usize) -> Vec<[f64; 3]> {
     let mut curve = Vec::new();
     for row in table("hinged_roof_h12.7") {
         let by = -row[1] - state.displacement(&roof.model, centre as usize).x;
-        let step =
-            solver.control(&mut state, Control::Displacement { node: centre, component: 0, by }).unwrap();
+        let step = solver
+            .control(&mut state, Control::Displacement { node: centre, component: 0, by }, 1.0)
+            .unwrap();
         println!(
             "hinged roof at w = {:.3}: {:.4} ({:.4}); {} iterations, {} negative pivots",
             row[1],

@@ -160,7 +160,7 @@ fn motions_of_solids_begin_where_their_curves_say() {
         let volume = "type = 'volume'\nby = 2e-8";
         let volume =
             |curve: &str| cube(solver, &format!("[constraint.air]\nbody = 'b'\n{volume}\n{curve}\n"));
-        begins_where_its_curve_says(&format!("{solver}: volume"), &volume, stands, None);
+        begins_where_its_curve_says(&format!("{solver}: volume"), volume, stands, None);
         for (curve, share) in CURVES {
             let [first, last] = ends(&volume(curve));
             let wanted = [if stands { share } else { 0.0 }, 1.0].map(|part| 1e-6 + part * 2e-8);
@@ -209,7 +209,7 @@ fn volumes_of_shells_begin_where_their_curves_say() {
                  [output.history]\ntype = 'csv'\nevery = 0.005\nprobes.top = {{ on = 'b', at = [0, 0, 0.01] }}\n"
             )
         };
-        begins_where_its_curve_says(&format!("{solver}: ball"), &text, stands, None);
+        begins_where_its_curve_says(&format!("{solver}: ball"), text, stands, None);
         let [first, last] = ends(&text("curve = 'hold'"));
         let grown = last["volume.air"] - first["volume.air"];
         assert!((grown - if stands { 0.0 } else { 2e-7 }).abs() < 1e-12, "{solver}: {grown:e}");
@@ -318,7 +318,9 @@ fn an_exchanged_motion_is_taken_up() {
         };
         let mut simulation = moved(0.001).simulation().unwrap();
         let half = simulation.steps_until(0.5 * UNTIL);
-        (0..half).for_each(|_| drop(simulation.step(1).unwrap()));
+        for _ in 0..half {
+            simulation.step(1).unwrap();
+        }
         let at = |simulation: &mut pliant_sim::Simulation| {
             let frame = simulation.frame().unwrap();
             frame.displacements("b").unwrap().iter().map(|u| u[2]).fold(0.0, f64::max)
