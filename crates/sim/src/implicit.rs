@@ -1131,6 +1131,7 @@ mod tests {
                 shells.state.spin[node] = Vector3::x() * (turn / shells.step);
             }
             let stops = shells.device.as_mut().is_some_and(|own| {
+                own.stepper.upload(&shells.state);
                 let moved = own.stepper.advance(&mut shells.state.clone(), 1).unwrap();
                 own.stepper.upload(&shells.state);
                 moved.broken

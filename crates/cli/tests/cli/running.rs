@@ -23,7 +23,7 @@ fn keys(object: &Value) -> Vec<&str> {
 }
 
 /// The keys of `--json`, in their order.
-const KEYS: [&str; 29] = [
+const KEYS: [&str; 30] = [
     "status",
     "error",
     "bodies",
@@ -41,6 +41,7 @@ const KEYS: [&str; 29] = [
     "equilibria",
     "ended",
     "shell_strains",
+    "volume_changes",
     "device",
     "precision",
     "steps",
