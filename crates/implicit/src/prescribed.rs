@@ -80,7 +80,7 @@ impl Assembly {
         fill(state, wanted, &mut gradient, volume, State::advance);
     }
 
-    /// Whether a constraint holds or moves each component by itself, six a node.
+    /// Flags of the components that a constraint fixes or moves by itself, six a node.
     pub fn held_components(&self) -> Vec<bool> {
         let mut held = vec![false; 6 * self.rest.len()];
         for own in self.constraints.iter().filter(|own| !own.motion.is_collective()) {

@@ -366,7 +366,7 @@ impl Statics {
         })
     }
 
-    /// A step under a control to a time [s], in two halves if it fails as a whole and may be halved so many times.
+    /// A step under a control to a time [s]. A step that fails is split into two halves, `halvings` times at most.
     fn halved(
         &mut self,
         state: &mut State,
@@ -750,7 +750,7 @@ impl Contacting for Statics {
     }
 }
 
-/// The equations of the translations of nodes that only membranes and bars hold, and the extent of these nodes [m].
+/// Translational equations of the nodes that belong to membranes and bars only, and the extent of these nodes [m].
 fn slack(model: &Assembly, system: &System) -> (Vec<u32>, f64) {
     let mut slack = vec![false; model.rest.len()];
     let bends = |solid: &Solid| !matches!(solid.cells, Cells::Membrane(..) | Cells::Bar(..));

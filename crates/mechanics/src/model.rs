@@ -681,7 +681,7 @@ const CORRECTIONS: usize = 50;
 const FILLED: f64 = 1e-12;
 
 /// Moves the components of a state along the gradient of an enclosed volume until that is `wanted` [m³] (Newton's method). `volume` finds
-/// the volume [m³] and its gradient; `advance` moves the state by so many gradients.
+/// the volume [m³] and its gradient; `advance` moves the state by a multiple of the gradient.
 pub fn fill<S: ?Sized>(
     state: &mut S,
     wanted: f64,

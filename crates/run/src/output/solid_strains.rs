@@ -122,7 +122,7 @@ fn largest(all: impl Iterator<Item = f64>, known: f64) -> Option<(usize, f64)> {
     )
 }
 
-/// Whether a change of the volume of a solid is a doubt.
+/// Decides whether a solid should keep its volume: nearly incompressible laws and laws with fibres do.
 fn keeps_volume(solid: &Solid) -> bool {
     let law = &solid.material.law;
     !matches!(solid.cells, Cells::Bar(..))

@@ -160,7 +160,7 @@ pub(crate) fn doubts(
         .collect()
 }
 
-/// Where static equilibria lie that the body would leave. A control goes past limit points, where they are expected.
+/// Warning of unstable static equilibria. A run with a control has none, since it passes limit points on purpose.
 fn unstable_equilibria(built: &Built, outcome: &PartOutcome) -> Option<String> {
     let controlled = built.implicit.as_ref().is_some_and(|part| part.control.is_some());
     let from = outcome.effort.as_ref().filter(|_| !controlled)?.unstable_from?;

@@ -363,7 +363,9 @@ fn large_strains_are_told() {
         ],
     );
     let (json, told, page) = pulled(0.002);
-    assert!(!told.words().contains("is strained by"), "{}", told.err);
+    // A thin wall that is clamped and pulled has unstable equilibria by its triangles; it has no other warning.
+    let warnings = json["warnings"].as_array().unwrap();
+    assert!(warnings.iter().all(|own| own.as_str().unwrap().contains("are unstable")), "{}", told.err);
     assert!(json["shell_strains"][0]["above_from"].is_null(), "{json}");
     assert!(page.contains("| wall | 1."), "{page}");
 }
