@@ -43,10 +43,12 @@ pub mod io;
 mod labels;
 mod locate;
 mod mesh;
+mod mortar;
 mod patch;
 mod quality;
 mod regions;
 mod selection;
+mod split;
 mod surface;
 #[cfg(test)]
 mod testing;
@@ -60,6 +62,7 @@ pub use grid::{FlatGrid, Grid};
 pub use labels::{CellLabel, Labels, UnknownLabel};
 pub use locate::{Location, Locator, barycentric_of_closest};
 pub use mesh::{CellBlock, CellKind, DataArray, Mesh};
+pub use mortar::{MortarRow, MortarRows, MortarSide, mortar_rows};
 pub use patch::patch;
 pub use quality::{
     QualityReport, Spread, acoustic_length, dihedral_angles, gradient_integrals, relative_acoustic_length,
@@ -67,6 +70,7 @@ pub use quality::{
 };
 pub use regions::{Region, RegionNames, cell_body};
 pub use selection::{Selection, SelectionError};
+pub use split::{SplitCells, SplitKind, add_as_tets, faces_met_by_two_tets};
 pub use surface::{Face, Surface, borders, boundary, cell_label, label_boundary, label_nodes, labels};
 
 /// A point or a vector in space.

@@ -10,7 +10,7 @@ use pliant_geometry::io::{
     Format, MeshFile, MeshFileError, MeshFileProblem, Place, VtuOptions, VtuSeries, pvd_text, read,
     read_bytes, save_vtu, write, write_vtu,
 };
-use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
+use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3, boundary, volume};
 use pliant_testing::Random;
 
 fn data() -> PathBuf {
@@ -581,6 +581,156 @@ fn error(content: &str, format: Format) -> (Place, MeshFileProblem, String) {
         }
         Ok(file) => panic!("read as {file:?}"),
     }
+}
+
+/// Types of a cell in VTK and in Gmsh, and its nodes.
+type FileCell = (u8, u8, Vec<usize>);
+
+/// A column of three cubes: of tets, of wedges, and of a hex under a pyramid, in files of a format. Cells are numbered from 1 to 11.
+fn column(format: &str) -> String {
+    let points: Vec<[usize; 3]> = (0..16).map(|at| [at % 2, at / 2 % 2, at / 4]).collect();
+    let point = |[x, y, z]: &[usize; 3]| format!("{x} {y} {z}");
+    let mut points: Vec<String> = points.iter().map(point).collect();
+    points.push("0.5 0.5 4".to_owned());
+    let mut cells: Vec<FileCell> = Vec::new();
+    for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
+        cells.push((10, 4, vec![0, a, b, 7]));
+    }
+    cells.push((13, 6, vec![4, 5, 7, 8, 9, 11]));
+    // The other order.
+    cells.push((13, 6, vec![8, 11, 10, 4, 7, 6]));
+    cells.push((12, 5, vec![8, 9, 11, 10, 12, 13, 15, 14]));
+    cells.push((14, 7, vec![12, 13, 15, 14, 16]));
+    cells.push((5, 2, vec![0, 2, 3]));
+    let first = usize::from(format.starts_with("msh"));
+    let nodes = |cell: &[usize]| {
+        let words: Vec<String> = cell.iter().map(|node| (node + first).to_string()).collect();
+        words.join(" ")
+    };
+    let numbered = |lines: Vec<String>| -> String {
+        lines.iter().zip(1..).map(|(line, number)| format!("{number} {line}\n")).collect()
+    };
+    // Labels: 1 of tets, 2 of wedges, 3 of the hex and the pyramid.
+    let label = |vtk: u8| match vtk {
+        10 => 1,
+        13 => 2,
+        _ => 3,
+    };
+    let each = |line: &dyn Fn(&FileCell) -> String| cells.iter().map(line).collect::<Vec<String>>();
+    match format {
+        "msh 1" => format!(
+            "$NOD\n17\n{}$ENDNOD\n$ELM\n11\n{}$ENDELM\n",
+            numbered(points),
+            numbered(each(&|(vtk, own, cell)| format!(
+                "{own} {} 1 {} {}",
+                label(*vtk),
+                cell.len(),
+                nodes(cell)
+            )))
+        ),
+        "msh 2" => format!(
+            "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n17\n{}$EndNodes\n$Elements\n11\n{}$EndElements\n",
+            numbered(points),
+            numbered(each(&|(vtk, own, cell)| format!("{own} 2 {} 1 {}", label(*vtk), nodes(cell))))
+        ),
+        "msh 4" => {
+            let tags: String = (1..=17).map(|tag| format!("{tag}\n")).collect();
+            let blocks: String = cells
+                .iter()
+                .zip(1..)
+                .map(|((vtk, own, cell), number)| {
+                    let dimension = if *own == 2 { 2 } else { 3 };
+                    format!("{dimension} {} {own} 1\n{number} {}\n", label(*vtk), nodes(cell))
+                })
+                .collect();
+            let entities: String = (1..=3).map(|tag| format!("{tag} 0 0 0 1 1 4 1 {tag} 0\n")).collect();
+            format!(
+                "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 1 3\n3 0 0 0 1 1 4 0 0\n{entities}$EndEntities\n$Nodes\n\
+                 1 17 1 17\n3 1 0 17\n{tags}{}\n$EndNodes\n$Elements\n11 11 1 11\n{blocks}$EndElements\n",
+                points.join("\n")
+            )
+        }
+        "vtk" => {
+            let lines = each(&|(_, _, cell)| format!("{} {}", cell.len(), nodes(cell)));
+            let numbers: usize = cells.iter().map(|(.., cell)| cell.len() + 1).sum();
+            format!(
+                "# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 17 double\n{}\nCELLS 11 {numbers}\n{}\n\
+                 CELL_TYPES 11\n{}\nCELL_DATA 11\nSCALARS label int\nLOOKUP_TABLE default\n{}\n",
+                points.join("\n"),
+                lines.join("\n"),
+                each(&|(vtk, ..)| vtk.to_string()).join("\n"),
+                each(&|(vtk, ..)| label(*vtk).to_string()).join("\n")
+            )
+        }
+        _ => {
+            let mut end = 0;
+            let ends = cells.iter().map(|(.., cell)| {
+                end += cell.len();
+                end.to_string()
+            });
+            let ends = ends.collect::<Vec<_>>().join(" ");
+            let array = |name: &str, kind: &str, text: String| {
+                format!("<DataArray type=\"{kind}\" Name=\"{name}\" format=\"ascii\">{text}</DataArray>")
+            };
+            format!(
+                "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" byte_order=\"LittleEndian\"><UnstructuredGrid>\
+                 <Piece NumberOfPoints=\"17\" NumberOfCells=\"11\"><Points>\
+                 <DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">{}</DataArray></Points><Cells>{}{}{}</Cells>\
+                 <CellData>{}</CellData></Piece></UnstructuredGrid></VTKFile>",
+                points.join(" "),
+                array("connectivity", "Int64", each(&|(.., cell)| nodes(cell)).join(" ")),
+                array("offsets", "Int64", ends),
+                array("types", "UInt8", each(&|(vtk, ..)| vtk.to_string()).join(" ")),
+                array("label", "Int32", each(&|(vtk, ..)| label(*vtk).to_string()).join(" "))
+            )
+        }
+    }
+}
+
+#[test]
+fn wedges_and_pyramids_are_read_as_tets_that_fit() {
+    for (name, format) in [
+        ("msh 1", Format::Gmsh),
+        ("msh 2", Format::Gmsh),
+        ("msh 4", Format::Gmsh),
+        ("vtk", Format::Vtk),
+        ("vtu", Format::Vtu),
+    ] {
+        let file = read_bytes(column(name).as_bytes(), format).unwrap_or_else(|error| panic!("{error}"));
+        let mesh = &file.mesh;
+        let tets = mesh.block(CellKind::Tet).unwrap();
+        assert!(mesh.block(CellKind::Hex).is_none(), "{name}: a hex next to a wedge stays a hex");
+        let volumes = tets.cells().map(|cell| {
+            volume(CellKind::Tet, &cell.iter().map(|&n| mesh.points[n as usize]).collect::<Vec<_>>())
+        });
+        let by_label = volumes.zip(&tets.data["label"].values).fold([0.0; 3], |mut sums, (volume, label)| {
+            assert!(volume > 0.0, "{name}");
+            sums[*label as usize - 1] += volume;
+            sums
+        });
+        for (found, right) in by_label.into_iter().zip([1.0, 1.0, 1.0 + 1.0 / 3.0]) {
+            assert!((found - right).abs() < 1e-12, "{name}: {by_label:?}");
+        }
+        // A face cut in two ways would be boundary inside the column. The pyramid's sides are √5/4 each.
+        let area = boundary(mesh).area(&mesh.points);
+        assert!((area - (1.0 + 12.0 + 5.0_f64.sqrt())).abs() < 1e-12, "{name}: {area}");
+        let notes = file.notes.join("; ");
+        assert!(notes.contains("split into tets: 2 wedges, 1 pyramid, 1 hex"), "{name}: {notes}");
+    }
+}
+
+#[test]
+fn a_body_that_would_lack_cells_is_an_error() {
+    let text = column("vtk");
+    // The hex as 25 (quadratic) has too few nodes, which nobody looks at.
+    let quadratic = text.replace("10\n13\n13\n12\n14\n5\n", "10\n13\n13\n25\n14\n5\n");
+    let (_, problem, message) = error(&quadratic, Format::Vtk);
+    assert!(matches!(problem, MeshFileProblem::UnsupportedCells { .. }));
+    assert!(message.contains("1 quadratic hex (hex20) (VTK type 25)"), "{message}");
+    // A face that is not read leaves the body whole.
+    let face = text.replace("14\n5\nCELL_DATA", "14\n22\nCELL_DATA");
+    let notes = read_bytes(face.as_bytes(), Format::Vtk).unwrap().notes.join("; ");
+    assert!(notes.contains("skipped cells of unsupported kinds: 1 quadratic triangle (tri6)"), "{notes}");
 }
 
 #[test]

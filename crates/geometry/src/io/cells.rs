@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use super::error::{Fault, MeshFileProblem, Place};
-use crate::{CellBlock, CellKind, DataArray, Mesh, Vector3};
+use crate::{CellBlock, CellKind, DataArray, Mesh, SplitCells, SplitKind, Vector3, add_as_tets};
 
 /// Prefix of arrays that hold a named set: 1 inside, 0 outside.
 pub(super) const SET_PREFIX: &str = "set:";
@@ -12,6 +12,46 @@ pub(super) const SET_PREFIX: &str = "set:";
 pub(super) const LABEL_NAMES: &str = "label-names";
 /// The texts that name bodies, obstacles and tools.
 pub(super) const BODY_NAMES: &str = "body-names";
+
+/// A kind of cell in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum FileKind {
+    /// Read as it is.
+    Kept(CellKind),
+    /// Read as tets.
+    Split(SplitKind),
+}
+
+impl FileKind {
+    pub const fn node_count(self) -> usize {
+        match self {
+            Self::Kept(kind) => kind.node_count(),
+            Self::Split(kind) => kind.node_count(),
+        }
+    }
+
+    pub const fn dimension(self) -> usize {
+        match self {
+            Self::Kept(kind) => kind.dimension(),
+            Self::Split(_) => 3,
+        }
+    }
+
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Kept(kind) => kind.name(),
+            Self::Split(kind) => kind.name(),
+        }
+    }
+}
+
+/// All cells of one kind.
+struct Block {
+    kind: FileKind,
+    nodes: Vec<u32>,
+    data: BTreeMap<String, DataArray>,
+    sets: BTreeMap<String, Vec<u32>>,
+}
 
 /// Where the cells that came from one cell of the file are.
 #[derive(Clone, Copy)]
@@ -24,11 +64,11 @@ struct Span {
 /// Cells being collected.
 #[derive(Default)]
 pub(super) struct Cells {
-    blocks: Vec<CellBlock>,
-    /// For each cell of the file: its cells here (none if skipped, several if split).
+    blocks: Vec<Block>,
+    /// For each cell of the file: its cells here (none if skipped, several for polygons and lists).
     spans: Vec<Span>,
-    /// Cells of unsupported kinds, by name.
-    skipped: BTreeMap<String, usize>,
+    /// Cells of unsupported kinds: their dimension and number by name.
+    skipped: BTreeMap<String, (usize, usize)>,
     cut: usize,
 }
 
@@ -45,12 +85,18 @@ impl Cells {
 
     /// Adds a cell of the mesh to the open cell of the file.
     pub fn push(&mut self, kind: CellKind, nodes: &[u32]) {
+        self.push_of(FileKind::Kept(kind), nodes);
+    }
+
+    /// The same for a cell of any kind that can be read.
+    pub fn push_of(&mut self, kind: FileKind, nodes: &[u32]) {
         let at = self.blocks.iter().position(|block| block.kind == kind).unwrap_or_else(|| {
-            self.blocks.push(CellBlock::new(kind, Vec::new()));
+            let (data, sets) = (BTreeMap::new(), BTreeMap::new());
+            self.blocks.push(Block { kind, nodes: Vec::new(), data, sets });
             self.blocks.len() - 1
         });
         let block = &mut self.blocks[at];
-        let index = block.len() as u32;
+        let index = (block.nodes.len() / kind.node_count()) as u32;
         block.nodes.extend_from_slice(nodes);
         if let Some(span) = self.spans.last_mut() {
             if span.start == span.end {
@@ -76,9 +122,9 @@ impl Cells {
         }
     }
 
-    /// Leaves the open cell of the file out, because its kind is not supported.
-    pub fn skip(&mut self, kind: impl Into<String>) {
-        *self.skipped.entry(kind.into()).or_default() += 1;
+    /// Leaves the open cell of the file out, because its kind is not supported. Its dimension is 3 for a volume.
+    pub fn skip(&mut self, kind: impl Into<String>, dimension: usize) {
+        self.skipped.entry(kind.into()).or_insert((dimension, 0)).1 += 1;
     }
 
     /// The mesh's cells that came from a cell of the file: index of the block and range in it.
@@ -140,7 +186,8 @@ impl Cells {
         }
     }
 
-    /// The mesh, or the reason for its absence; adds notes about skipped items.
+    /// The mesh, or the reason for its absence; adds notes about skipped and split cells. Cells may be skipped only if their dimension is
+    /// below that of the others: a body would have holes without them.
     pub fn into_mesh(
         self,
         points: Vec<Vector3>,
@@ -150,16 +197,16 @@ impl Cells {
         if points.is_empty() {
             return Err(Fault::whole(MeshFileProblem::NoPoints));
         }
-        let kinds: Vec<String> = self.skipped.iter().map(|(kind, count)| format!("{count} {kind}")).collect();
+        let kinds: Vec<String> =
+            self.skipped.iter().map(|(kind, (_, count))| format!("{count} {kind}")).collect();
         let kinds = kinds.join(", ");
-        // Points without their cells of higher order are useless for a simulation.
-        let only_vertices = self.blocks.iter().all(|block| block.kind == CellKind::Vertex);
-        if self.blocks.is_empty() || only_vertices && !kinds.is_empty() {
-            return Err(Fault::whole(if kinds.is_empty() {
-                MeshFileProblem::NoCells
-            } else {
-                MeshFileProblem::UnsupportedCells { kinds }
-            }));
+        let most = self.blocks.iter().map(|block| block.kind.dimension()).max();
+        let lacks =
+            |most: usize| self.skipped.values().any(|&(dimension, _)| dimension > 0 && dimension >= most);
+        match most {
+            None if kinds.is_empty() => return Err(Fault::whole(MeshFileProblem::NoCells)),
+            Some(most) if !lacks(most) => {}
+            _ => return Err(Fault::whole(MeshFileProblem::UnsupportedCells { kinds })),
         }
         if !kinds.is_empty() {
             notes.push(format!("skipped cells of unsupported kinds: {kinds}"));
@@ -172,7 +219,14 @@ impl Cells {
             set.sort_unstable();
             set.dedup();
         }
-        let mut mesh = Mesh { points, blocks, ..Mesh::default() };
+        let mut mesh = Mesh { points, ..Mesh::default() };
+        let mut split = Vec::new();
+        for Block { kind, nodes, data, sets } in blocks {
+            match kind {
+                FileKind::Kept(kind) => mesh.blocks.push(CellBlock { kind, nodes, data, sets }),
+                FileKind::Split(kind) => split.push(SplitCells { kind, nodes, data, sets }),
+            }
+        }
         for (name, array) in point_data {
             match name.strip_prefix(SET_PREFIX) {
                 Some(set) if array.components == 1 => {
@@ -184,6 +238,7 @@ impl Cells {
                 }
             }
         }
+        notes.extend(add_as_tets(&mut mesh, &split));
         Ok(mesh)
     }
 }

@@ -130,10 +130,10 @@ pub enum MeshFileProblem {
     /// The file holds points, but no cells.
     #[error("the file has points but no cells; export the elements too")]
     NoCells,
-    /// All cells are of kinds that are not supported.
+    /// Cells of the body are of kinds that are not supported.
     #[error(
-        "no supported cells: {kinds} not supported; convert to linear tet, hex, triangle, quad, line or vertex \
-         cells (Gmsh: `gmsh FILE -order 1 -save`)"
+        "cells of unsupported kinds: {kinds}; convert them to linear tets, hexes, wedges, pyramids, triangles, quads \
+         or lines (Gmsh: `gmsh FILE -order 1 -save`)"
     )]
     UnsupportedCells {
         /// The kinds found, with their counts.

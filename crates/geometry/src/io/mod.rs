@@ -2,8 +2,8 @@
 //!
 //! Reads Gmsh 1, 2 and 4.1 (`.msh`), legacy VTK (`.vtk`), VTK XML (`.vtu`, `.vtp`), Wavefront OBJ, OFF, STL, PLY, GIfTI (`.gii`) and
 //! FreeSurfer surfaces (`lh.pial`), text and binary; writes `.vtu`, Gmsh 4.1, OBJ, STL and PLY. The first bytes select the reader if they
-//! identify a format, otherwise the extension. Cells are linear: vertex, line, triangle, quad, tet, hex. Other cells are skipped with a
-//! note; it is an error if none remain.
+//! identify a format, otherwise the extension. Cells are linear: vertex, line, triangle, quad, tet, hex. Wedges and pyramids become tets
+//! (`split.rs`). Cells of other kinds are an error if the body would lack them, otherwise they are skipped with a note.
 
 mod base64;
 mod cells;

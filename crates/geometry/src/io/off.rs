@@ -73,7 +73,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
         }
         cells.open();
         match corners.len() {
-            0 => cells.skip("face without corners"),
+            0 => cells.skip("face without corners", 0),
             1 => cells.push(CellKind::Vertex, &corners),
             2 => cells.push(CellKind::Line, &corners),
             _ => cells.push_polygon(&corners),

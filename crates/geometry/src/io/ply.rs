@@ -317,7 +317,7 @@ impl PlyReader<'_> {
             }
             self.cells.open();
             match corners.len() {
-                0 => self.cells.skip("face without corners"),
+                0 => self.cells.skip("face without corners", 0),
                 1 => self.cells.push(CellKind::Vertex, &corners),
                 2 => self.cells.push(CellKind::Line, &corners),
                 _ => self.cells.push_polygon(&corners),

@@ -1,8 +1,8 @@
 //! Cells of VTK files (legacy and XML): cell types, and connectivity with offsets.
 
-use super::cells::{Cells, node};
+use super::cells::{Cells, FileKind, node};
 use super::error::{Fault, MeshFileProblem, Place};
-use crate::CellKind;
+use crate::{CellKind, SplitKind};
 
 /// VTK's number for a kind.
 pub(super) const fn type_number(kind: CellKind) -> u8 {
@@ -16,38 +16,40 @@ pub(super) const fn type_number(kind: CellKind) -> u8 {
     }
 }
 
-/// Names of VTK cell types that are not supported.
-fn unsupported_name(number: i64) -> String {
-    let name = match number {
-        0 => "empty cell",
-        13 => "wedge",
-        14 => "pyramid",
-        15 => "pentagonal prism",
-        16 => "hexagonal prism",
-        21 => "quadratic line (line3)",
-        22 => "quadratic triangle (tri6)",
-        23 => "quadratic quad (quad8)",
-        24 => "quadratic tet (tet10)",
-        25 => "quadratic hex (hex20)",
-        26 => "quadratic wedge (wedge15)",
-        27 => "quadratic pyramid (pyramid13)",
-        28 => "quadratic quad (quad9)",
-        29 => "quadratic hex (hex27)",
-        30 => "quadratic-linear quad",
-        31 => "quadratic-linear wedge",
-        32 => "quadratic wedge (wedge18)",
-        33 => "quadratic hex (hex24)",
-        34 => "quadratic triangle (tri7)",
-        35 => "cubic line (line4)",
-        36 => "quadratic polygon",
-        37 => "quadratic pyramid (pyramid19)",
-        41 => "convex point set",
-        42 => "polyhedron",
-        68..=74 => "Lagrange cell",
-        75..=81 => "Bézier cell",
-        _ => "",
+/// Name and dimension of a VTK cell type that is not supported. Unknown types may be volumes.
+fn unsupported(number: i64) -> (String, usize) {
+    let (name, dimension) = match number {
+        0 => ("empty cell", 0),
+        15 => ("pentagonal prism", 3),
+        16 => ("hexagonal prism", 3),
+        21 => ("quadratic line (line3)", 1),
+        22 => ("quadratic triangle (tri6)", 2),
+        23 => ("quadratic quad (quad8)", 2),
+        24 => ("quadratic tet (tet10)", 3),
+        25 => ("quadratic hex (hex20)", 3),
+        26 => ("quadratic wedge (wedge15)", 3),
+        27 => ("quadratic pyramid (pyramid13)", 3),
+        28 => ("quadratic quad (quad9)", 2),
+        29 => ("quadratic hex (hex27)", 3),
+        30 => ("quadratic-linear quad", 2),
+        31 => ("quadratic-linear wedge", 3),
+        32 => ("quadratic wedge (wedge18)", 3),
+        33 => ("quadratic hex (hex24)", 3),
+        34 => ("quadratic triangle (tri7)", 2),
+        35 => ("cubic line (line4)", 1),
+        36 => ("quadratic polygon", 2),
+        37 => ("quadratic pyramid (pyramid19)", 3),
+        41 => ("convex point set", 3),
+        42 => ("polyhedron", 3),
+        68 => ("Lagrange curve", 1),
+        69 | 70 => ("Lagrange face", 2),
+        71..=74 => ("Lagrange cell", 3),
+        75 => ("Bézier curve", 1),
+        76 | 77 => ("Bézier face", 2),
+        78..=81 => ("Bézier cell", 3),
+        _ => return (format!("VTK cell type {number}"), 3),
     };
-    if name.is_empty() { format!("VTK cell type {number}") } else { format!("{name} (VTK type {number})") }
+    (format!("{name} (VTK type {number})"), dimension)
 }
 
 /// Cells as connectivity and the end of each cell in it.
@@ -182,9 +184,12 @@ fn add_cell(
         5 => 3,
         8..=10 => 4,
         11 | 12 => 8,
+        13 => 6,
+        14 => 5,
         2 | 4 | 6 | 7 => nodes.len(),
         _ => {
-            cells.skip(unsupported_name(number));
+            let (name, dimension) = unsupported(number);
+            cells.skip(name, dimension);
             return Ok(());
         }
     };
@@ -194,7 +199,7 @@ fn add_cell(
     }
     // Lists of polygons and strips may hold shorter cells; too short to be anything are only these.
     if nodes.len() < if number == 4 { 2 } else { 1 } {
-        cells.skip(format!("cell of VTK type {number} with {} nodes", nodes.len()));
+        cells.skip(format!("cell of VTK type {number} with {} nodes", nodes.len()), 0);
         return Ok(());
     }
     let mut small = [0; 8];
@@ -229,6 +234,8 @@ fn add_cell(
         8 => cells.push(CellKind::Quad, &[corners[0], corners[1], corners[3], corners[2]]),
         9 => cells.push(CellKind::Quad, corners),
         10 => cells.push(CellKind::Tet, corners),
+        13 => cells.push_of(FileKind::Split(SplitKind::Wedge), corners),
+        14 => cells.push_of(FileKind::Split(SplitKind::Pyramid), corners),
         11 => {
             let order = [0, 1, 3, 2, 4, 5, 7, 6];
             cells.push(CellKind::Hex, &order.map(|corner| corners[corner]));

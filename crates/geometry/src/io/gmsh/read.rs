@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::element_type;
 use super::numbers::{Encoding, Numbers};
-use crate::io::cells::{Cells, check_filled, finite, index_limit};
+use crate::io::cells::{Cells, FileKind, check_filled, finite, index_limit};
 use crate::io::cursor::{Cursor, Order, Scalar, name, shown};
 use crate::io::error::{Fault, MeshFileProblem};
 use crate::io::{Format, MeshFile};
@@ -72,7 +72,7 @@ struct Sections {
     /// Cells by dimension and number of the physical group.
     groups: BTreeMap<(i64, i64), Vec<u32>>,
     /// Cells by kind and nodes (versions 1 and 2 repeat a cell for each of its physical groups).
-    seen: HashMap<(CellKind, [u32; 8]), u32>,
+    seen: HashMap<(FileKind, [u32; 8]), u32>,
     repeated: usize,
     point_fields: BTreeMap<String, Field>,
     cell_fields: BTreeMap<String, Field>,
@@ -338,7 +338,7 @@ fn read_elements_1(numbers: &mut Numbers<'_>, model: &mut Sections) -> Result<()
         let physical = numbers.int(what)?;
         let entity = numbers.int(what)?;
         let nodes = numbers.count(2, 4, what)?;
-        if let Some((Some(kind), _, needed)) = element_type(element)
+        if let Some((Ok(kind), _, needed)) = element_type(element)
             && needed == nodes
         {
             let nodes = read_cell(numbers, model, kind, number)?;
@@ -362,7 +362,7 @@ fn read_elements_2(numbers: &mut Numbers<'_>, model: &mut Sections) -> Result<()
         let number = numbers.int(what)?;
         let element = numbers.int(what)?;
         let (physical, entity) = read_tags(numbers, what)?;
-        if let Some((Some(kind), ..)) = element_type(element) {
+        if let Some((Ok(kind), ..)) = element_type(element) {
             let nodes = read_cell(numbers, model, kind, number)?;
             model.add_tagged(kind, nodes, number, physical, entity);
         } else {
@@ -417,7 +417,7 @@ fn read_elements_2_binary(numbers: &mut Numbers<'_>, model: &mut Sections) -> Re
                     _ => {}
                 }
             }
-            if let Some(kind) = kind {
+            if let Ok(kind) = kind {
                 let nodes = read_cell(numbers, model, kind, number)?;
                 model.add_tagged(kind, nodes, number, physical, entity);
             } else {
@@ -469,8 +469,8 @@ fn read_elements_4(numbers: &mut Numbers<'_>, model: &mut Sections) -> Result<()
             let number = numbers.tag(what)?;
             let mut nodes = [0; 8];
             match kind {
-                Some(kind) => nodes = read_cell(numbers, model, kind, number)?,
-                None => {
+                Ok(kind) => nodes = read_cell(numbers, model, kind, number)?,
+                Err(_) => {
                     for _ in 0..node_count {
                         numbers.tag(what)?;
                     }
@@ -481,7 +481,7 @@ fn read_elements_4(numbers: &mut Numbers<'_>, model: &mut Sections) -> Result<()
     }
     elements.sort_by_key(|element| element.number);
     for ElementRecord { number, element, nodes, entity } in elements {
-        let Some((Some(kind), ..)) = element_type(element) else {
+        let Some((Ok(kind), ..)) = element_type(element) else {
             model.skip(element, number);
             continue;
         };
@@ -501,7 +501,7 @@ fn read_elements_4(numbers: &mut Numbers<'_>, model: &mut Sections) -> Result<()
 fn read_cell(
     numbers: &mut Numbers<'_>,
     model: &Sections,
-    kind: CellKind,
+    kind: FileKind,
     number: i64,
 ) -> Result<[u32; 8], Fault> {
     let mut nodes = [0; 8];
@@ -574,7 +574,7 @@ fn read_field(
 
 impl Sections {
     /// Adds a cell of versions 1 and 2, or a further physical group to a cell that is there already.
-    fn add_tagged(&mut self, kind: CellKind, nodes: [u32; 8], number: i64, physical: i64, entity: i64) {
+    fn add_tagged(&mut self, kind: FileKind, nodes: [u32; 8], number: i64, physical: i64, entity: i64) {
         let group = (kind.dimension() as i64, physical.saturating_abs());
         let next = self.cells.len() as u32;
         let index = *self.seen.entry((kind, nodes)).or_insert(next);
@@ -589,10 +589,10 @@ impl Sections {
         }
     }
 
-    fn add(&mut self, kind: CellKind, nodes: [u32; 8], number: i64, physical: i64, entity: i64) {
+    fn add(&mut self, kind: FileKind, nodes: [u32; 8], number: i64, physical: i64, entity: i64) {
         self.elements.pairs.push((number, self.cells.len() as u32));
         self.cells.open();
-        self.cells.push(kind, &nodes[..kind.node_count()]);
+        self.cells.push_of(kind, &nodes[..kind.node_count()]);
         self.label.push(physical as f64);
         self.entity.push(entity as f64);
     }
@@ -601,8 +601,11 @@ impl Sections {
         self.elements.pairs.push((number, self.cells.len() as u32));
         self.cells.open();
         match element_type(element) {
-            Some((_, name, _)) => self.cells.skip(name),
-            None => self.cells.skip(format!("Gmsh type {element}")),
+            Some((kind, name, _)) => {
+                self.cells.skip(name, kind.map_or_else(|dimension| dimension, FileKind::dimension))
+            }
+            // Unknown types may be volumes.
+            None => self.cells.skip(format!("Gmsh type {element}"), 3),
         }
         self.label.push(0.0);
         self.entity.push(0.0);
