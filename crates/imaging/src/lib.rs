@@ -25,6 +25,7 @@ mod image;
 mod labels;
 mod names;
 mod region;
+mod vessels;
 
 pub use border::Border;
 pub use clean::{Cleaned, Cleaning};
