@@ -21,6 +21,11 @@ impl Boxes {
         Self { grids: BTreeMap::new(), finest: power(finest), len: 0 }
     }
 
+    /// None, with the same finest cubes.
+    pub(crate) fn emptied(&self) -> Self {
+        Self { grids: BTreeMap::new(), finest: self.finest, len: 0 }
+    }
+
     /// How many were put in.
     pub(crate) fn len(&self) -> usize {
         self.len

@@ -26,6 +26,7 @@ pub const MOST_MATERIALS: usize = 63;
 pub(crate) const LONGEST: f64 = 1.6;
 
 /// Tets, points and how they hang together.
+#[derive(Clone)]
 pub(crate) struct Complex {
     pub(crate) points: Vec<Vector3>,
     pub(crate) tets: Vec<[u32; 4]>,
@@ -69,6 +70,13 @@ impl Complex {
     /// Recomputes the sides of all points.
     pub(crate) fn find_sides(&mut self) {
         self.sides = (0..self.points.len() as u32).map(|point| self.sides_of(point)).collect();
+    }
+
+    /// Recomputes the sides of some points.
+    pub(crate) fn find_sides_of(&mut self, points: &[u32]) {
+        for &point in points {
+            self.sides[point as usize] = self.sides_of(point);
+        }
     }
 
     fn sides_of(&self, point: u32) -> Sides {
@@ -181,18 +189,18 @@ impl Complex {
         (mass / stiffness).sqrt()
     }
 
+    /// The faces that only one tet has, outward, in the order of their sorted nodes.
+    pub(crate) fn outer_faces(&self) -> Vec<[u32; 3]> {
+        lone(self.alive().flat_map(|tet| self.faces(tet)).collect())
+    }
+
     /// Faces round a point that only one of the chosen tets has, outward from it.
     pub(crate) fn rim_of(&self, point: u32, chosen: impl Fn(u32) -> bool) -> Vec<[u32; 3]> {
-        let mut faces: Vec<([u32; 3], [u32; 3])> = Vec::with_capacity(72);
+        let mut faces: Vec<[u32; 3]> = Vec::with_capacity(72);
         for &tet in self.star[point as usize].iter().filter(|&&tet| chosen(tet)) {
-            for face in self.faces(tet).into_iter().filter(|face| face.contains(&point)) {
-                let mut key = face;
-                key.sort_unstable();
-                faces.push((key, face));
-            }
+            faces.extend(self.faces(tet).into_iter().filter(|face| face.contains(&point)));
         }
-        faces.sort_unstable();
-        faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1).map(|same| same[0].1).collect()
+        lone(faces)
     }
 
     /// Points joined to a point by an edge, increasing.
@@ -257,9 +265,7 @@ impl Complex {
             [a, b, c, apex].into_iter().for_each(|node| self.star[node as usize].push(tet));
         }
         self.sides.push(self.sides_of(apex));
-        for node in faces.concat() {
-            self.sides[node as usize] = self.sides_of(node);
-        }
+        self.find_sides_of(&faces.concat());
     }
 
     /// Joins `gone` into `kept`, which moves to `position`. The caller has checked
@@ -358,6 +364,18 @@ struct Link {
     points: Vec<u32>,
     edges: Vec<[u32; 2]>,
     faces: Vec<[u32; 3]>,
+}
+
+/// The faces that occur once, in the order of their sorted nodes.
+fn lone(faces: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
+    let keyed = |face: [u32; 3]| {
+        let mut key = face;
+        key.sort_unstable();
+        (key, face)
+    };
+    let mut faces: Vec<([u32; 3], [u32; 3])> = faces.into_iter().map(keyed).collect();
+    faces.sort_unstable();
+    faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1).map(|same| same[0].1).collect()
 }
 
 fn distinct<T: Ord>(mut all: Vec<T>) -> Vec<T> {

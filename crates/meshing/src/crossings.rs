@@ -35,6 +35,7 @@ pub(crate) fn crossing_groups(
     each: usize,
     is_looked_at: impl Fn(u32) -> bool + Sync,
 ) -> (Vec<[u32; 2]>, Option<Vector3>) {
+    let place_of = |n: u32| points[n as usize];
     let boxed = |nodes: &[[u32; 3]]| {
         let start = points[nodes[0][0] as usize];
         nodes.as_flattened().iter().map(|&n| &points[n as usize]).fold([start; 2], widened)
@@ -55,7 +56,7 @@ pub(crate) fn crossing_groups(
         let both = [a[0].sup(&b[0]), a[1].inf(&b[1])];
         within(own, both).find_map(|&s| {
             let near = s.iter().map(|&n| &points[n as usize]).fold([points[s[0] as usize]; 2], widened);
-            within(other, [near[0].sup(&both[0]), near[1].inf(&both[1])]).find_map(|&t| meet(points, s, t))
+            within(other, [near[0].sup(&both[0]), near[1].inf(&both[1])]).find_map(|&t| meet(&place_of, s, t))
         })
     };
     let of = |own: u32| {
@@ -77,7 +78,7 @@ pub(crate) fn crossing_groups(
 }
 
 /// A box made to hold a point.
-fn widened([low, high]: [Vector3; 2], x: &Vector3) -> [Vector3; 2] {
+pub(crate) fn widened([low, high]: [Vector3; 2], x: &Vector3) -> [Vector3; 2] {
     [low.inf(x), high.sup(x)]
 }
 
@@ -108,36 +109,35 @@ impl TriangleMesh {
             (0..3).all(|k| a[k].min(b[k]).min(c[k]) <= high[k] && a[k].max(b[k]).max(c[k]) >= low[k])
                 && !gone.contains(t)
         };
-        let cross = |s: [u32; 3], t: [u32; 3]| meet(&self.points, s, t).is_some();
+        let cross = |s: [u32; 3], t: [u32; 3]| meet(&|n| self.points[n as usize], s, t).is_some();
         let mut others = existing.filter(near).map(|t| self.triangles[t as usize]);
         others.any(|other| new.iter().any(|&own| cross(own, other)))
             || new.iter().enumerate().any(|(k, &s)| new[..k].iter().any(|&t| cross(s, t)))
     }
 }
 
-/// A point where an edge of one of two triangles pierces the other.
-fn meet(points: &[Vector3], s: [u32; 3], t: [u32; 3]) -> Option<Vector3> {
+/// A point where an edge of one of two triangles pierces the other; `at` gives corners.
+pub(crate) fn meet(at: &(impl Fn(u32) -> Vector3 + ?Sized), s: [u32; 3], t: [u32; 3]) -> Option<Vector3> {
     if s.iter().filter(|n| t.contains(n)).count() > 1 {
         return None;
     }
-    let reaching = |&(own, other): &([u32; 3], [u32; 3])| !is_beside(points, other, own);
+    let reaching = |&(own, other): &([u32; 3], [u32; 3])| !is_beside(at, other, own);
     [(s, t), (t, s)].into_iter().filter(reaching).find_map(|(own, other)| {
         (0..3).find_map(|k| {
             let edge = [own[k], own[(k + 1) % 3]];
             if edge.iter().any(|n| other.contains(n)) {
                 return None;
             }
-            pierced(edge.map(|n| points[n as usize]), other.map(|n| points[n as usize]))
+            pierced(edge.map(at), other.map(at))
         })
     })
 }
 
 /// Whether a triangle lies on one side of the plane of another, or touches it. No edge of it pierces the other then.
-fn is_beside(points: &[Vector3], plane: [u32; 3], triangle: [u32; 3]) -> bool {
-    let [a, b, c] = plane.map(|n| points[n as usize]);
+fn is_beside(at: &(impl Fn(u32) -> Vector3 + ?Sized), plane: [u32; 3], triangle: [u32; 3]) -> bool {
+    let [a, b, c] = plane.map(at);
     let normal = (b - a).cross(&(c - a));
-    let heights =
-        triangle.map(|n| if plane.contains(&n) { 0.0 } else { normal.dot(&(points[n as usize] - a)) });
+    let heights = triangle.map(|n| if plane.contains(&n) { 0.0 } else { normal.dot(&(at(n) - a)) });
     heights.iter().all(|&h| h >= 0.0) || heights.iter().all(|&h| h <= 0.0)
 }
 

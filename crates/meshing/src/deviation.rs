@@ -284,8 +284,13 @@ pub(crate) fn surface_points(
     edge: f64,
 ) -> Result<Vec<Vector3>, MeshingError> {
     let (low, high) = checked_box(field)?;
-    let step = (edge / 4.0).max((high - low).amax() / MOST_SAMPLES);
-    Ok(crossings(field, &low, &high, step))
+    Ok(crossings(field, &low, &high, sample_step(field, edge)?))
+}
+
+/// Step of the grid that samples a field for cells of `edge` [m].
+pub(crate) fn sample_step(field: &(impl ImplicitField + ?Sized), edge: f64) -> Result<f64, MeshingError> {
+    let (low, high) = checked_box(field)?;
+    Ok((edge / SAMPLES_PER_EDGE).max((high - low).amax() / MOST_SAMPLES))
 }
 
 /// Where the zero surface crosses the edges of a grid over a box.

@@ -3,8 +3,6 @@
 //! new edge. A flip is accepted if its worst tet improves, within one material; on the boundary also only if the new edge
 //! follows the surface.
 
-use pliant_geometry::Vector3;
-
 use crate::complex::{Complex, acoustic_length};
 
 /// Longest ring of an edge that is taken away.
@@ -13,8 +11,8 @@ const LONGEST_RING: usize = 8;
 /// A flip must lengthen the worst tet by this factor.
 const GAIN: f64 = 1.0 + 1e-3;
 
-/// Tells whether a new edge of the boundary follows the surface, given its middle and the lattice constant there [m].
-pub(crate) type Follows<'a> = dyn Fn(&Vector3, f64) -> bool + 'a;
+/// Tells whether an edge of the boundary may turn, given its nodes and those of the new one.
+pub(crate) type Follows<'a> = dyn Fn(&Complex, [u32; 2], [u32; 2]) -> bool + 'a;
 
 impl Complex {
     /// Flips one tet away if that lengthens the worst acoustic length of the tets that change: its edges first, then its
@@ -41,9 +39,7 @@ impl Complex {
         let refused = triangles.iter().any(|&[i, j, k]| {
             [[i, j], [j, k], [i, k]].into_iter().any(|[i, j]| is_new(i, j) && unfit(nodes[i], nodes[j]))
         });
-        let [first, end] = [nodes[0], nodes[last]].map(|node| node as usize);
-        let middle = (self.points[first] + self.points[end]) / 2.0;
-        if refused || open && !follows(&middle, self.size[first].min(self.size[end])) {
+        if refused || open && !follows(self, [p, q], [nodes[0], nodes[last]]) {
             return false;
         }
         let new = triangles.into_iter().flat_map(|[i, j, k]| {
@@ -178,6 +174,8 @@ struct Ring {
 
 #[cfg(test)]
 mod tests {
+    use pliant_geometry::Vector3;
+
     use super::*;
 
     fn volume(complex: &Complex) -> f64 {
@@ -200,11 +198,11 @@ mod tests {
             |half: f64| vec![ring(0.), ring(1.), ring(2.), Vector3::z() * -half, Vector3::z() * half];
         let mut tall = Complex::new(points(1.5), vec![[3, 4, 0, 1], [3, 4, 1, 2], [3, 4, 2, 0]], 3.0);
         let before = shape(&tall);
-        assert!(tall.flip(0, &|_, _| true));
+        assert!(tall.flip(0, &|_, _, _| true));
         assert_eq!(shape(&tall).0, 2);
         assert!((shape(&tall).1 - before.1).abs() < 1e-14);
         let mut flat = Complex::new(points(0.3), vec![[0, 1, 2, 4], [0, 2, 1, 3]], 3.0);
-        assert!(flat.flip(0, &|_, _| false));
+        assert!(flat.flip(0, &|_, _, _| false));
         assert_eq!(shape(&flat).0, 3);
         assert!(flat.alive().all(|tet| flat.length(tet) > 0.0));
     }
@@ -227,9 +225,9 @@ mod tests {
                 tet.swap(2, 3);
             }
         });
-        assert!(!wedge.flip(0, &|_, _| false));
+        assert!(!wedge.flip(0, &|_, _, _| false));
         let before = shape(&wedge);
-        assert!(wedge.flip(0, &|_, _| true));
+        assert!(wedge.flip(0, &|_, _, _| true));
         assert_eq!(shape(&wedge), before);
         assert!(
             wedge

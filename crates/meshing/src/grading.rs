@@ -12,13 +12,19 @@ use crate::complex::Complex;
 use crate::cut::cut_outside;
 use crate::error::{MeshingError, require_at_most, require_finite, require_positive};
 use crate::extent::{allowed, checked_box};
-use crate::octree::{Cube, GradedLattice, Octree};
+use crate::field::ImplicitField;
+use crate::octree::{Cube, GradedLattice, Octree, around};
 use crate::request::{OrganTets, SMALLEST_PART};
 use crate::surfaces::Surfaces;
+use crate::tears::{Tear, tears};
 use crate::topology::in_large_components;
 
 /// Cubes outside the body may be this many doublings larger than the edge.
 const LARGEST_OUTSIDE: usize = 3;
+
+/// Cubes across a thin part that is torn by larger ones. With 1.71 a lattice point is always left inside: points that are nearer to a side
+/// than 0.357 of a cube may move onto it, and no edge of a tet is longer than a cube.
+const CELLS_ACROSS: f64 = 1.75;
 
 /// Limit of cubes examined for a size.
 const MOST_CUBES: f64 = (1 << 27) as f64;
@@ -50,6 +56,29 @@ impl Levels {
         let doublings = request.inner_edge.map_or(0.0, |inner| (inner / edge).log2() + 1e-9).floor().max(0.0);
         let protected = request.protect.iter().map(|&(label, smaller)| (label, base - halvings(smaller)));
         Ok(Self { base, inner: base + doublings as usize, protected: protected.collect() })
+    }
+
+    /// Wants smaller cubes round tears, at least halved ones and enough of them across the thin part; whether any are.
+    pub(crate) fn close(
+        &self,
+        request: &OrganTets,
+        tree: &Octree,
+        tears: &[Tear],
+        wanted: &mut Wanted,
+    ) -> bool {
+        let before = wanted.len();
+        let finest = self.finest(request);
+        // Thinner parts would be torn by the smallest cubes, too.
+        for tear in tears.iter().filter(|tear| tear.thickness >= finest) {
+            let thin = (tear.thickness / CELLS_ACROSS / finest).log2().floor().max(0.0) as usize;
+            for place in &tear.places {
+                if let Some(finer) = tree.level_at(place).checked_sub(1) {
+                    let level = finer.min(thin);
+                    wanted.extend(around(tree.cube_at(level, place)).map(|cube| (level, cube)));
+                }
+            }
+        }
+        wanted.len() > before
     }
 
     /// Edge of the smallest cubes [m].
@@ -171,6 +200,9 @@ pub(crate) struct Filled {
     pub(crate) complex: Complex,
     pub(crate) dropped_pieces: usize,
     pub(crate) dropped_cells: usize,
+    /// Tears of thin parts, and how many smaller cells closed.
+    pub(crate) tears: Vec<Tear>,
+    pub(crate) closed_tears: usize,
 }
 
 /// Fills a body with the tets of a lattice, cut along its surface.
@@ -194,13 +226,22 @@ pub(crate) fn fill(
         return Err(MeshingError::NoCells { edge: request.edge, size: high - low });
     }
     require_at_most(alive.len() as f64, allowed(request.cell_limit))?;
-    let nodes: Vec<u32> = alive.iter().flat_map(|&tet| complex.tets[tet as usize]).collect();
-    let (kept, dropped_pieces) = in_large_components(CellKind::Tet, &nodes, request.smallest_piece);
-    let dropped: Vec<u32> =
-        alive.into_iter().zip(kept).filter(|(_, kept)| !kept).map(|(tet, _)| tet).collect();
-    dropped.iter().for_each(|&tet| complex.remove(tet));
-    complex.find_sides();
-    Ok(Filled { complex, dropped_pieces, dropped_cells: dropped.len() })
+    Ok(Filled::of(complex, request.smallest_piece, field))
+}
+
+impl Filled {
+    /// Leaves out pieces of less than the part `smallest` of the largest one.
+    pub(crate) fn of(mut complex: Complex, smallest: f64, field: &dyn ImplicitField) -> Self {
+        let tears = tears(&complex, field);
+        let alive: Vec<u32> = complex.alive().collect();
+        let nodes: Vec<u32> = alive.iter().flat_map(|&tet| complex.tets[tet as usize]).collect();
+        let (kept, dropped_pieces) = in_large_components(CellKind::Tet, &nodes, smallest);
+        let dropped: Vec<u32> =
+            alive.into_iter().zip(kept).filter(|(_, kept)| !kept).map(|(tet, _)| tet).collect();
+        dropped.iter().for_each(|&tet| complex.remove(tet));
+        complex.find_sides();
+        Self { complex, dropped_pieces, dropped_cells: dropped.len(), tears, closed_tears: 0 }
+    }
 }
 
 /// Points, sizes and tets of a lattice that touch a tet with a point in the body.

@@ -3,6 +3,7 @@
 //! either asks for, and cuts along surfaces shorten what is asked for at its points, too.
 
 use crate::complex::{Complex, LONGEST};
+use crate::guard::Guard;
 use crate::surfaces::Surfaces;
 
 /// Halvings of one edge at most; a halving makes shorter edges, so that few are needed.
@@ -15,7 +16,11 @@ const LEAST_AFTER_MOVE: f64 = 0.2;
 const REACH: f64 = 0.5;
 
 /// Halves edges that are too long, the longest as compared with its limit first. Points between sides go there. How many were halved.
-pub(crate) fn halve_long_edges(complex: &mut Complex, surfaces: &Surfaces<'_>) -> usize {
+pub(crate) fn halve_long_edges(
+    complex: &mut Complex,
+    surfaces: &Surfaces<'_>,
+    guard: &mut Option<Guard>,
+) -> usize {
     let mut halved = 0;
     for _ in 0..PASSES {
         let part = |[p, q]: [u32; 2]| {
@@ -30,24 +35,33 @@ pub(crate) fn halve_long_edges(complex: &mut Complex, surfaces: &Surfaces<'_>) -
         long.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         halved += long.len();
         for (_, edge) in long {
-            halve(complex, edge, surfaces);
+            halve(complex, edge, surfaces, guard);
         }
     }
     halved
 }
 
-fn halve(complex: &mut Complex, [p, q]: [u32; 2], surfaces: &Surfaces<'_>) {
+fn halve(complex: &mut Complex, [p, q]: [u32; 2], surfaces: &Surfaces<'_>, guard: &mut Option<Guard>) {
     let middle = 0.5 * (complex.points[p as usize] + complex.points[q as usize]);
-    let new = complex.bisect([p, q], middle) as usize;
+    let number = complex.bisect([p, q], middle);
+    let new = number as usize;
+    if let Some(guard) = guard {
+        guard.note(complex, &[number, p, q]);
+    }
     let sides = complex.sides[new];
     if sides.count_ones() < 2 {
         return;
     }
-    if let Some(place) = surfaces.project(sides, &middle, REACH * complex.size[new]) {
+    if let Some(place) = surfaces.project(sides, &middle, REACH * complex.size[new])
+        && guard.as_ref().is_none_or(|guard| guard.lets_move(complex, number, &place))
+    {
         complex.points[new] = place;
         let bears = complex.star[new].iter().all(|&tet| complex.part(tet) > LEAST_AFTER_MOVE);
         if !bears {
             complex.points[new] = middle;
+        }
+        if let Some(guard) = guard {
+            guard.note(complex, &[number]);
         }
     }
 }

@@ -1,16 +1,28 @@
 //! Repairs a body that touches itself: where a gap is thinner than the cells, its two sides share points or edges. A point is doubled
 //! for every group of its tets connected through faces. An edge with more than two boundary faces is halved first, which gives each
-//! side its own point. Faces do not change, so no volume does. Where two stretches of the boundary meet in a point whose tets are
-//! connected (a sheet without thickness), one of them gets its own point slightly further out, with a tet on each of its faces.
+//! side its own point. Where two stretches of the boundary meet in a point whose tets are connected (a sheet without thickness), one of
+//! them gets its own point slightly further out, with a tet on each of its faces, or the point is taken off. Points in one place then move apart, each into its own
+//! tets, so that the sides have a gap between them.
 
 use std::collections::BTreeMap;
 
 use pliant_geometry::Vector3;
 
 use crate::complex::{Complex, OUTSIDE, acoustic_length};
+use crate::edges::key;
+use crate::optimise::directions;
 
 /// How far the new point of a pinch may lie from the old one, in lattice constants.
 const LIFTS: [f64; 5] = [0.5, 0.35, 0.25, 0.15, 0.08];
+
+/// How far points in one place move into their tets, in lattice constants.
+const APART: f64 = 0.08;
+
+/// How much of its edges a point takes along where it is taken off.
+const DUG: f64 = 0.35;
+
+/// Moving apart must leave tets this part of their acoustic length.
+const LEAST_AFTER_MOVE: f64 = 0.3;
 
 /// The repairs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -41,11 +53,64 @@ pub(crate) fn mend(complex: &mut Complex) -> Mended {
         }
     }
     for point in pinched_points(complex) {
-        while fans(complex, point).len() > 1 && part_pinch(complex, point) {
+        while fans(complex, point).len() > 1 {
+            if !part_pinch(complex, point) {
+                dig(complex, point);
+            }
             mended.parted += 1;
         }
     }
+    move_apart(complex);
     mended
+}
+
+/// Moves points that lie in one place apart.
+fn move_apart(complex: &mut Complex) {
+    let mut places: BTreeMap<[u64; 3], Vec<u32>> = BTreeMap::new();
+    for (point, (place, star)) in (0..).zip(complex.points.iter().zip(&complex.star)) {
+        if !star.is_empty() {
+            places.entry([place.x, place.y, place.z].map(f64::to_bits)).or_default().push(point);
+        }
+    }
+    for point in places.into_values().filter(|own| own.len() > 1).flatten() {
+        move_inwards(complex, point);
+    }
+}
+
+/// Moves a point of the boundary into its tets, in the direction that leads deepest behind all faces round it.
+fn move_inwards(complex: &mut Complex, point: u32) {
+    let (here, size) = (complex.points[point as usize], complex.size[point as usize]);
+    let normal = |face: [u32; 3]| {
+        let [a, b, c] = face.map(|node| complex.points[node as usize]);
+        (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default()
+    };
+    let normals: Vec<Vector3> = complex.rim_of(point, |_| true).into_iter().map(normal).collect();
+    let behind = |way: &Vector3| normals.iter().map(|normal| -normal.dot(way)).fold(f64::INFINITY, f64::min);
+    let mean = -normals.iter().sum::<Vector3>().try_normalize(0.0).unwrap_or_default();
+    // Corners too narrow for these directions have their own tets.
+    let corner = |&tet: &u32| {
+        let centre = complex.corners(tet).iter().sum::<Vector3>() / 4.0;
+        (centre - here).try_normalize(0.0).unwrap_or_default()
+    };
+    let into_tets: Vec<Vector3> = complex.star[point as usize].iter().map(corner).collect();
+    let (depth, way) = std::iter::once(mean)
+        .chain(directions())
+        .chain(into_tets)
+        .map(|way| (behind(&way), way))
+        .fold((0.0, mean), |best, other| if other.0 > best.0 { other } else { best });
+    let least = |complex: &Complex| {
+        let star = &complex.star[point as usize];
+        star.iter().map(|&tet| complex.part(tet)).fold(f64::INFINITY, f64::min)
+    };
+    let enough = LEAST_AFTER_MOVE * least(complex);
+    for halvings in 0..5 {
+        let reach = APART * size * 0.5_f64.powi(halvings);
+        complex.points[point as usize] = here + way * reach;
+        if depth > 0.0 && least(complex) >= enough {
+            return;
+        }
+    }
+    complex.points[point as usize] = here;
 }
 
 /// Points where the boundary touches itself: their boundary faces form more than one fan.
@@ -87,9 +152,8 @@ fn part_pinch(complex: &mut Complex, point: u32) -> bool {
         });
         let normals: Vec<Vector3> = normals.collect();
         let mean = normals.iter().sum::<Vector3>().try_normalize(0.0);
-        for place in
-            mean.into_iter().chain(normals).flat_map(|way| LIFTS.map(|lift| here + way * (lift * size)))
-        {
+        let ways = mean.into_iter().chain(normals).chain(directions());
+        for place in ways.flat_map(|way| LIFTS.map(|lift| here + way * (lift * size))) {
             let lengths = fan.iter().map(|face| {
                 let [a, b, c] = corners(face);
                 acoustic_length([a, b, c, place])
@@ -105,18 +169,25 @@ fn part_pinch(complex: &mut Complex, point: u32) -> bool {
     true
 }
 
+/// Takes a point off with the near thirds of its tets, which joins what its fans bound.
+fn dig(complex: &mut Complex, point: u32) {
+    for other in complex.neighbours(point) {
+        let place = complex.points[point as usize].lerp(&complex.points[other as usize], DUG);
+        complex.bisect([point, other], place);
+    }
+    for tet in complex.star[point as usize].clone() {
+        let nodes = complex.tets[tet as usize];
+        complex.remove(tet);
+        complex.find_sides_of(&nodes);
+    }
+}
+
 /// Edges with more than two boundary faces, increasing.
 pub(crate) fn crowded_edges(complex: &Complex) -> Vec<[u32; 2]> {
-    let mut faces: BTreeMap<[u32; 3], u32> = BTreeMap::new();
-    for face in complex.alive().flat_map(|tet| complex.faces(tet)) {
-        let mut key = face;
-        key.sort_unstable();
-        *faces.entry(key).or_default() += 1;
-    }
     let mut edges: BTreeMap<[u32; 2], u32> = BTreeMap::new();
-    for ([a, b, c], _) in faces.into_iter().filter(|(_, count)| *count == 1) {
-        for edge in [[a, b], [a, c], [b, c]] {
-            *edges.entry(edge).or_default() += 1;
+    for [a, b, c] in complex.outer_faces() {
+        for [p, q] in [[a, b], [b, c], [c, a]] {
+            *edges.entry(key(p, q)).or_default() += 1;
         }
     }
     edges.into_iter().filter(|(_, count)| *count > 2).map(|(edge, _)| edge).collect()
@@ -194,6 +265,11 @@ mod tests {
         assert_eq!(mend(&mut complex), Mended { doubled: 2, ..Mended::default() });
         assert!(crowded_edges(&complex).is_empty());
         assert_eq!(complex.points.len(), 8);
+        // Each moves by 0.08 lattice constants into its tet, which both lean along the edge.
+        assert!(complex.alive().all(|tet| complex.length(tet) > 0.0));
+        for (point, twin) in [(0, 6), (1, 7)] {
+            assert!((complex.points[point] - complex.points[twin]).norm() > 0.1);
+        }
     }
 
     /// A ring of tets round an edge with two of them taken out opposite each other: its ends hold the halves together.
@@ -241,5 +317,25 @@ mod tests {
         assert!(pinched_points(&complex).is_empty());
         assert!(complex.alive().all(|tet| complex.length(tet) > 0.0));
         assert_eq!(complex.alive().count(), 12 + 6);
+    }
+
+    /// The same plate where no cap fits: a hole joins the cones.
+    #[test]
+    fn a_point_that_is_taken_off_leaves_a_hole() {
+        let around = |at: usize, height: f64| {
+            let (sine, cosine) = (at as f64 * std::f64::consts::FRAC_PI_3).sin_cos();
+            Vector3::new(cosine, sine, height)
+        };
+        let mut points = vec![Vector3::zeros()];
+        points.extend((0..6).map(|at| around(at, 0.4)));
+        points.extend((0..6).map(|at| around(at, -0.4)));
+        let (top, low) = (|at: u32| 1 + at % 6, |at: u32| 7 + at % 6);
+        let wedge = |at: u32| [[0, low(at), low(at + 1), top(at + 1)], [0, low(at), top(at + 1), top(at)]];
+        let mut complex = Complex::new(points, (0..6).flat_map(wedge).collect(), 1.0);
+        dig(&mut complex, 0);
+        assert!(complex.star[0].is_empty() && complex.sides[0] == 0);
+        assert!(crowded_edges(&complex).is_empty() && pinched_points(&complex).is_empty());
+        assert!(complex.alive().all(|tet| complex.length(tet) > 0.0));
+        assert_eq!(crate::soundness::euler_number(&complex.outer_faces()), 0);
     }
 }

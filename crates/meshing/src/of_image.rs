@@ -4,7 +4,9 @@ use pliant_imaging::{Cleaned, Cleaning, LabelError, LabelImage, Smoothing};
 
 use crate::anatomy::Anatomy;
 use crate::complex::MOST_MATERIALS;
+use crate::error::MeshingError;
 use crate::field::ImplicitField;
+use crate::triangles::TriangleMesh;
 
 /// Best smoothing of the field of an image if [`SURFACE_PAIRS`] smooth its surface afterwards. Of the settings tested on labels
 /// of the analytic liver and brain, this one stays closest to them. With sigma 1 and no pairs, which suits tetrahedra, the
@@ -13,6 +15,18 @@ pub const SURFACE_SMOOTHING: Smoothing = Smoothing { sigma: 0.55, clip: 6.0 };
 
 /// Pairs of moves for [`TriangleMesh::smooth`](crate::TriangleMesh::smooth) after that.
 pub const SURFACE_PAIRS: usize = 50;
+
+impl TriangleMesh {
+    /// The smooth surface of a body in an image, on a grid of `step` [m], with [`SURFACE_SMOOTHING`] of its field.
+    ///
+    /// # Errors
+    /// If the box of the body is empty or not finite, or the grid is too large.
+    pub fn of_image(anatomy: &Anatomy<'_>, step: f64, cell_limit: usize) -> Result<Self, MeshingError> {
+        let mut surface = Self::of_field(anatomy.field(), step, cell_limit)?;
+        surface.smooth(SURFACE_PAIRS);
+        Ok(surface)
+    }
+}
 
 impl Anatomy<'static> {
     /// The regions of some labels of an image as one body, each a material: cleaned together (gaps and holes are filled

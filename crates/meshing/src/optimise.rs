@@ -6,6 +6,7 @@
 use pliant_geometry::{CellKind, Vector3};
 
 use crate::complex::{Complex, OUTSIDE, Sides, acoustic_length};
+use crate::guard::Guard;
 use crate::surfaces::Surfaces;
 
 /// Threshold of the first round, in ideal acoustic lengths.
@@ -68,29 +69,51 @@ pub(crate) struct Optimiser<'a> {
     slack: f64,
     /// Whether points where three materials meet, or two and the outside, only keep to the outside.
     lines_are_free: bool,
+    /// Rejects what would let the boundary intersect itself, if it is there.
+    guard: Option<Guard>,
     noise: u64,
     done: Optimised,
 }
 
 impl<'a> Optimiser<'a> {
-    pub(crate) fn new(complex: &'a mut Complex, surfaces: Surfaces<'a>) -> Self {
-        Self { complex, surfaces, slack: 0.0, lines_are_free: false, noise: 1, done: Optimised::default() }
+    pub(crate) fn new(complex: &'a mut Complex, surfaces: Surfaces<'a>, guard: Option<Guard>) -> Self {
+        let (slack, lines_are_free, done) = (0.0, false, Optimised::default());
+        Self { complex, surfaces, slack, lines_are_free, guard, noise: 1, done }
     }
 
-    /// Up to `rounds` rounds towards a least acoustic length of `target` × ideal, then surfaces shifted until the mesh
-    /// encloses `volumes` [m³], of the whole and of the inner materials, as far as these are known.
+    /// Whether a point may move to `place`.
+    fn lets_move(&self, node: u32, place: &Vector3) -> bool {
+        self.guard.as_ref().is_none_or(|guard| guard.lets_move(self.complex, node, place))
+    }
+
+    fn move_to(&mut self, node: u32, place: Vector3) {
+        self.complex.points[node as usize] = place;
+        self.note(&[node]);
+    }
+
+    /// Takes note of changes round points.
+    fn note(&mut self, nodes: &[u32]) {
+        if let Some(guard) = &mut self.guard {
+            guard.note(self.complex, nodes);
+        }
+    }
+
+    /// Up to `rounds` rounds towards a least acoustic length of `target` × ideal, then surfaces shifted until the mesh encloses the volumes
+    /// [m³] of the whole and of the inner materials, as far as these are known; `volumes` gives them for the mesh before.
     pub(crate) fn run(
         &mut self,
         target: f64,
         rounds: usize,
-        volumes: &[Option<f64>],
+        volumes: &dyn Fn(&Complex) -> Vec<Option<f64>>,
         progress: &dyn Fn(f64),
     ) -> Optimised {
         let aim = (AIM * target).min(1.0);
         self.improve(aim, rounds, RAMP, &|done| progress(0.6 * done));
+        let mut wanted = None;
         for sweep in 0..FIT_SWEEPS {
             self.fit(aim, FIT_REACH * SHRINK.powi(sweep as i32));
-            if self.shift_surfaces(volumes, aim) {
+            let wanted = wanted.get_or_insert_with(|| volumes(self.complex));
+            if self.shift_surfaces(wanted, aim) {
                 self.improve(aim, rounds.div_ceil(2), 0.0, &|_| {});
             }
             progress(0.6 + 0.3 * (sweep + 1) as f64 / FIT_SWEEPS as f64);
@@ -142,8 +165,9 @@ impl<'a> Optimiser<'a> {
                 if let Some(there) = self.project(node, here)
                     && self.star_min(node, &there, u32::MAX, 0.0) >= least
                     && !self.complex.stretches(node, &there, u32::MAX)
+                    && self.lets_move(node, &there)
                 {
-                    self.complex.points[node as usize] = there;
+                    self.move_to(node, there);
                 }
             }
         }
@@ -210,9 +234,8 @@ impl<'a> Optimiser<'a> {
             if self.complex.is_alive(tet) && self.may_peel(tet) {
                 let nodes = self.complex.tets[tet as usize];
                 self.complex.remove(tet);
-                for node in nodes {
-                    self.refresh(node);
-                }
+                self.complex.find_sides_of(&nodes);
+                self.note(&nodes);
                 peeled += 1;
             }
         }
@@ -271,18 +294,12 @@ impl<'a> Optimiser<'a> {
                 .fold(towards[0], |most, other| if other.1 > most.1 { *other } else { most });
             if most.0 != own {
                 self.complex.material[tet as usize] = most.0;
-                self.complex.tets[tet as usize].into_iter().for_each(|node| self.refresh(node));
+                let nodes = self.complex.tets[tet as usize];
+                self.complex.find_sides_of(&nodes);
                 given += 1;
             }
         }
         self.done.given += given;
-    }
-
-    fn refresh(&mut self, node: u32) {
-        let star = &self.complex.star[node as usize];
-        let materials = star.iter().fold(0, |sides, &tet| sides | 1 << self.complex.material[tet as usize]);
-        let open = !self.complex.rim_of(node, |_| true).is_empty();
-        self.complex.sides[node as usize] = materials | if open { OUTSIDE } else { 0 };
     }
 
     fn collapse(&mut self, threshold: f64) {
@@ -302,11 +319,21 @@ impl<'a> Optimiser<'a> {
 
     /// Flips edges and faces of tets below a part of the ideal length.
     fn flip(&mut self, threshold: f64) {
-        let surfaces = &self.surfaces;
-        let follows = |middle: &Vector3, size: f64| surfaces.off(OUTSIDE, middle) <= FLIP_OFF * size;
         let mut flipped = 0;
         for tet in self.below(threshold) {
-            if self.complex.is_alive(tet) && self.complex.flip(tet, &follows) {
+            if !self.complex.is_alive(tet) {
+                continue;
+            }
+            let (surfaces, guard) = (&self.surfaces, &self.guard);
+            let follows = |complex: &Complex, edge: [u32; 2], ends: [u32; 2]| {
+                let [a, b] = ends.map(|end| complex.points[end as usize]);
+                let [first, last] = ends.map(|end| complex.size[end as usize]);
+                surfaces.off(OUTSIDE, &((a + b) / 2.0)) <= FLIP_OFF * first.min(last)
+                    && guard.as_ref().is_none_or(|guard| guard.lets_turn(complex, edge, ends))
+            };
+            let nodes = self.complex.tets[tet as usize];
+            if self.complex.flip(tet, &follows) {
+                self.note(&nodes);
                 flipped += 1;
             }
         }
@@ -325,8 +352,13 @@ impl<'a> Optimiser<'a> {
             for (gone, kept) in [(p, q), (q, p)] {
                 if let Some(position) = self.best_collapse(gone, kept, threshold)
                     && self.complex.may_collapse(gone, kept)
+                    && self
+                        .guard
+                        .as_ref()
+                        .is_none_or(|guard| guard.lets_collapse(self.complex, gone, kept, &position))
                 {
                     self.complex.collapse(gone, kept, position);
+                    self.note(&[gone, kept]);
                     return true;
                 }
             }
@@ -452,12 +484,12 @@ impl<'a> Optimiser<'a> {
         for direction in directions() {
             let Some(trial) = self.project(node, here + direction * (reach * size)) else { continue };
             let [misfit, _] = self.misfit(node, &trial, &faces);
-            if misfit < best && bears(&trial) {
+            if misfit < best && bears(&trial) && self.lets_move(node, &trial) {
                 (best, place) = (misfit, trial);
             }
         }
         if place != here {
-            self.complex.points[node as usize] = place;
+            self.move_to(node, place);
             self.done.moved += 1;
         }
     }
@@ -508,13 +540,16 @@ impl<'a> Optimiser<'a> {
             // Free trials without improvement are not worth projecting: their tets change little.
             if let Some(trial) = self.project(node, trial) {
                 let part = self.star_min(node, &trial, u32::MAX, best);
-                if part > best && !self.complex.stretches(node, &trial, u32::MAX) {
+                if part > best
+                    && !self.complex.stretches(node, &trial, u32::MAX)
+                    && self.lets_move(node, &trial)
+                {
                     (best, place) = (part, trial);
                 }
             }
         }
         if place != here {
-            self.complex.points[node as usize] = place;
+            self.move_to(node, place);
             self.done.moved += 1;
         }
     }
@@ -527,7 +562,7 @@ impl<'a> Optimiser<'a> {
 }
 
 /// The 26 unit vectors to the neighbours in a cubic grid.
-fn directions() -> impl Iterator<Item = Vector3> {
+pub(crate) fn directions() -> impl Iterator<Item = Vector3> {
     let grid = (0..27)
         .map(|at| Vector3::new((at % 3) as f64 - 1.0, (at / 3 % 3) as f64 - 1.0, (at / 9) as f64 - 1.0));
     grid.filter(|direction| *direction != Vector3::zeros()).map(|direction| direction.normalize())

@@ -13,7 +13,7 @@ use crate::topology::faces_between_labels;
 use crate::voxels::Voxels;
 
 /// Volumes off by more than this part are reported.
-const LARGEST_VOLUME_ERROR: f64 = 0.05;
+pub(crate) const LARGEST_VOLUME_ERROR: f64 = 0.05;
 
 /// One label of a mesh.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -11,19 +11,32 @@ use crate::Stuffing;
 use crate::anatomy::Anatomy;
 use crate::complex::{Complex, LONGEST};
 use crate::cut::{cut_gaps, cut_materials};
-use crate::deviation::Measured;
+use crate::deviation::{Measured, sample_step};
 use crate::error::{MeshingError, require_positive};
 use crate::given::MeasuredTo;
 use crate::grading::{Filled, Levels, Wanted, fill, tree};
+use crate::guard::Guard;
+use crate::isosurface::euler_number_of_field;
 use crate::long_edges::halve_long_edges;
+use crate::lost::{LostPart, Samples};
 use crate::manifold::{crowded_edges, mend, pinched_points};
 use crate::octree::{Octree, around};
-use crate::optimise::Optimiser;
+use crate::optimise::{Optimised, Optimiser};
 use crate::request::{OrganTets, SMALLEST_PART};
+use crate::soundness::{euler_number, self_intersections};
 use crate::surfaces::Surfaces;
 
 /// Meshes made at most until a distance is held.
 const MOST_PASSES: usize = 8;
+
+/// Lost parts of less than this part of the body are not named.
+const LEAST_LOST: f64 = 1e-4;
+
+/// Lost parts that are listed.
+const LISTED: usize = 3;
+
+/// Cells may be halved this often where a thin part would be torn.
+const TEAR_HALVINGS: usize = 2;
 
 /// Cells become smaller where the distance exceeds this fraction of the requested one.
 const BEYOND: f64 = 0.85;
@@ -45,13 +58,7 @@ impl OrganTets {
         if let Some(distance) = self.distance {
             return self.within(distance, anatomy, progress);
         }
-        let is_even = self.inner_edge.is_none() && self.protect.is_empty();
-        let filled = if is_even {
-            self.stuffed(anatomy)?
-        } else {
-            let levels = Levels::new(self, self.edge)?;
-            fill(self, anatomy, &tree(self, anatomy, &levels, &Wanted::new())?)?
-        };
+        let filled = self.filled(anatomy)?;
         progress(0.1);
         self.finished(filled, anatomy, &|done| progress(0.1 + 0.9 * done))
     }
@@ -64,14 +71,14 @@ impl OrganTets {
         progress: &dyn Fn(f64),
     ) -> Result<OrganMesh, MeshingError> {
         require_positive("distance", distance)?;
-        let levels = Levels::new(self, finest_for(distance, self.edge))?;
+        let finest = finest_for(distance, self.edge).min(self.edge / f64::from(1 << TEAR_HALVINGS));
+        let levels = Levels::new(self, finest)?;
         let (mut wanted, mut coarser) = (Wanted::new(), Wanted::new());
         let (mut best, mut is_final): (Option<OrganMesh>, bool) = (None, false);
         for pass in 0..=MOST_PASSES {
             let share = |done: f64| progress((pass as f64 + done) / (MOST_PASSES + 1) as f64);
             is_final |= pass + 1 >= MOST_PASSES;
-            let tree = tree(self, anatomy, &levels, &wanted)?;
-            let filled = match fill(self, anatomy, &tree) {
+            let (filled, tree) = match self.whole(anatomy, &levels, &mut wanted) {
                 Err(MeshingError::TooManyCells { .. }) if best.is_some() => break,
                 // The one before fits, and is finished.
                 Err(MeshingError::TooManyCells { .. }) if pass > 0 && !wanted.eq(&coarser) => {
@@ -105,17 +112,63 @@ impl OrganTets {
         best.ok_or(MeshingError::NoCells { edge: self.edge, size: Vector3::zeros() })
     }
 
+    /// A body filled with tets, with smaller ones where thin parts would be torn.
+    fn filled(&self, anatomy: &Anatomy<'_>) -> Result<Filled, MeshingError> {
+        let levels = Levels::new(self, self.edge / f64::from(1 << TEAR_HALVINGS))?;
+        let mut wanted = Wanted::new();
+        if self.inner_edge.is_some() || !self.protect.is_empty() {
+            return Ok(self.whole(anatomy, &levels, &mut wanted)?.0);
+        }
+        let stuffed = self.stuffed(anatomy)?;
+        if stuffed.tears.is_empty() {
+            return Ok(stuffed);
+        }
+        if !levels.close(self, &tree(self, anatomy, &levels, &wanted)?, &stuffed.tears, &mut wanted) {
+            return Ok(stuffed);
+        }
+        match self.whole(anatomy, &levels, &mut wanted) {
+            Err(MeshingError::TooManyCells { .. }) => Ok(stuffed),
+            filled => filled.map(|(filled, _)| Filled {
+                closed_tears: stuffed.tears.len().saturating_sub(filled.tears.len()).max(filled.closed_tears),
+                ..filled
+            }),
+        }
+    }
+
+    /// A body filled with tets of several sizes, smaller ones than `wanted` where thin parts would be torn; and the lattice.
+    fn whole(
+        &self,
+        anatomy: &Anatomy<'_>,
+        levels: &Levels,
+        wanted: &mut Wanted,
+    ) -> Result<(Filled, Octree), MeshingError> {
+        let mut best: Option<(Filled, Octree)> = None;
+        let mut found = 0_usize;
+        loop {
+            let lattice = tree(self, anatomy, levels, wanted)?;
+            let mut filled = match fill(self, anatomy, &lattice) {
+                Err(MeshingError::TooManyCells { .. }) if best.is_some() => break,
+                filled => filled?,
+            };
+            filled.closed_tears = found.saturating_sub(filled.tears.len());
+            found = found.max(filled.tears.len());
+            let is_finer = levels.close(self, &lattice, &filled.tears, wanted);
+            best = Some((filled, lattice));
+            if !is_finer {
+                break;
+            }
+        }
+        best.ok_or(MeshingError::NoCells { edge: self.edge, size: Vector3::zeros() })
+    }
+
     /// Tets of one size.
     fn stuffed(&self, anatomy: &Anatomy<'_>) -> Result<Filled, MeshingError> {
         let stuffing = Stuffing { edge: self.edge, origin: self.origin, cell_limit: self.cell_limit };
-        let stuffed = stuffing.parts(anatomy.field(), self.smallest_piece)?;
+        let stuffed = stuffing.parts(anatomy.field(), 0.0)?;
         let block = &stuffed.mesh.blocks[0];
         let tets = block.cells().map(|cell| [cell[0], cell[1], cell[2], cell[3]]).collect();
-        Ok(Filled {
-            complex: Complex::new(stuffed.mesh.points.clone(), tets, self.edge),
-            dropped_pieces: stuffed.dropped_components,
-            dropped_cells: stuffed.dropped_cells,
-        })
+        let complex = Complex::new(stuffed.mesh.points.clone(), tets, self.edge);
+        Ok(Filled::of(complex, self.smallest_piece, anatomy.field()))
     }
 
     /// Cuts materials out, parts what touches, and optimises.
@@ -125,22 +178,47 @@ impl OrganTets {
         anatomy: &Anatomy<'_>,
         progress: &dyn Fn(f64),
     ) -> Result<OrganMesh, MeshingError> {
-        let Filled { mut complex, dropped_pieces, dropped_cells } = filled;
+        let Filled { mut complex, dropped_pieces, dropped_cells, tears, closed_tears } = filled;
         let raw = complex.worst();
-        let surfaces = Surfaces::new(anatomy, self.edge);
         let bridges = cut_gaps(&mut complex, anatomy.field());
-        cut_materials(&mut complex, &surfaces);
+        cut_materials(&mut complex, &Surfaces::new(anatomy, self.edge));
         let crowded = crowded_edges(&complex).len();
         let mended = mend(&mut complex);
-        let long_edges = halve_long_edges(&mut complex, &surfaces);
         progress(0.1);
-        let optimised = if self.target > 0.0 {
-            let onward = |done: f64| progress(0.1 + 0.85 * done);
-            let volumes = wanted_volumes(anatomy);
-            Optimiser::new(&mut complex, surfaces).run(self.target, self.rounds, &volumes, &onward)
-        } else {
-            Default::default()
+        let samples = Samples::of(anatomy, self.edge);
+        // A mesh has the surface of its body within half an edge, a smooth one of voxels within their diagonal.
+        let far = (self.edge / 2.0).max(anatomy.resolution());
+        let lost = |complex: &Complex| {
+            samples.as_ref().map_or_else(Vec::new, |own| own.lost(&own.within_tets(complex), far))
         };
+        let volumes = |complex: &Complex| wanted_volumes(anatomy, &lost(complex));
+        let improved = |complex: &mut Complex, guard: Option<Guard>, onward: &dyn Fn(f64)| {
+            let surfaces = Surfaces::new(anatomy, self.edge);
+            let mut guard = guard;
+            let long_edges = halve_long_edges(complex, &surfaces, &mut guard);
+            let optimised = match self.target > 0.0 {
+                true => {
+                    Optimiser::new(complex, surfaces, guard).run(self.target, self.rounds, &volumes, onward)
+                }
+                false => Optimised::default(),
+            };
+            (long_edges, optimised)
+        };
+        // Few bodies have banks that could meet, and guarding all moves takes long: it is done where the body touched itself, or where the
+        // result intersects itself without.
+        let is_tight = mended.doubled + mended.parted > 0;
+        let mut made = None;
+        if !is_tight {
+            let mut free = complex.clone();
+            let done = improved(&mut free, None, &|done| progress(0.1 + 0.85 * done));
+            let is_sound = self_intersections(&free.points, &free.outer_faces()).0.is_empty();
+            made = is_sound.then_some((free, done));
+        }
+        let (complex, (long_edges, optimised)) = made.unwrap_or_else(|| {
+            let guard = Guard::new(&complex);
+            let done = improved(&mut complex, Some(guard), &|done| progress(0.1 + 0.85 * done));
+            (complex, done)
+        });
         let repairs = Repairs {
             dropped_pieces,
             dropped_cells,
@@ -150,6 +228,7 @@ impl OrganTets {
             halved_edges: mended.halved,
             parted_points: mended.parted,
             long_edges,
+            closed_tears,
         };
         let steps = Steps {
             rounds: optimised.rounds,
@@ -162,10 +241,24 @@ impl OrganTets {
         let left = crowded_edges(&complex).len();
         let pinched = pinched_points(&complex);
         let pinched_points = pinched.iter().map(|&point| complex.points[point as usize].into()).collect();
+        let outer = complex.outer_faces();
+        let (crossing, first_crossing) = self_intersections(&complex.points, &outer);
+        let surface = SurfaceCheck {
+            euler_number: euler_number(&outer),
+            of_body: sample_step(anatomy.field(), self.edge)
+                .and_then(|step| euler_number_of_field(anatomy.field(), step))
+                .ok(),
+            self_intersections: crossing.len(),
+            first_crossing,
+            tears: tears.len(),
+            first_tear: tears.first().map(|tear| tear.places[0].into()),
+        };
+        let lost = lost(&complex);
         let (acoustic_part, edges) = (complex.worst(), EdgeLengths::of(&complex));
         let (points, nodes, material) = complex.compacted();
         let mesh = labelled(points, nodes, &material, &anatomy.labels());
-        let of_complex = OfComplex { raw, acoustic_part, edges, crowded_edges_left: left, pinched_points };
+        let of_complex =
+            OfComplex { raw, acoustic_part, edges, crowded_edges_left: left, pinched_points, surface, lost };
         let report = TetReport::new(&mesh, &material, anatomy, of_complex, repairs, steps);
         progress(1.0);
         Ok(OrganMesh { mesh, report })
@@ -188,9 +281,14 @@ fn finer(wanted: &mut Wanted, tree: &Octree, measured: &Measured, distance: f64)
     wanted.len() > before
 }
 
-/// Volume of the whole and of each inner material [m³], where known.
-fn wanted_volumes(anatomy: &Anatomy<'_>) -> Vec<Option<f64>> {
+/// Volume of the whole and of each inner material [m³], where known, without what a mesh lacks: the rest must not grow for it.
+fn wanted_volumes(anatomy: &Anatomy<'_>, lost: &[LostPart]) -> Vec<Option<f64>> {
     let mut volumes = anatomy.volumes().to_vec();
+    for part in lost {
+        for (volume, own) in volumes.iter_mut().zip(&part.volumes) {
+            *volume = volume.map(|volume| volume - own);
+        }
+    }
     volumes[0] = volumes.iter().copied().sum();
     volumes
 }
@@ -232,6 +330,8 @@ pub struct Repairs {
     pub parted_points: usize,
     /// Edges halved because they were too long for the size requested at their location.
     pub long_edges: usize,
+    /// Tears of thin parts that were closed by smaller cells.
+    pub closed_tears: usize,
 }
 
 /// The steps of the optimiser.
@@ -286,6 +386,64 @@ struct OfComplex {
     edges: EdgeLengths,
     crowded_edges_left: usize,
     pinched_points: Vec<[f64; 3]>,
+    surface: SurfaceCheck,
+    lost: Vec<LostPart>,
+}
+
+/// A part of a body that its mesh lacks: thinner than the cells, torn off, or too small.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LostReport {
+    /// Label of most of it.
+    pub label: i32,
+    /// Its volume [m³].
+    pub volume: f64,
+    /// Its point that is farthest from the mesh [m].
+    pub place: [f64; 3],
+}
+
+impl LostReport {
+    /// Of the parts of labels that are not negligible in a body of a volume [m³].
+    pub(crate) fn of(parts: Vec<LostPart>, labels: &[i32], whole: f64) -> Vec<Self> {
+        let named = |part: LostPart| {
+            let most = (0..part.volumes.len()).max_by(|&a, &b| part.volumes[a].total_cmp(&part.volumes[b]));
+            let label = labels.get(most.unwrap_or(0)).copied().unwrap_or(0);
+            Self { label, volume: part.volume(), place: part.place.into() }
+        };
+        parts.into_iter().map(named).filter(|part| part.volume >= LEAST_LOST * whole).collect()
+    }
+
+    /// The first of some parts, and the volume of the rest; `None` without any.
+    pub(crate) fn in_words(parts: &[Self]) -> Option<String> {
+        let one = |part: &Self| {
+            let [x, y, z] = part.place;
+            format!("{:.3} ml of label {} at ({x:.4}, {y:.4}, {z:.4}) m", part.volume * 1e6, part.label)
+        };
+        let first: Vec<String> = parts.iter().take(LISTED).map(one).collect();
+        let more = parts.iter().skip(LISTED);
+        let rest: f64 = more.clone().map(|part| part.volume).sum();
+        match more.count() {
+            _ if first.is_empty() => None,
+            0 => Some(first.join(", ")),
+            count => Some(format!("{}, {:.3} ml in {count} other parts", first.join(", "), rest * 1e6)),
+        }
+    }
+}
+
+/// Whether the boundary of a mesh is that of a body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct SurfaceCheck {
+    /// Euler number of the boundary of the mesh: 2 for each closed surface, less 2 for each handle.
+    pub euler_number: i64,
+    /// That of the body's surface, sampled at a quarter of the edge.
+    pub of_body: Option<i64>,
+    /// Boundary faces that pass through others.
+    pub self_intersections: usize,
+    /// Where the first do [m].
+    pub first_crossing: Option<[f64; 3]>,
+    /// Thin parts that cells of the smallest size still tear.
+    pub tears: usize,
+    /// Where the first is [m].
+    pub first_tear: Option<[f64; 3]>,
 }
 
 /// Distance between a mesh and its body, if requested.
@@ -347,18 +505,37 @@ pub struct TetReport {
     pub steps: Steps,
     /// The distance, if requested.
     pub distance: Option<DistanceReport>,
+    /// The boundary.
+    pub surface: SurfaceCheck,
+    /// Parts of the body that the mesh lacks, the largest first, of a ten-thousandth of the body and more.
+    pub lost: Vec<LostReport>,
 }
 
 impl TetReport {
     /// Deviations from the request.
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
+        doubts.extend(
+            LostReport::in_words(&self.lost).map(|lost| format!("the mesh lacks parts of the body: {lost}")),
+        );
         if let Some(DistanceReport { asked, reached, to, .. }) = self.distance.filter(|d| d.reached > d.asked)
         {
             doubts.push(format!(
                 "the distance of {:.3} mm to {to} was not reached; the best mesh reaches {:.3} mm",
                 asked * 1e3,
                 reached * 1e3
+            ));
+        }
+        if let Some([x, y, z]) = self.surface.first_crossing {
+            let number = self.surface.self_intersections;
+            doubts.push(format!(
+                "{number} faces of the mesh boundary pass through others, the first at ({x:.4}, {y:.4}, {z:.4}) m"
+            ));
+        }
+        if let Some([x, y, z]) = self.surface.first_tear {
+            let number = self.surface.tears;
+            doubts.push(format!(
+                "the mesh tears thin parts of the body in {number} places, the first at ({x:.4}, {y:.4}, {z:.4}) m"
             ));
         }
         if self.edges.longest_part > LONGEST + 1e-9 {
@@ -382,7 +559,8 @@ impl TetReport {
         repairs: Repairs,
         steps: Steps,
     ) -> Self {
-        let OfComplex { raw, acoustic_part, edges, crowded_edges_left, pinched_points } = of_complex;
+        let OfComplex { raw, acoustic_part, edges, crowded_edges_left, pinched_points, surface, lost } =
+            of_complex;
         let quality = QualityReport::new(mesh);
         let block = &mesh.blocks[0];
         let mut materials: Vec<MaterialReport> = anatomy
@@ -391,6 +569,7 @@ impl TetReport {
             .zip(anatomy.volumes())
             .map(|(label, &voxel_volume)| MaterialReport { label, tets: 0, volume: 0.0, voxel_volume })
             .collect();
+        let lost = LostReport::of(lost, &anatomy.labels(), anatomy.volumes().iter().flatten().sum());
         let mut around = vec![0_usize; mesh.points.len()];
         for (cell, &material) in block.cells().zip(material) {
             let corners = [0, 1, 2, 3].map(|at| mesh.points[cell[at] as usize]);
@@ -417,6 +596,8 @@ impl TetReport {
             repairs,
             steps,
             distance: None,
+            surface,
+            lost,
         }
     }
 }
@@ -464,6 +645,7 @@ impl fmt::Display for TetReport {
             halved_edges,
             parted_points,
             long_edges,
+            closed_tears,
         } = self.repairs;
         if dropped_pieces > 0 {
             writeln!(f, "left out         {dropped_cells} cells in {dropped_pieces} small pieces")?;
@@ -487,6 +669,18 @@ impl fmt::Display for TetReport {
                 "halved           {long_edges} edges too long for the size requested at their location"
             )?;
         }
+        if closed_tears > 0 {
+            writeln!(f, "refined          {closed_tears} places where thin parts would be torn")?;
+        }
+        if let Some(lost) = LostReport::in_words(&self.lost) {
+            writeln!(f, "lost             {lost}")?;
+        }
+        let SurfaceCheck { euler_number, of_body, self_intersections, .. } = self.surface;
+        let of_body = of_body.map_or_else(String::new, |own| format!(" (body: {own})"));
+        writeln!(
+            f,
+            "surface          Euler number {euler_number}{of_body}, {self_intersections} faces intersect others"
+        )?;
         if self.crowded_edges_left > 0 {
             writeln!(f, "still touching   {} edges", self.crowded_edges_left)?;
         }

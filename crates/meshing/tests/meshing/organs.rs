@@ -4,7 +4,10 @@ use std::f64::consts::PI;
 
 use pliant_geometry::{Grid, Vector3};
 use pliant_imaging::{Cleaning, LabelError, LabelImage, Smoothing};
-use pliant_meshing::{Anatomy, Ellipsoid, MeshingError, OrganMesh, OrganTets};
+use pliant_meshing::{
+    Anatomy, Closing, Ellipsoid, Enclosed, ImplicitField, MeshingError, OrganMesh, OrganTets,
+    SURFACE_SMOOTHING, TriangleMesh,
+};
 use pliant_testing::Random;
 
 use pliant_testing::mesh_checks::*;
@@ -273,4 +276,151 @@ fn the_liver_of_a_scan_is_meshed_with_the_stomach() {
     for material in &made.report.materials {
         assert!((material.volume / material.voxel_volume.expect("the image knows") - 1.0).abs() < 0.05);
     }
+}
+
+/// The space between two spheres about the origin.
+struct Hollow {
+    outer: f64,
+    wall: f64,
+}
+
+impl ImplicitField for Hollow {
+    fn value(&self, point: &Vector3) -> f64 {
+        let half = self.wall / 2.0;
+        half - (point.norm() - self.outer + half).abs()
+    }
+
+    fn bounds(&self) -> (Vector3, Vector3) {
+        (Vector3::repeat(-self.outer), Vector3::repeat(self.outer))
+    }
+}
+
+/// A wall of little more than a cell keeps its two surfaces: cells are smaller where all points of some lie on them.
+#[test]
+fn a_thin_wall_is_not_torn() {
+    // Without smaller cells the first has 48 holes, and the second 12.
+    for (outer, wall) in [(0.03, 0.003), (0.02, 0.0028)] {
+        let body = Anatomy::new(1, Hollow { outer, wall });
+        let request = OrganTets { target: 0.0, ..OrganTets::new(0.0025) };
+        let report = request.mesh(&body, &|_| {}).unwrap().report;
+        assert!(report.repairs.closed_tears > 0, "{report}");
+        assert_eq!((report.surface.euler_number, report.surface.of_body), (4, Some(4)), "{report}");
+        assert_eq!((report.surface.self_intersections, report.surface.tears), (0, 0));
+    }
+}
+
+/// Two balls with a neck of one cell between them.
+struct Dumbbell {
+    neck: f64,
+}
+
+impl ImplicitField for Dumbbell {
+    fn value(&self, point: &Vector3) -> f64 {
+        let ball = |x: f64| 0.015 - (point - Vector3::new(x, 0.0, 0.0)).norm();
+        let bar = (self.neck - point.y.hypot(point.z)).min(0.025 - point.x.abs());
+        ball(-0.025).max(ball(0.025)).max(bar)
+    }
+
+    fn bounds(&self) -> (Vector3, Vector3) {
+        (Vector3::new(-0.04, -0.015, -0.015), Vector3::new(0.04, 0.015, 0.015))
+    }
+}
+
+#[test]
+fn a_thin_neck_is_not_broken() {
+    for shift in [2, 3] {
+        let origin = Vector3::new(0.0, 0.0006 * f64::from(shift), 0.0004 * f64::from(shift));
+        let request = OrganTets { target: 0.0, origin: Some(origin), ..OrganTets::new(0.005) };
+        let report = request.mesh(&Anatomy::new(1, Dumbbell { neck: 0.0025 }), &|_| {}).unwrap().report;
+        assert_eq!((report.surface.euler_number, report.repairs.closed_tears), (2, 1), "{report}");
+    }
+}
+
+/// Two cubes that share an edge come apart, with a gap between them that survives the optimiser.
+struct Cubes;
+
+impl ImplicitField for Cubes {
+    fn value(&self, point: &Vector3) -> f64 {
+        let cube = |sign: f64| {
+            let centre = Vector3::new(0.02 * sign, 0.02 * sign, 0.0);
+            0.02 - (point - centre).amax()
+        };
+        cube(1.0).max(cube(-1.0))
+    }
+
+    fn bounds(&self) -> (Vector3, Vector3) {
+        (Vector3::new(-0.04, -0.04, -0.02), Vector3::new(0.04, 0.04, 0.02))
+    }
+}
+
+#[test]
+fn banks_that_touch_are_moved_apart() {
+    let made = OrganTets::new(0.005).mesh(&Anatomy::new(1, Cubes), &|_| {}).unwrap();
+    check_sound(&made);
+    assert!(made.report.repairs.doubled_points > 0, "{}", made.report);
+    assert_eq!(made.report.surface.self_intersections, 0, "{}", made.report);
+    // Points of the two cubes near their edge.
+    let faces = conforming_boundary(&made.mesh);
+    let near = |side: f64| {
+        let mut nodes: Vec<u32> = faces.concat();
+        nodes.retain(|&n| {
+            let x = made.mesh.points[n as usize];
+            x.x.hypot(x.y) < 0.003 && side * (x.x + x.y) > 0.0
+        });
+        nodes
+    };
+    let (first, second) = (near(1.0), near(-1.0));
+    assert!(!first.is_empty() && !second.is_empty());
+    let gaps = first.iter().flat_map(|&a| second.iter().map(move |&b| (a, b)).filter(|(a, b)| a != b));
+    let least = gaps
+        .map(|(a, b)| (made.mesh.points[a as usize] - made.mesh.points[b as usize]).norm())
+        .fold(f64::INFINITY, f64::min);
+    assert!(least > 0.04 * 0.005, "{least}");
+}
+
+/// A ball with a disc round it, which is far thinner than the cells.
+struct Saturn;
+
+impl ImplicitField for Saturn {
+    fn value(&self, point: &Vector3) -> f64 {
+        let ball = 0.02 - point.norm();
+        let disc = (0.0005 - point.z.abs()).min(0.03 - point.x.hypot(point.y));
+        ball.max(disc)
+    }
+
+    fn bounds(&self) -> (Vector3, Vector3) {
+        (Vector3::new(-0.03, -0.03, -0.02), Vector3::new(0.03, 0.03, 0.02))
+    }
+}
+
+#[test]
+fn what_is_lost_is_named_and_does_not_inflate_the_rest() {
+    let surface = TriangleMesh::of_field(&Saturn, 0.0004, usize::MAX).unwrap().to_mesh();
+    let body = Enclosed::new(&surface, 0.005, &Closing::default()).unwrap();
+    let made = OrganTets::new(0.005).mesh(&body.anatomy(7, 0.005, &|_| {}).unwrap(), &|_| {}).unwrap();
+    let ball = 4.0 / 3.0 * PI * 0.02_f64.powi(3);
+    let disc = body.volume() - ball;
+    assert!((tet_volume(&made.mesh) / ball - 1.0).abs() < 0.005, "{}", made.report);
+    let [lost] = made.report.lost[..] else { panic!("{}", made.report) };
+    assert!((lost.volume / disc - 1.0).abs() < 0.05, "{lost:?} of {disc:e}");
+    assert!(lost.label == 7 && lost.place[0].hypot(lost.place[1]) > 0.028 && lost.place[2].abs() < 0.001);
+    let told = made.report.doubts().join("\n");
+    assert!(told.contains("lacks parts of the body: 1.") && told.contains(" ml of label 7 at ("), "{told}");
+}
+
+/// A ball of 10 mm in triangles of 8 mm is a fifth too small unless its points move out.
+#[test]
+fn a_surface_of_few_triangles_keeps_the_volume_of_its_label() {
+    let image = organs::ball(0.01);
+    let cleaning = Cleaning::default();
+    let (body, _) = Anatomy::from_image(&image, &[1], &cleaning, &SURFACE_SMOOTHING, &|_| {})
+        .expect("the label is there");
+    let voxel = image.grid.spacing()[0];
+    let mut surface = TriangleMesh::of_image(&body, voxel, usize::MAX).unwrap();
+    surface.remesh(0.008, usize::MAX).unwrap();
+    let kept = surface.keep_volume(&body).unwrap();
+    let [label] = kept.labels[..] else { panic!("{kept:?}") };
+    assert!(label.error().abs() < 1e-3 && kept.moved > 0.5e-3, "{kept:?}");
+    assert!(kept.lost.is_empty() && kept.warnings().is_empty(), "{kept:?}");
+    assert!(kept.lines()[0].contains("% of the input"), "{:?}", kept.lines());
 }
