@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use crate::barrier::distance::edge_edge;
+use crate::barrier::distance::{edge_edge, point_triangle};
 use crate::tree::{Bounds, Tree};
 pub use narrow::Edge;
 use narrow::{Above, Across, is_beyond};
@@ -78,6 +78,8 @@ pub struct Pair {
     pub normal: Vector3<f64>,
     /// The distance [m] along it, negative of an overlap.
     pub distance: f64,
+    /// The distance [m] that both keep.
+    pub kept: f64,
     /// Whether the first belongs to the first of two surfaces.
     pub in_order: bool,
 }
@@ -198,6 +200,8 @@ pub struct Pairs {
     sides: Vec<Side>,
     /// Distance [m] that they keep.
     offset: f64,
+    /// The distance [m] that each node keeps, by its number; the same of all nodes beyond its end.
+    kept: Vec<f64>,
     /// How far [m] beyond that pairs are found.
     reach: f64,
     skin: f64,
@@ -232,16 +236,81 @@ impl Pairs {
         let mean = sum / count.max(1.0);
         let [reach, skin, depth] = [REACH, SKIN, DEPTH].map(|part| part * mean);
         let (points, crossings, room, apart, near) = Default::default();
-        let mut own = Self { sides, offset, reach, skin, depth, points, crossings, room, apart, near };
+        let kept = Vec::new();
+        let mut own = Self { sides, offset, kept, reach, skin, depth, points, crossings, room, apart, near };
         if second.is_none() {
-            own.set_apart(&place);
+            own.set_apart(&place, AT_REST * offset);
         }
         own
     }
 
-    /// Finds the parts of a surface that are too near each other at rest: beside each other, or on both sides of a thin part.
-    fn set_apart(&mut self, place: &impl Fn(u32) -> Vector3<f64>) {
-        let keep = AT_REST * self.offset;
+    /// Nodes that keep a smaller distance [m] than the others, with that distance. Parts of a surface that are nearer at rest than others keep may then touch
+    /// each other; only those behind each other never do. `place` is where nodes are at rest [m].
+    #[must_use]
+    pub fn keeping(
+        mut self,
+        near: impl IntoIterator<Item = (u32, f64)>,
+        place: impl Fn(u32) -> Vector3<f64>,
+    ) -> Self {
+        for (node, kept) in near {
+            let count = self.kept.len().max(node as usize + 1);
+            self.kept.resize(count, self.offset);
+            self.kept[node as usize] = kept;
+        }
+        if self.sides.len() == 1 {
+            self.apart = Default::default();
+            self.set_apart(&place, 0.0);
+        }
+        self
+    }
+
+    /// Nodes of pairs whose distance is less than the one to keep, whichever way they look, with the least distance [m]. Of two edges those of the first
+    /// count.
+    pub fn nearer(&mut self, place: impl Fn(u32) -> Vector3<f64>) -> Vec<(u32, f64)> {
+        self.list_again(&place);
+        let mut least = BTreeMap::<u32, f64>::new();
+        let mut note = |node: u32, distance: f64| {
+            if distance < self.offset {
+                let known = least.entry(node).or_insert(distance);
+                *known = known.min(distance);
+            }
+        };
+        for point in self.points() {
+            for ([a, b, c], _) in point.faces() {
+                note(point.node, point_triangle(&[point.node, a, b, c].map(&place)).distance);
+            }
+        }
+        for [first, second] in self.crossings() {
+            let distance = between(&first, &second, &place);
+            first.ends.into_iter().for_each(|end| note(end, distance));
+        }
+        least.into_iter().collect()
+    }
+
+    /// The mean length [m] of the edges at rest.
+    pub fn mean_edge(&self) -> f64 {
+        self.reach / REACH
+    }
+
+    /// The distance [m] that each node keeps, by its number, where some keep less than [`lengths`](Self::lengths) says; the others beyond its end do not.
+    pub fn kept(&self) -> &[f64] {
+        &self.kept
+    }
+
+    /// The distance [m] that two points keep, by the nodes of each and their weights.
+    fn kept_by(&self, sides: [&[(u32, f64)]; 2]) -> f64 {
+        if self.kept.is_empty() {
+            return self.offset;
+        }
+        let of = |&(node, weight): &(u32, f64)| {
+            weight * self.kept.get(node as usize).copied().unwrap_or(self.offset)
+        };
+        let [first, second] = sides.map(|side| side.iter().map(of).sum::<f64>());
+        first.min(second).clamp(0.0, self.offset)
+    }
+
+    /// Finds the parts of a surface that are nearer each other at rest than a distance [m]: beside each other, or on both sides of a thin part.
+    fn set_apart(&mut self, place: &impl Fn(u32) -> Vector3<f64>, keep: f64) {
         self.list(place, keep.max(2.0 * self.depth) + self.skin);
         let side = &self.sides[0];
         let behind = |distance: f64| -2.0 * self.depth < distance && distance < keep;
@@ -426,7 +495,8 @@ impl Pairs {
                 };
                 let [[a, b], [c, d]] = [first.ends, second.ends];
                 let weights = [1.0 - s, s, t - 1.0, -t];
-                let pair = Pair { nodes: [a, b, c, d], weights, normal, distance, in_order: true };
+                let kept = self.kept_by([&[(a, 1.0 - s), (b, s)], &[(c, 1.0 - t), (d, t)]]);
+                let pair = Pair { nodes: [a, b, c, d], weights, normal, distance, kept, in_order: true };
                 if wanted(&pair) {
                     found(pair);
                 }
@@ -453,6 +523,7 @@ impl Pairs {
             weights: [1.0, -u, -v, -w],
             normal,
             distance,
+            kept: self.kept_by([&[(node, 1.0)], &[(a, u), (b, v), (c, w)]]),
             in_order: true,
         };
         // The nearest edge or corner: its distance, the way from there, the normals of its triangles, its triangle and weights.
@@ -590,6 +661,46 @@ mod tests {
         assert!(found(&pairs, &places).is_empty());
     }
 
+    /// A sheet that begins askew above another one, at its lower side nearer than both keep: nodes there keep the distance that they have, so that no pair is
+    /// pushed apart, and others the whole.
+    #[test]
+    fn what_is_nearer_at_the_start_keeps_that_distance() {
+        let (low, mut places) = square(6, true, 0);
+        let (high, above) = square(4, false, 49);
+        places.extend(above.iter().map(|x| x + Vector3::new(0.3, 0.2, 0.01 + 0.1 * x.x)));
+        let rest = places.clone();
+        let place = |node: u32| rest[node as usize];
+        let fresh = || Pairs::new(&low, Some(&high), 0.2, place);
+        let near = fresh().nearer(place);
+        assert!(near.len() > 10 && near.len() < 50, "{near:?}");
+        assert!(near.iter().all(|(_, kept)| (0.0..0.2).contains(kept)), "{near:?}");
+        let mut pairs = fresh().keeping(near, place);
+        pairs.update(place);
+        let all = found(&pairs, &places);
+        assert!(all.iter().all(|pair| pair.distance > pair.kept - 1e-12), "{all:?}");
+        let [whole, part] =
+            [true, false].map(|whole| all.iter().filter(|p| (p.kept == 0.2) == whole).count());
+        assert!(whole > 3 && part > 10, "{whole} {part}");
+        // The distance that is kept changes evenly along triangles: a sheet that slides is not pushed at once.
+        let (mut before, mut least): (Option<f64>, f64) = (None, f64::INFINITY);
+        for step in 0..400 {
+            let slid = |node: u32| {
+                let by = if node < 49 { 0.0 } else { 0.005 * f64::from(step) };
+                rest[node as usize] - Vector3::x() * by
+            };
+            pairs.update(slid);
+            let mut kept = f64::INFINITY;
+            pairs.find(slid, |pair| {
+                if pair.nodes[0] == 61 && pair.normal.z > 0.99 {
+                    kept = kept.min(pair.kept);
+                }
+            });
+            assert!(before.is_none_or(|before| (kept - before).abs() < 0.01), "{step}: {before:?} {kept}");
+            (before, least) = (Some(kept), least.min(kept));
+        }
+        assert!(least < 0.1, "{least}");
+    }
+
     /// Pairs at some places are those of lists made at these places, and of lists with a larger skin, to the last bit.
     #[test]
     fn pairs_do_not_depend_on_when_lists_are_made() {
@@ -690,8 +801,16 @@ mod tests {
         let across = all.iter().filter(|pair| (pair.distance - 0.1).abs() < 1e-12).count();
         assert!(across > 40, "{across} of {}", all.len());
         assert!(all.iter().all(|pair| pair.distance > 0.0));
-        // Too near at rest.
-        let pairs = Pairs::new(&sheet, None, 0.2, |node| folded[node as usize]);
+        // Too near at rest: they never touch, or keep what they have.
+        let place = |node: u32| folded[node as usize];
+        let pairs = Pairs::new(&sheet, None, 0.2, place);
         assert!(pairs.set_apart_count() > 40);
+        let near = pairs.keeping([], place).nearer(place);
+        let mut pairs = Pairs::new(&sheet, None, 0.2, place).keeping(near, place);
+        assert_eq!(pairs.set_apart_count(), 0);
+        pairs.update(place);
+        let all = found(&pairs, &folded);
+        assert!(all.iter().filter(|pair| (pair.kept - 0.1).abs() < 1e-12).count() > 40);
+        assert!(all.iter().all(|pair| pair.distance > pair.kept - 1e-12));
     }
 }

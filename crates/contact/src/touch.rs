@@ -4,6 +4,8 @@
 //! node is the correction over its mobility: a step with this force is perfectly plastic along the normal, keeps momentum, and leaves the
 //! critical time step as it is.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Matrix3, Point3, Vector3};
 use pliant_mechanics::curve::Curve;
 use pliant_mechanics::tensor::Vector;
@@ -385,6 +387,19 @@ impl Contact {
 }
 
 impl Contacts {
+    /// [`Contact::pairs`] of a contact by its place, with the nodes that keep less.
+    pub fn pairs(
+        &self,
+        contact: usize,
+        number: impl Fn(u32) -> u32,
+        place: impl Fn(u32) -> Vector3<f64>,
+    ) -> Option<(Pairs, f64)> {
+        let (pairs, sign) = self.contacts[contact].pairs(&number, &place)?;
+        let Some(near) = self.near.get(&contact) else { return Some((pairs, sign)) };
+        let near = near.iter().map(|&(node, kept)| (number(node), kept));
+        Some((pairs.keeping(near, place), sign))
+    }
+
     /// All nodes that may touch something, increasing.
     pub fn nodes(&self) -> Vec<u32> {
         let surfaces = self.contacts.iter().flat_map(Contact::surfaces);
@@ -415,6 +430,8 @@ pub struct Contacts {
     pub contacts: Vec<Contact>,
     /// Rest places [m] of nodes that another solver moves: in surfaces they are numbered after the nodes of the model.
     pub guests: Vec<Vector<f64>>,
+    /// Of contacts of bodies, by their place, the nodes that keep a smaller distance [m] than their [`Touch`] says, since they are nearer at the start.
+    pub near: BTreeMap<usize, Vec<(u32, f64)>>,
 }
 
 /// Points on a triangle besides its corners, by their weights: a lattice of so many parts of an edge.

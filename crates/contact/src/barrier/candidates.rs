@@ -9,8 +9,10 @@ use super::rows::{Mollified, Row, Stencil};
 use super::surfaces::BarrierSide;
 use super::wide::{Apart, ROUND_OFF, Sort, Wide, common, other};
 
-/// Rest distances, over the reach, up to which parts of one surface never touch each other.
-const AT_REST: f64 = 1.02;
+/// The reach of parts of one surface that are nearer at rest than that of the contact, over their distance at rest.
+const NEAR: f64 = 0.98;
+/// Rest distances, over the distance of the barrier, up to which parts of one surface are in one place, and never touch each other.
+const IN_ONE_PLACE: f64 = 1e-3;
 /// The skin of a node beside the motion that it is to make, over that motion; and of a node of a rigid thing, which may turn: an arc of up to half a turn about the
 /// origin of the thing is no further from its chord than half of that. Lists are made anew where another arc leaves its skin.
 const SKIN: [f64; 2] = [0.25, 0.55];
@@ -34,6 +36,8 @@ struct Candidate {
     /// A bound [m] of how far both primitives go towards each other on the course of the list.
     nearing: f64,
     in_order: bool,
+    /// The reach [m] of parts of one surface that are near at rest; infinite of others.
+    most: f64,
 }
 
 /// How a contact acts.
@@ -70,12 +74,22 @@ impl Action {
         Self { growth: 0.0, ..*self }
     }
 
+    /// The same for a pair whose reach is no more than a length [m]: it keeps less, and if that is not enough its barrier begins nearer.
+    fn within(&self, most: f64) -> Self {
+        if most >= self.reach() {
+            return *self;
+        }
+        let kept = (most - self.growth - self.law.distance).clamp(0.0, self.kept);
+        Self { kept, law: Barrier { distance: most - self.growth - kept }, ..*self }
+    }
+
     /// What a distance below the reach makes of a pair; `None` if it is none.
     pub fn row(&self, stencil: Stencil, area: f64, distance: f64, normal: Vector3<f64>) -> Option<Row> {
         let gap = distance - self.offset();
         (gap < self.law.distance).then(|| Row {
             stencil,
             normal,
+            distance,
             gap,
             energy: self.stiffness * area * self.law.energy(gap),
             force: -self.stiffness * area * self.law.slope(gap),
@@ -99,7 +113,8 @@ pub(super) struct Group {
     pub thing: Option<u32>,
     pub rise: f64,
     pub action: Action,
-    /// Of one surface: nodes with triangles, and edges, that are too near at rest to touch.
+    /// Of one surface: places of its nodes at rest [m]; nodes with triangles, and edges, that are in one place there.
+    rest: Vec<Vector3<f64>>,
     apart: [Apart; 2],
     /// In bins by their distance, in the order of their numbers within one.
     candidates: Vec<Candidate>,
@@ -143,6 +158,7 @@ impl Group {
             thing,
             rise: 0.0,
             action,
+            rest: Vec::new(),
             apart: Default::default(),
             candidates: Vec::new(),
             bins: Vec::new(),
@@ -159,7 +175,8 @@ impl Group {
             longest,
         };
         if group.sides.len() == 1 {
-            let near = AT_REST * group.action.reach();
+            group.rest = rest.to_vec();
+            let near = IN_ONE_PLACE * group.action.law.distance;
             let [points, edges] = group.wide.within(&mut group.sides, rest, near);
             let side = &group.sides[0];
             group.apart = [Apart::new(points, side.points.len()), Apart::new(edges, side.edges.len())];
@@ -167,7 +184,7 @@ impl Group {
         group
     }
 
-    /// Pairs that never touch, since they are too near at rest.
+    /// Pairs that never touch, since they are in one place at rest.
     pub fn apart_count(&self) -> usize {
         self.apart.iter().map(Apart::len).sum()
     }
@@ -197,7 +214,7 @@ impl Group {
 
     /// Lists what is within a distance [m] and the skins of both.
     fn find(&mut self, place: &[Vector3<f64>], within: f64) {
-        let Self { sides, course, skin, whole, apart, unsorted, wide, action, .. } = self;
+        let Self { sides, course, skin, whole, rest, apart, unsorted, wide, action, .. } = self;
         unsorted.clear();
         let mut largest: f64 = 0.0;
         wide.each(sides, apart, place, whole, [within, action.law.distance], |sides, sort, numbers, most| {
@@ -229,7 +246,9 @@ impl Group {
             };
             let in_order = sort != Sort::Point(1);
             largest = largest.max(nearing);
-            unsorted.push(Candidate { kind, nodes, area, threshold, distance, nearing, in_order });
+            let most =
+                if rest.is_empty() { f64::INFINITY } else { at_rest(kind, nodes, rest, action.reach()) };
+            unsorted.push(Candidate { kind, nodes, area, threshold, distance, nearing, in_order, most });
         });
         self.nearing = largest;
         self.sort();
@@ -327,6 +346,8 @@ impl Group {
     pub fn act(&self, place: &[Vector3<f64>], rows: &mut Vec<Row>) -> bool {
         let reach = self.action.reach();
         for one in self.nearer_than(reach) {
+            let action = self.action.within(one.most);
+            let reach = action.reach();
             if one.distance - self.moved(one) >= reach {
                 continue;
             }
@@ -343,7 +364,7 @@ impl Group {
                 split: one.kind.split() as u8,
                 in_order: one.in_order,
             };
-            let Some(mut row) = self.action.row(stencil, one.area, near.distance, near.normal) else {
+            let Some(mut row) = action.row(stencil, one.area, near.distance, near.normal) else {
                 continue;
             };
             if row.gap <= 0.0 || row.gap.is_nan() {
@@ -385,6 +406,7 @@ impl Group {
         let (offset, rise) = (self.action.offset(), self.rise);
         let widest = (self.largest_of(&self.way) + rise.max(0.0)) * most / (1.0 - keep);
         for one in self.nearer_than(offset + widest) {
+            let offset = self.action.within(one.most).offset();
             let gap = one.distance - self.moved(one) - offset;
             let way = one.kind.reach(one.nodes.map(|node| self.way[node as usize])) + rise.max(0.0);
             if gap * (1.0 - keep) > way * most {
@@ -400,6 +422,7 @@ impl Group {
     pub fn pairs(&self, place: &[Vector3<f64>], margin: f64, mut found: impl FnMut(&[u32; 4])) {
         let reach = self.action.reach() + margin;
         let near = |one: &&Candidate| {
+            let reach = self.action.within(one.most).reach() + margin;
             one.distance - self.moved(one) < reach
                 && one.kind.nearest(&one.nodes.map(|node| place[node as usize])).distance < reach
         };
@@ -409,8 +432,8 @@ impl Group {
     /// Calls back with the nodes and gaps [m] of pairs that have no gap.
     pub fn too_close(&self, place: &[Vector3<f64>], mut found: impl FnMut([u32; 4], f64)) {
         for one in &self.candidates {
-            let gap =
-                one.kind.nearest(&one.nodes.map(|node| place[node as usize])).distance - self.action.offset();
+            let distance = one.kind.nearest(&one.nodes.map(|node| place[node as usize])).distance;
+            let gap = distance - self.action.within(one.most).offset();
             if gap <= 0.0 {
                 found(one.nodes, gap);
             }
@@ -421,4 +444,14 @@ impl Group {
     pub fn listed(&self) -> usize {
         self.candidates.len()
     }
+}
+
+/// The reach [m] of a pair of one surface that is near at rest; infinite where it has all of the reach of the contact.
+fn at_rest(kind: Kind, nodes: [u32; 4], rest: &[Vector3<f64>], reach: f64) -> f64 {
+    let points = nodes.map(|node| &rest[node as usize]);
+    if kind.is_beyond(points, reach / NEAR) {
+        return f64::INFINITY;
+    }
+    let most = NEAR * kind.distance(&points.map(|point| *point));
+    if most < reach { most } else { f64::INFINITY }
 }

@@ -3,8 +3,81 @@
 
 use nalgebra::Vector3;
 
+use super::distance::edge_distance;
 use super::surfaces::{BarrierSide, around};
+use crate::touch::{Contacts, With};
 use crate::tree::{Bounds, Tree};
+
+/// Depth of an intersection, over the mean edge, up to which it does not count.
+const SLIGHT: f64 = 1e-4;
+
+/// Searches bodies that touch each other or themselves for edges that go through triangles.
+pub struct IntersectionCheck {
+    /// Contacts by their places, with their surfaces and the depth [m] above which an intersection counts.
+    contacts: Vec<(usize, Vec<BarrierSide>, f64)>,
+}
+
+/// An edge that goes through a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Intersection {
+    /// The contact, by its place.
+    pub contact: usize,
+    /// The shortest way [m] that parts the edge and the triangle.
+    pub depth: f64,
+    /// An end of the edge [m].
+    pub place: [f64; 3],
+}
+
+impl IntersectionCheck {
+    /// A check of the contacts of bodies, except those with nodes that another solver moves. Nodes are at rest at some places [m].
+    pub fn new(contacts: &Contacts, rest: &[[f64; 3]]) -> Self {
+        let own = |node: &u32| (*node as usize) < rest.len();
+        let place = |node: u32| Vector3::from(rest[node as usize]);
+        let of_bodies = contacts.contacts.iter().enumerate().filter(|(_, contact)| {
+            !matches!(contact.with, With::Rigid(_))
+                && contact.surfaces().all(|surface| surface.nodes.iter().all(own))
+        });
+        let checked = of_bodies.map(|(number, contact)| {
+            let sides = contact.surfaces().map(|surface| BarrierSide::of_body(surface, place));
+            let sides: Vec<BarrierSide> = sides.collect();
+            let count = |side: &BarrierSide| side.edges.len() as f64;
+            let length: f64 = sides.iter().map(|side| side.mean_edge(place) * count(side)).sum();
+            let all: f64 = sides.iter().map(count).sum();
+            (number, sides, SLIGHT * length / all.max(1.0))
+        });
+        Self { contacts: checked.collect() }
+    }
+
+    /// Calls back with each intersection that counts, with nodes at some places [m].
+    pub fn find(&self, place: impl Fn(u32) -> Vector3<f64>, mut found: impl FnMut(Intersection)) {
+        for (contact, sides, slight) in &self.contacts {
+            let mut look = |edges, faces| {
+                crossings([edges, faces], &place, |ends, corners| {
+                    let (ends, corners) = (ends.map(&place), corners.map(&place));
+                    let depth = depth(ends, corners);
+                    if depth > *slight {
+                        found(Intersection { contact: *contact, depth, place: ends[0].into() });
+                    }
+                });
+            };
+            match &sides[..] {
+                [first, second] => {
+                    look(first, second);
+                    look(second, first);
+                }
+                sides => sides.iter().for_each(|side| look(side, side)),
+            }
+        }
+    }
+}
+
+/// The shortest way [m] that parts an edge and a triangle which it goes through: of an end to the plane, or of the edge to a side.
+fn depth([p, q]: [Vector3<f64>; 2], [a, b, c]: [Vector3<f64>; 3]) -> f64 {
+    let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
+    let ends = [p, q].map(|end| normal.dot(&(end - a)).abs());
+    let sides = [[a, b], [b, c], [c, a]].map(|[from, to]| edge_distance(&[p, q, from, to]));
+    ends.into_iter().chain(sides).fold(f64::INFINITY, f64::min)
+}
 
 /// Edges that go through triangles: calls back with the ends and the corners. Of one side alone those with a node in common count for
 /// nothing.
@@ -66,6 +139,16 @@ fn goes_through([p, q]: [Vector3<f64>; 2], [a, b, c]: [Vector3<f64>; 3]) -> bool
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A spike that goes through a block by a tenth of its edge: by the way back, not by the length of its edges.
+    #[test]
+    fn an_intersection_is_as_deep_as_the_way_out() {
+        let triangle = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(Vector3::from);
+        let of = |p: [f64; 3], q: [f64; 3]| depth([p, q].map(Vector3::from), triangle);
+        assert!((of([0.3, 0.3, 1.0], [0.3, 0.3, -0.1]) - 0.1).abs() < 1e-12);
+        assert!((of([0.3, 0.02, 1.0], [0.3, 0.02, -1.0]) - 0.02).abs() < 1e-12);
+        assert!((of([0.4, 0.5, 1.0], [0.4, 0.5, -1.0]) - 0.1 / 2.0_f64.sqrt()).abs() < 1e-12);
+    }
 
     #[test]
     fn edges_go_through_triangles_within_their_borders() {

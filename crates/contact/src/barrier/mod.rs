@@ -21,6 +21,7 @@ mod system;
 mod tests;
 mod wide;
 
+pub use crossing::{Intersection, IntersectionCheck};
 pub use curvature::Matrix12;
 pub use nodal::NodeTouch;
 pub use rows::{Held, Mollified, Row, Stencil};

@@ -46,7 +46,9 @@ pub struct Row {
     pub stencil: Stencil,
     /// The direction from the second to the first.
     pub normal: Vector3<f64>,
-    /// The gap [m], above 0.
+    /// The distance [m] of its sides.
+    pub distance: f64,
+    /// The gap [m], above 0: the distance without what the pair keeps.
     pub gap: f64,
     /// Its energy [J].
     pub energy: f64,

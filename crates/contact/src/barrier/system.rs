@@ -157,7 +157,7 @@ impl Barriers {
         &self.contacts
     }
 
-    /// Of each contact the pairs that never touch, since they are too near at rest.
+    /// Of each contact the pairs that never touch, since they are in one place at rest.
     pub fn apart_counts(&self) -> Vec<usize> {
         self.groups.iter().map(Group::apart_count).collect()
     }
@@ -541,8 +541,7 @@ impl Barriers {
             return block(&coefficients, &(along + curved.unwrap_or_default() * row.force));
         };
         let points = nodes.map(|node| self.place[node as usize]);
-        let distance = row.gap + group.action.offset();
-        let near = Nearest { distance, coefficients, normal: row.normal, region };
+        let near = Nearest { distance: row.distance, coefficients, normal: row.normal, region };
         match &row.mollified {
             Some(with) => of_parallel(&points, &near, row.stiffness, with),
             None => block(&coefficients, &along) + bent(&points, &near) * row.force,

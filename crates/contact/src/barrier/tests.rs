@@ -208,6 +208,43 @@ fn no_motion_that_is_allowed_goes_through() {
     }
 }
 
+/// Neighbours of a sheet that is thicker than its triangles are high have a reach of their own: nothing acts at rest, and no motion that is allowed takes an edge
+/// through a triangle. Parts that are farther from each other keep all of the distance.
+#[test]
+fn neighbours_of_a_thick_sheet_keep_the_guarantee() {
+    let (surface, flat) = sheet(6, 0);
+    let touch = Touch { friction: 0.0, offset: 0.12 };
+    let contact = Contact { name: "itself".into(), surface, with: With::Itself, touch };
+    let contacts = Arc::new(Contacts { contacts: vec![contact], ..Default::default() });
+    let settings = BarrierSettings { distance: 0.03, stiffness: 1e4, creep_speed: 1e-3 };
+    let rest: Vec<[f64; 3]> = flat.iter().map(|&x| x.into()).collect();
+    let mut random = Random::new(5);
+    let still = vec![0.0; 6 * flat.len()];
+    for round in 0..20 {
+        let mut barriers = Barriers::new(Arc::clone(&contacts), &[settings], &rest);
+        assert_eq!(barriers.apart_counts(), [0]);
+        let mut places = flat.clone();
+        barriers.begin(&places, &still, [0.0, 1.0]);
+        assert!(barriers.rows().is_empty() && barriers.least_gap().is_none());
+        for _ in 0..6 {
+            let motion: Vec<f64> = (0..still.len()).map(|_| 0.3 * (2.0 * random.part() - 1.0)).collect();
+            barriers.begin(&places, &motion, [0.0, 1.0]);
+            let part = barriers.allowed(&places, &motion, 0.0, [0.1, 1.0]);
+            let ways = motion.chunks_exact(6).map(|way| Vector3::new(way[0], way[1], way[2]) * part);
+            places.iter_mut().zip(ways).for_each(|(x, way)| *x += way);
+            assert!(barriers.evaluate(&places, 0.0).is_finite(), "{round}");
+            let mut crossed = 0;
+            barriers.crossings(|_, _, _| crossed += 1);
+            assert_eq!(crossed, 0, "{round}");
+        }
+        // Corners across are 0.85 m apart at rest.
+        let mut across = flat.clone();
+        across[48] = across[0] + Vector3::new(0.0, 0.0, 0.119);
+        barriers.begin(&across, &still, [0.0, 1.0]);
+        assert!(barriers.evaluate(&across, 0.0).is_infinite());
+    }
+}
+
 /// A thing that grows by d presses like one that is larger by d, and the way that it has yet to go changes forces as its stiffness says.
 #[test]
 fn what_grows_presses_like_what_is_larger() {
