@@ -48,7 +48,8 @@ impl Model {
     /// Each part of the model in words, such as ``load `push` ``, with its number. The material of a body is all but its
     /// mesh: laws, fibres, masses, damping, hourglass control, velocity at the start.
     pub fn fingerprints(&self) -> Vec<(String, u64)> {
-        let mut parts = Vec::new();
+        let damping = fingerprint(&self.stiffness_damping);
+        let mut parts = vec![("damping by stiffness of solids".into(), damping)];
         for (index, body) in self.bodies.iter().enumerate() {
             let range = body.nodes.start as usize..body.nodes.end as usize;
             let solids = || self.solids.iter().filter(|solid| solid.body == index);
@@ -66,6 +67,9 @@ impl Model {
                 material.numbers(solid.fibre.iter().flatten());
                 (0..solid.cells.len())
                     .for_each(|cell| material.numbers([&solid.cells.hourglass_modulus(cell)]));
+                if let Some(shear) = solid.hourglass_growth() {
+                    material.numbers([&shear]);
+                }
                 match &solid.cells {
                     Cells::Membrane(_, sheets) => {
                         material.numbers(sheets.iter().map(|sheet| &sheet.thickness));

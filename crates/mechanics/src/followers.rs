@@ -1,9 +1,11 @@
 //! Nodes that follow others, in a model: J of displacements, Jᵀ of forces and masses, by the rows of its [`Tie`]s.
 
+use std::collections::BTreeMap;
+
 use crate::Real;
 use crate::mapping::{Weights, weighted};
 use crate::model::Model;
-use crate::tensor::{Vector, add, cast, scale};
+use crate::tensor::{Vector, add, cast};
 use crate::tie::{Tie, TieError};
 
 impl Model {
@@ -12,7 +14,7 @@ impl Model {
     /// # Errors
     /// If a node is tied already, or follows one that is tied. The model then is as it was.
     pub fn tie(&mut self, name: &str, nodes: Vec<u32>, mapping: Weights) -> Result<usize, TieError> {
-        let tie = Tie { name: name.into(), nodes, mapping };
+        let tie = Tie { name: name.into(), held: vec![[false; 3]; nodes.len()], nodes, mapping };
         let mut owner = vec![None; self.node_count()];
         for known in &self.ties {
             known.nodes.iter().for_each(|&node| owner[node as usize] = Some(known.name.as_str()));
@@ -47,6 +49,29 @@ impl Model {
         Ok(self.ties.len() - 1)
     }
 
+    /// Lets tied nodes follow no longer along components that a constraint holds or moves, of them and of a node of the other body that they follow: both
+    /// bodies are held there, as at a plane of symmetry. To be called once constraints and ties are there.
+    pub fn hold_tied(&mut self) {
+        let mut held = vec![[false; 3]; self.node_count()];
+        for constraint in self.constraints.iter().filter(|own| !own.motion.is_collective()) {
+            for &node in &constraint.nodes {
+                for (own, by) in held[node as usize].iter_mut().zip(constraint.components) {
+                    *own |= by;
+                }
+            }
+        }
+        let bodies = &self.bodies;
+        for tie in &mut self.ties {
+            let both = |(node, row): (u32, Vec<u32>)| {
+                let own = bodies.iter().find(|body| body.nodes.contains(&node)).map(|body| &body.nodes);
+                let others = || row.iter().filter(|other| own.is_none_or(|own| !own.contains(other)));
+                [0, 1, 2].map(|c| held[node as usize][c] && others().any(|&other| held[other as usize][c]))
+            };
+            let rows = tie.rows().map(|(node, row)| (node, row.map(|(other, _)| other).collect()));
+            tie.held = rows.map(both).collect();
+        }
+    }
+
     /// Whether each node follows others.
     pub fn followers(&self) -> Vec<bool> {
         let mut follows = vec![false; self.node_count()];
@@ -56,27 +81,58 @@ impl Model {
 
     /// Takes the nodes that follow others along: J of displacements or velocities.
     pub fn follow<R: Real>(&self, field: &mut [Vector<R>]) {
-        for (node, row) in self.ties.iter().flat_map(Tie::rows) {
-            field[node as usize] =
-                weighted(row, |followed| cast::<R, f64>(field[followed as usize])).map(R::of);
+        for tie in &self.ties {
+            for ((node, row), held) in tie.rows().zip(&tie.held) {
+                let moved = weighted(row, |followed| cast::<R, f64>(field[followed as usize]));
+                for c in (0..3).filter(|&c| !held[c]) {
+                    field[node as usize][c] = R::of(moved[c]);
+                }
+            }
         }
     }
 
     /// Jᵀ of forces on all nodes: those on nodes that follow others go to these.
     pub fn give_back(&self, forces: &mut [Vector<f64>]) {
-        for (node, row) in self.ties.iter().flat_map(Tie::rows) {
+        for (node, row) in self.ties.iter().flat_map(Tie::component_rows) {
             let force = std::mem::take(&mut forces[node as usize]);
-            for (followed, weight) in row {
-                forces[followed as usize] = add(forces[followed as usize], scale(force, weight));
+            for (followed, weights) in row {
+                let part = [0, 1, 2].map(|c| force[c] * weights[c]);
+                forces[followed as usize] = add(forces[followed as usize], part);
             }
         }
     }
 
-    /// Row sums of Jᵀ M J: the masses of nodes that follow others go to these.
+    /// Row sums of Jᵀ M J: the masses of nodes that follow others go to these. Where rows have so many negative weights that a followed node
+    /// would lose mass by a tie, as beside a much heavier element, all masses of that tie go by the rows without their negative weights.
     pub fn give_down(&self, masses: &mut [f64]) {
+        for tie in &self.ties {
+            let given: Vec<f64> =
+                tie.nodes.iter().map(|&node| std::mem::take(&mut masses[node as usize])).collect();
+            let mut taken: BTreeMap<u32, f64> = BTreeMap::new();
+            for (point, mass) in given.iter().enumerate() {
+                tie.mapping.row(point).for_each(|(node, w)| *taken.entry(node).or_default() += w * mass);
+            }
+            let round_off = 1e-12 * given.iter().sum::<f64>();
+            let loses = taken.values().any(|&mass| mass < -round_off);
+            for (point, mass) in given.iter().enumerate() {
+                let mut give = |(node, weight): (u32, f64)| masses[node as usize] += weight * mass;
+                match loses {
+                    true => tie.mapping.inner_row(point).for_each(&mut give),
+                    false => tie.mapping.row(point).for_each(&mut give),
+                }
+            }
+        }
+    }
+
+    /// A bound of Jᵀ K J by nodes: |J_ai| Σ_j |J_aj| k_a of the stiffness k_a of each node that follows others goes to the nodes i.
+    pub fn give_down_stiffness(&self, stiffness: &mut [f64]) {
         for (node, row) in self.ties.iter().flat_map(Tie::rows) {
-            let mass = std::mem::take(&mut masses[node as usize]);
-            row.for_each(|(followed, weight)| masses[followed as usize] += weight * mass);
+            let own = std::mem::take(&mut stiffness[node as usize]);
+            let row: Vec<(u32, f64)> = row.collect();
+            let sum: f64 = row.iter().map(|(_, weight)| weight.abs()).sum();
+            for (followed, weight) in row {
+                stiffness[followed as usize] += weight.abs() * sum * own;
+            }
         }
     }
 
@@ -102,6 +158,7 @@ impl Model {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::{Constraint, Motion};
 
     fn model() -> Model {
         let mut model = Model::default();
@@ -141,6 +198,37 @@ mod tests {
         let point = model.resolved(&[(4, 0.5), (0, 0.5)]);
         assert_eq!(point.iter().map(|(_, w)| w).sum::<f64>(), 1.0);
         assert_eq!(point[0], (0, 0.7));
+    }
+
+    /// A plane of symmetry holds both bodies; what holds one alone would open the joint.
+    #[test]
+    fn tied_nodes_are_held_where_the_nodes_that_they_follow_are() {
+        let mut model = model();
+        model.tie("glue", vec![4, 5], rows()).unwrap();
+        let plane = |nodes: Vec<u32>, [x, y]: [bool; 2]| Constraint {
+            name: "plane".into(),
+            nodes,
+            components: [x, y, false, false, false, false],
+            motion: Motion::Fixed,
+        };
+        model.constraints.push(plane(vec![4, 5], [true, true]));
+        model.hold_tied();
+        assert_eq!(model.ties[0].held, [[false; 3]; 2]);
+        assert!(model.constrained_components().is_err());
+        model.constraints.push(plane(vec![3], [true, false]));
+        model.hold_tied();
+        assert_eq!(model.ties[0].held, [[true, false, false]; 2]);
+        model.constraints[0].components[1] = false;
+        model.constrained_components().unwrap();
+        let mut forces = vec![[0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3], [1.0, 10.0, 0.0], [0.0; 3]];
+        model.give_back(&mut forces);
+        assert_eq!([forces[4], forces[0]], [[1.0, 0.0, 0.0], [0.0, 4.0, 0.0]]);
+        let mut places = model.rest.clone();
+        places[3] = [0.0, 0.0, 2.0];
+        places[4] = [7.0, 0.0, 0.0];
+        model.follow(&mut places);
+        assert_eq!(places[4][0], 7.0);
+        assert!((places[4][2] - 0.2).abs() < 1e-15);
     }
 
     #[test]

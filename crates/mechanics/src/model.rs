@@ -35,6 +35,8 @@ pub struct Model {
     pub surfaces: Vec<Surface>,
     /// Nodes that follow others.
     pub ties: Vec<Tie>,
+    /// Stiffness-proportional damping β [s].
+    pub stiffness_damping: f64,
     /// Mass added for a larger stable step.
     pub mass_scaling: Option<MassScaling>,
     /// Velocities [m/s] of the nodes at time 0, for dynamics; nodes beyond its end are at rest.
@@ -155,6 +157,13 @@ impl Solid {
         }
     }
 
+    /// The shear modulus at rest [Pa] over which that of a state is the factor on the hourglass stiffness; `None` where that stiffness stays.
+    pub fn hourglass_growth(&self) -> Option<f64> {
+        let Cells::Hex8(CellBlock { hourglass: Some(control), .. }) = &self.cells else { return None };
+        let law = &self.material.law;
+        (control.grows && !law.keeps_shear_stiffness()).then(|| law.small_strain().shear)
+    }
+
     /// Adds ρV/N [kg] of every cell to the masses of its nodes.
     pub fn add_mass(&self, mass: &mut [f64]) {
         for cell in 0..self.cells.len() {
@@ -245,7 +254,7 @@ pub struct CellBlock<const N: usize> {
     pub offsets: Vec<[Vector<f64>; N]>,
 }
 
-/// Hourglass control: energy ½ k Σ_c |Σ_a γ_ca u_a|².
+/// Hourglass control: energy ½ k Σ_c |Σ_a γ_ca u_a|², or ½ k g of it.
 #[derive(Clone, Debug)]
 pub struct Hourglass<R, const N: usize> {
     /// The patterns γ, four per cell.
@@ -256,6 +265,8 @@ pub struct Hourglass<R, const N: usize> {
     pub stiffness: Vec<R>,
     /// κ² [1/m²] of each cell: how far corners follow the patterns; see [`Hex8::corner_reach`].
     pub corner_reach: Vec<R>,
+    /// Whether the stiffness grows with the shear stiffness of the law, k g; see [`ShearGrowth`](crate::law::ShearGrowth).
+    pub grows: bool,
 }
 
 impl<const N: usize> CellBlock<N> {
@@ -279,6 +290,7 @@ impl<const N: usize> CellBlock<N> {
                 moments: picked(&control.moments, order),
                 stiffness: picked(&control.stiffness, order),
                 corner_reach: picked(&control.corner_reach, order),
+                grows: control.grows,
             }),
             offsets: if self.offsets.is_empty() { vec![] } else { picked(&self.offsets, order) },
         }
@@ -306,8 +318,18 @@ impl Cells {
                 moments: hexes.iter().map(|hex| hex.moments).collect(),
                 stiffness: hexes.iter().map(stiffness).collect(),
                 corner_reach: hexes.iter().map(|hex| hex.corner_reach).collect(),
+                grows: false,
             }),
         })
+    }
+
+    /// The same cells, whose stiffness against hourglass patterns grows with the shear stiffness of their law. Without it evenly squeezed
+    /// cells of a law that stiffens collapse into these patterns.
+    pub fn with_growing_hourglass(mut self) -> Self {
+        if let Self::Hex8(CellBlock { hourglass: Some(control), .. }) = &mut self {
+            control.grows = true;
+        }
+        self
     }
 
     /// Tetrahedra with averaged pressure from their nodes.
@@ -440,7 +462,7 @@ impl Cells {
         with_cells!(self, block => block.rest[cell].gradient_square_sum())
     }
 
-    /// c μ [Pa] of a cell's hourglass control; 0 without.
+    /// c μ [Pa] of a cell's hourglass control at rest; 0 without.
     pub fn hourglass_modulus(&self, cell: usize) -> f64 {
         let of_block = |block: &CellBlock<8>| {
             let stiffness = block.hourglass.as_ref().map_or(0.0, |control| control.stiffness[cell]);
@@ -1039,8 +1061,9 @@ impl Model {
         self.check_rotations()?;
         let bound = self.check_collective(&owners)?;
         for tie in &self.ties {
-            for &node in &tie.nodes {
-                let own = owners[node as usize].into_iter().zip(0..).chain([(bound[node as usize], 0)]);
+            for (&node, held) in tie.nodes.iter().zip(&tie.held) {
+                let alone = owners[node as usize].into_iter().zip(0..).filter(|&(_, c)| !held[c]);
+                let own = alone.chain([(bound[node as usize], 0)]);
                 if let Some((first, component)) = own.into_iter().find(|&(first, _)| first != FREE) {
                     let first = self.constraints[first as usize].name.clone();
                     let (body, node) = self.locate_node(node);

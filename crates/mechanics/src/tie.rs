@@ -1,8 +1,9 @@
 //! Ties: nodes that follow others, x = J x_nodes, such as those of a vessel inside an organ or of a wall whose mesh does not match the
 //! surface below it. They have no equations of their own: forces on them and their masses go to the nodes that they follow, f += Jᵀ f and
-//! m += Jᵀ m, by the same rows.
+//! m += Jᵀ m, by the same rows. Along components that a constraint holds or moves a node does not follow; forces there are the reaction.
 
 use crate::mapping::Weights;
+use crate::tensor::Vector;
 
 /// Nodes that follow others.
 #[derive(Clone, Debug)]
@@ -13,12 +14,26 @@ pub struct Tie {
     pub nodes: Vec<u32>,
     /// How each follows, in their order. Each row sums to 1.
     pub mapping: Weights,
+    /// The components of each that a constraint holds or moves; see [`Model::hold_tied`](crate::Model::hold_tied).
+    pub held: Vec<[bool; 3]>,
 }
 
 impl Tie {
     /// Each node with what it follows.
     pub fn rows(&self) -> impl Iterator<Item = (u32, impl Iterator<Item = (u32, f64)> + '_)> + '_ {
         self.nodes.iter().enumerate().map(|(point, &node)| (node, self.mapping.row(point)))
+    }
+
+    /// Each node with what moves it along each component: the nodes that it follows, and itself where it is held.
+    pub fn component_rows(
+        &self,
+    ) -> impl Iterator<Item = (u32, impl Iterator<Item = (u32, Vector<f64>)> + '_)> + '_ {
+        self.rows().zip(&self.held).map(|((node, row), held)| {
+            let followed =
+                row.map(|(other, weight)| (other, held.map(|held| if held { 0.0 } else { weight })));
+            let own = held.map(|held| f64::from(u8::from(held)));
+            (node, followed.chain((own != [0.0; 3]).then_some((node, own))))
+        })
     }
 }
 

@@ -26,6 +26,7 @@ pub mod plane_stress;
 mod polynomial;
 mod principal;
 mod shader;
+mod shear_growth;
 mod split;
 mod st_venant_kirchhoff;
 mod tangent;
@@ -56,6 +57,7 @@ pub use orthotropic::Orthotropic;
 pub use own::{Own, OwnLaw};
 pub use polynomial::Polynomial;
 pub use shader::Shader;
+pub use shear_growth::ShearGrowth;
 pub use split::{Compressibility, Matrix, SplitLaw};
 pub use st_venant_kirchhoff::StVenantKirchhoff;
 pub use transversely_isotropic::{FibreConvention, TransverselyIsotropic};
@@ -158,6 +160,11 @@ pub trait Law: Copy + Send + Sync + 'static {
     /// Whether the law is the same in all directions.
     fn is_isotropic(&self) -> bool {
         self.families() == 0
+    }
+
+    /// Whether the shear stiffness never rises above that at rest, as [`ShearGrowth`] measures it.
+    fn keeps_shear_stiffness(&self) -> bool {
+        false
     }
 
     /// Moduli at rest, without the fibres; of a law without isotropic matrix the largest shear modulus.
@@ -312,6 +319,11 @@ impl AnyLaw {
     /// Whether the law is the same in all directions.
     pub fn is_isotropic(&self) -> bool {
         with_law!(self, law => Law::is_isotropic(law))
+    }
+
+    /// Whether the shear stiffness never rises; see [`Law::keeps_shear_stiffness`].
+    pub fn keeps_shear_stiffness(&self) -> bool {
+        with_law!(self, law => Law::keeps_shear_stiffness(law))
     }
 
     /// Moduli at rest; see [`Law::small_strain`].

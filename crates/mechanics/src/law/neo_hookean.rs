@@ -60,4 +60,8 @@ impl SplitLaw for NeoHookean {
     fn shear(&self) -> f64 {
         self.shear
     }
+
+    fn keeps_shear_stiffness(&self) -> bool {
+        true
+    }
 }

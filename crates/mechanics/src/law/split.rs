@@ -49,6 +49,11 @@ pub trait SplitLaw: Copy + Send + Sync + 'static {
     fn fibre_stiffness(&self) -> f64 {
         0.0
     }
+
+    /// Whether the shear stiffness never rises; see [`Law::keeps_shear_stiffness`].
+    fn keeps_shear_stiffness(&self) -> bool {
+        false
+    }
 }
 
 /// The largest ρc² [Pa] that fibres of the energy η/2 (Ī₄ − 1)² feel at rest. For a wave along n that moves along m the
@@ -103,6 +108,10 @@ impl<L: SplitLaw> Law for L {
 
     fn fibre_modulus(&self) -> f64 {
         self.fibre_stiffness()
+    }
+
+    fn keeps_shear_stiffness(&self) -> bool {
+        SplitLaw::keeps_shear_stiffness(self)
     }
 }
 
