@@ -53,7 +53,7 @@ impl<R: Scalar> Clocked<R> {
     /// # Errors
     /// If constraints contradict each other.
     pub fn new(model: impl Into<Arc<Model>>, step: f64, state: State<R>) -> Result<Self, Contradiction> {
-        Ok(Self { stepper: CentralDifference::new(model, step)?, state })
+        Ok(Self { stepper: CentralDifference::new(model, step)?.dissipating(), state })
     }
 
     /// With the lanes of given instructions instead of the widest.

@@ -13,6 +13,7 @@ use pliant_mechanics::tensor::{Vector, add, cast, dot, sub};
 use rayon::prelude::*;
 
 use crate::Scalar;
+use crate::damping_force::damped;
 use crate::forces::InternalForces;
 use crate::history::History;
 
@@ -51,7 +52,7 @@ pub(crate) fn scaled_bound(model: &Model, solid: &Solid, cell: usize) -> f64 {
     cell_bound(solid, cell) * mass_factor(model, solid, cell).sqrt()
 }
 
-/// The smallest bound over all cells; `None` without cells.
+/// The smallest bound over all cells, with damping by stiffness; `None` without cells.
 pub fn element_bound(model: &Model) -> Option<ElementBound> {
     let mut worst: Option<ElementBound> = None;
     for (index, solid) in model.solids.iter().enumerate() {
@@ -62,7 +63,7 @@ pub fn element_bound(model: &Model) -> Option<ElementBound> {
             }
         }
     }
-    worst
+    worst.map(|found| ElementBound { step: damped(found.step, model.stiffness_damping), ..found })
 }
 
 /// The limit [s] of a cell alone, from the largest eigenvalue of its stiffness over its volume [Pa/m²].
@@ -93,7 +94,7 @@ const ROUGH: f64 = 0.01;
 /// Nodes that a thread takes at once.
 const SHARE: usize = 512;
 
-/// The critical time step at rest; infinite if every node is held.
+/// The critical time step at rest, with damping by stiffness; infinite if every node is held.
 ///
 /// # Errors
 /// If constraints contradict each other.
@@ -122,10 +123,11 @@ pub(crate) fn assembled_about(
     let (eigenvalue, error) =
         largest_eigenvalue(&mut operator, Until::Accurate).unwrap_or((f64::NAN, f64::NAN));
     let seconds_per_call = started.elapsed().as_secs_f64() / operator.calls.max(1) as f64;
-    CriticalStep { step: step_of(eigenvalue), error, force_calls: operator.calls, seconds_per_call }
+    let step = damped(step_of(eigenvalue), model.stiffness_damping);
+    CriticalStep { step, error, force_calls: operator.calls, seconds_per_call }
 }
 
-/// The critical time step [s] about a deformed state of a run, where the owner of each component is known. Once three looks at Lanczos'
+/// The critical time step [s] without damping about a deformed state of a run, where the owner of each component is known. Once three looks at Lanczos'
 /// iteration agree to [`ROUGH`] that it is at least `enough` [s], the iteration ends. What it then overlooks is less than
 /// [`RESERVE`](crate::stability::RESERVE) leaves: 2 % of the step at most in the tests below.
 ///

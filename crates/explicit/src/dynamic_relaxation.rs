@@ -1013,7 +1013,7 @@ fn fictitious_masses(model: &Model) -> Vec<f64> {
             }
         }
     }
-    model.give_down(&mut mass);
+    model.give_down_stiffness(&mut mass);
     // Nodes that follow others feel no force.
     for (mass, follows) in mass.iter_mut().zip(model.followers()) {
         *mass = if follows { 1.0 } else { *mass };

@@ -79,12 +79,13 @@ impl Work {
         (self.shaken, self.steps_off_balance) = (true, 0);
     }
 
-    /// Enters the sums of an instant, `before` seconds after the one before; `None` at the start. Judged above `floor`. What was entered
-    /// before (`again`) is not entered twice.
+    /// Enters the sums of an instant, `before` seconds after the one before; `None` at the start. A change of the step length there adds
+    /// the energy `change` [J]. Judged above `floor`. What was entered before (`again`) is not entered twice.
     pub fn settle(
         &mut self,
         sums: &Sums,
         hourglass: f64,
+        change: f64,
         before: Option<f64>,
         floor: f64,
         again: bool,
@@ -97,13 +98,15 @@ impl Work {
         self.damping_power = sums.damping_power;
         self.pending_internal = sums.internal_after;
         self.pending_external = sums.external_after;
+        self.pending_change = change;
         let internal = self.internal - hourglass;
         self.largest = self.largest.max(sums.kinetic).max(internal).max(self.external.abs());
-        // Left is ⅛ Δt² Σ m|a|² of now: small where the step resolves the motion, growing where it is unstable.
+        // Left is ⅛ Δt⁻² Σ m|a|² of now: small where the step resolves the motion, growing where it is unstable.
         let missing = if before.is_none() {
             0.0
         } else {
-            (sums.kinetic + self.internal + self.damping + self.at_start - self.external).abs()
+            let held = sums.kinetic + self.internal + self.damping + self.at_start;
+            (held - self.external - self.step_changes).abs()
         };
         let balance = missing / self.largest.max(floor);
         let off = self.largest > floor && balance > BALANCE_LIMIT;
@@ -117,6 +120,7 @@ impl Work {
             damping: self.damping,
             hourglass,
             external: self.external,
+            step_changes: self.step_changes,
             balance,
         }
     }
@@ -125,6 +129,7 @@ impl Work {
     pub fn advance(&mut self) {
         self.internal += self.pending_internal;
         self.external += self.pending_external;
+        self.step_changes += self.pending_change;
     }
 
     /// Goes on over whole instants at once, each `step` seconds after the one before, from those sums of theirs: internal

@@ -33,6 +33,7 @@
 mod applied;
 mod collective;
 pub mod critical_step;
+mod damping_force;
 mod dynamic_relaxation;
 mod eigenvalues;
 mod energies;
@@ -53,6 +54,7 @@ mod stepper;
 mod tangent;
 mod touching;
 
+pub use damping_force::{DISSIPATION, DampingFactors};
 pub use dynamic_relaxation::{
     Convergence, DynamicRelaxation, Equilibrium, Iteration, RelaxationError, RelaxationSettings, Way,
 };

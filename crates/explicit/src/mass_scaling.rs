@@ -67,7 +67,7 @@ impl NodalSteps {
     fn of(model: &Model, owners: &[[u32; 3]]) -> Self {
         let mut stiffness = vec![0.0; model.node_count()];
         model.solids.iter().for_each(|solid| add_stiffness(solid, &mut stiffness));
-        give_down(model, &mut stiffness);
+        model.give_down_stiffness(&mut stiffness);
         for ((stiffness, mass), owner) in stiffness.iter_mut().zip(&model.mass).zip(owners) {
             if !owner.contains(&FREE) || *mass <= 0.0 {
                 *stiffness = 0.0;
@@ -111,7 +111,8 @@ impl NodalSteps {
     }
 }
 
-/// Adds k_a [N/m] of every cell of a solid. Hourglass control adds c μ V Σ|B|² at most, as its patterns are orthogonal to the rest.
+/// Adds k_a [N/m] of every cell of a solid at rest. Hourglass control adds c μ V Σ|B|² at most, as its patterns are orthogonal to the rest; it
+/// grows with the law, whose growth is not foreseen either.
 fn add_stiffness(solid: &Solid, stiffness: &mut [f64]) {
     let modulus = solid.longitudinal_modulus();
     with_cells!(&solid.cells, block => {
@@ -124,20 +125,6 @@ fn add_stiffness(solid: &Solid, stiffness: &mut [f64]) {
             }
         }
     });
-}
-
-/// Gives the stiffness of nodes that follow others to these: |J_ai| Σ_j |J_aj| k_a, a bound of Jᵀ K J as above. Weights of points outside
-/// are negative in part.
-fn give_down(model: &Model, stiffness: &mut [f64]) {
-    for tie in &model.ties {
-        for (point, &node) in tie.nodes.iter().enumerate() {
-            let own = std::mem::take(&mut stiffness[node as usize]);
-            let sum: f64 = tie.mapping.row(point).map(|(_, weight)| weight.abs()).sum();
-            for (followed, weight) in tie.mapping.row(point) {
-                stiffness[followed as usize] += weight.abs() * sum * own;
-            }
-        }
-    }
 }
 
 /// An interval of thresholds within a tolerance, at whose second end alone something holds, from a wider one.

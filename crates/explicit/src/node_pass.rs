@@ -6,6 +6,7 @@ use pliant_mechanics::tensor::Vector;
 
 use crate::Scalar;
 use crate::applied::{AppliedForces, BLOCK};
+use crate::damping_force::Past;
 use crate::energies::Sums;
 use crate::forces::{InternalForces, Quad};
 use crate::lanes::{LaneWork, Lanes};
@@ -52,6 +53,8 @@ pub(crate) fn held(owners: &[[u32; 3]], amplitudes: &[Amplitudes]) -> Vec<Held> 
 pub(crate) struct Pace<R> {
     /// Δt⁺/Δt⁻.
     ratio: R,
+    /// Δt⁻/Δt⁺.
+    inverse_ratio: R,
     /// h/2 [s].
     half_mean: R,
     /// Δt⁺ h [s²].
@@ -60,6 +63,8 @@ pub(crate) struct Pace<R> {
     per_step_squared: R,
     /// 1/(2 Δt⁺) [1/s].
     per_two_steps: R,
+    /// 1/(2 h) [1/s].
+    per_two_means: R,
 }
 
 impl<R: Scalar> Pace<R> {
@@ -67,15 +72,17 @@ impl<R: Scalar> Pace<R> {
         let step_squared = lengths.next * lengths.mean();
         Self {
             ratio: R::of(lengths.ratio()),
+            inverse_ratio: R::of(1.0 / lengths.ratio()),
             half_mean: R::of(0.5 * lengths.mean()),
             step_squared: R::of(step_squared),
             per_step_squared: R::of(1.0 / step_squared),
             per_two_steps: R::of(0.5 / lengths.next),
+            per_two_means: R::of(0.5 / lengths.mean()),
         }
     }
 }
 
-/// A pass over the nodes from `first` on: the coming increments, reactions and sums.
+/// A pass over the nodes from `first` on: the coming increments, reactions and sums, and the internal forces where these are kept.
 pub(crate) struct NodePass<'a, R> {
     pub(crate) first: usize,
     pub(crate) pace: Pace<R>,
@@ -91,6 +98,10 @@ pub(crate) struct NodePass<'a, R> {
     pub(crate) before: &'a [Vector<R>],
     pub(crate) next: &'a mut [Vector<R>],
     pub(crate) reaction: &'a mut [Vector<R>],
+    /// Earlier internal forces on these nodes, where they damp …
+    pub(crate) past: Option<Past<'a, R>>,
+    /// … and room for those of the instant [N].
+    pub(crate) internal: &'a mut [Vector<R>],
 }
 
 impl<R: Scalar> LaneWork<R> for NodePass<'_, R> {
@@ -101,7 +112,9 @@ impl<R: Scalar> LaneWork<R> for NodePass<'_, R> {
     #[inline(always)]
     fn run<L: Lanes<R>>(self) -> Sums {
         const { assert!(CHUNK.is_multiple_of(BLOCK) && BLOCK.is_multiple_of(LANES)) };
-        let Self { first, pace, forces, applied, factors, before, next, reaction, .. } = self;
+        let Self {
+            first, pace, forces, applied, factors, before, next, reaction, past, internal: kept, ..
+        } = self;
         let mut held = self.held.iter().peekable();
         let mut sums = [[0.0; LANES]; 6];
         let mut block = Block::at_rest();
@@ -112,6 +125,11 @@ impl<R: Scalar> LaneWork<R> for NodePass<'_, R> {
                 block = Block::at_rest();
             }
             forces.at_nodes(nodes.clone(), &mut block.parts, &mut block.internal);
+            if let Some(past) = past {
+                let (at, internal) = (index * BLOCK, &block.internal[..before.len()]);
+                kept[at..at + before.len()].copy_from_slice(internal);
+                past.from(at).damp(internal, &mut block.damping[..before.len()]);
+            }
             let mut pushed = applied.act_at(nodes.clone(), &mut block.external);
             let (mass, damping) = (&self.mass[nodes.clone()], &self.damping[nodes.clone()]);
             let known = Known { before, mass, damping }.filled_up(&mut end);
@@ -202,13 +220,15 @@ struct Block<R> {
     parts: [Quad<R>; BLOCK],
     /// Zero but for what pushes now.
     external: [Vector<R>; BLOCK],
+    /// D of `damping_force`.
+    damping: [Vector<R>; BLOCK],
 }
 
 impl<R: Scalar> Block<R> {
     #[inline(always)]
     fn at_rest() -> Self {
         let zero = [[R::ZERO; 3]; BLOCK];
-        Self { next: zero, internal: zero, parts: [[R::ZERO; 4]; BLOCK], external: zero }
+        Self { next: zero, internal: zero, parts: [[R::ZERO; 4]; BLOCK], external: zero, damping: zero }
     }
 
     /// The increments of nodes that nothing holds.
@@ -217,10 +237,12 @@ impl<R: Scalar> Block<R> {
         let (before, next) = (known.before.as_flattened(), self.next.as_flattened_mut());
         let (internal, external) = (self.internal.as_flattened(), self.external.as_flattened());
         let (mass, damping) = (known.mass.as_flattened(), known.damping.as_flattened());
+        let lost = self.damping.as_flattened();
         for i in 0..3 * BLOCK {
             let a = damping[i] * half_mean;
             let kept = (R::ONE - a) * (before[i] * ratio) * mass[i];
-            next[i] = (kept + step_squared * (external[i] - internal[i])) / (mass[i] * (R::ONE + a));
+            let force = external[i] - internal[i] - lost[i];
+            next[i] = (kept + step_squared * force) / (mass[i] * (R::ONE + a));
         }
     }
 
@@ -238,7 +260,7 @@ impl<R: Scalar> Block<R> {
         let velocity = (same_speed + next) * pace.per_two_steps;
         let acceleration = (next - same_speed) * pace.per_step_squared;
         let inertia = known.mass[node][c] * (acceleration + known.damping[node][c] * velocity);
-        (next, inertia + self.internal[node][c] - self.external[node][c])
+        (next, inertia + self.internal[node][c] + self.damping[node][c] - self.external[node][c])
     }
 
     /// Adds kinetic energy, damping power and the halves of the internal work to sums kept apart by lane. The products of
@@ -249,20 +271,21 @@ impl<R: Scalar> Block<R> {
         &self,
         known: &Whole<'_, R>,
         sums: &mut [[f64; LANES]; 6],
-        &Pace { ratio, per_two_steps, .. }: &Pace<R>,
+        &Pace { ratio, inverse_ratio, per_two_means, .. }: &Pace<R>,
     ) {
         let (before, next, internal) =
             (known.before.as_flattened(), self.next.as_flattened(), self.internal.as_flattened());
         let (mass, damping) = (known.mass.as_flattened(), known.damping.as_flattened());
+        let lost = self.damping.as_flattened();
         for first in (0..3 * BLOCK).step_by(3 * LANES) {
             let mut parts = [[R::ZERO; LANES]; 4];
             for part in 0..3 {
                 for lane in 0..LANES {
                     let i = first + part * LANES + lane;
-                    let velocity = (before[i] * ratio + next[i]) * per_two_steps;
+                    let velocity = (before[i] * ratio + next[i] * inverse_ratio) * per_two_means;
                     let twice_kinetic = mass[i] * velocity * velocity;
                     parts[0][lane] += twice_kinetic;
-                    parts[1][lane] += damping[i] * twice_kinetic;
+                    parts[1][lane] += damping[i] * twice_kinetic + lost[i] * velocity;
                     parts[2][lane] += internal[i] * before[i];
                     parts[3][lane] += internal[i] * next[i];
                 }

@@ -16,14 +16,18 @@
 //!
 //! *Which cells.* Stiffness is computed for the first cells of two cheap orders, one by an isotropic guess of their speed
 //! and one by stretch: 18 stresses and the eigenvalue problems, a pack of cells at a time, cost more than steps of these cells.
-//! Averaged tets and full hexes are taken at their mean deformation with a pressure of their own. Hourglass control
-//! does not change with deformation. Loads that follow the surface do not count.
+//! Averaged tets and full hexes are taken at their mean deformation with a pressure of their own. Hourglass control counts with its current
+//! factor. Loads that follow the surface do not count.
 //!
 //! *Then.* If the estimate would change the steps, the critical time step of the current state is computed, by Lanczos' iteration of many force
 //! evaluations, and the current state becomes the reference. This happens once in [`REFERENCE_EVERY`] steps at most, and always before
 //! [`OnUnstable::Stop`] ends a run. If a part of a step takes more than [`KEEP`] of the limit, whole steps are cut into equal parts that
-//! take [`RESERVE`] at most. Fewer parts are used again once they keep this reserve. Velocities continue (formula in `stepper.rs`), and
+//! take [`RESERVE`] at most. Fewer parts are used again once they have kept this reserve for [`REJOIN_AFTER`] steps: a vibrating body would be
+//! cut and rejoined in each period, at phases that add energy. Velocities continue (formula in `stepper.rs`), and
 //! relaxing laws take coefficients of the new length. Observers, checkpoints and step counts see whole steps only.
+//!
+//! *Halvings.* A run that fails all the same can go back to an earlier state and [halve its steps](State::halve_steps): whole steps are then cut
+//! into parts of at most ½, ¼ or ⅛ of their length for good.
 //!
 //! The state holds all that monitoring needs to resume ([`Stability`] and [`State::reference`]). Stiffnesses in the reference state are computed
 //! from it again, so a resumed run has the same bits. A new reference allocates memory; nothing else in a step does.
@@ -38,6 +42,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
 use crate::critical_step::{limit_alone, scaled_bound};
+use crate::damping_force::{damped, undamped};
 use crate::lanes::{LaneWork, Lanes, PACK, Pack, Processor, load_symmetric, load_tensor};
 pub use crate::stability_record::{MOST_SUBSTEPS, Stability, StepLimit};
 use crate::state::State;
@@ -51,6 +56,10 @@ pub const CHANGE: f64 = 1.1;
 pub const RESERVE: f64 = 0.95;
 /// They are kept up to this part: the limit may fall before the next check.
 pub const KEEP: f64 = 0.97;
+/// Steps for which the limit has to allow fewer parts before they are used.
+pub const REJOIN_AFTER: u64 = 1000;
+/// How often the steps of a run are halved at most.
+pub const MOST_HALVINGS: u32 = 3;
 /// Steps between two critical time steps, except where a run would stop.
 pub const REFERENCE_EVERY: u64 = 1000;
 /// One in this many cells is checked closely, for each of the two orders …
@@ -84,12 +93,14 @@ pub(crate) fn substeps(step: f64, limit: f64, now: u32) -> Option<u32> {
     Some(if stable { now.min(enough) } else { enough })
 }
 
-/// By which factor the limit may change before [`substeps`] chooses other parts than these, as a logarithm; zero where it does so now.
+/// By which factor the limit may change before [`substeps`] chooses other parts than these, as a logarithm; zero where it asks for more now.
+/// Where it allows fewer already, only more count: fewer are not used at once.
 pub(crate) fn margin(step: f64, limit: f64, parts: u32) -> f64 {
     let more = f64::from(parts) * KEEP * limit / step;
     // One part cannot become fewer.
     let fewer = step / (RESERVE * limit * f64::from(parts - 1));
-    more.min(fewer).ln().max(0.0)
+    let nearest = if fewer > 1.0 { more.min(fewer) } else { more };
+    nearest.ln().max(0.0)
 }
 
 /// Watches the largest stable step of a model. Holds constants and scratch, and what follows from the reference.
@@ -106,7 +117,7 @@ struct Watch {
     limit: f64,
     /// Of each cell in the reference state, once it was needed.
     reference: Vec<Option<Stiffness>>,
-    /// λ of hourglass control alone, over V [Pa/m²].
+    /// λ of hourglass control alone at rest, over V [Pa/m²].
     hourglass: Vec<f64>,
     /// Σ B_a ⊗ B_a [1/m²] of packs of cells, as [`gradient_square_of`]: found once, a check would spend much of its time there.
     square: Vec<Symmetric<Pack<f64>>>,
@@ -122,6 +133,7 @@ struct Watch {
 impl Monitor {
     /// A monitor of a model whose limit at rest is `limit` [s].
     pub fn new(model: &Model, limit: f64, on_unstable: OnUnstable) -> Self {
+        let limit = undamped(limit, model.stiffness_damping);
         let solids = model.solids.iter().map(|solid| Watch::new(model, solid, limit)).collect();
         Self { on_unstable, solids, reference: None }
     }
@@ -170,7 +182,7 @@ impl Monitor {
                 watch.rank(solid, displacement);
                 watch.pick();
                 let found = watch.smallest(model, solid, displacement, reference);
-                found.map(|(limit, cell)| (limit, index, cell))
+                found.map(|(limit, cell)| (damped(limit, model.stiffness_damping), index, cell))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))
     }
@@ -191,7 +203,7 @@ impl Monitor {
                     smallest(&found, cells)
                 };
                 let least = all.par_chunks(PACK).map(least).reduce(|| None, smaller);
-                least.map(|(limit, cell)| (limit, index, cell))
+                least.map(|(limit, cell)| (damped(limit, model.stiffness_damping), index, cell))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))
     }
@@ -312,7 +324,7 @@ impl Watch {
             let state = |cell: usize| (displacement_gradient(solid, cell, displacement), self.square(cell));
             let mut found = stiffness(solid, cells, state);
             for (own, &cell) in found.iter_mut().zip(cells) {
-                own.mode = own.mode.max(self.hourglass[cell as usize]);
+                own.mode = own.mode.max(self.hourglass[cell as usize] * own.hourglass);
             }
             found
         };
@@ -366,7 +378,9 @@ fn limits_alone<R: Scalar>(
     let mut limits = [f64::NAN; PACK];
     for (limit, (&cell, own)) in limits.iter_mut().zip(cells.iter().zip(&found)) {
         let cell = cell as usize;
-        *limit = limit_alone(model, solid, cell, own.mode.max(hourglass_modulus(solid, cell)));
+        let hourglass = hourglass_modulus(solid, cell) * own.hourglass;
+        let alone = limit_alone(model, solid, cell, own.mode.max(hourglass));
+        *limit = damped(alone, model.stiffness_damping);
     }
     limits
 }
@@ -389,7 +403,7 @@ fn smaller(a: Option<(f64, usize)>, b: Option<(f64, usize)>) -> Option<(f64, usi
     }
 }
 
-/// c μ ΣB² [Pa/m²], see [`critical_step::cell_bound`](crate::critical_step::cell_bound).
+/// c μ ΣB² [Pa/m²] at rest, see [`critical_step::cell_bound`](crate::critical_step::cell_bound).
 fn hourglass_modulus(solid: &Solid, cell: usize) -> f64 {
     solid.cells.hourglass_modulus(cell) * solid.cells.gradient_square_sum(cell)
 }

@@ -3,8 +3,10 @@
 use pliant_mechanics::model::Model;
 use serde::{Deserialize, Serialize};
 
+use crate::damping_force::{DISSIPATION, DampingFactors};
 use crate::forces::Deformed;
 use crate::foresight::Foresight;
+use crate::stability::MOST_HALVINGS;
 
 /// The most substeps a step is cut into.
 pub const MOST_SUBSTEPS: u32 = 100;
@@ -37,6 +39,12 @@ pub struct Stability {
     pub most_substeps: u32,
     /// Substeps beyond one a step, in all.
     pub extra_steps: u64,
+    /// How often the steps were halved after a failure.
+    pub halvings: u32,
+    /// Steps done when the limit last asked for as many parts as there are.
+    pub(crate) needed_at: u64,
+    /// Ratio of the last two steps, by which internal forces are extrapolated; none before the first force is known.
+    pub(crate) extrapolation: Option<f64>,
     /// The last critical time step and the steps done then; its state is [`State::reference`](crate::State::reference).
     pub(crate) reference: Option<(f64, u64)>,
     /// Deformation at the last check.
@@ -54,6 +62,9 @@ impl Default for Stability {
             done: 0,
             checks: 0,
             critical_steps: 0,
+            halvings: 0,
+            needed_at: 0,
+            extrapolation: None,
             reference: None,
             last: None,
             smallest: None,
@@ -78,8 +89,18 @@ impl Stability {
                 && found.limit > 0.0
         };
         self.done == 0
-            && (1..=MOST_SUBSTEPS).contains(&self.substeps)
+            && self.halvings <= MOST_HALVINGS
+            && (1..=MOST_SUBSTEPS << self.halvings).contains(&self.substeps)
             && self.last.iter().chain(&self.smallest).all(known)
+    }
+
+    /// Factors of the damping forces after a step of `before` [s], where the highest modes are dissipated or not, with damping by stiffness [s];
+    /// all zero before the first force is known.
+    pub fn damping_factors(&self, dissipates: bool, damping: f64, before: f64) -> DampingFactors {
+        let dissipation = if dissipates { DISSIPATION } else { 0.0 };
+        let known =
+            |extrapolation| DampingFactors { dissipation, extrapolation, stiffness: damping / before };
+        self.extrapolation.map_or_else(DampingFactors::default, known)
     }
 
     /// Forgets the limits of another model. Steps stay cut as they are until the first check.
@@ -88,7 +109,7 @@ impl Stability {
         (self.checks, self.last, self.smallest) = (unseen.checks, unseen.last, unseen.smallest);
         (self.reference, self.deformed, self.checked_at) =
             (unseen.reference, unseen.deformed, unseen.checked_at);
-        self.foresight = unseen.foresight;
+        (self.foresight, self.extrapolation) = (unseen.foresight, unseen.extrapolation);
     }
 
     /// Records a check and the deformation it was made at.

@@ -9,6 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
 use crate::history::History;
+use crate::stability::MOST_HALVINGS;
+#[cfg(doc)]
+use crate::stability::OnUnstable;
 use crate::stability_record::Stability;
 
 /// What a stepper advances.
@@ -22,6 +25,8 @@ pub struct State<R> {
     pub displacement: Vec<Vector<R>>,
     /// The last increments, u − u one step before [m].
     pub increment: Vec<Vector<R>>,
+    /// Internal forces [N] at the last two instants, the later ones first; empty where no stepper damps by them.
+    pub forces: [Vec<Vector<R>>; 2],
     /// History of each solid.
     pub history: Vec<History<R>>,
     /// Energies so far.
@@ -50,8 +55,10 @@ pub struct Work {
     pub internal: f64,
     /// Work of loads and of prescribed motions, to the current time, and the kinetic energy given at time 0.
     pub external: f64,
-    /// Energy taken by mass-proportional damping, to the current time.
+    /// Energy taken by damping, to the current time.
     pub damping: f64,
+    /// Energy that changes of the step length added, to the current time.
+    pub step_changes: f64,
     /// Running maximum of kinetic energy, internal and |external| work.
     pub largest: f64,
     /// ⅛ Δt² Σ m|a|² at the start, which the mean velocity of the method keeps from the kinetic energy from then on.
@@ -64,6 +71,8 @@ pub struct Work {
     pub(crate) pending_internal: f64,
     /// First half of the external work of the step under way.
     pub(crate) pending_external: f64,
+    /// Energy that the step under way adds by its length, where it differs from the one before.
+    pub(crate) pending_change: f64,
     /// Damping power [W] at the last evaluation.
     pub(crate) damping_power: f64,
 }
@@ -122,6 +131,7 @@ impl<R: Scalar> State<R> {
             increment: vec![[R::ZERO; 3]; model.node_count()],
             reference: vec![[R::ZERO; 3]; model.node_count()],
             displacement,
+            forces: [Vec::new(), Vec::new()],
             history: model.solids.iter().map(History::at_rest).collect(),
             work: Work::default(),
             stability: Stability::default(),
@@ -130,6 +140,15 @@ impl<R: Scalar> State<R> {
             gripped: Vec::new(),
             slip: Vec::new(),
             evaluated: false,
+        }
+    }
+
+    /// Has room for the internal forces of the last two instants.
+    pub fn keep_forces(&mut self) {
+        let nodes = self.displacement.len();
+        if self.forces[0].len() != nodes {
+            self.forces = [(); 2].map(|()| vec![[R::ZERO; 3]; nodes]);
+            self.stability.extrapolation = None;
         }
     }
 
@@ -161,6 +180,13 @@ impl<R: Scalar> State<R> {
         self.work.shake(gained.sum::<f64>());
         self.stability.forget();
         self.reference.fill([R::ZERO; 3]);
+    }
+
+    /// Halves all steps from here on, in a run that [cuts steps](OnUnstable::Substep); false where that was done [`MOST_HALVINGS`] times.
+    pub fn halve_steps(&mut self) -> bool {
+        let may = self.stability.halvings < MOST_HALVINGS;
+        self.stability.halvings += u32::from(may);
+        may
     }
 
     /// True before the first step.

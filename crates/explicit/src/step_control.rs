@@ -5,8 +5,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
 use crate::critical_step::limit_about;
+use crate::damping_force::{damped, undamped};
 use crate::forces::{Deformed, InternalForces};
-use crate::stability::{CHANGE, CHECK_EVERY, Monitor, OnUnstable, RESERVE, StepLimit, substeps};
+use crate::stability::{
+    CHANGE, CHECK_EVERY, Monitor, OnUnstable, REJOIN_AFTER, RESERVE, StepLimit, substeps,
+};
 use crate::state::State;
 use crate::step_error::StepError;
 
@@ -28,6 +31,16 @@ impl Lengths {
     /// h = (Δt⁻ + Δt⁺)/2 [s].
     pub fn mean(self) -> f64 {
         0.5 * (self.before + self.next)
+    }
+
+    /// The velocity [m/s] at the instant, v⁻ + ½ Δt⁻ a, from the increments [m] before and after it.
+    pub fn velocity(self, before: f64, after: f64) -> f64 {
+        (before * self.ratio() + after / self.ratio()) / (2.0 * self.mean())
+    }
+
+    /// The energy [J] that the change of the length adds, from ⅛ Δt⁻² Σ m|a|² [J].
+    pub fn change_energy(self, error: f64) -> f64 {
+        if self.next == self.before { 0.0 } else { (1.0 - self.ratio() * self.ratio()) * error }
     }
 }
 
@@ -79,12 +92,13 @@ impl StepControl {
 
     /// Passes over a check that is due, if it would leave the steps as they are.
     pub fn pass<R>(&self, state: &mut State<R>, deformed: &Deformed) -> bool {
-        let Some(monitor) = &self.monitor else { return false };
-        let plain = state.stability.foresight.covers(state.steps, deformed, self.step, self.substeps)
-            && state
-                .stability
-                .last
-                .is_some_and(|look| !monitor.doubts(state, look.limit, self.step, self.substeps));
+        let (Some(monitor), Some(look)) = (&self.monitor, state.stability.last) else { return false };
+        let (step, parts) = self.parts(state);
+        let rejoins = state.steps >= state.stability.needed_at.saturating_add(REJOIN_AFTER)
+            && substeps(step, look.limit, parts) != Some(parts);
+        let plain = state.stability.foresight.covers(state.steps, deformed, step, parts)
+            && !monitor.doubts(state, look.limit, step, parts)
+            && !rejoins;
         if plain {
             state.stability.pass(*deformed, state.steps);
         }
@@ -94,6 +108,12 @@ impl StepControl {
     /// The length [s] of a whole step.
     pub fn step(&self) -> f64 {
         self.step
+    }
+
+    /// The step [s] as it was halved, and the parts of it that the step to come has.
+    fn parts<R>(&self, state: &State<R>) -> (f64, u32) {
+        let halves = 1 << state.stability.halvings;
+        (self.step / f64::from(halves), (self.substeps / halves).max(1))
     }
 
     /// Parts of the step to come.
@@ -168,11 +188,12 @@ impl StepControl {
         state: &mut State<R>,
         deformed: &Deformed,
     ) {
+        let (step, parts) = self.parts(state);
         let Some(monitor) = &mut self.monitor else { return };
         monitor.refer_to(state);
         if let Some((mut limit, solid, cell)) = monitor.limit(model, &state.displacement, &state.reference) {
-            if monitor.doubts(state, limit, self.step, self.substeps) {
-                limit = take_as_reference(model, owners, forces, state, self.step / RESERVE);
+            if monitor.doubts(state, limit, step, parts) {
+                limit = take_as_reference(model, owners, forces, state, step / RESERVE);
             }
             let look = StepLimit { time: state.time, limit, solid, cell };
             state.stability.note(look, *deformed, state.steps);
@@ -190,10 +211,17 @@ impl StepControl {
             OnUnstable::Report => {}
             OnUnstable::Stop if look.limit < self.step => return below(),
             OnUnstable::Stop => {}
-            OnUnstable::Substep => match substeps(self.step, look.limit, self.substeps) {
-                Some(substeps) => self.substeps = substeps,
-                None => return below(),
-            },
+            OnUnstable::Substep => {
+                let (step, now) = self.parts(state);
+                let Some(mut parts) = substeps(step, look.limit, now) else { return below() };
+                let seen = &mut state.stability;
+                if parts >= now {
+                    seen.needed_at = state.steps;
+                } else if state.steps < seen.needed_at.saturating_add(REJOIN_AFTER) {
+                    parts = now;
+                }
+                self.substeps = parts << seen.halvings;
+            }
         }
         Ok(())
     }
@@ -210,6 +238,8 @@ impl StepControl {
 
     /// Moves the clock of a state on by the (sub)step to come.
     pub fn count<R>(&mut self, state: &mut State<R>) {
+        let known = state.stability.extrapolation.is_some();
+        state.stability.extrapolation = Some(if known { self.lengths(state).ratio() } else { 0.0 });
         self.before = None;
         state.evaluated = false;
         state.stability.substeps = self.substeps;
@@ -232,9 +262,11 @@ fn take_as_reference<R: Scalar>(
     state: &mut State<R>,
     enough: f64,
 ) -> f64 {
+    let damping = model.stiffness_damping;
+    let enough = undamped(enough, damping);
     let limit = limit_about(model, owners, forces, &state.displacement, enough);
     state.reference.clone_from(&state.displacement);
     state.stability.reference = Some((limit, state.steps));
     state.stability.critical_steps += 1;
-    limit
+    damped(limit, damping)
 }

@@ -3,6 +3,9 @@
 //! (thesis 5.28–5.32 without the cancellation in 2uⁿ − uⁿ⁻¹). Damping does not lower the stable step.
 //! Where the step changes from Δt⁻ to Δt⁺, velocities go on: with h = (Δt⁻ + Δt⁺)/2 and a = α h/2,
 //! Δuⁿ⁺¹ = ((1 − a) Δt⁺/Δt⁻ Δuⁿ + Δt⁺ h/m (R − f)) / (1 + a).
+//! With v⁻ = Δuⁿ/Δt⁻ and v⁺ = Δuⁿ⁺¹/Δt⁺, so that h a = v⁺ − v⁻, the work of all forces by the trapezoidal rule is
+//! ½ m a (Δt⁻ v⁻ + Δt⁺ v⁺) = ½ m (v⁺² − v⁻²) + ⅛ (Δt⁺² − Δt⁻²) m a². So the change adds ⅛ (Δt⁻² − Δt⁺²) Σ m|a|² to the kinetic
+//! energy, which the book of energies enters beside the work. The velocity at the instant is v⁻ + ½ Δt⁻ a = v⁺ − ½ Δt⁺ a.
 //!
 //! A step has two halves: [`CentralDifference::evaluate`] finds forces, the coming increments, reactions and energies
 //! at the current time, so that all that an observer sees belongs to one instant; [`CentralDifference::advance`] moves.
@@ -24,6 +27,7 @@ use rayon::prelude::*;
 use crate::Scalar;
 use crate::applied::AppliedForces;
 use crate::collective::{Collective, Predicted, enclosed};
+use crate::damping_force::{DampingFactors, Past};
 use crate::energies::{Sums, model_balance_floor};
 use crate::forces::{Deformed, Found, InternalForces};
 use crate::lanes::{Instructions, MissingInstructions, Processor};
@@ -34,6 +38,9 @@ use crate::state::State;
 use crate::step_control::{Clock, Lengths, StepControl};
 use crate::step_error::StepError;
 use crate::touching::{Free, NodeContact, Nodes, Posture, Touching};
+
+/// Mass [kg] of a component that is held and of which the mass went elsewhere.
+const NO_MASS: f64 = 1e-30;
 
 /// Tasks that a thread takes at least: fewer take less time than waking another thread.
 const LEAST_CHUNKS: usize = 5;
@@ -108,11 +115,15 @@ pub struct CentralDifference<R> {
     collectives: Vec<Collective>,
     /// Contacts with rigid things.
     touching: Option<Touching<R>>,
+    /// Whether the highest modes are dissipated.
+    dissipates: bool,
     processor: Processor,
     /// Factors on the amplitudes of each constraint now and after the step.
     factors: Vec<[[f64; 2]; 2]>,
     next: Vec<Vector<R>>,
     reaction: Vec<Vector<R>>,
+    /// Internal forces [N], where they damp.
+    internal: Vec<Vector<R>>,
     sums: Vec<Sums>,
     energies: Energies,
     balance_floor: f64,
@@ -153,17 +164,17 @@ impl<R: Scalar> Observable<R> for CentralDifference<R> {
         self.touching.as_ref().map_or_else(Vec::new, |touching| touching.nodal(state))
     }
 
-    /// The mean of the increments before and after.
     fn velocity(&self, state: &State<R>, node: usize) -> Vector<f64> {
-        let Lengths { next, .. } = self.lengths;
         let own = |node: u32| {
             let (before, after) = (state.increment[node as usize], self.next[node as usize]);
-            [0, 1, 2].map(|c| (before[c].to_f64() * self.lengths.ratio() + after[c].to_f64()) / (2.0 * next))
+            [0, 1, 2].map(|c| self.lengths.velocity(before[c].to_f64(), after[c].to_f64()))
         };
-        match self.model.ties.is_empty() {
-            true => own(node as u32),
-            false => weighted(self.model.resolved(&[(node as u32, 1.0)]), own),
+        let alone = own(node as u32);
+        if self.model.ties.is_empty() {
+            return alone;
         }
+        let followed = weighted(self.model.resolved(&[(node as u32, 1.0)]), own);
+        [0, 1, 2].map(|c| if self.owners[node][c] == FREE { followed[c] } else { alone[c] })
     }
 }
 
@@ -211,19 +222,24 @@ impl<R: Scalar> CentralDifference<R> {
             relaxing: step,
             forces: InternalForces::new(&model, step),
             held: held(&owners, &model.amplitudes(&owners)),
-            owners,
-            // Nodes that follow others have no mass, and no force.
+            // Nodes that follow others have no mass, and no force but where they are held: there next to no mass moves with them.
             mass: (0..nodes)
-                .map(|node| [R::of(if follows[node] { 1.0 } else { model.inertia(node) }); 3])
+                .map(|node| {
+                    let without = owners[node].map(|owner| if owner == FREE { 1.0 } else { NO_MASS });
+                    (if follows[node] { without } else { [model.inertia(node); 3] }).map(R::of)
+                })
                 .collect(),
+            owners,
             damping,
             applied,
             collectives: Collective::all(&model),
             touching: None,
+            dissipates: false,
             processor: Processor::detect(),
             factors: vec![[[0.0; 2]; 2]; model.constraints.len()],
             next: vec![[R::ZERO; 3]; nodes],
             reaction: vec![[R::ZERO; 3]; nodes],
+            internal: vec![[R::ZERO; 3]; nodes],
             sums: vec![Sums::default(); nodes.div_ceil(CHUNK)],
             energies: Energies::default(),
             balance_floor: model_balance_floor::<R>(&model),
@@ -236,6 +252,22 @@ impl<R: Scalar> CentralDifference<R> {
     pub fn watched(mut self, monitor: Monitor) -> Self {
         self.control.watch(monitor);
         self
+    }
+
+    /// [Dissipates](crate::DISSIPATION) the highest modes. Without it, angular momentum of a free body is exact and energies are kept to round-off.
+    #[must_use]
+    pub fn dissipating(mut self) -> Self {
+        self.dissipates = true;
+        self
+    }
+
+    /// Whether internal forces of earlier instants damp.
+    fn damps_by_forces(&self) -> bool {
+        self.dissipates || self.model.stiffness_damping > 0.0
+    }
+
+    fn damping_factors(&self, state: &State<R>) -> DampingFactors {
+        state.stability.damping_factors(self.dissipates, self.model.stiffness_damping, self.lengths.before)
     }
 
     /// Lets nodes touch rigid things.
@@ -305,6 +337,9 @@ impl<R: Scalar> CentralDifference<R> {
     /// must not be cut.
     pub fn evaluate(&mut self, state: &mut State<R>) -> Result<(), StepError> {
         self.control.keep(state);
+        if self.damps_by_forces() {
+            state.keep_forces();
+        }
         self.lengths = self.control.lengths(state);
         let relaxing = self.control.relaxing(state);
         if self.relaxing != relaxing {
@@ -370,6 +405,11 @@ impl<R: Scalar> CentralDifference<R> {
             state.gripped.append(&mut touching.taken);
             touching.press_guests(self.lengths.next);
         }
+        if self.damps_by_forces() {
+            let [last, before] = &mut state.forces;
+            std::mem::swap(before, last);
+            std::mem::swap(last, &mut self.internal);
+        }
         state.work.advance();
         self.control.count(state);
         state.lags.iter_mut().for_each(|lag| lag.advance(state.time));
@@ -426,10 +466,14 @@ impl<R: Scalar> CentralDifference<R> {
         let step_squared = next * mean;
         let (m, a) = (self.mass[at][0].to_f64(), 0.5 * mean * self.damping[at][0].to_f64());
         let (external, internal): (Vector<f64>, _) = (self.applied.at(at), self.forces.at(at));
+        let mut lost = [[R::ZERO; 3]];
+        if self.damps_by_forces() {
+            Past::of(state, self.damping_factors(state)).from(at).damp(&[internal], &mut lost);
+        }
         let inertia = m * (1.0 + a);
         let place = [0, 1, 2].map(|c| {
             let before = state.increment[at][c].to_f64() * self.lengths.ratio();
-            let force = external[c] - internal[c].to_f64();
+            let force = external[c] - internal[c].to_f64() - lost[0][c].to_f64();
             state.displacement[at][c].to_f64() + ((1.0 - a) * before * m + step_squared * force) / inertia
         });
         let now = state.displacement[at].map(|u| u.to_f64());
@@ -521,11 +565,14 @@ impl<R: Scalar> CentralDifference<R> {
         let mut next = std::mem::take(&mut self.next);
         let mut reaction = std::mem::take(&mut self.reaction);
         let mut sums = std::mem::take(&mut self.sums);
+        let mut internal = std::mem::take(&mut self.internal);
+        let past = self.damps_by_forces().then(|| Past::of(state, self.damping_factors(state)));
         let (increment, pace) = (state.increment.par_chunks(CHUNK), Pace::new(self.lengths));
-        (next.par_chunks_mut(CHUNK).zip(reaction.par_chunks_mut(CHUNK)).zip(increment).zip(&mut sums))
+        let found = internal.par_chunks_mut(CHUNK).zip(&mut sums);
+        (next.par_chunks_mut(CHUNK).zip(reaction.par_chunks_mut(CHUNK)).zip(increment).zip(found))
             .enumerate()
             .with_min_len(self.least_chunks())
-            .for_each(|(task, (((next, reaction), before), sums))| {
+            .for_each(|(task, (((next, reaction), before), (internal, sums)))| {
                 let first = task * CHUNK;
                 *sums = self.processor.run(NodePass {
                     first,
@@ -539,9 +586,11 @@ impl<R: Scalar> CentralDifference<R> {
                     before,
                     next,
                     reaction,
+                    past: past.map(|past| past.from(first)),
+                    internal,
                 });
             });
-        (self.next, self.reaction, self.sums) = (next, reaction, sums);
+        (self.next, self.reaction, self.internal, self.sums) = (next, reaction, internal, sums);
     }
 
     fn check_state(&self, state: &State<R>, sums: &Sums, found: &Found) -> Result<(), StepError> {
@@ -571,12 +620,30 @@ impl<R: Scalar> CentralDifference<R> {
     ) -> Result<(), StepError> {
         let before = (!state.is_at_start()).then_some(self.lengths.before);
         let again = std::mem::replace(&mut state.evaluated, true);
-        self.energies = state.work.settle(sums, hourglass, before, self.balance_floor, again);
+        let change = self.change_energy(state);
+        self.energies = state.work.settle(sums, hourglass, change, before, self.balance_floor, again);
         if state.work.has_lost_balance() {
             let (fastest, balance) = (self.fastest_node(), self.energies.balance);
             return Err(StepError::unbalanced(&self.model, fastest, balance, state.time));
         }
         Ok(())
+    }
+
+    /// The energy [J] that a change of the step length adds at the instant.
+    fn change_energy(&self, state: &State<R>) -> f64 {
+        if self.lengths.next == self.lengths.before {
+            return 0.0;
+        }
+        let per_step_squared = 1.0 / (self.lengths.next * self.lengths.mean());
+        let nodes = self.mass.iter().zip(&state.increment).zip(&self.next);
+        let error = nodes.map(|((mass, before), next)| {
+            let square = |c: usize| {
+                let change = next[c].to_f64() - before[c].to_f64() * self.lengths.ratio();
+                (0.5 * self.lengths.before * change * per_step_squared).powi(2)
+            };
+            (0..3).map(|c| 0.5 * mass[c].to_f64() * square(c)).sum::<f64>()
+        });
+        self.lengths.change_energy(error.sum())
     }
 
     fn fastest_node(&self) -> u32 {

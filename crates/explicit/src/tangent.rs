@@ -14,7 +14,7 @@ use pliant_mechanics::model::{Cells, Solid};
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, dot, scale};
 
 use crate::eigenvalues::{ROWS, eigenvector, largest_of_nine, largest_of_three};
-use crate::forces::{Batch, Wanted};
+use crate::forces::{Batch, Wanted, growth};
 use crate::lanes::{LaneWork, Lanes, PACK, Pack, Processor, load_symmetric, load_tensor};
 
 /// Size of the differences of F: truncation and round-off both near 1e-10.
@@ -33,6 +33,8 @@ pub(crate) struct Stiffness {
     /// The largest over the modes n⊗y of plane waves. In a mesh it is they that neighbours share, while alone a cell is
     /// often stiffest in a change of volume, all directions at once: compressed along one of them it hardly changes.
     pub wave: f64,
+    /// The factor on the stiffness of hourglass control.
+    pub hourglass: f64,
 }
 
 /// How stiff some cells are, at most [`PACK`], each with its displacement gradient and its Σ B_a ⊗ B_a [1/m²]; entries beyond them
@@ -54,14 +56,14 @@ pub(crate) fn stiffness(
             (0..3).for_each(|k| to[k].0[lane] = fibre[k]);
         }
     }
-    let (mode, wave) = Processor::detect().run(Tangents {
+    let [mode, wave, hourglass] = Processor::detect().run(Tangents {
         solid,
         cells: &cells,
         gradient: &Tensor(from_fn(|i| from_fn(|k| entry(i, k)))),
         square: &Symmetric(from_fn(|k| Pack::from_fn(|lane| states[lane].1.0[k]))),
         fibres: &fibres,
     });
-    from_fn(|lane| Stiffness { mode: mode.0[lane], wave: wave.0[lane] })
+    from_fn(|lane| Stiffness { mode: mode.0[lane], wave: wave.0[lane], hourglass: hourglass.0[lane] })
 }
 
 /// Of a bar, as if it were taut: E/(λ₀ L²) along it, or P/(λ L²) across, twice for its two nodes, with λ₀ the slack.
@@ -70,7 +72,7 @@ fn of_bar(solid: &Solid, rest: &Rest<2>, cord: &Cord, h: &Tensor<f64>) -> Stiffn
         cord.pull(rest, h.apply(rest.between()), solid.material.law.small_strain().young());
     let along = solid.longitudinal_modulus() / rest.length().powi(2);
     let mode = 2.0 * along.max(stress / (rest.length() * length));
-    Stiffness { mode, wave: mode }
+    Stiffness { mode, wave: mode, hourglass: 1.0 }
 }
 
 /// Directions in which the search for the stiffest wave begins: axes and diagonals of the square.
@@ -103,8 +105,8 @@ struct Tangents<'a> {
 type Matrix<N> = [[N; ROWS]; ROWS];
 
 impl LaneWork<f64> for Tangents<'_> {
-    /// The largest eigenvalues over all modes and over plane waves.
-    type Output = (Pack<f64>, Pack<f64>);
+    /// The largest eigenvalues over all modes and over plane waves, and the factors on hourglass control.
+    type Output = [Pack<f64>; 3];
 
     #[inline(always)]
     fn run<L: Lanes<f64>>(self) -> Self::Output {
@@ -117,6 +119,7 @@ impl LaneWork<f64> for Tangents<'_> {
                 self.fill_column::<L>(&batch, &mut matrix, 3 * i + p);
             }
         }
+        let hourglass = self.hourglass::<L>(&mut batch);
         let (mut mode, mut wave) = (Pack::ZERO, Pack::ZERO);
         for at in (0..PACK).step_by(L::WIDTH) {
             let size = load_symmetric::<f64, L>(self.square, at).trace();
@@ -132,11 +135,27 @@ impl LaneWork<f64> for Tangents<'_> {
             (size * stiffest_wave(&symmetric) + sound).store(&mut wave, at);
             (size * largest_of_nine(&mut { symmetric }) + sound).store(&mut mode, at);
         }
-        (mode, wave)
+        [mode, wave, hourglass]
     }
 }
 
 impl Tangents<'_> {
+    /// The factors on the stiffness of hourglass control.
+    #[inline(always)]
+    fn hourglass<L: Lanes<f64>>(&self, batch: &mut Batch<f64>) -> Pack<f64> {
+        let mut factors = Pack([1.0; PACK]);
+        if let Some(shear) = self.solid.hourglass_growth() {
+            for at in (0..PACK).step_by(L::WIDTH) {
+                batch.set(0, at, &load_tensor::<f64, L>(self.gradient, at));
+            }
+            batch.evaluate::<L>(&self.solid.material.law, Wanted::Whole, 1, 1, self.fibres);
+            for at in (0..PACK).step_by(L::WIDTH) {
+                growth::<f64, L>(batch, shear, at).store(&mut factors, at);
+            }
+        }
+        factors
+    }
+
     /// The columns of L over √|G|.
     #[inline(always)]
     fn columns<L: Lanes<f64>>(&self, at: usize) -> [Vector<L>; 3] {

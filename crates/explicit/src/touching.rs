@@ -155,14 +155,16 @@ impl<R: Scalar> Touching<R> {
             let number = numbers[node as usize] as usize;
             rest.get(number).map_or_else(|| guests.rest(number), |&rest| rest.into())
         };
-        let parts = contacts.contacts.iter().map(|contact| {
+        let parts = contacts.contacts.iter().enumerate().map(|(index, contact)| {
             let at_rigid = |rigid: usize| {
                 let surface = contact.surface.numbered(number);
                 Own::Rigid(Box::new(AtRigid::new(&contacts.rigids[rigid], rigid, surface, place)))
             };
             match contact.with {
                 With::Rigid(rigid) => Some(at_rigid(rigid)),
-                _ => contact.pairs(number, place).map(|(pairs, sign)| Own::Bodies(Box::new(pairs), sign)),
+                _ => contacts
+                    .pairs(index, number, place)
+                    .map(|(pairs, sign)| Own::Bodies(Box::new(pairs), sign)),
             }
         });
         let own = parts.flatten().collect();
@@ -441,7 +443,6 @@ impl<R: Scalar> Touching<R> {
         });
         for (index, own) in own.iter().enumerate() {
             let Own::Bodies(pairs, sign) = own else { continue };
-            let offset = contacts.contacts[index].touch.offset;
             let first = rows.len();
             // Impulses along the way between two points before the step have no moment.
             pairs.find(
@@ -450,7 +451,7 @@ impl<R: Scalar> Touching<R> {
                     let mut row = Row::new(index, pair.nodes, pair.weights);
                     row.carried = row.place(places, nodes);
                     (row.normal, row.sign) = (pair.normal, if pair.in_order { *sign } else { -sign });
-                    row.gap = row.normal.dot(&row.place) - offset;
+                    row.gap = row.normal.dot(&row.place) - pair.kept;
                     deepest = deepest.max(-row.gap);
                     rows.push(row);
                 },

@@ -99,6 +99,13 @@ impl<R: Scalar> Batch<R> {
         Split { isochoric: self.stress(pack, at), volumetric: load_symmetric(&self.volumetric[pack], at) }
     }
 
+    /// The whole elastic stress, if the whole or both parts were wanted.
+    #[inline(always)]
+    pub(super) fn elastic<L: Lanes<R>>(&self, wanted: Wanted, pack: usize, at: usize) -> Symmetric<L> {
+        let stress = self.stress(pack, at);
+        if wanted == Wanted::Parts { stress + load_symmetric(&self.volumetric[pack], at) } else { stress }
+    }
+
     /// F of the points from lane `at` of a pack on.
     #[inline(always)]
     pub(crate) fn deformation_gradient<L: Lanes<R>>(&self, pack: usize, at: usize) -> Tensor<L> {

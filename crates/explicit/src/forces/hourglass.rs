@@ -2,14 +2,21 @@
 //! γ_ca = Γ_ca − B_a·Y_c, the signs Γ_ca = ±1 of the patterns ηζ, ξζ, ξη, ξηζ and their moments Y_c = Σ_a Γ_ca X_a it is
 //! q_c = Σ_b Γ_cb u_b − H Y_c and f_a = Σ_c Γ_ca k q_c − (k Σ_c q_c ⊗ Y_c) B_a: thirteen numbers a cell, and the second term
 //! of the force goes along with the stress.
+//!
+//! Where the stiffness grows with the law, k becomes k g(F) ([`ShearGrowth`]). The forces stay the gradient of an energy, ½ k g Σ |q_c|²: its
+//! derivative by F adds ½ k Σ |q_c|² ∂g/∂F to V P. That derivative costs two more stresses, in batches where g is above 1 and cells bend.
 
+use pliant_mechanics::law::{AnyLaw, Deformation, ShearGrowth};
 use pliant_mechanics::model::Hourglass;
-use pliant_mechanics::tensor::{Tensor, Vector, add, cast, dot, scale, sub};
+use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cast, dot, scale, sub};
 use rayon::prelude::*;
 
 use super::PackedCells;
+use super::batch::{Batch, PACKS, Wanted};
 use crate::Scalar;
-use crate::lanes::{Lanes, Pack, load_vector, store_vector};
+use crate::lanes::{
+    LaneWork, Lanes, PACK, Pack, load_symmetric, load_tensor, load_vector, store_symmetric, store_vector,
+};
 
 /// Hourglass control of packs of cells; see [`Hourglass`].
 pub(super) struct PackedHourglass<R> {
@@ -61,6 +68,15 @@ impl<R: Scalar> Resistance<R> {
         [L::of(0.5) * stiffness * energy, L::load(&control.reach, at) * energy]
     }
 
+    /// Takes a factor g into account.
+    #[inline(always)]
+    fn grow<L: Lanes<R>>(&mut self, factor: L, at: usize) {
+        for kq in &mut self.0 {
+            let grown = scale(load_vector(kq, at), factor);
+            store_vector(grown, kq, at);
+        }
+    }
+
     /// Takes Σ_c k q_c ⊗ Y_c from V P.
     #[inline(always)]
     pub(super) fn turn<L: Lanes<R>>(&self, control: &PackedHourglass<R>, piola: &mut Tensor<L>, at: usize) {
@@ -88,6 +104,124 @@ impl<R: Scalar> Resistance<R> {
         forces[5] = add(forces[5], add(a, odd));
         forces[6] = add(forces[6], sub(b, odd));
     }
+}
+
+/// The growth of the stiffness of a batch of cells.
+pub(super) struct Growth<R> {
+    /// ½ k Σ |q_c|² [J].
+    pub(super) constant: [Pack<R>; PACKS],
+    /// ½ k Σ |q_c|² G [J], which adds to V S; `None` where no entry differs from zero.
+    stress: Option<[Symmetric<Pack<R>>; PACKS]>,
+}
+
+impl<R: Scalar> Growth<R> {
+    pub(super) fn new() -> Self {
+        Self { constant: [Pack::ZERO; PACKS], stress: None }
+    }
+
+    /// Adds F ½ k Σ |q_c|² G to V P.
+    #[inline(always)]
+    pub(super) fn add_to<L: Lanes<R>>(
+        &self,
+        piola: &mut Tensor<L>,
+        batch: &Batch<R>,
+        index: usize,
+        at: usize,
+    ) {
+        if let Some(stress) = &self.stress {
+            let gradient: Tensor<L> = batch.deformation_gradient(index, at);
+            let own = gradient.times_symmetric(&load_symmetric(&stress[index], at));
+            *piola = piola.plus_scaled(&own, L::ONE);
+        }
+    }
+}
+
+/// The search for the growth of a batch of cells, as many packs as there are resistances: g from their stresses goes into resistance and energy.
+pub(super) struct FindGrowth<'a, R> {
+    pub law: &'a AnyLaw,
+    /// Shear modulus at rest [Pa].
+    pub shear: f64,
+    pub fibres: &'a [Vector<Pack<R>>],
+    pub wanted: Wanted,
+    pub batch: &'a Batch<R>,
+    pub resistance: &'a mut [Resistance<R>],
+    /// ½ k g Σ |q_c|² [J] is added here.
+    pub energy: &'a mut Pack<R>,
+    pub growth: &'a mut Growth<R>,
+}
+
+impl<R: Scalar> LaneWork<R> for FindGrowth<'_, R> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes<R>>(self) {
+        let Self { law, shear, fibres, wanted, batch, resistance, energy, growth } = self;
+        let packs = resistance.len();
+        let mut bends = false;
+        for (index, resistance) in resistance.iter_mut().enumerate() {
+            let constant = &growth.constant[index];
+            let mut factors = Pack::ZERO;
+            for at in (0..PACK).step_by(L::WIDTH) {
+                let (_, own) = grown::<R, L>(batch, wanted, shear, index, at);
+                own.factor.store(&mut factors, at);
+                resistance.grow(own.factor, at);
+                let held = L::load(constant, at) * own.factor;
+                (held + L::load(energy, at)).store(energy, at);
+            }
+            for lane in 0..PACK {
+                bends |= factors.0[lane] > R::ONE && constant.0[lane] > R::ZERO;
+            }
+        }
+        growth.stress = None;
+        if !bends {
+            return;
+        }
+        // A pressure has no part in G, and much of the round-off.
+        let part = if law.has_volumetric_energy() { Wanted::Isochoric } else { Wanted::Whole };
+        let difference = L::of(R::EPSILON.cbrt());
+        let (mut ahead, mut behind) = (Batch::new(), Batch::new());
+        for index in 0..packs {
+            for at in (0..PACK).step_by(L::WIDTH) {
+                let (deformation, own) = grown::<R, L>(batch, wanted, shear, index, at);
+                let (h, way) = (load_tensor(&batch.gradient[index], at), own.direction(&deformation));
+                ahead.set(index, at, &h.plus_scaled(&way, difference));
+                behind.set(index, at, &h.plus_scaled(&way, -difference));
+            }
+        }
+        ahead.evaluate::<L>(law, part, packs, 1, fibres);
+        behind.evaluate::<L>(law, part, packs, 1, fibres);
+        let added = growth.stress.insert([Symmetric([Pack::ZERO; 6]); PACKS]);
+        for (index, added) in added[..packs].iter_mut().enumerate() {
+            for at in (0..PACK).step_by(L::WIDTH) {
+                let (deformation, own) = grown::<R, L>(batch, wanted, shear, index, at);
+                let (after, before) = (ahead.stress::<L>(index, at), behind.stress::<L>(index, at));
+                let (half, rate) = (L::of(0.5), L::of(0.5) / difference);
+                let gradient =
+                    own.gradient(&deformation, &((after + before) * half), &((after - before) * rate));
+                store_symmetric(gradient * L::load(&growth.constant[index], at), added, at);
+            }
+        }
+    }
+}
+
+/// The growth of points of a batch, with their deformation.
+#[inline(always)]
+fn grown<R: Scalar, L: Lanes<R>>(
+    batch: &Batch<R>,
+    wanted: Wanted,
+    shear: f64,
+    index: usize,
+    at: usize,
+) -> (Deformation<L>, ShearGrowth<L>) {
+    let deformation = Deformation::from_displacement_gradient(&load_tensor(&batch.gradient[index], at));
+    let growth = ShearGrowth::new(&deformation, &batch.elastic(wanted, index, at), L::of(shear));
+    (deformation, growth)
+}
+
+/// The factors g of a pack of points, from a batch whose first pack has their elastic stresses.
+#[inline(always)]
+pub(crate) fn growth<R: Scalar, L: Lanes<R>>(batch: &Batch<R>, shear: f64, at: usize) -> L {
+    grown::<R, L>(batch, Wanted::Whole, shear, 0, at).1.factor
 }
 
 /// Σ_b Γ_cb u_b of the nodes 1 to 7, with u_0 = 0: sums and differences of opposite nodes first.

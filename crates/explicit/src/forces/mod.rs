@@ -27,6 +27,7 @@ use averaged::AveragedTets;
 use bar::Bars;
 pub(crate) use batch::{Batch, Wanted, pressure};
 pub(crate) use blocks::MOST_PACKS;
+pub(crate) use hourglass::growth;
 use std::ops::Range;
 
 use pliant_mechanics::Real;
@@ -373,8 +374,8 @@ struct Tied<R> {
     shares: Shares,
     /// First entry of `given` of each, one more than there are.
     offsets: Vec<u32>,
-    /// How much of the force on it goes to each node that it follows.
-    given: Vec<R>,
+    /// How much of each component of the force on it goes to each node that it follows, and stays where it is held.
+    given: Vec<Vector<R>>,
     /// The first of their places in `forces`.
     first: usize,
     forces: Vec<Vector<R>>,
@@ -385,11 +386,11 @@ impl<R: Scalar> Tied<R> {
     fn new(model: &Model, places: &[(u32, u32)], first: usize, none: u32) -> (Self, Vec<(u32, u32)>) {
         let mut number = vec![u32::MAX; model.node_count()];
         let (mut offsets, mut given, mut taken) = (vec![0], Vec::new(), Vec::new());
-        for (node, row) in model.ties.iter().flat_map(Tie::rows) {
+        for (node, row) in model.ties.iter().flat_map(Tie::component_rows) {
             number[node as usize] = offsets.len() as u32 - 1;
-            for (followed, weight) in row {
+            for (followed, weights) in row {
                 taken.push((followed, (first + given.len()) as u32));
-                given.push(R::of(weight));
+                given.push(cast(weights));
             }
             offsets.push(given.len() as u32);
         }
@@ -416,8 +417,8 @@ impl<R: Scalar> Tied<R> {
         self.shares.visit(0..count, &mut self.forces, part, |sum, place| *sum = add(*sum, part(place)));
         for (rows, force) in self.offsets.windows(2).zip(&self.forces) {
             let row = rows[0] as usize..rows[1] as usize;
-            for (to, &weight) in forces[self.first..][row.clone()].iter_mut().zip(&self.given[row]) {
-                *to = [weight * force[0], weight * force[1], weight * force[2], R::ZERO];
+            for (to, &[x, y, z]) in forces[self.first..][row.clone()].iter_mut().zip(&self.given[row]) {
+                *to = [x * force[0], y * force[1], z * force[2], R::ZERO];
             }
         }
     }
@@ -434,7 +435,7 @@ impl<R: Scalar> InternalForces<R> {
         let places = fields.iter().zip(&field_offsets).flat_map(|(field, &first)| {
             field.blocks().places().map(move |(node, place)| (node, first as u32 + place))
         });
-        let given: usize = model.ties.iter().map(|tie| tie.mapping.nodes.len()).sum();
+        let given: usize = model.ties.iter().flat_map(Tie::component_rows).map(|(_, row)| row.count()).sum();
         let none = (count + given) as u32;
         let (tied, shares) = if model.ties.is_empty() {
             (None, Shares::new(model.node_count(), none, places))

@@ -7,7 +7,7 @@ use pliant_mechanics::tensor::Vector;
 use super::batch::{Batch, PACKS, Wanted};
 use super::blocks::Task;
 use super::corners::{CornerCheck, PackedCorners, flatness, may_fold};
-use super::hourglass::{PackedHourglass, Resistance};
+use super::hourglass::{FindGrowth, Growth, PackedHourglass, Resistance};
 use super::one_pass::{Element, OnePass};
 use super::{
     Findings, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, own_packs, relative,
@@ -25,6 +25,8 @@ pub(super) struct PlainConstants<R, const N: usize, const M: usize> {
     cells: PackedCells<R, N>,
     rest: Vec<PackedRest<R, M>>,
     hourglass: Option<Vec<PackedHourglass<R>>>,
+    /// The shear modulus at rest [Pa], where the stiffness against hourglass patterns grows from it.
+    growth: Option<f64>,
     /// Of hexahedra.
     corners: Vec<PackedCorners<R>>,
     relaxation: Relaxation<R>,
@@ -45,6 +47,7 @@ impl<R: Scalar, const N: usize, const M: usize> SolidForces<R, N, M> {
             rest: PackedRest::of(&packed, cells),
             cells: packed,
             hourglass,
+            growth: solid.hourglass_growth(),
             corners,
             relaxation: Relaxation::new(&solid.material.prony, step),
             history: 6 * solid.material.prony.slots(),
@@ -63,7 +66,8 @@ impl<R: Scalar, const N: usize, const M: usize> Element<R> for PlainConstants<R,
 
     #[inline(always)]
     fn pass<L: Lanes<R>>(&self, displacement: &[Vector<R>], mut task: Task<'_, R>) -> Findings<R> {
-        let PlainConstants { law, cells, rest, hourglass, corners, relaxation, history: per_pack } = self;
+        let PlainConstants { law, cells, rest, hourglass, growth, corners, relaxation, history: per_pack } =
+            self;
         task.copy_in(displacement);
         let Task { block, moved, forces: sums, history, .. } = task;
         sums.fill([R::ZERO; 4]);
@@ -72,6 +76,7 @@ impl<R: Scalar, const N: usize, const M: usize> Element<R> for PlainConstants<R,
         let mut findings = Findings::default();
         let mut batch = Batch::new();
         let mut resistance = [Resistance::new(); PACKS];
+        let mut grown = Growth::new();
         let mut reach = [Pack::ZERO; PACKS];
         let mut forces = [Pack([[R::ZERO; 4]; PACK]); N];
         let packs = cells.packs_of(block);
@@ -87,11 +92,28 @@ impl<R: Scalar, const N: usize, const M: usize> Element<R> for PlainConstants<R,
                     if let Some(control) = hourglass {
                         let [energy, far] = resistance.find(&control[pack], &u, &h, at);
                         far.store(&mut reach[index], at);
-                        (energy + L::load(&findings.hourglass, at)).store(&mut findings.hourglass, at);
+                        if growth.is_some() {
+                            energy.store(&mut grown.constant[index], at);
+                        } else {
+                            (energy + L::load(&findings.hourglass, at)).store(&mut findings.hourglass, at);
+                        }
                     }
                 }
             }
-            batch.evaluate::<L>(law, wanted, count, 1, cells.fibres(first, count));
+            let fibres = cells.fibres(first, count);
+            batch.evaluate::<L>(law, wanted, count, 1, fibres);
+            if let Some(shear) = *growth {
+                L::call(FindGrowth {
+                    law,
+                    shear,
+                    fibres,
+                    wanted,
+                    batch: &batch,
+                    resistance: &mut resistance[..count],
+                    energy: &mut findings.hourglass,
+                    growth: &mut grown,
+                });
+            }
             for (index, resistance) in resistance[..count].iter().enumerate() {
                 let pack = first + index;
                 batch.note(index, pack * PACK, &mut findings);
@@ -115,6 +137,9 @@ impl<R: Scalar, const N: usize, const M: usize> Element<R> for PlainConstants<R,
                     };
                     let piola = batch.deformation_gradient::<L>(index, at).times_symmetric(&stress);
                     let mut piola = piola.scaled(L::load(&rest[pack].volume, at));
+                    if growth.is_some() {
+                        grown.add_to(&mut piola, &batch, index, at);
+                    }
                     if let Some(control) = hourglass {
                         resistance.turn(&control[pack], &mut piola, at);
                     }

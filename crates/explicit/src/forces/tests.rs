@@ -3,22 +3,23 @@
 
 use pliant_mechanics::element::Cord;
 use pliant_mechanics::law::plane_stress::InPlane;
-use pliant_mechanics::law::samples::every_law;
+use pliant_mechanics::law::samples::{every_law, law};
 use pliant_mechanics::law::{AnyLaw, Deformation, NeoHookean, Split, TransverselyIsotropic, Volumetric};
 use pliant_mechanics::model::{Averaging, Body, Cells, LocalNodes, Material};
 use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
 use pliant_mechanics::tensor::scale as times;
 use pliant_mechanics::tensor::{cross, dot, scale};
 use pliant_testing::Random;
+use serde_json::json;
 
 use super::*;
-use crate::State;
 use crate::critical_step;
 use crate::lanes::Instructions;
 use crate::recover::{CellFields, Recovery};
+use crate::{CentralDifference, Observable, State};
 
 /// Every element whose force is the gradient of an energy.
-const ELEMENTS: [&str; 5] = ["tet4", "tet4-anp", "tet4-ianp", "hex8", "hex8-full"];
+const ELEMENTS: [&str; 6] = ["tet4", "tet4-anp", "tet4-ianp", "hex8", "growing-hex8", "hex8-full"];
 
 /// A vector with each coordinate in [−size, size).
 fn vector(random: &mut Random, size: f64) -> Vector<f64> {
@@ -72,6 +73,7 @@ fn filled_cube(
         "tet4-anp" => Cells::averaged_tet4(tets(), &rest, Averaging::Nodal),
         "tet4-ianp" => Cells::averaged_tet4(tets(), &rest, Averaging::Variational),
         "hex8" => Cells::hex8(hex_nodes.clone(), &rest, 0.2, shear),
+        "growing-hex8" => Cells::hex8(hex_nodes.clone(), &rest, 0.2, shear).with_growing_hourglass(),
         "membrane" => {
             // Two sides of each hexahedron.
             const SIDES: [[usize; 3]; 4] = [[0, 1, 2], [0, 2, 3], [0, 1, 5], [0, 5, 4]];
@@ -89,7 +91,12 @@ fn filled_cube(
         }
         _ => Cells::full_hex8(hex_nodes.clone(), &rest),
     };
-    assert_eq!(cells.element(), if element == "thread" { "bar" } else { element });
+    let scene_word = match element {
+        "thread" => "bar",
+        "growing-hex8" => "hex8",
+        other => other,
+    };
+    assert_eq!(cells.element(), scene_word);
     let fractions: Vec<f64> = (0..cells.len()).map(fraction).collect();
     let cells = cells.filled(&fractions);
     let mut model = Model { mass: vec![0.0; rest.len()], rest, ..Model::default() };
@@ -200,7 +207,7 @@ fn energy(model: &Model, displacement: &[Vector<f64>]) -> f64 {
     }
 }
 
-fn every_element() -> impl Iterator<Item = Model> {
+pub(crate) fn every_element() -> impl Iterator<Item = Model> {
     laws().into_iter().flat_map(|law| ELEMENTS.map(|element| distorted_cube(element, law)))
 }
 
@@ -381,6 +388,31 @@ fn force_is_the_derivative_of_energy() {
     }
 }
 
+/// A free cube of tissue that stiffens, thrown into itself: over 4,000 steps a third of the energy goes through hourglass modes and back, and
+/// none is made.
+#[test]
+fn a_growing_hourglass_stiffness_conserves_energy() {
+    let law = law("demiray", json!({ "shear-modulus": 700.0, "bulk-modulus": 5e3, "exponent": 8.0 }));
+    let mut model = distorted_cube("growing-hex8", law);
+    let mut random = Random::new(41);
+    model.initial_velocity = model.rest.iter().map(|_| vector(&mut random, 0.5)).collect();
+    let step = 0.2 * critical_step::assembled(&model).unwrap().step;
+    let mut stepper = CentralDifference::<f64>::new(model.clone(), step).unwrap();
+    let mut state = State::at_rest(&model);
+    let (mut least, mut most, mut hourglass) = (f64::INFINITY, 0.0_f64, 0.0_f64);
+    for _ in 0..4000 {
+        stepper.evaluate(&mut state).unwrap();
+        let energies = stepper.energies();
+        let stored = Recovery::new(&model, &state).stored_energy() + energies.hourglass;
+        let all = energies.kinetic + stored;
+        (least, most) = (least.min(all), most.max(all));
+        hourglass = hourglass.max(energies.hourglass / all);
+        stepper.advance(&mut state);
+    }
+    assert!(hourglass > 0.1, "{hourglass}");
+    assert!(most / least - 1.0 < 0.02, "{least} to {most}");
+}
+
 /// Of the written energy density; with the J of the cell instead of the averaged one it was up to 1.88 times too large.
 #[test]
 fn energy_densities_sum_to_the_energy_that_the_forces_come_from() {
@@ -529,7 +561,7 @@ fn single_precision_follows_double() {
         let scale = largest(fine.iter().copied());
         for (node, f) in fine.iter().enumerate() {
             for (a, b) in f.iter().zip(coarse.at(node)) {
-                assert!((a - f64::from(b)).abs() < 3e-6 * scale);
+                assert!((a - f64::from(b)).abs() < 3e-6 * lost_digits(&model) * scale);
             }
         }
     }
@@ -570,11 +602,17 @@ fn apart(a: &[Vector<f64>], b: &[Vector<f64>]) -> f64 {
     largest(a.iter().zip(b).map(|(&a, &b)| sub(a, b))) / largest(a.iter().copied())
 }
 
+/// A growing hourglass stiffness takes differences of stresses, over the cube root of round-off in F: of the small part that they make of a force a
+/// third of the digits is lost.
+fn lost_digits(model: &Model) -> f64 {
+    if model.solids[0].hourglass_growth().is_some() { 10.0 } else { 1.0 }
+}
+
 /// Of every law and element, without and with history: 162 tets or 27 hexes, so that the last pack is not full.
 fn every_kernel() -> impl Iterator<Item = Model> {
-    let elements = ["tet4", "tet4-anp", "tet4-ianp", "hex8", "hex8-full", "membrane"];
+    let elements = ["tet4", "tet4-anp", "tet4-ianp", "hex8", "growing-hex8", "hex8-full", "membrane"];
     let models = every_law().into_iter().flat_map(move |law| elements.map(|e| (e, law)));
-    let any = ["tet4", "hex8", "membrane"];
+    let any = ["tet4", "hex8", "growing-hex8", "membrane"];
     models.filter(move |(e, law)| any.contains(e) || law.has_volumetric_energy()).flat_map(
         |(element, law)| {
             let terms =
@@ -598,10 +636,11 @@ fn lanes_compute_what_plain_numbers_do_for_every_law_and_element() {
         let wide = Instructions::ALL.into_iter().filter(|&wide| wide != Instructions::Plain);
         for processor in wide.filter_map(|wide| Processor::with(wide).ok()) {
             let (forces, deformed) = moved_on::<f32>(processor, &model);
-            assert!(apart(&single.0, &forces) <= 2e-5, "{name}: {:e}", apart(&single.0, &forces));
+            let lost = lost_digits(&model);
+            assert!(apart(&single.0, &forces) <= 2e-5 * lost, "{name}: {:e}", apart(&single.0, &forces));
             assert!(!deformed.differs(&single.1, 1.0001), "{name}");
             let (forces, deformed) = moved_on::<f64>(processor, &model);
-            assert!(apart(&double.0, &forces) <= 1e-12, "{name}: {:e}", apart(&double.0, &forces));
+            assert!(apart(&double.0, &forces) <= 1e-12 * lost, "{name}: {:e}", apart(&double.0, &forces));
             assert!(!deformed.differs(&double.1, 1.0001), "{name}");
         }
         // AVX2 and AVX-512, where this processor has both.

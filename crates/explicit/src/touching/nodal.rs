@@ -95,7 +95,7 @@ impl<R: Scalar> Touching<R> {
                     |pair| {
                         if pair.weights[0] == 1.0 {
                             let gap = &mut gaps[pair.nodes[0] as usize];
-                            *gap = gap.min(pair.distance - offset);
+                            *gap = gap.min(pair.distance - pair.kept);
                         }
                     },
                 ),

@@ -317,3 +317,52 @@ fn a_body_touches_itself() {
     assert!(touched > 3 && least > -1e-4, "{least}");
     assert!(most < start * 1.001 && stepper.energies().balance.abs() < 0.02, "{:?}", stepper.energies());
 }
+
+/// Bodies, and the arms of a body, that begin nearer than the distance that they keep stay where they are: nothing pushes them. Bodies that begin farther away keep
+/// the whole of it.
+#[test]
+fn what_begins_nearer_than_the_distance_to_keep_is_not_pushed() {
+    for (gap, nearer) in [(0.0, true), (2e-4, true), (2e-3, false)] {
+        let mut model = Model::default();
+        for (cells, z) in [([3, 3, 2], 0.0), ([2, 2, 2], 0.02 + gap)] {
+            let at = Isometry3::translation(0.001 * z, 0.0, z);
+            add_block(&mut model, cells, [0.03, 0.03, 0.02], at, elastic(2e3, 1000.0));
+        }
+        let low = (0..model.node_count() as u32).filter(|&node| model.rest[node as usize][2] == 0.0);
+        let low = low.collect();
+        model.fix("base", low);
+        let mut contacts = between(&model, 0.2, 1e-3);
+        let place = |node: u32| Vector3::from(model.rest[node as usize]);
+        let (mut pairs, _) = contacts.contacts[0].pairs(|node| node, place).unwrap();
+        let near = pairs.nearer(place);
+        assert_eq!(!near.is_empty(), nearer, "{near:?}");
+        Arc::make_mut(&mut contacts).near.insert(0, near);
+        let still = Arc::new(model.clone());
+        let mut free = stepper(&still, &contacts, 0.9);
+        let mut state = State::at_rest(&still);
+        for _ in 0..100 {
+            step(&mut free, &mut state);
+        }
+        let moved = state.displacement.as_flattened().iter().fold(0.0_f64, |most, u| most.max(u.abs()));
+        assert!(moved < 1e-15, "{gap}: pushed by {moved}");
+        // Pressed on each other, they keep what they have, or the whole distance.
+        model.bodies.iter_mut().for_each(|body| body.damping = 60.0);
+        model.loads.push(Load::gravity(1, [0.0, 0.0, -9.81]));
+        let pressed = Arc::new(model);
+        let mut stepper = stepper(&pressed, &contacts, 0.9);
+        let mut state = State::at_rest(&pressed);
+        while state.time < 0.3 {
+            step(&mut stepper, &mut state);
+        }
+        let place = |node: u32| {
+            Vector3::from(pressed.rest[node as usize]) + Vector3::from(state.displacement[node as usize])
+        };
+        let (mut pairs, _) = contacts.contacts[0].pairs(|node| node, place).unwrap();
+        pairs.list_again(place);
+        let mut least = f64::INFINITY;
+        pairs.find(place, |pair| least = least.min(pair.distance));
+        println!("gap {gap}: {least} m are left");
+        let wanted = if nearer { gap } else { 1e-3 };
+        assert!((least - wanted).abs() < 2e-6, "{gap}: {least} of {wanted}");
+    }
+}

@@ -2,17 +2,19 @@
 
 use std::sync::Arc;
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 use pliant_contact::pose::{Pose, Trajectory};
 use pliant_contact::shape::Shape;
 use pliant_contact::touch::Rigid;
 use pliant_explicit::{Observable, State};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
-use pliant_mechanics::model::{Constraint, Motion};
+use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
+use pliant_mechanics::load::Load;
+use pliant_mechanics::model::{Constraint, Material, Model, Motion};
 use pliant_mechanics::prony::Prony;
 
-use super::rigid::at;
-use super::{block, stepper};
+use super::rigid::{at, floor};
+use super::{add_block, block, stepper};
 
 /// A block that is pressed onto a floor, and drawn over it at 10 mm/s by its top, or rests while the floor is drawn away beneath it: the floor
 /// feels μ N along the slip in any direction (A5).
@@ -63,4 +65,53 @@ fn friction_of_a_dragged_block_is_mu_times_the_load_along_the_slip() {
     }
     println!("friction off by {off:.1e} of mu N at most, and {askew:.1e} degrees beside the slip");
     assert!(off < 0.01 && askew < 1.0, "{off:.1e} {askew:.1e}");
+}
+
+/// A stiff block, 1 MPa, is put on a plane of slope ½, gravity at once. What trembles in it would slide at friction 0.51 and too fast at 0.49; damping by
+/// stiffness of as much as the critical time step calms it. It sticks, or slides by 43.87 mm/s² t² but for what it gains in the first tremble.
+#[test]
+fn a_stiff_block_on_an_incline_sticks_or_slides_with_damping_by_stiffness() {
+    let slid = |friction: f64, damping: f64, mass_damping: f64| {
+        let mut model = Model::default();
+        let (young, poisson) = (1e6, 0.4);
+        let (shear, bulk) = (young / (2.0 * (1.0 + poisson)), young / (3.0 * (1.0 - 2.0 * poisson)));
+        let law = AnyLaw::NeoHookean(NeoHookean { shear, volumetric: Volumetric::quadratic(bulk) });
+        let material = Material::elastic(law, 1000.0);
+        add_block(&mut model, [3, 3, 3], [0.02; 3], Isometry3::identity(), material);
+        model.bodies[0].damping = mass_damping;
+        model.stiffness_damping = damping;
+        model.loads.push(Load::gravity(0, [4.387165, 0.0, -8.774331]));
+        let contacts = at(floor(), &model, friction);
+        let model = Arc::new(model);
+        let mut stepper = stepper(&model, &contacts, 0.9);
+        let mut state = State::<f64>::at_rest(&model);
+        let mean = |state: &State<f64>| {
+            state.displacement.iter().map(|u| u[0]).sum::<f64>() / state.displacement.len() as f64
+        };
+        let mut then = None;
+        while state.time < 1.5 {
+            stepper.evaluate(&mut state).unwrap();
+            if state.time >= 0.5 {
+                then.get_or_insert(mean(&state));
+            }
+            stepper.advance(&mut state);
+        }
+        let energies = stepper.energies();
+        assert!(energies.balance < 1e-3 && energies.damping > 0.0, "{energies:?}");
+        (mean(&state), mean(&state) - then.unwrap())
+    };
+    let damping = 1.28e-4;
+    for mass_damping in [5.0, 0.0] {
+        let (_, creep) = slid(0.51, damping, mass_damping);
+        println!("friction 0.51, {mass_damping}/s: {creep:.1e} m in the last second");
+        assert!(creep.abs() < 1e-6, "{creep}");
+        let (way, _) = slid(0.49, damping, mass_damping);
+        let acceleration = 4.387165 - 0.49 * 8.774331;
+        let wanted = match mass_damping {
+            0.0 => 0.5 * acceleration * 2.25,
+            of => acceleration / of * (1.5 - (1.0 - f64::exp(-1.5 * of)) / of),
+        };
+        println!("friction 0.49, {mass_damping}/s: {way} m of {wanted} m");
+        assert!((way / wanted - 1.0).abs() < 0.05, "{way} m of {wanted} m");
+    }
 }
