@@ -11,6 +11,8 @@ use crate::{Device, GpuError};
 
 /// Marks an entry as a corner of a face.
 const CORNER: u32 = u32::MAX;
+/// A bit for each component of the force of a corner that acts.
+const ALL: u32 = 0b111;
 
 /// The loads of a model.
 pub(crate) struct DeviceLoads {
@@ -28,11 +30,18 @@ fn weights(model: &Model, load: &Load, point: u32) -> Vec<(u32, f64)> {
     }
 }
 
-/// A part of an entry, for a node that its node follows.
-fn part_of([x, y, z, w]: Four, weight: f32) -> Four {
+/// A part of an entry by components, for a node that its node follows, or for that node itself where it is held. The weights that are not zero
+/// are the same.
+fn part_of([x, y, z, w]: Four, weights: Vector<f64>) -> Four {
+    let [a, b, c] = weights.map(|weight| weight as f32);
     match w.to_bits() {
-        CORNER => [x, weight * y, z, w],
-        _ => [weight * x, weight * y, weight * z, w],
+        CORNER => {
+            let weight = [a, b, c].into_iter().find(|&weight| weight != 0.0).unwrap_or(0.0);
+            let given = [a, b, c].map(|own| u32::from(own != 0.0));
+            let components = given[0] | given[1] << 1 | given[2] << 2;
+            [x, weight * y, f32::from_bits(z.to_bits() & components), w]
+        }
+        _ => [a * x, b * y, c * z, w],
     }
 }
 
@@ -64,7 +73,8 @@ impl Corners {
                 place = sub(rest[point as usize], rest[face[0] as usize]);
                 for (node, weight) in weights(model, load, point) {
                     self.nodes.push([node, (weight as f32).to_bits()]);
-                    let entry = [f32::from_bits(corner), weight as f32, 0.0, f32::from_bits(CORNER)];
+                    let entry =
+                        [f32::from_bits(corner), weight as f32, f32::from_bits(ALL), f32::from_bits(CORNER)];
                     entries[node as usize].push(entry);
                 }
             }
@@ -105,10 +115,10 @@ impl DeviceLoads {
                 LoadKind::Gravity { .. } | LoadKind::Moments(_) | LoadKind::ShellPressure { .. } => {}
             }
         }
-        for (node, row) in model.ties.iter().flat_map(Tie::rows) {
+        for (node, row) in model.ties.iter().flat_map(Tie::component_rows) {
             let own = std::mem::take(&mut entries[node as usize]);
-            for (followed, weight) in row {
-                entries[followed as usize].extend(own.iter().map(|&entry| part_of(entry, weight as f32)));
+            for (followed, weights) in row {
+                entries[followed as usize].extend(own.iter().map(|&entry| part_of(entry, weights)));
             }
         }
         let mut offsets = vec![0];

@@ -10,6 +10,9 @@ use crate::ties::Followers;
 use crate::transfer::Four;
 use crate::{Device, GpuError};
 
+/// Mass [kg] of a held node whose mass went elsewhere.
+const NO_MASS: f64 = 1e-30;
+
 /// A node that is held.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -21,11 +24,15 @@ struct Hold {
 /// Numbers that the pass over nodes leaves for each of its groups.
 pub(crate) const SUMS: usize = 12;
 
+/// Vectors of a node beside its increment, and that: see in_place.wgsl.
+pub(crate) const OF_NODE: usize = 3;
+
 /// The arrays of nodes.
 pub(crate) struct DeviceNodes {
     pub displacement: Sides,
+    /// Of each node its increment, and the internal forces at the last two instants.
     pub increment: Sides,
-    /// The coming increments; where sides alternate they lie where the increments will be.
+    /// The same with the coming increments; where sides alternate they lie where the increments will be.
     pub next: Sides,
     pub reactions: wgpu::Buffer,
     pub sums: wgpu::Buffer,
@@ -80,23 +87,28 @@ impl DeviceNodes {
                         amplitudes: amplitudes[node as usize].map(four),
                     });
                 }
-                // Nodes that follow others have no mass, and no force.
+                // Nodes that follow others have no mass, and no force but where they are held: there next to no mass moves with them.
                 let follows = followers.as_ref().is_some_and(|followers| followers.number(node).is_some());
-                let inertia = if follows { 1.0 } else { model.inertia(node as usize) };
+                let inertia = match follows {
+                    true if tag == 0 => 1.0,
+                    true => NO_MASS,
+                    false => model.inertia(node as usize),
+                };
                 let mass = model.mass[node as usize];
                 constants.push([inertia as f32, body.damping as f32, mass as f32, f32::from_bits(tag)]);
             }
         }
-        let vectors = |alternate| memory.sides("the nodes", count * size_of::<Four>(), alternate);
+        let vectors =
+            |each: usize, alternate| memory.sides("the nodes", each * count * size_of::<Four>(), alternate);
         let [columns, rows] = groups(count);
         let groups = ((columns * rows) as usize).max(blocks.unwrap_or(0));
-        let increment = vectors(blocks.is_some())?;
+        let increment = vectors(OF_NODE, blocks.is_some())?;
         let next = match blocks {
             Some(_) => [increment[1].clone(), increment[0].clone()],
-            None => vectors(false)?,
+            None => vectors(OF_NODE, false)?,
         };
         Ok(Self {
-            displacement: vectors(blocks.is_some())?,
+            displacement: vectors(1, blocks.is_some())?,
             increment,
             next,
             reactions: memory.zeros("the reactions", held.len() * size_of::<Four>())?,

@@ -11,7 +11,7 @@ use crate::transfer::Four;
 use crate::{Device, GpuError};
 
 /// Numbers in the head of the candidates, and of each contact there; twin of the one in pairs.wgsl.
-const OF_CONTACT: usize = 8;
+const OF_CONTACT: usize = 9;
 
 /// Longer arrays than needed are made, so that few lists ask for others.
 const SPARE: usize = 2;
@@ -58,7 +58,9 @@ impl DevicePairs {
         let mut watched = vec![false; nodes.len()];
         let mut own = Vec::new();
         for (index, contact) in contacts.contacts.iter().enumerate() {
-            let Some((pairs, sign)) = contact.pairs(number, |node| rest[node as usize]) else { continue };
+            let Some((pairs, sign)) = contacts.pairs(index, number, |node| rest[node as usize]) else {
+                continue;
+            };
             let surfaces = contact.surfaces().flat_map(|surface| &surface.nodes);
             surfaces.for_each(|&node| watched[number(node) as usize] = true);
             own.push((index, pairs, sign));
@@ -152,7 +154,12 @@ impl DevicePairs {
             ranges[3] = row_count(&rows);
             let at = OF_CONTACT * (1 + *contact);
             let lengths = [offset, offset + reach, depth, friction].map(float);
-            numbers[at..at + OF_CONTACT].copy_from_slice([lengths, ranges].as_flattened());
+            numbers[at..at + OF_CONTACT - 1].copy_from_slice([lengths, ranges].as_flattened());
+            if !pairs.kept().is_empty() {
+                numbers[at + OF_CONTACT - 1] = numbers.len() as u32;
+                numbers.extend(pairs.kept().iter().map(|&kept| float(kept)));
+                numbers.extend((pairs.kept().len()..watched.len()).map(|_| float(offset)));
+            }
         }
         let points_at = numbers.len();
         let crossings_at = points_at + points.len();

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 use pliant_contact::pose::Leg;
 use pliant_contact::touch::Contacts;
-use pliant_explicit::{Lengths, StepError};
+use pliant_explicit::{DampingFactors, Lengths, StepError};
 use pliant_mechanics::load::LoadKind;
 use pliant_mechanics::model::Model;
 
@@ -67,11 +67,16 @@ pub(crate) struct Instant {
     pub per_push: f32,
     pub half_mean: f32,
     pub per_two_steps: f32,
-    pub padding: [u32; 3],
+    pub inverse_ratio: f32,
+    pub per_two_means: f32,
+    pub dissipation: f32,
+    pub extrapolation: f32,
+    pub stiffness: f32,
+    pub padding: [u32; 2],
 }
 
 impl Instant {
-    pub(crate) fn new(index: u32, flags: u32, lengths: Lengths) -> Self {
+    pub(crate) fn new(index: u32, flags: u32, lengths: Lengths, damping: DampingFactors) -> Self {
         let push = lengths.next * lengths.mean();
         Self {
             index,
@@ -83,7 +88,12 @@ impl Instant {
             per_push: (1.0 / push) as f32,
             half_mean: (0.5 * lengths.mean()) as f32,
             per_two_steps: (0.5 / lengths.next) as f32,
-            padding: [0; 3],
+            inverse_ratio: (1.0 / lengths.ratio()) as f32,
+            per_two_means: (0.5 / lengths.mean()) as f32,
+            dissipation: damping.dissipation as f32,
+            extrapolation: damping.extrapolation as f32,
+            stiffness: damping.stiffness as f32,
+            padding: [0; 2],
         }
     }
 }

@@ -39,7 +39,22 @@ pub(crate) fn constants_of(
         ("SLOTS", History::<f32>::slots(solid)),
         ("FIBRES", fibre_row),
         ("FIRST_SLOT", first_slot),
+        ("HOURGLASS_GROWS", hourglass_grows(solid)),
     ]
+}
+
+/// Whether the hourglass stiffness of a solid grows: 0 if not, 1 of a law with an energy of the volume alone, 2 of others.
+fn hourglass_grows(solid: &Solid) -> usize {
+    match solid.hourglass_growth() {
+        None => 0,
+        Some(_) => {
+            if solid.material.law.has_volumetric_energy() {
+                1
+            } else {
+                2
+            }
+        }
+    }
 }
 
 /// What the kernels of a solid are made of.
@@ -75,7 +90,10 @@ impl SolidKernels<'_> {
     pub(crate) fn all(&self) -> Result<Vec<Kernel>, GpuError> {
         Ok(match &self.solid.cells {
             Cells::Tet4(_) => vec![self.tets(&[include_str!("shaders/tet4.wgsl")])?],
-            Cells::Hex8(_) => vec![self.forces(&[HEX_CORNERS, include_str!("shaders/hex8.wgsl")])?],
+            Cells::Hex8(_) => {
+                let growth = include_str!("shaders/shear_growth.wgsl");
+                vec![self.forces(&[HEX_CORNERS, growth, include_str!("shaders/hex8.wgsl")])?]
+            }
             Cells::FullHex8(..) => {
                 let own = include_str!("shaders/full_hex8.wgsl");
                 vec![self.forces(&[PRESSURE_HISTORY, HEX_CORNERS, own])?]

@@ -240,6 +240,7 @@ fn rows_at_rest(solid: &Solid, order: &[u32]) -> Vec<Four> {
             (0, _) => four(block.rest[cell].gradient[0], block.rest[cell].volume),
             (1, Some(control)) => four(block.rest[cell].gradient[1], control.stiffness[cell]),
             (2, Some(control)) => four(block.rest[cell].gradient[2], reach(control.corner_reach[cell])),
+            (3, _) => four(block.rest[cell].gradient[3], solid.hourglass_growth().unwrap_or(0.0)),
             (..8, _) => four(block.rest[cell].gradient[row], 0.0),
             (_, Some(control)) => control.patterns[cell].map(|gamma| gamma[row - 8] as f32),
             (_, None) => Four::default(),

@@ -7,8 +7,8 @@ use pliant_contact::touch::Contacts;
 use pliant_explicit::recover::stored_at_start;
 use pliant_explicit::stability::{Monitor, Stability};
 use pliant_explicit::{
-    CentralDifference, Deformed, Lengths, Observable, State, StepControl, StepError, Sums, Wanted,
-    model_balance_floor,
+    CentralDifference, DampingFactors, Deformed, Lengths, Observable, State, StepControl, StepError, Sums,
+    Wanted, model_balance_floor,
 };
 use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
@@ -22,7 +22,7 @@ use crate::grips::DeviceGrips;
 use crate::kernel::{Kernel, Memory};
 use crate::loads::DeviceLoads;
 use crate::mapping::{DeviceMapping, PointValue};
-use crate::nodes::{DeviceNodes, NodeKernels, SUMS, fours};
+use crate::nodes::{DeviceNodes, NodeKernels, OF_NODE, SUMS, fours};
 use crate::paths::Paths;
 use crate::run::{Instant, Instants, StepFailure, UNLISTED, flags, room, table_constants};
 use crate::solids::DeviceSolid;
@@ -50,7 +50,8 @@ struct Origin {
 struct Results {
     sums: Sums,
     hourglass: f64,
-    shock: f64,
+    /// ⅛ Δt⁻² Σ m|a|² [J].
+    error: f64,
     /// Internal and external work and damping power of the instants passed over.
     passed: [f64; 3],
     /// The first instant at which a cell is broken, and the first at which a force is out of range.
@@ -74,6 +75,8 @@ pub struct GpuStepper {
     owners: Vec<[u32; 3]>,
     control: StepControl,
     lengths: Lengths,
+    /// Whether the highest modes are dissipated.
+    dissipates: bool,
     balance_floor: f64,
     solids: Vec<DeviceSolid>,
     paths: Paths,
@@ -136,18 +139,18 @@ impl Observable<f32> for GpuStepper {
         self.contact_forces.iter().map(|&[x, y, z, _]| [x, y, z].map(|f| -f64::from(f))).collect()
     }
 
-    /// The mean of the increments before and after; belongs to the last instant of which everything was wanted.
+    /// Belongs to the last instant of which everything was wanted.
     fn velocity(&self, state: &State<f32>, node: usize) -> Vector<f64> {
-        let Lengths { next, .. } = self.lengths;
         let own = |node: u32| {
             let (before, after) = (state.increment[node as usize], self.next[node as usize]);
-            [0, 1, 2]
-                .map(|c| (f64::from(before[c]) * self.lengths.ratio() + f64::from(after[c])) / (2.0 * next))
+            [0, 1, 2].map(|c| self.lengths.velocity(before[c].into(), after[c].into()))
         };
-        match self.ties {
-            None => own(node as u32),
-            Some(_) => weighted(self.model.resolved(&[(node as u32, 1.0)]), own),
+        let alone = own(node as u32);
+        if self.ties.is_none() {
+            return alone;
         }
+        let followed = weighted(self.model.resolved(&[(node as u32, 1.0)]), own);
+        [0, 1, 2].map(|c| if self.owners[node][c] == FREE { followed[c] } else { alone[c] })
     }
 }
 
@@ -250,6 +253,7 @@ impl GpuStepper {
             design,
             control,
             lengths: Lengths { before: step, next: step },
+            dissipates: false,
             balance_floor: model_balance_floor::<f32>(model),
             solids,
             paths,
@@ -293,6 +297,18 @@ impl GpuStepper {
         self
     }
 
+    /// [Dissipates](pliant_explicit::DISSIPATION) the highest modes.
+    #[must_use]
+    pub fn dissipating(mut self) -> Self {
+        self.dissipates = true;
+        self
+    }
+
+    /// Factors of the damping forces after a step of `before` [s].
+    fn damping_factors(&self, state: &State<f32>, before: f64) -> DampingFactors {
+        state.stability.damping_factors(self.dissipates, self.model.stiffness_damping, before)
+    }
+
     /// How another stepper goes on from a state of this one.
     pub fn clock(&self, state: &State<f32>) -> pliant_explicit::Clock {
         self.control.clock(state)
@@ -326,10 +342,12 @@ impl GpuStepper {
             [0, 1, 2].map(|c| if self.owners[node][c] == FREE { v[c] as f32 } else { 0.0 })
         };
         // The start makes increments of velocities.
-        let increment = match state.is_at_start() {
-            true => fours((0..self.nodes.count).map(velocity)),
-            false => fours(state.increment.iter().copied()),
+        let of_node = |node: usize| {
+            let increment = if state.is_at_start() { velocity(node) } else { state.increment[node] };
+            let [last, before] = [0, 1].map(|k| state.forces[k].get(node).copied().unwrap_or_default());
+            [increment, last, before]
         };
+        let increment = fours((0..self.nodes.count).flat_map(of_node));
         let displacement = fours(state.displacement.iter().copied());
         queue.write_buffer(&self.nodes.displacement[self.side], 0, bytemuck::cast_slice(&displacement));
         queue.write_buffer(&self.nodes.increment[self.side], 0, bytemuck::cast_slice(&increment));
@@ -349,6 +367,9 @@ impl GpuStepper {
     /// If the state is not finite, a cell is inverted, the energies do not balance, the step is above the limit and
     /// must not be cut, or the device fails.
     pub fn evaluate(&mut self, state: &mut State<f32>, wanted: Wanted) -> Result<(), StepFailure> {
+        if self.dissipates || self.model.stiffness_damping > 0.0 {
+            state.keep_forces();
+        }
         if !self.loaded {
             self.upload(state);
         }
@@ -379,11 +400,10 @@ impl GpuStepper {
         let passed = self.origin.map_or(1, |origin| state.steps - origin.steps);
         self.to_check = self.control.steps_to_check(state, &results.deformed, (&self.deformed, passed));
         self.deformed = results.deformed;
+        let shock = results.error;
         if self.lengths != self.control.lengths(state) {
             self.lengths = self.control.lengths(state);
-            let shock = results.shock;
             results = self.evaluate_listed(state, flags::MEASURES, false)?;
-            results.shock = shock;
         }
         if !results.sums.is_finite() {
             return Err(self.fail(state, self.since));
@@ -391,12 +411,13 @@ impl GpuStepper {
         let at_start = state.is_at_start();
         if at_start {
             let stored = stored_at_start(&self.model, state, results.hourglass);
-            state.work.begin(self.kinetic_at_start(), stored, results.shock);
+            state.work.begin(self.kinetic_at_start(), stored, shock);
         }
         let before = (!at_start).then_some(self.lengths.before);
         let again = std::mem::replace(&mut state.evaluated, true);
+        let change = self.lengths.change_energy(results.error);
         self.energies =
-            state.work.settle(&results.sums, results.hourglass, before, self.balance_floor, again);
+            state.work.settle(&results.sums, results.hourglass, change, before, self.balance_floor, again);
         self.enter_reactions(&results.reactions);
         self.contact_forces.clone_from(&results.contact_forces);
         (self.evaluated, self.since) = (true, 0);
@@ -504,14 +525,23 @@ impl GpuStepper {
 
     fn bring_arrays_back(&mut self, state: &mut State<f32>) -> Result<(), GpuError> {
         let (count, device, transfer) = (self.nodes.count, &self.device, &mut self.transfer);
-        let mut vectors = |buffer: &wgpu::Buffer, to: &mut [Vector<f32>]| {
-            transfer.read::<Four>(device, buffer, count, |fours| {
-                to.iter_mut().zip(fours).for_each(|(to, &[x, y, z, _])| *to = [x, y, z]);
+        let three = |four: &Four| [four[0], four[1], four[2]];
+        let mut read = |buffer: &wgpu::Buffer, each: usize, to: &mut dyn FnMut(usize, &[Four])| {
+            transfer.read::<Four>(device, buffer, each * count, |fours| {
+                fours.chunks_exact(each).enumerate().for_each(|(node, own)| to(node, own));
             })
         };
-        vectors(&self.nodes.displacement[self.side], &mut state.displacement)?;
-        vectors(&self.nodes.increment[self.side], &mut state.increment)?;
-        vectors(&self.nodes.next[self.side], &mut self.next)?;
+        let side = self.side;
+        read(&self.nodes.displacement[side], 1, &mut |node, own| state.displacement[node] = three(&own[0]))?;
+        read(&self.nodes.next[side], OF_NODE, &mut |node, own| self.next[node] = three(&own[0]))?;
+        read(&self.nodes.increment[side], OF_NODE, &mut |node, own| {
+            state.increment[node] = three(&own[0]);
+            for (forces, own) in state.forces.iter_mut().zip(&own[1..]) {
+                if let Some(force) = forces.get_mut(node) {
+                    *force = three(own);
+                }
+            }
+        })?;
         for (solid, history) in self.solids.iter().zip(&mut state.history) {
             solid.bring_back(&mut self.transfer, &self.device, history)?;
         }
@@ -571,7 +601,8 @@ impl GpuStepper {
                     0 => self.lengths,
                     _ => Lengths { before: self.lengths.next, next: self.lengths.next },
                 };
-                let instant = Instant::new(self.since, flags::MOVES, lengths);
+                let damping = self.damping_factors(state, lengths.before);
+                let instant = Instant::new(self.since, flags::MOVES, lengths, damping);
                 let of = (self.model.as_ref(), &state.driven[..]);
                 self.instants.push(of, state.time, lengths.next, instant);
                 self.count(state);
@@ -666,7 +697,8 @@ impl GpuStepper {
 
     /// Evaluates an instant, with the forces of cells found anew or as they stand.
     fn submit_evaluation(&mut self, state: &State<f32>, flags: u32, anew: bool) -> Result<Results, GpuError> {
-        let instant = Instant::new(self.since, flags, self.lengths);
+        let damping = self.damping_factors(state, self.lengths.before);
+        let instant = Instant::new(self.since, flags, self.lengths, damping);
         self.instants.push((&self.model, &state.driven), state.time, self.lengths.next, instant);
         let (nodes, side, contacts) = (&self.kernels, self.side, &self.contacts);
         let forces = || force_kernels(&self.loads, &self.grips, &self.solids, &self.ties);
@@ -746,7 +778,7 @@ impl GpuStepper {
                 external_after: sums[5],
             },
             hourglass: sums[6],
-            shock: sums[7],
+            error: sums[7],
             passed: [sums[8], sums[9], sums[10]],
             broken: (broken != u32::MAX).then_some(broken),
             overflown: (overflown != u32::MAX).then_some(overflown),

@@ -2,6 +2,7 @@
 //! follow, by the rows of `pliant_mechanics::tie`. Masses have gone there when the model was made.
 
 use pliant_mechanics::model::Model;
+use pliant_mechanics::tensor::Vector;
 use pliant_mechanics::tie::Tie;
 
 use crate::kernel::{Binding, Bound, Kernel, Memory, Sides};
@@ -13,8 +14,8 @@ pub(crate) struct Followers {
     number: Vec<u32>,
     /// How many there are.
     pub count: usize,
-    /// The followed nodes of all rows, with bits of the weights.
-    rows: Vec<[u32; 2]>,
+    /// Bits of the weights of all rows along each component, with the followed nodes.
+    rows: Vec<[u32; 4]>,
     /// Followers, first entries of their rows, and rows.
     arrays: [wgpu::Buffer; 3],
 }
@@ -33,10 +34,14 @@ impl Followers {
         }
         let mut number = vec![NONE; model.node_count()];
         let (mut followers, mut offsets, mut rows) = (Vec::new(), vec![0], Vec::new());
-        for (node, row) in model.ties.iter().flat_map(Tie::rows) {
+        for (node, row) in model.ties.iter().flat_map(Tie::component_rows) {
             number[node as usize] = followers.len() as u32;
             followers.push(node);
-            rows.extend(row.map(|(followed, weight)| [followed, (weight as f32).to_bits()]));
+            let entry = |(followed, weights): (u32, Vector<f64>)| {
+                let [x, y, z] = weights.map(|weight| (weight as f32).to_bits());
+                [x, y, z, followed]
+            };
+            rows.extend(row.map(entry));
             offsets.push(rows.len() as u32);
         }
         let arrays = [
@@ -52,9 +57,9 @@ impl Followers {
         Some(self.number[node as usize]).filter(|&number| number != NONE)
     }
 
-    /// The nodes that are followed, entry by entry of the rows.
+    /// The nodes that are followed, entry by entry of the rows; a follower itself where it is held.
     pub(crate) fn followed(&self) -> impl Iterator<Item = u32> + Clone + '_ {
-        self.rows.iter().map(|&[followed, _]| followed)
+        self.rows.iter().map(|&[.., followed]| followed)
     }
 
     /// What gives forces on where each cell has slots, with the slots of followers as [`Followers::number`] counts them, and the first

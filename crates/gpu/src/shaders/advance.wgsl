@@ -8,6 +8,6 @@ fn main(
 ) {
     let node = number(group, groups, local);
     if node < NODES && end() > instant.index {
-        go(node, next_increment[node].xyz, hold_of(nodes[node].w));
+        go(node, next_increment[3u * node].xyz, next_increment[3u * node + 1u].xyz, hold_of(nodes[node].w));
     }
 }

@@ -1,4 +1,4 @@
-// The force on a follower goes to slots of the nodes that it follows, one for each entry of its row.
+// The force on a follower goes to slots of the nodes that it follows, one for each entry of its row; the energy beside it to the first.
 
 @group(1) @binding(0) var<storage, read_write> slots: array<vec4f>;
 @group(1) @binding(4) var<storage, read> slot_offsets: array<u32>;
@@ -10,6 +10,7 @@ fn each(follower: u32) {
         force += slots[slots_of[k]];
     }
     for (var k = row_offsets[follower]; k < row_offsets[follower + 1u]; k++) {
-        slots[FIRST_GIVEN + k] = weight(k) * force;
+        slots[FIRST_GIVEN + k] = vec4f(weights(k) * force.xyz, force.w);
+        force.w = 0.0;
     }
 }

@@ -1,17 +1,16 @@
-// The force on a follower is added to those on the nodes that it follows, and is zero from then on.
+// The force on a follower is added to those on the nodes that it follows; what stays is that along held components, and the energy beside it.
 
 @group(1) @binding(0) var<storage, read_write> forces: array<atomic<f32>>;
 
 fn each(follower: u32) {
     let own = 4u * followers[follower];
-    for (var c = 0u; c < 4u; c++) {
-        let force = atomicLoad(&forces[own + c]);
+    for (var c = 0u; c < 3u; c++) {
+        let force = atomicExchange(&forces[own + c], 0.0);
         if force == 0.0 {
             continue;
         }
         for (var k = row_offsets[follower]; k < row_offsets[follower + 1u]; k++) {
-            atomicAdd(&forces[4u * rows[k].x + c], weight(k) * force);
+            atomicAdd(&forces[4u * followed(k) + c], weights(k)[c] * force);
         }
-        atomicStore(&forces[own + c], 0.0);
     }
 }

@@ -1,6 +1,6 @@
-// Forces of uniform-strain hexahedra with hourglass control. Rows at rest: the eight B_a, with the volume and the stiffness
-// k [N/m] of the control beside the first two, and 3/2 κ² [1/m²] beside the third; the four patterns γ at each node. Corners are looked
-// at where the patterns are large enough to invert one; forces/corners.rs of pliant-explicit says why.
+// Forces of uniform-strain hexahedra with hourglass control. Rows at rest: the eight B_a; beside the first four the volume, the stiffness
+// k [N/m] of the control, 3/2 κ² [1/m²] and the shear modulus [Pa] from which k grows; then the four patterns γ at each node. Corners are
+// looked at where the patterns are large enough to invert one; forces/corners.rs of pliant-explicit says why.
 
 const FIRST_CORNER = 16u;
 
@@ -18,11 +18,18 @@ fn compute(cell: u32) {
         q += mat4x3f(u * gamma.x, u * gamma.y, u * gamma.z, u * gamma.w);
     }
     let d = deformation(h);
-    let stress = relaxed_stress(law_stress(d, fibre(0u, cell), fibre(1u, cell)), cell);
-    let piola = volume * gradient_times(d.gradient, stress);
+    let elastic = law_stress(d, fibre(0u, cell), fibre(1u, cell));
+    var piola = volume * gradient_times(d.gradient, relaxed_stress(elastic, cell));
     let square = dot(q[0], q[0]) + dot(q[1], q[1]) + dot(q[2], q[2]) + dot(q[3], q[3]);
-    let energy = 0.5 * stiffness * square;
+    var energy = 0.5 * stiffness * square;
     q = stiffness * q;
+    if HOURGLASS_GROWS != 0u {
+        let whole = symmetric_sum(elastic.isochoric, elastic.volumetric);
+        let grown = growth(d, h, whole, row(3u, cell).w, cell, square > 0.0);
+        piola += energy * gradient_times(d.gradient, grown.gradient);
+        energy *= grown.factor;
+        q = grown.factor * q;
+    }
     var first = vec3f(0.0);
     var size = vec3f(0.0);
     for (var a = 1u; a < 8u; a++) {

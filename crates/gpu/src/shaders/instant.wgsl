@@ -19,6 +19,14 @@ struct Instant {
     half_mean: f32,
     // 1/(2 Δt⁺) [1/s].
     per_two_steps: f32,
+    // Δt⁻/Δt⁺.
+    inverse_ratio: f32,
+    // 1/(2 h) [1/s].
+    per_two_means: f32,
+    // η, r and β/Δt⁻ of damping_force/mod.rs, all zero where internal forces do not damp.
+    dissipation: f32,
+    extrapolation: f32,
+    stiffness: f32,
 }
 
 // Goes on to the next instant.

@@ -19,23 +19,24 @@ fn main(
         let m = motion(node, gathered.xyz);
         if does(MOVES) {
             first = work(m, nodes[node].y);
-            go(node, m.next, m.held);
+            go(node, m.next, m.internal, m.held);
         } else {
-            let kinetic = twice_kinetic(m);
+            let found = kinetic_and_power(m, nodes[node].y);
             first = vec4f(
-                0.5 * kinetic, nodes[node].y * kinetic, 0.5 * dot(m.internal, m.before), 0.5 * dot(m.internal, m.next),
+                0.5 * found.x, found.y, 0.5 * dot(m.internal, m.before), 0.5 * dot(m.internal, m.next),
             );
             second = vec4f(
                 0.5 * dot(m.applied, m.before), 0.5 * dot(m.applied, m.next), gathered.w,
-                0.5 * m.inertia * dot(m.shock, m.shock),
+                0.5 * m.inertia * dot(m.gain, m.gain),
             );
-            next_increment[node] = vec4f(m.next, 0.0);
+            next_increment[3u * node] = vec4f(m.next, 0.0);
+            next_increment[3u * node + 1u] = vec4f(m.internal, 0.0);
         }
         if m.held != FREE {
             reactions[m.held] = vec4f(m.reaction, 0.0);
         }
         if does(STARTS) {
-            increment[node] = vec4f(m.before, 0.0);
+            increment[3u * node] = vec4f(m.before, 0.0);
         }
     }
     let sum = total(local, first);

@@ -120,6 +120,8 @@ fn settle(n: u32, entry: u32) -> vec4f {
     }
     let m = motion(node, force_of(force).xyz);
     moved_displacement[node] = vec4f(placed(displacement[node].xyz + m.next, m.held), 0.0);
-    moved_increment[node] = vec4f(m.next, 0.0);
+    moved_increment[3u * node] = vec4f(m.next, 0.0);
+    moved_increment[3u * node + 1u] = vec4f(m.internal, 0.0);
+    moved_increment[3u * node + 2u] = increment[3u * node + 1u];
     return work(m, nodes[node].y);
 }

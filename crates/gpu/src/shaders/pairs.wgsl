@@ -18,13 +18,15 @@ const ROWS_LISTED = 4u;
 const MOST_ROWS = 5u;
 
 // Numbers of a contact.
-const OF_CONTACT = 8u;
+const OF_CONTACT = 9u;
 const OFFSET = 0u;
 const LIMIT = 1u;
 const DEPTH = 2u;
 const FRICTION = 3u;
 // From where to where its rows go: of nodes, then of edges.
 const RANGES = 4u;
+// Where the distances [m] are that its nodes keep, by their own numbers; zero: all keep the offset.
+const KEPT = 8u;
 
 const FOUND_PAIRS = 0u;
 const CLAIMS = 1u;
@@ -84,6 +86,23 @@ fn leave_pair(row: u32) {
     rows[at + 2u] = vec4f(0.0);
 }
 
+// The distance [m] that two points keep: a node and a point of a triangle, or points of two edges.
+fn kept_by(row: u32, contact: u32, nodes: vec4u, weights: vec4f) -> f32 {
+    let offset = contact_number(contact, OFFSET);
+    let head = OF_CONTACT * (contact + 1u);
+    let at = candidates[head + KEPT];
+    if at == 0u {
+        return offset;
+    }
+    var own = vec4f(0.0);
+    for (var k = 0u; k < 4u; k++) {
+        own[k] = weights[k] * bitcast<f32>(candidates[at + nodes[k]]);
+    }
+    let is_node = row < candidates[head + RANGES + 1u];
+    let first = own.x + select(own.y, 0.0, is_node);
+    return clamp(min(first, first - (own.x + own.y + own.z + own.w)), 0.0, offset);
+}
+
 fn take_pair(row: u32, nodes: vec4u, weights: vec4f, normal: vec3f, distance: f32) {
     let contact = pair_info(row) >> 4u;
     if distance <= -contact_number(contact, DEPTH) || distance >= contact_number(contact, LIMIT) {
@@ -97,7 +116,7 @@ fn take_pair(row: u32, nodes: vec4u, weights: vec4f, normal: vec3f, distance: f3
         moved += weights[k] * states[2u * nodes[k]].xyz;
     }
     let at = pair_at(row);
-    rows[at] = vec4f(normal, dot(normal, place + moved) - contact_number(contact, OFFSET));
+    rows[at] = vec4f(normal, dot(normal, place + moved) - kept_by(row, contact, nodes, weights));
     rows[at + 1u] = vec4f(moved, 0.0);
     rows[at + 2u] = vec4f(0.0, 0.0, 0.0, 1.0);
     rows[at + 3u] = weights;

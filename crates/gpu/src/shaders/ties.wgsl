@@ -3,11 +3,15 @@
 @group(1) @binding(1) var<storage, read> followers: array<u32>;
 // First entry of each …
 @group(1) @binding(2) var<storage, read> row_offsets: array<u32>;
-// … in these: a followed node, and bits of its weight.
-@group(1) @binding(3) var<storage, read> rows: array<vec2u>;
+// … in these: bits of the weights along each component, and the followed node.
+@group(1) @binding(3) var<storage, read> rows: array<vec4u>;
 
-fn weight(entry: u32) -> f32 {
-    return bitcast<f32>(rows[entry].y);
+fn weights(entry: u32) -> vec3f {
+    return bitcast<vec3f>(rows[entry].xyz);
+}
+
+fn followed(entry: u32) -> u32 {
+    return rows[entry].w;
 }
 
 @compute @workgroup_size(GROUP)

@@ -38,7 +38,7 @@ fn may_touch(n: u32) -> bool {
     if does(STARTS) || is_listed(n) {
         return true;
     }
-    let way = length(increment[node_of(n)].xyz) * instant.ratio;
+    let way = length(increment[3u * node_of(n)].xyz) * instant.ratio;
     for (var entry = first_contact(n); entry < first_contact(n + 1u); entry++) {
         let touch = touch_of(lists[entry]);
         let room = touch.offset + 2.0 * way + touch.margin + touch.beyond + touch.passage.travel;

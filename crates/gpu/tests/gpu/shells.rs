@@ -272,7 +272,10 @@ fn what_only_the_cpu_has_is_refused_by_name() {
         model.springs.push(Spring { node: 1, anchor: Vector3::zeros(), stiffness: 1.0 });
     };
     assert_eq!(refused(&spring), "a spring on explicit shells");
-    assert_eq!(refused(&|model| model.stiffness_damping = 1e-3), "damping by stiffness of explicit shells");
+    assert_eq!(
+        refused(&|model| model.model_mut().stiffness_damping = 1e-3),
+        "damping by stiffness of explicit shells"
+    );
     let controlled = |model: &mut Assembly| model.model_mut().loads[0].controlled = true;
     assert!(refused(&controlled).contains("the load `load`"));
     let rigid = |model: &mut Assembly| model.model_mut().constraints[1].motion = Motion::Rigid;

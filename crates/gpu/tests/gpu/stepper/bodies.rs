@@ -115,6 +115,22 @@ fn a_lid_slides_on_a_block() {
     compare(&device, "lid", &model, &touching(&model, vec![], 0.3), PLAIN);
 }
 
+/// The lid begins nearer than the distance to keep over a part of the block, and slides on: each node keeps what it had.
+#[test]
+fn a_lid_keeps_less_where_it_begins_nearer() {
+    let Some(device) = support::device() else { return };
+    let model = lid();
+    let mut contacts = touching(&model, vec![], 0.3);
+    let of_bodies = Arc::make_mut(&mut contacts);
+    of_bodies.contacts[0].touch.offset = 0.0035;
+    let rest = |node: u32| Vector3::from(model.rest[node as usize]);
+    let near = of_bodies.contacts[0].pairs(|node| node, rest).map(|(mut pairs, _)| pairs.nearer(rest));
+    let near = near.unwrap();
+    assert!(near.len() > 10 && near.len() < model.node_count() / 2, "{}", near.len());
+    of_bodies.near.insert(0, near);
+    compare(&device, "lid that begins near", &model, &contacts, PLAIN);
+}
+
 #[test]
 fn a_tool_presses_a_lid_on_a_block() {
     let Some(device) = support::device() else { return };

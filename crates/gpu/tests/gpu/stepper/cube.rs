@@ -125,6 +125,9 @@ fn body(
         "tet4-ianp" => Cells::averaged_tet4(tets, &rest, Averaging::Variational),
         "tet4-ianp-niftysim" => Cells::averaged_tet4(tets, &rest, Averaging::NiftySim),
         "hex8" => Cells::hex8(hexes, &rest, 0.1, material.law.small_strain().shear),
+        "growing-hex8" => {
+            Cells::hex8(hexes, &rest, 0.1, material.law.small_strain().shear).with_growing_hourglass()
+        }
         "hex8-full" => Cells::full_hex8(hexes, &rest),
         "membrane" => {
             // Two sides of each hexahedron, of several thicknesses.

@@ -17,8 +17,8 @@ use cube::{
 use pliant_explicit::Wanted;
 use pliant_explicit::mass_scaling::{self, Goal};
 use pliant_explicit::stability::{Monitor, OnUnstable};
-use pliant_explicit::{CentralDifference, Observable, State, StepError, critical_step};
-use pliant_gpu::{Design, StepFailure};
+use pliant_explicit::{BALANCE_STEPS, CentralDifference, Observable, State, StepError, critical_step};
+use pliant_gpu::{Design, Device, StepFailure};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::LoadKind;
 use pliant_mechanics::model::{Averaging, Body, Cells, Constraint, Model, Motion, Solid};
@@ -52,6 +52,20 @@ fn membranes_of_every_law() {
         let what = format!("membrane of {}", law.name());
         compare(&device, &what, &moved_cube("membrane", elastic(law)), &[Design::Gather, Design::Blocks]);
     }
+}
+
+/// Hourglass control that grows with every law; of one that stiffens in every design.
+#[test]
+fn a_growing_hourglass_stiffness_of_every_law() {
+    let Some(device) = support::device() else { return };
+    let stiffens =
+        cube::law("demiray", json!({ "shear-modulus": 700.0, "bulk-modulus": 5e3, "exponent": 5.0 }));
+    for law in every_law() {
+        let what = format!("growing hex8 of {}", law.name());
+        compare(&device, &what, &moved_cube("growing-hex8", elastic(law)), &[Design::Gather]);
+    }
+    let designs: Vec<_> = designs(&device).collect();
+    compare(&device, "growing hex8", &moved_cube("growing-hex8", elastic(stiffens)), &designs);
 }
 
 #[test]
@@ -203,14 +217,14 @@ fn a_state_goes_from_the_processor_to_the_device_and_back() {
         let model = relaxing_cube(element);
         let step = step_of(&model);
         let on_processor = |state: &mut State<f32>| {
-            let mut stepper = CentralDifference::new(model.clone(), step).unwrap();
+            let mut stepper = CentralDifference::new(model.clone(), step).unwrap().dissipating();
             for _ in 0..50 {
                 stepper.evaluate(state).unwrap();
                 stepper.advance(state);
             }
         };
         let last = |state: &mut State<f32>| {
-            let mut stepper = CentralDifference::new(model.clone(), step).unwrap();
+            let mut stepper = CentralDifference::new(model.clone(), step).unwrap().dissipating();
             stepper.evaluate(state).unwrap();
             (double(&state.displacement), *stepper.energies())
         };
@@ -222,7 +236,7 @@ fn a_state_goes_from_the_processor_to_the_device_and_back() {
         let (a, energies) = last(&mut whole);
         for design in designs(&device) {
             let mut mixed = begun.clone();
-            let mut stepper = stepper(&device, &model, step, design);
+            let mut stepper = stepper(&device, &model, step, design).dissipating();
             stepper.advance(&mut mixed, 50).unwrap();
             stepper.bring_back(&mut mixed).unwrap();
             on_processor(&mut mixed);
@@ -232,6 +246,56 @@ fn a_state_goes_from_the_processor_to_the_device_and_back() {
             for (a, b) in numbers(&energies).into_iter().zip(numbers(&other)) {
                 assert!((a - b).abs() < 1e-5 * energies.external, "{element}: {energies:?} {other:?}");
             }
+        }
+    }
+}
+
+/// A cube in vibrations that a step hardly resolves loses much of their energy, as on the CPU and not as without dissipation; the same with
+/// damping by stiffness.
+#[test]
+fn vibrations_are_damped_as_on_the_processor() {
+    let Some(device) = support::device() else { return };
+    let mut model = held_cube("tet4", elastic(neo_hookean()));
+    let sign = |node: usize| if node.is_multiple_of(2) { 0.05 } else { -0.05 };
+    model.initial_velocity = (0..model.node_count()).map(|node| [sign(node), 0.0, -sign(node)]).collect();
+    let undamped = critical_step::assembled(&model).unwrap().step;
+    for part in [0.0, 0.3] {
+        model.stiffness_damping = part * undamped;
+        are_damped_as_on_the_processor(&device, &model);
+    }
+}
+
+fn are_damped_as_on_the_processor(device: &Device, model: &Model) {
+    let step = 0.9 * critical_step::assembled(model).unwrap().step;
+    // As many as may be off balance, which vibrations are that a step hardly resolves.
+    let steps = u64::from(BALANCE_STEPS) - 2;
+    let run = |mut stepper: CentralDifference<f64>| {
+        let mut state = State::<f64>::at_rest(model);
+        for step in 0..=steps {
+            stepper.evaluate(&mut state).unwrap();
+            if step < steps {
+                stepper.advance(&mut state);
+            }
+        }
+        (state.displacement, *stepper.energies())
+    };
+    let plain = Model { stiffness_damping: 0.0, ..model.clone() };
+    let (kept, _) = run(CentralDifference::new(plain, step).unwrap());
+    let (expected, energies) = run(CentralDifference::new(model.clone(), step).unwrap().dissipating());
+    assert!(distance(&expected, &kept) > 0.1 && energies.damping > 0.3 * energies.external, "{energies:?}");
+    for design in designs(device) {
+        let mut state = State::<f32>::at_rest(model);
+        let mut stepper = stepper(device, model, step, design).dissipating();
+        stepper.advance(&mut state, steps).unwrap();
+        stepper.evaluate(&mut state, Wanted::Everything).unwrap();
+        let error = distance(&expected, &double(&state.displacement));
+        assert!(error < 1e-4, "{design}: {error:.1e}");
+        for (a, b) in numbers(&energies).into_iter().zip(numbers(stepper.energies())) {
+            assert!(
+                (a - b).abs() < 1e-4 * energies.external,
+                "{design}: {energies:?} {:?}",
+                stepper.energies()
+            );
         }
     }
 }
