@@ -35,8 +35,6 @@ pub struct Assembly {
     pub corner_normals: Vec<[u32; 3]>,
     /// Rotary inertia [kg m²], the same about every axis, one per node.
     pub rotary_inertia: Vec<f64>,
-    /// Stiffness-proportional damping [s].
-    pub stiffness_damping: f64,
     /// Springs from nodes to points.
     pub springs: Vec<Spring>,
     /// The points of each surface of the model that shells carry.

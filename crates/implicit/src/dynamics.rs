@@ -1078,7 +1078,7 @@ mod tests {
         assert!(rest.position[16].z < -0.2, "{}", rest.position[16]);
         // About critical.
         model.model_mut().bodies[0].damping = 2.0 * first_frequency(THIN);
-        model.stiffness_damping = 0.01;
+        model.model_mut().stiffness_damping = 0.01;
         let iterative = |preconditioner| LinearSolver::ConjugateGradients {
             tolerance: 1e-8,
             iterations: 5000,

@@ -26,6 +26,8 @@ pub(crate) struct Followers {
     row_of: Vec<u32>,
     /// Each node with those that it follows.
     rows: Vec<(u32, Vec<Followed>)>,
+    /// Components of nodes that do not follow, as a constraint holds or moves them; increasing nodes.
+    held: Vec<(u32, [bool; 3])>,
     parts: Vec<RigidPart>,
     /// Nodes that turn as the first one of their rigid part, with that.
     turned: Vec<[u32; 2]>,
@@ -115,6 +117,9 @@ impl Followers {
         {
             rows.push((node, vec![followed(node, 1.0)]));
         }
+        let all = model.ties.iter().flat_map(|tie| tie.nodes.iter().copied().zip(tie.held.iter().copied()));
+        let mut held: Vec<(u32, [bool; 3])> = all.filter(|(_, held)| held.contains(&true)).collect();
+        held.sort_unstable();
         let mut row_of = vec![NONE; model.rest.len()];
         for ((node, _), number) in rows.iter().zip(0..) {
             row_of[*node as usize] = number;
@@ -123,11 +128,17 @@ impl Followers {
         let mut turns: Vec<Turn> = carried_turns(model).map(Turn::new).collect();
         turns.sort_by_key(|turn| turn.node);
         let some = !rows.is_empty() || !turns.is_empty();
-        some.then_some(Self { row_of, rows, parts, turned, turns })
+        some.then_some(Self { row_of, rows, held, parts, turned, turns })
     }
 
     pub(crate) fn follows(&self, node: u32) -> bool {
         self.row_of[node as usize] != NONE
+    }
+
+    /// The components of a node that do not follow.
+    fn held(&self, node: u32) -> [bool; 3] {
+        let found = self.held.binary_search_by_key(&node, |(own, _)| *own);
+        found.map_or([false; 3], |at| self.held[at].1)
     }
 
     /// Nodes that turn with another one, each with that.
@@ -166,8 +177,8 @@ impl Followers {
             return None;
         }
         let turn = |node: &u32| turns && !carried(node);
-        let mut all: Vec<u32> =
-            nodes.iter().copied().filter(|node| turn(node) || !self.follows(*node)).collect();
+        let stays = |node: &u32| !self.follows(*node) || self.held(*node).contains(&true);
+        let mut all: Vec<u32> = nodes.iter().copied().filter(|node| turn(node) || stays(node)).collect();
         let solids = nodes.iter().filter(|node| carried(node)).filter_map(|&node| self.carried(node));
         for moving in nodes.iter().copied().chain(solids.flat_map(Turn::nodes)) {
             for node in self.movers(moving) {
@@ -202,8 +213,9 @@ impl Followers {
         let place = |node: u32| wide * expanded.iter().position(|&known| known == node).unwrap_or(0);
         let shift = |node: u32, c: usize, by: f64, all: &mut Vec<(usize, f64)>| {
             let followed = self.followed(node);
-            if followed.is_empty() {
+            if followed.is_empty() || self.held(node)[c] {
                 all.push((place(node) + c, by));
+                return;
             }
             for Followed { node, weight, part, arm, .. } in followed {
                 let at = place(*node);
@@ -270,8 +282,10 @@ impl Followers {
                 };
                 row.iter().map(of).sum::<f64>()
             };
-            let along = [0, 1, 2].map(along);
-            components[6 * *node as usize..][..3].copy_from_slice(&along);
+            let (along, held) = ([0, 1, 2].map(along), self.held(*node));
+            for c in (0..3).filter(|&c| !held[c]) {
+                components[6 * *node as usize + c] = along[c];
+            }
         }
         for turn in &self.turns {
             let moved = |node: u32| Vector3::from_column_slice(&components[6 * node as usize..][..3]);
@@ -300,9 +314,10 @@ impl Followers {
             }
         }
         for (node, row) in &self.rows {
-            let own = &mut components[6 * *node as usize..][..3];
-            let force = Vector3::from_column_slice(own);
-            own.fill(0.0);
+            let (held, mut force) = (self.held(*node), Vector3::zeros());
+            for c in (0..3).filter(|&c| !held[c]) {
+                force[c] = std::mem::take(&mut components[6 * *node as usize + c]);
+            }
             row.iter().for_each(|followed| {
                 followed.pull(&force, |c, f| components[6 * followed.node as usize + c] += f)
             });
@@ -322,7 +337,10 @@ impl Followers {
                 (*node, row.iter().fold(model.place(*node as usize), |sum, own| sum + moved(own)))
             })
             .collect();
-        places.into_iter().for_each(|(node, place)| state.position[node as usize] = place);
+        for (node, place) in places {
+            let held = self.held(node);
+            (0..3).filter(|&c| !held[c]).for_each(|c| state.position[node as usize][c] = place[c]);
+        }
         for [node, first] in self.turned() {
             state.rotation[node] = state.rotation[first];
         }

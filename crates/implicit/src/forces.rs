@@ -82,4 +82,9 @@ impl Forces {
     pub fn strain_energy(&self) -> f64 {
         self.system.energy
     }
+
+    /// What hourglass control holds of it [J].
+    pub fn hourglass_energy(&self) -> f64 {
+        self.system.hourglass
+    }
 }

@@ -129,6 +129,8 @@ pub(crate) struct System {
     pub(crate) exact_pressure: bool,
     /// Strain energy [J].
     pub(crate) energy: f64,
+    /// What hourglass control holds of it [J].
+    pub(crate) hourglass: f64,
     /// Largest force on a node of a cell [N].
     pub(crate) largest: f64,
     /// Of a chunk of facets that is found and of the one before, whose nodes take it up.
@@ -412,6 +414,7 @@ impl System {
             exact_pressure: true,
             surface: needs_surface(&model).then(|| CurvedSurface::new(&model, EdgeRule::Arc)),
             energy: 0.0,
+            hourglass: 0.0,
             largest: 0.0,
             // The second only where there is a second chunk.
             results: [0, FACETS]
@@ -508,7 +511,7 @@ impl System {
         self.conditions.find_gaps(&model, &self.equations, self.surface.as_ref(), state, time);
         self.nodal_loads(state, time);
         self.internal.fill(0.0);
-        self.energy = 0.0;
+        (self.energy, self.hourglass) = (0.0, 0.0);
         self.largest = 0.0;
         if tangent.is_some() {
             self.matrix.clear();
@@ -864,6 +867,7 @@ impl System {
                 }
                 for (cell, result) in (first..last).zip(&results) {
                     self.energy += result.energy;
+                    self.hourglass += result.hourglass;
                     self.add_forces(solid.cells.nodes(cell), &result.force);
                     if let Some(moved) = moved {
                         self.add_stiffness(solid.cells.nodes(cell), [index, 0, cell], &result.tangent, moved);

@@ -53,7 +53,7 @@ impl Touching {
         }
     }
 
-    /// Of each contact the pairs that never touch, since they are too near at rest.
+    /// Of each contact the pairs that never touch, since they are in one place at rest.
     pub fn apart_counts(&self, model: &Assembly) -> Vec<usize> {
         self.made(model).0.apart_counts()
     }

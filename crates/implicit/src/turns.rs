@@ -119,10 +119,10 @@ impl Turn {
 impl Assembly {
     /// Puts all nodes that follow others where these are at a state, and turns those that turn with a solid.
     pub fn take_along(&self, state: &mut State) {
-        for (node, row) in self.ties.iter().flat_map(pliant_mechanics::tie::Tie::rows) {
+        for (node, row) in self.ties.iter().flat_map(pliant_mechanics::tie::Tie::component_rows) {
             let moved = |followed: usize| state.position[followed] - self.place(followed);
-            let along: Vector3<f64> = row.map(|(followed, w)| moved(followed as usize) * w).sum();
-            state.position[node as usize] = self.place(node as usize) + along;
+            let along = row.map(|(followed, w)| moved(followed as usize).component_mul(&Vector3::from(w)));
+            state.position[node as usize] = self.place(node as usize) + along.sum::<Vector3<f64>>();
         }
         for turn in carried_turns(self) {
             state.rotation[turn.node as usize] = Turn::new(turn).rotation(state);

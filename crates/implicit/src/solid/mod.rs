@@ -2,7 +2,7 @@
 //! Moran, *Nonlinear Finite Elements*, 4.9 and 6.4): f_a = Σ w F S B_a, K_ab = Σ w (𝔹_aᵀ D 𝔹_b + (B_a·S B_b) I), with D from
 //! [`AnyLaw::tangent`], and that of the co-rotated linear law in closed form (`closed.rs`).
 //!
-//! `hex8` adds its hourglass control, k γ_a·γ_b I. `hex8-full` takes one mean dilatation J̄ = v/V a cell, whose energy V U(J̄) adds
+//! `hex8` adds its hourglass control, k γ_a·γ_b I, with the derivatives of its factor g where that follows the law. `hex8-full` takes one mean dilatation J̄ = v/V a cell, whose energy V U(J̄) adds
 //! p cof F B_a to the force, and U″(J̄)/V c_a ⊗ c_b with c_a = Σ w cof F B_a to the stiffness. `tet4-anp` does so for each node with
 //! the tets around it (`star.rs`). Membranes are in plane stress (`membrane.rs`), bars in uniaxial stress (`bar.rs`).
 
@@ -15,7 +15,7 @@ mod tests;
 
 use pliant_mechanics::element::FLAT_HEX;
 use pliant_mechanics::law::plane_stress::InPlane;
-use pliant_mechanics::law::{AnyLaw, Deformation, Split};
+use pliant_mechanics::law::{AnyLaw, Deformation, ShearGrowth, Split};
 use pliant_mechanics::model::{Averaging, CellBlock, Cells, Hourglass, Solid};
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cross, dot, scale, sub};
 
@@ -35,6 +35,8 @@ pub(crate) const MOST_POINTS: usize = 8;
 pub(crate) struct Response {
     /// Strain energy [J].
     pub(crate) energy: f64,
+    /// What hourglass control holds of it [J].
+    pub(crate) hourglass: f64,
     /// Internal forces [N], three a node.
     pub(crate) force: [f64; MOST],
     /// Stiffness [N/m] over the same, column by column; filled if it is asked for.
@@ -44,7 +46,7 @@ pub(crate) struct Response {
 
 impl Response {
     pub(crate) fn none() -> Self {
-        Self { energy: 0.0, force: [0.0; MOST], tangent: Vec::new(), broken: None }
+        Self { energy: 0.0, hourglass: 0.0, force: [0.0; MOST], tangent: Vec::new(), broken: None }
     }
 
     /// Finds what a cell makes. `pressure` is the averaged one of a tetrahedron, whose energy is counted at its nodes; `lag` says how its
@@ -59,7 +61,7 @@ impl Response {
         stiffness: bool,
     ) {
         let size = 3 * solid.cells.nodes_per_cell();
-        self.energy = 0.0;
+        (self.energy, self.hourglass) = (0.0, 0.0);
         self.force.fill(0.0);
         self.tangent.clear();
         self.tangent.resize(if stiffness { size * size } else { 0 }, 0.0);
@@ -70,8 +72,8 @@ impl Response {
         let fibres = solid.law_fibres(cell);
         let own = CellMaterial { law: &solid.material.law, fibres: &fibres, lag, stiffness };
         let found = match &solid.cells {
-            Cells::Tet4(block) => self.fill_plain(own, block, cell, displacement),
-            Cells::Hex8(block) => self.fill_plain(own, block, cell, displacement),
+            Cells::Tet4(block) => self.fill_plain(own, (solid, block), cell, displacement),
+            Cells::Hex8(block) => self.fill_plain(own, (solid, block), cell, displacement),
             Cells::AveragedTet4(block, _) => {
                 let u = moved(block, cell, displacement);
                 let rest = &block.rest[cell];
@@ -115,7 +117,7 @@ impl Response {
     fn fill_plain<const N: usize>(
         &mut self,
         own: CellMaterial<'_>,
-        block: &CellBlock<N>,
+        (solid, block): (&Solid, &CellBlock<N>),
         cell: usize,
         displacement: impl Fn(u32) -> Vector<f64>,
     ) -> Result<(), Broken> {
@@ -123,38 +125,63 @@ impl Response {
         let rest = &block.rest[cell];
         self.add_point(own, &u, &rest.gradient, rest.volume, Part::Whole)?;
         if let Some(control) = &block.hourglass {
-            self.add_hourglass(control, cell, &u, own.stiffness);
+            let growth = solid.hourglass_growth().map(|shear| (shear, &rest.gradient));
+            self.add_hourglass(own, control, cell, &u, growth);
         }
         Ok(())
     }
 
+    /// Adds the energy ½ k g Σ |q_c|² of hourglass control; g is 1 without a `growth`, which has the shear modulus at rest [Pa] and the
+    /// gradients of the shape functions [1/m].
     fn add_hourglass<const N: usize>(
         &mut self,
+        own: CellMaterial<'_>,
         control: &Hourglass<f64, N>,
         cell: usize,
         u: &[Vector<f64>; N],
-        stiffness: bool,
+        growth: Option<(f64, &[Vector<f64>; N])>,
     ) {
-        let k = control.stiffness[cell];
-        for pattern in &control.patterns[cell] {
-            let mut q = [0.0; 3];
-            for (&u, &g) in u.iter().zip(pattern) {
-                q = add(q, scale(u, g));
+        let all = control.patterns[cell]
+            .map(|pattern| u.iter().zip(pattern).fold([0.0; 3], |q, (&u, gamma)| add(q, scale(u, gamma))));
+        let constant = 0.5 * control.stiffness[cell] * all.iter().map(|&q| dot(q, q)).sum::<f64>();
+        let grown = growth.map(|(shear, shape)| own.growth(&gradient(u, shape), shear));
+        let factor = grown.map_or(1.0, |(factor, _)| factor);
+        let k = factor * control.stiffness[cell];
+        self.hourglass = factor * constant;
+        self.energy += self.hourglass;
+        // Σ_c k₀ γ_ca q_c, the gradient of the constant energy.
+        let mut resistance = [[0.0; 3]; N];
+        for (pattern, &q) in control.patterns[cell].iter().zip(&all) {
+            for (a, &gamma) in pattern.iter().enumerate() {
+                resistance[a] = add(resistance[a], scale(q, gamma * control.stiffness[cell]));
             }
-            self.energy += 0.5 * k * dot(q, q);
-            for (a, &g) in pattern.iter().enumerate() {
-                add_to(&mut self.force, a, scale(q, k * g));
-            }
-            if !stiffness {
-                continue;
-            }
-            for (b, &gb) in pattern.iter().enumerate() {
-                for (a, &ga) in pattern.iter().enumerate() {
-                    for c in 0..3 {
-                        self.tangent[(3 * b + c) * 3 * N + 3 * a + c] += k * ga * gb;
+        }
+        for (a, &f) in resistance.iter().enumerate() {
+            add_to(&mut self.force, a, scale(f, factor));
+        }
+        if own.stiffness {
+            for pattern in &control.patterns[cell] {
+                for (b, &gb) in pattern.iter().enumerate() {
+                    for (a, &ga) in pattern.iter().enumerate() {
+                        for c in 0..3 {
+                            self.tangent[(3 * b + c) * 3 * N + 3 * a + c] += k * ga * gb;
+                        }
                     }
                 }
             }
+        }
+        let (Some((shear, shape)), Some((_, slope))) = (growth, grown) else { return };
+        if factor == 1.0 || constant == 0.0 {
+            return;
+        }
+        let slopes = shape.map(|b| slope.apply(b));
+        for (a, &f) in slopes.iter().enumerate() {
+            add_to(&mut self.force, a, scale(f, constant));
+        }
+        if own.stiffness {
+            add_symmetric_dyads(&mut self.tangent, resistance.as_flattened(), slopes.as_flattened());
+            let second = own.growth_curvature(&gradient(u, shape), shear);
+            add_second(&mut self.tangent, &second, shape, constant);
         }
     }
 
@@ -231,6 +258,50 @@ impl CellMaterial<'_> {
     fn taken(&self, elastic: Split<Symmetric<f64>>, part: Part) -> Symmetric<f64> {
         let [shape, volume] = self.lag.factors;
         part.of(Split { isochoric: elastic.isochoric * shape, volumetric: elastic.volumetric * volume })
+    }
+}
+
+/// Size of the differences of F from which the growth of hourglass control is found. Differences of differences lose half of the digits
+/// at a smaller one, so they are of fourth order.
+const DIFFERENCE: f64 = 1e-4;
+
+/// (8 (f(h) − f(−h)) − f(2h) + f(−2h))/(12h) has these weights at the h of [`DIFFERENCE`].
+const WEIGHTS: [(f64, f64); 4] = [(1.0, 8.0), (-1.0, -8.0), (2.0, -1.0), (-2.0, 1.0)];
+
+impl CellMaterial<'_> {
+    /// The factor g on the stiffness of hourglass control at a displacement gradient, and ∂g/∂F.
+    fn growth(&self, h: &Tensor<f64>, shear: f64) -> (f64, Tensor<f64>) {
+        let stress = |deformation: &Deformation<f64>| {
+            let Split { isochoric, volumetric } = self.law.stress(deformation, self.fibres);
+            isochoric + volumetric
+        };
+        let deformation = Deformation::from_displacement_gradient(h);
+        let here = stress(&deformation);
+        let growth = ShearGrowth::new(&deformation, &here, shear);
+        if growth.factor == 1.0 {
+            return (1.0, Tensor::ZERO);
+        }
+        let direction = growth.direction(&deformation);
+        let derivative = WEIGHTS.into_iter().fold(Symmetric::ZERO, |sum, (at, weight)| {
+            let moved = h.plus_scaled(&direction, at * DIFFERENCE);
+            let there = stress(&Deformation::from_displacement_gradient(&moved));
+            sum.plus_scaled(&there, weight / (12.0 * DIFFERENCE))
+        });
+        let gradient = growth.gradient(&deformation, &here, &derivative);
+        (growth.factor, deformation.gradient.times_symmetric(&gradient))
+    }
+
+    /// ∂²g/∂F², by the entries of F, row by row: symmetric.
+    fn growth_curvature(&self, h: &Tensor<f64>, shear: f64) -> [[f64; 9]; 9] {
+        let columns: [[f64; 9]; 9] = std::array::from_fn(|entry| {
+            let change = WEIGHTS.into_iter().fold(Tensor::ZERO, |sum, (at, weight)| {
+                let mut moved = *h;
+                moved.0[entry / 3][entry % 3] += at * DIFFERENCE;
+                sum.plus_scaled(&self.growth(&moved, shear).1, weight / (12.0 * DIFFERENCE))
+            });
+            std::array::from_fn(|k| change.0[k / 3][k % 3])
+        });
+        std::array::from_fn(|p| std::array::from_fn(|q| 0.5 * (columns[p][q] + columns[q][p])))
     }
 }
 
@@ -387,6 +458,27 @@ fn add_dyad(tangent: &mut [f64], v: &[f64], s: f64) {
     for (column, &x) in tangent.chunks_exact_mut(v.len()).zip(v) {
         for (entry, &y) in column.iter_mut().zip(v) {
             *entry += s * x * y;
+        }
+    }
+}
+
+/// Adds v ⊗ w + w ⊗ v.
+fn add_symmetric_dyads(tangent: &mut [f64], v: &[f64], w: &[f64]) {
+    for (column, (&x, &y)) in tangent.chunks_exact_mut(v.len()).zip(v.iter().zip(w)) {
+        for (entry, (&a, &b)) in column.iter_mut().zip(v.iter().zip(w)) {
+            *entry += x * b + y * a;
+        }
+    }
+}
+
+/// Adds w B_a·A B_b of second derivatives A by the entries of F, row by row.
+fn add_second<const N: usize>(tangent: &mut [f64], second: &[[f64; 9]; 9], shape: &[Vector<f64>; N], w: f64) {
+    for (b, k) in (0..N).flat_map(|b| (0..3).map(move |k| (b, k))) {
+        // A B_b of component k.
+        let along = second.map(|row| w * dot([row[3 * k], row[3 * k + 1], row[3 * k + 2]], shape[b]));
+        for (a, i) in (0..N).flat_map(|a| (0..3).map(move |i| (a, i))) {
+            let own = [along[3 * i], along[3 * i + 1], along[3 * i + 2]];
+            tangent[(3 * b + k) * 3 * N + 3 * a + i] += dot(own, shape[a]);
         }
     }
 }
