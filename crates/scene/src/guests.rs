@@ -9,7 +9,7 @@ use pliant_sim::contact::pairs::Surface;
 use pliant_sim::contact::touch::{Contact, Touch, With};
 use pliant_sim::{Guests, number};
 
-use crate::assemble::{Meet, overlaps, told_overlap};
+use crate::assemble::{Meet, overlaps, told_distance, told_overlap, usual_distance};
 use crate::diagnostic::Diagnostic;
 use crate::format::SolverName;
 use crate::world::World;
@@ -57,10 +57,6 @@ impl World {
                 out.push(Diagnostic::error(message).at(place, "beside a tie").help(help));
                 continue;
             }
-            let touch = Touch {
-                friction: table.friction,
-                offset: table.thickness.unwrap_or(own.offset + other.offset),
-            };
             let mut surface = other.surface.clone();
             if self.is_behind([(host, own), (of, other)]) {
                 surface.faces.iter_mut().for_each(|face| face.swap(1, 2));
@@ -69,11 +65,22 @@ impl World {
                     table.between[other.side]
                 ));
             }
-            if let Some(told) = self.overlap([(host, own), (of, other)], &surface, touch.offset) {
-                let help = "move one of them (`at` of its mesh), or make `thickness` smaller";
+            let sides = [(host, own), (of, other)];
+            if let Some(told) = self.overlap(sides, &surface) {
+                let help = "move one of them (`at` of its mesh)";
                 out.push(Diagnostic::error(told).at(place, "overlapping").help(help));
                 continue;
             }
+            let (second, place) = self.side_by_side(sides, &surface);
+            let offset = table.thickness.unwrap_or_else(|| {
+                // Half of the thickness of shells, or what solids keep.
+                let usual = own.offset + other.offset;
+                if usual > 0.0 { usual } else { usual_distance(&own.surface, Some(&second), place) }
+            });
+            if table.thickness.is_none() && own.offset + other.offset == 0.0 {
+                notes.push(told_distance(name, [offset; 2]));
+            }
+            let touch = Touch { friction: table.friction, offset };
             nodes.entry([host, of]).or_default().extend(&other.surface.nodes);
             let contact = Contact {
                 name: name.clone(),
@@ -105,7 +112,16 @@ impl World {
                 *surface = surface.numbered(|node| first + own.partition_point(|&known| known < node) as u32);
             }
             let built = Arc::make_mut(&mut self.participants[pair[0]].built);
-            Arc::make_mut(built.contacts.get_or_insert_default()).contacts.push(contact);
+            let (rest, contacts) = (&built.model.rest, Arc::make_mut(built.contacts.get_or_insert_default()));
+            let place = |node: u32| -> Vector3<f64> {
+                let node = node as usize;
+                rest.get(node).unwrap_or_else(|| &contacts.guests[node - rest.len()]).to_owned().into()
+            };
+            let near = contact.pairs(|node| node, place).map(|(mut pairs, _)| pairs.nearer(place));
+            if let Some(near) = near.filter(|near| !near.is_empty()) {
+                contacts.near.insert(contacts.contacts.len(), near);
+            }
+            contacts.contacts.push(contact);
         }
     }
 
@@ -128,19 +144,28 @@ impl World {
         ways.min_by(|a, b| a.0.total_cmp(&b.0)).is_some_and(|(_, along)| along < 0.0)
     }
 
-    /// How the surfaces of two participants overlap at the start, in words; `None` where they are apart by the distance that they keep [m].
-    fn overlap(&self, sides: [(usize, &Meet); 2], surface: &Surface, offset: f64) -> Option<String> {
+    /// A surface of the second participant with its nodes numbered after those of the first, and the places [m] of all at rest.
+    fn side_by_side(
+        &self,
+        sides: [(usize, &Meet); 2],
+        surface: &Surface,
+    ) -> (Surface, impl Fn(u32) -> Vector3<f64> + Copy + use<'_>) {
         let models = sides.map(|(part, _)| &self.participants[part].built.model);
-        let bodies = sides.map(|(part, meet)| &self.participants[part].built.bodies[meet.body]);
         let first = models[0].node_count() as u32;
-        let place = |node: u32| -> Vector3<f64> {
+        let place = move |node: u32| -> Vector3<f64> {
             let (model, node) = if node < first { (models[0], node) } else { (models[1], node - first) };
             model.rest[node as usize].into()
         };
-        let other = surface.numbered(|node| first + node);
+        (surface.numbered(|node| first + node), place)
+    }
+
+    /// How the surfaces of two participants overlap at the start, in words; `None` where they do not.
+    fn overlap(&self, sides: [(usize, &Meet); 2], surface: &Surface) -> Option<String> {
+        let bodies = sides.map(|(part, meet)| &self.participants[part].built.bodies[meet.body]);
+        let (other, place) = self.side_by_side(sides, surface);
         let own = &sides[0].1.surface;
         let size = own.nodes.iter().map(|&node| place(node).amax()).fold(0.0, f64::max);
-        let inside = overlaps([(bodies[0], own), (bodies[1], &other)], offset, size, place);
+        let inside = overlaps([(bodies[0], own), (bodies[1], &other)], size, place);
         told_overlap([&bodies[0].name, &bodies[1].name], &inside)
     }
 

@@ -16,7 +16,7 @@ const DENSITY: f64 = 1060.0;
 pub struct OrganScene {
     /// What the scene is called.
     pub title: String,
-    /// Where the tissue comes from, as in the `mesh` of a body: `image = "seg.nii.gz", labels = [5, 6]`, with names and cleaning.
+    /// Where the tissue comes from, as in the `mesh` of a body: `image = "seg.nii.gz", labels = [5], vessels = [6]`, with names and cleaning.
     pub source: String,
     /// Edge of the tets [m].
     pub edge: f64,
@@ -35,7 +35,7 @@ impl OrganScene {
     /// use pliant_geometry::Vector3;
     /// let organ = pliant_scene::OrganScene {
     ///     title: "liver".into(),
-    ///     source: "image = \"seg.nii.gz\", labels = [5, 6]".into(),
+    ///     source: "image = \"seg.nii.gz\", labels = [5], vessels = [6]".into(),
     ///     edge: 0.008,
     ///     vessels: vec![("image = \"seg.nii.gz\", label = 6".into(), 1e-3)],
     ///     capsule: Some(1e-4),

@@ -2,9 +2,9 @@
 
 use pliant_sim::PenaltyTie;
 
-use crate::assemble::{Placed, attach, holds_nothing};
+use crate::assemble::{Placed, attach, doubt_points, holds_nothing};
 use crate::diagnostic::Diagnostic;
-use crate::format::{Rotations, SolverName, StepChoice, TieTable};
+use crate::format::{Rotations, SolverName, StepChoice, TieMethod, TieTable};
 use crate::world::{Part, World};
 
 /// Steps in an automatic one of explicit participants that are tied to others. A body at half of its usual step leaves ties more of the
@@ -39,6 +39,13 @@ impl World {
                 out.push(Diagnostic::error(message).at(place, "two participants").help(help));
                 continue;
             }
+            if table.method == Some(TieMethod::Mortar) {
+                let message = format!("the springs of `{name}`, between participants, hold points");
+                let help = "leave `method` out, or put both bodies into one participant";
+                let place = source.span(&["tie", name, "method"]);
+                out.push(Diagnostic::error(message).at(place, "two participants").help(help));
+                continue;
+            }
             let guest = at(0, guest);
             let nodes = match chosen(table, guest) {
                 Ok(nodes) => nodes,
@@ -51,6 +58,7 @@ impl World {
             let Some(found) = attach(source, (name, table), (guest, &nodes), at(1, host), out) else {
                 continue;
             };
+            out.extend(doubt_points(source, name, table, [guest.body, at(1, host).body]));
             let alone = found.nodes.iter().map(|&node| [(node, 1.0)]).collect::<Vec<_>>();
             let own = pliant_mechanics::mapping::Weights::from_rows(alone.iter().map(|row| &row[..]));
             notes.push(found.note);

@@ -3,10 +3,8 @@
 use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
-use pliant_geometry::Vector3;
 use pliant_implicit::{State, Touching};
 use pliant_sim::contact::barrier::{BarrierSettings, Meeting};
-use pliant_sim::contact::pairs::Surface;
 use pliant_sim::contact::touch::{Contacts, With};
 use pliant_sim::{counted, number};
 
@@ -19,8 +17,6 @@ const DISTANCE: f64 = 1e-3;
 const STIFFNESS: f64 = 0.1;
 /// The speed [m/s] below which friction lets bodies creep, if none is given.
 const CREEP: f64 = 1e-3;
-/// The largest part of the least altitude of triangles that the distance to keep and the barrier may take together.
-const ALTITUDE: f64 = 0.98;
 /// Places without a gap that are listed.
 const LISTED: usize = 3;
 
@@ -31,7 +27,8 @@ pub(super) struct BarrierTables {
     levels: Vec<u8>,
     /// The table of each contact.
     tables: Vec<String>,
-    check: bool,
+    /// Whether states are searched for intersections, also without barriers.
+    pub check: bool,
 }
 
 impl Builder<'_> {
@@ -42,19 +39,20 @@ impl Builder<'_> {
         table: &ContactTable,
         is_barrier: bool,
     ) -> bool {
+        let is_meet = self.scene.meets.iter().any(|(known, _)| known == name);
         let given = [
             ("barrier-distance", table.barrier_distance.is_some(), true),
             ("barrier-stiffness", table.barrier_stiffness.is_some(), true),
             ("creep-speed", table.creep_speed.is_some(), true),
             ("subdivision", table.subdivision.is_some(), true),
-            ("check-intersections", table.check_intersections, true),
+            ("check-intersections", table.check_intersections && is_meet, true),
             ("separate", table.separate, false),
         ];
         let mut fits = true;
         for (key, _, of_barrier) in given.into_iter().filter(|(_, given, of)| *given && *of != is_barrier) {
             let solvers =
                 if of_barrier { "the solvers `implicit` and `static`" } else { "the solver `explicit`" };
-            let message = match self.scene.meets.iter().any(|(known, _)| known == name) {
+            let message = match is_meet {
                 true => format!("`{key}` of a contact is for bodies of one participant with {solvers}"),
                 false => format!(
                     "`{key}` of a contact is for {solvers}, and this scene goes with `{}`",
@@ -73,7 +71,6 @@ impl Builder<'_> {
         name: &str,
         table: &ContactTable,
         [own, with]: [Partner; 2],
-        surface: &Surface,
         barriers: &mut BarrierTables,
     ) -> Option<f64> {
         let bodies: Vec<usize> = [own, with].into_iter().filter_map(Partner::body).collect();
@@ -88,25 +85,11 @@ impl Builder<'_> {
             return None;
         };
         let thick = |body: usize| self.thickest(body);
-        let mut offset = table.thickness.unwrap_or_else(|| match with {
+        let offset = table.thickness.unwrap_or_else(|| match with {
             Partner::Body(other) => 0.5 * (thick(bodies[0]) + thick(other)),
             Partner::Rigid(_) => 0.5 * thick(bodies[0]),
         });
         let level = self.level(name, table, &bodies)?;
-        if own == with {
-            let altitude = ALTITUDE * self.least_altitude(surface) / f64::from(1 << level);
-            if offset + distance > altitude {
-                let kept = (altitude - distance).max(0.0);
-                let message = format!(
-                    "contact `{name}`: the surfaces keep {} m instead of {} m, since that and the barrier must be less than the least altitude \
-                     of a triangle; smaller elements make it worse, a smaller `barrier-distance` better",
-                    number(kept),
-                    number(offset)
-                );
-                self.notes.push(message);
-                offset = kept;
-            }
-        }
         barriers.settings.push(BarrierSettings {
             distance,
             stiffness,
@@ -114,7 +97,6 @@ impl Builder<'_> {
         });
         barriers.levels.push(level);
         barriers.tables.push(name.into());
-        barriers.check |= table.check_intersections;
         Some(offset)
     }
 
@@ -131,7 +113,7 @@ impl Builder<'_> {
         for (contact, count) in contacts.contacts.iter().zip(touching.apart_counts(&self.assembly)) {
             if count > 0 {
                 self.notes.push(format!(
-                    "contact `{}`: {} of nodes with triangles or of edges never touch, since they are too near at rest",
+                    "contact `{}`: {} of nodes with triangles or of edges never touch, since they are in one place at rest",
                     contact.name,
                     counted(count, "pair")
                 ));
@@ -216,17 +198,6 @@ impl Builder<'_> {
     pub(super) fn thickest(&self, body: usize) -> f64 {
         let cells = self.shell_cells(body).unwrap_or_default();
         cells.iter().map(|&cell| self.assembly.facets[cell as usize].thickness).fold(0.0, f64::max)
-    }
-
-    /// The least altitude [m] of triangles of a surface at rest.
-    fn least_altitude(&self, surface: &Surface) -> f64 {
-        let place = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
-        let altitude = |face: &[u32; 3]| {
-            let [a, b, c] = face.map(place);
-            let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
-            (b - a).cross(&(c - a)).norm() / longest
-        };
-        surface.faces.iter().map(altitude).fold(f64::INFINITY, f64::min)
     }
 
     /// Refuses what goes with no barrier: a controlled load, and jaws that hold by an ideal grip.

@@ -39,7 +39,8 @@ pub(super) struct Shape {
 struct MaterialCells {
     law: String,
     density: Density,
-    hourglass: Hourglass,
+    /// As it is given.
+    hourglass: Option<Hourglass>,
     cells: Vec<u32>,
 }
 
@@ -101,8 +102,8 @@ impl Builder<'_> {
         };
         self.assembly.model_mut().bodies[body].damping = table.damping;
         self.set_velocity(name, table, first);
-        if self.scene.is_implicit() && !is_wall_on_solid {
-            self.assembly.stiffness_damping = table.stiffness_damping;
+        if !is_wall_on_solid {
+            self.assembly.model_mut().stiffness_damping = table.stiffness_damping;
         }
         if table.layers.is_empty() {
             if table.law.values().is_empty() {
@@ -114,7 +115,9 @@ impl Builder<'_> {
             self.check_labels(name, ["law", "\"law\""], &table.law, mesh);
         }
         self.check_labels(name, ["density", "1000"], &table.density, mesh);
-        self.check_labels(name, ["hourglass", "0.2"], &table.hourglass, mesh);
+        if let Some(hourglass) = &table.hourglass {
+            self.check_labels(name, ["hourglass", "0.2"], hourglass, mesh);
+        }
         if table.model == BodyModel::Shell {
             if table.fraction.is_some() {
                 let message = format!("`{name}` is a shell, whose cells are all full");
@@ -188,7 +191,9 @@ impl Builder<'_> {
         let mut numbered = table.clone();
         let mut all = self.numbered(&labels, &["body", name, "law"], &mut numbered.law);
         all &= self.numbered(&labels, &["body", name, "density"], &mut numbered.density);
-        all &= self.numbered(&labels, &["body", name, "hourglass"], &mut numbered.hourglass);
+        if let Some(hourglass) = &mut numbered.hourglass {
+            all &= self.numbered(&labels, &["body", name, "hourglass"], hourglass);
+        }
         if let Some(Thickness::PerCell(ThicknessRule::ByLabel(map))) = &mut numbered.thickness {
             all &= self.number_keys(&labels, &["body", name, "thickness", "by-label"], map);
         }
@@ -305,8 +310,13 @@ impl Builder<'_> {
             CellKind::Triangle => self.membrane(draft, body, block, &cells, &fibre),
             CellKind::Line => self.bars(draft, body, block, &cells),
             _ => {
-                let control = [hourglass.0, law.law.small_strain().shear];
-                Some(self.volume_cells(table.element, body, block, &cells, control))
+                // Averaged pressures do not relax in implicit steps.
+                let averages = law.law.has_volumetric_energy() && material.prony.volumetric.is_empty();
+                let fills_in_part = block.kind == CellKind::Hex && table.is_filled_in_part();
+                let full = fills_in_part && averages && table.hourglass.is_none();
+                let element = table.element.or(full.then_some(Element::Hex8Full));
+                let shear = law.law.small_strain().shear;
+                Some(self.volume_cells(element, body, block, &cells, (hourglass, shear)))
             }
         };
         let Some(cells_of) = cells_of else { return };
@@ -336,14 +346,14 @@ impl Builder<'_> {
         }
     }
 
-    /// Some cells of a block with their element; hourglass control has a coefficient and a shear modulus [Pa].
+    /// Some cells of a block with their element; hourglass control has a coefficient, if that is given, and a shear modulus [Pa].
     fn volume_cells(
         &self,
         element: Option<Element>,
         body: usize,
         block: &CellBlock,
         cells: &[u32],
-        [hourglass, shear]: [f64; 2],
+        (hourglass, shear): (Option<Hourglass>, f64),
     ) -> Cells {
         let own = &self.assembly.bodies[body];
         let rest = &self.assembly.rest;
@@ -359,7 +369,10 @@ impl Builder<'_> {
             }
             (CellKind::Tet, _) => Cells::tet4(tets(), rest),
             (_, Some(Element::Hex8Full)) => Cells::full_hex8(hexes(), rest),
-            _ => Cells::hex8(hexes(), rest, hourglass, shear),
+            _ => match hourglass {
+                Some(Hourglass(given)) => Cells::hex8(hexes(), rest, given, shear),
+                None => Cells::hex8(hexes(), rest, Hourglass::DEFAULT.0, shear).with_growing_hourglass(),
+            },
         }
     }
 
@@ -415,16 +428,16 @@ fn number_of(labels: &Labels, name: &str) -> Result<String, UnknownLabel> {
 fn parts(table: &BodyTable, block: &CellBlock) -> Vec<MaterialCells> {
     let labels = block.data.get("label");
     let has_hourglass = block.kind == CellKind::Hex && table.element != Some(Element::Hex8Full);
-    let mut parts: BTreeMap<(&str, u64, u64), MaterialCells> = BTreeMap::new();
+    let mut parts: BTreeMap<(&str, u64, Option<u64>), MaterialCells> = BTreeMap::new();
     for cell in 0..block.len() as u32 {
         let label = labels.map(|labels| labels.item(cell as usize)[0].to_string());
         let label = label.as_deref();
         // A label without a value is already reported.
         let (Some(law), Some(&density)) = (table.law.of(label), table.density.of(label)) else { continue };
-        let hourglass =
-            table.hourglass.of(label).copied().filter(|_| has_hourglass).unwrap_or(Hourglass(0.0));
+        let given = table.hourglass.as_ref().filter(|_| has_hourglass);
+        let hourglass = given.and_then(|given| given.of(label)).copied();
         parts
-            .entry((law, density.0.to_bits(), hourglass.0.to_bits()))
+            .entry((law, density.0.to_bits(), hourglass.map(|own| own.0.to_bits())))
             .or_insert_with(|| MaterialCells { law: law.clone(), density, hourglass, cells: Vec::new() })
             .cells
             .push(cell);
@@ -471,22 +484,25 @@ mod tests {
             let text = CUBE.replace("law = \"tissue\"\ndensity = 1000", more);
             parts(&read(&text).bodies[0].1, &block)
                 .into_iter()
-                .map(|part| (part.law, part.density.0, part.hourglass.0, part.cells))
+                .map(|part| (part.law, part.density.0, part.hourglass.map(|own| own.0), part.cells))
                 .collect::<Vec<_>>()
         };
         let told = |law: &str, density, hourglass, cells: &[u32]| {
             (law.to_owned(), density, hourglass, cells.to_vec())
         };
         let hex = CellKind::Hex;
-        assert_eq!(of("law = 'soft'\ndensity = 9", hex), [told("soft", 9.0, 0.2, &[0, 1, 2])]);
+        assert_eq!(of("law = 'soft'\ndensity = 9", hex), [told("soft", 9.0, None, &[0, 1, 2])]);
         assert_eq!(
             of("law = { 1 = 'soft', 2 = 'hard' }\ndensity = { 1 = 8, 2 = 9 }", hex),
-            [told("hard", 9.0, 0.2, &[0, 2]), told("soft", 8.0, 0.2, &[1])]
+            [told("hard", 9.0, None, &[0, 2]), told("soft", 8.0, None, &[1])]
         );
         let by_hourglass = "law = 'soft'\ndensity = 9\nhourglass = { 1 = 0.1, 2 = 0.3 }";
-        assert_eq!(of(by_hourglass, hex), [told("soft", 9.0, 0.1, &[1]), told("soft", 9.0, 0.3, &[0, 2])]);
+        assert_eq!(
+            of(by_hourglass, hex),
+            [told("soft", 9.0, Some(0.1), &[1]), told("soft", 9.0, Some(0.3), &[0, 2])]
+        );
         // Tets have no hourglass patterns: they stay together.
-        assert_eq!(of(by_hourglass, CellKind::Tet), [told("soft", 9.0, 0.0, &[0, 1, 2])]);
+        assert_eq!(of(by_hourglass, CellKind::Tet), [told("soft", 9.0, None, &[0, 1, 2])]);
     }
 
     #[test]

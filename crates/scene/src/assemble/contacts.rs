@@ -5,6 +5,7 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
+use pliant_explicit::State;
 use pliant_geometry::{Locator, Selection, SurfaceLocator, Vector3};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::load::NO_NODE;
@@ -36,20 +37,38 @@ pub(super) const OVERLAP: f64 = 1e-9;
 /// What to do about contact with other solvers.
 const EXPLICIT: &str = "take `solver = \"explicit\"` on the CPU, for solids, membranes and bars, or `\"implicit\"` or `\"static\"`, for solids and shells";
 
-/// The distance [m] that surfaces keep without a barrier.
-fn kept(table: &ContactTable) -> f64 {
-    table.thickness.unwrap_or(0.0)
+/// The distance [m] that surfaces keep without a barrier if none is given, over the mean edge of both. Sharp parts slip by each other where it is
+/// zero.
+const KEPT: f64 = 0.005;
+
+/// The distance [m] that bodies keep if none is given, or parts of one.
+pub(crate) fn usual_distance(
+    first: &Surface,
+    second: Option<&Surface>,
+    place: impl Fn(u32) -> Vector3,
+) -> f64 {
+    KEPT * Pairs::new(first, second, 0.0, place).mean_edge()
 }
 
-/// Where two bodies overlap by more than round-off of a size [m], or are nearer than the distance to keep [m]: how deep [m], and the places. `place` has
-/// nodes by their numbers in the surfaces.
+/// What tells which distances [m] the surfaces of a contact keep since none is given.
+pub(crate) fn told_distance(name: &str, [least, most]: [f64; 2]) -> String {
+    let range = match least == most {
+        true => number(most),
+        false => format!("{} to {}", number(least), number(most)),
+    };
+    format!(
+        "contact `{name}`: surfaces keep {range} m, {} % of their mean edge, since `thickness` is not given",
+        100.0 * KEPT
+    )
+}
+
+/// Where two bodies overlap by more than round-off of a size [m]: how deep [m], and the places. `place` has nodes by their numbers in the surfaces.
 pub(crate) fn overlaps(
     sides: [(&BuiltBody, &Surface); 2],
-    offset: f64,
     size: f64,
     place: impl Fn(u32) -> Vector3 + Copy,
 ) -> Vec<(f64, Vector3)> {
-    // How deep nodes lie in the other body: from cells for large overlaps, from faces for the distance to keep.
+    // How deep nodes lie in the other body: from cells for large overlaps, from faces for small ones.
     let mut inside = Vec::new();
     let [first, second] = sides;
     for ((_, surface), (body, _)) in [(first, second), (second, first)] {
@@ -68,9 +87,9 @@ pub(crate) fn overlaps(
             }
         }
     }
-    let mut pairs = Pairs::new(first.1, Some(second.1), offset, place);
+    let mut pairs = Pairs::new(first.1, Some(second.1), 0.0, place);
     pairs.update(place);
-    pairs.find(place, |pair| inside.push((offset - pair.distance, place(pair.nodes[0]))));
+    pairs.find(place, |pair| inside.push((-pair.distance, place(pair.nodes[0]))));
     inside.retain(|(depth, _)| *depth > OVERLAP * size);
     inside
 }
@@ -137,13 +156,70 @@ impl Builder<'_> {
         }
         let mut barriers = BarrierTables::default();
         for (name, table) in &scene.contacts {
-            let contacts = self.contact(name, table, &all.rigids, &mut barriers);
-            all.contacts.extend(contacts.into_iter().flatten());
+            let contacts = self.contact(name, table, &all.rigids, &mut barriers).unwrap_or_default();
+            if !scene.run.solver.solves_equations() {
+                self.keep_apart(name, table, &contacts, &mut all);
+            }
+            all.contacts.extend(contacts);
             if scene.run.solver.solves_equations() {
                 self.check_goes_with_barriers(name, &all);
             }
         }
         (!all.contacts.is_empty()).then(|| (Arc::new(all), barriers))
+    }
+
+    /// Notes the contacts of a table whose bodies keep less where they are nearer at the start, and the distances that they keep if none is given. They come
+    /// next after those that there are.
+    fn keep_apart(&mut self, name: &str, table: &ContactTable, contacts: &[Contact], all: &mut Contacts) {
+        let first = all.contacts.len();
+        let mut usual: Option<[f64; 2]> = None;
+        for (contact, index) in contacts.iter().zip(first..) {
+            let is_usual = table.thickness.is_none();
+            let keeps_less = match contact.with {
+                With::Rigid(_) => continue,
+                With::Body(_) => true,
+                With::Itself => is_usual,
+            };
+            let offset = contact.touch.offset;
+            if keeps_less && offset > 0.0 {
+                all.near.insert(index, Vec::new());
+            }
+            if is_usual {
+                let [least, most] = usual.unwrap_or([offset; 2]);
+                usual = Some([least.min(offset), most.max(offset)]);
+            }
+        }
+        self.notes.extend(usual.map(|range| told_distance(name, range)));
+    }
+
+    /// Finds the nodes of bodies that are nearer at the start than the distance to keep; `pushed` are displacements [m] there, if bodies were pushed apart.
+    pub(super) fn find_near(&mut self, contacts: &mut Contacts, pushed: Option<&[[f64; 3]]>) {
+        if contacts.near.is_empty() {
+            return;
+        }
+        let start = State::<f64>::at_rest(&self.assembly.model).displacement;
+        let moved = pushed.unwrap_or(&start);
+        let rest = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
+        let place = |node: u32| rest(node) + Vector3::from(moved[node as usize]);
+        let mut near = std::mem::take(&mut contacts.near);
+        for (&index, near) in &mut near {
+            let contact = &contacts.contacts[index];
+            let pairs = contact.pairs(|node| node, rest).map(|(pairs, _)| pairs.keeping([], rest));
+            *near = pairs.map_or_else(Vec::new, |mut pairs| pairs.nearer(place));
+            if !near.is_empty() {
+                self.notes.push(format!(
+                    "contact `{}`: {} nearer at the start than {} m and {} that distance",
+                    contact.name,
+                    match near.len() {
+                        1 => "1 node is".to_owned(),
+                        count => format!("{} are", counted(count, "node")),
+                    },
+                    number(contact.touch.offset),
+                    if near.len() == 1 { "keeps" } else { "keep" }
+                ));
+            }
+        }
+        contacts.near = near;
     }
 
     /// Takes note of the bodies that touch something, unless a mistake leaves that open.
@@ -411,6 +487,14 @@ impl Builder<'_> {
             self.error(&["contact", name, "between"], "no body touches anything here", "no body", help);
             return None;
         }
+        barriers.check |= table.check_intersections;
+        let of_bodies = |[_, with]: &[Partner; 2]| with.body().is_some();
+        if table.check_intersections && !is_barrier && !pairs.iter().any(of_bodies) {
+            let message = "`check-intersections` is for bodies that touch each other or themselves with the solver `explicit`";
+            let path = ["contact", name, "check-intersections"];
+            self.error(&path, message, "no bodies that touch each other", "leave it out");
+            return None;
+        }
         let several = pairs.len() > 1;
         let mut all = Vec::new();
         for [own, with] in pairs {
@@ -422,32 +506,40 @@ impl Builder<'_> {
             let full =
                 if several { format!("{name}.{}-{other}", self.bodies[body].name) } else { name.into() };
             let surface = self.surface_of(name, table, body, 0)?;
+            let (touches, with) = (
+                with,
+                match with {
+                    Partner::Rigid(rigid) => With::Rigid(rigid),
+                    Partner::Body(other) if other == body => With::Itself,
+                    Partner::Body(other) => With::Body(self.surface_of(name, table, other, 1)?),
+                },
+            );
             let offset = match is_barrier {
-                true => self.barrier(&full, table, [own, with], &surface, barriers)?,
-                false => kept(table),
+                true => self.barrier(&full, table, [own, touches], barriers)?,
+                false => self.distance_to_keep(table, &surface, &with),
             };
             let touch = Touch { friction: table.friction, offset };
-            let with = match with {
-                Partner::Rigid(rigid) if is_barrier => With::Rigid(rigid),
-                Partner::Body(other) if is_barrier && other == body => With::Itself,
-                Partner::Body(other) if is_barrier => With::Body(self.surface_of(name, table, other, 1)?),
-                Partner::Rigid(rigid) => {
-                    self.check_apart(name, table, body, &rigids[rigid], &surface);
-                    With::Rigid(rigid)
+            match (&with, touches) {
+                _ if is_barrier => {}
+                (With::Rigid(rigid), _) => self.check_apart(name, table, body, &rigids[*rigid], &surface),
+                (With::Body(second), Partner::Body(other)) => {
+                    self.check_bodies_apart(name, table, [body, other], [&surface, second]);
                 }
-                Partner::Body(other) if other == body => {
-                    self.note_apart(&full, &surface, kept(table));
-                    With::Itself
-                }
-                Partner::Body(other) => {
-                    let second = self.surface_of(name, table, other, 1)?;
-                    self.check_bodies_apart(name, table, [body, other], [&surface, &second]);
-                    With::Body(second)
-                }
-            };
+                _ => self.note_apart(&full, &surface, table.thickness),
+            }
             all.push(Contact { name: full, surface, with, touch });
         }
         Some(all)
+    }
+
+    /// The distance [m] that surfaces keep without a barrier.
+    fn distance_to_keep(&self, table: &ContactTable, surface: &Surface, with: &With) -> f64 {
+        let rest = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
+        table.thickness.unwrap_or_else(|| match with {
+            With::Rigid(_) => 0.0,
+            With::Body(other) => usual_distance(surface, Some(other), rest),
+            With::Itself => usual_distance(surface, None, rest),
+        })
     }
 
     /// The bodies and things of a side of a contact.
@@ -557,9 +649,9 @@ impl Builder<'_> {
     }
 
     /// Remarks on parts of a body that are too near each other at rest to touch, and on gaps that are small for its faces.
-    fn note_apart(&mut self, name: &str, surface: &Surface, thickness: f64) {
+    fn note_apart(&mut self, name: &str, surface: &Surface, thickness: Option<f64>) {
         let place = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
-        let mut pairs = Pairs::new(surface, None, thickness, place);
+        let mut pairs = Pairs::new(surface, None, thickness.unwrap_or(0.0), place);
         let count = pairs.set_apart_count();
         let mut narrow: Option<(f64, Vector3)> = None;
         pairs.update(place);
@@ -608,13 +700,13 @@ impl Builder<'_> {
         let size = self.assembly.rest.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
         let place = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
         let sides = [0, 1].map(|side| (&self.bodies[bodies[side]], surfaces[side]));
-        let inside = overlaps(sides, kept(table), size, place);
+        let inside = overlaps(sides, size, place);
         if !inside.is_empty() && table.separate {
             self.overlapping.get_or_insert_with(|| name.into());
             return;
         }
         let Some(message) = told_overlap([&names[0], &names[1]], &inside) else { return };
-        let help = "move one of them (`at` of its mesh), make `thickness` smaller, or let `separate = true` push them apart";
+        let help = "move one of them (`at` of its mesh), or let `separate = true` push them apart";
         self.error(&path, message, "overlapping", help);
     }
 
@@ -631,7 +723,8 @@ impl Builder<'_> {
         let rest = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
         let size = self.assembly.rest.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
         let inside = |places: &mut dyn Iterator<Item = Vector3>| -> Vec<(f64, Vector3)> {
-            let gaps = places.map(|place| (rigid.near(&stance, &place).distance - kept(table), place));
+            let kept = table.thickness.unwrap_or(0.0);
+            let gaps = places.map(|place| (rigid.near(&stance, &place).distance - kept, place));
             gaps.filter(|(gap, _)| *gap < -OVERLAP * size).collect()
         };
         let mut of = "node";

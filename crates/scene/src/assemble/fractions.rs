@@ -81,6 +81,28 @@ mod tests {
         assert!(immersed.model.cell_count() > of("hexes").model.cell_count());
     }
 
+    /// Nothing but their stiffness against hourglass patterns would hold cubes of which little is filled.
+    #[test]
+    fn immersed_cubes_are_full_elements_unless_something_else_is_given() {
+        let own = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();
+        let element = |cells: &str, law: &str, more: &str| {
+            let mesh = format!(
+                "mesh = {{ ellipsoid = {{ radii = [0.05, 0.04, 0.03] }}, edge = 0.02, as = '{cells}' }}\n{more}"
+            );
+            let held = "nodes = { box = [[-1, -1, -1], [1, 1, -0.02]] }";
+            let text = CUBE.replace(own, &mesh).replace("nodes = { set = \"z-min\" }", held);
+            let built = built_alone(&text.replace("neo-hookean", law));
+            built.model.solids[0].cells.element()
+        };
+        let law = "neo-hookean";
+        assert_eq!(element("immersed-hexes", law, ""), "hex8-full");
+        assert_eq!(element("hexes", law, ""), "hex8");
+        assert_eq!(element("immersed-hexes", law, "element = 'hex8'"), "hex8");
+        assert_eq!(element("immersed-hexes", law, "hourglass = 0.3"), "hex8");
+        // No element averages the pressure of this law.
+        assert_eq!(element("immersed-hexes", "st-venant-kirchhoff", ""), "hex8");
+    }
+
     #[test]
     fn fractions_of_a_mesh_file_count_where_the_body_names_them() {
         let folder = tempfile::tempdir().unwrap();

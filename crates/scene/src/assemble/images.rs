@@ -11,8 +11,8 @@ use pliant_imaging::{
 };
 use pliant_meshing::{
     Anatomy, Assessment, Closing, DEFAULT_CELL_LIMIT, Enclosed, Fewer, FieldMesh, FitProgress, FittedShells,
-    MeshingError, Missed, OrganTets, SURFACE_PAIRS, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs,
-    TriangleMesh, Voxels, require_room_for,
+    MeshingError, Missed, OrganTets, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs, TriangleMesh, Voxels,
+    require_room_for,
 };
 
 use super::mesh_files::{MeshFault, words};
@@ -146,6 +146,7 @@ impl Builder<'_> {
         require_one_cut(table)?;
         let image = self.read_images(table, watch)?;
         let choice = choice(&image, table)?;
+        let image = with_vessels(image, &choice, table)?;
         Ok(Scan::Image(image, choice))
     }
 
@@ -214,6 +215,27 @@ fn choice(image: &Image, table: &MeshTable) -> Result<Choice, MeshFault> {
         let whole = matches!(error, LabelError::Grey { .. } | LabelError::NotWhole { .. });
         label_fault(if whole { "image" } else { key }, table, &error)
     })
+}
+
+/// The image with the vessels that run inside of the chosen labels as a part of these.
+fn with_vessels(image: Image, choice: &Choice, table: &MeshTable) -> Result<Image, MeshFault> {
+    let Some(vessels) = &table.vessels else { return Ok(image) };
+    let Choice::Labels(organ) = choice else {
+        let help = "name the organ by `label` or `labels`";
+        let message = "`vessels` run inside of labels, and this body is chosen by `threshold`".into();
+        return Err(MeshFault { key: "vessels", message, help: help.into() });
+    };
+    let all: Vec<LabelChoice> = vessels.iter().map(Label::choice).collect();
+    let chosen = image.choose(&all).map_err(|error| label_fault("vessels", table, &error))?;
+    let Choice::Labels(mut vessels) = chosen else { return Ok(image) };
+    // What is the organ is inside of it anyway.
+    vessels.retain(|label| !organ.contains(label));
+    let (mut filled, voxels) = image.with_vessels_inside(organ, &vessels);
+    let [inside, outside] = voxels.map(|voxels| voxels as f64 * image.grid.voxel_volume() * 1e6);
+    filled.notes.push(format!(
+        "{inside:.2} ml of the vessels run inside of the organ and belong to it, {outside:.2} ml outside do not"
+    ));
+    Ok(filled)
 }
 
 fn label_fault(key: &'static str, table: &MeshTable, error: &LabelError) -> MeshFault {
@@ -522,7 +544,8 @@ impl Recipe {
                         let edge = fineness.edge_in(anatomy.field().bounds().into());
                         fill(&anatomy, *cells, &fineness.tets(edge), &mut notes, watch)
                     }
-                    goal => extracted(&anatomy, voxel).and_then(|surface| cover(surface, goal, watch)),
+                    goal => TriangleMesh::of_image(&anatomy, voxel, DEFAULT_CELL_LIMIT)
+                        .and_then(|surface| cover(surface, goal, Some(&anatomy), &mut notes, watch)),
                 }
             }
             (Scan::Surface(file), Goal::Volume(cells, fineness)) => {
@@ -537,7 +560,7 @@ impl Recipe {
                     if repairs != SurfaceRepairs::default() {
                         notes.push(repairs.to_string());
                     }
-                    cover(surface, goal, watch)
+                    cover(surface, goal, None, &mut notes, watch)
                 })
             }
         }
@@ -631,20 +654,16 @@ fn fill(
     Ok((mesh, doubts))
 }
 
-/// The surface of an anatomy as fine as its voxels [m].
-fn extracted(anatomy: &Anatomy<'_>, voxel: f64) -> Result<TriangleMesh, MeshingError> {
-    let mut surface = TriangleMesh::of_field(anatomy.field(), voxel, DEFAULT_CELL_LIMIT)?;
-    surface.smooth(SURFACE_PAIRS);
-    Ok(surface)
-}
-
-/// A surface in the requested triangles or shells, with warnings about it.
+/// A surface in the requested triangles or shells, with warnings about it. That of an image keeps its volume.
 fn cover(
     mut surface: TriangleMesh,
     goal: &Goal,
+    anatomy: Option<&Anatomy<'_>>,
+    notes: &mut Vec<String>,
     watch: Watch<'_>,
 ) -> Result<(Mesh, Vec<String>), MeshingError> {
     watch(DONE[2], MAKING);
+    let input = surface.clone();
     match goal {
         Goal::Shells(goal) => {
             let fitting = |now: FitProgress| watch(DONE[2] + (1.0 - DONE[2]) * now.part, "fitting shells");
@@ -660,5 +679,12 @@ fn cover(
         }
         Goal::Finest | Goal::Volume(..) => {}
     }
-    Ok((surface.to_mesh(), Vec::new()))
+    let warnings = match anatomy.and_then(|anatomy| surface.keep_volume(anatomy)) {
+        Some(kept) => {
+            notes.extend(kept.note());
+            kept.warnings()
+        }
+        None => surface.volume_warning(&input).into_iter().collect(),
+    };
+    Ok((surface.to_mesh(), warnings))
 }

@@ -2,7 +2,8 @@
 
 use pliant_geometry::io::MeshFile;
 use pliant_geometry::{
-    CellBlock, CellId, CellKind, DataArray, Diagnosis, Mesh, Vector3, boundary, diagnose, reorder,
+    CellBlock, CellId, CellKind, DataArray, Diagnosis, Mesh, Vector3, boundary, diagnose,
+    faces_met_by_two_tets, reorder,
 };
 use pliant_meshing::{
     Block, DEFAULT_CELL_LIMIT, Ellipsoid, FieldMesh, ImplicitField, MeshingError, Phantom, Resolution,
@@ -60,6 +61,7 @@ impl Builder<'_> {
         let of_scans = [
             ("label", table.label.is_some(), false),
             ("labels", table.labels.is_some(), false),
+            ("vessels", table.vessels.is_some(), false),
             ("threshold", table.threshold.is_some(), false),
             ("add", table.add.is_some(), false),
             ("names", table.names.is_some(), false),
@@ -229,6 +231,13 @@ impl Builder<'_> {
         }
         if problems.is_empty() {
             self.doubt_size(mesh, path);
+            let met = faces_met_by_two_tets(mesh);
+            if met > 0 {
+                let message = format!("`{}` has {} that two tets meet", path[1], counted(met, "hex face"));
+                let help = "stresses are wrong there, since such faces fail the patch test: make the body of one kind of cells";
+                let place = self.source().span(&place);
+                self.out.push(Diagnostic::warning(message).at(place, "this mesh").help(help));
+            }
             if found.components > 1 {
                 self.notes.push(format!("`{}` is made of {} separate parts", path[1], found.components));
             }
@@ -495,6 +504,7 @@ mod tests {
             ("{ masks = ['a.nii'], edge = 1, threshold = 1, add = 'b.nii' }", "`add` goes with `image`"),
             ("{ masks = [], edge = 1 }", "`masks` names no image"),
             ("{ organ = 'liver', edge = 1, names = 'a.txt' }", "`names` is for images"),
+            ("{ organ = 'liver', edge = 1, vessels = [1] }", "`vessels` is for images"),
             ("{ organ = 'liver', edge = 1, error = 0.1 }", "`error` is for images"),
             ("{ organ = 'liver', edge = 1, as = 'shells' }", "`organ` is not made of shells"),
             (

@@ -14,6 +14,7 @@ mod loads;
 mod mass;
 mod mesh_files;
 mod meshes;
+mod mortar;
 mod node_vectors;
 mod obstacles;
 mod separate;
@@ -41,10 +42,10 @@ use crate::scene::Scene;
 use crate::source::Source;
 
 use contacts::Partner;
-pub(crate) use contacts::{Meet, overlaps, told_overlap, touches};
+pub(crate) use contacts::{Meet, overlaps, told_distance, told_overlap, touches, usual_distance};
 pub use mesh_files::SizeDoubt;
 pub(crate) use meshes::MeshOrigin;
-pub(crate) use ties::{Placed, attach, holds_nothing};
+pub(crate) use ties::{Placed, attach, doubt_points, holds_nothing};
 
 /// A model, and what the outputs need beside it.
 #[derive(Clone, Debug)]
@@ -59,6 +60,8 @@ pub struct Built {
     pub surfaces: Vec<Mesh>,
     /// Contacts with obstacles and tools.
     pub contacts: Option<Arc<Contacts>>,
+    /// Whether states that are written are searched for intersections.
+    pub check_intersections: bool,
     /// Surfaces that bodies of other participants touch.
     pub(crate) meets: Vec<Meet>,
     /// Displacements [m] of all nodes at the start, where bodies were pushed apart.
@@ -224,7 +227,7 @@ pub fn build_watched(
     builder.add_constraints();
     builder.check_turns();
     builder.add_loads();
-    let (contacts, barriers) = builder.contacts().unzip();
+    let (mut contacts, barriers) = builder.contacts().unzip();
     let meets = builder.meets();
     builder.note_touching(contacts.as_deref(), &meets);
     builder.check_outputs();
@@ -236,6 +239,11 @@ pub fn build_watched(
     }
     let start = if builder.failed() { None } else { builder.start() };
     let pushed = if builder.failed() { None } else { builder.separate(contacts.as_deref()) };
+    if let (Some(contacts), false) = (&mut contacts, builder.failed()) {
+        builder.find_near(Arc::make_mut(contacts), pushed.as_ref().map(|moved| &moved[..]));
+    }
+    let is_explicit = !scene.run.solver.solves_equations();
+    let check_intersections = is_explicit && barriers.as_ref().is_some_and(|barriers| barriers.check);
     if let (Some(contacts), Some(barriers), Some(start), true) =
         (&contacts, barriers, &start, scene.run.solver.solves_equations())
     {
@@ -249,7 +257,18 @@ pub fn build_watched(
     let implicit = start.map(|start| {
         Arc::new(ImplicitBodies { model: Arc::new(assembly), cells, control, start, surface: curved })
     });
-    Ok(Built { model, implicit, bodies, surfaces, contacts, meets, pushed, warnings, notes })
+    Ok(Built {
+        model,
+        implicit,
+        bodies,
+        surfaces,
+        contacts,
+        check_intersections,
+        meets,
+        pushed,
+        warnings,
+        notes,
+    })
 }
 
 /// The mesh alone of a body of a scene, in metres, with remarks on how it was made.

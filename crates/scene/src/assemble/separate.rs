@@ -28,8 +28,6 @@ const SWEEPS: usize = 200;
 struct Row {
     parts: Vec<(u32, f64)>,
     normal: Vector3,
-    /// Distance [m] that they keep.
-    offset: f64,
 }
 
 /// Nodes that are pushed.
@@ -46,8 +44,7 @@ struct Pushed {
 impl Pushed {
     fn push(&mut self, row: &Row) {
         let place: Vector3 = row.parts.iter().map(|&(node, c)| self.places[node as usize] * c).sum();
-        let gap = row.normal.dot(&place) - row.offset;
-        self.push_by(row, gap);
+        self.push_by(row, row.normal.dot(&place));
     }
 
     /// Pushes points with a gap [m] < 0 apart.
@@ -118,18 +115,17 @@ impl Builder<'_> {
 
     /// A pass over a contact.
     fn push_apart(&self, contact: &Contact, contacts: &Contacts, pushed: &mut Pushed) {
-        let offset = contact.touch.offset;
         match &contact.with {
             &With::Rigid(rigid) => {
                 let is_solid = self.holder(&contact.surface).is_some_and(|body| {
                     self.bodies[body].mesh.volume_blocks().any(|block| !block.is_empty())
                 });
-                push_out(&contacts.rigids[rigid], offset, &contact.surface, is_solid, pushed);
+                push_out(&contacts.rigids[rigid], contact.touch.offset, &contact.surface, is_solid, pushed);
             }
             With::Body(other) => {
                 self.push_nodes_out(&contact.surface, other, pushed);
                 self.push_nodes_out(other, &contact.surface, pushed);
-                push_pairs(&contact.surface, Some(other), offset, pushed);
+                push_pairs(&contact.surface, other, pushed);
             }
             // What is near at rest never touches.
             With::Itself => {}
@@ -160,7 +156,7 @@ impl Builder<'_> {
             let Some(normal) = (on.position - at).try_normalize(pushed.left) else { continue };
             let on = on.nodes.iter().zip(on.weights).map(|(&corner, weight)| (own.node(corner), -weight));
             let parts = std::iter::once((node, 1.0)).chain(on).collect();
-            pushed.push(&Row { parts, normal, offset: 0.0 });
+            pushed.push(&Row { parts, normal });
         }
     }
 
@@ -252,7 +248,7 @@ fn push_out(rigid: &Rigid, offset: f64, surface: &Surface, is_solid: bool, pushe
         {
             (normal, depth) = (inward, -way);
         }
-        pushed.push_by(&Row { parts, normal, offset: 0.0 }, depth);
+        pushed.push_by(&Row { parts, normal }, depth);
     };
     let mut inward = vec![Vector3::zeros(); if is_solid { pushed.places.len() } else { 0 }];
     let longest = surface.longest_edge(|node| pushed.places[node as usize]);
@@ -292,17 +288,17 @@ fn way_out(from: &Vector3, along: &Vector3, thinnest: f64, gap: impl Fn(&Vector3
     None
 }
 
-/// Pushes nodes and faces, and edges and edges, of surfaces apart.
-fn push_pairs(first: &Surface, second: Option<&Surface>, offset: f64, pushed: &mut Pushed) {
+/// Pushes nodes and faces, and edges and edges, of two surfaces out of each other.
+fn push_pairs(first: &Surface, second: &Surface, pushed: &mut Pushed) {
     let mut rows = Vec::new();
     {
         let place = |node: u32| pushed.places[node as usize];
-        let mut pairs = Pairs::new(first, second, offset, place);
+        let mut pairs = Pairs::new(first, Some(second), 0.0, place);
         pairs.update(place);
         pairs.find(place, |pair| {
-            if pair.distance < offset {
+            if pair.distance < 0.0 {
                 let parts = pair.nodes.into_iter().zip(pair.weights).collect();
-                rows.push(Row { parts, normal: pair.normal, offset });
+                rows.push(Row { parts, normal: pair.normal });
             }
         });
     }

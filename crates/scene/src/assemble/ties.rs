@@ -1,6 +1,6 @@
 //! Ties: nodes of one body that follow the cells of another.
 
-use pliant_geometry::{CellId, QualityReport};
+use pliant_geometry::{CellId, Mesh, QualityReport};
 use pliant_implicit::CarriedTurn;
 use pliant_mechanics::Model;
 use pliant_mechanics::mapping::Weights;
@@ -8,13 +8,16 @@ use pliant_mechanics::model::Cells;
 use pliant_mechanics::tie::TieError;
 use pliant_sim::{counted, number};
 
+use super::mortar::Joint;
 use super::{Builder, BuiltBody, in_metres};
 use crate::diagnostic::Diagnostic;
 use crate::format::{Rotations, TieTable};
 use crate::source::Source;
 
 /// Part of the median edge of the followed body that a gap may have.
-const GAP: f64 = 0.1;
+pub(super) const GAP: f64 = 0.1;
+/// A body whose edges are longer by this factor than those of what it follows is coarser.
+const COARSER: f64 = 1.2;
 /// A body inside another that takes more of its volume is reported: both are stiff there.
 const CROWDED: f64 = 1e-3;
 
@@ -24,8 +27,10 @@ pub(crate) struct Attached {
     pub nodes: Vec<u32>,
     /// Nodes of the second model with their weights, for each of them.
     pub mapping: Weights,
-    /// The cell that holds each of them.
-    cells: Vec<CellId>,
+    /// The cell that holds each of them; none by mortar rows.
+    pub(super) cells: Vec<CellId>,
+    /// The widest gap [m].
+    pub(super) widest: f64,
     /// A remark on how many there are, and the widest gap.
     pub note: String,
 }
@@ -39,6 +44,11 @@ pub(crate) struct Placed<'b> {
     pub index: usize,
 }
 
+/// The median edge of a mesh [m].
+pub(super) fn median_edge(mesh: &Mesh) -> f64 {
+    QualityReport::new(mesh).edge_length.map_or(0.0, |edges| edges.median)
+}
+
 /// Finds where nodes of one body lie in another one, and reports the nodes that are too far away.
 pub(crate) fn attach(
     source: &Source,
@@ -49,8 +59,7 @@ pub(crate) fn attach(
 ) -> Option<Attached> {
     let path = ["tie", name, "between"];
     let names = &table.between;
-    let median = QualityReport::new(&host.body.mesh).edge_length.map_or(0.0, |edges| edges.median);
-    let tolerance = table.tolerance.unwrap_or(GAP * median);
+    let tolerance = table.tolerance.unwrap_or(GAP * median_edge(&host.body.mesh));
     let locator = host.body.locator();
     let own = &host.model.bodies[host.index];
     let (mut tied, mut rows, mut cells, mut left) = (Vec::new(), Vec::new(), Vec::new(), 0);
@@ -111,7 +120,30 @@ pub(crate) fn attach(
         names[1],
         number(widest)
     );
-    Some(Attached { nodes: tied, mapping: Weights::from_rows(rows.iter().map(Vec::as_slice)), cells, note })
+    let mapping = Weights::from_rows(rows.iter().map(Vec::as_slice));
+    Some(Attached { nodes: tied, mapping, cells, widest, note })
+}
+
+/// A warning that the points of a coarse body hold a fine one, whose nodes in between stay free.
+pub(crate) fn doubt_points(
+    source: &Source,
+    name: &str,
+    table: &TieTable,
+    [guest, host]: [&BuiltBody; 2],
+) -> Option<Diagnostic> {
+    let [mine, theirs] = [guest, host].map(|body| median_edge(&body.mesh));
+    if guest.is_of_bars() || host.is_of_bars() || mine <= COARSER * theirs {
+        return None;
+    }
+    let [coarse, fine] = &table.between;
+    let message = format!(
+        "`{coarse}` is coarser than `{fine}` (median edges {} and {} m), so nodes of `{fine}` between its nodes stay free",
+        number(mine),
+        number(theirs)
+    );
+    let help = format!("name `{fine}` first: `between = [\"{fine}\", \"{coarse}\"]`");
+    let at = source.span(&["tie", name, "between"]);
+    Some(Diagnostic::warning(message).at(at, "the finer one second").help(&help))
 }
 
 /// The complaint about a bar that shall hold another body.
@@ -168,6 +200,7 @@ impl Builder<'_> {
         let placed = |index: usize| Placed { body: &self.bodies[index], model: &self.assembly.model, index };
         let (source, out) = (&self.scene.source, &mut self.out);
         let found = attach(source, (name, table), (placed(guest), &nodes), placed(host), out)?;
+        let found = self.by_method(Joint { name, table, guest, host }, &nodes, found)?;
         self.notes.push(found.note);
         if follow {
             let turns =

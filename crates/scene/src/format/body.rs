@@ -86,14 +86,17 @@ pub struct BodyTable {
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub damping: f64,
-    /// Stiffness-proportional damping [s] with the solver `implicit`; the same for all bodies of a participant.
+    /// Stiffness-proportional damping β [s] with the solver `implicit`, and with `explicit` of all bodies but shells; the same for all bodies of
+    /// a participant. It damps a vibration of angular frequency ω with the ratio βω/2. An explicit step shrinks with it, from the critical time step
+    /// Δt to √(β² + Δt²) − β.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub stiffness_damping: f64,
-    /// Stiffness against hourglass patterns of `hex8`, as a multiple of the shear modulus; above about 0.5 it stiffens
-    /// bending. One for the whole body or for each cell label.
-    #[serde(default = "default_hourglass")]
-    pub hourglass: ByLabel<Hourglass>,
+    /// Stiffness against hourglass patterns of `hex8`, as a multiple of the shear modulus at rest; above about 0.5 it stiffens
+    /// bending. One for the whole body or for each cell label. If not given, 0.2 of the current shear modulus of each element, which is at
+    /// least the one at rest.
+    #[serde(default)]
+    pub hourglass: Option<ByLabel<Hourglass>>,
     /// Velocity [m/s] at the start, of all nodes that no constraint holds or moves; not for quasi-static runs.
     #[serde(default)]
     pub velocity: Option<[f64; 3]>,
@@ -107,6 +110,13 @@ pub struct BodyTable {
     /// Direction of the second family of fibres at rest; overrides that of the law.
     #[serde(default)]
     pub second_fibre: Option<Fibre>,
+}
+
+impl BodyTable {
+    /// Whether it names the parts of its cells that it fills, or its mesh has them.
+    pub fn is_filled_in_part(&self) -> bool {
+        self.fraction.is_some() || self.mesh.made_of() == Cells::ImmersedHexes
+    }
 }
 
 fn one() -> f64 {
@@ -146,10 +156,6 @@ pub struct LayerTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub density: Option<f64>,
-}
-
-fn default_hourglass() -> ByLabel<Hourglass> {
-    ByLabel::One(Hourglass(0.2))
 }
 
 /// How a body is modelled.
@@ -249,6 +255,11 @@ pub struct Density(pub f64);
 #[schemars(extend("minimum" = 0.0, "maximum" = 10.0))]
 pub struct Hourglass(pub f64);
 
+impl Hourglass {
+    /// Of a body that gives none: a bent cube then has the right energy.
+    pub const DEFAULT: Self = Self(0.2);
+}
+
 /// Fibre direction at rest: `fibre = [x, y, z]` for one direction everywhere, whose length does not matter, or a table with exactly
 /// one of the keys below for a direction in each element, such as `fibre = { cell-data = "fibre" }`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -317,9 +328,10 @@ pub enum Element {
     Tet4Ianp,
     /// Linear tetrahedron with improved average nodal pressure as in NiftySim; not the gradient of an energy.
     Tet4IanpNiftysim,
-    /// Uniform-strain hexahedron with hourglass control.
+    /// Uniform-strain hexahedron with hourglass control: the default of hexahedra.
     Hex8,
-    /// Hexahedron with eight points and one mean dilatation: no hourglass patterns, eight stresses a cell.
+    /// Hexahedron with eight points and one mean dilatation: no hourglass patterns, eight stresses a cell. The default of elements that the
+    /// body fills in part, unless `hourglass` is given or the law has no energy of the volume alone.
     Hex8Full,
     /// Shell: discrete Kirchhoff triangle and the mean membrane strain of the curved triangle: the recommended one.
     DktCurved,
@@ -394,6 +406,11 @@ pub struct MeshTable {
     /// `hourglass` by label. The first label takes what cleaning adds.
     #[serde(default)]
     pub labels: Option<Vec<Label>>,
+    /// Labels of vessels in the organ of `label` or `labels`, by number, name or range. Where they run inside of the organ, their voxels belong
+    /// to it, with the label of the tissue round them; outside of it they do not. A voxel is inside if more than half of the 26 ways from it
+    /// lead through vessels into the organ.
+    #[serde(default)]
+    pub vessels: Option<Vec<Label>>,
     /// Instead of labels: all voxels of at least this value, as of a map of probabilities. Their label is 1.
     #[serde(default)]
     pub threshold: Option<f64>,

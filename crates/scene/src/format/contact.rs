@@ -262,9 +262,9 @@ impl ImageTool {
     }
 }
 
-/// Who touches whom: a body an obstacle or a tool, another body, or itself. No surface goes into the other. With the solver `explicit`, for bodies
-/// without bending; bodies that touch each other are solids. With the solvers `implicit` and `static`, for solids and shells: a barrier
-/// keeps surfaces apart, and no state that is accepted has an intersection. The force on the second is in `csv` outputs as `contact.NAME`.
+/// Who touches whom: a body an obstacle or a tool, another body, or itself. With the solver `explicit`, for bodies without bending, impulses keep
+/// surfaces apart; bodies that touch each other are solids. With the solvers `implicit` and `static`, for solids and shells, a barrier does. Only barriers
+/// exclude intersections: no state that is accepted has one. The force on the second is in `csv` outputs as `contact.NAME`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ContactTable {
@@ -281,8 +281,9 @@ pub struct ContactTable {
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub friction: f64,
-    /// Distance [m] that the surfaces keep; 0 if not given. With the solvers `implicit` and `static`, if not given: half of the thickness of
-    /// each shell that takes part.
+    /// Distance [m] that the surfaces keep. If not given: with the solver `explicit` 0.5 % of the mean edge between two bodies and of a body with itself, 0 from a
+    /// rigid thing; with the solvers `implicit` and `static` half of the thickness of each shell that takes part. Nodes of explicit bodies that are nearer at
+    /// the start keep the distance that they have.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub thickness: Option<f64>,
@@ -305,8 +306,10 @@ pub struct ContactTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub creep_speed: Option<f64>,
-    /// Whether each state is searched for edges that go through triangles, by a way of its own. One would be a fault of the program, and ends the
-    /// run. Holds for all contacts of the solver.
+    /// Whether states are searched for edges that go through triangles, by a way of its own. With the solvers `implicit` and `static` the search looks at
+    /// each state; an intersection would be a fault of the program, and ends the run. With the solver `explicit` the search looks at the states that
+    /// outputs write, and counts the intersections of bodies that are deeper than 1e-4 of the mean edge: a warning, and `intersections` in `--json`.
+    /// Holds for all contacts of the solver.
     #[serde(default)]
     pub check_intersections: bool,
     /// Whether bodies that overlap at the start are pushed apart before the run, by the least ways of their nodes. The shape at rest stays as it is, so that

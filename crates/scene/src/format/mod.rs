@@ -31,7 +31,7 @@ pub use load::{
 };
 pub use output::{At, CsvTable, FieldName, ProbeTable, VtuTable};
 pub use participant::ParticipantTable;
-pub use tie::{Rotations, TieTable};
+pub use tie::{Rotations, TieMethod, TieTable};
 pub use view::{
     BackgroundName, CameraTable, Choice, ClipTable, ColourBy, Component, Labels, LookColour, LookTable,
     MapName, Nothing, TextureName, UpName, ViewTable,
@@ -125,6 +125,11 @@ pub struct RunTable {
     /// What a `static` run prescribes instead of the size of a load, so that it goes past limit points.
     #[serde(default)]
     pub control: Option<ControlTable>,
+    /// The part of the internal energy that a run may hold in hourglass modes of `hex8` at its end. With more it writes all outputs and ends
+    /// with an error: the shape of the elements is not resolved.
+    #[serde(default = "tenth")]
+    #[schemars(range(min = 0.0))]
+    pub allow_hourglass: f64,
     /// Threads; 0: one per core. The number never changes a result.
     #[serde(default)]
     #[schemars(range(max = 1024))]
@@ -132,6 +137,10 @@ pub struct RunTable {
     /// Checkpoints to resume an interrupted run from (`pliant run --resume`); the last two are kept.
     #[serde(default)]
     pub checkpoint: Option<CheckpointTable>,
+}
+
+fn tenth() -> f64 {
+    0.1
 }
 
 /// When checkpoints are written.

@@ -96,6 +96,7 @@ impl ParticipantTable {
             adapter: self.adapter.clone().or(run.adapter),
             #[cfg(feature = "gpu")]
             design: self.design.or(run.design),
+            allow_hourglass: run.allow_hourglass,
             threads: run.threads,
             checkpoint: run.checkpoint,
         }

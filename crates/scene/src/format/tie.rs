@@ -4,15 +4,19 @@ use pliant_geometry::Selection;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Ties the nodes of one body to another body, whose mesh need not match: each follows the cell of the other in which it lies, or on
-/// whose surface, and its forces and its mass go there. For vessels inside an organ, walls on a surface, parts that are glued. Bodies of
-/// two participants are tied by springs, as stiff as their steps allow. On the CPU.
+/// Ties the nodes of one body to another body, whose mesh need not match: they follow nodes of the other, and their forces and masses go
+/// there. For vessels inside an organ, walls on a surface, parts that are glued. Bodies of two participants are tied by springs, as stiff as
+/// their steps allow.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct TieTable {
-    /// The body whose nodes follow, and the body that they follow: `between = ["vessels", "liver"]`. Take the finer or the softer one
-    /// first.
+    /// The body whose nodes follow, and the body that they follow: `between = ["vessels", "liver"]`. With `points`, take the finer or the
+    /// softer one first.
     pub between: [String; 2],
+    /// How nodes follow. If not given, `mortar` where faces of one solid lie on those of another one, and `points` elsewhere: walls, bars, a
+    /// solid inside another one, and gaps wider than the default `tolerance`.
+    #[serde(default)]
+    pub method: Option<TieMethod>,
     /// The nodes of the first body that follow; if not given, all inside or on the second.
     #[serde(default)]
     pub nodes: Option<Selection>,
@@ -23,6 +27,16 @@ pub struct TieTable {
     /// What the rotations of tied nodes of a shell do, with the solvers `implicit` and `static`.
     #[serde(default)]
     pub rotations: Rotations,
+}
+
+/// How nodes of a body follow another body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum TieMethod {
+    /// Weighted means over the common area of faces of two solids, so that a constant stress passes in either order.
+    Mortar,
+    /// Each node follows the element of the other body in which it lies, or on whose surface.
+    Points,
 }
 
 /// What rotations of nodes of a shell do whose places go with a solid.

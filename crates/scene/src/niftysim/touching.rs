@@ -88,14 +88,14 @@ impl Touching {
                 }
             }
             *met = true;
-            lines.push_str(&how(thing.friction, thing.margin));
+            lines.push_str(&how(thing.friction, Some(thing.margin).filter(|&margin| margin > 0.0)));
             self.tables.push_str(&lines);
         }
     }
 
     /// The contacts of bodies with each other and themselves.
     fn write_bodies(&mut self, writer: &mut Writer, Bodies { themselves, friction }: Bodies) {
-        let how = how(friction, self.contact.margin);
+        let how = how(friction, Some(self.contact.margin));
         let mut any = false;
         for (at, (body, pieces)) in self.bodies.iter().enumerate() {
             for (other, _) in &self.bodies[at + 1..] {
@@ -124,11 +124,11 @@ impl Touching {
     }
 }
 
-/// Friction and distance of a contact, and an empty line.
-fn how(friction: f64, margin: f64) -> String {
+/// Friction and distance of a contact, and an empty line. Bodies that keep none say so.
+fn how(friction: f64, thickness: Option<f64>) -> String {
     let mut lines = format!("friction = {friction:?}\n");
-    if margin > 0.0 {
-        let _ = writeln!(lines, "thickness = {margin:?}");
+    if let Some(thickness) = thickness {
+        let _ = writeln!(lines, "thickness = {thickness:?}");
     }
     lines.push('\n');
     lines

@@ -9,7 +9,7 @@ use pliant_implicit::State;
 use pliant_sim::{Precision, counted};
 
 use crate::assemble::Builder;
-use crate::format::{BodyModel, BodyTable, DeviceName, Element, SolverName};
+use crate::format::{BodyModel, DeviceName, Element, SolverName};
 use crate::registry::OutputTable;
 
 impl Builder<'_> {
@@ -19,7 +19,10 @@ impl Builder<'_> {
         let is_implicit = scene.is_implicit();
         self.check_keys_of_solver(is_implicit);
         self.check_keys_of_bodies(is_implicit);
-        let Some((first, table)) = scene.bodies.first().filter(|_| is_implicit) else { return };
+        self.check_stiffness_damping(is_implicit);
+        if scene.bodies.is_empty() || !is_implicit {
+            return;
+        }
         let solver = scene.run.solver.word();
         let of_model = |model: BodyModel| scene.bodies.iter().find(|(_, body)| body.model == model);
         if let (Some((solid, _)), Some((shell, _)), false) = (
@@ -77,26 +80,30 @@ impl Builder<'_> {
             let help = "leave it out; their step is compared with the critical one at rest before the run";
             self.error(&scene.run_at("on-unstable"), message, "not for these bodies", help);
         }
-        let other = |(_, body): &&(String, BodyTable)| {
-            body.on.is_none() && body.stiffness_damping != table.stiffness_damping
-        };
-        if let Some((name, _)) = scene.bodies.iter().find(other) {
+    }
+
+    /// Rejects damping by stiffness that differs between bodies, or that the solver does not have.
+    fn check_stiffness_damping(&mut self, is_implicit: bool) {
+        let scene = self.scene;
+        let mut own = scene.bodies.iter().filter(|(_, body)| body.on.is_none());
+        let Some((first, table)) = own.next() else { return };
+        if let Some((name, _)) = own.find(|(_, body)| body.stiffness_damping != table.stiffness_damping) {
             let message = format!("`{name}` and `{first}` have different `stiffness-damping`");
-            let help = "bodies of a participant share one value with this solver";
+            let help = "bodies of a participant share one value";
             self.error(&["body", name, "stiffness-damping"], message, "another", help);
         }
-        if table.stiffness_damping > 0.0 && scene.run.solver != SolverName::Implicit {
-            let message = format!(
-                "damping by stiffness needs the solver `implicit`, not `{}`",
-                scene.run.solver.word()
-            );
+        let solver = scene.run.solver;
+        let (damps, wanted) = match (solver, is_implicit) {
+            (SolverName::Implicit, _) | (SolverName::Explicit, false) => (true, ""),
+            (SolverName::Explicit, true) => (false, "the solver `implicit` for shells"),
+            (SolverName::QuasiStatic, _) => (false, "the solver `explicit` or `implicit`"),
+            _ => (false, "the solver `implicit`"),
+        };
+        if table.stiffness_damping > 0.0 && !damps {
+            let message = format!("damping by stiffness needs {wanted}, not `{}`", solver.word());
+            let help = "leave it out, or take `solver = \"implicit\"`";
             let path = ["body", first.as_str(), "stiffness-damping"];
-            self.error(
-                &path,
-                message,
-                "not with this solver",
-                "leave it out, or take `solver = \"implicit\"`",
-            );
+            self.error(&path, message, "not with this solver", help);
         }
     }
 
@@ -168,7 +175,6 @@ impl Builder<'_> {
                 ("crease", shell, "a shell"),
                 ("normals", shell, "a shell"),
                 ("branches", shell, "a shell"),
-                ("stiffness-damping", is_implicit, "shells and the solver `implicit`"),
                 ("initial-displacement", is_implicit, "shells and the solvers `implicit` and `static`"),
                 ("hourglass", body.model == BodyModel::Solid, "`model = \"solid\"`"),
                 ("layers", shell, "a shell"),
