@@ -69,7 +69,7 @@ typedef struct PliantError {
     int64_t element;
     /* Time [s] of the simulation; NaN if it is about none. */
     double time;
-    /* Of `PLIANT_STATUS_FAILED`: `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `blocked`, `intersecting`, `device`, `output` or `input`. */
+    /* Of `PLIANT_STATUS_FAILED`: `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `blocked`, `intersecting`, `hourglass`, `device`, `output` or `input`. */
     char kind[32];
     /* The body that it is about. */
     char body[64];
@@ -307,6 +307,8 @@ typedef struct PliantEnergies {
     double hourglass;
     /* Work from outside. */
     double external;
+    /* What explicit steps of changing length added. */
+    double step_changes;
     /* What is missing of their balance over the largest of them so far: above 0.05 a run is questionable. */
     double balance;
 } PliantEnergies;

@@ -68,7 +68,7 @@ pub struct PliantError {
     pub element: i64,
     /// Time [s] of the simulation; NaN if it is about none.
     pub time: f64,
-    /// Of `PLIANT_STATUS_FAILED`: `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `blocked`, `intersecting`, `device`, `output` or `input`.
+    /// Of `PLIANT_STATUS_FAILED`: `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `blocked`, `intersecting`, `hourglass`, `device`, `output` or `input`.
     pub kind: [c_char; 32],
     /// The body that it is about.
     pub body: [c_char; 64],

@@ -258,6 +258,8 @@ pub struct PliantEnergies {
     pub hourglass: f64,
     /// Work from outside.
     pub external: f64,
+    /// What explicit steps of changing length added.
+    pub step_changes: f64,
     /// What is missing of their balance over the largest of them so far: above 0.05 a run is questionable.
     pub balance: f64,
 }
@@ -274,9 +276,10 @@ pub unsafe extern "C" fn pliant_energies(
     unsafe {
         running(context, simulation, error, |own| {
             own.look()?;
-            let Energies { kinetic, internal, damping, hourglass, external, balance, .. } =
+            let Energies { kinetic, internal, damping, hourglass, external, step_changes, balance } =
                 own.simulation.energies();
-            let all = PliantEnergies { kinetic, internal, damping, hourglass, external, balance };
+            let all =
+                PliantEnergies { kinetic, internal, damping, hourglass, external, step_changes, balance };
             give(energies, "energies", all)
         })
     }

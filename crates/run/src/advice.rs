@@ -1,12 +1,12 @@
-//! What to try after a failed step. It depends on what the run does already: nobody is told to switch on what is on, to take a
-//! smaller step where steps are kept below the limit, or to damp more where damping is the trouble.
+//! What to try after a failed step. It depends on what the run does already: nobody is told to switch on what is on, or to damp more where
+//! damping is the trouble.
 
 use pliant_explicit::stability::OnUnstable;
 use pliant_sim::contact::touch::{Contact, With};
-use pliant_sim::{Failure, Instant, Precision, number};
+use pliant_sim::{Failure, Instant, Precision, counted, number};
 
 use pliant_scene::format::SolverName;
-use pliant_scene::{Built, Part, Plan};
+use pliant_scene::{Built, Part};
 
 /// Damping [1/s] times step [s] from which on a step does not resolve the damping: central differences take
 /// (1 − a) / (1 + a) of a velocity over a step, a = ½ damping × step, and 2 turns it round.
@@ -18,21 +18,27 @@ pub(crate) fn remedy(failure: &Failure, part: &Part, now: &dyn Instant) -> Optio
     if scene.run.solver != SolverName::Explicit || built.implicit.is_some() {
         return None;
     }
-    if let Some(told) = too_much_damping(failure, built, plan) {
-        return Some(told);
-    }
     let on_unstable = scene.run.on_unstable.unwrap_or_default();
     let stability = now.stability();
+    let step = plan.steps.step / f64::from(1 << stability.halvings);
+    if let Some(told) = too_much_damping(failure, built, step) {
+        return Some(told);
+    }
     let seen = stability.smallest.as_ref().map(|look| look.limit / plan.steps.step);
+    let cuts = match stability.halvings {
+        0 => "the run cuts its steps already".to_owned(),
+        n => format!("the run cuts its steps, went back {} and halved them", counted(n as usize, "time")),
+    };
+    let shorter = format!("a `step` of {} s or less", number(0.5 * step));
     let told = match (failure.kind, on_unstable) {
-        ("unstable", OnUnstable::Substep) => "its steps are cut into 100 parts at the most, and that is not enough: try a slower or smaller \
-                                              motion, or a coarser mesh there"
-            .into(),
+        ("unstable", OnUnstable::Substep) => format!(
+            "{cuts}, into 100 parts at the most, and that is not enough: try a slower or smaller motion, a coarser mesh there, or {shorter}"
+        ),
         ("unstable", _) => {
             "try a smaller `step` or a slower motion, or let the run cut its steps (`on-unstable = \"substep\"`)".into()
         }
         ("inverted", OnUnstable::Substep) => {
-            "the run cuts its steps already: try a slower or smaller motion or load, more damping, or a finer mesh there".into()
+            format!("{cuts}: try {shorter}, a slower or smaller motion or load, more damping, or a finer mesh there")
         }
         ("inverted", _) => "try a slower or smaller motion or load, `on-unstable = \"substep\"`, a smaller `step`, more damping, or a finer \
                             mesh there"
@@ -46,7 +52,8 @@ pub(crate) fn remedy(failure: &Failure, part: &Part, now: &dyn Instant) -> Optio
         ("not-finite" | "unbalanced", _) => {
             let single = plan.target.precision == Precision::Single;
             let precise = if single { ", or `precision = \"double\"`" } else { "" };
-            format!("the step is held below the limit already: try a slower motion, a smoother curve or a smaller load{precise}")
+            let held = if on_unstable == OnUnstable::Substep { &cuts } else { "the step is below the limit" };
+            format!("{held}: try {shorter}, a slower motion, a smoother curve or a smaller load{precise}")
         }
         _ => return None,
     };
@@ -71,16 +78,16 @@ fn pushing(part: &Part, now: &dyn Instant) -> String {
 }
 
 /// That damping is what the steps are too long for, where it is so.
-fn too_much_damping(failure: &Failure, built: &Built, plan: &Plan) -> Option<String> {
+fn too_much_damping(failure: &Failure, built: &Built, step: f64) -> Option<String> {
     let body = built.model.bodies.iter().find(|body| failure.body.as_deref() == Some(&body.name))?;
-    (body.damping * plan.steps.step > RESOLVED).then(|| {
+    (body.damping * step > RESOLVED).then(|| {
         format!(
             "the damping of `{}`, {} 1/s, is too strong for steps of {} s: it turns velocities round; take `damping` below {} 1/s or a \
              `step` below {} s",
             body.name,
             number(body.damping),
-            number(plan.steps.step),
-            number(RESOLVED / plan.steps.step),
+            number(step),
+            number(RESOLVED / step),
             number(RESOLVED / body.damping)
         )
     })

@@ -2,7 +2,8 @@
 //!
 //! The file: [`MAGIC`], the [`FORMAT`] (u32), the length of the body (u64), the body in postcard's encoding, and the
 //! CRC-32 of all before it (u32); little-endian. The body: [`Origin`] (what the run was), [`Progressed`] (how far it
-//! and its outputs were), then the states of its participants with what a restart needs beside them. A file appears under its name only once it is whole.
+//! and its outputs were), the states of its participants with what a restart needs beside them, and its rollback points: of each how far the run
+//! was, and the states. A file appears under its name only once it is whole.
 
 use std::fs;
 use std::io::Write;
@@ -14,13 +15,14 @@ use pliant_sim::{Precision, Schedule, State, counted, number};
 use serde::{Deserialize, Serialize};
 
 use crate::output::{History, OutputError, OutputFolder, Watched, Written, replace};
+use crate::rollback::Point;
 use pliant_scene::format::{LoadSteps, SolverName};
 use pliant_scene::{Part, World};
 
 /// The first bytes of every checkpoint.
 const MAGIC: [u8; 8] = *b"\x89PLIANT\n";
 /// The version of what follows. Any change of what is in a body needs the next number.
-pub(crate) const FORMAT: u32 = 18;
+pub(crate) const FORMAT: u32 = 19;
 /// Bytes before the body: magic, format, length.
 const HEAD: usize = 20;
 /// Bytes after it.
@@ -329,7 +331,11 @@ pub struct Checkpoint {
     pub(crate) progressed: Progressed,
     /// The participants, each encoded.
     participants: Vec<Vec<u8>>,
+    points: Vec<EncodedPoint>,
 }
+
+/// A rollback point: how far the run was, and its participants, each encoded.
+type EncodedPoint = (Progressed, Vec<Vec<u8>>);
 
 impl Checkpoint {
     /// Reads a checkpoint; a folder means the last one in it.
@@ -378,7 +384,9 @@ impl Checkpoint {
             return Err(ResumeError::Damaged { path });
         }
         match postcard::from_bytes(&content[HEAD..]) {
-            Ok((origin, progressed, participants)) => Ok(Self { path, origin, progressed, participants }),
+            Ok((origin, progressed, participants, points)) => {
+                Ok(Self { path, origin, progressed, participants, points })
+            }
             Err(_) => Err(ResumeError::Damaged { path }),
         }
     }
@@ -425,9 +433,8 @@ impl Checkpoint {
         if time > until + 0.51 * step {
             return Err(ResumeError::BeyondTheEnd { time, until });
         }
-        if self.state(world, &world.simulated()).is_none()
-            || self.progressed.outputs.len() != world.scene.outputs.len()
-        {
+        let simulated = world.simulated();
+        if self.state(world, &simulated).is_none() || self.points(world, &simulated).is_none() {
             return Err(ResumeError::Damaged { path: self.path.clone() });
         }
         let mut world = world.clone();
@@ -443,16 +450,36 @@ impl Checkpoint {
 
     /// The state of a world, which is given with and without its tables; `None` where it has other sizes.
     pub(crate) fn state(&self, world: &World, simulated: &pliant_sim::World) -> Option<State> {
+        self.state_at(&self.progressed, &self.participants, world, simulated)
+    }
+
+    /// The rollback points of a world; `None` where one has other sizes.
+    pub(crate) fn points(&self, world: &World, simulated: &pliant_sim::World) -> Option<Vec<Point>> {
+        let point = |(progressed, participants): &EncodedPoint| {
+            let state = self.state_at(progressed, participants, world, simulated)?;
+            Some(Point { progressed: progressed.clone(), state })
+        };
+        self.points.iter().map(point).collect()
+    }
+
+    fn state_at(
+        &self,
+        progressed: &Progressed,
+        participants: &[Vec<u8>],
+        world: &World,
+        simulated: &pliant_sim::World,
+    ) -> Option<State> {
         let parts = &world.participants;
         let constraints: usize = parts.iter().map(|part| part.built.model.constraints.len()).sum();
-        let history = &self.progressed.history;
+        let history = &progressed.history;
         let all = parts.iter().flat_map(|part| &part.built.model.constraints);
         let filled = all.filter(|own| own.motion.encloses()).count();
         let whole = history.reactions.iter().all(|row| row.len() == constraints)
             && history.enclosed.len() == filled * history.times.len()
-            && self.progressed.watched.len() == parts.len()
+            && progressed.watched.len() == parts.len()
+            && progressed.outputs.len() == world.scene.outputs.len()
             && self.origin.participants.len() == parts.len();
-        if whole { State::decode(simulated, &self.participants) } else { None }
+        if whole { State::decode(simulated, participants) } else { None }
     }
 }
 
@@ -481,11 +508,25 @@ impl<'a> Checkpoints<'a> {
         self.schedule.stride(time, step)
     }
 
+    /// Removes those after some steps.
+    pub fn remove_after(&self, steps: u64) -> Result<(), OutputError> {
+        let folder = self.folder.path();
+        let all = checkpoints_in(folder).map_err(|error| OutputError::new(folder, error))?;
+        all.iter()
+            .filter(|(own, _)| *own > steps)
+            .try_for_each(|(_, later)| fs::remove_file(later).map_err(|error| OutputError::new(later, error)))
+    }
+
     /// Writes one, and removes those before the last two.
-    pub fn write(&self, progressed: &Progressed, states: &[Vec<u8>]) -> Result<PathBuf, OutputError> {
+    pub fn write(
+        &self,
+        progressed: &Progressed,
+        state: &State,
+        points: &[Point],
+    ) -> Result<PathBuf, OutputError> {
         let path = self.folder.path().join(name(progressed.steps));
         let failed = |reason: &dyn std::fmt::Display| OutputError::new(&path, reason);
-        let bytes = encode(&self.origin, progressed, states).map_err(|error| failed(&error))?;
+        let bytes = encode(&self.origin, progressed, state, points).map_err(|error| failed(&error))?;
         replace(&path, |file| file.write_all(&bytes).and_then(|()| file.sync_all()))
             .map_err(|error| failed(&error))?;
         let mut earlier = checkpoints_in(self.folder.path()).map_err(|error| failed(&error))?;
@@ -497,8 +538,15 @@ impl<'a> Checkpoints<'a> {
     }
 }
 
-fn encode(origin: &Origin, progressed: &Progressed, participants: &[Vec<u8>]) -> postcard::Result<Vec<u8>> {
-    Ok(Checkpoint::framed(&postcard::to_stdvec(&(origin, progressed, participants))?))
+fn encode(
+    origin: &Origin,
+    progressed: &Progressed,
+    state: &State,
+    points: &[Point],
+) -> postcard::Result<Vec<u8>> {
+    let point = |Point { progressed, state }: &Point| Ok((progressed.clone(), state.encode()?));
+    let points: Vec<EncodedPoint> = points.iter().map(point).collect::<postcard::Result<_>>()?;
+    Ok(Checkpoint::framed(&postcard::to_stdvec(&(origin, progressed, state.encode()?, points))?))
 }
 
 const PREFIX: &str = "checkpoint-";
@@ -545,8 +593,12 @@ mod tests {
             sampling: Schedule::new(0.1),
             outputs: Vec::new(),
         };
-        let states = world.simulation().unwrap().encode().unwrap();
-        encode(&Origin::of(&world), &progressed, &states).unwrap()
+        let state = world.simulation().unwrap().state().unwrap();
+        let point = Point {
+            progressed: Progressed { time: 0.0, steps: 0, ..progressed.clone() },
+            state: state.clone(),
+        };
+        encode(&Origin::of(&world), &progressed, &state, &[point]).unwrap()
     }
 
     #[test]
@@ -589,6 +641,7 @@ mod tests {
             let forged = Checkpoint::framed(&body);
             if let Ok(read) = Checkpoint::from_bytes(Path::new("x.pliant"), &forged) {
                 let _ = read.state(&world, &world.simulated());
+                let _ = read.points(&world, &world.simulated());
             }
         }
     }
@@ -596,7 +649,7 @@ mod tests {
     /// The layout of [`State`] and [`Progressed`] decides what a checkpoint can be read with: whoever changes it gives
     /// [`FORMAT`] the next number, and this test the new bytes.
     #[test]
-    fn the_layout_of_format_18_is_as_it_was() {
+    fn the_layout_of_format_19_is_as_it_was() {
         let bytes = |run: &str| {
             let world = World::new(&scene(run)).unwrap();
             world.simulation().unwrap().encode().unwrap()[0].len()
@@ -613,6 +666,6 @@ mod tests {
         let shell = shell.simulation().unwrap().encode().unwrap()[0].len();
         let explicit = bytes("[run]\nprecision = 'single'\n");
         let quasi_static = bytes("[run]\nprecision = 'single'\nsolver = 'quasi-static'\n");
-        assert_eq!((FORMAT, explicit, quasi_static, shell), (18, 1116, 1475, 1092));
+        assert_eq!((FORMAT, explicit, quasi_static, shell), (19, 1137, 1504, 1100));
     }
 }

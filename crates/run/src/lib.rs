@@ -42,6 +42,7 @@ mod live;
 mod output;
 mod overview;
 mod parts;
+mod rollback;
 mod run;
 mod skin;
 mod snapshot;
@@ -53,8 +54,8 @@ pub use checkpoint::{Checkpoint, ResumeError};
 pub use field_reader::{FieldReader, field_named};
 pub use live::Live;
 pub use output::{
-    AddedMass, BodySummary, Column, GuestSummary, OutputError, OutputFolder, ParticipantSummary,
-    StabilitySummary, Summary, TieSummary, failed_input, failed_output, sampled_columns,
+    AddedMass, BodySummary, Column, GuestSummary, Intersections, OutputError, OutputFolder,
+    ParticipantSummary, StabilitySummary, Summary, TieSummary, failed_input, failed_output, sampled_columns,
 };
 pub use overview::overview;
 pub use parts::{MergedSweep, PartSummary, SweepPart};

@@ -73,6 +73,18 @@ impl Live {
         Ok(())
     }
 
+    /// Halves the steps from here on. Hands let go.
+    ///
+    /// # Errors
+    /// If the steps can't be halved, the state can't be taken, or a stepper can't be made.
+    pub fn halve_steps(&mut self) -> Result<(), Failure> {
+        let mut state = self.simulation.state()?;
+        if !state.halve_steps(self.simulation.world()) {
+            return Err(Failure::input(&"the steps of this scene can't be halved"));
+        }
+        self.restore(state)
+    }
+
     /// Goes on with other numbers (laws, loads, steps) from the present state. False, and nothing changes, where the other world has other
     /// meshes, solvers or number types.
     ///

@@ -7,16 +7,18 @@ use std::time::{Duration, Instant};
 
 use pliant_explicit::Wanted;
 use pliant_geometry::Mesh;
+use pliant_sim::contact::barrier::IntersectionCheck;
 use pliant_sim::{Failure, LoadStepProgress, Observer, Schedule, Simulation, StopFlag};
 
 use crate::advice::remedy;
 use crate::checkpoint::{Checkpoint, Checkpoints, Progressed};
 use crate::output::{
     CONVERGENCE, FieldMesh, GuestSummary, History, Outcome, OutputError, OutputFolder, Outputs, PICTURE,
-    PLOT, PartOutcome, SUMMARY, Summary, TieSummary, Watched, frames, interrupted, markdown, output_failure,
-    plot, summarise,
+    PLOT, PartOutcome, SUMMARY, Summary, TieSummary, Watched, frames, hourglass_failure, interrupted,
+    markdown, output_failure, plot, summarise,
 };
-use pliant_scene::World;
+use crate::rollback::{Point, RollbackPoints};
+use pliant_scene::{Part, World};
 
 /// Draws an instant of a run.
 pub trait Draw: fmt::Debug + Sync {
@@ -154,20 +156,33 @@ fn go(
     })
 }
 
+/// The search for intersections of a participant that asks for one.
+fn check_of(part: &Part) -> Option<IntersectionCheck> {
+    let contacts = part.built.contacts.as_deref().filter(|_| part.built.check_intersections)?;
+    Some(IntersectionCheck::new(contacts, &part.built.model.rest))
+}
+
 /// Whether states lie on a GPU.
 fn is_on_device(world: &World) -> bool {
     world.participants.iter().any(|part| part.plan.target.is_gpu())
 }
 
 /// What is seen, written and kept of a run.
-struct Run<'a> {
+struct Run<'a, 'env> {
     world: &'a World,
     outputs: Outputs<'a>,
     history: History,
     sampling: Schedule,
     /// The worst of each participant.
     watched: Vec<Watched>,
+    /// The search for intersections of each, where one is asked for.
+    checks: Vec<Option<IntersectionCheck>>,
     checkpoints: Option<Checkpoints<'a>>,
+    /// Where it goes back to after a step that failed.
+    rollback: Option<RollbackPoints>,
+    folder: &'a OutputFolder,
+    /// Where outputs on a thread of their own get it.
+    spare: Option<&'a Scope<'a, 'env>>,
     /// Ends the run once it is asked.
     stop: Option<&'a StopFlag>,
     report: &'a mut (dyn FnMut(Progress) + Send),
@@ -182,7 +197,7 @@ struct Run<'a> {
     kept: Option<PathBuf>,
 }
 
-impl<'a> Run<'a> {
+impl<'a, 'env> Run<'a, 'env> {
     /// At the start, or where a checkpoint was.
     fn new(
         world: &'a World,
@@ -190,7 +205,7 @@ impl<'a> Run<'a> {
         options: Options<'a>,
         simulation: &Simulation,
         report: &'a mut (dyn FnMut(Progress) + Send),
-        spare: Option<&'a Scope<'a, '_>>,
+        spare: Option<&'a Scope<'a, 'env>>,
     ) -> Result<Self, OutputError> {
         let mut files = Vec::new();
         let before = options.resume.map(|checkpoint| &checkpoint.progressed);
@@ -201,6 +216,8 @@ impl<'a> Run<'a> {
             folder.go_on(&world.scene)?;
         }
         let outputs = Outputs::new(world, folder.path(), &mut files, written, spare)?;
+        let points = options.resume.and_then(|checkpoint| checkpoint.points(world, simulation.world()));
+        let points = points.unwrap_or_default();
         let fresh = || vec![Watched::default(); world.participants.len()];
         let started = Instant::now();
         Ok(Self {
@@ -209,7 +226,11 @@ impl<'a> Run<'a> {
             history: before.map_or_else(History::default, |before| before.history.clone()),
             sampling: before.map_or(sampling, |before| before.sampling),
             watched: before.map_or_else(fresh, |before| before.watched.clone()),
+            checks: world.participants.iter().map(check_of).collect(),
             checkpoints: Checkpoints::new(world, folder, simulation.time()),
+            rollback: RollbackPoints::new(simulation.world(), points),
+            folder,
+            spare,
             stop: options.stop,
             report,
             reported: started,
@@ -227,7 +248,7 @@ impl<'a> Run<'a> {
         folder: &OutputFolder,
         options: Options<'_>,
     ) -> Outcome {
-        let failure = simulation.observe(self.world.scene.scene.until, &mut self).err();
+        let failure = self.go(&mut simulation).err();
         // What the run has failed at counts before what its outputs have.
         let failure = failure.or(self.outputs.end().err());
         let failure = failure.map(|failure| self.advised(failure, &simulation));
@@ -240,7 +261,7 @@ impl<'a> Run<'a> {
         let wall_seconds = self.wall_seconds();
         let Self { world, watched, history, files, kept, .. } = self;
         let parts = world.participants.iter().zip(simulation.instants()).zip(watched);
-        Outcome {
+        let mut outcome = Outcome {
             failure,
             steps: simulation.steps(),
             time: simulation.time(),
@@ -255,7 +276,78 @@ impl<'a> Run<'a> {
             picture: drawn,
             threads: rayon::current_num_threads(),
             resumed: options.resume.map(|checkpoint| (checkpoint.path().to_owned(), checkpoint.time())),
+        };
+        if outcome.failure.is_none() {
+            outcome.failure = hourglass_failure(world, &outcome);
         }
+        outcome
+    }
+
+    /// Takes all steps. After one that fails it goes back, if shorter steps may avoid the failure, and halves them.
+    fn go(&mut self, simulation: &mut Simulation) -> Result<(), Failure> {
+        if self.rollback.as_ref().is_some_and(|points| points.points().is_empty()) {
+            self.keep_point(simulation)?;
+        }
+        loop {
+            let Err(failure) = simulation.observe(self.world.scene.scene.until, self) else { return Ok(()) };
+            let points = self.rollback.as_mut();
+            match points.and_then(|points| points.take(simulation.world(), &failure)) {
+                Some(point) => self.go_back(simulation, point)?,
+                None => return Err(failure),
+            }
+        }
+    }
+
+    /// Goes back to a point. Rows, frames and checkpoints since then are removed.
+    fn go_back(&mut self, simulation: &mut Simulation, point: Point) -> Result<(), Failure> {
+        let Point { progressed, state } = point;
+        let Progressed { time, steps, watched, history, sampling, outputs, .. } = progressed;
+        self.outputs.end()?;
+        simulation.restore(state)?;
+        (self.watched, self.history, self.sampling) = (watched, history, sampling);
+        let failed = |error| output_failure(&error, Some(time));
+        let mut known = Vec::new();
+        let (world, path) = (self.world, self.folder.path());
+        self.outputs = Outputs::new(world, path, &mut known, Some(&outputs), self.spare).map_err(failed)?;
+        self.outputs.remove_later().map_err(failed)?;
+        self.checkpoints = Checkpoints::new(world, self.folder, time);
+        if let Some(checkpoints) = &self.checkpoints {
+            checkpoints.remove_after(steps).map_err(failed)?;
+            self.write_checkpoint(simulation)?;
+        }
+        Ok(())
+    }
+
+    /// How far the run is.
+    fn progressed(&mut self, simulation: &Simulation) -> Result<Progressed, Failure> {
+        Ok(Progressed {
+            time: simulation.time(),
+            steps: simulation.steps(),
+            wall_seconds: self.wall_seconds(),
+            watched: self.watched.clone(),
+            history: self.history.clone(),
+            sampling: self.sampling,
+            outputs: self.outputs.written()?,
+        })
+    }
+
+    fn keep_point(&mut self, simulation: &mut Simulation) -> Result<(), Failure> {
+        // The wall time goes on.
+        let progressed = Progressed { wall_seconds: 0.0, ..self.progressed(simulation)? };
+        let point = Point { progressed, state: simulation.state()? };
+        if let Some(points) = &mut self.rollback {
+            points.keep(point);
+        }
+        Ok(())
+    }
+
+    fn write_checkpoint(&mut self, simulation: &mut Simulation) -> Result<(), Failure> {
+        let (state, progressed) = (simulation.state()?, self.progressed(simulation)?);
+        let Some(checkpoints) = &self.checkpoints else { return Ok(()) };
+        let points = self.rollback.as_ref().map_or(&[][..], RollbackPoints::points);
+        let written = checkpoints.write(&progressed, &state, points);
+        self.kept = Some(written.map_err(|error| output_failure(&error, Some(progressed.time)))?);
+        Ok(())
     }
 
     fn wall_seconds(&self) -> f64 {
@@ -313,7 +405,7 @@ impl<'a> Run<'a> {
     }
 }
 
-impl Observer for Run<'_> {
+impl Observer for Run<'_, '_> {
     /// The steps to the next instant at which there is something to do.
     fn stride(&self, simulation: &Simulation) -> u64 {
         let (time, step) = (simulation.time(), simulation.step_length());
@@ -321,6 +413,7 @@ impl Observer for Run<'_> {
             .chain([&self.sampling])
             .map(|schedule| schedule.stride(time, step))
             .chain(self.checkpoints.as_ref().map(|checkpoints| checkpoints.stride(time, step)))
+            .chain(self.rollback.as_ref().map(|points| points.stride(simulation)))
             .fold(u64::MAX, u64::min)
     }
 
@@ -333,36 +426,35 @@ impl Observer for Run<'_> {
     /// Shows an instant to all outputs that await it.
     fn see(&mut self, simulation: &Simulation, last: bool) -> Result<(), Failure> {
         let (time, step) = (simulation.time(), simulation.step_length());
-        self.watched.iter_mut().zip(simulation.instants()).for_each(|(own, now)| own.see(now));
+        let parts = self.world.participants.iter().zip(simulation.instants());
+        self.watched.iter_mut().zip(parts).for_each(|(own, (part, now))| own.see(part, now));
         if self.sampling.is_due(time, step, last) {
             self.history.sample(&frames(self.world, simulation));
             // A GPU brings states back at the end.
             let looks = self.history.times.len() % SAMPLES_A_LOOK == 1 && !is_on_device(self.world);
             self.look_at_strains(simulation, looks || last);
         }
+        if self.outputs.are_due(time, step, last) {
+            let parts = self.world.participants.iter().zip(simulation.instants());
+            for ((own, check), (part, now)) in self.watched.iter_mut().zip(&self.checks).zip(parts) {
+                check.iter().for_each(|check| own.intersections.look(check, part, now));
+            }
+        }
         self.outputs.see(simulation, last)?;
         self.tell(time, None, last);
         Ok(())
     }
 
-    /// Writes a checkpoint where one is due or the run is to stop.
+    /// Keeps a rollback point where one is due, and writes a checkpoint where one is or the run is to stop.
     fn stepped(&mut self, simulation: &mut Simulation, last: bool) -> Result<(), Failure> {
         let (time, step) = (simulation.time(), simulation.step_length());
         let stop = self.stop.is_some_and(StopFlag::is_asked);
+        if self.rollback.as_ref().is_some_and(|points| points.is_due(simulation)) {
+            self.keep_point(simulation)?;
+        }
         let due = self.checkpoints.as_mut().is_some_and(|all| all.is_due(time, step, last || stop));
-        if due && let Some(checkpoints) = &self.checkpoints {
-            let states = simulation.encode()?;
-            let progressed = Progressed {
-                time,
-                steps: simulation.steps(),
-                wall_seconds: self.wall_seconds(),
-                watched: self.watched.clone(),
-                history: self.history.clone(),
-                sampling: self.sampling,
-                outputs: self.outputs.written()?,
-            };
-            let written = checkpoints.write(&progressed, &states);
-            self.kept = Some(written.map_err(|error| output_failure(&error, Some(time)))?);
+        if due {
+            self.write_checkpoint(simulation)?;
         }
         // What is left of the last instant is quickly done.
         if stop && !last {

@@ -71,7 +71,8 @@ pub(crate) fn on_device(part: &Part, state: &State<f32>) -> Option<Result<Box<dy
         Some(contacts) => GpuStepper::touching(device, model, Arc::clone(contacts), step, design),
         None => GpuStepper::new(device, model, step, design),
     };
-    Some(stepper.map_err(|error| Failure::device(&error, None)).map(|mut stepper| {
+    Some(stepper.map_err(|error| Failure::device(&error, None)).map(|stepper| {
+        let mut stepper = stepper.dissipating();
         if let Some(monitor) = settings.monitor(&part.model) {
             stepper = stepper.watched(monitor);
         }

@@ -13,7 +13,7 @@ pub const INTERRUPTED: &str = "interrupted";
 /// A failure, with its place and time.
 #[derive(Clone, Debug, Serialize)]
 pub struct Failure {
-    /// `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `blocked`, `intersecting`, `device`, `output`, `input` or `interrupted`.
+    /// `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `blocked`, `intersecting`, `hourglass`, `device`, `output`, `input` or `interrupted`.
     pub kind: &'static str,
     /// The body, where it is about one.
     pub body: Option<Box<str>>,

@@ -382,19 +382,21 @@ impl Implicit {
     fn find_energies(&mut self) {
         self.find_outside();
         let kinetic = self.kinetic();
-        let internal = self.method.forces().strain_energy();
+        let stored = self.method.forces().strain_energy();
+        let hourglass = self.method.forces().hourglass_energy();
         let external = match &self.before {
             Some(_) if self.entered => self.energies.external,
             Some(_) => self.energies.external + self.work(),
             // What is given at the start.
-            None => kinetic + internal,
+            None => kinetic + stored,
         };
         // Backward Euler takes energy like a damper; a static path has no inertia to compare with.
         let damping = match self.method {
-            SolverMethod::Implicit(..) => external - kinetic - internal,
+            SolverMethod::Implicit(..) => external - kinetic - stored,
             _ => 0.0,
         };
-        self.energies = Energies { kinetic, internal, damping, external, ..Energies::default() };
+        let internal = stored - hourglass;
+        self.energies = Energies { kinetic, internal, damping, external, hourglass, ..Energies::default() };
         match &mut self.before {
             Some((forces, state)) => {
                 std::mem::swap(forces, &mut self.outside);

@@ -68,6 +68,15 @@ impl Kept {
         }
     }
 
+    /// Halves the steps of explicit solids; false where that cannot be done again.
+    pub fn halve_steps(&mut self) -> bool {
+        match self {
+            Self::Single(state, _) => state.halve_steps(),
+            Self::Double(state, _) => state.halve_steps(),
+            Self::Implicit(_) => false,
+        }
+    }
+
     /// Whether it has the sizes of a participant's model, and is of its method.
     pub fn fits(&self, part: &Part) -> bool {
         match self {
@@ -263,5 +272,10 @@ fn fits<R: Scalar>(state: &State<R>, memory: &Memory<R>, part: &Part) -> bool {
         let nodes = [&state.displacement, &state.increment, &state.reference].map(Vec::len);
         (nodes, history.collect::<Vec<_>>())
     };
-    sizes(state) == sizes(&rest) && state.stability.fits(model) && memory.fits(model.node_count())
+    let keeps = |forces: &Vec<_>| forces.is_empty() || forces.len() == model.node_count();
+    sizes(state) == sizes(&rest)
+        && state.forces.iter().all(keeps)
+        && state.forces[0].len() == state.forces[1].len()
+        && state.stability.fits(model)
+        && memory.fits(model.node_count())
 }

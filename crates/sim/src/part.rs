@@ -168,6 +168,12 @@ impl Method {
 }
 
 impl Part {
+    /// Whether its steps are cut where they are too long.
+    pub(crate) fn cuts_steps(&self) -> bool {
+        let Method::Explicit(settings) = &self.method else { return false };
+        settings.on_unstable == OnUnstable::Substep && settings.critical_step.is_finite()
+    }
+
     /// Solids by central differences in double precision on the CPU, for a duration [s]. Steps take 0.9 of the critical time step, which is
     /// monitored: steps are cut where it falls.
     ///

@@ -53,6 +53,20 @@ impl World {
         numbers().map(|number| number / common).collect()
     }
 
+    /// Whether the steps of a participant are cut where they are too long, so that those of a run can be halved.
+    pub fn cuts_steps(&self) -> bool {
+        self.parts.iter().any(Part::cuts_steps)
+    }
+
+    /// Whether shorter steps may avoid a failure: of a participant whose steps are cut.
+    pub fn shorter_steps_may_avoid(&self, failure: &Failure) -> bool {
+        let of_body = |part: &Part| {
+            part.model.bodies.iter().any(|body| failure.body.as_deref() == Some(body.name.as_str()))
+        };
+        matches!(failure.kind, "not-finite" | "inverted" | "unbalanced" | "unstable")
+            && self.parts.iter().any(|part| part.cuts_steps() && of_body(part))
+    }
+
     /// Length [s] of the step of all from a time [s] on.
     fn step_from(&self, time: f64) -> f64 {
         let slowest = self.parts.iter().min_by_key(|part| part.steps.number);
@@ -124,6 +138,13 @@ impl State {
             Ok([steps, own.kept.encode()?].concat())
         };
         parts.iter().map(of).chain(between).collect()
+    }
+
+    /// Halves the steps of all participants of its world that [cut theirs](World::cuts_steps) from here on. False where there are none, or
+    /// where that was done [three times](pliant_explicit::stability::MOST_HALVINGS).
+    pub fn halve_steps(&mut self, world: &World) -> bool {
+        let mut cut = self.0.iter_mut().zip(&world.parts).filter(|(_, part)| part.cuts_steps()).peekable();
+        cut.peek().is_some() && cut.all(|(own, _)| own.kept.halve_steps())
     }
 
     /// Whether it is one of a world.

@@ -153,7 +153,8 @@ pub(crate) fn on_cpu<R: Scalar>(part: &Part) -> Result<Box<dyn Solver<R>>, Failu
     let contradicting = |error: Contradiction| Failure::input(&error);
     Ok(match &part.method {
         Method::Explicit(settings) => {
-            let stepper = CentralDifference::new(model(), part.steps.step).map_err(contradicting)?;
+            let stepper =
+                CentralDifference::new(model(), part.steps.step).map_err(contradicting)?.dissipating();
             let stepper = match &settings.contacts {
                 Some(contacts) => stepper.touching(Arc::clone(contacts)),
                 None => stepper,

@@ -82,8 +82,8 @@ impl Samples {
 }
 
 /// Energies [J] in the order of [`ENERGIES`], and the balance.
-pub(crate) fn in_columns(e: &Energies) -> [f64; 6] {
-    [e.kinetic, e.internal, e.damping, e.external, e.hourglass, e.balance]
+pub(crate) fn in_columns(e: &Energies) -> [f64; 7] {
+    [e.kinetic, e.internal, e.damping, e.external, e.hourglass, e.step_changes, e.balance]
 }
 
 impl Column {
@@ -131,7 +131,8 @@ enum Place {
     Carried(Carried, Vector3),
 }
 
-pub(crate) const ENERGIES: [&str; 6] = ["kinetic", "internal", "damping", "external", "hourglass", "balance"];
+pub(crate) const ENERGIES: [&str; 7] =
+    ["kinetic", "internal", "damping", "external", "hourglass", "step-changes", "balance"];
 /// Parts of the internal energy of shells.
 const SHELL_ENERGIES: [&str; 3] = ["membrane", "bending", "drilling"];
 pub(crate) const AXES: [&str; 3] = ["x", "y", "z"];

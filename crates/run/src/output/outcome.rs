@@ -2,11 +2,14 @@
 
 use std::path::PathBuf;
 
+use nalgebra::Vector3;
+use pliant_explicit::model_balance_floor;
 use pliant_explicit::stability::Stability;
 use pliant_mechanics::Energies;
 use pliant_mechanics::model::Enclosed;
+use pliant_sim::contact::barrier::IntersectionCheck;
 use pliant_sim::contact::lag::Lag;
-use pliant_sim::{Effort, Equilibria, Failure, GuestsNow, Instant, TieNow};
+use pliant_sim::{Effort, Equilibria, Failure, GuestsNow, Instant, TieNow, counted, number};
 use serde::{Deserialize, Serialize};
 
 use super::{Frame, ShellStrains, SolidStrains, time_of};
@@ -72,6 +75,8 @@ pub(crate) struct PartOutcome {
     pub steps: u64,
     pub energies: Energies,
     pub balance_floor: f64,
+    /// Hourglass energy over the internal one.
+    pub hourglass_share: f64,
     pub watched: Watched,
     /// The critical time step as it was seen; `None` of a run without inertia.
     pub stability: Option<Stability>,
@@ -109,6 +114,7 @@ impl PartOutcome {
             steps: participant.steps(),
             energies: participant.energies(),
             balance_floor: participant.balance_floor(),
+            hourglass_share: hourglass_share(part, participant, 0.0).unwrap_or(0.0),
             watched,
             stability: watches.then(|| participant.stability()),
             equilibria: participant.equilibria(),
@@ -224,30 +230,92 @@ pub(crate) struct Watched {
     pub worst_hourglass: (f64, f64),
     /// How far shells were strained.
     pub strains: ShellStrains,
+    /// Intersections of explicit bodies.
+    pub intersections: Intersections,
     /// Changes of volume of solids, and compression of membranes.
     pub solids: SolidStrains,
 }
 
+/// Edges of bodies that go through triangles of others, in the states that outputs have written.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Intersections {
+    /// All of them, counted in each state.
+    pub count: u64,
+    /// States with some.
+    pub states: u64,
+    /// The largest depth [m].
+    pub deepest: f64,
+    /// Time of the deepest one [s].
+    pub time: f64,
+    /// Place of the deepest one [m].
+    pub at: [f64; 3],
+    /// Contact of the deepest one.
+    pub contact: String,
+}
+
+impl Intersections {
+    /// Looks at an instant of a participant.
+    pub(crate) fn look(&mut self, check: &IntersectionCheck, part: &Part, now: &dyn Instant) {
+        let rest = &part.built.model.rest;
+        let place =
+            |node: u32| Vector3::from(rest[node as usize]) + Vector3::from(now.displacement(node as usize));
+        let before = self.count;
+        check.find(place, |found| {
+            self.count += 1;
+            if found.depth > self.deepest {
+                (self.deepest, self.time, self.at) = (found.depth, now.time(), found.place);
+                let contacts = part.built.contacts.as_deref();
+                self.contact =
+                    contacts.map_or_else(String::new, |all| all.contacts[found.contact].name.clone());
+            }
+        });
+        self.states += u64::from(self.count > before);
+    }
+
+    /// Together with those of another participant.
+    pub(crate) fn with(self, other: Self) -> Self {
+        let (count, states) = (self.count + other.count, self.states + other.states);
+        let deepest = if other.deepest > self.deepest { other } else { self };
+        Self { count, states, ..deepest }
+    }
+
+    /// What a user should know of them; `None` without any.
+    pub(crate) fn doubt(&self) -> Option<String> {
+        let Self { count, states, deepest, time, at, contact } = self;
+        (*count > 0).then(|| {
+            format!(
+                "contact `{contact}`: {} of edges with triangles in {}, up to {} m deep at t = {} s at ({}) m; \
+                 take a larger `thickness`, smaller elements, or `solver = \"implicit\"`, whose barriers exclude them",
+                counted(*count as usize, "intersection"),
+                counted(*states as usize, "written state"),
+                number(*deepest),
+                number(*time),
+                at.map(number).join(", ")
+            )
+        })
+    }
+}
+
 impl Watched {
-    pub fn see(&mut self, participant: &dyn Instant) {
-        let (energies, floor) = (participant.energies(), participant.balance_floor());
-        if participant.largest_energy() > floor {
-            self.worst_balance = self.worst_balance.max(energies.balance);
+    pub fn see(&mut self, part: &Part, participant: &dyn Instant) {
+        if participant.largest_energy() > participant.balance_floor() {
+            self.worst_balance = self.worst_balance.max(participant.energies().balance);
         }
-        let share = hourglass_share(&energies, floor);
-        if share > self.worst_hourglass.0 {
+        if let Some(share) = hourglass_share(part, participant, self.worst_hourglass.0) {
             self.worst_hourglass = (share, participant.time());
         }
     }
 }
 
-/// Hourglass energy over internal energy; 0 while both together are below the floor [J] from which on energies mean
-/// something.
-fn hourglass_share(energies: &Energies, floor: f64) -> f64 {
-    let Energies { internal, hourglass, .. } = *energies;
-    if hourglass > 0.0 && internal + hourglass > floor {
-        hourglass / internal.max(f64::MIN_POSITIVE)
-    } else {
-        0.0
-    }
+/// Hourglass energy over internal energy, if it is above a share; none while both together are below the energy from which on they mean
+/// something. A vibrating body has no internal energy at times, so a hundredth of the largest energy counts as internal at least.
+fn hourglass_share(part: &Part, participant: &dyn Instant, above: f64) -> Option<f64> {
+    let Energies { internal, hourglass, .. } = participant.energies();
+    let share = hourglass / internal.max(0.01 * participant.largest_energy()).max(f64::MIN_POSITIVE);
+    let floor = participant.balance_floor();
+    let means = || {
+        let least = model_balance_floor::<f64>(&part.built.model);
+        internal + hourglass > if floor.is_finite() { floor.max(least) } else { least }
+    };
+    (share > above && means()).then_some(share)
 }

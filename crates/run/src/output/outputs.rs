@@ -90,6 +90,11 @@ impl<'scope> Outputs<'scope> {
         &self.schedules
     }
 
+    /// Whether any awaits an instant.
+    pub fn are_due(&self, time: f64, step: f64, last: bool) -> bool {
+        self.schedules.iter().any(|schedule| schedule.awaits(time, step, last))
+    }
+
     /// Whether one within the run awaits an instant.
     pub fn reads(&self, time: f64, step: f64, last: bool) -> bool {
         self.near.iter().any(|(place, _)| self.schedules[*place].awaits(time, step, last))
@@ -104,12 +109,7 @@ impl<'scope> Outputs<'scope> {
         if !last {
             return Ok(());
         }
-        let failed = |error| output_failure(&error, Some(time));
-        self.near.iter_mut().try_for_each(|(_, output)| output.finish()).map_err(failed)?;
-        if let Some(far) = &self.far {
-            // A thread that has failed tells why when it is joined.
-            let _ = far.tasks.send(Task::Finish);
-        }
+        self.remove_later().map_err(|error| output_failure(&error, Some(time)))?;
         self.end()
     }
 
@@ -138,6 +138,16 @@ impl<'scope> Outputs<'scope> {
             Ok(()) => Ok(()),
             Err(_) => self.end(),
         }
+    }
+
+    /// Removes rows and frames beyond those that were taken up.
+    pub fn remove_later(&mut self) -> Result<(), OutputError> {
+        self.near.iter_mut().try_for_each(|(_, output)| output.finish())?;
+        if let Some(far) = &self.far {
+            // A thread that has failed tells why when it is joined.
+            let _ = far.tasks.send(Task::Finish);
+        }
+        Ok(())
     }
 
     /// What is written so far, for a checkpoint.

@@ -74,6 +74,7 @@ pub(crate) fn plot(world: &World, history: &History) -> Result<String, String> {
             energy("kinetic", |e| e.kinetic),
             energy("damping", |e| e.damping),
             energy("hourglass", |e| e.hourglass),
+            energy("step changes", |e| e.step_changes),
         ];
         panel(&areas[1], "Energy", "J", &energies)?;
         for (area, (kind, title, unit)) in areas[2..].iter().zip([(1, "Pressure", "Pa"), (0, "Volume", "m³")])

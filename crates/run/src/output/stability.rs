@@ -5,12 +5,12 @@ use std::fmt;
 use pliant_explicit::BALANCE_LIMIT;
 use pliant_explicit::stability::{OnUnstable, StepLimit};
 use pliant_mechanics::Energies;
-use pliant_sim::{counted, number};
+use pliant_sim::{Failure, counted, number};
 use serde::Serialize;
 
-use super::PartOutcome;
 use super::outcome::HeldBack;
-use pliant_scene::{Built, Part};
+use super::{Outcome, PartOutcome};
+use pliant_scene::{Built, Part, World};
 
 /// Hourglass energy, as a fraction of the internal one, above which a run gives a warning.
 const MUCH_HOURGLASS: f64 = 0.05;
@@ -40,6 +40,8 @@ pub struct StabilitySummary {
     pub most_substeps: u32,
     /// Steps taken beyond the whole ones.
     pub extra_steps: u64,
+    /// How often the run went back after a step that failed, and halved its steps from there on.
+    pub halvings: u32,
     /// Whether a node is free to move, so that there is a limit.
     #[serde(skip)]
     limited: bool,
@@ -62,6 +64,7 @@ impl StabilitySummary {
             last_cut: seen.last_cut,
             most_substeps: seen.most_substeps,
             extra_steps: seen.extra_steps,
+            halvings: seen.halvings,
             limited: plan.limits.as_ref().is_some_and(|limits| limits.critical.assembled.step.is_finite()),
         })
     }
@@ -98,6 +101,10 @@ impl fmt::Display for StabilitySummary {
         } else if self.steps_below > 0 {
             write!(f, "; it was below the step during {}", counted(self.steps_below as usize, "step"))?;
         }
+        if self.halvings > 0 {
+            let times = counted(self.halvings as usize, "time");
+            write!(f, "; the run went back {times} after a step that failed, and halved its steps")?;
+        }
         Ok(())
     }
 }
@@ -132,32 +139,48 @@ pub(crate) fn doubts(
     stability: Option<&StabilitySummary>,
 ) -> Vec<String> {
     let (share, time) = outcome.watched.worst_hourglass;
-    let hourglass = (share > MUCH_HOURGLASS).then(|| {
-        let (of, remedy) = match share < 10.0 {
-            true => (format!("{:.1} % of the internal energy", share * 100.0), HOURGLASS_REMEDY),
-            false => ("more than ten times the internal energy".to_owned(), HOURGLASS_REMEDY),
-        };
-        let bodies: Vec<String> = (built.model.bodies.iter().enumerate())
-            .filter(|(index, _)| {
-                built.model.solids.iter().any(|solid| solid.body == *index && solid.cells.element() == "hex8")
-            })
-            .map(|(_, body)| format!("`{}`", body.name))
-            .collect();
-        format!(
-            "hourglass control holds {of} at t = {} s, more than 5 %: the shape of the elements of {} is not resolved; \
-             {remedy}",
-            number(time),
-            bodies.join(", ")
-        )
-    });
+    let hourglass =
+        (share > MUCH_HOURGLASS).then(|| held_by_hourglass(built, share, time, "5 %", HOURGLASS_REMEDY));
     (hourglass.into_iter())
         .chain(stability.and_then(StabilitySummary::doubt))
         .chain(equilibria_doubts(outcome))
         .chain(unstable_equilibria(built, outcome))
         .chain(outcome.watched.strains.doubts())
+        .chain(outcome.watched.intersections.doubt())
         .chain(outcome.watched.solids.doubts())
         .chain(outcome.held_back.iter().map(held_back))
         .collect()
+}
+
+/// The failure of a run that ended with a larger part of its internal energy in hourglass modes than its scene allows.
+pub(crate) fn hourglass_failure(world: &World, outcome: &Outcome) -> Option<Failure> {
+    let allowed = world.scene.run.allow_hourglass;
+    let (part, share) = (world.participants.iter().zip(&outcome.parts))
+        .map(|(part, own)| (part, own.hourglass_share))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .filter(|(_, share)| *share > allowed)?;
+    let most = format!("{} % that `allow-hourglass` of `[run]` allows at the end", number(allowed * 100.0));
+    let remedy = format!("{HOURGLASS_REMEDY}; outputs are complete");
+    let message = held_by_hourglass(&part.built, share, outcome.time, &most, &remedy);
+    Some(Failure::new("hourglass", message, Some(outcome.time)))
+}
+
+/// That hourglass control holds a share of the internal energy at a time [s].
+fn held_by_hourglass(built: &Built, share: f64, time: f64, most: &str, remedy: &str) -> String {
+    let of = match share < 10.0 {
+        true => format!("{:.1} % of the internal energy", share * 100.0),
+        false => "more than ten times the internal energy".to_owned(),
+    };
+    let has_control = |index: usize| {
+        built.model.solids.iter().any(|solid| solid.body == index && solid.cells.element() == "hex8")
+    };
+    let bodies = built.model.bodies.iter().enumerate().filter(|(index, _)| has_control(*index));
+    let bodies: Vec<String> = bodies.map(|(_, body)| format!("`{}`", body.name)).collect();
+    format!(
+        "hourglass control holds {of} at t = {} s, more than {most}: the shape of the elements of {} is not resolved; {remedy}",
+        number(time),
+        bodies.join(", ")
+    )
 }
 
 /// Warning of unstable static equilibria. A run with a control has none, since it passes limit points on purpose.

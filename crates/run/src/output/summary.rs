@@ -10,7 +10,7 @@ use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
 
 use super::stability::{AddedMass, StabilitySummary, doubts};
-use super::{GuestSummary, History, Outcome, PartOutcome, TieSummary};
+use super::{GuestSummary, History, Intersections, Outcome, PartOutcome, TieSummary};
 use super::{OutputError, StrainSummary, VolumeChange, constraints};
 use pliant_scene::{Built, LimitingElement, Limits, Part, World, printable};
 
@@ -51,6 +51,8 @@ pub struct Summary {
     pub ended: Option<String>,
     /// The largest strain of each shell, over up to 1000 sampled instants.
     pub shell_strains: Vec<StrainSummary>,
+    /// Intersections of explicit bodies in the written states; `null` where none were searched for with `check-intersections`.
+    pub intersections: Option<Intersections>,
     /// The largest change of volume of each nearly incompressible body and of each body with fibres.
     pub volume_changes: Vec<VolumeChange>,
     /// The device: `cpu`, or the name of the GPU.
@@ -167,7 +169,7 @@ fn empty(status: &str, error: Failure) -> Json {
         "status": status,
         "error": error,
         "bodies": [], "nodes": null, "elements": null, "mass": null, "step": null, "element_bound": null,
-        "critical_step": null, "limiting_element": null, "participants": [], "ties": [], "guests": [], "solver": null, "equilibria": null, "ended": null, "shell_strains": [], "volume_changes": [], "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
+        "critical_step": null, "limiting_element": null, "participants": [], "ties": [], "guests": [], "solver": null, "equilibria": null, "ended": null, "shell_strains": [], "intersections": null, "volume_changes": [], "device": null, "precision": null, "steps": 0, "wall_seconds": 0.0, "real_time_factor": null,
         "stability": null, "added_mass": null, "energy_balance": null, "reactions": {}, "volumes": {}, "warnings": [], "files": [],
     })
 }
@@ -256,6 +258,10 @@ pub(crate) fn summarise(world: &World, outcome: &Outcome) -> Summary {
         equilibria: parts().find_map(|(_, own)| own.equilibria),
         ended: outcome.ended.clone(),
         shell_strains: parts().flat_map(|(_, own)| own.watched.strains.0.clone()).collect(),
+        intersections: parts()
+            .filter(|(part, _)| part.built.check_intersections)
+            .map(|(_, own)| own.watched.intersections.clone())
+            .reduce(Intersections::with),
         volume_changes: parts().flat_map(|(_, own)| own.watched.solids.volumes().cloned()).collect(),
         device: target.name().to_owned(),
         precision: target.precision.word(),
@@ -471,13 +477,14 @@ fn write_strains(page: &mut String, strains: &[StrainSummary]) -> std::fmt::Resu
 }
 
 fn write_energy_rows(page: &mut String, energies: &Energies) -> std::fmt::Result {
-    let Energies { kinetic, internal, damping, hourglass, external, .. } = *energies;
+    let Energies { kinetic, internal, damping, hourglass, external, step_changes, .. } = *energies;
     for (name, value) in [
         ("external work", external),
         ("internal (stored and viscous)", internal),
         ("kinetic", kinetic),
         ("lost to damping", damping),
         ("hourglass control", hourglass),
+        ("added by step changes", step_changes),
     ] {
         writeln!(page, "| {name} | {} |", number(value))?;
     }

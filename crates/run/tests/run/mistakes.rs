@@ -106,6 +106,7 @@ fn unknown_keys_in_every_kind_of_table_get_the_nearest_name() {
             &[&format!("unknown key `{key}` in `{table}`"), &format!("did you mean `{meant}`?")],
         );
     }
+    spoilt("threads = 1", "allow-hourglas = 0.3", &["did you mean `allow-hourglass`?"]);
     spoilt("[output.fields]", "[ouput.fields]", &["unknown table `ouput`", "did you mean `output`?"]);
     spoilt(
         "pressure = 20",
@@ -147,6 +148,7 @@ fn wrong_types_tell_what_was_expected_and_what_was_found() {
     spoilt("[0, 0, -9.81]", "-9.81", &["expected 3 numbers [m/s²], found -9.81"]);
     spoilt("[0, 0, -9.81]", "[0, -9.81]", &["expected 3 numbers [m/s²], found 2"]);
     spoilt("threads = 1", "threads = 1.5", &["expected a whole number, found 1.5"]);
+    spoilt("threads = 1", "allow-hourglass = \"30 %\"", &["expected a number"]);
     spoilt("law = \"tissue\"", "law = tissue", &["`tissue` is not a value", "write \"tissue\""]);
     spoilt("[body.block]", "[body.block", &["not valid TOML", "expected `]`"]);
     spoilt("[body.block]\n", "[body]\nblock = 3\n[body.other]\n", &["`body.block` must be a table"]);
@@ -237,6 +239,7 @@ fn numbers_out_of_range_are_refused() {
         ("poisson-ratio = 0.45", "poisson-ratio = -1", "greater than -1 and at most 0.5, found -1"),
         ("damping = 5", "damping = -5", "must be at least 0, found -5"),
         ("threads = 1", "threads = -1", "must be at least 0"),
+        ("threads = 1", "allow-hourglass = -0.1", "must be at least 0"),
         ("threads = 1", "threads = 100000", "at most 1024, found 100000"),
         ("every = 0.004", "every = 0", "must be greater than 0, found 0"),
         ("edge = 0.05", "edge = 0", "must be greater than 0, found 0"),
@@ -820,14 +823,17 @@ fn failure_of(changes: &[&str]) -> String {
 
 #[test]
 fn advice_fits_what_the_run_does_already() {
-    let damped = failure_of(&["body.block.damping=1e4", "body.block.velocity=[0,0,1]"]);
-    for piece in ["the damping of `block`, 10000 1/s, is too strong", "take `damping` below 200"] {
+    let damped = failure_of(&["body.block.damping=1e5", "body.block.velocity=[0,0,1]"]);
+    for piece in ["the damping of `block`, 1.000e5 1/s, is too strong", "take `damping` below 1600"] {
         assert!(damped.contains(piece), "{damped}");
     }
     assert!(!damped.contains("more damping"), "{damped}");
     let squeezed = "constraint.hand.by=[0,0,-0.0999]";
     let cut = failure_of(&[squeezed]);
-    assert!(cut.contains("inverted") && cut.contains("the run cuts its steps already"), "{cut}");
+    assert!(
+        cut.contains("inverted") && cut.contains("the run cuts its steps, went back 3 times and halved them"),
+        "{cut}"
+    );
     assert!(!cut.contains("substep") && !cut.contains("smaller `step`"), "{cut}");
     let report = failure_of(&[squeezed, "run.on-unstable=report"]);
     assert!(report.contains("`on-unstable = \"substep\"`"), "{report}");

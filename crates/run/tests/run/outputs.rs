@@ -21,7 +21,7 @@ fn csv_columns_are_named_as_promised() {
     for constraint in ["base", "hand"] {
         expected.extend(["x", "y", "z"].map(|axis| format!("reaction.{constraint}.{axis}")));
     }
-    for energy in ["kinetic", "internal", "damping", "external", "hourglass", "balance"] {
+    for energy in ["kinetic", "internal", "damping", "external", "hourglass", "step-changes", "balance"] {
         expected.push(format!("energy.{energy}"));
     }
     expected.extend(["x", "y", "z"].map(|axis| format!("probe.middle.displacement.{axis}")));

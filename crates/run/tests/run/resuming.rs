@@ -404,6 +404,11 @@ fn a_checkpoint_that_does_not_fit_is_refused_with_a_reason() {
     workshop.run_into("out/open", &[]).done();
     let told = workshop.resume("out/open", &["scene.until=0.2"]);
     refused(&told, &["constraint `hand` differs", "write `to = 0.1`"]);
+    // Damping by stiffness, which also shortens automatic steps.
+    workshop.write("case/scene.toml", changed(&scene, "[run]", "[run]\nstep = 1e-4"));
+    workshop.run_into("out/stepped", &[]).done();
+    let told = workshop.resume("out/stepped", &["body.block.stiffness-damping=1e-5"]);
+    refused(&told, &["damping by stiffness of solids differs", "run from the start"]);
     workshop.write("case/scene.toml", &scene);
 
     // Problems of the file.
@@ -421,7 +426,7 @@ fn a_checkpoint_that_does_not_fit_is_refused_with_a_reason() {
     refused(&file(&flipped), &["is damaged: its checksum does not fit", "take the one before it"]);
     let mut newer = bytes.clone();
     newer[8] = 99;
-    refused(&file(&newer), &["has format 99; this version of pliant reads format 18"]);
+    refused(&file(&newer), &["has format 99; this version of pliant reads format 19"]);
     refused(&workshop.resume("none.pliant", &[]), &["`none.pliant` cannot be read"]);
     refused(&workshop.resume("case", &[]), &["there is no checkpoint in `case`", "every = 1.0"]);
 

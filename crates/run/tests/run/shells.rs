@@ -660,6 +660,11 @@ fn wrong_combinations_of_models_solvers_and_keys_are_refused() {
     ] {
         refused(&[(THICK, &body(line))], &pieces);
     }
+    let damped = body("stiffness-damping = 1e-3");
+    refused(
+        &[explicit, (THICK, &damped)],
+        &["damping by stiffness needs the solver `implicit` for shells, not `explicit`"],
+    );
     for key in ["iterations = 3", "linear = \"direct\"", "control = { load = \"push\", arc-length = 0.1 }"] {
         let name = key.split(' ').next().unwrap();
         refused(&[explicit, (STEPS, key)], &[&format!("`{name}` is for `solver ="), "has no effect here"]);

@@ -249,10 +249,6 @@ fn contact_that_cannot_be_is_refused_with_its_line() {
             ["`lid` and `block` overlap at the start in", "up to 0.001000 m deep"],
         ),
         (
-            stacked("", "").replace("thickness = 0", "thickness = 0.001"),
-            ["overlap at the start in", "up to 5.000e-4 m deep"],
-        ),
-        (
             stacked(
                 "",
                 "[law.skin]\ntype = 'neo-hookean'\nyoung-modulus = 1e5\npoisson-ratio = 0.45\n\

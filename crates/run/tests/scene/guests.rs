@@ -152,7 +152,6 @@ fn contacts_of_participants_that_cannot_be_are_refused_with_the_line() {
     let told = |text: &str| world(text).err().unwrap_or_else(|| panic!("accepted:\n{text}"));
     let plain = pressed(0.01, 1.0, "");
     for (from, to, pieces) in [
-        ("0.0212]", "0.0205]", ["overlap at the start", "make `thickness` smaller"]),
         ("0.0212]", "0.015]", ["overlap at the start", "move one of them"]),
         ("solver = 'implicit'\nstep = 0.01", "", ["is a shell", ""]),
         (

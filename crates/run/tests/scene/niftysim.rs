@@ -140,7 +140,7 @@ fn hourglass_stiffness_is_scaled_as_niftysim_scales_it() {
     let (mu, kappa) = (1034.48276, 10_000.0);
     let expected = 0.075 * (kappa + 4.0 / 3.0 * mu) / mu;
     assert!(
-        matches!(scene.bodies[0].1.hourglass, ByLabel::One(Hourglass(c)) if (c - expected).abs() < 1e-12)
+        matches!(scene.bodies[0].1.hourglass, Some(ByLabel::One(Hourglass(c))) if (c - expected).abs() < 1e-12)
     );
     assert_note(&imported, "0.075 (λ + 2μ), which is 0.8250 μ");
 }

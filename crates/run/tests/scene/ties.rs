@@ -178,6 +178,13 @@ fn ties_that_cannot_be_are_refused_by_name_and_gaps_are_told() {
         ),
         (
             with(
+                "[constraint.start]\ntype = 'fix'\nbody = 'block'\nnodes = { set = 'x-min' }\ncomponents = ['x']",
+                "[constraint.start]\ntype = 'rigid'\nbody = 'coat'\nnodes = { set = 'x-min' }",
+            ),
+            ["`start` and `glue`", "constrain `block`, which the node follows"],
+        ),
+        (
+            with(
                 "model = 'membrane'\nmesh = { plate = { size = [0.04, 0.02], cells = [7, 5] }, at = [0, 0, 0.01] }",
                 "on = 'block'\nfaces = { set = 'z-max' }",
             ),
@@ -401,7 +408,7 @@ fn pull(stretch: [f64; 3]) -> f64 {
 /// Runs a scene on the CPU in double precision and on a GPU until a time [s]: displacements of all bodies differ by at most 1e-5, energies and the
 /// reaction of a constraint by 1e-4. Steps are cut at the same instants; how often they were.
 #[cfg(feature = "gpu")]
-fn agrees_on_a_device([cpu, gpu]: [&World; 2], until: f64, constraint: &str) -> u32 {
+pub fn agrees_on_a_device([cpu, gpu]: [&World; 2], until: f64, constraint: &str) -> u32 {
     let mut runs = [cpu, gpu].map(|world| world.simulation().unwrap());
     runs.iter_mut().for_each(|run| run.run(until, |_| ()).unwrap());
     let [a, b] = runs.each_mut().map(|run| {

@@ -1,0 +1,142 @@
+//! Explicit runs whose steps fail go back to an earlier state and halve their steps.
+
+use pliant_testing::scenes::{Workshop, world};
+
+/// A cube of 10 mm, pressed gently, and by 6 mm more between 3 s and another time [s]: cells invert within steps of 1 ms.
+fn pressed(until: f64) -> String {
+    format!(
+        r#"[scene]
+until = 4.0
+[run]
+precision = "double"
+step = 1e-3
+checkpoint = {{ every = 0.5 }}
+[law.a]
+type = "neo-hookean"
+young-modulus = 1e4
+poisson-ratio = 0.3
+[body.b]
+mesh = {{ block = {{ size = [0.01, 0.01, 0.01], cells = [2, 2, 2] }}, as = "hexes" }}
+element = "hex8-full"
+law = "a"
+density = 1000
+damping = 20
+[constraint.low]
+type = "fix"
+body = "b"
+nodes = {{ set = "z-min" }}
+[constraint.top]
+type = "move"
+body = "b"
+nodes = {{ set = "z-max" }}
+by = [0, 0, -0.006]
+curve = {{ table = [[0, 0], [1, 0.01], [3, 0.01], [{until}, 1], [4, 1]] }}
+[output.history]
+type = "csv"
+every = 0.01
+[output.fields]
+type = "vtu"
+every = 0.05
+data = ["displacement"]
+"#
+    )
+}
+
+/// Until then, steps of 0.5 ms can follow.
+const SOON: f64 = 3.003;
+/// Until then, no eighth of a step can.
+const AT_ONCE: f64 = 3.001;
+
+/// A shell that swings in implicit steps beside the cube.
+const SHELL: &str = r#"
+[participant.walls]
+bodies = ["strip"]
+solver = "implicit"
+step = 0.01
+[law.wall]
+type = "neo-hookean"
+young-modulus = 1e6
+poisson-ratio = 0.4
+[body.strip]
+model = "shell"
+mesh = { plate = { size = [0.1, 0.02] }, edge = 0.02 }
+law = "wall"
+density = 1000
+thickness = 0.002
+damping = 2
+[constraint.end]
+type = "fix"
+body = "strip"
+nodes = { set = "x-min" }
+"#;
+
+#[test]
+fn a_run_whose_step_fails_goes_back_and_halves_its_steps() {
+    let workshop = Workshop::new(&pressed(SOON));
+    let told = workshop.run(&[]).done();
+    assert_eq!(told["stability"]["halvings"], 1, "{told}");
+    assert!(workshop.read("out/case/summary.md").contains("went back 1 time"));
+    // Each instant once, and the rows before the state that it went back to are those of a run until then.
+    let (names, rows) = workshop.table("out/case/history.csv");
+    let times: Vec<f64> = rows.iter().map(|row| row[0]).collect();
+    assert_eq!(times.len(), 401);
+    assert!(times.iter().enumerate().all(|(k, time)| (time - 0.01 * k as f64).abs() < 1e-9));
+    assert_eq!(workshop.series("out/case/fields.pvd").len(), 81);
+    workshop.run_into("out/before", &["scene.until=2.0"]).done();
+    let before = workshop.read("out/before/history.csv");
+    let (before, _) = before.trim_end().rsplit_once('\n').unwrap();
+    assert!(workshop.read("out/case/history.csv").starts_with(before));
+    // The energies are balanced in the end.
+    let column = names.iter().position(|name| name == "energy.balance").unwrap();
+    assert!(rows.last().unwrap()[column] < 0.01);
+}
+
+#[test]
+fn a_run_that_is_resumed_before_or_after_it_went_back_ends_in_the_same_bits() {
+    let workshop = Workshop::new(&pressed(SOON));
+    workshop.run_into("out/whole", &[]).done();
+    for until in ["2.5", "3.5"] {
+        let parts = format!("out/until-{until}");
+        workshop.run_into(&parts, &[&format!("scene.until={until}")]).done();
+        let told = workshop.resume(&parts, &[]).done();
+        assert_eq!(told["stability"]["halvings"], 1, "{until}");
+        // Samples of the plot follow the time at which a run was to end.
+        let files = |folder: &str| {
+            let mut files = workshop.files(folder);
+            files.retain(|(name, _)| !name.ends_with("plot.svg"));
+            files
+        };
+        assert!(files("out/whole") == files(&parts), "{until}");
+    }
+}
+
+#[test]
+fn steps_are_halved_three_times_at_most() {
+    let told = Workshop::new(&pressed(AT_ONCE)).run(&[]);
+    let json = told.json();
+    assert_eq!((told.status(), &json["stability"]["halvings"]), ("failed", &3.into()), "{json}");
+    assert!(json["error"]["message"].as_str().unwrap().contains("`step`"), "{json}");
+}
+
+#[test]
+fn all_participants_go_back_together() {
+    let scene = pressed(SOON).replacen("until = 4.0", "until = 4.0\ngravity = [0, 0, -1]", 1);
+    let workshop = Workshop::new(&(scene + SHELL));
+    let told = workshop.run(&[]).done();
+    assert!(told.to_string().contains("\"halvings\":1"), "{told}");
+    // The shell swings as it does beside a cube that never fails.
+    workshop.run_into("out/calm", &["constraint.top.by=[0,0,0]"]).done();
+    let [both, calm] = ["out/case/history.csv", "out/calm/history.csv"].map(|name| workshop.table(name));
+    let column = both.0.iter().position(|name| name == "reaction.end.z").unwrap();
+    assert_eq!(both.1.len(), calm.1.len());
+    assert!(both.1.iter().zip(&calm.1).all(|(a, b)| a[column] == b[column]));
+}
+
+#[test]
+fn a_step_of_a_simulation_does_not_go_back_but_names_step() {
+    let world = world(&pressed(SOON)).unwrap();
+    let mut simulation = world.simulation().unwrap();
+    let failure = (0..4000).find_map(|_| simulation.step(1).err()).unwrap();
+    assert!(failure.message.contains("`step`") && failure.time > Some(3.0), "{failure}");
+    assert!(simulation.instants().all(|now| now.stability().halvings == 0));
+}
