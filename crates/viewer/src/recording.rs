@@ -18,6 +18,8 @@ pub enum Done {
     Surface(Surface),
     /// By the second hand.
     Second(Hand),
+    /// Steps are half as long from then on.
+    Halve,
 }
 
 impl Done {

@@ -74,6 +74,7 @@ pub fn replay_in_real_time(world: &World, recording: &Recording) -> Result<Recor
                 Order::Change(Box::new(with_numbers(&world.scene, numbers)?), numbers.clone())
             }
             Done::Surface(surface) => Order::Show(Box::new(surface.put_into(&world.scene.view))),
+            Done::Halve => Order::Halve,
         };
         orders.push((Duration::try_from_secs_f64(then.seconds).unwrap_or_default(), order));
     }
@@ -171,6 +172,10 @@ impl<'r> Replay<'r> {
                         let view = surface.put_into(&world.scene.view);
                         live.show(&world.scene.shown_as(&view, 1.0));
                         *subject = subject_of(world, &view, &mut live)?;
+                    }
+                    Done::Halve => {
+                        live.halve_steps().map_err(|failure| failure.message)?;
+                        self.hold.hold_on(&mut live);
                     }
                     Done::Numbers(numbers) if self.steps == 0 => return Ok(Ended::Change(None, numbers)),
                     Done::Numbers(numbers) => {

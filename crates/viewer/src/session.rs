@@ -59,6 +59,8 @@ pub enum Order {
     ForgetProbes,
     /// Keeps what is done to the run from now on.
     Record,
+    /// Halves the steps.
+    Halve,
     /// Shows another field, or another surface.
     Show(Box<ViewTable>),
     /// Brings every frame to ordinary memory where the state lies on a device, as a section needs it; or only some.
@@ -600,6 +602,7 @@ impl<'s> Player<'s> {
                 self.name_columns();
             }
             Order::Record => playback.begin_recording(),
+            Order::Halve => self.halve(),
             Order::Show(view) => self.show_another(*view, sent),
             Order::Memory(every) => playback.in_memory = every,
             Order::Quit => return Some(Left::Quit),
@@ -616,7 +619,7 @@ impl<'s> Player<'s> {
             self.playback.seen.at = None;
         }
         if !matches!(hand, Hand::Release) {
-            self.sound.touch();
+            self.sound.touch(self.playback.steps);
         }
         let evaluated = self.live.simulation.is_evaluated();
         let held = self.playback.hold.take(which, hand, &self.subject, &mut self.live);
@@ -719,7 +722,7 @@ impl<'s> Player<'s> {
             }
             // Nobody looks any more.
             Err(failure) if failure.is_interrupted() => {}
-            Err(failure) => self.go_back(failure.message),
+            Err(failure) => self.go_back(failure),
         }
         let playback = &mut self.playback;
         if playback.pace.goal() - self.live.simulation.time() > BEHIND * playback.pace.speed {
@@ -741,11 +744,21 @@ impl<'s> Player<'s> {
         self.sound.keep(sound, nodes);
     }
 
-    /// After a step that failed: goes back to a state before it, where hands let go; or stays, where no hand has broken it.
-    fn go_back(&mut self, message: String) {
+    /// After a step that failed: goes back to a state before it and halves the steps there, where no hand has done anything and shorter steps
+    /// may avoid the failure; else hands let go there, or the run stays where it is.
+    fn go_back(&mut self, failure: Failure) {
         let broken = self.live.simulation.time();
-        let sound = self.sound.take();
-        let Some(time) = sound.and_then(|sound| self.restore(sound)) else {
+        let world = Arc::clone(self.live.simulation.world());
+        let untouched = world.shorter_steps_may_avoid(&failure).then(|| self.sound.untouched()).flatten();
+        let halved = untouched.and_then(|sound| sound.state.halve_steps(&world).then(|| sound.clone()));
+        let message = failure.message;
+        if let Some(time) = halved.and_then(|sound| self.restore(sound)) {
+            self.playback.record(false, Instant::now(), Done::Halve);
+            self.playback.note =
+                Some(format!("the run went back to t = {} s and halved its steps: {message}", number(time)));
+            return;
+        }
+        let Some(time) = self.sound.take().and_then(|sound| self.restore(sound)) else {
             self.playback.failure.get_or_insert(message);
             return;
         };
@@ -756,6 +769,15 @@ impl<'s> Player<'s> {
         playback.breaks += 1;
         playback.note =
             Some(format!("the hand let go, and the run went back to t = {} s: {message}", number(time)));
+    }
+
+    /// Halves the steps, as the run did that is replayed.
+    fn halve(&mut self) {
+        // A device that fails tells so in the next step.
+        if self.live.halve_steps().is_ok() {
+            self.playback.hold.hold_on(&mut self.live);
+            self.playback.record(false, Instant::now(), Done::Halve);
+        }
     }
 
     /// As a user wants it: to a state that is still kept.
@@ -809,10 +831,10 @@ impl<'s> Player<'s> {
                 seen.unconverged = efforts.map(|effort| effort.unconverged).sum();
             }
             // The last good picture stays.
-            Err(failure) => broken = Some(failure.message),
+            Err(failure) => broken = Some(failure),
         }
-        if let Some(message) = broken {
-            self.go_back(message);
+        if let Some(failure) = broken {
+            self.go_back(failure);
         }
         let playback = &mut self.playback;
         let seen = &mut playback.seen;

@@ -1,4 +1,5 @@
-//! Sound states of the last moments of a run: after a pull that breaks it, the run goes on from one of them.
+//! Sound states of the last moments of a run. After a step that fails, the run continues from one of them: hands let go, or without hands
+//! steps are halved.
 
 use std::collections::VecDeque;
 
@@ -14,8 +15,9 @@ const MOST_STEPS: u64 = 1000;
 const MOST: usize = 8;
 /// Memory [bytes] that all of them take, about.
 const MEMORY: usize = 256 << 20;
-/// Memory [bytes] that one takes for each node, about: displacements, increments and what laws remember.
-const NODE: usize = 200;
+/// Memory [bytes] that one takes for each node, about: displacements, increments, the internal forces of
+/// the last two instants and what laws remember.
+const NODE: usize = 250;
 
 /// A state, and what the run was then.
 #[derive(Clone)]
@@ -39,12 +41,14 @@ pub(crate) struct SoundStates {
     at_first: bool,
     /// Whether hands did something since the run began or last went back.
     touched: bool,
+    /// Steps done when they last did.
+    touched_at: Option<u64>,
 }
 
 impl SoundStates {
-    /// Hands do something.
-    pub fn touch(&mut self) {
-        self.touched = true;
+    /// Hands do something after so many steps.
+    pub fn touch(&mut self, steps: u64) {
+        (self.touched, self.touched_at) = (true, Some(steps));
     }
 
     /// Whether a state is due after so many steps of a length [s].
@@ -74,6 +78,18 @@ impl SoundStates {
         let sound = self.later.back().or(self.first.as_ref())?.clone();
         self.back_at = sound.steps;
         Some(sound)
+    }
+
+    /// The state to halve the steps from: the newest but one, or the first. `None` where hands did something since then: they let go instead.
+    pub fn untouched(&mut self) -> Option<&mut Sound> {
+        let place = self.later.len().checked_sub(2);
+        let sound = place.map_or(self.first.as_mut(), |place| self.later.get_mut(place))?;
+        if self.touched_at.is_some_and(|at| at >= sound.steps) {
+            return None;
+        }
+        self.back_at = sound.steps;
+        self.later.truncate(place.map_or(0, |place| place + 1));
+        place.map_or(self.first.as_mut(), |place| self.later.get_mut(place))
     }
 
     /// The state to go back to after a break: the newest one that the run has not gone back to. `None` where hands did nothing and the run

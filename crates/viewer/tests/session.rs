@@ -215,7 +215,7 @@ fn a_pull_that_breaks_a_run_is_undone() {
     let taken = wait(&mut session, |frame| !frame.held.is_empty());
     let place = Vector3::from(taken.held[0][0]);
     for pull in 1..=200 {
-        let place = place + Vector3::x() * 0.005 * f64::from(pull);
+        let place = place + Vector3::x() * 0.05 * f64::from(pull);
         session.order(Order::Hand(Hand::Pull(place.into())));
         session.order(Order::Step(20));
     }
