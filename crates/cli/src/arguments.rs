@@ -772,6 +772,7 @@ pub struct MeshImage {
     #[arg(long = "as", value_name = "CELLS", default_value = "tets")]
     pub cells: MeshCells,
     /// In a scene: a label whose surface is a wall of that thickness, tied to the tissue, such as "portal vein=1mm"; may be repeated.
+    /// Voxels of the label inside the organ become tissue.
     #[arg(long, value_name = "LABEL=LENGTH", value_parser = vessel, allow_hyphen_values = true)]
     pub vessels: Vec<(LabelChoice, f64)>,
     /// In a scene: a capsule of this thickness on the boundary of the tissue, such as 0.1mm.

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use pliant_geometry::Vector3;
-use pliant_imaging::LabelChoice;
+use pliant_imaging::{Choice, Image, LabelChoice};
 use pliant_scene::OrganScene;
 
 use super::input::{image, is_mesh_file, label_failure, regions_in};
@@ -47,16 +47,23 @@ pub fn scene(arguments: &MeshImage) -> Result<u8, Failure> {
     let vessels: Vec<LabelChoice> = arguments.vessels.iter().map(|(label, _)| label.clone()).collect();
     let organ = MeshImage { label: sources.organ, ..arguments.clone() };
     let found = image(arguments, &bar).and_then(|image| {
-        // The organ gives the box; of vessels it is enough that they are there.
-        if !vessels.is_empty() {
-            image.choose(&vessels).map_err(|error| label_failure(&error))?;
-        }
-        regions_in(image, &organ, &bar)
+        let (image, volumes) = with_vessels(image, &organ, &vessels)?;
+        Ok((regions_in(image, &organ, &bar)?, volumes))
     });
     bar.finish();
-    let found = found?;
+    let (found, volumes) = found?;
     for line in &found.lines {
         say(line)?;
+    }
+    if let Some([inside, outside]) = volumes {
+        let voxels = found.labels.labels.iter().filter(|&&label| label != 0).count();
+        let tissue = voxels as f64 * found.labels.grid.voxel_volume();
+        say(format_args!(
+            "tissue           {:.2} ml, with {:.2} ml of the vessels; {:.2} ml of these run outside of it",
+            tissue * 1e6,
+            inside * 1e6,
+            outside * 1e6
+        ))?;
     }
     found.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
     let grid = &found.labels.grid;
@@ -72,7 +79,7 @@ pub fn scene(arguments: &MeshImage) -> Result<u8, Failure> {
     };
     let organ = OrganScene {
         title: folder_name(&arguments.out),
-        source: source(&sources.files, &format!("labels = [{}]", sources.labels.join(", "))),
+        source: source(&sources.files, &sources.labels),
         edge,
         vessels: sources.vessels.iter().zip(&arguments.vessels).map(with_thickness).collect(),
         capsule: arguments.capsule,
@@ -89,6 +96,26 @@ pub fn scene(arguments: &MeshImage) -> Result<u8, Failure> {
     let out = arguments.out.display();
     say(format_args!("wrote {out}; try: pliant check {out} && pliant run {out}"))?;
     Ok(SUCCESS)
+}
+
+/// The image with the vessels inside of the organ as tissue, and their volumes inside and outside [m³]. Masks stay as they are.
+fn with_vessels(
+    image: Image,
+    organ: &MeshImage,
+    vessels: &[LabelChoice],
+) -> Result<(Image, Option<[f64; 2]>), Failure> {
+    let chosen = |labels: &[LabelChoice]| match image.choose(labels) {
+        Ok(Choice::Labels(labels)) => Ok(labels),
+        Ok(Choice::From(_)) => Ok(Vec::new()),
+        Err(error) => Err(label_failure(&error)),
+    };
+    if vessels.is_empty() || !organ.masks.is_empty() {
+        return Ok((image, None));
+    }
+    let (own, mut vessels) = (chosen(&organ.label)?, chosen(vessels)?);
+    vessels.retain(|label| !own.contains(label));
+    let (filled, voxels) = image.with_vessels_inside(&own, &vessels);
+    Ok((filled, Some(voxels.map(|voxels| voxels as f64 * image.grid.voxel_volume()))))
 }
 
 /// Corners of the box that holds all but one in two hundred of the places at either end of each axis: loose voxels do not count.
@@ -108,19 +135,23 @@ fn bulk(places: Vec<Vector3>) -> Option<[Vector3; 2]> {
 struct Sources<'a> {
     /// What the organ is chosen by in the input.
     organ: Vec<LabelChoice>,
-    /// Its files, and its labels as a scene has them.
+    /// Its files, and its labels as the keys of a scene.
     files: Vec<&'a PathBuf>,
-    labels: Vec<String>,
+    labels: String,
     /// The same of each vessel.
     vessels: Vec<(Vec<&'a PathBuf>, String)>,
 }
 
 impl<'a> Sources<'a> {
-    /// Of one image the tissue fills the voxels of the vessels, too; masks overlap, and each stands for itself.
+    /// Of one image the tissue takes the voxels of the vessels inside of it; masks overlap, and each stands for itself.
     fn of(arguments: &'a MeshImage) -> Result<Self, Failure> {
         let vessels = || arguments.vessels.iter().map(|(label, _)| label);
         if arguments.masks.is_empty() {
-            let labels = arguments.label.iter().chain(vessels()).map(typed).collect();
+            let list = |all: Vec<String>| all.join(", ");
+            let mut labels = format!("labels = [{}]", list(arguments.label.iter().map(typed).collect()));
+            if !arguments.vessels.is_empty() {
+                labels += &format!(", vessels = [{}]", list(vessels().map(typed).collect()));
+            }
             let files = vec![&arguments.image];
             let vessels = vessels().map(|label| (files.clone(), typed(label))).collect();
             return Ok(Self { organ: arguments.label.clone(), files, labels, vessels });
@@ -150,7 +181,10 @@ impl<'a> Sources<'a> {
         }
         Ok(Self {
             organ: of_organ.iter().map(|&at| LabelChoice::One(at as i32 + 1)).collect(),
-            labels: (1..=of_organ.len()).map(|label| label.to_string()).collect(),
+            labels: {
+                let numbers: Vec<String> = (1..=of_organ.len()).map(|label| label.to_string()).collect();
+                format!("labels = [{}]", numbers.join(", "))
+            },
             files: of_organ.iter().map(|&at| files[at]).collect(),
             vessels: walls.iter().map(|&at| (vec![files[at]], "1".into())).collect(),
         })

@@ -402,6 +402,8 @@ impl MadeMesh {
                 object["edges"] = json!(report.edges);
                 object["crowded_edges_left"] = json!(report.crowded_edges_left);
                 object["pinched_points"] = json!(report.pinched_points);
+                object["surface_check"] = json!(report.surface);
+                object["lost"] = json!(report.lost);
                 object["optimiser"] = json!(report.steps);
                 object["distance"] = json!(report.distance);
             }

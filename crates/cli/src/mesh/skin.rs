@@ -5,7 +5,7 @@ use std::path::Path;
 use pliant_geometry::io::{self, Format};
 use pliant_geometry::{CellKind, Mesh, Vector3, diagnose};
 use pliant_meshing::{
-    Fewer, FitProgress, FittedShells, Hausdorff, SURFACE_PAIRS, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs,
+    Anatomy, Fewer, FitProgress, FittedShells, Hausdorff, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs,
     TriangleMesh,
 };
 use serde_json::{Value as Json, json};
@@ -24,6 +24,8 @@ const SAMPLES: f64 = 400.0;
 /// The input surface with notes on its source.
 struct InputSurface {
     surface: TriangleMesh,
+    /// The labels that it is the surface of, of an image.
+    anatomy: Option<Anatomy<'static>>,
     lines: Vec<String>,
     object: Json,
     warnings: Vec<String>,
@@ -35,7 +37,7 @@ pub fn mesh(arguments: &MeshImage) -> Result<u8, Failure> {
     arguments.error_map.as_deref().map(require_surface_format).transpose()?;
     let bar = Bar::new();
     let made = found(arguments, &bar).and_then(|found| {
-        let made = make(arguments, &found.surface, goal, &bar)?;
+        let made = make(arguments, &found, goal, &bar)?;
         Ok((found, made))
     });
     bar.finish();
@@ -43,7 +45,10 @@ pub fn mesh(arguments: &MeshImage) -> Result<u8, Failure> {
     if !arguments.json {
         say(found.lines.iter().chain(&made.lines).cloned().collect::<Vec<_>>().join("\n"))?;
     }
-    found.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+    // The lines of shells have their warnings.
+    let is_new = |warning: &&String| arguments.json || !made.lines.iter().any(|line| line.contains(*warning));
+    let warnings = found.warnings.iter().chain(made.warnings.iter().filter(is_new));
+    warnings.for_each(|warning| eprintln!("warning: {warning}"));
     let mut files = vec![(&arguments.out, &made.mesh)];
     files.extend(arguments.error_map.as_ref().zip(made.error_map.as_ref()));
     for (path, mesh) in &files {
@@ -55,7 +60,6 @@ pub fn mesh(arguments: &MeshImage) -> Result<u8, Failure> {
     if arguments.json {
         let mut object = made.object;
         object["input"] = found.object;
-        made.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
         object["warnings"] = json!(found.warnings.iter().chain(&made.warnings).collect::<Vec<_>>());
         object["files"] = json!(files.iter().map(|(path, _)| path).collect::<Vec<_>>());
         say(object)?;
@@ -110,17 +114,16 @@ fn found(arguments: &MeshImage, bar: &Bar) -> Result<InputSurface, Failure> {
             vec![format!("{}: {}, {} triangles", arguments.image.display(), file.format, surface.len())];
         lines.extend(file.notes.iter().map(|note| format!("note: {note}")));
         lines.push(format!("mended           {repairs}"));
-        return Ok(InputSurface { surface, lines, object: file_object(&file.format, &repairs), warnings });
+        let object = file_object(&file.format, &repairs);
+        return Ok(InputSurface { surface, anatomy: None, lines, object, warnings });
     }
     let found = regions(arguments, bar)?;
     let (anatomy, cleaned) = anatomy(arguments, &found, &SURFACE_SMOOTHING, bar)?;
-    let mut surface =
-        TriangleMesh::of_field(anatomy.field(), found.voxel, cell_limit(arguments)).map_err(refused)?;
-    surface.smooth(SURFACE_PAIRS);
+    let surface = TriangleMesh::of_image(&anatomy, found.voxel, cell_limit(arguments)).map_err(refused)?;
     let Segmented { mut lines, mut object, warnings, .. } = found;
     lines.push(format!("cleaned          {cleaned}"));
     object["cleaned"] = json!(cleaned);
-    Ok(InputSurface { surface, lines, object, warnings })
+    Ok(InputSurface { surface, anatomy: Some(anatomy), lines, object, warnings })
 }
 
 fn file_object(format: &str, repairs: &SurfaceRepairs) -> Json {
@@ -133,13 +136,13 @@ struct MadeSurface {
     error_map: Option<Mesh>,
     lines: Vec<String>,
     object: Json,
-    /// Those that its lines have.
     warnings: Vec<String>,
 }
 
-fn make(arguments: &MeshImage, found: &TriangleMesh, goal: Goal, bar: &Bar) -> Result<MadeSurface, Failure> {
+fn make(arguments: &MeshImage, found: &InputSurface, goal: Goal, bar: &Bar) -> Result<MadeSurface, Failure> {
     let refused = |error| meshing_failure(&error, arguments.force);
-    let mut surface = found.clone();
+    let InputSurface { surface: input, anatomy, .. } = found;
+    let mut surface = input.clone();
     bar.update_mesh(0.5, "making triangles");
     match goal {
         Goal::Shells(goal) => {
@@ -153,7 +156,7 @@ fn make(arguments: &MeshImage, found: &TriangleMesh, goal: Goal, bar: &Bar) -> R
                 );
                 bar.update_mesh(0.3 + 0.7 * now.part, words);
             };
-            return FittedShells::new(found, goal, &progress).map(shells).map_err(refused);
+            return FittedShells::new(input, goal, &progress).map(shells).map_err(refused);
         }
         Goal::Edge(edge) => {
             surface.mark_creases(CREASE);
@@ -164,8 +167,17 @@ fn make(arguments: &MeshImage, found: &TriangleMesh, goal: Goal, bar: &Bar) -> R
         }
     }
     bar.update_mesh(0.8, "measuring distances");
-    let diagonal = found.diagonal();
-    Ok(triangles(&surface, &Hausdorff::between(&surface, found, diagonal / SAMPLES), diagonal))
+    let kept = anatomy.as_ref().and_then(|anatomy| surface.keep_volume(anatomy));
+    let diagonal = input.diagonal();
+    let mut made = triangles(&surface, &Hausdorff::between(&surface, input, diagonal / SAMPLES), diagonal);
+    made.warnings.extend(surface.volume_warning(input).filter(|_| kept.is_none()));
+    if let Some(kept) = kept {
+        made.lines.extend(kept.lines());
+        made.warnings = kept.warnings();
+        made.object["labels"] = json!(kept.labels);
+        made.object["lost"] = json!(kept.lost);
+    }
+    Ok(made)
 }
 
 fn shells(fitted: FittedShells) -> MadeSurface {

@@ -33,9 +33,11 @@ fn an_image_becomes_a_scene_with_walls_and_ties() {
     let told = mesh(&workshop, &[&more[..], &["-o", "organ/scene.toml"]].concat());
     assert_eq!(told.code, 0, "{}", told.err);
     assert!(told.out.contains("wrote organ/scene.toml"), "{}", told.out);
+    // The core is inside of the ball, all of it.
+    assert!(told.out.contains("1.47 ml of the vessels; 0.00 ml of these run outside"), "{}", told.out);
     let text = workshop.read("organ/scene.toml");
     for piece in [
-        "labels = [5, 8]",
+        "labels = [5], vessels = [8]",
         "label = 8, clean = { keep-largest = true }, as = \"surface\"",
         "on = \"organ\"",
         "[tie.vessel-1]",
@@ -311,7 +313,8 @@ fn a_part_thinner_than_the_cells_is_told_with_its_place() {
         told.err
     );
     assert!(close(&json["distances"]["farthest"][0], 0.0175, 0.06), "{json}");
-    assert_eq!(json["warnings"].as_array().map(Vec::len), Some(1));
+    assert!(told.words().contains("the mesh lacks parts of the body: "), "{}", told.err);
+    assert_eq!(json["warnings"].as_array().map(Vec::len), Some(2));
 }
 
 #[test]
@@ -404,6 +407,13 @@ fn a_surface_of_an_image_becomes_fewer_triangles_and_shells() {
     let json = mesh(&workshop, &even).json();
     assert!(close(&json["volume"], 14.14e-6, 0.04) && close(&json["area"], 28.27e-4, 0.04), "{json}");
     assert_eq!((&json["border_edges"], &json["components"]), (&0.into(), &1.into()));
+    // It has the volume of its voxels, and says so label by label.
+    let inputs: f64 = [0, 1].iter().map(|&at| json["labels"][at]["input_volume"].as_f64().unwrap()).sum();
+    assert!(close(&json["volume"], inputs, 1e-3), "{json}");
+    assert!(
+        close(&json["labels"][1]["volume"], 1.472e-6, 1e-3) && json["lost"] == serde_json::json!([]),
+        "{json}"
+    );
     assert!(json["least_angle"].as_f64().unwrap() > 20.0, "{json}");
 
     let fewer = workshop

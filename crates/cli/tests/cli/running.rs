@@ -23,7 +23,7 @@ fn keys(object: &Value) -> Vec<&str> {
 }
 
 /// The keys of `--json`, in their order.
-const KEYS: [&str; 30] = [
+const KEYS: [&str; 31] = [
     "status",
     "error",
     "bodies",
@@ -41,6 +41,7 @@ const KEYS: [&str; 30] = [
     "equilibria",
     "ended",
     "shell_strains",
+    "intersections",
     "volume_changes",
     "device",
     "precision",
