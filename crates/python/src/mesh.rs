@@ -1,10 +1,11 @@
 //! Meshes between arrays and the engine.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
-use pliant_geometry::{CellBlock, CellKind, DataArray, Vector3, io};
+use pliant_geometry::{CellBlock, CellKind, DataArray, SplitCells, SplitKind, Vector3, add_as_tets, io};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -24,6 +25,9 @@ const KINDS: [(&str, CellKind); 6] = [
     ("tetra", CellKind::Tet),
     ("hexahedron", CellKind::Hex),
 ];
+
+/// Kinds that become tets.
+const SPLIT: [(&str, SplitKind); 2] = [("wedge", SplitKind::Wedge), ("pyramid", SplitKind::Pyramid)];
 
 /// The word for a kind.
 pub fn word(kind: CellKind) -> &'static str {
@@ -51,23 +55,28 @@ impl Mesh {
             points: vectors(&points)?.into_iter().map(Vector3::from).collect(),
             ..Default::default()
         };
-        for (word, nodes) in &cells {
-            let kind = KINDS.iter().find(|(own, _)| own == word).map(|(_, kind)| *kind).ok_or_else(|| {
-                let known = KINDS.map(|(word, _)| word).join(", ");
-                Trouble::Value(format!("there are no cells `{word}`; there are {known}"))
-            })?;
-            mesh.blocks.push(CellBlock::new(kind, nodes.as_array().iter().copied().collect()));
-        }
         let data = |array: &PyReadonlyArray2<'_, f64>| {
             let values = array.as_array();
             DataArray { components: values.ncols(), values: values.iter().copied().collect() }
         };
-        mesh.point_data.extend(point_data.iter().map(|(name, values)| (name.clone(), data(values))));
-        for (word, name, values) in &cell_data {
-            if let Some(at) = cells.iter().position(|(own, _)| own == word) {
-                mesh.blocks[at].data.insert(name.clone(), data(values));
+        let mut split = Vec::new();
+        for (word, nodes) in &cells {
+            let nodes = nodes.as_array().iter().copied().collect();
+            let own = cell_data.iter().filter(|(kind, ..)| kind == word);
+            let own = own.map(|(_, name, values)| (name.clone(), data(values))).collect();
+            if let Some((_, kind)) = KINDS.iter().find(|(own, _)| own == word) {
+                mesh.blocks.push(CellBlock { data: own, ..CellBlock::new(*kind, nodes) });
+            } else if let Some(&(_, kind)) = SPLIT.iter().find(|(own, _)| own == word) {
+                split.push(SplitCells { kind, nodes, data: own, sets: BTreeMap::new() });
+            } else {
+                let known: Vec<&str> =
+                    KINDS.iter().map(|(word, _)| *word).chain(SPLIT.map(|(word, _)| word)).collect();
+                let known = known.join(", ");
+                return Err(Trouble::Value(format!("there are no cells `{word}`; there are {known}")));
             }
         }
+        mesh.point_data.extend(point_data.iter().map(|(name, values)| (name.clone(), data(values))));
+        add_as_tets(&mut mesh, &split);
         for (name, nodes) in &point_sets {
             let mut nodes: Vec<u32> = nodes.as_array().iter().copied().collect();
             nodes.sort_unstable();

@@ -136,7 +136,7 @@ impl Model {
         out: PathBuf,
         options: RunOptions,
         each: Option<Py<PyAny>>,
-    ) -> PyResult<(String, f64, [f64; 6])> {
+    ) -> PyResult<(String, f64, [f64; 7])> {
         let RunOptions { until, threads, force, resume, picture } = options;
         let mut world = until.map_or_else(|| (*self.world).clone(), |until| self.world.lasting(until));
         world.scene.run.threads = threads;
@@ -189,9 +189,9 @@ impl Model {
     }
 }
 
-/// Kinetic, internal, damping, external and hourglass energy [J], and the balance.
-pub fn in_order(e: &Energies) -> [f64; 6] {
-    [e.kinetic, e.internal, e.damping, e.external, e.hourglass, e.balance]
+/// Kinetic, internal, damping, external and hourglass energy and that of step changes [J], and the balance.
+pub fn in_order(e: &Energies) -> [f64; 7] {
+    [e.kinetic, e.internal, e.damping, e.external, e.hourglass, e.step_changes, e.balance]
 }
 
 /// The adapters of this machine, the best first.

@@ -265,8 +265,8 @@ impl Simulation {
         Ok(array(py, values, columns))
     }
 
-    /// Kinetic, internal, damping, external and hourglass energy [J], and the balance.
-    fn energies(&self, py: Python<'_>) -> PyResult<[f64; 6]> {
+    /// Kinetic, internal, damping, external and hourglass energy and that of step changes [J], and the balance.
+    fn energies(&self, py: Python<'_>) -> PyResult<[f64; 7]> {
         self.work(py, |running, _| {
             running.evaluate()?;
             Ok(in_order(&running.simulation().energies()))

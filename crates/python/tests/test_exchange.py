@@ -132,3 +132,40 @@ def test_masks_from_memory_are_saved_beside_the_scene(tmp_path: object) -> None:
     scene.body["ball"] = {"mesh": {"masks": masks, "edge": 6e-3}, "law": "tissue", "density": 1000.0}
     scene.save(f"{tmp_path}/scene.toml")
     assert np.allclose(pliant.load(f"{tmp_path}/scene.toml").build().rest, scene.build().rest, atol=1e-9)
+
+
+def column() -> tuple[np.ndarray, dict[str, list[list[int]]]]:
+    """A cube of two wedges under one of a hexahedron, with a pyramid on top."""
+    points = np.array([[x, y, z] for z in (0, 1, 2) for y in (0, 1) for x in (0, 1)] + [[0.5, 0.5, 3]], float)
+    cells = {"wedge": [[0, 1, 3, 4, 5, 7], [0, 3, 2, 4, 7, 6]], "hexahedron": [[4, 5, 7, 6, 8, 9, 11, 10]], "pyramid": [[8, 9, 11, 10, 12]]}
+    return points, cells
+
+
+def volume(mesh: Mesh) -> float:
+    a, b, c, d = np.moveaxis(mesh.points[mesh.cells["tetra"]], 1, 0)
+    volumes = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6
+    assert (volumes > 0).all()
+    return float(volumes.sum())
+
+
+def test_wedges_and_pyramids_become_tetrahedra() -> None:
+    points, cells = column()
+    mesh = Mesh(points, cells, cell_data={"label": [1, 1, 2, 3]})
+    assert set(mesh.cells) == {"tetra"} and abs(volume(mesh) - 7 / 3) < 1e-12
+    assert {label: int((mesh.cell_data["label"] == label).sum()) for label in (1, 2, 3)} == {1: 6, 2: 6, 3: 2}
+    meshio = pytest.importorskip("meshio")
+    blocks = [(kind, np.array(own)) for kind, own in cells.items()]
+    labels = [np.array([1.0, 1.0]), np.array([2.0]), np.array([3.0])]
+    back = Mesh.from_meshio(meshio.Mesh(points, blocks, cell_data={"label": labels}))
+    assert same(mesh, back) and np.array_equal(mesh.cell_data["label"], back.cell_data["label"])
+    with pytest.raises(ValueError, match="tetra10"):
+        Mesh.from_meshio(meshio.Mesh(np.zeros((10, 3)), [("tetra10", np.arange(10)[None])]))
+    pyvista = pytest.importorskip("pyvista")
+    kinds = {"wedge": 13, "hexahedron": 12, "pyramid": 14}
+    grid = pyvista.UnstructuredGrid({kinds[kind]: np.array(own) for kind, own in cells.items()}, points)
+    assert abs(volume(Mesh.from_pyvista(grid)) - 7 / 3) < 1e-12
+    voxels = Mesh.from_pyvista(pyvista.ImageData(dimensions=(3, 2, 2)))
+    assert len(voxels.cells["hexahedron"]) == 2
+    quadratic = pyvista.UnstructuredGrid({24: np.arange(10)[None]}, np.random.default_rng(1).random((10, 3)))
+    with pytest.raises(ValueError, match="VTK type 24"):
+        Mesh.from_pyvista(quadratic)

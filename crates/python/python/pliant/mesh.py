@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 
 __all__ = ["Mesh"]
 
-_CORNERS = {"vertex": 1, "line": 2, "triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8}
-_VTK = {"vertex": 1, "line": 3, "triangle": 5, "quad": 9, "tetra": 10, "hexahedron": 12}
+_CORNERS = {"vertex": 1, "line": 2, "triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8, "wedge": 6, "pyramid": 5}
+_VTK = {"vertex": 1, "line": 3, "triangle": 5, "quad": 9, "tetra": 10, "hexahedron": 12, "wedge": 13, "pyramid": 14}
+# VTK's cells along the axes have other orders of corners.
+_REORDERED = {8: ("quad", [0, 1, 3, 2]), 11: ("hexahedron", [0, 1, 3, 2, 4, 5, 7, 6])}
 
 
 class Mesh:
@@ -34,7 +36,8 @@ class Mesh:
         Places [m], (n, 3).
     cells
         Corners of the cells by kind: ``"tetra"`` (k, 4), ``"hexahedron"`` (k, 8), ``"triangle"`` (k, 3), ``"quad"`` (k, 4),
-        ``"line"`` (k, 2), numbered as VTK and meshio do.
+        ``"line"`` (k, 2), numbered as VTK and meshio do. ``"wedge"`` (k, 6) and ``"pyramid"`` (k, 5) become tetrahedra, and so do
+        hexahedra that share faces with them.
     point_data, cell_data
         Values by name: (n,) or (n, c) for points; for cells in the order of `cells`, all kinds after each other.
     point_sets
@@ -252,11 +255,23 @@ class Mesh:
 
     @classmethod
     def from_pyvista(cls, grid: Any) -> Mesh:
-        """From a grid or a surface of PyVista; lengths are taken as metres."""
+        """From a grid or a surface of PyVista; lengths are taken as metres. Cells of kinds that a mesh does not have are a `ValueError`."""
         grid = grid.cast_to_unstructured_grid()
         words = {number: word for word, number in _VTK.items()}
-        cells = {words[int(kind)]: corners for kind, corners in grid.cells_dict.items() if int(kind) in words}
-        return cls(grid.points, cells, point_data={k: grid.point_data[k] for k in grid.point_data})
+        cells: dict[str, Any] = {}
+        order = []
+        for number, corners in grid.cells_dict.items():
+            kind = words.get(int(number), f"VTK type {number}")
+            if int(number) in _REORDERED:
+                kind, places = _REORDERED[int(number)]
+                corners = corners[:, places]
+            cells[kind] = np.concatenate([cells[kind], corners]) if kind in cells else corners
+            order.append((kind, np.flatnonzero(grid.celltypes == number)))
+        # Cells of one kind stand together, as the mesh has them.
+        at = np.concatenate([own for kind in cells for word, own in order if word == kind]) if order else np.empty(0, int)
+        by_cell = {name: np.asarray(grid.cell_data[name])[at] for name in grid.cell_data}
+        by_point = {name: np.asarray(grid.point_data[name]) for name in grid.point_data}
+        return cls(grid.points, cells, point_data=by_point, cell_data=by_cell)
 
     def to_meshio(self) -> meshio.Mesh:
         """A copy for meshio."""
@@ -271,13 +286,16 @@ class Mesh:
 
     @classmethod
     def from_meshio(cls, mesh: Any, *, scale: float = 1.0) -> Mesh:
-        """From a mesh of meshio; `scale` is the size of its unit in metres."""
+        """From a mesh of meshio; `scale` is the size of its unit in metres. Cells of kinds that a mesh does not have are a `ValueError`."""
         cells: dict[str, Any] = {}
         for block in mesh.cells:
-            if block.type in _CORNERS:
-                before = cells.get(block.type)
-                cells[block.type] = block.data if before is None else np.concatenate([before, block.data])
-        return cls(mesh.points, cells, point_data=dict(mesh.point_data), scale=scale)
+            before = cells.get(block.type)
+            cells[block.type] = block.data if before is None else np.concatenate([before, block.data])
+        by_cell: dict[str, Any] = {}
+        for name, parts in mesh.cell_data.items():
+            own = [np.asarray(part) for kind in cells for block, part in zip(mesh.cells, parts, strict=True) if block.type == kind]
+            by_cell[name] = np.concatenate(own) if own else np.empty(0)
+        return cls(mesh.points, cells, point_data=dict(mesh.point_data), cell_data=by_cell, scale=scale)
 
     def __repr__(self) -> str:
         kinds = ", ".join(f"{len(corners)} {kind}" for kind, corners in self.cells.items() if len(corners))

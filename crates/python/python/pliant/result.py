@@ -178,7 +178,7 @@ class Result:
             time=simulation.time,
             steps=simulation.steps,
             wall_seconds=wall,
-            energies=Energies(*(last.get(name, float("nan")) for name in Energies._fields)),
+            energies=Energies(*(last.get(name.replace("_", "-"), float("nan")) for name in Energies._fields)),
             reactions=reactions,
             warnings=[],
             files=[],

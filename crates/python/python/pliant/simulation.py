@@ -26,13 +26,17 @@ __all__ = ["Energies", "Grip", "Simulation", "State", "Tool"]
 
 
 class Energies(NamedTuple):
-    """Energies [J]; `balance` is what is missing, as a part of the largest."""
+    """Energies [J]; `balance` is what is missing, as a part of the largest.
+
+    `step_changes` is what explicit steps of changing length added.
+    """
 
     kinetic: float
     internal: float
     damping: float
     external: float
     hourglass: float
+    step_changes: float
     balance: float
 
 

@@ -53,6 +53,8 @@ class Run(Table):
         How `implicit` and `static` solve their linear equations. Takes "direct", "unsymmetric" or "conjugate-gradients" or { by = … }.
     control
         What a `static` run prescribes instead of the size of a load, so that it goes past limit points. Takes { load = … }.
+    allow_hourglass
+        The part of the internal energy that a run may hold in hourglass modes of `hex8` at its end. With more it writes all outputs and ends with an error: the shape of the elements is not resolved. Takes a number, at least 0; 0.1 if not given.
     threads
         Threads; 0: one per core. The number never changes a result. Takes a whole number, at least 0 and at most 1024; 0 if not given.
     checkpoint
@@ -60,7 +62,7 @@ class Run(Table):
     """
 
     _type: ClassVar[str | None] = None
-    _keys: ClassVar[dict[str, str]] = {"device": "device", "adapter": "adapter", "design": "design", "precision": "precision", "solver": "solver", "step": "step", "on_unstable": "on-unstable", "mass_scaling": "mass-scaling", "load_steps": "load-steps", "tolerance": "tolerance", "iterations": "iterations", "speed_tolerance": "speed-tolerance", "accept_unconverged": "accept-unconverged", "integrator": "integrator", "linear": "linear", "control": "control", "threads": "threads", "checkpoint": "checkpoint"}
+    _keys: ClassVar[dict[str, str]] = {"device": "device", "adapter": "adapter", "design": "design", "precision": "precision", "solver": "solver", "step": "step", "on_unstable": "on-unstable", "mass_scaling": "mass-scaling", "load_steps": "load-steps", "tolerance": "tolerance", "iterations": "iterations", "speed_tolerance": "speed-tolerance", "accept_unconverged": "accept-unconverged", "integrator": "integrator", "linear": "linear", "control": "control", "allow_hourglass": "allow-hourglass", "threads": "threads", "checkpoint": "checkpoint"}
 
     device: str | None = None
     adapter: str | None = None
@@ -78,6 +80,7 @@ class Run(Table):
     integrator: Any | None = None
     linear: Any | None = None
     control: Any | None = None
+    allow_hourglass: float | None = None
     threads: int | None = None
     checkpoint: Any | None = None
 
@@ -907,9 +910,9 @@ class Body(Table):
     damping
         Mass-proportional damping [1/s]. Takes a number, at least 0; 0.0 if not given.
     stiffness_damping
-        Stiffness-proportional damping [s] with the solver `implicit`; the same for all bodies of a participant. Takes a number, at least 0; 0.0 if not given.
+        Stiffness-proportional damping β [s] with the solver `implicit`, and with `explicit` of all bodies but shells; the same for all bodies of a participant. It damps a vibration of angular frequency ω with the ratio βω/2. An explicit step shrinks with it, from the critical time step Δt to √(β² + Δt²) − β. Takes a number, at least 0; 0.0 if not given.
     hourglass
-        Stiffness against hourglass patterns of `hex8`, as a multiple of the shear modulus; above about 0.5 it stiffens bending. One for the whole body or for each cell label. Takes a number or a table of numbers, at least 0 and at most 10; 0.2 if not given.
+        Stiffness against hourglass patterns of `hex8`, as a multiple of the shear modulus at rest; above about 0.5 it stiffens bending. One for the whole body or for each cell label. If not given, 0.2 of the current shear modulus of each element, which is at least the one at rest. Takes a number or a table of numbers, at least 0 and at most 10.
     velocity
         Velocity [m/s] at the start, of all nodes that no constraint holds or moves; not for quasi-static runs. Takes 3 numbers.
     initial_displacement
@@ -952,12 +955,14 @@ class Body(Table):
 
 @dataclass(frozen=True, kw_only=True)
 class Tie(Table):
-    """`[tie.NAME]`. Ties the nodes of one body to another body, whose mesh need not match: each follows the cell of the other in which it lies, or on whose surface, and its forces and its mass go there. For vessels inside an organ, walls on a surface, parts that are glued. Bodies of two participants are tied by springs, as stiff as their steps allow. On the CPU.
+    """`[tie.NAME]`. Ties the nodes of one body to another body, whose mesh need not match: they follow nodes of the other, and their forces and masses go there. For vessels inside an organ, walls on a surface, parts that are glued. Bodies of two participants are tied by springs, as stiff as their steps allow.
 
     Parameters
     ----------
     between
-        The body whose nodes follow, and the body that they follow: `between = ["vessels", "liver"]`. Take the finer or the softer one first. Takes 2 texts.
+        The body whose nodes follow, and the body that they follow: `between = ["vessels", "liver"]`. With `points`, take the finer or the softer one first. Takes 2 texts.
+    method
+        How nodes follow. If not given, `mortar` where faces of one solid lie on those of another one, and `points` elsewhere: walls, bars, a solid inside another one, and gaps wider than the default `tolerance`. Takes "mortar" or "points".
     nodes
         The nodes of the first body that follow; if not given, all inside or on the second. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     tolerance
@@ -967,9 +972,10 @@ class Tie(Table):
     """
 
     _type: ClassVar[str | None] = None
-    _keys: ClassVar[dict[str, str]] = {"between": "between", "nodes": "nodes", "tolerance": "tolerance", "rotations": "rotations"}
+    _keys: ClassVar[dict[str, str]] = {"between": "between", "method": "method", "nodes": "nodes", "tolerance": "tolerance", "rotations": "rotations"}
 
     between: Any
+    method: Any | None = None
     nodes: Any | None = None
     tolerance: float | None = None
     rotations: Any | None = None
@@ -1481,7 +1487,7 @@ class Tool(Table):
 
 @dataclass(frozen=True, kw_only=True)
 class Contact(Table):
-    """`[contact.NAME]`. Who touches whom: a body an obstacle or a tool, another body, or itself. No surface goes into the other. With the solver `explicit`, for bodies without bending; bodies that touch each other are solids. With the solvers `implicit` and `static`, for solids and shells: a barrier keeps surfaces apart, and no state that is accepted has an intersection. The force on the second is in `csv` outputs as `contact.NAME`.
+    """`[contact.NAME]`. Who touches whom: a body an obstacle or a tool, another body, or itself. With the solver `explicit`, for bodies without bending, impulses keep surfaces apart; bodies that touch each other are solids. With the solvers `implicit` and `static`, for solids and shells, a barrier does. Only barriers exclude intersections: no state that is accepted has one. The force on the second is in `csv` outputs as `contact.NAME`.
 
     Parameters
     ----------
@@ -1494,7 +1500,7 @@ class Contact(Table):
     friction
         Coulomb's coefficient of friction. Takes a number, at least 0; 0.0 if not given.
     thickness
-        Distance [m] that the surfaces keep; 0 if not given. With the solvers `implicit` and `static`, if not given: half of the thickness of each shell that takes part. Takes a number, at least 0.
+        Distance [m] that the surfaces keep. If not given: with the solver `explicit` 0.5 % of the mean edge between two bodies and of a body with itself, 0 from a rigid thing; with the solvers `implicit` and `static` half of the thickness of each shell that takes part. Nodes of explicit bodies that are nearer at the start keep the distance that they have. Takes a number, at least 0.
     barrier_distance
         The gap [m], in addition to `thickness`, below which surfaces push each other away, with the solvers `implicit` and `static`; a thousandth of the diagonal of all bodies if not given. Takes a number, greater than 0.
     barrier_stiffness
@@ -1504,7 +1510,7 @@ class Contact(Table):
     creep_speed
         Speed [m/s] below which bodies creep that friction should hold, with the solvers `implicit` and `static`; 0.001 if not given. Takes a number, greater than 0.
     check_intersections
-        Whether each state is searched for edges that go through triangles, by a way of its own. One would be a fault of the program, and ends the run. Holds for all contacts of the solver. Takes true or false; false if not given.
+        Whether states are searched for edges that go through triangles, by a way of its own. With the solvers `implicit` and `static` the search looks at each state; an intersection would be a fault of the program, and ends the run. With the solver `explicit` the search looks at the states that outputs write, and counts the intersections of bodies that are deeper than 1e-4 of the mean edge: a warning, and `intersections` in `--json`. Holds for all contacts of the solver. Takes true or false; false if not given.
     separate
         Whether bodies that overlap at the start are pushed apart before the run, by the least ways of their nodes. The shape at rest stays as it is, so that the run starts deformed. Without it they are refused. Takes true or false; false if not given.
     """
