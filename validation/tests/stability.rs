@@ -62,7 +62,9 @@ fn single(cells: VolumeCell, law: AnyLaw) -> Model {
         }
         VolumeCell::Hex => {
             model.rest = HEX_CORNERS.map(skew).to_vec();
-            Cells::hex8(vec![[0, 1, 2, 3, 4, 5, 6, 7]], &model.rest, HOURGLASS, law.small_strain().shear)
+            let shear = law.small_strain().shear;
+            Cells::hex8(vec![[0, 1, 2, 3, 4, 5, 6, 7]], &model.rest, HOURGLASS, shear)
+                .with_growing_hourglass()
         }
     };
     let nodes = model.rest.len();
