@@ -17,6 +17,7 @@ const STEPS: f64 = 1e5;
 
 /// A body of 0.5 to 20 cm, a block or an ellipsoid of some tens to a thousand cells, fixed at one end. From the start a traction acts on the other
 /// end: it pulls with 2 to 20 % of Young's modulus or pushes with 2 to 5 %, under which no body collapses at steps of any length.
+/// Coarse `hex8` that bend have more energy in hourglass modes than a run may end with; stability is another question.
 fn suddenly_loaded(seed: u64) -> String {
     let mut random = Random::new(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x1234_5678);
     // Seeds that lie close have close first numbers.
@@ -54,6 +55,7 @@ until = 1.0
 [run]
 precision = "{precision}"
 threads = 1
+allow-hourglass = 1.0
 [law.tissue]
 type = "neo-hookean"
 young-modulus = {young}
