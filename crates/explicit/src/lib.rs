@@ -66,5 +66,5 @@ pub use relaxation::{Relaxation, Series};
 pub use state::{State, Work};
 pub use step_control::{Clock, Lengths, StepControl};
 pub use step_error::StepError;
-pub use stepper::{CentralDifference, Observable, Wanted};
+pub use stepper::{CentralDifference, NO_MASS, Observable, Wanted};
 pub use touching::NodeContact;

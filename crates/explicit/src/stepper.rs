@@ -40,7 +40,7 @@ use crate::step_error::StepError;
 use crate::touching::{Free, NodeContact, Nodes, Posture, Touching};
 
 /// Mass [kg] of a component that is held and of which the mass went elsewhere.
-const NO_MASS: f64 = 1e-30;
+pub const NO_MASS: f64 = 1e-30;
 
 /// Tasks that a thread takes at least: fewer take less time than waking another thread.
 const LEAST_CHUNKS: usize = 5;

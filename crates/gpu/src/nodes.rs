@@ -1,6 +1,7 @@
 //! Nodes on the device: where they are, what holds them, and the kernels that move them.
 
 use bytemuck::{Pod, Zeroable};
+use pliant_explicit::NO_MASS;
 use pliant_mechanics::model::{FREE, Model};
 use pliant_mechanics::tensor::Vector;
 
@@ -9,9 +10,6 @@ use crate::loads::DeviceLoads;
 use crate::ties::Followers;
 use crate::transfer::Four;
 use crate::{Device, GpuError};
-
-/// Mass [kg] of a held node whose mass went elsewhere.
-const NO_MASS: f64 = 1e-30;
 
 /// A node that is held.
 #[repr(C)]

@@ -45,16 +45,8 @@ pub(crate) fn constants_of(
 
 /// Whether the hourglass stiffness of a solid grows: 0 if not, 1 of a law with an energy of the volume alone, 2 of others.
 fn hourglass_grows(solid: &Solid) -> usize {
-    match solid.hourglass_growth() {
-        None => 0,
-        Some(_) => {
-            if solid.material.law.has_volumetric_energy() {
-                1
-            } else {
-                2
-            }
-        }
-    }
+    let kind = if solid.material.law.has_volumetric_energy() { 1 } else { 2 };
+    solid.hourglass_growth().map_or(0, |_| kind)
 }
 
 /// What the kernels of a solid are made of.

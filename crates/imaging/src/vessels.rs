@@ -11,8 +11,9 @@ const INSIDE: usize = 14;
 
 impl Image {
     /// The image of labels with the voxels of vessels inside an organ as voxels of the organ, each with the label that most ways lead to;
-    /// and how many voxels of the vessels are inside and outside.
+    /// and how many voxels of the vessels are inside and outside. Labels of the organ are no vessels.
     pub fn with_vessels_inside(&self, organ: &[i32], vessels: &[i32]) -> (Self, [usize; 2]) {
+        let vessels: Vec<i32> = vessels.iter().copied().filter(|label| !organ.contains(label)).collect();
         let dims = self.grid.dims;
         // The label behind the vessels on a way from a voxel; 0 beyond the image.
         let behind = |from: [usize; 3], way: usize| {

@@ -297,8 +297,8 @@ mod tests {
         assert!(complex.alive().all(|tet| complex.length(tet) > 0.0));
     }
 
-    #[test]
-    fn a_boundary_that_meets_itself_in_a_point_is_parted() {
+    /// The wedges of a plate between two cones that meet at its middle, each of two tets.
+    fn plate() -> Complex {
         let around = |at: usize, height: f64| {
             let (sine, cosine) = (at as f64 * std::f64::consts::FRAC_PI_3).sin_cos();
             Vector3::new(cosine, sine, height)
@@ -307,9 +307,13 @@ mod tests {
         points.extend((0..6).map(|at| around(at, 0.4)));
         points.extend((0..6).map(|at| around(at, -0.4)));
         let (top, low) = (|at: u32| 1 + at % 6, |at: u32| 7 + at % 6);
-        // The wedges of a plate between two cones that meet at its middle, each of two tets.
         let wedge = |at: u32| [[0, low(at), low(at + 1), top(at + 1)], [0, low(at), top(at + 1), top(at)]];
-        let mut complex = Complex::new(points, (0..6).flat_map(wedge).collect(), 1.0);
+        Complex::new(points, (0..6).flat_map(wedge).collect(), 1.0)
+    }
+
+    #[test]
+    fn a_boundary_that_meets_itself_in_a_point_is_parted() {
+        let mut complex = plate();
         assert!(complex.alive().all(|tet| complex.length(tet) > 0.0));
         assert!(crowded_edges(&complex).is_empty());
         assert_eq!(pinched_points(&complex), [0]);
@@ -322,16 +326,7 @@ mod tests {
     /// The same plate where no cap fits: a hole joins the cones.
     #[test]
     fn a_point_that_is_taken_off_leaves_a_hole() {
-        let around = |at: usize, height: f64| {
-            let (sine, cosine) = (at as f64 * std::f64::consts::FRAC_PI_3).sin_cos();
-            Vector3::new(cosine, sine, height)
-        };
-        let mut points = vec![Vector3::zeros()];
-        points.extend((0..6).map(|at| around(at, 0.4)));
-        points.extend((0..6).map(|at| around(at, -0.4)));
-        let (top, low) = (|at: u32| 1 + at % 6, |at: u32| 7 + at % 6);
-        let wedge = |at: u32| [[0, low(at), low(at + 1), top(at + 1)], [0, low(at), top(at + 1), top(at)]];
-        let mut complex = Complex::new(points, (0..6).flat_map(wedge).collect(), 1.0);
+        let mut complex = plate();
         dig(&mut complex, 0);
         assert!(complex.star[0].is_empty() && complex.sides[0] == 0);
         assert!(crowded_edges(&complex).is_empty() && pinched_points(&complex).is_empty());

@@ -112,9 +112,7 @@ fn with_vessels(
     if vessels.is_empty() || !organ.masks.is_empty() {
         return Ok((image, None));
     }
-    let (own, mut vessels) = (chosen(&organ.label)?, chosen(vessels)?);
-    vessels.retain(|label| !own.contains(label));
-    let (filled, voxels) = image.with_vessels_inside(&own, &vessels);
+    let (filled, voxels) = image.with_vessels_inside(&chosen(&organ.label)?, &chosen(vessels)?);
     Ok((filled, Some(voxels.map(|voxels| voxels as f64 * image.grid.voxel_volume()))))
 }
 

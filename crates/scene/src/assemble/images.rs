@@ -227,9 +227,7 @@ fn with_vessels(image: Image, choice: &Choice, table: &MeshTable) -> Result<Imag
     };
     let all: Vec<LabelChoice> = vessels.iter().map(Label::choice).collect();
     let chosen = image.choose(&all).map_err(|error| label_fault("vessels", table, &error))?;
-    let Choice::Labels(mut vessels) = chosen else { return Ok(image) };
-    // What is the organ is inside of it anyway.
-    vessels.retain(|label| !organ.contains(label));
+    let Choice::Labels(vessels) = chosen else { return Ok(image) };
     let (mut filled, voxels) = image.with_vessels_inside(organ, &vessels);
     let [inside, outside] = voxels.map(|voxels| voxels as f64 * image.grid.voxel_volume() * 1e6);
     filled.notes.push(format!(
