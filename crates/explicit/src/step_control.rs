@@ -33,6 +33,11 @@ impl Lengths {
         0.5 * (self.before + self.next)
     }
 
+    /// The part Δt⁺/(2 h) of a force that moves a node in the first step; the rest is in the increment before that step.
+    pub fn first_part(self) -> f64 {
+        0.5 * self.next / self.mean()
+    }
+
     /// The velocity [m/s] at the instant, v⁻ + ½ Δt⁻ a, from the increments [m] before and after it.
     pub fn velocity(self, before: f64, after: f64) -> f64 {
         (before * self.ratio() + after / self.ratio()) / (2.0 * self.mean())

@@ -357,8 +357,7 @@ impl<R: Scalar> CentralDifference<R> {
         if state.is_at_start() {
             let stored = stored_at_start(&self.model, state, found.hourglass);
             self.start(state, stored);
-            // Half of a step's force moves a node in the first one: its other half is in the increment before.
-            if self.touch(state, 0.5) {
+            if self.touch(state, self.lengths.first_part()) {
                 self.start(state, stored);
             }
             if self.bind(state) {
@@ -533,9 +532,7 @@ impl<R: Scalar> CentralDifference<R> {
             let predicted = |node: u32| {
                 let mut own = self.predicted(state, node);
                 if at_start {
-                    // The other half of a force is in the increment before the first step.
-                    own.mobility =
-                        0.5 * self.lengths.next * self.lengths.mean() / self.mass[node as usize][0].to_f64();
+                    own.mobility = 0.5 * self.lengths.next.powi(2) / self.mass[node as usize][0].to_f64();
                 }
                 if own.held == [false; 3] {
                     return own;

@@ -50,11 +50,11 @@ fn may_touch(n: u32) -> bool {
     return false;
 }
 
-// Half of a step's force moves a node in the first one: its other half is in the increment before.
+// Of a force the part Δt⁺/(2 h) moves a node in the first step; the rest is in the increment before.
 fn predict(n: u32) {
     let node = node_of(n);
     let m = motion(node, internal_force(node).xyz);
-    let part = select(1.0, 0.5, does(STARTS));
+    let part = select(1.0, instant.ratio / (1.0 + instant.ratio), does(STARTS));
     var free = 7u;
     if m.held != FREE {
         let owner = holds[m.held].owner;
