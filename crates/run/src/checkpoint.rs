@@ -22,7 +22,7 @@ use pliant_scene::{Part, World};
 /// The first bytes of every checkpoint.
 const MAGIC: [u8; 8] = *b"\x89PLIANT\n";
 /// The version of what follows. Any change of what is in a body needs the next number.
-pub(crate) const FORMAT: u32 = 19;
+pub(crate) const FORMAT: u32 = 20;
 /// Bytes before the body: magic, format, length.
 const HEAD: usize = 20;
 /// Bytes after it.

@@ -434,7 +434,7 @@ impl Observer for Run<'_, '_> {
             let looks = self.history.times.len() % SAMPLES_A_LOOK == 1 && !is_on_device(self.world);
             self.look_at_strains(simulation, looks || last);
         }
-        if self.outputs.are_due(time, step, last) {
+        if last || self.outputs.are_due(time, step, last) {
             let parts = self.world.participants.iter().zip(simulation.instants());
             for ((own, check), (part, now)) in self.watched.iter_mut().zip(&self.checks).zip(parts) {
                 check.iter().for_each(|check| own.intersections.look(check, part, now));

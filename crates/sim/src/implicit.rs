@@ -978,6 +978,11 @@ impl Participant for Implicit {
         }
     }
 
+    fn cut_log(&mut self) {
+        let done = self.done;
+        self.convergence.retain(|row| row.step <= done);
+    }
+
     fn fingerprint(&self) -> u64 {
         let bits = |numbers: &[f64]| -> Vec<u64> { numbers.iter().map(|x| x.to_bits()).collect() };
         let positions = self.state.position.iter().flat_map(|x| bits(x.as_slice()));

@@ -98,6 +98,9 @@ pub(crate) trait Participant: Instant + Send {
     /// Adds what a checkpoint has beside that: the residuals of iterations so far.
     fn add_log(&self, _kept: &mut Kept) {}
 
+    /// Forgets what it notes of iterations after the present state.
+    fn cut_log(&mut self) {}
+
     /// How its steps are counted, of a stepper whose increments tell velocities.
     fn clock(&self) -> Option<Clock> {
         None

@@ -659,6 +659,7 @@ impl Simulation {
     pub fn restore(&mut self, state: State) -> Result<(), Failure> {
         state.check(&self.world)?;
         self.go_back(state)?;
+        self.participants.iter_mut().for_each(|own| own.cut_log());
         self.hold(&[]);
         Ok(())
     }

@@ -236,11 +236,13 @@ pub(crate) struct Watched {
     pub solids: SolidStrains,
 }
 
-/// Edges of bodies that go through triangles of others, in the states that outputs have written.
+/// Edges of bodies that go through triangles of others, in the states that outputs have written and in the last one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Intersections {
     /// All of them, counted in each state.
     pub count: u64,
+    /// States that were searched.
+    pub searched: u64,
     /// States with some.
     pub states: u64,
     /// The largest depth [m].
@@ -260,6 +262,7 @@ impl Intersections {
         let place =
             |node: u32| Vector3::from(rest[node as usize]) + Vector3::from(now.displacement(node as usize));
         let before = self.count;
+        self.searched += 1;
         check.find(place, |found| {
             self.count += 1;
             if found.depth > self.deepest {
@@ -274,20 +277,21 @@ impl Intersections {
 
     /// Together with those of another participant.
     pub(crate) fn with(self, other: Self) -> Self {
-        let (count, states) = (self.count + other.count, self.states + other.states);
+        let [count, searched, states] =
+            [self.count + other.count, self.searched + other.searched, self.states + other.states];
         let deepest = if other.deepest > self.deepest { other } else { self };
-        Self { count, states, ..deepest }
+        Self { count, searched, states, ..deepest }
     }
 
     /// What a user should know of them; `None` without any.
     pub(crate) fn doubt(&self) -> Option<String> {
-        let Self { count, states, deepest, time, at, contact } = self;
+        let Self { count, searched, states, deepest, time, at, contact } = self;
         (*count > 0).then(|| {
             format!(
-                "contact `{contact}`: {} of edges with triangles in {}, up to {} m deep at t = {} s at ({}) m; \
+                "contact `{contact}`: {} of edges with triangles in {states} of {}, up to {} m deep at t = {} s at ({}) m; \
                  take a larger `thickness`, smaller elements, or `solver = \"implicit\"`, whose barriers exclude them",
                 counted(*count as usize, "intersection"),
-                counted(*states as usize, "written state"),
+                counted(*searched as usize, "searched state"),
                 number(*deepest),
                 number(*time),
                 at.map(number).join(", ")

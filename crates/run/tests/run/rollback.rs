@@ -130,6 +130,53 @@ fn all_participants_go_back_together() {
     let column = both.0.iter().position(|name| name == "reaction.end.z").unwrap();
     assert_eq!(both.1.len(), calm.1.len());
     assert!(both.1.iter().zip(&calm.1).all(|(a, b)| a[column] == b[column]));
+    // Of its iterations no row is of a step that was undone.
+    let [both, calm] =
+        ["out/case", "out/calm"].map(|folder| workshop.read(&format!("{folder}/convergence-walls.csv")));
+    assert!(both == calm && both.lines().count() > 100);
+}
+
+#[test]
+#[cfg(feature = "gpu")]
+fn a_run_on_a_gpu_goes_back_too() {
+    if !pliant_testing::has_gpu(pliant_sim::gpu::adapters().len()) {
+        return;
+    }
+    let on = |device: &str| Workshop::new(&pressed(SOON).replace("precision = \"double\"", device));
+    let [gpu, cpu] = [on("device = \"gpu\""), on("precision = \"single\"")]
+        .map(|own| (own.run(&[]).done(), own.table("out/case/history.csv")));
+    for (told, (_, rows)) in [&gpu, &cpu] {
+        assert_eq!((told["stability"]["halvings"].as_u64(), rows.len()), (Some(1), 401), "{told}");
+    }
+    let column = cpu.1.0.iter().position(|name| name == "reaction.top.z").unwrap();
+    let [last, other] = [&gpu, &cpu].map(|(_, (_, rows))| rows.last().unwrap()[column]);
+    assert!((last / other - 1.0).abs() < 1e-3, "{last} {other}");
+}
+
+/// A block that lies on a floor. Going back to the start with half the step leaves the floor's force, since the weight on it is the same.
+#[test]
+fn contact_forces_at_the_start_do_not_depend_on_the_step() {
+    let fixed = "[constraint.low]\ntype = \"fix\"\nbody = \"b\"\nnodes = { set = \"z-min\" }";
+    let floor = "[obstacle.floor]\nshape = \"half-space\"\n[contact.feet]\nbetween = [\"b\", \"floor\"]";
+    let scene = pressed(SOON)
+        .replacen("until = 4.0", "until = 1.0\ngravity = [0, 0, -9.81]", 1)
+        .replacen("damping = 20", "damping = 0", 1)
+        .replacen(fixed, floor, 1);
+    for device in ["precision = \"double\"", "device = \"gpu\""] {
+        if device.contains("gpu") && !(cfg!(feature = "gpu") && pliant_testing::has_gpu(1)) {
+            continue;
+        }
+        let world = world(&scene.replace("precision = \"double\"", device)).unwrap();
+        let mut simulation = world.simulation().unwrap();
+        let start = simulation.state().unwrap();
+        let mut force = || simulation.frame().unwrap().contact_force("feet").unwrap()[2];
+        let whole = force();
+        let mut halved = start;
+        assert!(halved.halve_steps(simulation.world()));
+        simulation.restore(halved).unwrap();
+        let half = simulation.frame().unwrap().contact_force("feet").unwrap()[2];
+        assert!(whole < 0.0 && (half / whole - 1.0).abs() < 1e-5, "{device}: {half} N for {whole} N");
+    }
 }
 
 #[test]

@@ -110,11 +110,17 @@ fn intersections_are_counted() {
     let summary = found("check-intersections = true\nthickness = 0");
     let counted = summary.intersections.unwrap();
     println!("{counted:?}");
+    assert_eq!(counted.searched, 81);
     assert!(counted.count > 0 && counted.states > 0 && counted.deepest > 0.0, "{counted:?}");
     assert_eq!(counted.contact, "crack");
     let warning = summary.warnings.iter().find(|own| own.contains("of edges with triangles in")).unwrap();
     assert!(warning.starts_with("contact `crack`: ") && warning.contains("larger `thickness`"), "{warning}");
     assert!(found("").intersections.is_none());
+    // Without an output the last state is searched.
+    let silent = text("check-intersections = true\nthickness = 0");
+    let silent = silent.split("[output.fields]").next().unwrap();
+    let counted = run(silent, &place.path().join("silent")).intersections.unwrap();
+    assert_eq!(counted.searched, 1, "{counted:?}");
 }
 
 #[test]

@@ -662,7 +662,7 @@ impl Builder<'_> {
         });
         if count > 0 {
             self.notes.push(format!(
-                "contact `{name}`: {} of nodes with faces or of edges never touch, since they are too near at rest",
+                "contact `{name}`: {} of nodes with faces or of edges never touch, since they are too near each other, or behind each other, at rest",
                 counted(count, "pair")
             ));
         }

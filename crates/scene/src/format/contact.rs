@@ -308,7 +308,8 @@ pub struct ContactTable {
     pub creep_speed: Option<f64>,
     /// Whether states are searched for edges that go through triangles, by a way of its own. With the solvers `implicit` and `static` the search looks at
     /// each state; an intersection would be a fault of the program, and ends the run. With the solver `explicit` the search looks at the states that
-    /// outputs write, and counts the intersections of bodies that are deeper than 1e-4 of the mean edge: a warning, and `intersections` in `--json`.
+    /// outputs write and at the last one, and counts the intersections of bodies that are deeper than 1e-4 of the mean edge: a warning, and
+    /// `intersections` in `--json`.
     /// Holds for all contacts of the solver.
     #[serde(default)]
     pub check_intersections: bool,
