@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use pliant_geometry::io;
 use pliant_imaging::{Choice, Cleaning, LabelChoice, ReadOptions, Smoothing};
-use pliant_meshing::{Anatomy, Closing, Enclosed, OrganTets};
+use pliant_meshing::{Anatomy, Closing, Enclosed, OrganTets, SurfaceCheck, TriangleMesh, Voxels};
 
 /// Parts of the diagonal that are edges.
 const PARTS: [f64; 2] = [16.0, 32.0];
@@ -74,7 +74,7 @@ fn main() -> Result<(), Failed> {
     let out = words.next().filter(|out| out != "-").map(PathBuf::from);
     let names: Vec<String> = words.collect();
     out.as_deref().map(std::fs::create_dir_all).transpose()?;
-    let (mut meshes, mut crossing) = (0, 0);
+    let (mut meshes, mut crossing, mut crossing_triangles) = (0, 0, 0);
     for (name, file, body) in BODIES {
         if !names.is_empty() && !names.iter().any(|own| name.contains(own.as_str())) {
             continue;
@@ -100,18 +100,27 @@ fn main() -> Result<(), Failed> {
                 report.surface.of_body.unwrap_or(0),
                 report.surface.self_intersections,
                 report.repairs.closed_tears,
-                report.surface.tears,
+                report.tears.number,
                 report.crowded_edges_left + report.pinched_points.len(),
                 start.elapsed().as_secs_f64()
             );
             meshes += 1;
             crossing += usize::from(report.surface.self_intersections > 0);
+            let hexes = SurfaceCheck::of(&Voxels::new(edge).mesh(anatomy.field())?.mesh);
+            let mut surface = TriangleMesh::of_field(anatomy.field(), 0.5 * edge, usize::MAX)?;
+            surface.remesh(edge, usize::MAX)?;
+            let surface = SurfaceCheck::of(&surface.to_mesh());
+            let of = |own: &SurfaceCheck| {
+                format!("Euler number {}, {} faces cross", own.euler_number, own.self_intersections)
+            };
+            println!("{:<20} hexes: {}; triangles: {}", "", of(&hexes), of(&surface));
+            crossing_triangles += usize::from(surface.self_intersections > 0);
             if let Some(out) = &out {
                 io::write(&out.join(format!("{name}-{part:.0}.vtu")), &made.mesh)?;
             }
         }
     }
-    println!("{crossing} of {meshes} meshes intersect themselves");
+    println!("{crossing} of {meshes} meshes of tets and {crossing_triangles} surfaces intersect themselves");
     Ok(())
 }
 

@@ -101,12 +101,12 @@ pub use request::OrganTets;
 pub use sampled::SampledDistances;
 pub use sheets::{Distortion, Pattern, Sheet, sphere};
 pub use shells::{FitProgress, FittedShells, Flaw, ShellGoal, ShellReport};
+pub use soundness::SurfaceCheck;
 pub use structured::{Block, Resolution, Tube, VolumeCell};
 pub use stuffing::Stuffing;
 pub use surface_volume::{LabelVolume, SurfaceVolume};
 pub use tets::{
-    DistanceReport, EdgeLengths, LostReport, MaterialReport, OrganMesh, Repairs, Steps, SurfaceCheck,
-    TetReport,
+    DistanceReport, EdgeLengths, LostReport, MaterialReport, OrganMesh, Repairs, Steps, Tears, TetReport,
 };
 pub use thickness::Thickness;
 pub use triangles::{SurfaceRepairs, TriangleMesh};

@@ -1,9 +1,63 @@
 //! Whether the boundary of a mesh bounds a body: its Euler number, and faces that pass through each other.
 
-use pliant_geometry::Vector3;
+use pliant_geometry::{Mesh, Vector3, boundary};
+use serde::Serialize;
 
 use crate::crossings::crossings;
+use crate::deviation::sample_step;
 use crate::edges::key;
+use crate::field::ImplicitField;
+use crate::isosurface::euler_number_of_field;
+
+/// Whether the boundary of a mesh is that of a body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct SurfaceCheck {
+    /// Euler number of the boundary of the mesh: 2 for each closed surface, less 2 for each handle.
+    pub euler_number: i64,
+    /// That of the body's surface, if it is known.
+    pub of_body: Option<i64>,
+    /// Boundary faces that pass through others, quads as two triangles.
+    pub self_intersections: usize,
+    /// Where the first do [m].
+    pub first_crossing: Option<[f64; 3]>,
+}
+
+impl SurfaceCheck {
+    /// Of the boundary of volume cells, or of a mesh of triangles and quads itself.
+    pub fn of(mesh: &Mesh) -> Self {
+        let faces = boundary(mesh).faces;
+        let fan =
+            |nodes: &[u32]| (2..nodes.len()).map(|k| [nodes[0], nodes[k - 1], nodes[k]]).collect::<Vec<_>>();
+        let triangles: Vec<[u32; 3]> = faces.iter().flat_map(|face| fan(face.nodes())).collect();
+        let (crossing, first_crossing) = self_intersections(&mesh.points, &triangles);
+        let (euler_number, self_intersections) = (euler_number(&triangles), crossing.len());
+        Self { euler_number, of_body: None, self_intersections, first_crossing }
+    }
+
+    /// Beside the surface of the body, the field sampled at a quarter of an edge [m].
+    pub fn with_body(self, field: &(impl ImplicitField + ?Sized), edge: f64) -> Self {
+        let step = sample_step(field, edge);
+        Self { of_body: step.and_then(|step| euler_number_of_field(field, step)).ok(), ..self }
+    }
+
+    /// The numbers in words.
+    pub fn line(&self) -> String {
+        let of_body = self.of_body.map_or_else(String::new, |own| format!(" (body: {own})"));
+        let Self { euler_number, self_intersections, .. } = self;
+        format!(
+            "surface          Euler number {euler_number}{of_body}, {self_intersections} faces intersect others"
+        )
+    }
+
+    /// What is wrong with it; `None` where no face passes through another.
+    pub fn doubt(&self) -> Option<String> {
+        let [x, y, z] = self.first_crossing?;
+        let number = self.self_intersections;
+        Some(format!(
+            "{number} faces of the mesh boundary pass through others, the first at ({x:.4}, {y:.4}, {z:.4}) m"
+        ))
+    }
+}
 
 /// V − E + F of the triangles: 2 for each closed piece, less 2 for each handle.
 pub(crate) fn euler_number(triangles: &[[u32; 3]]) -> i64 {

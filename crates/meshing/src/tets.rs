@@ -11,19 +11,18 @@ use crate::Stuffing;
 use crate::anatomy::Anatomy;
 use crate::complex::{Complex, LONGEST};
 use crate::cut::{cut_gaps, cut_materials};
-use crate::deviation::{Measured, sample_step};
+use crate::deviation::Measured;
 use crate::error::{MeshingError, require_positive};
 use crate::given::MeasuredTo;
 use crate::grading::{Filled, Levels, Wanted, fill, tree};
 use crate::guard::Guard;
-use crate::isosurface::euler_number_of_field;
 use crate::long_edges::halve_long_edges;
 use crate::lost::{LostPart, Samples};
 use crate::manifold::{crowded_edges, mend, pinched_points};
 use crate::octree::{Octree, around};
 use crate::optimise::{Optimised, Optimiser};
 use crate::request::{OrganTets, SMALLEST_PART};
-use crate::soundness::{euler_number, self_intersections};
+use crate::soundness::{SurfaceCheck, self_intersections};
 use crate::surfaces::Surfaces;
 
 /// Meshes made at most until a distance is held.
@@ -241,24 +240,22 @@ impl OrganTets {
         let left = crowded_edges(&complex).len();
         let pinched = pinched_points(&complex);
         let pinched_points = pinched.iter().map(|&point| complex.points[point as usize].into()).collect();
-        let outer = complex.outer_faces();
-        let (crossing, first_crossing) = self_intersections(&complex.points, &outer);
-        let surface = SurfaceCheck {
-            euler_number: euler_number(&outer),
-            of_body: sample_step(anatomy.field(), self.edge)
-                .and_then(|step| euler_number_of_field(anatomy.field(), step))
-                .ok(),
-            self_intersections: crossing.len(),
-            first_crossing,
-            tears: tears.len(),
-            first_tear: tears.first().map(|tear| tear.places[0].into()),
-        };
         let lost = lost(&complex);
         let (acoustic_part, edges) = (complex.worst(), EdgeLengths::of(&complex));
         let (points, nodes, material) = complex.compacted();
         let mesh = labelled(points, nodes, &material, &anatomy.labels());
-        let of_complex =
-            OfComplex { raw, acoustic_part, edges, crowded_edges_left: left, pinched_points, surface, lost };
+        let surface = SurfaceCheck::of(&mesh).with_body(anatomy.field(), self.edge);
+        let tears = Tears { number: tears.len(), first: tears.first().map(|tear| tear.places[0].into()) };
+        let of_complex = OfComplex {
+            raw,
+            acoustic_part,
+            edges,
+            crowded_edges_left: left,
+            pinched_points,
+            surface,
+            tears,
+            lost,
+        };
         let report = TetReport::new(&mesh, &material, anatomy, of_complex, repairs, steps);
         progress(1.0);
         Ok(OrganMesh { mesh, report })
@@ -387,6 +384,7 @@ struct OfComplex {
     crowded_edges_left: usize,
     pinched_points: Vec<[f64; 3]>,
     surface: SurfaceCheck,
+    tears: Tears,
     lost: Vec<LostPart>,
 }
 
@@ -429,21 +427,13 @@ impl LostReport {
     }
 }
 
-/// Whether the boundary of a mesh is that of a body.
+/// Thin parts of a body that a mesh tears.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct SurfaceCheck {
-    /// Euler number of the boundary of the mesh: 2 for each closed surface, less 2 for each handle.
-    pub euler_number: i64,
-    /// That of the body's surface, sampled at a quarter of the edge.
-    pub of_body: Option<i64>,
-    /// Boundary faces that pass through others.
-    pub self_intersections: usize,
-    /// Where the first do [m].
-    pub first_crossing: Option<[f64; 3]>,
-    /// Thin parts that cells of the smallest size still tear.
-    pub tears: usize,
+pub struct Tears {
+    /// How many.
+    pub number: usize,
     /// Where the first is [m].
-    pub first_tear: Option<[f64; 3]>,
+    pub first: Option<[f64; 3]>,
 }
 
 /// Distance between a mesh and its body, if requested.
@@ -507,6 +497,8 @@ pub struct TetReport {
     pub distance: Option<DistanceReport>,
     /// The boundary.
     pub surface: SurfaceCheck,
+    /// Thin parts that cells of the smallest size still tear.
+    pub tears: Tears,
     /// Parts of the body that the mesh lacks, the largest first, of a ten-thousandth of the body and more.
     pub lost: Vec<LostReport>,
 }
@@ -526,14 +518,8 @@ impl TetReport {
                 reached * 1e3
             ));
         }
-        if let Some([x, y, z]) = self.surface.first_crossing {
-            let number = self.surface.self_intersections;
-            doubts.push(format!(
-                "{number} faces of the mesh boundary pass through others, the first at ({x:.4}, {y:.4}, {z:.4}) m"
-            ));
-        }
-        if let Some([x, y, z]) = self.surface.first_tear {
-            let number = self.surface.tears;
+        doubts.extend(self.surface.doubt());
+        if let Tears { number, first: Some([x, y, z]) } = self.tears {
             doubts.push(format!(
                 "the mesh tears thin parts of the body in {number} places, the first at ({x:.4}, {y:.4}, {z:.4}) m"
             ));
@@ -559,7 +545,7 @@ impl TetReport {
         repairs: Repairs,
         steps: Steps,
     ) -> Self {
-        let OfComplex { raw, acoustic_part, edges, crowded_edges_left, pinched_points, surface, lost } =
+        let OfComplex { raw, acoustic_part, edges, crowded_edges_left, pinched_points, surface, tears, lost } =
             of_complex;
         let quality = QualityReport::new(mesh);
         let block = &mesh.blocks[0];
@@ -597,6 +583,7 @@ impl TetReport {
             steps,
             distance: None,
             surface,
+            tears,
             lost,
         }
     }
@@ -675,12 +662,7 @@ impl fmt::Display for TetReport {
         if let Some(lost) = LostReport::in_words(&self.lost) {
             writeln!(f, "lost             {lost}")?;
         }
-        let SurfaceCheck { euler_number, of_body, self_intersections, .. } = self.surface;
-        let of_body = of_body.map_or_else(String::new, |own| format!(" (body: {own})"));
-        writeln!(
-            f,
-            "surface          Euler number {euler_number}{of_body}, {self_intersections} faces intersect others"
-        )?;
+        writeln!(f, "{}", self.surface.line())?;
         if self.crowded_edges_left > 0 {
             writeln!(f, "still touching   {} edges", self.crowded_edges_left)?;
         }

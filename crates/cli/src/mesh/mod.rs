@@ -13,7 +13,7 @@ use pliant_geometry::{CellKind, Mesh, QualityReport, Vector3, diagnose};
 use pliant_imaging::{LabelChoice, LabelError, RegionReport, Smoothing};
 use pliant_meshing::{
     Anatomy, Assessment, Closing, Deviation, Enclosed, LabelReport, MeshingError, Missed, OrganTets,
-    TetReport, Voxels, require_room_for,
+    SurfaceCheck, TetReport, Voxels, require_room_for,
 };
 use pliant_scene::element_bound;
 use pliant_sim::number;
@@ -166,15 +166,18 @@ fn make(arguments: &MeshImage, bar: &Bar) -> Result<MadeMesh, Failure> {
             let made = if immersed { voxels.immersed(field) } else { voxels.mesh(field) };
             let mut made = made.map_err(refused)?;
             anatomy.label(&mut made.mesh);
-            (made.mesh, Cells::Hexes { immersed, dropped: [made.dropped_components, made.dropped_cells] })
+            let surface = SurfaceCheck::of(&made.mesh).with_body(field, edge);
+            let dropped = [made.dropped_components, made.dropped_cells];
+            (made.mesh, Cells::Hexes { immersed, dropped, surface })
         }
     };
     bar.update_mesh(PARTS[0] + PARTS[1], "measuring distances");
     let assessment = Assessment::of(&mesh, anatomy, edge).map_err(refused)?;
     let mut warnings = found.warnings;
     warnings.extend(assessment.missed.iter().map(warning));
-    if let Cells::Tets(report) = &cells {
-        warnings.extend(report.doubts());
+    match &cells {
+        Cells::Tets(report) => warnings.extend(report.doubts()),
+        Cells::Hexes { surface, .. } => warnings.extend(surface.doubt()),
     }
     Ok(MadeMesh {
         quality: QualityReport::new(&mesh),
@@ -312,10 +315,11 @@ fn require_few(arguments: &MeshImage, edge: f64, volume: f64) -> Result<(), Fail
 /// The cells of each kind with their report.
 enum Cells {
     Tets(Box<TetReport>),
-    /// Whether fractions weight them; loose parts dropped, and their cells.
+    /// Whether fractions weight them; loose parts dropped, and their cells; their boundary.
     Hexes {
         immersed: bool,
         dropped: [usize; 2],
+        surface: SurfaceCheck,
     },
 }
 
@@ -339,7 +343,7 @@ impl MadeMesh {
         let mut lines = self.lines.clone();
         match &self.cells {
             Cells::Tets(report) => lines.push(report.to_string()),
-            Cells::Hexes { dropped: [parts, cells], .. } => {
+            Cells::Hexes { dropped: [parts, cells], surface, .. } => {
                 lines.push(format!("nodes            {}", self.quality.nodes));
                 lines.push(format!("hexes            {}", self.cell_count()));
                 lines.extend(self.assessment.regions.labels.iter().map(label_line));
@@ -349,6 +353,7 @@ impl MadeMesh {
                 if let Some(length) = self.quality.acoustic_length {
                     lines.push(format!("acoustic length  {:.4e} m at least", length.min));
                 }
+                lines.push(surface.line());
                 if *parts > 0 {
                     lines.push(format!("left out         {cells} cells in {parts} loose parts"));
                 }
@@ -403,11 +408,13 @@ impl MadeMesh {
                 object["crowded_edges_left"] = json!(report.crowded_edges_left);
                 object["pinched_points"] = json!(report.pinched_points);
                 object["surface_check"] = json!(report.surface);
+                object["tears"] = json!(report.tears);
                 object["lost"] = json!(report.lost);
                 object["optimiser"] = json!(report.steps);
                 object["distance"] = json!(report.distance);
             }
-            Cells::Hexes { immersed, dropped: [parts, cells] } => {
+            Cells::Hexes { immersed, dropped: [parts, cells], surface } => {
+                object["surface_check"] = json!(surface);
                 object["as"] = json!(if *immersed { "immersed-hexes" } else { "hexes" });
                 object["repairs"] = json!({ "dropped_pieces": parts, "dropped_cells": cells });
             }

@@ -5,8 +5,8 @@ use std::path::Path;
 use pliant_geometry::io::{self, Format};
 use pliant_geometry::{CellKind, Mesh, Vector3, diagnose};
 use pliant_meshing::{
-    Anatomy, Fewer, FitProgress, FittedShells, Hausdorff, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs,
-    TriangleMesh,
+    Anatomy, Fewer, FitProgress, FittedShells, Hausdorff, SURFACE_SMOOTHING, ShellGoal, SurfaceCheck,
+    SurfaceRepairs, TriangleMesh,
 };
 use serde_json::{Value as Json, json};
 
@@ -169,11 +169,17 @@ fn make(arguments: &MeshImage, found: &InputSurface, goal: Goal, bar: &Bar) -> R
     bar.update_mesh(0.8, "measuring distances");
     let kept = anatomy.as_ref().and_then(|anatomy| surface.keep_volume(anatomy));
     let diagonal = input.diagonal();
-    let mut made = triangles(&surface, &Hausdorff::between(&surface, input, diagonal / SAMPLES), diagonal);
+    let mesh = surface.to_mesh();
+    let mut check = SurfaceCheck::of(&mesh);
+    check.of_body = anatomy.is_none().then(|| SurfaceCheck::of(&input.to_mesh()).euler_number);
+    if let (Some(anatomy), Some(edge)) = (anatomy, arguments.edge) {
+        check = check.with_body(anatomy.field(), edge);
+    }
+    let mut made = triangles(mesh, check, &Hausdorff::between(&surface, input, diagonal / SAMPLES), diagonal);
     made.warnings.extend(surface.volume_warning(input).filter(|_| kept.is_none()));
     if let Some(kept) = kept {
         made.lines.extend(kept.lines());
-        made.warnings = kept.warnings();
+        made.warnings.extend(kept.warnings());
         made.object["labels"] = json!(kept.labels);
         made.object["lost"] = json!(kept.lost);
     }
@@ -187,8 +193,7 @@ fn shells(fitted: FittedShells) -> MadeSurface {
     MadeSurface { mesh, error_map: Some(error_map), lines, object, warnings: report.warnings() }
 }
 
-fn triangles(surface: &TriangleMesh, distances: &Hausdorff, diagonal: f64) -> MadeSurface {
-    let mesh = surface.to_mesh();
+fn triangles(mesh: Mesh, check: SurfaceCheck, distances: &Hausdorff, diagonal: f64) -> MadeSurface {
     let of = |nodes: &[u32]| [0, 1, 2].map(|k| mesh.points[nodes[k] as usize]);
     let block = mesh.block(CellKind::Triangle);
     let corners: Vec<[Vector3; 3]> = block.into_iter().flat_map(|block| block.cells().map(of)).collect();
@@ -208,14 +213,15 @@ fn triangles(surface: &TriangleMesh, distances: &Hausdorff, diagonal: f64) -> Ma
         format!("angle            {angle:.1}° at least"),
         format!("pieces           {pieces}"),
         format!("border edges     {borders}"),
+        check.line(),
     ];
     lines.extend(distances.lines(diagonal, ["result to input ", "input to result "]));
     let object = json!({
         "status": "done", "as": "surface", "nodes": mesh.points.len(), "cells": corners.len(), "area": area,
         "volume": volume, "least_angle": angle, "components": pieces, "border_edges": borders,
-        "distances": distances, "diagonal": diagonal,
+        "distances": distances, "diagonal": diagonal, "surface_check": check,
     });
-    MadeSurface { mesh, error_map: None, lines, object, warnings: Vec::new() }
+    MadeSurface { mesh, error_map: None, lines, object, warnings: check.doubt().into_iter().collect() }
 }
 
 /// The smallest angle of a triangle [rad].

@@ -6,7 +6,7 @@ use pliant_geometry::{Grid, Vector3};
 use pliant_imaging::{Cleaning, LabelError, LabelImage, Smoothing};
 use pliant_meshing::{
     Anatomy, Closing, Ellipsoid, Enclosed, ImplicitField, MeshingError, OrganMesh, OrganTets,
-    SURFACE_SMOOTHING, TriangleMesh,
+    SURFACE_SMOOTHING, SurfaceCheck, TriangleMesh, Voxels,
 };
 use pliant_testing::Random;
 
@@ -305,8 +305,32 @@ fn a_thin_wall_is_not_torn() {
         let report = request.mesh(&body, &|_| {}).unwrap().report;
         assert!(report.repairs.closed_tears > 0, "{report}");
         assert_eq!((report.surface.euler_number, report.surface.of_body), (4, Some(4)), "{report}");
-        assert_eq!((report.surface.self_intersections, report.surface.tears), (0, 0));
+        assert_eq!((report.surface.self_intersections, report.tears.number), (0, 0));
     }
+}
+
+/// Every kind of mesh tells whether its boundary is that of the body: large cubes do not enclose the cavity of a thin wall, fine triangles do.
+#[test]
+fn boundaries_of_cubes_and_triangles_are_checked() {
+    let wall = Hollow { outer: 0.03, wall: 0.003 };
+    let cubes = |edge: f64| {
+        let mesh = Voxels::new(edge).mesh(&wall).unwrap().mesh;
+        SurfaceCheck::of(&mesh).with_body(&wall, edge)
+    };
+    assert_eq!(cubes(0.001).of_body, Some(4));
+    assert_eq!(cubes(0.001).euler_number, 4);
+    assert_ne!(cubes(0.005).euler_number, 4);
+    let surface = TriangleMesh::of_field(&wall, 0.001, usize::MAX).unwrap().to_mesh();
+    let check = SurfaceCheck::of(&surface);
+    assert_eq!((check.euler_number, check.self_intersections, check.doubt()), (4, 0, None));
+    // A piece of it that is moved passes through the rest.
+    let mut moved = surface.clone();
+    moved.points.iter_mut().filter(|x| x.norm() > 0.0285).for_each(|x| x.x += 0.002);
+    let check = SurfaceCheck::of(&moved);
+    assert!(
+        check.self_intersections > 0 && check.doubt().unwrap().contains("pass through others"),
+        "{check:?}"
+    );
 }
 
 /// Two balls with a neck of one cell between them.

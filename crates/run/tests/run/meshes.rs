@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-use pliant_geometry::{CellKind, io};
+use pliant_geometry::{CellKind, Vector3, io};
+use pliant_meshing::{Ellipsoid, TriangleMesh};
 use pliant_testing::scenes::{BLOCK, CORNERS, FROM_FILE, ROOT, TETS, Workshop, changed, fibres, labels, vtk};
 
 use crate::support::assert_close;
@@ -225,4 +226,50 @@ fn scale_and_at_bring_a_mesh_to_metres_and_in_place() {
     let (low, high) = mesh.bounds().unwrap();
     assert_close(low.x, 0.5, 1e-12, "left end [m]");
     assert_close(high.x, 0.6, 1e-12, "right end [m]");
+}
+
+/// How much a hollow ball of 30 mm, with a wall of 3 mm, gives way to a pressure inside, in tets of an edge [m]: its energy [J].
+fn inflated(workshop: &Workshop, edge: f64) -> f64 {
+    let held = |name: &str, at: [f64; 3], components: &str| {
+        format!(
+            "[constraint.{name}]\ntype = 'fix'\nbody = 'ball'\nnodes = {{ nearest = {{ point = {at:?} }} }}\ncomponents = {components}\n"
+        )
+    };
+    let scene = format!(
+        "[scene]\nuntil = 1\n[run]\nsolver = 'static'\nload-steps = 1\n\
+         [law.wall]\ntype = 'neo-hookean'\nyoung-modulus = 1e6\npoisson-ratio = 0.3\n\
+         [body.ball]\nmesh = {{ file = 'ball.stl', edge = {edge}, as = 'tets' }}\nlaw = 'wall'\ndensity = 1000\nelement = 'tet4'\n\
+         {}{}{}\
+         [load.inside]\ntype = 'pressure'\non = 'ball'\nfaces = {{ sphere = {{ centre = [0, 0, 0], radius = 0.0285 }} }}\npressure = 100\n\
+         [output.history]\ntype = 'csv'\nevery = 1\nenergy = true\n",
+        held("a", [0.03, 0.0, 0.0], "['x', 'y', 'z']"),
+        held("b", [-0.03, 0.0, 0.0], "['y', 'z']"),
+        held("c", [0.0, 0.03, 0.0], "['z']"),
+    );
+    workshop.write("case/scene.toml", scene);
+    workshop.run_into(&format!("out/{edge}"), &[]).done();
+    let (names, rows) = workshop.table(&format!("out/{edge}/history.csv"));
+    let column = names.iter().position(|name| name == "energy.internal").expect("a column");
+    rows.last().expect("a row")[column]
+}
+
+/// A wall that is little thicker than its cells is neither torn nor softer than in cells that resolve it.
+#[test]
+fn a_thin_wall_is_as_stiff_in_cells_as_large_as_it_is_thick() {
+    let ball = |radius: f64| {
+        let field = Ellipsoid::sphere(Vector3::zeros(), radius);
+        TriangleMesh::of_field(&field, 0.001, usize::MAX).expect("a ball").to_mesh()
+    };
+    let (mut wall, inner) = (ball(0.03), ball(0.027));
+    let first = wall.points.len() as u32;
+    wall.points.extend(inner.points);
+    let triangles = inner.blocks[0].nodes.chunks(3).flat_map(|t| [t[0], t[2], t[1]].map(|node| node + first));
+    wall.block_mut(CellKind::Triangle).nodes.extend(triangles);
+    let workshop = Workshop::new("");
+    let file = tempfile::tempdir().expect("a folder");
+    io::write(&file.path().join("ball.stl"), &wall).expect("a file");
+    workshop.write("case/ball.stl", fs::read(file.path().join("ball.stl")).expect("a file"));
+    let [coarse, fine] = [0.0025, 0.002].map(|edge| inflated(&workshop, edge));
+    println!("{coarse} J in tets of 2.5 mm, {fine} J in tets of 2 mm");
+    assert!((fine / coarse - 1.0).abs() < 0.02, "{coarse} {fine}");
 }

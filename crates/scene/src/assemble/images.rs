@@ -11,8 +11,8 @@ use pliant_imaging::{
 };
 use pliant_meshing::{
     Anatomy, Assessment, Closing, DEFAULT_CELL_LIMIT, Enclosed, Fewer, FieldMesh, FitProgress, FittedShells,
-    MeshingError, Missed, OrganTets, SURFACE_SMOOTHING, ShellGoal, SurfaceRepairs, TriangleMesh, Voxels,
-    require_room_for,
+    MeshingError, Missed, OrganTets, SURFACE_SMOOTHING, ShellGoal, SurfaceCheck, SurfaceRepairs,
+    TriangleMesh, Voxels, require_room_for,
 };
 
 use super::mesh_files::{MeshFault, words};
@@ -677,12 +677,14 @@ fn cover(
         }
         Goal::Finest | Goal::Volume(..) => {}
     }
-    let warnings = match anatomy.and_then(|anatomy| surface.keep_volume(anatomy)) {
+    let mut warnings = match anatomy.and_then(|anatomy| surface.keep_volume(anatomy)) {
         Some(kept) => {
             notes.extend(kept.note());
             kept.warnings()
         }
         None => surface.volume_warning(&input).into_iter().collect(),
     };
-    Ok((surface.to_mesh(), warnings))
+    let mesh = surface.to_mesh();
+    warnings.extend(SurfaceCheck::of(&mesh).doubt());
+    Ok((mesh, warnings))
 }
