@@ -204,7 +204,27 @@ fn joined_faces_move_on_a_device_as_on_the_processor() {
             super::ties::agrees_on_a_device([&cpu, &gpu], 1.0, "top");
             super::ties::agrees_on_a_device([&cpu, &atomics], 1.0, "top");
         }
+        // A load on tied nodes that are held there is part of the reaction, and not given on to the nodes that they follow.
+        let press =
+            format!("[load.press]\ntype = 'pressure'\non = 'a'\nfaces = {}\npressure = 100\n", plane(0, 0.0));
+        let [cpu, gpu] =
+            ["precision = 'double'", "device = 'gpu'"].map(|run| world(&(squeezed(run) + &press)).unwrap());
+        for constraint in ["ax", "bx", "top"] {
+            super::ties::agrees_on_a_device([&cpu, &gpu], 1.0, constraint);
+        }
     }
+}
+
+/// A constraint that holds nodes of the following body alone would tear the joint there: it is refused.
+#[test]
+fn constraints_of_the_following_body_alone_are_refused() {
+    let place = tempfile::tempdir().unwrap();
+    let text = stacked(place.path(), "solver = 'static'", PAIRS[0], ["a", "b"], "");
+    let told = world(&text.replace(&symmetric("b"), "")).err().unwrap();
+    for piece in ["`ax`", "follows nodes of", "constrain `b`"] {
+        assert!(told.contains(piece), "no {piece} in {told}");
+    }
+    assert!(world(&text.replace(&symmetric("a"), "")).is_ok());
 }
 
 #[test]
