@@ -111,8 +111,8 @@ impl NodalSteps {
     }
 }
 
-/// Adds k_a [N/m] of every cell of a solid at rest. Hourglass control adds c μ V Σ|B|² at most, as its patterns are orthogonal to the rest; it
-/// grows with the law, whose growth is not foreseen either.
+/// Adds k_a [N/m] of every cell of a solid at rest. Hourglass control adds c μ V Σ|B|² at most, as its patterns are orthogonal to the rest; where it
+/// grows with the law, the watch over the step looks at both.
 fn add_stiffness(solid: &Solid, stiffness: &mut [f64]) {
     let modulus = solid.longitudinal_modulus();
     with_cells!(&solid.cells, block => {
