@@ -8,9 +8,9 @@ use crate::{CellBlock, CellKind, DataArray, Mesh, SplitCells, SplitKind, Vector3
 
 /// Prefix of arrays that hold a named set: 1 inside, 0 outside.
 pub(super) const SET_PREFIX: &str = "set:";
-/// The texts of a file that name labels.
+/// Field data with the names of labels: bytes of texts such as `5 liver`, each ended by a 0.
 pub(super) const LABEL_NAMES: &str = "label-names";
-/// The texts that name bodies, obstacles and tools.
+/// Field data with the names of bodies, obstacles and tools.
 pub(super) const BODY_NAMES: &str = "body-names";
 
 /// A kind of cell in a file.

@@ -187,11 +187,13 @@ impl<'a> Storage<'a> {
         let (mut time, mut label_names, mut body_names) = (None, BTreeMap::new(), BTreeMap::new());
         for array in child(set, "FieldData").into_iter().flat_map(|fields| children(fields, "DataArray")) {
             let name = array.attribute("Name").unwrap_or_default();
+            // Earlier versions wrote names as texts.
+            let is_names = matches!(array.attribute("type"), Some("UInt8" | "String"));
             if name.eq_ignore_ascii_case("TimeValue") {
                 time = self.reals(array)?.first().copied().filter(|time| time.is_finite());
-            } else if name == LABEL_NAMES && array.attribute("type") == Some("String") {
+            } else if is_names && name == LABEL_NAMES {
                 label_names = self.numbered_names(array)?;
-            } else if name == BODY_NAMES && array.attribute("type") == Some("String") {
+            } else if is_names && name == BODY_NAMES {
                 body_names = self.numbered_names(array)?;
             }
         }

@@ -42,7 +42,7 @@ const REPEATED: usize = 8;
 /// Writes a mesh as a `.vtu` file into `writer`, as one piece with all its cells.
 ///
 /// Sets become arrays `set:NAME` of 0 and 1. Cell data that a kind of cells does not have are NaN there.
-/// `label` is written as integers if it is integral everywhere; the names of labels become texts of the file.
+/// `label` is written as integers if it is integral everywhere; the names of labels become field data `label-names` (byte codes).
 pub fn write_vtu(writer: impl Write, mesh: &Mesh, options: &VtuOptions) -> Result<(), MeshFileError> {
     let path = Path::new("stream.vtu");
     check(path, mesh)?;
@@ -288,7 +288,8 @@ fn write_with(out: &mut dyn Write, mesh: &Mesh, options: &VtuOptions, lasting: &
     out.write_all(&parts.xml)
 }
 
-/// The time, and the names of labels and bodies: a text such as `5 liver` for each, as byte codes ended by a 0.
+/// Writes the time, and the names of labels and bodies: for each a text such as `5 liver` as numbers, its bytes in UTF-8 and a 0. meshio
+/// 5.3.5 reads no file that has an array of type `String`.
 fn write_field_data(parts: &mut Parts, mesh: &Mesh, options: &VtuOptions) -> io::Result<()> {
     let names = [(LABEL_NAMES, &mesh.label_names), (BODY_NAMES, &mesh.body_names)];
     if options.time.is_none() && names.iter().all(|(_, names)| names.is_empty()) {
@@ -300,13 +301,12 @@ fn write_field_data(parts: &mut Parts, mesh: &Mesh, options: &VtuOptions) -> io:
         writeln!(parts.xml, " format=\"ascii\">{time:?}</DataArray>")?;
     }
     for (of, names) in names.into_iter().filter(|(_, names)| !names.is_empty()) {
-        let count = names.len();
-        write!(parts.xml, "      <DataArray type=\"String\" Name=\"{of}\" NumberOfTuples=\"{count}\"")?;
+        let texts: String = names.iter().map(|(number, name)| format!("{number} {name}\0")).collect();
+        let count = texts.len();
+        write!(parts.xml, "      <DataArray type=\"UInt8\" Name=\"{of}\" NumberOfTuples=\"{count}\"")?;
         parts.push(" format=\"ascii\">");
-        for (number, name) in names {
-            for byte in format!("{number} {name}\0").bytes() {
-                write!(parts.xml, "{byte} ")?;
-            }
+        for byte in texts.bytes() {
+            write!(parts.xml, "{byte} ")?;
         }
         parts.push("</DataArray>\n");
     }

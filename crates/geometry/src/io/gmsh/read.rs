@@ -628,7 +628,7 @@ impl Sections {
         let of_points = self.points.len().saturating_mul(components(&self.point_fields));
         check_filled(of_cells.saturating_add(of_points), file_size)?;
         let mut label = self.label;
-        if label.iter().all(|&label| label == 0.0) && self.entity.iter().any(|&entity| entity != 0.0) {
+        if self.groups.is_empty() && self.entity.iter().any(|&entity| entity != 0.0) {
             notes
                 .push("no physical groups: `label` holds the numbers of the geometrical entities".to_owned());
             label = self.entity;

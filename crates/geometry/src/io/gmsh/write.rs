@@ -127,10 +127,13 @@ fn points_of(mesh: &Mesh, cells: &[(CellKind, u32)]) -> Vec<u32> {
     points
 }
 
+/// The group of cells without a label: meshio 5.3.5 reads groups of all cells or of none.
+const NO_LABEL: i64 = 0;
+
 /// Physical groups per cell.
 fn cell_groups(block: &CellBlock, physical: &Physical) -> Vec<Groups> {
     let mut groups: Vec<Groups> =
-        labels(block).into_iter().map(|label| label.into_iter().collect()).collect();
+        labels(block).into_iter().map(|label| vec![label.unwrap_or(NO_LABEL)]).collect();
     for (name, set) in &block.sets {
         let Some(&number) = physical.number.get(name) else { continue };
         for &cell in set {
@@ -149,7 +152,7 @@ fn point_groups(mesh: &Mesh, physical: &Physical) -> BTreeMap<u32, Groups> {
     for (name, set) in &mesh.point_sets {
         let Some(&number) = physical.number.get(name) else { continue };
         for &point in set {
-            groups.entry(point).or_default().push(number);
+            groups.entry(point).or_insert_with(|| vec![NO_LABEL]).push(number);
         }
     }
     groups
