@@ -250,6 +250,12 @@ public:
         detail::call(pliant_tool_lead, context(), id(), tool.c_str(), position.data(), rotation.data(), within, &arrival);
         return arrival;
     }
+    // Leads a tool to a pose and its jaws to an angle [rad] at the same time.
+    double lead(const std::string &tool, const Vector &position, const Rotation &rotation, double angle, double within) {
+        double arrival = 0.0;
+        detail::call(pliant_tool_lead_open, context(), id(), tool.c_str(), position.data(), rotation.data(), angle, within, &arrival);
+        return arrival;
+    }
     double open(const std::string &tool, double angle, double within) {
         double arrival = 0;
         detail::call(pliant_tool_open, context(), id(), tool.c_str(), angle, within, &arrival);

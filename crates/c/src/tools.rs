@@ -36,7 +36,17 @@ fn led(result: Result<f64, Failure>) -> Result<f64, Fault> {
     result.map_err(|failure| Fault::new(PliantStatus::NotANumber, failure.message))
 }
 
-/// Leads a tool to a pose within a time [s] from now, on a straight way and the shortest turn; there it stays. `rotation` is a quaternion x, y, z, w of any
+/// A pose of a place [m] and a quaternion x, y, z, w.
+unsafe fn goal(position: *const f64, rotation: *const f64) -> Result<Pose, Fault> {
+    // SAFETY: pointers are what the caller owes.
+    let ([x, y, z], [i, j, k, w]) =
+        unsafe { (numbers(position, "position")?, numbers(rotation, "rotation")?) };
+    let rotation = UnitQuaternion::try_new(Quaternion::new(w, i, j, k), 1e-9)
+        .ok_or_else(|| Fault::new(PliantStatus::NotANumber, "`rotation` is a quaternion of length 0"))?;
+    Ok(Pose::from_parts(Translation3::new(x, y, z), rotation))
+}
+
+/// Leads a tool to a pose within a time [s] from now, on a straight way and the shortest turn; there it stays. Its jaws go on as they were going. `rotation` is a quaternion x, y, z, w of any
 /// length but 0. `arrival`, if it is not null, gets the time [s] at which it is there: later than asked for where nodes would be passed over on the way.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_tool_lead(
@@ -52,22 +62,17 @@ pub unsafe extern "C" fn pliant_tool_lead(
     // SAFETY: pointers are what the caller owes.
     unsafe {
         running(context, simulation, error, |own| {
-            let (name, [x, y, z]) = (text(tool, "tool")?, numbers(position, "position")?);
-            let [i, j, k, w] = numbers(rotation, "rotation")?;
+            let name = text(tool, "tool")?;
+            let pose = goal(position, rotation)?;
             finite(&[within], "within")?;
-            let rotation = UnitQuaternion::try_new(Quaternion::new(w, i, j, k), 1e-9);
-            let rotation = rotation.ok_or_else(|| {
-                Fault::new(PliantStatus::NotANumber, "`rotation` is a quaternion of length 0")
-            })?;
             known(own, name)?;
-            let pose = Pose::from_parts(Translation3::new(x, y, z), rotation);
             let there = led(own.simulation.drive(name, pose, within))?;
             if arrival.is_null() { Ok(()) } else { give(arrival, "arrival", there) }
         })
     }
 }
 
-/// Opens or closes the jaws of a tool to an angle [rad] within a time [s] from now; else as `pliant_tool_lead`.
+/// Opens or closes the jaws of a tool to an angle [rad] within a time [s] from now, while it goes on as it was going; else as `pliant_tool_lead`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_tool_open(
     context: *const PliantContext,
@@ -90,7 +95,33 @@ pub unsafe extern "C" fn pliant_tool_open(
     }
 }
 
-/// Tells where a tool or an obstacle is, and what it feels.
+/// Leads a tool to a pose and its jaws to an angle [rad], which are there together; else as `pliant_tool_lead`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pliant_tool_lead_open(
+    context: *const PliantContext,
+    simulation: PliantSimulation,
+    tool: *const c_char,
+    position: *const f64,
+    rotation: *const f64,
+    angle: f64,
+    within: f64,
+    arrival: *mut f64,
+    error: *mut PliantError,
+) -> PliantStatus {
+    // SAFETY: pointers are what the caller owes.
+    unsafe {
+        running(context, simulation, error, |own| {
+            let name = text(tool, "tool")?;
+            let pose = goal(position, rotation)?;
+            finite(&[angle, within], "angle and within")?;
+            known(own, name)?;
+            let there = led(own.simulation.lead(name, Some(pose), Some(angle), within))?;
+            if arrival.is_null() { Ok(()) } else { give(arrival, "arrival", there) }
+        })
+    }
+}
+
+/// Tells where a tool, an obstacle or a jaw (`grasper.upper`, `grasper.lower`) is, and what it feels.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_tool(
     context: *const PliantContext,

@@ -146,40 +146,76 @@ pub fn between([from, to]: [&Pose; 2], part: f64) -> Pose {
     Pose::from_parts(place.into(), turn)
 }
 
-/// Where a tool goes that is driven from outside: on a straight way and the shortest arc to a pose, where it stays. Its trajectory is left.
+/// Where a tool goes that is driven from outside: its pose on a straight way and the shortest arc, the angle between its jaws evenly. At the
+/// goal it stays. Pose and angle have a way each; without one, they follow the trajectory.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Leg {
+    /// Positions [m] and unit quaternions (i, j, k, w).
+    pose: Option<Way<([f64; 3], [f64; 4])>>,
+    /// Angles [rad] between jaws.
+    opening: Option<Way<f64>>,
+}
+
+/// A way from one value to another.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Way<T> {
     /// When it begins and ends [s].
     times: [f64; 2],
-    /// Position [m] and unit quaternion (i, j, k, w) at these times.
-    poses: [([f64; 3], [f64; 4]); 2],
-    /// Angles [rad] between jaws at these times.
-    openings: [f64; 2],
+    ends: [T; 2],
+}
+
+impl<T> Way<T> {
+    /// The part of the way done at a time [s], from 0 to 1.
+    fn part(&self, time: f64) -> f64 {
+        let [from, to] = self.times;
+        if to > from { ((time - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 }
+    }
 }
 
 impl Leg {
-    /// Between two times [s], from a pose and an angle [rad] between jaws to others.
-    pub fn new(times: [f64; 2], [from, to]: [(Pose, f64); 2]) -> Self {
+    /// From a pose to another between two times [s].
+    pub fn to_pose(times: [f64; 2], poses: [Pose; 2]) -> Self {
         let plain = |pose: Pose| (pose.translation.vector.into(), pose.rotation.coords.into());
-        Self { times, poses: [plain(from.0), plain(to.0)], openings: [from.1, to.1] }
+        Self { pose: Some(Way { times, ends: poses.map(plain) }), opening: None }
     }
 
-    /// The pose and the angle [rad] between jaws at a time [s].
-    pub fn at(&self, time: f64) -> (Pose, f64) {
-        let [from, to] = self.times;
-        let part = if to > from { ((time - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 };
-        let poses = self.poses.map(|(place, turn)| {
-            let turn = UnitQuaternion::new_unchecked(Quaternion::from_vector(turn.into()));
-            Pose::from_parts(place.into(), turn)
-        });
-        let [closed, open] = self.openings;
-        (between([&poses[0], &poses[1]], part), closed + (open - closed) * part)
+    /// From an angle [rad] between jaws to another between two times [s].
+    pub fn to_opening(times: [f64; 2], angles: [f64; 2]) -> Self {
+        Self { pose: None, opening: Some(Way { times, ends: angles }) }
+    }
+
+    /// The same, with the way of `before` for what has none.
+    pub fn or(self, before: &Self) -> Self {
+        Self { pose: self.pose.or(before.pose), opening: self.opening.or(before.opening) }
+    }
+
+    /// The pose at a time [s], if it has a way.
+    pub fn pose(&self, time: f64) -> Option<Pose> {
+        self.pose.as_ref().map(|way| {
+            let poses = way.ends.map(|(place, turn)| {
+                let turn = UnitQuaternion::new_unchecked(Quaternion::from_vector(turn.into()));
+                Pose::from_parts(place.into(), turn)
+            });
+            between([&poses[0], &poses[1]], way.part(time))
+        })
+    }
+
+    /// The angle [rad] between jaws at a time [s], if it has a way.
+    pub fn opening(&self, time: f64) -> Option<f64> {
+        self.opening.as_ref().map(|way| {
+            let [from, to] = way.ends;
+            from + (to - from) * way.part(time)
+        })
     }
 
     /// Whether all of its numbers are finite.
     pub fn is_finite(&self) -> bool {
-        let of_poses = self.poses.iter().flat_map(|(place, turn)| place.iter().chain(turn));
-        of_poses.chain(&self.times).chain(&self.openings).all(|x| x.is_finite())
+        let poses = self.pose.iter().flat_map(|way| {
+            let of_poses = way.ends.iter().flat_map(|(place, turn)| place.iter().chain(turn));
+            of_poses.chain(&way.times)
+        });
+        let openings = self.opening.iter().flat_map(|way| way.ends.iter().chain(&way.times));
+        poses.chain(openings).all(|x| x.is_finite())
     }
 }
 
@@ -208,10 +244,12 @@ mod tests {
         assert_eq!(place(&trajectory, 0.0), Vector3::x());
         assert!((place(&trajectory, 2.0) - Vector3::new(0.5_f64.cos(), 0.5_f64.sin(), 1.0)).norm() < 1e-15);
         assert_eq!(place(&trajectory, 9.0), place(&trajectory, 3.0));
-        let leg = Leg::new([1.0, 3.0], [(table[0].1, 0.5), (table[1].1, 0.1)]);
-        let (pose, opening) = leg.at(2.0);
+        let leg = Leg::to_pose([1.0, 3.0], [table[0].1, table[1].1]);
+        let pose = leg.pose(2.0).unwrap();
         assert!((pose.inverse() * trajectory.at(2.0) * start.inverse()).translation.vector.norm() < 1e-15);
-        assert!((opening - 0.3).abs() < 1e-15 && leg.at(0.0) == leg.at(1.0) && leg.at(9.0) == leg.at(3.0));
+        assert!(leg.pose(0.0) == leg.pose(1.0) && leg.pose(9.0) == leg.pose(3.0));
+        let both = Leg::to_opening([2.0, 4.0], [0.5, 0.1]).or(&leg);
+        assert!((both.opening(3.0).unwrap() - 0.3).abs() < 1e-15 && both.pose(2.0) == Some(pose));
         assert!(Trajectory::table(start, Vec::new()).is_none());
         assert!(Trajectory::table(start, table.into_iter().rev().collect()).is_none());
     }

@@ -92,13 +92,12 @@ impl Rigid {
         self.jaw.as_ref().map_or(&self.name, |jaw| &jaw.tool)
     }
 
-    /// The pose of the tool or obstacle at a time [s], and the angle [rad] between its jaws; driven if there is a leg.
+    /// The pose of the tool or obstacle at a time [s], and the angle [rad] between its jaws; driven as far as there is a leg.
     pub fn posture(&self, time: f64, leg: Option<&Leg>) -> (Pose, f64) {
         let opening = |jaw: &Jaw| jaw.opening.0 * jaw.opening.1.value(time);
-        leg.map_or_else(
-            || (self.trajectory.at(time), self.jaw.as_ref().map_or(0.0, opening)),
-            |leg| leg.at(time),
-        )
+        let pose = leg.and_then(|leg| leg.pose(time)).unwrap_or_else(|| self.trajectory.at(time));
+        let driven = leg.and_then(|leg| leg.opening(time));
+        (pose, driven.unwrap_or_else(|| self.jaw.as_ref().map_or(0.0, opening)))
     }
 
     /// Its pose at a time [s]; driven if there is a leg.
@@ -139,15 +138,16 @@ impl Rigid {
         self.jaw.as_ref().and_then(|jaw| jaw.grip).is_some_and(|closed| opening <= closed)
     }
 
-    /// The shortest time [s] between two postures in steps of a length [s] in which no node is passed over.
+    /// The shortest time [s] between two postures in steps of a length [s] in which no node is passed over. Of a tool with jaws, pose and
+    /// opening take half of what a step allows each: they may be driven at the same time.
     pub fn shortest(&self, postures: [(Pose, f64); 2], step: f64) -> f64 {
         let [(from, closed), (to, open)] = postures;
-        let opened = self.jaw.as_ref().map_or(0.0, |jaw| {
+        let moved = travel(self, &[from, to].map(Stance::at));
+        let way = self.jaw.as_ref().map_or(moved, |jaw| {
             let reach = jaw.place.translation.vector.norm() + self.shape.reach();
-            (jaw.part * (open - closed)).abs() * reach
+            2.0 * moved.max((jaw.part * (open - closed)).abs() * reach)
         });
-        2.0 * (travel(self, &[from, to].map(Stance::at)) + opened) / (MOST_PARTS * self.shape.thinnest())
-            * step
+        2.0 * way / (MOST_PARTS * self.shape.thinnest()) * step
     }
 }
 

@@ -1,7 +1,7 @@
 //! Segmented images, from files and from arrays.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
-
 use std::sync::Arc;
 
 use nalgebra::Matrix3;
@@ -53,6 +53,18 @@ impl Image {
         let image = pliant_imaging::Image::new(grid, *scalar, bytes, own);
         let image = image.ok_or_else(|| Trouble::Value("an image has other bytes than voxels".into()))?;
         Ok(Self(Arc::new(image)))
+    }
+
+    /// The labels but 0 with their voxels, rounded as the mesher does.
+    fn labels(&self, py: Python<'_>) -> PyResult<Vec<(i32, usize)>> {
+        let image = Arc::clone(&self.0);
+        on_thread(py, move || {
+            let labels = image.labels().map_err(|error| Trouble::Mesh(None, error.to_string()))?;
+            let mut counts = BTreeMap::<i32, usize>::new();
+            labels.labels.iter().for_each(|&label| *counts.entry(label).or_default() += 1);
+            counts.remove(&0);
+            Ok(counts.into_iter().collect())
+        })
     }
 }
 

@@ -40,6 +40,9 @@ type Data<'py> = Vec<(String, PyReadonlyArray2<'py, f64>)>;
 /// A name, a kind of cells, and a value for each of them.
 type CellData<'py> = (String, &'static str, Bound<'py, PyArray2<f64>>);
 
+/// A name, a kind of cells, and which of them are in a set.
+type CellSet<'py> = (String, &'static str, Bound<'py, PyArray1<u32>>);
+
 #[pymethods]
 impl Mesh {
     /// From arrays that Python has checked.
@@ -50,24 +53,35 @@ impl Mesh {
         point_data: Data<'_>,
         cell_data: Vec<(String, String, PyReadonlyArray2<'_, f64>)>,
         point_sets: Vec<(String, PyReadonlyArray1<'_, u32>)>,
+        cell_sets: Vec<(String, String, PyReadonlyArray1<'_, u32>)>,
+        label_names: BTreeMap<i32, String>,
     ) -> Result<Self, Trouble> {
         let mut mesh = pliant_geometry::Mesh {
             points: vectors(&points)?.into_iter().map(Vector3::from).collect(),
+            label_names,
             ..Default::default()
         };
         let data = |array: &PyReadonlyArray2<'_, f64>| {
             let values = array.as_array();
             DataArray { components: values.ncols(), values: values.iter().copied().collect() }
         };
+        let set = |array: &PyReadonlyArray1<'_, u32>| {
+            let mut members: Vec<u32> = array.as_array().iter().copied().collect();
+            members.sort_unstable();
+            members.dedup();
+            members
+        };
         let mut split = Vec::new();
         for (word, nodes) in &cells {
             let nodes = nodes.as_array().iter().copied().collect();
             let own = cell_data.iter().filter(|(kind, ..)| kind == word);
             let own = own.map(|(_, name, values)| (name.clone(), data(values))).collect();
+            let sets = cell_sets.iter().filter(|(kind, ..)| kind == word);
+            let sets = sets.map(|(_, name, members)| (name.clone(), set(members))).collect();
             if let Some((_, kind)) = KINDS.iter().find(|(own, _)| own == word) {
-                mesh.blocks.push(CellBlock { data: own, ..CellBlock::new(*kind, nodes) });
+                mesh.blocks.push(CellBlock { kind: *kind, nodes, data: own, sets });
             } else if let Some(&(_, kind)) = SPLIT.iter().find(|(own, _)| own == word) {
-                split.push(SplitCells { kind, nodes, data: own, sets: BTreeMap::new() });
+                split.push(SplitCells { kind, nodes, data: own, sets });
             } else {
                 let known: Vec<&str> =
                     KINDS.iter().map(|(word, _)| *word).chain(SPLIT.map(|(word, _)| word)).collect();
@@ -78,10 +92,7 @@ impl Mesh {
         mesh.point_data.extend(point_data.iter().map(|(name, values)| (name.clone(), data(values))));
         add_as_tets(&mut mesh, &split);
         for (name, nodes) in &point_sets {
-            let mut nodes: Vec<u32> = nodes.as_array().iter().copied().collect();
-            nodes.sort_unstable();
-            nodes.dedup();
-            mesh.point_sets.insert(name.clone(), nodes);
+            mesh.point_sets.insert(name.clone(), set(nodes));
         }
         Ok(Self(Arc::new(mesh)))
     }
@@ -143,11 +154,26 @@ impl Mesh {
         Ok(data)
     }
 
-    fn point_sets<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    /// By name, the cells of each kind that are in it.
+    fn cell_sets<'py>(&self, py: Python<'py>) -> Vec<CellSet<'py>> {
+        let blocks = self.0.blocks.iter().flat_map(|block| {
+            block.sets.iter().map(|(name, cells)| (name.clone(), word(block.kind), cells.clone()))
+        });
+        blocks.map(|(name, kind, cells)| (name, kind, array1(py, cells))).collect()
+    }
+
+    fn label_names(&self) -> BTreeMap<i32, String> {
+        self.0.label_names.clone()
+    }
+
+    /// Sets of points; with `all`, also the points of sets of cells.
+    fn point_sets<'py>(&self, py: Python<'py>, all: bool) -> PyResult<Bound<'py, PyDict>> {
         let sets = PyDict::new(py);
         for name in self.0.set_names() {
-            let nodes: Bound<'_, PyArray1<u32>> = array1(py, self.0.set_points(name).unwrap_or_default());
-            sets.set_item(name, nodes)?;
+            let own = self.0.point_sets.get(name).cloned();
+            let Some(points) = (if all { self.0.set_points(name) } else { own }) else { continue };
+            let points: Bound<'_, PyArray1<u32>> = array1(py, points);
+            sets.set_item(name, points)?;
         }
         Ok(sets)
     }

@@ -93,7 +93,7 @@ impl Model {
         }
         [
             ("constraints", of(&scene.constraints)),
-            ("contacts", of(&scene.contacts)),
+            ("contacts", contact_names(&self.world)),
             ("tools", of(&scene.tools)),
             ("surfaces", of(&scene.surfaces)),
             ("laws", of(&scene.laws)),
@@ -112,6 +112,11 @@ impl Model {
 
     fn warnings<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
         diagnostics(py, &self.world.scene.source.errors(self.world.warnings().cloned().collect()))
+    }
+
+    /// The same with another duration [s].
+    fn lasting(&self, until: f64) -> Self {
+        Self { world: Arc::new(self.world.lasting(until)) }
     }
 
     /// The device that it is stepped on.
@@ -187,6 +192,16 @@ impl Model {
         }
         Ok(summary?)
     }
+}
+
+/// Names of contacts; of one between several things, those of its pairs.
+pub fn contact_names(world: &World) -> Vec<String> {
+    let all = world.participants.iter().filter_map(|part| part.built.contacts.as_ref());
+    let mut names: Vec<String> =
+        all.flat_map(|own| &own.contacts).map(|contact| contact.name.clone()).collect();
+    let mut known = std::collections::BTreeSet::new();
+    names.retain(|name| known.insert(name.clone()));
+    names
 }
 
 /// Kinetic, internal, damping, external and hourglass energy and that of step changes [J], and the balance.

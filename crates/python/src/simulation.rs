@@ -19,7 +19,7 @@ use crate::arrays::{array, array3, vectors};
 use crate::errors::{Trouble, broken};
 use crate::jobs::on_pool;
 use crate::mesh::Mesh;
-use crate::model::{Model, in_order};
+use crate::model::{Model, contact_names, in_order};
 use crate::running::Running;
 use crate::state::State;
 
@@ -286,11 +286,10 @@ impl Simulation {
         })
     }
 
-    /// Force [N] of each contact.
+    /// Force [N] of each contact; of one between several things, that of each pair.
     fn contacts(&self, py: Python<'_>) -> PyResult<BTreeMap<String, [f64; 3]>> {
         self.work(py, |running, _| {
-            let names: Vec<String> =
-                running.world.scene.contacts.iter().map(|(name, _)| name.clone()).collect();
+            let names = contact_names(&running.world);
             let frame = running.live.simulation.frame()?;
             Ok(names
                 .into_iter()
@@ -336,6 +335,11 @@ impl Simulation {
         })
     }
 
+    /// Ends the call that computes now after its step, from any thread.
+    fn interrupt(&self) {
+        self.stop.ask();
+    }
+
     /// Replaces all grips: nodes with weights, place [m], stiffness [N/m], at most the stable one of each. The stiffnesses taken.
     fn hold(&self, grips: Vec<Held>) -> PyResult<Vec<f64>> {
         let taken = self.quick(|running| {
@@ -368,19 +372,15 @@ impl Simulation {
         Ok(self.quick(|running| running.around(at, on.as_deref(), radius))??)
     }
 
-    /// Drives a tool to a pose within a time [s]: when it arrives [s].
-    fn drive(&self, tool: &str, pose: Posed, within: f64) -> PyResult<f64> {
-        let (place, [x, y, z, w]) = pose;
-        let turn = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9)
-            .ok_or_else(|| Trouble::Value("the quaternion of a pose has no length".into()))?;
-        let pose = Pose::from_parts(Translation3::new(place[0], place[1], place[2]), turn);
-        let arrival = self.quick(|running| running.live.simulation.drive(tool, pose, within))?;
-        Ok(arrival.map_err(|failure| Trouble::Value(failure.message))?)
-    }
-
-    /// Opens the jaws of a tool to an angle [rad] within a time [s]: when they are there [s].
-    fn open(&self, tool: &str, angle: f64, within: f64) -> PyResult<f64> {
-        let arrival = self.quick(|running| running.live.simulation.open(tool, angle, within))?;
+    /// Drives a tool to a pose and its jaws to an angle [rad] within a time [s]: when they arrive [s].
+    fn drive(&self, tool: &str, pose: Option<Posed>, opening: Option<f64>, within: f64) -> PyResult<f64> {
+        let pose = pose.map(|(place, [x, y, z, w])| {
+            let turn = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9)
+                .ok_or_else(|| Trouble::Value("the quaternion of a pose has no length".into()))?;
+            Ok::<_, Trouble>(Pose::from_parts(Translation3::new(place[0], place[1], place[2]), turn))
+        });
+        let pose = pose.transpose()?;
+        let arrival = self.quick(|running| running.live.simulation.lead(tool, pose, opening, within))?;
         Ok(arrival.map_err(|failure| Trouble::Value(failure.message))?)
     }
 

@@ -435,3 +435,164 @@ def test_a_driven_tool_moves_after_a_look_also_where_bodies_touch() -> None:
     sim.drive(name, begin + (0.0, 0.0, 0.001))
     sim.step(2)
     assert np.allclose(sim.tool(name).place, begin + (0.0, 0.0, 0.001), atol=1e-6)
+
+
+def grasped() -> pliant.Scene:
+    """A flap between the jaws of a grasper, and a ball that touches nothing."""
+    scene = pliant.Scene(until=1.0, run={"precision": "double"})
+    scene.law["tissue"] = {"type": "neo-hookean", "young-modulus": 5e3, "poisson-ratio": 0.4}
+    mesh = {"block": {"size": [0.08, 0.04, 0.01], "cells": [8, 4, 2]}, "as": "hexes"}
+    scene.body["flap"] = {"mesh": mesh, "law": "tissue", "density": 1000.0, "damping": 30.0}
+    scene.constraint["root"] = {"type": "fix", "body": "flap", "nodes": {"set": "x-min"}}
+    jaws = {"jaws": {"length": 0.03, "width": 0.02, "thickness": 0.003}}
+    opening = {"angle": 0.8, "curve": {"table": [[0, 1], [1, 1]]}}
+    scene.tool["grasper"] = {"shape": jaws, "opening": opening, "at": [0.105, 0.02, 0.005], "turn": [1.2092, -1.2092, -1.2092]}
+    scene.tool["ball"] = {"shape": {"sphere": {"radius": 0.01}}, "at": [0.0, 0.0, 0.1]}
+    scene.contact["hold"] = {"between": ["all", "grasper"], "friction": 0.5}
+    scene.contact["rest"] = {"between": ["flap", "ball"]}
+    return scene
+
+
+def led(*calls: Callable[[pliant.Simulation], object], steps: int = 20) -> tuple[np.ndarray, float]:
+    """How far a grasper has come, and its opening."""
+    sim = grasped().build().simulate()
+    begin = sim.tool("grasper").place
+    for call in calls:
+        call(sim)
+    sim.step(steps)
+    end = sim.tool("grasper")
+    return end.place - begin, end.opening
+
+
+def test_a_tool_moves_while_its_jaws_close() -> None:
+    goal = np.array([0.105, 0.02, 0.005]) + (0, 0, 0.01)
+    step = grasped().build().step
+
+    def drive(sim: pliant.Simulation) -> object:
+        return sim.drive("grasper", goal, within=10 * step)
+
+    def close(sim: pliant.Simulation) -> object:
+        return sim.open("grasper", 0.3, within=10 * step)
+
+    def both(sim: pliant.Simulation) -> object:
+        return sim.drive("grasper", goal, opening=0.3, within=10 * step)
+
+    def one(sim: pliant.Simulation) -> object:
+        return sim.step()
+
+    def look(sim: pliant.Simulation) -> object:
+        return sim.tool("grasper")
+
+    for calls in ((drive, close), (close, drive), (both,), (drive, one, close), (close, look, drive), (drive, one, look, close)):
+        way, opening = led(*calls)
+        assert np.allclose(way, (0, 0, 0.01), atol=1e-12) and opening == pytest.approx(0.3, abs=1e-12), calls
+    assert led(close) == (pytest.approx([0, 0, 0], abs=1e-15), pytest.approx(0.3))
+    way, opening = led(drive)
+    assert np.allclose(way, (0, 0, 0.01), atol=1e-12) and opening == pytest.approx(0.8)
+    # Half of the way to each goal: after a look it begins one step later.
+    way, opening = led(both, steps=6)
+    assert np.allclose(way, (0, 0, 0.005), atol=1e-12) and opening == pytest.approx(0.55)
+    with pytest.raises(ValueError, match="no goal"):
+        grasped().build().simulate().drive("grasper")
+
+
+def test_a_tool_goes_on_its_trajectory_while_its_jaws_are_driven() -> None:
+    scene = grasped()
+    scene["tool.grasper.by"] = [0, 0, 0.02]
+    scene["tool.grasper.curve"] = "ramp"
+    alone, closing = scene.build().simulate(), scene.build().simulate()
+    closing.open("grasper", 0.3, within=0.01)
+    assert alone.step(50) == closing.step(50) == 50
+    assert np.array_equal(alone.tool("grasper").place, closing.tool("grasper").place)
+    assert closing.tool("grasper").opening == pytest.approx(0.3)
+
+
+def test_pairs_of_contacts_and_jaws_have_forces_of_their_own() -> None:
+    sim = grasped().build().simulate()
+    sim.open("grasper", 0.2, within=0.05)
+    sim.step(round(0.1 / sim.step_size))
+    pairs = {"hold.flap-grasper.upper", "hold.flap-grasper.lower"}
+    forces = sim.contacts()
+    assert pairs | {"rest"} == {*forces} == {*sim.model.contacts}
+    upper, lower, whole = sim.tool("grasper.upper"), sim.tool("grasper.lower"), sim.tool("grasper")
+    assert np.array_equal(upper.force, forces["hold.flap-grasper.upper"])
+    # Each jaw is pushed open by more than both together move the grasper.
+    assert min(np.linalg.norm(upper.force), np.linalg.norm(lower.force)) > 2 * np.linalg.norm(whole.force) > 0
+    assert np.allclose(upper.force + lower.force, whole.force, atol=1e-12)
+    assert np.linalg.norm(upper.place - whole.place) > 1e-3
+
+
+def test_runs_in_memory_take_the_steps_of_runs_with_files(any_solver: pliant.Scene, tmp_path: object) -> None:
+    for until in (0.05, 0.3):
+        memory = any_solver.run(until=until, threads=1)
+        files = any_solver.run(f"{tmp_path}/{until}", until=until, threads=1)
+        scene = any_solver.replace({"scene.until": until}).run(threads=1)
+        assert memory.time == files.time == scene.time and memory.steps == files.steps == scene.steps
+        assert np.array_equal(memory.reactions["base"], files.reactions["base"])
+
+
+@pytest.mark.parametrize("until", [float("nan"), float("inf"), -1.0, 0.0])
+def test_runs_without_an_end_are_refused(scene: pliant.Scene, tmp_path: object, until: float) -> None:
+    model = scene.build()
+    for out in (None, f"{tmp_path}/out"):
+        with pytest.raises(ValueError, match="until a time greater than 0"):
+            model.run(out, until=until)
+    if not np.isfinite(until):
+        with pytest.raises(ValueError, match="goes on to a time"):
+            model.simulate().run(until=until)
+
+
+@pytest.mark.parametrize("every", [1e-300, 1e-9, 1e-4])
+def test_samples_closer_than_steps_are_one_a_step(scene: pliant.Scene, every: float) -> None:
+    sim = scene.build().simulate()
+    history = sim.run(until=10 * sim.step_size, every=every)
+    assert sim.steps == 10 and len(history["time"]) == 11
+
+
+def test_callbacks_go_back_to_no_snapshot(scene: pliant.Scene) -> None:
+    sim = scene.build().simulate()
+    start = sim.state()
+    for call in (lambda now: now.restore(start), lambda now: now.reset()):
+        with pytest.raises(pliant.BusyError, match="snapshot"):
+            sim.run(until=0.05, each=call)
+    assert sim.step() == 1
+
+
+def test_what_ends_a_run_early_has_its_history() -> None:
+    sim = crushed().build().simulate()
+    with pytest.raises(pliant.UnstableError) as caught:
+        sim.run(every=0.005, record="displacement")
+    history = caught.value.history
+    assert history is not None and history["displacement"].shape == (len(history["time"]), *sim.model.rest.shape)
+    assert len(history["time"]) > 3
+
+    def stop(now: pliant.Simulation) -> None:
+        if now.steps > 3:
+            raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough") as raised:
+        cube().build().simulate().run(each=stop)
+    assert len(raised.value.history["time"]) > 1  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("solver", ["static", "implicit"])
+def test_equations_that_are_not_solved_tell_residual_and_step(solver: str, tmp_path: object) -> None:
+    scene = cube(**{"run.solver": solver, "run.iterations": 1 if solver == "static" else 2, "run.tolerance": 1e-14})
+    with pytest.warns(pliant.PliantWarning, match="failed"):
+        memory = scene.run()
+    with pytest.warns(pliant.PliantWarning, match="failed"):
+        files = scene.run(f"{tmp_path}/out")
+    for result in (memory, files):
+        error = result.error
+        assert isinstance(error, pliant.ConvergenceError) and error.load_step is not None and error.residual is not None
+        assert 0.0 < error.residual < 1.0 and error.load_step <= 1
+
+
+def test_selections_by_word_and_by_numpy(scene: pliant.Scene) -> None:
+    model = scene.build()
+    assert len(model.select("cube", "all")) == 27 and len(model.select("cube", "boundary")) == 26
+    assert len(model.select("cube", {"ids": np.array([1, 2])})) == 2
+    assert len(model.select("cube", {"sphere": {"centre": np.zeros(3), "radius": np.float64(0.06)}})) == 4
+    with pytest.raises(TypeError):
+        model.simulate().step(2.7)  # type: ignore[arg-type]
+    assert model.simulate().step(np.int64(3)) == 3

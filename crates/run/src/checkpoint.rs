@@ -666,6 +666,6 @@ mod tests {
         let shell = shell.simulation().unwrap().encode().unwrap()[0].len();
         let explicit = bytes("[run]\nprecision = 'single'\n");
         let quasi_static = bytes("[run]\nprecision = 'single'\nsolver = 'quasi-static'\n");
-        assert_eq!((FORMAT, explicit, quasi_static, shell), (19, 1137, 1504, 1100));
+        assert_eq!((FORMAT, explicit, quasi_static, shell), (20, 1137, 1504, 1100));
     }
 }

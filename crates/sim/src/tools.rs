@@ -68,27 +68,34 @@ pub struct ToolNow {
 impl Simulation {
     /// Drives a tool or an obstacle to a pose within a time [s], on a straight way and the shortest arc from where it is. There it stays; the
     /// trajectory that it has in the scene is left. When it arrives [s]: later than asked for where nodes would be passed over on the way, and
-    /// after one step at the earliest. The step under way, if its forces are found, is the last one of the motion before.
+    /// after one step at the earliest. The step under way, if its forces are found, is the last one of the motion before. Its jaws go on as they
+    /// were going.
     ///
     /// # Errors
     /// If there is no tool of this name, or a number is not finite.
     pub fn drive(&mut self, tool: &str, pose: Pose, within: f64) -> Result<f64, Failure> {
-        self.lead(tool, within, |(_, opening)| (pose, opening))
+        self.lead(tool, Some(pose), None, within)
     }
 
-    /// Opens or closes the jaws of a tool to an angle [rad] within a time [s]. When they are there [s].
+    /// Opens or closes the jaws of a tool to an angle [rad] within a time [s]. When they are there [s]. The tool goes on as it was going.
     ///
     /// # Errors
     /// If there is no tool of this name, or a number is not finite.
     pub fn open(&mut self, tool: &str, opening: f64, within: f64) -> Result<f64, Failure> {
-        self.lead(tool, within, |(pose, _)| (pose, opening))
+        self.lead(tool, None, Some(opening), within)
     }
 
-    fn lead(
+    /// Drives a tool to a pose and its jaws to an angle [rad], which arrive together; what is not given goes on as it was going. When they
+    /// are there [s].
+    ///
+    /// # Errors
+    /// If there is no tool of this name, or a number is not finite.
+    pub fn lead(
         &mut self,
         tool: &str,
+        pose: Option<Pose>,
+        opening: Option<f64>,
         within: f64,
-        goal: impl Fn((Pose, f64)) -> (Pose, f64),
     ) -> Result<f64, Failure> {
         let world = Arc::clone(self.world());
         let evaluated = self.is_evaluated();
@@ -98,17 +105,22 @@ impl Simulation {
             let begin = if evaluated { now.time() + step } else { now.time() };
             let rigids = part.method.contacts().map_or(&[][..], |contacts| &contacts.rigids);
             for (number, rigid) in rigids.iter().enumerate().filter(|(_, rigid)| rigid.tool() == tool) {
-                let from = rigid.posture(begin, now.leg(number));
-                let ways = [from, goal(from)];
-                let duration = within.max(step).max(rigid.shortest(ways, step));
-                legs.push((index, number, begin, duration, ways));
+                let before = now.leg(number);
+                let from = rigid.posture(begin, before);
+                let to = (pose.unwrap_or(from.0), opening.unwrap_or(from.1));
+                let duration = within.max(step).max(rigid.shortest([from, to], step));
+                legs.push((index, number, begin, duration, from, before.copied()));
             }
         }
         // Jaws of a tool arrive together.
         let duration = legs.iter().map(|leg| leg.3).fold(0.0, f64::max);
         let mut arrival = None;
-        for (index, number, begin, _, ways) in legs {
-            let leg = Leg::new([begin, begin + duration], ways);
+        for (index, number, begin, _, from, before) in legs {
+            let times = [begin, begin + duration];
+            let moved = pose.map(|to| Leg::to_pose(times, [from.0, to]));
+            let opened = opening.map(|to| Leg::to_opening(times, [from.1, to]));
+            let ways = [moved, opened, before].into_iter().flatten();
+            let Some(leg) = ways.reduce(|leg, before| leg.or(&before)) else { continue };
             if !(leg.is_finite() && within.is_finite()) {
                 return Err(Failure::input(&format_args!(
                     "a number of the goal of `{tool}`, or the time to it, is not finite"
@@ -130,21 +142,24 @@ impl Simulation {
 }
 
 impl Frame<'_> {
-    /// A tool or an obstacle; `None` without one of this name.
+    /// A tool, an obstacle, or a jaw (`grasper.upper`, `grasper.lower`); `None` without one of this name.
     pub fn tool(&self, name: &str) -> Option<ToolNow> {
         self.simulation.tool(name)
     }
 }
 
 impl Simulation {
-    /// A tool or an obstacle, with the force found last; `None` without one of this name.
+    /// A tool, an obstacle, or a jaw (`grasper.upper`, `grasper.lower`), with the force found last; `None` without one of this name. The pose
+    /// of a jaw is that of its shape.
     pub fn tool(&self, name: &str) -> Option<ToolNow> {
         let mut found: Option<ToolNow> = None;
         for (part, now) in self.world().parts.iter().zip(self.instants()) {
             let Some(all) = part.method.contacts() else { continue };
-            let own = |number: usize| all.rigids[number].tool() == name;
+            let own = |number: usize| [all.rigids[number].tool(), &all.rigids[number].name].contains(&name);
             let Some(number) = (0..all.rigids.len()).find(|&number| own(number)) else { continue };
-            let (pose, opening) = now.posture(number, &all.rigids[number]);
+            let rigid = &all.rigids[number];
+            let (of_tool, opening) = now.posture(number, rigid);
+            let pose = if rigid.tool() == name { of_tool } else { now.pose(number, rigid) };
             let sum = found.get_or_insert(ToolNow { pose, opening, force: [0.0; 3], torque: Some([0.0; 3]) });
             let moments = now.contact_moments();
             let frame = pose.translation.vector.into();

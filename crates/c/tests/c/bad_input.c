@@ -235,6 +235,10 @@ int main(void) {
     EXPECT(pliant_tool_lead(context, simulation, "ball", up, still, INFINITY, NULL, &error), PLIANT_STATUS_NOT_A_NUMBER, "`within`");
     EXPECT(pliant_tool_open(context, simulation, "ball", NAN, 0.1, NULL, &error), PLIANT_STATUS_NOT_A_NUMBER, "angle");
     OK(pliant_tool_lead(context, simulation, "ball", up, still, 0.1, &three[0], &error));
+    EXPECT(pliant_tool_lead_open(context, simulation, "ball", up, still, NAN, 0.1, NULL, &error), PLIANT_STATUS_NOT_A_NUMBER, "angle");
+    EXPECT(pliant_tool_lead_open(context, simulation, "ball", up, zero4, 0.2, 0.1, NULL, &error), PLIANT_STATUS_NOT_A_NUMBER, "length 0");
+    EXPECT(pliant_tool_lead_open(context, simulation, "bal", up, still, 0.2, 0.1, NULL, &error), PLIANT_STATUS_UNKNOWN, "there are ball");
+    OK(pliant_tool_lead_open(context, simulation, "ball", up, still, 0.2, 0.1, &three[0], &error));
     TRUE(three[0] >= 0.1);
     PliantTool tool;
     EXPECT(pliant_tool(context, simulation, "bal", &tool, &error), PLIANT_STATUS_UNKNOWN, "ball");

@@ -8,7 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pliant.result import History
 
 __all__ = [
     "BlockedError",
@@ -92,7 +95,7 @@ class MeshError(Error, ValueError):
 
 
 class SimulationError(Error, RuntimeError):
-    """A simulation that can't go on. It stays at the last good instant; `time` is in s."""
+    """A simulation that can't go on. It stays at the last good instant; `time` is in s. Of `Simulation.run`, `history` has the samples until then."""
 
     _fields: tuple[str, ...] = ("kind", "body", "element", "node", "time")
     kind: str
@@ -100,6 +103,7 @@ class SimulationError(Error, RuntimeError):
     element: int | None
     node: int | None
     time: float | None
+    history: History | None = None
 
 
 class UnstableError(SimulationError):

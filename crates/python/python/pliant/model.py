@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import os
 import warnings
 from collections.abc import Callable, Mapping
@@ -20,6 +21,7 @@ from pliant.errors import PliantWarning, SimulationError
 from pliant.mesh import Mesh, _table
 
 if TYPE_CHECKING:
+    from pliant.engines import Stop
     from pliant.result import Progress, Result
     from pliant.scene import Scene
     from pliant.simulation import Simulation
@@ -149,14 +151,17 @@ class Model:
         return self.bodies[name].mesh
 
     def select(self, body: str, what: str | Mapping[str, Any]) -> NDArray[np.uint32]:
-        """Nodes of a body's mesh: a named set, or a selection as scenes write it.
+        """Nodes of a body's mesh: ``"all"``, ``"boundary"``, the name of a set, or a selection as scenes write it.
 
         >>> from pliant import Mesh, Scene
         >>> model = Scene.of_mesh(Mesh.block([0.1, 0.05, 0.05], edge=0.025)).build()
         >>> model.select("body", "x-max").size, model.select("body", {"sphere": {"centre": [0, 0, 0], "radius": 0.03}}).size
         (9, 4)
         """
-        selection = {"set": what} if isinstance(what, str) and what != "all" else what
+        from pliant.scene import _plain
+
+        is_set = isinstance(what, str) and what not in ("all", "boundary")
+        selection = _plain({"set": what} if is_set else what, {}, "the selection")
         return np.asarray(self._own.select(body, json.dumps(selection)), dtype=np.uint32)
 
     def simulate(self, *, threads: int = 1, precision: str | None = None, device: str | None = None) -> Simulation:
@@ -210,47 +215,91 @@ class Model:
 
         A run that fails warns and returns a result whose `status` is ``"failed"``: `Result.error` has the reason, and what was found until then is kept.
         """
+        result = self._run(out, until=until, each=each, threads=threads, force=force, resume=resume, picture=picture)
+        _doubt(result)
+        return result
+
+    def _run(
+        self,
+        out: str | os.PathLike[str] | None,
+        *,
+        until: float | None = None,
+        each: Callable[[Progress], object] | None = None,
+        threads: int = 0,
+        stop: Stop | None = None,
+        **options: bool,
+    ) -> Result:
+        """`run`, which `stop` can end from another thread: it then raises `Stopped`."""
         from pliant.result import Progress, Result
 
+        if until is not None:
+            until = float(until)
+            if not (0.0 < until < math.inf):
+                raise ValueError(f"a run lasts until a time greater than 0, not {until} s")
         if out is None:
-            if resume or picture:
+            if options.get("resume") or options.get("picture"):
                 raise ValueError("a run in memory has no checkpoints and draws no file: give a folder `out`")
-            return self._run_in_memory(until, each, threads)
-        told = None if each is None else lambda time, end, wall: each(Progress(time, end, wall))
+            return self._run_in_memory(until, each, threads, stop)
+
+        def told(time: float, end: float, wall: float) -> None:
+            if stop is not None:
+                stop.check()
+            if each is not None:
+                each(Progress(time, end, wall))
+
         try:
-            options = {"until": until, "threads": threads, "force": force, "resume": resume, "picture": picture}
-            text, time, energies = self._own.run(os.fspath(out), options, told)
+            all_options = {"until": until, "threads": threads, "force": False, "resume": False, "picture": False, **options}
+            text, time, energies = self._own.run(os.fspath(out), all_options, told if each or stop else None)
         except KeyboardInterrupt as interrupt:
             if "checkpoint" in self._scene.run_table and hasattr(interrupt, "add_note"):
                 interrupt.add_note(f"`run({os.fspath(out)!r}, resume=True)` goes on from the last checkpoint")
             raise
         units = {"time": "s", **dict(self._own.columns())}
-        result = Result._of_files(json.loads(text), time, energies, os.fspath(out), units)
-        _doubt(result)
-        return result
+        return Result._of_files(json.loads(text), time, energies, os.fspath(out), units)
 
-    def _run_in_memory(self, until: float | None, each: Callable[[Progress], object] | None, threads: int) -> Result:
+    def _lasting(self, until: float | None) -> Model:
+        """The same with another duration [s]: steps divide it, as they do in a run with a folder."""
+        if until is None or until == self._scene.until:
+            return self
+        model = Model.__new__(Model)
+        model._scene, model._own = self._scene.replace({"scene.until": until}), self._own.lasting(until)
+        return model
+
+    def _run_in_memory(
+        self,
+        until: float | None,
+        each: Callable[[Progress], object] | None,
+        threads: int,
+        stop: Stop | None,
+    ) -> Result:
         import time as clock
 
         from pliant.result import Progress, Result
 
         started = clock.monotonic()
         end = self._scene.until if until is None else until
-        simulation = self.simulate(threads=threads)
+        simulation = self._lasting(until).simulate(threads=threads)
         error: SimulationError | None = None
 
         def look(now: Simulation) -> None:
+            if stop is not None:
+                stop.check()
             if each is not None:
                 each(Progress(now.time, end, clock.monotonic() - started))
 
         history = simulation._history(())
+        if stop is not None:
+            stop.watch(simulation)
         try:
             simulation._run_into(history, end, look, None)
         except SimulationError as failure:
             error = failure
-        result = Result._of_memory(simulation, history, clock.monotonic() - started, error)
-        _doubt(result)
-        return result
+        finally:
+            if stop is not None:
+                stop.forget(simulation)
+        if stop is not None:
+            stop.check()
+        return Result._of_memory(simulation, history, clock.monotonic() - started, error)
 
     def _lends(self, scene: Scene) -> dict[str, Mesh]:
         """Meshes for the bodies of another scene whose tables of the mesh are the same, and are not given anyway."""

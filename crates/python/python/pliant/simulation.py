@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
+import operator
 import os
 import warnings
 import zipfile
@@ -296,38 +299,55 @@ class Simulation:
         return found[0], found[1]
 
     def contacts(self) -> dict[str, NDArray[np.float64]]:
-        """Force of each contact on what it is with [N], (3,), by name."""
+        """Force of each contact on what it is with [N], (3,), by name.
+
+        A contact between several things has pairs, such as ``"hold.liver-grasper.upper"`` of ``between = ["liver", "grasper"]``.
+        """
         return {name: np.array(force) for name, force in self._own.contacts().items()}
 
     def tool(self, name: str) -> Tool:
-        """A tool or an obstacle at the instant."""
+        """A tool, an obstacle, or a jaw of a tool (``"grasper.upper"``, ``"grasper.lower"``) at the instant."""
         found = self._own.tool(name)
         if found is None:
             raise KeyError(f"nothing touches a tool `{name}`; there are {', '.join(self._model.tools) or 'none'}")
         (place, quaternion), opening, force, torque = found
         return Tool(np.array(place), np.array(quaternion), opening, np.array(force), None if torque is None else np.array(torque))
 
-    def drive(self, tool: str, pose: ArrayLike | tuple[ArrayLike, ArrayLike], *, within: float = 0.0) -> float:
-        """Leads a tool to a pose: when it arrives [s].
+    def drive(
+        self,
+        tool: str,
+        pose: ArrayLike | tuple[ArrayLike, ArrayLike] | None = None,
+        *,
+        opening: float | None = None,
+        within: float = 0.0,
+    ) -> float:
+        """Leads a tool to a pose, and its jaws to an angle: when it arrives [s].
 
         Parameters
         ----------
         tool
             Its name.
         pose
-            A place [m], a pair of place and quaternion (x, y, z, w), or a matrix (4, 4). A place alone keeps its orientation.
+            A place [m], a pair of place and quaternion (x, y, z, w), or a matrix (4, 4). A place alone keeps its orientation. Without one
+            the tool goes on as it was going.
+        opening
+            Angle between the jaws [rad]. Without one they go on as they were going.
         within
             Time to get there [s]; a step, if it is shorter.
         """
-        place, quaternion = _pose(pose)
-        if quaternion is None:
-            quaternion = self.tool(tool).quaternion
-        x, q = [float(c) for c in place], [float(c) for c in quaternion]
-        return self._own.drive(tool, (x, q), float(within))
+        if pose is None and opening is None:
+            raise ValueError(f"`{tool}` has no goal: give a pose, an opening, or both")
+        goal: tuple[list[float], list[float]] | None = None
+        if pose is not None:
+            place, quaternion = _pose(pose)
+            if quaternion is None:
+                quaternion = self.tool(tool).quaternion
+            goal = [float(c) for c in place], [float(c) for c in quaternion]
+        return self._own.drive(tool, goal, None if opening is None else float(opening), float(within))
 
     def open(self, tool: str, angle: float, *, within: float = 0.0) -> float:
-        """Opens the jaws of a tool to an angle [rad], or closes them: when they are there [s]."""
-        return self._own.open(tool, float(angle), float(within))
+        """Opens the jaws of a tool to an angle [rad], or closes them, while it goes on as it was going: when they are there [s]."""
+        return self.drive(tool, opening=angle, within=within)
 
     def sample(self) -> dict[str, float]:
         """All columns of the scene's tables at the instant."""
@@ -335,10 +355,11 @@ class Simulation:
 
     def step(self, count: int = 1) -> int:
         """Goes so many steps on; the steps done, fewer where the run ends before."""
-        if count < 0:
+        number = operator.index(count)
+        if number < 0:
             raise ValueError(f"{count} steps can't be taken")
         self._free()
-        return self._own.advance(int(count), None)
+        return self._own.advance(number, None)
 
     def run(
         self,
@@ -346,9 +367,9 @@ class Simulation:
         *,
         each: Callable[[Simulation], object] | None = None,
         every: float | None = None,
-        record: Sequence[str] = (),
+        record: str | Sequence[str] = (),
     ) -> History:
-        """Goes on to a time, and records on the way.
+        """Goes on to a time, and records on the way. What ends it early has the history until then as its attribute `history`.
 
         Parameters
         ----------
@@ -357,13 +378,22 @@ class Simulation:
         each
             Called at every sample, between steps: it may read, move grips and tools, push and set. What it raises comes through.
         every
-            Time between samples [s]; that of the scene's table, or a thousandth of the way.
+            Time between samples [s], at least a step; that of the scene's table, or a thousandth of the way.
         record
-            Fields at points that are recorded, too: ``history["displacement"]`` is (samples, nodes, 3).
+            Fields at points that are recorded, too, one or several: ``history["displacement"]`` is (samples, nodes, 3).
         """
         self._free()
-        history = self._history(record)
-        self._run_into(history, self._model._scene.until if until is None else float(until), each, every)
+        end = self._model._scene.until if until is None else float(until)
+        if not math.isfinite(end):
+            raise ValueError(f"a run goes on to a time, not to {end} s")
+        history = self._history([record] if isinstance(record, str) else record)
+        try:
+            self._run_into(history, end, each, every)
+        except BaseException as error:
+            # Some exceptions take no attributes.
+            with contextlib.suppress(AttributeError):
+                error.history = history  # type: ignore[attr-defined]
+            raise
         return history
 
     def _history(self, record: Sequence[str]) -> History:
@@ -379,7 +409,9 @@ class Simulation:
         if every is None:
             tables = [own for own in self._model._scene._data.get("output", {}).values() if _kind(own) == "csv"]
             every = float(_every(tables[0])) if tables else (until - self.time) / 1000.0
-        if not every > 0.0 and until > self.time:
+        if until <= self.time:
+            every = math.inf
+        if not every > 0.0:
             raise ValueError(f"samples can't be {every} s apart")
         start, count = self.time, 0
         while True:
@@ -393,7 +425,11 @@ class Simulation:
             done = 0
             while done == 0:
                 count += 1
-                target = min(start + count * every, until)
+                target = start + count * every
+                # Samples that come closer than steps are one a step.
+                if target < self.time + 0.5 * self.step_size:
+                    target = self.time + self.step_size
+                target = min(target, until)
                 done = self._own.advance(None, target)
                 if target >= until or self.ended is not None:
                     break
@@ -405,7 +441,7 @@ class Simulation:
 
     def _free(self) -> None:
         if self._calling:
-            raise BusyError("a callback of `run` reads, pulls and sets; steps are taken by `run` itself")
+            raise BusyError("a callback of `run` reads, pulls and sets; `run` itself takes steps, and goes back to no snapshot")
 
     def push(self, forces: ArrayLike | None, *, body: str | None = None) -> None:
         """Forces on all nodes [N], (nodes, 3), or on those of a body; they stay until replaced. `None` ends them."""
@@ -490,7 +526,8 @@ class Simulation:
         return State._of(self._own.state())
 
     def restore(self, state: State) -> None:
-        """Goes back, or on, to a snapshot. Grips and pushed forces stay."""
+        """Goes back, or on, to a snapshot. Grips and pushed forces stay. A callback of `run` can't do so: the run would have no end."""
+        self._free()
         try:
             self._own.restore(state._own)
         except ValueError as error:

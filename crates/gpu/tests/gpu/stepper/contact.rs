@@ -222,7 +222,7 @@ fn a_driven_tool_gives_the_same_bits_however_the_steps_are_divided() {
     let step = 0.5 * step_of(&model);
     let drive = |time: f64, drive: &mut dyn FnMut(Leg)| {
         let from = contacts.rigids[0].at(time, None);
-        drive(Leg::new([time, time + 0.05], [(from, 0.0), (above(0.022), 0.0)]));
+        drive(Leg::to_pose([time, time + 0.05], [from, above(0.022)]));
     };
     let run = |strides: &[u64]| {
         let mut state = State::<f32>::at_rest(&model);
