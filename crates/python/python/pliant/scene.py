@@ -199,7 +199,8 @@ class Scene:
         own: Any = self._data
         for part in _path(key):
             try:
-                own = own[int(part)] if isinstance(own, list) else own[part]
+                own = _opened(own)
+                own = own[int(part)] if isinstance(own, (list, tuple, np.ndarray)) else own[part]
             except (KeyError, IndexError, ValueError, TypeError):
                 raise KeyError(f"the scene has no `{key}`") from None
         return own
@@ -212,13 +213,11 @@ class Scene:
                 continue
             own: Any = tree
             for part in parts[:-1]:
-                own = own[int(part)] if isinstance(own, list) else own.setdefault(part, {})
-                if not isinstance(own, (list, dict)):
-                    raise KeyError(f"`{key}` lies in a value that is no table")
-            if isinstance(own, list):
-                own[int(parts[-1])] = deepcopy(plain)
-            else:
-                own[parts[-1]] = deepcopy(plain)
+                own = _inner(own, part, key)
+            try:
+                own[int(parts[-1]) if isinstance(own, list) else parts[-1]] = deepcopy(plain)
+            except (IndexError, ValueError):
+                raise KeyError(f"the scene has no `{key}`") from None
         if self._origin is not None:
             self._set = {known: own for known, own in self._set.items() if not known.startswith(f"{key}.")}
             self._set[key] = plain
@@ -362,6 +361,30 @@ def _path(key: str) -> list[str]:
     if not all(parts):
         raise KeyError(f"`{key}` is no path of a value, such as law.tissue.young-modulus")
     return parts
+
+
+def _opened(value: Any) -> Any:
+    """The plain table of a class of `pliant.tables`; anything else as it is."""
+    return value.to_dict() if isinstance(value, Table) else value
+
+
+def _inner(own: Any, part: str, key: str) -> Any:
+    """The table or list at a part of a path, which can be written into: classes of tables, which are constant, become plain tables."""
+    at: Any = int(part) if isinstance(own, list) and part.lstrip("-").isdigit() else part
+    try:
+        inner = own[at] if isinstance(own, list) else own.get(at)
+    except (IndexError, TypeError):
+        raise KeyError(f"the scene has no `{key}`") from None
+    if inner is None:
+        inner = {}
+    elif isinstance(inner, Table):
+        inner = deepcopy(inner.to_dict(), {id(given): given for given in _given_in(inner)})
+    elif isinstance(inner, (tuple, np.ndarray)):
+        inner = list(inner)
+    elif not isinstance(inner, (list, MutableMapping)):
+        raise KeyError(f"`{key}` lies in a value that is no table")
+    own[at] = inner
+    return inner
 
 
 def _plain(value: Any, given: dict[str, Mesh | Image], name: str) -> Any:
