@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -112,14 +113,18 @@ def no_mark() -> Any:
     MARK.unlink(missing_ok=True)
 
 
+def slow(_: pliant.Result) -> dict[str, object]:
+    """A measure that takes its time."""
+    time.sleep(0.4)
+    return {}
+
+
 def test_an_interrupted_sweep_goes_on(tmp_path: Path, expected: list[dict[str, Any]]) -> None:
     out = tmp_path / "study"
     program = (
         f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
-        "import time, pliant, test_sweeps as t\n"
-        "slow = lambda result: time.sleep(0.4) or {}\n"
-        "slow.__qualname__ = ''\n"
-        f"pliant.sweep(t.scene(), t.VALUES, out={str(out)!r}, progress=False, measure=slow)\n"
+        "import pliant, test_sweeps as t\n"
+        f"pliant.sweep(t.scene(), t.VALUES, out={str(out)!r}, progress=False, measure=t.slow)\n"
     )
     process = subprocess.Popen([sys.executable, "-c", program])
     rows = out / "rows.jsonl"
@@ -133,7 +138,7 @@ def test_an_interrupted_sweep_goes_on(tmp_path: Path, expected: list[dict[str, A
     known = before.count("\n")
     assert 2 <= known < 6
     rows.write_text(before + '{"run": 5, "cut')
-    table = pliant.sweep(scene(), VALUES, out=out, progress=False)
+    table = pliant.sweep(scene(), VALUES, out=out, progress=False, measure=slow)
     assert rows_of(table) == expected
     assert rows.read_text().startswith(before) and len([line for line in rows.read_text().splitlines() if line.endswith("}")]) == 6
     with open(out / "sweep.csv", newline="") as file:
@@ -203,3 +208,119 @@ def test_parts_are_put_together(tmp_path: Path) -> None:
     with pytest.warns(pliant.PliantWarning, match="2 of 3"):
         table = pliant.merge(tmp_path)
     assert table.missing == [0, 2] and table.rows[0]["a"] == 2.0
+
+
+def swept(out: Path, **options: Any) -> pliant.Sweep:
+    return pliant.sweep(scene(), {"law.tissue.young-modulus": [5e3]}, out=out, progress=False, **options)
+
+
+def test_rows_of_an_edited_measure_are_made_anew(tmp_path: Path) -> None:
+    def make(text: str) -> Any:
+        names: dict[str, Any] = {}
+        exec(text, names)
+        return names["measure"]
+
+    edits = [
+        "def measure(r): return {'x': 1}",
+        "def measure(r): return {'x': 2}",
+        "LEVEL = 3\ndef measure(r): return {'x': LEVEL}",
+        "LEVEL = 4\ndef measure(r): return {'x': LEVEL}",
+        "def helper(): return 5\ndef measure(r): return {'x': helper()}",
+        "def helper(): return 6\ndef measure(r): return {'x': helper()}",
+        "def measure(r, level=7): return {'x': level}",
+    ]
+    assert [swept(tmp_path, measure=make(text)).rows[0]["x"] for text in edits] == [1, 2, 3, 4, 5, 6, 7]
+    stamp = (tmp_path / "rows.jsonl").read_text()
+    assert swept(tmp_path, measure=make(edits[2])).rows[0]["x"] == 3
+    assert (tmp_path / "rows.jsonl").read_text() == stamp
+
+
+def test_a_measure_that_raises_leaves_the_columns_of_the_run(tmp_path: Path) -> None:
+    mark = tmp_path / "mark"
+    mark.touch()
+
+    def measure(_: pliant.Result) -> dict[str, object]:
+        if mark.exists():
+            raise OSError("disk full")
+        return {"ok": 1}
+
+    for _ in range(2):
+        (row,) = swept(tmp_path, measure=measure).rows
+        assert row["status"] == "failed" and row["error"] == "measure: OSError: disk full" and np.isfinite(row["reaction.base.z"])
+        mark.unlink(missing_ok=True)
+    (row,) = swept(tmp_path, measure=measure, retry="failed").rows
+    assert row["status"] == "done" and row["ok"] == 1
+    with pytest.raises(ValueError, match="retry"):
+        swept(tmp_path, retry="all")
+    (row,) = swept(tmp_path / "other", measure=lambda _: {"a": object()}).rows
+    assert row["status"] == "failed" and "object" in row["error"]
+
+
+def test_a_wrong_combination_is_a_row_wherever_it_stands() -> None:
+    for ratios in ([0.6, 0.2], [0.2, 0.6], [0.6, 0.7]):
+        table = pliant.sweep(scene(), {"law.tissue.poisson-ratio": ratios}, progress=False)
+        assert [row["status"] for row in table] == ["failed" if ratio > 0.5 else "done" for ratio in ratios]
+    table = pliant.sweep(scene(), {"law.tisue.young-modulus": [3e3, 4e3]}, progress=False)
+    assert all(row["status"] == "failed" and "tisue" in row["error"] for row in table)
+
+
+def test_values_are_vectors_tables_meshes_and_numbers_of_numpy(tmp_path: Path) -> None:
+    from pliant import tables
+
+    gravities = [np.array([0, 0, -9.81]), (0, 0, np.float64(-1.6))]
+    table = pliant.sweep(scene(), {"scene.gravity": gravities, "law.tissue.young-modulus": np.array([5e3, 8e3])}, progress=False, out=tmp_path)
+    assert not table.failures and table.rows[0]["scene.gravity"] == [0.0, 0.0, -9.81]
+    again = pliant.sweep(scene(), {"scene.gravity": gravities, "law.tissue.young-modulus": [5e3, 8e3]}, progress=False, out=tmp_path)
+    assert [row["wall_seconds"] for row in again] == [row["wall_seconds"] for row in table]
+    pytest.importorskip("xarray")
+    grid = table.to_xarray()
+    assert grid["reaction.base.z"].shape == (2, 2) and grid["scene.gravity"].values[0] == "[0.0, 0.0, -9.81]"
+    meshes = [pliant.Mesh.block([0.1] * 3, edge=edge) for edge in (0.05, 0.034)]
+    table = pliant.sweep(scene(), {"body.cube.mesh": meshes}, progress=False, out=tmp_path)
+    assert not table.failures and "48 tetra" in table.rows[0]["body.cube.mesh"]
+    assert table.rows[0]["step"] != table.rows[1]["step"]
+    laws = [tables.NeoHookean(young_modulus=e, poisson_ratio=0.3) for e in (5e3, np.float64(8e3))]
+    table = pliant.sweep(scene(), {"law.tissue": laws}, progress=False, measure=lambda r: {"three": np.arange(3.0)})
+    assert not table.failures and table.to_xarray()["three"].shape == (2, 3)
+
+
+def test_ctrl_c_stops_the_runs_under_way_and_keeps_rows(tmp_path: Path) -> None:
+    program = (
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+        "import pliant\nfrom conftest import cube\n"
+        "scene = cube(8, **{'law.tissue.young-modulus': 2e5})\n"
+        "values = {'scene.until': [0.002, 0.003, 60.0, 61.0, 62.0, 63.0]}\n"
+        "print('go', flush=True)\n"
+        f"try: pliant.sweep(scene, values, out={str(tmp_path)!r}, progress=False)\n"
+        "except KeyboardInterrupt: print('interrupted', flush=True)\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None and process.stdout.readline() == "go\n"
+    rows = tmp_path / "rows.jsonl"
+    until = time.monotonic() + 60
+    while time.monotonic() < until and not (rows.exists() and rows.read_text().count("\n") >= 2):
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    begin = time.monotonic()
+    assert process.communicate(timeout=60)[0] == "interrupted\n"
+    assert time.monotonic() - begin < 10
+    assert [json.loads(line)["scene.until"] for line in rows.read_text().splitlines()] == [0.002, 0.003]
+
+
+def test_a_worker_of_dask_without_the_package_is_named(tmp_path: Path) -> None:
+    distributed = engine("distributed")
+    with distributed.LocalCluster(n_workers=0, dashboard_address=None) as cluster, distributed.Client(cluster) as client:
+        program = (
+            "import importlib.util as own\nfind = own.find_spec\n"
+            "own.find_spec = lambda name, package=None: None if name == 'pliant' else find(name, package)\n"
+            "from distributed.cli.dask_worker import main\n"
+            f"main(['{cluster.scheduler_address}', '--no-nanny', '--nthreads', '1', '--no-dashboard'])\n"
+        )
+        worker = subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        try:
+            client.wait_for_workers(1, timeout=60)
+            with pytest.raises(pliant.ClusterError, match="not installed"):
+                pliant.sweep(scene(), VALUES, on=client, progress=False)
+        finally:
+            worker.terminate()
+            worker.wait()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import glob
 import hashlib
@@ -21,9 +22,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from pliant import _native, _toml
-from pliant.engines import engine_of
-from pliant.errors import ClusterError, PliantWarning
-from pliant.mesh import _extra, _table
+from pliant._code import code_of
+from pliant._table import Table
+from pliant.engines import Stop, Stopped, engine_of
+from pliant.errors import ClusterError, Error, PliantWarning
+from pliant.image import Image
+from pliant.mesh import Mesh, _extra, _table
 from pliant.model import Model
 from pliant.result import Result
 from pliant.scene import Scene, load
@@ -63,15 +67,21 @@ class Sweep:
     def to_xarray(self) -> xarray.Dataset:
         """A data set over the values, if all their combinations were run."""
         xr = _extra("xarray", "tables")
-        axes = {key: list(dict.fromkeys(row[key] for row in self.rows)) for key in self.keys}
+        # Vectors and tables are no coordinates: their text is.
+        texts = [{key: _toml.value(row[key]) if isinstance(row[key], (list, dict)) else row[key] for key in self.keys} for row in self.rows]
+        axes = {key: list(dict.fromkeys(row[key] for row in texts)) for key in self.keys}
         shape = tuple(len(own) for own in axes.values())
         if math.prod(shape) != len(self.rows):
             raise ValueError("these runs are no grid of values; `to_pandas` has them as a table")
         names = [name for name in _columns(self.rows, self.keys) if name not in ("run", *self.keys, *_TOLD)]
         data = {}
         for name in names:
-            own = np.array([row.get(name, math.nan) for row in self.rows])
-            data[name] = (list(axes), own.reshape(shape))
+            there = [np.asarray(row[name]) for row in self.rows if name in row]
+            if len({own.shape for own in there}) != 1:
+                raise ValueError(f"`{name}` has other shapes from run to run; `to_pandas` has them as a table")
+            own = np.array([row.get(name, np.full(there[0].shape, math.nan)) for row in self.rows])
+            dims = [*axes, *(f"{name}_{k}" for k in range(1, own.ndim))]
+            data[name] = (dims, own.reshape(shape + own.shape[1:]))
         found: xarray.Dataset = xr.Dataset(data, coords=axes)
         return found
 
@@ -104,14 +114,15 @@ class _Bundle:
     threads: int
     keep: str | None
     version: str
+    code: str
 
     def hashed(self, number: int) -> str:
-        """The key of a row: it belongs to these values of this scene, in this version."""
+        """The key of a row: it belongs to these values of this scene, to the code of `measure` and to this version."""
         own = hashlib.sha256(self.scene)
         for name in sorted(self.files):
             own.update(name.encode() + hashlib.sha256(self.files[name]).digest())
-        measure = getattr(self.measure, "__qualname__", "")
-        own.update(json.dumps([self.combinations[number], measure, self.version], sort_keys=True).encode())
+        values = {key: pickle.dumps(value).hex() if isinstance(value, (Mesh, Image)) else value for key, value in self.combinations[number].items()}
+        own.update(json.dumps([values, self.code, self.version], sort_keys=True).encode())
         return own.hexdigest()
 
 
@@ -127,6 +138,7 @@ def sweep(
     measure: Callable[[Result], Mapping[str, object]] | None = None,
     keep: Literal["table", "all"] = "table",
     resume: bool = True,
+    retry: Literal["failed"] | None = None,
     progress: bool = True,
 ) -> Sweep:
     """Runs a scene with many values.
@@ -137,6 +149,7 @@ def sweep(
         The scene, or the path of its file.
     values
         Lists of values by path, of which all combinations are run, the last path changing fastest; or one mapping for each run; or a data frame, a row a run.
+        A value is a number, a text, a vector or a table, also of NumPy, or a mesh.
     out
         Folder of ``rows.jsonl`` and ``sweep.csv``. The same call again goes on where it was interrupted.
     on
@@ -146,13 +159,20 @@ def sweep(
     retries
         How often a run is repeated whose worker was lost. Runs that fail are rows, and not repeated.
     measure
-        Called with the `Result` of each run, where it was done; what it returns goes into the row.
+        Called with the `Result` of each run, where it was done; what it returns goes into the row. If it raises, the row has failed, and keeps
+        the columns of the run.
     keep
         ``"all"`` writes the outputs of each run to ``out/run-NNNN``, which all workers must reach.
     resume
-        Whether rows of an earlier call are taken.
+        Whether rows of an earlier call are taken: those of the same scene, values, version and `measure`, whose code counts with the functions
+        and plain values of its module that it names.
+    retry
+        ``"failed"`` runs again what failed in an earlier call.
     progress
         Whether a line on standard error tells how many runs have ended.
+
+    Ctrl-C stops the runs under way on threads of this process; elsewhere it cancels what is queued. Rows of runs that have ended are kept, so
+    that the same call goes on.
 
     Examples
     --------
@@ -168,6 +188,8 @@ def sweep(
         raise ValueError("a sweep needs values")
     if keep == "all" and out is None:
         raise ValueError("to keep the outputs of all runs, give a folder `out`")
+    if retry not in (None, "failed"):
+        raise ValueError(f"`retry` is None or 'failed', not {retry!r}")
     folder = None if out is None else os.path.abspath(os.fspath(out))
     bundle = _bundle(scene, combinations, keys, measure, cores, folder if keep == "all" else None)
     rows: dict[int, dict[str, Any]] = {}
@@ -176,21 +198,31 @@ def sweep(
         rows = _known(os.path.join(folder, _ROWS), bundle) if resume else {}
         if not resume and os.path.exists(os.path.join(folder, _ROWS)):
             os.remove(os.path.join(folder, _ROWS))
+    if retry == "failed":
+        rows = {number: row for number, row in rows.items() if row["status"] == "done"}
     left = [number for number in range(len(combinations)) if number not in rows]
     sink = None if folder is None else open(os.path.join(folder, _ROWS), "a", encoding="utf-8")  # noqa: SIM115
-    runs = engine_of(on, cores, gpus, retries).run(_run, bundle, left)
+    engine = engine_of(on, cores, gpus, retries)
+    runs = engine.run(_run, bundle, left)
+
+    def take(row: dict[str, Any]) -> None:
+        _take(row, rows, bundle)
+        if sink is not None:
+            sink.write(json.dumps(row) + "\n")
+            sink.flush()
+        if progress:
+            print(f"\r{len(rows)} of {len(combinations)} runs", end="", file=sys.stderr, flush=True)
+
     try:
         for row in runs:
-            _take(row, rows, bundle)
-            if sink is not None:
-                sink.write(json.dumps(row) + "\n")
-                sink.flush()
-            if progress:
-                print(f"\r{len(rows)} of {len(combinations)} runs", end="", file=sys.stderr, flush=True)
+            take(row)
+    except KeyboardInterrupt:
+        runs.close()
+        for row in engine.ended:
+            take(row)
+        raise
     finally:
-        close = getattr(runs, "close", None)
-        if close is not None:
-            close()
+        runs.close()
         if sink is not None:
             sink.close()
         if progress and rows:
@@ -237,7 +269,18 @@ def _combinations(values: Any) -> tuple[list[dict[str, Any]], list[str]]:
 
 
 def _number(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value
+    """A value as plain data; meshes and images as they are."""
+    if isinstance(value, Table):
+        value = value.to_dict()
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, (list, tuple)):
+        return [_number(own) for own in value]
+    if isinstance(value, Mapping):
+        return {str(key): _number(own) for key, own in value.items()}
+    return value
 
 
 def _bundle(
@@ -251,13 +294,24 @@ def _bundle(
     scene = scene.copy()
     # Meshes of images and surfaces are made here, once, unless a value changes them.
     if not any(".mesh" in key for key in keys):
-        model = scene.replace(combinations[0]).build()
-        for name, mesh in model._lends(scene).items():
-            if any(word in scene.body[name]["mesh"] for word in ("image", "masks", "file")):
-                scene.body[name]["mesh"] = mesh
+        for name, mesh in _lent(scene, combinations).items():
+            body = _number(scene.body[name])
+            if any(word in body["mesh"] for word in ("image", "masks", "file")):
+                scene.body[name] = {**body, "mesh": mesh}
     files = {name: _bytes(os.path.join(scene.folder, name)) for name in _files(scene._data, scene.folder)}
     carried = scene if not files else _elsewhere(scene)
-    return _Bundle(pickle.dumps(carried), files, combinations, keys, measure, threads, keep, _native.__version__)
+    version, code = _native.__version__, code_of(measure)
+    return _Bundle(pickle.dumps(carried), files, combinations, keys, measure, threads, keep, version, code)
+
+
+def _lent(scene: Scene, combinations: Sequence[Mapping[str, Any]]) -> Mapping[str, Mesh]:
+    """Meshes of the first combination that can be built; a wrong one is a row that fails."""
+    for values in combinations:
+        try:
+            return scene.replace(values).build()._lends(scene)
+        except (Error, KeyError, TypeError, ValueError):
+            continue
+    return {}
 
 
 def _elsewhere(scene: Scene) -> Scene:
@@ -284,22 +338,29 @@ def _bytes(path: str) -> bytes:
         return file.read()
 
 
-def _run(bundle: _Bundle, number: int) -> dict[str, Any]:
-    """A run as a row. It never raises, so that no engine repeats it."""
-    row: dict[str, Any] = {"run": number, **bundle.combinations[number]}
+def _run(bundle: _Bundle, number: int, stop: Stop | None = None) -> dict[str, Any]:
+    """A run as a row. It raises only if it was stopped, so that no engine repeats it."""
+    row: dict[str, Any] = {"run": number, **{key: _told(value) for key, value in bundle.combinations[number].items()}}
     row |= {"key": bundle.hashed(number), "host": socket.gethostname(), "version": _native.__version__}
     if bundle.version != _native.__version__:
         return row | {"status": "failed", "error": "another version"}
-    try:
-        if bundle.files:
-            with tempfile.TemporaryDirectory() as folder:
-                return row | _measured(bundle, number, folder)
-        return row | _measured(bundle, number, None)
-    except Exception as error:
-        return row | {"status": "failed", "error": f"{type(error).__name__}: {error}"}
+    with tempfile.TemporaryDirectory() if bundle.files else contextlib.nullcontext() as folder:
+        try:
+            result, found = _ran(bundle, number, folder, stop)
+        except Stopped:
+            raise
+        except Exception as error:
+            return row | {"status": "failed", "error": f"{type(error).__name__}: {error}"}
+        if bundle.measure is not None and result.status == "done":
+            try:
+                found |= {str(name): _jsonable(own) for name, own in bundle.measure(result).items()}
+            except Exception as error:
+                found |= {"status": "failed", "error": f"measure: {type(error).__name__}: {error}"}
+        return row | found
 
 
-def _measured(bundle: _Bundle, number: int, folder: str | None) -> dict[str, Any]:
+def _ran(bundle: _Bundle, number: int, folder: str | None, stop: Stop | None) -> tuple[Result, dict[str, Any]]:
+    """The result of a run, and its columns."""
     scene: Scene = pickle.loads(bundle.scene)
     if folder is not None:
         for name, content in bundle.files.items():
@@ -312,22 +373,26 @@ def _measured(bundle: _Bundle, number: int, folder: str | None) -> dict[str, Any
         warnings.simplefilter("ignore", PliantWarning)
         model: Model = scene.replace(bundle.combinations[number]).build()
         out = None if bundle.keep is None else os.path.join(bundle.keep, f"run-{number:04}")
-        result = model.run(out, threads=bundle.threads, force=out is not None)
+        result = model._run(out, threads=bundle.threads, force=out is not None, stop=stop)
         last: dict[str, Any] = {} if out is not None else {name: float(own[-1]) for name, own in result.history.items() if name != "time"}
     row: dict[str, Any] = {"status": result.status, "error": "" if result.error is None else str(result.error)}
     row |= {"time": result.time, "steps": result.steps, "step": model.step, "wall_seconds": result.wall_seconds}
     row |= last or {f"energy.{name}": own for name, own in result.energies._asdict().items()}
     for name, force in result.reactions.items():
         row |= {f"reaction.{name}.{axis}": float(own) for axis, own in zip("xyz", force, strict=True)}
-    if bundle.measure is not None and result.status == "done":
-        row |= {str(name): _jsonable(own) for name, own in bundle.measure(result).items()}
-    return row
+    return result, row
+
+
+def _told(value: Any) -> Any:
+    """A value as it stands in a row."""
+    return repr(value) if isinstance(value, (Mesh, Image)) else value
 
 
 def _jsonable(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    return _number(value)
+    """What `measure` returned as plain data; an error names what can't be."""
+    plain = _number(value)
+    json.dumps(plain)
+    return plain
 
 
 def _take(row: dict[str, Any], rows: dict[int, dict[str, Any]], bundle: _Bundle) -> None:

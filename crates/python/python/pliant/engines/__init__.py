@@ -6,22 +6,63 @@ Tasks never raise: a run that fails is a row as any other, so engines repeat onl
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from typing import Any, Protocol
+import threading
+from collections.abc import Callable, Generator, Iterable
+from typing import TYPE_CHECKING, Any, Protocol
 
 from pliant.errors import ClusterError
 
-__all__ = ["Engine", "engine_of"]
+if TYPE_CHECKING:
+    from pliant.simulation import Simulation
 
-Task = Callable[[Any, int], dict[str, Any]]
-"""Does the run of a number, with a bundle that all runs share."""
+__all__ = ["Engine", "Stop", "Stopped", "engine_of"]
+
+Task = Callable[..., dict[str, Any]]
+"""Does the run of a number, with a bundle that all runs share; the third argument, a `Stop`, is optional."""
+
+
+class Stopped(Exception):
+    """A run that was stopped before its end."""
+
+
+class Stop:
+    """Ends runs on threads of this process."""
+
+    def __init__(self) -> None:
+        self._asked, self._lock = threading.Event(), threading.Lock()
+        self._running: set[Simulation] = set()
+
+    def ask(self) -> None:
+        """Ends all runs under way after their steps."""
+        self._asked.set()
+        with self._lock:
+            for simulation in self._running:
+                simulation._own.interrupt()
+
+    def check(self, *_: object) -> None:
+        """Raises `Stopped` if somebody has asked."""
+        if self._asked.is_set():
+            raise Stopped
+
+    def watch(self, simulation: Simulation) -> None:
+        """Adds a simulation that is to be interrupted."""
+        with self._lock:
+            self._running.add(simulation)
+
+    def forget(self, simulation: Simulation) -> None:
+        """Removes a simulation that has ended."""
+        with self._lock:
+            self._running.discard(simulation)
 
 
 class Engine(Protocol):
     """Runs tasks."""
 
-    def run(self, task: Task, bundle: Any, numbers: Iterable[int]) -> Iterator[dict[str, Any]]:
-        """Rows in the order in which runs end. Closing the iterator cancels what is queued."""
+    ended: list[dict[str, Any]]
+    """Rows of runs that had ended when the iterator was closed, and were not given back."""
+
+    def run(self, task: Task, bundle: Any, numbers: Iterable[int]) -> Generator[dict[str, Any]]:
+        """Rows in the order in which runs end. Closing the iterator cancels what is queued, and stops what runs on threads of this process."""
         ...
 
 

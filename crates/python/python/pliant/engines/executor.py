@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, ThreadPoolExecutor, wait
+from collections.abc import Generator, Iterable
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from typing import Any
 
-from pliant.engines import Task
+from pliant.engines import Stop, Task
 
 __all__ = ["Futures"]
 
@@ -20,27 +20,36 @@ class Futures:
     def __init__(self, executor: Executor | None, cores: int) -> None:
         self._executor = executor
         self._threads = max(1, len(os.sched_getaffinity(0)) // max(1, cores)) if hasattr(os, "sched_getaffinity") else 1
+        self.ended: list[dict[str, Any]] = []
 
-    def run(self, task: Task, bundle: Any, numbers: Iterable[int]) -> Iterator[dict[str, Any]]:
+    def run(self, task: Task, bundle: Any, numbers: Iterable[int]) -> Generator[dict[str, Any]]:
         """Rows as runs end."""
         own = ThreadPoolExecutor(self._threads, thread_name_prefix="pliant") if self._executor is None else None
         executor = own or self._executor
         assert executor is not None
+        stop = Stop()
+        # Another process can't be stopped by a flag of this one.
+        extra = () if own is None else (stop,)
         most = 2 * self._threads if own else _MOST
-        left, pending = iter(numbers), set()
+        left = iter(numbers)
+        pending: set[Future[dict[str, Any]]] = set()
         try:
             while True:
                 for number in left:
-                    pending.add(executor.submit(task, bundle, number))
+                    pending.add(executor.submit(task, bundle, number, *extra))
                     if len(pending) >= most:
                         break
                 if not pending:
                     return
-                done, pending = wait(pending, return_when=FIRST_COMPLETED)
+                done, _ = wait(pending, return_when=FIRST_COMPLETED)
                 for future in done:
+                    pending.discard(future)
                     yield future.result()
         finally:
+            stop.ask()
             for future in pending:
                 future.cancel()
             if own is not None:
                 own.shutdown(wait=True, cancel_futures=True)
+            ended = (future for future in pending if future.done() and not future.cancelled())
+            self.ended = [future.result() for future in ended if future.exception() is None]

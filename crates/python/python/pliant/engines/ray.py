@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import contextlib
+from collections.abc import Generator, Iterable
 from typing import Any
 
 from pliant.engines import Task
@@ -17,8 +18,9 @@ class Ray:
     def __init__(self, cores: int, gpus: float, retries: int) -> None:
         self._ray = _extra("ray", "ray")
         self._options = {"num_cpus": cores, "num_gpus": gpus, "max_retries": retries}
+        self.ended: list[dict[str, Any]] = []
 
-    def run(self, task: Task, bundle: Any, numbers: Iterable[int]) -> Iterator[dict[str, Any]]:
+    def run(self, task: Task, bundle: Any, numbers: Iterable[int]) -> Generator[dict[str, Any]]:
         """Rows as runs end."""
         ray = self._ray
         own = not ray.is_initialized()
@@ -39,6 +41,11 @@ class Ray:
                 for reference in done:
                     yield ray.get(reference)
         finally:
+            done, running = ray.wait(running, num_returns=len(running), timeout=0) if running else ([], [])
+            for reference in done:
+                # What a lost worker had is run by the next call.
+                with contextlib.suppress(ray.exceptions.RayError):
+                    self.ended.append(ray.get(reference))
             for reference in running:
                 ray.cancel(reference, force=True)
             if own:
