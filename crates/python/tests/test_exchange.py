@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -169,3 +170,90 @@ def test_wedges_and_pyramids_become_tetrahedra() -> None:
     quadratic = pyvista.UnstructuredGrid({24: np.arange(10)[None]}, np.random.default_rng(1).random((10, 3)))
     with pytest.raises(ValueError, match="VTK type 24"):
         Mesh.from_pyvista(quadratic)
+
+
+def everything() -> Mesh:
+    """Tetrahedra with labels, names, fibres and sets, and triangles that lack some of them."""
+    block = Mesh.block([0.1, 0.05, 0.05], edge=0.025)
+    tets, (count,) = block.cells["tetra"], block.cells["tetra"].shape[:1]
+    labels = np.concatenate([np.arange(count) % 3, np.full(2, np.nan)])
+    fibres = np.concatenate([np.tile([1.0, 0.0, 0.0], (count, 1)), np.full((2, 3), np.nan)])
+    return Mesh(
+        block.points,
+        {"tetra": tets, "triangle": tets[:2, :3]},
+        point_data={"height": block.points[:, 2], "strain": np.tile(np.eye(3).ravel(), (len(block.points), 1))},
+        cell_data={"label": labels, "fibre": fibres},
+        point_sets={"left": [0, 2, 3], "none": []},
+        cell_sets={"skin": [count, count + 1], "both": [1, count]},
+        label_names={1: "liver", 2: "Größe der Galle"},
+    )
+
+
+def alike(a: Mesh, b: Mesh) -> None:
+    """Asserts that two meshes have the same of everything."""
+    assert list(a.cells) == list(b.cells) and same(a, b)
+    for of in ("point_data", "cell_data", "point_sets", "cell_sets"):
+        left, right = getattr(a, of), getattr(b, of)
+        assert set(left) == set(right), of
+        assert all(np.array_equal(left[name], right[name], equal_nan=left[name].dtype.kind == "f") for name in left), of
+    assert a.label_names == b.label_names
+
+
+def test_nothing_of_a_mesh_is_lost_on_the_way(tmp_path: Path) -> None:
+    meshio, pyvista = pytest.importorskip("meshio"), pytest.importorskip("pyvista")
+    mesh = everything()
+    alike(pickle.loads(pickle.dumps(mesh)), mesh)
+    alike(Mesh.from_meshio(mesh.to_meshio()), mesh)
+    alike(Mesh.from_pyvista(mesh.to_pyvista()), mesh)
+    mesh.write(tmp_path / "mesh.vtu")
+    for back in (
+        Mesh.read(tmp_path / "mesh.vtu"),
+        Mesh.from_meshio(meshio.read(tmp_path / "mesh.vtu")),
+        Mesh.from_pyvista(pyvista.read(tmp_path / "mesh.vtu")),
+    ):
+        alike(back, mesh)
+    mesh.write(tmp_path / "mesh.msh")
+    mine, theirs = Mesh.read(tmp_path / "mesh.msh"), Mesh.from_meshio(meshio.read(tmp_path / "mesh.msh"))
+    assert same(mine, theirs) and np.array_equal(mine.cell_data["label"], theirs.cell_data["label"], equal_nan=True)
+    assert {name: len(own) for name, own in mine.point_sets.items() if len(own)} == {name: len(own) for name, own in theirs.point_sets.items() if len(own)}
+    assert Mesh.from_pyvista(mesh.to_pyvista(), scale=1e-3).points.max() == pytest.approx(1e-4)
+
+
+def test_wedges_keep_labels_and_sets_of_cells() -> None:
+    meshio = pytest.importorskip("meshio")
+    points, cells = column()
+    blocks = [(kind, np.array(own)) for kind, own in cells.items()]
+    sets = {"top": [np.empty(0, int), np.array([0]), np.array([0])]}
+    mesh = Mesh.from_meshio(meshio.Mesh(points, blocks, cell_sets=sets, point_sets={"foot": np.arange(4)}))
+    assert len(mesh.cell_sets["top"]) == 8 and {*range(4)} == {*mesh.point_sets["foot"].tolist()}
+    assert {*mesh.point_sets["top"].tolist()} == {*range(4, 13)}
+
+
+def test_labels_of_images_are_rounded_as_the_mesher_does() -> None:
+    values = np.zeros((12, 12, 12))
+    values[2:6, 2:10, 2:10], values[6:10, 2:10, 2:10] = 5, 6.99999
+    image = Image(values, np.diag([2e-3] * 3 + [1.0]))
+    assert {label: own.voxels for label, own in image.labels().items()} == {5: 256, 7: 256}
+    assert set(np.unique(Mesh.of_image(image, [5, 7], edge=4e-3).cell_data["label"])) == {5.0, 7.0}
+    with pytest.raises(pliant.MeshError, match=r"6\.9"):
+        Image(np.where(values > 6, 6.9, values), image.affine).labels()
+
+
+@pytest.mark.parametrize("labels", [np.int64(5), np.uint8(5), np.array([5, 7]), range(5, 8, 2), {5, 7}, (5, 7), [np.int32(5)]])
+def test_labels_are_any_whole_numbers(labels: object) -> None:
+    values = np.zeros((12, 12, 12), np.uint8)
+    values[2:6, 2:10, 2:10], values[6:10, 2:10, 2:10] = 5, 7
+    mesh = Mesh.of_image(Image(values, np.diag([2e-3] * 3 + [1.0])), labels, edge=4e-3)
+    assert set(np.unique(mesh.cell_data["label"])) == {
+        float(own) for own in np.atleast_1d(list(np.ravel(labels)) if not isinstance(labels, set) else list(labels))
+    }
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("meter", 1.0), ("mm", 1e-3), ("micron", 1e-6), ("unknown", 1e-3)])
+def test_images_of_nibabel_have_the_unit_of_their_header(tmp_path: Path, unit: str, metres: float) -> None:
+    nib = pytest.importorskip("nibabel")
+    image = nib.Nifti1Image(np.ones((4, 4, 4), np.uint8), np.diag([2e-3 / metres] * 3 + [1.0]))
+    image.header.set_xyzt_units(unit)
+    nib.save(image, tmp_path / "image.nii")
+    for found in (Image.from_nibabel(image), Image.read(tmp_path / "image.nii")):
+        assert found.labels()[1].volume == pytest.approx(64 * 8e-9, rel=1e-5)

@@ -1,8 +1,12 @@
-"""Calls in any order leave the bits that a fresh run has."""
+"""Calls in any order leave the bits that a fresh run has, and meshes come back from other packages as they went."""
 
 from __future__ import annotations
 
+import pickle
+
+import numpy as np
 import pytest
+from test_exchange import alike
 
 import pliant
 from conftest import cube
@@ -70,3 +74,39 @@ def replayed(model: pliant.Model, calls: list[tuple[str, object]], looks: bool) 
 def test_looks_snapshots_and_detours_change_no_bit(solver: str, calls: list[tuple[str, object]]) -> None:
     model = MODELS[solver]
     assert replayed(model, calls, looks=True) == replayed(model, calls, looks=False)
+
+
+KINDS = {"line": 2, "triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8}
+NAMES = st.text("abö1 -", min_size=1, max_size=6).filter(lambda name: name == name.strip() and name != "label")
+
+
+@st.composite
+def meshes(draw: hypothesis.strategies.DrawFn) -> pliant.Mesh:
+    """Any cells on a dozen points, with data, sets and names; some data are not there for all kinds."""
+    random = np.random.default_rng(draw(st.integers(0, 2**32)))
+    kinds = draw(st.lists(st.sampled_from(list(KINDS)), min_size=1, max_size=3, unique=True))
+    counts = [draw(st.integers(1, 4)) for _ in kinds]
+    total = sum(counts)
+    cells = {kind: random.integers(0, 12, (count, KINDS[kind])) for kind, count in zip(kinds, counts, strict=True)}
+    data = {name: random.random((total, draw(st.sampled_from([1, 3, 9])))) for name in draw(st.lists(NAMES, max_size=2, unique=True))}
+    data |= {"label": random.integers(-3, 4, total)} if draw(st.booleans()) else {}
+    if len(kinds) > 1:
+        for own in data.values():
+            if own.dtype == float and draw(st.booleans()):
+                own[: counts[0]] = np.nan
+    subset = lambda count: np.flatnonzero(random.random(count) < 0.5)  # noqa: E731
+    point_sets = {name: subset(12) for name in draw(st.lists(NAMES, max_size=2, unique=True))}
+    cell_sets = {name: subset(total) for name in draw(st.lists(NAMES, max_size=2, unique=True))}
+    names = draw(st.dictionaries(st.integers(-5, 5), NAMES, max_size=3))
+    own = {"point_data": {name: random.random((12, 3)) for name in data if name != "label"}, "cell_data": data}
+    return pliant.Mesh(random.random((12, 3)), cells, **own, point_sets=point_sets, cell_sets=cell_sets, label_names=names)
+
+
+@settings(max_examples=100, deadline=None)
+@given(mesh=meshes())
+def test_meshes_go_there_and_back(mesh: pliant.Mesh) -> None:
+    pytest.importorskip("meshio")
+    pytest.importorskip("pyvista")
+    alike(pickle.loads(pickle.dumps(mesh)), mesh)
+    alike(pliant.Mesh.from_meshio(mesh.to_meshio()), mesh)
+    alike(pliant.Mesh.from_pyvista(mesh.to_pyvista()), mesh)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import os
 import struct
 from collections.abc import Mapping, Sequence
@@ -73,8 +74,10 @@ class Image:
 
     @classmethod
     def from_nibabel(cls, image: Any) -> Image:
-        """From an image of nibabel, whose affine matrix is in millimetres."""
-        return cls(np.asanyarray(image.dataobj), np.diag([1e-3, 1e-3, 1e-3, 1.0]) @ np.asarray(image.affine))
+        """From an image of nibabel, in the unit that its header names; in millimetres, if it names none."""
+        units = getattr(image.header, "get_xyzt_units", lambda: ("mm", "sec"))()[0]
+        metres = {"meter": 1.0, "micron": 1e-6}.get(units, 1e-3)
+        return cls(np.asanyarray(image.dataobj), np.diag([metres, metres, metres, 1.0]) @ np.asarray(image.affine))
 
     @classmethod
     def from_sitk(cls, image: Any) -> Image:
@@ -89,16 +92,12 @@ class Image:
         return cls(np.transpose(sitk.GetArrayFromImage(image)), to_metres @ _LPS_TO_RAS @ affine)
 
     def labels(self) -> dict[int, Label]:
-        """The labels but 0, with their voxels."""
-        found, counts = np.unique(self.array, return_counts=True)
-        if len(found) > 10_000:
-            raise ValueError(f"the image has {len(found)} values: it is a scan, not a segmentation")
+        """The labels but 0, with their voxels. Values are rounded as for a mesh: those further than 1e-4 from a whole number are a `MeshError`."""
         size = float(abs(np.linalg.det(self.affine[:3, :3])))
-        all_labels = ((int(label), int(count)) for label, count in zip(found, counts, strict=True) if label != 0)
-        return {label: Label(self._names.get(label), count, count * size) for label, count in all_labels}
+        return {label: Label(self._names.get(label), count, count * size) for label, count in self._own.labels()}
 
     def _mesh(self, labels: Sequence[int], edge: float, kind: str, clean: Mapping[str, Any] | None) -> Mesh:
-        table: dict[str, Any] = {"image": self, "labels": [int(label) for label in labels]}
+        table: dict[str, Any] = {"image": self, "labels": [operator.index(label) for label in labels]}
         table |= {"edge": float(edge), "as": kind}
         if clean is not None:
             table["clean"] = dict(clean)
@@ -118,9 +117,9 @@ class Image:
         return _native.Image(values.tobytes(order="F"), number.name, self.array.shape, affine, names)
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Writes it as NIfTI-1 of 32-bit integers, whole numbers only, the affine matrix in millimetres (`sform`)."""
+        """Writes it as NIfTI-1 of 32-bit integers, the affine matrix in millimetres (`sform`). Values are rounded as for a mesh."""
         whole = np.rint(self.array)
-        if not np.array_equal(whole, self.array) or float(np.abs(whole).max()) >= 2**31:
+        if not bool((np.abs(whole - self.array) <= 1e-4).all()) or float(np.abs(whole).max()) >= 2**31:
             raise ValueError("the image holds other values than whole numbers below 2³¹: labels are wanted")
         if max(self.array.shape) >= 2**15:
             raise ValueError(f"NIfTI-1 takes 32,767 voxels along an axis at most, not {max(self.array.shape)}")

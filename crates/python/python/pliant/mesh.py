@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import operator
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,8 @@ __all__ = ["Mesh"]
 
 _CORNERS = {"vertex": 1, "line": 2, "triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8, "wedge": 6, "pyramid": 5}
 _VTK = {"vertex": 1, "line": 3, "triangle": 5, "quad": 9, "tetra": 10, "hexahedron": 12, "wedge": 13, "pyramid": 14}
+_SET = "set:"
+_NAMES = "label-names"
 # VTK's cells along the axes have other orders of corners.
 _REORDERED = {8: ("quad", [0, 1, 3, 2]), 11: ("hexahedron", [0, 1, 3, 2, 4, 5, 7, 6])}
 
@@ -40,8 +43,10 @@ class Mesh:
         hexahedra that share faces with them.
     point_data, cell_data
         Values by name: (n,) or (n, c) for points; for cells in the order of `cells`, all kinds after each other.
-    point_sets
-        Named sets of points, which scenes name as ``{ set = "NAME" }``.
+    point_sets, cell_sets
+        Named sets of points, and of cells counted over all kinds, which scenes name as ``{ set = "NAME" }``.
+    label_names
+        Names of the numbers that cell data ``label`` has.
     scale
         Size of one unit of `points` in metres.
 
@@ -62,6 +67,8 @@ class Mesh:
         point_data: Mapping[str, ArrayLike] | None = None,
         cell_data: Mapping[str, ArrayLike] | None = None,
         point_sets: Mapping[str, ArrayLike] | None = None,
+        cell_sets: Mapping[str, ArrayLike] | None = None,
+        label_names: Mapping[int, str] | None = None,
         scale: float = 1.0,
     ) -> None:
         places = numbers(points, "points", (None, 3)) * float(scale)
@@ -79,10 +86,22 @@ class Mesh:
         for name, values in (cell_data or {}).items():
             all_values, first = _columns(values, f"cell data `{name}`", total), 0
             for kind, corners in blocks:
-                by_cell.append((kind, name, np.ascontiguousarray(all_values[first : first + len(corners)])))
+                part = np.ascontiguousarray(all_values[first : first + len(corners)])
+                # Data that a kind of cells does not have are NaN there, as in files.
+                if len(blocks) == 1 or not np.isnan(part).all():
+                    by_cell.append((kind, name, part))
                 first += len(corners)
         sets = [(name, indices(own, f"points of the set `{name}`", (None,), count)) for name, own in (point_sets or {}).items()]
-        self._own = _native.Mesh(places, blocks, by_point, by_cell, sets)
+        of_cells = []
+        for name, members in (cell_sets or {}).items():
+            own, first = indices(members, f"cells of the set `{name}`", (None,), total), 0
+            for kind, corners in blocks:
+                here = own[(own >= first) & (own < first + len(corners))] - np.uint32(first)
+                if len(here) or not (len(own) or first):
+                    of_cells.append((kind, name, here))
+                first += len(corners)
+        names = {operator.index(number): str(name) for number, name in (label_names or {}).items()}
+        self._own = _native.Mesh(places, blocks, by_point, by_cell, sets, of_cells, names)
 
     @classmethod
     def _of(cls, native: _native.Mesh) -> Mesh:
@@ -118,10 +137,30 @@ class Mesh:
 
     @property
     def point_sets(self) -> Mapping[str, NDArray[np.uint32]]:
-        """Named sets of points."""
-        make = lambda: MappingProxyType({k: fixed(v) for k, v in self._own.point_sets().items()})  # noqa: E731
+        """Named sets of points, and the points of named sets of cells."""
+        make = lambda: MappingProxyType({k: fixed(v) for k, v in self._own.point_sets(True).items()})  # noqa: E731
         own: Mapping[str, NDArray[np.uint32]] = self._kept("_point_sets", make)
         return own
+
+    @property
+    def cell_sets(self) -> Mapping[str, NDArray[np.uint32]]:
+        """Named sets of cells, counted over all kinds."""
+
+        def make() -> Mapping[str, NDArray[np.uint32]]:
+            counts = [len(corners) for corners in self.cells.values()]
+            first = dict(zip(self.cells, np.cumsum([0, *counts]).tolist(), strict=False))
+            sets: dict[str, list[NDArray[np.uint32]]] = {}
+            for name, kind, members in self._own.cell_sets():
+                sets.setdefault(name, []).append(members + np.uint32(first[kind]))
+            return MappingProxyType({name: fixed(np.concatenate(parts)) for name, parts in sets.items()})
+
+        own: Mapping[str, NDArray[np.uint32]] = self._kept("_cell_sets", make)
+        return own
+
+    @property
+    def label_names(self) -> dict[int, str]:
+        """Names of the labels of cells, if known."""
+        return self._own.label_names()
 
     def _kept(self, name: str, make: Any) -> Any:
         if name not in self.__dict__:
@@ -212,14 +251,15 @@ class Mesh:
     def of_image(
         cls,
         image: Image,
-        labels: int | Sequence[int],
+        labels: int | Iterable[int],
         edge: float,
         *,
         kind: str = "tets",
         clean: Mapping[str, Any] | None = None,
     ) -> Mesh:
         """Cells of `edge` [m] in what has one of the labels of an image. Each cell has its own as cell data ``label``."""
-        return image._mesh([labels] if isinstance(labels, int) else list(labels), edge, kind, clean)
+        own = [labels] if isinstance(labels, (int, np.integer)) else list(labels)
+        return image._mesh(own, edge, kind, clean)
 
     def of_surface(self, edge: float, *, kind: str = "tets") -> Mesh:
         """Cells of `edge` [m] in what the closed surface of this mesh encloses."""
@@ -240,7 +280,10 @@ class Mesh:
         return _meshed(table, {"surface": self}, shell=True)
 
     def to_pyvista(self) -> pyvista.UnstructuredGrid:
-        """A copy for PyVista, with data and cells."""
+        """A copy for PyVista, with cells, data, sets and names of labels as they stand in ``.vtu`` files.
+
+        Sets are arrays ``set:NAME`` of 0 and 1, names the field data ``label-names``.
+        """
         pv = _extra("pyvista", "mesh")
         cells, kinds = [], []
         for kind, corners in self.cells.items():
@@ -248,19 +291,33 @@ class Mesh:
             kinds.append(np.full(len(corners), _VTK[kind], dtype=np.uint8))
         grid: pyvista.UnstructuredGrid = pv.UnstructuredGrid(np.concatenate(cells), np.concatenate(kinds), self.points.copy())
         for name, values in self.point_data.items():
-            grid.point_data[name] = values.reshape(len(values), -1).squeeze().copy()
+            grid.point_data[name] = _flat(values)
         for name, values in self.cell_data.items():
-            grid.cell_data[name] = values.reshape(len(values), -1).squeeze().copy()
+            grid.cell_data[name] = _as_label(name, _flat(values))
+        for name, points in self._own.point_sets(False).items():
+            grid.point_data[_SET + name] = _mask(points, grid.n_points)
+        for name, members in self.cell_sets.items():
+            grid.cell_data[_SET + name] = _mask(members, grid.n_cells)
+        if self.label_names:
+            grid.field_data[_NAMES] = _bytes_of(self.label_names)
         return grid
 
     @classmethod
-    def from_pyvista(cls, grid: Any) -> Mesh:
-        """From a grid or a surface of PyVista; lengths are taken as metres. Cells of kinds that a mesh does not have are a `ValueError`."""
+    def from_pyvista(cls, grid: Any, *, scale: float = 1.0) -> Mesh:
+        """From a grid or a surface of PyVista; `scale` is the size of its unit in metres. It is read as a ``.vtu`` file would be.
+
+        Arrays ``set:NAME`` become sets, the field data ``label-names`` the names of labels. Cells of kinds that a mesh does not have are a
+        `ValueError`.
+        """
+        names = grid.field_data.get(_NAMES)
         grid = grid.cast_to_unstructured_grid()
         words = {number: word for word, number in _VTK.items()}
         cells: dict[str, Any] = {}
         order = []
-        for number, corners in grid.cells_dict.items():
+        all_corners = grid.cells_dict
+        numbers, firsts = np.unique(grid.celltypes, return_index=True)
+        for number in numbers[np.argsort(firsts)]:
+            corners = all_corners[number]
             kind = words.get(int(number), f"VTK type {number}")
             if int(number) in _REORDERED:
                 kind, places = _REORDERED[int(number)]
@@ -271,31 +328,64 @@ class Mesh:
         at = np.concatenate([own for kind in cells for word, own in order if word == kind]) if order else np.empty(0, int)
         by_cell = {name: np.asarray(grid.cell_data[name])[at] for name in grid.cell_data}
         by_point = {name: np.asarray(grid.point_data[name]) for name in grid.point_data}
-        return cls(grid.points, cells, point_data=by_point, cell_data=by_cell)
+        return cls._with_sets(grid.points, cells, by_point, by_cell, {}, {}, _names_of(names), scale)
+
+    @classmethod
+    def _with_sets(
+        cls,
+        points: Any,
+        cells: dict[str, Any],
+        point_data: dict[str, NDArray[Any]],
+        cell_data: dict[str, NDArray[Any]],
+        point_sets: dict[str, Any],
+        cell_sets: dict[str, Any],
+        names: dict[int, str],
+        scale: float,
+    ) -> Mesh:
+        """A mesh whose arrays ``set:NAME`` are sets."""
+        for data, sets in ((point_data, point_sets), (cell_data, cell_sets)):
+            for name in [own for own in data if own.startswith(_SET) and data[own].ndim == 1]:
+                sets[name.removeprefix(_SET)] = np.flatnonzero(data.pop(name))
+        own: dict[str, Any] = {"point_data": point_data, "cell_data": cell_data, "point_sets": point_sets, "cell_sets": cell_sets}
+        return cls(points, cells, **own, label_names=names, scale=scale)
 
     def to_meshio(self) -> meshio.Mesh:
-        """A copy for meshio."""
+        """A copy for meshio, with data, sets, and names of labels as the field data ``label-names``."""
         mio = _extra("meshio", "mesh")
         blocks = [(kind, np.array(corners)) for kind, corners in self.cells.items()]
         cell_data: dict[str, list[NDArray[np.float64]]] = {}
         for name, values in self.cell_data.items():
             ends = np.cumsum([len(corners) for _, corners in blocks])[:-1]
-            cell_data[name] = [part.copy() for part in np.split(values, ends)]
+            cell_data[name] = [part.copy() for part in np.split(_as_label(name, values), ends)]
         data = {name: np.array(values) for name, values in self.point_data.items()}
-        return mio.Mesh(self.points.copy(), blocks, point_data=data, cell_data=cell_data)
+        point_sets = {name: np.array(points) for name, points in self._own.point_sets(False).items()}
+        cell_sets: dict[str, list[NDArray[np.uint32]]] = {}
+        for name, kind, members in self._own.cell_sets():
+            none = [np.empty(0, dtype=np.uint32) for _ in blocks]
+            cell_sets.setdefault(name, none)[list(self.cells).index(kind)] = members
+        names = {_NAMES: _bytes_of(self.label_names)} if self.label_names else {}
+        own: dict[str, Any] = {"point_data": data, "cell_data": cell_data, "point_sets": point_sets, "cell_sets": cell_sets}
+        return mio.Mesh(self.points.copy(), blocks, **own, field_data=names)
 
     @classmethod
     def from_meshio(cls, mesh: Any, *, scale: float = 1.0) -> Mesh:
-        """From a mesh of meshio; `scale` is the size of its unit in metres. Cells of kinds that a mesh does not have are a `ValueError`."""
-        cells: dict[str, Any] = {}
-        for block in mesh.cells:
-            before = cells.get(block.type)
-            cells[block.type] = block.data if before is None else np.concatenate([before, block.data])
-        by_cell: dict[str, Any] = {}
-        for name, parts in mesh.cell_data.items():
-            own = [np.asarray(part) for kind in cells for block, part in zip(mesh.cells, parts, strict=True) if block.type == kind]
-            by_cell[name] = np.concatenate(own) if own else np.empty(0)
-        return cls(mesh.points, cells, point_data=dict(mesh.point_data), cell_data=by_cell, scale=scale)
+        """From a mesh of meshio; `scale` is the size of its unit in metres. It is read as the file would be.
+
+        Arrays ``set:NAME`` become sets, the physical groups of Gmsh labels. Cells of kinds that a mesh does not have are a `ValueError`.
+        """
+        kinds = list(dict.fromkeys(block.type for block in mesh.cells))
+        # Cells of one kind stand together, as the mesh has them.
+        order = [k for kind in kinds for k, block in enumerate(mesh.cells) if block.type == kind]
+        cells = {kind: np.concatenate([block.data for block in mesh.cells if block.type == kind]) for kind in kinds}
+        by_cell = {name: np.concatenate([np.asarray(parts[k]) for k in order]) for name, parts in mesh.cell_data.items() if order}
+        first = dict(zip(order, np.cumsum([0, *(len(mesh.cells[k].data) for k in order)]).tolist(), strict=False))
+        cell_sets = {}
+        for name, parts in mesh.cell_sets.items():
+            here = [np.asarray(parts[k], dtype=np.int64) + first[k] for k in order if parts[k] is not None]
+            cell_sets[name] = np.concatenate(here) if here else np.empty(0, dtype=np.int64)
+        by_point, point_sets = {name: np.asarray(own) for name, own in mesh.point_data.items()}, dict(mesh.point_sets)
+        _of_gmsh(by_cell, by_point, cell_sets)
+        return cls._with_sets(mesh.points, cells, by_point, by_cell, point_sets, cell_sets, _names_of(mesh.field_data.get(_NAMES)), scale)
 
     def __repr__(self) -> str:
         kinds = ", ".join(f"{len(corners)} {kind}" for kind, corners in self.cells.items() if len(corners))
@@ -308,16 +398,58 @@ class Mesh:
         return _table("Mesh", rows)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        sets = {name: np.array(own) for name, own in self.point_sets.items()}
-        points, cells = np.array(self.points), {kind: np.array(own) for kind, own in self.cells.items()}
-        data = {name: np.array(own) for name, own in self.point_data.items()}
-        return _again, (points, cells, data, {name: np.array(own) for name, own in self.cell_data.items()}, sets)
+        cells = {kind: np.array(own) for kind, own in self.cells.items()}
+        data = [{name: own.reshape(len(own), -1) for name, own in all_data.items()} for all_data in (self.point_data, self.cell_data)]
+        sets = [self._own.point_sets(False), {name: np.array(own) for name, own in self.cell_sets.items()}]
+        return _again, (np.array(self.points), cells, *data, *sets, self.label_names)
 
 
-def _again(points: Any, cells: Any, point_data: Any, cell_data: Any, point_sets: Any) -> Mesh:
-    flat = {k: v.reshape(len(v), -1) for k, v in point_data.items()}
-    by_cell = {k: v.reshape(len(v), -1) for k, v in cell_data.items()}
-    return Mesh(points, cells, point_data=flat, cell_data=by_cell, point_sets=point_sets)
+def _again(points: Any, cells: Any, point_data: Any, cell_data: Any, point_sets: Any, cell_sets: Any, label_names: Any) -> Mesh:
+    own = {"point_data": point_data, "cell_data": cell_data, "point_sets": point_sets, "cell_sets": cell_sets}
+    return Mesh(points, cells, **own, label_names=label_names)
+
+
+def _flat(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A copy of (n,) or (n, c)."""
+    return values.copy() if values.ndim == 1 else values.reshape(len(values), -1).copy()
+
+
+def _mask(members: NDArray[Any], count: int) -> NDArray[np.uint8]:
+    mask = np.zeros(count, dtype=np.uint8)
+    mask[members] = 1
+    return mask
+
+
+def _as_label(name: str, values: NDArray[Any]) -> NDArray[Any]:
+    """Labels as integers, if all are whole."""
+    whole = name == "label" and bool((values == np.rint(values)).all()) and bool((np.abs(values) < 2**31).all())
+    return values.astype(np.int32) if whole else values
+
+
+def _bytes_of(names: Mapping[int, str]) -> NDArray[np.uint8]:
+    """Names as ``.vtu`` files have them: bytes of texts such as ``5 liver``, each ended by a 0."""
+    return np.frombuffer("".join(f"{number} {name}\0" for number, name in names.items()).encode(), dtype=np.uint8).copy()
+
+
+def _names_of(array: Any) -> dict[int, str]:
+    """The names in such bytes, or in texts, as earlier versions wrote them."""
+    if array is None:
+        return {}
+    own = np.asarray(array).ravel()
+    texts = own.astype(np.uint8).tobytes().decode(errors="replace").split("\0") if own.dtype.kind in "biu" else [str(text) for text in own]
+    pairs = [text.partition(" ") for text in texts]
+    return {int(number): name for number, _, name in pairs if name and number.lstrip("-").isdecimal()}
+
+
+def _of_gmsh(cell_data: dict[str, NDArray[Any]], point_data: dict[str, NDArray[Any]], cell_sets: dict[str, Any]) -> None:
+    """Makes labels of the physical groups that meshio reads, or of the geometrical entities without any, as the reader of files does."""
+    groups, entities = cell_data.pop("gmsh:physical", None), cell_data.pop("gmsh:geometrical", None)
+    for sets in (point_data, cell_sets):
+        for name in [own for own in sets if own.startswith("gmsh:")]:
+            del sets[name]
+    found = entities if groups is None else groups
+    if found is not None and np.any(found):
+        cell_data.setdefault("label", found)
 
 
 def _columns(values: ArrayLike, what: str, count: int) -> NDArray[np.float64]:
