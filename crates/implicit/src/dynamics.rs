@@ -25,6 +25,7 @@ use crate::linear::{LinearDevice, LinearReport, LinearSolver, dot};
 use crate::rotation::{exponential, logarithm, spin_to_vector};
 use crate::solid::highest_frequency_squared;
 use crate::state::{NODES, State};
+use crate::statics::Attempted;
 use crate::system::{Phases, System};
 use crate::touching::TouchingSystem;
 
@@ -123,6 +124,7 @@ pub struct BackwardEuler {
     differences: Differences,
     /// No step was taken so far: the state may be off the curves of prescribed components.
     fresh: bool,
+    attempts: Vec<Attempted>,
 }
 
 /// The equation of a step: positions are `shift` further on plus `step` times the new velocities, these `rate` further on plus `step`
@@ -226,6 +228,7 @@ impl BackwardEuler {
             start: State::at_rest(&model),
             previous: None,
             differences: Differences::default(),
+            attempts: Vec::new(),
             fresh: true,
             system,
         })
@@ -296,6 +299,11 @@ impl BackwardEuler {
         &self.settings
     }
 
+    /// The attempts of the last step, one after the other. Their residuals are relative, as those of [`DynamicStep`].
+    pub fn attempts(&self) -> &[Attempted] {
+        &self.attempts
+    }
+
     /// Where the state was a step before, if the next step takes differences with it.
     pub fn previous(&self) -> Option<&State> {
         self.previous.as_deref()
@@ -311,6 +319,7 @@ impl BackwardEuler {
     /// # Errors
     /// If it fails as often as it may be halved; the state then is at the last part of it that was made.
     pub fn advance(&mut self, state: &mut State) -> Result<DynamicStep, SolveError> {
+        self.attempts.clear();
         let until = state.time + self.settings.step;
         let mut size = self.settings.step;
         let (mut parts, mut halvings, mut converged) = (0, 0, true);
@@ -352,28 +361,36 @@ impl BackwardEuler {
         }
     }
 
+    /// Newton's method for a step of a length [s], kept with the other attempts.
     fn newton(&mut self, state: &mut State, h: f64) -> Result<DynamicStep, SolveError> {
         let time = state.time + h;
+        let allowed = self.settings.tolerance;
+        self.attempts.push(Attempted { time, allowed, ..Attempted::default() });
         self.system.prescribed(state.time, time, &mut self.pending);
         self.system.begin_step(&state.history, h);
-        if self.system.touching.is_some() {
-            return self.newton_in_contact(state, h);
-        }
-        let mut residuals = Vec::with_capacity(self.settings.iterations + 1);
-        let converged = within_limits(self, state, time, |solver, state| {
-            solver.newton_without_contact(state, h, &mut residuals)
-        })?;
+        let converged = if self.system.touching.is_some() {
+            self.newton_in_contact(state, h)?
+        } else {
+            within_limits(self, state, time, |solver, state| solver.newton_without_contact(state, h))?
+        };
         self.end(state, time);
-        Ok(DynamicStep { residuals, linear: self.system.last_solution, parts: 0, converged })
+        let linear = self.system.last_solution;
+        let residuals = self.attempts.last_mut().map(|attempt| {
+            attempt.found = converged;
+            attempt.residuals.clone()
+        });
+        Ok(DynamicStep { residuals: residuals.unwrap_or_default(), linear, parts: 0, converged })
+    }
+
+    /// Keeps residuals of the attempt under way.
+    fn note(&mut self, residuals: &[f64]) {
+        if let Some(attempt) = self.attempts.last_mut() {
+            attempt.residuals.extend_from_slice(residuals);
+        }
     }
 
     /// [`newton`](Self::newton) without contact; whether the residual has come below the tolerance, or was not asked for.
-    fn newton_without_contact(
-        &mut self,
-        state: &mut State,
-        h: f64,
-        residuals: &mut Vec<f64>,
-    ) -> Result<bool, SolveError> {
+    fn newton_without_contact(&mut self, state: &mut State, h: f64) -> Result<bool, SolveError> {
         let time = state.time + h;
         self.moved.fill(0.0);
         let mut converged = true;
@@ -390,7 +407,7 @@ impl BackwardEuler {
                 self.system.take_damper();
             }
             let (norm, scale) = self.find_residual(state);
-            residuals.push(if scale > 0.0 { norm / scale } else { 0.0 });
+            self.note(&[if scale > 0.0 { norm / scale } else { 0.0 }]);
             let moving = self.pending.iter().any(|&p| p != 0.0) || !self.system.conditions.are_closed();
             if iteration > 0 && !moving && norm <= self.settings.tolerance * scale + self.round_off {
                 break;
@@ -405,7 +422,8 @@ impl BackwardEuler {
             }
             if iteration == self.settings.iterations || !norm.is_finite() {
                 let node = self.worst_node();
-                let residuals = std::mem::take(residuals);
+                let residuals = self.attempts.last().map(|attempt| attempt.residuals.clone());
+                let residuals = residuals.unwrap_or_default();
                 return Err(SolveError::NotConverged { time, node, residuals, broken: None });
             }
             // The motion goes on, to begin with.
@@ -430,8 +448,8 @@ impl BackwardEuler {
         Ok(converged)
     }
 
-    /// [`newton`](Self::newton) in contact, from the motion of before.
-    fn newton_in_contact(&mut self, state: &mut State, h: f64) -> Result<DynamicStep, SolveError> {
+    /// [`newton`](Self::newton) in contact, from the motion of before; the result as without.
+    fn newton_in_contact(&mut self, state: &mut State, h: f64) -> Result<bool, SolveError> {
         let time = state.time + h;
         self.moved.fill(0.0);
         if !self.system.damper.is_empty() {
@@ -452,26 +470,22 @@ impl BackwardEuler {
             accept: self.settings.accept_unconverged,
             farthest: self.length,
         };
+        let tolerance = self.settings.tolerance;
         let mut residuals = Vec::new();
         let result = within_limits(self, state, time, |solver, state| {
             descend(solver, state, time, Some(&guess), &limits, &mut |norm, allowed| {
-                residuals.push((norm, allowed));
+                residuals.push(if allowed > 0.0 { norm / allowed * tolerance } else { 0.0 });
             })
         });
-        let tolerance = self.settings.tolerance;
-        let relative =
-            |&(norm, allowed): &(f64, f64)| if allowed > 0.0 { norm / allowed * tolerance } else { 0.0 };
-        let told: Vec<f64> = residuals.iter().map(relative).collect();
-        let converged = match result {
-            Ok(converged) => converged,
-            Err(SolveError::NotConverged { time, node, broken, .. }) => {
-                return Err(SolveError::NotConverged { time, node, residuals: told, broken });
+        self.note(&residuals);
+        let converged = result.map_err(|error| match error {
+            SolveError::NotConverged { time, node, broken, .. } => {
+                SolveError::NotConverged { time, node, residuals, broken }
             }
-            Err(error) => return Err(error),
-        };
+            error => error,
+        })?;
         self.find_motion(state);
-        self.end(state, time);
-        Ok(DynamicStep { residuals: told, linear: self.system.last_solution, parts: 0, converged })
+        Ok(converged)
     }
 
     /// Ends a step: velocities and spins of the motion in it.

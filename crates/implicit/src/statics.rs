@@ -119,6 +119,13 @@ pub struct Attempted {
     pub allowed: f64,
 }
 
+impl Attempted {
+    /// Iterations of Newton's method: at least one.
+    pub fn iterations(&self) -> usize {
+        self.residuals.len().saturating_sub(1).max(1)
+    }
+}
+
 /// A static solver.
 pub struct Statics {
     system: System,
@@ -264,6 +271,11 @@ impl Statics {
     /// Takes forces [N] on nodes, as [`Forces::push`](crate::Forces::push).
     pub fn push(&mut self, forces: &[(u32, [f64; 3])]) {
         self.system.push(forces);
+    }
+
+    /// How its steps are solved.
+    pub fn settings(&self) -> &StaticSettings {
+        &self.settings
     }
 
     /// The attempts of the last call of [`solve`](Self::solve) or [`control`](Self::control), one after the other.

@@ -160,7 +160,9 @@ pub(crate) fn steps(limits: Option<&Limits>, scene: &Scene, built: &Built, until
     let longest = match scene.run.step {
         StepChoice::Seconds(step) => step,
         StepChoice::Auto(_) => match (scene.run.solver, limits, &built.implicit) {
-            (SolverName::QuasiStatic, ..) if let Some(ends) = scene.run.load_steps.ends(until) => {
+            (SolverName::QuasiStatic | SolverName::Static, ..)
+                if let Some(ends) = scene.run.load_steps.ends(until) =>
+            {
                 let number = ends.len() as u64;
                 return Steps { step: until / number as f64, number, ends: Some(ends) };
             }

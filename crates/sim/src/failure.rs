@@ -23,7 +23,7 @@ pub struct Failure {
     pub node: Option<u32>,
     /// Time [s].
     pub time: Option<f64>,
-    /// The load step of a quasi-static run.
+    /// The load step, or the step whose equations were not solved.
     pub load_step: Option<Box<FailedLoadStep>>,
     /// What could not go on, where it is `blocked`.
     pub blocked: Option<Box<BlockedDriver>>,
@@ -34,7 +34,7 @@ pub struct Failure {
     pub remedy: &'static str,
 }
 
-/// A load step that came to no equilibrium.
+/// A load step that came to no equilibrium, or an implicit step whose equations were not solved.
 #[derive(Clone, Debug, Serialize)]
 pub struct FailedLoadStep {
     /// Its number, counted from 1.

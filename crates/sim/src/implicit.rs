@@ -16,8 +16,8 @@ use pliant_gpu::GpuShells;
 #[cfg(feature = "gpu")]
 use pliant_implicit::LinearDevice;
 use pliant_implicit::{
-    Assembly, BackwardEuler, DynamicSettings, Explicit, Forces, Phases, SolveError, Spring, State, Statics,
-    TouchingNow, TouchingSystem,
+    Assembly, Attempted, BackwardEuler, DynamicSettings, Explicit, Forces, Phases, SolveError, Spring, State,
+    Statics, TouchingNow, TouchingSystem,
 };
 use pliant_mechanics::grip::{Grip, ROOM};
 use pliant_mechanics::mapping::Mapping;
@@ -27,13 +27,14 @@ use pliant_mechanics::{Energies, StopFlag, fingerprint};
 use serde::{Deserialize, Serialize};
 
 use crate::bodies::{ImplicitBodies, RunControl, Stop};
-use crate::failure::{BlockedDriver, Failure};
+use crate::failure::{BlockedDriver, FailedLoadStep, Failure};
 use crate::instant::{CellsNow, Effort, Instant};
 use crate::kept::{ContactState, ImplicitState, Iterated, Kept, PlainState};
 use crate::part::{self, Part};
 use crate::participant::Participant;
 use crate::solids::SolidCells;
 use crate::solver::LoadStepProgress;
+use crate::steps::Steps;
 use crate::words::{counted, number};
 
 /// Stiffness of the firmest grip over that of the stiffest cell.
@@ -48,10 +49,8 @@ pub(crate) struct Implicit {
     model: Arc<pliant_mechanics::Model>,
     bodies: Arc<ImplicitBodies>,
     method: SolverMethod,
-    /// Step [s].
-    step: f64,
     /// Steps of the whole run.
-    planned: u64,
+    steps: Steps,
     state: State,
     /// Whole steps done, and the time [s] they end at.
     done: u64,
@@ -144,6 +143,24 @@ impl SolverMethod {
             Self::Static(solver, _) => solver.touching_mut(),
             Self::Implicit(solver, _) => solver.touching_mut(),
             Self::Explicit(_) => None,
+        }
+    }
+
+    /// The attempts of the last step, one after the other.
+    fn attempts(&self) -> &[Attempted] {
+        match self {
+            Self::Static(solver, _) => solver.attempts(),
+            Self::Implicit(solver, _) => solver.attempts(),
+            Self::Explicit(_) => &[],
+        }
+    }
+
+    /// The relative residual that is allowed.
+    fn tolerance(&self) -> f64 {
+        match self {
+            Self::Static(solver, _) => solver.settings().tolerance,
+            Self::Implicit(solver, _) => solver.settings().tolerance,
+            Self::Explicit(_) => f64::NAN,
         }
     }
 
@@ -240,8 +257,7 @@ impl Implicit {
         };
         Ok(Self {
             method: method.map_err(|error| failure(&error, own, bodies, 0.0))?,
-            step: part.steps.step,
-            planned: part.steps.number,
+            steps: part.steps.clone(),
             time: bodies.start.time,
             done: 0,
             state,
@@ -273,7 +289,12 @@ impl Implicit {
     /// One step on the CPU.
     fn advance_on_processor(&mut self) -> Result<(), Failure> {
         let number = self.done + 1;
-        self.go(number).map_err(|error| failure(&error, &self.model, &self.bodies, self.state.time))?;
+        self.go(number).map_err(|error| {
+            let failed = failure(&error, &self.model, &self.bodies, self.state.time);
+            let step = self.method.attempts().last().filter(|_| failed.kind == "not-converged");
+            let load_step = step.map(|last| Box::new(self.failed_step(number, last)));
+            Failure { load_step, ..failed }
+        })?;
         (self.done, self.time) = (number, self.state.time);
         self.touching = self.method.touching().map(TouchingSystem::now);
         (self.evaluated, self.entered) = (false, false);
@@ -325,8 +346,8 @@ impl Implicit {
             forces.fill(0.0);
             state.clone_from(&self.state);
             for node in 0..state.position.len() {
-                state.position[node] -= self.step * state.velocity[node];
-                let turn = UnitQuaternion::from_scaled_axis(-self.step * state.spin[node]);
+                state.position[node] -= self.steps.step * state.velocity[node];
+                let turn = UnitQuaternion::from_scaled_axis(-self.steps.step * state.spin[node]);
                 state.rotation[node] = turn * state.rotation[node];
             }
         }
@@ -475,31 +496,10 @@ impl Implicit {
 
     fn go_implicitly(&mut self, number: u64) -> Result<(), SolveError> {
         let SolverMethod::Implicit(solver, _) = &mut self.method else { return Ok(()) };
-        let allowed = solver.settings().tolerance;
         let result = solver.advance(&mut self.state);
-        let (residuals, found) = match &result {
-            Ok(step) => (&step.residuals[..], step.converged),
-            Err(SolveError::NotConverged { residuals, .. }) => (&residuals[..], false),
-            Err(_) => (&[][..], false),
-        };
-        // A single one is not checked.
-        if residuals.len() > 1 {
-            let time = number as f64 * self.step;
-            let iterated = |(iteration, &residual)| Iterated {
-                step: number,
-                attempt: 1,
-                time,
-                iteration,
-                residual,
-                allowed,
-                found,
-            };
-            keep(&mut self.convergence, residuals.iter().enumerate().map(iterated));
-        }
         let phases = solver.phases();
+        self.note_attempts(number);
         let step = result?;
-        let iterations = step.residuals.len().saturating_sub(1).max(1);
-        self.effort.newton_iterations += iterations as u64;
         self.effort.halved += u64::from(step.parts > 1);
         self.effort.unconverged += u64::from(!step.converged);
         self.effort.linear_residual = step.linear.residual;
@@ -508,15 +508,20 @@ impl Implicit {
         Ok(())
     }
 
-    fn go_statically(&mut self, number: u64) -> Result<(), SolveError> {
-        let until = number as f64 * self.step;
-        let control = self.bodies.control.map(|control| part_of(control, number, self.planned));
-        let SolverMethod::Static(solver, _) = &mut self.method else { return Ok(()) };
-        let result = match control {
-            Some(control) => solver.control(&mut self.state, control, until),
-            None => solver.solve(&mut self.state, until),
-        };
-        for (attempt, tried) in solver.attempts().iter().enumerate() {
+    /// The report of a step of a number that came to no end, by its last attempt.
+    fn failed_step(&self, number: u64, last: &Attempted) -> FailedLoadStep {
+        let relative = |residual: &f64| residual / last.allowed * self.method.tolerance();
+        let residual = last.residuals.last().map(relative).filter(|residual| residual.is_finite());
+        FailedLoadStep { number, of: self.steps.number, iterations: last.iterations(), residual }
+    }
+
+    /// Keeps the iterations of the attempts of a step, those that failed, too.
+    fn note_attempts(&mut self, number: u64) {
+        for (attempt, tried) in self.method.attempts().iter().enumerate() {
+            self.effort.newton_iterations += tried.iterations() as u64;
+            // The residual of a single iteration is not checked.
+            let is_checked = tried.residuals.len() > 1 || !tried.found;
+            let checked = tried.residuals.iter().enumerate().filter(|_| is_checked);
             let iterated = |(iteration, &residual)| Iterated {
                 step: number,
                 attempt: attempt + 1,
@@ -526,11 +531,21 @@ impl Implicit {
                 allowed: tried.allowed,
                 found: tried.found,
             };
-            keep(&mut self.convergence, tried.residuals.iter().enumerate().map(iterated));
+            keep(&mut self.convergence, checked.map(iterated));
         }
+    }
+
+    fn go_statically(&mut self, number: u64) -> Result<(), SolveError> {
+        let until = self.steps.end_of(number);
+        let control = self.bodies.control.map(|control| part_of(control, number, self.steps.number));
+        let SolverMethod::Static(solver, _) = &mut self.method else { return Ok(()) };
+        let result = match control {
+            Some(control) => solver.control(&mut self.state, control, until),
+            None => solver.solve(&mut self.state, until),
+        };
         let phases = solver.phases();
+        self.note_attempts(number);
         let step = result?;
-        self.effort.newton_iterations += step.residuals.len().saturating_sub(1) as u64;
         self.effort.halved += u64::from(step.parts > 1);
         self.effort.take(phases, &self.effort_before);
         if step.negative_pivots > 0 {
@@ -933,7 +948,7 @@ impl Participant for Implicit {
         }
         let mass = |&(node, weight): &(u32, f64)| self.bodies.model.mass[node as usize] / weight;
         let lightest = grip.nodes.iter().map(mass).fold(f64::INFINITY, f64::min);
-        ROOM * 4.0 * lightest / (self.step * self.step)
+        ROOM * 4.0 * lightest / (self.steps.step * self.steps.step)
     }
 
     fn last_velocity(&self, node: usize) -> [f64; 3] {
@@ -1135,7 +1150,7 @@ mod tests {
             let mut shells = strip(ShortSteps { device: device.cloned() }, 0.05);
             for node in 2..4 {
                 shells.state.rotation[node] = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), angle);
-                shells.state.spin[node] = Vector3::x() * (turn / shells.step);
+                shells.state.spin[node] = Vector3::x() * (turn / shells.steps.step);
             }
             let stops = shells.device.as_mut().is_some_and(|own| {
                 own.stepper.upload(&shells.state);

@@ -426,7 +426,7 @@ fn a_checkpoint_that_does_not_fit_is_refused_with_a_reason() {
     refused(&file(&flipped), &["is damaged: its checksum does not fit", "take the one before it"]);
     let mut newer = bytes.clone();
     newer[8] = 99;
-    refused(&file(&newer), &["has format 99; this version of pliant reads format 19"]);
+    refused(&file(&newer), &["has format 99; this version of pliant reads format 20"]);
     refused(&workshop.resume("none.pliant", &[]), &["`none.pliant` cannot be read"]);
     refused(&workshop.resume("case", &[]), &["there is no checkpoint in `case`", "every = 1.0"]);
 

@@ -595,6 +595,12 @@ fn a_run_without_equilibrium_keeps_what_it_found() {
     // Of the first step, which was found; and nine attempts at the second, of three evaluations each.
     assert_eq!(rows.iter().filter(|row| row[0] == "2" && row[6] == "0").count(), 27, "{table}");
     assert!(rows.iter().any(|row| row[0] == "1" && row[6] == "1"), "{table}");
+    // Iterations of all attempts count, those that found nothing, too.
+    let iterations = rows.iter().filter(|row| row[3] != "0").count();
+    assert_eq!(json["solver"]["newton_iterations"], iterations, "{json}");
+    let step = &json["error"]["load_step"];
+    assert_eq!((&step["number"], &step["of"], &step["iterations"]), (&2.into(), &2.into(), &2.into()));
+    assert!(step["residual"].as_f64().unwrap() > 1e-8, "{step}");
     kept(&workshop);
 
     let stalled = "load-steps = 2\nlinear = { by = \"conjugate-gradients\", iterations = 2, preconditioner = \"block-jacobi\" }";

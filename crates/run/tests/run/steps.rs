@@ -345,6 +345,21 @@ fn load_steps_that_are_not_as_asked_or_not_equal_are_told() {
         1e-6,
         "the same equilibrium at the end",
     );
+    // Newton's method ends its load steps at the same instants.
+    let workshop = Workshop::new(&bent(
+        "hex8",
+        "solver = \"static\"\nload-steps = { times = [0.1, 0.4] }\n[output.forces]\ntype = \"csv\"\nevery = 0.01",
+    ));
+    let newton = workshop.run(&[]).done();
+    assert_eq!(newton["steps"], 3);
+    let (_, rows) = workshop.table("out/case/forces.csv");
+    assert_eq!(rows.iter().map(|row| row[0]).collect::<Vec<_>>(), [0.0, 0.1, 0.4, 1.0]);
+    assert_close(
+        unequal["reactions"]["hand"][2].as_f64().unwrap(),
+        newton["reactions"]["hand"][2].as_f64().unwrap(),
+        1e-6,
+        "the same equilibrium by both solvers",
+    );
     let equilibria = &unequal["equilibria"];
     assert_eq!(keys(equilibria), ["found", "external_error", "displacement_error"]);
     assert!(equilibria["displacement_error"].as_f64().unwrap() < 1e-3, "{equilibria}");
@@ -360,6 +375,9 @@ fn load_steps_that_are_not_as_asked_or_not_equal_are_told() {
             told.err
         );
     }
+    let controlled = "solver = \"static\"\nload-steps = { times = [0.4] }\ncontrol = { load = \"pull\", arc-length = 0.1 }";
+    let told = Workshop::new(&bent("hex8", controlled)).run(&[]);
+    assert!(told.status() == "invalid" && told.err.contains("equal parts"), "{}", told.err);
 }
 
 #[test]

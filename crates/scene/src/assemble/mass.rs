@@ -50,14 +50,11 @@ impl Builder<'_> {
             let message = "the load steps are given in two ways, by `step` and by their times";
             self.error(&path, message, "and by `step`", "leave one of them out");
         }
-        if run.solver == SolverName::Static {
-            let message = "the load steps of `solver = \"static\"` are equal";
-            self.error(
-                &path,
-                message,
-                "for `quasi-static` only",
-                "give their number, such as `load-steps = 10`",
-            );
+        if run.control.is_some() {
+            let message =
+                "`control` goes on by equal parts in each load step, and these end at times of their own";
+            let help = "give their number, such as `load-steps = 10`";
+            self.error(&path, message, "not with `control`", help);
         }
     }
 

@@ -171,7 +171,7 @@ pub enum MassScalingTable {
 pub enum LoadSteps {
     /// So many equal ones.
     Count(#[schemars(range(min = 1, max = 1_000_000))] u32),
-    /// Unequal ones, of a quasi-static run.
+    /// Unequal ones.
     Times(LoadTimes),
 }
 
