@@ -1039,7 +1039,7 @@ class Move(Table):
     turn
         Rotation of nodes of shells about their own places [rad]: about the axis of this vector by its length, reached along the curve. Takes 3 numbers.
     rotate
-        Rotation of nodes of a solid about an axis, reached along the curve; each node stays on its circle all the way. Takes { axis = …, centre = …, angle = … }.
+        Rotation of nodes of a solid about an axis, reached along the curve; each node stays on its circle all the way. Takes { axis = …, centre = … }.
     components
         Components prescribed; if not given, all three of the displacement, and with `turn` the rotations. A rotation takes all three. Takes an array of texts ("x", "y", "z", "rx", "ry" or "rz").
     force_limit
@@ -1390,7 +1390,7 @@ class Obstacle(Table):
     inside
         True if bodies are inside of it, as a brain in its skull. Takes true or false; false if not given.
     opening
-        How far the jaws are open over time, of a tool with jaws; closed if not given. Takes { angle = … }.
+        How far the jaws are open over time, of a tool with jaws; closed if not given. Takes a table.
     ideal_grip
         The angle [rad] between jaws from which on down they hold all that touches their inner faces, as if tied; they let go where they open wider. If not given, they hold by the contact's friction. Takes a number, at least 0.
     force_limit
@@ -1400,7 +1400,7 @@ class Obstacle(Table):
     by
         Displacement [m], reached along the curve. Takes 3 numbers.
     rotate
-        Rotation about an axis, reached along the curve. Takes { axis = …, centre = …, angle = … }.
+        Rotation about an axis, reached along the curve. Takes { axis = …, centre = … }.
     poses
         A CSV file of poses: a row for each time [s] with a position [m] and a unit quaternion, columns t, x, y, z, qw, qx, qy, qz. In between it moves on straight ways and shortest arcs; before the first and after the last row it rests. Takes a text.
     curve
@@ -1445,7 +1445,7 @@ class Tool(Table):
     inside
         True if bodies are inside of it, as a brain in its skull. Takes true or false; false if not given.
     opening
-        How far the jaws are open over time, of a tool with jaws; closed if not given. Takes { angle = … }.
+        How far the jaws are open over time, of a tool with jaws; closed if not given. Takes a table.
     ideal_grip
         The angle [rad] between jaws from which on down they hold all that touches their inner faces, as if tied; they let go where they open wider. If not given, they hold by the contact's friction. Takes a number, at least 0.
     force_limit
@@ -1455,7 +1455,7 @@ class Tool(Table):
     by
         Displacement [m], reached along the curve. Takes 3 numbers.
     rotate
-        Rotation about an axis, reached along the curve. Takes { axis = …, centre = …, angle = … }.
+        Rotation about an axis, reached along the curve. Takes { axis = …, centre = … }.
     poses
         A CSV file of poses: a row for each time [s] with a position [m] and a unit quaternion, columns t, x, y, z, qw, qx, qy, qz. In between it moves on straight ways and shortest arcs; before the first and after the last row it rests. Takes a text.
     curve

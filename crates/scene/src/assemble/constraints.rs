@@ -325,8 +325,9 @@ impl Builder<'_> {
             self.error(&at, "the axis of the rotation is zero", "no direction", "such as `[0, 0, 1]`");
             return None;
         }
+        let angle = self.angle(&[path, &["rotate"]].concat(), rotate.angle, rotate.degrees)?;
         let rest = nodes.iter().map(|&node| self.assembly.rest[node as usize]);
-        Some(Motion::rotation(rotate.axis, rotate.centre, rotate.angle, curve, rest))
+        Some(Motion::rotation(rotate.axis, rotate.centre, angle, curve, rest))
     }
 
     /// The nodes of a body that a selection holds, numbered in the model.
@@ -489,6 +490,30 @@ mod tests {
         ] {
             let told = mistakes(&top(what)).plain().to_string();
             assert!(told.contains(says), "{told}");
+        }
+    }
+
+    #[test]
+    fn angles_are_in_radians_or_degrees_and_many_turns_are_noted() {
+        let turned = |angle: &str| {
+            let rotate = format!("rotate = {{ axis = [0, 0, 1], centre = [0, 0, 0], {angle} }}");
+            let model = built(&top(&format!("type = 'move'\n{rotate}")));
+            let Motion::Rotation { angle, .. } = model.model.constraints[1].motion else {
+                panic!("no rotation")
+            };
+            (angle, model.notes.join("\n"))
+        };
+        let (quarter, notes) = turned("degrees = 90");
+        assert!((quarter - std::f64::consts::FRAC_PI_2).abs() < 1e-15 && !notes.contains("turns"), "{notes}");
+        let (large, notes) = turned("angle = 90");
+        assert_eq!(large, 90.0);
+        let note = "`constraint.top.rotate.angle`: 90.00 rad are 14.3 turns: degrees?";
+        assert!(notes.contains(note), "{notes}");
+        assert!(!turned("angle = 6.2831853").1.contains("turns"));
+        for (angle, found) in [("", "neither"), (", angle = 1, degrees = 60", "both")] {
+            let rotate = format!("rotate = {{ axis = [0, 0, 1], centre = [0, 0, 0]{angle} }}");
+            let told = mistakes(&top(&format!("type = 'move'\n{rotate}"))).plain().to_string();
+            assert!(told.contains(&format!("by `angle` or by `degrees`, found {found}")), "{told}");
         }
     }
 

@@ -297,6 +297,7 @@ impl Builder<'_> {
             ShapeName::Mesh(of) => self.shape_of_mesh(of, &[kind, name, "shape", "mesh"])?,
             ShapeName::Image(of) => self.shape_of_image(of, &[kind, name, "shape", "image"])?,
         };
+        self.note_turns(&format!("{kind} `{name}`: `turn`"), Vector3::from(table.turn).norm());
         let start = Pose::new(table.at.into(), table.turn.into());
         let ways = [table.by.is_some(), table.rotate.is_some(), table.poses.is_some()];
         if ways.iter().filter(|&&given| given).count() > 1 {
@@ -317,13 +318,9 @@ impl Builder<'_> {
                 );
                 return None;
             };
-            Trajectory::turn(
-                start,
-                axis.into(),
-                rotate.centre,
-                rotate.angle,
-                self.curve(&table.timing, &path)?,
-            )
+            let angle = self.angle(&at("rotate"), rotate.angle, rotate.degrees)?;
+            let curve = self.curve(&table.timing, &path)?;
+            Trajectory::turn(start, axis.into(), rotate.centre, angle, curve)
         } else if let Some(file) = &table.poses {
             let text = self.scene.file(file).and_then(|found| table_file(&found));
             let reach = shape.reach();
@@ -382,9 +379,13 @@ impl Builder<'_> {
             return None;
         }
         let opening = match &table.opening {
-            Some(opening) => (opening.angle, self.curve(&opening.timing, &at("opening"))?),
+            Some(opening) => {
+                let angle = self.angle(&at("opening"), opening.angle, opening.degrees)?;
+                (angle, self.curve(&opening.timing, &at("opening"))?)
+            }
             None => (0.0, Curve { shape: CurveShape::Hold, from: 0.0, to: 1.0 }),
         };
+        self.note_turns(&format!("{kind} `{name}`: `ideal-grip`"), table.ideal_grip.unwrap_or_default());
         // The upper one turns from z towards y, against the axis x.
         let sides = [("upper", 1.0), ("lower", -1.0)];
         let rigids = sides.map(|(side, sign)| Rigid {

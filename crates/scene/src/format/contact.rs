@@ -159,14 +159,19 @@ pub struct JawsTool {
     pub thickness: f64,
 }
 
-/// The angle between two jaws: 0 at `from`, `angle` at `to`. `curve = "hold"` keeps them open; a table opens and closes them:
+/// The angle between two jaws: 0 at `from`, `angle` or `degrees` at `to`. `curve = "hold"` keeps them open; a table opens and closes them:
 /// `curve = { table = [[0, 1], [0.5, 0.1]] }`. Curve: `smooth-step` if not given.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct OpeningTable {
     /// The angle [rad].
+    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 3.0))]
-    pub angle: f64,
+    pub angle: Option<f64>,
+    /// The same angle in degrees, instead of `angle`.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 170.0))]
+    pub degrees: Option<f64>,
     /// Its curve over time.
     #[serde(flatten)]
     pub timing: Timing,

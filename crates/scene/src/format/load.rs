@@ -176,7 +176,7 @@ pub struct MoveTable {
     pub timing: Timing,
 }
 
-/// A rotation about an axis.
+/// A rotation about an axis, by `angle` or `degrees`.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RotateTable {
@@ -185,7 +185,11 @@ pub struct RotateTable {
     /// A point of the axis [m].
     pub centre: [f64; 3],
     /// Angle [rad] by which it turns, right-handed about the axis; 6.2832 is a whole turn.
-    pub angle: f64,
+    #[serde(default)]
+    pub angle: Option<f64>,
+    /// The same angle in degrees, instead of `angle`; 360 is a whole turn.
+    #[serde(default)]
+    pub degrees: Option<f64>,
 }
 
 /// Displacements [m] or forces [N] of nodes.

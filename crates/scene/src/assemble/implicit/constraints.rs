@@ -51,6 +51,8 @@ impl Builder<'_> {
         nodes: Option<(usize, &[u32])>,
     ) -> Option<Motion> {
         let path = ["constraint", name];
+        let turn = Vector3::from(table.turn.unwrap_or_default());
+        self.note_turns(&format!("constraint `{name}`: `turn`"), turn.norm());
         if table.rotate.is_some() {
             let message = "a rotation about an axis is for nodes of solids";
             let help = "of shells `turn` turns the nodes about their own places; give their way node by node in `by`";
