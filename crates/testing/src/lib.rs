@@ -16,6 +16,7 @@ pub mod mesh_checks;
 pub mod organs;
 #[cfg(feature = "pieces")]
 pub mod pieces;
+mod pressed;
 #[cfg(feature = "scenes")]
 pub mod scenes;
 
@@ -23,6 +24,7 @@ use std::fs;
 use std::io::Write;
 
 pub use grown::{Hexes, ball_of_hexes, grown_hexes};
+pub use pressed::pressed_cube;
 
 /// A linear congruential generator (Knuth's MMIX): the same numbers on every machine.
 #[derive(Clone, Debug)]

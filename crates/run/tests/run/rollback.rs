@@ -1,46 +1,7 @@
 //! Explicit runs whose steps fail go back to an earlier state and halve their steps.
 
+use pliant_testing::pressed_cube as pressed;
 use pliant_testing::scenes::{Workshop, world};
-
-/// A cube of 10 mm, pressed gently, and by 6 mm more between 3 s and another time [s]: cells invert within steps of 1 ms.
-fn pressed(until: f64) -> String {
-    format!(
-        r#"[scene]
-until = 4.0
-[run]
-precision = "double"
-step = 1e-3
-checkpoint = {{ every = 0.5 }}
-[law.a]
-type = "neo-hookean"
-young-modulus = 1e4
-poisson-ratio = 0.3
-[body.b]
-mesh = {{ block = {{ size = [0.01, 0.01, 0.01], cells = [2, 2, 2] }}, as = "hexes" }}
-element = "hex8-full"
-law = "a"
-density = 1000
-damping = 20
-[constraint.low]
-type = "fix"
-body = "b"
-nodes = {{ set = "z-min" }}
-[constraint.top]
-type = "move"
-body = "b"
-nodes = {{ set = "z-max" }}
-by = [0, 0, -0.006]
-curve = {{ table = [[0, 0], [1, 0.01], [3, 0.01], [{until}, 1], [4, 1]] }}
-[output.history]
-type = "csv"
-every = 0.01
-[output.fields]
-type = "vtu"
-every = 0.05
-data = ["displacement"]
-"#
-    )
-}
 
 /// Until then, steps of 0.5 ms can follow.
 const SOON: f64 = 3.003;
