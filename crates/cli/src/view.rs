@@ -17,6 +17,7 @@ use crate::arguments::View;
 use crate::look::look_of;
 use crate::prepare::prepare;
 use crate::report::{Failure, say};
+use crate::signals::{exit_code, stop};
 
 impl From<WindowError> for Failure {
     fn from(error: WindowError) -> Self {
@@ -32,6 +33,14 @@ pub fn view(arguments: &View) -> Result<u8, Failure> {
         }
         return Ok(SUCCESS);
     }
+    if let Some(path) = &arguments.record {
+        Recording::try_path(path).map_err(|error| {
+            Failure::plain(
+                format!("`{}` cannot be written: {error}", path.display()),
+                "give a file in a folder that you can write, so that the recording is not lost",
+            )
+        })?;
+    }
     let world = prepare(&arguments.scene, &arguments.overrides)?;
     for note in world.notes() {
         eprintln!("note: {note}");
@@ -39,7 +48,6 @@ pub fn view(arguments: &View) -> Result<u8, Failure> {
     if let Some(file) = &arguments.replay {
         return repeat(&world, file, arguments.real_time);
     }
-    let look = look_of(&world.scene);
     let overrides = arguments.overrides.clone();
     let read = move |path: &Path| {
         prepare(path, &overrides).map_err(|failure| match failure {
@@ -49,19 +57,19 @@ pub fn view(arguments: &View) -> Result<u8, Failure> {
         })
     };
     let told = open(Opening {
-        style: look.style,
-        camera: look.camera,
+        look: look_of,
         file: pliant_scene::scene_file(&arguments.scene),
         world,
         read: Arc::new(read),
         record: arguments.record.clone(),
+        stop: stop().clone(),
         self_test: self_test(arguments),
         began,
     })?;
     if let Some(told) = told {
         say(told)?;
     }
-    Ok(SUCCESS)
+    Ok(if stop().is_asked() { exit_code() } else { SUCCESS })
 }
 
 /// A finished run: a folder with series of frames and no scene, or one of its series (`.pvd`).

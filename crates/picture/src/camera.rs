@@ -22,6 +22,18 @@ pub enum Axis {
 }
 
 impl Axis {
+    /// Its word in `[view] camera.up`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::X => "x",
+            Self::Y => "y",
+            Self::Z => "z",
+            Self::MinusX => "-x",
+            Self::MinusY => "-y",
+            Self::MinusZ => "-z",
+        }
+    }
+
     /// The axis nearest to a direction; z for a zero vector.
     pub fn nearest(direction: &Vector3) -> Self {
         let largest = direction.iamax();

@@ -139,12 +139,37 @@ pub(crate) fn linear(byte: u8) -> f32 {
 #[derive(Clone, Debug, Default)]
 pub struct Extremes {
     values: Vec<f32>,
+    /// The size below which a value is round-off.
+    noise: f64,
 }
 
 /// Part of the values that the range leaves out at each end.
 const LEFT_OUT: f64 = 0.005;
+/// Part of a value by which others differ from it at most that count as equal: some digits of single precision.
+const EQUAL: f64 = 1e-6;
+
+/// The size below which values of a unit are round-off, on bodies of an extent [m]: displacements of a millionth of it, and stresses [Pa] that
+/// strain the softest tissue (100 Pa) by 10⁻⁵. Zero for other units, whose scale is not known.
+pub fn noise(unit: &str, extent: f64) -> f64 {
+    match unit {
+        "m" => 1e-6 * extent,
+        "Pa" => 1e-3,
+        _ => 0.0,
+    }
+}
 
 impl Extremes {
+    /// Without values yet; if all are smaller than a size, they count as zero.
+    pub fn above(noise: f64) -> Self {
+        Self { noise, ..Self::default() }
+    }
+
+    /// The least and the greatest value, with those that the range leaves out.
+    pub fn ends(&self) -> Option<[f64; 2]> {
+        let ends = self.values.iter().map(|&value| [value; 2]).reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]);
+        ends.map(|ends| ends.map(f64::from))
+    }
+
     /// Adds values of a frame; non-finite ones are ignored.
     pub fn add(&mut self, values: impl IntoIterator<Item = f64>) {
         self.values.extend(values.into_iter().filter(|value| value.is_finite()).map(|value| value as f32));
@@ -160,6 +185,12 @@ impl Extremes {
         let last = self.values.len() - 1;
         let at = |part: f64| f64::from(self.values[(part * last as f64).round() as usize]);
         let (least, most) = (f64::from(self.values[0]), f64::from(self.values[last]));
+        if least.abs().max(most.abs()) < self.noise {
+            return Some([0.0; 2]);
+        }
+        if most - least <= EQUAL * most.abs().max(least.abs()) {
+            return Some([most; 2]);
+        }
         let (low, high) = (at(LEFT_OUT), at(1.0 - LEFT_OUT));
         // Values that hardly differ keep their whole range.
         let (low, high) = if high > low { (low, high) } else { (least, most) };
@@ -232,6 +263,15 @@ mod tests {
         assert_eq!(range([f64::NAN]), None);
         assert_eq!(range([0.0, 0.0]), Some([0.0, 0.0]), "no range is made up");
         assert_eq!(range([4.0, f64::NAN]), Some([4.0, 4.0]));
+        assert_eq!(range([2.0, 2.000_000_1]), Some([2.000_000_1_f32.into(); 2]), "round-off is no range");
+        let at_rest = |noise: f64| {
+            let mut extremes = Extremes::above(noise);
+            extremes.add([0.0, 3e-9, -2e-9]);
+            (extremes.ends(), extremes.range(ColourMap::Viridis))
+        };
+        assert_eq!(at_rest(noise("m", 0.1)).1, Some([0.0; 2]), "a body of 10 cm at rest");
+        assert_eq!(at_rest(noise("m", 1e-6)).0, Some([-2e-9_f32, 3e-9].map(f64::from)));
+        assert!(at_rest(noise("m", 1e-6)).1.is_some_and(|[low, high]| low < high));
         let mut extremes = Extremes::default();
         extremes.add((0..=1000).map(|x| f64::from(x) - 100.0));
         assert_eq!(extremes.range(ColourMap::BlueRed), Some([-895.0, 895.0]), "white is zero");

@@ -22,6 +22,8 @@ pub struct Legend {
     pub unconverged: u64,
     /// Whether a part of what is drawn has no value: its grey then has a swatch.
     pub missing: bool,
+    /// The least and the greatest value that is seen: they are written where the scale leaves them out.
+    pub ends: Option<[f64; 2]>,
 }
 
 /// Part of the picture's width that names of labels take at most.
@@ -33,6 +35,24 @@ const ROW: f32 = 1.45;
 
 /// The text beside the grey of parts without a value.
 pub const NO_VALUE: &str = "no value";
+
+/// Part of the scale by which a value lies beyond an end of it, from which on it is written.
+const BEYOND: f64 = 1e-3;
+
+/// Values that lie beyond a range, in words, scaled by a factor and with a unit.
+pub fn beyond([low, high]: [f64; 2], ends: Option<[f64; 2]>, unit: &str, factor: f64) -> Vec<String> {
+    let Some([least, most]) = ends else { return Vec::new() };
+    let room = BEYOND * (high - low);
+    let told = |word: &str, value: f64| {
+        let decimals = (2.0 - (value * factor).abs().max(1e-300).log10().floor()).clamp(0.0, 9.0) as usize;
+        format!("{word} {} {unit}", written(value * factor, decimals)).trim_end().to_owned()
+    };
+    let ends = [(most > high + room, "max", most), (least < low - room, "min", least)];
+    ends.into_iter()
+        .filter(|(is_beyond, ..)| high > low && *is_beyond)
+        .map(|(_, word, value)| told(word, value))
+        .collect()
+}
 
 /// The text below the swatches if not all fit.
 fn told_of(more: usize) -> String {
@@ -120,8 +140,17 @@ impl Legend {
         let (Some(pen), Some(large)) = (Pen::new(size), Pen::new(1.2 * size)) else { return };
         let (width, height) = (picture.width as f32, picture.height as f32);
         let margin = 1.1 * size;
-        large.write(picture, &self.title, [margin, 1.4 * size], Align::Left, ink);
-        pen.write(picture, &self.note, [margin, height - 1.3 * size], Align::Left, ink);
+        let line = |y: f32, width: f32| [0.0, y - 1.2 * size, margin + width + size, y + 1.2 * size];
+        for (pen, text, y) in [(&large, &self.title, 1.4 * size), (&pen, &self.note, height - 1.3 * size)] {
+            if !text.is_empty() {
+                clear_ground(picture, style, line(y, pen.width(text)));
+            }
+            pen.write(picture, text, [margin, y], Align::Left, ink);
+        }
+        if style.labels || style.range.is_some() {
+            let left = width * (1.0 - self.width(style, [picture.width, picture.height]) as f32);
+            clear_ground(picture, style, [left, 0.0, width, height]);
+        }
         if style.labels {
             self.write_labels(picture, style, &pen, size);
         } else if let Some(range) = style.range {
@@ -202,10 +231,32 @@ impl Legend {
             }
             pen.write(picture, &text, [bar[1] + 0.6 * size, y], Align::Left, ink);
         }
+        let beyond = beyond([low, high], self.ends, &unit, factor);
+        for (text, row) in beyond.iter().zip(0..) {
+            let y = bottom + (1.5 + 1.4 * row as f32) * size;
+            pen.write(picture, text, [right, y], Align::Right, ink);
+        }
         if self.missing {
-            let y = bottom + 1.7 * size;
+            let y = bottom + (1.7 + 1.4 * beyond.len() as f32) * size;
             pen.write(picture, NO_VALUE, [right, y], Align::Right, ink);
             write_swatch(picture, [right - pen.width(NO_VALUE) - 1.6 * size, y], size, MISSING, ink);
+        }
+    }
+}
+
+/// How much of a body is hidden behind text.
+const GROUND: f32 = 0.82;
+
+/// Lays the background over what is drawn of bodies in a rectangle [pixels] (left, top, right, bottom), so that text on it can be read.
+fn clear_ground(picture: &mut Picture, style: &Style, [left, top, right, bottom]: [f32; 4]) {
+    let [above, below] = style.background.colours();
+    for y in top.max(0.0) as u32..(bottom.max(0.0) as u32).min(picture.height) {
+        let part = f64::from(y) / f64::from(picture.height);
+        let mix = |a: u8, b: u8| (f64::from(a) * (1.0 - part) + f64::from(b) * part).round() as u8;
+        let colour = [0, 1, 2].map(|c| mix(above[c], below[c]));
+        for x in left.max(0.0) as u32..(right.max(0.0) as u32).min(picture.width) {
+            let covered = f32::from(picture.rgba[4 * (y * picture.width + x) as usize + 3]) / 255.0;
+            picture.mix(x.into(), y.into(), colour, GROUND * covered);
         }
     }
 }
@@ -311,6 +362,30 @@ mod tests {
         assert!(count(&many, label_colour(10)) > 60 && count(&many, label_colour(200)) == 0);
         let mut tiny = Picture { width: 20, height: 9, rgba: vec![255; 4 * 20 * 9] };
         Legend { labels: organs(5), ..Legend::default() }.write(&mut tiny, &style);
+    }
+
+    /// Dark text on a dark body: its ground is that of the picture, and elsewhere the body stays.
+    #[test]
+    fn text_over_a_body_stands_on_a_plain_ground() {
+        let black = Picture { width: 320, height: 240, rgba: [0, 0, 0, 255].repeat(320 * 240) };
+        let legend = Legend { title: "A liver".into(), note: "t = 1 s".into(), ..Legend::default() };
+        let mut picture = black.clone();
+        legend.write(&mut picture, &Style { range: Some([0.0, 1.0]), ..Style::default() });
+        let at = |x: u32, y: u32| picture.rgba[4 * (y * 320 + x) as usize];
+        assert!(at(2, 15) > 150 && at(2, 228) > 150 && at(316, 120) > 150);
+        assert_eq!([at(160, 120), at(200, 15), at(200, 228)], [0; 3]);
+        // Where no body is, nothing is laid over the background.
+        let mut bare = Picture { rgba: [9, 9, 9, 0].repeat(320 * 240), ..black };
+        legend.write(&mut bare, &Style::default());
+        assert_eq!(bare.rgba[..4], [9, 9, 9, 0]);
+    }
+
+    #[test]
+    fn values_beyond_the_scale_are_written() {
+        let told = |ends| beyond([0.0, 2000.0], Some(ends), "kPa", 1e-3);
+        assert_eq!(told([0.0, 2000.5]), Vec::<String>::new());
+        assert_eq!(told([-10.0, 3456.0]), ["max 3.46 kPa", "min −0.0100 kPa"]);
+        assert!(beyond([0.0, 0.0], Some([0.0, 1e-9]), "m", 1.0).is_empty(), "noise");
     }
 
     #[test]

@@ -48,11 +48,11 @@ mod vertex;
 
 pub use arrows::{PointForce, arrow_note, arrow_unit, contact_forces, largest_force};
 pub use camera::{Axis, Camera, Projection};
-pub use colour::{ColourMap, Extremes, label_colour};
+pub use colour::{ColourMap, Extremes, label_colour, noise};
 pub use error::PictureError;
 pub use film::{AnimatedPng, Film, ffmpeg};
 pub use graphics::Graphics;
-pub use legend::{Legend, NO_VALUE, readable, scale_marks, swatches};
+pub use legend::{Legend, NO_VALUE, beyond, readable, scale_marks, swatches, ticks};
 pub use marks::{Mark, Marked, WEIGHT, largest_load, some_of, weight_of};
 pub use offscreen::{Frame, Offscreen};
 pub use outermost::Outermost;

@@ -8,7 +8,8 @@ use pliant_geometry::Vector3;
 
 use crate::lines::{Line, edges};
 use crate::plane::Plane;
-use crate::subject::Subject;
+use crate::regions::Regions;
+use crate::subject::{KIND, Subject};
 use crate::vertex::staged;
 
 /// A corner of a triangle of a section.
@@ -83,6 +84,14 @@ impl Section {
                 }
             }
         }
+    }
+
+    /// Values in the section, of cells that show theirs.
+    pub fn values(&self, subject: &Subject, regions: &Regions) -> impl Iterator<Item = f64> {
+        let shows = subject.showing(regions);
+        let seen = self.corners.iter().filter(move |corner| shows[(corner.edges >> KIND) as usize]);
+        // What has no value is drawn with a large one.
+        seen.map(|corner| f64::from(corner.point[3])).filter(|value| *value < 1e30)
     }
 
     fn add(&mut self, polygon: &mut [Cut], axes: &[Vector3; 2], word: u32) {

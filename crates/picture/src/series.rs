@@ -1,5 +1,6 @@
 //! Pictures of a series: the frames written by a run, with one view and one range of colours.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -8,7 +9,7 @@ use pliant_geometry::{Labels, Mesh, RegionNames, Vector3};
 
 use crate::arrows::{self, PointForce, arrow_note, arrow_unit, contact_forces, largest_force};
 use crate::camera::Camera;
-use crate::colour::Extremes;
+use crate::colour::{Extremes, noise};
 use crate::error::PictureError;
 use crate::graphics::Graphics;
 use crate::legend::{Legend, readable};
@@ -17,6 +18,7 @@ use crate::offscreen::{Frame, Offscreen};
 use crate::outermost::Outermost;
 use crate::picture::Picture;
 use crate::regions::Regions;
+use crate::section::Section;
 use crate::style::Style;
 use crate::subject::{Subject, critical_cell, deformed_points, nodal_values, visible};
 
@@ -241,6 +243,8 @@ struct Common {
     largest: [f64; 2],
     /// Whether a part of a body has no value.
     missing: bool,
+    /// Labels of which something is seen.
+    labels: BTreeSet<i32>,
 }
 
 /// An instant that is drawn.
@@ -261,19 +265,35 @@ struct Settled {
     style: Style,
     /// Length of arrows over their force [m/N], and the largest force [N], of contacts and of loads.
     arrows: [[f64; 2]; 2],
-    missing: bool,
+    /// The text of all of them.
+    legend: Legend,
 }
 
 impl Common {
-    fn add(&mut self, subject: &Subject, shown: &Shown, ghost: bool) {
+    fn add(&mut self, subject: &Subject, shown: &Shown, style: &Style, regions: &Regions) {
         let frame = &shown.frame;
+        let mut section = Section::default();
+        if let Some(plane) = &style.clip {
+            section.cut(subject, &frame.points, &frame.values, plane);
+        }
+        let is_seen = |point: &u32| {
+            style.clip.is_none_or(|plane| plane.distance(&frame.points[*point as usize]) <= 0.0)
+        };
         let largest = [largest_force(&shown.forces), largest_load(&shown.marks)];
         self.largest = [0, 1].map(|kind| self.largest[kind].max(largest[kind]));
-        self.missing |= subject.lacks_value(&frame.values);
+        let mut showing = subject.showing_points(regions);
+        showing.retain(is_seen);
+        self.missing |= subject.lacks_value(&showing, &frame.values);
+        self.extremes.add(showing.iter().filter_map(|&point| frame.values.get(point as usize)).copied());
+        if !frame.values.is_empty() {
+            self.extremes.add(section.values(subject, regions));
+        }
+        if style.labels {
+            self.labels.extend(subject.labels_seen(regions, |point| is_seen(&point), &section));
+        }
         let surface = subject.surface_points();
-        self.extremes.add(surface.iter().filter_map(|&point| frame.values.get(point as usize)).copied());
         self.points.add(surface.iter().map(|&point| frame.points[point as usize]));
-        if ghost {
+        if style.ghost {
             self.points.add(surface.iter().map(|&point| subject.points[point as usize]));
         }
     }
@@ -335,16 +355,24 @@ impl Look {
         Ok(subject)
     }
 
-    /// Camera, style and the length of arrows for all frames.
+    /// What frames have in common, before the first.
+    fn common(&self, subject: &Subject) -> Common {
+        Common { extremes: Extremes::above(noise(&self.legend.unit, subject.extent())), ..Common::default() }
+    }
+
+    /// Camera, style, text and the length of arrows for all frames.
     fn settle(&self, common: Common) -> Settled {
         let mut style = self.style;
+        let mut legend = Legend { missing: common.missing, ..self.legend.clone() };
+        legend.labels.retain(|(label, _)| common.labels.contains(label));
+        legend.ends = common.extremes.ends();
         style.range = self
             .field
             .as_ref()
             .and_then(|_| self.style.range.or_else(|| common.extremes.range(self.style.map)));
         let [width, height] = self.size.map(f64::from);
         // The colour scale is beside the body, not on it.
-        let taken = self.legend.width(&style, self.size);
+        let taken = legend.width(&style, self.size);
         let mut camera = self.camera;
         camera.fit(common.points.points(), width * (1.0 - taken) / height);
         if let Some(target) = self.target {
@@ -355,11 +383,11 @@ impl Look {
         }
         camera.pan(-0.5 * taken * width / height, 0.0);
         let arrows = common.largest.map(|largest| [arrow_unit(common.points.points(), largest), largest]);
-        Settled { camera, style, arrows, missing: common.missing }
+        Settled { camera, style, arrows, legend }
     }
 
     fn finished(&self, mut picture: Picture, settled: &Settled, shown: &Shown, time: f64) -> Picture {
-        let Settled { camera, style, arrows: [contacts, loads], missing } = settled;
+        let Settled { camera, style, arrows: [contacts, loads], legend } = settled;
         marks::draw(&mut picture, camera, &shown.marks, loads[0]);
         arrows::draw(&mut picture, camera, &shown.forces, contacts[0]);
         let mut note =
@@ -380,7 +408,7 @@ impl Look {
         if self.legend.unconverged > 0 {
             note.push_str(&format!(", steps that did not converge: {}", self.legend.unconverged));
         }
-        Legend { note, missing: *missing, ..self.legend.clone() }.write(&mut picture, style);
+        Legend { note, ..legend.clone() }.write(&mut picture, style);
         picture
     }
 
@@ -398,8 +426,8 @@ impl Look {
         let look = self.with_labels_of(mesh)?;
         let subject = look.subject(mesh)?;
         let shown = look.frame(mesh, marks)?;
-        let mut common = Common::default();
-        common.add(&subject, &shown, look.style.ghost);
+        let mut common = look.common(&subject);
+        common.add(&subject, &shown, &look.style, &look.regions);
         let settled = look.settle(common);
         let mut offscreen = Offscreen::new(graphics, &subject, look.size)?;
         let picture = offscreen.draw(&shown.frame, &settled.camera, &settled.style, &look.regions)?;
@@ -432,9 +460,9 @@ impl Look {
             let marks = look.marks.as_ref().map(|marks| marks.mesh_at(series.frames[index].0)).transpose()?;
             look.frame(&mesh, marks.as_ref())
         };
-        let mut common = Common::default();
+        let mut common = look.common(&subject);
         for &index in frames {
-            common.add(&subject, &read(index)?, look.style.ghost);
+            common.add(&subject, &read(index)?, &look.style, &look.regions);
         }
         let settled = look.settle(common);
         let mut offscreen = Offscreen::new(graphics, &subject, look.size)?;

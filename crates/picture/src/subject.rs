@@ -10,7 +10,8 @@ use pliant_geometry::{
 };
 
 use crate::lines::{Fibres, Line, outline};
-use crate::regions::Kind;
+use crate::regions::{Kind, Paint, Regions};
+use crate::section::Section;
 
 /// Cosine of the angle between faces [75°] from which on their edge is sharp: the round sides of a coarse organ stay smooth.
 const SHARP: f64 = 0.26;
@@ -199,11 +200,64 @@ impl Subject {
         cells.skip(cell as usize).take(1).flat_map(|(kind, nodes)| outline(kind, nodes)).collect()
     }
 
-    /// Whether a body has a corner without a value where others have one; things never have one.
-    pub fn lacks_value(&self, values: &[f64]) -> bool {
-        let bodies = self.triangles[..self.outer].iter().filter(|triangle| triangle[3] & STEEL == 0);
-        let mut corners = bodies.flat_map(|triangle| &triangle[..3]).map(|&v| self.vertices[v as usize]);
-        !values.is_empty() && corners.any(|point| !values[point as usize].is_finite())
+    /// Whether one of some points that show values has none where others have one.
+    pub fn lacks_value(&self, points: &[u32], values: &[f64]) -> bool {
+        !values.is_empty() && points.iter().any(|&point| !values[point as usize].is_finite())
+    }
+
+    /// Whether cells of each kind show their values: those of obstacles and tools, of regions with a colour, and of invisible ones do not.
+    pub(crate) fn showing(&self, regions: &Regions) -> Vec<bool> {
+        let shows = |kind: &Kind| {
+            let coat = regions.coat(*kind);
+            coat.paint == Paint::AsAll && coat.opacity > 0.0 && !kind.thing
+        };
+        self.kinds.iter().map(shows).collect()
+    }
+
+    /// Points of the surface that show values, increasing, each once.
+    pub fn showing_points(&self, regions: &Regions) -> Vec<u32> {
+        let shows = self.showing(regions);
+        let outer =
+            self.triangles[..self.outer].iter().filter(|triangle| shows[(triangle[3] >> KIND) as usize]);
+        let mut points: Vec<u32> =
+            outer.flat_map(|triangle| &triangle[..3]).map(|&vertex| self.vertices[vertex as usize]).collect();
+        points.sort_unstable();
+        points.dedup();
+        points
+    }
+
+    /// Labels of which something is seen in colours of labels, of some points that are: on the surface, on the borders within bodies that one
+    /// sees through, and in a section.
+    pub(crate) fn labels_seen(
+        &self,
+        regions: &Regions,
+        is_seen: impl Fn(u32) -> bool,
+        section: &Section,
+    ) -> BTreeSet<i32> {
+        let through = self.kinds.iter().any(|kind| regions.coat(*kind).opacity < 1.0);
+        let drawn = if through { &self.triangles[..] } else { &self.triangles[..self.outer] };
+        let seen = |triangle: &&[u32; 4]| {
+            triangle[..3].iter().any(|&vertex| is_seen(self.vertices[vertex as usize]))
+        };
+        let surface = drawn.iter().filter(seen).map(|triangle| triangle[3] >> KIND);
+        let beyond = self.beyond.iter().copied().filter(|_| through);
+        let cut = section.corners.iter().map(|corner| corner.edges >> KIND);
+        let kinds: BTreeSet<u32> = surface.chain(beyond).chain(cut).collect();
+        let kinds = kinds.into_iter().filter_map(|number| self.kinds.get(number as usize));
+        kinds
+            .filter(|kind| {
+                let coat = regions.coat(**kind);
+                !kind.thing && coat.opacity > 0.0 && !matches!(coat.paint, Paint::Plain(_))
+            })
+            .filter_map(|kind| kind.label)
+            .collect()
+    }
+
+    /// The diagonal of the box around the surface at rest [m].
+    pub fn extent(&self) -> f64 {
+        let points = self.surface_points().into_iter().map(|point| [self.points[point as usize]; 2]);
+        let around = points.reduce(|[a, b], [c, d]| [a.inf(&c), b.sup(&d)]);
+        around.map_or(0.0, |[low, high]| (high - low).norm())
     }
 
     /// Triangles drawn.
@@ -568,7 +622,9 @@ pub(crate) mod tests {
         let edges: Vec<u32> = Subject::new(&mesh).triangles.iter().map(|triangle| triangle[3]).collect();
         assert_eq!(edges, [0b110, 0b111]);
         let all = [0.0, 1.0, 2.0, f64::NAN];
-        assert!(Subject::new(&mesh).lacks_value(&all) && !Subject::new(&mesh).lacks_value(&[0.0; 4]));
+        let subject = Subject::new(&mesh);
+        let points = subject.showing_points(&Regions::default());
+        assert!(subject.lacks_value(&points, &all) && !subject.lacks_value(&points, &[0.0; 4]));
     }
 
     #[test]

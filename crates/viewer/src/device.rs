@@ -40,8 +40,6 @@ pub(crate) struct Seen {
     pub marks: Vec<Mark>,
     /// Points that the user follows.
     pub followed: Vec<FollowedPoint>,
-    /// The sample of that instant.
-    pub sample: Vec<f64>,
     /// When it was; `None` where the next one is due at once.
     pub at: Option<Instant>,
 }

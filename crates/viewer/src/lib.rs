@@ -23,7 +23,7 @@ pub use parameters::{Number, Parameter, parameters, with_numbers};
 pub use recording::{Break, Done, Move, Recording, Surface};
 pub use regions::{coat_of, regions_of};
 pub use replay::{Lags, Replayed, replay, replay_in_real_time};
-pub use samples::Samples;
+pub use samples::{Sample, Samples};
 pub use session::{Frame, Order, Session};
 #[cfg(feature = "window")]
 pub use window::{FinishedRun, Opening, SelfTest, WindowError, open, open_finished};

@@ -1,5 +1,7 @@
 //! What was done to a run, so that it can be repeated before the same steps.
 
+use std::path::{Path, PathBuf};
+
 use pliant_geometry::CellLabel;
 use pliant_scene::format::ViewTable;
 use serde::{Deserialize, Serialize};
@@ -96,6 +98,13 @@ pub struct Recording {
     pub breaks: Vec<Break>,
 }
 
+/// The file beside a recording that takes its place.
+fn part_of(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".part");
+    name.into()
+}
+
 /// A pull that broke a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Break {
@@ -112,6 +121,29 @@ impl Recording {
     /// Never in practice: memory that ran out.
     pub fn to_bytes(&self) -> Result<Vec<u8>, String> {
         postcard::to_stdvec(self).map_err(|error| error.to_string())
+    }
+
+    /// Writes it into another file beside its own, which then takes the place of this one: a file of a recording is whole at any time.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn write(&self, path: &Path) -> Result<(), String> {
+        let part = part_of(path);
+        let written = std::fs::write(&part, self.to_bytes()?).and_then(|()| std::fs::rename(&part, path));
+        written.map_err(|error| error.to_string())
+    }
+
+    /// Tries whether a recording can be written into a file, which stays as it is.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn try_path(path: &Path) -> std::io::Result<()> {
+        if path.is_dir() {
+            return Err(std::io::Error::other("it is a folder"));
+        }
+        let part = part_of(path);
+        std::fs::write(&part, [])?;
+        std::fs::remove_file(part)
     }
 
     /// From these bytes.

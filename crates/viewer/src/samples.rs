@@ -7,10 +7,23 @@ use std::sync::Arc;
 use pliant_run::Column;
 
 use crate::beside::create_beside;
-use crate::session::Frame;
 
+/// Names of the forces of the hands.
+pub(crate) const HAND: &str = "hand";
+pub(crate) const SECOND_HAND: &str = "second-hand";
 /// Samples kept.
 const MOST: usize = 4000;
+
+/// What a run is like at an instant.
+#[derive(Clone, Debug)]
+pub struct Sample {
+    /// Time [s].
+    pub time: f64,
+    /// Names and units.
+    pub columns: Arc<[Column]>,
+    /// Forces of the hands, energies, reactions, probes and displacements of points that are followed.
+    pub values: Vec<f64>,
+}
 
 /// Samples of a run, in the order of time.
 #[derive(Clone, Debug, Default)]
@@ -20,7 +33,7 @@ pub struct Samples {
     times: Vec<f64>,
     /// One after the other, each as long as there are columns.
     values: Vec<f64>,
-    /// Of so many frames one is kept …
+    /// Of so many samples one is kept …
     every: u64,
     /// … and so many were seen since.
     passed: u64,
@@ -47,25 +60,25 @@ impl Samples {
         *self = Self::default();
     }
 
-    /// Takes the sample of a frame, if its time is a later one. Of a run that goes back the later ones are forgotten. Where there are too many, every
+    /// Takes a sample, if its time is a later one. Of a run that goes back the later ones are forgotten. Where there are too many, every
     /// second one goes, and from then on comes.
-    pub fn take(&mut self, frame: &Frame) {
+    pub fn take(&mut self, Sample { time, columns, values }: Sample) {
         let last = self.times.last().copied().unwrap_or(-1.0);
-        if frame.time < last {
-            self.forget_from(frame.time);
-        } else if frame.time == last {
+        if time < last {
+            self.forget_from(time);
+        } else if time == last {
             return;
         }
-        if self.columns != frame.columns {
-            self.rearrange(&frame.columns);
+        if self.columns != columns {
+            self.rearrange(&columns);
         }
         self.passed += 1;
-        if self.passed < self.every || frame.sample.len() != self.columns.len() {
+        if self.passed < self.every {
             return;
         }
         self.passed = 0;
-        self.times.push(frame.time);
-        self.values.extend(&frame.sample);
+        self.times.push(time);
+        self.values.extend(values);
         if self.times.len() > MOST {
             let width = self.columns.len();
             for kept in 0..MOST / 2 {

@@ -2,11 +2,13 @@
 //! other: orders go through a channel, the newest frame lies in one of three places of which each side holds one.
 
 use std::collections::BTreeSet;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use pliant_explicit::Wanted;
 use pliant_geometry::{Region, Vector3};
 use pliant_mechanics::Energies;
 use pliant_picture::{
@@ -25,10 +27,15 @@ use crate::hand::{Hand, Hold, Point, Which};
 use crate::marks::marks;
 use crate::parameters::Number;
 use crate::recording::{Break, Done, Move, Recording, Surface};
+use crate::samples::{HAND, SECOND_HAND, Sample};
 use crate::sound::{Sound, SoundStates};
 
 /// Wall time between frames.
 pub(crate) const FRAME: Duration = Duration::from_micros(16_667);
+/// Simulated time [s] from sample to sample; longer steps have one each.
+const SAMPLED: f64 = 0.005;
+/// Wall time from one writing of a recording to the next.
+const WRITTEN: Duration = Duration::from_secs(1);
 /// Wall time that the solver may fall behind before it gives up catching up.
 const BEHIND: f64 = 0.1;
 
@@ -59,6 +66,8 @@ pub enum Order {
     ForgetProbes,
     /// Keeps what is done to the run from now on.
     Record,
+    /// The same, written into a file each second.
+    RecordTo(PathBuf),
     /// Halves the steps.
     Halve,
     /// Shows another field, or another surface.
@@ -86,7 +95,7 @@ pub struct Frame {
     pub playing: bool,
     /// Points on the device where the state lies, at this instant, to be drawn from there; `None` of a state in ordinary memory.
     pub on_device: Option<DevicePoints>,
-    /// How many inspections there were. Points, values, energies, what is held and the sample are of the last one: of this instant unless
+    /// How many inspections there were. Points, values, energies, and what is held are of the last one: of this instant unless
     /// the state lies on a device, where inspections are rare ([`INSPECTION`](crate::INSPECTION)).
     pub inspections: u64,
     /// What was read back from the device so far.
@@ -133,14 +142,14 @@ pub struct Frame {
     pub input_lag: Option<f64>,
     /// How often a pull broke the run, which then went back to a state before it.
     pub breaks: u64,
+    /// The numbers that are others than in the file.
+    pub numbers: Vec<Number>,
+    /// How often changed numbers broke the run at once; it then went on with those before.
+    pub refusals: u64,
     /// Why it cannot go on: what happened, where, and what to try.
     pub failure: Option<String>,
     /// What else to tell.
     pub note: Option<String>,
-    /// Names and units of the sample of this instant.
-    pub columns: Arc<[Column]>,
-    /// The sample: forces of the hands, energies, reactions and probes.
-    pub sample: Vec<f64>,
 }
 
 impl Frame {
@@ -160,6 +169,7 @@ impl Frame {
 #[derive(Debug)]
 pub struct Session {
     orders: Sender<(Instant, Order)>,
+    samples: Receiver<Sample>,
     frames: triple_buffer::Output<Frame>,
     /// Ends a step that takes long.
     stop: StopFlag,
@@ -186,14 +196,15 @@ impl Session {
     pub fn start(world: World, wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
         let (input, frames) = triple_buffer::TripleBuffer::new(&Frame::default()).split();
         let (orders, inbox) = channel();
+        let (sampled, samples) = channel();
         let threads = world.scene.run.threads as usize;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(std::io::Error::other)?;
         let stop = StopFlag::default();
         let asked = stop.clone();
-        let run = move || pool.install(move || play(world, &inbox, input, &wake, asked));
+        let run = move || pool.install(move || play(world, &inbox, input, sampled, &wake, asked));
         let thread = std::thread::Builder::new().name("solver".into()).spawn(run)?;
-        Ok(Self { orders, frames, stop, thread: Some(thread) })
+        Ok(Self { orders, samples, frames, stop, thread: Some(thread) })
     }
 
     /// Gives an order; it is forgotten where the solver has ended.
@@ -204,6 +215,11 @@ impl Session {
     /// The newest frame; whether it is a new one.
     pub fn look(&mut self) -> (bool, &Frame) {
         (self.frames.update(), self.frames.output_buffer())
+    }
+
+    /// The samples since the last call, in the order in which they were taken.
+    pub fn samples(&self) -> impl Iterator<Item = Sample> + '_ {
+        self.samples.try_iter()
     }
 
     /// Whether the solver's thread has ended.
@@ -290,13 +306,21 @@ struct Playback {
     /// Wall time that the last frame took to prepare.
     prepared: Duration,
     recording: Option<Recording>,
+    /// Where the recording is written, and when and after how many moves and steps it was last.
+    file: Option<(PathBuf, Instant, (usize, u64))>,
     /// When the first move was recorded.
     started: Option<Instant>,
     /// The world to go on as, and its numbers that are others than in the file.
     change: Option<(Box<World>, Vec<Number>)>,
     numbers: Vec<Number>,
+    refusals: u64,
+    /// Why changed numbers are refused.
+    refused: Option<String>,
     followed: Vec<Followed>,
     columns: Arc<[Column]>,
+    samples: Sender<Sample>,
+    /// Steps done at the last sample.
+    sampled: Option<u64>,
     seen: Seen,
     /// Whether marks are found.
     marked: bool,
@@ -311,6 +335,19 @@ enum Left {
     Reset,
     /// For another world.
     Change,
+    /// For the world before, since the changed numbers break the run.
+    Refusal(String),
+}
+
+/// A run before its numbers were changed.
+struct Former {
+    world: World,
+    numbers: Vec<Number>,
+    state: Option<State>,
+    steps: u64,
+    hold: Hold,
+    /// Moves and breaks that were recorded.
+    recorded: [usize; 2],
 }
 
 /// The solver's thread while it plays a world.
@@ -328,6 +365,8 @@ struct Player<'s> {
     /// Whether the state lies on a device.
     on_device: bool,
     sound: SoundStates,
+    /// Whether it goes on from a world with other numbers.
+    is_changed: bool,
     playback: Playback,
 }
 
@@ -335,58 +374,72 @@ fn play(
     mut world: World,
     inbox: &Receiver<(Instant, Order)>,
     mut frames: triple_buffer::Input<Frame>,
+    samples: Sender<Sample>,
     wake: &(impl Fn() + Send),
     stop: StopFlag,
 ) -> Recording {
-    let mut playback = Playback { stop, ..Playback::new(&world) };
-    let mut from = None;
-    let mut subject = None;
+    let mut playback = Playback::new(&world, samples, stop);
+    let (mut from, mut subject) = (None, None);
+    let mut former: Option<Former> = None;
     loop {
-        let (left, snapshot, evaluated);
-        (left, snapshot, evaluated, subject, playback) = {
-            let mut player = match Player::enter(&world, from, subject, playback) {
-                Ok(player) => player,
-                Err(message) => {
-                    frames.input_buffer_mut().failure = Some(message);
-                    frames.publish();
-                    wake();
-                    return Recording::default();
+        let (left, evaluated) = match enter(&world, from.take()) {
+            Err(message) if former.is_some() => (Left::Refusal(message), false),
+            Err(message) => {
+                frames.input_buffer_mut().failure = Some(message);
+                frames.publish();
+                wake();
+                return Recording::default();
+            }
+            Ok((live, goes_on)) => {
+                let mut player = Player::enter(&world, (live, goes_on), subject, playback, former.is_some());
+                player.show(&mut frames);
+                wake();
+                let left = player.go(inbox, &mut frames, wake);
+                if matches!(left, Left::Change) {
+                    former = player.former();
                 }
-            };
-            player.show(&mut frames);
-            wake();
-            let left = player.go(inbox, &mut frames, wake);
-            let goes_on = matches!(left, Left::Change) && player.playback.steps > 0;
-            let snapshot = if goes_on && player.playback.failure.is_none() {
-                player.live.simulation.state().ok()
-            } else {
-                None
-            };
-            let evaluated = player.live.simulation.is_evaluated();
-            let (subject, playback) = player.end();
-            (left, snapshot, evaluated, subject, playback)
+                let evaluated = player.live.simulation.is_evaluated();
+                (subject, playback) = player.end();
+                (left, evaluated)
+            }
         };
-        if matches!(left, Left::Quit) {
-            let recording = playback.recording.unwrap_or_default();
-            return Recording { steps: playback.steps, ..recording };
+        match left {
+            Left::Quit => {
+                let recording = playback.recording.unwrap_or_default();
+                return Recording { steps: playback.steps, ..recording };
+            }
+            Left::Reset => {
+                former = None;
+                playback.start_anew();
+            }
+            Left::Refusal(message) => {
+                if let Some(former) = former.take() {
+                    let state = playback.refuse(&former, &message);
+                    from = Some((former.world.clone(), state));
+                    world = former.world;
+                }
+            }
+            Left::Change => {
+                if former.is_none() {
+                    playback.start_anew();
+                }
+                let state = former.as_ref().and_then(|former| former.state.clone());
+                from = playback.change.take().map(|(mut next, numbers)| {
+                    next.share(world.device());
+                    playback.record(evaluated, Instant::now(), Done::Numbers(numbers.clone()));
+                    playback.numbers = numbers;
+                    (std::mem::replace(&mut world, *next), state)
+                });
+            }
         }
-        if matches!(left, Left::Reset) || playback.failure.is_some() {
-            playback.start_anew();
-        }
-        from = playback.change.take().map(|(mut next, numbers)| {
-            next.share(world.device());
-            playback.record(evaluated, Instant::now(), Done::Numbers(numbers.clone()));
-            playback.numbers = numbers;
-            (std::mem::replace(&mut world, *next), snapshot)
-        });
     }
 }
 
 impl Playback {
-    fn new(world: &World) -> Self {
+    fn new(world: &World, samples: Sender<Sample>, stop: StopFlag) -> Self {
         Self {
             hold: Hold::default(),
-            stop: StopFlag::default(),
+            stop,
             view: world.scene.view.clone(),
             usual: Surface::of(&world.scene.view),
             field: None,
@@ -405,11 +458,16 @@ impl Playback {
             shown: Instant::now(),
             prepared: Duration::ZERO,
             recording: None,
+            file: None,
             started: None,
             change: None,
             numbers: Vec::new(),
+            refusals: 0,
+            refused: None,
             followed: Vec::new(),
             columns: Arc::default(),
+            samples,
+            sampled: None,
             seen: Seen::default(),
             marked: false,
             in_memory: false,
@@ -421,6 +479,7 @@ impl Playback {
         (self.steps, self.owed, self.started) = (0, 0, None);
         (self.failure, self.note) = (None, None);
         self.waiting.clear();
+        self.sampled = None;
         if self.recording.is_some() {
             self.begin_recording();
         }
@@ -428,6 +487,39 @@ impl Playback {
             self.record(false, Instant::now(), Done::Numbers(self.numbers.clone()));
         }
         self.pace.anchor(0.0);
+    }
+
+    /// Goes back to a run before its numbers were changed; the state from which it goes on.
+    fn refuse(&mut self, former: &Former, reason: &str) -> Option<State> {
+        (self.steps, self.owed, self.hold) = (former.steps, 0, former.hold.clone());
+        self.numbers.clone_from(&former.numbers);
+        (self.failure, self.refused, self.change) = (None, None, None);
+        self.waiting.clear();
+        self.sampled = None;
+        if let Some(recording) = &mut self.recording {
+            let [moves, breaks] = former.recorded;
+            recording.moves.truncate(moves);
+            recording.breaks.truncate(breaks);
+        }
+        self.refusals += 1;
+        self.note =
+            Some(format!("the changed numbers break the run, so they go back to those before: {reason}"));
+        former.state.clone()
+    }
+
+    /// Writes the recording into its file once a second, if something has happened.
+    fn write_recording(&mut self) {
+        let (Some((path, written, known)), Some(recording)) = (&mut self.file, &self.recording) else {
+            return;
+        };
+        let now = (recording.moves.len(), self.steps);
+        if *known == now || written.elapsed() < WRITTEN {
+            return;
+        }
+        (*written, *known) = (Instant::now(), now);
+        if let Err(error) = (Recording { steps: self.steps, ..recording.clone() }).write(path) {
+            self.note = Some(format!("`{}` cannot be written: {error}", path.display()));
+        }
     }
 
     /// Records from now on, a surface that is another one than the scene's first.
@@ -475,11 +567,11 @@ impl<'s> Player<'s> {
     /// Begins to play a world, or goes on as it from where a run of the world before stands.
     fn enter(
         world: &'s World,
-        from: Option<(World, Option<State>)>,
+        (mut live, goes_on): (Live, bool),
         subject: Option<Arc<Subject>>,
         mut playback: Playback,
-    ) -> Result<Self, String> {
-        let (mut live, goes_on) = enter(world, from)?;
+        is_changed: bool,
+    ) -> Self {
         live.simulation.stop_on(&playback.stop);
         if !goes_on && playback.steps > 0 {
             playback.start_anew();
@@ -499,17 +591,44 @@ impl<'s> Player<'s> {
             live,
             on_device,
             sound: SoundStates::default(),
+            is_changed,
             playback,
         };
         player.keep_sound();
         player.show_as_viewed();
         if is_known {
             player.find_movable();
-        } else {
-            player.renew_subject()?;
+        } else if let Err(message) = player.renew_subject() {
+            player.fail(message);
         }
         player.name_columns();
-        Ok(player)
+        player
+    }
+
+    /// The run as it is before its numbers change; `None` of one that has failed.
+    fn former(&mut self) -> Option<Former> {
+        let playback = &self.playback;
+        let recorded = |recording: &Recording| [recording.moves.len(), recording.breaks.len()];
+        let former = playback.failure.is_none().then(|| Former {
+            world: self.world.clone(),
+            numbers: playback.numbers.clone(),
+            state: None,
+            steps: playback.steps,
+            hold: playback.hold.clone(),
+            recorded: playback.recording.as_ref().map_or([0; 2], recorded),
+        })?;
+        let state = (former.steps > 0).then(|| self.live.simulation.state().ok()).flatten();
+        Some(Former { state, ..former })
+    }
+
+    /// The run cannot go on: changed numbers that break it at once are refused.
+    fn fail(&mut self, message: String) {
+        let playback = &mut self.playback;
+        if self.is_changed && self.sound.has_just_begun(playback.steps, self.world.step()) {
+            playback.refused.get_or_insert(message);
+        } else {
+            playback.failure.get_or_insert(message);
+        }
     }
 
     /// What lasts.
@@ -526,9 +645,13 @@ impl<'s> Player<'s> {
     ) -> Left {
         let mut changed = false;
         loop {
+            if let Some(message) = self.playback.refused.take() {
+                return Left::Refusal(message);
+            }
             if self.playback.change.is_some() {
                 return Left::Change;
             }
+            self.playback.write_recording();
             // Orders come first, before each step; while it stands still nothing but orders happens.
             if self.playback.owed == 0 {
                 let mut next = match self.patience(changed) {
@@ -602,6 +725,10 @@ impl<'s> Player<'s> {
                 self.name_columns();
             }
             Order::Record => playback.begin_recording(),
+            Order::RecordTo(path) => {
+                playback.begin_recording();
+                playback.file = Some((path, Instant::now(), (0, 0)));
+            }
             Order::Halve => self.halve(),
             Order::Show(view) => self.show_another(*view, sent),
             Order::Memory(every) => playback.in_memory = every,
@@ -646,13 +773,13 @@ impl<'s> Player<'s> {
     fn name_columns(&mut self) {
         let axes =
             |name: String, unit| ["x", "y", "z"].map(|axis| Column { name: format!("{name}.{axis}"), unit });
-        let mut columns = [axes("hand".into(), "N"), axes("second-hand".into(), "N")].concat();
+        let mut columns = [axes(HAND.into(), "N"), axes(SECOND_HAND.into(), "N")].concat();
         columns.extend_from_slice(self.live.columns());
         for number in 1..=self.playback.followed.len() {
             columns.extend(axes(format!("point.{number}.displacement"), "m"));
         }
         self.playback.columns = columns.into();
-        self.playback.seen.at = None;
+        (self.playback.seen.at, self.playback.sampled) = (None, None);
     }
 
     fn show_another(&mut self, view: ViewTable, sent: Instant) {
@@ -662,7 +789,7 @@ impl<'s> Player<'s> {
         if before != now {
             self.playback.record(self.live.simulation.is_evaluated(), sent, Done::Surface(now));
             if let Err(message) = self.renew_subject() {
-                self.playback.failure.get_or_insert(message);
+                self.fail(message);
             }
         }
     }
@@ -719,6 +846,9 @@ impl<'s> Player<'s> {
                 playback.feel();
                 self.keep_sound();
                 self.playback.hold.follow(&mut self.live);
+                if !self.on_device && self.is_sample_due() {
+                    self.sample();
+                }
             }
             // Nobody looks any more.
             Err(failure) if failure.is_interrupted() => {}
@@ -759,8 +889,7 @@ impl<'s> Player<'s> {
             return;
         }
         let Some(time) = self.sound.take().and_then(|sound| self.restore(sound)) else {
-            self.playback.failure.get_or_insert(message);
-            return;
+            return self.fail(message);
         };
         let playback = &mut self.playback;
         if let Some(recording) = &mut playback.recording {
@@ -782,10 +911,13 @@ impl<'s> Player<'s> {
 
     /// As a user wants it: to a state that is still kept.
     fn go_back_before(&mut self, steps: u64) {
-        let sound = self.sound.before(steps);
+        let sound = self.sound.before(steps, self.world.step());
         if let Some(time) = sound.and_then(|sound| self.restore(sound)) {
-            self.playback.failure = None;
-            self.playback.note = Some(format!("the run went back to t = {} s", number(time)));
+            let playback = &mut self.playback;
+            let oldest =
+                if playback.steps > steps { ", the oldest state that is kept: R starts anew" } else { "" };
+            playback.failure = None;
+            playback.note = Some(format!("the run went back to t = {} s{oldest}", number(time)));
         }
     }
 
@@ -806,8 +938,38 @@ impl<'s> Player<'s> {
             }
         }
         playback.pace.anchor(time);
-        playback.seen.at = None;
+        (playback.seen.at, playback.sampled) = (None, None);
         Some(time)
+    }
+
+    /// Whether the instant is one of those that are sampled: they lie as far apart however a run is played.
+    fn is_sample_due(&self) -> bool {
+        let every = (SAMPLED / self.world.step()).round().max(1.0) as u64;
+        self.playback.steps.is_multiple_of(every)
+    }
+
+    /// Samples the instant, once.
+    fn sample(&mut self) {
+        if self.playback.sampled == Some(self.playback.steps) {
+            return;
+        }
+        if let Err(failure) = self.live.simulation.evaluate(Wanted::Everything) {
+            return self.go_back(failure);
+        }
+        let playback = &mut self.playback;
+        let held: Vec<_> = playback.hold.shown(&self.live).collect();
+        let mut values = Vec::with_capacity(playback.columns.len());
+        for hand in playback.hold.hands() {
+            values.extend(hand.and_then(|at| held.get(at)).map_or([0.0; 3], |[_, force]| *force));
+        }
+        self.live.sample(&mut values);
+        for followed in &playback.followed {
+            values.extend((followed.now(&self.live, &[]).place - followed.rest()).iter());
+        }
+        playback.sampled = Some(playback.steps);
+        let time = self.live.simulation.time();
+        // Nobody may read them any more.
+        let _ = playback.samples.send(Sample { time, columns: Arc::clone(&playback.columns), values });
     }
 
     /// Looks at the instant in ordinary memory.
@@ -841,17 +1003,8 @@ impl<'s> Player<'s> {
         seen.held.clear();
         seen.held.extend(playback.hold.shown(&self.live));
         seen.hands = playback.hold.hands();
-        seen.sample.clear();
-        for hand in seen.hands {
-            seen.sample.extend(hand.and_then(|at| seen.held.get(at)).map_or([0.0; 3], |[_, force]| *force));
-        }
-        self.live.sample(&mut seen.sample);
         seen.followed.clear();
-        for followed in &playback.followed {
-            let now = followed.now(&self.live, &seen.values);
-            seen.sample.extend((now.place - followed.rest()).iter());
-            seen.followed.push(now);
-        }
+        seen.followed.extend(playback.followed.iter().map(|own| own.now(&self.live, &seen.values)));
         seen.marks = if playback.marked { marks(self.world, &self.live) } else { Vec::new() };
         seen.number += 1;
         seen.at = Some(Instant::now());
@@ -883,6 +1036,10 @@ impl<'s> Player<'s> {
         let inspects = !is_there || playback.in_memory || !playback.is_going() || playback.seen.is_old();
         if inspects {
             self.inspect();
+            let stands_still = !self.playback.is_going() && self.playback.owed == 0;
+            if self.on_device || stands_still || self.is_sample_due() {
+                self.sample();
+            }
         }
         let on_device = if is_there { self.place(inspects) } else { None };
         let playback = &mut self.playback;
@@ -898,12 +1055,10 @@ impl<'s> Player<'s> {
             frame.contacts.clone_from(&playback.seen.contacts);
             frame.marks.clone_from(&playback.seen.marks);
             frame.followed.clone_from(&playback.seen.followed);
-            frame.sample.clone_from(&playback.seen.sample);
         }
         let device = self.world.device();
         frame.read_backs = device.map_or(0, |device| device.read_backs());
         frame.on_device = on_device;
-        frame.columns.clone_from(&playback.columns);
         let (steps, wall) = std::mem::take(&mut playback.batch);
         if steps > 0 {
             playback.step_seconds = wall.as_secs_f64() / steps as f64;
@@ -925,6 +1080,8 @@ impl<'s> Player<'s> {
         frame.possible_factor = if playback.step_seconds > 0.0 { step / playback.step_seconds } else { 0.0 };
         frame.input_lag = playback.input_lag;
         frame.breaks = playback.breaks;
+        frame.numbers.clone_from(&playback.numbers);
+        frame.refusals = playback.refusals;
         frame.failure.clone_from(&playback.failure);
         frame.note.clone_from(&playback.note);
         playback.prepared = started.elapsed();

@@ -1,5 +1,5 @@
 //! Sound states of the last moments of a run. After a step that fails, the run continues from one of them: hands let go, or without hands
-//! steps are halved.
+//! steps are halved. The older states are, the farther they lie from each other, so that they reach over the whole run.
 
 use std::collections::VecDeque;
 
@@ -12,7 +12,7 @@ const EVERY: f64 = 0.25;
 /// Steps from one to the next at most.
 const MOST_STEPS: u64 = 1000;
 /// How many there are at most, but for that at the start.
-const MOST: usize = 8;
+const MOST: usize = 16;
 /// Memory [bytes] that all of them take, about.
 const MEMORY: usize = 256 << 20;
 /// Memory [bytes] that one takes for each node, about: displacements, increments, the internal forces of
@@ -45,6 +45,11 @@ pub(crate) struct SoundStates {
     touched_at: Option<u64>,
 }
 
+/// Steps of a length [s] from one state to the next.
+fn apart(step: f64) -> u64 {
+    ((EVERY / step).ceil() as u64).clamp(1, MOST_STEPS)
+}
+
 impl SoundStates {
     /// Hands do something after so many steps.
     pub fn touch(&mut self, steps: u64) {
@@ -53,7 +58,7 @@ impl SoundStates {
 
     /// Whether a state is due after so many steps of a length [s].
     pub fn is_due(&self, steps: u64, step: f64) -> bool {
-        let apart = ((EVERY / step).ceil() as u64).clamp(1, MOST_STEPS);
+        let apart = apart(step);
         let newest = self.later.back().or(self.first.as_ref());
         newest.is_none_or(|newest| steps >= newest.steps.max(self.back_at) + apart)
     }
@@ -64,20 +69,40 @@ impl SoundStates {
             self.first = Some(sound);
             return;
         }
-        if self.later.len() >= (MEMORY / (NODE * nodes.max(1))).clamp(1, MOST) {
-            self.later.pop_front();
-        }
         self.later.push_back(sound);
+        if self.later.len() > (MEMORY / (NODE * nodes.max(1))).clamp(1, MOST) {
+            self.thin();
+        }
     }
 
-    /// The newest state of no more than so many steps, and the ones after it are forgotten; the oldest that is kept where all have more.
-    pub fn before(&mut self, steps: u64) -> Option<Sound> {
-        while self.later.back().is_some_and(|newest| newest.steps > steps) {
-            self.later.pop_back();
-        }
+    /// Forgets the state whose neighbours lie nearest to each other for its age.
+    fn thin(&mut self) {
+        let newest = self.later.back().map_or(0, |sound| sound.steps);
+        let start = self.first.as_ref().map_or(0, |sound| sound.steps);
+        let steps = |at: usize| self.later[at].steps;
+        let gap = |&at: &usize| {
+            let before = if at > 0 { steps(at - 1) } else { start };
+            (steps(at + 1) - before) as f64 / (newest - steps(at)).max(1) as f64
+        };
+        let crowded = (0..self.later.len() - 1).min_by(|a, b| gap(a).total_cmp(&gap(b)));
+        crowded.map(|at| self.later.remove(at));
+    }
+
+    /// The newest state of no more than so many steps, of a length [s], and the ones after it are forgotten; the oldest that is kept where all
+    /// have more. The start is one only for a run that was near it.
+    pub fn before(&mut self, steps: u64, step: f64) -> Option<Sound> {
+        let older = self.later.partition_point(|sound| sound.steps <= steps);
+        let start = self.first.as_ref()?;
+        let from_start = older == 0 && (self.later.is_empty() || steps < start.steps + apart(step));
+        self.later.truncate(if from_start { 0 } else { older.max(1) });
         let sound = self.later.back().or(self.first.as_ref())?.clone();
         self.back_at = sound.steps;
         Some(sound)
+    }
+
+    /// Whether a run of so many steps, of a length [s], has come no farther than one state from where it began.
+    pub fn has_just_begun(&self, steps: u64, step: f64) -> bool {
+        self.first.as_ref().is_some_and(|first| steps <= first.steps + apart(step))
     }
 
     /// The state to halve the steps from: the newest but one, or the first. `None` where hands did something since then: they let go instead.

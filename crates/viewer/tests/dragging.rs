@@ -22,8 +22,8 @@ const PATIENCE: Duration = Duration::from_secs(900);
 /// Bytes by which the most that is allocated may differ: lists of held nodes are some KB long, and a leak of 100 bytes a drag would show
 /// within 700.
 const GROWTH: usize = 64 << 10;
-/// Drags in a row after which all states are kept that ever are: eight, of a quarter of a second each.
-const FULL: u64 = 4;
+/// Drags in a row after which all states are kept that ever are: sixteen, of a quarter of a second each.
+const FULL: u64 = 5;
 /// Part of the body's longest side that a hand moves from pull to pull, at most along each axis.
 const WALK: f64 = 0.02;
 
@@ -128,7 +128,8 @@ fn drag(text: &str, until: &Until) -> [u64; 2] {
         let frame = wait_up_to(PATIENCE, &mut session, ends);
         assert_eq!(frame.failure, None, "in drag {drag}");
         assert!(frame.points.iter().flat_map(|point| point.iter()).all(|x| x.is_finite()));
-        assert!(frame.values.iter().chain(&frame.sample).all(|x| x.is_finite()));
+        assert!(frame.values.iter().all(|x| x.is_finite()));
+        assert!(session.samples().all(|sample| sample.values.iter().all(|x| x.is_finite())));
         if frame.breaks > broken {
             broken = frame.breaks;
             let told = frame.note.as_deref().unwrap_or_default();

@@ -2,15 +2,18 @@
 
 mod support;
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use pliant_geometry::{CellLabel, Vector3};
 use pliant_picture::{Camera, Projection, Subject};
+use pliant_run::Column;
 use pliant_scene::World;
 use pliant_scene::format::ViewTable;
+use pliant_testing::pressed_cube;
 use pliant_viewer::{
-    Done, Frame, Hand, Lags, Number, Order, Point, Recording, Samples, Session, Which, parameters, pick,
-    replay, replay_in_real_time, with_numbers,
+    Done, Frame, Hand, Lags, Number, Order, Point, Recording, Sample, Samples, Session, Which, parameters,
+    pick, replay, replay_in_real_time, with_numbers,
 };
 use support::{BALL, shell, subject, wait, world};
 
@@ -202,6 +205,32 @@ fn a_run_that_breaks_tells_body_and_element_and_keeps_the_last_good_picture() {
     wait(&mut session, |frame| frame.failure.is_none() && frame.steps == 0);
 }
 
+/// A run that breaks by itself goes back and goes on with halved steps; a replay comes to the same bits.
+#[test]
+fn a_run_whose_step_fails_goes_back_and_halves_its_steps() {
+    let world = world(&pressed_cube(3.003));
+    let mut session = Session::start(world.clone(), || ()).unwrap();
+    session.order(Order::Record);
+    session.order(Order::Step(4000));
+    let back = wait(&mut session, |frame| frame.note.is_some() || frame.failure.is_some());
+    let note = back.note.unwrap();
+    assert!(note.contains("the run went back to t = ") && note.contains("halved its steps"), "{note}");
+    assert_eq!((back.failure, back.breaks), (None, 0));
+    // 2.5 s are not gone again, and all that is left is.
+    assert!(back.time > 2.0 && back.time < 3.0, "{} s", back.time);
+    let steps = ((4.0 - back.time) / 0.5e-3).round() as u64;
+    session.order(Order::Step(steps));
+    let end = wait(&mut session, |frame| frame.time > 3.999 || frame.failure.is_some());
+    assert_eq!((end.failure, end.steps), (None, back.steps + steps));
+    let mut samples = Samples::default();
+    session.samples().for_each(|sample| samples.take(sample));
+    let times: Vec<f64> = samples.curve(0).map(|[time, _]| time).collect();
+    assert!(times.is_sorted_by(|a, b| a < b) && times.len() > 700, "each instant once");
+    let recording = session.end().unwrap();
+    assert_eq!(recording.moves.iter().filter(|then| then.done == Done::Halve).count(), 1);
+    assert_eq!(replay(&world, &recording).unwrap(), replay(&world, &recording).unwrap());
+}
+
 /// A pull that tears the ball does not end the run: it goes back to a state before, where the hand lets go, and goes on; a replay comes to the
 /// same bits, and has the break.
 #[test]
@@ -264,6 +293,79 @@ fn a_pull_is_taken_back_and_a_picked_point_is_read() {
     assert_eq!(after.points, wait(&mut other, |frame| frame.steps == 2000).points);
     let recording = session.end().unwrap();
     assert!(recording.breaks.is_empty() && replay(&world, &recording).unwrap().held.is_none());
+}
+
+/// However long ago the pull began, undo does not go to the start, and it goes no farther before the pull than a part of what the run has done since.
+#[test]
+fn a_pull_of_long_ago_is_taken_back_without_going_to_the_start() {
+    let mut session = Session::start(world(BALL), || ()).unwrap();
+    for pulled in [3000, 9000] {
+        let steps = wait(&mut session, |frame| !frame.playing).steps;
+        session.order(Order::Step(2 * pulled - steps));
+        wait(&mut session, |frame| frame.steps == 2 * pulled);
+        session.order(Order::Back(pulled));
+        let back = wait(&mut session, |frame| frame.steps < 2 * pulled);
+        assert!((pulled / 2..=pulled).contains(&back.steps), "back at step {} of {pulled}", back.steps);
+    }
+    // Step by step, it ends at the oldest state that is kept, and says so.
+    loop {
+        let now = session.look().1.clone();
+        session.order(Order::Back(now.steps.saturating_sub(1)));
+        let back = wait(&mut session, |frame| frame.number > now.number);
+        assert!(back.steps > 0);
+        if back.steps == now.steps {
+            assert!(back.note.unwrap().contains("the oldest state that is kept"));
+            break;
+        }
+    }
+}
+
+/// A number that breaks the run at once is taken back: the run goes on from where it was, with the numbers before.
+#[test]
+fn numbers_that_ruin_a_run_are_taken_back() {
+    let world = calm();
+    let tip = tip(&subject(&world));
+    for ruin in [number("body.ball.density", 1e-6), number("law.tissue.young-modulus", 1e12)] {
+        let mut session = Session::start(world.clone(), || ()).unwrap();
+        session.order(Order::Record);
+        let [held, _] = pull(&mut session, tip, 600);
+        change(&session, &world, &[ruin]);
+        session.order(Order::Play(true));
+        let refused = wait(&mut session, |frame| frame.failure.is_some() || frame.refusals == 1);
+        assert_eq!((refused.failure, refused.numbers.len()), (None, 0));
+        let note = refused.note.unwrap();
+        assert!(note.contains("they go back to those before") && note.contains("is inverted"), "{note}");
+        session.order(Order::Play(false));
+        let after = wait(&mut session, |frame| !frame.playing);
+        assert!(after.steps >= 600 && (after.hand(Which::First).unwrap()[0][0] - held.x).abs() < 1e-2);
+        let recording = session.end().unwrap();
+        assert_eq!((recording.moves.len(), recording.breaks.len()), (2, 0), "a pull, and no number");
+        replay(&world, &recording).unwrap();
+    }
+}
+
+/// A recording is written each second, whole, and not only when the window closes.
+#[test]
+fn a_recording_is_written_while_it_grows() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("drag");
+    let world = world(BALL);
+    let tip = tip(&subject(&world));
+    let session = Session::start(world, || ()).unwrap();
+    session.order(Order::RecordTo(path.clone()));
+    session.order(Order::Hand(Hand::Take(tip, 20.0)));
+    session.order(Order::Play(true));
+    let began = Instant::now();
+    let written = || Recording::from_bytes(&std::fs::read(&path).ok()?).ok();
+    while written().is_none_or(|recording| recording.moves.is_empty()) {
+        assert!(began.elapsed() < Duration::from_secs(60));
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert_eq!(written().unwrap().moves.len(), 1);
+    assert!(Recording::try_path(&path).is_ok() && written().is_some(), "a try leaves the file as it is");
+    for wrong in [folder.path().to_owned(), folder.path().join("nowhere/drag")] {
+        assert!(Recording::try_path(&wrong).is_err());
+    }
 }
 
 #[test]
@@ -391,17 +493,21 @@ fn what_is_sampled_has_names_and_units_and_is_written_once() {
         "{BALL}[output.h]\ntype = 'csv'\nevery = 1\nprobes.end = {{ on = 'ball', at = [0.04, 0, 0] }}\n"
     );
     let world = world(&text);
+    let world_step = world.step();
     let subject = subject(&world);
     let tip = tip(&subject);
     let mut session = Session::start(world, || ()).unwrap();
-    let mut samples = Samples::default();
-    samples.take(&wait(&mut session, |frame| !frame.columns.is_empty()));
+    wait(&mut session, |frame| !frame.points.is_empty());
     session.order(Order::Probe(tip));
     session.order(Order::Hand(Hand::Take(tip, 20.0)));
     session.order(Order::Hand(Hand::Pull([0.06, 0.0, 0.0])));
     session.order(Order::Step(200));
     let frame = wait(&mut session, |frame| frame.steps == 200);
-    samples.take(&frame);
+    let mut samples = Samples::default();
+    session.samples().for_each(|sample| samples.take(sample));
+    // Each 5 ms of simulated time, whatever the frames are: the start, five steps each, and the end.
+    let steps = (0.005 / world_step).round();
+    assert_eq!(samples.len(), (200.0 / steps).ceil() as usize + 1);
     let column = |name: &str| samples.columns().iter().position(|column| column.name == name).expect(name);
     let last = |name: &str| samples.curve(column(name)).last().unwrap()[1];
     assert_eq!(last("hand.x"), frame.held[0][1][0]);
@@ -422,23 +528,41 @@ fn what_is_sampled_has_names_and_units_and_is_written_once() {
         "{header}"
     );
     let count = |line: &str| line.split(',').count();
-    assert!(lines.clone().count() == 2 && lines.all(|line| count(line) == count(header)));
+    assert!(lines.clone().count() == samples.len() && lines.all(|line| count(line) == count(header)));
     let again = samples.write_beside(&scene).unwrap();
     assert_eq!(again.file_name().unwrap(), "ball-probes-2.csv");
+}
+
+/// Curves do not depend on how often the window looks: two runs of the same steps have the same samples.
+#[test]
+fn samples_are_those_of_the_run_and_not_of_frames() {
+    let taken = |strides: &[u64]| {
+        let mut session = Session::start(world(BALL), || ()).unwrap();
+        let mut steps = 0;
+        for stride in strides {
+            session.order(Order::Step(*stride));
+            steps += stride;
+            wait(&mut session, |frame| frame.steps == steps);
+        }
+        let all: Vec<_> = session.samples().map(|sample| (sample.time.to_bits(), sample.values)).collect();
+        all
+    };
+    let [whole, parts] = [taken(&[700]), taken(&[350, 350])];
+    assert!(whole.len() > 100 && whole.iter().all(|sample| parts.contains(sample)), "{}", whole.len());
 }
 
 #[test]
 fn samples_stay_few_however_long_a_run_lasts() {
     let mut samples = Samples::default();
-    let mut frame = wait(&mut Session::start(world(BALL), || ()).unwrap(), |frame| !frame.columns.is_empty());
+    let column = |name: &str| Column { name: name.into(), unit: "J" };
+    let columns: Arc<[Column]> = ["a", "b"].map(column).into();
     for number in 0..100_000 {
-        frame.time = f64::from(number);
-        frame.sample.fill(frame.time);
-        samples.take(&frame);
+        let time = f64::from(number);
+        samples.take(Sample { time, columns: Arc::clone(&columns), values: vec![time; 2] });
         assert!(samples.len() <= 4001);
     }
     assert!(samples.len() > 1500);
-    let curve: Vec<[f64; 2]> = samples.curve(3).collect();
+    let curve: Vec<[f64; 2]> = samples.curve(1).collect();
     assert!(curve.iter().all(|[time, value]| time == value) && curve.is_sorted_by(|a, b| a[0] < b[0]));
 }
 
@@ -616,7 +740,8 @@ fn two_hands_pull_each_on_its_own_and_are_repeated() {
     let both = wait(&mut session, |frame| frame.steps == 200);
     let [up, down] = Which::BOTH.map(|which| both.hand(which).unwrap()[1][1]);
     assert!(up > 0.0 && down < 0.0 && both.pins().len() == 1, "{up} N, {down} N");
-    let last = |name: &str| both.sample[both.columns.iter().position(|own| own.name == name).unwrap()];
+    let sample = session.samples().last().unwrap();
+    let last = |name: &str| sample.values[sample.columns.iter().position(|own| own.name == name).unwrap()];
     assert_eq!([last("hand.y"), last("second-hand.y")], [up, down]);
     session.order(Order::Hand(Hand::Release));
     session.order(Order::Step(50));

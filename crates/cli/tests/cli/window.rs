@@ -9,6 +9,8 @@ use std::time::Duration;
 use pliant_testing::found_or_skipped;
 use pliant_viewer::{Break, Recording};
 
+use x11rb::protocol::xproto::ConnectionExt as _;
+
 use crate::support::{BLOCK, Told, Workshop, changed, has_gpu};
 
 /// A screen, closed on drop.
@@ -79,6 +81,69 @@ fn the_window_draws_picks_pins_and_pulls_and_what_holds_the_body_holds_against_t
     assert!(size > 0.01, "{once}");
     for (hand, base) in hand.iter().zip(base) {
         assert!((hand + base).abs() < 1e-3 * size, "{once}");
+    }
+}
+
+/// Copies go to the clipboard of the screen, and not only to the window.
+#[test]
+fn a_view_is_copied_to_the_clipboard() {
+    if !has_gpu() {
+        return;
+    }
+    let Some(screen) = Screen::start() else { return };
+    let workshop = Workshop::new(BALL);
+    let (connection, _) = x11rb::connect(Some(&screen.display)).unwrap();
+    let clipboard = connection.intern_atom(false, b"CLIPBOARD").unwrap().reply().unwrap().atom;
+    let owner = || connection.get_selection_owner(clipboard).unwrap().reply().unwrap().owner;
+    let mut command = workshop.command(&["view", "case", "--rehearse"]);
+    command.env("DISPLAY", &screen.display).env_remove("WAYLAND_DISPLAY");
+    let mut window = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the binary starts");
+    while owner() == x11rb::NONE {
+        assert!(window.try_wait().unwrap().is_none(), "it copied nothing");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    window.kill().unwrap();
+    window.wait().unwrap();
+}
+
+/// A recording that cannot be written is refused before the window opens; one is whole after a signal, and has all but the last second
+/// where the window is killed.
+#[test]
+fn recordings_outlive_signals() {
+    let workshop = Workshop::new(BALL);
+    for (path, why) in [("nowhere/drag", "No such file"), ("case", "it is a folder")] {
+        let told = workshop.pliant(&["view", "case", "--record", path]);
+        assert_eq!(told.code, 2, "{}", told.err);
+        assert!(
+            told.err.contains(path) && told.err.contains("cannot be written") && told.err.contains(why),
+            "{}",
+            told.err
+        );
+    }
+    if !has_gpu() {
+        return;
+    }
+    let Some(screen) = Screen::start() else { return };
+    for signal in ["-TERM", "-KILL"] {
+        let mut command = workshop.command(&["view", "case", "--record", "drag"]);
+        command.env("DISPLAY", &screen.display).env_remove("WAYLAND_DISPLAY");
+        let mut window =
+            command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the binary starts");
+        let read = || Recording::from_bytes(&std::fs::read(workshop.path("drag")).ok()?).ok();
+        while read().is_none() {
+            assert!(window.try_wait().unwrap().is_none(), "it closed by itself");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        let before = read().unwrap();
+        let pid = window.id().to_string();
+        assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());
+        let ended = window.wait().unwrap();
+        let after = read().unwrap();
+        assert!(before.steps > 0 && after.steps >= before.steps);
+        if signal == "-TERM" {
+            assert_eq!(ended.code(), Some(143));
+        }
+        std::fs::remove_file(workshop.path("drag")).unwrap();
     }
 }
 

@@ -39,7 +39,7 @@ impl Choice for TextureName {
 
 /// How pictures and films of the scene are taken (`pliant render`, `pliant run --picture`) and how the window opens (`pliant view`). It
 /// changes nothing of the run.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ViewTable {
     /// The body or the carried surface that is shown; if not given, all bodies together.
@@ -296,7 +296,7 @@ pub struct ClipTable {
 }
 
 /// A camera that orbits what is shown.
-#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct CameraTable {
     /// Angle around the axis that points up [°]; with `up = "z"` 0 looks from the side of x, 90 from that of y.

@@ -10,8 +10,8 @@ use eframe::egui::{self, Align2, Key, PointerButton, vec2};
 use eframe::egui_wgpu::WgpuConfiguration;
 use pliant_geometry::{CellKind, Mesh, RegionNames, Vector3};
 use pliant_picture::{
-    Camera, ColourMap, Extremes, Outermost, Series, SeriesError, Style, Subject, Texture, deformed_points,
-    field_choices, nodal_values,
+    ColourMap, Look, Outermost, Series, SeriesError, Subject, Texture, deformed_points, field_choices,
+    nodal_values,
 };
 use pliant_scene::format::FieldName;
 
@@ -202,7 +202,7 @@ impl Finished {
         series: Series,
         outcome: Outcome,
     ) -> Result<Self, String> {
-        let port = Viewport::new(context, Style::default(), Camera::default())?;
+        let port = Viewport::new(context, &Look::default())?;
         let ((asks, asked), (found, receive)) = (channel(), channel());
         let woken = context.egui_ctx.clone();
         let work = move || read_frames(&asked, &found, &|| woken.request_repaint());
@@ -269,11 +269,10 @@ impl Finished {
             self.port.fit();
         }
         let other = self.shown.as_ref().is_none_or(|shown| shown.field != loaded.asked.field);
+        let unit = loaded.asked.field.as_deref().map_or("", |field| words(field).1);
+        let own = self.port.range_seen(unit);
         if !self.port.locked {
             // The range grows over the frames that were seen, so that colours mean the same in all of them.
-            let mut extremes = Extremes::default();
-            extremes.add(self.port.values_seen());
-            let own = extremes.range(self.port.style.map);
             let before = self.port.style.range.filter(|_| !other);
             self.port.style.range = match (before, own) {
                 (Some([low, high]), Some(own)) => Some([low.min(own[0]), high.max(own[1])]),
@@ -374,7 +373,9 @@ impl Finished {
             }
         });
         let unit = self.field.as_deref().map_or("", |field| words(field).1);
-        self.port.edit_range(ui, unit);
+        if let Some(reason) = self.port.edit_range(ui, unit) {
+            self.message = Some(Told::failure(reason));
+        }
         ui.separator();
         ui.heading("Bodies");
         self.port.regions = self.listed.edit(ui);

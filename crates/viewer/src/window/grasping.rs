@@ -9,6 +9,7 @@ use pliant_geometry::Vector3;
 use super::App;
 use super::self_test::{Cue, button, holding, inside, known_pixel, press};
 use crate::hand::Which;
+use crate::samples::{HAND, SECOND_HAND};
 
 const LEFT: PointerButton = PointerButton::Primary;
 
@@ -120,7 +121,12 @@ pub(super) fn tools() -> Vec<Cue> {
     };
     let mut cues = vec![
         Cue::key("Space plays", Key::Space, |app| app.frame.playing),
-        Cue::key("K takes a tool", Key::K, |app| app.frame.tools.iter().flatten().count() == 1),
+        Cue::key("K takes a tool, whose force is plotted", Key::K, |app| {
+            let plotted = [HAND, SECOND_HAND].map(|name| app.plotted.contains(name));
+            app.led.is_some_and(|(_, which)| {
+                app.frame.tools[which as usize].is_some() && plotted[which as usize]
+            })
+        }),
     ];
     cues.extend(led("an arrow moves it", Key::ArrowUp, goes(1, 1.0)));
     cues.extend(led("the other arrow moves it back", Key::ArrowDown, goes(1, -1.0)));

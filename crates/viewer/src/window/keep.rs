@@ -150,8 +150,9 @@ fn view_text(view: &ViewTable, style: &Style, camera: &Camera, cut: Option<Plane
         Background::Dark => put("background", toml_text("dark")),
     }
     put("curved", view.curved.to_string());
-    let mut seen =
-        format!("azimuth = {:?}, elevation = {:?}", rounded(camera.azimuth), rounded(camera.elevation));
+    let [azimuth, elevation] = [camera.azimuth, camera.elevation].map(rounded);
+    let up = toml_text(camera.up.name());
+    let mut seen = format!("azimuth = {azimuth:?}, elevation = {elevation:?}, up = {up}");
     if let Some((target, zoom)) = closer {
         seen.push_str(&format!(", target = {}, zoom = {:?}", list(&target), rounded(zoom.clamp(1e-3, 1e3))));
     }
@@ -206,9 +207,7 @@ impl App {
             self.film();
         }
         if ui.button("Copy view").on_hover_text("copies the view as the table [view] of a scene").clicked() {
-            ui.ctx().copy_text(self.view_text());
-            self.message =
-                Some(Told::done("the table [view] was copied: paste it into the scene in place of its own"));
+            self.copy_view();
         }
         let changed = self.changed_numbers();
         let button = egui::Button::new("Save scene");
@@ -230,12 +229,16 @@ impl App {
         }
     }
 
+    /// Copies the view to the clipboard.
+    pub(super) fn copy_view(&mut self) {
+        self.context.copy_text(self.view_text());
+        self.message =
+            Some(Told::done("the table [view] was copied: paste it into the scene in place of its own"));
+    }
+
     /// The view as a table of a scene.
     pub(super) fn view_text(&self) -> String {
-        let fitted = self.port.fitted();
-        let moved = (self.port.camera.target - fitted.target).norm() > 0.01 * fitted.height
-            || (self.port.camera.height / fitted.height - 1.0).abs() > 0.01;
-        let closer = moved.then(|| (self.port.camera.target.into(), fitted.height / self.port.camera.height));
+        let closer = self.port.closer().map(|(target, zoom)| (target.into(), zoom));
         view_text(&self.view, &self.port.style, &self.port.camera, self.port.style.clip, closer)
     }
 
@@ -249,8 +252,9 @@ impl App {
 #[cfg(test)]
 mod tests {
     use pliant_geometry::Vector3;
-    use pliant_picture::ColourMap;
+    use pliant_picture::{Axis, ColourMap};
     use pliant_scene::Scene;
+    use pliant_scene::format::UpName;
 
     use super::*;
 
@@ -280,6 +284,7 @@ mod tests {
             azimuth: 12.25,
             elevation: -30.0,
             projection: Projection::Orthographic,
+            up: Axis::MinusY,
             ..Camera::default()
         };
         let cut = Plane::through(&Vector3::new(0.5, 0.0, 0.0), &Vector3::x());
@@ -294,6 +299,7 @@ mod tests {
         assert_eq!(read.clip.map(|clip| (clip.point, clip.normal)), Some(([0.5, 0.0, 0.0], [1.0, 0.0, 0.0])));
         let camera = read.camera;
         assert_eq!((camera.azimuth, camera.elevation, camera.orthographic), (12.25, -30.0, true));
+        assert_eq!(camera.up, Some(UpName::MinusY));
         assert_eq!((camera.target, camera.zoom, read.curved), (Some([0.0, 0.5, 1.0]), 2.5, view.curved));
     }
 

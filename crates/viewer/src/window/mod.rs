@@ -30,7 +30,9 @@ use std::time::{Duration, Instant, SystemTime};
 use eframe::egui::{self, Key};
 use eframe::egui_wgpu::WgpuConfiguration;
 use pliant_geometry::{RegionNames, Vector3};
-use pliant_picture::{Camera, Style};
+use pliant_mechanics::StopFlag;
+use pliant_picture::Look;
+use pliant_scene::Scene;
 use pliant_scene::format::{FieldName, ViewTable};
 use pliant_sim::gpu::Device;
 
@@ -57,16 +59,16 @@ pub type Read = Arc<dyn Fn(&Path) -> Result<World, String> + Send + Sync>;
 pub struct Opening {
     /// The scene.
     pub world: World,
-    /// How it is looked at.
-    pub style: Style,
-    /// From where; target and height are those that fit.
-    pub camera: Camera,
+    /// How a scene asks to be looked at.
+    pub look: fn(&Scene) -> Look,
     /// The file of the scene, watched for changes.
     pub file: PathBuf,
     /// Reads a scene, at the start of another one or after a change.
     pub read: Read,
-    /// Where what the hand did is written when the window closes or the scene starts anew.
+    /// Where what the hand did is written, each second and when the window closes.
     pub record: Option<PathBuf>,
+    /// Closes the window once it is set.
+    pub stop: StopFlag,
     /// What it does by itself before it closes; without, it stays open.
     pub self_test: Option<SelfTest>,
     /// When the user asked for it.
@@ -187,6 +189,8 @@ struct App {
     /// Points that the user follows.
     probes: usize,
     file: PathBuf,
+    look_of: fn(&Scene) -> Look,
+    stop: StopFlag,
     changed: Option<SystemTime>,
     looked: Instant,
     read: Read,
@@ -223,8 +227,8 @@ impl App {
     ) -> Result<Self, String> {
         let state = context.wgpu_render_state.as_ref().ok_or("wgpu did not start")?;
         context.egui_ctx.set_visuals(egui::Visuals::light());
-        let Opening { world, style, camera, file, read, record, self_test, began } = opening;
-        let port = Viewport::new(context, style, camera)?;
+        let Opening { world, look, file, read, record, stop, self_test, began } = opening;
+        let port = Viewport::new(context, &look(&world.scene))?;
         let session = begin(&world, &context.egui_ctx)?;
         let device = device::shared(state, &world);
         let has_tools = !world.scene.tools.is_empty();
@@ -259,6 +263,8 @@ impl App {
             probes: 0,
             changed: modified(&file),
             file,
+            look_of: look,
+            stop,
             looked: Instant::now(),
             read,
             reading: None,
@@ -277,15 +283,16 @@ impl App {
             record,
             outcome,
         };
-        if app.record.is_some() {
-            app.order(Order::Record);
-        }
+        app.begin_recording();
         app.show();
         app.show_marks(app.view.marks);
         remember(&app.file);
-        // A self-test plays when it is due.
-        if app.running_test.is_none() {
-            app.order(Order::Play(true));
+        // A self-test plays when it is due, and clicks as slowly as the machine draws.
+        match app.running_test {
+            Some(_) => context
+                .egui_ctx
+                .options_mut(|options| options.input_options.max_click_duration = f64::INFINITY),
+            None => app.order(Order::Play(true)),
         }
         Ok(app)
     }
@@ -316,6 +323,7 @@ impl App {
 
     /// Takes the newest instant.
     fn look(&mut self) {
+        self.session.samples().for_each(|sample| self.samples.take(sample));
         let (new, frame) = self.session.look();
         if !new {
             return;
@@ -330,19 +338,21 @@ impl App {
         if inspected && frame.points.len() == self.port.subject.points.len() {
             self.port.set(&frame.points, &frame.values);
         }
+        let refused = (frame.refusals > self.frame.refusals).then(|| frame.note.clone()).flatten();
         self.frame = frame.clone();
+        if let Some(reason) = refused {
+            self.numbers.refuse(&self.frame.numbers);
+            self.message = Some(Told::failure(reason));
+        }
         if !Arc::ptr_eq(&self.port.reach, &self.frame.ways) {
             self.port.learn(Arc::clone(&self.frame.ways));
         }
-        self.port.fit_range();
+        self.port.fit_range(self.field().map_or("", FieldName::unit));
         let hands = Which::BOTH.into_iter().filter_map(|which| self.frame.hand(which));
         let strongest = hands.map(|[_, force]| Vector3::from(force).norm()).fold(0.0, f64::max);
         self.strongest = self.strongest.max(strongest);
-        if inspected {
-            self.samples.take(&self.frame);
-        }
         if first {
-            self.port.fit();
+            self.port.camera = self.port.at_start();
         }
     }
 
@@ -353,6 +363,12 @@ impl App {
         self.port.patient = self.world.scene.is_of_patient();
         self.look_at_regions();
         self.order(Order::Show(Box::new(view)));
+    }
+
+    fn begin_recording(&self) {
+        if let Some(path) = &self.record {
+            self.order(Order::RecordTo(path.clone()));
+        }
     }
 
     fn order(&self, order: Order) {
@@ -400,8 +416,12 @@ impl App {
         let before = std::mem::replace(&mut self.session, begin(&world, &self.context)?);
         // A long step ends in its own time.
         std::thread::spawn(move || drop(before));
-        if path != self.file {
+        // A view that the file leaves as it was is the user's.
+        if path != self.file || world.scene.view != self.world.scene.view {
             self.view = world.scene.view.clone();
+            self.port.take_look(&(self.look_of)(&world.scene));
+        }
+        if path != self.file {
             self.port.subject = Arc::default();
         }
         self.numbers = Numbers::of(&world.scene);
@@ -415,9 +435,7 @@ impl App {
         self.file = path;
         self.samples.clear();
         self.let_go();
-        if self.record.is_some() {
-            self.session.order(Order::Record);
-        }
+        self.begin_recording();
         self.frame.inspections = 0;
         self.session.order(Order::Memory(self.in_memory));
         self.session.order(Order::Marks(self.view.marks));
@@ -495,6 +513,9 @@ impl eframe::App for App {
         self.look();
         self.port.bring(frame);
         self.choose_memory();
+        if self.stop.is_asked() {
+            context.send_viewport_cmd(egui::ViewportCommand::Close);
+        }
         self.take_picture(&context);
         self.go_on_filming();
         self.keys(&context);
@@ -525,9 +546,7 @@ impl eframe::App for App {
 
     fn on_exit(&mut self) {
         let (Some(path), Some(recording)) = (&self.record, self.session.end()) else { return };
-        let written =
-            recording.to_bytes().and_then(|bytes| std::fs::write(path, bytes).map_err(|e| e.to_string()));
-        if let Err(reason) = written {
+        if let Err(reason) = recording.write(path) {
             use std::io::Write as _;
             // Nobody reads it where standard error can't be written.
             let _ = writeln!(std::io::stderr(), "error: `{}` cannot be written: {reason}", path.display());

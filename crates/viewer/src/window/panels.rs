@@ -7,6 +7,7 @@ use pliant_scene::Part;
 use pliant_scene::format::{BodyModel, ColourBy, Component, FieldName, Labels, Nothing, SolverName};
 
 use super::App;
+use super::told::Told;
 use super::viewport::OCCLUSION;
 use crate::hand::{Hand, Which};
 use crate::recording::Surface;
@@ -155,7 +156,9 @@ impl App {
             },
         );
         let unit = self.field().map_or("", FieldName::unit);
-        self.port.edit_range(ui, unit);
+        if let Some(reason) = self.port.edit_range(ui, unit) {
+            self.message = Some(Told::failure(reason));
+        }
         before != (self.colour(), self.view.component)
     }
 

@@ -7,6 +7,7 @@ use pliant_scene::Scene;
 
 use super::told::Told;
 use super::undo::Act;
+use super::viewport::typed_number;
 use super::{App, warnings};
 use crate::parameters::{Number, Parameter, parameters, with_numbers};
 use crate::session::Order;
@@ -42,6 +43,18 @@ impl Numbers {
         self.all.iter_mut().zip(values).for_each(|(parameter, value)| parameter.number.value = *value);
     }
 
+    /// Goes back to the numbers that are played, those that are others than in the file.
+    pub(super) fn refuse(&mut self, played: &[Number]) {
+        let value = |parameter: &Parameter, file: f64| {
+            let own = played.iter().find(|number| number.path == parameter.number.path);
+            own.map_or(file, |number| number.value)
+        };
+        let values: Vec<f64> =
+            self.all.iter().zip(&self.in_file).map(|(own, file)| value(own, *file)).collect();
+        self.set(&values);
+        self.accepted = values;
+    }
+
     /// Those of some values that are others than in the file.
     fn changed(&self, values: &[f64]) -> Vec<Number> {
         let all = self.all.iter().zip(values).zip(&self.in_file);
@@ -62,6 +75,7 @@ fn dragged(ui: &mut egui::Ui, parameter: &mut Parameter) -> bool {
     let drag = egui::DragValue::new(value)
         .speed(speed)
         .custom_formatter(write)
+        .custom_parser(typed_number)
         .suffix(format!(" {}", parameter.unit));
     let response = ui.add(drag).on_hover_text(&parameter.meaning);
     response.drag_stopped() || response.lost_focus()

@@ -35,7 +35,7 @@ const KEYS: [(&str, &str); 29] = [
     ),
     ("B", "let go what the other hand keeps"),
     ("Ctrl or P + click", "pin it; on a pin, take it away"),
-    ("Alt + click", "follow a point: read and plot it; two give their distance"),
+    ("Alt or I + click", "follow a point: read and plot it; two give their distance"),
     ("drag beside it", "turn the view"),
     ("right drag", "turn the view; with Shift move it"),
     ("middle drag", "move the view"),
@@ -47,7 +47,7 @@ const KEYS: [(&str, &str); 29] = [
     ("R", "start anew"),
     ("F", "see all"),
     ("0", "look as at the start"),
-    ("1 2 3 4 5 6", "look from the front, back, left, right, top, bottom"),
+    ("1 2 3 4 5 6", "see all from the front, back, left, right, top, bottom"),
     ("E G C", "edges, shape at rest, section"),
     ("L", "lock the range of colours"),
     ("O", "parallel or perspective"),
@@ -111,7 +111,7 @@ impl App {
             }
         }
         if response.clicked()
-            && context.input(|input| input.modifiers.alt)
+            && context.input(|input| input.modifiers.alt || input.key_down(Key::I))
             && let Some((point, _)) = self.hit(place)
         {
             self.add_probe(point);

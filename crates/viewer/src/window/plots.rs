@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use eframe::egui;
-use egui_plot::{Corner, Legend, Line, Plot};
-use pliant_picture::readable;
+use egui_plot::{Corner, GridInput, GridMark, Legend, Line, Plot};
+use pliant_picture::{readable, ticks};
 
 use super::App;
 use super::told::Told;
@@ -54,6 +54,38 @@ fn words(name: &str) -> String {
         other => other.join(" "),
     };
     format!("{told}{axis}")
+}
+
+/// Height of a plot on the screen.
+const HEIGHT: f32 = 130.0;
+
+/// Draws curves of one unit: the name, and times [s] and values of each.
+fn draw(ui: &mut egui::Ui, unit: &str, mut lines: Vec<(String, Vec<[f64; 2]>)>) {
+    let values = lines.iter().flat_map(|(_, line)| line).map(|[_, value]| value.abs());
+    let (scaled, factor) = readable(unit, values.filter(|size| size.is_finite()).fold(0.0, f64::max));
+    lines.iter_mut().flat_map(|(_, line)| line).for_each(|[_, value]| *value *= factor);
+    let plot = Plot::new(("curves", unit))
+        .height(HEIGHT)
+        .legend(Legend::default().position(Corner::LeftTop))
+        .x_axis_label("time [s]")
+        .y_axis_label(format!("[{scaled}]"))
+        .x_grid_spacer(marks)
+        .y_grid_spacer(marks)
+        .grid_spacing(12.0..=300.0);
+    plot.allow_scroll(false).show(ui, |plot| {
+        for (name, line) in lines {
+            plot.line(Line::new(name, line));
+        }
+    });
+}
+
+/// Marks of an axis: round values, three at least.
+fn marks(GridInput { bounds: (low, high), .. }: GridInput) -> Vec<GridMark> {
+    let marks = |about| {
+        let (values, step_size) = ticks([low, high], about);
+        values.into_iter().map(|value| GridMark { value, step_size }).collect::<Vec<_>>()
+    };
+    (3..10).map(marks).find(|marks| marks.len() >= 3).unwrap_or_default()
 }
 
 /// The curves plotted at first.
@@ -116,24 +148,9 @@ impl App {
         }
         ui.columns(units.len(), |columns| {
             for (column, unit) in columns.iter_mut().zip(&units) {
-                let own: Vec<&&Curve> = shown.iter().filter(|curve| curve.unit == *unit).collect();
-                let mut lines: Vec<Vec<[f64; 2]>> = own.iter().map(|curve| self.points_of(curve)).collect();
-                let sizes =
-                    lines.iter().flatten().map(|[_, value]| value.abs()).filter(|size| size.is_finite());
-                let (unit, factor) = readable(unit, sizes.fold(0.0, f64::max));
-                lines.iter_mut().flatten().for_each(|[_, value]| *value *= factor);
-                let plot = Plot::new(("curves", &own[0].unit))
-                    .height(130.0)
-                    .legend(Legend::default().position(Corner::LeftTop));
-                let plot = plot
-                    .x_axis_label("time [s]")
-                    .y_axis_label(format!("[{unit}]"))
-                    .grid_spacing(25.0..=300.0);
-                plot.allow_scroll(false).show(column, |plot| {
-                    for (curve, line) in own.iter().zip(lines) {
-                        plot.line(Line::new(words(&curve.name), line));
-                    }
-                });
+                let own = shown.iter().filter(|curve| curve.unit == *unit);
+                let lines = own.map(|curve| (words(&curve.name), self.points_of(curve)));
+                draw(column, unit, lines.collect());
             }
         });
     }
@@ -162,6 +179,79 @@ impl App {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The triangles in a colour that a plot of a curve consists of, in pixels.
+    fn triangles(line: Vec<[f64; 2]>) -> (Vec<[egui::Pos2; 3]>, Vec<String>) {
+        let context = egui::Context::default();
+        let mut output = egui::FullOutput::default();
+        for _ in 0..3 {
+            let input = egui::RawInput {
+                screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(330.0, 160.0))),
+                ..Default::default()
+            };
+            output = context.run_ui(input, |ui| draw(ui, "N", vec![("force".into(), line.clone())]));
+        }
+        let mut texts = Vec::new();
+        for shape in &output.shapes {
+            if let egui::Shape::Text(text) = &shape.shape {
+                texts.push(text.galley.text().to_owned());
+            }
+        }
+        let meshes = context.tessellate(output.shapes, output.pixels_per_point).into_iter();
+        let mut found = Vec::new();
+        for primitive in meshes {
+            let egui::epaint::Primitive::Mesh(mesh) = primitive.primitive else { continue };
+            for corners in mesh.indices.chunks(3) {
+                let corners = [0, 1, 2].map(|at| mesh.vertices[corners[at] as usize]);
+                // Curves have hues; all else is grey.
+                let coloured = |vertex: &egui::epaint::Vertex| {
+                    let [r, g, b, _] = vertex.color.to_array();
+                    r.max(g).max(b) - r.min(g).min(b) > 40
+                };
+                if corners.iter().all(coloured) {
+                    found.push(corners.map(|vertex| vertex.pos));
+                }
+            }
+        }
+        (found, texts)
+    }
+
+    /// A curve of an even width: nothing that is drawn of it is farther from its line than that, also where it drops, turns back, is a point
+    /// many times, or is not known.
+    #[test]
+    fn curves_are_lines_where_they_drop() {
+        let ramp = (0..400).map(|i| [0.01 * f64::from(i), 0.5 * f64::from(i)]);
+        let dropped =
+            ramp.clone().chain((0..400).map(|i| [4.0 + 0.01 * f64::from(i), 0.0])).collect::<Vec<_>>();
+        let spikes = (0..2000).map(|i| [0.004 * f64::from(i), f64::from(i % 2)]).collect();
+        let unknown = ramp.map(|[t, v]| [t, if t < 1.0 { f64::NAN } else { v }]).collect();
+        let same = vec![[0.0, 0.0], [1.0, 1.0], [1.0, 1.0], [1.0, 1.0], [1.0, 1.0], [2.0, 0.0]];
+        let (legend, _) = triangles(Vec::new());
+        for line in [dropped, spikes, unknown, same] {
+            let (mut triangles, _) = triangles(line.clone());
+            triangles.retain(|own| !legend.contains(own));
+            assert!(triangles.iter().flatten().all(|at| at.x.is_finite() && at.y.is_finite()));
+            assert!(triangles.len() > 4, "{}", triangles.len());
+            let widest = triangles.iter().map(|&[a, b, c]| {
+                let sides = [b - a, c - b, a - c].map(egui::Vec2::length);
+                let area = 0.5 * ((b - a).x * (c - a).y - (b - a).y * (c - a).x).abs();
+                // Width of a triangle: twice its area over its longest side.
+                2.0 * area / sides.into_iter().fold(1e-6, f32::max)
+            });
+            let widest = widest.fold(0.0, f32::max);
+            assert!(widest < 4.0, "{widest} points wide");
+        }
+    }
+
+    #[test]
+    fn plots_have_three_ticks_at_least() {
+        for top in [0.9, 1.0, 1.9, 4.2, 7.3, 99.0, 1.04e-3] {
+            let (_, texts) = triangles((0..50).map(|i| [f64::from(i), top * f64::from(i) / 49.0]).collect());
+            let numbers = texts.iter().filter(|text| text.parse::<f64>().is_ok()).count();
+            // Of the axis of time, too, which has three.
+            assert!(numbers >= 6, "{top}: {texts:?}");
+        }
+    }
 
     #[test]
     fn curves_have_names_in_words() {

@@ -41,6 +41,8 @@ const FRAMES: u64 = 10;
 const PICKS: u64 = 100;
 /// Wall time in which what has to happen does.
 const PATIENCE: Duration = Duration::from_secs(180);
+/// Wall time for which a button is pressed in one of the clicks: longer than a user's.
+const SLOW: Duration = Duration::from_secs(1);
 /// Simulated time [s] in which what is pulled comes to rest.
 const SETTLING: f64 = 1.0;
 
@@ -158,7 +160,7 @@ fn tried(app: &App) -> String {
 
 /// What a picture of the window shows.
 fn shown(app: &App) -> String {
-    let told = app.banner().map(|told| format!(": {}", told.text)).unwrap_or_default();
+    let told: String = app.banner().iter().map(|told| format!(": {}", told.text)).collect();
     let first = app.first_picture.unwrap_or_default();
     let frame = 1e3 * app.frame_seconds;
     format!(
@@ -264,6 +266,14 @@ fn keys() -> Vec<Cue> {
         Cue::key("Space pauses", Key::Space, |app| !app.frame.playing),
         Cue::key("R starts anew", Key::R, |app| app.frame.steps == 0),
         turns("E shows or hides edges", Key::E, |app| app.port.style.edges),
+        Cue::new(
+            "the view is copied",
+            |app| {
+                app.copy_view();
+                Vec::new()
+            },
+            |app| Ok(app.message.is_some()),
+        ),
         holding(Modifiers::COMMAND | Modifiers::CTRL),
         Cue::key("Ctrl and O lists what can be opened", Key::O, |app| {
             app.browser.shown && !app.browser.entries.is_empty()
@@ -363,7 +373,11 @@ fn pinning() -> Vec<Cue> {
                 move |app| vec![Event::PointerMoved(inside(app)), press(Key::P, true)],
                 |_| Ok(true),
             ),
-            Cue::new("a press", move |app| vec![button(inside(app), left, true)], |_| Ok(true)),
+            Cue::new("a press", move |app| vec![button(inside(app), left, true)], {
+                // As on a machine that is busy.
+                let mut pressed = None;
+                move |_| Ok(pressed.get_or_insert_with(Instant::now).elapsed() > SLOW)
+            }),
             Cue::new(
                 what,
                 move |app| vec![button(inside(app), left, false)],
@@ -395,10 +409,19 @@ fn following() -> Vec<Cue> {
         let there = move |app: &App| {
             (app.port.camera.azimuth - azimuth).abs() < 1e-9
                 && (app.port.camera.elevation - elevation).abs() < 0.2
+                && app.port.camera == app.port.fitted()
         };
         Cue::key("a number looks from a side", key, there)
     };
     vec![
+        Cue::new(
+            "the wheel comes nearer",
+            |app| {
+                app.port.camera.zoom(0.5);
+                Vec::new()
+            },
+            |_| Ok(true),
+        ),
         side(Key::Num1, 0.0, 0.0),
         side(Key::Num2, 180.0, 0.0),
         side(Key::Num5, 0.0, 90.0),
@@ -445,6 +468,18 @@ fn following() -> Vec<Cue> {
             },
         ),
         holding(Modifiers::NONE),
+        Cue::new(
+            "the mouse goes to the body",
+            |app| vec![Event::PointerMoved(inside(app)), press(Key::I, true)],
+            |_| Ok(true),
+        ),
+        Cue::new("a press", move |app| vec![button(inside(app), left, true)], |_| Ok(true)),
+        Cue::new(
+            "a click with I follows a point",
+            move |app| vec![button(inside(app), left, false)],
+            |app| Ok(app.frame.followed.len() == 3),
+        ),
+        Cue::new("I is let go", |_| vec![press(Key::I, false)], |_| Ok(true)),
     ]
 }
 

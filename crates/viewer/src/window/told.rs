@@ -57,21 +57,27 @@ impl Kind {
 }
 
 impl App {
-    /// What a user should know now: why the run cannot go on, what was done last, what the run notes, what the scene warns of. A message
-    /// that was closed does not come back.
-    pub(super) fn banner(&self) -> Option<Told> {
+    /// What a user should know now: why the run cannot go on, then what was done last, else what the run notes or the scene warns of. A
+    /// failure, a note and a warning that were closed do not come back; a message does where it comes anew.
+    pub(super) fn banner(&self) -> Vec<Told> {
         let warned = |text: String| Told { kind: Kind::Warning, text };
-        let failure = self.frame.failure.clone().map(Told::failure);
-        let notes = self.frame.note.iter().chain(&self.warnings).cloned().map(warned);
-        let mut all = failure.into_iter().chain(self.message.clone()).chain(notes);
-        all.find(|told| !self.closed.contains(&told.text))
+        let open = |told: &Told| !self.closed.contains(&told.text);
+        let failure = self.frame.failure.clone().map(Told::failure).filter(open);
+        let mut notes = self.frame.note.iter().chain(&self.warnings).cloned().map(warned);
+        let second = self.message.clone().or_else(|| notes.find(open).filter(|_| failure.is_none()));
+        failure.into_iter().chain(second).collect()
     }
 
-    /// The line, until it is closed.
+    /// The lines, until they are closed.
     pub(super) fn tell(&mut self, ui: &mut Ui) {
-        let told = self.banner();
-        if tell(ui, told.as_ref()) {
-            self.closed.extend(told.map(|told| told.text));
+        for told in self.banner() {
+            if !tell(ui, Some(&told)) {
+                continue;
+            }
+            match self.message.take_if(|message| *message == told) {
+                Some(_) => {}
+                None => _ = self.closed.insert(told.text),
+            }
         }
     }
 }
@@ -82,7 +88,7 @@ pub(super) fn tell(ui: &mut Ui, told: Option<&Told>) -> bool {
     let dark = ui.visuals().dark_mode;
     let (word, paper, ink) = kind.look(dark);
     let frame = Frame::NONE.fill(paper).inner_margin(Margin::symmetric(10, 5));
-    let line = egui::Panel::bottom("told").frame(frame).show(ui, |ui| {
+    let line = egui::Panel::bottom(egui::Id::unique(("told", text))).frame(frame).show(ui, |ui| {
         let row = ui.horizontal_wrapped(|ui| {
             ui.label(RichText::new(word).strong().color(ink));
             let ink = if dark { ink.lerp_to_gamma(Color32::WHITE, 0.5) } else { Color32::from_gray(25) };

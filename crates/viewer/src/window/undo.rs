@@ -2,6 +2,7 @@
 
 use super::App;
 use crate::hand::{Hand, Which};
+use crate::samples::SECOND_HAND;
 use crate::session::Order;
 
 /// Something that can be taken back.
@@ -24,7 +25,13 @@ impl App {
     /// The same with one of the hands.
     pub(super) fn act_with(&mut self, which: Which, hand: Hand) {
         match hand {
-            Hand::Take(..) => self.acts.push(Act::Pull(self.frame.steps)),
+            Hand::Take(..) => {
+                self.acts.push(Act::Pull(self.frame.steps));
+                // The force of the first hand is plotted from the start.
+                if which == Which::Second {
+                    self.plotted.insert(SECOND_HAND.into());
+                }
+            }
             Hand::Pin(_) => self.acts.push(Act::Pin),
             _ => {}
         }

@@ -10,8 +10,8 @@ use eframe::egui_wgpu::Callback;
 use eframe::{CreationContext, Frame, wgpu};
 use pliant_geometry::Vector3;
 use pliant_picture::{
-    Background, Camera, Extremes, MISSING, NO_VALUE, Plane, Projection, Regions, Style, Subject, Target,
-    readable, scale_marks,
+    Background, Camera, Extremes, Look, MISSING, NO_VALUE, Plane, Projection, Regions, Section, Style,
+    Subject, Target, beyond, noise, readable, scale_marks,
 };
 
 use super::paint::{Paint, SAMPLES, place};
@@ -35,15 +35,19 @@ const COLOURS: [Color32; 3] =
 /// Letters of the sides of a patient to which x, y and z point, and of the other sides: right and left, front (anterior) and back, head (superior)
 /// and feet.
 const SIDES_OF_PATIENT: [[&str; 2]; 3] = [["R", "L"], ["A", "P"], ["S", "I"]];
-/// Azimuth and elevation [°] of the sides: front, back, left, right, top, bottom.
-const SIDES: [(Key, [f64; 2]); 6] = [
-    (Key::Num1, [0.0, 0.0]),
-    (Key::Num2, [180.0, 0.0]),
-    (Key::Num3, [90.0, 0.0]),
-    (Key::Num4, [270.0, 0.0]),
-    (Key::Num5, [0.0, 89.9]),
-    (Key::Num6, [0.0, -89.9]),
-];
+
+/// Azimuth and elevation [°] of the sides: front, back, left, right, top, bottom. Those of a patient, whose front is along y, or of x.
+fn sides(patient: bool) -> [(Key, [f64; 2]); 6] {
+    let front = if patient { 90.0 } else { 0.0 };
+    [
+        (Key::Num1, [front, 0.0]),
+        (Key::Num2, [front + 180.0, 0.0]),
+        (Key::Num3, [front + 90.0, 0.0]),
+        (Key::Num4, [(front + 270.0) % 360.0, 0.0]),
+        (Key::Num5, [front, 89.9]),
+        (Key::Num6, [front, -89.9]),
+    ]
+}
 
 /// A section: whether it is on, its normal, and how far along it the plane lies, as a part of the body's extent at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,8 +108,12 @@ pub(super) struct Viewport {
     /// Whether the subject is other than on the device.
     renewed: bool,
     pub camera: Camera,
-    /// From where it is seen at first.
+    /// From where it is seen at first; target and height are those that fit.
     pub home: Camera,
+    /// What is in the middle at first [m], unless all is, and the magnification of what fits.
+    closer: (Option<Vector3>, f64),
+    /// Whether software draws.
+    software: bool,
     pub style: Style,
     /// Regions with a look of their own.
     pub regions: Regions,
@@ -116,8 +124,15 @@ pub(super) struct Viewport {
     /// Whether a part of a body has no value of the field.
     pub missing: bool,
     pub cut: Cut,
-    /// Points on the surface, increasing.
+    /// Points on the surface, increasing, and those of regions that show values.
     pub surface: Vec<u32>,
+    showing: Vec<u32>,
+    /// The regions of which the latter are.
+    shown: Option<Regions>,
+    /// Size of the body at rest [m], and the least and the greatest value that is seen.
+    extent: f64,
+    ends: Option<[f64; 2]>,
+    section: Section,
     /// Where something will be or has been [m], as far as it is known.
     pub reach: Arc<Vec<Vector3>>,
     /// Where the picture is in the window, in egui's points.
@@ -129,40 +144,61 @@ impl Viewport {
     ///
     /// # Errors
     /// If the window has no GPU.
-    pub fn new(context: &CreationContext<'_>, mut style: Style, camera: Camera) -> Result<Self, String> {
+    pub fn new(context: &CreationContext<'_>, look: &Look) -> Result<Self, String> {
         let state = context.wgpu_render_state.as_ref().ok_or("wgpu did not start")?;
-        // Software takes a twelfth longer for a frame with it.
-        style.occlusion &= state.adapter.get_info().device_type != wgpu::DeviceType::Cpu;
         let target = Target {
             format: state.target_format,
             depth: wgpu::TextureFormat::Depth32Float,
             samples: SAMPLES,
         };
-        Ok(Self {
+        let mut port = Self {
             target,
             subject: Arc::default(),
             points: Arc::default(),
             values: Arc::default(),
             fresh: true,
             renewed: false,
-            camera,
-            home: camera,
-            locked: style.range.is_some(),
-            cut: Cut::new(style.clip),
-            style,
+            camera: look.camera,
+            home: look.camera,
+            closer: (None, 1.0),
+            software: state.adapter.get_info().device_type == wgpu::DeviceType::Cpu,
+            locked: false,
+            cut: Cut::new(None),
+            style: look.style,
             regions: Regions::default(),
             patient: false,
             missing: false,
             surface: Vec::new(),
+            showing: Vec::new(),
+            shown: None,
+            extent: 0.0,
+            ends: None,
+            section: Section::default(),
             reach: Arc::default(),
             rect: Rect::ZERO,
-        })
+        };
+        port.take_look(look);
+        Ok(port)
+    }
+
+    /// Looks as a scene asks for.
+    pub fn take_look(&mut self, look: &Look) {
+        self.style = look.style;
+        // Software takes a twelfth longer for a frame with it.
+        self.style.occlusion &= !self.software;
+        self.locked = look.style.range.is_some();
+        self.cut = Cut::new(look.style.clip);
+        self.home = look.camera;
+        self.closer = (look.target, if look.zoom > 0.0 { look.zoom } else { 1.0 });
+        self.camera = self.at_start();
     }
 
     /// Looks at another body, at rest and without values.
     pub fn renew(&mut self, subject: &Arc<Subject>) {
         self.subject = subject.clone();
         self.surface = subject.surface_points();
+        self.extent = subject.extent();
+        self.shown = None;
         self.points = Arc::new(subject.points.clone());
         self.values = Arc::default();
         self.renewed = true;
@@ -176,21 +212,35 @@ impl Viewport {
         let own = Arc::make_mut(&mut self.values);
         own.clear();
         own.extend_from_slice(values);
-        self.missing = self.subject.lacks_value(values);
         self.fresh = true;
     }
 
-    /// The values on the surface.
-    pub fn values_seen(&self) -> impl Iterator<Item = f64> + '_ {
-        self.surface.iter().filter_map(|&point| self.values.get(point as usize)).copied()
+    /// The range of the values that are seen, of a unit.
+    pub fn range_seen(&mut self, unit: &str) -> Option<[f64; 2]> {
+        if self.shown.as_ref() != Some(&self.regions) {
+            self.showing = self.subject.showing_points(&self.regions);
+            self.shown = Some(self.regions.clone());
+        }
+        let mut extremes = Extremes::above(noise(unit, self.extent));
+        let clip = self.style.clip;
+        let is_seen =
+            |point: &&u32| clip.is_none_or(|plane| plane.distance(&self.points[**point as usize]) <= 0.0);
+        let seen: Vec<u32> = self.showing.iter().filter(is_seen).copied().collect();
+        self.missing = self.subject.lacks_value(&seen, &self.values);
+        extremes.add(seen.iter().filter_map(|&point| self.values.get(point as usize)).copied());
+        if let Some(plane) = clip.filter(|_| !self.values.is_empty()) {
+            self.section.cut(&self.subject, &self.points, &self.values, &plane);
+            extremes.add(self.section.values(&self.subject, &self.regions));
+        }
+        self.ends = extremes.ends();
+        extremes.range(self.style.map)
     }
 
-    /// Takes the range of the values, unless it is locked.
-    pub fn fit_range(&mut self) {
+    /// Takes the range of the values of a unit, unless it is locked.
+    pub fn fit_range(&mut self, unit: &str) {
+        let range = self.range_seen(unit);
         if !self.locked {
-            let mut extremes = Extremes::default();
-            extremes.add(self.values_seen());
-            self.style.range = extremes.range(self.style.map);
+            self.style.range = range;
         }
     }
 
@@ -212,7 +262,7 @@ impl Viewport {
         let first = self.rect == Rect::ZERO;
         self.rect = rect;
         if first {
-            self.fit();
+            self.camera = self.at_start();
         }
         self.style.clip = self.cut.plane(&self.subject);
         response
@@ -252,31 +302,70 @@ impl Viewport {
 
     /// The camera that sees all, from the side from which it looks.
     pub fn fitted(&self) -> Camera {
-        let mut camera =
-            Camera { azimuth: self.camera.azimuth, elevation: self.camera.elevation, ..self.home };
-        // Beside the scale of colours and below the figures, as parts of the height.
+        self.fit_from(Camera { azimuth: self.camera.azimuth, elevation: self.camera.elevation, ..self.home })
+    }
+
+    /// The camera of the start.
+    pub fn at_start(&self) -> Camera {
+        let mut camera = self.fit_from(self.home);
+        let (target, zoom) = self.closer;
+        camera.zoom(1.0 / zoom);
+        if let Some(target) = target {
+            camera.target = target;
+            let [right, up] = self.beside();
+            camera.pan(right, up);
+        }
+        camera
+    }
+
+    /// How far the middle of what is seen lies beside that of the picture, in heights to the right and up: beside the scale of colours and
+    /// below the figures.
+    fn beside(&self) -> [f64; 2] {
         let height = self.rect.height().max(SCALE);
-        let scale = f64::from(SCALE / height);
-        let figures = f64::from(FIGURES / height).min(0.4);
+        [-0.5 * f64::from(SCALE / height), -0.5 * f64::from(FIGURES / height).min(0.4)]
+    }
+
+    fn fit_from(&self, mut camera: Camera) -> Camera {
+        let [right, up] = self.beside();
+        let (scale, figures) = (-2.0 * right, -2.0 * up);
         let aspect = ((self.aspect() - scale) / (1.0 - figures)).max(0.5);
         let now = self.surface.iter().map(|&point| &self.points[point as usize]);
         camera.fit(now.chain(&*self.reach), aspect);
         camera.height /= 1.0 - figures;
-        camera.pan(-0.5 * scale, -0.5 * figures);
+        camera.pan(right, up);
         camera
+    }
+
+    /// What the camera looks at and how near it is where it does not see all: target [m] and magnification of what fits.
+    pub fn closer(&self) -> Option<(Vector3, f64)> {
+        let fitted = self.fitted();
+        let moved = (self.camera.target - fitted.target).norm() > 0.01 * fitted.height
+            || (self.camera.height / fitted.height - 1.0).abs() > 0.01;
+        let mut middle = self.camera;
+        let [right, up] = self.beside();
+        middle.pan(-right, -up);
+        moved.then(|| (middle.target, fitted.height / self.camera.height))
     }
 
     /// Learns where something will be or has been; goes on to see all, if it did.
     pub fn learn(&mut self, reach: Arc<Vec<Vector3>>) {
-        let saw_all = self.camera == self.fitted();
+        let (saw_all, at_start) = (self.camera == self.fitted(), self.camera == self.at_start());
         self.reach = reach;
-        if saw_all {
+        if at_start {
+            self.camera = self.at_start();
+        } else if saw_all {
             self.fit();
         }
     }
 
     pub fn fit(&mut self) {
         self.camera = self.fitted();
+    }
+
+    /// Sees all from a side: azimuth and elevation [°].
+    fn look_from(&mut self, [azimuth, elevation]: [f64; 2]) {
+        (self.camera.azimuth, self.camera.elevation) = (azimuth, elevation);
+        self.fit();
     }
 
     /// What a mouse does beside what it holds: turns, moves and comes nearer.
@@ -320,9 +409,13 @@ impl Viewport {
             };
             self.camera.projection = self.home.projection;
         }
-        let home = [(Key::Num0, [self.home.azimuth, self.home.elevation])];
-        for (_, [azimuth, elevation]) in home.into_iter().chain(SIDES).filter(|(key, _)| pressed(*key)) {
-            (self.camera.azimuth, self.camera.elevation) = (azimuth, elevation);
+        if pressed(Key::Num0) {
+            self.camera = self.at_start();
+        }
+        for (key, side) in sides(self.patient) {
+            if pressed(key) {
+                self.look_from(side);
+            }
         }
         let cuts = pressed(Key::C);
         self.cut.on ^= cuts;
@@ -373,7 +466,7 @@ impl Viewport {
             rect.right_top() + vec2(-78.0, 70.0),
             Pos2::new(rect.right() - 60.0, (rect.bottom() - 60.0).max(rect.top() + 90.0)),
         );
-        self.card(painter, Rect::from_min_max(bar.min - vec2(36.0, 46.0), bar.max + vec2(52.0, 8.0)));
+        self.card(painter, Rect::from_min_max(bar.min - vec2(36.0, 46.0), bar.max + vec2(52.0, 54.0)));
         let right = Pos2::new(rect.right() - 12.0, bar.top() - 34.0);
         painter.text(right, Align2::RIGHT_CENTER, quantity, FontId::proportional(14.0), ink);
         if !unit.is_empty() {
@@ -392,8 +485,12 @@ impl Viewport {
             let place = Pos2::new(bar.right() + 6.0, bar.bottom() - part as f32 * bar.height());
             painter.text(place, Align2::LEFT_CENTER, text, FontId::proportional(13.0), ink);
         }
+        for (text, row) in beyond([low, high], self.ends, &unit, factor).into_iter().zip(0..) {
+            let place = rect.right_bottom() - vec2(12.0, 42.0 - 16.0 * row as f32);
+            painter.text(place, Align2::RIGHT_CENTER, text, FontId::proportional(13.0), ink);
+        }
         if self.missing {
-            let place = rect.right_bottom() - vec2(12.0, 34.0);
+            let place = rect.right_bottom() - vec2(12.0, 10.0);
             let text = painter.text(place, Align2::RIGHT_CENTER, NO_VALUE, FontId::proportional(13.0), ink);
             let [r, g, b] = MISSING;
             let swatch = Rect::from_center_size(text.left_center() - vec2(12.0, 0.0), vec2(12.0, 12.0));
@@ -401,8 +498,9 @@ impl Viewport {
         }
     }
 
-    /// The range of colours, typed in the unit of the scale: a typed one is locked.
-    pub fn edit_range(&mut self, ui: &mut egui::Ui, unit: &str) {
+    /// The range of colours, typed in the unit of the scale: a typed one is locked. What is wrong with one that is not taken.
+    pub fn edit_range(&mut self, ui: &mut egui::Ui, unit: &str) -> Option<String> {
+        let mut refused = None;
         if let Some(range) = self.style.range {
             let size = range[0].abs().max(range[1].abs());
             let (unit, factor) = readable(unit, size);
@@ -411,18 +509,28 @@ impl Viewport {
             let changed = ui.horizontal(|ui| {
                 let ends = typed.each_mut().map(|end| {
                     let number = egui::DragValue::new(end).speed(speed).max_decimals(4);
-                    ui.add(number).on_hover_text("an end of the range of colours").changed()
+                    ui.add(number.custom_parser(typed_number))
+                        .on_hover_text("an end of the range of colours")
+                        .changed()
                 });
-                ui.label(unit);
+                ui.label(&unit);
                 ends.contains(&true)
             });
-            if changed.inner && typed[0] < typed[1] {
-                self.style.range = Some(typed.map(|value| value / factor));
-                self.locked = true;
+            if changed.inner {
+                let [low, high] = typed;
+                if low < high {
+                    self.style.range = Some(typed.map(|value| value / factor));
+                    self.locked = true;
+                } else {
+                    refused = Some(format!(
+                        "the range of colours must begin below its end; found {low} to {high} {unit}, it stays as it was"
+                    ));
+                }
             }
         }
         ui.checkbox(&mut self.locked, "Lock the range")
             .on_hover_text("L: keeps the range while values change");
+        refused
     }
 
     /// The axes and a bar of a round length in the lower left corner.
@@ -463,6 +571,12 @@ fn letters(axis: usize, patient: bool, along: Vec2) -> [&'static str; 2] {
     }
 }
 
+/// A typed number; what is none is not a number, so that it is refused and not passed over.
+pub(super) fn typed_number(text: &str) -> Option<f64> {
+    let text: String = text.chars().filter(|letter| !letter.is_whitespace()).collect();
+    Some(text.replace('−', "-").parse().unwrap_or(f64::NAN))
+}
+
 /// By how much the wheel turned, and a pinch.
 pub(super) fn scrolled(context: &egui::Context) -> f32 {
     context.input(|input| input.smooth_scroll_delta.y + 200.0 * (input.zoom_delta() - 1.0))
@@ -497,6 +611,25 @@ mod tests {
         assert!(axes[2].1.length() < 1e-6);
         let z = axes.iter().find(|(axis, _)| *axis == 2).unwrap();
         assert!((z.1 - vec2(0.0, -1.0)).length() < 1e-6, "up is up");
+    }
+
+    /// The front of a patient is seen from y, their left from −x; without a patient the front is along x.
+    #[test]
+    fn sides_are_those_of_the_patient() {
+        let towards = |patient: bool, number: usize| {
+            let (_, [azimuth, elevation]) = sides(patient)[number];
+            Camera { azimuth, elevation, ..Camera::default() }.axes()[2].map(|x| (100.0 * x).round() / 100.0)
+        };
+        let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
+        let patient = [0, 1, 2, 3, 4, 5].map(|number| towards(true, number));
+        assert_eq!(patient, [y, -y, -x, x, z, -z]);
+        assert_eq!([0, 1, 2, 3].map(|number| towards(false, number)), [x, -x, y, -y]);
+    }
+
+    #[test]
+    fn what_is_typed_is_a_number_or_none() {
+        assert_eq!([" 1 000", "−2.5", "1e3"].map(typed_number), [1000.0, -2.5, 1000.0].map(Some));
+        assert!(["abc", "", "5 kPa"].into_iter().all(|text| typed_number(text).unwrap().is_nan()));
     }
 
     /// x goes to the right of a patient, y to the front, z to the head.
