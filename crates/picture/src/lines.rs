@@ -20,6 +20,30 @@ pub(crate) struct Line {
 }
 
 impl Line {
+    /// From a place on an edge to one on another: two nodes each, and the part of the way from the first to the second.
+    pub fn across([from, to]: [([u32; 2], f64); 2]) -> Self {
+        let mut line = Self::default();
+        for (at, (nodes, part), sign) in [(0, from, -0.5), (2, to, 0.5)] {
+            for (node, weight) in [(0, 1.0 - part), (1, part)] {
+                line.nodes[at + node] = nodes[node];
+                line.middle[at + node] = 0.5 * weight as f32;
+                line.half[at + node] = sign * weight as f32;
+            }
+        }
+        line
+    }
+
+    /// Its ends [m] at some points.
+    #[cfg(test)]
+    pub fn at(&self, points: &[Vector3]) -> [Vector3; 2] {
+        let sum = |sign: f32| {
+            let weights =
+                self.middle.iter().zip(&self.half).map(|(middle, half)| f64::from(middle + sign * half));
+            self.nodes.iter().zip(weights).map(|(&node, weight)| points[node as usize] * weight).sum()
+        };
+        [sum(-1.0), sum(1.0)]
+    }
+
     /// The points that an edge connects.
     pub fn ends(&self) -> [u32; 2] {
         [self.nodes[0], self.nodes[1]]

@@ -258,6 +258,8 @@ pub struct Drawn {
     strokes: Vec<Line>,
     bars: u32,
     section_fibres: u32,
+    /// Lines along which it cuts shells, after these.
+    section_shells: u32,
     /// Of the surface.
     corners: u32,
     /// All triangles of the subject; a list in another order lies behind them on the device.
@@ -378,6 +380,7 @@ impl Drawn {
             strokes,
             bars: subject.bars.len() as u32,
             section_fibres: 0,
+            section_shells: 0,
             corners: 3 * subject.outer as u32,
             triangle_count: subject.triangles.len() as u32,
             vertex_count: subject.vertices.len() as u32,
@@ -469,18 +472,20 @@ impl Drawn {
         section: &Section,
     ) {
         self.section_corners = section.corners.len() as u32;
-        self.section_fibres = section.fibres.len() as u32;
+        (self.section_fibres, self.section_shells) =
+            (section.fibres.len() as u32, section.shells.len() as u32);
+        let lines = [&section.fibres[..], &section.shells].concat();
         let fits = |buffer: &wgpu::Buffer, bytes: usize| buffer.size() >= bytes as u64;
         let before = (MOST_EDGES + self.strokes.len()) * size_of::<Line>();
-        let fibres: &[u8] = bytemuck::cast_slice(&section.fibres);
+        let cut: &[u8] = bytemuck::cast_slice(&lines);
         let corners: &[u8] = bytemuck::cast_slice(&section.corners);
-        if fits(&self.section, corners.len()) && fits(&self.lines, before + fibres.len()) {
+        if fits(&self.section, corners.len()) && fits(&self.lines, before + cut.len()) {
             queue.write_buffer(&self.section, 0, corners);
-            queue.write_buffer(&self.lines, before as u64, fibres);
+            queue.write_buffer(&self.lines, before as u64, cut);
             return;
         }
         self.section = storage(device, &section.corners);
-        self.lines = storage(device, &[&self.first[..], &self.strokes, &section.fibres].concat());
+        self.lines = storage(device, &[&self.first[..], &self.strokes, &lines].concat());
         self.bind_shape(device, renderer);
     }
 
@@ -583,10 +588,14 @@ impl Drawn {
         }
         cut(pass, false);
         pass.set_pipeline(&renderer.fibres);
+        let surface = first + self.strokes.len() as u32;
+        let fibres = surface + self.section_fibres;
         if style.fibres {
-            let surface = first + self.strokes.len() as u32;
-            let last = surface + if style.clip.is_some() { self.section_fibres } else { 0 };
+            let last = if style.clip.is_some() { fibres } else { surface };
             pass.draw(6 * (first + self.bars)..6 * last, 0..1);
+        }
+        if is_cut {
+            pass.draw(6 * fibres..6 * (fibres + self.section_shells), 0..1);
         }
         if style.ghost {
             pass.set_bind_group(1, &self.poses[1].draw, &[]);

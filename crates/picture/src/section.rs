@@ -1,5 +1,5 @@
 //! Sections of volume cells by a plane. Linear interpolation gives the intersections of the plane and the cell edges; sorted
-//! around their middle, these points form a convex polygon. Leaves out: cells so distorted that their section is not convex.
+//! around their middle, these points form a convex polygon. A shell is cut along a line. Leaves out: cells so distorted that their section is not convex.
 
 use std::collections::BTreeSet;
 
@@ -24,12 +24,14 @@ pub(crate) struct Corner {
     pub edges: u32,
 }
 
-/// The triangles of a section, and the fibres in it.
+/// The triangles of a section, the fibres in it, and where it cuts shells.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Section {
     /// Three a triangle.
     pub(crate) corners: Vec<Corner>,
     pub(crate) fibres: Vec<Line>,
+    /// Where the plane cuts shells.
+    pub(crate) shells: Vec<Line>,
 }
 
 /// Where a plane cuts an edge of a cell.
@@ -46,6 +48,15 @@ impl Section {
         self.corners.clear();
         self.fibres.clear();
         let distances: Vec<f64> = points.iter().map(|point| plane.distance(point)).collect();
+        self.shells.clear();
+        self.shells.extend(subject.shell_triangles().filter_map(|corners| {
+            let crossed = [[0, 1], [1, 2], [2, 0]].map(|ends: [usize; 2]| ends.map(|at| corners[at]));
+            let mut cuts = crossed.into_iter().filter_map(|nodes| {
+                let [a, b] = nodes.map(|node| distances[node as usize]);
+                ((a > 0.0) != (b > 0.0)).then(|| (nodes, a / (a - b)))
+            });
+            Some(Line::across([cuts.next()?, cuts.next()?]))
+        }));
         let across = plane.normal.cross(&any_other(&plane.normal)).normalize();
         let axes = [across, plane.normal.cross(&across)];
         let rest = &subject.points;
@@ -125,6 +136,8 @@ fn any_other(direction: &Vector3) -> Vector3 {
 
 #[cfg(test)]
 mod tests {
+    use pliant_geometry::{CellBlock, CellKind, Mesh};
+
     use super::*;
     use crate::subject::tests::{block, tets};
 
@@ -150,6 +163,26 @@ mod tests {
                 assert!((x + 2.0 * y - value).abs() < 1e-5);
             }
         }
+    }
+
+    /// A sheet over the unit square is cut along a line of length 1 / n_y, as straight as the plane.
+    #[test]
+    fn a_shell_is_cut_along_a_line() {
+        let mut mesh = Mesh::default();
+        let place = |index: u32| Vector3::new(f64::from(index % 4), f64::from(index / 4), 0.0) / 3.0;
+        mesh.points = (0..16).map(place).collect();
+        let squares = (0..9).map(|cell| cell / 3 * 4 + cell % 3);
+        let nodes = squares.flat_map(|low| [low, low + 1, low + 5, low, low + 5, low + 4]).collect();
+        mesh.blocks.push(CellBlock::new(CellKind::Triangle, nodes));
+        let subject = Subject::new(&mesh);
+        let plane = Plane::through(&Vector3::new(0.41, 0.5, 0.0), &Vector3::new(1.0, 0.3, 0.0)).unwrap();
+        let mut section = Section::default();
+        section.cut(&subject, &mesh.points, &[], &plane);
+        let ends: Vec<[Vector3; 2]> = section.shells.iter().map(|line| line.at(&mesh.points)).collect();
+        assert!(ends.iter().flatten().all(|end| plane.distance(end).abs() < 1e-6));
+        let length: f64 = ends.iter().map(|[a, b]| (a - b).norm()).sum();
+        assert!((length - 1.0 / plane.normal.x).abs() < 1e-6, "{length}");
+        assert!(section.corners.is_empty());
     }
 
     #[test]

@@ -233,6 +233,9 @@ pub struct Look {
     pub legend: Legend,
 }
 
+/// Size of a gap [m] below which it is round-off: the finest tissue that is meshed has elements a thousand times as large.
+const LEAST_GAP: f64 = 1e-8;
+
 /// What frames have in common.
 #[derive(Default)]
 struct Common {
@@ -398,8 +401,7 @@ impl Look {
             }
         }
         if let Some(gap) = shown.gap {
-            let (unit, factor) = readable("m", gap.abs().max(1e-6));
-            note.push_str(&format!(", least gap {:.3} {unit}", gap * factor));
+            note.push_str(&format!(", {}", gap_note(gap)));
         }
         if let Some(step) = shown.step {
             let (unit, factor) = readable("s", step);
@@ -475,6 +477,15 @@ impl Look {
     }
 }
 
+/// The least gap [m] in words: round-off is none.
+fn gap_note(gap: f64) -> String {
+    let (unit, factor) = readable("m", gap.abs().max(LEAST_GAP));
+    match gap.abs() < LEAST_GAP {
+        true => "least gap 0".into(),
+        false => format!("least gap {:.3} {unit}", gap * factor).replace('-', "−"),
+    }
+}
+
 /// Names of the fields of points and cells.
 fn fields(mesh: &Mesh) -> Vec<String> {
     let cells = mesh.blocks.iter().flat_map(|block| block.data.keys());
@@ -489,6 +500,16 @@ mod tests {
     use pliant_geometry::io::pvd_text;
 
     use super::*;
+
+    #[test]
+    fn gaps_of_round_off_are_none() {
+        assert_eq!([-1e-9, 0.0, 2e-5, -3e-4].map(gap_note), [
+            "least gap 0",
+            "least gap 0",
+            "least gap 20.000 µm",
+            "least gap −300.000 µm"
+        ]);
+    }
 
     #[test]
     fn a_list_whose_writer_was_stopped_shows_its_whole_frames() {

@@ -289,6 +289,14 @@ impl Subject {
             .map(|&[a, b, c, _]| [a, b, c].map(|vertex| self.vertices[vertex as usize]))
     }
 
+    /// The points of the triangles of shells.
+    pub(crate) fn shell_triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+        let own = self.triangles().zip(&self.parents).zip(&self.triangles);
+        let shells =
+            own.filter(|((_, parent), triangle)| parent.kind.dimension() == 2 && triangle[3] & STEEL == 0);
+        shells.map(|((corners, _), _)| corners)
+    }
+
     /// The cell of the mesh that a triangle is a part of.
     pub fn cell(&self, triangle: usize) -> Option<CellId> {
         self.parents.get(triangle).copied()

@@ -309,7 +309,7 @@ impl Finished {
     }
 
     fn top(&mut self, ui: &mut egui::Ui) {
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             let word = if self.timeline.playing { "Pause" } else { "Play" };
             if ui.button(word).on_hover_text("Space").clicked() {
                 self.timeline.play();
@@ -337,9 +337,7 @@ impl Finished {
             {
                 self.taking.ask(ui.ctx());
             }
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                ui.label(self.run.folder.display().to_string());
-            });
+            ui.label(self.run.folder.display().to_string());
         });
     }
 

@@ -501,6 +501,9 @@ impl App {
     }
 }
 
+/// Height of what is left for plots and the picture below which plots are left out.
+const LOW: f32 = 380.0;
+
 /// The message after a scene was read again.
 const REPLACED: &str = "the scene was read anew";
 
@@ -524,7 +527,8 @@ impl eframe::App for App {
             egui::Panel::right("side").default_size(220.0).show(ui, |ui| self.side(ui));
         }
         self.tell(ui);
-        if self.plots_shown {
+        // In a low window the picture comes first.
+        if self.plots_shown && ui.available_height() > LOW {
             egui::Panel::bottom("plots").show(ui, |ui| self.plots(ui));
         }
         egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| self.scene(ui));

@@ -25,7 +25,8 @@ const TENSOR: [Option<Component>; 6] = {
 
 impl App {
     pub(super) fn top(&mut self, ui: &mut egui::Ui) {
-        ui.horizontal(|ui| {
+        // In a small window, or with large text, buttons take several lines.
+        ui.horizontal_wrapped(|ui| {
             let word = if self.frame.playing { "Pause" } else { "Play" };
             if ui.button(word).on_hover_text("Space").clicked() {
                 self.order(Order::Play(!self.frame.playing));
@@ -66,9 +67,7 @@ impl App {
             self.keep(ui);
             ui.separator();
             ui.menu_button("Window", |ui| self.settings(ui));
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                ui.label(self.title());
-            });
+            ui.label(self.title());
         });
     }
 
