@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use nalgebra::Matrix3;
+
 use crate::Vector3;
 
 /// Shape of a cell and the number and order of its nodes (the order of VTK).
@@ -167,6 +169,17 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// Turns or mirrors the mesh about the origin: its points, and its data of three components as vectors.
+    pub fn transform(&mut self, map: &Matrix3<f64>) {
+        self.points.iter_mut().for_each(|point| *point = map * *point);
+        let of_cells = self.blocks.iter_mut().flat_map(|block| block.data.values_mut());
+        for array in self.point_data.values_mut().chain(of_cells).filter(|array| array.components == 3) {
+            for vector in array.values.chunks_exact_mut(3) {
+                vector.copy_from_slice((map * Vector3::from_column_slice(vector)).as_slice());
+            }
+        }
+    }
+
     /// The block of a kind, if the mesh has these cells.
     pub fn block(&self, kind: CellKind) -> Option<&CellBlock> {
         self.blocks.iter().find(|block| block.kind == kind)

@@ -438,6 +438,66 @@ fn stl_solids_become_sets_and_corners_are_shared() {
     assert!(file.notes[0].contains("1 triangles with two equal corners"));
 }
 
+/// As some programs write them: every ending as two words.
+#[test]
+fn endings_of_stl_may_be_two_words() {
+    let content = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nend loop\nEnd Facet\n\
+                   end solid a\nsolid b\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 1 0\nvertex 0 1 0\nendloop\n\
+                   endfacet\nend solid b\n";
+    let triangles = &text(content, Format::Stl).mesh.blocks[0];
+    assert_eq!(triangles.nodes, [0, 1, 2, 0, 2, 3]);
+    assert_eq!(triangles.sets.keys().collect::<Vec<_>>(), ["a", "b"]);
+    let broken = content.replacen("end loop", "end lop", 1);
+    let error = read_bytes(broken.as_bytes(), Format::Stl).unwrap_err().to_string();
+    assert!(error.contains("`lop` found instead of `loop` in facet 1"), "{error}");
+}
+
+/// 3D Slicer writes surfaces with x to the left and y to the back, and says so. Images have x to the right and y to the front.
+#[test]
+fn surfaces_of_3d_slicer_have_the_axes_of_images() {
+    let lps = "3D Slicer output. SPACE=LPS";
+    let facets =
+        "facet normal 0 0 1\nouter loop\nvertex -1 -2 3\nvertex -4 -2 3\nvertex -4 -5 3\nendloop\nendfacet\n";
+    let triangle = "-1 -2 3\n-4 -2 3\n-4 -5 3\n";
+    let off = "POINTS 3 float\n".to_owned() + triangle + "POLYGONS 1 4\n3 0 1 2\n";
+    let vtp = |space: &str| {
+        let codes: Vec<String> = space.bytes().chain([0]).map(|byte| byte.to_string()).collect();
+        format!(
+            "<VTKFile type=\"PolyData\"><PolyData><FieldData><Array type=\"String\" Name=\"SPACE\" NumberOfTuples=\"1\" \
+             format=\"ascii\">{}</Array></FieldData><Piece NumberOfPoints=\"3\" NumberOfPolys=\"1\"><PointData>\
+             <DataArray type=\"Float64\" Name=\"Normals\" NumberOfComponents=\"3\" format=\"ascii\">1 0 0 0 1 0 0 0 1</DataArray>\
+             </PointData><Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">{}</DataArray></Points>\
+             <Polys><DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">0 1 2</DataArray>\
+             <DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">3</DataArray></Polys></Piece></PolyData></VTKFile>",
+            codes.join(" "),
+            triangle.replace('\n', " ")
+        )
+    };
+    let v = "v -1 -2 3\nv -4 -2 3\nv -4 -5 3\nf 1 2 3\n";
+    let ply = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n\
+               property list uchar int vertex_index\nend_header\n";
+    let all = [
+        (Format::Stl, format!("solid {lps}\n{facets}endsolid\n")),
+        (Format::Obj, format!("# {lps}\n{v}")),
+        (Format::Ply, format!("ply\nformat ascii 1.0\ncomment {lps}\n{ply}{triangle}3 0 1 2\n")),
+        (Format::Vtk, format!("# vtk DataFile Version 3.0\n{lps}\nASCII\nDATASET POLYDATA\n{off}")),
+        (Format::Vtp, vtp("LPS")),
+    ];
+    for (format, content) in all {
+        let file = text(&content, format);
+        let expected = points(&[[1.0, 2.0, 3.0], [4.0, 2.0, 3.0], [4.0, 5.0, 3.0]]);
+        assert_eq!(file.mesh.points, expected, "{format:?}");
+        assert!(file.notes.iter().any(|note| note.contains("(LPS): turned")), "{format:?}: {:?}", file.notes);
+        let kept = content.replace("SPACE=LPS", "SPACE=RAS");
+        if kept != content {
+            assert_eq!(text(&kept, format).mesh.points[0], Vector3::new(-1.0, -2.0, 3.0), "{format:?}");
+        }
+    }
+    let normals = &text(&vtp("LPS"), Format::Vtp).mesh.point_data["Normals"];
+    assert_eq!(normals.values, [-1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0]);
+    assert_eq!(text(&vtp("RAS"), Format::Vtp).mesh.points[0], Vector3::new(-1.0, -2.0, 3.0));
+}
+
 #[test]
 fn binary_stl_whose_head_begins_like_text() {
     let mut bytes = fs::read(data().join("meshio-binary.stl")).unwrap();

@@ -30,7 +30,9 @@ use std::fs;
 use std::io::{self, BufWriter, Read, Write};
 use std::path::Path;
 
-use crate::Mesh;
+use nalgebra::Matrix3;
+
+use crate::{Mesh, Vector3};
 pub use base64::encode as encode_base64;
 pub use error::{MeshFileError, MeshFileProblem, Place};
 pub use pvd::{read_pvd, read_torn_pvd};
@@ -215,11 +217,32 @@ fn read_of(path: &Path, bytes: &[u8], format: Format) -> Result<MeshFile, MeshFi
         Format::Gifti => gifti::read(bytes),
         Format::FreeSurfer => freesurfer::read(bytes),
     };
-    result.map_err(|fault| MeshFileError::Content {
+    let mut file = result.map_err(|fault| MeshFileError::Content {
         path: path.to_owned(),
         place: fault.place,
         problem: fault.problem,
-    })
+    })?;
+    if bytes[..bytes.len().min(HEAD)].windows(LPS.len()).any(|word| word == LPS) {
+        file.turn_from_lps();
+    }
+    Ok(file)
+}
+
+/// What 3D Slicer writes into the title or the comments of a mesh file whose x runs to the left and y to the back.
+const LPS: &[u8] = b"SPACE=LPS";
+
+/// Bytes that are searched for it.
+const HEAD: usize = 4096;
+
+impl MeshFile {
+    /// From the axes left, back, head (LPS) to right, front, head (RAS), those of images.
+    fn turn_from_lps(&mut self) {
+        self.mesh.transform(&Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0)));
+        self.notes.push(
+            "the file has the axes left, back, head (LPS): turned to right, front, head (RAS), as images have them"
+                .to_owned(),
+        );
+    }
 }
 
 /// Writes a mesh file in the format of the ending, in place of an older one only once it is complete.

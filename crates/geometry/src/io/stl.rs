@@ -108,7 +108,8 @@ fn read_text(bytes: &[u8]) -> Result<MeshFile, Fault> {
                 cursor.line();
                 read_facet(&mut cursor, &mut soup)?;
             }
-            b"endsolid" => {
+            // The rest of the line has the second word and the name.
+            b"endsolid" | b"end" => {
                 cursor.line();
             }
             // Lines that some programs add, such as `color`.
@@ -142,10 +143,21 @@ fn read_facet(cursor: &mut Cursor<'_>, soup: &mut Soup) -> Result<(), Fault> {
         let (x, y, z) = (cursor.real(what)?, cursor.real(what)?, cursor.real(what)?);
         *corner = finite(x, y, z, (3 * (facet - 1) + i) as u64, cursor.place())?;
     }
-    expect(cursor, b"endloop", facet)?;
-    expect(cursor, b"endfacet", facet)?;
+    expect_end(cursor, b"loop", facet)?;
+    expect_end(cursor, b"facet", facet)?;
     soup.triangle(corners);
     Ok(())
+}
+
+/// `endloop` as one word, or as two.
+fn expect_end(cursor: &mut Cursor<'_>, word: &[u8], facet: usize) -> Result<(), Fault> {
+    let joined = [b"end", word].concat();
+    let found = cursor.need_word(format_args!("facet {facet}"))?;
+    match found.to_ascii_lowercase() {
+        found if found == b"end" => expect(cursor, word, facet),
+        found if found == joined => Ok(()),
+        _ => Err(unexpected(cursor, found, &joined, facet)),
+    }
 }
 
 fn expect(cursor: &mut Cursor<'_>, word: &[u8], facet: usize) -> Result<(), Fault> {
@@ -153,7 +165,11 @@ fn expect(cursor: &mut Cursor<'_>, word: &[u8], facet: usize) -> Result<(), Faul
     if found.eq_ignore_ascii_case(word) {
         return Ok(());
     }
-    Err(cursor.malformed(format!("`{}` found instead of `{}` in facet {facet}", shown(found), shown(word))))
+    Err(unexpected(cursor, found, word, facet))
+}
+
+fn unexpected(cursor: &Cursor<'_>, found: &[u8], word: &[u8], facet: usize) -> Fault {
+    cursor.malformed(format!("`{}` found instead of `{}` in facet {facet}", shown(found), shown(word)))
 }
 
 /// Writes the surface cells of a mesh; quads as two triangles. Coordinates are rounded to 32 bits.

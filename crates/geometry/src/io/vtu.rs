@@ -197,6 +197,11 @@ impl<'a> Storage<'a> {
                 body_names = self.numbered_names(array)?;
             }
         }
+        // 3D Slicer names the axes of its files so; VTK writes texts as `Array`.
+        let mut is_lps = false;
+        for array in child(set, "FieldData").into_iter().flat_map(|fields| children(fields, "Array")) {
+            is_lps |= array.attribute("Name") == Some("SPACE") && self.text(array)?.starts_with(b"LPS");
+        }
         let mut points: Vec<Vector3> = Vec::new();
         let mut cells = Cells::default();
         let mut point_data = Joined::default();
@@ -227,23 +232,31 @@ impl<'a> Storage<'a> {
         }
         let mut mesh = cells.into_mesh(points, point_data.arrays, &mut notes)?;
         (mesh.label_names, mesh.body_names) = (label_names, body_names);
-        Ok(MeshFile { mesh, format: String::new(), notes, time })
+        let mut file = MeshFile { mesh, format: String::new(), notes, time };
+        if is_lps {
+            file.turn_from_lps();
+        }
+        Ok(file)
     }
 
     /// The names in texts such as `5 liver`, each ended by a 0. Other texts contain no names.
     fn numbered_names(&mut self, array: Node<'a, 'a>) -> Result<BTreeMap<i32, String>, Fault> {
-        let bytes: Bytes<'a> = if is_text(array) {
-            let codes = self.words(array, |cursor, what| cursor.integer(format_args!("{what}")))?;
-            codes.into_iter().map(|code| u8::try_from(code).unwrap_or(b'?')).collect::<Vec<u8>>().into()
-        } else {
-            self.bytes(array)?
-        };
+        let bytes = self.text(array)?;
         let named = bytes.split(|&byte| byte == 0).filter_map(|text| {
             let text = String::from_utf8_lossy(text);
             let (label, name) = text.split_once(' ')?;
             Some((label.parse().ok()?, clean_name(name)?))
         });
         Ok(named.collect())
+    }
+
+    /// The bytes of an array of texts.
+    fn text(&mut self, array: Node<'a, 'a>) -> Result<Bytes<'a>, Fault> {
+        if !is_text(array) {
+            return self.bytes(array);
+        }
+        let codes = self.words(array, |cursor, what| cursor.integer(format_args!("{what}")))?;
+        Ok(codes.into_iter().map(|code| u8::try_from(code).unwrap_or(b'?')).collect::<Vec<u8>>().into())
     }
 
     /// The line, from 1, of a byte of the XML.
