@@ -5,7 +5,7 @@ use std::path::Path;
 use pliant_geometry::io::{self, MeshFile};
 use pliant_geometry::{CellKind, Mesh, QualityReport, Spread, Vector3, boundary, diagnose};
 use pliant_meshing::{Curvature, Hausdorff, Percentiles, Thickness, TriangleMesh};
-use pliant_scene::SizeDoubt;
+use pliant_scene::{SizeDoubt, foreign_file};
 use pliant_sim::number;
 use serde_json::{Map, Value as Json, json};
 
@@ -66,7 +66,10 @@ fn read(path: &Path, scale: f64, option: &str) -> Result<MeshFile, Failure> {
         let message = format!("`{option}` must be greater than 0, found {scale}");
         return Err(Failure::plain(message, "0.001 for millimetres"));
     }
-    let mut file = io::read(path).map_err(|error| Failure::plain(error, ""))?;
+    let mut file = io::read(path).map_err(|error| match foreign_file(path) {
+        Some([what, help]) => Failure::plain(format!("`{}` is {what}", path.display()), help),
+        None => Failure::plain(error, ""),
+    })?;
     file.mesh.points.iter_mut().for_each(|point| *point *= scale);
     Ok(file)
 }

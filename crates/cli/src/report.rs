@@ -3,7 +3,8 @@
 use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{self, IsTerminal, Write};
-use std::time::Duration;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::Diagnostic;
@@ -113,8 +114,15 @@ fn theme() -> miette::GraphicalTheme {
     if colours { miette::GraphicalTheme::unicode() } else { miette::GraphicalTheme::unicode_nocolor() }
 }
 
-/// A progress bar with the time left and the real-time factor; hidden without a terminal.
-pub struct Bar(ProgressBar);
+/// Time between lines of progress without a terminal.
+const BETWEEN_LINES: Duration = Duration::from_secs(10);
+
+/// A progress bar with the time left and the real-time factor; without a terminal a line every ten seconds.
+pub struct Bar {
+    bar: ProgressBar,
+    /// When the last line was written, or the work began; `None` with a terminal.
+    last: Option<Mutex<Instant>>,
+}
 
 impl Bar {
     pub fn new() -> Self {
@@ -122,13 +130,27 @@ impl Bar {
         let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}  {eta} left");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         bar.enable_steady_tick(Duration::from_millis(200));
-        Self(bar)
+        let last = (!io::stderr().is_terminal()).then(|| Mutex::new(Instant::now()));
+        Self { bar, last }
+    }
+
+    /// Shows a part of the work from 0 to 1 and what is being done.
+    fn show(&self, part: f64, now: impl Into<Cow<'static, str>>) {
+        let now = now.into();
+        if let Some(last) = &self.last
+            && let Ok(mut last) = last.lock()
+            && last.elapsed() >= BETWEEN_LINES
+        {
+            *last = Instant::now();
+            tell(format_args!("{:3.0} %  {:4.0} s  {now}", 100.0 * part, self.bar.elapsed().as_secs_f64()));
+        }
+        self.bar.set_position((1000.0 * part) as u64);
+        self.bar.set_message(now);
     }
 
     pub fn update(&self, progress: Progress) {
         let Progress { time, until, wall, load_step } = progress;
-        self.0.set_position((1000.0 * time / until) as u64);
-        self.0.set_message(match load_step {
+        let now = match load_step {
             Some(LoadStepProgress { number, of, iteration, tolerance }) => format!(
                 "load step {number} of {of}: iteration {}, residual {:.1e} of {tolerance:.0e}",
                 iteration.number, iteration.residual
@@ -137,27 +159,25 @@ impl Bar {
                 let factor = time / wall.as_secs_f64().max(f64::MIN_POSITIVE);
                 format!("{time:.3} of {until} s simulated, {factor:.2} × real time")
             }
-        });
+        };
+        self.show(time / until, now);
     }
 
     pub fn update_sweep(&self, progress: SweepProgress, runs: usize) {
-        self.0.set_position((1000.0 * progress.part) as u64);
-        self.0.set_message(progress.words(runs));
+        self.show(progress.part, progress.words(runs));
     }
 
     pub fn update_bench(&self, progress: &pliant_bench::Progress) {
-        self.0.set_position((1000.0 * progress.part) as u64);
-        self.0.set_message(progress.now.clone());
+        self.show(progress.part, progress.now.clone());
     }
 
     /// A fraction of the work from 0 to 1, and the current task.
     pub fn update_mesh(&self, part: f64, now: impl Into<Cow<'static, str>>) {
-        self.0.set_position((1000.0 * part) as u64);
-        self.0.set_message(now);
+        self.show(part, now);
     }
 
     pub fn finish(&self) {
-        self.0.finish_and_clear();
+        self.bar.finish_and_clear();
     }
 }
 

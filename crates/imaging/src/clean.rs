@@ -9,7 +9,6 @@ use serde::Serialize;
 
 use crate::distance::nearest_sites;
 use crate::error::LabelError;
-use crate::image::LabelImage;
 use crate::labels::Components;
 use crate::region::{LARGEST, Region};
 
@@ -54,26 +53,6 @@ impl fmt::Display for Cleaned {
 }
 
 impl Region {
-    /// The part of the region with this label in its source image, in the same box.
-    pub fn part(&self, image: &LabelImage, label: i32) -> Result<Self, LabelError> {
-        let first = image.grid.index(&self.grid.origin).map(f64::round);
-        let dims = image.grid.dims;
-        let of_label = |at: usize| {
-            let triple = self.grid.triple(at);
-            let [i, j, k] = [0, 1, 2].map(|axis| triple[axis] as i64 + first[axis] as i64);
-            let within = [i, j, k].iter().zip(dims).all(|(&i, n)| (0..n as i64).contains(&i));
-            within && image.labels[i as usize + dims[0] * (j as usize + dims[1] * k as usize)] == label
-        };
-        let inside: Vec<bool> =
-            self.inside.iter().enumerate().map(|(at, &inside)| inside && of_label(at)).collect();
-        let part = Self { label, inside, ..*self };
-        match part.voxels() {
-            0 if image.labels.contains(&label) => Err(LabelError::Emptied { label, operation: "cleaning" }),
-            0 => Err(LabelError::Absent { label, present: image.present() }),
-            _ => Ok(part),
-        }
-    }
-
     /// Number of voxels inside.
     pub fn voxels(&self) -> u64 {
         self.inside.iter().filter(|&&inside| inside).count() as u64

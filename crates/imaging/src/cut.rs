@@ -1,6 +1,8 @@
 //! Crops an image to the box of a body, and resamples it by majority if the box has too many voxels. Voxels at the border of the image are
 //! reported, because the body may be cut off there.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use pliant_geometry::Vector3;
 use rayon::prelude::*;
 
@@ -43,19 +45,63 @@ impl Cut {
 }
 
 impl Image {
-    /// The labels selected by words; an error if the image has no labels, or lacks some of them.
-    pub fn choose(&self, choices: &[LabelChoice]) -> Result<Choice, LabelError> {
+    /// The labels selected by words; an error if the image has no labels, lacks some of them, or has one in a group and elsewhere. The
+    /// labels of a group become one in the image. A note tells of rounded labels.
+    pub fn choose(&mut self, choices: &[LabelChoice]) -> Result<Choice, LabelError> {
         let present = self.survey()?;
-        let chosen = LabelChoice::resolve(choices, &self.names, &present)?;
+        let (mut chosen, mut groups) = (Vec::new(), Vec::new());
+        let mut all = BTreeSet::new();
+        for choice in choices {
+            let labels = LabelChoice::resolve(std::slice::from_ref(choice), &self.names, &present)?;
+            if labels.contains(&0) {
+                return Err(LabelError::Background { present });
+            }
+            if let Some(&label) = labels.iter().find(|label| !present.contains(label)) {
+                return Err(LabelError::Absent { label, present });
+            }
+            if let Some(&label) = labels.iter().find(|&&label| !all.insert(label)) {
+                return Err(LabelError::Repeated { label });
+            }
+            match (choice, labels.first()) {
+                (LabelChoice::Group(name, _), Some(&first)) => {
+                    chosen.push(first);
+                    groups.push((name, labels));
+                }
+                _ => chosen.extend(labels),
+            }
+        }
         if chosen.is_empty() {
             return Err(LabelError::NoneChosen { present });
         }
-        if chosen.contains(&0) {
-            return Err(LabelError::Background { present });
+        let note = self.rounding().filter(|note| !self.notes.contains(note));
+        self.notes.extend(note);
+        self.merge(groups);
+        Ok(Choice::Labels(chosen))
+    }
+
+    /// Gives the voxels of each group of labels the number of its first one, and that its name.
+    fn merge(&mut self, groups: Vec<(&String, Vec<i32>)>) {
+        let mut first_of = BTreeMap::new();
+        for (name, labels) in groups {
+            first_of.extend(labels.iter().map(|&label| (label, labels[0])));
+            self.names.insert(labels[0], name);
         }
-        match chosen.iter().find(|label| !present.contains(label)) {
-            Some(&label) => Err(LabelError::Absent { label, present }),
-            None => Ok(Choice::Labels(chosen)),
+        if first_of.is_empty() {
+            return;
+        }
+        let size = self.numbers.scalar.size();
+        // The bytes of the first label of each group, as the file has them.
+        let mut stored: BTreeMap<i32, Vec<u8>> = BTreeMap::new();
+        for at in 0..self.grid.len() {
+            let label = self.label(at);
+            if first_of.get(&label) == Some(&label) && !stored.contains_key(&label) {
+                stored.insert(label, self.numbers.bytes[at * size..(at + 1) * size].to_vec());
+            }
+        }
+        for at in 0..self.grid.len() {
+            if let Some(bytes) = first_of.get(&self.label(at)).and_then(|first| stored.get(first)) {
+                self.numbers.bytes[at * size..(at + 1) * size].copy_from_slice(bytes);
+            }
         }
     }
 

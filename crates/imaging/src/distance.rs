@@ -48,20 +48,8 @@ impl Region {
         self.distance_field_beside(&outside, smoothing, progress)
     }
 
-    /// The smooth signed distance of the region as a part of a whole in the same box: positive where the part is nearer than
-    /// the rest of the whole, also outside both. Its zero surface continues beyond the surface of the whole.
-    pub fn distance_field_within(
-        &self,
-        whole: &Region,
-        smoothing: &Smoothing,
-        progress: &dyn Fn(f64),
-    ) -> Result<DistanceField, LabelError> {
-        let rest: Vec<bool> =
-            self.inside.iter().zip(&whole.inside).map(|(&part, &whole)| whole && !part).collect();
-        self.distance_field_beside(&rest, smoothing, progress)
-    }
-
-    fn distance_field_beside(
+    /// The same to the surface between the region and another one in the same box; where neither is, by which of them is nearer.
+    pub(crate) fn distance_field_beside(
         &self,
         other: &[bool],
         smoothing: &Smoothing,

@@ -195,7 +195,7 @@ fn shown(step: &Vector3) -> String {
 pub enum LabelError {
     /// A value that is not a whole number.
     #[error(
-        "voxel {voxel:?} is {value}, which is not a label (values from {} to {}); give a label image, or choose the region by a threshold",
+        "voxel {voxel:?} is {value}, which is not a label (values from {} to {}); give a label image (resampled by nearest neighbours, not interpolated), or choose the region by a threshold",
         range[0], range[1]
     )]
     NotWhole {
@@ -292,9 +292,7 @@ pub enum LabelError {
         label: i32,
     },
     /// The cleaning left nothing.
-    #[error(
-        "nothing is left of label {label} after {operation}; use a milder setting, or an image of finer voxels"
-    )]
+    #[error("nothing is left of label {label} after {operation}: {}", advice(operation))]
     Emptied {
         /// The label.
         label: i32,
@@ -335,6 +333,19 @@ pub enum LabelError {
         /// Voxels allowed.
         limit: u64,
     },
+}
+
+/// What helps where an operation left nothing of a label.
+fn advice(operation: &str) -> &'static str {
+    match operation {
+        "cleaning" => {
+            "its voxels lie in pieces that cleaning removes; keep all pieces, or leave the label out"
+        }
+        "resampling" => {
+            "it has too few voxels for a box of this size; mesh it by itself, or use a shorter edge"
+        }
+        _ => "it is about as thin as a voxel; take an image of finer voxels, or leave the label out",
+    }
 }
 
 fn instead(nearest: &Option<String>, names: &[String]) -> String {

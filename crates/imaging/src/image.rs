@@ -36,6 +36,10 @@ pub enum Scalar {
 }
 
 impl Scalar {
+    const fn is_integer(self) -> bool {
+        !matches!(self, Self::F32 | Self::F64)
+    }
+
     /// Bytes of a number.
     pub const fn size(self) -> usize {
         match self {
@@ -109,6 +113,12 @@ impl Numbers {
         }
     }
 }
+
+/// Labels scaled by a single-precision slope miss whole numbers by this at most, in the usual numbers of labels.
+const ROUND_OFF: f64 = 1e-4;
+
+/// Labels that a program interpolated between equal ones miss whole numbers by this at most.
+const INTERPOLATED: f64 = 0.05;
 
 /// Different values that are counted; a scan may have more.
 const MOST_VALUES: usize = 1 << 16;
@@ -227,13 +237,13 @@ impl Image {
 
     /// The existing labels without 0, increasing; an error if the values are not labels.
     pub(crate) fn survey(&self) -> Result<Vec<i32>, LabelError> {
+        let off = self.label_tolerance();
         let whole = |at: usize| match self.numbers.at(at) {
             Number::Integer(number) if self.scale == [1.0, 0.0] => i32::try_from(number)
                 .map_err(|_| LabelError::TooLarge { label: number, voxel: self.grid.triple(at) }),
             _ => {
                 let value = self.value(at);
-                // Values scaled by a single-precision slope miss whole numbers by round-off.
-                if (value - value.round()).abs() <= 1e-4 && value.abs() <= f64::from(i32::MAX) {
+                if (value - value.round()).abs() <= off && value.abs() <= f64::from(i32::MAX) {
                     Ok(value.round() as i32)
                 } else {
                     let (range, voxel) = ([f64::NAN; 2], self.grid.triple(at));
@@ -269,6 +279,32 @@ impl Image {
             }
             Err((_, error)) => Err(error),
         }
+    }
+
+    /// How far a label may be from a whole number. Scaled integers are within half a step of the label that was stored, and have lost
+    /// labels from a step of 1 on. Interpolation of equal labels misses them by its weights, which do not add up to exactly 1.
+    fn label_tolerance(&self) -> f64 {
+        let step = self.scale[0].abs();
+        let scaled = if self.numbers.scalar.is_integer() && step < 1.0 { 0.5 * step } else { 0.0 };
+        let least = if self.numbers.scalar.is_integer() { ROUND_OFF } else { INTERPOLATED };
+        least.max(scaled)
+    }
+
+    /// A note on labels that are not whole numbers and were rounded, if there are any.
+    pub fn rounding(&self) -> Option<String> {
+        if self.numbers.scalar.is_integer() && self.scale == [1.0, 0.0] {
+            return None;
+        }
+        let off = |at: usize| {
+            let value = self.value(at);
+            (value - value.round()).abs()
+        };
+        let far = (0..self.grid.len()).into_par_iter().map(off).filter(|&off| off > ROUND_OFF);
+        let (voxels, most) = far
+            .fold(|| (0_usize, 0.0_f64), |(n, most), off| (n + 1, most.max(off)))
+            .reduce(|| (0, 0.0), |a, b| (a.0 + b.0, a.1.max(b.1)));
+        (voxels > 0)
+            .then(|| format!("{voxels} voxels miss whole numbers, by up to {most:.2e}: rounded to labels"))
     }
 
     /// The least and the largest value that is finite.
@@ -359,6 +395,15 @@ pub struct LabelImage {
     pub grid: Grid,
     /// One label a voxel, i fastest; as long as the grid.
     pub labels: Vec<i32>,
+}
+
+impl LabelImage {
+    /// The label of a voxel; 0 beyond the image.
+    pub(crate) fn label_at(&self, voxel: [i64; 3]) -> i32 {
+        let [nx, ny, nz] = self.grid.dims;
+        let [i, j, k] = voxel.map(|at| usize::try_from(at).unwrap_or(usize::MAX));
+        if i < nx && j < ny && k < nz { self.labels[i + nx * (j + ny * k)] } else { 0 }
+    }
 }
 
 #[cfg(test)]

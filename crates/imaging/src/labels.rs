@@ -4,7 +4,6 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use pliant_geometry::Vector3;
 use serde::Serialize;
 
 use crate::border::Border;
@@ -69,21 +68,18 @@ impl RegionReport {
     pub(crate) fn all(grid: &Grid, label: impl Fn(usize) -> i32) -> Vec<Self> {
         let components = Components::new(grid.dims, label, 0);
         let [nx, ny, nz] = grid.dims;
-        let mut found: BTreeMap<i32, (Self, [[usize; 3]; 2])> = BTreeMap::new();
+        let mut found: BTreeMap<i32, Self> = BTreeMap::new();
         for run in &components.runs {
-            let (report, [first, last]) = found.entry(run.label).or_insert_with(|| {
-                let empty = Self {
-                    label: run.label,
-                    voxels: 0,
-                    volume: 0.0,
-                    low: [0.0; 3],
-                    high: [0.0; 3],
-                    components: 0,
-                    largest_component: 0,
-                    name: None,
-                    border: Border::new(grid),
-                };
-                (empty, [[usize::MAX; 3], [0; 3]])
+            let report = found.entry(run.label).or_insert_with(|| Self {
+                label: run.label,
+                voxels: 0,
+                volume: 0.0,
+                low: [f64::INFINITY; 3],
+                high: [f64::NEG_INFINITY; 3],
+                components: 0,
+                largest_component: 0,
+                name: None,
+                border: Border::new(grid),
             });
             let length = u64::from(run.to - run.from);
             report.voxels += length;
@@ -94,26 +90,22 @@ impl RegionReport {
                 [(k, 0), (k, nz - 1)].map(|(k, side)| if k == side { length } else { 0 }),
             ];
             report.border.add(at_sides);
-            for (axis, (low, high)) in
-                [(run.from as usize, run.to as usize - 1), (j, j), (k, k)].into_iter().enumerate()
-            {
-                first[axis] = first[axis].min(low);
-                last[axis] = last[axis].max(high);
+            // Run by run: the box in an oblique grid is smaller than that round its box of voxels.
+            let [low, high] = grid.world_box([run.from as usize, j, k], [run.to as usize - 1, j, k]);
+            for axis in 0..3 {
+                report.low[axis] = report.low[axis].min(low[axis]);
+                report.high[axis] = report.high[axis].max(high[axis]);
             }
         }
         for (run, size) in components.runs.iter().zip(components.sizes()).filter(|(_, size)| *size > 0) {
-            if let Some((report, _)) = found.get_mut(&run.label) {
+            if let Some(report) = found.get_mut(&run.label) {
                 report.components += 1;
                 report.largest_component = report.largest_component.max(size);
             }
         }
-        let finished = |(mut report, [first, last]): (Self, [[usize; 3]; 2])| {
-            let [low, high] = grid.world_box(first, last).map(|corner: Vector3| corner.into());
-            (report.low, report.high) = (low, high);
-            report.volume = report.voxels as f64 * grid.voxel_volume();
-            report
-        };
-        found.into_values().map(finished).collect()
+        let with_volume =
+            |report: Self| Self { volume: report.voxels as f64 * grid.voxel_volume(), ..report };
+        found.into_values().map(with_volume).collect()
     }
 }
 

@@ -24,6 +24,7 @@ mod file;
 mod image;
 mod labels;
 mod names;
+mod parts;
 mod region;
 mod vessels;
 
@@ -36,4 +37,5 @@ pub use file::{ImageFormat, ReadOptions, read, read_bytes, read_with};
 pub use image::{Image, LabelImage, Scalar};
 pub use labels::RegionReport;
 pub use names::{LabelChoice, LabelNames};
+pub use parts::Parts;
 pub use region::Region;

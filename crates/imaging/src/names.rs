@@ -120,7 +120,7 @@ impl LabelNames {
     }
 }
 
-/// A label, a range of labels or a name, as people type it: `5`, `5-8`, `liver`.
+/// A label, a range of labels, a name or a group of them, as people type it: `5`, `5-8`, `liver`, `tissue=1,5,7-9`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LabelChoice {
     /// A label by its number.
@@ -129,6 +129,8 @@ pub enum LabelChoice {
     Range(i32, i32),
     /// The label of this name.
     Named(String),
+    /// Several labels as one of this name; its number is that of the first.
+    Group(String, Vec<LabelChoice>),
 }
 
 impl FromStr for LabelChoice {
@@ -138,6 +140,10 @@ impl FromStr for LabelChoice {
         let typed = typed.trim();
         if let Ok(label) = typed.parse() {
             return Ok(Self::One(label));
+        }
+        if let Some((name, labels)) = typed.split_once('=') {
+            let labels = labels.split(',').map(str::parse).collect::<Result<_, _>>()?;
+            return Ok(Self::Group(name.trim().to_owned(), labels));
         }
         // The first sign may belong to a negative number.
         let dash = typed.char_indices().skip(1).find(|(_, c)| *c == '-').map(|(at, _)| at);
@@ -153,18 +159,23 @@ impl fmt::Display for LabelChoice {
             Self::One(label) => write!(f, "{label}"),
             Self::Range(from, to) => write!(f, "{from}-{to}"),
             Self::Named(name) => f.write_str(name),
+            Self::Group(name, labels) => {
+                let labels: Vec<String> = labels.iter().map(Self::to_string).collect();
+                write!(f, "{name}={}", labels.join(","))
+            }
         }
     }
 }
 
 impl LabelChoice {
-    /// The labels selected by choices, among the labels `present` in an image.
+    /// The labels selected by choices, among the labels `present` in an image; of groups all their labels.
     pub fn resolve(choices: &[Self], names: &LabelNames, present: &[i32]) -> Result<Vec<i32>, LabelError> {
         let mut chosen = Vec::new();
         for choice in choices {
             match choice {
                 Self::One(label) => chosen.push(*label),
                 Self::Named(name) => chosen.push(names.named(name, present)?),
+                Self::Group(_, labels) => chosen.extend(Self::resolve(labels, names, present)?),
                 Self::Range(from, to) => {
                     let before = chosen.len();
                     chosen.extend(present.iter().filter(|label| (from..=to).contains(label)));

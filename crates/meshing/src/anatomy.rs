@@ -77,6 +77,12 @@ impl<'a> Anatomy<'a> {
         self.materials[0].1.as_deref().map(|field| field as &dyn ImplicitField)
     }
 
+    /// Whether each material has a signed distance of its own, as those of voxels have from three materials on.
+    pub(crate) fn has_own_fields(&self) -> bool {
+        matches!(self.given, Some(Given::Voxels { .. }))
+            && self.materials.iter().all(|(_, field)| field.is_some())
+    }
+
     /// The field of the whole body.
     pub fn field(&self) -> &dyn ImplicitField {
         &*self.whole

@@ -14,13 +14,23 @@ const GHOST: u32 = u32::MAX;
 const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
 /// The sides at a point: bit 0 the outside, bit m the material m.
-pub(crate) type Sides = u64;
+pub(crate) type Sides = u128;
 
 /// The outside as a side.
 pub(crate) const OUTSIDE: Sides = 1;
 
+/// The materials among some sides, increasing.
+pub(crate) fn materials_of(sides: Sides) -> impl Iterator<Item = usize> {
+    let mut left = sides & !OUTSIDE;
+    std::iter::from_fn(move || {
+        let next = (left != 0).then(|| left.trailing_zeros() as usize)?;
+        left &= left - 1;
+        Some(next)
+    })
+}
+
 /// Most materials in a mesh.
-pub const MOST_MATERIALS: usize = 63;
+pub const MOST_MATERIALS: usize = 127;
 
 /// No step makes an edge longer than this many lattice constants.
 pub(crate) const LONGEST: f64 = 1.6;
@@ -160,10 +170,15 @@ impl Complex {
     pub(crate) fn edges(&self) -> Vec<[u32; 2]> {
         let mut edges = Vec::new();
         for tet in self.alive() {
-            let [a, b, c, d] = self.tets[tet as usize];
-            edges.extend([[a, b], [a, c], [a, d], [b, c], [b, d], [c, d]].map(|[p, q]| [p.min(q), p.max(q)]));
+            edges.extend(self.edges_of(tet));
         }
         distinct(edges)
+    }
+
+    /// The edges of a tet, each from the smaller point.
+    pub(crate) fn edges_of(&self, tet: u32) -> [[u32; 2]; 6] {
+        let [a, b, c, d] = self.tets[tet as usize];
+        [[a, b], [a, c], [a, d], [b, c], [b, d], [c, d]].map(|[p, q]| [p.min(q), p.max(q)])
     }
 
     /// Least acoustic length of all tets as a part of the ideal one.
@@ -294,13 +309,14 @@ impl Complex {
     /// point on its boundary.
     pub(crate) fn may_collapse(&self, u: u32, v: u32) -> bool {
         let stars = [u, v].map(|point| self.star[point as usize].as_slice());
-        let materials = stars.concat().iter().fold(0_u64, |all, &tet| all | 1 << self.material[tet as usize]);
+        let materials: Sides =
+            stars.concat().iter().fold(0, |all, &tet| all | 1 << self.material[tet as usize]);
         if !self.link_condition(u, v, |_| true) {
             return false;
         }
-        let mut each = (1..64_u8).filter(|m| materials >> m & 1 == 1);
         materials.count_ones() == 1
-            || each.all(|m| self.link_condition(u, v, |tet| self.material[tet as usize] == m))
+            || materials_of(materials)
+                .all(|m| self.link_condition(u, v, |tet| usize::from(self.material[tet as usize]) == m))
     }
 
     fn link_condition(&self, u: u32, v: u32, chosen: impl Fn(u32) -> bool + Copy) -> bool {

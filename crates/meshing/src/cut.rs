@@ -24,6 +24,9 @@ const LEAST_AFTER_MOVE: f64 = 0.2;
 /// it.
 const GAP: f64 = 0.1;
 
+/// A tet that no cut gave to a material stays in the first one if that is not farther than this, in lattice constants.
+const FAR: f64 = 0.25;
+
 /// Where a surface crosses an edge.
 struct EdgeCrossing {
     edge: [u32; 2],
@@ -38,13 +41,28 @@ pub(crate) fn cut_materials(complex: &mut Complex, surfaces: &Surfaces<'_>) {
         let inside = |point: &Vector3| surfaces.inside(material, point);
         let values = complex.points.iter().map(inside).collect();
         let sides = Surface { inside: &inside }.cut(complex, values);
-        for (tet, side) in sides {
-            if side > 0.0 {
-                complex.material[tet as usize] = material as u8;
-            }
-        }
-        complex.find_sides();
+        let own = sides.into_iter().filter(|(_, side)| *side > 0.0).map(|(tet, _)| (tet, material));
+        give(complex, own.collect());
     }
+    // Flat tets where many materials meet can have a side of no material; the first one may be far away.
+    let lost = |&tet: &u32| {
+        let centre = complex.corners(tet).iter().sum::<Vector3>() / 4.0;
+        (complex.material[tet as usize] == 1 && surfaces.inside(1, &centre) < -FAR * surfaces.edge())
+            .then(|| (tet, surfaces.deepest(&centre)))
+    };
+    let lost = complex.alive().filter_map(|tet| lost(&tet)).collect();
+    give(complex, lost);
+}
+
+/// Gives tets to materials.
+fn give(complex: &mut Complex, tets: Vec<(u32, usize)>) {
+    let mut points: Vec<u32> = tets.iter().flat_map(|&(tet, _)| complex.tets[tet as usize]).collect();
+    points.sort_unstable();
+    points.dedup();
+    for (tet, material) in tets {
+        complex.material[tet as usize] = material as u8;
+    }
+    complex.find_sides_of(&points);
 }
 
 /// Removes the part outside a body.
@@ -139,8 +157,11 @@ impl Surface<'_> {
     /// Edges that cross the surface, and their intersections.
     fn crossings(&self, complex: &Complex, values: &[f64]) -> Vec<EdgeCrossing> {
         let crossed = |[p, q]: &[u32; 2]| values[*p as usize] * values[*q as usize] < 0.0;
-        let edges = complex.edges().into_iter().filter(crossed);
-        edges.map(|edge| self.crossing(complex, edge, values)).collect()
+        let mut edges: Vec<[u32; 2]> =
+            complex.alive().flat_map(|tet| complex.edges_of(tet)).filter(crossed).collect();
+        edges.sort_unstable();
+        edges.dedup();
+        edges.into_iter().map(|edge| self.crossing(complex, edge, values)).collect()
     }
 
     fn crossing(&self, complex: &Complex, edge: [u32; 2], values: &[f64]) -> EdgeCrossing {

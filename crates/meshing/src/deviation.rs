@@ -101,17 +101,17 @@ impl Measured {
         chosen: &dyn Fn([i32; 2]) -> bool,
         spacing: f64,
     ) -> Option<Self> {
-        let [own, other] = [mesh, given].map(|patches| patches.between(chosen));
-        let one_way = |from: &Patches, triangles: &[[u32; 3]], to: &SurfaceLocator| {
-            let samples = from.samples(triangles, spacing);
+        let [mesh, given] = [mesh, given].map(|patches| patches.only(chosen));
+        let one_way = |from: &Patches, to: &SurfaceLocator| {
+            let samples = from.samples(spacing);
             let far = samples.par_iter().map(|sample| distance(to, &sample.point)).collect();
             (samples, far)
         };
-        let (to_mesh, to_given) = (mesh.locator(&own)?, given.locator(&other)?);
+        let (to_mesh, to_given) = (mesh.locator()?, given.locator()?);
         Some(Self {
             to: MeasuredTo::Field,
-            from_mesh: one_way(mesh, &own, &to_given),
-            from_body: one_way(given, &other, &to_mesh),
+            from_mesh: one_way(&mesh, &to_given),
+            from_body: one_way(&given, &to_mesh),
         })
     }
 

@@ -91,40 +91,50 @@ pub(crate) fn sorted([a, b]: [i32; 2]) -> [i32; 2] {
 }
 
 impl Patches {
-    /// The triangles between some sides.
-    pub(crate) fn between(&self, chosen: impl Fn([i32; 2]) -> bool) -> Vec<[u32; 3]> {
-        let chosen = self.triangles.iter().zip(&self.sides).filter(|(_, sides)| chosen(**sides));
-        chosen.map(|(triangle, _)| *triangle).collect()
-    }
-
-    /// Area of some of its triangles [m²].
-    pub(crate) fn area(&self, triangles: &[[u32; 3]]) -> f64 {
-        triangles.iter().map(|nodes| area(self.corners(nodes))).sum()
+    /// Area of its triangles [m²].
+    pub(crate) fn area(&self) -> f64 {
+        self.triangles.iter().map(|nodes| area(self.corners(nodes))).sum()
     }
 
     fn corners(&self, nodes: &[u32; 3]) -> [Vector3; 3] {
         nodes.map(|node| self.points[node as usize])
     }
 
-    /// A search tree over some of its triangles; `None` without any.
-    pub(crate) fn locator(&self, triangles: &[[u32; 3]]) -> Option<SurfaceLocator> {
-        if triangles.is_empty() {
+    /// Some of its triangles with the points they use.
+    pub(crate) fn only(&self, chosen: impl Fn([i32; 2]) -> bool) -> Self {
+        let (mut triangles, mut sides) = (Vec::new(), Vec::new());
+        for (triangle, own) in self.triangles.iter().zip(&self.sides).filter(|(_, own)| chosen(**own)) {
+            triangles.push(*triangle);
+            sides.push(*own);
+        }
+        let mut used = triangles.concat();
+        used.sort_unstable();
+        used.dedup();
+        for node in triangles.as_flattened_mut() {
+            *node = used.binary_search(node).unwrap_or_default() as u32;
+        }
+        Self { points: used.iter().map(|&node| self.points[node as usize]).collect(), triangles, sides }
+    }
+
+    /// A search tree over its triangles; `None` without any.
+    pub(crate) fn locator(&self) -> Option<SurfaceLocator> {
+        if self.triangles.is_empty() {
             return None;
         }
         let mut mesh = Mesh { points: self.points.clone(), ..Mesh::default() };
-        mesh.block_mut(CellKind::Triangle).nodes = triangles.concat();
+        mesh.block_mut(CellKind::Triangle).nodes = self.triangles.concat();
         let surface = boundary(&mesh);
         let faces: Vec<u32> = (0..surface.faces.len() as u32).collect();
         Some(SurfaceLocator::new(&surface, &faces, &mesh.points))
     }
 
-    /// Samples of some of its triangles no more than about `spacing` [m] apart, corners once each.
-    pub(crate) fn samples(&self, triangles: &[[u32; 3]], spacing: f64) -> Vec<Sample> {
+    /// Samples of its triangles no more than about `spacing` [m] apart, corners once each.
+    pub(crate) fn samples(&self, spacing: f64) -> Vec<Sample> {
         /// Samples along an edge at most.
         const MOST_ALONG: usize = 32;
         let mut share = vec![0.0; self.points.len()];
         let mut found = Vec::new();
-        for nodes in triangles {
+        for nodes in &self.triangles {
             let [a, b, c] = self.corners(nodes);
             let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
             let places = lattice(((longest / spacing).ceil() as usize).clamp(1, MOST_ALONG));
@@ -212,13 +222,14 @@ mod tests {
         materials[2 + 4 * (1 + 3)] = 2;
         let given = Given::Voxels { grid, materials };
         let patches = given.patches(&[7, 5]);
-        let count = |sides: [i32; 2]| patches.between(|own| own == sides).len();
+        let only = |sides: [i32; 2]| patches.only(|own| own == sides);
+        let count = |sides: [i32; 2]| only(sides).triangles.len();
         assert_eq!([count([0, 5]), count([0, 7]), count([5, 7])], [10, 10, 2]);
-        let inner = patches.between(|sides| sides == [5, 7]);
-        assert!((patches.area(&inner) - 6.0).abs() < 1e-12);
-        assert!(inner.concat().iter().all(|&node| patches.points[node as usize].x == 1.5));
-        assert!((patches.area(&patches.triangles) - 2.0 * (2.0 + 3.0) * 2.0 - 12.0 - 6.0).abs() < 1e-12);
-        let area: f64 = patches.samples(&inner, 0.7).iter().map(|sample| sample.area).sum();
+        let inner = only([5, 7]);
+        assert!((inner.area() - 6.0).abs() < 1e-12);
+        assert!(inner.points.len() == 4 && inner.points.iter().all(|point| point.x == 1.5));
+        assert!((patches.area() - 2.0 * (2.0 + 3.0) * 2.0 - 12.0 - 6.0).abs() < 1e-12);
+        let area: f64 = inner.samples(0.7).iter().map(|sample| sample.area).sum();
         assert!((area - 6.0).abs() < 1e-12);
     }
 }

@@ -48,6 +48,7 @@ mod long_edges;
 mod lost;
 mod manifold;
 mod missed;
+mod near_materials;
 mod nesting;
 mod octree;
 #[cfg(feature = "imaging")]

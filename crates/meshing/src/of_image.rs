@@ -44,30 +44,23 @@ impl Anatomy<'static> {
         let (whole, done) = image.region(labels, smoothing.margin())?.clean(cleaning)?;
         let field = whole.distance_field(smoothing, &part(0))?;
         let (mut materials, mut volumes, mut others) = (vec![(labels[0], None)], vec![None], 0.0);
-        let mut of_voxels: Vec<u8> = whole.inside.iter().map(|&inside| u8::from(inside)).collect();
+        let parts = whole.parts(image, labels)?;
         for (number, &label) in labels.iter().enumerate().skip(1) {
-            let region = whole.part(image, label)?;
-            let own = of_voxels.iter_mut().zip(&region.inside).filter(|(_, inside)| **inside);
-            own.for_each(|(material, _)| *material = number as u8 + 1);
-            others += region.volume();
-            volumes.push(Some(region.volume()));
-            let inner = region.distance_field_within(&whole, smoothing, &part(number))?;
+            others += parts.volume(number + 1);
+            volumes.push(Some(parts.volume(number + 1)));
+            let inner = parts.distance_field(number + 1, smoothing, &part(number))?;
             materials.push((label, Some(Box::new(inner) as Box<dyn ImplicitField>)));
         }
         volumes[0] = Some(whole.volume() - others);
         if labels.len() > 2 {
             // The remainder of several others is a poor measure of the first one: where two of them meet, it is as near as they
             // are.
-            let first = whole.part(image, labels[0])?.distance_field_within(
-                &whole,
-                smoothing,
-                &part(labels.len()),
-            )?;
+            let first = parts.distance_field(1, smoothing, &part(labels.len()))?;
             materials[0].1 = Some(Box::new(first));
         }
         let mut body = Self::new(labels[0], field);
         (body.materials, body.volumes) = (materials, volumes);
-        Ok((body.measured_to_voxels(whole.grid, of_voxels), done))
+        Ok((body.measured_to_voxels(whole.grid, parts.into_numbers()), done))
     }
 }
 

@@ -463,7 +463,7 @@ impl<'a> Optimiser<'a> {
     fn fit_one(&mut self, node: u32, least: f64, reach: f64) {
         let here = self.complex.points[node as usize];
         let sides = self.complex.sides[node as usize];
-        let last = 63 - sides.leading_zeros();
+        let last = Sides::BITS - 1 - sides.leading_zeros();
         let faces = match sides & OUTSIDE {
             0 => self.complex.rim_of(node, |tet| u32::from(self.complex.material[tet as usize]) == last),
             _ => self.complex.rim_of(node, |_| true),

@@ -74,7 +74,7 @@ impl Regions {
             }
             let interface = |labels: [i32; 2]| InterfaceReport {
                 labels,
-                area: made.area(&made.between(|sides| sides == labels)),
+                area: made.only(|sides| sides == labels).area(),
                 distances: measured(&|sides| sides == labels),
             };
             found.interfaces = pairs(&[&made, &given]).into_iter().map(interface).collect();

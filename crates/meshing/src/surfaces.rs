@@ -4,7 +4,8 @@
 use pliant_geometry::Vector3;
 
 use crate::anatomy::Anatomy;
-use crate::complex::{OUTSIDE, Sides};
+use crate::complex::{OUTSIDE, Sides, materials_of};
+use crate::near_materials::NearMaterials;
 
 /// The surfaces of the whole body and of its inner materials.
 pub(crate) struct Surfaces<'a> {
@@ -13,12 +14,19 @@ pub(crate) struct Surfaces<'a> {
     levels: Vec<f64>,
     /// Lattice constant of the mesh [m].
     edge: f64,
+    /// Which materials a point can be deep in.
+    near: NearMaterials,
 }
 
 impl<'a> Surfaces<'a> {
     /// For a mesh with a lattice constant [m].
     pub(crate) fn new(anatomy: &'a Anatomy<'a>, edge: f64) -> Self {
-        Self { anatomy, levels: vec![0.0; anatomy.labels().len()], edge }
+        Self {
+            anatomy,
+            levels: vec![0.0; anatomy.labels().len()],
+            edge,
+            near: NearMaterials::new(anatomy, edge),
+        }
     }
 
     /// Lattice constant of the mesh [m].
@@ -38,11 +46,21 @@ impl<'a> Surfaces<'a> {
         std::mem::replace(&mut self.levels[surface], level) != level
     }
 
-    /// How far a point is inside a material (numbered from 1) rather than in any other [m].
+    /// How far a point is inside a material (numbered from 1) rather than in any other [m]; of one far from the material only the sign
+    /// counts.
     pub(crate) fn inside(&self, material: usize, point: &Vector3) -> f64 {
+        if self.near.is_far(material, point) {
+            return -self.edge;
+        }
         let own = self.depth(material, point);
-        let others = (1..=self.levels.len()).filter(|&other| other != material);
-        own - others.map(|other| self.depth(other, point)).fold(f64::NEG_INFINITY, f64::max)
+        let others = self.near.of(point).filter(|&other| other != material);
+        own - others.map(|other| self.depth(other, point)).fold(-f64::MAX, f64::max)
+    }
+
+    /// The material that a point is deepest in.
+    pub(crate) fn deepest(&self, point: &Vector3) -> usize {
+        let depths = self.near.of(point).map(|material| (self.depth(material, point), material));
+        depths.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(1, |(_, material)| material)
     }
 
     /// Field of a material [m]. The first one has no field of its own; it is the remainder of the others, minus the
@@ -79,7 +97,7 @@ impl<'a> Surfaces<'a> {
                 self.anatomy.field().gradient(point),
             );
         }
-        let mut materials = (1..=self.levels.len()).filter(|&m| sides >> m & 1 == 1);
+        let mut materials = materials_of(sides);
         if let Some(first) = materials.next() {
             for other in materials {
                 // Half the difference has the slope of a distance.

@@ -22,6 +22,9 @@ const GONE: [u32; 3] = [u32::MAX; 3];
 /// Points closer than this part of the box's diagonal are one.
 const SAME: f64 = 1e-9;
 
+/// Points at one place are moved apart by this part of the diagonal: more than readers take for one point, in single precision too.
+const APART: f64 = 1e-5;
+
 /// A triangulated surface, manifold with or without borders.
 #[derive(Clone, Debug)]
 pub struct TriangleMesh {
@@ -136,6 +139,37 @@ impl TriangleMesh {
         let (points, triangles) = self.compact();
         let mut mesh = Mesh { points, ..Mesh::default() };
         mesh.block_mut(CellKind::Triangle).nodes = triangles.into_flattened();
+        mesh
+    }
+
+    /// The same for a file or a body: points at one place, where the surface touches itself, are moved a little apart, each towards its
+    /// neighbours. Readers take points at one place for one.
+    pub fn to_parted_mesh(&self) -> Mesh {
+        let mut mesh = self.to_mesh();
+        let rest = mesh.points.clone();
+        let key = |node: u32| <[f64; 3]>::from(rest[node as usize]).map(f64::to_bits);
+        let mut order: Vec<u32> = (0..rest.len() as u32).collect();
+        order.sort_by_key(|&node| (key(node), node));
+        let twins: BTreeSet<u32> = order
+            .chunk_by(|&a, &b| key(a) == key(b))
+            .filter(|same| same.len() > 1)
+            .flatten()
+            .copied()
+            .collect();
+        if twins.is_empty() {
+            return mesh;
+        }
+        let apart = APART * mesh.bounds().map_or(0.0, |(low, high)| (high - low).norm());
+        let mut ways: BTreeMap<u32, Vector3> = BTreeMap::new();
+        for nodes in mesh.blocks[0].cells() {
+            for &node in nodes.iter().filter(|node| twins.contains(node)) {
+                let sum: Vector3 = nodes.iter().map(|&n| rest[n as usize] - rest[node as usize]).sum();
+                *ways.entry(node).or_default() += sum;
+            }
+        }
+        for (node, way) in ways {
+            mesh.points[node as usize] += apart * way.try_normalize(0.0).unwrap_or_default();
+        }
         mesh
     }
 
@@ -486,8 +520,47 @@ fn turn_pieces(triangles: &mut [[u32; 3]]) -> (Vec<Vec<u32>>, Vec<bool>) {
     (pieces, closed)
 }
 
-/// Gives each fan of triangles around a point its own point. A fan is joined by edges of two triangles with the same
-/// orientation.
+/// Triangles of an edge that continue each other on one surface. Of more than two, those that bound the same inside: from each, turning
+/// about the edge into its inside, the next one that runs the other way.
+fn joined_at(
+    edge: [u32; 2],
+    sides: &[(u32, bool)],
+    triangles: &[[u32; 3]],
+    points: &[Vector3],
+) -> Vec<[u32; 2]> {
+    let (forth, back): (Vec<_>, Vec<_>) = sides.iter().partition(|(_, forward)| *forward);
+    if forth.len() != back.len() {
+        return Vec::new();
+    }
+    if let ([(s, _)], [(t, _)]) = (&forth[..], &back[..]) {
+        return vec![[*s, *t]];
+    }
+    let [from, to] = edge.map(|end| points[end as usize]);
+    let along = (to - from).normalize();
+    // From the edge into a triangle.
+    let into = |t: u32| {
+        let apex = triangles[t as usize].into_iter().find(|node| !edge.contains(node));
+        let way = apex.map_or(along, |apex| points[apex as usize] - from);
+        way - along * way.dot(&along)
+    };
+    let mut left: Vec<u32> = back.iter().map(|&(t, _)| t).collect();
+    let pair = |(s, _): (u32, bool)| {
+        let start = into(s);
+        let inward = -cross(triangles[s as usize].map(|node| points[node as usize]));
+        let angle = |t: u32| {
+            let way = into(t);
+            (way.dot(&inward) / inward.norm())
+                .atan2(way.dot(&start) / start.norm())
+                .rem_euclid(std::f64::consts::TAU)
+        };
+        let next = (0..left.len()).min_by(|&a, &b| angle(left[a]).total_cmp(&angle(left[b])))?;
+        Some([s, left.swap_remove(next)])
+    };
+    forth.into_iter().filter_map(pair).collect()
+}
+
+/// Gives each fan of triangles around a point its own point. A fan is joined by edges of two triangles with
+/// the same orientation, and by pairs of more.
 fn cut(
     mut points: Vec<Vector3>,
     mut triangles: Vec<[u32; 3]>,
@@ -500,6 +573,13 @@ fn cut(
         nodes.iter().for_each(|&n| star[n as usize].push(t));
     }
     let before = triangles.clone();
+    let mut across: BTreeMap<(u32, [u32; 2]), u32> = BTreeMap::new();
+    for (&edge, own) in &sides {
+        for [s, t] in joined_at(edge, own, &before, &points) {
+            across.insert((s, edge), t);
+            across.insert((t, edge), s);
+        }
+    }
     for (point, star) in (0_u32..).zip(&star) {
         let mut left = star.clone();
         let mut first = true;
@@ -508,14 +588,11 @@ fn cut(
             let mut at = 0;
             while at < fan.len() {
                 for other in before[fan[at] as usize].into_iter().filter(|&n| n != point) {
-                    if let [(s, forward), (t, back)] = sides[&key(point, other)][..]
-                        && forward != back
+                    if let Some(next) = across.get(&(fan[at], key(point, other)))
+                        && let Some(place) = left.iter().position(|l| l == next)
                     {
-                        let across = if s == fan[at] { t } else { s };
-                        if let Some(place) = left.iter().position(|&l| l == across) {
-                            left.swap_remove(place);
-                            fan.push(across);
-                        }
+                        left.swap_remove(place);
+                        fan.push(*next);
                     }
                 }
                 at += 1;

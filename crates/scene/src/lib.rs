@@ -37,6 +37,7 @@ mod bound;
 mod cache;
 pub mod checker;
 pub mod diagnostic;
+mod foreign;
 pub mod format;
 mod guests;
 mod method;
@@ -66,6 +67,7 @@ pub use assemble::{
 };
 pub use bound::element_bound;
 pub use cache::{MeshCache, cache_folder};
+pub use foreign::foreign_file;
 pub use of_mesh::{SceneOfMesh, is_mesh, scene_of_given, scene_of_mesh};
 pub use organ_scene::OrganScene;
 pub use plan::{LimitingElement, Limits, Plan, plan};

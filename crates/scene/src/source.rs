@@ -13,6 +13,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use crate::diagnostic::{Diagnostic, Place, SceneErrors};
+use crate::foreign::foreign_text;
 use crate::nearest::nearest;
 use crate::reads::Reads;
 
@@ -199,6 +200,12 @@ impl Source {
     /// Reads TOML; `name` is shown to the user, mostly the path of the file.
     pub fn parse(name: impl Into<String>, text: impl Into<Arc<str>>) -> Result<Self, SceneErrors> {
         let (name, text) = (name.into(), text.into());
+        if let Some([what, help]) = foreign_text(&text) {
+            let start = text.len() - text.trim_start_matches('\u{feff}').trim_start().len();
+            let message = format!("this is {what}, not a scene in TOML");
+            let diagnostic = Diagnostic::error(message).at(start..start + 1, "XML begins here").help(help);
+            return Err(SceneErrors::new(name, text, vec![diagnostic]));
+        }
         let (table, errors) = DeTable::parse_recoverable(&text);
         let mut diagnostics = Vec::new();
         for error in &errors {

@@ -100,11 +100,11 @@ pub fn scene(arguments: &MeshImage) -> Result<u8, Failure> {
 
 /// The image with the vessels inside of the organ as tissue, and their volumes inside and outside [m³]. Masks stay as they are.
 fn with_vessels(
-    image: Image,
+    mut image: Image,
     organ: &MeshImage,
     vessels: &[LabelChoice],
 ) -> Result<(Image, Option<[f64; 2]>), Failure> {
-    let chosen = |labels: &[LabelChoice]| match image.choose(labels) {
+    let mut chosen = |labels: &[LabelChoice]| match image.choose(labels) {
         Ok(Choice::Labels(labels)) => Ok(labels),
         Ok(Choice::From(_)) => Ok(Vec::new()),
         Err(error) => Err(label_failure(&error)),
@@ -112,7 +112,8 @@ fn with_vessels(
     if vessels.is_empty() || !organ.masks.is_empty() {
         return Ok((image, None));
     }
-    let (filled, voxels) = image.with_vessels_inside(&chosen(&organ.label)?, &chosen(vessels)?);
+    let [organ, vessels] = [chosen(&organ.label)?, chosen(vessels)?];
+    let (filled, voxels) = image.with_vessels_inside(&organ, &vessels);
     Ok((filled, Some(voxels.map(|voxels| voxels as f64 * image.grid.voxel_volume()))))
 }
 
@@ -146,7 +147,17 @@ impl<'a> Sources<'a> {
         let vessels = || arguments.vessels.iter().map(|(label, _)| label);
         if arguments.masks.is_empty() {
             let list = |all: Vec<String>| all.join(", ");
-            let mut labels = format!("labels = [{}]", list(arguments.label.iter().map(typed).collect()));
+            let groups =
+                arguments.label.iter().filter(|label| matches!(label, LabelChoice::Group(..))).count();
+            if groups > 0 && groups < arguments.label.len() {
+                return Err(Failure::plain(
+                    "a scene has either labels or groups of them",
+                    "make each label a group, such as `--label liver=5`",
+                ));
+            }
+            let all = list(arguments.label.iter().map(typed).collect());
+            let mut labels =
+                if groups > 0 { format!("label = {{ {all} }}") } else { format!("labels = [{all}]") };
             if !arguments.vessels.is_empty() {
                 labels += &format!(", vessels = [{}]", list(vessels().map(typed).collect()));
             }
@@ -161,7 +172,7 @@ impl<'a> Sources<'a> {
                 LabelChoice::Named(name) => {
                     files.iter().position(|file| stem(file).eq_ignore_ascii_case(name))
                 }
-                LabelChoice::Range(..) => None,
+                LabelChoice::Range(..) | LabelChoice::Group(..) => None,
             };
             found.filter(|&at| at < files.len()).ok_or_else(|| {
                 let names: Vec<String> = files.iter().map(|file| stem(file)).collect();
@@ -195,12 +206,15 @@ fn stem(file: &Path) -> String {
     name.split_once('.').map_or(&*name, |(stem, _)| stem).to_owned()
 }
 
-/// A label as a scene has it: a number, or a text in quotes.
+/// A label as a scene has it: a number, a text in quotes, or a key with several of these.
 fn typed(label: &LabelChoice) -> String {
+    let quoted = |text: String| serde_json::Value::from(text).to_string();
     match label {
         LabelChoice::One(number) => number.to_string(),
-        LabelChoice::Range(..) | LabelChoice::Named(_) => {
-            serde_json::Value::from(label.to_string()).to_string()
+        LabelChoice::Range(..) | LabelChoice::Named(_) => quoted(label.to_string()),
+        LabelChoice::Group(name, labels) => {
+            let labels: Vec<String> = labels.iter().map(typed).collect();
+            format!("{} = [{}]", quoted(name.clone()), labels.join(", "))
         }
     }
 }

@@ -68,7 +68,8 @@ pub fn is_mesh_file(arguments: &MeshImage) -> bool {
 pub fn mesh_file(arguments: &MeshImage, warnings: &mut Vec<String>) -> Result<MeshFile, Failure> {
     let mut file = io::read(&arguments.image).map_err(|error| Failure::plain(error, ""))?;
     file.mesh.points.iter_mut().for_each(|point| *point *= arguments.scale.unwrap_or(1.0));
-    if let Some(doubt) = SizeDoubt::of(&file.mesh) {
+    let is_meant = |doubt: &SizeDoubt| arguments.scale.is_some() && doubt.is_possible();
+    if let Some(doubt) = SizeDoubt::of(&file.mesh).filter(|doubt| !is_meant(doubt)) {
         let message = format!("`{}` measures {doubt}", arguments.image.display());
         if arguments.scale.is_none() && doubt.is_large() {
             return Err(Failure::plain(
@@ -76,7 +77,7 @@ pub fn mesh_file(arguments: &MeshImage, warnings: &mut Vec<String>) -> Result<Me
                 format!("{}; `--scale 1` if it is in metres", doubt.advice("--scale ")),
             ));
         }
-        warnings.push(message);
+        warnings.push(format!("{message}; {}", doubt.advice("--scale ")));
     }
     Ok(file)
 }
@@ -240,12 +241,18 @@ pub fn label_failure(error: &LabelError) -> Failure {
 }
 
 pub fn meshing_failure(error: &MeshingError, force: bool) -> Failure {
+    if let MeshingError::OpenSurface { widest, .. } = error {
+        // In whole millimetres, or in tenths of them.
+        let unit = if *widest > 1e-3 { 1e-3 } else { 1e-4 };
+        let width = number((1e3 * unit * (widest / unit * (1.0 + 1e-9)).ceil() * 1e6).round() / 1e6);
+        let help = format!(
+            "`--close-gaps {width}mm` closes holes as wide as this one; a file in millimetres needs `--scale 0.001`"
+        );
+        return Failure::plain(error, help);
+    }
     let help = match error {
         MeshingError::TooManyCells { .. } | MeshingError::LatticeTooLarge { .. } if !force => {
             "lengths without a unit are in metres: `--edge 8mm` or 0.008; `--force` makes that many anyway"
-        }
-        MeshingError::OpenSurface { .. } => {
-            "`--close-gaps 20mm` closes holes of up to 20 mm; a file in millimetres needs `--scale 0.001`"
         }
         MeshingError::NothingEnclosed => "`pliant info` lists the contents of the file",
         MeshingError::NoSuchLabel { .. } => "`--label` selects the labels that are meshed",

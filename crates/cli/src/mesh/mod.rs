@@ -15,7 +15,7 @@ use pliant_meshing::{
     Anatomy, Assessment, Closing, Deviation, Enclosed, LabelReport, MeshingError, Missed, OrganTets,
     SurfaceCheck, TetReport, Voxels, require_room_for,
 };
-use pliant_scene::element_bound;
+use pliant_scene::{element_bound, foreign_file};
 use pliant_sim::number;
 use serde_json::{Value as Json, json};
 
@@ -48,7 +48,7 @@ pub fn labels(arguments: &Labels) -> Result<u8, Failure> {
         say(object)?;
     } else {
         let mut lines = vec![format!("{}: {}", arguments.image.display(), image_line(&image))];
-        lines.extend(image.notes.iter().map(|note| format!("note: {note}")));
+        lines.extend(image.notes.iter().chain(&image.rounding()).map(|note| format!("note: {note}")));
         lines.extend(regions.iter().map(RegionReport::to_string));
         if regions.is_empty() {
             lines.push("no labels: only background (0)".into());
@@ -62,6 +62,9 @@ pub fn mesh(arguments: &MeshImage) -> Result<u8, Failure> {
     if let Some(scale) = arguments.scale.filter(|scale| !(scale.is_finite() && *scale > 0.0)) {
         let message = format!("`--scale` is {scale}; it must be positive and finite");
         return Err(Failure::plain(message, "for example `--scale 0.001` for a file in millimetres"));
+    }
+    if let Some([what, help]) = foreign_file(&arguments.image).filter(|_| !is_mesh_file(arguments)) {
+        return Err(Failure::plain(format!("`{}` is {what}", arguments.image.display()), help));
     }
     if coupled::is_scene(arguments) {
         return coupled::scene(arguments);

@@ -169,7 +169,7 @@ fn make(arguments: &MeshImage, found: &InputSurface, goal: Goal, bar: &Bar) -> R
     bar.update_mesh(0.8, "measuring distances");
     let kept = anatomy.as_ref().and_then(|anatomy| surface.keep_volume(anatomy));
     let diagonal = input.diagonal();
-    let mesh = surface.to_mesh();
+    let mesh = surface.to_parted_mesh();
     let mut check = SurfaceCheck::of(&mesh);
     check.of_body = anatomy.is_none().then(|| SurfaceCheck::of(&input.to_mesh()).euler_number);
     if let (Some(anatomy), Some(edge)) = (anatomy, arguments.edge) {

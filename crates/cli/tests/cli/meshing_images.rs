@@ -7,7 +7,7 @@ use pliant_geometry::io;
 use pliant_testing::image_files::{Form, Volume, nifti1};
 use serde_json::Value;
 
-use crate::support::{FROM_IMAGE, Told, Workshop};
+use crate::support::{FROM_IMAGE, Told, Workshop, changed};
 
 fn with_image() -> Workshop {
     let workshop = Workshop::new(FROM_IMAGE);
@@ -117,6 +117,35 @@ fn labels_are_listed_with_volume_place_and_pieces() {
     assert_eq!((&core["label"], &core["components"]), (&8.into(), &1.into()));
     assert!(close(&core["volume"], 1.4368e-6, 0.03), "{core}");
     assert!(close(&core["low"][0], -7e-3, 0.01) && close(&core["high"][2], 7e-3, 0.01), "{core}");
+}
+
+/// Several labels as one material, on the command line and in a scene, with the name of the group.
+#[test]
+fn groups_of_labels_are_one_material_each() {
+    let workshop = with_image();
+    let groups = ["--label", "tissue=5,9", "--label", "core=6-8"];
+    let told = mesh(&workshop, &[&groups[..], &["--edge", "4mm", "-o", "two.vtu"]].concat());
+    assert_eq!(told.code, 0, "{}", told.err);
+    assert!(told.out.contains("labels           5 (tissue), 8 (core)"), "{}", told.out);
+    let made = io::read(&workshop.path("two.vtu")).unwrap().mesh;
+    assert_eq!(made.label_names, [(5, "tissue".into()), (8, "core".into())].into());
+    let twice = mesh(&workshop, &["--label", "a=5,8", "--label", "8", "--edge", "4mm", "-o", "two.vtu"]);
+    assert!(twice.code == 2 && twice.err.contains("label 8 is named twice"), "{}", twice.err);
+
+    let grouped = "label = { tissue = [5, 9], core = \"6-8\" }";
+    let scene = changed(FROM_IMAGE, "label = 5", grouped);
+    let scene = changed(&scene, "law = \"tissue\"", "law = { tissue = \"tissue\", core = \"core\" }");
+    workshop.write("case/scene.toml", &scene);
+    let told = workshop.pliant(&["check", "case"]);
+    assert!(told.code == 0 && told.words().contains("5 (tissue)"), "{} {}", told.out, told.err);
+    // As `pliant mesh` writes it, and labels and groups do not mix there.
+    let told = mesh(&workshop, &[&groups[..], &["--edge", "4mm", "-o", "organ/scene.toml"]].concat());
+    assert_eq!(told.code, 0, "{}", told.err);
+    let text = workshop.read("organ/scene.toml");
+    assert!(text.contains("label = { \"tissue\" = [5, 9], \"core\" = [\"6-8\"] }"), "{text}");
+    assert_eq!(workshop.pliant(&["check", "organ"]).code, 0);
+    let mixed = mesh(&workshop, &["--label", "a=5", "--label", "8", "--edge", "4mm", "-o", "b/scene.toml"]);
+    assert!(mixed.code == 2 && mixed.err.contains("either labels or groups"), "{}", mixed.err);
 }
 
 #[test]

@@ -199,7 +199,11 @@ fn what_cannot_be_filled_is_refused_with_a_remedy() {
         (
             "open.ply",
             &[],
-            &["the surface is open: 1 hole", "holes of up to 5.00 mm are closed", "--close-gaps 20mm"],
+            &[
+                "the surface is open: 1 hole",
+                "holes of up to 5.00 mm are closed",
+                "closes holes as wide as this one",
+            ],
         ),
         ("plate.ply", &["--close-gaps", "2mm"], &["encloses nothing"]),
         ("ball.ply", &["--label", "1", "--label", "2"], &["`--label` more than once is for images"]),

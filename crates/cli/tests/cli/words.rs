@@ -180,6 +180,78 @@ fn a_surface_in_millimetres_is_not_taken_for_one_in_metres() {
     assert!(told.code == 0 && told.err.contains("larger than any organ"), "{}", told.err);
 }
 
+/// A tumour of 4 mm in millimetres measures as much as a machine in metres: both are possible, and the user is asked.
+#[test]
+fn a_small_organ_in_millimetres_is_noted() {
+    let workshop = workshop();
+    io::write(&workshop.path("tumour.stl"), &sphere(2.0, 3, 100_000).expect("a sphere")).expect("written");
+    let asked = ["measures 6.928 m across, larger than a person", "may be millimetres", "`--scale 0.001`"];
+    let made = ["mesh", "tumour.stl", "--edge", "0.8", "-o", "out.vtu"];
+    let told = workshop.pliant(&made);
+    assert!(told.code == 0 && asked.iter().all(|piece| told.words().contains(piece)), "{}", told.err);
+    let told = workshop.pliant(&[&made[..], &["--scale", "1"]].concat());
+    assert!(told.code == 0 && !told.err.contains("larger than"), "{}", told.err);
+    let told = workshop.pliant(&["info", "tumour.stl"]);
+    assert!(told.out.contains("may be millimetres or centimetres"), "{}", told.out);
+}
+
+/// What other programs read is named, with what helps; a scene in XML is one mistake, not five of TOML.
+#[test]
+fn files_of_other_programs_are_named() {
+    let workshop = workshop();
+    for (name, text, says) in [
+        ("model.inp", "*NODE\n1, 0, 0, 0\n", ["an input deck of Abaqus", "meshio convert"]),
+        ("model.feb", "<febio_spec version=\"4.0\">\n", ["a model of FEBio", "VTK"]),
+        ("model.scn", "<Node name=\"root\">\n", ["a scene of SOFA", "`filename`"]),
+    ] {
+        workshop.write(name, text);
+        for told in [workshop.pliant(&["info", name]), mesh(&workshop, &[name, "--label", "1"])] {
+            refused(&told, &says);
+        }
+    }
+    let scenes = [
+        (
+            "a.feb",
+            "<?xml version=\"1.0\"?>\n<febio_spec version=\"4.0\">\n</febio_spec>\n",
+            "a model of FEBio",
+        ),
+        ("a.scn", "<Node name=\"root\" dt=\"0.01\">\n</Node>\n", "a scene of SOFA"),
+        ("a.xml", "<?xml version=\"1.0\"?>\n<Model>\n</Model>\n", "`pliant import MODEL.xml"),
+    ];
+    for (name, text, says) in scenes {
+        workshop.write(name, text);
+        let told = workshop.pliant(&["check", name]);
+        refused(&told, &[says, "not a scene in TOML"]);
+        assert!(!told.err.contains("mistakes"), "{}", told.err);
+    }
+}
+
+/// A mesh is turned about the origin before it is shifted: half a turn about z takes LPS to RAS.
+#[test]
+fn a_mesh_of_a_scene_takes_a_turn() {
+    let whole = "{ file = \"ball.stl\", as = \"tets\", edge = 0.008, scale = 0.001, at = [0.1, 0, 0]";
+    let centre = |mesh: &str| {
+        let workshop = scene(mesh);
+        let mut ball = sphere(60.0, 3, 100_000).expect("a sphere");
+        ball.points.iter_mut().for_each(|point| *point += nalgebra::Vector3::new(70.0, -40.0, 20.0));
+        io::write(&workshop.path("case/ball.stl"), &ball).expect("the mesh is written");
+        let told =
+            workshop.pliant(&["mesh", "case/ball.stl", "--scale", "0.001", "--edge", "8mm", "-o", "x.vtu"]);
+        assert_eq!(told.code, 0, "{}", told.err);
+        let output = "[output.fields]\ntype = \"vtu\"\nevery = 0.001\n";
+        let text = workshop.read("case/scene.toml") + output;
+        workshop.write("case/scene.toml", text);
+        let told = workshop.pliant(&["run", "case", "--out", "out"]);
+        assert_eq!(told.code, 0, "{}", told.err);
+        let (low, high) = io::read(&workshop.path("out/fields/000000.vtu")).unwrap().mesh.bounds().unwrap();
+        (low + high) / 2.0
+    };
+    for (turn, x, y) in [("", 0.17, -0.04), (", turn = [0, 0, 3.141592653589793]", 0.03, 0.04)] {
+        let found = centre(&format!("{whole}{turn} }}"));
+        assert!((found - nalgebra::Vector3::new(x, y, 0.02)).norm() < 1e-3, "{turn}: {found}");
+    }
+}
+
 /// A scene of one body with this mesh.
 fn scene(mesh: &str) -> Workshop {
     let text = format!(

@@ -52,6 +52,19 @@ pub(super) fn read(input: &mut Input<'_>, options: &ReadOptions) -> Result<Image
     Ok(Image { grid, format: format!("NIfTI-{}", header.version), notes, names, numbers, scale })
 }
 
+/// A note on two orientations of one image that place a corner differently by more than a tenth of a voxel.
+fn different_forms(taken: &Grid, other: &Grid) -> Option<String> {
+    let corner = |grid: &Grid, at: usize| {
+        grid.position(&Vector3::from_fn(|axis, _| (at >> axis & 1) as f64 * (grid.dims[axis] as f64 - 1.0)))
+    };
+    let apart = (0..8).map(|at| (corner(taken, at) - corner(other, at)).norm()).fold(0.0, f64::max);
+    let least = taken.spacing().into_iter().fold(f64::INFINITY, f64::min);
+    (apart > 0.1 * least).then(|| {
+        let apart = 1e3 * apart;
+        format!("sform and qform place the image differently, by up to {apart:.1} mm: the sform is taken")
+    })
+}
+
 /// The header as bytes, and how to read them.
 struct NiftiHeader {
     bytes: Vec<u8>,
@@ -242,33 +255,44 @@ impl NiftiHeader {
 
     fn grid(&self, dims: [usize; 3], notes: &mut Vec<String>) -> Result<Grid, ImageProblem> {
         let unit = self.unit(notes);
+        let has_qform = self.integer(252, 344, 4) > 0;
         if self.integer(254, 348, 4) > 0 {
             let row = |row: usize| {
                 [0, 1, 2, 3].map(|at| self.real(280 + 16 * row + 4 * at, 400 + 32 * row + 8 * at) * unit)
             };
             let rows = [row(0), row(1), row(2)];
             let axes = Matrix3::from_fn(|i, j| rows[i][j]);
-            return Ok(Grid::new(dims, Vector3::from(rows.map(|row| row[3])), axes)?);
+            let grid = Grid::new(dims, Vector3::from(rows.map(|row| row[3])), axes)?;
+            let other = if has_qform { self.of_qform(dims, unit).ok() } else { None };
+            notes.extend(other.and_then(|other| different_forms(&grid, &other)));
+            return Ok(grid);
         }
-        let spacing = [1, 2, 3].map(|at| self.pixdim(at));
-        if spacing.iter().any(|&h| !(h.is_finite() && h > 0.0)) {
-            return Err(ImageProblem::bad("pixdim", format!("{spacing:?}"), POSITIVE));
+        if has_qform {
+            return self.of_qform(dims, unit);
         }
-        let spacing = Matrix3::from_diagonal(&(Vector3::from(spacing) * unit));
-        if self.integer(252, 344, 4) > 0 {
-            let offset = [0, 1, 2].map(|at| self.real(268 + 4 * at, 376 + 8 * at) * unit);
-            let mirror = Matrix3::from_diagonal(&Vector3::new(
-                1.0,
-                1.0,
-                if self.pixdim(0) < 0.0 { -1.0 } else { 1.0 },
-            ));
-            return Ok(Grid::new(dims, offset.into(), self.rotation()? * mirror * spacing)?);
-        }
+        let spacing = self.steps(unit)?;
         notes.push(
             "no orientation (sform and qform codes are 0): assuming axes x, y and z from the origin"
                 .to_owned(),
         );
         Ok(Grid::new(dims, Vector3::zeros(), spacing)?)
+    }
+
+    /// Steps along i, j and k [m], as a diagonal matrix.
+    fn steps(&self, unit: f64) -> Result<Matrix3<f64>, ImageProblem> {
+        let spacing = [1, 2, 3].map(|at| self.pixdim(at));
+        if spacing.iter().any(|&h| !(h.is_finite() && h > 0.0)) {
+            return Err(ImageProblem::bad("pixdim", format!("{spacing:?}"), POSITIVE));
+        }
+        Ok(Matrix3::from_diagonal(&(Vector3::from(spacing) * unit)))
+    }
+
+    /// The grid of the qform.
+    fn of_qform(&self, dims: [usize; 3], unit: f64) -> Result<Grid, ImageProblem> {
+        let offset = [0, 1, 2].map(|at| self.real(268 + 4 * at, 376 + 8 * at) * unit);
+        let side = if self.pixdim(0) < 0.0 { -1.0 } else { 1.0 };
+        let mirror = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, side));
+        Ok(Grid::new(dims, offset.into(), self.rotation()? * mirror * self.steps(unit)?)?)
     }
 
     /// Rotation of the quaternion (a, b, c, d); the file contains b, c and d.

@@ -6,7 +6,8 @@ use std::path::PathBuf;
 
 use nalgebra::Vector3;
 use pliant_imaging::{
-    Choice, Image, ImageError, ImageFormat, LabelChoice, LabelError, ReadOptions, read, read_bytes, read_with,
+    Choice, Image, ImageError, ImageFormat, LabelChoice, LabelError, LabelNames, ReadOptions, Scalar, read,
+    read_bytes, read_with,
 };
 
 use pliant_testing::image_files::*;
@@ -115,7 +116,7 @@ fn names_stand_in_the_headers_of_nrrd_and_nifti() {
     nifti.splice(348..352, extension);
     nifti[108..112].copy_from_slice(&((352 + padded) as f32).to_le_bytes());
     for (bytes, format) in [(slicer.into_bytes(), ImageFormat::Nrrd), (nifti, ImageFormat::Nifti)] {
-        let image =
+        let mut image =
             read_bytes(&bytes, format, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
         assert_same(&image, &labelled());
         assert_eq!(
@@ -125,6 +126,104 @@ fn names_stand_in_the_headers_of_nrrd_and_nifti() {
         let choice = image.choose(&[LabelChoice::Named("Tumour".into()), LabelChoice::Range(1, 1)]);
         assert_eq!(choice, Ok(Choice::Labels(vec![2, 1])));
     }
+}
+
+/// Labels that a program stored as scaled integers are half a step of the scale off at most; those that it interpolated between equal ones
+/// a little. Both are rounded, with a note; what lies between labels is no label.
+#[test]
+fn labels_off_by_their_storage_are_rounded() {
+    let (slope, intercept) = (0.216_296_65_f32, 7087.5_f32);
+    let stored = [0, 2, 1001, 14175]
+        .map(|label| ((f64::from(label) - f64::from(intercept)) / f64::from(slope)).round() as i16);
+    let volume = Volume { dims: [4, 1, 1], values: stored.to_vec(), ..Volume::oblique() };
+    let mut bytes = nifti1(&volume, Form::Sform, false);
+    bytes[112..116].copy_from_slice(&slope.to_le_bytes());
+    bytes[116..120].copy_from_slice(&intercept.to_le_bytes());
+    let scaled = read_bytes(&bytes, ImageFormat::Nifti, &ReadOptions::default()).unwrap();
+    assert_eq!(scaled.labels().unwrap().labels, [0, 2, 1001, 14175]);
+    let note = scaled.rounding().unwrap();
+    assert!(note.starts_with("4 voxels miss whole numbers, by up to 1.08e-1: rounded"), "{note}");
+    // From a step of 1 on, several labels have one number.
+    bytes[112..116].copy_from_slice(&1.5_f32.to_le_bytes());
+    let coarse = read_bytes(&bytes, ImageFormat::Nifti, &ReadOptions::default()).unwrap();
+    assert!(matches!(coarse.labels().unwrap_err(), LabelError::NotWhole { .. }));
+
+    let of = |values: [f64; 4]| {
+        let bytes = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+        let grid = pliant_geometry::Grid::along_axes([4, 1, 1], Vector3::zeros(), [1e-3; 3]).unwrap();
+        Image::new(grid, Scalar::F64, bytes, LabelNames::default()).unwrap()
+    };
+    let mut resampled = of([0.0, 7014.9999, 7002.977, 7015.0]);
+    let choice = resampled.choose(&["7003".parse().unwrap(), "7015".parse().unwrap()]).unwrap();
+    assert_eq!(choice, Choice::Labels(vec![7003, 7015]));
+    assert!(resampled.notes[0].contains("by up to 2.30e-2"), "{:?}", resampled.notes);
+    let between = of([0.0, 7014.9, 7003.0, 7015.0]).labels().unwrap_err().to_string();
+    assert!(between.contains("resampled by nearest neighbours"), "{between}");
+    assert_eq!(of([0.0, 1.0, 2.0, 3.0]).rounding(), None);
+}
+
+/// The box of a ball in an oblique image is that of its voxels, not that of the corners of its box of voxels.
+#[test]
+fn boxes_of_oblique_labels_are_true() {
+    let dims = [24, 20, 16];
+    let ball = |at: usize| {
+        let [i, j, k] = [at % 24, at / 24 % 20, at / 480].map(|i| i as f64);
+        i16::from((i - 12.0).powi(2) + (j - 10.0).powi(2) + (k - 8.0).powi(2) < 36.0)
+    };
+    let values = (0..dims.iter().product()).map(ball).collect();
+    let volume = Volume { dims, values, ..Volume::oblique() };
+    let image = read_bytes(&nifti1(&volume, Form::Sform, false), ImageFormat::Nifti, &ReadOptions::default())
+        .unwrap();
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for at in (0..image.grid.len()).filter(|&at| image.value(at) > 0.5) {
+        let here = Vector3::from(image.grid.triple(at).map(|i| i as f64)).add_scalar(-0.5);
+        for corner in 0..8 {
+            let corner = Vector3::from([corner & 1, corner >> 1 & 1, corner >> 2].map(f64::from));
+            let place = image.grid.position(&(here + corner));
+            for axis in 0..3 {
+                (low[axis], high[axis]) = (low[axis].min(place[axis]), high[axis].max(place[axis]));
+            }
+        }
+    }
+    let region = &image.regions(&|_| {}).unwrap()[0];
+    for axis in 0..3 {
+        assert!((region.low[axis] - low[axis]).abs() < 1e-12, "{region} {low:?}");
+        assert!((region.high[axis] - high[axis]).abs() < 1e-12, "{region} {high:?}");
+    }
+}
+
+/// Programs take one of the two: an image that has both says so where they differ.
+#[test]
+fn an_image_placed_twice_says_so() {
+    let mut bytes = nifti1(&labelled(), Form::Sform, false);
+    let notes = |bytes: &[u8]| read_bytes(bytes, ImageFormat::Nifti, &ReadOptions::default()).unwrap().notes;
+    assert_eq!(notes(&bytes), Vec::<String>::new());
+    let x = f32::from_le_bytes(bytes[268..272].try_into().unwrap());
+    bytes[268..272].copy_from_slice(&(x + 12.5).to_le_bytes());
+    let expected = "sform and qform place the image differently, by up to 12.5 mm: the sform is taken";
+    assert_eq!(notes(&bytes), [expected]);
+}
+
+/// The labels of a group are one label with the name of the group, in every type of number.
+#[test]
+fn groups_of_labels_become_one() {
+    let read = || {
+        let bytes = nifti1(&labelled(), Form::Sform, true);
+        read_bytes(&bytes, ImageFormat::Nifti, &ReadOptions::default()).unwrap()
+    };
+    let choices =
+        |typed: &[&str]| -> Vec<LabelChoice> { typed.iter().map(|typed| typed.parse().unwrap()).collect() };
+    let mut image = read();
+    let before = image.labels().unwrap().labels;
+    assert_eq!(image.choose(&choices(&["rest=3,1", "2"])), Ok(Choice::Labels(vec![3, 2])));
+    let expected: Vec<i32> = before.iter().map(|&label| if label == 1 { 3 } else { label }).collect();
+    assert_eq!(image.labels().unwrap().labels, expected);
+    assert_eq!(image.names.get(3), Some("rest"));
+    let told = |typed: &[&str]| read().choose(&choices(typed)).unwrap_err();
+    assert_eq!(told(&["a=1-2", "b=2,3"]), LabelError::Repeated { label: 2 });
+    assert!(matches!(told(&["a=1,9"]), LabelError::Absent { label: 9, .. }));
+    assert!(matches!(told(&["a=0,1"]), LabelError::Background { .. }));
+    assert!(matches!(told(&["a=7-9"]), LabelError::EmptyRange { .. }));
 }
 
 /// Layers of segments as 3D Slicer writes them: two numbers for each of the 2 × 2 × 1 voxels.

@@ -165,7 +165,7 @@ impl Shells {
         let creased = |n: &usize| self.creased[*n];
         let creases = (0..self.creased.len()).filter(creased).collect::<Vec<_>>();
         let crossing = self.crossing();
-        let mut mesh = self.mesh.to_mesh();
+        let mut mesh = self.mesh.to_parted_mesh();
         let normal = |(n, normal): (usize, &Vector3)| if creased(&n) { [0.0; 3] } else { (*normal).into() };
         let normals = self.normals.iter().enumerate().flat_map(normal).collect();
         mesh.point_data.insert("normal".into(), DataArray { components: 3, values: normals });

@@ -9,4 +9,5 @@ mod sizes;
 mod smoothing;
 mod structured;
 mod stuffing;
+mod touching;
 mod voxels;

@@ -81,6 +81,34 @@ fn many_labels_keep_three_quarters_of_the_ideal_step() {
     assert!(made.report.acoustic_part >= 0.75, "{}", made.report);
 }
 
+/// A hundred labels side by side: each has its cells in its place, with about its volume.
+#[test]
+fn a_hundred_labels_are_as_many_materials() {
+    let dims = [40, 40, 32];
+    let grid = Grid::along_axes(dims, Vector3::zeros(), [1e-3; 3]).unwrap();
+    let cube = |at: usize| {
+        let [i, j, k] = [at % 40 / 8, at / 40 % 40 / 8, at / 1600 / 8];
+        (1 + i + 5 * (j + 5 * k)) as i32
+    };
+    let labels = (0..grid.len()).map(cube).collect();
+    let all: Vec<i32> = (1..=100).collect();
+    let body = anatomy(&LabelImage { grid, labels }, &all);
+    let made = meshed(&body, 0.004, Vector3::zeros());
+    check_sound(&made);
+    for material in &made.report.materials {
+        let off = material.volume / 512e-9 - 1.0;
+        assert!(material.tets > 20 && off.abs() < 0.15, "label {}: {off}", material.label);
+    }
+    let block = &made.mesh.blocks[0];
+    for (cell, label) in block.cells().zip(&block.data["label"].values) {
+        let centre = cell.iter().map(|&node| made.mesh.points[node as usize]).sum::<Vector3>() / 4.0;
+        let cube = centre.map(|x| ((x / 1e-3 + 0.5) / 8.0).floor());
+        let own = [(*label as i32 - 1) % 5, (*label as i32 - 1) / 5 % 5, (*label as i32 - 1) / 25];
+        let far = (0..3).map(|axis| (cube[axis] - f64::from(own[axis])).abs()).fold(0.0, f64::max);
+        assert!(far <= 1.0, "a cell of label {label} at {centre}");
+    }
+}
+
 /// T2 for one lattice; the other seven, and 5 mm, are in the slow test.
 #[test]
 fn the_liver_keeps_its_shape_its_volume_and_its_step() {
@@ -246,10 +274,10 @@ fn impossible_requests_are_refused() {
     assert!(matches!(with(&|r| r.edge = 0.0), MeshingError::NotPositive { .. }));
     assert!(matches!(with(&|r| r.edge = 1e-4), MeshingError::TooManyCells { .. }));
     assert!(matches!(with(&|r| r.edge = 5.0), MeshingError::NoCells { .. }));
-    let many: Vec<i32> = (1..=64).collect();
+    let many: Vec<i32> = (1..=128).collect();
     let error =
         Anatomy::from_image(&organs::ball(0.02), &many, &Cleaning::default(), &Smoothing::default(), &|_| {});
-    assert!(matches!(error, Err(LabelError::TooManyLabels { labels: 64, limit: 63 })));
+    assert!(matches!(error, Err(LabelError::TooManyLabels { labels: 128, limit: 127 })));
 }
 
 /// A real organ from the folder PLIANT_DATA.

@@ -144,8 +144,8 @@ impl Builder<'_> {
             return Ok(Scan::Surface(self.mesh_file(table)?.1));
         }
         require_one_cut(table)?;
-        let image = self.read_images(table, watch)?;
-        let choice = choice(&image, table)?;
+        let mut image = self.read_images(table, watch)?;
+        let choice = choice(&mut image, table)?;
         let image = with_vessels(image, &choice, table)?;
         Ok(Scan::Image(image, choice))
     }
@@ -201,12 +201,12 @@ impl Builder<'_> {
 }
 
 /// The labels that a table requests, as far as the image has them, or the threshold above which voxels are inside.
-fn choice(image: &Image, table: &MeshTable) -> Result<Choice, MeshFault> {
+fn choice(image: &mut Image, table: &MeshTable) -> Result<Choice, MeshFault> {
     if let (Some(threshold), None) = (table.threshold, &table.masks) {
         return Ok(Choice::From(threshold));
     }
     let (key, labels) = match (&table.label, &table.labels, &table.masks) {
-        (Some(label), ..) => ("label", vec![label.choice()]),
+        (Some(label), ..) => ("label", label.choices()),
         (None, Some(labels), _) => ("labels", labels.iter().map(Label::choice).collect()),
         (None, None, Some(masks)) => ("masks", vec![LabelChoice::Range(1, masks.len() as i32)]),
         (None, None, None) => ("image", Vec::new()),
@@ -218,7 +218,7 @@ fn choice(image: &Image, table: &MeshTable) -> Result<Choice, MeshFault> {
 }
 
 /// The image with the vessels that run inside of the chosen labels as a part of these.
-fn with_vessels(image: Image, choice: &Choice, table: &MeshTable) -> Result<Image, MeshFault> {
+fn with_vessels(mut image: Image, choice: &Choice, table: &MeshTable) -> Result<Image, MeshFault> {
     let Some(vessels) = &table.vessels else { return Ok(image) };
     let Choice::Labels(organ) = choice else {
         let help = "name the organ by `label` or `labels`";
@@ -684,7 +684,7 @@ fn cover(
         }
         None => surface.volume_warning(&input).into_iter().collect(),
     };
-    let mesh = surface.to_mesh();
+    let mesh = surface.to_parted_mesh();
     warnings.extend(SurfaceCheck::of(&mesh).doubt());
     Ok((mesh, warnings))
 }

@@ -7,10 +7,11 @@ use pliant_geometry::io::{self, MeshFile, MeshFileError};
 use pliant_sim::number;
 
 use super::Builder;
+use crate::foreign::foreign_file;
 use crate::format::{Cells, MeshTable};
 
-/// An organ larger or smaller than this [m] is probably in other units.
-const PLAUSIBLE_SIZE: [f64; 2] = [1e-3, 10.0];
+/// An organ smaller than the first or larger than the last [m] is probably in other units; from the second on it may be.
+const PLAUSIBLE_SIZE: [f64; 3] = [1e-3, 2.0, 10.0];
 
 /// A size that no organ has: the mesh is probably not in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,9 +28,14 @@ impl SizeDoubt {
         (!(PLAUSIBLE_SIZE[0]..=PLAUSIBLE_SIZE[1]).contains(&size) && size > 0.0).then_some(Self { size })
     }
 
-    /// Whether it is too large, not too small.
+    /// Whether it is too large for any organ.
     pub fn is_large(&self) -> bool {
-        self.size > PLAUSIBLE_SIZE[1]
+        self.size > PLAUSIBLE_SIZE[2]
+    }
+
+    /// Whether it is larger than a person, and not too large for a part of a machine: a small organ in millimetres has this size.
+    pub fn is_possible(&self) -> bool {
+        (PLAUSIBLE_SIZE[1]..=PLAUSIBLE_SIZE[2]).contains(&self.size)
     }
 
     /// What to do; `scale` is how the factor is given, such as `--scale `.
@@ -38,7 +44,7 @@ impl SizeDoubt {
             size if size > 1e4 => {
                 format!("`{scale}1e-6` brings micrometres to metres, `{scale}0.001` millimetres")
             }
-            _ if self.is_large() => {
+            _ if self.is_large() || self.is_possible() => {
                 format!("`{scale}0.001` brings millimetres to metres, `{scale}0.01` centimetres")
             }
             _ => format!(
@@ -62,6 +68,12 @@ impl std::fmt::Display for SizeDoubt {
                 write!(
                     f,
                     "{size} m across, larger than any organ: its lengths are probably centimetres or millimetres"
+                )
+            }
+            _ if self.is_possible() => {
+                write!(
+                    f,
+                    "{size} m across, larger than a person: its lengths may be millimetres or centimetres"
                 )
             }
             _ => {
@@ -105,11 +117,16 @@ impl Builder<'_> {
         let opened = |source| MeshFileError::Open { path: file.to_owned(), source };
         let read = self.scene.file(file).map_err(opened).and_then(|path| io::read(&path));
         read.map_err(|error| {
-            let help = match error {
-                MeshFileError::Open { .. } => "file names are relative to the scene file",
-                _ => "`pliant info` reads a mesh file on its own",
+            let (message, help) = match (&error, foreign_file(file)) {
+                (MeshFileError::UnsupportedFormat { .. }, Some([what, help])) => {
+                    (format!("`{}` is {what}", file.display()), help)
+                }
+                (MeshFileError::Open { .. }, _) => {
+                    (error.to_string(), "file names are relative to the scene file")
+                }
+                _ => (error.to_string(), "`pliant info` reads a mesh file on its own"),
             };
-            MeshFault { key: "file", message: error.to_string(), help: help.into() }
+            MeshFault { key: "file", message, help: help.into() }
         })
     }
 

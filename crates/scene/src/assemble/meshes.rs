@@ -1,5 +1,6 @@
 //! The mesh of a body or a surface: read from a file or made from a shape, brought to metres, checked and repaired.
 
+use nalgebra::Rotation3;
 use pliant_geometry::io::MeshFile;
 use pliant_geometry::{
     CellBlock, CellId, CellKind, DataArray, Diagnosis, Mesh, Vector3, boundary, diagnose,
@@ -87,6 +88,9 @@ impl Builder<'_> {
             _ if SOLID_SHAPES.contains(&source) => self.shape(source, table, path)?,
             _ => self.sheet(source, table, path)?,
         };
+        if table.turn != [0.0; 3] {
+            made.mesh.transform(Rotation3::new(table.turn.into()).matrix());
+        }
         let shift = Vector3::from(table.at);
         made.mesh.points.iter_mut().for_each(|point| *point += shift);
         Some(made)
@@ -230,7 +234,7 @@ impl Builder<'_> {
             self.error(&place, format!("`{}` has {message}", path[1]), "this mesh", *help);
         }
         if problems.is_empty() {
-            self.doubt_size(mesh, path);
+            self.doubt_size(mesh, table, path);
             let met = faces_met_by_two_tets(mesh);
             if met > 0 {
                 let message = format!("`{}` has {} that two tets meet", path[1], counted(met, "hex face"));
@@ -246,8 +250,11 @@ impl Builder<'_> {
     }
 
     /// Warns of a size that no organ has.
-    fn doubt_size(&mut self, mesh: &Mesh, path: &[&str]) {
-        let Some(doubt) = SizeDoubt::of(mesh) else { return };
+    fn doubt_size(&mut self, mesh: &Mesh, table: &MeshTable, path: &[&str]) {
+        // Shapes are as large as the scene says, and a scale was thought about.
+        let is_meant = table.own_cells().is_none() || table.scale.is_some();
+        let doubt = SizeDoubt::of(mesh).filter(|doubt| !(is_meant && doubt.is_possible()));
+        let Some(doubt) = doubt else { return };
         let message = format!("`{}` measures {doubt}", path[1]);
         let place = self.source().span(path);
         self.out.push(Diagnostic::warning(message).at(place, "this mesh").help(doubt.advice("scale = ")));

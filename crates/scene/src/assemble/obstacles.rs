@@ -15,7 +15,7 @@ use super::mesh_files::SizeDoubt;
 use super::{Builder, Meshing};
 use crate::cache::{KeptGrid, Key};
 use crate::diagnostic::Diagnostic;
-use crate::format::{Cells, ImageTool, MeshTable, MeshTool, Sampling};
+use crate::format::{Cells, ImageTool, LabelOrGroups, MeshTable, MeshTool, Sampling};
 
 /// Steps of a grid along the diagonal of the box, if no `resolution` is given: the error at a surface as round as the box is below 1e-5 of
 /// its diagonal, and 3.4 million points (13 MiB) are the most.
@@ -42,7 +42,7 @@ impl Builder<'_> {
         let source = MeshTable {
             image: Some(table.file.clone()),
             names: table.names.clone(),
-            label: table.label.clone(),
+            label: table.label.clone().map(LabelOrGroups::One),
             labels: table.labels.clone(),
             threshold: table.threshold,
             clean: table.clean,

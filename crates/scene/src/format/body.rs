@@ -399,9 +399,11 @@ pub struct MeshTable {
     /// Names for the labels: a table of ITK-SNAP, FreeSurfer or 3D Slicer, lines like `5 liver`, JSON, or the word `totalsegmentator`.
     #[serde(default)]
     pub names: Option<PathBuf>,
-    /// Label of the image to mesh, by number or name.
+    /// Label of the image to mesh, by number or name; or groups of labels, each one material of that name:
+    /// `{ tissue = [1, 5, "liver"], bone = "26-50" }`. Cells of a group carry the number of its first label. The first group by name takes
+    /// what cleaning adds.
     #[serde(default)]
-    pub label: Option<Label>,
+    pub label: Option<LabelOrGroups>,
     /// Several labels of the image as one body, by number, name or range as `"5-8"`; of `masks` all if not given. Each cell has its own as cell data `label`, for `law`, `density` and
     /// `hourglass` by label. The first label takes what cleaning adds.
     #[serde(default)]
@@ -495,7 +497,11 @@ pub struct MeshTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub scale: Option<f64>,
-    /// Shift after scaling [m].
+    /// Turn about the origin, after scaling: about the axis of this vector by its length [rad]. `[0, 0, 3.14159265]` takes the axes left,
+    /// back, head (LPS) to right, front, head (RAS). Data of three components turn as vectors.
+    #[serde(default)]
+    pub turn: [f64; 3],
+    /// Shift after scaling and turning [m].
     #[serde(default)]
     pub at: [f64; 3],
     /// Repairs of a mesh file, in this order.
@@ -543,6 +549,43 @@ impl Label {
                 Ok(choice) => choice,
                 Err(never) => match never {},
             },
+        }
+    }
+}
+
+/// A label of an image, or groups of labels.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum LabelOrGroups {
+    /// A label.
+    One(Label),
+    /// Groups by their names.
+    Groups(BTreeMap<String, LabelGroup>),
+}
+
+/// Labels that become one: a label or a range, or several of them.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum LabelGroup {
+    /// A label, or a range as `"26-50"`.
+    One(Label),
+    /// Several labels and ranges.
+    Several(Vec<Label>),
+}
+
+impl LabelOrGroups {
+    /// What of an image it stands for.
+    pub fn choices(&self) -> Vec<LabelChoice> {
+        let group = |(name, group): (&String, &LabelGroup)| {
+            let labels = match group {
+                LabelGroup::One(label) => std::slice::from_ref(label),
+                LabelGroup::Several(labels) => labels,
+            };
+            LabelChoice::Group(name.clone(), labels.iter().map(Label::choice).collect())
+        };
+        match self {
+            Self::One(label) => vec![label.choice()],
+            Self::Groups(groups) => groups.iter().map(group).collect(),
         }
     }
 }

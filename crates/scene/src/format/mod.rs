@@ -12,9 +12,9 @@ mod view;
 
 pub use body::{
     AnnulusShape, BlockShape, BodyModel, BodyTable, ByLabel, Cells, CleanTable, CylinderShape, Density,
-    Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, Label, LayerTable,
-    LensShape, MeshTable, Normals, Organ, PatternName, PlateShape, Protected, SheetGrid, SphereShape,
-    SurfaceTable, Thickness, ThicknessRule, TubeShape, TwistedStripShape,
+    Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, Label, LabelGroup,
+    LabelOrGroups, LayerTable, LensShape, MeshTable, Normals, Organ, PatternName, PlateShape, Protected,
+    SheetGrid, SphereShape, SurfaceTable, Thickness, ThicknessRule, TubeShape, TwistedStripShape,
 };
 pub use contact::{
     BoxTool, CapsuleTool, ConeTool, ContactTable, GrowthTable, ImageTool, JawsTool, MeshTool, OpeningTable,
