@@ -31,6 +31,22 @@ pub(super) struct BarrierTables {
     pub check: bool,
 }
 
+impl BarrierTables {
+    /// The distance of the barrier of each contact [m].
+    pub(super) fn distances(&self) -> Vec<f64> {
+        self.settings.iter().map(|settings| settings.distance).collect()
+    }
+
+    fn touching(&self, contacts: &Arc<Contacts>) -> Touching {
+        Touching {
+            contacts: Arc::clone(contacts),
+            settings: self.settings.clone(),
+            levels: self.levels.clone(),
+            check_crossings: self.check,
+        }
+    }
+}
+
 impl Builder<'_> {
     /// Refuses keys that only barriers have, or only contacts without them.
     pub(super) fn check_keys_of_contact(
@@ -46,7 +62,6 @@ impl Builder<'_> {
             ("creep-speed", table.creep_speed.is_some(), true),
             ("subdivision", table.subdivision.is_some(), true),
             ("check-intersections", table.check_intersections && is_meet, true),
-            ("separate", table.separate, false),
         ];
         let mut fits = true;
         for (key, _, of_barrier) in given.into_iter().filter(|(_, given, of)| *given && *of != is_barrier) {
@@ -100,10 +115,27 @@ impl Builder<'_> {
         Some(offset)
     }
 
+    /// Takes note of bodies without a gap at the start that are to be pushed apart.
+    pub(super) fn find_meetings(
+        &mut self,
+        contacts: &Arc<Contacts>,
+        barriers: &BarrierTables,
+        start: &State,
+    ) {
+        let is_asked =
+            |name: &String| self.scene.contacts.iter().any(|(known, table)| known == name && table.separate);
+        if !barriers.tables.iter().any(is_asked) {
+            return;
+        }
+        let met = barriers.touching(contacts).meetings(&self.assembly, start);
+        let names = met.iter().map(|one| &barriers.tables[one.contact as usize]);
+        self.overlapping = names.into_iter().find(|name| is_asked(name)).cloned();
+    }
+
     /// Gives the contacts to the model, unless bodies have no gap at the start.
     pub(super) fn touch(&mut self, contacts: &Arc<Contacts>, barriers: BarrierTables, start: &State) {
-        let BarrierTables { settings, levels, tables, check } = barriers;
-        let touching = Touching { contacts: Arc::clone(contacts), settings, levels, check_crossings: check };
+        let touching = barriers.touching(contacts);
+        let tables = barriers.tables;
         let met = touching.meetings(&self.assembly, start);
         let mut of_contacts = BTreeMap::<u32, Vec<Meeting>>::new();
         met.into_iter().for_each(|one| of_contacts.entry(one.contact).or_default().push(one));
@@ -173,8 +205,8 @@ impl Builder<'_> {
             first.join("; "),
             if met.len() > LISTED { "; …" } else { "" }
         );
-        let help =
-            "move one of them (`at`), or make `thickness` smaller: a barrier can't begin within another body";
+        let help = "let `separate = true` push them apart, move one of them (`at`), or make `thickness` smaller: a barrier can't \
+                    begin within another body";
         self.error(&["contact", table, "between"], message, "no gap", help);
     }
 

@@ -41,6 +41,7 @@ use crate::nearest::nearest;
 use crate::scene::Scene;
 use crate::source::Source;
 
+use barriers::BarrierTables;
 use contacts::Partner;
 pub(crate) use contacts::{Meet, overlaps, told_distance, told_overlap, touches, usual_distance};
 pub use mesh_files::SizeDoubt;
@@ -237,8 +238,19 @@ pub fn build_watched(
     if !builder.failed() {
         builder.scale_mass();
     }
-    let start = if builder.failed() { None } else { builder.start() };
-    let pushed = if builder.failed() { None } else { builder.separate(contacts.as_deref()) };
+    let mut start = if builder.failed() { None } else { builder.start() };
+    let with_barriers = barriers.as_ref().filter(|_| scene.run.solver.solves_equations());
+    if let (Some(contacts), Some(barriers), Some(start)) = (&contacts, with_barriers, &start) {
+        builder.find_meetings(contacts, barriers, start);
+    }
+    let distances = with_barriers.map(BarrierTables::distances).unwrap_or_default();
+    let pushed = match builder.failed() {
+        true => None,
+        false => builder.separate(contacts.as_deref(), &distances, start.as_ref()),
+    };
+    if let (Some(start), Some(pushed)) = (&mut start, &pushed) {
+        builder.place(start, pushed);
+    }
     if let (Some(contacts), false) = (&mut contacts, builder.failed()) {
         builder.find_near(Arc::make_mut(contacts), pushed.as_ref().map(|moved| &moved[..]));
     }

@@ -17,6 +17,8 @@ use pliant_sim::{counted, number};
 use super::contacts::{OVERLAP, hang};
 use super::{Builder, in_metres};
 
+/// The gap between bodies that were pushed apart, over the distance of their barrier, is this at least.
+const LEAST_GAP: f64 = 0.5;
 /// Passes at most.
 const PASSES: usize = 400;
 /// Cosine of the angle between the shortest way out of a thing and that into the own body, below which the latter is taken.
@@ -35,8 +37,11 @@ struct Pushed {
     places: Vec<Vector3>,
     /// 1 along components that are free, else 0.
     free: Vec<Vector3>,
-    /// Gap [m] that is left between what was pushed apart.
+    /// Gap [m] below which points are pushed, and the gap that is left between them: that of barriers, without them none.
+    least: f64,
     left: f64,
+    /// Ways [m] up to this have no direction.
+    round_off: f64,
     /// The deepest overlap [m] in a pass, and where.
     deepest: (f64, Vector3),
 }
@@ -47,13 +52,13 @@ impl Pushed {
         self.push_by(row, row.normal.dot(&place));
     }
 
-    /// Pushes points with a gap [m] < 0 apart.
+    /// Pushes points with too small a gap [m] apart.
     fn push_by(&mut self, row: &Row, gap: f64) {
-        if gap >= 0.0 {
+        if gap >= self.least {
             return;
         }
-        if -gap > self.deepest.0 {
-            self.deepest = (-gap, self.places[row.parts[0].0 as usize]);
+        if self.least - gap > self.deepest.0 {
+            self.deepest = (self.least - gap, self.places[row.parts[0].0 as usize]);
         }
         let along = |&(node, c): &(u32, f64)| {
             c * c * row.normal.component_mul(&row.normal).dot(&self.free[node as usize])
@@ -70,11 +75,22 @@ impl Pushed {
 }
 
 impl Builder<'_> {
-    /// The displacements [m] that push bodies apart which overlap, of all nodes; `None` if nothing has to, or cannot be.
-    pub(super) fn separate(&mut self, contacts: Option<&Contacts>) -> Option<Arc<Vec<[f64; 3]>>> {
+    /// The displacements [m] that push bodies apart which overlap, of all nodes; `None` if nothing has to, or cannot be. Barriers have `distances`
+    /// [m], one a contact: bodies are pushed apart by as much, so that the run starts without forces between them.
+    pub(super) fn separate(
+        &mut self,
+        contacts: Option<&Contacts>,
+        distances: &[f64],
+        start: Option<&pliant_implicit::State>,
+    ) -> Option<Arc<Vec<[f64; 3]>>> {
         let (contacts, name) = (contacts?, self.overlapping.clone()?);
         let owners = self.assembly.constrained_components().ok()?;
-        let start = State::<f64>::at_rest(&self.assembly.model);
+        let mut at_first = State::<f64>::at_rest(&self.assembly.model);
+        if let Some(start) = start {
+            let moved = start.position.iter().zip(&self.assembly.rest);
+            at_first.displacement = moved.map(|(now, rest)| (now - Vector::from(*rest)).into()).collect();
+        }
+        let start = at_first;
         let at_rest = |(rest, u): (&[f64; 3], &[f64; 3])| Vector::from(*rest) + Vector::from(*u);
         let before: Vec<Vector3> = self.assembly.rest.iter().zip(&start.displacement).map(at_rest).collect();
         let size = before.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -82,12 +98,23 @@ impl Builder<'_> {
         let mut pushed = Pushed {
             places: before.clone(),
             free: owners.iter().map(is_free).collect(),
+            least: 0.0,
             left: OVERLAP * size,
+            round_off: OVERLAP * size,
             deepest: (0.0, Vector3::zeros()),
         };
         for pass in 0..=PASSES {
             pushed.deepest.0 = 0.0;
-            contacts.contacts.iter().for_each(|contact| self.push_apart(contact, contacts, &mut pushed));
+            for (index, contact) in contacts.contacts.iter().enumerate() {
+                if let Some(distance) = distances.get(index) {
+                    let kept = match contact.with {
+                        With::Rigid(_) => 0.0,
+                        _ => contact.touch.offset,
+                    };
+                    (pushed.least, pushed.left) = (kept + LEAST_GAP * distance, kept + distance);
+                }
+                self.push_apart(contact, contacts, &mut pushed);
+            }
             if pushed.deepest.0 <= OVERLAP * size {
                 break;
             }
@@ -153,7 +180,7 @@ impl Builder<'_> {
             let at = pushed.places[node as usize];
             let inside = cells.locate(at).is_some_and(|found| found.distance == 0.0);
             let Some(on) = faces.closest(&at).filter(|_| inside) else { continue };
-            let Some(normal) = (on.position - at).try_normalize(pushed.left) else { continue };
+            let Some(normal) = (on.position - at).try_normalize(pushed.round_off) else { continue };
             let on = on.nodes.iter().zip(on.weights).map(|(&corner, weight)| (own.node(corner), -weight));
             let parts = std::iter::once((node, 1.0)).chain(on).collect();
             pushed.push(&Row { parts, normal });
@@ -296,7 +323,7 @@ fn push_pairs(first: &Surface, second: &Surface, pushed: &mut Pushed) {
         let mut pairs = Pairs::new(first, Some(second), 0.0, place);
         pairs.update(place);
         pairs.find(place, |pair| {
-            if pair.distance < 0.0 {
+            if pair.distance < pushed.least {
                 let parts = pair.nodes.into_iter().zip(pair.weights).collect();
                 rows.push(Row { parts, normal: pair.normal });
             }

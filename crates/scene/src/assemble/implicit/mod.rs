@@ -262,6 +262,13 @@ impl Builder<'_> {
         }
         Some(start)
     }
+
+    /// Moves a start to displacements from rest [m].
+    pub(in crate::assemble) fn place(&self, start: &mut State, displacement: &[[f64; 3]]) {
+        let moved = self.assembly.places().zip(displacement).map(|(x, u)| x + Vector3::from(*u));
+        let positions: Vec<Vector3> = moved.collect();
+        start.set_positions(&self.assembly, &positions);
+    }
 }
 
 #[cfg(test)]
