@@ -649,7 +649,7 @@ mod tests {
     /// The layout of [`State`] and [`Progressed`] decides what a checkpoint can be read with: whoever changes it gives
     /// [`FORMAT`] the next number, and this test the new bytes.
     #[test]
-    fn the_layout_of_format_19_is_as_it_was() {
+    fn the_layout_of_format_20_is_as_it_was() {
         let bytes = |run: &str| {
             let world = World::new(&scene(run)).unwrap();
             world.simulation().unwrap().encode().unwrap()[0].len()
