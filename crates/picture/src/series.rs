@@ -503,12 +503,10 @@ mod tests {
 
     #[test]
     fn gaps_of_round_off_are_none() {
-        assert_eq!([-1e-9, 0.0, 2e-5, -3e-4].map(gap_note), [
-            "least gap 0",
-            "least gap 0",
-            "least gap 20.000 µm",
-            "least gap −300.000 µm"
-        ]);
+        assert_eq!(
+            [-1e-9, 0.0, 2e-5, -3e-4].map(gap_note),
+            ["least gap 0", "least gap 0", "least gap 20.000 µm", "least gap −300.000 µm"]
+        );
     }
 
     #[test]

