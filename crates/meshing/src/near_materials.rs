@@ -67,7 +67,7 @@ impl NearMaterials {
     pub(crate) fn of(&self, point: &Vector3) -> impl Iterator<Item = usize> {
         let [i, j, k] = self.cube(point);
         let own = &self.cubes[i + self.dims[0] * (j + self.dims[1] * k)];
-        let all = if own.is_empty() { 1..=self.materials } else { 1..=0 };
+        let all = 1..=if own.is_empty() { self.materials } else { 0 };
         own.iter().copied().chain(all)
     }
 
