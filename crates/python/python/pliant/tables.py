@@ -1510,7 +1510,7 @@ class Contact(Table):
     creep_speed
         Speed [m/s] below which bodies creep that friction should hold, with the solvers `implicit` and `static`; 0.001 if not given. Takes a number, greater than 0.
     check_intersections
-        Whether states are searched for edges that go through triangles, by a way of its own. With the solvers `implicit` and `static` the search looks at each state; an intersection would be a fault of the program, and ends the run. With the solver `explicit` the search looks at the states that outputs write, and counts the intersections of bodies that are deeper than 1e-4 of the mean edge: a warning, and `intersections` in `--json`. Holds for all contacts of the solver. Takes true or false; false if not given.
+        Whether states are searched for edges that go through triangles, by a way of its own. With the solvers `implicit` and `static` the search looks at each state; an intersection would be a fault of the program, and ends the run. With the solver `explicit` the search looks at the states that outputs write and at the last one, and counts the intersections of bodies that are deeper than 1e-4 of the mean edge: a warning, and `intersections` in `--json`. Holds for all contacts of the solver. Takes true or false; false if not given.
     separate
         Whether bodies that overlap at the start are pushed apart before the run, by the least ways of their nodes. The shape at rest stays as it is, so that the run starts deformed. Without it they are refused. Takes true or false; false if not given.
     """
