@@ -137,7 +137,7 @@ fn groups_of_labels_are_one_material_each() {
     let scene = changed(&scene, "law = \"tissue\"", "law = { tissue = \"tissue\", core = \"core\" }");
     workshop.write("case/scene.toml", &scene);
     let told = workshop.pliant(&["check", "case"]);
-    assert!(told.code == 0 && told.words().contains("5 (tissue)"), "{} {}", told.out, told.err);
+    assert!(told.code == 0 && told.out.contains("label 8 (core), 5 (tissue)"), "{} {}", told.out, told.err);
     // As `pliant mesh` writes it, and labels and groups do not mix there.
     let told = mesh(&workshop, &[&groups[..], &["--edge", "4mm", "-o", "organ/scene.toml"]].concat());
     assert_eq!(told.code, 0, "{}", told.err);

@@ -216,7 +216,6 @@ fn files_of_other_programs_are_named() {
             "a model of FEBio",
         ),
         ("a.scn", "<Node name=\"root\" dt=\"0.01\">\n</Node>\n", "a scene of SOFA"),
-        ("a.xml", "<?xml version=\"1.0\"?>\n<Model>\n</Model>\n", "`pliant import MODEL.xml"),
     ];
     for (name, text, says) in scenes {
         workshop.write(name, text);

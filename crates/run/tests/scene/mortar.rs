@@ -221,7 +221,7 @@ fn constraints_of_the_following_body_alone_are_refused() {
     let place = tempfile::tempdir().unwrap();
     let text = stacked(place.path(), "solver = 'static'", PAIRS[0], ["a", "b"], "");
     let told = world(&text.replace(&symmetric("b"), "")).err().unwrap();
-    for piece in ["`ax`", "follows nodes of", "constrain `b`"] {
+    for piece in ["`ax` and `t` both prescribe x", "constrain `b`"] {
         assert!(told.contains(piece), "no {piece} in {told}");
     }
     assert!(world(&text.replace(&symmetric("a"), "")).is_ok());
