@@ -333,14 +333,17 @@ typedef struct PliantTool {
     double torque[3];
 } PliantTool;
 
-/* Leads a tool to a pose within a time [s] from now, on a straight way and the shortest turn; there it stays. `rotation` is a quaternion x, y, z, w of any
+/* Leads a tool to a pose within a time [s] from now, on a straight way and the shortest turn; there it stays. Its jaws go on as they were going. `rotation` is a quaternion x, y, z, w of any
  * length but 0. `arrival`, if it is not null, gets the time [s] at which it is there: later than asked for where nodes would be passed over on the way. */
 PliantStatus pliant_tool_lead(const PliantContext *context, PliantSimulation simulation, const char *tool, const double *position, const double *rotation, double within, double *arrival, PliantError *error);
 
-/* Opens or closes the jaws of a tool to an angle [rad] within a time [s] from now; else as `pliant_tool_lead`. */
+/* Opens or closes the jaws of a tool to an angle [rad] within a time [s] from now, while it goes on as it was going; else as `pliant_tool_lead`. */
 PliantStatus pliant_tool_open(const PliantContext *context, PliantSimulation simulation, const char *tool, double angle, double within, double *arrival, PliantError *error);
 
-/* Tells where a tool or an obstacle is, and what it feels. */
+/* Leads a tool to a pose and its jaws to an angle [rad], which are there together; else as `pliant_tool_lead`. */
+PliantStatus pliant_tool_lead_open(const PliantContext *context, PliantSimulation simulation, const char *tool, const double *position, const double *rotation, double angle, double within, double *arrival, PliantError *error);
+
+/* Tells where a tool, an obstacle or a jaw (`grasper.upper`, `grasper.lower`) is, and what it feels. */
 PliantStatus pliant_tool(const PliantContext *context, PliantSimulation simulation, const char *tool, PliantTool *now, PliantError *error);
 
 /* Takes hold of nodes by a spring of a stiffness [N/m]; infinite is a pin. It acts on their mean by `weights`, which need not sum to 1; null weighs all the same.
