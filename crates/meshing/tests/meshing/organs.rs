@@ -83,6 +83,7 @@ fn many_labels_keep_three_quarters_of_the_ideal_step() {
 
 /// A hundred labels side by side, four cells wide: each has its cells in its place, with about its volume.
 #[test]
+#[ignore = "slow: a minute"]
 fn a_hundred_labels_are_as_many_materials() {
     let dims = [40, 40, 32];
     let grid = Grid::along_axes(dims, Vector3::zeros(), [1e-3; 3]).unwrap();
