@@ -3,7 +3,6 @@
 use std::ffi::c_char;
 
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
-use pliant_sim::Failure;
 use pliant_sim::contact::pose::Pose;
 
 use crate::context::{PliantContext, finite, give, needed, numbers, text};
@@ -32,8 +31,19 @@ fn known(own: &Running, name: &str) -> Result<(), Fault> {
     own.simulation.tool(name).map(|_| ()).ok_or_else(|| unknown(own, PLIANT_TOOLS, "tool", name))
 }
 
-fn led(result: Result<f64, Failure>) -> Result<f64, Fault> {
-    result.map_err(|failure| Fault::new(PliantStatus::NotANumber, failure.message))
+/// Leads a tool to a pose, its jaws to an angle [rad], or both within a time [s]; `arrival`, if it is not null, gets the time [s] at which they are there.
+unsafe fn lead(
+    own: &mut Running,
+    name: &str,
+    goal: (Option<Pose>, Option<f64>),
+    within: f64,
+    arrival: *mut f64,
+) -> Result<(), Fault> {
+    known(own, name)?;
+    let there = own.simulation.lead(name, goal.0, goal.1, within);
+    let there = there.map_err(|failure| Fault::new(PliantStatus::NotANumber, failure.message))?;
+    // SAFETY: pointers are what the caller owes.
+    if arrival.is_null() { Ok(()) } else { unsafe { give(arrival, "arrival", there) } }
 }
 
 /// A pose of a place [m] and a quaternion x, y, z, w.
@@ -65,9 +75,7 @@ pub unsafe extern "C" fn pliant_tool_lead(
             let name = text(tool, "tool")?;
             let pose = goal(position, rotation)?;
             finite(&[within], "within")?;
-            known(own, name)?;
-            let there = led(own.simulation.drive(name, pose, within))?;
-            if arrival.is_null() { Ok(()) } else { give(arrival, "arrival", there) }
+            lead(own, name, (Some(pose), None), within, arrival)
         })
     }
 }
@@ -88,9 +96,7 @@ pub unsafe extern "C" fn pliant_tool_open(
         running(context, simulation, error, |own| {
             let name = text(tool, "tool")?;
             finite(&[angle, within], "angle and within")?;
-            known(own, name)?;
-            let there = led(own.simulation.open(name, angle, within))?;
-            if arrival.is_null() { Ok(()) } else { give(arrival, "arrival", there) }
+            lead(own, name, (None, Some(angle)), within, arrival)
         })
     }
 }
@@ -114,9 +120,7 @@ pub unsafe extern "C" fn pliant_tool_lead_open(
             let name = text(tool, "tool")?;
             let pose = goal(position, rotation)?;
             finite(&[angle, within], "angle and within")?;
-            known(own, name)?;
-            let there = led(own.simulation.lead(name, Some(pose), Some(angle), within))?;
-            if arrival.is_null() { Ok(()) } else { give(arrival, "arrival", there) }
+            lead(own, name, (Some(pose), Some(angle)), within, arrival)
         })
     }
 }
