@@ -70,7 +70,8 @@ pub(crate) fn plot(world: &World, history: &History) -> Result<String, String> {
         };
         let energies = [
             energy("external work", |e| e.external),
-            energy("internal", |e| e.internal),
+            // What viscous laws have dissipated is not known apart from it.
+            energy("internal (stored and viscous)", |e| e.internal),
             energy("kinetic", |e| e.kinetic),
             energy("damping", |e| e.damping),
             energy("hourglass", |e| e.hourglass),
@@ -87,7 +88,12 @@ pub(crate) fn plot(world: &World, history: &History) -> Result<String, String> {
         }
         root.present().map_err(|error| error.to_string())?;
     }
-    Ok(svg)
+    Ok(with_round_joins(&svg))
+}
+
+/// The same plot with round joins of lines: a mitre would reach beyond the values of a curve that turns sharply.
+fn with_round_joins(svg: &str) -> String {
+    svg.replace("<polyline fill=\"none\"", "<polyline fill=\"none\" stroke-linejoin=\"round\"")
 }
 
 /// The plot of some runs of a sweep: a panel for each reaction, six at most, and a curve in it for each run by its title. `None` without
@@ -119,7 +125,7 @@ pub(crate) fn plot_of_sweep(runs: &[(String, Reactions)]) -> Result<Option<Strin
         }
         root.present().map_err(|error| error.to_string())?;
     }
-    Ok(Some(svg))
+    Ok(Some(with_round_joins(&svg)))
 }
 
 fn panel(
@@ -165,4 +171,24 @@ fn panel(
         Ok(())
     };
     draw().map_err(|error| error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// No line is filled, and none has a mitre, which would reach beyond the values.
+    #[test]
+    fn a_curve_that_drops_is_a_line_with_round_joins() {
+        let points = (0..100).map(|i| [f64::from(i) / 100.0, if i == 50 { 1.0 } else { 0.0 }]).collect();
+        let runs = [("a run".to_owned(), vec![("hand".to_owned(), points)])];
+        let svg = plot_of_sweep(&runs).unwrap().unwrap();
+        let lines: Vec<&str> = svg.split('<').filter(|tag| tag.starts_with("polyline")).collect();
+        assert!(!lines.is_empty());
+        for line in lines {
+            assert!(line.contains("fill=\"none\"") && line.contains("stroke-linejoin=\"round\""), "{line}");
+        }
+        let filled = svg.split('<').filter(|tag| tag.starts_with("polygon")).count();
+        assert_eq!(filled, 0);
+    }
 }
