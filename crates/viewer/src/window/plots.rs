@@ -74,7 +74,8 @@ fn draw(ui: &mut egui::Ui, unit: &str, mut lines: Vec<(String, Vec<[f64; 2]>)>) 
         .grid_spacing(12.0..=300.0);
     plot.allow_scroll(false).show(ui, |plot| {
         for (name, line) in lines {
-            plot.line(Line::new(name, line));
+            // Bands fill what lies between curves that rise and drop within a pixel and their next point.
+            plot.line(Line::new(name, line).allow_band(false));
         }
     });
 }
@@ -180,8 +181,8 @@ impl App {
 mod tests {
     use super::*;
 
-    /// The texts in a plot of a curve.
-    fn texts(line: &[[f64; 2]]) -> Vec<String> {
+    /// The shapes of a plot of a curve.
+    fn shapes(line: &[[f64; 2]]) -> Vec<egui::Shape> {
         let context = egui::Context::default();
         let mut output = egui::FullOutput::default();
         for _ in 0..3 {
@@ -192,11 +193,29 @@ mod tests {
             };
             output = context.run_ui(input, |ui| draw(ui, "N", vec![("force".into(), line.to_vec())]));
         }
+        output.shapes.into_iter().map(|clipped| clipped.shape).collect()
+    }
+
+    /// The texts in a plot of a curve.
+    fn texts(line: &[[f64; 2]]) -> Vec<String> {
         let text = |shape: &egui::Shape| match shape {
             egui::Shape::Text(text) => Some(text.galley.text().to_owned()),
             _ => None,
         };
-        output.shapes.iter().filter_map(|clipped| text(&clipped.shape)).collect()
+        shapes(line).iter().filter_map(text).collect()
+    }
+
+    /// Many values in a pixel, then a drop and a pause: a band would be filled from the drop to the end of the pause.
+    #[test]
+    fn a_curve_that_drops_is_a_line_and_fills_nothing() {
+        let rise = (0..2000).map(|i| [f64::from(i) * 1e-3, f64::from(i)]);
+        let line: Vec<[f64; 2]> = rise.chain([[2.0, 0.0], [3.0, 0.0]]).collect();
+        let shapes = shapes(&line);
+        let bands = shapes.iter().filter(|shape| matches!(shape, egui::Shape::Band(_))).count();
+        let lines = shapes
+            .iter()
+            .filter(|shape| matches!(shape, egui::Shape::Path(path) if path.points.len() > 1000));
+        assert_eq!((bands, lines.count()), (0, 1));
     }
 
     #[test]
