@@ -299,6 +299,9 @@ pub struct Render {
     /// its series.
     #[arg(long)]
     pub critical: bool,
+    /// Do not mark the largest value that the colours tell. A ring marks it, dashed where something hides the place.
+    #[arg(long)]
+    pub no_maximum: bool,
     /// Texture of the surface.
     #[arg(long, value_name = "WORD", value_parser = word::<TextureName>())]
     pub texture: Option<TextureName>,

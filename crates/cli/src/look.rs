@@ -20,6 +20,7 @@ pub fn look_of(scene: &Scene) -> Look {
             fibres: view.fibres,
             contacts: view.contacts,
             critical: view.critical,
+            maximum: view.mark_maximum,
             occlusion: view.occlusion,
             texture: texture_of(view.texture),
             clip: view.clip.and_then(|clip| Plane::through(&clip.point.into(), &clip.normal.into())),

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use pliant_geometry::{CellLabel, Labels, Mesh, RegionNames, Vector3, io};
 use pliant_picture::{
     AnimatedPng, Axis, Film, Graphics, Legend, Look, Picture, PictureError, Plane, Projection, Regions,
-    Series, SeriesError, ffmpeg,
+    Series, SeriesError, Style, ffmpeg,
 };
 use pliant_run::{Draw, Options, OutputFolder};
-use pliant_scene::format::VtuTable;
+use pliant_scene::format::{ClipTable, VtuTable};
 use pliant_scene::registry::OutputTable;
 use pliant_scene::{Scene, World};
 use pliant_viewer::{coat_of, regions_of};
@@ -47,6 +47,7 @@ fn typed(look: &mut Look, arguments: &Render) {
     style.fibres |= arguments.fibres;
     style.contacts |= arguments.contacts;
     style.critical |= arguments.critical;
+    style.maximum &= !arguments.no_maximum;
     if let Some([x, y, z, nx, ny, nz]) = arguments.clip {
         style.clip = Plane::through(&Vector3::new(x, y, z), &Vector3::new(nx, ny, nz));
     }
@@ -120,7 +121,8 @@ pub fn render(arguments: &Render) -> Result<u8, Failure> {
     if is_folder_of_run(&arguments.what) {
         refuse_words_of_scenes(arguments)?;
         let series = Series::find(&arguments.what, arguments.series.as_deref())?;
-        let mut look = Look { size: [1280, 800], ..Look::default() };
+        let style = Style { maximum: true, ..Style::default() };
+        let mut look = Look { size: [1280, 800], style, ..Look::default() };
         let usual = ["von-mises", "displacement"];
         if let Some(field) = series.first_field(&usual)? {
             colour_by_name(&mut look, field);
@@ -307,6 +309,10 @@ fn forget_outputs(scene: &mut Scene, arguments: &Render) -> f64 {
     // A different field does not use the scene's component.
     if arguments.colour.as_ref().is_some_and(|name| !name.contains(':')) {
         scene.view.component = None;
+    }
+    // A section shows the body that carries a surface: the surface has no inside.
+    if let Some([x, y, z, nx, ny, nz]) = arguments.clip {
+        scene.view.clip = Some(ClipTable { point: [x, y, z], normal: [nx, ny, nz] });
     }
     scene.view.fibres |= arguments.fibres;
     scene.view.contacts |= arguments.contacts;

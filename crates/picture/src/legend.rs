@@ -1,5 +1,7 @@
 //! Text in a picture: the colour scale with ticks and unit or the colours of labels with their names, a title and the time.
 
+use std::collections::BTreeSet;
+
 use crate::colour::label_colour;
 use crate::picture::Picture;
 use crate::style::{MISSING, Style};
@@ -18,6 +20,8 @@ pub struct Legend {
     pub note: String,
     /// Labels with their names, or empty: each has a swatch if colours show labels.
     pub labels: Vec<(i32, String)>,
+    /// Labels of which nothing is seen from here: their names say so.
+    pub hidden: BTreeSet<i32>,
     /// Steps of the run that did not converge and were accepted all the same. The note counts them.
     pub unconverged: u64,
     /// Whether a part of what is drawn has no value: its grey then has a swatch.
@@ -44,14 +48,19 @@ pub fn beyond([low, high]: [f64; 2], ends: Option<[f64; 2]>, unit: &str, factor:
     let Some([least, most]) = ends else { return Vec::new() };
     let room = BEYOND * (high - low);
     let told = |word: &str, value: f64| {
-        let decimals = (2.0 - (value * factor).abs().max(1e-300).log10().floor()).clamp(0.0, 9.0) as usize;
-        format!("{word} {} {unit}", written(value * factor, decimals)).trim_end().to_owned()
+        format!("{word} {} {unit}", three_digits(value * factor)).trim_end().to_owned()
     };
     let ends = [(most > high + room, "max", most), (least < low - room, "min", least)];
     ends.into_iter()
         .filter(|(is_beyond, ..)| high > low && *is_beyond)
         .map(|(_, word, value)| told(word, value))
         .collect()
+}
+
+/// A number with three digits.
+pub(crate) fn three_digits(value: f64) -> String {
+    let decimals = (2.0 - value.abs().max(1e-300).log10().floor()).clamp(0.0, 9.0) as usize;
+    written(value, decimals)
 }
 
 /// The text below the swatches if not all fit.
@@ -87,8 +96,7 @@ pub fn ticks([low, high]: [f64; 2], about: usize) -> (Vec<f64>, f64) {
 /// Where a scale of colours has marks, as parts of its length from the low end, and their numbers. Equal ends have one mark, in the middle.
 pub fn scale_marks([low, high]: [f64; 2], about: usize) -> Vec<(f64, String)> {
     if low == high {
-        let decimals = (2.0 - low.abs().max(1e-300).log10().floor()).clamp(0.0, 9.0) as usize;
-        return vec![(0.5, written(low, decimals))];
+        return vec![(0.5, three_digits(low))];
     }
     let (values, step) = ticks([low, high], about);
     let decimals = (-(step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize;
@@ -113,6 +121,17 @@ pub fn readable(unit: &str, size: f64) -> (String, f64) {
 }
 
 impl Legend {
+    /// The labels with their names, those that are seen first; of the others it is told that they are hidden.
+    fn told_labels(&self) -> Vec<(i32, String)> {
+        let told = |(label, name): &(i32, String)| match self.hidden.contains(label) {
+            true => (*label, format!("{name} (hidden)").trim_start().to_owned()),
+            false => (*label, name.clone()),
+        };
+        let (hidden, seen): (Vec<_>, Vec<_>) =
+            self.labels.iter().partition(|(label, _)| self.hidden.contains(label));
+        seen.into_iter().chain(hidden).map(told).collect()
+    }
+
     /// Part of the picture's width that the scale of colours or the names of labels take at the right.
     pub fn width(&self, style: &Style, [width, height]: [u32; 2]) -> f64 {
         let size = letters(height);
@@ -121,7 +140,7 @@ impl Legend {
             return if style.range.is_some() { scale } else { 0.0 };
         }
         let Some(pen) = Pen::new(size) else { return 0.0 };
-        let (lines, more) = swatches(&self.labels, rows(height));
+        let (lines, more) = swatches(&self.told_labels(), rows(height));
         let rest = (more > 0).then(|| told_of(more));
         let widest =
             lines.iter().map(|(_, text)| text).chain(&rest).map(|text| pen.width(text)).fold(0.0, f32::max);
@@ -168,7 +187,7 @@ impl Legend {
         if room < size {
             return;
         }
-        let (lines, more) = swatches(&self.labels, rows(picture.height));
+        let (lines, more) = swatches(&self.told_labels(), rows(picture.height));
         let middle = |row: usize| SWATCHES[0] * picture.height as f32 + (row as f32 + 0.5) * ROW * size;
         let places: Vec<f32> = (0..=lines.len()).map(middle).collect();
         for ((label, text), &y) in lines.iter().zip(&places) {
@@ -248,7 +267,7 @@ impl Legend {
 const GROUND: f32 = 0.82;
 
 /// Lays the background over what is drawn of bodies in a rectangle [pixels] (left, top, right, bottom), so that text on it can be read.
-fn clear_ground(picture: &mut Picture, style: &Style, [left, top, right, bottom]: [f32; 4]) {
+pub(crate) fn clear_ground(picture: &mut Picture, style: &Style, [left, top, right, bottom]: [f32; 4]) {
     let [above, below] = style.background.colours();
     for y in top.max(0.0) as u32..(bottom.max(0.0) as u32).min(picture.height) {
         let part = f64::from(y) / f64::from(picture.height);
@@ -289,7 +308,7 @@ fn rows(height: u32) -> usize {
 }
 
 /// Height of letters in a picture of a height [pixels].
-fn letters(height: u32) -> f32 {
+pub(crate) fn letters(height: u32) -> f32 {
     (height as f32 / 36.0).clamp(11.0, 60.0).round()
 }
 
@@ -333,6 +352,14 @@ mod tests {
         let (lines, more) = swatches(&organs(9), 3);
         assert_eq!((lines.len(), more), (2, 7));
         assert_eq!(swatches(&organs(2), 0), (Vec::new(), 2));
+    }
+
+    #[test]
+    fn labels_that_are_hidden_stand_last_and_are_told_to_be() {
+        let legend = Legend { labels: organs(3), hidden: [1, 2].into(), ..Legend::default() };
+        let (lines, _) = swatches(&legend.told_labels(), 5);
+        let texts: Vec<&str> = lines.iter().map(|(_, text)| text.as_str()).collect();
+        assert_eq!(texts, ["3", "1 (hidden)", "2 liver (hidden)"]);
     }
 
     #[test]

@@ -8,15 +8,13 @@ struct Solid {
     @location(1) facing: vec4<f32>,
 }
 
-fn solid_at(at: Corner) -> Solid {
-    let normal = normalize(at.normal);
-    let turned = select(-normal, normal, dot(normal, towards_eye(at.position)) >= 0.0);
-    return Solid(vec4(at.position, 1.0), vec4(turned, 0.0));
+fn solid_at(at: Corner, front: bool) -> Solid {
+    return Solid(vec4(at.position, 1.0), vec4(seen_normal(at, front, towards_eye(at.position)), 0.0));
 }
 
 @fragment
-fn solid(at: Corner) -> Solid {
-    let result = solid_at(at);
+fn solid(at: Corner, @builtin(front_facing) front: bool) -> Solid {
+    let result = solid_at(at, front);
     if is_behind(at) || opacity_at(at, 1.0) < 0.004 || dot(view.plane.xyz, at.place) > view.plane.w {
         discard;
     }
@@ -24,8 +22,8 @@ fn solid(at: Corner) -> Solid {
 }
 
 @fragment
-fn solid_cut(at: Corner) -> Solid {
-    return solid_at(at);
+fn solid_cut(at: Corner, @builtin(front_facing) front: bool) -> Solid {
+    return solid_at(at, front);
 }
 
 @group(1) @binding(0) var places: texture_2d<f32>;

@@ -105,6 +105,18 @@ impl Section {
         seen.map(|corner| f64::from(corner.point[3])).filter(|value| *value < 1e30)
     }
 
+    /// Places [m] in the section with their values, of cells that show theirs.
+    pub(crate) fn places(
+        &self,
+        subject: &Subject,
+        regions: &Regions,
+    ) -> impl Iterator<Item = (Vector3, f64)> {
+        let shows = subject.showing(regions);
+        let seen = self.corners.iter().filter(move |corner| shows[(corner.edges >> KIND) as usize]);
+        let place = |corner: &Corner| Vector3::from([0, 1, 2].map(|axis| f64::from(corner.point[axis])));
+        seen.map(move |corner| (place(corner), f64::from(corner.point[3]))).filter(|(_, value)| *value < 1e30)
+    }
+
     fn add(&mut self, polygon: &mut [Cut], axes: &[Vector3; 2], word: u32) {
         let middle = polygon.iter().map(|cut| cut.point).sum::<Vector3>() / polygon.len() as f64;
         for cut in polygon.iter_mut() {

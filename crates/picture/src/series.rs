@@ -14,11 +14,13 @@ use crate::error::PictureError;
 use crate::graphics::Graphics;
 use crate::legend::{Legend, readable};
 use crate::marks::{self, Mark, largest_load, marks_of};
+use crate::maximum::{Maximum, largest_seen};
 use crate::offscreen::{Frame, Offscreen};
 use crate::outermost::Outermost;
 use crate::picture::Picture;
 use crate::regions::Regions;
 use crate::section::Section;
+use crate::sight::Sight;
 use crate::style::Style;
 use crate::subject::{Subject, critical_cell, deformed_points, nodal_values, visible};
 
@@ -389,8 +391,36 @@ impl Look {
         Settled { camera, style, arrows, legend }
     }
 
-    fn finished(&self, mut picture: Picture, settled: &Settled, shown: &Shown, time: f64) -> Picture {
+    fn finished(
+        &self,
+        mut picture: Picture,
+        subject: &Subject,
+        settled: &Settled,
+        shown: &Shown,
+        time: f64,
+    ) -> Picture {
         let Settled { camera, style, arrows: [contacts, loads], legend } = settled;
+        let Frame { points, values, .. } = &shown.frame;
+        let mut section = Section::default();
+        let is_marked =
+            style.maximum && !values.is_empty() && style.range.is_some_and(|[low, high]| low < high);
+        if let Some(plane) = style.clip.filter(|_| is_marked || style.labels) {
+            section.cut(subject, points, values, &plane);
+        }
+        let sight = Sight::new(subject, points, &self.regions, style.clip, &section, camera);
+        let mut legend = legend.clone();
+        if style.labels {
+            let labels = legend.labels.iter().map(|(label, _)| *label);
+            legend.hidden = sight.hidden_labels(&self.regions, labels);
+        }
+        let largest = largest_seen(subject, &self.regions, points, values, style.clip, &section);
+        if let Some((place, value)) = largest.filter(|_| is_marked) {
+            let [low, high] = style.range.unwrap_or_default();
+            let (unit, factor) = readable(&legend.unit, low.abs().max(high.abs()));
+            let beside = picture.width as f32 * (1.0 - legend.width(style, self.size) as f32);
+            let maximum = Maximum { place, value, unit: &unit, factor, is_seen: sight.sees(&place) };
+            maximum.draw(&mut picture, camera, style, beside);
+        }
         marks::draw(&mut picture, camera, &shown.marks, loads[0]);
         arrows::draw(&mut picture, camera, &shown.forces, contacts[0]);
         let mut note =
@@ -410,7 +440,7 @@ impl Look {
         if self.legend.unconverged > 0 {
             note.push_str(&format!(", steps that did not converge: {}", self.legend.unconverged));
         }
-        Legend { note, ..legend.clone() }.write(&mut picture, style);
+        Legend { note, ..legend }.write(&mut picture, style);
         picture
     }
 
@@ -433,7 +463,7 @@ impl Look {
         let settled = look.settle(common);
         let mut offscreen = Offscreen::new(graphics, &subject, look.size)?;
         let picture = offscreen.draw(&shown.frame, &settled.camera, &settled.style, &look.regions)?;
-        Ok(look.finished(picture, &settled, &shown, time))
+        Ok(look.finished(picture, &subject, &settled, &shown, time))
     }
 
     /// Pictures of chosen frames of a series: `take` receives each with its index.
@@ -471,7 +501,7 @@ impl Look {
         for (count, &index) in frames.iter().enumerate() {
             let shown = read(index)?;
             let picture = offscreen.draw(&shown.frame, &settled.camera, &settled.style, &look.regions)?;
-            take(count, look.finished(picture, &settled, &shown, series.frames[index].0))?;
+            take(count, look.finished(picture, &subject, &settled, &shown, series.frames[index].0))?;
         }
         Ok(())
     }

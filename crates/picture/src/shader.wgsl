@@ -40,7 +40,7 @@ struct Kind {
 
 // Position [m] and value of each point.
 @group(1) @binding(0) var<storage, read> points: array<vec4<f32>>;
-// Three vertices, and a word: bits 0 to 2 tell which edges are drawn, bit 4 that it is of an obstacle or tool, bit 5 of one that holds bodies
+// Three vertices, and a word: bits 0 to 2 tell which edges are drawn, bit 3 that it is of a section, bit 4 that it is of an obstacle or tool, bit 5 of one that holds bodies
 // inside, bits 8 to 31 are the number of its kind.
 @group(1) @binding(1) var<storage, read> triangles: array<vec4<u32>>;
 // The point of each vertex.
@@ -98,7 +98,7 @@ struct Cut {
 @vertex
 fn section(@builtin(vertex_index) index: u32) -> Corner {
     let cut = corners[index];
-    return corner_at(cut.point, view.plane.xyz, index, cut.edges, cut.rest);
+    return corner_at(cut.point, view.plane.xyz, index, cut.edges | 8u, cut.rest);
 }
 
 fn corner_at(point: vec4<f32>, normal: vec3<f32>, index: u32, edges: u32, rest: vec3<f32>) -> Corner {
@@ -135,6 +135,19 @@ fn colour_of(value: f32) -> vec3<f32> {
 
 fn is_thing(at: Corner) -> bool {
     return (at.edges & 16u) != 0u;
+}
+
+fn is_cut(at: Corner) -> bool {
+    return (at.edges & 8u) != 0u;
+}
+
+// The normal on the side that is seen. Near outlines the smooth normal of a face that is seen may face away: it is turned to the outline, since
+// turned around it would have other light than the faces beside it.
+fn seen_normal(at: Corner, front: bool, eye: vec3<f32>) -> vec3<f32> {
+    let own = normalize(at.normal);
+    let is_front = select(front, dot(own, eye) >= 0.0, is_cut(at));
+    let normal = select(-own, own, is_front);
+    return normalize(normal - min(dot(normal, eye) - 1.0e-3, 0.0) * eye);
 }
 
 // Things are drawn from outside, so that one sees through a half-space from its back; those that hold bodies inside from there. The
@@ -209,10 +222,9 @@ fn coded(colour: vec3<f32>) -> vec3<f32> {
     return select(bounded, coded, view.range.w > 0.5);
 }
 
-fn shade(at: Corner) -> vec4<f32> {
+fn shade(at: Corner, front: bool) -> vec4<f32> {
     let eye = towards_eye(at.position);
-    var normal = normalize(at.normal);
-    normal = select(-normal, normal, dot(normal, eye) >= 0.0);
+    let normal = seen_normal(at, front, eye);
     let albedo = colour_at(at);
     let finish = kinds[at.edges >> 8u].finish;
     let light = light_at(at.place);
@@ -221,6 +233,10 @@ fn shade(at: Corner) -> vec4<f32> {
     let bumpy = uneven(at, normal);
     if view.skin.y > 0.0 && !is_thing(at) {
         colour = moist(albedo * mottled(at.rest, is_tissue(at), finish.z), bumpy, eye, finish.xy, light);
+    }
+    // In a section colours that tell something are those of the legend, whatever light falls on it.
+    if is_cut(at) && view.range.z > 0.5 && !is_tissue(at) {
+        colour = albedo;
     }
     let edges = edge_cover(at.corner, at.edges) * view.edge.a;
     return vec4(coded(mix(colour, view.edge.rgb, edges)), opacity_at(at, dot(normal, eye)));
@@ -312,8 +328,8 @@ fn uneven(at: Corner, normal: vec3<f32>) -> vec3<f32> {
 
 
 @fragment
-fn opaque(at: Corner) -> @location(0) vec4<f32> {
-    let colour = shade(at);
+fn opaque(at: Corner, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
+    let colour = shade(at, front);
     if is_behind(at) || colour.a < 0.004 {
         discard;
     }
@@ -321,8 +337,8 @@ fn opaque(at: Corner) -> @location(0) vec4<f32> {
 }
 
 @fragment
-fn clipped(at: Corner) -> @location(0) vec4<f32> {
-    let colour = shade(at);
+fn clipped(at: Corner, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
+    let colour = shade(at, front);
     if is_behind(at) || dot(view.plane.xyz, at.place) > view.plane.w {
         discard;
     }

@@ -179,6 +179,8 @@ pub struct Style {
     pub contacts: bool,
     /// Whether the cell with the smallest stable step is marked.
     pub critical: bool,
+    /// Whether the largest value that colours tell is marked with a ring, and its number written.
+    pub maximum: bool,
     /// Whether folds and contacts are darker, where less light arrives.
     pub occlusion: bool,
     /// The texture of the surface.
@@ -201,6 +203,7 @@ impl Default for Style {
             fibres: false,
             contacts: false,
             critical: false,
+            maximum: false,
             occlusion: true,
             texture: Texture::default(),
             clip: None,

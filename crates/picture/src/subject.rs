@@ -111,11 +111,15 @@ impl Subject {
         let mut triangles = Vec::new();
         let mut parents = Vec::new();
         let mut vertices = Vec::new();
+        let mut groups: Vec<u32> = Vec::new();
         let mut add = |faces: &[Patch], kinds: &mut Kinds| {
             let normals: Vec<Vector3> = faces.iter().map(|face| normal(&face.nodes, &mesh.points)).collect();
-            let (corners, own) = split_at_sharp_edges(faces, &normals, mesh.points.len());
+            let Split { corners, vertices: own, groups: own_groups } =
+                split_at_sharp_edges(faces, &normals, &places(mesh, faces));
             let first = vertices.len() as u32;
+            let first_group = groups.iter().max().map_or(0, |last| last + 1);
             vertices.extend(own);
+            groups.extend(own_groups.iter().map(|group| first_group + group));
             for (corners, Patch { parent, edges, .. }) in corners.iter().zip(faces) {
                 parents.resize(parents.len() + corners.len().saturating_sub(2).min(2), *parent);
                 let word = kinds.word(mesh.block(parent.kind), parent.index);
@@ -141,25 +145,7 @@ impl Subject {
             inner.push(face);
         }
         add(&inner, &mut kinds);
-        let mut counts = vec![0_u32; vertices.len() + 1];
-        for triangle in &triangles {
-            triangle[..3].iter().for_each(|&vertex| counts[vertex as usize + 1] += 1);
-        }
-        let mut sum = 0;
-        let offsets: Vec<u32> = (counts.iter())
-            .map(|count| {
-                sum += count;
-                sum
-            })
-            .collect();
-        let mut next = offsets.clone();
-        let mut around = vec![0; sum as usize];
-        for (triangle, number) in triangles.iter().zip(0..) {
-            for &vertex in &triangle[..3] {
-                around[next[vertex as usize] as usize] = number;
-                next[vertex as usize] += 1;
-            }
-        }
+        let (offsets, around) = around_vertices(&triangles, &groups);
         let cells: Vec<_> = shown_blocks(mesh).map(|block| (block.kind, block.nodes.clone())).collect();
         let volumes = shown_blocks(mesh).filter(|block| block.kind.dimension() == 3);
         let cells_of = |block| (0..CellBlock::len(block) as u32).map(move |cell| (block, cell));
@@ -405,46 +391,95 @@ fn normal(face: &[u32], points: &[Vector3]) -> Vector3 {
     vector_area(&corners).try_normalize(0.0).unwrap_or_default()
 }
 
-/// The vertices of each face, and the point of each vertex: around a point, faces that meet in edges that are not sharp share
-/// one.
-fn split_at_sharp_edges(faces: &[Patch], normals: &[Vector3], points: usize) -> (Vec<Vec<u32>>, Vec<u32>) {
-    let mut at_point: Vec<Vec<(u32, u32)>> = vec![Vec::new(); points];
+/// The triangles around each vertex of a group, which are those of all its vertices: where they begin in the list, and the list.
+fn around_vertices(triangles: &[[u32; 4]], groups: &[u32]) -> (Vec<u32>, Vec<u32>) {
+    let count = groups.iter().max().map_or(0, |last| *last as usize + 1);
+    let mut of_group: Vec<Vec<u32>> = vec![Vec::new(); count];
+    for (triangle, number) in triangles.iter().zip(0..) {
+        for &vertex in &triangle[..3] {
+            of_group[groups[vertex as usize] as usize].push(number);
+        }
+    }
+    let (mut offsets, mut around) = (vec![0], Vec::new());
+    for &group in groups {
+        around.extend(&of_group[group as usize]);
+        offsets.push(around.len() as u32);
+    }
+    (offsets, around)
+}
+
+/// For each point of a mesh the first one of the same body at the same place at rest: blocks whose nodes are doubled where they meet have one
+/// surface.
+fn places(mesh: &Mesh, faces: &[Patch]) -> Vec<u32> {
+    let mut places: Vec<u32> = (0..mesh.points.len() as u32).collect();
+    let mut known: BTreeMap<([u64; 3], i32), u32> = BTreeMap::new();
+    for face in faces {
+        let body = mesh.block(face.parent.kind).map_or(0, |block| cell_body(block, face.parent.index));
+        for &node in &face.nodes {
+            // Zeros of both signs are one.
+            let point = mesh.points[node as usize].map(|x| (x + 0.0).to_bits());
+            places[node as usize] = *known.entry((point.into(), body)).or_insert(node);
+        }
+    }
+    places
+}
+
+/// Faces whose corners are vertices.
+struct Split {
+    /// The vertices of each face.
+    corners: Vec<Vec<u32>>,
+    /// The point of each vertex.
+    vertices: Vec<u32>,
+    /// The group of each vertex: those of one share their normal.
+    groups: Vec<u32>,
+}
+
+/// Around a place, faces that meet in edges that are not sharp share a vertex, or several with one normal if points are doubled there.
+fn split_at_sharp_edges(faces: &[Patch], normals: &[Vector3], places: &[u32]) -> Split {
+    let mut at_place: Vec<Vec<(u32, u32)>> = vec![Vec::new(); places.len()];
     for (face, number) in faces.iter().zip(0..) {
         for (&node, corner) in face.nodes.iter().zip(0..) {
-            at_point[node as usize].push((number, corner));
+            at_place[places[node as usize] as usize].push((number, corner));
         }
     }
     let mut corners: Vec<Vec<u32>> = faces.iter().map(|face| vec![0; face.nodes.len()]).collect();
-    let mut vertices = Vec::new();
-    for (around, point) in at_point.iter().zip(0..) {
-        // Groups of the faces around the point, by the smallest index in it.
+    let (mut vertices, mut groups) = (Vec::new(), Vec::new());
+    let mut count = 0;
+    for around in at_place {
+        // Groups of the faces around the place, by the smallest index in it.
         let mut group: Vec<usize> = (0..around.len()).collect();
-        let mut by_edge: BTreeMap<u32, usize> = BTreeMap::new();
+        let mut by_edge: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         for (index, &(face, corner)) in around.iter().enumerate() {
             let nodes = &faces[face as usize].nodes;
             let (corner, count) = (corner as usize, nodes.len());
             for other in [nodes[(corner + 1) % count], nodes[(corner + count - 1) % count]] {
-                let Some(&first) = by_edge.get(&other) else {
-                    by_edge.insert(other, index);
-                    continue;
-                };
-                let angle = normals[face as usize].dot(&normals[around[first].0 as usize]);
-                if angle > SHARP {
-                    let (one, two) = (group[first], group[index]);
-                    group.iter_mut().filter(|g| **g == one.max(two)).for_each(|g| *g = one.min(two));
+                let beside = by_edge.entry(places[other as usize]).or_default();
+                for &before in &*beside {
+                    let angle = normals[face as usize].dot(&normals[around[before].0 as usize]);
+                    if angle > SHARP {
+                        let (one, two) = (group[before], group[index]);
+                        group.iter_mut().filter(|g| **g == one.max(two)).for_each(|g| *g = one.min(two));
+                    }
                 }
+                beside.push(index);
             }
         }
-        let mut number: BTreeMap<usize, u32> = BTreeMap::new();
+        let mut number: BTreeMap<(usize, u32), u32> = BTreeMap::new();
+        let mut known: BTreeMap<usize, u32> = BTreeMap::new();
         for (&(face, corner), &own) in around.iter().zip(&group) {
-            let vertex = *number.entry(own).or_insert_with(|| {
+            let point = faces[face as usize].nodes[corner as usize];
+            let vertex = *number.entry((own, point)).or_insert_with(|| {
                 vertices.push(point);
+                groups.push(*known.entry(own).or_insert_with(|| {
+                    count += 1;
+                    count - 1
+                }));
                 vertices.len() as u32 - 1
             });
             corners[face as usize][corner as usize] = vertex;
         }
     }
-    (corners, vertices)
+    Split { corners, vertices, groups }
 }
 
 /// The points of a mesh, moved by its field `displacement` [m] if it has one.

@@ -4,7 +4,9 @@
 mod support;
 
 use pliant_geometry::{CellKind, DataArray, Mesh, Region, Vector3};
-use pliant_picture::{Coat, Look, Picture, Plane, Regions, Style, label_colour};
+use pliant_picture::{
+    Camera, Coat, Look, Picture, Plane, Regions, Section, Sight, Style, Subject, label_colour,
+};
 use support::graphics;
 
 /// A cube of 6³ hexes: label 1 in one half and 2 in the other, around a core of 2³ with label 3.
@@ -140,6 +142,48 @@ fn a_section_has_the_colours_of_the_cells_it_cuts() {
     assert!(left > 2000 && right > 2000 && core > 400, "{left} {right} {core}");
     assert!(other * 50 < left + right, "{other}");
     assert_eq!(swatches(&picture), [1, 2, 3]);
+}
+
+/// Whatever light falls on a section: its colours are those of the legend, byte by byte.
+#[test]
+fn colours_of_a_section_are_those_of_the_legend_from_every_side() {
+    let Some(graphics) = graphics() else { return };
+    for (azimuth, normal) in
+        [(0.0, Vector3::x()), (80.0, Vector3::x()), (-80.0, Vector3::x()), (-55.0, -Vector3::z())]
+    {
+        let clip = Plane::through(&Vector3::new(0.025, 0.0, 0.031), &normal);
+        let elevation = if normal.z < 0.0 { -40.0 } else { 5.0 };
+        let camera = Camera { azimuth, elevation, ..Camera::default() };
+        let look = Look { style: Style { clip, ..look().style }, camera, ..look() };
+        let picture = look.picture(&graphics, &cube(), None, 0.0).unwrap();
+        let exact = |label| {
+            let colour = label_colour(label);
+            picture.rgba.chunks(4).filter(|pixel| pixel[..3] == colour && pixel[3] == 255).count()
+        };
+        // Swatches are not covered by a body.
+        assert!(exact(1) > 2000 && exact(3) > 200, "{azimuth}: {} {}", exact(1), exact(3));
+    }
+}
+
+#[test]
+fn the_legend_tells_which_labels_nothing_is_seen_of_from_here() {
+    let mut mesh = cube();
+    // The corner of the smallest x, the greatest y and the smallest z.
+    mesh.blocks[0].data.get_mut("label").unwrap().values[30] = 4.0;
+    let subject = Subject::new(&mesh);
+    let hidden = |azimuth: f64, regions: &Regions| -> Vec<i32> {
+        let mut camera = Camera { azimuth, ..Camera::default() };
+        camera.fit(&mesh.points, 1.0);
+        let sight = Sight::new(&subject, &mesh.points, regions, None, &Section::default(), &camera);
+        sight.hidden_labels(regions, [1, 2, 4].into_iter()).into_iter().collect()
+    };
+    let all = Regions::default();
+    assert_eq!(hidden(-45.0, &all), [4]);
+    assert_eq!(hidden(135.0, &all), [0; 0]);
+    assert_eq!(hidden(45.0, &all), [0; 0], "the side of y");
+    let glass = Coat { opacity: 0.5, ..Coat::default() };
+    let through = Regions { coats: [1, 2].map(|label| (Region::Label(label), glass)).to_vec(), ..all };
+    assert_eq!(hidden(-45.0, &through), [0; 0]);
 }
 
 #[test]

@@ -127,7 +127,8 @@ mod with_pictures {
             fs::read(workshop.path(folder).join("frame-00005.png")).unwrap()
         };
         let plain = take("plain", &[]);
-        let different: [&[&str]; 9] = [
+        let different: [&[&str]; 10] = [
+            &["--no-maximum"],
             &["--colour", "pressure"],
             &["--colour", "none"],
             &["--colour", "cauchy-stress:zz"],
@@ -144,6 +145,10 @@ mod with_pictures {
         assert_eq!(take("again", &["--camera", "20,22"]), plain);
         let surface = take("surface", &["--set", "view.on=skin", "--colour", "von-mises"]);
         assert_ne!(surface, plain);
+        // A surface has no inside: a section shows that of the body that carries it.
+        let cut = ["--clip", "0.05,0.05,0.05,1,0.2,0"];
+        let section = |on: &str| take(on, &[&["--set", &format!("view.on={on}")][..], &cut].concat());
+        assert_eq!(section("skin"), section("block"));
         assert!(Picture::from_png_with_coverage(&plain).is_err(), "pictures are opaque");
     }
 

@@ -1621,6 +1621,8 @@ class View(Table):
         Whether constraints and loads are marked, through the bodies: squares where nodes are held, dots where they are moved, bars under plates, arrows along the forces of loads, and one along the weight of all. At most 300 of each kind are drawn. Takes true or false; false if not given.
     critical
         Whether the element with the smallest `element-step` is marked, through the body. Shells are then shown flat. Takes true or false; false if not given.
+    mark_maximum
+        Whether the largest value that the colours tell is marked: a ring at its place and the number. The ring is dashed where something hides the place. Takes true or false; true if not given.
     occlusion
         Whether folds and contacts are darker, where less light from all sides arrives. Takes true or false; true if not given.
     texture
@@ -1640,7 +1642,7 @@ class View(Table):
     """
 
     _type: ClassVar[str | None] = None
-    _keys: ClassVar[dict[str, str]] = {"on": "on", "colour": "colour", "hide": "hide", "look": "look", "component": "component", "map": "map", "range": "range", "edges": "edges", "wireframe": "wireframe", "ghost": "ghost", "fibres": "fibres", "contacts": "contacts", "marks": "marks", "critical": "critical", "occlusion": "occlusion", "texture": "texture", "clip": "clip", "at": "at", "camera": "camera", "background": "background", "size": "size", "curved": "curved"}
+    _keys: ClassVar[dict[str, str]] = {"on": "on", "colour": "colour", "hide": "hide", "look": "look", "component": "component", "map": "map", "range": "range", "edges": "edges", "wireframe": "wireframe", "ghost": "ghost", "fibres": "fibres", "contacts": "contacts", "marks": "marks", "critical": "critical", "mark_maximum": "mark-maximum", "occlusion": "occlusion", "texture": "texture", "clip": "clip", "at": "at", "camera": "camera", "background": "background", "size": "size", "curved": "curved"}
 
     on: str | None = None
     colour: str | None = None
@@ -1656,6 +1658,7 @@ class View(Table):
     contacts: bool | None = None
     marks: bool | None = None
     critical: bool | None = None
+    mark_maximum: bool | None = None
     occlusion: bool | None = None
     texture: Any | None = None
     clip: Any | None = None

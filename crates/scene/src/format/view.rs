@@ -89,6 +89,10 @@ pub struct ViewTable {
     /// Whether the element with the smallest `element-step` is marked, through the body. Shells are then shown flat.
     #[serde(default)]
     pub critical: bool,
+    /// Whether the largest value that the colours tell is marked: a ring at its place and the number. The ring is dashed where something hides the
+    /// place.
+    #[serde(default = "yes")]
+    pub mark_maximum: bool,
     /// Whether folds and contacts are darker, where less light from all sides arrives.
     #[serde(default = "yes")]
     pub occlusion: bool,

@@ -10,13 +10,15 @@ use eframe::egui::{self, Align2, Key, PointerButton, vec2};
 use eframe::egui_wgpu::WgpuConfiguration;
 use pliant_geometry::{CellKind, Mesh, RegionNames, Vector3};
 use pliant_picture::{
-    ColourMap, Look, Outermost, Series, SeriesError, Subject, Texture, deformed_points, field_choices,
+    ColourMap, Look, Outermost, Series, SeriesError, Style, Subject, Texture, deformed_points, field_choices,
     nodal_values,
 };
 use pliant_scene::format::FieldName;
 
+use super::NARROW;
 use super::bodies::Listed;
 use super::keep::Taking;
+use super::panels::{SPEED, make_room};
 use super::told::{Told, tell};
 use super::viewport::{OCCLUSION, Viewport};
 use super::{Outcome, WindowError, run_window};
@@ -202,7 +204,8 @@ impl Finished {
         series: Series,
         outcome: Outcome,
     ) -> Result<Self, String> {
-        let port = Viewport::new(context, &Look::default())?;
+        let style = Style { maximum: true, ..Style::default() };
+        let port = Viewport::new(context, &Look { style, ..Look::default() })?;
         let ((asks, asked), (found, receive)) = (channel(), channel());
         let woken = context.egui_ctx.clone();
         let work = move || read_frames(&asked, &found, &|| woken.request_repaint());
@@ -324,6 +327,7 @@ impl Finished {
                 }
             }
             ui.checkbox(&mut self.timeline.looped, "Loop").on_hover_text("at the end, starts again");
+            make_room(ui, SPEED);
             let speed = egui::Slider::new(&mut self.timeline.speed, 0.01..=100.0).logarithmic(true);
             ui.add(speed.text("× real time"));
             ui.separator();
@@ -416,6 +420,7 @@ impl Finished {
         self.port.draw_axes(&painter);
         if let Some(field) = self.field.as_deref().filter(|_| !labels) {
             let (quantity, unit) = words(field);
+            self.port.draw_maximum(&painter, unit);
             self.port.draw_scale(&painter, &quantity, unit);
         }
         let frame = self.timeline.frame(&self.series);
@@ -472,7 +477,9 @@ impl eframe::App for Finished {
         self.load();
         self.port.bring(frame);
         egui::Panel::top("top").show(ui, |ui| self.top(ui));
-        egui::Panel::right("side").default_size(220.0).show(ui, |ui| self.side(ui));
+        if ui.available_width() > NARROW {
+            egui::Panel::right("side").default_size(220.0).show(ui, |ui| self.side(ui));
+        }
         if tell(ui, self.message.as_ref()) {
             self.message = None;
         }

@@ -12,6 +12,7 @@ use pliant_scene::format::{Choice, ColourBy, LookColour, ViewTable};
 use pliant_scene::source::{Source, Value};
 
 use super::App;
+use super::panels::make_room;
 use super::told::Told;
 use crate::beside::create_beside;
 use crate::parameters::Number;
@@ -136,6 +137,9 @@ fn view_text(view: &ViewTable, style: &Style, camera: &Camera, cut: Option<Plane
     if !view.occlusion {
         put("occlusion", "false".into());
     }
+    if !style.maximum {
+        put("mark-maximum", "false".into());
+    }
     if style.texture == Texture::Skin {
         put("texture", toml_text("skin"));
     }
@@ -211,6 +215,7 @@ impl App {
         }
         let changed = self.changed_numbers();
         let button = egui::Button::new("Save scene");
+        make_room(ui, 90.0);
         let button = ui.add_enabled(!changed.is_empty(), button);
         if button.on_hover_text("writes the scene with the changed numbers beside it").clicked() {
             let (text, elsewhere) = text_with(&self.world.scene.source, &changed);
@@ -292,8 +297,8 @@ mod tests {
         let read = scene(&format!("{SCENE}{text}")).view;
         assert_eq!((read.on, read.colour, read.component), (view.on, view.colour, view.component), "{text}");
         assert_eq!(
-            (read.range, read.edges, read.ghost, read.wireframe, read.occlusion),
-            (Some([-1e-3, 0.25]), true, true, false, false)
+            (read.range, read.edges, read.ghost, read.wireframe, read.occlusion, read.mark_maximum),
+            (Some([-1e-3, 0.25]), true, true, false, false, false)
         );
         assert_eq!((read.hide, read.look), (view.hide, view.look));
         assert_eq!(read.clip.map(|clip| (clip.point, clip.normal)), Some(([0.5, 0.0, 0.0], [1.0, 0.0, 0.0])));

@@ -501,6 +501,9 @@ impl App {
     }
 }
 
+/// Width of a window below which the side panel is left out.
+const NARROW: f32 = 520.0;
+
 /// Height of what is left for plots and the picture below which plots are left out.
 const LOW: f32 = 380.0;
 
@@ -523,7 +526,7 @@ impl eframe::App for App {
         self.go_on_filming();
         self.keys(&context);
         egui::Panel::top("top").show(ui, |ui| self.top(ui));
-        if self.side_shown {
+        if self.side_shown && ui.available_width() > NARROW {
             egui::Panel::right("side").default_size(220.0).show(ui, |ui| self.side(ui));
         }
         self.tell(ui);

@@ -23,6 +23,16 @@ const TENSOR: [Option<Component>; 6] = {
     [Some(Xx), Some(Yy), Some(Zz), Some(Xy), Some(Yz), Some(Xz)]
 };
 
+/// Width of a slider with its number and its text.
+pub(super) const SPEED: f32 = 240.0;
+
+/// Begins another line of buttons where this one has less room than what comes next is wide.
+pub(super) fn make_room(ui: &mut egui::Ui, width: f32) {
+    if ui.available_size_before_wrap().x < width {
+        ui.end_row();
+    }
+}
+
 impl App {
     pub(super) fn top(&mut self, ui: &mut egui::Ui) {
         // In a small window, or with large text, buttons take several lines.
@@ -49,6 +59,7 @@ impl App {
                 self.reset();
             }
             ui.separator();
+            make_room(ui, SPEED);
             let speed = egui::Slider::new(&mut self.speed, 0.01..=10.0).logarithmic(true).text("× real time");
             if ui.add(speed).changed() {
                 self.order(Order::Speed(self.speed));

@@ -74,6 +74,10 @@ impl App {
         self.draw_followed(&painter);
         if let Some(field) = self.field().filter(|_| !self.view.shows_labels()) {
             let component = self.view.component.map(|part| format!(" {}", part.word())).unwrap_or_default();
+            // Points on the device are newer than values while the scene plays there.
+            if self.on_device().is_none() || !self.frame.playing {
+                self.port.draw_maximum(&painter, field.unit());
+            }
             self.port.draw_scale(&painter, &format!("{}{component}", field.title()), field.unit());
         }
         self.draw_figures(&painter);

@@ -10,8 +10,8 @@ use eframe::egui_wgpu::Callback;
 use eframe::{CreationContext, Frame, wgpu};
 use pliant_geometry::Vector3;
 use pliant_picture::{
-    Background, Camera, Extremes, Look, MISSING, NO_VALUE, Plane, Projection, Regions, Section, Style,
-    Subject, Target, beyond, noise, readable, scale_marks,
+    Background, Camera, Extremes, Look, MISSING, NO_VALUE, Plane, Projection, Regions, Section, Sight, Style,
+    Subject, Target, beyond, largest_seen, maximum_text, noise, readable, scale_marks,
 };
 
 use super::paint::{Paint, SAMPLES, place};
@@ -20,6 +20,8 @@ use super::paint::{Paint, SAMPLES, place};
 pub(super) const OCCLUSION: &str = "folds and contacts are darker, where less light arrives";
 /// Width of the scale of colours on the screen.
 const SCALE: f32 = 110.0;
+/// Radius of the ring around the largest value on the screen.
+const RING: f32 = 8.0;
 /// Height of the figures on the screen.
 const FIGURES: f32 = 104.0;
 /// Length of the axes on the screen, and how far their origin is from the corner.
@@ -132,6 +134,8 @@ pub(super) struct Viewport {
     /// Size of the body at rest [m], and the least and the greatest value that is seen.
     extent: f64,
     ends: Option<[f64; 2]>,
+    /// The largest value that is seen, and its place [m].
+    largest: Option<(Vector3, f64)>,
     section: Section,
     /// Where something will be or has been [m], as far as it is known.
     pub reach: Arc<Vec<Vector3>>,
@@ -173,6 +177,7 @@ impl Viewport {
             shown: None,
             extent: 0.0,
             ends: None,
+            largest: None,
             section: Section::default(),
             reach: Arc::default(),
             rect: Rect::ZERO,
@@ -233,6 +238,8 @@ impl Viewport {
             extremes.add(self.section.values(&self.subject, &self.regions));
         }
         self.ends = extremes.ends();
+        let (subject, values) = (&self.subject, &self.values);
+        self.largest = largest_seen(subject, &self.regions, &self.points, values, clip, &self.section);
         extremes.range(self.style.map)
     }
 
@@ -443,9 +450,11 @@ impl Viewport {
         painter.rect_filled(place.expand(6.0), 5.0, pale);
     }
 
-    /// Lines of text on a card, from a corner on.
+    /// Lines of text on a card, from a corner at the left on. Where the picture is narrow they are broken before the scale of colours.
     pub fn write(&self, painter: &Painter, corner: Align2, at: Pos2, lines: &[String], size: f32) {
-        let galley = painter.layout_no_wrap(lines.join("\n"), FontId::proportional(size), self.ink());
+        let scale = if self.style.range.is_some() && !self.values.is_empty() { SCALE + 20.0 } else { 12.0 };
+        let room = (self.rect.right() - scale - at.x).max(100.0);
+        let galley = painter.layout(lines.join("\n"), FontId::proportional(size), self.ink(), room);
         let place = corner.anchor_size(at, galley.size());
         self.card(painter, place);
         painter.galley(place.min, galley, self.ink());
@@ -498,6 +507,46 @@ impl Viewport {
         }
     }
 
+    /// A ring around the place of the largest value that is seen, dashed where something hides it, and the number.
+    pub fn draw_maximum(&self, painter: &Painter, unit: &str) {
+        let Some([low, high]) = self.style.range.filter(|_| self.style.maximum && !self.values.is_empty())
+        else {
+            return;
+        };
+        let Some((place, value)) = self.largest.filter(|_| low < high) else { return };
+        let Some(at) = self.to_screen(&place).filter(|at| self.rect.contains(*at)) else { return };
+        let (unit, factor) = readable(unit, low.abs().max(high.abs()));
+        let sight = Sight::new(
+            &self.subject,
+            &self.points,
+            &self.regions,
+            self.style.clip,
+            &self.section,
+            &self.camera,
+        );
+        let is_seen = sight.sees(&place);
+        let ink = self.ink();
+        let pale = if self.style.background == Background::Dark { Color32::BLACK } else { Color32::WHITE };
+        let circle: Vec<Pos2> = (0..=48)
+            .map(|part| at + RING * Vec2::angled(std::f32::consts::TAU * part as f32 / 48.0))
+            .collect();
+        for stroke in [Stroke::new(4.5, pale), Stroke::new(2.0, ink)] {
+            if is_seen {
+                painter.circle_stroke(at, RING, stroke);
+            } else {
+                painter.extend(egui::Shape::dashed_line(&circle, stroke, 6.0, 5.0));
+            }
+        }
+        let text = maximum_text(value * factor, &unit, is_seen);
+        let galley = painter.layout_no_wrap(text, FontId::proportional(14.0), ink);
+        let beside = at + vec2(RING + 12.0, -0.5 * galley.size().y);
+        let fits = beside.x + galley.size().x < self.rect.right() - SCALE;
+        let left = at - vec2(RING + 12.0 + galley.size().x, 0.5 * galley.size().y);
+        let text = Rect::from_min_size(if fits { beside } else { left }, galley.size());
+        self.card(painter, text);
+        painter.galley(text.min, galley, ink);
+    }
+
     /// The range of colours, typed in the unit of the scale: a typed one is locked. What is wrong with one that is not taken.
     pub fn edit_range(&mut self, ui: &mut egui::Ui, unit: &str) -> Option<String> {
         let mut refused = None;
@@ -530,6 +579,8 @@ impl Viewport {
         }
         ui.checkbox(&mut self.locked, "Lock the range")
             .on_hover_text("L: keeps the range while values change");
+        ui.checkbox(&mut self.style.maximum, "Mark the maximum")
+            .on_hover_text("a ring around the largest value, dashed where something hides the place");
         refused
     }
 

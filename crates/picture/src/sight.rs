@@ -1,0 +1,135 @@
+//! What is seen from a camera: places that nothing opaque hides.
+
+use std::collections::BTreeSet;
+
+use pliant_geometry::Vector3;
+
+use crate::camera::{Camera, Projection};
+use crate::plane::Plane;
+use crate::regions::{Paint, Regions};
+use crate::section::Section;
+use crate::subject::{KIND, Subject};
+
+/// Distance from a place over the size of what is shown, below which nothing hides it: the faces around it.
+const NEAR: f64 = 1e-5;
+/// Triangles of a label that are looked for, at most, spread evenly over those there are.
+const MOST: usize = 200;
+
+/// What hides places from a camera.
+pub struct Sight<'s> {
+    subject: &'s Subject,
+    points: &'s [Vector3],
+    section: Vec<[Vector3; 3]>,
+    section_kinds: Vec<u32>,
+    /// Whether cells of each kind hide what is behind.
+    opaque: Vec<bool>,
+    clip: Option<Plane>,
+    camera: Camera,
+    near: f64,
+}
+
+impl<'s> Sight<'s> {
+    /// Of a subject whose points are at some places now [m], cut by a plane with this section.
+    pub fn new(
+        subject: &'s Subject,
+        points: &'s [Vector3],
+        regions: &Regions,
+        clip: Option<Plane>,
+        section: &Section,
+        camera: &Camera,
+    ) -> Self {
+        let place = |corner: &crate::section::Corner| {
+            Vector3::from([0, 1, 2].map(|axis| f64::from(corner.point[axis])))
+        };
+        let parts = section.corners.chunks_exact(3);
+        Self {
+            subject,
+            points,
+            section: parts.clone().map(|own| [0, 1, 2].map(|at| place(&own[at]))).collect(),
+            section_kinds: parts.map(|own| own[0].edges >> KIND).collect(),
+            opaque: subject.kinds.iter().map(|kind| regions.coat(*kind).opacity >= 1.0).collect(),
+            clip,
+            camera: *camera,
+            near: NEAR * subject.extent(),
+        }
+    }
+
+    fn is_left(&self, place: &Vector3) -> bool {
+        self.clip.is_none_or(|plane| plane.distance(place) <= self.near)
+    }
+
+    /// Whether nothing opaque is between the eye and a place [m].
+    pub fn sees(&self, place: &Vector3) -> bool {
+        let eye = self.camera.eye();
+        let (along, far) = match self.camera.projection {
+            Projection::Orthographic => (self.camera.axes()[2], f64::INFINITY),
+            Projection::Perspective => ((eye - place).normalize(), (eye - place).norm()),
+        };
+        let hides = |corners: &[Vector3; 3]| {
+            hit(corners, place, &along).filter(|(way, _)| (self.near..far).contains(way))
+        };
+        let surface = self.subject.triangles().enumerate().any(|(number, nodes)| {
+            self.opaque[(self.subject.triangles[number][3] >> KIND) as usize]
+                && hides(&nodes.map(|node| self.points[node as usize])).is_some_and(|(way, front)| {
+                    self.subject.is_drawn(number, front) && self.is_left(&(place + along * way))
+                })
+        });
+        let cut = || {
+            let mut parts = self.section.iter().zip(&self.section_kinds);
+            parts.any(|(corners, kind)| self.opaque[*kind as usize] && hides(corners).is_some())
+        };
+        !surface && !cut()
+    }
+
+    /// Labels in colours of their own of which no part is seen, of some labels.
+    pub fn hidden_labels(&self, regions: &Regions, labels: impl Iterator<Item = i32>) -> BTreeSet<i32> {
+        let of_label = |number: u32, label: i32| {
+            let kind = self.subject.kinds[number as usize];
+            let coat = regions.coat(kind);
+            kind.label == Some(label)
+                && !kind.thing
+                && coat.opacity > 0.0
+                && !matches!(coat.paint, Paint::Plain(_))
+        };
+        // Borders within bodies are drawn where one sees through these.
+        let through = self.subject.kinds.iter().any(|kind| regions.coat(*kind).opacity < 1.0);
+        let is_hidden = |label: &i32| {
+            let inner = self.subject.beyond.iter().copied().chain(
+                self.subject.triangles[self.subject.outer..].iter().map(|triangle| triangle[3] >> KIND),
+            );
+            if through && inner.into_iter().any(|number| of_label(number, *label)) {
+                return false;
+            }
+            let surface = self.subject.triangles().zip(&self.subject.triangles);
+            let surface = surface.filter(|(_, triangle)| of_label(triangle[3] >> KIND, *label));
+            let surface = surface.map(|(nodes, _)| nodes.map(|node| self.points[node as usize]));
+            let cut = self.section.iter().zip(&self.section_kinds);
+            let cut = cut.filter(|(_, kind)| of_label(**kind, *label)).map(|(corners, _)| *corners);
+            let all: Vec<[Vector3; 3]> = surface.chain(cut).collect();
+            let every = all.len().div_ceil(MOST).max(1);
+            !all.iter().step_by(every).any(|corners| {
+                let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+                let places = corners.iter().map(|corner| corner * 0.9 + middle * 0.1);
+                places.chain([middle]).any(|place| self.is_left(&place) && self.sees(&place))
+            })
+        };
+        labels.filter(is_hidden).collect()
+    }
+}
+
+/// How far along a unit direction from a place a triangle is, and whether it shows its front there to who looks back; `None` beside it.
+fn hit([a, b, c]: &[Vector3; 3], from: &Vector3, along: &Vector3) -> Option<(f64, bool)> {
+    let (ab, ac) = (b - a, c - a);
+    let across = along.cross(&ac);
+    let volume = ab.dot(&across);
+    if volume == 0.0 {
+        return None;
+    }
+    let off = from - a;
+    let u = off.dot(&across) / volume;
+    let turned = off.cross(&ab);
+    let v = along.dot(&turned) / volume;
+    let way = ac.dot(&turned) / volume;
+    // The normal is along the ray, which goes to the eye, where the volume is negative.
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && way > 0.0).then_some((way, ab.cross(&ac).dot(along) > 0.0))
+}
