@@ -146,7 +146,7 @@ pub struct Extremes {
 /// Part of the values that the range leaves out at each end.
 const LEFT_OUT: f64 = 0.005;
 /// Part of a value by which others differ from it at most that count as equal: some digits of single precision.
-const EQUAL: f64 = 1e-6;
+pub(crate) const EQUAL: f64 = 1e-6;
 
 /// The size below which values of a unit are round-off, on bodies of an extent [m]: displacements of a millionth of it, and stresses [Pa] that
 /// strain the softest tissue (100 Pa) by 10⁻⁵. Zero for other units, whose scale is not known.

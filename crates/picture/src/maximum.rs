@@ -4,6 +4,7 @@ use pliant_geometry::Vector3;
 
 use crate::arrows::{PALE, pixels};
 use crate::camera::Camera;
+use crate::colour::EQUAL;
 use crate::legend::{clear_ground, letters, three_digits};
 use crate::picture::Picture;
 use crate::plane::Plane;
@@ -20,7 +21,8 @@ const RIM: f32 = 0.0018;
 /// Dashes of the ring of a hidden place.
 const DASHES: f32 = 6.0;
 
-/// The largest value that is seen in colours, and its place [m]: of points of the surface that a plane leaves, and of the section.
+/// The largest value that is seen in colours, and its place [m]: of points of the surface that a plane leaves, and of the section. `None` where all
+/// values are equal.
 pub fn largest_seen(
     subject: &Subject,
     regions: &Regions,
@@ -34,7 +36,11 @@ pub fn largest_seen(
     let left = surface.filter(|(place, _)| clip.is_none_or(|plane| plane.distance(place) <= 0.0));
     let cut = section.places(subject, regions).filter(|_| !values.is_empty());
     let finite = left.chain(cut).filter(|(_, value)| value.is_finite());
-    finite.max_by(|a, b| a.1.total_cmp(&b.1))
+    let ends = finite.fold(None, |ends: Option<(f64, (Vector3, f64))>, (place, value)| {
+        let (least, most) = ends.unwrap_or((value, (place, value)));
+        Some((least.min(value), if value > most.1 { (place, value) } else { most }))
+    });
+    ends.filter(|(least, most)| most.1 - least > EQUAL * most.1.abs().max(least.abs())).map(|(_, most)| most)
 }
 
 /// A largest value as it is drawn.

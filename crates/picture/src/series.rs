@@ -414,7 +414,9 @@ impl Look {
             legend.hidden = sight.hidden_labels(&self.regions, labels);
         }
         let largest = largest_seen(subject, &self.regions, points, values, style.clip, &section);
-        if let Some((place, value)) = largest.filter(|_| is_marked) {
+        // What is round-off in this frame has no maximum, whatever the others have.
+        let least = noise(&legend.unit, subject.extent());
+        if let Some((place, value)) = largest.filter(|(_, value)| is_marked && value.abs() >= least) {
             let [low, high] = style.range.unwrap_or_default();
             let (unit, factor) = readable(&legend.unit, low.abs().max(high.abs()));
             let beside = picture.width as f32 * (1.0 - legend.width(style, self.size) as f32);

@@ -112,4 +112,11 @@ fn equal_values_have_no_maximum() {
         Look { field: Some("pressure".into()), style, ..look() }.picture(&graphics, &mesh, None, 0.0).unwrap()
     };
     assert_eq!(draw(true), draw(false));
+    // The range of a film is that of all its frames.
+    let style = Style { maximum: true, range: Some([0.0, 5.0]), ..Style::default() };
+    let drawn = |maximum: bool| {
+        let style = Style { maximum, ..style };
+        Look { field: Some("pressure".into()), style, ..look() }.picture(&graphics, &mesh, None, 0.0).unwrap()
+    };
+    assert_eq!(drawn(true), drawn(false), "a range that was given");
 }

@@ -71,6 +71,8 @@ fn draw(ui: &mut egui::Ui, unit: &str, mut lines: Vec<(String, Vec<[f64; 2]>)>) 
         .y_axis_label(format!("[{scaled}]"))
         .x_grid_spacer(marks)
         .y_grid_spacer(marks)
+        .x_axis_formatter(|mark, _| number(mark.value, mark.step_size))
+        .y_axis_formatter(|mark, _| number(mark.value, mark.step_size))
         .grid_spacing(12.0..=300.0);
     plot.allow_scroll(false).show(ui, |plot| {
         for (name, line) in lines {
@@ -87,6 +89,18 @@ fn marks(GridInput { bounds: (low, high), .. }: GridInput) -> Vec<GridMark> {
         values.into_iter().map(|value| GridMark { value, step_size }).collect::<Vec<_>>()
     };
     (3..10).map(marks).find(|marks| marks.len() >= 3).unwrap_or_default()
+}
+
+/// A number at an axis, with the digits that tell it from the next one a step away.
+fn number(value: f64, step: f64) -> String {
+    let is_whole = |decimals: &usize| {
+        let steps = step * 10_f64.powi(*decimals as i32);
+        (steps - steps.round()).abs() < 1e-6 * steps.abs().max(1e-6)
+    };
+    let decimals = (0..9).find(is_whole).unwrap_or(9);
+    // Without the sign of a zero.
+    let text = format!("{value:.decimals$}");
+    if text.parse() == Ok(0.0) { "0".into() } else { text }
 }
 
 /// The curves plotted at first.
@@ -227,6 +241,14 @@ mod tests {
             // Of the axis of time, too, which has three.
             assert!(numbers >= 6, "{top}: {texts:?}");
         }
+    }
+
+    #[test]
+    fn numbers_at_axes_have_the_digits_of_their_step() {
+        let cases =
+            [(0.5, 0.5), (1.5, 0.5), (2.0, 1.0), (-1e-17, 0.5), (0.25, 0.25), (400.0, 200.0), (1e-3, 1e-3)];
+        let told = cases.map(|(value, step)| number(value, step));
+        assert_eq!(told, ["0.5", "1.5", "2", "0", "0.25", "400", "0.001"]);
     }
 
     #[test]

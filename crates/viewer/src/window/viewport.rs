@@ -513,7 +513,11 @@ impl Viewport {
         else {
             return;
         };
-        let Some((place, value)) = self.largest.filter(|_| low < high) else { return };
+        let least = noise(unit, self.extent);
+        let Some((place, value)) = self.largest.filter(|(_, value)| low < high && value.abs() >= least)
+        else {
+            return;
+        };
         let Some(at) = self.to_screen(&place).filter(|at| self.rect.contains(*at)) else { return };
         let (unit, factor) = readable(unit, low.abs().max(high.abs()));
         let sight = Sight::new(
