@@ -117,7 +117,8 @@ impl<'s> Sight<'s> {
     }
 }
 
-/// How far along a unit direction from a place a triangle is, and whether it shows its front there to who looks back; `None` beside it.
+/// How far a triangle is from a place along a unit direction, which goes to the eye, and whether its front is seen from there; `None` if the ray
+/// misses it (Möller and Trumbore 1997).
 fn hit([a, b, c]: &[Vector3; 3], from: &Vector3, along: &Vector3) -> Option<(f64, bool)> {
     let (ab, ac) = (b - a, c - a);
     let across = along.cross(&ac);
@@ -130,6 +131,5 @@ fn hit([a, b, c]: &[Vector3; 3], from: &Vector3, along: &Vector3) -> Option<(f64
     let turned = off.cross(&ab);
     let v = along.dot(&turned) / volume;
     let way = ac.dot(&turned) / volume;
-    // The normal is along the ray, which goes to the eye, where the volume is negative.
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && way > 0.0).then_some((way, ab.cross(&ac).dot(along) > 0.0))
 }
