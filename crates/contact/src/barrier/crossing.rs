@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::distance::edge_distance;
+use super::distance::{Nearest, edge_edge, point_triangle};
 use super::surfaces::{BarrierSide, around};
 use crate::touch::{Contacts, With};
 use crate::tree::{Bounds, Tree};
@@ -26,6 +26,12 @@ pub struct Intersection {
     pub depth: f64,
     /// An end of the edge [m].
     pub place: [f64; 3],
+    /// The nodes of that way: an end and the corners of the triangle, or the ends of two edges.
+    pub nodes: [u32; 4],
+    /// Coefficients c of the nodes: Σ c x is the way [m], which ends where the edge and the triangle meet no more.
+    pub coefficients: [f64; 4],
+    /// Σ c x over the depth.
+    pub normal: Vector3<f64>,
 }
 
 impl IntersectionCheck {
@@ -48,15 +54,28 @@ impl IntersectionCheck {
         Self { contacts: checked.collect() }
     }
 
+    /// The same check, where each intersection counts.
+    #[must_use]
+    pub fn of_all(mut self) -> Self {
+        self.contacts.iter_mut().for_each(|(_, _, slight)| *slight = 0.0);
+        self
+    }
+
     /// Calls back with each intersection that counts, with nodes at some places [m].
     pub fn find(&self, place: impl Fn(u32) -> Vector3<f64>, mut found: impl FnMut(Intersection)) {
         for (contact, sides, slight) in &self.contacts {
             let mut look = |edges, faces| {
                 crossings([edges, faces], &place, |ends, corners| {
-                    let (ends, corners) = (ends.map(&place), corners.map(&place));
-                    let depth = depth(ends, corners);
-                    if depth > *slight {
-                        found(Intersection { contact: *contact, depth, place: ends[0].into() });
+                    let (nodes, out) = way_out(ends, corners, &place);
+                    if out.distance > *slight {
+                        found(Intersection {
+                            contact: *contact,
+                            depth: out.distance,
+                            place: place(ends[0]).into(),
+                            nodes,
+                            coefficients: out.coefficients,
+                            normal: out.normal,
+                        });
                     }
                 });
             };
@@ -71,12 +90,20 @@ impl IntersectionCheck {
     }
 }
 
-/// The shortest way [m] that parts an edge and a triangle which it goes through: of an end to the plane, or of the edge to a side.
-fn depth([p, q]: [Vector3<f64>; 2], [a, b, c]: [Vector3<f64>; 3]) -> f64 {
-    let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
-    let ends = [p, q].map(|end| normal.dot(&(end - a)).abs());
-    let sides = [[a, b], [b, c], [c, a]].map(|[from, to]| edge_distance(&[p, q, from, to]));
-    ends.into_iter().chain(sides).fold(f64::INFINITY, f64::min)
+/// The shortest way that parts an edge and a triangle which it goes through, with its nodes: an end goes to the triangle, or the edge to a side.
+fn way_out(
+    [p, q]: [u32; 2],
+    [a, b, c]: [u32; 3],
+    place: &impl Fn(u32) -> Vector3<f64>,
+) -> ([u32; 4], Nearest) {
+    let ends = [p, q].map(|end| [end, a, b, c]).map(|nodes| (nodes, point_triangle(&nodes.map(place))));
+    let sides = [[a, b], [b, c], [c, a]].map(|[from, to]| [p, q, from, to]);
+    let sides = sides.map(|nodes| (nodes, edge_edge(&nodes.map(place))));
+    let [first, second] = ends;
+    let shorter = |one: ([u32; 4], Nearest), other: ([u32; 4], Nearest)| {
+        if other.1.distance < one.1.distance { other } else { one }
+    };
+    sides.into_iter().fold(shorter(first, second), shorter)
 }
 
 /// Edges that go through triangles: calls back with the ends and the corners. Of one side alone those with a node in common count for
@@ -143,8 +170,15 @@ mod tests {
     /// A spike that goes through a block by a tenth of its edge: by the way back, not by the length of its edges.
     #[test]
     fn an_intersection_is_as_deep_as_the_way_out() {
-        let triangle = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(Vector3::from);
-        let of = |p: [f64; 3], q: [f64; 3]| depth([p, q].map(Vector3::from), triangle);
+        let triangle = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let of = |p: [f64; 3], q: [f64; 3]| {
+            let points: Vec<Vector3<f64>> = triangle.into_iter().chain([p, q]).map(Vector3::from).collect();
+            let (nodes, out) = way_out([3, 4], [0, 1, 2], &|node| points[node as usize]);
+            let way: Vector3<f64> =
+                nodes.iter().zip(out.coefficients).map(|(&node, c)| c * points[node as usize]).sum();
+            assert!((way - out.normal * out.distance).norm() < 1e-12);
+            out.distance
+        };
         assert!((of([0.3, 0.3, 1.0], [0.3, 0.3, -0.1]) - 0.1).abs() < 1e-12);
         assert!((of([0.3, 0.02, 1.0], [0.3, 0.02, -1.0]) - 0.02).abs() < 1e-12);
         assert!((of([0.4, 0.5, 1.0], [0.4, 0.5, -1.0]) - 0.1 / 2.0_f64.sqrt()).abs() < 1e-12);

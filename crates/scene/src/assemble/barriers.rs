@@ -205,8 +205,16 @@ impl Builder<'_> {
             first.join("; "),
             if met.len() > LISTED { "; …" } else { "" }
         );
-        let help = "let `separate = true` push them apart, move one of them (`at`), or make `thickness` smaller: a barrier can't \
-                    begin within another body";
+        let asked = self.scene.contacts.iter().find(|(known, _)| known == table).map(|(_, table)| table);
+        let help = match asked {
+            Some(table) if table.separate || table.gap.is_some() => {
+                "move one of them (`at`), make `thickness` smaller, or take finer cells there: what overlaps must be smaller than them"
+            }
+            _ => {
+                "let `gap = 2e-4` or `separate = true` part them, move one of them (`at`), or make `thickness` smaller: a barrier can't \
+                 begin within another body"
+            }
+        };
         self.error(&["contact", table, "between"], message, "no gap", help);
     }
 

@@ -67,6 +67,10 @@ impl Builder<'_> {
         if let Some(host) = &table.on {
             return self.wall(name, table, host);
         }
+        if let Some(known) = self.parted.iter().position(|body| body.name == name) {
+            let BuiltBody { mesh, origin, file_nodes, file_numbers, .. } = self.parted.swap_remove(known);
+            return Some(Shape { mesh, origin, file_nodes, file_numbers, shared: None });
+        }
         let path = ["body", name, "mesh"];
         if self.source().node(&path).is_none() {
             let message = format!("missing key `mesh` in `body.{name}`");

@@ -242,9 +242,11 @@ impl Builder<'_> {
         let meet = |own: &mut Self, (name, table): &(String, ContactTable)| {
             let side =
                 table.between.iter().position(|body| scene.bodies.iter().any(|(known, _)| known == body))?;
-            if table.separate {
-                let message = "`separate` is for bodies of one participant";
-                own.error(&["contact", name, "separate"], message, "of two participants", "move one of them");
+            for (key, _) in
+                [("separate", table.separate), ("gap", table.gap.is_some())].iter().filter(|key| key.1)
+            {
+                let message = format!("`{key}` is for bodies of one participant");
+                own.error(&["contact", name, key], message, "of two participants", "move one of them");
                 return None;
             }
             if !own.check_keys_of_contact(name, table, false) {
@@ -465,6 +467,12 @@ impl Builder<'_> {
         if !self.check_keys_of_contact(name, table, is_barrier) {
             return None;
         }
+        if table.separate && table.gap.is_some() {
+            let message =
+                "`gap` and `separate` part the same bodies: shapes at rest, or the state at the start";
+            self.error(&["contact", name, "gap"], message, "one too many", "leave one of them out");
+            return None;
+        }
         let [first, second] = [0, 1].map(|side| self.partners(name, table, side, rigids));
         let (first, second) = (first?, second?);
         let mut pairs = Vec::new();
@@ -516,7 +524,7 @@ impl Builder<'_> {
                 },
             );
             let offset = match is_barrier {
-                true => self.barrier(&full, table, [own, touches], barriers)?,
+                true => self.barrier(name, table, [own, touches], barriers)?,
                 false => self.distance_to_keep(table, &surface, &with),
             };
             let touch = Touch { friction: table.friction, offset };
@@ -529,6 +537,7 @@ impl Builder<'_> {
                 _ => self.note_apart(&full, &surface, table.thickness),
             }
             all.push(Contact { name: full, surface, with, touch });
+            self.gaps.push(table.gap);
         }
         Some(all)
     }
@@ -702,13 +711,20 @@ impl Builder<'_> {
         let place = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
         let sides = [0, 1].map(|side| (&self.bodies[bodies[side]], surfaces[side]));
         let inside = overlaps(sides, size, place);
-        if !inside.is_empty() && table.separate {
-            self.overlapping.get_or_insert_with(|| name.into());
+        if !inside.is_empty() && self.moves_apart(name, table) {
             return;
         }
         let Some(message) = told_overlap([&names[0], &names[1]], &inside) else { return };
-        let help = "move one of them (`at` of its mesh), or let `separate = true` push them apart";
+        let help = "move one of them (`at` of its mesh), or let `gap` or `separate = true` part them";
         self.error(&path, message, "overlapping", help);
+    }
+
+    /// Whether bodies that overlap are moved apart before the run.
+    fn moves_apart(&mut self, name: &str, table: &ContactTable) -> bool {
+        if table.separate {
+            self.overlapping.get_or_insert_with(|| name.into());
+        }
+        table.separate || table.gap.is_some() && !self.is_parted
     }
 
     /// Refuses bodies that are in an obstacle or a tool at the start: a step would throw them out.
@@ -742,8 +758,7 @@ impl Builder<'_> {
             let hangs = hang(rigid, longest);
             found.retain(|(gap, _)| hangs == 0.0 || -gap > hangs);
         }
-        if !found.is_empty() && table.separate {
-            self.overlapping.get_or_insert_with(|| name.into());
+        if !found.is_empty() && self.moves_apart(name, table) {
             return;
         }
         let Some((gap, place)) = found.iter().min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
@@ -756,7 +771,7 @@ impl Builder<'_> {
             number(-gap),
             in_metres(*place)
         );
-        let help = "move one of them (`at`), make `thickness` smaller, or let `separate = true` push them apart; \
+        let help = "move one of them (`at`), make `thickness` smaller, or let `gap` or `separate = true` part them; \
                     `inside = true` is for bodies within an obstacle";
         self.error(&["contact", name, "between"], message, "overlapping", help);
     }

@@ -25,6 +25,7 @@ mod ties;
 mod turns;
 mod walls;
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use pliant_geometry::{CellKind, Labels, Locator, Mesh, Surface, SurfaceLocator, Vector3};
@@ -214,9 +215,15 @@ pub fn build_watched(
     cache: &MeshCache,
     watch: &dyn Fn(Meshing<'_>),
 ) -> Result<Built, SceneErrors> {
-    let mut builder = Builder::new(scene, cache, watch);
+    assembled(Builder::new(scene, cache, watch))
+}
+
+/// The model of a builder.
+fn assembled(mut builder: Builder<'_>) -> Result<Built, SceneErrors> {
+    let scene = builder.scene;
     builder.check_models();
     builder.add_bodies();
+    let noted = builder.notes.len();
     if !builder.failed() {
         builder.add_ties();
     }
@@ -229,6 +236,11 @@ pub fn build_watched(
     builder.check_turns();
     builder.add_loads();
     let (mut contacts, barriers) = builder.contacts().unzip();
+    if let (Some(contacts), false, false) = (&contacts, builder.is_parted, builder.failed())
+        && let Some(parted) = builder.part_at_rest(contacts)
+    {
+        return assembled(builder.again_with(parted, noted));
+    }
     let meets = builder.meets();
     builder.note_touching(contacts.as_deref(), &meets);
     builder.check_outputs();
@@ -264,7 +276,10 @@ pub fn build_watched(
     if builder.failed() {
         return Err(scene.source.errors(builder.out));
     }
-    let Builder { assembly, cells, control, curved, bodies, surfaces, out: warnings, notes, .. } = builder;
+    let Builder { assembly, cells, control, curved, bodies, surfaces, out: warnings, mut notes, .. } =
+        builder;
+    let mut told = HashSet::new();
+    notes.retain(|note| told.insert(note.clone()));
     let model = Arc::clone(&assembly.model);
     let implicit = start.map(|start| {
         Arc::new(ImplicitBodies { model: Arc::new(assembly), cells, control, start, surface: curved })
@@ -337,6 +352,11 @@ struct Builder<'s> {
     touching: Option<Vec<bool>>,
     /// A contact whose bodies overlap at the start, and are to be pushed apart.
     overlapping: Option<String>,
+    /// The gap [m] that each contact gets between shapes at rest.
+    gaps: Vec<Option<f64>>,
+    /// Bodies whose shapes are known, with their gaps.
+    parted: Vec<BuiltBody>,
+    is_parted: bool,
 }
 
 /// What a load or an output acts on.
@@ -364,7 +384,17 @@ impl<'s> Builder<'s> {
             notes: Vec::new(),
             touching: None,
             overlapping: None,
+            gaps: Vec::new(),
+            parted: Vec::new(),
+            is_parted: false,
         }
+    }
+
+    /// A new builder that has the shapes of bodies, with the remarks on how they were made: the first ones, and that on how they were parted.
+    fn again_with(mut self, parted: Vec<BuiltBody>, noted: usize) -> Self {
+        self.notes.drain(noted..self.notes.len() - 1);
+        let fresh = Self::new(self.scene, self.cache, self.watch);
+        Self { parted, is_parted: true, notes: self.notes, ..fresh }
     }
 
     fn failed(&self) -> bool {

@@ -1,6 +1,7 @@
 //! Bodies that overlap at the start are pushed apart: with the gap g < 0 of points Σ cᵢ xᵢ along a normal n, xᵢ += cᵢ n λ, λ = −g / Σ cᵢ².
-//! Passes over all contacts go on until nothing overlaps. The shape at rest stays, so that the run starts deformed; nodes inside of bodies follow
-//! harmonically. Leaves out: whether bodies could have been moved as a whole.
+//! Passes over all contacts go on until nothing overlaps, and no edge of one body goes through another; nodes inside of bodies follow
+//! harmonically. With `separate` the shape at rest stays, so that the run starts deformed; with `gap` the shape at rest moves. Leaves out:
+//! whether bodies could have been moved as a whole.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -10,12 +11,13 @@ use pliant_explicit::State;
 use pliant_explicit::recover::Recovery;
 use pliant_geometry::{Locator, SurfaceLocator, Vector3};
 use pliant_mechanics::model::FREE;
+use pliant_sim::contact::barrier::IntersectionCheck;
 use pliant_sim::contact::pairs::{Pairs, Surface};
 use pliant_sim::contact::touch::{Contact, Contacts, Rigid, With, lattice, parts_of};
 use pliant_sim::{counted, number};
 
 use super::contacts::{OVERLAP, hang};
-use super::{Builder, in_metres};
+use super::{Builder, BuiltBody, in_metres};
 
 /// The gap between bodies that were pushed apart, over the distance of their barrier, is this at least.
 const LEAST_GAP: f64 = 0.5;
@@ -93,51 +95,116 @@ impl Builder<'_> {
         let start = at_first;
         let at_rest = |(rest, u): (&[f64; 3], &[f64; 3])| Vector::from(*rest) + Vector::from(*u);
         let before: Vec<Vector3> = self.assembly.rest.iter().zip(&start.displacement).map(at_rest).collect();
-        let size = before.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
+        let kept = |index: usize| {
+            let contact = &contacts.contacts[index];
+            let Some(distance) = distances.get(index) else { return Some([0.0, OVERLAP * size_of(&before)]) };
+            let kept = match contact.with {
+                With::Rigid(_) => 0.0,
+                _ => contact.touch.offset,
+            };
+            Some([kept + LEAST_GAP * distance, kept + distance])
+        };
         let is_free = |owner: &[u32; 3]| Vector3::from_fn(|c, _| if owner[c] == FREE { 1.0 } else { 0.0 });
+        let free = owners.iter().map(is_free).collect();
+        let places = self.push_all_apart([&name, "separate"], contacts, &before, free, kept)?;
+        let stays: Vec<bool> = owners.iter().map(|owner| *owner != [FREE; 3]).collect();
+        let ways = self.follow_inside(contacts, stays, &before, &places);
+        let moved = ways.iter().zip(&start.displacement).map(|(way, u)| (Vector::from(*u) + way).into());
+        let mut displacement: Vec<[f64; 3]> = moved.collect();
+        self.assembly.model.follow(&mut displacement);
+        self.check_cells_apart([&name, "separate"], &displacement, start)?;
+        self.note_pushed(&before, &places, OVERLAP * size_of(&before), "that overlapped");
+        Some(Arc::new(displacement))
+    }
+
+    /// The bodies with shapes at rest that have the gaps of contacts between them; `None` if nothing has to move, or can't.
+    pub(super) fn part_at_rest(&mut self, contacts: &Contacts) -> Option<Vec<BuiltBody>> {
+        let scene = self.scene;
+        let (name, _) = scene.contacts.iter().find(|(_, table)| table.gap.is_some())?;
+        let before: Vec<Vector3> = self.assembly.rest.iter().map(|&rest| rest.into()).collect();
+        let gaps = std::mem::take(&mut self.gaps);
+        let kept = |index: usize| match (gaps[index], &contacts.contacts[index].with) {
+            (None, _) => None,
+            (Some(gap), With::Rigid(_)) => Some([gap; 2]),
+            (Some(gap), _) => Some([gap + contacts.contacts[index].touch.offset; 2]),
+        };
+        let free = vec![Vector3::repeat(1.0); before.len()];
+        let places = self.push_all_apart([name, "gap"], contacts, &before, free, kept)?;
+        let ways = self.follow_inside(contacts, vec![false; before.len()], &before, &places);
+        let displacement: Vec<[f64; 3]> = ways.iter().map(|way| (*way).into()).collect();
+        let start = State::<f64>::at_rest(&self.assembly.model);
+        self.check_cells_apart([name, "gap"], &displacement, start)?;
+        self.note_pushed(&before, &places, OVERLAP * size_of(&before), "too near each other");
+        if ways.iter().all(|way| *way == Vector3::zeros()) {
+            return None;
+        }
+        let mut bodies = std::mem::take(&mut self.bodies);
+        for (body, own) in bodies.iter_mut().zip(&self.assembly.bodies) {
+            for (point, node) in body.mesh.points.iter_mut().zip(own.all_nodes()) {
+                *point += ways[node as usize];
+            }
+        }
+        Some(bodies)
+    }
+
+    /// Where nodes are [m] once nothing overlaps; `None` if something still does. Of each contact that counts `kept` says below which gap [m] points are
+    /// pushed, and which is left.
+    fn push_all_apart(
+        &mut self,
+        asked: [&str; 2],
+        contacts: &Contacts,
+        before: &[Vector3],
+        free: Vec<Vector3>,
+        kept: impl Fn(usize) -> Option<[f64; 2]>,
+    ) -> Option<Vec<Vector3>> {
+        let round_off = OVERLAP * size_of(before);
         let mut pushed = Pushed {
-            places: before.clone(),
-            free: owners.iter().map(is_free).collect(),
+            places: before.to_vec(),
+            free,
             least: 0.0,
-            left: OVERLAP * size,
-            round_off: OVERLAP * size,
+            left: round_off,
+            round_off,
             deepest: (0.0, Vector3::zeros()),
         };
+        let check = IntersectionCheck::new(contacts, &self.assembly.rest).of_all();
+        let mut crossings = Vec::new();
         for pass in 0..=PASSES {
             pushed.deepest.0 = 0.0;
             for (index, contact) in contacts.contacts.iter().enumerate() {
-                if let Some(distance) = distances.get(index) {
-                    let kept = match contact.with {
-                        With::Rigid(_) => 0.0,
-                        _ => contact.touch.offset,
-                    };
-                    (pushed.least, pushed.left) = (kept + LEAST_GAP * distance, kept + distance);
-                }
+                let Some(gaps) = kept(index) else { continue };
+                [pushed.least, pushed.left] = gaps;
                 self.push_apart(contact, contacts, &mut pushed);
             }
-            if pushed.deepest.0 <= OVERLAP * size {
+            check.find(|node| pushed.places[node as usize], |found| crossings.push(found));
+            for found in crossings.drain(..) {
+                let Some(gaps) = kept(found.contact) else { continue };
+                if matches!(contacts.contacts[found.contact].with, With::Itself) {
+                    continue;
+                }
+                [pushed.least, pushed.left] = gaps;
+                let parts = found.nodes.into_iter().zip(found.coefficients).collect();
+                pushed.push_by(&Row { parts, normal: -found.normal }, -found.depth);
+            }
+            if pushed.deepest.0 <= round_off {
                 break;
             }
             if pass == PASSES {
                 let (depth, at) = pushed.deepest;
-                self.refuse_overlap(&name, depth, &at);
+                self.refuse_overlap(asked, depth, &at);
                 return None;
             }
         }
-        let displacement = self.follow_inside(contacts, &owners, &before, &pushed.places, &start);
-        self.check_cells_apart(&name, &displacement, start)?;
-        self.note_pushed(&before, &pushed.places, OVERLAP * size);
-        Some(Arc::new(displacement))
+        Some(pushed.places)
     }
 
-    fn refuse_overlap(&mut self, name: &str, depth: f64, at: &Vector3) {
+    fn refuse_overlap(&mut self, [name, key]: [&str; 2], depth: f64, at: &Vector3) {
         let message = format!(
             "bodies cannot be pushed apart: an overlap of {} m at {} is left after {PASSES} passes",
             number(depth),
             in_metres(*at)
         );
         let help = "move one of them (`at`), or release nodes that constraints hold there";
-        self.error(&["contact", name, "separate"], message, "still overlapping", help);
+        self.error(&["contact", name, key], message, "still overlapping", help);
     }
 
     /// A pass over a contact.
@@ -187,22 +254,19 @@ impl Builder<'_> {
         }
     }
 
-    /// Displacements [m] of all nodes, where those inside of bodies are means of those around.
+    /// Ways [m] of all nodes, where those inside of bodies that do not stay are means of those around.
     fn follow_inside(
         &self,
         contacts: &Contacts,
-        owners: &[[u32; 3]],
+        mut stays: Vec<bool>,
         before: &[Vector3],
         places: &[Vector3],
-        start: &State<f64>,
-    ) -> Vec<[f64; 3]> {
-        let model = &self.assembly.model;
+    ) -> Vec<Vector3> {
         let mut ways: Vec<Vector3> = places.iter().zip(before).map(|(now, then)| now - then).collect();
         let surfaces = contacts.contacts.iter().flat_map(Contact::surfaces);
-        let mut stays: Vec<bool> = owners.iter().map(|owner| *owner != [FREE; 3]).collect();
         surfaces.flat_map(|surface| &surface.nodes).for_each(|&node| stays[node as usize] = true);
         let mut around = vec![BTreeSet::new(); places.len()];
-        for solid in &model.solids {
+        for solid in &self.assembly.model.solids {
             for cell in 0..solid.cells.len() {
                 let nodes = solid.cells.nodes(cell);
                 for &node in nodes.iter().filter(|&&node| !stays[node as usize]) {
@@ -216,14 +280,16 @@ impl Builder<'_> {
                 ways[node] = sum / around.len() as f64;
             }
         }
-        let moved = ways.iter().zip(&start.displacement).map(|(way, u)| (Vector::from(*u) + way).into());
-        let mut displacement: Vec<[f64; 3]> = moved.collect();
-        model.follow(&mut displacement);
-        displacement
+        ways
     }
 
     /// Refuses displacements that invert a cell; `None` then.
-    fn check_cells_apart(&mut self, name: &str, displacement: &[[f64; 3]], start: State<f64>) -> Option<()> {
+    fn check_cells_apart(
+        &mut self,
+        [name, key]: [&str; 2],
+        displacement: &[[f64; 3]],
+        start: State<f64>,
+    ) -> Option<()> {
         let model = Arc::clone(&self.assembly.model);
         let state = State { displacement: displacement.to_vec(), ..start };
         let recovery = Recovery::new(&model, &state);
@@ -239,18 +305,18 @@ impl Builder<'_> {
             own.original[cell], model.bodies[own.body].name
         );
         let help = "move one of them (`at`): overlaps must be smaller than the elements there";
-        self.error(&["contact", name, "separate"], message, "too deep", help);
+        self.error(&["contact", name, key], message, "too deep", help);
         None
     }
 
     /// Tells how many nodes were pushed, and how far.
-    fn note_pushed(&mut self, before: &[Vector3], places: &[Vector3], least: f64) {
+    fn note_pushed(&mut self, before: &[Vector3], places: &[Vector3], least: f64, which: &str) {
         let ways = before.iter().zip(places).map(|(then, now)| (now - then).norm()).enumerate();
         let moved: Vec<(usize, f64)> = ways.filter(|(_, way)| *way > least).collect();
         let Some(&(node, way)) = moved.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else { return };
         let (body, _) = self.assembly.locate_node(node as u32);
         self.notes.push(format!(
-            "{} that overlapped {} pushed apart before the run, by up to {} m at {} of `{}`",
+            "{} {which} {} pushed apart before the run, by up to {} m at {} of `{}`",
             counted(moved.len(), "node"),
             if moved.len() == 1 { "was" } else { "were" },
             number(way),
@@ -258,6 +324,11 @@ impl Builder<'_> {
             self.assembly.bodies[body].name
         ));
     }
+}
+
+/// The largest coordinate [m].
+fn size_of(places: &[Vector3]) -> f64 {
+    places.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()))
 }
 
 /// Pushes nodes and points of faces out of a rigid thing: the shortest way, unless this leads out of the body. A solid then draws back into itself.

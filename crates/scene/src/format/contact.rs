@@ -322,4 +322,9 @@ pub struct ContactTable {
     /// the run starts deformed. Without it they are refused.
     #[serde(default)]
     pub separate: bool,
+    /// Gap [m] between the shapes at rest, beyond the distance that surfaces keep. Where bodies overlap or are nearer, their nodes at rest move apart
+    /// by the least ways, so that the run starts without stress. For organs that touch in one segmentation and are meshed one by one.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub gap: Option<f64>,
 }
