@@ -138,8 +138,7 @@ impl TriangleMesh {
         work.placed = Some(work.places());
         let at = |&number: &usize| {
             work.run(number, f64::INFINITY);
-            let (points, triangles) = work.mesh.compact();
-            Self::new(points, triangles)
+            work.mesh.compacted()
         };
         numbers.iter().map(at).collect()
     }
@@ -160,7 +159,8 @@ impl<'m> Decimation<'m> {
             }
             for k in 0..3 {
                 let (a, b) = (nodes[k], nodes[(k + 1) % 3]);
-                if mesh.is_marked(a, b) {
+                // The faces of a crease hold its points by themselves.
+                if mesh.is_border(a, b) {
                     let along = x[(k + 1) % 3] - x[k];
                     let across = along.cross(&mesh.normal(t)).try_normalize(0.0).unwrap_or_default();
                     let mut wall = Quadric::plane(&across, &x[k], LINE_WEIGHT * along.norm_squared());

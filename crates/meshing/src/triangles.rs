@@ -198,6 +198,30 @@ impl TriangleMesh {
         }
     }
 
+    /// The edges that are marked as creases, increasing.
+    pub(crate) fn creases(&self) -> impl Iterator<Item = [u32; 2]> + '_ {
+        self.creases.iter().copied()
+    }
+
+    /// Marks these edges as creases, and no others.
+    pub(crate) fn set_creases(&mut self, edges: impl IntoIterator<Item = [u32; 2]>) {
+        self.creases = edges.into_iter().map(|[a, b]| key(a, b)).collect();
+    }
+
+    /// The same with points in use alone, numbered anew in their order; creases stay marked.
+    pub(crate) fn compacted(&self) -> Self {
+        let (points, triangles) = self.compact();
+        let mut compacted = Self::new(points, triangles);
+        let used = self.star.iter().scan(0, |count, star| {
+            let own = *count;
+            *count += u32::from(!star.is_empty());
+            Some(own)
+        });
+        let number: Vec<u32> = used.collect();
+        compacted.set_creases(self.creases().map(|edge| edge.map(|node| number[node as usize])));
+        compacted
+    }
+
     /// Number of triangles.
     pub fn len(&self) -> usize {
         self.alive().count()

@@ -5,6 +5,10 @@
 use pliant_geometry::Vector3;
 
 use super::Shells;
+use super::target::Target;
+
+/// Times at most that shells are made flat since they are nearer then.
+const TIMES: usize = 6;
 
 impl Shells {
     /// Makes shells flat until none cross but those whose triangles do: of two that cross the one that bulges more. Nothing may change
@@ -23,6 +27,30 @@ impl Shells {
             }
             chosen.into_iter().for_each(|t| self.flat[t as usize] = true);
         }
+    }
+
+    /// Makes those shells flat that are farther off than a bound [m], told by the distances of all, and nearer as flat triangles, as long as the largest
+    /// distance falls. Returns whether any are.
+    pub(super) fn flatten_nearer(&mut self, target: &Target, bound: impl Fn(&[f64]) -> f64) -> bool {
+        let largest = |far: &[f64]| far.iter().copied().fold(0.0, f64::max);
+        let flat = Self { flat: vec![true; self.mesh.triangles.len()], ..self.clone() };
+        let if_flat = flat.distances(&target.fine, target).far();
+        let mut far = self.distances(&target.fine, target).far();
+        let mut is_changed = false;
+        for _ in 0..TIMES {
+            let bound = bound(&far);
+            let mut next = self.clone();
+            next.flat.resize(next.mesh.triangles.len(), false);
+            let nearer = |&t: &usize| far[t] > bound && if_flat[t] < far[t];
+            let chosen: Vec<usize> = self.mesh.alive().map(|t| t as usize).filter(nearer).collect();
+            chosen.iter().for_each(|&t| next.flat[t] = true);
+            let now = next.distances(&target.fine, target).far();
+            if chosen.is_empty() || largest(&now) >= largest(&far) {
+                break;
+            }
+            (*self, far, is_changed) = (next, now, true);
+        }
+        is_changed
     }
 
     /// How far the control points of a shell lie from its triangle at most [m].
@@ -63,6 +91,7 @@ mod tests {
             active: vec![true; 10],
             strict: true,
             creased: vec![false; 10],
+            sharp: vec![false; 10],
             flat: Vec::new(),
         }
     }

@@ -163,7 +163,8 @@ impl Shells {
         }
         let shapes: Vec<f64> = self.mesh.alive().map(|t| shape(self.mesh.corners(t))).collect();
         let creased = |n: &usize| self.creased[*n];
-        let creases = (0..self.creased.len()).filter(creased).collect::<Vec<_>>();
+        let folds = |n: &usize| self.creased[*n] && !self.sharp[*n];
+        let creases = (0..self.creased.len()).filter(folds).collect::<Vec<_>>();
         let crossing = self.crossing();
         let mut mesh = self.mesh.to_parted_mesh();
         let normal = |(n, normal): (usize, &Vector3)| if creased(&n) { [0.0; 3] } else { (*normal).into() };
@@ -203,6 +204,7 @@ impl Shells {
             asked,
             reached,
             stopped: stopped && !reached,
+            sharp: self.sharp.iter().filter(|sharp| **sharp).count(),
             creases: Flaw::of(creases.len(), creases.first().map(|&n| self.mesh.points[n])),
             flattened: Flaw::of(flattened, first_flat),
             crossings: Flaw::of(crossing.shells().len(), crossing.place),

@@ -5,7 +5,8 @@
 //! What crosses in the end is repaired (`repair`), and of what is left shells become flat (`flatten`). Where a fit fails, it starts again from finer
 //! triangles, and where even flat triangles cross from some that never did (`start`). The work is bounded, by a count that is the same on
 //! every machine; what was closest by then is the result.
-//! Leaves out: creases of the target, but where it folds too sharply for one normal; edges that bend more than their end normals tell.
+//! Sharp edges of the surface stay (`sharp`). Where flat triangles are nearer than curved ones, they are flat.
+//! Leaves out: edges that bend more than their end normals tell.
 
 mod crossing;
 mod effort;
@@ -15,6 +16,7 @@ mod measure;
 mod refine;
 mod repair;
 mod report;
+mod sharp;
 mod solve;
 mod start;
 mod target;
@@ -68,6 +70,11 @@ const STUCK: usize = 3;
 /// Part of the work allowed that a second fit has at least.
 const AGAIN: f64 = 0.5;
 
+/// Shells that keep sharp edges are compared with others if one of them is slimmer than this, and the others count if they are not this many times
+/// as far off: rims of images have more corners than few shells can follow.
+const SLIM: f64 = 0.3;
+const MUCH: f64 = 2.0;
+
 /// So many shells are fitted once a round, fewer up to four times.
 const MANY: usize = 3000;
 
@@ -104,8 +111,10 @@ struct Shells {
     /// Whether normals must stand on their triangles. On the way to the goal, while triangles are large, they need not: points that
     /// are held back then do not find their places.
     strict: bool,
-    /// Points where no normal stands on all triangles.
+    /// Points where no normal stands on all triangles, and points of sharp edges.
     creased: Vec<bool>,
+    /// Points of sharp edges of the target, which stay there.
+    sharp: Vec<bool>,
     /// Shells that are as flat as their triangles, by the numbers of these; empty if there are none.
     flat: Vec<bool>,
 }
@@ -151,6 +160,31 @@ impl FittedShells {
         uncrossed: usize,
         progress: &dyn Fn(FitProgress),
     ) -> Self {
+        let fit = |surface: &TriangleMesh| Self::of_lines(surface, goal, effort, uncrossed, progress);
+        let Some(sharp) = sharp::with_sharp_edges(surface, goal).map(|marked| fit(&marked)) else {
+            return fit(surface).fitted;
+        };
+        let report = &sharp.fitted.report;
+        let (is_slim, off) = (report.shape[0] < SLIM, report.distances.largest());
+        if !report.fails() && !is_slim {
+            return sharp.fitted;
+        }
+        let smooth = fit(surface);
+        let is_near = smooth.fitted.report.distances.largest() <= MUCH * off;
+        match is_slim && !smooth.fitted.report.fails() && is_near {
+            true => smooth.fitted,
+            false => sharp.better(smooth).fitted,
+        }
+    }
+
+    /// The same of a surface whose creases are marked.
+    fn of_lines(
+        surface: &TriangleMesh,
+        goal: ShellGoal,
+        effort: Effort,
+        uncrossed: usize,
+        progress: &dyn Fn(FitProgress),
+    ) -> Found {
         let target = Target::new(surface);
         let job = Job { target: &target, goal, progress };
         let attempt = |uncrossed: usize| {
@@ -158,9 +192,9 @@ impl FittedShells {
         };
         let first = attempt(uncrossed);
         if first.fitted.report.crossings.count == 0 || surface.len() <= uncrossed {
-            return first.fitted;
+            return first;
         }
-        first.better(attempt(usize::MAX)).fitted
+        first.better(attempt(usize::MAX))
     }
 
     /// Fits the shells of given triangles to a surface, without changing which points they join.
@@ -216,14 +250,33 @@ impl Job<'_> {
         found
     }
 
-    /// The same made flat where shells cross.
+    /// The same made flat where flat triangles are nearer, if the fit fails or all flat ones are nearer, and where shells cross.
     fn flattened(&self, found: Found) -> Found {
+        let FittedShells { report, .. } = &found.fitted;
+        let is_nearer = !report.reached || report.flat.largest() < report.distances.largest();
+        let found = if is_nearer { self.flat_where_nearer(found) } else { found };
         let FittedShells { report, .. } = &found.fitted;
         if report.crossings.count == 0 {
             return found;
         }
         let mut shells = found.shells.clone();
         shells.flatten();
+        let fitted = shells.finished(self.target, report.rounds, self.goal, report.stopped);
+        found.better(Found { shells, fitted })
+    }
+}
+
+impl Job<'_> {
+    /// Shells that are farther off than the error asked for, or than most, are flat where that is nearer.
+    fn flat_where_nearer(&self, found: Found) -> Found {
+        let mut shells = found.shells.clone();
+        let report = &found.fitted.report;
+        if !shells.flatten_nearer(self.target, |far| match self.goal {
+            ShellGoal::Error(error) => error * self.target.diagonal,
+            ShellGoal::Shells(_) => share(far),
+        }) {
+            return found;
+        }
         let fitted = shells.finished(self.target, report.rounds, self.goal, report.stopped);
         found.better(Found { shells, fitted })
     }
@@ -388,7 +441,8 @@ impl<'t> Fit<'t> {
     /// Shells with a crease, and shells that cross.
     fn flaws(&self) -> [Vec<u32>; 2] {
         let mesh = &self.shells.mesh;
-        let creased = |t: &u32| mesh.triangles[*t as usize].iter().any(|&n| self.shells.creased[n as usize]);
+        let folds = |n: &u32| self.shells.creased[*n as usize] && !self.shells.sharp[*n as usize];
+        let creased = |t: &u32| mesh.triangles[*t as usize].iter().any(folds);
         [mesh.alive().filter(creased).collect(), self.shells.crossing().shells()]
     }
 
@@ -414,8 +468,9 @@ fn share(far: &[f64]) -> f64 {
 
 impl Shells {
     fn new(mesh: &TriangleMesh, target: &Target) -> Self {
-        let (points, triangles) = mesh.compact();
-        let mesh = TriangleMesh::new(points, triangles);
+        let mesh = mesh.compacted();
+        let mut sharp = vec![false; mesh.points.len()];
+        mesh.creases().flatten().for_each(|node| sharp[node as usize] = true);
         let normal = |(point, x): (u32, &Vector3)| {
             let facing = mesh.point_normal(point);
             let (_, normal) = target.foot(x, &facing, 0.1 * target.diagonal);
@@ -426,7 +481,8 @@ impl Shells {
             on_border: (0..mesh.points.len() as u32).map(|n| !mesh.marked(n).is_empty()).collect(),
             active: vec![true; mesh.points.len()],
             strict: false,
-            creased: vec![false; mesh.points.len()],
+            creased: sharp.clone(),
+            sharp,
             flat: Vec::new(),
             mesh,
         }
@@ -452,6 +508,7 @@ impl Shells {
             active: some(&self.active),
             strict: self.strict,
             creased: some(&self.creased),
+            sharp: some(&self.sharp),
             flat: own_flat,
         };
         (part, nodes)

@@ -24,7 +24,7 @@ const SEARCHES: usize = 5;
 const BEND: f64 = 2.0;
 
 impl Shells {
-    /// Puts a point on the target, or on its border, with the normal there.
+    /// Puts a point on the target, or on its border or sharp edge, with the normal there.
     pub(super) fn place(&mut self, point: u32, target: &Target) {
         let facing = self.mesh.point_normal(point);
         let place = self.projected(point, &self.mesh.points[point as usize], &facing, target);
@@ -36,7 +36,9 @@ impl Shells {
 
     /// The nearest place of the target for a point that moves, on the side where its triangles look.
     fn projected(&self, point: u32, to: &Vector3, facing: &Vector3, target: &Target) -> Vector3 {
-        if self.on_border[point as usize] {
+        if self.mesh.marked(point).len() > 2 {
+            *to
+        } else if self.on_border[point as usize] {
             target.reference.closest_on_lines(to)
         } else {
             target.foot(to, facing, self.reach(point)).0
@@ -205,10 +207,13 @@ impl Shells {
             let patch = self.patch(t);
             let mut place = [0.0; 3];
             (place[longest], place[(longest + 1) % 3]) = (0.5, 0.5);
+            let is_marked = self.mesh.is_marked(a, b);
+            let is_sharp = is_marked && sides[1].is_some();
             let fresh = self.mesh.split(a, b, patch.point(place));
             self.normals.push(patch.normal(place));
-            self.on_border.push(sides[1].is_none());
-            self.creased.push(false);
+            self.on_border.push(is_marked);
+            self.creased.push(is_sharp);
+            self.sharp.push(is_sharp);
             touched.resize(self.mesh.triangles.len(), true);
             let middle = 0.5 * (self.mesh.points[a as usize] + self.mesh.points[b as usize]);
             self.place(fresh, target);

@@ -33,10 +33,12 @@ pub struct ShellReport {
     pub reached: bool,
     /// Whether the bound on work or on rounds ended the fit short of its goal.
     pub stopped: bool,
+    /// Vertices on sharp edges of the target, where faces meet at more than 45°: they have no normal.
+    pub sharp: usize,
     /// Vertices where the surface folds too sharply for a normal within 60° of all triangles, or for curved shells that do not cross: they
     /// have none, `normal` is zero there.
     pub creases: Flaw,
-    /// Shells that are as flat as their triangles, since curved they would cross others.
+    /// Shells that are as flat as their triangles, since curved they would cross others or be farther from the target.
     pub flattened: Flaw,
     /// Shells that pass through themselves or each other.
     pub crossings: Flaw,
@@ -88,7 +90,7 @@ impl ShellReport {
         });
         let flat = (self.flattened.count > 0).then(|| {
             format!(
-                "{} flat, at {} and elsewhere: curved they would pass through others; cell data `flat` says which, and a scene keeps \
+                "{} flat, at {} and elsewhere: curved they would pass through others or be farther off; cell data `flat` says which, and a scene keeps \
                  them flat",
                 counted(self.flattened.count, "shell is", "shells are"),
                 self.flattened.place(),
@@ -143,6 +145,10 @@ impl fmt::Display for ShellReport {
             "shape            {:.2} at least, {:.2} on average (1: equilateral)",
             self.shape[0], self.shape[1]
         )?;
+        if self.sharp > 0 {
+            let nodes = counted(self.sharp, "node", "nodes");
+            writeln!(f, "sharp edges      {nodes}, which have no normal: in a scene they are creases")?;
+        }
         let [there, back] = self.distances.lines(self.diagonal, ["shells to target", "target to shells"]);
         writeln!(f, "{there}\n{back}")?;
         writeln!(f, "farthest apart   at {}", millimetres(&self.farthest))?;

@@ -77,7 +77,7 @@ impl Shells {
 
     /// Turns the normal of a vertex as far as it must to stand on all triangles round it; a crease where none does.
     pub(super) fn stand(&mut self, point: u32) {
-        if !self.strict {
+        if !self.strict || self.sharp[point as usize] {
             return;
         }
         let star = self.mesh.star[point as usize].iter();
