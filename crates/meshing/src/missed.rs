@@ -151,7 +151,7 @@ impl fmt::Display for Missed {
         match self {
             Self::ThinPart { place, thickness, edge } => write!(
                 f,
-                "the mesh misses a part of the body {:.1} mm thick at {}, thinner than the cells of {:.1} mm",
+                "the mesh misses a part of the body {:.1} mm thick at {}, thinner than the cells of {:.1} mm: a smaller edge keeps it",
                 thickness * 1e3,
                 at(place),
                 edge * 1e3
@@ -159,7 +159,7 @@ impl fmt::Display for Missed {
             Self::ThinGap { place, thickness, edge } => write!(
                 f,
                 "the mesh closes a gap {:.1} mm wide at {}, thinner than the cells of {:.1} mm, and connects \
-                 its sides",
+                 its sides: a smaller edge keeps them apart",
                 thickness * 1e3,
                 at(place),
                 edge * 1e3

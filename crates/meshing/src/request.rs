@@ -48,9 +48,10 @@ impl OrganTets {
         }
     }
 
-    /// The initial edge [m] if only a distance [m] is given, from the box of the body [m].
+    /// The initial edge [m] if only a distance [m] is given, from the box of the body [m]: the chord √(8 R d) that is a distance d off an arc,
+    /// whose radius R is a quarter of the shortest side of the box.
     pub fn edge_for(distance: f64, [low, high]: [Vector3; 2]) -> f64 {
-        (12.0 * distance).min((high - low).norm() / 15.0)
+        (2.0 * (high - low).min() * distance).sqrt().min((high - low).norm() / 15.0)
     }
 
     /// The same with labels that have smaller cells: of the edge given [m], or else of half the edge of the others.

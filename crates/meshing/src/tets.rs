@@ -4,7 +4,7 @@
 
 use std::fmt;
 
-use pliant_geometry::{CellKind, DataArray, Mesh, QualityReport, Spread, Vector3, volume};
+use pliant_geometry::{CellKind, DataArray, Mesh, QualityReport, Spread, Vector3, acoustic_length, volume};
 use serde::Serialize;
 
 use crate::Stuffing;
@@ -39,6 +39,12 @@ const TEAR_HALVINGS: usize = 2;
 
 /// Cells become smaller where the distance exceeds this fraction of the requested one.
 const BEYOND: f64 = 0.85;
+
+/// A place is told whose cells make the step at least so many times as short.
+const COSTLY: f64 = 2.0;
+
+/// How far around its smallest cell a place reaches, over the longest edge.
+const REACH: f64 = 3.0;
 
 /// An unoptimised mesh is refined where its distance exceeds the requested one by this factor.
 const RAW_BEYOND: f64 = 1.2;
@@ -462,6 +468,26 @@ pub struct MaterialReport {
     pub voxel_volume: Option<f64>,
 }
 
+/// A place whose cells alone set the step.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CostlyPlace {
+    /// The middle of the smallest cell [m].
+    pub place: [f64; 3],
+    /// Without the cells within three of the longest edges from there the step would be so many times as long.
+    pub factor: f64,
+}
+
+impl CostlyPlace {
+    /// That of cells with middles and acoustic lengths [m], if the step would be at least [`COSTLY`] times as long without it.
+    fn of(cells: &[(Vector3, f64)], reach: f64) -> Option<Self> {
+        let &(place, least) = cells.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let beyond = cells.iter().filter(|(middle, _)| (middle - place).norm() > reach);
+        let next = beyond.map(|(_, length)| *length).fold(f64::INFINITY, f64::min);
+        let factor = next / least;
+        (factor.is_finite() && factor >= COSTLY).then(|| Self { place: place.into(), factor })
+    }
+}
+
 /// Size and quality of a mesh of an anatomy.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TetReport {
@@ -479,6 +505,8 @@ pub struct TetReport {
     pub raw_acoustic_part: f64,
     /// Median acoustic length [m].
     pub median_acoustic_length: f64,
+    /// The place whose cells alone set the step, if there is one.
+    pub costly: Option<CostlyPlace>,
     /// Smallest and largest dihedral angle [°].
     pub dihedral: [f64; 2],
     /// Most tets round a point.
@@ -507,21 +535,29 @@ impl TetReport {
     /// Deviations from the request.
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
-        doubts.extend(
-            LostReport::in_words(&self.lost).map(|lost| format!("the mesh lacks parts of the body: {lost}")),
-        );
+        doubts.extend(LostReport::in_words(&self.lost).map(|lost| {
+            format!("the mesh lacks parts of the body: {lost}; a smaller edge keeps parts as thick as it")
+        }));
         if let Some(DistanceReport { asked, reached, to, .. }) = self.distance.filter(|d| d.reached > d.asked)
         {
             doubts.push(format!(
-                "the distance of {:.3} mm to {to} was not reached; the best mesh reaches {:.3} mm",
+                "the distance of {:.3} mm to {to} was not reached; the best mesh reaches {:.3} mm: a larger distance is, \
+                 or a surface without folds and specks",
                 asked * 1e3,
                 reached * 1e3
+            ));
+        }
+        if let (Some(CostlyPlace { place: [x, y, z], factor }), Some(_)) = (self.costly, self.distance) {
+            doubts.push(format!(
+                "cells at ({x:.4}, {y:.4}, {z:.4}) m, made small to hold the distance there, make the step {factor:.1} times as short; \
+                 a larger distance, or a surface that is smoothed there, takes longer steps"
             ));
         }
         doubts.extend(self.surface.doubt());
         if let Tears { number, first: Some([x, y, z]) } = self.tears {
             doubts.push(format!(
-                "the mesh tears thin parts of the body in {number} places, the first at ({x:.4}, {y:.4}, {z:.4}) m"
+                "the mesh tears thin parts of the body in {number} places, the first at ({x:.4}, {y:.4}, {z:.4}) m; an edge below \
+                 their thickness keeps them whole"
             ));
         }
         if self.edges.longest_part > LONGEST + 1e-9 {
@@ -531,7 +567,8 @@ impl TetReport {
         if let Some([x, y, z]) = self.pinched_points.first() {
             let number = self.pinched_points.len();
             doubts.push(format!(
-                "the mesh boundary touches itself in {number} points, the first at ({x:.4}, {y:.4}, {z:.4}) m"
+                "the mesh boundary touches itself in {number} points, the first at ({x:.4}, {y:.4}, {z:.4}) m; a smaller edge may part \
+                 them"
             ));
         }
         doubts
@@ -557,8 +594,10 @@ impl TetReport {
             .collect();
         let lost = LostReport::of(lost, &anatomy.labels(), anatomy.volumes().iter().flatten().sum());
         let mut around = vec![0_usize; mesh.points.len()];
+        let mut lengths = Vec::with_capacity(block.len());
         for (cell, &material) in block.cells().zip(material) {
             let corners = [0, 1, 2, 3].map(|at| mesh.points[cell[at] as usize]);
+            lengths.push((corners.iter().sum::<Vector3>() / 4.0, acoustic_length(CellKind::Tet, &corners)));
             let own = &mut materials[usize::from(material) - 1];
             own.tets += 1;
             own.volume += volume(CellKind::Tet, &corners);
@@ -574,6 +613,7 @@ impl TetReport {
             acoustic_part,
             raw_acoustic_part: raw,
             median_acoustic_length: median,
+            costly: CostlyPlace::of(&lengths, REACH * edges.longest),
             dihedral: quality.dihedral.unwrap_or([0.0; 2]),
             most_tets_round_a_node: around.into_iter().max().unwrap_or(0),
             edges,
@@ -615,6 +655,15 @@ impl fmt::Display for TetReport {
             "acoustic length  {:.4e} m at least, {:.3} of the ideal ({:.3} before optimisation)",
             self.acoustic_length, self.acoustic_part, self.raw_acoustic_part
         )?;
+        if let Some(CostlyPlace { place: [x, y, z], factor }) = self.costly {
+            writeln!(
+                f,
+                "shortest step    at ({:.1}, {:.1}, {:.1}) mm: without the cells there it would be {factor:.1} times as long",
+                x * 1e3,
+                y * 1e3,
+                z * 1e3
+            )?;
+        }
         let EdgeLengths { least, median, longest, longest_part } = self.edges;
         writeln!(
             f,
@@ -690,5 +739,27 @@ impl fmt::Display for TetReport {
             f,
             "optimiser        {rounds} rounds: {peeled} tets peeled, {given} moved to another label, {collapsed} edges collapsed, {flipped} flips, {moved} moves"
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A small cell among even ones costs as much as it is smaller; where small cells are everywhere, no place does.
+    #[test]
+    fn a_place_costs_what_its_cells_shorten_the_step_by() {
+        let row = |least: f64| -> Vec<(Vector3, f64)> {
+            (0..10)
+                .map(|k| (Vector3::new(f64::from(k), 0.0, 0.0), if k == 4 { least } else { 1.0 }))
+                .collect()
+        };
+        let found = CostlyPlace::of(&row(0.1), 0.5).unwrap();
+        assert_eq!(found.place, [4.0, 0.0, 0.0]);
+        assert!((found.factor - 10.0).abs() < 1e-12);
+        assert_eq!(CostlyPlace::of(&row(0.6), 0.5), None);
+        let small: Vec<(Vector3, f64)> = row(0.1).into_iter().map(|(x, _)| (x, 0.1)).collect();
+        assert_eq!(CostlyPlace::of(&small, 0.5), None);
+        assert_eq!(CostlyPlace::of(&[], 0.5), None);
     }
 }

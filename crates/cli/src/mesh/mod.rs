@@ -302,7 +302,13 @@ fn enclosed(arguments: &MeshImage, bar: &Bar) -> Result<Input, Failure> {
     if report.shells > 1 {
         let cavities = report.cavities;
         let word = if cavities == 1 { "cavity" } else { "cavities" };
-        lines.push(format!("surface          {} pieces, of which {cavities} {word}", report.shells));
+        let fill = if cavities > 0 { "; `--fill-holes` fills them" } else { "" };
+        let solid = report.shells - cavities;
+        let largest = if solid > 1 { "; `--keep-largest` leaves out all but the largest piece" } else { "" };
+        lines.push(format!(
+            "surface          {} pieces, of which {cavities} {word}{fill}{largest}",
+            report.shells
+        ));
     }
     let object = json!({ "surface": { "format": file.format, "notes": file.notes }, "mended": report });
     Ok(Input { anatomy, names, protect, edge, lines, object, warnings })

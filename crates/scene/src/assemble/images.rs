@@ -125,13 +125,10 @@ impl Builder<'_> {
         self.notes.extend(how.map(|how| format!("mesh of {name}: {how}")));
         self.notes.extend(notes.iter().chain(&kept.notes).map(|note| format!("{name}: {note}")));
         let place = self.source().span(path);
-        let doubt = |message: String, help: &'static str| {
-            Diagnostic::warning(message).at(place.clone(), "this mesh").help(help)
-        };
-        let finer = "use finer cells, or `clean = { keep-largest = true }` for small pieces";
-        self.out.extend(kept.doubts.into_iter().map(|message| doubt(message, finer)));
+        let doubt = |message: String| Diagnostic::warning(message).at(place.clone(), "this mesh");
+        self.out.extend(kept.doubts.into_iter().map(doubt));
         let whole = "if the organ goes on beyond the image, its mesh ends there with a flat face";
-        self.out.extend(scan.cut_off().into_iter().map(|message| doubt(message, whole)));
+        self.out.extend(scan.cut_off().into_iter().map(|message| doubt(message).help(whole)));
         let origin = format!("{name} ({format}), {}", recipe.words(&scan));
         let mut mesh = kept.mesh;
         let present = labels(&mesh).into_iter();

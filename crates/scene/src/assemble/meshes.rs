@@ -243,7 +243,17 @@ impl Builder<'_> {
                 self.out.push(Diagnostic::warning(message).at(place, "this mesh").help(help));
             }
             if found.components > 1 {
-                self.notes.push(format!("`{}` is made of {} separate parts", path[1], found.components));
+                let of_scan = table.image.is_some();
+                self.notes.push(format!(
+                    "`{}` is made of {} separate parts{}",
+                    path[1],
+                    found.components,
+                    if of_scan {
+                        "; `clean = { keep-largest = true }` leaves out all but the largest"
+                    } else {
+                        ""
+                    }
+                ));
             }
         }
         problems.is_empty() && (dimension != 2 || self.check_slivers(mesh, path, &place))
