@@ -242,9 +242,8 @@ impl Builder<'_> {
         let meet = |own: &mut Self, (name, table): &(String, ContactTable)| {
             let side =
                 table.between.iter().position(|body| scene.bodies.iter().any(|(known, _)| known == body))?;
-            for (key, _) in
-                [("separate", table.separate), ("gap", table.gap.is_some())].iter().filter(|key| key.1)
-            {
+            let parts = [("separate", table.separate), ("gap", table.gap.is_some())];
+            if let Some((key, _)) = parts.into_iter().find(|(_, given)| *given) {
                 let message = format!("`{key}` is for bodies of one participant");
                 own.error(&["contact", name, key], message, "of two participants", "move one of them");
                 return None;
