@@ -10,6 +10,10 @@ const SHARP: f64 = std::f64::consts::FRAC_PI_4;
 /// Sharp edges that hang together are this long at least, over the diagonal. Shorter ones are noise.
 const LEAST_LENGTH: f64 = 0.05;
 
+/// The faces beside sharp edges meet their other neighbours at angles that are this part of those of the sharp edges at most, in the mean. At thin
+/// edges of organs triangles turn step by step, and such edges are round.
+const BESIDE: f64 = 0.25;
+
 /// Part of the surface that may be nearer to sharp edges than the error asked for. The steps of voxels take more, and are none.
 const MOST_NEAR: f64 = 0.1;
 
@@ -32,10 +36,12 @@ pub(super) fn with_sharp_edges(surface: &TriangleMesh, goal: ShellGoal) -> Optio
         lengths[root(&mut first, edge[0]) as usize] += length(edge);
     }
     let diagonal = surface.diagonal();
-    let is_long = |edge: &[u32; 2], first: &mut [u32]| {
-        lengths[root(first, edge[0]) as usize] >= LEAST_LENGTH * diagonal
+    let turns = turns_of_chains(&marked, &edges, |node| root(&mut first, node));
+    let counts = |edge: &[u32; 2]| {
+        let chain = root(&mut first, edge[0]) as usize;
+        lengths[chain] >= LEAST_LENGTH * diagonal && turns[chain][1] <= BESIDE * turns[chain][0]
     };
-    let long: Vec<[u32; 2]> = edges.into_iter().filter(|edge| is_long(edge, &mut first)).collect();
+    let long: Vec<[u32; 2]> = edges.into_iter().filter(counts).collect();
     let area: f64 = surface.alive().map(|t| surface.area(t)).sum();
     let error = match goal {
         ShellGoal::Error(error) => error * diagonal,
@@ -47,6 +53,33 @@ pub(super) fn with_sharp_edges(surface: &TriangleMesh, goal: ShellGoal) -> Optio
     }
     marked.set_creases(long);
     Some(marked)
+}
+
+/// The mean angles [rad] at the sharp edges of each chain, and at the other edges of their faces, by the first point of the chain.
+fn turns_of_chains(
+    marked: &TriangleMesh,
+    edges: &[[u32; 2]],
+    mut chain: impl FnMut(u32) -> u32,
+) -> Vec<[f64; 2]> {
+    let turn = |[a, b]: [u32; 2]| match marked.sides(a, b) {
+        [Some(s), Some(t)] => marked.normal(s).angle(&marked.normal(t)),
+        _ => 0.0,
+    };
+    let mut sums = vec![[[0.0_f64; 2]; 2]; marked.points.len()];
+    let mut add = |at: u32, kind: usize, angle: f64| {
+        let [sum, count] = &mut sums[at as usize][kind];
+        (*sum, *count) = (*sum + angle, *count + 1.0);
+    };
+    for &[a, b] in edges {
+        let at = chain(a);
+        add(at, 0, turn([a, b]));
+        for side in marked.sides(a, b).into_iter().flatten() {
+            let c = marked.opposite(side, a, b);
+            let others = [[a, c], [b, c]].into_iter().filter(|&[p, q]| !marked.is_marked(p, q));
+            others.for_each(|other| add(at, 1, turn(other)));
+        }
+    }
+    sums.into_iter().map(|kinds| kinds.map(|[sum, count]| sum / count.max(1.0))).collect()
 }
 
 /// The first of the points that hang together with a point.

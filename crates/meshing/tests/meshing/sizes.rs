@@ -179,7 +179,8 @@ fn a_distance_is_held_or_the_best_so_far_is_told() {
         made.report
     );
     assert!(truth.largest() < 1.53e-3, "{truth:?}");
-    assert!(made.report.doubts().is_empty());
+    // The spike costs most of the step, which is told.
+    assert!(made.report.doubts().iter().all(|doubt| doubt.contains("make the step")));
     // Few cells are allowed.
     let made = OrganTets { cell_limit: 2000, ..held }.mesh(&body, &|_| {}).expect("a mesh");
     assert!(made.report.tets <= 2000 && made.report.doubts()[0].contains("not reached"), "{}", made.report);

@@ -1513,10 +1513,12 @@ class Contact(Table):
         Whether states are searched for edges that go through triangles, by a way of its own. With the solvers `implicit` and `static` the search looks at each state; an intersection would be a fault of the program, and ends the run. With the solver `explicit` the search looks at the states that outputs write and at the last one, and counts the intersections of bodies that are deeper than 1e-4 of the mean edge: a warning, and `intersections` in `--json`. Holds for all contacts of the solver. Takes true or false; false if not given.
     separate
         Whether bodies that overlap at the start are pushed apart before the run, by the least ways of their nodes. The shape at rest stays as it is, so that the run starts deformed. Without it they are refused. Takes true or false; false if not given.
+    gap
+        Gap [m] between the shapes at rest, beyond the distance that surfaces keep. Where bodies overlap or are nearer, their nodes at rest move apart by the least ways, so that the run starts without stress. For organs that touch in one segmentation and are meshed one by one. Takes a number, greater than 0.
     """
 
     _type: ClassVar[str | None] = None
-    _keys: ClassVar[dict[str, str]] = {"between": "between", "faces": "faces", "other_faces": "other-faces", "friction": "friction", "thickness": "thickness", "barrier_distance": "barrier-distance", "barrier_stiffness": "barrier-stiffness", "subdivision": "subdivision", "creep_speed": "creep-speed", "check_intersections": "check-intersections", "separate": "separate"}
+    _keys: ClassVar[dict[str, str]] = {"between": "between", "faces": "faces", "other_faces": "other-faces", "friction": "friction", "thickness": "thickness", "barrier_distance": "barrier-distance", "barrier_stiffness": "barrier-stiffness", "subdivision": "subdivision", "creep_speed": "creep-speed", "check_intersections": "check-intersections", "separate": "separate", "gap": "gap"}
 
     between: Any
     faces: Any | None = None
@@ -1529,6 +1531,7 @@ class Contact(Table):
     creep_speed: float | None = None
     check_intersections: bool | None = None
     separate: bool | None = None
+    gap: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -168,7 +168,7 @@ pub struct OpeningTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 3.0))]
     pub angle: Option<f64>,
-    /// The same angle in degrees, instead of `angle`.
+    /// The same angle [degrees], instead of `angle`.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 170.0))]
     pub degrees: Option<f64>,

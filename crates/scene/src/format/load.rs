@@ -187,7 +187,7 @@ pub struct RotateTable {
     /// Angle [rad] by which it turns, right-handed about the axis; 6.2832 is a whole turn.
     #[serde(default)]
     pub angle: Option<f64>,
-    /// The same angle in degrees, instead of `angle`; 360 is a whole turn.
+    /// The same angle [degrees], instead of `angle`; 360 is a whole turn.
     #[serde(default)]
     pub degrees: Option<f64>,
 }
