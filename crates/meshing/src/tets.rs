@@ -40,10 +40,10 @@ const TEAR_HALVINGS: usize = 2;
 /// Cells become smaller where the distance exceeds this fraction of the requested one.
 const BEYOND: f64 = 0.85;
 
-/// A place is told whose cells make the step at least so many times as short.
+/// Least factor by which the cells of a place shorten the step for the report to name it.
 const COSTLY: f64 = 2.0;
 
-/// How far around its smallest cell a place reaches, over the longest edge.
+/// Radius of a place around its smallest cell, over the longest edge.
 const REACH: f64 = 3.0;
 
 /// An unoptimised mesh is refined where its distance exceeds the requested one by this factor.
@@ -473,12 +473,12 @@ pub struct MaterialReport {
 pub struct CostlyPlace {
     /// The middle of the smallest cell [m].
     pub place: [f64; 3],
-    /// Without the cells within three of the longest edges from there the step would be so many times as long.
+    /// Factor by which the step would grow without the cells nearer than three times the longest edge.
     pub factor: f64,
 }
 
 impl CostlyPlace {
-    /// That of cells with middles and acoustic lengths [m], if the step would be at least [`COSTLY`] times as long without it.
+    /// Finds it among cells with centres and acoustic lengths [m]; `None` if its factor is below [`COSTLY`].
     fn of(cells: &[(Vector3, f64)], reach: f64) -> Option<Self> {
         let &(place, least) = cells.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
         let beyond = cells.iter().filter(|(middle, _)| (middle - place).norm() > reach);

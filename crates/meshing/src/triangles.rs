@@ -208,7 +208,7 @@ impl TriangleMesh {
         self.creases = edges.into_iter().map(|[a, b]| key(a, b)).collect();
     }
 
-    /// The same with points in use alone, numbered anew in their order; creases stay marked.
+    /// Drops points that no triangle uses and numbers the others anew, in their order. Creases stay marked.
     pub(crate) fn compacted(&self) -> Self {
         let (points, triangles) = self.compact();
         let mut compacted = Self::new(points, triangles);

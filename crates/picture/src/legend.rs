@@ -121,7 +121,7 @@ pub fn readable(unit: &str, size: f64) -> (String, f64) {
 }
 
 impl Legend {
-    /// The labels with their names, those that are seen first; of the others it is told that they are hidden.
+    /// The labels with their names. Labels that are seen come first; the names of the others end in "(hidden)".
     fn told_labels(&self) -> Vec<(i32, String)> {
         let told = |(label, name): &(i32, String)| match self.hidden.contains(label) {
             true => (*label, format!("{name} (hidden)").trim_start().to_owned()),

@@ -51,7 +51,7 @@ pub(crate) struct Maximum<'a> {
     pub value: f64,
     pub unit: &'a str,
     pub factor: f64,
-    /// Whether nothing hides the place.
+    /// True if nothing hides the place.
     pub is_seen: bool,
 }
 

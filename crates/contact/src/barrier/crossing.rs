@@ -54,7 +54,7 @@ impl IntersectionCheck {
         Self { contacts: checked.collect() }
     }
 
-    /// The same check, where each intersection counts.
+    /// Counts each intersection, however shallow.
     #[must_use]
     pub fn of_all(mut self) -> Self {
         self.contacts.iter_mut().for_each(|(_, _, slight)| *slight = 0.0);

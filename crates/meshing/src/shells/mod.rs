@@ -70,8 +70,8 @@ const STUCK: usize = 3;
 /// Part of the work allowed that a second fit has at least.
 const AGAIN: f64 = 0.5;
 
-/// Shells that keep sharp edges are compared with others if one of them is slimmer than this, and the others count if they are not this many times
-/// as far off: rims of images have more corners than few shells can follow.
+/// Least shape of shells that keep sharp edges. If one is slimmer, shells without sharp edges are fitted, too, and are the result unless their
+/// distance is larger by more than the factor below. Rims of images have more corners than few shells can follow.
 const SLIM: f64 = 0.3;
 const MUCH: f64 = 2.0;
 
@@ -177,7 +177,7 @@ impl FittedShells {
         }
     }
 
-    /// The same of a surface whose creases are marked.
+    /// Fits shells to a surface whose creases are marked.
     fn of_lines(
         surface: &TriangleMesh,
         goal: ShellGoal,
@@ -250,7 +250,7 @@ impl Job<'_> {
         found
     }
 
-    /// The same made flat where flat triangles are nearer, if the fit fails or all flat ones are nearer, and where shells cross.
+    /// Makes shells flat where they cross. If the fit fails, or the flat triangles are nearer as a whole, shells become flat where that is nearer, too.
     fn flattened(&self, found: Found) -> Found {
         let FittedShells { report, .. } = &found.fitted;
         let is_nearer = !report.reached || report.flat.largest() < report.distances.largest();
