@@ -7,6 +7,7 @@ use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
 use crate::cell::{CellId, corners, diagonal, edges, is_finite, nodes_differ};
+use crate::disjoint_sets::DisjointSets;
 use crate::quality::{scaled_jacobian, volume};
 use crate::surface::{FaceGroups, boundary, valid_cells};
 use crate::{CellKind, Mesh, Vector3};
@@ -276,32 +277,6 @@ impl EdgeUses {
 
     fn edges_where(&self, wanted: impl Fn(&[EdgeUse]) -> bool) -> Vec<[u32; 2]> {
         self.iter().filter(|group| wanted(group)).map(|group| group[0].nodes).collect()
-    }
-}
-
-/// Disjoint sets (union by smaller root, paths halved).
-struct DisjointSets(Vec<usize>);
-
-impl DisjointSets {
-    fn new(count: usize) -> Self {
-        Self((0..count).collect())
-    }
-
-    fn root(&mut self, mut at: usize) -> usize {
-        while self.0[at] != at {
-            self.0[at] = self.0[self.0[at]];
-            at = self.0[at];
-        }
-        at
-    }
-
-    fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.0[a.max(b)] = a.min(b);
-    }
-
-    fn count(&self) -> usize {
-        self.0.iter().enumerate().filter(|(at, root)| at == *root).count()
     }
 }
 

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix6, RowVector6, SymmetricEigen, Vector3};
 use pliant_contact::lag::Lag;
+use pliant_geometry::DisjointSets;
 use pliant_mechanics::StopFlag;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::{Cells, Motion, Solid};
@@ -798,33 +799,23 @@ fn controlled_volume(model: &Assembly, state: &State) -> f64 {
 /// If not: a node of a part, and how many motions it is free in.
 pub fn check_held(model: &Assembly) -> Result<(), SolveError> {
     let nodes = model.rest.len();
-    let mut part: Vec<usize> = (0..nodes).collect();
-    fn root(part: &mut [usize], mut node: usize) -> usize {
-        while part[node] != node {
-            part[node] = part[part[node]];
-            node = part[node];
-        }
-        node
-    }
+    let mut part = DisjointSets::new(nodes);
     let mut used = vec![false; nodes];
     let facets = model.facets.iter().map(|facet| &facet.nodes[..]);
     for nodes in facets.chain(model.solid_cells()) {
         for &node in nodes {
             used[node as usize] = true;
-            let (x, y) = (root(&mut part, nodes[0] as usize), root(&mut part, node as usize));
-            part[x.max(y)] = x.min(y);
+            part.join(nodes[0] as usize, node as usize);
         }
     }
     for constraint in model.constraints.iter().filter(|own| matches!(own.motion, Motion::Rigid)) {
         for &node in &constraint.nodes {
-            let (x, y) = (root(&mut part, constraint.nodes[0] as usize), root(&mut part, node as usize));
-            part[x.max(y)] = x.min(y);
+            part.join(constraint.nodes[0] as usize, node as usize);
         }
     }
     for (node, row) in model.ties.iter().flat_map(Tie::rows) {
         for (followed, _) in row {
-            let (x, y) = (root(&mut part, node as usize), root(&mut part, followed as usize));
-            part[x.max(y)] = x.min(y);
+            part.join(node as usize, followed as usize);
         }
     }
     let turning = model.turning();
@@ -844,7 +835,7 @@ pub fn check_held(model: &Assembly) -> Result<(), SolveError> {
     // The mean of a face holds what its nodes together do.
     for constraint in &model.constraints {
         let Motion::Mean { weights, .. } = &constraint.motion else { continue };
-        let first = root(&mut part, constraint.nodes[0] as usize);
+        let first = part.root(constraint.nodes[0] as usize);
         for component in (0..3).filter(|&c| constraint.components[c]) {
             let rows = constraint.nodes.iter().map(|&node| row_of(node as usize, component, first));
             let row = rows.zip(weights).fold(RowVector6::zeros(), |sum, (row, w)| sum + row * *w);
@@ -852,7 +843,7 @@ pub fn check_held(model: &Assembly) -> Result<(), SolveError> {
         }
     }
     let mut hold = |node: usize, component: usize, held: &mut Vec<Matrix6<f64>>| {
-        let first = root(&mut part, node);
+        let first = part.root(node);
         let row = row_of(node, component, first);
         held[first] += row.transpose() * row;
     };
@@ -876,7 +867,7 @@ pub fn check_held(model: &Assembly) -> Result<(), SolveError> {
         (0..if turning[node] { 6 } else { 3 }).for_each(|c| hold(node, c, &mut moved));
     }
     for node in 0..nodes {
-        if used[node] && root(&mut part, node) == node {
+        if used[node] && part.root(node) == node {
             let SymmetricEigen { eigenvalues, eigenvectors } = SymmetricEigen::new(moved[node]);
             let limit = 1e-10 * eigenvalues.max().max(1.0);
             for (value, motion) in eigenvalues.iter().zip(eigenvectors.column_iter()) {

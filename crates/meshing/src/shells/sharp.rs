@@ -1,6 +1,8 @@
 //! Sharp edges of a surface, which its shells keep: nodes stay on them, and have no normals there.
 //! Leaves out: sharp edges that bend, between nodes: shells leave them straight.
 
+use pliant_geometry::DisjointSets;
+
 use super::ShellGoal;
 use crate::triangles::TriangleMesh;
 
@@ -14,7 +16,7 @@ const LEAST_LENGTH: f64 = 0.05;
 /// edges of organs triangles turn step by step, and such edges are round.
 const BESIDE: f64 = 0.25;
 
-/// Part of the surface that may be nearer to sharp edges than the error asked for. The steps of voxels take more, and are none.
+/// Largest part of the surface that is nearer to sharp edges than the error asked for. Steps of voxels take a larger part, and are not sharp edges.
 const MOST_NEAR: f64 = 0.1;
 
 /// The error that stands for a number of shells, over their edges.
@@ -26,19 +28,16 @@ pub(super) fn with_sharp_edges(surface: &TriangleMesh, goal: ShellGoal) -> Optio
     marked.mark_creases(SHARP);
     let edges: Vec<[u32; 2]> = marked.creases().collect();
     let length = |&[a, b]: &[u32; 2]| (marked.points[a as usize] - marked.points[b as usize]).norm();
-    let mut first: Vec<u32> = (0..marked.points.len() as u32).collect();
-    for &[a, b] in &edges {
-        let [a, b] = [a, b].map(|node| root(&mut first, node));
-        first[a.max(b) as usize] = a.min(b);
-    }
-    let mut lengths = vec![0.0; first.len()];
+    let mut chains = DisjointSets::new(marked.points.len());
+    edges.iter().for_each(|&[a, b]| chains.join(a as usize, b as usize));
+    let mut lengths = vec![0.0; marked.points.len()];
     for edge in &edges {
-        lengths[root(&mut first, edge[0]) as usize] += length(edge);
+        lengths[chains.root(edge[0] as usize)] += length(edge);
     }
     let diagonal = surface.diagonal();
-    let turns = turns_of_chains(&marked, &edges, |node| root(&mut first, node));
+    let turns = turns_of_chains(&marked, &edges, &mut chains);
     let counts = |edge: &[u32; 2]| {
-        let chain = root(&mut first, edge[0]) as usize;
+        let chain = chains.root(edge[0] as usize);
         lengths[chain] >= LEAST_LENGTH * diagonal && turns[chain][1] <= BESIDE * turns[chain][0]
     };
     let long: Vec<[u32; 2]> = edges.into_iter().filter(counts).collect();
@@ -56,22 +55,18 @@ pub(super) fn with_sharp_edges(surface: &TriangleMesh, goal: ShellGoal) -> Optio
 }
 
 /// The mean angles [rad] at the sharp edges of each chain, and at the other edges of their faces, by the first point of the chain.
-fn turns_of_chains(
-    marked: &TriangleMesh,
-    edges: &[[u32; 2]],
-    mut chain: impl FnMut(u32) -> u32,
-) -> Vec<[f64; 2]> {
+fn turns_of_chains(marked: &TriangleMesh, edges: &[[u32; 2]], chains: &mut DisjointSets) -> Vec<[f64; 2]> {
     let turn = |[a, b]: [u32; 2]| match marked.sides(a, b) {
         [Some(s), Some(t)] => marked.normal(s).angle(&marked.normal(t)),
         _ => 0.0,
     };
     let mut sums = vec![[[0.0_f64; 2]; 2]; marked.points.len()];
-    let mut add = |at: u32, kind: usize, angle: f64| {
-        let [sum, count] = &mut sums[at as usize][kind];
+    let mut add = |at: usize, kind: usize, angle: f64| {
+        let [sum, count] = &mut sums[at][kind];
         (*sum, *count) = (*sum + angle, *count + 1.0);
     };
     for &[a, b] in edges {
-        let at = chain(a);
+        let at = chains.root(a as usize);
         add(at, 0, turn([a, b]));
         for side in marked.sides(a, b).into_iter().flatten() {
             let c = marked.opposite(side, a, b);
@@ -80,15 +75,6 @@ fn turns_of_chains(
         }
     }
     sums.into_iter().map(|kinds| kinds.map(|[sum, count]| sum / count.max(1.0))).collect()
-}
-
-/// The first of the points that hang together with a point.
-fn root(first: &mut [u32], mut point: u32) -> u32 {
-    while first[point as usize] != point {
-        first[point as usize] = first[first[point as usize] as usize];
-        point = first[point as usize];
-    }
-    point
 }
 
 #[cfg(test)]
@@ -105,7 +91,7 @@ mod tests {
         TriangleMesh::from_mesh(&mesh).unwrap().0
     }
 
-    /// A closed prism of height 60 mm whose sides are `sides` of radius 30 mm, in so many layers.
+    /// Builds a closed prism, 60 mm high and with corners at a radius of 30 mm. Its sides are divided into layers.
     fn prism(sides: u32, layers: u32) -> TriangleMesh {
         let corner = |k: u32, layer: u32| {
             let angle = f64::from(k) / f64::from(sides) * std::f64::consts::TAU;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use pliant_geometry::{CellKind, Mesh, Vector3};
+use pliant_geometry::{CellKind, DisjointSets, Mesh, Vector3};
 
 use super::Files;
 use super::error::{Fault, ImportProblem};
@@ -89,32 +89,21 @@ impl Geometry {
 
     /// How many parts have no node in common.
     pub fn piece_count(&self) -> usize {
-        let mut parent: Vec<u32> = (0..self.node_count() as u32).collect();
-        let mut used = vec![false; parent.len()];
+        let mut pieces = DisjointSets::new(self.node_count());
+        let mut used = vec![false; self.node_count()];
         for cell in self.cells().chunks_exact(self.solid.cell().node_count()) {
-            let first = root(&mut parent, cell[0]);
             for &node in cell {
                 used[node as usize] = true;
-                let other = root(&mut parent, node);
-                parent[other as usize] = first;
+                pieces.join(cell[0] as usize, node as usize);
             }
         }
-        (0..parent.len()).filter(|&node| used[node] && parent[node] as usize == node).count()
+        (0..used.len()).filter(|&node| used[node] && pieces.root(node) == node).count()
     }
 
     /// Nodes of all cells, one after another.
     pub fn cells(&self) -> &[u32] {
         self.mesh.block(self.solid.cell()).map_or(&[], |block| &block.nodes)
     }
-}
-
-/// The node that stands for all that are connected with one; the way to it becomes shorter.
-fn root(parent: &mut [u32], mut node: u32) -> u32 {
-    while parent[node as usize] != node {
-        parent[node as usize] = parent[parent[node as usize] as usize];
-        node = parent[node as usize];
-    }
-    node
 }
 
 /// Reads the geometry of a model or submodel.
