@@ -5,7 +5,7 @@ use std::array::from_fn;
 
 use pliant_mechanics::element::{Cord, Rest, Sheet};
 use pliant_mechanics::law::plane_stress::InPlane;
-use pliant_mechanics::law::{Deformation, Law, MOST_FAMILIES, Split, with_law};
+use pliant_mechanics::law::{AnyLaw, Deformation, Law, MOST_FAMILIES, Split, with_law};
 use pliant_mechanics::model::{Averaging, Cells, LocalNodes, Material, Model, Solid, with_cells};
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cast, cross, dot, scale, sub};
 use rayon::prelude::*;
@@ -231,7 +231,7 @@ impl<'a, R: Scalar> Recovery<'a, R> {
             energy: Split { isochoric: Pack::ZERO, volumetric: Pack::ZERO },
             fibre_stretch: Pack::ZERO,
         };
-        with_law!(law, law => Processor::detect().run(AtPoints { law: *law, given: &given, found: &mut found }));
+        at_points(law, &given, &mut found);
         found.cell_volume_ratio = found.volume_ratio;
         for (lane, (cell, _, h)) in points.iter().enumerate() {
             match averages {
@@ -296,6 +296,11 @@ impl Found {
             stable_step: None,
         }
     }
+}
+
+/// Evaluates a law at a pack of points. Not generic, so that laws are compiled here and not again in every crate that recovers fields.
+fn at_points(law: &AnyLaw, given: &Given, found: &mut Found) {
+    with_law!(law, law => Processor::detect().run(AtPoints { law: *law, given, found }));
 }
 
 /// A law at a pack of points.

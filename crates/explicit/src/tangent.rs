@@ -45,7 +45,15 @@ pub(crate) fn stiffness(
     state: impl Fn(usize) -> (Tensor<f64>, Symmetric<f64>),
 ) -> [Stiffness; PACK] {
     let cells: [usize; PACK] = from_fn(|lane| cells[lane.min(cells.len() - 1)] as usize);
-    let states = cells.map(state);
+    of_states(solid, &cells, &cells.map(state))
+}
+
+/// The same of known states. Not generic, so that laws are compiled here and not again in every crate that steps a model.
+fn of_states(
+    solid: &Solid,
+    cells: &[usize; PACK],
+    states: &[(Tensor<f64>, Symmetric<f64>); PACK],
+) -> [Stiffness; PACK] {
     if let Cells::Bar(block, cord) = &solid.cells {
         return from_fn(|lane| of_bar(solid, &block.rest[cells[lane]], cord, &states[lane].0));
     }
@@ -58,7 +66,7 @@ pub(crate) fn stiffness(
     }
     let [mode, wave, hourglass] = Processor::detect().run(Tangents {
         solid,
-        cells: &cells,
+        cells,
         gradient: &Tensor(from_fn(|i| from_fn(|k| entry(i, k)))),
         square: &Symmetric(from_fn(|k| Pack::from_fn(|lane| states[lane].1.0[k]))),
         fibres: &fibres,
