@@ -37,21 +37,41 @@ impl DistanceField {
     pub fn value(&self, point: &Vector3) -> f64 {
         let index = self.grid.index(point);
         let within = self.clamped(&index);
-        let [first, part] = self.cell(&within);
-        let value = |at: usize| f64::from(self.values[self.corner(&first, at)]);
-        let along = |at: usize, t: f64| value(at) * (1.0 - t) + value(at + 1) * t;
-        let plane = |at: usize| along(at, part.x) * (1.0 - part.y) + along(at + 2, part.x) * part.y;
-        let inner = plane(0) * (1.0 - part.z) + plane(4) * part.z;
-        // Beyond the box the field falls with the distance from it.
-        if index == within { inner } else { inner - (self.grid.position(&within) - point).norm() }
+        let (values, part) = self.round(&within);
+        self.value_of(&values, &part, [&index, &within], point)
     }
 
     /// Gradient of the field at a point, dimensionless; of length 1 except for smoothing.
     pub fn gradient(&self, point: &Vector3) -> Vector3 {
-        let [first, part] = self.cell(&self.clamped(&self.grid.index(point)));
+        let (values, part) = self.round(&self.clamped(&self.grid.index(point)));
+        self.gradient_of(&values, &part)
+    }
+
+    /// Both, for little more than one.
+    pub fn value_and_gradient(&self, point: &Vector3) -> (f64, Vector3) {
+        let index = self.grid.index(point);
+        let within = self.clamped(&index);
+        let (values, part) = self.round(&within);
+        (self.value_of(&values, &part, [&index, &within], point), self.gradient_of(&values, &part))
+    }
+
+    fn value_of(
+        &self,
+        values: &[f64; 8],
+        part: &Vector3,
+        [index, within]: [&Vector3; 2],
+        point: &Vector3,
+    ) -> f64 {
+        let along = |at: usize, t: f64| values[at] * (1.0 - t) + values[at + 1] * t;
+        let plane = |at: usize| along(at, part.x) * (1.0 - part.y) + along(at + 2, part.x) * part.y;
+        let inner = plane(0) * (1.0 - part.z) + plane(4) * part.z;
+        // Beyond the box the field falls with the distance from it.
+        if index == within { inner } else { inner - (self.grid.position(within) - point).norm() }
+    }
+
+    fn gradient_of(&self, values: &[f64; 8], part: &Vector3) -> Vector3 {
         let mut gradient = Vector3::zeros();
-        for at in 0..8 {
-            let value = f64::from(self.values[self.corner(&first, at)]);
+        for (at, value) in values.iter().enumerate() {
             let side = [at & 1, at >> 1 & 1, at >> 2 & 1];
             let weight = |axis: usize| if side[axis] == 1 { part[axis] } else { 1.0 - part[axis] };
             let slope = |axis: usize| if side[axis] == 1 { 1.0 } else { -1.0 };
@@ -77,17 +97,16 @@ impl DistanceField {
         Vector3::new(index.x.clamp(0.0, last[0]), index.y.clamp(0.0, last[1]), index.z.clamp(0.0, last[2]))
     }
 
-    /// The first corner of the cell that holds a place, and how far the place is from it (0 to 1 along each axis).
-    fn cell(&self, index: &Vector3) -> [Vector3; 2] {
-        let first = Vector3::from_fn(|axis, _| index[axis].floor().min(self.grid.dims[axis] as f64 - 2.0));
-        [first, index - first]
-    }
-
-    /// Place in memory of a corner of a cell; bits of `at` are steps along i, j and k.
-    fn corner(&self, first: &Vector3, at: usize) -> usize {
+    /// The values at the corners of the cell that holds a place, bits of their numbers are steps along i, j and k; and how far the place
+    /// is from the first of them (0 to 1 along each axis).
+    fn round(&self, within: &Vector3) -> ([f64; 8], Vector3) {
         let [nx, ny, _] = self.grid.dims;
-        let [i, j, k] = [0, 1, 2].map(|axis| first[axis] as usize + (at >> axis & 1));
-        i + nx * (j + ny * k)
+        // No place is negative, so the conversion rounds down.
+        let first = [0, 1, 2].map(|axis| (within[axis] as usize).min(self.grid.dims[axis] - 2));
+        let start = first[0] + nx * (first[1] + ny * first[2]);
+        let value =
+            |at: usize| f64::from(self.values[start + (at & 1) + nx * ((at >> 1 & 1) + ny * (at >> 2 & 1))]);
+        (std::array::from_fn(value), Vector3::from_fn(|axis, _| within[axis] - first[axis] as f64))
     }
 }
 

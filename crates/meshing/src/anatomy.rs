@@ -20,6 +20,10 @@ impl ImplicitField for DistanceField {
     fn gradient(&self, point: &Vector3) -> Vector3 {
         DistanceField::gradient(self, point)
     }
+
+    fn value_and_gradient(&self, point: &Vector3) -> (f64, Vector3) {
+        DistanceField::value_and_gradient(self, point)
+    }
 }
 
 /// A body of one material or several, each with its label.

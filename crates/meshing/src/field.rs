@@ -22,6 +22,11 @@ pub trait ImplicitField: Sync {
             (self.value(&(point + shift)) - self.value(&(point - shift))) / (2.0 * step)
         })
     }
+
+    /// The value and its gradient, for fields that find both at once.
+    fn value_and_gradient(&self, point: &Vector3) -> (f64, Vector3) {
+        (self.value(point), self.gradient(point))
+    }
 }
 
 impl<F: ImplicitField + ?Sized> ImplicitField for &F {
@@ -35,6 +40,10 @@ impl<F: ImplicitField + ?Sized> ImplicitField for &F {
 
     fn gradient(&self, point: &Vector3) -> Vector3 {
         (**self).gradient(point)
+    }
+
+    fn value_and_gradient(&self, point: &Vector3) -> (f64, Vector3) {
+        (**self).value_and_gradient(point)
     }
 }
 

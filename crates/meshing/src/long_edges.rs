@@ -52,7 +52,7 @@ fn halve(complex: &mut Complex, [p, q]: [u32; 2], surfaces: &Surfaces<'_>, guard
     if sides.count_ones() < 2 {
         return;
     }
-    if let Some(place) = surfaces.project(sides, &middle, REACH * complex.size[new])
+    if let Some((place, _)) = surfaces.project(sides, &middle, REACH * complex.size[new])
         && guard.as_ref().is_none_or(|guard| guard.lets_move(complex, number, &place))
     {
         complex.points[new] = place;

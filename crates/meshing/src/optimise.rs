@@ -3,7 +3,10 @@
 //! them. No edge exceeds 1.6 lattice constants. Lengths are measured in the local lattice constant, which may be graded. Deterministic:
 //! work follows the order of numbers, and a fixed sequence rotates the directions of trial moves.
 
+use std::cell::OnceCell;
+
 use pliant_geometry::{CellKind, Vector3};
+use rayon::prelude::*;
 
 use crate::complex::{Complex, OUTSIDE, Sides, acoustic_length};
 use crate::guard::Guard;
@@ -204,17 +207,22 @@ impl<'a> Optimiser<'a> {
         }
     }
 
+    /// Acoustic length of each tet as a part of the ideal; infinite where there is none any more.
+    fn parts(&self) -> Vec<f64> {
+        let part = |tet: u32| if self.complex.is_alive(tet) { self.complex.part(tet) } else { f64::INFINITY };
+        (0..self.complex.tets.len() as u32).into_par_iter().map(part).collect()
+    }
+
     /// Least acoustic length as a part of the ideal, and how many tets are below `target`.
     fn state(&self, target: f64) -> (f64, usize) {
-        let parts = self.complex.alive().map(|tet| self.complex.part(tet));
-        parts.fold((f64::INFINITY, 0), |(least, short), part| {
+        self.parts().into_iter().fold((f64::INFINITY, 0), |(least, short), part| {
             (least.min(part), short + usize::from(part < target))
         })
     }
 
     /// Tets below a part of the ideal length, the worst first.
     fn below(&self, threshold: f64) -> Vec<u32> {
-        let parts = self.complex.alive().map(|tet| (self.complex.part(tet), tet));
+        let parts = self.parts().into_iter().zip(0..);
         let mut bad: Vec<(f64, u32)> = parts.filter(|(part, _)| *part < threshold).collect();
         bad.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         bad.into_iter().map(|(_, tet)| tet).collect()
@@ -429,6 +437,11 @@ impl<'a> Optimiser<'a> {
     /// The position nearest to `place` between the sides of a node, if it is on the same side of the body: the normals
     /// differ by less than 90°. The other side of a gap or of a thin lobe may be nearer.
     fn project(&self, node: u32, place: Vector3) -> Option<Vector3> {
+        self.project_from(node, place, &OnceCell::new())
+    }
+
+    /// The same; `look` is the normal at the node, found once for several places.
+    fn project_from(&self, node: u32, place: Vector3, look: &OnceCell<Vector3>) -> Option<Vector3> {
         let mut sides = self.complex.sides[node as usize];
         if self.lines_are_free && sides.count_ones() > 2 {
             // The outside and the lowest material: their statements about each other are redundant.
@@ -439,15 +452,16 @@ impl<'a> Optimiser<'a> {
             return Some(place);
         }
         let size = self.complex.size[node as usize];
-        let near = self.surfaces.off(sides, &place) < self.slack * size;
-        let there = match near && (sides & OUTSIDE == 0 || self.surfaces.has_room(&place, self.slack * size))
-        {
-            true => place,
-            false => self.surfaces.project(sides, &place, 0.15 * size)?,
-        };
         let looks = |point: &Vector3| self.surfaces.constraints(sides, point).first_gradient();
+        let near = self.slack > 0.0 && self.surfaces.off(sides, &place) < self.slack * size;
+        let (there, its_look) =
+            match near && (sides & OUTSIDE == 0 || self.surfaces.has_room(&place, self.slack * size)) {
+                true => (place, looks(&place)),
+                false => self.surfaces.project(sides, &place, 0.15 * size)?,
+            };
         let here = self.complex.points[node as usize];
-        (looks(&here).dot(&looks(&there)) > 0.0).then_some(there)
+        let own_look = look.get_or_init(|| looks(&here));
+        (own_look.dot(&its_look) > 0.0).then_some(there)
     }
 
     /// Slides points along their surface to where its facets follow the field best, as long as no tet falls below the
@@ -481,8 +495,10 @@ impl<'a> Optimiser<'a> {
                 && !self.complex.stretches(node, trial, u32::MAX)
         };
         let (mut best, mut place) = (0.99 * misfit, here);
+        let look = OnceCell::new();
         for direction in directions() {
-            let Some(trial) = self.project(node, here + direction * (reach * size)) else { continue };
+            let trial = here + direction * (reach * size);
+            let Some(trial) = self.project_from(node, trial, &look) else { continue };
             let [misfit, _] = self.misfit(node, &trial, &faces);
             if misfit < best && bears(&trial) && self.lets_move(node, &trial) {
                 (best, place) = (misfit, trial);
@@ -516,29 +532,31 @@ impl<'a> Optimiser<'a> {
 
     /// Moves the chosen points whose worst tet is below the threshold to the best of some places round them; `reach` in lattice constants.
     fn relocate(&mut self, threshold: f64, reach: f64, chosen: &dyn Fn(Sides) -> bool) {
+        let mut parts = self.parts();
         for node in 0..self.complex.points.len() as u32 {
-            let here = self.complex.points[node as usize];
-            let now = self.star_min(node, &here, u32::MAX, f64::NEG_INFINITY);
+            let star = self.complex.star[node as usize].iter();
+            let now = star.map(|&tet| parts[tet as usize]).fold(f64::INFINITY, f64::min);
             if now < threshold && chosen(self.complex.sides[node as usize]) {
-                self.relocate_one(node, now, reach);
+                self.relocate_one(node, now, reach, &mut parts);
             }
         }
     }
 
-    fn relocate_one(&mut self, node: u32, now: f64, reach: f64) {
+    /// Moves a point; `parts` are those of all tets, before and after.
+    fn relocate_one(&mut self, node: u32, now: f64, reach: f64, parts: &mut [f64]) {
         let here = self.complex.points[node as usize];
         let neighbours = self.complex.neighbours(node);
         let sum: Vector3 = neighbours.iter().map(|&other| self.complex.points[other as usize]).sum();
         let half_way = (here + sum / neighbours.len() as f64) / 2.0;
         let reach = reach * self.complex.size[node as usize] * (0.5 + self.random());
         // Worst tets first: most trials end at the first tet.
-        let mut star = std::mem::take(&mut self.complex.star[node as usize]);
-        star.sort_by(|&a, &b| self.complex.part(a).total_cmp(&self.complex.part(b)).then(a.cmp(&b)));
-        self.complex.star[node as usize] = star;
+        let star = &mut self.complex.star[node as usize];
+        star.sort_by(|&a, &b| parts[a as usize].total_cmp(&parts[b as usize]).then(a.cmp(&b)));
         let (mut best, mut place) = (now, here);
+        let look = OnceCell::new();
         for trial in std::iter::once(half_way).chain(directions().map(|direction| here + direction * reach)) {
             // Free trials without improvement are not worth projecting: their tets change little.
-            if let Some(trial) = self.project(node, trial) {
+            if let Some(trial) = self.project_from(node, trial, &look) {
                 let part = self.star_min(node, &trial, u32::MAX, best);
                 if part > best
                     && !self.complex.stretches(node, &trial, u32::MAX)
@@ -551,6 +569,9 @@ impl<'a> Optimiser<'a> {
         if place != here {
             self.move_to(node, place);
             self.done.moved += 1;
+            for &tet in &self.complex.star[node as usize] {
+                parts[tet as usize] = self.complex.part(tet);
+            }
         }
     }
 

@@ -78,13 +78,22 @@ impl<'a> Surfaces<'a> {
         2..=self.levels.len()
     }
 
-    /// Gradient of the field of a material.
-    fn slope(&self, material: usize, point: &Vector3) -> Vector3 {
-        if material > 1 || self.anatomy.first().is_some() {
-            return self.anatomy.inner(material).gradient(point);
+    /// Field of a material [m] and its gradient.
+    fn depth_and_slope(&self, material: usize, point: &Vector3) -> (f64, Vector3) {
+        match (material, self.anatomy.first()) {
+            (1, Some(first)) => first.value_and_gradient(point),
+            (1, None) => {
+                let fields = self.inner().map(|inner| self.depth_and_slope(inner, point));
+                let (depth, slope) = fields
+                    .max_by(|a, b| a.0.total_cmp(&b.0))
+                    .unwrap_or((f64::NEG_INFINITY, Vector3::zeros()));
+                (-depth, -slope)
+            }
+            (m, _) => {
+                let (value, gradient) = self.anatomy.inner(m).value_and_gradient(point);
+                (value - self.levels[m - 1], gradient)
+            }
         }
-        let deepest = self.inner().max_by(|&a, &b| self.depth(a, point).total_cmp(&self.depth(b, point)));
-        deepest.map_or(Vector3::zeros(), |m| -self.slope(m, point))
     }
 
     /// What must be zero at a point between sides, with its gradient: the field of the body on its boundary, the
@@ -92,17 +101,16 @@ impl<'a> Surfaces<'a> {
     pub(crate) fn constraints(&self, sides: Sides, point: &Vector3) -> Constraints {
         let mut found = Constraints::default();
         if sides & OUTSIDE != 0 {
-            found.push(
-                self.anatomy.field().value(point) - self.levels[0],
-                self.anatomy.field().gradient(point),
-            );
+            let (value, gradient) = self.anatomy.field().value_and_gradient(point);
+            found.push(value - self.levels[0], gradient);
         }
         let mut materials = materials_of(sides);
-        if let Some(first) = materials.next() {
-            for other in materials {
+        if let (Some(first), Some(second)) = (materials.next(), materials.next()) {
+            let (depth, slope) = self.depth_and_slope(first, point);
+            for other in std::iter::once(second).chain(materials).take(3 - found.count) {
+                let (of_other, its_slope) = self.depth_and_slope(other, point);
                 // Half the difference has the slope of a distance.
-                let value = 0.5 * (self.depth(first, point) - self.depth(other, point));
-                found.push(value, 0.5 * (self.slope(first, point) - self.slope(other, point)));
+                found.push(0.5 * (depth - of_other), 0.5 * (slope - its_slope));
             }
         }
         found
@@ -123,13 +131,13 @@ impl<'a> Surfaces<'a> {
     }
 
     /// The closest point between the same sides, by Newton's method with steps of at most `longest` [m] on the least
-    /// move; `None` if it is not found.
-    pub(crate) fn project(&self, sides: Sides, from: &Vector3, longest: f64) -> Option<Vector3> {
+    /// move, and the gradient of the first constraint there; `None` if it is not found.
+    pub(crate) fn project(&self, sides: Sides, from: &Vector3, longest: f64) -> Option<(Vector3, Vector3)> {
         let mut point = *from;
         for _ in 0..12 {
             let constraints = self.constraints(sides, &point);
             if constraints.count == 0 || constraints.largest() < 1e-4 * longest {
-                return Some(point);
+                return Some((point, constraints.first_gradient()));
             }
             let step = constraints.newton_step()?;
             let length = step.norm();
