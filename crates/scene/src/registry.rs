@@ -274,7 +274,9 @@ pub fn scene_schema() -> Json {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::checker::check;
     use crate::reference::describe;
+    use crate::source::Node;
 
     #[test]
     fn every_parameter_of_every_table_has_a_meaning() {
@@ -301,6 +303,73 @@ mod tests {
         all::<ConstraintTable>();
         all::<LoadTable>();
         all::<OutputTable>();
+    }
+
+    /// Lines of TOML between backticks in the descriptions of a schema: how many there are, and those that the checker refuses.
+    fn lines_refused(scene: &Json) -> (usize, Vec<String>) {
+        /// All schemas with the names of their keys, and those around each, the innermost first.
+        fn visit<'s>(schema: &'s Json, around: &[&'s Json], seen: &mut dyn FnMut(&[&'s Json])) {
+            let chain: Vec<&Json> = std::iter::once(schema).chain(around.iter().copied()).collect();
+            match schema {
+                Json::Object(parts) => {
+                    seen(&chain);
+                    parts.values().for_each(|part| visit(part, &chain, seen));
+                }
+                Json::Array(parts) => parts.iter().for_each(|part| visit(part, &chain, seen)),
+                _ => {}
+            }
+        }
+        let takes = |schema: &Json, node: &Node| {
+            let Json::Object(own) = schema else { return false };
+            let mut own = own.clone();
+            own.insert("$defs".into(), scene["$defs"].clone());
+            let mut errors = Vec::new();
+            check(node, "", &Schema::from(own), &mut errors);
+            !errors.iter().any(Diagnostic::is_error)
+        };
+        let mut keys: BTreeMap<&str, Vec<&Json>> = BTreeMap::new();
+        visit(scene, &[], &mut |chain| {
+            let properties = chain[0].get("properties").and_then(Json::as_object);
+            properties.into_iter().flatten().for_each(|(key, own)| keys.entry(key).or_default().push(own));
+        });
+        let (mut tried, mut refused) = (0, Vec::new());
+        visit(scene, &[], &mut |chain| {
+            let Some(doc) = chain[0].get("description").and_then(Json::as_str) else { return };
+            for line in doc.split('`').skip(1).step_by(2).filter(|line| !line.contains('…')) {
+                let is_value = line.starts_with(['{', '[', '"']);
+                let is_table = line.starts_with('[') && line.ends_with(']') && !line.contains([' ', ',']);
+                if is_table || !is_value && !line.contains(" = ") {
+                    continue;
+                }
+                tried += 1;
+                let text = if is_value { format!("value = {line}") } else { line.to_owned() };
+                let is_taken = Source::parse("reference", text).is_ok_and(|source| {
+                    source.root().entries().iter().all(|(key, node)| match is_value {
+                        true => chain.iter().any(|schema| takes(schema, node)),
+                        false => {
+                            keys.get(key.as_str()).is_some_and(|all| all.iter().any(|own| takes(own, node)))
+                        }
+                    })
+                });
+                if !is_taken {
+                    refused.push(line.to_owned());
+                }
+            }
+        });
+        (tried, refused)
+    }
+
+    #[test]
+    fn every_line_of_the_reference_is_taken() {
+        let (tried, refused) = lines_refused(&scene_schema());
+        assert!(refused.is_empty(), "{refused:#?}");
+        assert!(tried > 50, "{tried}");
+        let wrong = json!({ "properties": { "angle": {
+            "type": "number",
+            "description": "As in `angle = 2`, `angle = \"2\"`, `turn = 2`, `{ angle = }`, `\"2\"`."
+        } } });
+        let (tried, refused) = lines_refused(&wrong);
+        assert_eq!((tried, refused.len()), (5, 4), "{refused:#?}");
     }
 
     #[test]

@@ -260,7 +260,7 @@ impl Hourglass {
     pub const DEFAULT: Self = Self(0.2);
 }
 
-/// Fibre direction at rest: `fibre = [x, y, z]` for one direction everywhere, whose length does not matter, or a table with exactly
+/// Fibre direction at rest: `fibre = [0, 0, 1]` for one direction everywhere, whose length does not matter, or a table with exactly
 /// one of the keys below for a direction in each element, such as `fibre = { cell-data = "fibre" }`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(untagged)]
