@@ -102,13 +102,16 @@ impl Simulation {
         let mut legs = Vec::new();
         for (index, (part, now)) in world.parts.iter().zip(self.instants()).enumerate() {
             let step = part.steps.step_from(now.time());
-            let begin = if evaluated { now.time() + step } else { now.time() };
+            // The forces of an explicit step know where the tool goes in it; equations are solved for with the new way.
+            let is_decided = evaluated && !part.method.takes_long();
+            let begin = if is_decided { now.time() + step } else { now.time() };
             let rigids = part.method.contacts().map_or(&[][..], |contacts| &contacts.rigids);
             for (number, rigid) in rigids.iter().enumerate().filter(|(_, rigid)| rigid.tool() == tool) {
                 let before = now.leg(number);
                 let from = rigid.posture(begin, before);
                 let to = (pose.unwrap_or(from.0), opening.unwrap_or(from.1));
-                let duration = within.max(step).max(rigid.shortest([from, to], step));
+                let duration =
+                    (within - (begin - now.time())).max(step).max(rigid.shortest([from, to], step));
                 legs.push((index, number, begin, duration, from, before.copied()));
             }
         }
