@@ -164,6 +164,58 @@ impl Grid {
         let close = (1.0 - distance.abs() * self.per_metre).max(0.0);
         let missing = (1.0 - steepness * self.per_metre).clamp(0.0, FLATTEST);
         let distance = distance + distance * close * missing * (1.0 + missing);
+        self.beyond([&along, &inner], distance, normal)
+    }
+
+    /// The distance at a point [m] by splines of second degree, and its gradient, which is continuous, as that of [`near`](Self::near) is not. They
+    /// round corners by about the spacing, where the gradient is shorter than 1.
+    pub fn smooth(&self, point: &Vector3<f64>) -> Near {
+        let along = (point - self.origin) * self.per_metre;
+        let last = Vector3::from_fn(|c, _| (self.counts[c] - 1) as f64);
+        let inner = along.zip_map(&last, |x, last| x.clamp(0.0, last));
+        // The nearest point along each axis and both of its neighbours; beyond the grid values go on evenly.
+        let axes = [0, 1, 2].map(|c| {
+            let middle = inner[c].round();
+            let t = inner[c] - middle;
+            let weights = [0.5 * (0.5 - t).powi(2), 0.75 - t * t, 0.5 * (0.5 + t).powi(2)];
+            (middle as i64 - 1, weights, [t - 0.5, -2.0 * t, t + 0.5])
+        });
+        let value = |at: [i64; 3]| {
+            let last = self.counts.map(|count| count as i64 - 1);
+            let [i, j, k] = [0, 1, 2].map(|c| at[c].clamp(0, last[c]));
+            let step = |c: usize| {
+                let inward = if at[c] < 0 { 1 } else { -1 };
+                let mut to = [i, j, k];
+                to[c] += inward;
+                to
+            };
+            let read = |[i, j, k]: [i64; 3]| {
+                let [nx, ny, _] = self.counts;
+                f64::from(self.values[(k as usize * ny + j as usize) * nx + i as usize])
+            };
+            let here = read([i, j, k]);
+            let out = (0..3).filter(|&c| at[c] != [i, j, k][c]);
+            here + out.map(|c| here - read(step(c))).sum::<f64>()
+        };
+        let (mut distance, mut slope) = (0.0, Vector3::zeros());
+        for k in 0..3 {
+            for j in 0..3 {
+                for i in 0..3 {
+                    let offsets = [i, j, k];
+                    let at = [0, 1, 2].map(|c| axes[c].0 + offsets[c] as i64);
+                    let value = value(at);
+                    let [wx, wy, wz] = [0, 1, 2].map(|c| axes[c].1[offsets[c]]);
+                    let [gx, gy, gz] = [0, 1, 2].map(|c| axes[c].2[offsets[c]]);
+                    distance += value * wx * wy * wz;
+                    slope += value * Vector3::new(gx * wy * wz, wx * gy * wz, wx * wy * gz);
+                }
+            }
+        }
+        self.beyond([&along, &inner], distance, slope * self.per_metre)
+    }
+
+    /// A distance and its direction at a point of the grid, as they are at one beyond; both places in spacings.
+    fn beyond(&self, [along, inner]: [&Vector3<f64>; 2], distance: f64, normal: Vector3<f64>) -> Near {
         if inner == along {
             return Near { distance, normal };
         }

@@ -75,6 +75,41 @@ impl Shape {
         }
     }
 
+    /// Calls back with the distance and its gradient of each smooth side that a point [m] inside sees, negative inside, as if the side went on
+    /// beyond the corners between sides: the point is as far from the surface as from the nearest of them. Of sampled distances there is one,
+    /// whose gradient is continuous; it has not the length 1 where corners are rounded.
+    pub fn sides(&self, point: &Vector3<f64>, mut found: impl FnMut(Near)) {
+        match self {
+            Self::Cuboid { size } => {
+                for (axis, size) in size.iter().enumerate() {
+                    for sign in [-1.0, 1.0] {
+                        let mut normal = Vector3::zeros();
+                        normal[axis] = sign;
+                        found(Near { distance: sign * point[axis] - 0.5 * size, normal });
+                    }
+                }
+            }
+            Self::Cylinder { radius, length } => {
+                found(around(Vector3::new(point.x, point.y, 0.0), *radius));
+                for sign in [-1.0, 1.0] {
+                    found(Near { distance: sign * point.z - 0.5 * length, normal: Vector3::z() * sign });
+                }
+            }
+            Self::Cone { radius, height } => {
+                found(Near { distance: -point.z, normal: -Vector3::z() });
+                let from_axis = Vector2::new(point.x, point.y);
+                let radial = from_axis.try_normalize(0.0).unwrap_or(Vector2::x());
+                let flat = Vector2::new(*height, *radius).normalize();
+                let distance = flat.x * (from_axis.norm() - radius) + flat.y * point.z;
+                found(Near { distance, normal: Vector3::new(radial.x * flat.x, radial.y * flat.x, flat.y) });
+            }
+            Self::Grid(grid) => found(grid.smooth(point)),
+            Self::Sphere { .. } | Self::Capsule { .. } | Self::HalfSpace | Self::Revolved(_) => {
+                found(self.near(point));
+            }
+        }
+    }
+
     /// The least distance [m] that a point can go through it; infinite of a half-space.
     pub fn thinnest(&self) -> f64 {
         match self {
@@ -316,6 +351,49 @@ mod tests {
                 );
             }
             assert!(inside > 20 && rough < 5, "{shape:?}: {inside} inside, {rough} rough");
+        }
+    }
+
+    /// A point inside is as far from the surface as from the nearest side; sides have continuous gradients, also at corners.
+    #[test]
+    fn the_nearest_side_is_as_far_as_the_surface() {
+        let shapes = [
+            Shape::Sphere { radius: 0.3 },
+            Shape::Cylinder { radius: 0.3, length: 0.8 },
+            Shape::Cuboid { size: [0.5, 0.9, 0.4] },
+            Shape::Cone { radius: 0.4, height: 0.6 },
+            barrel(),
+        ];
+        let mut random = Random::new(4);
+        for shape in &shapes {
+            let sides = |point: &Vector3<f64>| {
+                let mut all = Vec::new();
+                shape.sides(point, |near| all.push(near));
+                all
+            };
+            let mut inside = 0;
+            for _ in 0..2000 {
+                let point = Vector3::from_fn(|_, _| random.part() - 0.5);
+                let near = shape.near(&point);
+                let all = sides(&point);
+                if near.distance >= 0.0 {
+                    continue;
+                }
+                inside += 1;
+                let nearest = all.iter().map(|side| side.distance).fold(f64::NEG_INFINITY, f64::max);
+                assert!((nearest - near.distance).abs() < 1e-12, "{shape:?} at {point}: {nearest}");
+                let h = 1e-6;
+                for (k, side) in all.iter().enumerate().filter(|(_, side)| side.distance > -0.05) {
+                    for c in 0..3 {
+                        let mut step = Vector3::zeros();
+                        step[c] = h;
+                        let [ahead, behind] = [point + step, point - step].map(|at| sides(&at)[k].distance);
+                        let slope = (ahead - behind) / (2.0 * h);
+                        assert!((slope - side.normal[c]).abs() < 1e-4, "{shape:?} at {point}, side {k}");
+                    }
+                }
+            }
+            assert!(inside > 20, "{shape:?}: {inside} inside");
         }
     }
 

@@ -128,6 +128,26 @@ impl Rigid {
         Near { distance: sign * (distance - growth), normal: normal * sign }
     }
 
+    /// Calls back with the distance of a point [m] from where it is free of each smooth side of the thing, and its gradient: of what bodies are
+    /// outside of there is one, the nearest part of the surface; else those of [`Shape::sides`].
+    pub fn sides(&self, stance: &Stance, point: &Vector3<f64>, mut found: impl FnMut(Near)) {
+        if !self.inside {
+            return found(self.near(stance, point));
+        }
+        let Stance { pose, growth } = stance;
+        let local = pose.inverse_transform_point(&(*point).into());
+        self.shape.sides(&local.coords, |Near { distance, normal }| {
+            found(Near { distance: growth - distance, normal: pose.rotation * -normal });
+        });
+    }
+
+    /// The distance [m] from the nearest of [`sides`](Self::sides).
+    pub fn distance(&self, stance: &Stance, point: &Vector3<f64>) -> f64 {
+        let mut least = f64::INFINITY;
+        self.sides(stance, point, |near| least = least.min(near.distance));
+        least
+    }
+
     /// −1 of a thing that bodies are inside of, else 1.
     fn sign(&self) -> f64 {
         if self.inside { -1.0 } else { 1.0 }

@@ -95,6 +95,7 @@ impl Action {
             force: -self.stiffness * area * self.law.slope(gap),
             stiffness: self.stiffness * area * self.law.curvature(gap),
             region: None,
+            side: 0,
             mollified: None,
         })
     }

@@ -32,7 +32,8 @@ impl Barriers {
         let mut all: BTreeMap<u32, (f64, Vector3<f64>, [f64; 2])> = BTreeMap::new();
         for row in self.rows() {
             let way = self.way(&row.stencil);
-            let slip = (way - row.normal * row.normal.dot(&way)).norm();
+            let (normal, _) = row.pushes();
+            let slip = (way - normal * normal.dot(&way)).norm();
             for (at, (node, c)) in row.stencil.parts().enumerate() {
                 if node as usize >= self.node_count() || c == 0.0 {
                     continue;

@@ -4,6 +4,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::distance::Region;
 
+/// How much the length of a normal may differ from 1.
+const UNIT: f64 = 1e-12;
+
 /// Nodes of a row and their coefficients: four, or one at a wall.
 #[derive(Clone, Copy, Debug)]
 pub struct Stencil {
@@ -44,7 +47,7 @@ impl Stencil {
 pub struct Row {
     /// Its nodes.
     pub stencil: Stencil,
-    /// The direction from the second to the first.
+    /// The gradient of the distance by the first: the direction from the second to it.
     pub normal: Vector3<f64>,
     /// The distance [m] of its sides.
     pub distance: f64,
@@ -58,11 +61,23 @@ pub struct Row {
     pub stiffness: f64,
     /// Which parts of the primitives are nearest; none at a wall.
     pub region: Option<Region>,
+    /// Of a wall: which of its smooth sides it is.
+    pub side: u8,
     /// What nearly parallel edges have beside.
     pub mollified: Option<Mollified>,
 }
 
 impl Row {
+    /// The direction of its normal, and the force [N] along it.
+    pub fn pushes(&self) -> (Vector3<f64>, f64) {
+        let length = self.normal.norm();
+        // Only rounded corners of sampled walls have another one.
+        match (length - 1.0).abs() < UNIT || length == 0.0 {
+            true => (self.normal, self.force),
+            false => (self.normal / length, self.force * length),
+        }
+    }
+
     /// The force [N] on a node, by its place in the stencil.
     pub fn force_on(&self, at: usize) -> Vector3<f64> {
         let push = self.normal * (self.force * self.stencil.coefficients[at]);

@@ -270,7 +270,7 @@ impl Barriers {
             let Some(wall) = group.wall else { continue };
             let (rigid, stance) = (&contacts.rigids[wall as usize], &stances[2][wall as usize]);
             for (distance, &node) in distances.iter_mut().zip(&group.sides[0].points) {
-                *distance = rigid.near(stance, &place[node as usize]).distance;
+                *distance = rigid.distance(stance, &place[node as usize]);
             }
         }
         holds
@@ -335,7 +335,6 @@ impl Barriers {
             if then - way - travel >= reach {
                 continue;
             }
-            let Near { distance, normal } = rigid.near(stance, place);
             let stencil = Stencil {
                 nodes: [node; 4],
                 coefficients: [1.0, 0.0, 0.0, 0.0],
@@ -344,11 +343,17 @@ impl Barriers {
                 split: 1,
                 in_order: true,
             };
-            let Some(row) = action.row(stencil, area, distance, normal) else { continue };
-            if row.gap <= 0.0 || row.gap.is_nan() {
+            let (mut side, mut apart) = (0, true);
+            rigid.sides(stance, place, |Near { distance, normal }| {
+                if let Some(row) = action.row(stencil, area, distance, normal) {
+                    apart &= row.gap > 0.0;
+                    rows.push(Row { side, ..row });
+                }
+                side += 1;
+            });
+            if !apart {
                 return false;
             }
-            rows.push(row);
         }
         true
     }
@@ -359,13 +364,14 @@ impl Barriers {
         held.clear();
         for row in rows.iter() {
             let group = &groups[row.stencil.contact as usize];
-            let limit = group.action.friction * row.force;
+            let (normal, force) = row.pushes();
+            let limit = group.action.friction * force;
             if limit <= 0.0 {
                 continue;
             }
             held.push(Held {
                 stencil: row.stencil,
-                normal: row.normal,
+                normal,
                 limit,
                 start: row.stencil.combine(|node| start[node as usize]),
                 wall: group.wall.filter(|_| row.stencil.count == 1),
@@ -379,8 +385,8 @@ impl Barriers {
 
     /// Σ μ λ [N] of the friction that is held, and of what would be held now.
     pub fn friction_limits(&self) -> [f64; 2] {
-        let now =
-            self.rows.iter().map(|row| self.groups[row.stencil.contact as usize].action.friction * row.force);
+        let of = |row: &Row| self.groups[row.stencil.contact as usize].action.friction * row.pushes().1;
+        let now = self.rows.iter().map(of);
         [self.held.iter().map(|held| held.limit).sum(), now.sum()]
     }
 
@@ -537,7 +543,7 @@ impl Barriers {
         let Stencil { nodes, coefficients, .. } = row.stencil;
         let along = row.normal * row.normal.transpose() * row.stiffness;
         let Some(region) = row.region else {
-            let curved = group.wall.map(|wall| self.curved_wall(wall, nodes[0], group.action.law.distance));
+            let curved = group.wall.map(|wall| self.curved_wall(wall, row, group.action.law.distance));
             return block(&coefficients, &(along + curved.unwrap_or_default() * row.force));
         };
         let points = nodes.map(|node| self.place[node as usize]);
@@ -548,15 +554,22 @@ impl Barriers {
         }
     }
 
-    /// The positive part [1/m] of −∂²d/∂x² of a node at a wall, by differences over a part of the distance [m] of its barrier.
-    fn curved_wall(&self, wall: u32, node: u32, distance: f64) -> Matrix3<f64> {
+    /// The positive part [1/m] of −∂²d/∂x² of a row at a wall, by differences over a part of the distance [m] of its barrier.
+    fn curved_wall(&self, wall: u32, row: &Row, distance: f64) -> Matrix3<f64> {
         let (rigid, stance) = (&self.contacts.rigids[wall as usize], &self.stances[2][wall as usize]);
         let h = DIFFERENCE * distance;
         let normals = [0, 1, 2].map(|axis| {
             [h, -h].map(|by| {
-                let mut place = self.place[node as usize];
+                let mut place = self.place[row.stencil.nodes[0] as usize];
                 place[axis] += by;
-                rigid.near(stance, &place).normal
+                let (mut side, mut normal) = (0, row.normal);
+                rigid.sides(stance, &place, |near| {
+                    if side == row.side {
+                        normal = near.normal;
+                    }
+                    side += 1;
+                });
+                normal
             })
         });
         of_wall(normals, h)
@@ -653,7 +666,7 @@ impl Barriers {
             }
             let gap_at = |part: f64| {
                 let stance = if target == now { now } else { Stance::between([&now, &target], part) };
-                rigid.near(&stance, &(place + motion * part)).distance - offset
+                rigid.distance(&stance, &(place + motion * part)) - offset
             };
             // A plane that turns has no largest way: it is followed where the node is.
             let way = if way.is_finite() { way } else { motion.norm() + self.swing(wall, &target, &place) };
