@@ -83,7 +83,7 @@ pub(crate) struct Limits {
     pub lags: usize,
     /// A Newton step [m] that is the last one, whatever the residual.
     pub close: Option<f64>,
-    /// Whether a state is good enough when iterations run out.
+    /// Whether a state is good enough when iterations run out or the energy does not fall any more.
     pub accept: bool,
     /// How far [m] an iteration takes nodes at most once all that moves by itself has gone its way: what is found at a state tells nothing of
     /// what is further away, and pairs need not be listed so far.
@@ -196,6 +196,9 @@ pub(crate) fn descend(
         }
         if !complete {
             return Err(not_found(solver, time, iteration + 1));
+        }
+        if limits.accept {
+            return check(solver, time).map(|()| false);
         }
         let node = solver.worst();
         return Err(SolveError::Uphill { time, node, iterations: iteration + 1 });

@@ -186,9 +186,9 @@ pub enum SolveError {
     },
     /// No equilibrium, with load steps halved as often as allowed.
     #[error(
-        "no equilibrium at t = {time:.6} after {} iterations: residual {:.3e}, largest at node {node}{}; try smaller \
+        "no equilibrium at t = {time:.6} after {} iterations: {}, largest at node {node}{}; try smaller \
          load steps, displacement control or the dynamic solver",
-        residuals.len(), residuals.last().copied().unwrap_or(f64::NAN), in_larger_steps(*broken)
+        residuals.len(), residual_in_words(residuals), in_larger_steps(*broken)
     )]
     NotConverged {
         /// Time of the load step that failed.
@@ -305,6 +305,13 @@ impl SolveError {
             *broken = broken.or(larger);
         }
         self
+    }
+}
+
+fn residual_in_words(residuals: &[f64]) -> String {
+    match residuals.last() {
+        Some(last) if last.is_finite() => format!("residual {last:.3e}"),
+        _ => "forces beyond all numbers".into(),
     }
 }
 

@@ -15,7 +15,7 @@ pub(crate) struct Quantity {
 }
 
 /// Sizes of values. Those of positions are not among them: a box may well reach to 1e9 m.
-const QUANTITIES: [Quantity; 8] = [
+const QUANTITIES: [Quantity; 9] = [
     Quantity {
         unit: "Pa",
         likely: 1e-2..=1e13,
@@ -28,6 +28,12 @@ const QUANTITIES: [Quantity; 8] = [
     Quantity { unit: "N", likely: 1e-9..=1e9, possible: 1e-20..=1e20, units: "1 kN is 1000 N" },
     Quantity { unit: "m/s", likely: 1e-9..=1e4, possible: 1e-20..=1e9, units: "1 mm/s is 0.001 m/s" },
     Quantity { unit: "m/s²", likely: 1e-9..=1e7, possible: 1e-20..=1e12, units: "gravity is 9.81 m/s²" },
+    Quantity {
+        unit: "1",
+        likely: 1e-9..=1e3,
+        possible: 1e-20..=1e20,
+        units: "tissue on steel or tissue has about 0.05 to 0.5",
+    },
     Quantity { unit: "1/s", likely: 1e-9..=1e7, possible: 1e-20..=1e15, units: "1/ms is 1000 1/s" },
 ];
 
@@ -48,19 +54,38 @@ pub(crate) fn remark(value: f64, unit: &str, positive: bool, shown: &str) -> Opt
         let size = value.abs();
         size > *range.end() || (positive && size < *range.start())
     };
-    let range = |range: &RangeInclusive<f64>| format!("{:e} to {:e} {unit}", range.start(), range.end());
-    let help = format!("values are in SI units: {}", quantity.units);
+    let help = match unit {
+        "1" => quantity.units.to_owned(),
+        _ => format!("values are in SI units: {}", quantity.units),
+    };
+    let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
+    let range = |range: &RangeInclusive<f64>| format!("{:e} to {:e}{unit}", range.start(), range.end());
     if positive && outside(&quantity.possible) {
         let message =
-            format!("is {shown} {unit}; values from {} can be computed with", range(&quantity.possible));
+            format!("is {shown}{unit}; values from {} can be computed with", range(&quantity.possible));
         return Some(Remark { is_mistake: true, message, label: "beyond all sense", help });
     }
     outside(&quantity.likely).then(|| {
         let usual = match positive {
             true => format!("usual are {}", range(&quantity.likely)),
-            false => format!("usual is less than {:e} {unit}", quantity.likely.end()),
+            false => format!("usual is less than {:e}{unit}", quantity.likely.end()),
         };
-        let message = format!("is {shown} {unit}, and {usual}: is that so?");
+        let message = format!("is {shown}{unit}, and {usual}: is that so?");
         Remark { is_mistake: false, message, label: "unusual", help }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_without_a_unit_are_told_without_one() {
+        let of = |friction| remark(friction, "1", false, "5000");
+        let Some(Remark { is_mistake, message, .. }) = of(5000.0) else {
+            panic!("5000 is no usual friction")
+        };
+        assert!(!is_mistake && message == "is 5000, and usual is less than 1e3: is that so?", "{message}");
+        assert!(of(0.0).is_none() && of(2.0).is_none());
+    }
 }

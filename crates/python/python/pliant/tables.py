@@ -46,7 +46,7 @@ class Run(Table):
     speed_tolerance
         Speed [m/s] of all nodes below which a Newton step of `implicit` in contact is the last one; it is still made. If not given, a step must move nothing by more than a thousandth of `barrier-distance`. Takes a number, greater than 0.
     accept_unconverged
-        Whether a step of `implicit` whose `iterations` run out goes on with what they have reached instead of being halved: bounded time, for real time. In contact that state has no intersection. Summary and window tell how many steps did so. Takes true or false.
+        Whether a step of `implicit` whose `iterations` run out, or whose energy does not fall any more, goes on with what it has reached instead of being halved: bounded time, for real time. In contact that state has no intersection. Summary and window tell how many steps did so. Takes true or false.
     integrator
         How `implicit` goes on in time; `backward-euler` if not given. Takes "backward-euler" or "bdf2".
     linear
@@ -1498,7 +1498,7 @@ class Contact(Table):
     other_faces
         The faces of the second, if that is another body; if not given, all of its boundary. Takes "all" or "boundary", { box = … }, { sphere = … }, { half-space = … }, { plane = … }, { normal = … }, { nearest = … }, { set = … }, { label = … }, { label-boundary = … }, { ids = … }, { union = … }, { intersection = … } or { difference = … }.
     friction
-        Coulomb's coefficient of friction. Takes a number, at least 0; 0.0 if not given.
+        Coulomb's coefficient of friction [1]. Takes a number, at least 0; 0.0 if not given.
     thickness
         Distance [m] that the surfaces keep. If not given: with the solver `explicit` 0.5 % of the mean edge between two bodies and of a body with itself, 0 from a rigid thing; with the solvers `implicit` and `static` half of the thickness of each shell that takes part. Nodes of explicit bodies that are nearer at the start keep the distance that they have. Takes a number, at least 0.
     barrier_distance

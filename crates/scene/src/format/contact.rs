@@ -282,7 +282,7 @@ pub struct ContactTable {
     /// The faces of the second, if that is another body; if not given, all of its boundary.
     #[serde(default)]
     pub other_faces: Option<Selection>,
-    /// Coulomb's coefficient of friction.
+    /// Coulomb's coefficient of friction [1].
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub friction: f64,

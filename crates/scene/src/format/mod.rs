@@ -112,8 +112,8 @@ pub struct RunTable {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub speed_tolerance: Option<f64>,
-    /// Whether a step of `implicit` whose `iterations` run out goes on with what they have reached instead of being halved: bounded time, for real
-    /// time. In contact that state has no intersection. Summary and window tell how many steps did so.
+    /// Whether a step of `implicit` whose `iterations` run out, or whose energy does not fall any more, goes on with what it has reached instead of
+    /// being halved: bounded time, for real time. In contact that state has no intersection. Summary and window tell how many steps did so.
     #[serde(default)]
     pub accept_unconverged: Option<bool>,
     /// How `implicit` goes on in time; `backward-euler` if not given.
