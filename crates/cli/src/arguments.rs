@@ -163,6 +163,9 @@ pub struct Haptics {
     /// Largest force [N].
     #[arg(long, value_name = "N", default_value_t = 3.3)]
     pub force_limit: f64,
+    /// Largest change of the force from a millisecond to the next [N].
+    #[arg(long, value_name = "N", default_value_t = 0.3)]
+    pub most_change: f64,
     /// Without the passivity guard.
     #[arg(long)]
     pub no_guard: bool,
@@ -197,6 +200,9 @@ pub struct View {
     /// Simulated time before the picture of the window [s].
     #[arg(long, value_name = "SECONDS", default_value_t = 1.0, requires = "screenshot")]
     pub after: f64,
+    /// Size of the window at its start, in pixels of a screen at 100 %.
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x800", conflicts_with = "replay")]
+    pub size: [u32; 2],
     /// Test mouse and keys automatically, report the result and close. A picture of the window shows the hand pulling.
     #[arg(long, conflicts_with = "replay")]
     pub rehearse: bool,

@@ -2,6 +2,7 @@
 //! contact becomes a local model: the tangent planes of the tool at the nearest points of the surfaces that it can touch, the mean
 //! force of the period at its mean place, and the compliance that the last periods tell.
 
+use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use nalgebra::{Isometry3, Vector3};
@@ -19,7 +20,7 @@ use pliant_haptics::thread::{Haptics as Thread, Report};
 use pliant_haptics::trace::Trace;
 use pliant_scene::{Scene, World};
 use pliant_sim::contact::touch::{With, lattice};
-use pliant_sim::{Frame, Simulation};
+use pliant_sim::{Frame, Simulation, State};
 
 use crate::SUCCESS;
 use crate::arguments::Haptics;
@@ -33,6 +34,12 @@ const STIFFNESS: [f64; 2] = [50.0, 5000.0];
 const REACH: f64 = 0.02;
 /// Time [s] in which the tool goes to the first pose of a trace, before this begins.
 const APPROACH: f64 = 0.5;
+/// Speeds [m/s], [rad/s] at which the tool follows the hand at most: a thrust must not carry it through tissue within a step.
+const FASTEST: [f64; 2] = [0.5, 20.0];
+/// Simulated time [s] between states that are kept, and how many are.
+const KEPT: (f64, usize) = (0.05, 6);
+/// How often in a row a step may fail at the state that the session began with.
+const MOST_FAILURES: usize = 100;
 /// Corners and points of a face that become planes.
 const FACE_PARTS: usize = 3;
 
@@ -71,7 +78,8 @@ fn refused(error: HapticsError) -> Failure {
 fn settings(arguments: &Haptics) -> Settings {
     let coupling = Coupling { stiffness: arguments.stiffness, damping: arguments.damping };
     let guard = (!arguments.no_guard).then(Guard::default);
-    Settings { coupling, guard, force_limit: arguments.force_limit, ..Settings::default() }
+    let (force_limit, most_change) = (arguments.force_limit, Some(arguments.most_change));
+    Settings { coupling, guard, force_limit, most_change, ..Settings::default() }
 }
 
 /// The tool in the hand: that of a name, or the only one.
@@ -129,6 +137,7 @@ fn run(
     let mut last = start;
     let mut pressed: Option<LocalModel> = None;
     let stop = signals::stop();
+    let mut kept = Kept::new(&mut simulation).map_err(failed)?;
     let mut ended = None;
     while !thread.is_over() && !stop.is_asked() {
         let state = thread.state();
@@ -144,7 +153,17 @@ fn run(
                     pressed = Some(model.clone());
                 }
                 thread.publish(model);
+                kept.keep(&mut simulation).map_err(failed)?;
                 pace.wait();
+            }
+            // The hand has done something that the body does not bear; it goes on from before.
+            Err(failure) if kept.go_back(&mut simulation) => {
+                pace.go_back(&simulation);
+                eprintln!(
+                    "note: the simulation went back to t = {:.3} s: {}",
+                    simulation.time(),
+                    failure.message
+                );
             }
             Err(failure) => {
                 ended = Some(failure);
@@ -155,6 +174,9 @@ fn run(
     let state = thread.state();
     let report = thread.finish().map_err(refused)?;
     say(words(&report, &pace, &simulation, &estimate))?;
+    if kept.failures > 0 {
+        say(format_args!("went back        {} times", kept.failures))?;
+    }
     if let Some(force) = simulation.frame().ok().and_then(|frame| frame.tool(tool)).map(|now| now.force) {
         let device: [f64; 3] = state.force.into();
         say(format_args!("last force       device {}, simulation {} N", vector(device), vector(force)))?;
@@ -186,7 +208,9 @@ fn step(
     until: f64,
 ) -> Result<Period, pliant_sim::Failure> {
     if let Some(goal) = goal {
-        simulation.drive(around.tool, *goal, (until - simulation.time()).max(0.0))?;
+        let time = (until - simulation.time()).max(0.0);
+        let goal = simulation.tool(around.tool).map_or(*goal, |now| on_the_way(&now.pose, goal, time));
+        simulation.drive(around.tool, goal, time)?;
     }
     let (mut place, mut force, mut count) = (Vector3::zeros(), Vector3::zeros(), 0.0);
     // The first instant is the last one of the period before.
@@ -209,6 +233,52 @@ fn step(
     let back = place - now.pose.translation.vector;
     let (planes, friction) = around.planes(&frame, &back);
     Ok(Period { place, force, friction, planes })
+}
+
+/// How far a tool comes towards a goal in a time [s].
+fn on_the_way(now: &Isometry3<f64>, goal: &Isometry3<f64>, time: f64) -> Isometry3<f64> {
+    let way = (goal.translation.vector - now.translation.vector).norm();
+    let turn = now.rotation.angle_to(&goal.rotation);
+    let part = (FASTEST[0] * time / way).min(FASTEST[1] * time / turn);
+    if part >= 1.0 { *goal } else { now.try_lerp_slerp(goal, part, 1e-9).unwrap_or(*now) }
+}
+
+/// States to go back to.
+struct Kept {
+    start: State,
+    /// Times [s] and states, the newest last.
+    states: VecDeque<(f64, State)>,
+    /// How often it went back, and how often of that from the start without a state kept since.
+    failures: usize,
+    in_a_row: usize,
+}
+
+impl Kept {
+    fn new(simulation: &mut Simulation) -> Result<Self, pliant_sim::Failure> {
+        Ok(Self { start: simulation.state()?, states: VecDeque::new(), failures: 0, in_a_row: 0 })
+    }
+
+    /// Keeps the state where one is due.
+    fn keep(&mut self, simulation: &mut Simulation) -> Result<(), pliant_sim::Failure> {
+        let (every, most) = KEPT;
+        if self.states.back().is_some_and(|(time, _)| simulation.time() < time + every) {
+            return Ok(());
+        }
+        if self.states.len() == most {
+            self.states.pop_front();
+        }
+        self.states.push_back((simulation.time(), simulation.state()?));
+        self.in_a_row = 0;
+        Ok(())
+    }
+
+    /// Goes back to the newest state, which is not gone back to again, or else to the start; whether it could.
+    fn go_back(&mut self, simulation: &mut Simulation) -> bool {
+        let newest = self.states.pop_back().map(|(_, state)| state);
+        self.in_a_row += usize::from(newest.is_none());
+        self.failures += 1;
+        self.in_a_row <= MOST_FAILURES && simulation.restore(newest.unwrap_or(self.start.clone())).is_ok()
+    }
 }
 
 impl Around<'_> {
@@ -287,6 +357,11 @@ impl Pace {
         self.from + self.due + self.period
     }
 
+    /// Counts on from where the simulation has gone back to.
+    fn go_back(&mut self, simulation: &Simulation) {
+        self.from = simulation.time() - self.due;
+    }
+
     /// The time [s] from the last model to the one that is done now.
     fn done(&mut self) -> f64 {
         let now = Instant::now();
@@ -325,7 +400,7 @@ fn stiffest(model: &LocalModel, settings: Settings) -> Result<String, HapticsErr
     let hand = Hand::default();
     // The time ahead damps as K times that, so it counts as a delay does.
     let limit = Coupling::limit(hand.friction, settings.coupling.damping, settings.period, settings.ahead);
-    let free = Settings { guard: None, soft_start: 0.0, ..settings };
+    let free = Settings { guard: None, soft_start: 0.0, most_change: None, ..settings };
     let found = hand.stiffest(model, free, 0.01)?;
     let here = if found > 0.9e6 { "1e6 N/m or more".into() } else { format!("{found:.0} N/m") };
     Ok(format!(

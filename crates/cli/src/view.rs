@@ -64,6 +64,7 @@ pub fn view(arguments: &View) -> Result<u8, Failure> {
         record: arguments.record.clone(),
         stop: stop().clone(),
         self_test: self_test(arguments),
+        size: arguments.size,
         began,
     })?;
     if let Some(told) = told {
@@ -96,7 +97,7 @@ fn finished_run(arguments: &View) -> Result<Option<FinishedRun>, Failure> {
     let folder = if is_series { path.parent().unwrap_or(path) } else { path };
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder }.to_owned();
     let portrait = arguments.screenshot.clone().map(|file| (arguments.after, file));
-    Ok(Some(FinishedRun { folder, series, portrait }))
+    Ok(Some(FinishedRun { folder, series, portrait, size: arguments.size }))
 }
 
 /// The automatic task of the window.

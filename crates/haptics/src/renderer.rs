@@ -32,6 +32,8 @@ pub struct Settings {
     pub ahead: f64,
     /// Largest force [N].
     pub force_limit: f64,
+    /// Largest change [N] of the force from a tick to the next, if it is bound. A bound delays the force where a hand goes fast.
+    pub most_change: Option<f64>,
     /// The guard, if any.
     pub guard: Option<Guard>,
     /// Time [s] over which the force comes up after the start or a silence.
@@ -46,6 +48,7 @@ impl Default for Settings {
             coupling: Coupling::default(),
             ahead: 0.5e-3,
             force_limit: 3.3,
+            most_change: None,
             guard: Some(Guard::default()),
             soft_start: 0.1,
         }
@@ -128,7 +131,7 @@ impl Renderer {
     /// # Errors
     /// If a setting is out of range or not finite.
     pub fn new(settings: Settings) -> Result<Self, HapticsError> {
-        let Settings { period, coupling, ahead, force_limit, guard, soft_start } = settings;
+        let Settings { period, coupling, ahead, force_limit, most_change, guard, soft_start } = settings;
         let fits = (1e-5..=0.1).contains(&period);
         HapticsError::check("the period of the haptic loop [s]", period, fits, "give 1e-5 to 0.1 s")?;
         coupling.check()?;
@@ -136,6 +139,10 @@ impl Renderer {
         HapticsError::check("the time ahead [s]", ahead, (0.0..=0.01).contains(&ahead), remedy)?;
         let remedy = "give a positive one, 3.3 N by default";
         HapticsError::check("the force limit [N]", force_limit, force_limit > 0.0, remedy)?;
+        if let Some(most) = most_change {
+            let remedy = "give a positive one, 0.3 N a tick is hardly felt";
+            HapticsError::check("the largest change of the force [N]", most, most > 0.0, remedy)?;
+        }
         HapticsError::check("the soft start [s]", soft_start, soft_start >= 0.0, "give at least 0")?;
         if let Some(guard) = guard {
             guard.check()?;
@@ -186,7 +193,7 @@ impl Renderer {
         };
         let first = Last { pose, stretch: resting, touch: resting, force: resting };
         let last = self.last.unwrap_or(first);
-        let Settings { period, coupling, ahead, force_limit, guard, soft_start } = self.settings;
+        let Settings { period, coupling, ahead, force_limit, most_change, guard, soft_start } = self.settings;
 
         let place = pose.translation.vector;
         let way = place - last.pose.translation.vector;
@@ -205,6 +212,11 @@ impl Renderer {
         let size = wanted.norm();
         let limited = size > force_limit;
         let force = if limited { wanted * (force_limit / size) } else { wanted };
+        let change = force - last.force;
+        let force = match most_change {
+            Some(most) if change.norm() > most => last.force + change * (most / change.norm()),
+            _ => force,
+        };
 
         let guarded = damping != resting;
         let record = &mut self.record;
@@ -324,12 +336,31 @@ mod tests {
         assert!(answer.limited && (answer.force.norm() - 3.3).abs() < 1e-12);
     }
 
+    /// A thrust of 2 m/s into a wall: the force comes as fast as it may, and to where it would without a bound.
+    #[test]
+    fn forces_change_by_no_more_than_they_may() {
+        let free = Settings { soft_start: 0.0, guard: None, force_limit: 100.0, ..Settings::default() };
+        let thrust = |settings| {
+            let mut renderer = Renderer::new(settings).unwrap();
+            renderer.take(wall(0.0));
+            for tick in 0..400 {
+                renderer.tick(&at(0.0, 0.01 - (0.002 * f64::from(tick)).min(0.02)));
+            }
+            (renderer.record().jump, renderer.tick(&at(0.0, -0.01)).force.z)
+        };
+        let [(free, without), (bound, with)] =
+            [free, Settings { most_change: Some(0.3), ..free }].map(thrust);
+        assert!(free > 0.5 && bound <= 0.3 + 1e-12, "{free} N, {bound} N");
+        assert!((with - without).abs() < 1e-9, "{with} N for {without} N");
+    }
+
     #[test]
     fn settings_that_make_no_sense_are_refused() {
         let good = Settings::default();
         for settings in [
             Settings { period: 0.0, ..good },
             Settings { force_limit: f64::NAN, ..good },
+            Settings { most_change: Some(0.0), ..good },
             Settings { ahead: -1.0, ..good },
             Settings { soft_start: -1.0, ..good },
             Settings { coupling: Coupling { stiffness: 0.0, damping: 0.0 }, ..good },

@@ -27,6 +27,34 @@ fn a_trace_presses_a_liver() {
     assert!(device > 0.3 && (device / simulated - 1.0).abs() < 0.1, "{last}");
 }
 
+/// Thrusts of 2 m/s, deeper than the body is thick: no session ends, and the force does not jump.
+#[test]
+fn thrusts_end_no_session() {
+    const SCENE: &str = "[scene]\nuntil = 10\n[run]\nSOLVER\nthreads = 1\n\
+        [law.tissue]\ntype = 'neo-hookean'\nyoung-modulus = 2e4\npoisson-ratio = 0.4\n\
+        [body.block]\nmesh = { block = { size = [0.06, 0.06, 0.06] }, edge = 0.03 }\nlaw = 'tissue'\ndensity = 1000\ndamping = 5\n\
+        [constraint.base]\ntype = 'fix'\nbody = 'block'\nnodes = { set = 'z-min' }\n\
+        [tool.ball]\nshape = { sphere = { radius = 0.02 } }\nat = [0.03, 0.03, 0.1]\n\
+        [contact.press]\nbetween = ['block', 'ball']\nWITH\n";
+    for (solver, with) in
+        [("solver = 'explicit'", ""), ("solver = 'implicit'\nstep = 5e-3", "barrier-distance = 1e-3")]
+    {
+        let workshop = Workshop::new(&SCENE.replace("SOLVER", solver).replace("WITH", with));
+        let mut trace = String::from("t,x,y,z,qw,qx,qy,qz\n");
+        for k in 0..12 {
+            // Down by 0.12 m in 60 ms, and up again.
+            let (t, x) = (0.2 * f64::from(k), 0.03 + 0.01 * f64::from(k % 3 - 1));
+            trace += &format!("{t},{x},0.03,0.1,1,0,0,0\n{},{x},0.03,-0.02,1,0,0,0\n", t + 0.06);
+        }
+        workshop.write("thrust.csv", trace);
+        let path = workshop.path("thrust.csv");
+        let told = workshop.pliant(&["haptics", "case", "--replay", path.to_str().unwrap()]);
+        assert_eq!(told.code, 0, "{solver}: {}\n{}", told.out, told.err);
+        let jump = told.out.split("largest jump ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
+        assert!(jump.parse::<f64>().unwrap() <= 0.3 + 1e-9, "{solver}: {}", told.out);
+    }
+}
+
 #[test]
 fn mistakes_are_told_with_a_remedy() {
     let workshop = Workshop::new("");

@@ -45,6 +45,9 @@ impl Drop for Screen {
     }
 }
 
+/// A window whose pixels take a software adapter little time.
+const SMALL: &[&str] = &["--size", "800x600"];
+
 fn view(workshop: &Workshop, screen: &Screen, more: &[&str]) -> Told {
     let mut command = workshop.command(&[&["view", "case"], more].concat());
     command.env("DISPLAY", &screen.display).env_remove("WAYLAND_DISPLAY");
@@ -61,7 +64,11 @@ fn the_window_draws_picks_pins_and_pulls_and_what_holds_the_body_holds_against_t
     }
     let Some(screen) = Screen::start() else { return };
     let workshop = Workshop::new(BALL);
-    let told = view(&workshop, &screen, &["--rehearse", "--record", "drag", "--screenshot", "window.png"]);
+    let told = view(
+        &workshop,
+        &screen,
+        &[SMALL, &["--rehearse", "--record", "drag", "--screenshot", "window.png"]].concat(),
+    );
     assert_eq!(told.code, 0, "{}", told.err);
     assert!(told.out.contains("10 frames drawn, 100 pixels picked"), "{}", told.out);
     let picture = std::fs::read(workshop.path("window.png")).unwrap();
@@ -95,7 +102,7 @@ fn a_view_is_copied_to_the_clipboard() {
     let (connection, _) = x11rb::connect(Some(&screen.display)).unwrap();
     let clipboard = connection.intern_atom(false, b"CLIPBOARD").unwrap().reply().unwrap().atom;
     let owner = || connection.get_selection_owner(clipboard).unwrap().reply().unwrap().owner;
-    let mut command = workshop.command(&["view", "case", "--rehearse"]);
+    let mut command = workshop.command(&[&["view", "case", "--rehearse"][..], SMALL].concat());
     command.env("DISPLAY", &screen.display).env_remove("WAYLAND_DISPLAY");
     let mut window = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the binary starts");
     while owner() == x11rb::NONE {
@@ -167,7 +174,11 @@ fn the_window_is_on_the_device_of_a_scene_that_runs_on_one() {
     }
     let Some(screen) = Screen::start() else { return };
     let workshop = Workshop::new(&changed(BALL, "threads = 1", "threads = 1\ndevice = 'gpu'"));
-    let told = view(&workshop, &screen, &["--rehearse", "--record", "drag", "--screenshot", "window.png"]);
+    let told = view(
+        &workshop,
+        &screen,
+        &[SMALL, &["--rehearse", "--record", "drag", "--screenshot", "window.png"]].concat(),
+    );
     assert_eq!(told.code, 0, "{}", told.err);
     assert!(told.out.contains("10 frames drawn, 100 pixels picked"), "{}", told.out);
     let replay = workshop.pliant(&["view", "case", "--replay", "drag"]);
@@ -241,7 +252,7 @@ fn a_finished_run_is_looked_at_over_its_timeline() {
 #[test]
 fn without_a_screen_it_says_what_it_needs() {
     let workshop = Workshop::new(BLOCK);
-    let mut command = workshop.command(&["view", "case", "--rehearse"]);
+    let mut command = workshop.command(&[&["view", "case", "--rehearse"][..], SMALL].concat());
     let told: Told = command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").output().unwrap().into();
     assert_eq!(told.code, 2, "{}", told.err);
     assert!(

@@ -32,6 +32,8 @@ pub struct FinishedRun {
     pub series: Option<String>,
     /// Takes a picture of the window at an instant [s] of the run, and closes.
     pub portrait: Option<(f64, PathBuf)>,
+    /// Width and height of the window at its start, in pixels of a screen at 100 %.
+    pub size: [u32; 2],
 }
 
 /// Opens the window of a finished run, and comes back once it is closed.
@@ -42,7 +44,7 @@ pub fn open_finished(run: FinishedRun) -> Result<Option<String>, WindowError> {
     let told = |error: SeriesError| WindowError::Run { message: error.to_string(), remedy: error.remedy() };
     let names = Series::names(&run.folder).map_err(told)?;
     let series = Series::find(&run.folder, run.series.as_deref()).map_err(told)?;
-    run_window(WgpuConfiguration::default(), move |context, outcome| {
+    run_window(WgpuConfiguration::default(), run.size, move |context, outcome| {
         Finished::new(context, run, names, series, outcome)
     })
 }

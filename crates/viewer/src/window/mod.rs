@@ -71,6 +71,8 @@ pub struct Opening {
     pub stop: StopFlag,
     /// What it does by itself before it closes; without, it stays open.
     pub self_test: Option<SelfTest>,
+    /// Width and height at its start, in pixels of a screen at 100 %.
+    pub size: [u32; 2],
     /// When the user asked for it.
     pub began: Instant,
 }
@@ -113,7 +115,8 @@ impl WindowError {
 /// # Errors
 /// If it can't be opened, or its self-test fails.
 pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
-    run_window(device::setup(&opening.world), |context, outcome| App::new(context, opening, outcome))
+    let (setup, size) = (device::setup(&opening.world), opening.size);
+    run_window(setup, size, |context, outcome| App::new(context, opening, outcome))
 }
 
 /// Where a self-test leaves what came of it.
@@ -122,12 +125,13 @@ type Outcome = Arc<Mutex<Option<Result<String, String>>>>;
 /// Opens a window on a device with what is made in it, until it is closed.
 fn run_window<A: eframe::App + 'static>(
     wgpu_options: WgpuConfiguration,
+    size: [u32; 2],
     make: impl FnOnce(&eframe::CreationContext<'_>, Outcome) -> Result<A, String>,
 ) -> Result<Option<String>, WindowError> {
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("Pliant")
-            .with_inner_size([1280.0, 800.0])
+            .with_inner_size(size.map(|side| side as f32))
             .with_drag_and_drop(true),
         depth_buffer: 32,
         multisampling: SAMPLES as u16,
@@ -227,7 +231,7 @@ impl App {
     ) -> Result<Self, String> {
         let state = context.wgpu_render_state.as_ref().ok_or("wgpu did not start")?;
         context.egui_ctx.set_visuals(egui::Visuals::light());
-        let Opening { world, look, file, read, record, stop, self_test, began } = opening;
+        let Opening { world, look, file, read, record, stop, self_test, size: _, began } = opening;
         let port = Viewport::new(context, &look(&world.scene))?;
         let session = begin(&world, &context.egui_ctx)?;
         let device = device::shared(state, &world);
