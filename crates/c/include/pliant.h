@@ -147,8 +147,8 @@ PliantStatus pliant_scene_close(const PliantContext *context, PliantScene scene,
 /* A simulation that is open: a number that `pliant_simulation_open` gives, never 0. */
 typedef uint64_t PliantSimulation;
 
-/* Makes a simulation of a scene as it is now, at its start. It computes on so many threads of its own; 0 takes `threads` of the scene's `[run]`. Results
- * do not depend on their number. Images are meshed and shapes built here: this can take seconds. */
+/* Makes a simulation of a scene as it is now, at its start. It computes on so many threads of its own, 1024 at most; 0 takes `threads` of the scene's
+ * `[run]`. Results do not depend on their number. Images are meshed and shapes built here: this can take seconds. */
 PliantStatus pliant_simulation_open(const PliantContext *context, PliantScene scene, uint32_t threads, PliantSimulation *simulation, PliantError *error);
 
 /* Closes a simulation. One that is stepped by another thread is stopped first; its memory goes when that call returns. */

@@ -17,6 +17,9 @@ use crate::values::OpenField;
 /// A simulation that is open: a number that `pliant_simulation_open` gives, never 0.
 pub type PliantSimulation = u64;
 
+/// The most threads of a simulation, as of the key `threads` of a scene.
+const MOST_THREADS: u32 = 1024;
+
 /// What threads share of a simulation: one of them runs it, any of them stops it.
 pub(crate) struct Shared {
     running: Mutex<Running>,
@@ -112,8 +115,8 @@ pub(crate) unsafe fn running(
     }
 }
 
-/// Makes a simulation of a scene as it is now, at its start. It computes on so many threads of its own; 0 takes `threads` of the scene's `[run]`. Results
-/// do not depend on their number. Images are meshed and shapes built here: this can take seconds.
+/// Makes a simulation of a scene as it is now, at its start. It computes on so many threads of its own, 1024 at most; 0 takes `threads` of the scene's
+/// `[run]`. Results do not depend on their number. Images are meshed and shapes built here: this can take seconds.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_simulation_open(
     context: *const PliantContext,
@@ -128,6 +131,11 @@ pub unsafe extern "C" fn pliant_simulation_open(
             needed(simulation, "simulation")?;
             let scene = context.scene(scene)?;
             let world = Arc::new(hold(&scene)?.world()?);
+            if threads > MOST_THREADS {
+                let message =
+                    format!("`threads` is {threads}: at most {MOST_THREADS}, or 0 for those of the scene");
+                return Err(Fault::new(PliantStatus::Unsupported, message));
+            }
             let threads = if threads == 0 { world.scene.run.threads as usize } else { threads as usize };
             let pool = ThreadPoolBuilder::new().num_threads(threads).build();
             let pool = pool.map_err(|error| Fault::new(PliantStatus::Unsupported, error.to_string()))?;

@@ -35,6 +35,15 @@ def test_a_value_that_is_set_is_underlined(tmp_path: object) -> None:
         pliant.load(path, set={"law.tisue.young-modulus": 3.0}).build()
 
 
+@pytest.mark.parametrize("threads", [-1, 1025, 1 << 70])
+def test_threads_that_no_machine_has(threads: int) -> None:
+    model = cube().build()
+    with pytest.raises(ValueError, match="threads: "):
+        model.simulate(threads=threads)
+    with pytest.raises(ValueError, match="threads: "):
+        model.run(threads=threads)
+
+
 def test_texts_that_are_none() -> None:
     with pytest.raises(pliant.SceneError):
         pliant.Scene.from_toml("[scene")

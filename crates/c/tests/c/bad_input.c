@@ -124,6 +124,7 @@ int main(void) {
     OK(pliant_scene_close(context, other, &error));
     EXPECT(pliant_simulation_open(context, other, 1, &simulation, &error), PLIANT_STATUS_CLOSED, "closed");
     EXPECT(pliant_simulation_open(context, scene, 1, NULL, &error), PLIANT_STATUS_NULL, "`simulation`");
+    EXPECT(pliant_simulation_open(context, scene, 1025, &simulation, &error), PLIANT_STATUS_UNSUPPORTED, "at most 1024");
 
     /* Meshes from memory. */
     const double corners[] = {0, 0, 0, 0.1, 0, 0, 0, 0.1, 0, 0, 0, 0.1};

@@ -37,7 +37,17 @@ fn sigterm_and_sighup_end_a_run_as_ctrl_c_does() {
         let scene = changed(BLOCK, "until = 0.02", "until = 5000");
         let workshop =
             Workshop::new(&changed(&scene, "threads = 1", "threads = 1\ncheckpoint = { every = 1 }"));
-        let child = started(&workshop, &mut workshop.command(&["run", "case", "--json"]));
+        // What ignores SIGHUP, as `nohup`, hands that on to the tests.
+        let mut command = match cfg!(target_os = "linux") {
+            true => {
+                let mut command = Command::new("env");
+                command.args(["--default-signal=HUP", env!("CARGO_BIN_EXE_pliant")]);
+                command.current_dir(workshop.path("")).args(["run", "case", "--json"]);
+                command
+            }
+            false => workshop.command(&["run", "case", "--json"]),
+        };
+        let child = started(&workshop, &mut command);
         send(signal, &child);
         let told = Told::from(child.wait_with_output().unwrap());
         assert_eq!((told.code, &told.json()["status"]), (code, &"interrupted".into()), "{}", told.err);

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Body", "Model"]
 
+_MOST_THREADS = 1024
+"""As of the key ``threads`` of a scene."""
+
 
 @dataclass(frozen=True)
 class Body:
@@ -170,7 +173,7 @@ class Model:
         Parameters
         ----------
         threads
-            Threads of its own; 0 for all cores. Many simulations at once do best with one each.
+            Threads of its own, 1024 at most; 0 for all cores. Many simulations at once do best with one each.
         precision
             ``"single"`` or ``"double"`` instead of the scene's.
         device
@@ -178,6 +181,7 @@ class Model:
         """
         from pliant.simulation import Simulation
 
+        _check_threads(threads)
         values = {"run.precision": precision, "run.device": device}
         changed = {key: value for key, value in values.items() if value is not None}
         model = self._scene.replace(changed).build(like=self) if changed else self
@@ -209,12 +213,13 @@ class Model:
         resume
             Whether it goes on from the last checkpoint in `out`.
         threads
-            Threads; 0 for all cores.
+            Threads, 1024 at most; 0 for all cores.
         picture
             Whether ``picture.png`` is drawn at the end.
 
         A run that fails warns and returns a result whose `status` is ``"failed"``: `Result.error` has the reason, and what was found until then is kept.
         """
+        _check_threads(threads)
         result = self._run(out, until=until, each=each, threads=threads, force=force, resume=resume, picture=picture)
         _doubt(result)
         return result
@@ -353,6 +358,12 @@ def _images_of(table: Mapping[str, Any]) -> list[Any]:
 
 def _get(body: Any, key: str) -> Any:
     return body.get(key) if isinstance(body, Mapping) else getattr(body, key, None)
+
+
+def _check_threads(threads: int) -> None:
+    """Raises `ValueError` for a number of threads that no scene may have either."""
+    if not 0 <= threads <= _MOST_THREADS:
+        raise ValueError(f"threads: {threads}, where 0 (all cores) to {_MOST_THREADS} are possible")
 
 
 def _doubt(result: Result) -> None:
