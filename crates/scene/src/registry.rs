@@ -319,8 +319,13 @@ mod tests {
                 _ => {}
             }
         }
+        const TELLING: [&str; 6] = ["type", "$ref", "oneOf", "anyOf", "enum", "const"];
         let takes = |schema: &Json, node: &Node| {
             let Json::Object(own) = schema else { return false };
+            // Tables of schemas are none themselves.
+            if !TELLING.iter().any(|key| own.get(*key).is_some_and(|told| !told.is_object())) {
+                return false;
+            }
             let mut own = own.clone();
             own.insert("$defs".into(), scene["$defs"].clone());
             let mut errors = Vec::new();
@@ -336,7 +341,7 @@ mod tests {
         visit(scene, &[], &mut |chain| {
             let Some(doc) = chain[0].get("description").and_then(Json::as_str) else { return };
             for line in doc.split('`').skip(1).step_by(2).filter(|line| !line.contains('…')) {
-                let is_value = line.starts_with(['{', '[', '"']);
+                let is_value = line.starts_with(['{', '[']);
                 let is_table = line.starts_with('[') && line.ends_with(']') && !line.contains([' ', ',']);
                 if is_table || !is_value && !line.contains(" = ") {
                     continue;
@@ -363,10 +368,10 @@ mod tests {
     fn every_line_of_the_reference_is_taken() {
         let (tried, refused) = lines_refused(&scene_schema());
         assert!(refused.is_empty(), "{refused:#?}");
-        assert!(tried > 50, "{tried}");
+        assert!(tried > 40, "{tried}");
         let wrong = json!({ "properties": { "angle": {
             "type": "number",
-            "description": "As in `angle = 2`, `angle = \"2\"`, `turn = 2`, `{ angle = }`, `\"2\"`."
+            "description": "As in `angle = 2`, `angle = \"2\"`, `turn = 2`, `{ angle = }`, `[2, 3]`."
         } } });
         let (tried, refused) = lines_refused(&wrong);
         assert_eq!((tried, refused.len()), (5, 4), "{refused:#?}");
