@@ -489,9 +489,9 @@ def test_a_tool_moves_while_its_jaws_close() -> None:
     assert led(close) == (pytest.approx([0, 0, 0], abs=1e-15), pytest.approx(0.3))
     way, opening = led(drive)
     assert np.allclose(way, (0, 0, 0.01), atol=1e-12) and opening == pytest.approx(0.8)
-    # Half of the way to each goal: after a look it begins one step later.
+    # After a look it begins one step later and arrives when it was asked to: five of nine steps.
     way, opening = led(both, steps=6)
-    assert np.allclose(way, (0, 0, 0.005), atol=1e-12) and opening == pytest.approx(0.55)
+    assert np.allclose(way, (0, 0, 0.01 * 5 / 9), atol=1e-12) and opening == pytest.approx(0.8 - 0.5 * 5 / 9)
     with pytest.raises(ValueError, match="no goal"):
         grasped().build().simulate().drive("grasper")
 
