@@ -4,6 +4,7 @@ use std::ffi::c_char;
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use pliant_scene::World;
+use pliant_scene::format::MOST_THREADS;
 use pliant_sim::{Simulation, StopFlag};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -16,9 +17,6 @@ use crate::values::OpenField;
 
 /// A simulation that is open: a number that `pliant_simulation_open` gives, never 0.
 pub type PliantSimulation = u64;
-
-/// The most threads of a simulation, as of the key `threads` of a scene.
-const MOST_THREADS: u32 = 1024;
 
 /// What threads share of a simulation: one of them runs it, any of them stops it.
 pub(crate) struct Shared {

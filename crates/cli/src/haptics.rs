@@ -38,7 +38,7 @@ const APPROACH: f64 = 0.5;
 const FASTEST: [f64; 2] = [0.5, 20.0];
 /// Simulated time [s] between states that are kept, and how many are.
 const KEPT: (f64, usize) = (0.05, 6);
-/// How often in a row a step may fail at the state that the session began with.
+/// Failures in a row, back at the start of the session, that end it.
 const MOST_FAILURES: usize = 100;
 /// Corners and points of a face that become planes.
 const FACE_PARTS: usize = 3;
@@ -156,18 +156,17 @@ fn run(
                 kept.keep(&mut simulation).map_err(failed)?;
                 pace.wait();
             }
-            // The hand has done something that the body does not bear; it goes on from before.
-            Err(failure) if kept.go_back(&mut simulation) => {
+            Err(failure) => {
+                if !kept.go_back(&mut simulation) {
+                    ended = Some(failure);
+                    break;
+                }
                 pace.go_back(&simulation);
                 eprintln!(
                     "note: the simulation went back to t = {:.3} s: {}",
                     simulation.time(),
                     failure.message
                 );
-            }
-            Err(failure) => {
-                ended = Some(failure);
-                break;
             }
         }
     }
@@ -235,7 +234,7 @@ fn step(
     Ok(Period { place, force, friction, planes })
 }
 
-/// How far a tool comes towards a goal in a time [s].
+/// Pose that a tool reaches on its way to a goal in a time [s].
 fn on_the_way(now: &Isometry3<f64>, goal: &Isometry3<f64>, time: f64) -> Isometry3<f64> {
     let way = (goal.translation.vector - now.translation.vector).norm();
     let turn = now.rotation.angle_to(&goal.rotation);
@@ -248,7 +247,7 @@ struct Kept {
     start: State,
     /// Times [s] and states, the newest last.
     states: VecDeque<(f64, State)>,
-    /// How often it went back, and how often of that from the start without a state kept since.
+    /// Failures so far, and those in a row that went back to the start.
     failures: usize,
     in_a_row: usize,
 }
@@ -277,7 +276,8 @@ impl Kept {
         let newest = self.states.pop_back().map(|(_, state)| state);
         self.in_a_row += usize::from(newest.is_none());
         self.failures += 1;
-        self.in_a_row <= MOST_FAILURES && simulation.restore(newest.unwrap_or(self.start.clone())).is_ok()
+        self.in_a_row <= MOST_FAILURES
+            && simulation.restore(newest.unwrap_or_else(|| self.start.clone())).is_ok()
     }
 }
 

@@ -173,7 +173,7 @@ impl Grid {
         let along = (point - self.origin) * self.per_metre;
         let last = Vector3::from_fn(|c, _| (self.counts[c] - 1) as f64);
         let inner = along.zip_map(&last, |x, last| x.clamp(0.0, last));
-        // The nearest point along each axis and both of its neighbours; beyond the grid values go on evenly.
+        // Three points along each axis; beyond the grid values are extrapolated linearly.
         let axes = [0, 1, 2].map(|c| {
             let middle = inner[c].round();
             let t = inner[c] - middle;

@@ -51,6 +51,12 @@ pub enum Shape {
     Grid(Arc<Grid>),
 }
 
+/// Sides of a shape that has most of them, a box.
+const MOST_SIDES: usize = 6;
+
+/// Smooth sides of a shape, the first places of the array.
+pub type Sides = [Option<Near>; MOST_SIDES];
+
 impl Shape {
     /// The distance of a point [m] of its frame, and the direction away from it.
     pub fn near(&self, point: &Vector3<f64>) -> Near {
@@ -75,39 +81,37 @@ impl Shape {
         }
     }
 
-    /// Calls back with the distance and its gradient of each smooth side that a point [m] inside sees, negative inside, as if the side went on
-    /// beyond the corners between sides: the point is as far from the surface as from the nearest of them. Of sampled distances there is one,
-    /// whose gradient is continuous; it has not the length 1 where corners are rounded.
-    pub fn sides(&self, point: &Vector3<f64>, mut found: impl FnMut(Near)) {
+    /// Smooth sides as a point [m] inside sees them: distance, negative inside, and its gradient. Each goes on beyond the corners of the shape, so the
+    /// nearest side is as far as the surface. Sampled distances have one side with a continuous gradient, shorter than 1 where it rounds corners.
+    pub fn sides(&self, point: &Vector3<f64>) -> Sides {
+        let side = |distance, normal| Some(Near { distance, normal });
+        let mut all = [None; MOST_SIDES];
         match self {
             Self::Cuboid { size } => {
-                for (axis, size) in size.iter().enumerate() {
-                    for sign in [-1.0, 1.0] {
-                        let mut normal = Vector3::zeros();
-                        normal[axis] = sign;
-                        found(Near { distance: sign * point[axis] - 0.5 * size, normal });
-                    }
+                for (at, found) in all.iter_mut().enumerate() {
+                    let (axis, sign) = (at / 2, if at % 2 == 0 { -1.0 } else { 1.0 });
+                    *found = side(sign * point[axis] - 0.5 * size[axis], Vector3::ith(axis, sign));
                 }
             }
             Self::Cylinder { radius, length } => {
-                found(around(Vector3::new(point.x, point.y, 0.0), *radius));
-                for sign in [-1.0, 1.0] {
-                    found(Near { distance: sign * point.z - 0.5 * length, normal: Vector3::z() * sign });
-                }
+                all[0] = Some(around(Vector3::new(point.x, point.y, 0.0), *radius));
+                all[1] = side(-point.z - 0.5 * length, -Vector3::z());
+                all[2] = side(point.z - 0.5 * length, Vector3::z());
             }
             Self::Cone { radius, height } => {
-                found(Near { distance: -point.z, normal: -Vector3::z() });
                 let from_axis = Vector2::new(point.x, point.y);
                 let radial = from_axis.try_normalize(0.0).unwrap_or(Vector2::x());
                 let flat = Vector2::new(*height, *radius).normalize();
                 let distance = flat.x * (from_axis.norm() - radius) + flat.y * point.z;
-                found(Near { distance, normal: Vector3::new(radial.x * flat.x, radial.y * flat.x, flat.y) });
+                all[0] = side(-point.z, -Vector3::z());
+                all[1] = side(distance, Vector3::new(radial.x * flat.x, radial.y * flat.x, flat.y));
             }
-            Self::Grid(grid) => found(grid.smooth(point)),
+            Self::Grid(grid) => all[0] = Some(grid.smooth(point)),
             Self::Sphere { .. } | Self::Capsule { .. } | Self::HalfSpace | Self::Revolved(_) => {
-                found(self.near(point));
+                all[0] = Some(self.near(point));
             }
         }
+        all
     }
 
     /// The least distance [m] that a point can go through it; infinite of a half-space.
@@ -366,11 +370,7 @@ mod tests {
         ];
         let mut random = Random::new(4);
         for shape in &shapes {
-            let sides = |point: &Vector3<f64>| {
-                let mut all = Vec::new();
-                shape.sides(point, |near| all.push(near));
-                all
-            };
+            let sides = |point: &Vector3<f64>| shape.sides(point).into_iter().flatten().collect::<Vec<_>>();
             let mut inside = 0;
             for _ in 0..2000 {
                 let point = Vector3::from_fn(|_, _| random.part() - 0.5);

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::pairs::{Pairs, Surface};
 use crate::pose::{Leg, Pose, Stance, Trajectory};
-use crate::shape::{Near, Shape};
+use crate::shape::{Near, Shape, Sides};
 
 /// Parts of a step at most in which a node is followed along a thing.
 pub(crate) const MOST_PARTS: f64 = 512.0;
@@ -128,24 +128,28 @@ impl Rigid {
         Near { distance: sign * (distance - growth), normal: normal * sign }
     }
 
-    /// Calls back with the distance of a point [m] from where it is free of each smooth side of the thing, and its gradient: of what bodies are
-    /// outside of there is one, the nearest part of the surface; else those of [`Shape::sides`].
-    pub fn sides(&self, stance: &Stance, point: &Vector3<f64>, mut found: impl FnMut(Near)) {
+    /// Distance of a point [m] from where it is free of the thing, and its gradient: of a hollow thing for each of [`Shape::sides`], else for the
+    /// nearest part of the surface.
+    pub fn sides(&self, stance: &Stance, point: &Vector3<f64>) -> Sides {
         if !self.inside {
-            return found(self.near(stance, point));
+            let mut all = Sides::default();
+            all[0] = Some(self.near(stance, point));
+            return all;
         }
         let Stance { pose, growth } = stance;
         let local = pose.inverse_transform_point(&(*point).into());
-        self.shape.sides(&local.coords, |Near { distance, normal }| {
-            found(Near { distance: growth - distance, normal: pose.rotation * -normal });
-        });
+        self.shape.sides(&local.coords).map(|side| {
+            side.map(|Near { distance, normal }| Near {
+                distance: growth - distance,
+                normal: pose.rotation * -normal,
+            })
+        })
     }
 
-    /// The distance [m] from the nearest of [`sides`](Self::sides).
+    /// Distance [m] from the nearest of [`sides`](Self::sides).
     pub fn distance(&self, stance: &Stance, point: &Vector3<f64>) -> f64 {
-        let mut least = f64::INFINITY;
-        self.sides(stance, point, |near| least = least.min(near.distance));
-        least
+        let sides = self.sides(stance, point).into_iter().flatten();
+        sides.map(|side| side.distance).fold(f64::INFINITY, f64::min)
     }
 
     /// −1 of a thing that bodies are inside of, else 1.

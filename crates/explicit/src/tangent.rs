@@ -48,7 +48,7 @@ pub(crate) fn stiffness(
     of_states(solid, &cells, &cells.map(state))
 }
 
-/// The same of known states. Not generic, so that laws are compiled here and not again in every crate that steps a model.
+/// Stiffness of cells in known states. Not generic: so laws are compiled here, and not again in every crate that steps a model.
 fn of_states(
     solid: &Solid,
     cells: &[usize; PACK],

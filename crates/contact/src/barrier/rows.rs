@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::distance::Region;
 
-/// How much the length of a normal may differ from 1.
+/// Round-off of the length of a normal.
 const UNIT: f64 = 1e-12;
 
 /// Nodes of a row and their coefficients: four, or one at a wall.
@@ -61,14 +61,14 @@ pub struct Row {
     pub stiffness: f64,
     /// Which parts of the primitives are nearest; none at a wall.
     pub region: Option<Region>,
-    /// Of a wall: which of its smooth sides it is.
+    /// Number of the smooth side, at a wall.
     pub side: u8,
     /// What nearly parallel edges have beside.
     pub mollified: Option<Mollified>,
 }
 
 impl Row {
-    /// The direction of its normal, and the force [N] along it.
+    /// Unit direction of the push, and the force [N] along it.
     pub fn pushes(&self) -> (Vector3<f64>, f64) {
         let length = self.normal.norm();
         // Only rounded corners of sampled walls have another one.

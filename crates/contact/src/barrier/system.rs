@@ -343,16 +343,13 @@ impl Barriers {
                 split: 1,
                 in_order: true,
             };
-            let (mut side, mut apart) = (0, true);
-            rigid.sides(stance, place, |Near { distance, normal }| {
-                if let Some(row) = action.row(stencil, area, distance, normal) {
-                    apart &= row.gap > 0.0;
-                    rows.push(Row { side, ..row });
+            for (side, near) in (0..).zip(rigid.sides(stance, place)) {
+                let Some(Near { distance, normal }) = near else { continue };
+                let Some(row) = action.row(stencil, area, distance, normal) else { continue };
+                if row.gap <= 0.0 || row.gap.is_nan() {
+                    return false;
                 }
-                side += 1;
-            });
-            if !apart {
-                return false;
+                rows.push(Row { side, ..row });
             }
         }
         true
@@ -562,14 +559,7 @@ impl Barriers {
             [h, -h].map(|by| {
                 let mut place = self.place[row.stencil.nodes[0] as usize];
                 place[axis] += by;
-                let (mut side, mut normal) = (0, row.normal);
-                rigid.sides(stance, &place, |near| {
-                    if side == row.side {
-                        normal = near.normal;
-                    }
-                    side += 1;
-                });
-                normal
+                rigid.sides(stance, &place)[usize::from(row.side)].map_or(row.normal, |side| side.normal)
             })
         });
         of_wall(normals, h)

@@ -45,6 +45,9 @@ use pliant_sim::gpu::Design;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Most threads of a run or a simulation.
+pub const MOST_THREADS: u32 = 1024;
+
 /// What the scene is and how long it lasts.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
@@ -132,7 +135,7 @@ pub struct RunTable {
     pub allow_hourglass: f64,
     /// Threads; 0: one per core. The number never changes a result.
     #[serde(default)]
-    #[schemars(range(max = 1024))]
+    #[schemars(range(max = MOST_THREADS))]
     pub threads: u32,
     /// Checkpoints to resume an interrupted run from (`pliant run --resume`); the last two are kept.
     #[serde(default)]
