@@ -36,6 +36,8 @@ const REACH: f64 = 0.02;
 const APPROACH: f64 = 0.5;
 /// Speeds [m/s], [rad/s] at which the tool follows the hand at most: a thrust must not carry it through tissue within a step.
 const FASTEST: [f64; 2] = [0.5, 20.0];
+/// The longest lag [s] behind real time that is caught up with.
+const CATCHES_UP: f64 = 0.1;
 /// Simulated time [s] between states that are kept, and how many are.
 const KEPT: (f64, usize) = (0.05, 6);
 /// Failures in a row, back at the start of the session, that end it.
@@ -377,6 +379,12 @@ impl Pace {
         let left = self.due - self.begun.elapsed().as_secs_f64();
         if left > 0.0 {
             std::thread::sleep(Duration::from_secs_f64(left));
+        }
+        // What is later than that is lost: steps that catch up move the tool faster than it may go.
+        let lost = -left - CATCHES_UP;
+        if lost > 0.0 {
+            self.due += lost;
+            self.from -= lost;
         }
     }
 }

@@ -25,6 +25,8 @@ use crate::renderer::Answer;
 const RELEASE: Duration = Duration::from_secs(1);
 /// Datagrams that are read for one answer at most.
 const MOST_WAITING: usize = 64;
+/// The shortest wait for a pose.
+const LEAST_PATIENCE: Duration = Duration::from_millis(1);
 
 /// A device at a socket.
 #[derive(Debug)]
@@ -93,8 +95,9 @@ impl Link {
     /// Waits for a pose, then reads what else has come.
     fn newest(&mut self, patience: Duration) -> io::Result<bool> {
         let until = Instant::now() + patience;
+        // It reads once at least: what has come waits, however late its thread is.
+        let mut left = patience.max(LEAST_PATIENCE);
         loop {
-            let left = until.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 return Ok(false);
             }
@@ -102,6 +105,7 @@ impl Link {
             if self.take()? {
                 break;
             }
+            left = until.saturating_duration_since(Instant::now());
         }
         self.socket.set_nonblocking(true)?;
         let mut result = Ok(true);

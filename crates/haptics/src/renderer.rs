@@ -119,6 +119,8 @@ pub struct Renderer {
     /// How far it has gone over to the new model.
     part: f64,
     last: Option<Last>,
+    /// The last force [N], also over a silence.
+    felt: Vector3<f64>,
     /// Of the soft start.
     gain: f64,
     observer: Observer,
@@ -153,6 +155,7 @@ impl Renderer {
             new: None,
             part: 1.0,
             last: None,
+            felt: Vector3::zeros(),
             gain: 0.0,
             observer: Observer::default(),
             record: Record::default(),
@@ -191,7 +194,7 @@ impl Renderer {
             (false, Some(last)) => last.pose,
             (false, None) => return Answer { held: true, ..Answer::default() },
         };
-        let first = Last { pose, stretch: resting, touch: resting, force: resting };
+        let first = Last { pose, stretch: resting, touch: resting, force: self.felt };
         let last = self.last.unwrap_or(first);
         let Settings { period, coupling, ahead, force_limit, most_change, guard, soft_start } = self.settings;
 
@@ -225,7 +228,7 @@ impl Renderer {
         record.peak = record.peak.max(force.norm());
         record.jump = record.jump.max((force - last.force).norm());
         (record.energy, record.least_energy) = (self.observer.energy, self.observer.least);
-        self.last = Some(Last { pose, stretch, touch, force });
+        (self.last, self.felt) = (Some(Last { pose, stretch, touch, force }), force);
         Answer { force, guarded, limited, held: !valid }
     }
 
@@ -249,7 +252,8 @@ impl Renderer {
         before.lerp(&force, self.part)
     }
 
-    /// After a silence of the device: the next pose counts as a first one, and the force comes up softly.
+    /// After a silence of the device: the next pose counts as a first one, and the force of the tissue comes up softly. What the device felt last goes
+    /// as slowly as forces change.
     pub fn restart(&mut self) {
         (self.last, self.gain) = (None, 0.0);
     }
@@ -321,6 +325,21 @@ mod tests {
         }
         assert_eq!(renderer.record().invalid, 3);
         assert!(renderer.proxy().unwrap().translation.vector.iter().all(|x| x.is_finite()));
+    }
+
+    #[test]
+    fn a_force_does_not_jump_over_a_silence() {
+        let mut renderer = Renderer::new(Settings { most_change: Some(0.3), ..Settings::default() }).unwrap();
+        renderer.take(wall(0.0));
+        let mut last = (0..300).map(|_| renderer.tick(&at(0.0, -0.02)).force).last().unwrap();
+        assert!(last.norm() > 3.0, "{last}");
+        renderer.restart();
+        for _ in 0..30 {
+            let force = renderer.tick(&at(0.0, 0.02)).force;
+            assert!((force - last).norm() < 0.3 + 1e-9, "{force} after {last}");
+            last = force;
+        }
+        assert!(last.norm() < 1e-9, "{last}");
     }
 
     #[test]
