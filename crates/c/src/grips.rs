@@ -105,8 +105,8 @@ pub unsafe extern "C" fn pliant_grip_nodes(
             let weights = if weights.is_null() { &same[..] } else { array(weights, count, "weights")? };
             finite(weights, "weights")?;
             let sum: f64 = weights.iter().sum();
-            if weights.iter().any(|&weight| weight < 0.0) || sum <= 0.0 {
-                let message = "weights are at least 0, and not all of them are";
+            if weights.iter().any(|&weight| weight < 0.0) || sum <= 0.0 || !sum.is_finite() {
+                let message = "weights are at least 0, not all of them are, and their sum is finite";
                 return Err(Fault::new(PliantStatus::NotANumber, message));
             }
             let mut held: Vec<(u32, f64)> =
@@ -141,6 +141,9 @@ pub unsafe extern "C" fn pliant_grip_surface(
             needed(grip, "grip")?;
             let point: [f64; 3] = numbers(point, "point")?;
             finite(&[radius], "radius")?;
+            if radius < 0.0 {
+                return Err(Fault::new(PliantStatus::NotANumber, "`radius` is at least 0"));
+            }
             own.see_places()?;
             own.surface(surface)?;
             let skin = &own.surfaces[surface as usize].skin;

@@ -2,8 +2,8 @@
 
 use std::ffi::c_char;
 
-use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use pliant_sim::contact::pose::Pose;
+use pliant_sim::pose_of;
 
 use crate::context::{PliantContext, finite, give, needed, numbers, text};
 use crate::simulation::{PLIANT_TOOLS, PliantSimulation, Running, running};
@@ -49,11 +49,9 @@ unsafe fn lead(
 /// A pose of a place [m] and a quaternion x, y, z, w.
 unsafe fn goal(position: *const f64, rotation: *const f64) -> Result<Pose, Fault> {
     // SAFETY: pointers are what the caller owes.
-    let ([x, y, z], [i, j, k, w]) =
-        unsafe { (numbers(position, "position")?, numbers(rotation, "rotation")?) };
-    let rotation = UnitQuaternion::try_new(Quaternion::new(w, i, j, k), 1e-9)
-        .ok_or_else(|| Fault::new(PliantStatus::NotANumber, "`rotation` is a quaternion of length 0"))?;
-    Ok(Pose::from_parts(Translation3::new(x, y, z), rotation))
+    let (place, turn) = unsafe { (numbers(position, "position")?, numbers(rotation, "rotation")?) };
+    let refused = || Fault::new(PliantStatus::NotANumber, "`rotation` is a quaternion of length 0");
+    pose_of(place, turn).ok_or_else(refused)
 }
 
 /// Leads a tool to a pose within a time [s] from now, on a straight way and the shortest turn; there it stays. Its jaws go on as they were going. `rotation` is a quaternion x, y, z, w of any

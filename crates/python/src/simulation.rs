@@ -5,13 +5,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use numpy::ndarray::ArrayView2;
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray2};
 use pliant_mechanics::grip::Grip;
 use pliant_run::{Live, field_named};
 use pliant_scene::format::At;
-use pliant_sim::contact::pose::Pose;
+use pliant_sim::pose_of;
 use pliant_sim::{Reals, StopFlag, panicked};
 use pyo3::prelude::*;
 
@@ -374,11 +373,10 @@ impl Simulation {
 
     /// Drives a tool to a pose and its jaws to an angle [rad] within a time [s]: when they arrive [s].
     fn drive(&self, tool: &str, pose: Option<Posed>, opening: Option<f64>, within: f64) -> PyResult<f64> {
-        let pose = pose.map(|(place, [x, y, z, w])| {
-            let turn = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9)
-                .ok_or_else(|| Trouble::Value("the quaternion of a pose has no length".into()))?;
-            Ok::<_, Trouble>(Pose::from_parts(Translation3::new(place[0], place[1], place[2]), turn))
-        });
+        let refused = || {
+            Trouble::Value("the quaternion of a pose has no length, or a number of it is not finite".into())
+        };
+        let pose = pose.map(|(place, turn)| pose_of(place, turn).ok_or_else(refused));
         let pose = pose.transpose()?;
         let arrival = self.quick(|running| running.live.simulation.lead(tool, pose, opening, within))?;
         Ok(arrival.map_err(|failure| Trouble::Value(failure.message))?)

@@ -71,7 +71,7 @@ pub use schedule::Schedule;
 pub use simulation::{Frame, Observer, Simulation, State, World};
 pub use solver::{Equilibria, LoadStepProgress};
 pub use steps::{Critical, SAFETY, Steps};
-pub use tools::ToolNow;
+pub use tools::{ToolNow, pose_of};
 pub use words::{counted, number, panicked};
 
 /// Ends long work early.

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use pliant_contact::pose::{Leg, Pose};
 use pliant_contact::touch::{Rigid, With};
 use pliant_mechanics::tensor::{add, cross, sub};
@@ -20,6 +21,20 @@ pub struct ToolNow {
     pub force: [f64; 3],
     /// The moment [N m] of that about its frame; `None` on a GPU.
     pub torque: Option<[f64; 3]>,
+}
+
+/// A pose of a place [m] and a quaternion x, y, z, w of any length but 0; `None` where that has none, or a number is not finite.
+pub fn pose_of([x, y, z]: [f64; 3], quaternion: [f64; 4]) -> Option<Pose> {
+    let most = quaternion.iter().fold(0.0_f64, |most, part| most.max(part.abs()));
+    if !(most > 0.0 && [x, y, z, most].iter().all(|part| part.is_finite())) {
+        return None;
+    }
+    // Its length may be beyond all numbers.
+    let [i, j, k, w] = quaternion.map(|part| part / most);
+    Some(Pose::from_parts(
+        Translation3::new(x, y, z),
+        UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k)),
+    ))
 }
 
 /// Tools.

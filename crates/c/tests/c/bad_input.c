@@ -235,6 +235,9 @@ int main(void) {
     EXPECT(pliant_tool_lead(context, simulation, "ball", NULL, still, 0.1, NULL, &error), PLIANT_STATUS_NULL, "`position`");
     EXPECT(pliant_tool_lead(context, simulation, "ball", up, still, INFINITY, NULL, &error), PLIANT_STATUS_NOT_A_NUMBER, "`within`");
     EXPECT(pliant_tool_open(context, simulation, "ball", NAN, 0.1, NULL, &error), PLIANT_STATUS_NOT_A_NUMBER, "angle");
+    /* Longer than all numbers, and no turn all the same. */
+    const double long4[] = {0, 0, 0, 1e200};
+    OK(pliant_tool_lead(context, simulation, "ball", up, long4, 0.1, NULL, &error));
     OK(pliant_tool_lead(context, simulation, "ball", up, still, 0.1, &three[0], &error));
     EXPECT(pliant_tool_lead_open(context, simulation, "ball", up, still, NAN, 0.1, NULL, &error), PLIANT_STATUS_NOT_A_NUMBER, "angle");
     EXPECT(pliant_tool_lead_open(context, simulation, "ball", up, zero4, 0.2, 0.1, NULL, &error), PLIANT_STATUS_NOT_A_NUMBER, "length 0");
@@ -253,6 +256,10 @@ int main(void) {
     EXPECT(pliant_grip_nodes(context, simulation, &first, &negative, 1, 10, &grip, &error), PLIANT_STATUS_NOT_A_NUMBER, "weights");
     EXPECT(pliant_grip_nodes(context, simulation, &first, NULL, 1, -10, &grip, &error), PLIANT_STATUS_NOT_A_NUMBER, "`stiffness`");
     EXPECT(pliant_grip_surface(context, simulation, skin.number, nan3, 0.01, 10, &grip, &error), PLIANT_STATUS_NOT_A_NUMBER, "`point`");
+    EXPECT(pliant_grip_surface(context, simulation, skin.number, up, -0.01, 10, &grip, &error), PLIANT_STATUS_NOT_A_NUMBER, "`radius`");
+    const uint32_t pair[] = {0, 1};
+    const double huge[] = {1e308, 1e308};
+    EXPECT(pliant_grip_nodes(context, simulation, pair, huge, 2, 10, &grip, &error), PLIANT_STATUS_NOT_A_NUMBER, "finite");
     OK(pliant_grip_surface(context, simulation, skin.number, up, 0.03, INFINITY, &grip, &error));
     EXPECT(pliant_grip_move(context, simulation, grip, nan3, &error), PLIANT_STATUS_NOT_A_NUMBER, "`place`");
     EXPECT(pliant_grip_move(context, simulation, grip + 1, up, &error), PLIANT_STATUS_BAD_HANDLE, "no grip 1");
