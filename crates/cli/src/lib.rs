@@ -45,6 +45,7 @@ pub const SUCCESS: u8 = 0;
 /// Does what a command line says, whose first word is the program: prints, writes files, opens a window. The code that the process is to
 /// end with.
 pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
+    signals::outlive_large_files();
     let words: Vec<OsString> = words.into_iter().collect();
     let arguments = match arguments::Arguments::try_parse_from(&words) {
         Ok(arguments) => arguments,

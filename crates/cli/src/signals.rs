@@ -27,6 +27,15 @@ static ASKED: LazyLock<Asked> = LazyLock::new(|| {
     asked
 });
 
+/// Files that grow beyond the limit of their size then end in an error that names them, not in the end of the process.
+pub fn outlive_large_files() {
+    #[cfg(unix)]
+    {
+        let seen = Arc::default();
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, seen);
+    }
+}
+
 /// Set by a stop signal. A second Ctrl-C or SIGTERM ends the process immediately.
 pub fn stop() -> &'static StopFlag {
     &ASKED.stop
