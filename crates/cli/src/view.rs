@@ -8,8 +8,8 @@ use pliant_picture::Series;
 use pliant_scene::World;
 use pliant_sim::number;
 use pliant_viewer::{
-    Break, FinishedRun, Lags, Opening, Recording, SelfTest, WindowError, open, open_finished, replay,
-    replay_in_real_time,
+    Break, FinishedRun, Lags, Opening, Recording, SelfTest, WindowError, open, open_finished,
+    replay_in_real_time, replay_until,
 };
 
 use crate::SUCCESS;
@@ -120,11 +120,11 @@ fn repeat(world: &World, file: &Path, real_time: bool) -> Result<u8, Failure> {
     };
     let bytes = std::fs::read(file).map_err(|error| wrong(&error))?;
     let recording = Recording::from_bytes(&bytes).map_err(|error| wrong(&error))?;
-    match replay(world, &recording) {
+    match replay_until(world, &recording, stop()) {
         Ok(replayed) => {
             let mut told = serde_json::to_value(&replayed).map_err(|error| wrong(&error))?;
             if real_time {
-                let played = replay_in_real_time(world, &recording);
+                let played = replay_in_real_time(world, &recording, stop());
                 let played = played.map_err(|message| Failure::plain(message, ""))?;
                 told["input_lag"] = serde_json::to_value(Lags::of(&played)).map_err(|error| wrong(&error))?;
             }
@@ -140,7 +140,7 @@ fn repeat(world: &World, file: &Path, real_time: bool) -> Result<u8, Failure> {
         }
         Err(message) => {
             eprintln!("error: {message}");
-            Ok(1)
+            Ok(if stop().is_asked() { exit_code() } else { 1 })
         }
     }
 }

@@ -22,7 +22,7 @@ pub use hand::{Hand, Hold, Point, Which, pick};
 pub use parameters::{Number, Parameter, parameters, with_numbers};
 pub use recording::{Break, Done, Move, Recording, Surface};
 pub use regions::{coat_of, regions_of};
-pub use replay::{Lags, Replayed, replay, replay_in_real_time};
+pub use replay::{Lags, Replayed, replay, replay_in_real_time, replay_until};
 pub use samples::{Sample, Samples};
 pub use session::{Frame, Order, Session};
 #[cfg(feature = "window")]

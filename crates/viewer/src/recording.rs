@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use pliant_geometry::CellLabel;
+use pliant_scene::World;
 use pliant_scene::format::ViewTable;
 use serde::{Deserialize, Serialize};
 
@@ -96,7 +97,16 @@ pub struct Recording {
     pub steps: u64,
     /// Pulls that broke the run: it went back to a state before them, so that they are not among the moves.
     pub breaks: Vec<Break>,
+    /// [Bodies](pliant_sim::World::fingerprint_of_bodies) of the scene that it is of.
+    pub of: u64,
 }
+
+/// The most parts of an edge, as the schema of scenes has it.
+const MOST_CURVED: u32 = 100;
+/// The first bytes of a file of a recording, with the version of what follows; the CRC-32 of all before them are the last four.
+const MAGIC: [u8; 8] = *b"\x89PLREC2\n";
+/// Bytes of the checksum.
+const CRC: usize = 4;
 
 /// The file beside a recording that takes its place.
 fn part_of(path: &Path) -> PathBuf {
@@ -120,7 +130,14 @@ impl Recording {
     /// # Errors
     /// Never in practice: memory that ran out.
     pub fn to_bytes(&self) -> Result<Vec<u8>, String> {
-        postcard::to_stdvec(self).map_err(|error| error.to_string())
+        Ok(Self::framed(&postcard::to_stdvec(self).map_err(|error| error.to_string())?))
+    }
+
+    /// The bytes of a file with this body: the first bytes before it, the CRC-32 after it.
+    pub fn framed(body: &[u8]) -> Vec<u8> {
+        let mut bytes = [&MAGIC[..], body].concat();
+        bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
+        bytes
     }
 
     /// Writes it into another file beside its own, which then takes the place of this one: a file of a recording is whole at any time.
@@ -149,8 +166,36 @@ impl Recording {
     /// From these bytes.
     ///
     /// # Errors
-    /// If they are no recording.
+    /// If they are no recording of this version, or damaged.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
-        postcard::from_bytes(bytes).map_err(|error| error.to_string())
+        let Some((content, crc)) = bytes.split_last_chunk::<CRC>().filter(|_| bytes.starts_with(&MAGIC))
+        else {
+            return Err("it does not begin as one of this version".into());
+        };
+        let body = content.get(MAGIC.len()..).filter(|_| crc32fast::hash(content).to_le_bytes() == *crc);
+        body.and_then(|body| postcard::from_bytes(body).ok()).ok_or_else(|| "it is damaged or cut off".into())
+    }
+
+    /// Whether it is of a scene.
+    ///
+    /// # Errors
+    /// If it is of another one.
+    pub fn check(&self, world: &World) -> Result<(), String> {
+        if self.of != world.simulated().fingerprint_of_bodies() {
+            return Err(
+                "the recording is of another scene: bodies, meshes, tools or their names differ".into()
+            );
+        }
+        let scene = &world.scene;
+        let is_known = |surface: &Surface| {
+            let names = || {
+                scene.bodies.iter().map(|(name, _)| name).chain(scene.surfaces.iter().map(|(name, _)| name))
+            };
+            surface.on.as_ref().is_none_or(|on| names().any(|name| name == on))
+                && surface.curved <= MOST_CURVED
+        };
+        let known =
+            self.moves.iter().all(|then| !matches!(&then.done, Done::Surface(surface) if !is_known(surface)));
+        if known { Ok(()) } else { Err("the recording shows a surface that the scene does not have".into()) }
     }
 }

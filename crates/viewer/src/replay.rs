@@ -7,7 +7,7 @@ use pliant_geometry::Vector3;
 use pliant_picture::{Subject, visible};
 use pliant_run::Live;
 use pliant_scene::format::ViewTable;
-use pliant_sim::State;
+use pliant_sim::{State, StopFlag};
 use serde::Serialize;
 
 use crate::hand::{Hand, Hold, Which};
@@ -60,11 +60,20 @@ impl Lags {
     }
 }
 
+fn stopped() -> String {
+    "stopped before the end of the recording".into()
+}
+
 /// Repeats a recording by a mouse that moves when it did, while the run goes on in real time: what was felt then, and when.
 ///
 /// # Errors
-/// If a world can't be made, or the run fails.
-pub fn replay_in_real_time(world: &World, recording: &Recording) -> Result<Recording, String> {
+/// If a world can't be made, the run fails, or a flag is asked for.
+pub fn replay_in_real_time(
+    world: &World,
+    recording: &Recording,
+    stop: &StopFlag,
+) -> Result<Recording, String> {
+    recording.check(world)?;
     let mut orders = Vec::new();
     for then in &recording.moves {
         let order = match &then.done {
@@ -83,7 +92,12 @@ pub fn replay_in_real_time(world: &World, recording: &Recording) -> Result<Recor
     session.order(Order::Play(true));
     let started = Instant::now();
     for (due, order) in orders {
-        std::thread::sleep(due.saturating_sub(started.elapsed()));
+        while !due.saturating_sub(started.elapsed()).is_zero() && !stop.is_asked() {
+            std::thread::sleep(due.saturating_sub(started.elapsed()).min(FRAME));
+        }
+        if stop.is_asked() {
+            return Err(stopped());
+        }
         session.order(order);
     }
     // Until the last one is felt.
@@ -99,7 +113,17 @@ pub fn replay_in_real_time(world: &World, recording: &Recording) -> Result<Recor
 /// # Errors
 /// Why the run could not go on.
 pub fn replay(world: &World, recording: &Recording) -> Result<Replayed, String> {
-    let mut replay = Replay { moves: &recording.moves, of: recording.steps, ..Replay::default() };
+    replay_until(world, recording, &StopFlag::default())
+}
+
+/// As [`replay`], until a flag is asked for.
+///
+/// # Errors
+/// Why the run could not go on, or that it was stopped.
+pub fn replay_until(world: &World, recording: &Recording, stop: &StopFlag) -> Result<Replayed, String> {
+    recording.check(world)?;
+    let mut replay =
+        Replay { moves: &recording.moves, of: recording.steps, stop: stop.clone(), ..Replay::default() };
     let (mut now, mut before) = (world.clone(), None);
     loop {
         match replay.play(&now, before.take())? {
@@ -125,6 +149,8 @@ struct Replay<'r> {
     surface: Option<&'r Surface>,
     hold: Hold,
     largest_force: f64,
+    /// Ends it.
+    stop: StopFlag,
 }
 
 /// What a view shows of a run.
@@ -143,6 +169,7 @@ impl<'r> Replay<'r> {
     /// Goes on until numbers are others, or to the end.
     fn play(&mut self, world: &World, from: Option<(World, Option<State>)>) -> Result<Ended<'r>, String> {
         let (mut live, _) = crate::session::enter(world, from)?;
+        live.simulation.stop_on(&self.stop);
         if let Some(surface) = self.surface {
             live.show(&world.scene.shown_as(&surface.put_into(&world.scene.view), 1.0));
         }
@@ -186,6 +213,9 @@ impl<'r> Replay<'r> {
                         return Ok(Ended::Change(Some(Box::new(snapshot)), numbers));
                     }
                 }
+            }
+            if self.stop.is_asked() {
+                return Err(stopped());
             }
             if self.steps >= self.of {
                 return self.end(&mut live).map(Ended::Whole);

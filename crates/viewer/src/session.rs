@@ -306,6 +306,8 @@ struct Playback {
     /// Wall time that the last frame took to prepare.
     prepared: Duration,
     recording: Option<Recording>,
+    /// The bodies that are recorded.
+    of: u64,
     /// Where the recording is written, and when and after how many moves and steps it was last.
     file: Option<(PathBuf, Instant, (usize, u64))>,
     /// When the first move was recorded.
@@ -458,6 +460,7 @@ impl Playback {
             shown: Instant::now(),
             prepared: Duration::ZERO,
             recording: None,
+            of: world.simulated().fingerprint_of_bodies(),
             file: None,
             started: None,
             change: None,
@@ -524,7 +527,7 @@ impl Playback {
 
     /// Records from now on, a surface that is another one than the scene's first.
     fn begin_recording(&mut self) {
-        self.recording = Some(Recording::default());
+        self.recording = Some(Recording { of: self.of, ..Recording::default() });
         let surface = Surface::of(&self.view);
         if surface != self.usual {
             self.record(false, Instant::now(), Done::Surface(surface));

@@ -585,7 +585,7 @@ fn a_mouse_is_felt_within_a_frame_and_a_replay_of_it_has_the_same_bits_twice() {
     assert_eq!(Recording::from_bytes(&bytes).unwrap(), recording);
     assert_eq!(replay(&world, &recording).unwrap(), replay(&world, &recording).unwrap());
 
-    let played = replay_in_real_time(&world, &recording).unwrap();
+    let played = replay_in_real_time(&world, &recording, &StopFlag::default()).unwrap();
     let lags = Lags::of(&played);
     println!("{lags:?}");
     assert!(lags.moves >= 60, "{lags:?}");

@@ -7,6 +7,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use pliant_testing::found_or_skipped;
+use pliant_testing::scenes::world;
 use pliant_viewer::{Break, Recording};
 
 use x11rb::protocol::xproto::ConnectionExt as _;
@@ -266,12 +267,43 @@ fn without_a_screen_it_says_what_it_needs() {
     assert!(told.err.contains("is not a recording"), "{}", told.err);
 }
 
+/// The bodies of a scene, as its recordings name them.
+fn of(scene: &str) -> u64 {
+    world(scene).unwrap().simulated().fingerprint_of_bodies()
+}
+
+/// A recording refers to bodies by name and to triangles by number: of another scene it is refused.
+#[test]
+fn a_recording_of_another_scene_is_refused() {
+    let workshop = Workshop::new(&BLOCK.replace("block", "brick"));
+    let recording = Recording { steps: 3, of: of(BLOCK), ..Recording::default() };
+    std::fs::write(workshop.path("drag"), recording.to_bytes().unwrap()).unwrap();
+    let told = workshop.pliant(&["view", "case", "--replay", "drag"]);
+    assert_eq!(told.code, 1);
+    assert!(told.err.contains("the recording is of another scene"), "{}", told.err);
+}
+
+/// Ctrl-C ends a replay, which may be as long as its file says.
+#[test]
+#[cfg(unix)]
+fn a_replay_is_stopped() {
+    let workshop = Workshop::new(BLOCK);
+    let recording = Recording { steps: 1 << 40, of: of(BLOCK), ..Recording::default() };
+    std::fs::write(workshop.path("drag"), recording.to_bytes().unwrap()).unwrap();
+    let mut replay = workshop.command(&["view", "case", "--replay", "drag"]);
+    let mut replay = replay.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    std::thread::sleep(Duration::from_secs(1));
+    let asked = Command::new("kill").args(["-INT", &replay.id().to_string()]).status().unwrap();
+    assert!(asked.success());
+    assert_eq!(replay.wait().unwrap().code(), Some(130));
+}
+
 /// A replay reports the pulls that broke the run when it was recorded.
 #[test]
 fn a_replay_tells_breaks() {
     let workshop = Workshop::new(BLOCK);
     let broken = Break { times: [0.5, 0.25], message: "element 3 of `block` is inverted".into() };
-    let recording = Recording { moves: Vec::new(), steps: 3, breaks: vec![broken] };
+    let recording = Recording { steps: 3, breaks: vec![broken], of: of(BLOCK), ..Recording::default() };
     std::fs::write(workshop.path("drag"), recording.to_bytes().unwrap()).unwrap();
     let told = workshop.pliant(&["view", "case", "--replay", "drag"]);
     assert_eq!(told.code, 1);
