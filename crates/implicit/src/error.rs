@@ -1,5 +1,7 @@
 //! What can be wrong with a model and why a solver stops.
 
+use pliant_mechanics::memory::OutOfMemory;
+
 use crate::facet::Broken;
 use crate::linear::DeviceError;
 
@@ -202,9 +204,9 @@ pub enum SolveError {
     },
     /// A tool or a prescribed motion that cannot go on.
     #[error(
-        "{}, with a gap of {gap:.1e} m left: on to t = {time:.6} it has gone {:.1} % of its way after {iterations} iterations; nothing is in anything else. \
+        "{}{}: on to t = {time:.6} it has gone {:.1} % of its way after {iterations} iterations; nothing is in anything else. \
          Give it a `force-limit`, let it go less far or more slowly, or take smaller steps",
-        blocked(driver.as_ref()), 100.0 * part
+        blocked(driver.as_ref()), gap_left(*gap), 100.0 * part
     )]
     Blocked {
         /// Time of the step that failed.
@@ -273,6 +275,12 @@ pub enum SolveError {
     /// A device that solves the equations failed.
     #[error("the equations could not be solved on the GPU: {0}")]
     Device(DeviceError),
+    /// The system has no room for the factors of the equations; how much they take, where that is known.
+    #[error(
+        "no room for the factors of the equations{}; use `linear = {{ by = \"conjugate-gradients\" }}`, or a coarser mesh",
+        .0.map_or(String::new(), |needed| format!(": {needed}"))
+    )]
+    OutOfMemory(Option<OutOfMemory>),
     /// Someone asked for it.
     #[error("the search for the state at the end of a step was stopped")]
     Stopped,
@@ -287,7 +295,7 @@ pub enum SolveError {
 impl SolveError {
     /// Whether smaller steps can't help.
     pub(crate) fn is_final(&self) -> bool {
-        matches!(self, Self::Crossed { .. } | Self::Stopped | Self::Device(_))
+        matches!(self, Self::Crossed { .. } | Self::Stopped | Self::Device(_) | Self::OutOfMemory(_))
     }
 
     /// The element that is broken, or was in a larger step, by its number in the model.
@@ -329,6 +337,10 @@ fn in_vain(pressure: Option<f64>, ahead: Option<f64>) -> String {
     let pressure = pressure.map(|pressure| format!("the volume takes {pressure:.4e} Pa"));
     let ahead = ahead.map(|ahead| format!("at the limit the volume is {ahead:.1e} m³ beyond its curve"));
     pressure.into_iter().chain(ahead).collect::<Vec<_>>().join(", and ")
+}
+
+fn gap_left(gap: f64) -> String {
+    if gap.is_finite() { format!(", with a gap of {gap:.1e} m left") } else { String::new() }
 }
 
 fn blocked(driver: Option<&(String, f64)>) -> String {

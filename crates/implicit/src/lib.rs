@@ -95,6 +95,6 @@ pub use state::State;
 pub use statics::{Attempted, Control, StaticSettings, Statics, Step, check_held};
 pub use strain::ShellStrain;
 pub use surface::CurvedSurface;
-pub use system::Phases;
+pub use system::{Phases, bytes_of_factors};
 pub use touching::{Touching, TouchingNow, TouchingSystem};
 pub use turns::CarriedTurn;

@@ -23,7 +23,7 @@ use crate::followers::{Followers, carried_turns};
 use crate::gathering::{ColumnSums, Corners, NodeSums};
 use crate::lanes::PACK;
 use crate::linear::{
-    DeviceTimes, LinearDevice, LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT,
+    DeviceTimes, Factors, LinearDevice, LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT,
 };
 use crate::mapping::CarriedPoints;
 use crate::patch::Vector18;
@@ -202,6 +202,15 @@ struct FacetSums {
     forces: [Vec<f64>; 3],
 }
 
+/// Bytes that the factors of a model's equations take, without what contacts couple: found by the order of elimination, without numbers.
+///
+/// # Errors
+/// If there are more equations than can be numbered, or the order has no room.
+pub fn bytes_of_factors(model: &Arc<Assembly>) -> Result<u64, SolveError> {
+    let matrix = System::forces_only(Arc::clone(model)).pattern();
+    Factors::bytes(&matrix).map_err(linear_error)
+}
+
 impl System {
     pub(crate) fn new(model: Arc<Assembly>, solver: LinearSolver) -> Result<Self, SolveError> {
         Self::on(None, model, solver)
@@ -233,55 +242,54 @@ impl System {
         Ok(system)
     }
 
-    /// Finds the pattern of the matrix and the places of cells in it.
-    fn find_pattern(&mut self) -> Result<(), SolveError> {
-        let system = self;
-        let model = Arc::clone(&system.model);
-        let matrix = &mut system.matrix;
+    /// Nodes of a cell, those that follow others replaced by these, and how many components each has.
+    fn expanded(&self, nodes: &[u32], turns: bool) -> (Vec<u32>, usize) {
+        let expanded = self.followers.as_ref().and_then(|followers| followers.expanded(nodes, turns));
+        expanded.unwrap_or_else(|| (nodes.to_vec(), if turns { 6 } else { 3 }))
+    }
+
+    /// The pattern of the matrix, with the pairs of nodes that contacts couple.
+    fn pattern(&self) -> LowerMatrix {
+        let model = &self.model;
         let facets = model.facets.iter().map(|facet| &facet.nodes[..]);
-        let stars = system.stars.iter().flatten().flat_map(|stars| stars.nodes.iter().map(Vec::as_slice));
-        let pairs = system.touching.as_ref().map_or(&[][..], |touching| touching.pairs());
+        let stars = self.stars.iter().flatten().flat_map(|stars| stars.nodes.iter().map(Vec::as_slice));
+        let pairs = self.touching.as_ref().map_or(&[][..], |touching| touching.pairs());
         // Contacts on curved surfaces couple rotations, too.
-        let is_curved = system.touching.as_ref().is_some_and(|touching| touching.is_curved());
+        let is_curved = self.touching.as_ref().is_some_and(|touching| touching.is_curved());
         let (pairs, turning) = if is_curved { (&[][..], pairs) } else { (pairs, &[][..]) };
         let turning = turning.iter().map(|pair| &pair[..]);
-        let followers = system.followers.as_ref();
-        let expand = |nodes: &[u32], turns: bool| {
-            let own = || (nodes.to_vec(), if turns { 6 } else { 3 });
-            followers.and_then(|followers| followers.expanded(nodes, turns)).unwrap_or_else(own)
+        let Some(followers) = &self.followers else {
+            let cells = facets.chain(model.solid_cells()).chain(stars).chain(turning);
+            return LowerMatrix::new(&self.equations, cells, pairs);
         };
-        let expanded: Vec<(Vec<u32>, usize)> = match followers {
-            None => Vec::new(),
-            Some(_) => {
-                let solids = model.solid_cells().chain(stars.clone()).map(|nodes| expand(nodes, false));
-                let turns = followers.into_iter().flat_map(Followers::turning_nodes);
-                let turns = turns.map(|nodes| expand(&nodes, false));
-                facets.clone().map(|nodes| expand(nodes, true)).chain(solids).chain(turns).collect()
-            }
-        };
-        *matrix = match followers {
-            None => {
-                let cells = facets.chain(model.solid_cells()).chain(stars).chain(turning);
-                LowerMatrix::new(&system.equations, cells, pairs)
-            }
-            Some(_) => {
-                let cells = expanded.iter().map(|(nodes, _)| nodes.as_slice()).chain(turning);
-                LowerMatrix::new(&system.equations, cells, pairs)
-            }
-        };
-        if system.solver == LinearSolver::Unsymmetric {
+        let solids = model.solid_cells().chain(stars).map(|nodes| self.expanded(nodes, false));
+        let turns = followers.turning_nodes().map(|nodes| self.expanded(&nodes, false));
+        let shells = facets.map(|nodes| self.expanded(nodes, true));
+        let expanded: Vec<(Vec<u32>, usize)> = shells.chain(solids).chain(turns).collect();
+        let cells = expanded.iter().map(|(nodes, _)| nodes.as_slice()).chain(turning);
+        LowerMatrix::new(&self.equations, cells, pairs)
+    }
+
+    /// Finds the pattern of the matrix and the places of cells in it.
+    fn find_pattern(&mut self) -> Result<(), SolveError> {
+        let mut matrix = self.pattern();
+        if self.solver == LinearSolver::Unsymmetric {
             matrix.keep_mirror();
         }
-        let equations = &system.equations;
+        let system = self;
+        let model = Arc::clone(&system.model);
         let placed = |nodes: &[u32], turns: bool| {
-            let (nodes, components) = expand(nodes, turns);
-            matrix.places(equations, &nodes, components)
+            let (nodes, components) = system.expanded(nodes, turns);
+            matrix.places(&system.equations, &nodes, components)
         };
-        system.places = model.facets.iter().map(|facet| placed(&facet.nodes, true)).collect();
+        let of_facets = model.facets.iter().map(|facet| placed(&facet.nodes, true)).collect();
         let is_bound = |facet: &Facet| {
-            followers.is_some_and(|followers| followers.expanded(&facet.nodes, true).is_some())
+            system
+                .followers
+                .as_ref()
+                .is_some_and(|followers| followers.expanded(&facet.nodes, true).is_some())
         };
-        system.bound = model.facets.iter().map(is_bound).collect();
+        let bound = model.facets.iter().map(is_bound).collect();
         let places = |nodes: &[u32]| placed(nodes, false);
         let of_solid = |(solid, stars): (&Solid, &Option<Stars>)| {
             let cells = (0..solid.cells.len()).map(|cell| places(solid.cells.nodes(cell)));
@@ -291,11 +299,14 @@ impl System {
         let of_load = |(_, faces, _): (&Load, &Vec<Face>, f64)| {
             faces.iter().map(|face| places(corners(face))).collect()
         };
-        system.face_places = pressing(&model).map(of_load).collect();
-        system.solid_places = model.solids.iter().zip(&system.stars).map(of_solid).collect();
+        let of_faces = pressing(&model).map(of_load).collect();
+        let of_solids = model.solids.iter().zip(&system.stars).map(of_solid).collect();
+        (system.places, system.bound) = (of_facets, bound);
+        (system.face_places, system.solid_places) = (of_faces, of_solids);
         let (device, before) = (system.device.as_ref(), system.workspace.as_mut());
-        let workspace = Workspace::new(system.solver, device, &system.equations, matrix, before);
+        let workspace = Workspace::new(system.solver, device, &system.equations, &matrix, before);
         system.workspace = Some(workspace.map_err(linear_error)?);
+        system.matrix = matrix;
         Ok(())
     }
 
@@ -1273,6 +1284,7 @@ fn linear_error(error: LinearError) -> SolveError {
         LinearError::TooLarge => SolveError::Impossible(
             "the equations are too many for the direct solver; use conjugate gradients",
         ),
+        LinearError::OutOfMemory(needed) => SolveError::OutOfMemory(needed),
         LinearError::Device(error) => SolveError::Device(error),
         LinearError::NotFinite => SolveError::Impossible("the stiffness is not finite; use smaller steps"),
         LinearError::Indefinite(iterations) => SolveError::Indefinite { iterations },

@@ -15,6 +15,7 @@
 //! assert!(stress.isochoric.0[0] + stress.volumetric.0[0] > 1000.0); // S₁₁ [Pa]
 //! ```
 
+pub mod count;
 pub mod curve;
 pub mod element;
 mod energies;
@@ -25,6 +26,7 @@ pub mod harmonic;
 pub mod law;
 pub mod load;
 pub mod mapping;
+pub mod memory;
 pub mod model;
 pub mod order;
 pub mod prony;

@@ -3,13 +3,15 @@
 use std::fmt::{self, Write};
 
 use pliant_geometry::QualityReport;
-use pliant_implicit::Facet;
+use pliant_implicit::{Facet, bytes_of_factors};
 use pliant_mechanics::load::{Load, LoadKind};
+use pliant_mechanics::memory;
 use pliant_mechanics::model::Motion;
 use pliant_sim::contact::touch::With;
 use pliant_sim::{BodyCells, Critical, ImplicitBodies, counted, number};
 
 use crate::output::{AddedMass, bodies, told_limit};
+use pliant_scene::format::{LinearName, PreconditionerName, SolverName};
 use pliant_scene::registry::OutputTable;
 use pliant_scene::{Built, Limits, Plan, Scene, World};
 
@@ -209,12 +211,43 @@ fn write_implicit(page: &mut String, part: &ImplicitBodies, name: &str, built: &
     }
 }
 
+/// What the factors of the equations take where a solver needs them, and a warning where that is more than is free.
+fn write_factors(page: &mut String, scene: &Scene, built: &Built) -> fmt::Result {
+    let table = scene.run.linear.table();
+    let needs = match table.by {
+        LinearName::Direct => true,
+        LinearName::ConjugateGradients => table.preconditioner == PreconditionerName::LaggedFactors,
+        LinearName::Unsymmetric => false,
+    };
+    let solves = matches!(scene.run.solver, SolverName::Static | SolverName::Implicit);
+    let Some(part) = built.implicit.as_ref().filter(|_| solves && needs) else { return Ok(()) };
+    match bytes_of_factors(&part.model) {
+        Ok(bytes) => {
+            writeln!(
+                page,
+                "factors of the equations: {} of memory, without contacts",
+                memory::in_words(bytes)
+            )?;
+            if let Some(free) = memory::free().filter(|&free| free < bytes) {
+                let free = memory::in_words(free);
+                writeln!(
+                    page,
+                    "warning: {free} are free: take `linear = {{ by = \"conjugate-gradients\" }}` or a coarser mesh"
+                )?;
+            }
+            Ok(())
+        }
+        Err(error) => writeln!(page, "warning: {error}"),
+    }
+}
+
 fn write_step(page: &mut String, scene: &Scene, built: &Built, plan: &Plan) -> fmt::Result {
     let Some(Limits { critical: Critical { bound, assembled: limit }, limiting }) = &plan.limits else {
         let (step, until, solver) =
             (number(plan.steps.step), number(scene.scene.until), scene.run.solver.word());
         let steps = counted(plan.steps.number as usize, "step");
-        return writeln!(page, "\nsolver `{solver}`: {steps} of {step} s for {until} s");
+        writeln!(page, "\nsolver `{solver}`: {steps} of {step} s for {until} s")?;
+        return write_factors(page, scene, built);
     };
     let seconds = plan.steps.number as f64 * limit.seconds_per_call;
     writeln!(page, "\ncritical time step:")?;

@@ -18,6 +18,8 @@ const IN_ONE_PLACE: f64 = 1e-3;
 const SKIN: [f64; 2] = [0.25, 0.55];
 /// Width of the bins that pairs are sorted into by their distance, over the distance of the barrier.
 const BIN: f64 = 0.2;
+/// The most bins: those beyond are in the last one.
+const BINS: usize = 1 << 12;
 /// The least skin and the longest motion, over the distance of the barrier. The longest is a mean edge if that is more, and that of a surface which touches
 /// itself always: all its parts are near others, and their lists would grow with the square of a motion over an edge.
 const SKINS: [f64; 2] = [0.5, 20.0];
@@ -257,7 +259,7 @@ impl Group {
 
     /// The bin of a distance [m].
     fn bin(&self, distance: f64) -> usize {
-        (distance / (BIN * self.action.law.distance)) as usize
+        ((distance / (BIN * self.action.law.distance)) as usize).min(BINS)
     }
 
     /// Puts candidates into their bins.
@@ -285,7 +287,7 @@ impl Group {
 
     /// The candidates that may be nearer than a distance [m] now, and some more.
     fn nearer_than(&self, distance: f64) -> &[Candidate] {
-        let after = self.bin(distance + self.nearer).saturating_add(1);
+        let after = self.bin(distance + self.nearer) + 1;
         let end = self.bins.get(after).map_or(self.candidates.len(), |&end| end as usize);
         &self.candidates[..end]
     }

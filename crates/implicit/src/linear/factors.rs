@@ -3,9 +3,11 @@
 //! the signs of pivots are wanted. They are found on one thread; solutions share two parts of the assembly tree between threads. Bits do not
 //! depend on how many there are.
 
+use pliant_mechanics::memory::zeros;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::fronts::{BLOCK, Left, PivotColumns, dot, eliminate, multiply};
+use super::report::LinearError;
 use super::supernodes::{Supernode, Supernodes, padded};
 use crate::sparse::LowerMatrix;
 
@@ -58,24 +60,26 @@ struct Memory {
 }
 
 impl Factors {
-    pub(crate) fn new(matrix: &LowerMatrix) -> Result<Self, faer::sparse::FaerError> {
+    /// # Errors
+    /// If there are more equations than can be numbered, or no room for the factors.
+    pub(crate) fn new(matrix: &LowerMatrix) -> Result<Self, LinearError> {
         Self::shared_from(matrix, SHARED)
     }
 
     /// Factors whose solutions are shared if they have at least so many numbers.
-    fn shared_from(matrix: &LowerMatrix, least: usize) -> Result<Self, faer::sparse::FaerError> {
+    fn shared_from(matrix: &LowerMatrix, least: usize) -> Result<Self, LinearError> {
         let supernodes = Supernodes::new(matrix)?;
         let shares =
             if supernodes.values < least { [supernodes.nodes.len(); 2] } else { supernodes.shares() };
         let rest = matrix.len() - supernodes.column(shares[1]);
         Ok(Self {
             shares,
-            value: vec![0.0; supernodes.values],
+            value: zeros(supernodes.values)?,
             pivot: vec![0.0; matrix.len()],
             diagonal: vec![0.0; matrix.len()],
             memory: Memory {
                 scaled: vec![0.0; supernodes.highest * BLOCK],
-                stacks: supernodes.stacks.map(|numbers| vec![0.0; numbers]),
+                stacks: [zeros(supernodes.stacks[0])?, zeros(supernodes.stacks[1])?],
                 waiting: Vec::with_capacity(supernodes.nodes.len()),
                 right: vec![0.0; matrix.len()],
                 below: [(); 2].map(|()| vec![0.0; padded(supernodes.most_below)]),
@@ -84,6 +88,15 @@ impl Factors {
             arch: Arch::new(),
             supernodes,
         })
+    }
+
+    /// Bytes that those of a pattern take.
+    ///
+    /// # Errors
+    /// If there are more equations than can be numbered, or the order of elimination has no room.
+    pub(crate) fn bytes(matrix: &LowerMatrix) -> Result<u64, LinearError> {
+        let Supernodes { values, stacks: [even, odd], .. } = Supernodes::new(matrix)?;
+        Ok(8 * (values + even + odd) as u64)
     }
 
     /// Factors a matrix; `None` if it holds a number that is not finite.

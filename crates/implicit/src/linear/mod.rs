@@ -131,15 +131,10 @@ impl Workspace {
             }
             _ => None,
         };
-        let too_large = |_| LinearError::TooLarge;
         Ok(Self {
             solver,
-            factors: if direct && !empty { Some(Factors::new(matrix).map_err(too_large)?) } else { None },
-            unsymmetric: if whole && !empty {
-                Some(LuFactors::new(matrix).map_err(too_large)?)
-            } else {
-                None
-            },
+            factors: if direct && !empty { Some(Factors::new(matrix)?) } else { None },
+            unsymmetric: if whole && !empty { Some(LuFactors::new(matrix)?) } else { None },
             current: false,
             fresh: false,
             factored: Vec::new(),
@@ -166,7 +161,7 @@ impl Workspace {
     pub(crate) fn prepare(&mut self, matrix: &LowerMatrix) -> Result<Pivots, LinearError> {
         self.fresh = false;
         if let Some(factors) = &mut self.unsymmetric {
-            factors.factorise(matrix).ok_or(LinearError::NotFinite)?;
+            factors.factorise(matrix)?;
         }
         if let Some(blocks) = &mut self.blocks {
             let (coarse, on_device) = (self.coarse.as_mut(), self.on_device.is_some());

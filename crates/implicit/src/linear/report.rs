@@ -1,5 +1,8 @@
 //! What a solution of linear equations took, or why there is none.
 
+use faer::sparse::FaerError;
+use pliant_mechanics::memory::OutOfMemory;
+
 use super::device::DeviceError;
 
 /// What a solution took.
@@ -16,8 +19,25 @@ pub struct LinearReport {
 pub(crate) enum LinearError {
     /// More equations than factors can number.
     TooLarge,
+    /// Factors that the system has no room for, and how much of it they take where that is known.
+    OutOfMemory(Option<OutOfMemory>),
     Device(DeviceError),
     NotFinite,
     Indefinite(usize),
     Stalled(LinearReport),
+}
+
+impl From<FaerError> for LinearError {
+    fn from(error: FaerError) -> Self {
+        match error {
+            FaerError::OutOfMemory => Self::OutOfMemory(None),
+            _ => Self::TooLarge,
+        }
+    }
+}
+
+impl From<OutOfMemory> for LinearError {
+    fn from(error: OutOfMemory) -> Self {
+        Self::OutOfMemory(Some(error))
+    }
 }

@@ -138,7 +138,8 @@ impl Groups {
     fn order(&self) -> Result<Vec<u32>, faer::sparse::FaerError> {
         let count = self.len();
         let (mut order, mut place) = (vec![0_u32; count], vec![0_u32; count]);
-        let mut memory = MemBuffer::new(amd::order_scratch::<u32>(count, self.row.len()));
+        let memory = MemBuffer::try_new(amd::order_scratch::<u32>(count, self.row.len()));
+        let mut memory = memory.map_err(|_| faer::sparse::FaerError::OutOfMemory)?;
         let pattern = SymbolicSparseColMatRef::new_checked(count, count, &self.row_start, None, &self.row);
         let stack = MemStack::new(&mut memory);
         amd::order(&mut order, &mut place, pattern, amd::Control::default(), stack)?;

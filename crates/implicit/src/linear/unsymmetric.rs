@@ -1,10 +1,12 @@
 //! L U of a matrix that is not symmetric (faer; the symbolic part once a pattern), on one thread.
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::sparse::linalg::LuError;
 use faer::sparse::linalg::lu::{LuRef, LuSymbolicParams, NumericLu, SymbolicLu, factorize_symbolic_lu};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::sparse::{FaerError, SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Spec};
 
+use super::report::LinearError;
 use crate::sparse::LowerMatrix;
 
 /// L U of the whole matrix.
@@ -20,7 +22,7 @@ pub(super) struct LuFactors {
 }
 
 impl LuFactors {
-    pub(super) fn new(matrix: &LowerMatrix) -> Result<Self, faer::sparse::FaerError> {
+    pub(super) fn new(matrix: &LowerMatrix) -> Result<Self, LinearError> {
         let mut columns: Vec<Vec<(u32, (u32, bool))>> = vec![Vec::new(); matrix.len()];
         // Columns to the left are done first, so rows above the diagonal come in order.
         for column in 0..matrix.len() {
@@ -44,30 +46,35 @@ impl LuFactors {
         let size = matrix.len();
         let pattern = SymbolicSparseColMatRef::new_checked(size, size, &column_start, None, &row);
         let symbolic = factorize_symbolic_lu(pattern, LuSymbolicParams::default())?;
-        let memory = MemBuffer::new(StackReq::any_of(&[
+        let memory = MemBuffer::try_new(StackReq::any_of(&[
             symbolic.factorize_numeric_lu_scratch::<f64>(Par::Seq, Spec::default()),
             symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
-        ]));
+        ]))
+        .map_err(FaerError::from)?;
         let value = vec![0.0; row.len()];
         Ok(Self { symbolic, numeric: NumericLu::new(), column_start, row, value, source, memory })
     }
 
-    /// Factors a matrix; `None` if it holds a number that is not finite.
-    pub(super) fn factorise(&mut self, matrix: &LowerMatrix) -> Option<()> {
+    /// Factors a matrix.
+    ///
+    /// # Errors
+    /// If it holds a number that is not finite, or there is no room for the factors.
+    pub(super) fn factorise(&mut self, matrix: &LowerMatrix) -> Result<(), LinearError> {
         for (value, &(at, mirrored)) in self.value.iter_mut().zip(&self.source) {
             *value = if mirrored { matrix.mirror[at as usize] } else { matrix.value[at as usize] };
             if !value.is_finite() {
-                return None;
+                return Err(LinearError::NotFinite);
             }
         }
         let size = matrix.len();
         let pattern = SymbolicSparseColMatRef::new_checked(size, size, &self.column_start, None, &self.row);
         let whole = SparseColMatRef::new(pattern, &self.value[..]);
         let stack = MemStack::new(&mut self.memory);
-        self.symbolic
-            .factorize_numeric_lu(&mut self.numeric, whole, Par::Seq, stack, Spec::default())
-            .ok()
-            .map(|_| ())
+        match self.symbolic.factorize_numeric_lu(&mut self.numeric, whole, Par::Seq, stack, Spec::default()) {
+            Ok(_) => Ok(()),
+            Err(LuError::Generic(error)) => Err(error.into()),
+            Err(LuError::SymbolicSingular { .. }) => Err(LinearError::NotFinite),
+        }
     }
 
     /// x ← A⁻¹ x.
