@@ -20,6 +20,7 @@
 
 use std::sync::Arc;
 
+use pliant_mechanics::count;
 use pliant_mechanics::load::Load;
 use pliant_mechanics::model::{Constraint, Contradiction, Enclosed, FREE, Model};
 use pliant_mechanics::tensor::{Vector, add, cast, scale, sub};
@@ -255,6 +256,7 @@ pub struct Equilibrium<R> {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Way<R> {
     /// Equilibria found.
+    #[serde(deserialize_with = "count::read")]
     pub equilibria: u64,
     /// Estimated error of the external work [J]: the trapezia less the integral. That of a first one is known where the next way
     /// isn't much shorter.

@@ -43,6 +43,11 @@ impl Foresight {
         self.last = Some(Check { limit, steps, deformed, rate });
     }
 
+    /// Steps done at the last check.
+    pub(crate) fn noted_at(&self) -> Option<u64> {
+        self.last.map(|last| last.steps)
+    }
+
     /// Whether a check, so many steps done, would leave steps of a length [s] in the same parts.
     pub(crate) fn covers(&self, steps: u64, deformed: &Deformed, step: f64, parts: u32) -> bool {
         let Some(Check { limit, steps: at, deformed: seen, rate: Some(rate) }) = self.last else {

@@ -1,5 +1,6 @@
 //! The record of a run's critical time step, and of the steps that were cut: part of the state.
 
+use pliant_mechanics::count;
 use pliant_mechanics::model::Model;
 use serde::{Deserialize, Serialize};
 
@@ -20,24 +21,30 @@ pub struct Stability {
     /// Parts of the step under way already done; 0 between steps.
     pub done: u32,
     /// Checks of the limit.
+    #[serde(deserialize_with = "count::read")]
     pub checks: u64,
     /// Critical time steps computed since the beginning.
+    #[serde(deserialize_with = "count::read")]
     pub critical_steps: u32,
     /// The last check.
     pub last: Option<StepLimit>,
     /// The check with the smallest limit.
     pub smallest: Option<StepLimit>,
     /// Steps at the start of which the limit was known to be below the whole step.
+    #[serde(deserialize_with = "count::read")]
     pub steps_below: u64,
     /// How often whole steps were given up for substeps.
+    #[serde(deserialize_with = "count::read")]
     pub cuts: u32,
     /// Time [s] of the first cut.
     pub first_cut: Option<f64>,
     /// Time [s] at which the last step that was cut began.
     pub last_cut: Option<f64>,
     /// The most parts of a step.
+    #[serde(deserialize_with = "count::read")]
     pub most_substeps: u32,
     /// Substeps beyond one a step, in all.
+    #[serde(deserialize_with = "count::read")]
     pub extra_steps: u64,
     /// How often the steps were halved after a failure.
     pub halvings: u32,
@@ -82,13 +89,20 @@ impl Default for Stability {
 }
 
 impl Stability {
-    /// Whether it can be of a state between two steps of a model.
-    pub fn fits(&self, model: &Model) -> bool {
+    /// Whether it can be of a state between two steps of a model, so many steps done.
+    pub fn fits(&self, model: &Model, steps: u64) -> bool {
         let known = |found: &StepLimit| {
             model.solids.get(found.solid).is_some_and(|solid| found.cell < solid.cells.len())
                 && found.limit > 0.0
         };
+        let before = [
+            Some(self.needed_at),
+            Some(self.checked_at),
+            self.reference.map(|(_, at)| at),
+            self.foresight.noted_at(),
+        ];
         self.done == 0
+            && before.into_iter().flatten().all(|at| at <= steps)
             && self.halvings <= MOST_HALVINGS
             && (1..=MOST_SUBSTEPS << self.halvings).contains(&self.substeps)
             && self.last.iter().chain(&self.smallest).all(known)

@@ -3,6 +3,7 @@
 use pliant_contact::lag::Lag;
 use pliant_contact::pose::Leg;
 use pliant_contact::touch::Gripped;
+use pliant_mechanics::count;
 use pliant_mechanics::model::{self, Constraint, FREE, Model, Motion, fill, placed};
 use pliant_mechanics::tensor::{Vector, add};
 use serde::{Deserialize, Serialize};
@@ -20,6 +21,7 @@ pub struct State<R> {
     /// Time [s].
     pub time: f64,
     /// Whole steps done.
+    #[serde(deserialize_with = "count::read")]
     pub steps: u64,
     /// Displacements u of the nodes [m].
     pub displacement: Vec<Vector<R>>,
@@ -64,6 +66,7 @@ pub struct Work {
     /// ⅛ Δt² Σ m|a|² at the start, which the mean velocity of the method keeps from the kinetic energy from then on.
     pub(crate) at_start: f64,
     /// Steps in a row that were off balance.
+    #[serde(deserialize_with = "count::read")]
     pub(crate) steps_off_balance: u32,
     /// Whether the model was changed, and the energies have not been balanced since.
     pub(crate) shaken: bool,

@@ -1,5 +1,6 @@
 //! Steps against the largest stable one: watches the limit, cuts steps into parts, and keeps the clock.
 
+use pliant_mechanics::count;
 use pliant_mechanics::model::Model;
 use serde::{Deserialize, Serialize};
 
@@ -55,6 +56,7 @@ pub struct Clock {
     /// Time [s] from which whole steps are counted …
     pub since: f64,
     /// … and those done before.
+    #[serde(deserialize_with = "count::read")]
     pub steps: u64,
     /// Length of the (sub)step that led to the state's instant [s].
     pub before: f64,

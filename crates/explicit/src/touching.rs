@@ -264,7 +264,9 @@ impl<R: Scalar> Touching<R> {
     /// The force [N] on each node that touches something.
     pub fn nodal_forces(&self) -> impl Iterator<Item = (u32, Vector<f64>)> {
         let nodes = self.near.iter().map(|&node| (&self.nodes[node as usize], self.numbers[node as usize]));
-        let touching = nodes.filter(|(node, _)| node.then != node.free);
+        // Guests are the last ones.
+        let own = nodes.take_while(|(_, number)| self.guests.place_of(*number).is_none());
+        let touching = own.filter(|(node, _)| node.then != node.free);
         touching.map(|(node, number)| (number, over(&(node.then - node.free), &node.own).into()))
     }
 

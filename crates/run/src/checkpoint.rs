@@ -10,7 +10,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::read_limited;
-use pliant_mechanics::fingerprint;
+use pliant_mechanics::{count, fingerprint};
 use pliant_sim::{Precision, Schedule, State, counted, number};
 use serde::{Deserialize, Serialize};
 
@@ -56,6 +56,7 @@ struct OwnOrigin {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Progressed {
     pub time: f64,
+    #[serde(deserialize_with = "count::read")]
     pub steps: u64,
     pub wall_seconds: f64,
     /// The worst that was seen of each participant.
@@ -479,7 +480,10 @@ impl Checkpoint {
             && progressed.watched.len() == parts.len()
             && progressed.outputs.len() == world.scene.outputs.len()
             && self.origin.participants.len() == parts.len();
-        if whole { State::decode(simulated, participants) } else { None }
+        if !whole {
+            return None;
+        }
+        State::decode(simulated, participants).filter(|state| state.time() == progressed.time)
     }
 }
 

@@ -13,6 +13,7 @@ use std::ops::Range;
 
 use pliant_contact::pairs::Surface;
 use pliant_contact::touch::Contact;
+use pliant_mechanics::count::Count;
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::tensor::{Vector, add, cross, dot, scale, sub};
 use serde::{Deserialize, Serialize};
@@ -76,7 +77,8 @@ impl GuestMemory {
     pub(crate) fn fits(&self, sets: &[Guests]) -> bool {
         let guests: usize = sets.iter().map(|set| set.nodes.len()).sum();
         let lengths = [self.guests.len(), self.counts.len(), self.last.len(), self.worst.len()];
-        lengths == [0; 4] || lengths == [guests, sets.len(), sets.len(), sets.len()]
+        let counted = self.counts.iter().flatten().all(|count| count.can_go_on());
+        counted && (lengths == [0; 4] || lengths == [guests, sets.len(), sets.len(), sets.len()])
     }
 }
 

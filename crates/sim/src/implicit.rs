@@ -19,6 +19,7 @@ use pliant_implicit::{
     Assembly, Attempted, BackwardEuler, DynamicSettings, Explicit, Forces, Phases, SolveError, Spring, State,
     Statics, TouchingNow, TouchingSystem,
 };
+use pliant_mechanics::count;
 use pliant_mechanics::grip::{Grip, ROOM};
 use pliant_mechanics::mapping::Mapping;
 use pliant_mechanics::model::{Enclosed, Motion};
@@ -106,6 +107,7 @@ pub(crate) struct Path {
     factor: f64,
     /// Its last change.
     change: f64,
+    #[serde(deserialize_with = "count::read")]
     limit_points: u32,
     /// Why it ended before its last step.
     ended: Option<String>,
@@ -1039,6 +1041,7 @@ fn failure(
         SolveError::Broken { cell, .. } => ("inverted", None, bodies.cell(*cell)),
         SolveError::Stopped => return Failure::stopped(time),
         SolveError::Device(_) => ("device", None, None),
+        SolveError::OutOfMemory(_) => ("memory", None, None),
         SolveError::Open(_) | SolveError::Impossible(_) => ("input", None, None),
     };
     let owner = match error {

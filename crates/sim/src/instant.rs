@@ -8,6 +8,7 @@ use pliant_explicit::NodeContact;
 use pliant_explicit::recover::CellFields;
 use pliant_explicit::stability::Stability;
 use pliant_mechanics::Energies;
+use pliant_mechanics::count;
 use pliant_mechanics::model::Enclosed;
 use serde::{Deserialize, Serialize};
 
@@ -161,20 +162,26 @@ pub trait Instant {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Effort {
     /// Iterations of Newton's method in all.
+    #[serde(deserialize_with = "count::read")]
     pub newton_iterations: u64,
     /// Linear equations solved.
+    #[serde(deserialize_with = "count::read")]
     pub solutions: u64,
     /// Iterations of conjugate gradients in all; 0 with factors.
+    #[serde(deserialize_with = "count::read")]
     pub linear_iterations: u64,
     /// Linear equations that single precision on a GPU could not solve, and that the CPU finished.
+    #[serde(deserialize_with = "count::read")]
     pub left_to_cpu: u64,
     /// Residual of the last solution by conjugate gradients over its right-hand side; 0 with factors.
     pub linear_residual: f64,
     /// Residual of the last step over the largest of loads, internal and inertial forces; `None` where it was not checked.
     pub residual: Option<f64>,
     /// Steps that were halved.
+    #[serde(deserialize_with = "count::read")]
     pub halved: u64,
     /// Steps whose iterations ran out, and that were taken as they were.
+    #[serde(deserialize_with = "count::read")]
     pub unconverged: u64,
     /// Wall time of forces and stiffness of the cells [s].
     pub seconds_cells: f64,

@@ -9,6 +9,7 @@ use pliant_contact::pose::Leg;
 use pliant_contact::touch::{Contacts, Gripped};
 use pliant_explicit::{Scalar, State};
 use pliant_implicit::History;
+use pliant_mechanics::count::{self, is_time};
 use pliant_mechanics::tensor::Symmetric;
 use pliant_mechanics::{Energies, Model};
 use serde::de::DeserializeOwned;
@@ -77,6 +78,15 @@ impl Kept {
         }
     }
 
+    /// Its time [s], and the steps done.
+    pub fn at(&self) -> (f64, u64) {
+        match self {
+            Self::Single(state, _) => (state.time, state.steps),
+            Self::Double(state, _) => (state.time, state.steps),
+            Self::Implicit(state) => (state.time, state.done),
+        }
+    }
+
     /// Whether it has the sizes of a participant's model, and is of its method.
     pub fn fits(&self, part: &Part) -> bool {
         match self {
@@ -91,6 +101,7 @@ impl Kept {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ImplicitState {
     /// Whole steps done, and the time [s] they end at.
+    #[serde(deserialize_with = "count::read")]
     pub done: u64,
     pub time: f64,
     pub state: PlainState,
@@ -162,9 +173,11 @@ impl ImplicitState {
         };
         let limited = limited.into_iter().flat_map(|limits| limits.keys().copied());
         let lags = self.lags.iter().map(Lag::number).eq(limited) && self.lags.iter().all(Lag::is_finite);
+        let times = [self.time, self.state.time];
         before
             && contact
             && lags
+            && times.into_iter().all(|time| is_time(time, part.steps.step))
             && self.path.fits(nodes)
             && self.legs.iter().all(|(_, leg)| leg.is_finite())
             && self.previous.iter().all(|state| state.fits(model))
@@ -234,10 +247,13 @@ impl PlainState {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Iterated {
     /// Step, counted from 1, and the attempt at it.
+    #[serde(deserialize_with = "count::read")]
     pub step: u64,
+    #[serde(deserialize_with = "count::read")]
     pub attempt: usize,
     /// The time that it was to reach [s].
     pub time: f64,
+    #[serde(deserialize_with = "count::read")]
     pub iteration: usize,
     /// Residual, and what was allowed at the end of the attempt: [N] of static steps, over the largest force of implicit ones.
     pub residual: f64,
@@ -276,6 +292,7 @@ fn fits<R: Scalar>(state: &State<R>, memory: &Memory<R>, part: &Part) -> bool {
     sizes(state) == sizes(&rest)
         && state.forces.iter().all(keeps)
         && state.forces[0].len() == state.forces[1].len()
-        && state.stability.fits(model)
+        && is_time(state.time, part.steps.step)
+        && state.stability.fits(model, state.steps)
         && memory.fits(model.node_count())
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use pliant_contact::pose::Leg;
 use pliant_explicit::{Clock, Wanted};
+use pliant_mechanics::count::is_time;
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::model::Enclosed;
 use pliant_mechanics::tensor::Vector;
@@ -44,6 +45,18 @@ impl World {
             part.steps.meet(common, duration);
         }
         Self { parts, ties: Vec::new(), guests: Vec::new() }
+    }
+
+    /// A fingerprint of its bodies with their meshes, and of its tools and obstacles, by name; not of laws, loads or steps.
+    pub fn fingerprint_of_bodies(&self) -> u64 {
+        let of = |part: &Part| {
+            let bodies = part.model.bodies.iter().map(|body| (body.name.clone(), body.nodes.clone()));
+            let contacts = part.method.contacts();
+            let things = contacts.iter().flat_map(|all| &all.rigids).map(|rigid| rigid.name.clone());
+            let bodies: Vec<_> = bodies.collect();
+            (bodies, part.model.rest.clone(), meshes(&part.model), things.collect::<Vec<_>>())
+        };
+        fingerprint(&self.parts.iter().map(of).collect::<Vec<_>>())
     }
 
     /// Steps of each participant between two common instants.
@@ -140,6 +153,11 @@ impl State {
         parts.iter().map(of).chain(between).collect()
     }
 
+    /// Its time [s].
+    pub fn time(&self) -> f64 {
+        self.0.first().map_or(0.0, |own| own.kept.at().0)
+    }
+
     /// Halves the steps of all participants of its world that [cut theirs](World::cuts_steps) from here on. False where there are none, or
     /// where that was done [three times](pliant_explicit::stability::MOST_HALVINGS).
     pub fn halve_steps(&mut self, world: &World) -> bool {
@@ -170,6 +188,16 @@ impl State {
         let of = |(part, bytes): (&Part, &B)| {
             let (steps, bytes) = postcard::take_from_bytes::<Option<(Clock, f64)>>(bytes.as_ref()).ok()?;
             let kept = Kept::decode(part, bytes)?;
+            let done = kept.at().1;
+            let fits = |&(clock, step): &(Clock, f64)| {
+                clock.steps <= done
+                    && is_time(clock.since, step)
+                    && clock.before.is_finite()
+                    && step.is_finite()
+            };
+            if !steps.iter().all(fits) {
+                return None;
+            }
             Some(OwnState {
                 kept,
                 clock: steps.map(|of| of.0),
@@ -480,7 +508,7 @@ impl Simulation {
         }
     }
 
-    /// Looks at a flag from now on within load steps and steps whose equations are solved. A step that it ends fails as
+    /// Looks at a flag from now on within load steps, steps whose equations are solved, and common steps of participants. A step that it ends fails as
     /// [interrupted](Failure::is_interrupted), and the simulation stays at the instant before, with the same bits as if the step had never begun.
     pub fn stop_on(&mut self, flag: &StopFlag) {
         self.participants.iter_mut().for_each(|participant| participant.stop_on(flag));
@@ -489,7 +517,17 @@ impl Simulation {
 
     /// Whether a flag may end steps before their end.
     fn can_stop_within(&self) -> bool {
-        self.stop.is_some() && self.world.parts.iter().any(|part| part.method.takes_long())
+        let takes_long = |(part, ratio): (&Part, &u64)| part.method.takes_long() || *ratio > 1;
+        self.stop.is_some() && self.world.parts.iter().zip(&self.ratios).any(takes_long)
+    }
+
+    /// Ends a common step of several steps of a participant where that was asked for.
+    ///
+    /// # Errors
+    /// If so.
+    fn heed_stop(&self) -> Result<(), Failure> {
+        let is_asked = self.stop.as_ref().is_some_and(StopFlag::is_asked) && self.can_stop_within();
+        if is_asked { Err(Failure::stopped(self.time())) } else { Ok(()) }
     }
 
     fn pass(&mut self, steps: u64, watch: &mut dyn FnMut(LoadStepProgress)) -> Result<(), Failure> {
@@ -508,9 +546,10 @@ impl Simulation {
         steps: u64,
         watch: &mut dyn FnMut(LoadStepProgress),
     ) -> Result<(), Failure> {
-        let participant = &mut self.participants[part];
         let mut left = steps * self.ratios[part];
         loop {
+            self.heed_stop()?;
+            let participant = &mut self.participants[part];
             let now = left.min(participant.stride());
             participant.advance(now, watch)?;
             left -= now;
@@ -526,6 +565,7 @@ impl Simulation {
     fn advance_tied(&mut self, watch: &mut dyn FnMut(LoadStepProgress)) -> Result<(), Failure> {
         self.done.fill(0);
         while let Some(part) = self.hindmost() {
+            self.heed_stop()?;
             // Forces of the first step are found where all meet; only equations are solved with ties as they are then.
             let first = self.done[part] == 0;
             if !first {
@@ -557,6 +597,7 @@ impl Simulation {
             self.before = before;
             back?;
             while let Some(part) = self.hindmost() {
+                self.heed_stop()?;
                 // Who has not gone back has found the forces of the first step where all met.
                 if pass > 0 || self.done[part] > 0 || self.meetings.is_host(part) {
                     self.take_hold(part);
@@ -976,11 +1017,13 @@ fn ahead<'a>(parts: &'a [Part], done: &'a [u64], part: usize, more: u64) -> impl
 
 /// Whether a participant has the nodes and cells that another one has.
 fn same_mesh(a: &Part, b: &Part) -> bool {
-    let cells = |model: &Model| -> Vec<(String, u64)> {
-        model.fingerprints().into_iter().filter(|(part, _)| part.starts_with("mesh of")).collect()
-    };
     let shells = |part: &Part| part.method.bodies().map(|bodies| bodies.model.rest.len());
-    a.model.rest == b.model.rest && shells(a) == shells(b) && cells(&a.model) == cells(&b.model)
+    a.model.rest == b.model.rest && shells(a) == shells(b) && meshes(&a.model) == meshes(&b.model)
+}
+
+/// Fingerprints of the meshes of a model.
+fn meshes(model: &Model) -> Vec<(String, u64)> {
+    model.fingerprints().into_iter().filter(|(part, _)| part.starts_with("mesh of")).collect()
 }
 
 /// A simulation at an instant whose forces are found.

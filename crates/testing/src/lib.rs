@@ -1,4 +1,4 @@
-//! Helpers of tests: numbers at random that are the same in every run, files damaged by them, hexahedra of simple bodies, and the memory of
+//! Helpers of tests: numbers at random that are the same in every run, files damaged by them and [what became of these](forging), hexahedra of simple bodies, and the memory of
 //! the process; with the features `images`, `organs`, `pieces` and `scenes` image files, label images and meshes of analytic organs, small
 //! bodies that meet, and scenes that are checked and run.
 //!
@@ -7,6 +7,7 @@
 //! assert!((-1.0..1.0).contains(&random.number()) && random.below(3) < 3);
 //! ```
 
+pub mod forging;
 mod grown;
 #[cfg(feature = "images")]
 pub mod image_files;

@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use pliant_explicit::model_balance_floor;
 use pliant_explicit::stability::Stability;
 use pliant_mechanics::Energies;
+use pliant_mechanics::count;
 use pliant_mechanics::model::Enclosed;
 use pliant_sim::contact::barrier::IntersectionCheck;
 use pliant_sim::contact::lag::Lag;
@@ -240,10 +241,13 @@ pub(crate) struct Watched {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Intersections {
     /// All of them, counted in each state.
+    #[serde(deserialize_with = "count::read")]
     pub count: u64,
     /// States that were searched.
+    #[serde(deserialize_with = "count::read")]
     pub searched: u64,
     /// States with some.
+    #[serde(deserialize_with = "count::read")]
     pub states: u64,
     /// The largest depth [m].
     pub deepest: f64,

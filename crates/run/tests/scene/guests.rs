@@ -6,7 +6,7 @@ use pliant_sim::contact::pose::Pose;
 use pliant_testing::scenes::{last_row_in, resumes, run, world};
 
 /// A plate of 353 mN, of a shell, a little above a held block of soft tissue.
-fn pressed(step: f64, until: f64, more: &str) -> String {
+pub(super) fn pressed(step: f64, until: f64, more: &str) -> String {
     format!(
         "[scene]\nuntil = {until}\ngravity = [0, 0, -9.81]\n\
          [participant.walls]\nbodies = ['plate']\nsolver = 'implicit'\nstep = {step}\n\

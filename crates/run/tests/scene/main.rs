@@ -13,6 +13,7 @@ mod contact_ways;
 mod corpus;
 mod doubts;
 mod force_limit;
+mod forged;
 mod grasper;
 mod grips;
 mod guests;

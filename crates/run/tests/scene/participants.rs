@@ -8,6 +8,7 @@ use pliant_geometry::CellKind;
 use pliant_geometry::io;
 use pliant_run::Live;
 use pliant_scene::World;
+use pliant_sim::StopFlag;
 use pliant_testing::scenes::{self, last_row_in, run_world, taken_up};
 
 const LAWS: &str = r#"
@@ -98,6 +99,24 @@ fn each_participant_comes_out_as_it_does_alone() {
     for piece in ["## Time step of `walls`", "## Time step of `solids`", "## Energy of all at the end"] {
         assert!(page.contains(piece), "no `{piece}` in {page}");
     }
+}
+
+/// A common step may be thousands of steps of a participant: a stop is heard between them, and the simulation stays at the instant before.
+#[test]
+fn a_stop_is_heard_within_a_common_step() {
+    let world = world(&both("").replace(IMPLICIT, "solver = 'explicit'\n"));
+    let [mut stopped, mut whole] = [(); 2].map(|()| world.simulation().unwrap());
+    let stop = StopFlag::default();
+    stopped.stop_on(&stop);
+    stopped.step(1).unwrap();
+    let before = (stopped.time(), stopped.fingerprint());
+    stop.ask();
+    assert!(stopped.step(1).unwrap_err().is_interrupted());
+    assert_eq!((stopped.time(), stopped.fingerprint()), before);
+    stop.clear();
+    stopped.step(1).unwrap();
+    (0..2).for_each(|_| assert_eq!(whole.step(1).unwrap(), 1));
+    assert_eq!(stopped.fingerprint(), whole.fingerprint());
 }
 
 #[test]

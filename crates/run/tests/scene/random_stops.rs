@@ -9,7 +9,7 @@ fn one<'a>(random: &mut Random, of: &[&'a str]) -> &'a str {
 }
 
 /// A scene of 24 steps in time, or of 8 load steps, of a small cube and whatever else its solver takes.
-fn ingredients(random: &mut Random) -> String {
+pub(super) fn ingredients(random: &mut Random) -> String {
     let solver = one(random, &["explicit", "quasi-static", "static", "implicit", "implicit", "implicit"]);
     let equations = ["static", "implicit"].contains(&solver);
     let in_time = ["explicit", "implicit"].contains(&solver);
