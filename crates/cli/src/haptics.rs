@@ -174,7 +174,7 @@ fn run(
     }
     let state = thread.state();
     let report = thread.finish().map_err(refused)?;
-    say(words(&report, &pace, &simulation, &estimate))?;
+    say(words(&report, &pace, &estimate))?;
     if kept.failures > 0 {
         say(format_args!("went back        {} times", kept.failures))?;
     }
@@ -344,6 +344,8 @@ struct Pace {
     last: Instant,
     due: f64,
     from: f64,
+    /// Time [s] that is not caught up with.
+    lost: f64,
     periods: Spread,
 }
 
@@ -351,7 +353,15 @@ impl Pace {
     fn new(simulation: &Simulation, rate: f64) -> Self {
         let now = Instant::now();
         let period = (1.0 / rate).max(simulation.step_length());
-        Self { period, begun: now, last: now, due: 0.0, from: simulation.time(), periods: Spread::default() }
+        Self {
+            period,
+            begun: now,
+            last: now,
+            due: 0.0,
+            from: simulation.time(),
+            lost: 0.0,
+            periods: Spread::default(),
+        }
     }
 
     /// The simulated time [s] at the end of this period.
@@ -385,6 +395,7 @@ impl Pace {
         if lost > 0.0 {
             self.due += lost;
             self.from -= lost;
+            self.lost += lost;
         }
     }
 }
@@ -393,8 +404,8 @@ fn vector([x, y, z]: [f64; 3]) -> String {
     format!("({x:.3}, {y:.3}, {z:.3})")
 }
 
-fn words(report: &Report, pace: &Pace, simulation: &Simulation, estimate: &Estimate) -> String {
-    let (simulated, wall) = (simulation.time() - pace.from, (pace.last - pace.begun).as_secs_f64());
+fn words(report: &Report, pace: &Pace, estimate: &Estimate) -> String {
+    let (simulated, wall) = (pace.due - pace.lost, (pace.last - pace.begun).as_secs_f64());
     format!(
         "{report}\nsimulation       {simulated:.2} s in {wall:.2} s, {:.2} × real time; a model each {}\ntissue           {:.0} N/m at the tool",
         simulated / wall.max(1e-9),

@@ -10,6 +10,7 @@ use pliant_picture::{Camera, Projection, Subject};
 use pliant_run::Column;
 use pliant_scene::World;
 use pliant_scene::format::ViewTable;
+use pliant_sim::StopFlag;
 use pliant_testing::pressed_cube;
 use pliant_viewer::{
     Done, Frame, Hand, Lags, Number, Order, Point, Recording, Sample, Samples, Session, Which, parameters,

@@ -3,8 +3,8 @@
 //! where that stores few zeros (relaxed amalgamation, Ashcraft and Grimes 1989). A function of the pattern alone.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::amd;
+use faer::sparse::{FaerError, SymbolicSparseColMatRef};
 
 use crate::sparse::LowerMatrix;
 
@@ -135,16 +135,21 @@ impl Groups {
     }
 
     /// An order of elimination with little fill (approximate minimum degree, Amestoy, Davis and Duff 1996).
-    fn order(&self) -> Result<Vec<u32>, faer::sparse::FaerError> {
+    fn order(&self) -> Result<Vec<u32>, FaerError> {
         let count = self.len();
         let (mut order, mut place) = (vec![0_u32; count], vec![0_u32; count]);
         let memory = MemBuffer::try_new(amd::order_scratch::<u32>(count, self.row.len()));
-        let mut memory = memory.map_err(|_| faer::sparse::FaerError::OutOfMemory)?;
+        let mut memory = memory.map_err(|_| FaerError::OutOfMemory)?;
         let pattern = SymbolicSparseColMatRef::new_checked(count, count, &self.row_start, None, &self.row);
         let stack = MemStack::new(&mut memory);
         amd::order(&mut order, &mut place, pattern, amd::Control::default(), stack)?;
         Ok(order)
     }
+}
+
+/// Makes room for more of what grows as the factors do.
+fn reserve<T>(all: &mut Vec<T>, more: usize) -> Result<(), FaerError> {
+    all.try_reserve(more).map_err(|_| FaerError::OutOfMemory)
 }
 
 /// A forest as lists: the first child of each and the next one of its parent.
@@ -191,7 +196,7 @@ struct Columns {
 }
 
 impl Columns {
-    fn new(groups: &Groups, place: &[u32]) -> Self {
+    fn new(groups: &Groups, place: &[u32]) -> Result<Self, FaerError> {
         let count = place.len();
         let pairs = |found: &mut dyn FnMut(usize, u32)| {
             for group in 0..count {
@@ -217,6 +222,10 @@ impl Columns {
         for own in 0..count as u32 {
             let first = row.len();
             mark[own as usize] = own;
+            let of_children = |child: u32| row_start[child as usize + 1] - row_start[child as usize];
+            let most = start[own as usize + 1] - start[own as usize]
+                + children.of(own).map(of_children).sum::<usize>();
+            reserve(&mut row, most)?;
             let mut take = |other: u32, row: &mut Vec<u32>| {
                 if std::mem::replace(&mut mark[other as usize], own) != own {
                     row.push(other);
@@ -234,7 +243,7 @@ impl Columns {
             }
             row_start.push(row.len());
         }
-        Self { row_start, row, children, is_root }
+        Ok(Self { row_start, row, children, is_root })
     }
 
     fn rows(&self, own: u32) -> &[u32] {
@@ -309,13 +318,13 @@ pub(super) struct Supernodes {
 
 impl Supernodes {
     /// Those of a pattern.
-    pub(super) fn new(matrix: &LowerMatrix) -> Result<Self, faer::sparse::FaerError> {
+    pub(super) fn new(matrix: &LowerMatrix) -> Result<Self, FaerError> {
         let groups = Groups::new(matrix);
         let order = groups.order()?;
         let mut place = vec![0; order.len()];
         order.iter().zip(0..).for_each(|(&group, at)| place[group as usize] = at);
         let size: Vec<usize> = order.iter().map(|&group| groups.size(group)).collect();
-        let mut columns = Columns::new(&groups, &place);
+        let mut columns = Columns::new(&groups, &place)?;
         let members = columns.merge(&size);
         let mut own = Self::default();
         // The first column of each group, by its place.
@@ -335,8 +344,8 @@ impl Supernodes {
         for (node, number) in own.nodes.iter().zip(0..) {
             owner[node.first..node.first + node.width].fill(number);
         }
-        own.set_rows(&post, &columns, &column, &size);
-        own.set_runs(&owner);
+        own.set_rows(&post, &columns, &column, &size)?;
+        own.set_runs(&owner)?;
         let group_column: Vec<u32> = place.iter().map(|&at| column[at as usize]).collect();
         own.set_pieces(matrix, &groups, &group_column, &owner);
         Ok(own)
@@ -387,7 +396,13 @@ impl Supernodes {
         &self.pieces[node.pieces[0]..node.pieces[1]]
     }
 
-    fn set_rows(&mut self, post: &[(u32, usize)], columns: &Columns, column: &[u32], size: &[usize]) {
+    fn set_rows(
+        &mut self,
+        post: &[(u32, usize)],
+        columns: &Columns,
+        column: &[u32],
+        size: &[usize],
+    ) -> Result<(), FaerError> {
         let mut parts = Vec::new();
         for (node, &(last, _)) in self.nodes.iter_mut().zip(post) {
             parts.clear();
@@ -395,6 +410,7 @@ impl Supernodes {
             parts.extend(below.map(|&row| (column[row as usize], size[row as usize] as u32)));
             parts.sort_unstable();
             let from = self.rows.len();
+            reserve(&mut self.rows, parts.iter().map(|(_, size)| *size as usize).sum())?;
             self.rows.extend(parts.iter().flat_map(|&(first, size)| first..first + size));
             node.rows = [from, self.rows.len()];
             node.value = self.values;
@@ -402,9 +418,10 @@ impl Supernodes {
             self.most_below = self.most_below.max(node.below());
             self.highest = self.highest.max(node.height());
         }
+        Ok(())
     }
 
-    fn set_runs(&mut self, owner: &[u32]) {
+    fn set_runs(&mut self, owner: &[u32]) -> Result<(), FaerError> {
         let (mut used, mut left) = ([0; 2], Vec::new());
         for number in 0..self.nodes.len() {
             let node = self.nodes[number];
@@ -434,10 +451,12 @@ impl Supernodes {
                         _ => runs.push(Run { from, to: to as u32, len: 1 }),
                     }
                 }
+                reserve(&mut self.runs, runs.len())?;
                 self.runs.extend(runs);
             }
             self.nodes[number].runs = [from, self.runs.len()];
         }
+        Ok(())
     }
 
     /// Where in the panel of a supernode the row of a column is.

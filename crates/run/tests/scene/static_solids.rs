@@ -4,6 +4,7 @@
 use std::fs;
 
 use pliant_geometry::{CellKind, io};
+use pliant_run::overview;
 use pliant_testing::scenes::{assert_rows_agree, last_row, resumes, run, world};
 
 /// A block of 100 × 50 × 50 mm, held at one end, turned and pulled at the other, pressed from above, under its weight.
@@ -23,6 +24,29 @@ pub(super) fn block(solver: &str, element: &str, law: &str, more: &str) -> Strin
          probes.b = {{ on = 'block', at = [0.075, 0.05, 0.025], data = ['displacement', 'cauchy-stress'] }}\n\
          probes.c = {{ on = 'block', at = [0.025, 0.025, 0.05], data = ['displacement', 'energy-density'] }}\n"
     )
+}
+
+/// What factors take is known before a run, where there are some.
+#[test]
+fn a_check_tells_what_factors_take() {
+    let law = format!("type = 'neo-hookean'\n{MATRIX}");
+    let told = |solver: &str| {
+        let page = overview(&world(&block(solver, "tet4", &law, "")).unwrap());
+        page.lines().find_map(|line| line.strip_prefix("factors of the equations: ").map(str::to_owned))
+    };
+    for solver in [
+        "solver = 'static'",
+        "solver = 'implicit'\nstep = 0.1",
+        "solver = 'static'\nlinear = { by = 'conjugate-gradients', preconditioner = 'lagged-factors' }",
+    ] {
+        let told = told(solver).unwrap_or_else(|| panic!("{solver}"));
+        // 45 nodes of which 9 are held: 27 equations a column at the most.
+        let bytes: f64 = told.split_once(" kB").unwrap().0.parse().unwrap();
+        assert!((20.0..200.0).contains(&bytes), "{solver}: {told}");
+    }
+    for solver in ["solver = 'quasi-static'", "solver = 'static'\nlinear = 'conjugate-gradients'"] {
+        assert_eq!(told(solver), None, "{solver}");
+    }
 }
 
 pub(super) const MATRIX: &str = "young-modulus = 1e4\npoisson-ratio = 0.45";
