@@ -258,8 +258,8 @@ int main(void) {
     EXPECT(pliant_grip_surface(context, simulation, skin.number, nan3, 0.01, 10, &grip, &error), PLIANT_STATUS_NOT_A_NUMBER, "`point`");
     EXPECT(pliant_grip_surface(context, simulation, skin.number, up, -0.01, 10, &grip, &error), PLIANT_STATUS_NOT_A_NUMBER, "`radius`");
     const uint32_t pair[] = {0, 1};
-    const double huge[] = {1e308, 1e308};
-    EXPECT(pliant_grip_nodes(context, simulation, pair, huge, 2, 10, &grip, &error), PLIANT_STATUS_NOT_A_NUMBER, "finite");
+    const double heavy[] = {1e308, 1e308};
+    EXPECT(pliant_grip_nodes(context, simulation, pair, heavy, 2, 10, &grip, &error), PLIANT_STATUS_NOT_A_NUMBER, "finite");
     OK(pliant_grip_surface(context, simulation, skin.number, up, 0.03, INFINITY, &grip, &error));
     EXPECT(pliant_grip_move(context, simulation, grip, nan3, &error), PLIANT_STATUS_NOT_A_NUMBER, "`place`");
     EXPECT(pliant_grip_move(context, simulation, grip + 1, up, &error), PLIANT_STATUS_BAD_HANDLE, "no grip 1");

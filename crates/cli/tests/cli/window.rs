@@ -275,7 +275,8 @@ fn of(scene: &str) -> u64 {
 /// A recording refers to bodies by name and to triangles by number: of another scene it is refused.
 #[test]
 fn a_recording_of_another_scene_is_refused() {
-    let workshop = Workshop::new(&BLOCK.replace("block", "brick"));
+    let workshop =
+        Workshop::new(&BLOCK.replace("[body.block]", "[body.brick]").replace("\"block\"", "\"brick\""));
     let recording = Recording { steps: 3, of: of(BLOCK), ..Recording::default() };
     std::fs::write(workshop.path("drag"), recording.to_bytes().unwrap()).unwrap();
     let told = workshop.pliant(&["view", "case", "--replay", "drag"]);

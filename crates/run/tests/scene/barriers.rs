@@ -1,6 +1,7 @@
 //! Contact with the solvers `implicit` and `static`: a barrier keeps surfaces apart, from the text of a scene to its outputs, and what is refused.
 
 use pliant_scene::BuiltBody;
+use pliant_testing::PeakMemory;
 use pliant_testing::scenes::{last_row, resumes, run, world};
 
 /// A block of 40 × 40 × 20 mm of tissue a little above a floor, and a ball that is pressed into its top; `held` holds its underside.
@@ -20,6 +21,21 @@ pub(super) fn pressed(run: &str, more: &str) -> String {
 const FLOOR: &str = "[obstacle.floor]\nshape = 'half-space'\nat = [0, 0, -2e-5]\n\
                      [contact.below]\nbetween = ['block', 'floor']\nfriction = 0.5\n";
 pub(super) const HELD: &str = "[constraint.base]\ntype = 'fix'\nbody = 'block'\nnodes = { set = 'z-min' }\n";
+
+/// Bins of candidates are as wide as a part of the barrier, but only so many: 1e-12 m asked for 20 GB.
+#[test]
+fn a_tiny_barrier_distance_takes_no_memory() {
+    let text = "[scene]\nuntil = 0.02\ngravity = [0, 0, -9.81]\n[run]\nthreads = 1\nsolver = 'implicit'\nstep = 0.01\niterations = 5\n\
+                [law.wall]\ntype = 'neo-hookean'\nyoung-modulus = 1e6\npoisson-ratio = 0.45\n\
+                [body.sheet]\nmodel = 'shell'\nmesh = { plate = { size = [0.3, 0.3], cells = [4, 4] } }\nlaw = 'wall'\nthickness = 1e-3\ndensity = 300\n\
+                [obstacle.ball]\nshape = { sphere = { radius = 0.08 } }\nat = [0.153, 0.152, -0.082]\n\
+                [contact.drapes]\nbetween = ['sheet', 'ball']\nbarrier-distance = 1e-12\nbarrier-stiffness = 1e4\n";
+    let before = PeakMemory::now();
+    let mut simulation = world(text).unwrap().simulation().unwrap();
+    // Whether it finds its way is another matter.
+    let _ = simulation.step(1).and_then(|_| simulation.step(1));
+    before.assert_rise_below(512 << 10);
+}
 
 /// What presses on top comes out below: at the floor by a barrier as well, in time, and at the constraint in equilibrium. The gap of the
 /// node under the ball is within the barrier.
