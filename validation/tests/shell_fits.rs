@@ -63,11 +63,11 @@ fn the_aneurysm_by_772_shells() {
     require("aneurysm", &surface, ShellGoal::Shells(772), 0.5, 772);
 }
 
-/// Glisson's capsule of a whole liver. Asked is 0.2 %, missed: 0.203 %.
+/// Glisson's capsule of a whole liver.
 #[test]
 #[ignore = "slow: half a minute"]
 fn the_capsule_of_a_liver_by_1200_shells() {
     let Some(mut surface) = organ("organs-openhelp/Liver.stl") else { return };
     surface.decimate(Fewer::Triangles(8000)).unwrap();
-    require("capsule", &surface, ShellGoal::Shells(1200), 0.21, 1200);
+    require("capsule", &surface, ShellGoal::Shells(1200), 0.2, 1200);
 }

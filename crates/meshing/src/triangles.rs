@@ -222,6 +222,35 @@ impl TriangleMesh {
         compacted
     }
 
+    /// Puts triangles in the place of others, and new ones beside them: those of a part of this surface that has changed, whose triangles
+    /// and points have these numbers here. Creases between its points are those of the part.
+    pub(crate) fn put(&mut self, part: &Self, own: &[u32], nodes: &[u32]) {
+        for &t in own.iter().filter(|&&t| (t as usize) < self.triangles.len()) {
+            let [a, b, c] = self.triangles[t as usize];
+            for (edge, node) in [([a, b], a), ([b, c], b), ([c, a], c)] {
+                self.creases.remove(&key(edge[0], edge[1]));
+                self.star[node as usize].retain(|&other| other != t);
+            }
+        }
+        let count =
+            |numbers: &[u32], old: usize| numbers.iter().map(|&n| n as usize + 1).fold(old, usize::max);
+        self.triangles.resize(count(own, self.triangles.len()), GONE);
+        self.points.resize(count(nodes, self.points.len()), Vector3::zeros());
+        self.star.resize(self.points.len(), Vec::new());
+        for (x, &node) in part.points.iter().zip(nodes) {
+            self.points[node as usize] = *x;
+        }
+        for (at, &t) in own.iter().enumerate() {
+            let exists = part.exists(at as u32);
+            let place = |n: u32| nodes[n as usize];
+            self.triangles[t as usize] = if exists { part.triangles[at].map(place) } else { GONE };
+            if exists {
+                self.triangles[t as usize].iter().for_each(|&node| self.star[node as usize].push(t));
+            }
+        }
+        self.creases.extend(part.creases().map(|[a, b]| key(nodes[a as usize], nodes[b as usize])));
+    }
+
     /// Number of triangles.
     pub fn len(&self) -> usize {
         self.alive().count()

@@ -19,7 +19,7 @@ impl Effort {
     /// Searches of a fit to a distance: 5 to 50 s of one core, by the surface.
     pub(super) const MOST: usize = 12_000_000;
 
-    /// The same to a number of shells, whose last round needs its time to settle.
+    /// The same to a number of shells, which are exchanged then.
     pub(super) const MOST_TO_A_NUMBER: usize = 32_000_000;
 
     pub(super) fn new(most: usize) -> Self {

@@ -36,6 +36,7 @@ pub(super) struct Landing {
 }
 
 /// Distances of shells.
+#[derive(Clone)]
 pub(super) struct Distances {
     /// The largest of each shell from the target, by the number of its triangle [m].
     there: Vec<f64>,
@@ -63,6 +64,24 @@ impl Distances {
             Some(Landing { shell: own.binary_search(&landing.shell).ok()? as u32, ..*landing })
         });
         Self { there, parts: self.parts, landings: landings.collect() }
+    }
+}
+
+impl Distances {
+    /// Puts those of a part, whose shells have these numbers here, in the place of those of the shells that moved there.
+    pub(super) fn put(&mut self, part: &Self, own: &[u32], moved: impl Fn(u32) -> bool) {
+        let count = own.iter().map(|&t| t as usize + 1).fold(self.there.len(), usize::max);
+        self.there.resize(count, 0.0);
+        own.iter().zip(&part.there).for_each(|(&t, &off)| self.there[t as usize] = off);
+        let changed = self.landings.iter_mut().filter(|landing| moved(landing.shell));
+        for (landing, found) in changed.zip(&part.landings) {
+            *landing = Landing { shell: own[found.shell as usize], ..*found };
+        }
+    }
+
+    /// The largest distance of points of the target.
+    pub(super) fn largest_back(&self) -> f64 {
+        self.landings.iter().map(|landing| landing.off).fold(0.0, f64::max)
     }
 }
 
@@ -99,6 +118,7 @@ impl Shells {
         let (moving, resting): (Vec<u32>, Vec<u32>) = self.mesh.alive().partition(|&t| self.moves(t));
         let mut there = before.there.clone();
         there.resize(self.mesh.triangles.len(), 0.0);
+        (0..).zip(&mut there).filter(|(t, _)| !self.mesh.exists(*t)).for_each(|(_, off)| *off = 0.0);
         self.measure(&moving, before.parts, target, &mut there);
         let mut near = vec![false; self.mesh.points.len()];
         moving.iter().flat_map(|&t| self.mesh.triangles[t as usize]).for_each(|n| near[n as usize] = true);

@@ -2,6 +2,7 @@
 //! A decimated surface starts; then, round by round, the shells that are too far off, either way, are halved at their longest edges, and
 //! round them triangles are evened out and fitted again, while the others rest. What is reached is looked at more closely before it counts.
 //! Normals stand within 60° of their triangles and shells do not pass through each other: where they would, they are halved, too.
+//! As many shells as asked for come nearer by exchange (`exchange`): some collapse where the surface is flat, and others are halved elsewhere.
 //! What crosses in the end is repaired (`repair`), and of what is left shells become flat (`flatten`). Where a fit fails, it starts again from finer
 //! triangles, and where even flat triangles cross from some that never did (`start`). The work is bounded, by a count that is the same on
 //! every machine; what was closest by then is the result.
@@ -10,9 +11,11 @@
 
 mod crossing;
 mod effort;
+mod exchange;
 mod fit;
 mod flatten;
 mod measure;
+mod part;
 mod refine;
 mod repair;
 mod report;
@@ -34,7 +37,7 @@ pub use report::{Flaw, ShellReport};
 use start::{Starts, UNCROSSED};
 use target::Target;
 
-/// Rounds after the goal is reached, where distances can fall or triangles are poor.
+/// Rounds after an error is reached, where distances can fall or triangles are poor.
 const LAST_ROUNDS: usize = 4;
 
 /// Rounds of refinement at most.
@@ -75,6 +78,9 @@ const AGAIN: f64 = 0.5;
 const SLIM: f64 = 0.3;
 const MUCH: f64 = 2.0;
 
+/// Part of the work allowed that is left for the exchange of shells, at least.
+const EXCHANGE: f64 = 0.25;
+
 /// So many shells are fitted once a round, fewer up to four times.
 const MANY: usize = 3000;
 
@@ -83,7 +89,7 @@ const MANY: usize = 3000;
 pub enum ShellGoal {
     /// When both ways no distance is above this part of the diagonal of the target's box.
     Error(f64),
-    /// At this many shells.
+    /// At this many shells, or one fewer, as close as the work allowed makes them.
     Shells(usize),
 }
 
@@ -373,7 +379,12 @@ impl<'t> Fit<'t> {
             }
             if part >= 1.0 {
                 let mends = !flawed.is_empty() && mending > 0;
-                if !mends && (left == 0 || !rank.2 && rank.3 <= self.aim) {
+                // As many as asked for come nearer by exchange.
+                let is_near = match self.goal {
+                    ShellGoal::Error(_) => !rank.2 && rank.3 <= self.aim,
+                    ShellGoal::Shells(_) => true,
+                };
+                if !mends && (left == 0 || is_near) {
                     ended = true;
                     break;
                 }
@@ -402,6 +413,13 @@ impl<'t> Fit<'t> {
         shells.activate((0..shells.mesh.points.len() as u32).collect());
         shells.uncross(&mut self.effort);
         if !given_up {
+            if let ShellGoal::Shells(number) = self.goal {
+                self.effort = self.effort.with_left(EXCHANGE);
+                let (rounds, diagonal) = (self.rounds, target.diagonal);
+                shells.exchange(number, target, &mut self.effort, |off| {
+                    progress(FitProgress { part: 1.0, round: rounds, shells: number, off: off / diagonal });
+                });
+            }
             shells.repair(target);
             shells.crease_crossing();
         }
@@ -501,8 +519,11 @@ impl Shells {
         let some = |all: &[bool]| nodes.iter().map(|&n| all[n as usize]).collect();
         let own_flat =
             if self.flat.is_empty() { Vec::new() } else { shells.iter().map(|&t| self.is_flat(t)).collect() };
+        let mut mesh = TriangleMesh::new(points, triangles);
+        let own = |node: u32| nodes.binary_search(&node).ok().map(|at| at as u32);
+        mesh.set_creases(self.mesh.creases().filter_map(|[a, b]| Some([own(a)?, own(b)?])));
         let part = Self {
-            mesh: TriangleMesh::new(points, triangles),
+            mesh,
             normals: nodes.iter().map(|&n| self.normals[n as usize]).collect(),
             on_border: some(&self.on_border),
             active: some(&self.active),
@@ -535,9 +556,10 @@ impl Shells {
         CurvedTriangle::new(self.mesh.corners(triangle), [a, b, c], [ab, ba, bc, cb, ca, ac], EdgeRule::Arc)
     }
 
-    /// Whether a corner of a shell may move.
+    /// Whether a corner of a shell may move, or the shell is gone.
     fn moves(&self, shell: u32) -> bool {
-        self.mesh.triangles[shell as usize].iter().any(|&n| self.active[n as usize])
+        !self.mesh.exists(shell)
+            || self.mesh.triangles[shell as usize].iter().any(|&n| self.active[n as usize])
     }
 
     /// Shells that may move.

@@ -17,6 +17,9 @@ const ALONG: f64 = 0.3;
 /// Points nearer to each other than this part of the diagonal coincide.
 const COINCIDING: f64 = 1e-9;
 
+/// Triangles after a collapse are of no worse shape, before they are evened out.
+const LEAST_COLLAPSED: f64 = 0.3;
+
 /// Searches to move a point along the target.
 const SEARCHES: usize = 5;
 
@@ -195,33 +198,14 @@ impl Shells {
             if halved == room {
                 break;
             }
-            let nodes = self.mesh.triangles[t as usize];
-            let length = |k: &usize| (self.mesh.corners(t)[*k] - self.mesh.corners(t)[(k + 1) % 3]).norm();
-            let longest = [0, 1, 2].into_iter().max_by(|a, b| length(a).total_cmp(&length(b))).unwrap_or(0);
-            let [a, b] = [nodes[longest], nodes[(longest + 1) % 3]];
-            let sides = self.mesh.sides(a, b);
+            let edge = self.longest_edge(t);
+            let sides = self.mesh.sides(edge[0], edge[1]);
             if sides.iter().flatten().any(|&s| touched[s as usize]) {
                 continue;
             }
             sides.iter().flatten().for_each(|&s| touched[s as usize] = true);
-            let patch = self.patch(t);
-            let mut place = [0.0; 3];
-            (place[longest], place[(longest + 1) % 3]) = (0.5, 0.5);
-            let is_marked = self.mesh.is_marked(a, b);
-            let is_sharp = is_marked && sides[1].is_some();
-            let fresh = self.mesh.split(a, b, patch.point(place));
-            self.normals.push(patch.normal(place));
-            self.on_border.push(is_marked);
-            self.creased.push(is_sharp);
-            self.sharp.push(is_sharp);
+            let fresh = self.halve(t, edge, target);
             touched.resize(self.mesh.triangles.len(), true);
-            let middle = 0.5 * (self.mesh.points[a as usize] + self.mesh.points[b as usize]);
-            self.place(fresh, target);
-            if self.is_crossed_round(fresh) || self.reach(fresh) <= COINCIDING * target.diagonal {
-                // As it was, which crosses nothing new. Points that fall on each other would have no curve between them.
-                self.mesh.points[fresh as usize] = middle;
-                self.stand(fresh);
-            }
             changed.push(fresh);
             halved += 1;
         }
@@ -233,5 +217,60 @@ impl Shells {
         self.activate(changed);
         self.stand_all();
         halved
+    }
+
+    /// The longest edge of a shell.
+    pub(super) fn longest_edge(&self, shell: u32) -> [u32; 2] {
+        let nodes = self.mesh.triangles[shell as usize];
+        let length =
+            |k: &usize| (self.mesh.corners(shell)[*k] - self.mesh.corners(shell)[(k + 1) % 3]).norm();
+        let longest = [0, 1, 2].into_iter().max_by(|a, b| length(a).total_cmp(&length(b))).unwrap_or(0);
+        [nodes[longest], nodes[(longest + 1) % 3]]
+    }
+
+    /// Halves a shell, and its neighbour there, at one of its edges. Returns the new point, which may move.
+    pub(super) fn halve(&mut self, shell: u32, [a, b]: [u32; 2], target: &Target) -> u32 {
+        let patch = self.patch(shell);
+        let nodes = self.mesh.triangles[shell as usize];
+        let place = nodes.map(|n| if n == a || n == b { 0.5 } else { 0.0 });
+        let is_marked = self.mesh.is_marked(a, b);
+        let is_sharp = is_marked && self.mesh.sides(a, b)[1].is_some();
+        let fresh = self.mesh.split(a, b, patch.point(place));
+        self.normals.push(patch.normal(place));
+        self.on_border.push(is_marked);
+        self.creased.push(is_sharp);
+        self.sharp.push(is_sharp);
+        self.active.push(true);
+        let middle = 0.5 * (self.mesh.points[a as usize] + self.mesh.points[b as usize]);
+        self.place(fresh, target);
+        if self.is_crossed_round(fresh) || self.reach(fresh) <= COINCIDING * target.diagonal {
+            // As it was, which crosses nothing new. Points that fall on each other would have no curve between them.
+            self.mesh.points[fresh as usize] = middle;
+            self.stand(fresh);
+        }
+        fresh
+    }
+
+    /// Whether an edge may collapse into its first end: the second is on no border, sharp edge or crease.
+    pub(super) fn may_collapse(&self, [keep, gone]: [u32; 2]) -> bool {
+        !self.on_border[gone as usize] && !self.creased[gone as usize] && self.mesh.may_collapse(keep, gone)
+    }
+
+    /// Makes the ends of an edge one, in the middle if the first may move. Returns whether it could: triangles keep their sides and some
+    /// shape, and flat ones do not cross. Otherwise the shells are of no more use.
+    pub(super) fn collapse(&mut self, [keep, gone]: [u32; 2], target: &Target) -> bool {
+        let stays = self.on_border[keep as usize] || self.creased[keep as usize];
+        let [here, there] = [keep, gone].map(|n| self.mesh.points[n as usize]);
+        let position = if stays { here } else { 0.5 * (here + there) };
+        if !self.mesh.keeps_sides(keep, gone, &position, LEAST_COLLAPSED) {
+            return false;
+        }
+        self.mesh.collapse(keep, gone, position);
+        self.active[gone as usize] = false;
+        if !stays {
+            self.place(keep, target);
+        }
+        self.stand_all();
+        !self.is_crossed_round(keep)
     }
 }

@@ -9,6 +9,7 @@ use pliant_geometry::Vector3;
 
 use super::effort::Effort;
 use super::measure::Distances;
+use super::part::Part;
 use super::target::Target;
 use super::{POOR, Shells};
 
@@ -54,37 +55,12 @@ const STEPS: [Step; 14] = [
 /// How good a step is; the least is best. Whether it takes shells farther off, how many pairs it parts, and how far off they are [m].
 type Rank = (bool, Reverse<usize>, f64);
 
-/// The shells that the corners of a knot may change, and what is near. A step of one corner costs no more on a large organ.
-struct Part {
-    shells: Shells,
-    distances: Distances,
-    /// The numbers of its points in the whole, increasing.
-    nodes: Vec<u32>,
-    /// Those of the knot in the part.
-    knot: Vec<u32>,
-}
-
 impl Part {
-    /// `None` if none of the shells is there.
-    fn new(whole: &mut Shells, knot: &[u32], distances: &Distances) -> Option<Self> {
-        // Normals of their neighbours turn, too.
-        whole.activate(knot.to_vec());
-        let mut inner = vec![false; whole.mesh.points.len()];
-        let near = whole.near(|shell| whole.moves(shell));
-        near.iter().flat_map(|&t| whole.mesh.triangles[t as usize]).for_each(|n| inner[n as usize] = true);
-        let has_inner = |t: &u32| whole.mesh.triangles[*t as usize].iter().any(|&n| inner[n as usize]);
-        let own: Vec<u32> = whole.mesh.alive().filter(has_inner).collect();
-        let (shells, nodes) = whole.part(&own);
-        let distances = distances.part(&own, |t| whole.moves(t));
-        let knot = knot.iter().filter_map(|node| Some(nodes.binary_search(node).ok()? as u32)).collect();
-        Some(Self { shells, distances, nodes, knot })
-    }
-
-    /// The part after the best step, if there is one.
-    fn best_step(&self, target: &Target, parts: usize, effort: &mut Effort) -> Option<Shells> {
+    /// The part after the best step of a knot of its points, if there is one.
+    fn best_step(&self, knot: &[u32], target: &Target, parts: usize, effort: &mut Effort) -> Option<Shells> {
         let mut best: Option<(Rank, Shells)> = None;
-        let singles = self.knot.iter().map(std::slice::from_ref);
-        for nodes in std::iter::once(&self.knot[..]).chain(singles) {
+        let singles = knot.iter().map(std::slice::from_ref);
+        for nodes in std::iter::once(knot).chain(singles) {
             let mut start = self.shells.clone();
             start.activate(nodes.to_vec());
             let before = start.crossing_with_moving(parts, effort);
@@ -170,7 +146,8 @@ impl Shells {
         effort: &mut Effort,
     ) -> bool {
         let Some(part) = Part::new(self, knot, distances) else { return false };
-        let Some(found) = part.best_step(target, parts, effort) else { return false };
+        let own: Vec<u32> = knot.iter().filter_map(|&node| part.point(node)).collect();
+        let Some(found) = part.best_step(&own, target, parts, effort) else { return false };
         // Normals of neighbours turn, too.
         self.activate(knot.to_vec());
         for (own, &node) in part.nodes.iter().enumerate().filter(|(_, node)| self.active[**node as usize]) {
