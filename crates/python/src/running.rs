@@ -167,11 +167,8 @@ impl Running {
         on: Option<&str>,
         radius: Option<f64>,
     ) -> Result<Vec<(u32, f64)>, Trouble> {
-        if radius.is_some_and(|radius| !(radius >= 0.0)) {
-            return Err(Trouble::Value(format!(
-                "`radius` is {} m: it must be at least 0",
-                radius.unwrap_or_default()
-            )));
+        if let Some(radius) = radius.filter(|radius| radius.is_nan() || *radius < 0.0) {
+            return Err(Trouble::Value(format!("`radius` is {radius} m: it must be at least 0")));
         }
         let at = Vector3::from(at);
         let mut nearest: Option<(f64, Vec<(u32, f64)>)> = None;
