@@ -110,6 +110,7 @@ def test_calls_that_do_not_fit() -> None:
         (lambda: sim.grip(nodes=[nodes]), f"0 to {nodes - 1}"),
         (lambda: sim.grip(at=(0, 0, 0), stiffness=-1.0), "holds nothing"),
         (lambda: sim.grip(at=(0, 0, 0), on="nobody"), "nobody"),
+        (lambda: sim.grip(at=(0, 0, 0), radius=-0.01), "at least 0"),
         (lambda: sim.positions(np.zeros((nodes, 3), dtype=np.float32)), "float32"),
         (lambda: sim.field("colour"), "there is no field"),
         (lambda: sim.field("membrane-force", on="cube"), "has no field"),
