@@ -20,7 +20,7 @@ use pliant_haptics::protocol::{Force, Pose};
 use pliant_haptics::trace::Trace;
 use pliant_imaging::{ImageFormat, ReadOptions};
 use pliant_meshing::{Closing, Enclosed};
-use pliant_run::{Checkpoint, OutputFolder, run, snapshot_from_bytes, snapshot_to_bytes};
+use pliant_run::{Checkpoint, OutputFolder, run, snapshot_framed, snapshot_from_bytes, snapshot_to_bytes};
 use pliant_scene::niftysim::import_bytes;
 use pliant_scene::source::Source;
 use pliant_scene::{Scene, World};
@@ -151,13 +151,6 @@ fn files(folder: &str, ending: &str) -> io::Result<Vec<Vec<u8>>> {
     Ok(all)
 }
 
-/// A body with the length before it and a checksum after it.
-fn framed(head: &[u8], body: &[u8]) -> Vec<u8> {
-    let mut bytes = [head, &(body.len() as u64).to_le_bytes(), body].concat();
-    bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
-    bytes
-}
-
 fn checkpoint(bytes: &[u8]) {
     let path = Path::new("any");
     for bytes in [bytes, &Checkpoint::framed(bytes)] {
@@ -168,14 +161,9 @@ fn checkpoint(bytes: &[u8]) {
 }
 
 fn snapshot(bytes: &[u8]) {
-    static WORLD: OnceLock<(Arc<pliant_sim::World>, Vec<u8>)> = OnceLock::new();
-    let (world, head) = WORLD.get_or_init(|| {
-        let world = Arc::new(block().simulated());
-        let state = Simulation::new(Arc::clone(&world)).and_then(|mut simulation| simulation.state());
-        let whole = state.and_then(|state| snapshot_to_bytes(&world, &state)).unwrap_or_default();
-        (world, whole[..SNAPSHOT_HEAD - 8].to_vec())
-    });
-    for bytes in [bytes, &framed(head, bytes)] {
+    static WORLD: OnceLock<Arc<pliant_sim::World>> = OnceLock::new();
+    let world = WORLD.get_or_init(|| Arc::new(block().simulated()));
+    for bytes in [bytes, &snapshot_framed(world, bytes)] {
         let Ok(state) = snapshot_from_bytes(world, bytes) else { continue };
         if let Ok(mut simulation) = Simulation::resumed(Arc::clone(world), state) {
             let _ = simulation.step(1);

@@ -106,8 +106,6 @@ struct Last {
     stretch: Vector3<f64>,
     /// Of the model [N].
     touch: Vector3<f64>,
-    /// On the device [N].
-    force: Vector3<f64>,
 }
 
 /// Makes forces of poses.
@@ -119,7 +117,7 @@ pub struct Renderer {
     /// How far it has gone over to the new model.
     part: f64,
     last: Option<Last>,
-    /// The last force [N], also over a silence.
+    /// The last force on the device [N], also over a silence.
     felt: Vector3<f64>,
     /// Of the soft start.
     gain: f64,
@@ -194,14 +192,14 @@ impl Renderer {
             (false, Some(last)) => last.pose,
             (false, None) => return Answer { held: true, ..Answer::default() },
         };
-        let first = Last { pose, stretch: resting, touch: resting, force: self.felt };
+        let first = Last { pose, stretch: resting, touch: resting };
         let last = self.last.unwrap_or(first);
         let Settings { period, coupling, ahead, force_limit, most_change, guard, soft_start } = self.settings;
 
         let place = pose.translation.vector;
         let way = place - last.pose.translation.vector;
         let reserve = guard.map_or(f64::INFINITY, |guard| guard.reserve);
-        self.observer.add(&last.force, &way, reserve);
+        self.observer.add(&self.felt, &way, reserve);
 
         let drag = coupling.damping / period;
         let stiffness = coupling.stiffness + drag;
@@ -215,9 +213,9 @@ impl Renderer {
         let size = wanted.norm();
         let limited = size > force_limit;
         let force = if limited { wanted * (force_limit / size) } else { wanted };
-        let change = force - last.force;
+        let change = force - self.felt;
         let force = match most_change {
-            Some(most) if change.norm() > most => last.force + change * (most / change.norm()),
+            Some(most) if change.norm() > most => self.felt + change * (most / change.norm()),
             _ => force,
         };
 
@@ -226,9 +224,9 @@ impl Renderer {
         record.guarded += u64::from(guarded);
         record.limited += u64::from(limited);
         record.peak = record.peak.max(force.norm());
-        record.jump = record.jump.max((force - last.force).norm());
+        record.jump = record.jump.max((force - self.felt).norm());
         (record.energy, record.least_energy) = (self.observer.energy, self.observer.least);
-        (self.last, self.felt) = (Some(Last { pose, stretch, touch, force }), force);
+        (self.last, self.felt) = (Some(Last { pose, stretch, touch }), force);
         Answer { force, guarded, limited, held: !valid }
     }
 

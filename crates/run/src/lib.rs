@@ -61,5 +61,5 @@ pub use overview::overview;
 pub use parts::{MergedSweep, PartSummary, SweepPart};
 pub use run::{Draw, Options, Progress, run, run_with};
 pub use skin::Skin;
-pub use snapshot::{snapshot_from_bytes, snapshot_to_bytes};
+pub use snapshot::{snapshot_framed, snapshot_from_bytes, snapshot_to_bytes};
 pub use sweep::{Sweep, SweepOptions, SweepProgress, SweepSummary};

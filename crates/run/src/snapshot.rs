@@ -21,6 +21,11 @@ const CRC: usize = 4;
 pub fn snapshot_to_bytes(world: &World, state: &State) -> Result<Vec<u8>, Failure> {
     let failed = |error: postcard::Error| Failure::new("output", error.to_string(), None);
     let body = state.encode().and_then(|parts| postcard::to_stdvec(&parts)).map_err(failed)?;
+    Ok(snapshot_framed(world, &body))
+}
+
+/// The bytes of a snapshot of a world with this body: magic, format, fingerprint and length before it, the CRC-32 after it.
+pub fn snapshot_framed(world: &World, body: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEAD + body.len() + CRC);
     bytes.extend(MAGIC);
     bytes.extend(FORMAT.to_le_bytes());
@@ -28,7 +33,7 @@ pub fn snapshot_to_bytes(world: &World, state: &State) -> Result<Vec<u8>, Failur
     bytes.extend((body.len() as u64).to_le_bytes());
     bytes.extend(body);
     bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
-    Ok(bytes)
+    bytes
 }
 
 /// The state of a world from bytes.

@@ -49,13 +49,10 @@ impl World {
 
     /// A fingerprint of its bodies with their meshes, and of its tools and obstacles, by name; not of laws, loads or steps.
     pub fn fingerprint_of_bodies(&self) -> u64 {
-        let of = |part: &Part| {
-            let bodies = part.model.bodies.iter().map(|body| (body.name.clone(), body.nodes.clone()));
-            let contacts = part.method.contacts();
-            let things = contacts.iter().flat_map(|all| &all.rigids).map(|rigid| rigid.name.clone());
-            let bodies: Vec<_> = bodies.collect();
-            (bodies, part.model.rest.clone(), meshes(&part.model), things.collect::<Vec<_>>())
-        };
+        fn of(part: &Part) -> (Vec<(String, u64)>, Vec<&str>) {
+            let things = part.method.contacts().into_iter().flat_map(|all| &all.rigids);
+            (meshes(&part.model), things.map(|rigid| rigid.name.as_str()).collect())
+        }
         fingerprint(&self.parts.iter().map(of).collect::<Vec<_>>())
     }
 
@@ -517,7 +514,9 @@ impl Simulation {
 
     /// Whether a flag may end steps before their end.
     fn can_stop_within(&self) -> bool {
-        let takes_long = |(part, ratio): (&Part, &u64)| part.method.takes_long() || *ratio > 1;
+        // States on a device would be read back before each common step.
+        let in_memory = self.participants.iter().all(|own| own.stride() == 1);
+        let takes_long = |(part, ratio): (&Part, &u64)| part.method.takes_long() || (*ratio > 1 && in_memory);
         self.stop.is_some() && self.world.parts.iter().zip(&self.ratios).any(takes_long)
     }
 

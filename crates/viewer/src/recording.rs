@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use pliant_geometry::CellLabel;
 use pliant_scene::World;
-use pliant_scene::format::ViewTable;
+use pliant_scene::format::{MOST_CURVED, ViewTable};
 use serde::{Deserialize, Serialize};
 
 use crate::hand::{Hand, Which};
@@ -101,8 +101,6 @@ pub struct Recording {
     pub of: u64,
 }
 
-/// The most parts of an edge, as the schema of scenes has it.
-const MOST_CURVED: u32 = 100;
 /// The first bytes of a file of a recording, with the version of what follows; the CRC-32 of all before them are the last four.
 const MAGIC: [u8; 8] = *b"\x89PLREC2\n";
 /// Bytes of the checksum.

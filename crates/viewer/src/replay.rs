@@ -92,11 +92,15 @@ pub fn replay_in_real_time(
     session.order(Order::Play(true));
     let started = Instant::now();
     for (due, order) in orders {
-        while !due.saturating_sub(started.elapsed()).is_zero() && !stop.is_asked() {
-            std::thread::sleep(due.saturating_sub(started.elapsed()).min(FRAME));
-        }
-        if stop.is_asked() {
-            return Err(stopped());
+        loop {
+            if stop.is_asked() {
+                return Err(stopped());
+            }
+            let left = due.saturating_sub(started.elapsed());
+            if left.is_zero() {
+                break;
+            }
+            std::thread::sleep(left.min(FRAME));
         }
         session.order(order);
     }

@@ -6,7 +6,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use pliant_explicit::Wanted;
-use pliant_run::{Checkpoint, Options, OutputFolder, run, run_with, snapshot_from_bytes, snapshot_to_bytes};
+use pliant_run::{
+    Checkpoint, Options, OutputFolder, run, run_with, snapshot_framed, snapshot_from_bytes, snapshot_to_bytes,
+};
 use pliant_scene::World;
 use pliant_sim::Simulation;
 use pliant_testing::Random;
@@ -19,15 +21,6 @@ use super::random_stops::ingredients;
 /// Bytes of a snapshot and of a checkpoint before the body, and after it.
 const HEADS: [usize; 2] = [28, 20];
 const CRC: usize = 4;
-
-/// A snapshot of the same model with another body.
-fn reframed(whole: &[u8], body: &[u8]) -> Vec<u8> {
-    let mut bytes = whole[..HEADS[0] - 8].to_vec();
-    bytes.extend((body.len() as u64).to_le_bytes());
-    bytes.extend(body);
-    bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
-    bytes
-}
 
 /// Scenes with all that states have: small cubes of random ingredients, a plate of shells on a block as participants.
 fn scenes() -> impl Iterator<Item = String> {
@@ -58,7 +51,7 @@ fn snapshots(seeds: std::ops::Range<u64>, attempts: &mut Attempts) {
         let body = &whole[HEADS[0]..whole.len() - CRC];
         for seed in seeds.clone() {
             let seed = 1_000_000 * number as u64 + seed;
-            let bytes = reframed(&whole, &forged(&mut Random::new(seed), body));
+            let bytes = snapshot_framed(&simulated, &forged(&mut Random::new(seed), body));
             attempts.attempt(seed, || {
                 let Ok(state) = snapshot_from_bytes(&simulated, &bytes) else { return false };
                 let Ok(mut simulation) = Simulation::resumed(Arc::clone(&simulated), state) else {

@@ -48,6 +48,9 @@ use serde::{Deserialize, Serialize};
 /// Most threads of a run or a simulation.
 pub const MOST_THREADS: u32 = 1024;
 
+/// Most parts that an edge of a shell is cut into in pictures.
+pub const MOST_CURVED: u32 = 100;
+
 /// What the scene is and how long it lasts.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]

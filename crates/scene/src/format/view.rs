@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::FieldName;
+use super::{FieldName, MOST_CURVED};
 
 /// A choice among words, such as [`MapName`].
 pub trait Choice: DeserializeOwned {
@@ -118,7 +118,7 @@ pub struct ViewTable {
     pub size: [u32; 2],
     /// Parts that each edge of a shell is cut into, to show its curved surface; 1: flat triangles.
     #[serde(default = "four")]
-    #[schemars(range(min = 1, max = 100))]
+    #[schemars(range(min = 1, max = MOST_CURVED))]
     pub curved: u32,
 }
 
