@@ -5,7 +5,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use pliant_geometry::Mesh;
 use pliant_implicit::element::{Formulation, Membrane};
-use pliant_implicit::{Control, LinearSolver, State, StaticSettings, Statics, Step};
+use pliant_implicit::{Control, State, StaticSettings, Statics, Step};
+use pliant_linear::LinearSolver;
 use pliant_mechanics::load::LoadKind;
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet};
 use pliant_reproduce::cases::plate::{LARGE, deflections};

@@ -12,9 +12,9 @@ use pliant_contact::touch::{Contact, Contacts, Touch, With};
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3, io};
 use pliant_implicit::element::{Elasticity, Formulation, Membrane};
 use pliant_implicit::{
-    Assembly, BackwardEuler, DynamicSettings, LinearSolver, Preconditioner, Shell, State, StaticSettings,
-    Statics, Touching, Wall,
+    Assembly, BackwardEuler, DynamicSettings, Shell, State, StaticSettings, Statics, Touching, Wall,
 };
+use pliant_linear::{LinearSolver, Preconditioner};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_mechanics::model::{Constraint, Motion};

@@ -10,9 +10,9 @@ use std::time::{Duration, Instant};
 use pliant_gpu::{Device, GpuError, Kind};
 use pliant_implicit::element::{Bending, Elasticity, Formulation, Membrane};
 use pliant_implicit::{
-    Assembly, BackwardEuler, DynamicSettings, LinearDevice, LinearSolver, ModelError, Phases, Preconditioner,
-    Shell, SolveError, State, Wall,
+    Assembly, BackwardEuler, DynamicSettings, ModelError, Phases, Shell, SolveError, State, Wall,
 };
+use pliant_linear::{LinearDevice, LinearSolver, Preconditioner};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_mechanics::model::{Constraint, Motion};

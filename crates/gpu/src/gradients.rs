@@ -5,11 +5,11 @@
 //! Sums are found group by group, and every group that needs a sum adds up those of the groups in the same order. The device itself decides
 //! where to stop: what was submitted after that does nothing. So bits depend on no number of submissions.
 //!
-//! `pliant-implicit` takes what comes back as a correction under a residual in double precision.
+//! `pliant-linear` takes what comes back as a correction under a residual in double precision.
 
 use std::time::Instant;
 
-use pliant_implicit::{
+use pliant_linear::{
     BlockPattern, BlockValues, DeviceError, DeviceSolver, DeviceTimes, LinearDevice, Pass, PassEnd,
 };
 use wgpu::{BufferAddress, BufferUsages};

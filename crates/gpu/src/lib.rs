@@ -91,7 +91,7 @@
 //!
 //! # Equations of implicit steps
 //!
-//! [`Device`] is a `LinearDevice` of `pliant-implicit`: it solves block matrices by conjugate gradients (`gradients.rs`). What it finds are corrections
+//! [`Device`] is a `LinearDevice` of `pliant-linear`: it solves block matrices by conjugate gradients (`gradients.rs`). What it finds are corrections
 //! under a residual in double precision on the CPU.
 //!
 //! # Shells

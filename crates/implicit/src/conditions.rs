@@ -10,10 +10,10 @@ use nalgebra::{DMatrix, DVector, Dyn, LU};
 use pliant_mechanics::model::{Constraint, Enclosure, Motion};
 
 use crate::Assembly;
-use crate::linear::dot;
-use crate::sparse::{Equations, LowerMatrix, NONE};
 use crate::state::State;
 use crate::surface::CurvedSurface;
+use pliant_linear::dot;
+use pliant_linear::sparse::{Equations, LowerMatrix, NONE};
 
 /// A gap that counts as none, over the mean edge or over the volume.
 const CLOSED: f64 = 1e-10;
@@ -83,7 +83,7 @@ impl Conditions {
             match &own.motion {
                 Motion::Mean { weights, .. } => {
                     for component in (0..3).filter(|&c| own.components[c]) {
-                        let mut dense = vec![0.0; equations.len()];
+                        let mut dense = vec![0.0; equations.count()];
                         for (&node, weight) in own.nodes.iter().zip(weights) {
                             let equation = equations.number[6 * node as usize + component];
                             if equation != NONE {
@@ -94,7 +94,7 @@ impl Conditions {
                     }
                 }
                 Motion::Volume { enclosure, .. } => {
-                    let mut dense = vec![0.0; equations.len()];
+                    let mut dense = vec![0.0; equations.count()];
                     let rest = State::at_rest(model);
                     let volume =
                         add_gradient(model, surface, own, enclosure, &rest, &mut into(equations, &mut dense));

@@ -12,9 +12,9 @@
 //! * Friction is then taken anew from the state found, while its size changes by more than a tenth.
 
 use crate::error::SolveError;
-use crate::linear::dot;
 use crate::state::State;
 use crate::system::System;
+use pliant_linear::dot;
 
 /// Part of every gap that an iteration keeps, twice over, and that the guess keeps.
 const KEEP: [f64; 2] = [0.1, 0.5];
@@ -237,7 +237,7 @@ fn start_from(
     let Vectors { system, pending, increment, .. } = solver.vectors();
     increment.copy_from_slice(guess);
     for ((own, &pending), number) in increment.iter_mut().zip(pending.iter()).zip(&system.equations.number) {
-        if *number == crate::sparse::NONE {
+        if *number == pliant_linear::sparse::NONE {
             *own = pending;
         }
     }
@@ -315,7 +315,7 @@ fn energy(solver: &mut impl Contacting) -> (f64, f64) {
 fn find_direction(solver: &mut impl Contacting, raised: &mut f64) -> Result<(f64, bool), SolveError> {
     solver.complete();
     let diagonal: Vec<f64> =
-        (0..solver.system().equations.len()).map(|k| solver.system().matrix.diagonal(k).abs()).collect();
+        (0..solver.system().equations.count()).map(|k| solver.system().matrix.diagonal(k).abs()).collect();
     let (first, growth, times) = RAISED;
     let mut added = 0.0;
     for _ in 0..=times {

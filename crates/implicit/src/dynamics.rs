@@ -21,13 +21,13 @@ use crate::descent::{Contacting, Limits, Vectors, descend};
 use crate::error::SolveError;
 use crate::forces::Forces;
 use crate::limited::within_limits;
-use crate::linear::{LinearDevice, LinearReport, LinearSolver, dot};
 use crate::rotation::{exponential, logarithm, spin_to_vector};
 use crate::solid::highest_frequency_squared;
 use crate::state::{NODES, State};
 use crate::statics::Attempted;
 use crate::system::{Phases, System};
 use crate::touching::TouchingSystem;
+use pliant_linear::{LinearDevice, LinearReport, LinearSolver, dot};
 
 /// How an implicit step goes on in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -213,7 +213,7 @@ impl BackwardEuler {
     ) -> Result<Self, SolveError> {
         let model = model.into();
         let system = System::on(device, Arc::clone(&model), settings.linear)?;
-        let (all, free) = (6 * model.rest.len(), system.equations.len());
+        let (all, free) = (6 * model.rest.len(), system.equations.count());
         Ok(Self {
             settings,
             length: model.mean_edge(),
@@ -552,7 +552,7 @@ impl BackwardEuler {
                 let sum = load - internal - momentum;
                 for c in 0..3 {
                     let equation = system.equations.number[at + first + c];
-                    if equation != crate::sparse::NONE {
+                    if equation != pliant_linear::sparse::NONE {
                         self.residual[equation as usize] = sum[c];
                     }
                 }
@@ -802,7 +802,7 @@ impl Explicit {
             let velocity = |first: usize, now: Vector3<f64>, mass: f64| {
                 Vector3::from_fn(|c, _| {
                     let at = 6 * node + first + c;
-                    if system.equations.number[at] == crate::sparse::NONE {
+                    if system.equations.number[at] == pliant_linear::sparse::NONE {
                         return self.pending[at] / h;
                     }
                     kept * now[c] + gained * (system.external[at] - system.internal[at]) / mass
@@ -826,7 +826,8 @@ mod tests {
 
     use super::*;
     use crate::element::Elasticity;
-    use crate::{Preconditioner, Shell, StaticSettings, Statics, Wall};
+    use crate::{Shell, StaticSettings, Statics, Wall};
+    use pliant_linear::Preconditioner;
     use pliant_mechanics::curve::{Curve, Shape};
     use pliant_mechanics::load::{Load, LoadKind};
     use pliant_mechanics::model::{Constraint, Motion};

@@ -1,9 +1,9 @@
 //! What can be wrong with a model and why a solver stops.
 
-use pliant_mechanics::memory::OutOfMemory;
+use pliant_linear::memory::OutOfMemory;
 
 use crate::facet::Broken;
-use crate::linear::DeviceError;
+use pliant_linear::DeviceError;
 
 /// Why a part could not be added to a model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -500,8 +500,8 @@ mod tests {
     use super::*;
     use crate::element::Elasticity;
     use crate::facets::{FacetPack, Work};
-    use crate::lanes::PACK;
     use crate::rotation::exponential;
+    use pliant_linear::lanes::PACK;
     use pliant_testing::Random;
 
     const MATERIAL: Wall = Wall { elastic: Elasticity { young: 1e3, poisson: 0.3 }, density: 1000.0 };

@@ -13,9 +13,9 @@ use pliant_mechanics::tie::Tie;
 
 use crate::Assembly;
 use crate::rotation::skew;
-use crate::sparse::{Cell, Equations, LowerMatrix, NONE};
 use crate::state::State;
 use crate::turns::{CarriedTurn, Turn};
+use pliant_linear::sparse::{Cell, Equations, LowerMatrix, NONE};
 
 /// The nodes whose unknowns move a cell, and how many components of each.
 pub(crate) type Expanded = (Vec<u32>, usize);

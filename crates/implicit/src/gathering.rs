@@ -1,7 +1,7 @@
 //! Sums over the facets of a chunk, node by node. Threads share the nodes. Each node adds the corners that meet there in the order of the
 //! facets, so the number of threads changes no bit.
 
-use crate::sparse::{Equations, Values};
+use pliant_linear::sparse::{Equations, Values};
 
 /// Nodes that a thread takes at least.
 const SHARE: usize = 32;
@@ -116,7 +116,7 @@ impl ColumnSums<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sparse::{Cell, LowerMatrix};
+    use pliant_linear::sparse::{Cell, LowerMatrix};
     use pliant_testing::Random;
 
     /// Columns of a strip of triangles, some of whose nodes are held, are those of cells added one after the other, bit by bit.
@@ -142,7 +142,7 @@ mod tests {
         (0..facets.len()).for_each(|at| expected.add(&equations, &cell(at)));
 
         let mut forces = [(); 3].map(|()| vec![0.0; 6 * nodes as usize]);
-        let mut coupling = vec![0.0; equations.len()];
+        let mut coupling = vec![0.0; equations.count()];
         let (values, column_start) = matrix.values();
         let stiffness = ColumnSums { first: 0, coupling: &mut coupling, values, column_start };
         let forces = forces.each_mut().map(|own| &mut own[..]);

@@ -46,9 +46,7 @@ mod followers;
 mod forces;
 mod gathering;
 mod initial;
-mod lanes;
 mod limited;
-mod linear;
 mod mapping;
 mod patch;
 mod picture;
@@ -60,7 +58,6 @@ mod resolution;
 mod rotation;
 mod samples;
 mod solid;
-mod sparse;
 mod state;
 mod statics;
 mod strain;
@@ -80,11 +77,6 @@ pub use element::Wall;
 pub use error::{ModelError, SolveError};
 pub use facet::{Broken, Facet, FacetAtRest, Resultants, ShellEnergy};
 pub use forces::Forces;
-pub use linear::{
-    BlockPattern, BlockValues, DeviceError, DeviceSolver, DeviceTimes, LinearDevice, LinearReport,
-    LinearSolver, Pass, PassEnd, Preconditioner,
-};
-
 pub use mapping::CarriedPoints;
 pub use patch::{Carried, EdgeRule, Patch, Place};
 pub use picture::{Picture, PictureFields};

@@ -13,10 +13,10 @@ use pliant_contact::touch::{Contact, Contacts, With};
 use crate::assembly::Assembly;
 use crate::followers::Followers;
 use crate::patch::{EdgeRule, Place};
-use crate::sparse::{Equations, LowerMatrix};
 use crate::state::State;
 use crate::surface::CurvedSurface;
 use crate::touching::{acts, movers_of};
+use pliant_linear::sparse::{Equations, LowerMatrix};
 
 /// J of a point: its velocity over those of a node and its spin.
 pub(crate) type ByNode = SMatrix<f64, 3, 6>;

@@ -18,11 +18,11 @@ use crate::assembly::{Assembly, Spring};
 use crate::descent::{Contacting, Limits, Vectors, descend};
 use crate::error::SolveError;
 use crate::limited::within_limits;
-use crate::linear::{LinearSolver, dot};
-use crate::sparse::NONE;
 use crate::state::State;
 use crate::system::{Phases, System};
 use crate::touching::TouchingSystem;
+use pliant_linear::sparse::NONE;
+use pliant_linear::{LinearSolver, dot};
 
 /// How equilibria are sought.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -180,7 +180,7 @@ impl Statics {
         let model = model.into();
         check_held(&model)?;
         let system = System::new(Arc::clone(&model), settings.linear)?;
-        let (all, free) = (6 * model.rest.len(), system.equations.len());
+        let (all, free) = (6 * model.rest.len(), system.equations.count());
         let (slack, extent) = slack(&model, &system);
         Ok(Self {
             settings,

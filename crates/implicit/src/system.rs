@@ -21,10 +21,6 @@ use crate::facet::{Broken, Facet, Matrix18, symmetrise};
 use crate::facets::{FacetPack, Work};
 use crate::followers::{Followers, carried_turns};
 use crate::gathering::{ColumnSums, Corners, NodeSums};
-use crate::lanes::PACK;
-use crate::linear::{
-    DeviceTimes, Factors, LinearDevice, LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT,
-};
 use crate::mapping::CarriedPoints;
 use crate::patch::Vector18;
 use crate::patch::{EdgeRule, Patch};
@@ -32,10 +28,14 @@ use crate::prescribed::Gap;
 use crate::relaxation::{History, Relaxation};
 use crate::rotation::skew;
 use crate::solid::{Response, Stars};
-use crate::sparse::{Cell, Equations, LowerMatrix, NONE};
 use crate::state::State;
 use crate::surface::CurvedSurface;
 use crate::touching::TouchingSystem;
+use pliant_linear::lanes::PACK;
+use pliant_linear::sparse::{Cell, Equations, LowerMatrix, NONE};
+use pliant_linear::{
+    DeviceTimes, Factors, LinearDevice, LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT,
+};
 
 /// Cells of solids computed side by side before they are added up.
 const CHUNK: usize = 256;
@@ -234,7 +234,7 @@ impl System {
         system.solver = solver;
         system.touching = model.touching.as_ref().map(|own| Box::new(TouchingSystem::new(own, &model)));
         system.lags = model.force_limits.keys().map(|&constraint| Lag::new(constraint as u32)).collect();
-        system.coupling = vec![0.0; system.equations.len()];
+        system.coupling = vec![0.0; system.equations.count()];
         system.find_pattern()?;
         if model.stiffness_damping > 0.0 {
             system.damper = vec![0.0; system.matrix.value.len()];

@@ -16,8 +16,8 @@ use crate::assembly::Assembly;
 use crate::error::SolveError;
 use crate::followers::Followers;
 use crate::samples::{Movers, Samples};
-use crate::sparse::{Equations, LowerMatrix};
 use crate::state::State;
+use pliant_linear::sparse::{Equations, LowerMatrix};
 
 /// Pairs of nodes kept in the pattern at most, over those that are needed.
 const ROOM: usize = 2;

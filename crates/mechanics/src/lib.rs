@@ -26,7 +26,6 @@ pub mod harmonic;
 pub mod law;
 pub mod load;
 pub mod mapping;
-pub mod memory;
 pub mod model;
 pub mod order;
 pub mod prony;

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use pliant_implicit::{DynamicSettings, Integrator, LinearSolver, Preconditioner, StaticSettings};
+use pliant_implicit::{DynamicSettings, Integrator, StaticSettings};
+use pliant_linear::{LinearSolver, Preconditioner};
 use pliant_sim::{Explicit, ImplicitBodies, LongSteps, Method, ShortSteps};
 
 use crate::format::{IntegratorName, LinearName, LinearTable, PreconditionerName, RunTable, SolverName};

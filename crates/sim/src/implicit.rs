@@ -13,12 +13,12 @@ use pliant_contact::pressure::{faces, pressures};
 use pliant_explicit::{Clock, NodeContact, Wanted};
 #[cfg(feature = "gpu")]
 use pliant_gpu::GpuShells;
-#[cfg(feature = "gpu")]
-use pliant_implicit::LinearDevice;
 use pliant_implicit::{
     Assembly, Attempted, BackwardEuler, DynamicSettings, Explicit, Forces, Phases, SolveError, Spring, State,
     Statics, TouchingNow, TouchingSystem,
 };
+#[cfg(feature = "gpu")]
+use pliant_linear::LinearDevice;
 use pliant_mechanics::count;
 use pliant_mechanics::grip::{Grip, ROOM};
 use pliant_mechanics::mapping::Mapping;

@@ -11,8 +11,10 @@ use pliant_geometry::Mesh;
 use pliant_gpu::Device;
 use pliant_implicit::element::{Elasticity, Formulation};
 use pliant_implicit::{
-    Assembly, BackwardEuler, BlockPattern, BlockValues, DeviceSolver, DynamicSettings, Facet, LinearDevice,
-    LinearSolver, PassEnd, Preconditioner, Shell, SolveError, State, Touching, Wall,
+    Assembly, BackwardEuler, DynamicSettings, Facet, Shell, SolveError, State, Touching, Wall,
+};
+use pliant_linear::{
+    BlockPattern, BlockValues, DeviceSolver, LinearDevice, LinearSolver, PassEnd, Preconditioner,
 };
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind, NO_NODE, Spread};

@@ -4,8 +4,8 @@
 use pulp::{Simd, WithSimd};
 
 use super::{FacetPack, Work, load3};
-use crate::lanes::{Lane, PACK, Pack, Square, Three, cross, dot, three};
 use crate::rotation::{ARCSINE, BERNOULLI};
+use pliant_linear::lanes::{Lane, PACK, Pack, Square, Three, cross, dot, three};
 
 /// (w, x, y, z).
 type Turn<S> = [Lane<S>; 4];

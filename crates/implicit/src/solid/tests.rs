@@ -11,10 +11,10 @@ use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
 use pliant_testing::Random;
 use serde_json::json;
 
-use crate::linear::LinearSolver;
 use crate::system::System;
 use crate::tests::bar;
 use crate::{Assembly, BackwardEuler, DynamicSettings, ModelError, State, StaticSettings, Statics};
+use pliant_linear::LinearSolver;
 
 const ELEMENTS: [&str; 5] = ["tet4", "tet4-anp", "hex8", "growing-hex8", "hex8-full"];
 
@@ -118,7 +118,7 @@ fn assert_derivatives(what: &str, system: &mut System, state: &State) {
     let mut random = Random::new(5);
     let still = vec![0.0; 6 * nodes];
     system.evaluate(state, 0.0, Some(&still)).unwrap();
-    let (force, size) = (system.internal.clone(), system.equations.len());
+    let (force, size) = (system.internal.clone(), system.equations.count());
     let along: Vec<f64> = (0..size).map(|_| random.number()).collect();
     let mut predicted = vec![0.0; size];
     system.matrix.multiply_values(&system.matrix.value, &along, &mut predicted);
@@ -178,7 +178,7 @@ fn pressures_on_faces_have_their_stiffness() {
         let curve = Curve { shape: Shape::Hold, from: 0.0, to: 0.0 };
         model.model_mut().loads.push(Load::new("press", kind, curve));
         let mut pressed = stiffness(&model, &state);
-        let size = pressed.equations.len();
+        let size = pressed.equations.count();
         let along: Vec<f64> = (0..size).map(|_| random.number()).collect();
         let mut predicted = vec![0.0; size];
         let own: Vec<f64> = pressed

@@ -5,10 +5,8 @@
 use pliant_bench::{SHELL_STEP, ShellRun, tube};
 use pliant_geometry::Vector3;
 use pliant_implicit::element::Elasticity;
-use pliant_implicit::{
-    Assembly, DynamicSettings, LinearSolver, Phases, Preconditioner, Shell, State, StaticSettings, Statics,
-    Wall,
-};
+use pliant_implicit::{Assembly, DynamicSettings, Phases, Shell, State, StaticSettings, Statics, Wall};
+use pliant_linear::{LinearSolver, Preconditioner};
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::{Constraint, Motion};
 

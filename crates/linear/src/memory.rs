@@ -2,11 +2,11 @@
 //! not the end of the program.
 //!
 //! ```
-//! use pliant_mechanics::memory::zeros;
+//! use pliant_linear::memory::zeros;
 //!
 //! assert_eq!(zeros(3)?, [0.0; 3]);
 //! assert!(zeros(usize::MAX / 16).is_err());
-//! # Ok::<(), pliant_mechanics::memory::OutOfMemory>(())
+//! # Ok::<(), pliant_linear::memory::OutOfMemory>(())
 //! ```
 
 use std::fs;

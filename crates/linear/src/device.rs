@@ -8,8 +8,8 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::gradients::{Block, BlockMatrix, Coarse, KrylovVectors};
-use super::report::{LinearError, LinearReport};
+use crate::conjugate_gradients::{Block, BlockMatrix, Coarse, KrylovVectors};
+use crate::report::{LinearError, LinearReport};
 use crate::sparse::LowerMatrix;
 
 /// The least residual over the right-hand side that is asked for in one pass: single precision comes no nearer on stiff walls.
@@ -142,7 +142,7 @@ pub struct DeviceTimes {
 
 /// Equations on a device, with what they are handed over in.
 #[derive(Debug)]
-pub(super) struct OnDevice {
+pub(crate) struct OnDevice {
     solver: Box<dyn DeviceSolver>,
     /// Whether the solver has the pattern.
     is_arranged: bool,
@@ -155,7 +155,7 @@ pub(super) struct OnDevice {
 }
 
 /// A solution, or that the CPU has to go on.
-pub(super) enum Found {
+pub(crate) enum Found {
     Solution(Result<LinearReport, LinearError>),
     /// After so many iterations single precision does no more.
     Rest(usize),
@@ -163,7 +163,7 @@ pub(super) enum Found {
 
 impl OnDevice {
     /// The equations of a pattern, on a solver that may have had others before. It gets the pattern with the first matrix at the latest.
-    pub(super) fn new(
+    pub(crate) fn new(
         solver: Box<dyn DeviceSolver>,
         matrix: &LowerMatrix,
         blocks: &BlockMatrix,
@@ -184,12 +184,12 @@ impl OnDevice {
     }
 
     /// The solver, for another pattern.
-    pub(super) fn into_solver(self) -> Box<dyn DeviceSolver> {
+    pub(crate) fn into_solver(self) -> Box<dyn DeviceSolver> {
         self.solver
     }
 
     /// Hands over the pattern, unless the device has it.
-    pub(super) fn arrange(
+    pub(crate) fn arrange(
         &mut self,
         blocks: &BlockMatrix,
         coarse: Option<&Coarse>,
@@ -202,7 +202,7 @@ impl OnDevice {
     }
 
     /// Hands over a matrix, unless it is empty.
-    pub(super) fn take(
+    pub(crate) fn take(
         &mut self,
         matrix: &LowerMatrix,
         blocks: &BlockMatrix,
@@ -236,7 +236,7 @@ impl OnDevice {
     }
 
     /// x ← A⁻¹ b, as [`KrylovVectors::solve`] does.
-    pub(super) fn solve(
+    pub(crate) fn solve(
         &mut self,
         vectors: &mut KrylovVectors,
         blocks: &BlockMatrix,
@@ -299,214 +299,10 @@ impl OnDevice {
         }
     }
 
-    pub(super) fn times(&self) -> DeviceTimes {
+    pub(crate) fn times(&self) -> DeviceTimes {
         self.solver.times()
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use std::sync::Arc;
-
-    use super::super::Workspace;
-    use super::*;
-    use crate::element::Elasticity;
-    use crate::sparse::Equations;
-    use crate::{
-        Assembly, BackwardEuler, DynamicSettings, LinearSolver, Phases, Preconditioner, Shell, SolveError,
-        State, Wall,
-    };
-    use pliant_mechanics::curve::{Curve, Shape};
-    use pliant_mechanics::load::{Load, LoadKind};
-
-    /// What a device that is no good does.
-    #[derive(Clone, Copy, Debug)]
-    enum Fault {
-        /// It fills its solutions with a number and says so.
-        Fills(f32, PassEnd),
-        Fails,
-    }
-
-    impl LinearDevice for Fault {
-        fn aggregates(&self) -> usize {
-            4
-        }
-
-        fn solver(&self) -> Result<Box<dyn DeviceSolver>, DeviceError> {
-            Ok(Box::new(*self))
-        }
-    }
-
-    impl DeviceSolver for Fault {
-        fn arrange(&mut self, _pattern: &BlockPattern<'_>) -> Result<(), DeviceError> {
-            Ok(())
-        }
-
-        fn take(&mut self, _values: &BlockValues<'_>) -> Result<(), DeviceError> {
-            Ok(())
-        }
-
-        fn solve(
-            &mut self,
-            _right: &[f32],
-            solution: &mut [f32],
-            _goal: f32,
-            _iterations: usize,
-        ) -> Result<Pass, DeviceError> {
-            match *self {
-                Self::Fills(number, end) => {
-                    solution.fill(number);
-                    Ok(Pass { iterations: 1, end })
-                }
-                Self::Fails => Err(DeviceError("it is unplugged; plug it in".into())),
-            }
-        }
-
-        fn times(&self) -> DeviceTimes {
-            DeviceTimes::default()
-        }
-    }
-
-    /// A strip that falls for a step.
-    fn fall(device: Option<Fault>) -> Result<(State, Phases), SolveError> {
-        let points = (0..42).map(|i| Vector3::new(f64::from(i / 2) * 0.1, f64::from(i % 2) * 0.1, 0.0));
-        let cells =
-            (0..20).flat_map(|i| [[2 * i, 2 * i + 2, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 1]]).collect();
-        let wall = Wall { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
-        let mut model = Assembly::new("strip", points);
-        model.add_shell(&Shell::new("strip", cells, 0.01, wall)).unwrap();
-        model.model_mut().fix("clamp", vec![0, 1]);
-        let kind = LoadKind::Gravity { body: 0, acceleration: [0.0, 0.0, -9.81] };
-        model.model_mut().loads.push(Load::new(
-            "weight",
-            kind,
-            Curve { shape: Shape::Hold, from: 0.0, to: 1.0 },
-        ));
-        let linear = LinearSolver::ConjugateGradients {
-            tolerance: 1e-10,
-            iterations: 1000,
-            preconditioner: Preconditioner::Aggregates,
-        };
-        let device = device.map(|fault| Arc::new(fault) as Arc<dyn LinearDevice>);
-        let settings = DynamicSettings::new(0.01).real_time(linear);
-        let mut solver = BackwardEuler::on(device, model.clone(), settings)?;
-        let mut state = State::at_rest(&model);
-        solver.advance(&mut state)?;
-        Ok((state, solver.phases()))
-    }
-
-    /// Solved to 1e-10 in the end, so displacements agree to some 1e-8.
-    #[test]
-    fn what_a_device_cannot_solve_is_finished_in_double_precision() {
-        let (exact, alone) = fall(None).unwrap();
-        assert_eq!(alone.left_to_cpu, 0);
-        for (number, end) in [
-            (f32::NAN, PassEnd::Reached),
-            (f32::INFINITY, PassEnd::Indefinite),
-            (0.0, PassEnd::Indefinite),
-            (1e3, PassEnd::Reached),
-        ] {
-            let (state, phases) = fall(Some(Fault::Fills(number, end))).unwrap();
-            let off = state.position.iter().zip(&exact.position).map(|(a, b)| (a - b).norm());
-            let off = off.fold(0.0, f64::max) / (exact.position[41].z).abs();
-            assert!(off < 1e-7 && phases.left_to_cpu == 1, "{number}: {off:e}, {}", phases.left_to_cpu);
-            assert!(phases.iterations > 1);
-        }
-    }
-
-    #[test]
-    fn a_device_that_fails_ends_the_step_with_its_words() {
-        match fall(Some(Fault::Fails)) {
-            Err(SolveError::Device(error)) => assert_eq!(error.0, "it is unplugged; plug it in"),
-            other => panic!("{:?}", other.map(|_| ())),
-        }
-    }
-
-    /// A device whose solver finds no room for its second pattern the first time, and leaves each solution to the CPU. Each pattern takes it
-    /// a second.
-    #[derive(Debug, Default)]
-    struct Narrow {
-        calls: u32,
-        /// Nodes of the pattern that it has.
-        nodes: Option<usize>,
-    }
-
-    impl LinearDevice for Narrow {
-        fn aggregates(&self) -> usize {
-            4
-        }
-
-        fn solver(&self) -> Result<Box<dyn DeviceSolver>, DeviceError> {
-            Ok(Box::new(Self::default()))
-        }
-    }
-
-    impl DeviceSolver for Narrow {
-        fn arrange(&mut self, pattern: &BlockPattern<'_>) -> Result<(), DeviceError> {
-            self.calls += 1;
-            self.nodes = (self.calls != 2).then(|| pattern.nodes());
-            self.nodes.map(|_| ()).ok_or(DeviceError("its memory is full; use a coarser mesh".into()))
-        }
-
-        fn take(&mut self, values: &BlockValues<'_>) -> Result<(), DeviceError> {
-            assert_eq!(self.nodes, Some(values.inverse.len() / 36));
-            Ok(())
-        }
-
-        fn solve(
-            &mut self,
-            right: &[f32],
-            solution: &mut [f32],
-            _goal: f32,
-            _iterations: usize,
-        ) -> Result<Pass, DeviceError> {
-            assert_eq!(self.nodes, Some(right.len() / 6));
-            solution.fill(0.0);
-            Ok(Pass { iterations: 1, end: PassEnd::Indefinite })
-        }
-
-        fn times(&self) -> DeviceTimes {
-            DeviceTimes { upload: Duration::from_secs(self.calls.into()), ..DeviceTimes::default() }
-        }
-    }
-
-    /// Springs to the ground at some nodes, on the device of the workspace before.
-    fn grounded(nodes: usize, before: Option<&mut Workspace>) -> (Workspace, LowerMatrix) {
-        let equations = Equations::new(&vec![true; 6 * nodes]);
-        let all: Vec<[u32; 1]> = (0..nodes as u32).map(|node| [node]).collect();
-        let mut matrix = LowerMatrix::new(&equations, all.iter().map(<[u32; 1]>::as_slice), &[]);
-        (0..6 * nodes).for_each(|at| matrix.add_diagonal(at, 2.0));
-        let preconditioner = Preconditioner::BlockJacobi;
-        let solver = LinearSolver::ConjugateGradients { tolerance: 1e-10, iterations: 100, preconditioner };
-        let device: Arc<dyn LinearDevice> = Arc::new(Narrow::default());
-        (Workspace::new(solver, Some(&device), &equations, &matrix, before).unwrap(), matrix)
-    }
-
-    #[test]
-    fn a_device_without_room_for_a_pattern_is_not_used_until_it_has_taken_it() {
-        let (mut small, matrix) = grounded(3, None);
-        assert!(small.prepare(&matrix).is_ok());
-        let (mut large, matrix) = grounded(5, Some(&mut small));
-        let full = DeviceError("its memory is full; use a coarser mesh".into());
-        assert_eq!(large.prepare(&matrix).unwrap_err(), LinearError::Device(full));
-        assert!(large.prepare(&matrix).is_ok());
-        let mut solution = [0.0; 30];
-        large.solve(&matrix, &[1.0; 30], &mut solution).unwrap();
-        assert!(solution.iter().all(|x| (x - 0.5).abs() < 1e-9), "{solution:?}");
-        assert_eq!(
-            large.of_device(),
-            (DeviceTimes { upload: Duration::from_secs(3), ..DeviceTimes::default() }, 1)
-        );
-    }
-
-    #[test]
-    fn a_pattern_without_equations_keeps_the_times_of_a_device() {
-        let (mut some, matrix) = grounded(3, None);
-        assert!(some.prepare(&matrix).is_ok());
-        let times = some.of_device();
-        assert_eq!(times.0.upload, Duration::from_secs(1));
-        let (mut none, matrix) = grounded(0, Some(&mut some));
-        assert!(none.prepare(&matrix).is_ok() && none.solve(&matrix, &[], &mut []).is_ok());
-        assert_eq!(none.of_device(), times);
-    }
-}
+mod tests;

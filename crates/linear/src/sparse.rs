@@ -10,30 +10,33 @@ const CLEARED: usize = 1 << 15;
 const ADDED: usize = 4096;
 
 /// No equation: the component is held or has no stiffness.
-pub(crate) const NONE: u32 = u32::MAX;
+pub const NONE: u32 = u32::MAX;
 
 /// Lower triangle with diagonal, column by column, rows increasing.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct LowerMatrix {
-    pub(crate) column_start: Vec<u32>,
-    pub(crate) row: Vec<u32>,
-    pub(crate) value: Vec<f64>,
+pub struct LowerMatrix {
+    /// Where the entries of each column start, and the end of the last.
+    pub column_start: Vec<u32>,
+    /// The row of each entry.
+    pub row: Vec<u32>,
+    /// The entries.
+    pub value: Vec<f64>,
     /// The entries mirrored at the diagonal, for matrices that are not symmetric; else empty.
-    pub(crate) mirror: Vec<f64>,
+    pub mirror: Vec<f64>,
 }
 
 /// The equations of a model: components of nodes that are free, numbered node by node.
 #[derive(Clone, Debug)]
-pub(crate) struct Equations {
+pub struct Equations {
     /// The equation of each component, six a node.
-    pub(crate) number: Vec<u32>,
+    pub number: Vec<u32>,
     /// The component of each equation.
-    pub(crate) component: Vec<u32>,
+    pub component: Vec<u32>,
 }
 
 impl Equations {
     /// Numbers the components that are free.
-    pub(crate) fn new(free: &[bool]) -> Self {
+    pub fn new(free: &[bool]) -> Self {
         let component: Vec<u32> = (0..free.len() as u32).filter(|&i| free[i as usize]).collect();
         let mut number = vec![NONE; free.len()];
         for (equation, &component) in component.iter().enumerate() {
@@ -42,12 +45,13 @@ impl Equations {
         Self { number, component }
     }
 
-    pub(crate) fn len(&self) -> usize {
+    /// How many there are.
+    pub fn count(&self) -> usize {
         self.component.len()
     }
 
     /// How many equations the nodes before one have.
-    pub(crate) fn before(&self, node: u32) -> usize {
+    pub fn before(&self, node: u32) -> usize {
         self.component.partition_point(|&component| component < 6 * node)
     }
 
@@ -64,18 +68,19 @@ impl Equations {
 }
 
 /// A cell's matrix on its way into a larger one.
-pub(crate) struct Cell<'a> {
-    pub(crate) nodes: &'a [u32],
+pub struct Cell<'a> {
+    /// Its nodes.
+    pub nodes: &'a [u32],
     /// Components of each node.
-    pub(crate) components: usize,
+    pub components: usize,
     /// Its [places](LowerMatrix::places).
-    pub(crate) places: &'a [u32],
+    pub places: &'a [u32],
     /// Column by column.
-    pub(crate) entries: &'a [f64],
+    pub entries: &'a [f64],
 }
 
 /// The values of consecutive columns.
-pub(crate) struct Values<'a> {
+pub struct Values<'a> {
     /// The place of the first.
     first: usize,
     value: &'a mut [f64],
@@ -84,7 +89,7 @@ pub(crate) struct Values<'a> {
 
 impl Values<'_> {
     /// Those before a place and those from there on.
-    pub(crate) fn split_at(self, place: usize) -> (Self, Self) {
+    pub fn split_at(self, place: usize) -> (Self, Self) {
         let Self { first, value, mirror } = self;
         let (value, after) = value.split_at_mut(place - first);
         let (mirror, mirror_after) = mirror.split_at_mut(value.len().min(mirror.len()));
@@ -117,7 +122,7 @@ impl Values<'_> {
     }
 
     /// Adds the columns of one of a cell's nodes.
-    pub(crate) fn add(&mut self, equations: &Equations, cell: &Cell<'_>, node: usize) {
+    pub fn add(&mut self, equations: &Equations, cell: &Cell<'_>, node: usize) {
         match cell.components {
             6 => self.add_columns::<6>(equations, cell, node),
             _ => self.add_columns::<3>(equations, cell, node),
@@ -164,7 +169,7 @@ impl Values<'_> {
 
 impl LowerMatrix {
     /// The pattern of cells that couple all equations of their nodes, and of pairs of nodes, the lower first, whose translations are coupled.
-    pub(crate) fn new<'a>(
+    pub fn new<'a>(
         equations: &Equations,
         cells: impl Iterator<Item = &'a [u32]>,
         pairs: &[[u32; 2]],
@@ -205,28 +210,32 @@ impl LowerMatrix {
         matrix
     }
 
-    pub(crate) fn len(&self) -> usize {
+    /// The number of columns.
+    #[inline]
+    pub fn columns(&self) -> usize {
         self.column_start.len() - 1
     }
 
     /// The rows of a column.
-    pub(crate) fn rows(&self, column: u32) -> &[u32] {
+    #[inline]
+    pub fn rows(&self, column: u32) -> &[u32] {
         &self.row
             [self.column_start[column as usize] as usize..self.column_start[column as usize + 1] as usize]
     }
 
     /// Keeps both halves from now on.
-    pub(crate) fn keep_mirror(&mut self) {
+    pub fn keep_mirror(&mut self) {
         self.mirror = vec![0.0; self.value.len()];
     }
 
-    pub(crate) fn clear(&mut self) {
+    /// Sets all entries to zero.
+    pub fn clear(&mut self) {
         self.value.par_chunks_mut(CLEARED).for_each(|values| values.fill(0.0));
         self.mirror.fill(0.0);
     }
 
     /// All values, and where each column starts.
-    pub(crate) fn values(&mut self) -> (Values<'_>, &[u32]) {
+    pub fn values(&mut self) -> (Values<'_>, &[u32]) {
         let Self { column_start, value, mirror, .. } = self;
         (Values { first: 0, value, mirror }, column_start)
     }
@@ -245,7 +254,7 @@ impl LowerMatrix {
     }
 
     /// The places of a cell: for each ordered pair of its nodes (row, column) and each component of the column.
-    pub(crate) fn places(&self, equations: &Equations, nodes: &[u32], components: usize) -> Vec<u32> {
+    pub fn places(&self, equations: &Equations, nodes: &[u32], components: usize) -> Vec<u32> {
         let mut places = Vec::with_capacity(nodes.len() * nodes.len() * components);
         for &row_node in nodes {
             for &column_node in nodes {
@@ -261,13 +270,13 @@ impl LowerMatrix {
     }
 
     /// Adds a cell's matrix; of a symmetric one the lower half.
-    pub(crate) fn add(&mut self, equations: &Equations, cell: &Cell<'_>) {
+    pub fn add(&mut self, equations: &Equations, cell: &Cell<'_>) {
         let (mut values, _) = self.values();
         (0..cell.nodes.len()).for_each(|node| values.add(equations, cell, node));
     }
 
     /// Whether the pattern couples the translations of two nodes, the lower number first, or one of them has none that is free.
-    pub(crate) fn couples(&self, equations: &Equations, [low, high]: [u32; 2]) -> bool {
+    pub fn couples(&self, equations: &Equations, [low, high]: [u32; 2]) -> bool {
         let [column, row] = [low, high].map(|node| {
             let translations = &equations.number[6 * node as usize..6 * node as usize + 3];
             translations.iter().copied().min().unwrap_or(NONE)
@@ -277,7 +286,7 @@ impl LowerMatrix {
 
     /// Adds to so many components of two nodes that the pattern couples, translations first; the first node has the higher number or is the
     /// same.
-    pub(crate) fn add_node_block(
+    pub fn add_node_block(
         &mut self,
         equations: &Equations,
         [row_node, column_node]: [u32; 2],
@@ -315,9 +324,9 @@ impl LowerMatrix {
     }
 
     /// Values of an older pattern, that this one contains, in this one.
-    pub(crate) fn carried(&self, older: &Self, values: &[f64]) -> Vec<f64> {
+    pub fn carried(&self, older: &Self, values: &[f64]) -> Vec<f64> {
         let mut all = vec![0.0; self.value.len()];
-        for column in 0..older.len() as u32 {
+        for column in 0..older.columns() as u32 {
             let (from, to) = (older.column_start[column as usize], self.column_start[column as usize]);
             let rows = self.rows(column);
             for (at, row) in older.rows(column).iter().enumerate() {
@@ -330,7 +339,8 @@ impl LowerMatrix {
     }
 
     /// Adds to a diagonal entry.
-    pub(crate) fn add_diagonal(&mut self, equation: usize, value: f64) {
+    #[inline]
+    pub fn add_diagonal(&mut self, equation: usize, value: f64) {
         let at = self.column_start[equation] as usize;
         self.value[at] += value;
         if !self.mirror.is_empty() {
@@ -339,14 +349,14 @@ impl LowerMatrix {
     }
 
     /// Adds a value to the diagonal entry of each equation.
-    pub(crate) fn add_to_each_diagonal(&mut self, value: impl Fn(usize) -> f64 + Sync) {
-        let equations = 0..self.len();
+    pub fn add_to_each_diagonal(&mut self, value: impl Fn(usize) -> f64 + Sync) {
+        let equations = 0..self.columns();
         let (values, column_start) = self.values();
         values.add_diagonals(column_start, equations, &value);
     }
 
     /// Adds to an entry of a matrix that is not symmetric, if the pattern has it.
-    pub(crate) fn add_entry(&mut self, row: u32, column: u32, value: f64) {
+    pub fn add_entry(&mut self, row: u32, column: u32, value: f64) {
         let (low, high) = (row.min(column), row.max(column));
         let (start, end) =
             (self.column_start[low as usize] as usize, self.column_start[low as usize + 1] as usize);
@@ -360,12 +370,14 @@ impl LowerMatrix {
         }
     }
 
-    pub(crate) fn diagonal(&self, equation: usize) -> f64 {
+    /// A diagonal entry.
+    #[inline]
+    pub fn diagonal(&self, equation: usize) -> f64 {
         self.value[self.column_start[equation] as usize]
     }
 
     /// y = A x for symmetric values in this pattern.
-    pub(crate) fn multiply_values(&self, values: &[f64], x: &[f64], y: &mut [f64]) {
+    pub fn multiply_values(&self, values: &[f64], x: &[f64], y: &mut [f64]) {
         y.fill(0.0);
         for (column, bounds) in self.column_start.windows(2).enumerate() {
             let (start, end) = (bounds[0] as usize, bounds[1] as usize);

@@ -27,8 +27,8 @@ fn pattern(random: &mut Random, nodes: usize, held: usize) -> LowerMatrix {
 }
 
 fn dense(matrix: &LowerMatrix) -> DMatrix<f64> {
-    let mut all = DMatrix::zeros(matrix.len(), matrix.len());
-    for column in 0..matrix.len() {
+    let mut all = DMatrix::zeros(matrix.columns(), matrix.columns());
+    for column in 0..matrix.columns() {
         let start = matrix.column_start[column] as usize;
         for (&row, &value) in matrix.rows(column as u32).iter().zip(&matrix.value[start..]) {
             all[(row as usize, column)] = value;
@@ -59,7 +59,7 @@ fn factors_solve_and_count_negative_eigenvalues() {
             let eigenvalues = SymmetricEigen::new(all.clone()).eigenvalues;
             assert_eq!(pivots.negative, eigenvalues.iter().filter(|value| **value < 0.0).count());
             assert!(pivots.smallest > 0.0 && pivots.smallest <= 1.0, "{pivots:?}");
-            let mut right = DVector::from_fn(matrix.len(), |_, _| random.number());
+            let mut right = DVector::from_fn(matrix.columns(), |_, _| random.number());
             let mut solution = right.clone();
             factors.solve(solution.as_mut_slice());
             let error = (&all * &solution - &right).amax() / (all.amax() * solution.amax());
@@ -102,7 +102,7 @@ fn zero_pivots_are_told() {
 fn numbers_that_are_not_finite_are_told() {
     let mut matrix = pattern(&mut Random::new(7), 12, 0);
     matrix.value.fill(-1.0);
-    (0..matrix.len()).for_each(|equation| matrix.add_diagonal(equation, 80.0));
+    (0..matrix.columns()).for_each(|equation| matrix.add_diagonal(equation, 80.0));
     let mut factors = Factors::new(&matrix).unwrap();
     for value in [f64::NAN, f64::INFINITY] {
         for at in 0..matrix.value.len() {
@@ -120,8 +120,8 @@ fn all_instructions_give_the_same_factors() {
     let mut random = Random::new(9);
     let mut matrix = pattern(&mut random, 60, 7);
     matrix.value.iter_mut().for_each(|value| *value = random.number());
-    (0..matrix.len()).for_each(|equation| matrix.add_diagonal(equation, 40.0));
-    let right: Vec<f64> = (0..matrix.len()).map(|_| random.number()).collect();
+    (0..matrix.columns()).for_each(|equation| matrix.add_diagonal(equation, 40.0));
+    let right: Vec<f64> = (0..matrix.columns()).map(|_| random.number()).collect();
     let mut solutions = Vec::new();
     let narrow = [
         Some(Arch::Scalar),

@@ -1,11 +1,32 @@
-//! Linear equations with a sparse matrix: factors L D Lᵀ (`factors.rs`) or L U (`unsymmetric.rs`), or conjugate gradients
-//! (`gradients.rs`), also on a device (`device.rs`). Factors are found on one thread, so results do not depend on the number of threads.
+//! Linear equations with a sparse matrix, of nodes with six components each: factors L D Lᵀ (`factors.rs`) or L U (`unsymmetric.rs`), or
+//! conjugate gradients (`conjugate_gradients/`), also on a device (`device.rs`). Knows no mechanics. Factors are found on one thread, and sums
+//! run in one order, so results do not depend on the number of threads.
+//!
+//! ```
+//! use pliant_linear::sparse::{Equations, LowerMatrix};
+//! use pliant_linear::{LinearSolver, Workspace};
+//!
+//! // Two nodes whose equations are coupled, the second held; 2 x = 1 on each diagonal.
+//! let free: Vec<bool> = (0..12).map(|component| component < 6).collect();
+//! let equations = Equations::new(&free);
+//! let mut matrix = LowerMatrix::new(&equations, [&[0, 1][..]].into_iter(), &[]);
+//! matrix.add_to_each_diagonal(|_| 2.0);
+//! let mut workspace = Workspace::new(LinearSolver::Direct, None, &equations, &matrix, None)?;
+//! assert_eq!(workspace.prepare(&matrix)?.negative, 0);
+//! let mut x = [0.0; 6];
+//! workspace.solve(&matrix, &[1.0; 6], &mut x)?;
+//! assert_eq!(x, [0.5; 6]);
+//! # Ok::<(), pliant_linear::LinearError>(())
+//! ```
 
+mod conjugate_gradients;
 mod device;
 mod factors;
 mod fronts;
-mod gradients;
+pub mod lanes;
+pub mod memory;
 mod report;
+pub mod sparse;
 mod supernodes;
 mod unsymmetric;
 
@@ -13,16 +34,15 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use self::conjugate_gradients::{Approximation, BlockMatrix, Coarse, KrylovVectors};
 pub use self::device::{
     BlockPattern, BlockValues, DeviceError, DeviceSolver, DeviceTimes, LinearDevice, Pass, PassEnd,
 };
 use self::device::{Found, OnDevice};
-pub(crate) use self::factors::{Factors, Pivots, ZERO_PIVOT};
-use self::gradients::{Approximation, BlockMatrix, Coarse, KrylovVectors};
-pub(crate) use self::report::LinearError;
-pub use self::report::LinearReport;
+pub use self::factors::{Factors, Pivots, ZERO_PIVOT};
+pub use self::report::{LinearError, LinearReport};
+use self::sparse::{Equations, LowerMatrix};
 use self::unsymmetric::LuFactors;
-use crate::sparse::{Equations, LowerMatrix};
 
 /// How linear equations are solved.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -46,7 +66,7 @@ pub enum LinearSolver {
 
 impl LinearSolver {
     /// Whether a device can do it.
-    pub(crate) fn suits_devices(self) -> bool {
+    pub fn suits_devices(self) -> bool {
         let Self::ConjugateGradients { preconditioner, .. } = self else { return false };
         !matches!(preconditioner, Preconditioner::LaggedFactors { .. })
     }
@@ -67,8 +87,8 @@ pub enum Preconditioner {
     },
 }
 
-/// A solver with its memory.
-pub(crate) struct Workspace {
+/// A solver of the equations of one pattern, with its memory.
+pub struct Workspace {
     solver: LinearSolver,
     factors: Option<Factors>,
     unsymmetric: Option<LuFactors>,
@@ -91,7 +111,10 @@ pub(crate) struct Workspace {
 impl Workspace {
     /// A solver for matrices of one pattern, on a device if one is given. It takes over the device's arrays and kernels from the solver of
     /// the pattern before.
-    pub(crate) fn new(
+    ///
+    /// # Errors
+    /// If there are more equations than can be numbered, no room for the factors, or the device fails or has no room.
+    pub fn new(
         solver: LinearSolver,
         device: Option<&Arc<dyn LinearDevice>>,
         equations: &Equations,
@@ -106,7 +129,7 @@ impl Workspace {
             }
         };
         let whole = solver == LinearSolver::Unsymmetric;
-        let empty = matrix.len() == 0;
+        let empty = matrix.columns() == 0;
         let most = device.map_or(usize::MAX, |device| device.aggregates());
         let blocks = preconditioner.map(|_| BlockMatrix::new(equations, matrix, most));
         let blocks = match solver {
@@ -143,7 +166,7 @@ impl Workspace {
             left_to_cpu: before.map_or(0, |before| before.left_to_cpu),
             vectors: blocks
                 .as_ref()
-                .map(|blocks| KrylovVectors::new(blocks, matrix.len()))
+                .map(|blocks| KrylovVectors::new(blocks, matrix.columns()))
                 .unwrap_or_default(),
             blocks,
             pivots: Pivots { smallest: 1.0, ..Pivots::default() },
@@ -151,14 +174,17 @@ impl Workspace {
     }
 
     /// Takes new positions of the nodes.
-    pub(crate) fn place(&mut self, position: &[Vector3<f64>]) {
+    pub fn place(&mut self, position: &[Vector3<f64>]) {
         if let (Some(coarse), Some(blocks)) = (&mut self.coarse, &self.blocks) {
             coarse.place(blocks, position);
         }
     }
 
-    /// Takes a new matrix.
-    pub(crate) fn prepare(&mut self, matrix: &LowerMatrix) -> Result<Pivots, LinearError> {
+    /// Takes a new matrix of the pattern; the signs of its factors where there are some.
+    ///
+    /// # Errors
+    /// If the matrix is not finite, a diagonal block is not positive definite where conjugate gradients invert it, or the device fails.
+    pub fn prepare(&mut self, matrix: &LowerMatrix) -> Result<Pivots, LinearError> {
         self.fresh = false;
         if let Some(factors) = &mut self.unsymmetric {
             factors.factorise(matrix)?;
@@ -200,12 +226,12 @@ impl Workspace {
     }
 
     /// Values of the older matrix whose factors precondition the next one, if there is one.
-    pub(crate) fn factored(&self) -> Option<&[f64]> {
+    pub fn factored(&self) -> Option<&[f64]> {
         (self.current && !self.factored.is_empty()).then_some(&self.factored)
     }
 
     /// Takes the factors of a matrix of this pattern with other values as preconditioner of the next one. Values that have none are left.
-    pub(crate) fn precondition_with(&mut self, mut values: Vec<f64>, matrix: &mut LowerMatrix) {
+    pub fn precondition_with(&mut self, mut values: Vec<f64>, matrix: &mut LowerMatrix) {
         if self.blocks.is_some() && self.factors.is_some() && values.len() == matrix.value.len() {
             std::mem::swap(&mut matrix.value, &mut values);
             self.current = self.factorise(matrix).is_ok();
@@ -216,7 +242,10 @@ impl Workspace {
 
     /// x ← A⁻¹ b for the matrix that was prepared; conjugate gradients start from the multiple of
     /// the x given that leaves the smallest residual.
-    pub(crate) fn solve(
+    ///
+    /// # Errors
+    /// If iterations run out or meet a direction without positive stiffness, numbers are not finite, or the device fails.
+    pub fn solve(
         &mut self,
         matrix: &LowerMatrix,
         b: &[f64],
@@ -291,12 +320,13 @@ impl Workspace {
     }
 
     /// Time of the device so far, and how many solutions it left to the CPU.
-    pub(crate) fn of_device(&self) -> (DeviceTimes, usize) {
+    pub fn of_device(&self) -> (DeviceTimes, usize) {
         let times = self.on_device.as_ref().map(OnDevice::times).unwrap_or_default();
         (times, self.left_to_cpu)
     }
 }
 
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+/// a · b.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -6,11 +6,11 @@ use faer::sparse::linalg::lu::{LuRef, LuSymbolicParams, NumericLu, SymbolicLu, f
 use faer::sparse::{FaerError, SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Spec};
 
-use super::report::LinearError;
+use crate::report::LinearError;
 use crate::sparse::LowerMatrix;
 
 /// L U of the whole matrix.
-pub(super) struct LuFactors {
+pub(crate) struct LuFactors {
     symbolic: SymbolicLu<u32>,
     numeric: NumericLu<u32, f64>,
     column_start: Vec<u32>,
@@ -22,10 +22,10 @@ pub(super) struct LuFactors {
 }
 
 impl LuFactors {
-    pub(super) fn new(matrix: &LowerMatrix) -> Result<Self, LinearError> {
-        let mut columns: Vec<Vec<(u32, (u32, bool))>> = vec![Vec::new(); matrix.len()];
+    pub(crate) fn new(matrix: &LowerMatrix) -> Result<Self, LinearError> {
+        let mut columns: Vec<Vec<(u32, (u32, bool))>> = vec![Vec::new(); matrix.columns()];
         // Columns to the left are done first, so rows above the diagonal come in order.
-        for column in 0..matrix.len() {
+        for column in 0..matrix.columns() {
             for at in matrix.column_start[column]..matrix.column_start[column + 1] {
                 let row = matrix.row[at as usize];
                 columns[column].push((row, (at, false)));
@@ -43,7 +43,7 @@ impl LuFactors {
             }
             column_start.push(row.len() as u32);
         }
-        let size = matrix.len();
+        let size = matrix.columns();
         let pattern = SymbolicSparseColMatRef::new_checked(size, size, &column_start, None, &row);
         let symbolic = factorize_symbolic_lu(pattern, LuSymbolicParams::default())?;
         let memory = MemBuffer::try_new(StackReq::any_of(&[
@@ -59,14 +59,14 @@ impl LuFactors {
     ///
     /// # Errors
     /// If it holds a number that is not finite, or there is no room for the factors.
-    pub(super) fn factorise(&mut self, matrix: &LowerMatrix) -> Result<(), LinearError> {
+    pub(crate) fn factorise(&mut self, matrix: &LowerMatrix) -> Result<(), LinearError> {
         for (value, &(at, mirrored)) in self.value.iter_mut().zip(&self.source) {
             *value = if mirrored { matrix.mirror[at as usize] } else { matrix.value[at as usize] };
             if !value.is_finite() {
                 return Err(LinearError::NotFinite);
             }
         }
-        let size = matrix.len();
+        let size = matrix.columns();
         let pattern = SymbolicSparseColMatRef::new_checked(size, size, &self.column_start, None, &self.row);
         let whole = SparseColMatRef::new(pattern, &self.value[..]);
         let stack = MemStack::new(&mut self.memory);
@@ -78,7 +78,7 @@ impl LuFactors {
     }
 
     /// x ← A⁻¹ x.
-    pub(super) fn solve(&mut self, x: &mut [f64]) {
+    pub(crate) fn solve(&mut self, x: &mut [f64]) {
         let size = x.len();
         LuRef::new_unchecked(&self.symbolic, &self.numeric).solve_in_place_with_conj(
             Conj::No,

@@ -3,35 +3,35 @@
 //! the signs of pivots are wanted. They are found on one thread; solutions share two parts of the assembly tree between threads. Bits do not
 //! depend on how many there are.
 
-use pliant_mechanics::memory::zeros;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::fronts::{BLOCK, Left, PivotColumns, dot, eliminate, multiply};
-use super::report::LinearError;
-use super::supernodes::{Supernode, Supernodes, padded};
+use crate::fronts::{BLOCK, Left, PivotColumns, dot, eliminate, multiply};
+use crate::memory::zeros;
+use crate::report::LinearError;
 use crate::sparse::LowerMatrix;
+use crate::supernodes::{Supernode, Supernodes, padded};
 
 /// The signs of a factorisation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Pivots {
+pub struct Pivots {
     /// Negative pivots: directions in which the stiffness is negative.
-    pub(crate) negative: usize,
+    pub negative: usize,
     /// Equation with the smallest pivot.
-    pub(crate) weakest: usize,
+    pub weakest: usize,
     /// That pivot over the diagonal entry.
-    pub(crate) smallest: f64,
+    pub smallest: f64,
     /// The lowest pivot over the diagonal entry, if one is negative.
-    pub(crate) lowest: f64,
+    pub lowest: f64,
 }
 
 /// Pivots below this part of the diagonal are zero but for round-off.
-pub(crate) const ZERO_PIVOT: f64 = 1e-14;
+pub const ZERO_PIVOT: f64 = 1e-14;
 
 /// Numbers of factors from which on solutions are shared: they take some 15 µs.
 const SHARED: usize = 1 << 15;
 
 /// L D Lᵀ of a matrix.
-pub(crate) struct Factors {
+pub struct Factors {
     supernodes: Supernodes,
     /// The supernodes up to the first number and from there up to the second have nothing to do with each other; the rest waits for both.
     shares: [usize; 2],
@@ -60,9 +60,11 @@ struct Memory {
 }
 
 impl Factors {
+    /// Room for the factors of a pattern.
+    ///
     /// # Errors
     /// If there are more equations than can be numbered, or no room for the factors.
-    pub(crate) fn new(matrix: &LowerMatrix) -> Result<Self, LinearError> {
+    pub fn new(matrix: &LowerMatrix) -> Result<Self, LinearError> {
         Self::shared_from(matrix, SHARED)
     }
 
@@ -71,17 +73,17 @@ impl Factors {
         let supernodes = Supernodes::new(matrix)?;
         let shares =
             if supernodes.values < least { [supernodes.nodes.len(); 2] } else { supernodes.shares() };
-        let rest = matrix.len() - supernodes.column(shares[1]);
+        let rest = matrix.columns() - supernodes.column(shares[1]);
         Ok(Self {
             shares,
             value: zeros(supernodes.values)?,
-            pivot: vec![0.0; matrix.len()],
-            diagonal: vec![0.0; matrix.len()],
+            pivot: vec![0.0; matrix.columns()],
+            diagonal: vec![0.0; matrix.columns()],
             memory: Memory {
                 scaled: vec![0.0; supernodes.highest * BLOCK],
                 stacks: [zeros(supernodes.stacks[0])?, zeros(supernodes.stacks[1])?],
                 waiting: Vec::with_capacity(supernodes.nodes.len()),
-                right: vec![0.0; matrix.len()],
+                right: vec![0.0; matrix.columns()],
                 below: [(); 2].map(|()| vec![0.0; padded(supernodes.most_below)]),
                 taken: [(); 2].map(|()| vec![0.0; rest]),
             },
@@ -94,13 +96,13 @@ impl Factors {
     ///
     /// # Errors
     /// If there are more equations than can be numbered, or the order of elimination has no room.
-    pub(crate) fn bytes(matrix: &LowerMatrix) -> Result<u64, LinearError> {
+    pub fn bytes(matrix: &LowerMatrix) -> Result<u64, LinearError> {
         let Supernodes { values, stacks: [even, odd], .. } = Supernodes::new(matrix)?;
         Ok(8 * (values + even + odd) as u64)
     }
 
     /// Factors a matrix; `None` if it holds a number that is not finite.
-    pub(crate) fn factorise(&mut self, matrix: &LowerMatrix) -> Option<Pivots> {
+    pub fn factorise(&mut self, matrix: &LowerMatrix) -> Option<Pivots> {
         for (diagonal, &equation) in self.diagonal.iter_mut().zip(&self.supernodes.order) {
             let own = matrix.diagonal(equation as usize).abs();
             *diagonal = if own > 0.0 { own } else { 1.0 };
@@ -124,7 +126,7 @@ impl Factors {
     }
 
     /// x ← A⁻¹ x.
-    pub(crate) fn solve(&mut self, x: &mut [f64]) {
+    pub fn solve(&mut self, x: &mut [f64]) {
         let Self { supernodes, shares: [middle, end], value, pivot, memory, arch, .. } = self;
         let Memory { right, below: [below, below_other], taken: [taken, taken_other], .. } = memory;
         for (own, &equation) in right.iter_mut().zip(&supernodes.order) {

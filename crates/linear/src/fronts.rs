@@ -9,10 +9,10 @@
 
 use pulp::Simd;
 
-use super::supernodes::{PACK, Run, padded};
+use crate::supernodes::{PACK, Run, padded};
 
 /// Columns of a block: their rows stay in the cache while the columns to the right take them off.
-pub(super) const BLOCK: usize = 48;
+pub(crate) const BLOCK: usize = 48;
 /// Columns of a strip: those of a node.
 const STRIP: usize = 6;
 
@@ -86,7 +86,7 @@ macro_rules! for_strips {
 }
 
 /// Pivots of the columns of a panel, as they are found.
-pub(super) struct PivotColumns<'a> {
+pub(crate) struct PivotColumns<'a> {
     /// The diagonal of the matrix, without signs.
     pub diagonal: &'a [f64],
     pub pivot: &'a mut [f64],
@@ -298,7 +298,7 @@ impl Rest<'_> {
 
 /// L of a panel of some columns, whose rows below begin at the width padded; and what is left for these rows.
 #[inline(always)]
-pub(super) fn eliminate<S: Simd>(
+pub(crate) fn eliminate<S: Simd>(
     simd: S,
     panel: &mut [f64],
     width: usize,
@@ -327,7 +327,7 @@ pub(super) fn eliminate<S: Simd>(
 }
 
 /// What a supernode has left for its rows below.
-pub(super) struct Left<'a> {
+pub(crate) struct Left<'a> {
     pub numbers: &'a [f64],
     /// Rows, padded.
     pub height: usize,
@@ -337,7 +337,7 @@ pub(super) struct Left<'a> {
 impl Left<'_> {
     /// Adds what comes to the columns of a front from one on up to another to these columns, whose first row is that of the first of them.
     #[inline(always)]
-    pub(super) fn add_to(&self, columns: &mut [f64], height: usize, [from, to]: [usize; 2]) {
+    pub(crate) fn add_to(&self, columns: &mut [f64], height: usize, [from, to]: [usize; 2]) {
         let is_there = |run: &Run| (from..to).contains(&(run.to as usize));
         for (number, across) in self.runs.iter().enumerate().filter(|(_, run)| is_there(run)) {
             let own =
@@ -399,7 +399,7 @@ fn add_all(from: &[f64], to: &mut [f64], places: [usize; 2], len: usize) {
 
 /// Sums of the rows of a panel from one on, each column times a number.
 #[inline(always)]
-pub(super) fn multiply<S: Simd>(simd: S, panel: &[f64], numbers: &[f64], from: usize, sums: &mut [f64]) {
+pub(crate) fn multiply<S: Simd>(simd: S, panel: &[f64], numbers: &[f64], from: usize, sums: &mut [f64]) {
     let height = panel.len() / numbers.len();
     for_rows!(simd, 0, sums.len(), row, R => {
         let mut own = [simd.splat_f64s(0.0); R];
@@ -417,7 +417,7 @@ pub(super) fn multiply<S: Simd>(simd: S, panel: &[f64], numbers: &[f64], from: u
 
 /// a · b of multiples of [`PACK`].
 #[inline(always)]
-pub(super) fn dot<S: Simd>(simd: S, a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot<S: Simd>(simd: S, a: &[f64], b: &[f64]) -> f64 {
     let mut sum = simd.splat_f64s(0.0);
     for (a, b) in S::as_simd_f64s(a).0.iter().zip(S::as_simd_f64s(b).0) {
         sum = simd.mul_add_e_f64s(*a, *b, sum);

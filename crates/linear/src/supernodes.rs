@@ -10,20 +10,20 @@ use crate::sparse::LowerMatrix;
 
 const NONE: u32 = u32::MAX;
 /// Rows are stored in multiples of this: the widest registers.
-pub(super) const PACK: usize = 8;
+pub(crate) const PACK: usize = 8;
 /// Columns of a supernode up to which it may hold a part of zeros, from narrow ones to any. Wide fronts are worth zeros: of the lens' factors
 /// these take a tenth of the time off.
 const ZEROS: [(usize, f64); 3] = [(18, 0.3), (48, 0.15), (usize::MAX, 0.05)];
 
 /// A number of rows with those that are stored after them.
-pub(super) fn padded(rows: usize) -> usize {
+pub(crate) fn padded(rows: usize) -> usize {
     rows.next_multiple_of(PACK)
 }
 
 /// Columns that are eliminated together. Its front has a panel of these columns, with rows for themselves and for those below, either padded, and
 /// what is left for the rows below.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Supernode {
+pub(crate) struct Supernode {
     /// Its first column, and how many it has.
     pub first: usize,
     pub width: usize,
@@ -43,19 +43,19 @@ pub(super) struct Supernode {
 
 impl Supernode {
     /// Rows below its columns.
-    pub(super) fn below(&self) -> usize {
+    pub(crate) fn below(&self) -> usize {
         self.rows[1] - self.rows[0]
     }
 
     /// Rows of its panel.
-    pub(super) fn height(&self) -> usize {
+    pub(crate) fn height(&self) -> usize {
         padded(self.width) + padded(self.below())
     }
 }
 
 /// Rows below a supernode that follow one another in the front of its parent, too.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Run {
+pub(crate) struct Run {
     pub from: u32,
     pub to: u32,
     pub len: u32,
@@ -63,7 +63,7 @@ pub(super) struct Run {
 
 /// Entries of a column of the matrix that follow one another, and in a panel lie in a column or in a row.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Piece {
+pub(crate) struct Piece {
     pub from: u32,
     pub to: u32,
     pub len: u32,
@@ -81,7 +81,7 @@ struct Groups {
 
 impl Groups {
     fn new(matrix: &LowerMatrix) -> Self {
-        let size = matrix.len();
+        let size = matrix.columns();
         // Columns to the left that have a row.
         let mut left_start = vec![0_u32; size + 1];
         let inner = |column: u32| &matrix.rows(column)[1..];
@@ -300,7 +300,7 @@ impl Columns {
 
 /// All supernodes in the order of elimination.
 #[derive(Default)]
-pub(super) struct Supernodes {
+pub(crate) struct Supernodes {
     pub nodes: Vec<Supernode>,
     /// The equation of each column.
     pub order: Vec<u32>,
@@ -318,7 +318,7 @@ pub(super) struct Supernodes {
 
 impl Supernodes {
     /// Those of a pattern.
-    pub(super) fn new(matrix: &LowerMatrix) -> Result<Self, FaerError> {
+    pub(crate) fn new(matrix: &LowerMatrix) -> Result<Self, FaerError> {
         let groups = Groups::new(matrix);
         let order = groups.order()?;
         let mut place = vec![0; order.len()];
@@ -352,13 +352,13 @@ impl Supernodes {
     }
 
     /// The first column of a supernode, or the end of all.
-    pub(super) fn column(&self, node: usize) -> usize {
+    pub(crate) fn column(&self, node: usize) -> usize {
         self.nodes.get(node).map_or(self.order.len(), |node| node.first)
     }
 
     /// Two numbers: the supernodes up to the first and from there up to the second are whole subtrees, and all others come after them. Two
     /// threads take a subtree each, and then one of them the rest; the larger subtree and the rest are together as small as they can be.
-    pub(super) fn shares(&self) -> [usize; 2] {
+    pub(crate) fn shares(&self) -> [usize; 2] {
         let count = self.nodes.len();
         // What there is to do before each, and the first of its subtree.
         let (mut work, mut begin) = (vec![0], Vec::with_capacity(count));
@@ -384,15 +384,15 @@ impl Supernodes {
         shares
     }
 
-    pub(super) fn rows(&self, node: &Supernode) -> &[u32] {
+    pub(crate) fn rows(&self, node: &Supernode) -> &[u32] {
         &self.rows[node.rows[0]..node.rows[1]]
     }
 
-    pub(super) fn runs(&self, node: &Supernode) -> &[Run] {
+    pub(crate) fn runs(&self, node: &Supernode) -> &[Run] {
         &self.runs[node.runs[0]..node.runs[1]]
     }
 
-    pub(super) fn pieces(&self, node: &Supernode) -> &[Piece] {
+    pub(crate) fn pieces(&self, node: &Supernode) -> &[Piece] {
         &self.pieces[node.pieces[0]..node.pieces[1]]
     }
 

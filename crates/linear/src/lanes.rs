@@ -6,14 +6,14 @@ use std::ops::{Add, Mul, Neg, Sub};
 use pulp::Simd;
 
 /// Numbers in a pack: the widest registers in double precision.
-pub(crate) const PACK: usize = 8;
+pub const PACK: usize = 8;
 
 /// The same number of each of the cells of a pack.
-pub(crate) type Pack = [f64; PACK];
+pub type Pack = [f64; PACK];
 
 /// Numbers of neighbouring cells in a register.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Lane<S: Simd> {
+pub struct Lane<S: Simd> {
     simd: S,
     own: S::f64s,
 }
@@ -21,56 +21,56 @@ pub(crate) struct Lane<S: Simd> {
 impl<S: Simd> Lane<S> {
     /// Those of a pack from the register's number on.
     #[inline(always)]
-    pub(crate) fn load(simd: S, pack: &Pack, register: usize) -> Self {
+    pub fn load(simd: S, pack: &Pack, register: usize) -> Self {
         Self { simd, own: S::as_simd_f64s(&pack[..]).0[register] }
     }
 
     /// Writes them into a pack.
     #[inline(always)]
-    pub(crate) fn store(self, pack: &mut Pack, register: usize) {
+    pub fn store(self, pack: &mut Pack, register: usize) {
         S::as_mut_simd_f64s(&mut pack[..]).0[register] = self.own;
     }
 
     /// The same number in all.
     #[inline(always)]
-    pub(crate) fn splat(simd: S, number: f64) -> Self {
+    pub fn splat(simd: S, number: f64) -> Self {
         Self { simd, own: simd.splat_f64s(number) }
     }
 
     /// Half of it.
     #[inline(always)]
-    pub(crate) fn half(self) -> Self {
+    pub fn half(self) -> Self {
         self * Self::splat(self.simd, 0.5)
     }
 
     /// This over another.
     #[inline(always)]
-    pub(crate) fn over(self, other: Self) -> Self {
+    pub fn over(self, other: Self) -> Self {
         Self { simd: self.simd, own: self.simd.div_f64s(self.own, other.own) }
     }
 
     /// Its square root.
     #[inline(always)]
-    pub(crate) fn sqrt(self) -> Self {
+    pub fn sqrt(self) -> Self {
         Self { simd: self.simd, own: self.simd.sqrt_f64s(self.own) }
     }
 
     /// Where this is less than another number, the first of two, and else the second.
     #[inline(always)]
-    pub(crate) fn if_less(self, than: Self, then: Self, other: Self) -> Self {
+    pub fn if_less(self, than: Self, then: Self, other: Self) -> Self {
         let mask = self.simd.less_than_f64s(self.own, than.own);
         Self { simd: self.simd, own: self.simd.select_f64s(mask, then.own, other.own) }
     }
 
     /// a b + this.
     #[inline(always)]
-    pub(crate) fn plus(self, a: Self, b: Self) -> Self {
+    pub fn plus(self, a: Self, b: Self) -> Self {
         Self { simd: self.simd, own: self.simd.mul_add_e_f64s(a.own, b.own, self.own) }
     }
 
     /// This − a b.
     #[inline(always)]
-    pub(crate) fn less(self, a: Self, b: Self) -> Self {
+    pub fn less(self, a: Self, b: Self) -> Self {
         Self { simd: self.simd, own: self.simd.negate_mul_add_e_f64s(a.own, b.own, self.own) }
     }
 }
@@ -108,20 +108,20 @@ impl<S: Simd> Neg for Lane<S> {
 }
 
 /// Three of them.
-pub(crate) type Three<S> = [Lane<S>; 3];
+pub type Three<S> = [Lane<S>; 3];
 
 /// A 3 × 3 matrix of them, row by row.
-pub(crate) type Square<S> = [Three<S>; 3];
+pub type Square<S> = [Three<S>; 3];
 
 /// Three of anything, by their numbers. The closures of `map` and `from_fn` would stay calls, without the instructions of a kernel.
 #[inline(always)]
-pub(crate) fn three<T>(of: impl Fn(usize) -> T) -> [T; 3] {
+pub fn three<T>(of: impl Fn(usize) -> T) -> [T; 3] {
     [of(0), of(1), of(2)]
 }
 
 /// A B.
 #[inline(always)]
-pub(crate) fn times<S: Simd>(a: &Square<S>, b: &Square<S>) -> Square<S> {
+pub fn times<S: Simd>(a: &Square<S>, b: &Square<S>) -> Square<S> {
     let entry = |row: &Three<S>, j: usize| (row[0] * b[0][j]).plus(row[1], b[1][j]).plus(row[2], b[2][j]);
     let row = |i: usize| [entry(&a[i], 0), entry(&a[i], 1), entry(&a[i], 2)];
     [row(0), row(1), row(2)]
@@ -129,54 +129,54 @@ pub(crate) fn times<S: Simd>(a: &Square<S>, b: &Square<S>) -> Square<S> {
 
 /// A Bᵀ.
 #[inline(always)]
-pub(crate) fn times_transposed<S: Simd>(a: &Square<S>, b: &Square<S>) -> Square<S> {
+pub fn times_transposed<S: Simd>(a: &Square<S>, b: &Square<S>) -> Square<S> {
     let row = |i: usize| [dot(&a[i], &b[0]), dot(&a[i], &b[1]), dot(&a[i], &b[2])];
     [row(0), row(1), row(2)]
 }
 
 /// A v.
 #[inline(always)]
-pub(crate) fn apply<S: Simd>(a: &Square<S>, v: &Three<S>) -> Three<S> {
+pub fn apply<S: Simd>(a: &Square<S>, v: &Three<S>) -> Three<S> {
     [dot(&a[0], v), dot(&a[1], v), dot(&a[2], v)]
 }
 
 /// a · b.
 #[inline(always)]
-pub(crate) fn dot<S: Simd>(a: &Three<S>, b: &Three<S>) -> Lane<S> {
+pub fn dot<S: Simd>(a: &Three<S>, b: &Three<S>) -> Lane<S> {
     (a[0] * b[0]).plus(a[1], b[1]).plus(a[2], b[2])
 }
 
 /// a × b.
 #[inline(always)]
-pub(crate) fn cross<S: Simd>(a: &Three<S>, b: &Three<S>) -> Three<S> {
+pub fn cross<S: Simd>(a: &Three<S>, b: &Three<S>) -> Three<S> {
     let entry = |i: usize, j: usize| (a[i] * b[j]).less(a[j], b[i]);
     [entry(1, 2), entry(2, 0), entry(0, 1)]
 }
 
 /// Aᵀ.
 #[inline(always)]
-pub(crate) fn transpose<S: Simd>(a: &Square<S>) -> Square<S> {
+pub fn transpose<S: Simd>(a: &Square<S>) -> Square<S> {
     let row = |i: usize| [a[0][i], a[1][i], a[2][i]];
     [row(0), row(1), row(2)]
 }
 
 /// A + B.
 #[inline(always)]
-pub(crate) fn sum<S: Simd>(a: &Square<S>, b: &Square<S>) -> Square<S> {
+pub fn sum<S: Simd>(a: &Square<S>, b: &Square<S>) -> Square<S> {
     let row = |i: usize| [a[i][0] + b[i][0], a[i][1] + b[i][1], a[i][2] + b[i][2]];
     [row(0), row(1), row(2)]
 }
 
 /// A − B.
 #[inline(always)]
-pub(crate) fn difference<S: Simd>(a: &Square<S>, b: &Square<S>) -> Square<S> {
+pub fn difference<S: Simd>(a: &Square<S>, b: &Square<S>) -> Square<S> {
     let row = |i: usize| [a[i][0] - b[i][0], a[i][1] - b[i][1], a[i][2] - b[i][2]];
     [row(0), row(1), row(2)]
 }
 
 /// (A + Aᵀ)/2.
 #[inline(always)]
-pub(crate) fn symmetric<S: Simd>(a: &Square<S>) -> Square<S> {
+pub fn symmetric<S: Simd>(a: &Square<S>) -> Square<S> {
     let mean = |i: usize, j: usize| (a[i][j] + a[j][i]).half();
     let (xy, xz, yz) = (mean(0, 1), mean(0, 2), mean(1, 2));
     [[a[0][0], xy, xz], [xy, a[1][1], yz], [xz, yz, a[2][2]]]
@@ -184,7 +184,7 @@ pub(crate) fn symmetric<S: Simd>(a: &Square<S>) -> Square<S> {
 
 /// Adds half of S(v), S(v) b = v × b.
 #[inline(always)]
-pub(crate) fn add_half_skew<S: Simd>(a: &mut Square<S>, v: &Three<S>) {
+pub fn add_half_skew<S: Simd>(a: &mut Square<S>, v: &Three<S>) {
     let [x, y, z] = three(|k| v[k].half());
     (a[0][1], a[1][0]) = (a[0][1] - z, a[1][0] + z);
     (a[0][2], a[2][0]) = (a[0][2] + y, a[2][0] - y);

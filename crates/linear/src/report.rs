@@ -1,9 +1,9 @@
 //! What a solution of linear equations took, or why there is none.
 
 use faer::sparse::FaerError;
-use pliant_mechanics::memory::OutOfMemory;
 
-use super::device::DeviceError;
+use crate::device::DeviceError;
+use crate::memory::OutOfMemory;
 
 /// What a solution took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -15,15 +15,25 @@ pub struct LinearReport {
 }
 
 /// Why a linear solve failed.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) enum LinearError {
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LinearError {
     /// More equations than factors can number.
+    #[error("there are more equations than factors can number")]
     TooLarge,
     /// Factors that the system has no room for, and how much of it they take where that is known.
+    #[error("the factors have no room{}", .0.map_or_else(String::new, |needed| format!(": {needed}")))]
     OutOfMemory(Option<OutOfMemory>),
+    /// The device failed.
+    #[error("{0}")]
     Device(DeviceError),
+    /// The matrix or the right-hand side holds a number that is not finite.
+    #[error("the matrix is not finite")]
     NotFinite,
+    /// After so many iterations a direction has no positive stiffness.
+    #[error("after {0} iterations a direction has no positive stiffness")]
     Indefinite(usize),
+    /// Iterations ran out; what was reached.
+    #[error("after {} iterations the residual is {:e}", .0.iterations, .0.residual)]
     Stalled(LinearReport),
 }
 
