@@ -3,10 +3,11 @@
 use std::error::Error;
 
 use nalgebra::Vector3;
-use pliant_implicit::element::Elasticity;
-use pliant_implicit::{Assembly, Shell, Wall};
+use pliant_implicit::{Assembly, Shell};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind};
+use pliant_shells::element::Elasticity;
+use pliant_shells::element::Wall;
 use pliant_sim::{Part, Simulation};
 
 fn main() -> Result<(), Box<dyn Error>> {

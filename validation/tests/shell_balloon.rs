@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
-use pliant_implicit::element::{Formulation, Membrane};
 use pliant_implicit::{Control, State, StaticSettings, Statics};
 use pliant_mechanics::load::{LoadKind, Spread};
+use pliant_shells::element::{Formulation, Membrane};
 use pliant_validation::claim;
 use pliant_validation::shells::{FLAT, Specimen};
 

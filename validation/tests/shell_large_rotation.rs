@@ -4,12 +4,12 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use pliant_geometry::Mesh;
-use pliant_implicit::element::{Formulation, Membrane};
 use pliant_implicit::{Control, State, StaticSettings, Statics, Step};
 use pliant_linear::LinearSolver;
 use pliant_mechanics::load::LoadKind;
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet};
 use pliant_reproduce::cases::plate::{LARGE, deflections};
+use pliant_shells::element::{Formulation, Membrane};
 use pliant_validation::shells::{CLAMPED, FLAT, Specimen, symmetry};
 use pliant_validation::{claim, numbers, reference};
 

@@ -3,12 +3,12 @@
 //! that a prototype of the same formulas found (`data/shell/`).
 
 use pliant_geometry::Mesh;
-use pliant_implicit::element::{Bending, Formulation, Membrane};
 use pliant_mechanics::load::{LoadKind, Spread};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Distortion, Pattern, Sheet};
 use pliant_reproduce::CaseError;
 use pliant_reproduce::cases::obstacle_course::{self as course, CantileverCells};
 use pliant_reproduce::cases::plate::{self, RIGIDITY, SIDE};
+use pliant_shells::element::{Bending, Formulation, Membrane};
 use pliant_validation::claim;
 use pliant_validation::shells::{CLAMPED, FLAT, renumbered};
 

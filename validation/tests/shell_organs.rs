@@ -10,14 +10,15 @@ use pliant_contact::barrier::BarrierSettings;
 use pliant_contact::pairs::Surface;
 use pliant_contact::touch::{Contact, Contacts, Touch, With};
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3, io};
-use pliant_implicit::element::{Elasticity, Formulation, Membrane};
 use pliant_implicit::{
-    Assembly, BackwardEuler, DynamicSettings, Shell, State, StaticSettings, Statics, Touching, Wall,
+    Assembly, BackwardEuler, DynamicSettings, Shell, State, StaticSettings, Statics, Touching,
 };
 use pliant_linear::{LinearSolver, Preconditioner};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_mechanics::model::{Constraint, Motion};
+use pliant_shells::element::Wall;
+use pliant_shells::element::{Elasticity, Formulation, Membrane};
 use pliant_validation::claim;
 use pliant_validation::shells::{FLAT, ramp, renumbered, triangles};
 

@@ -5,10 +5,10 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use pliant_geometry::{Mesh, Vector3};
-use pliant_implicit::element::{Bending, Formulation, Membrane};
 use pliant_implicit::{Assembly, Explicit, State, StaticSettings, Statics, Step};
 use pliant_mechanics::load::{LoadKind, Spread};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet, sphere};
+use pliant_shells::element::{Bending, Formulation, Membrane};
 use pliant_validation::shells::{FLAT, Specimen, symmetry};
 use pliant_validation::{Random, claim};
 

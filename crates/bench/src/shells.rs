@@ -8,15 +8,16 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use pliant_gpu::{Device, GpuError, Kind};
-use pliant_implicit::element::{Bending, Elasticity, Formulation, Membrane};
 use pliant_implicit::{
-    Assembly, BackwardEuler, DynamicSettings, ModelError, Phases, Shell, SolveError, State, Wall,
+    Assembly, BackwardEuler, DynamicSettings, ModelError, Phases, Shell, SolveError, State,
 };
 use pliant_linear::{LinearDevice, LinearSolver, Preconditioner};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_mechanics::model::{Constraint, Motion};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet};
+use pliant_shells::element::Wall;
+use pliant_shells::element::{Bending, Elasticity, Formulation, Membrane};
 
 use crate::suite::{BenchError, Progress};
 use crate::{Machine, Spread as Times};

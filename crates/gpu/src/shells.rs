@@ -12,9 +12,10 @@ use std::time::Instant as Clock;
 
 use bytemuck::{Pod, Zeroable};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
-use pliant_implicit::{Assembly, CurvedSurface, EdgeRule, Patch, State};
+use pliant_implicit::{Assembly, CurvedSurface, State};
 use pliant_mechanics::load::{LoadKind, Spread};
 use pliant_mechanics::model::Motion;
+use pliant_shells::{EdgeRule, Patch};
 
 use crate::kernel::{Binding, Bound, Kernel, Memory};
 use crate::paths::by_rows;
@@ -466,7 +467,7 @@ impl Pressed {
 /// Of each corner its normal at rest in the axes of its facet; with the first the control points on straight edges, as bits.
 fn normals(model: &Assembly) -> Vec<[Four; 3]> {
     let (surface, rest) = (CurvedSurface::new(model, EdgeRule::Arc), State::at_rest(model));
-    let of_facet = |(number, facet): (u32, &pliant_implicit::Facet)| {
+    let of_facet = |(number, facet): (u32, &pliant_shells::Facet)| {
         let patch = surface.patch(model, &rest, number);
         let axes: Matrix3<f64> = facet.at_rest().axes;
         let straight =

@@ -9,14 +9,14 @@ use pliant_mechanics::Model;
 use pliant_mechanics::load::LoadKind;
 use pliant_mechanics::model::Solid;
 
-use crate::creases::{Normal, straight_edges};
-use crate::element::{Formulation, Layer, Wall};
 use crate::error::ModelError;
-use crate::facet::Facet;
-use crate::patch::Carried;
 use crate::solid::refusal;
 use crate::touching::Touching;
 use crate::turns::CarriedTurn;
+use pliant_shells::Carried;
+use pliant_shells::Facet;
+use pliant_shells::element::{Formulation, Layer, Wall};
+use pliant_shells::{Normal, straight_edges};
 
 /// The least part of a direction that lies in a triangle.
 const ALONG: f64 = 1e-3;
@@ -201,7 +201,8 @@ impl Assembly {
                 value: 0.5 * (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).norm(),
             })?;
             notes.thick += usize::from(facet.thickness > facet.altitude());
-            notes.comas += usize::from(shell.formulation.bending == crate::element::Bending::Comas2010);
+            notes.comas +=
+                usize::from(shell.formulation.bending == pliant_shells::element::Bending::Comas2010);
             facets.push(facet);
         }
         notes.inverted = self.inverted(&cells);

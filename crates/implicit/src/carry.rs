@@ -9,9 +9,9 @@ use rayon::prelude::*;
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
 
 use crate::assembly::Assembly;
-use crate::patch::{Carried, Place};
 use crate::state::State;
 use crate::surface::CurvedSurface;
+use pliant_shells::{Carried, Place};
 
 /// A search tree over the curved surface where it was when the tree was made.
 struct Nearest<'s> {
@@ -108,9 +108,9 @@ impl CurvedSurface {
 mod tests {
     use super::*;
     use crate::mapping::CarriedPoints;
-    use crate::patch::EdgeRule;
     use crate::tests::{ball, cube, model, strip};
     use pliant_mechanics::mapping::Mapping;
+    use pliant_shells::EdgeRule;
     use pliant_testing::Random;
 
     fn vector(random: &mut Random) -> Vector3<f64> {

@@ -21,13 +21,13 @@ use crate::descent::{Contacting, Limits, Vectors, descend};
 use crate::error::SolveError;
 use crate::forces::Forces;
 use crate::limited::within_limits;
-use crate::rotation::{exponential, logarithm, spin_to_vector};
 use crate::solid::highest_frequency_squared;
 use crate::state::{NODES, State};
 use crate::statics::Attempted;
 use crate::system::{Phases, System};
 use crate::touching::TouchingSystem;
 use pliant_linear::{LinearDevice, LinearReport, LinearSolver, dot};
+use pliant_shells::rotation::{exponential, logarithm, spin_to_vector};
 
 /// How an implicit step goes on in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -825,12 +825,13 @@ mod tests {
     use std::f64::consts::TAU;
 
     use super::*;
-    use crate::element::Elasticity;
-    use crate::{Shell, StaticSettings, Statics, Wall};
+    use crate::{Shell, StaticSettings, Statics};
     use pliant_linear::Preconditioner;
     use pliant_mechanics::curve::{Curve, Shape};
     use pliant_mechanics::load::{Load, LoadKind};
     use pliant_mechanics::model::{Constraint, Motion};
+    use pliant_shells::element::Elasticity;
+    use pliant_shells::element::Wall;
 
     const LENGTH: f64 = 1.0;
     const THIN: f64 = 0.01;

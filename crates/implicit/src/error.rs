@@ -2,8 +2,8 @@
 
 use pliant_linear::memory::OutOfMemory;
 
-use crate::facet::Broken;
 use pliant_linear::DeviceError;
+use pliant_shells::Broken;
 
 /// Why a part could not be added to a model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

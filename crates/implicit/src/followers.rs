@@ -12,10 +12,10 @@ use pliant_mechanics::model::{Constraint, Motion};
 use pliant_mechanics::tie::Tie;
 
 use crate::Assembly;
-use crate::rotation::skew;
 use crate::state::State;
 use crate::turns::{CarriedTurn, Turn};
 use pliant_linear::sparse::{Cell, Equations, LowerMatrix, NONE};
+use pliant_shells::rotation::skew;
 
 /// The nodes whose unknowns move a cell, and how many components of each.
 pub(crate) type Expanded = (Vec<u32>, usize);

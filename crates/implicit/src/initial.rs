@@ -50,13 +50,14 @@ impl State {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rotation::exponential;
+    use crate::CurvedSurface;
     use crate::tests::{ball, cantilever, model, ramp};
     use crate::{BackwardEuler, DynamicSettings, StaticSettings, Statics};
-    use crate::{CurvedSurface, EdgeRule};
     use pliant_mechanics::load::{Load, LoadKind};
     use pliant_mechanics::mapping::Weights;
     use pliant_mechanics::model::{Motion, Surface};
+    use pliant_shells::EdgeRule;
+    use pliant_shells::rotation::exponential;
 
     /// A rigid motion given as positions turns every node by its rotation and costs nothing.
     #[test]

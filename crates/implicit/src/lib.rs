@@ -8,10 +8,10 @@
 //!
 //! ```
 //! use nalgebra::Vector3;
-//! use pliant_implicit::element::Elasticity;
-//! use pliant_implicit::{Assembly, Shell, State, StaticSettings, Statics, Wall};
+//! use pliant_implicit::{Assembly, Shell, State, StaticSettings, Statics};
 //! use pliant_mechanics::curve::{Curve, Shape};
 //! use pliant_mechanics::load::{Load, LoadKind};
+//! use pliant_shells::element::{Elasticity, Wall};
 //!
 //! // A strip of 1 m × 0.1 m × 10 mm in ten squares, clamped at x = 0, lifted at its other end.
 //! let points = (0..22).map(|i| Vector3::new(f64::from(i / 2) * 0.1, f64::from(i % 2) * 0.1, 0.0));
@@ -34,58 +34,42 @@
 mod assembly;
 mod carry;
 mod conditions;
-mod control;
-mod creases;
 mod descent;
 mod dynamics;
-pub mod element;
 mod error;
-mod facet;
-mod facets;
 mod followers;
 mod forces;
 mod gathering;
 mod initial;
 mod limited;
 mod mapping;
-mod patch;
 mod picture;
 mod prescribed;
-mod pressure;
 mod recover;
 mod relaxation;
 mod resolution;
-mod rotation;
 mod samples;
 mod solid;
 mod state;
 mod statics;
-mod strain;
 mod surface;
 mod system;
-#[cfg(test)]
-mod testing;
 #[cfg(test)]
 mod tests;
 mod touching;
 mod turns;
 
 pub use assembly::{Assembly, Notes, Shell, Spring};
-pub use creases::Normal;
 pub use dynamics::{BackwardEuler, DynamicSettings, DynamicStep, Explicit, Integrator};
-pub use element::Wall;
 pub use error::{ModelError, SolveError};
-pub use facet::{Broken, Facet, FacetAtRest, Resultants, ShellEnergy};
 pub use forces::Forces;
 pub use mapping::CarriedPoints;
-pub use patch::{Carried, EdgeRule, Patch, Place};
 pub use picture::{Picture, PictureFields};
 pub use recover::{ShellFields, von_mises};
 pub use relaxation::History;
 pub use resolution::Resolution;
 pub use state::State;
 pub use statics::{Attempted, Control, StaticSettings, Statics, Step, check_held};
-pub use strain::ShellStrain;
 pub use surface::CurvedSurface;
 pub use system::{Phases, bytes_of_factors};
 pub use touching::{Touching, TouchingNow, TouchingSystem};

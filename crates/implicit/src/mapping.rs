@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 use pliant_mechanics::mapping::{Configuration, Mapping, Weights};
 
 use crate::assembly::Assembly;
-use crate::patch::Carried;
 use crate::state::State;
 use crate::surface::CurvedSurface;
+use pliant_shells::Carried;
 
 impl Configuration for State {
     fn position(&self, node: u32) -> [f64; 3] {
@@ -92,8 +92,8 @@ mod tests {
     use pliant_testing::Random;
 
     use super::*;
-    use crate::patch::EdgeRule;
     use crate::tests::{ball, cube, model, strip};
+    use pliant_shells::EdgeRule;
 
     /// Points around shaken and spinning shells of every kind, and points of weights.
     #[test]

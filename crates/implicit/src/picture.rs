@@ -7,10 +7,10 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use crate::assembly::Assembly;
-use crate::patch::{Patch, Place};
-use crate::rotation::logarithm;
 use crate::state::State;
 use crate::surface::CurvedSurface;
+use pliant_shells::rotation::logarithm;
+use pliant_shells::Place;
 
 /// Points and triangles that show the surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -165,31 +165,13 @@ fn mean_rotation(rotations: [UnitQuaternion<f64>; 3], weights: [f64; 3]) -> Vect
     logarithm(&UnitQuaternion::new_normalize(Quaternion::from_vector(parts.sum())))
 }
 
-impl Patch {
-    /// A unit normal that is quadratic between those at the corners and, at the middle of an edge, the one that an S-shaped edge needs
-    /// (Vlachos et al. 2001, in Bernstein's form). It differs from [`Patch::normal`] by a term that falls with the square of the edges, but
-    /// is the same on both sides of an edge.
-    pub fn shading_normal(&self, weights: [f64; 3]) -> Vector3<f64> {
-        let (p, n) = (self.corners(), self.normals());
-        let sum = (0..3).fold(Vector3::zeros(), |sum, i| {
-            let j = (i + 1) % 3;
-            let (e, ends) = (p[j] - p[i], n[i] + n[j]);
-            // The mean of the ends mirrored at the plane across the edge.
-            let middle = ends - e * (2.0 * e.dot(&ends) / e.norm_squared());
-            let middle = middle.try_normalize(0.0).unwrap_or(n[i]);
-            sum + weights[i] * (weights[i] * n[i] + 2.0 * weights[j] * middle)
-        });
-        sum.try_normalize(0.0).unwrap_or(n[0])
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::patch::EdgeRule;
     use crate::tests::{ball, cube, model};
+    use pliant_shells::EdgeRule;
     use pliant_testing::Random;
 
     fn shaken(model: &Assembly, size: f64, seed: u64) -> State {
@@ -310,7 +292,7 @@ mod tests {
         assert!(fields.displacement.iter().chain(&fields.rotation).all(|d| *d == Vector3::zeros()));
         let rest_normals = fields.normal.clone();
         let vector = Vector3::new(1.0, -0.5, 2.0);
-        let turn = crate::rotation::exponential(&vector);
+        let turn = pliant_shells::rotation::exponential(&vector);
         state.position.iter_mut().for_each(|x| *x = turn * *x + vector);
         state.rotation.iter_mut().for_each(|r| *r = turn * *r);
         fields.fill(&picture, &surface, &model, &state);

@@ -6,10 +6,10 @@ use pliant_mechanics::model::{Constraint, Enclosure, Motion, fill};
 
 use crate::assembly::Assembly;
 use crate::conditions::add_gradient;
-use crate::patch::EdgeRule;
-use crate::rotation::{exponential, logarithm};
 use crate::state::State;
 use crate::surface::CurvedSurface;
+use pliant_shells::EdgeRule;
+use pliant_shells::rotation::{exponential, logarithm};
 
 /// A distance that counts as none, over the mean edge: what round-off adds up to over many steps.
 const ARRIVED: f64 = 1e-10;

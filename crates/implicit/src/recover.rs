@@ -6,14 +6,14 @@
 //! facet's normal is σ(z) = n/t + 12 z m/t³ (Timoshenko and Woinowsky-Krieger 1959), in layers Q (ε + z κ) with ε and κ of n and m.
 //! Fields of solids are those of `pliant-explicit`. Leaves out: shear across the thickness, variation within a facet, averages at nodes.
 
-use nalgebra::{Matrix2, Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use crate::assembly::Assembly;
 use crate::error::SolveError;
-use crate::facet::{Broken, Facet, Resultants, ShellEnergy};
 use crate::state::State;
-use crate::strain::ShellStrain;
+use pliant_shells::ShellStrain;
+use pliant_shells::{Broken, Facet, Resultants, ShellEnergy};
 
 impl State {
     /// Displacement of a node [m].
@@ -139,14 +139,6 @@ impl ShellFields {
     }
 }
 
-impl Resultants {
-    /// A tensor (xx, yy, xy) in the facet's axes as one in space: A t Aᵀ with the first two axes A.
-    pub fn in_space(&self, tensor: &Vector3<f64>) -> Matrix3<f64> {
-        let plane = self.axes.fixed_columns::<2>(0);
-        plane * Matrix2::new(tensor.x, tensor.z, tensor.z, tensor.y) * plane.transpose()
-    }
-}
-
 /// Von Mises stress √(3/2 s:s) with s the deviator (von Mises 1913): of plane stress √(σx² − σx σy + σy² + 3 τ²).
 pub fn von_mises(stress: &Matrix3<f64>) -> f64 {
     let deviator = stress - Matrix3::from_diagonal_element(stress.trace() / 3.0);
@@ -160,12 +152,12 @@ mod tests {
     use pliant_mechanics::curve::{Curve, Shape};
 
     use super::*;
-    use crate::element::Formulation;
-    use crate::rotation::exponential;
     use crate::tests::{FLAT, MATERIAL, balloon, model, strip};
     use crate::{Shell, StaticSettings, Statics};
     use pliant_mechanics::load::{Load, LoadKind, Spread};
     use pliant_mechanics::model::{Constraint, Motion};
+    use pliant_shells::element::Formulation;
+    use pliant_shells::rotation::exponential;
 
     const YOUNG: f64 = MATERIAL.elastic.young;
     const POISSON: f64 = MATERIAL.elastic.poisson;

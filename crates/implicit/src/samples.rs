@@ -12,11 +12,11 @@ use pliant_contact::touch::{Contact, Contacts, With};
 
 use crate::assembly::Assembly;
 use crate::followers::Followers;
-use crate::patch::{EdgeRule, Place};
 use crate::state::State;
 use crate::surface::CurvedSurface;
 use crate::touching::{acts, movers_of};
 use pliant_linear::sparse::{Equations, LowerMatrix};
+use pliant_shells::{EdgeRule, Place};
 
 /// J of a point: its velocity over those of a node and its spin.
 pub(crate) type ByNode = SMatrix<f64, 3, 6>;

@@ -6,7 +6,7 @@ use pliant_mechanics::Model;
 use rayon::prelude::*;
 
 use crate::relaxation::History;
-use crate::rotation::exponential;
+use pliant_shells::rotation::exponential;
 
 /// Nodes that a thread takes at least.
 pub(crate) const NODES: usize = 1024;

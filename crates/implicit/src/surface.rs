@@ -5,9 +5,9 @@
 use nalgebra::Vector3;
 
 use crate::assembly::Assembly;
-use crate::creases::{sides, straight_edges};
-use crate::patch::{Carried, EdgeRule, Patch, Place};
 use crate::state::State;
+use pliant_shells::{Carried, EdgeRule, Patch, Place};
+use pliant_shells::{sides, straight_edges};
 
 /// The curved surface of a model's shells.
 #[derive(Clone, Debug)]

@@ -17,16 +17,11 @@ use rayon::prelude::*;
 use crate::assembly::{Assembly, Spring};
 use crate::conditions::{Conditions, add_gradient};
 use crate::error::SolveError;
-use crate::facet::{Broken, Facet, Matrix18, symmetrise};
-use crate::facets::{FacetPack, Work};
 use crate::followers::{Followers, carried_turns};
 use crate::gathering::{ColumnSums, Corners, NodeSums};
 use crate::mapping::CarriedPoints;
-use crate::patch::Vector18;
-use crate::patch::{EdgeRule, Patch};
 use crate::prescribed::Gap;
 use crate::relaxation::{History, Relaxation};
-use crate::rotation::skew;
 use crate::solid::{Response, Stars};
 use crate::state::State;
 use crate::surface::CurvedSurface;
@@ -36,6 +31,11 @@ use pliant_linear::sparse::{Cell, Equations, LowerMatrix, NONE};
 use pliant_linear::{
     DeviceTimes, Factors, LinearDevice, LinearError, LinearReport, LinearSolver, Workspace, ZERO_PIVOT,
 };
+use pliant_shells::Vector18;
+use pliant_shells::facet_packs::{FacetPack, Work};
+use pliant_shells::rotation::skew;
+use pliant_shells::{Broken, Facet, Matrix18, symmetrise};
+use pliant_shells::{EdgeRule, Patch};
 
 /// Cells of solids computed side by side before they are added up.
 const CHUNK: usize = 256;

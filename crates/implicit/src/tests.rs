@@ -6,14 +6,16 @@ use pliant_mechanics::law::{AnyLaw, Corotational};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_mechanics::model::{Cells, Constraint, Material, Motion, Solid};
 
-use crate::element::{Bending, Elasticity, Formulation, Layer, Membrane, Orthotropic};
-use crate::rotation::exponential;
 use crate::system::System;
 use crate::*;
 use pliant_linear::{LinearSolver, Preconditioner};
+use pliant_shells::element::{Bending, Elasticity, Formulation, Layer, Membrane, Orthotropic, Wall};
+use pliant_shells::rotation::exponential;
+use pliant_shells::{Carried, EdgeRule, Place};
 use pliant_testing::Random;
 
 mod devices;
+mod surfaces;
 
 pub(crate) const MATERIAL: Wall = Wall { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
 
@@ -939,8 +941,10 @@ fn round_membrane(cells: u32) -> (Assembly, usize) {
     });
     let mut model = Assembly::new("shell", points);
     let mut shell = Shell::new("membrane", triangles.collect(), 0.01, MATERIAL);
-    shell.formulation =
-        Formulation { membrane: Membrane::Cst { drilling: 0.01 }, bending: crate::element::Bending::None };
+    shell.formulation = Formulation {
+        membrane: Membrane::Cst { drilling: 0.01 },
+        bending: pliant_shells::element::Bending::None,
+    };
     model.add_shell(&shell).unwrap();
     let rim = |n: &u32| [n % row, n / row].iter().any(|&i| i == 0 || i == cells);
     model.model_mut().constraints.push(fix((0..row * row).filter(rim).collect(), [true; 6]));
@@ -971,7 +975,7 @@ fn a_taut_membrane_rises_as_by_poisson() {
     for membrane in [Membrane::Cst { drilling: 0.01 }, Membrane::default()] {
         let mut model = Assembly::new("shell", points.clone());
         let mut shell = Shell::new("sheet", triangles.clone(), 1e-3, MATERIAL);
-        shell.formulation = Formulation { membrane, bending: crate::element::Bending::None };
+        shell.formulation = Formulation { membrane, bending: pliant_shells::element::Bending::None };
         shell.tension = tension;
         model.add_shell(&shell).unwrap();
         let rim = |n: &u32| [n % row, n / row].iter().any(|&i| i == 0 || i == cells);
@@ -1107,7 +1111,7 @@ fn layers_pass_the_patch_test() {
             // Many thin sheets.
             for k in 0..200 {
                 let z = bottom + layer.thickness * (f64::from(k) + 0.5) / 200.0;
-                let single = crate::element::Section::new(std::slice::from_ref(layer), 0.0);
+                let single = pliant_shells::element::Section::new(std::slice::from_ref(layer), 0.0);
                 let s = single.in_plane().matrix * (strain + curvature * z);
                 n += s * (layer.thickness / 200.0);
                 m += s * (z * layer.thickness / 200.0);

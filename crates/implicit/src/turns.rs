@@ -10,8 +10,8 @@ use pliant_mechanics::rotation::nearest_rotation;
 
 use crate::assembly::Assembly;
 use crate::followers::carried_turns;
-use crate::rotation::skew;
 use crate::state::State;
+use pliant_shells::rotation::skew;
 
 /// A node that turns with the gradient of a solid.
 #[derive(Clone, Debug, PartialEq)]
@@ -133,7 +133,7 @@ impl Assembly {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rotation::{exponential, logarithm};
+    use pliant_shells::rotation::{exponential, logarithm};
     use pliant_testing::Random;
 
     /// A tet with a node inside, in large rotation and strain.

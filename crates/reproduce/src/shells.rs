@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 
 use pliant_geometry::{Mesh, Vector3};
-use pliant_implicit::element::{Bending, Elasticity, Formulation, Membrane};
-use pliant_implicit::{Assembly, Shell, State, StaticSettings, Statics, Wall};
+use pliant_implicit::{Assembly, Shell, State, StaticSettings, Statics};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::{Constraint, Motion};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet};
+use pliant_shells::element::Wall;
+use pliant_shells::element::{Bending, Elasticity, Formulation, Membrane};
 
 use crate::CaseError;
 

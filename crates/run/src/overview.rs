@@ -3,10 +3,11 @@
 use std::fmt::{self, Write};
 
 use pliant_geometry::QualityReport;
-use pliant_implicit::{Facet, bytes_of_factors};
+use pliant_implicit::bytes_of_factors;
 use pliant_linear::memory;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::Motion;
+use pliant_shells::Facet;
 use pliant_sim::contact::touch::With;
 use pliant_sim::{BodyCells, Critical, ImplicitBodies, counted, number};
 

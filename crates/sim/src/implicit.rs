@@ -1103,8 +1103,9 @@ fn numbered(
 mod tests {
     #[cfg(feature = "gpu")]
     use pliant_gpu::Device;
-    use pliant_implicit::element::Elasticity;
-    use pliant_implicit::{Shell, Wall};
+    use pliant_implicit::Shell;
+    use pliant_shells::element::Elasticity;
+    use pliant_shells::element::Wall;
 
     use super::*;
     use crate::part::ShortSteps;

@@ -5,8 +5,9 @@
 //! Two participants, each at its own step:
 //!
 //! ```
-//! use pliant_implicit::element::Elasticity;
-//! use pliant_implicit::{Assembly, Shell, Wall};
+//! use pliant_shells::element::Elasticity;
+//! use pliant_implicit::{Assembly, Shell};
+//! use pliant_shells::element::Wall;
 //! use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 //! use pliant_mechanics::load::Load;
 //! use pliant_mechanics::model::{Cells, Material, Model, Solid};

@@ -2,8 +2,7 @@
 
 use nalgebra::Vector3;
 use pliant_explicit::Wanted;
-use pliant_implicit::element::Elasticity;
-use pliant_implicit::{Shell, Wall};
+use pliant_implicit::Shell;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
@@ -11,6 +10,8 @@ use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_mechanics::model::{Cells, Material, Motion, Solid};
 use pliant_mechanics::prony::{self, Prony, PronyTerm, PronyUpdate};
 use pliant_mechanics::{Energies, Model};
+use pliant_shells::element::Elasticity;
+use pliant_shells::element::Wall;
 use pliant_sim::{Method, Part, Precision, ShortSteps, Simulation, State, World};
 
 /// Duration of a run [s].

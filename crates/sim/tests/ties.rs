@@ -1,13 +1,14 @@
 //! Ties between participants that take steps of their own.
 
 use nalgebra::Vector3;
-use pliant_implicit::element::Elasticity;
-use pliant_implicit::{Shell, Wall};
+use pliant_implicit::Shell;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::{Cells, Material, Model, Solid};
+use pliant_shells::element::Elasticity;
+use pliant_shells::element::Wall;
 use pliant_sim::{Part, PenaltyTie, Simulation, State, Steps, World};
 
 /// Edge of a cell [m].

@@ -9,10 +9,7 @@ use pliant_contact::pairs::Surface;
 use pliant_contact::touch::{Contact, Contacts, Touch, With};
 use pliant_geometry::Mesh;
 use pliant_gpu::Device;
-use pliant_implicit::element::{Elasticity, Formulation};
-use pliant_implicit::{
-    Assembly, BackwardEuler, DynamicSettings, Facet, Shell, SolveError, State, Touching, Wall,
-};
+use pliant_implicit::{Assembly, BackwardEuler, DynamicSettings, Shell, SolveError, State, Touching};
 use pliant_linear::{
     BlockPattern, BlockValues, DeviceSolver, LinearDevice, LinearSolver, PassEnd, Preconditioner,
 };
@@ -21,6 +18,8 @@ use pliant_mechanics::load::{Load, LoadKind, NO_NODE, Spread};
 use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::{Constraint, Enclosure, Motion};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet, sphere};
+use pliant_shells::element::{Elasticity, Formulation};
+use pliant_shells::{Facet, element::Wall};
 
 use crate::support;
 

@@ -6,12 +6,13 @@ use std::time::Instant;
 use nalgebra::{UnitQuaternion, Vector3};
 use pliant_geometry::Mesh;
 use pliant_gpu::{Device, GpuError, GpuShells};
-use pliant_implicit::element::{Elasticity, Formulation, Membrane};
-use pliant_implicit::{Assembly, Explicit, Spring, State, Wall};
+use pliant_implicit::{Assembly, Explicit, Spring, State};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_mechanics::model::{Constraint, Motion};
 use pliant_meshing::{Pattern, Sheet};
+use pliant_shells::element::Wall;
+use pliant_shells::element::{Elasticity, Formulation, Membrane};
 use pliant_testing::Random;
 
 use crate::support;

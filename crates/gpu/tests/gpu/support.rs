@@ -2,9 +2,10 @@
 
 use pliant_geometry::Mesh;
 use pliant_gpu::{Device, GpuError};
-use pliant_implicit::element::Formulation;
-use pliant_implicit::{Assembly, Shell, Wall};
+use pliant_implicit::{Assembly, Shell};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet};
+use pliant_shells::element::Formulation;
+use pliant_shells::element::Wall;
 use pliant_testing::found_or_skipped;
 
 /// The best device. Without any a test is skipped with a notice, or fails where `PLIANT_REQUIRE_GPU=1`.

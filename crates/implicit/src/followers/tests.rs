@@ -9,10 +9,11 @@ use pliant_mechanics::model::{Cells, Constraint, Material, Solid};
 use pliant_testing::Random;
 
 use super::*;
-use crate::element::Elasticity;
 use crate::system::System;
-use crate::{BackwardEuler, DynamicSettings, Shell, Spring, StaticSettings, Statics, Wall};
+use crate::{BackwardEuler, DynamicSettings, Shell, Spring, StaticSettings, Statics};
 use pliant_linear::{LinearSolver, dot};
+use pliant_shells::element::Elasticity;
+use pliant_shells::element::Wall;
 
 /// A bar of 4 × 1 × 1 cubes of 1 cm with a rigid end, to which two free nodes are tied with a spring each.
 fn model() -> Assembly {
@@ -144,7 +145,7 @@ fn moves_rigidly(mut model: Assembly) {
     for step in 1..=10 {
         solver.solve(&mut state, f64::from(step) / 10.0).unwrap();
     }
-    let turn = crate::rotation::exponential(&(Vector3::new(0.3, -0.2, 0.9).normalize() * 2.5));
+    let turn = pliant_shells::rotation::exponential(&(Vector3::new(0.3, -0.2, 0.9).normalize() * 2.5));
     // The beads follow with an offset that does not turn.
     let count = model.rest.len();
     let all = (0..20).chain(22..count);

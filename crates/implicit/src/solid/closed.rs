@@ -5,8 +5,8 @@ use nalgebra::{Matrix3, Vector3};
 use pliant_mechanics::law::Corotational;
 use pliant_mechanics::tensor::{Tensor, Vector};
 
-use crate::facet::Broken;
-use crate::rotation::skew;
+use pliant_shells::Broken;
+use pliant_shells::rotation::skew;
 
 /// Adds the forces of a point of weight `w` [m³], and its stiffness where that is wanted; its energy [J/m³].
 ///

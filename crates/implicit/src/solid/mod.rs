@@ -19,7 +19,7 @@ use pliant_mechanics::law::{AnyLaw, Deformation, ShearGrowth, Split};
 use pliant_mechanics::model::{Averaging, CellBlock, Cells, Hourglass, Solid};
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cross, dot, scale, sub};
 
-use crate::facet::Broken;
+use pliant_shells::Broken;
 
 use crate::relaxation::Lag;
 pub(crate) use star::Stars;

@@ -303,7 +303,7 @@ fn relaxing(element: &str, update: PronyUpdate) -> Assembly {
 fn strained(model: &Assembly, seed: u64) -> State {
     let mut random = Random::new(seed);
     let mut state = State::at_rest(model);
-    let turn = crate::rotation::exponential(&Vector3::new(1.0, -2.0, 0.5));
+    let turn = pliant_shells::rotation::exponential(&Vector3::new(1.0, -2.0, 0.5));
     for x in &mut state.position {
         *x = turn * (*x + 0.008 * Vector3::from(random.vector()));
     }
@@ -443,7 +443,9 @@ fn inverted_cells_are_reported() {
         end[1..].iter().for_each(|&node| state.position[node as usize].x -= 0.085);
         let mut system = System::forces_only(model.clone().into());
         let error = system.evaluate(&state, 0.0, None).unwrap_err();
-        let Some((cell, crate::Broken::Inverted(determinant))) = error.broken() else { panic!("{error}") };
+        let Some((cell, pliant_shells::Broken::Inverted(determinant))) = error.broken() else {
+            panic!("{error}")
+        };
         let half = model.solids[0].cells.len() / 2;
         assert!(determinant < 0.0 && (half..2 * half).contains(&cell), "{element}: {cell} {determinant}");
     }

@@ -10,8 +10,8 @@ use pliant_linear::{
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind};
 
-use crate::element::Elasticity;
-use crate::{Assembly, BackwardEuler, DynamicSettings, Phases, Shell, SolveError, State, Wall};
+use crate::{Assembly, BackwardEuler, DynamicSettings, Phases, Shell, SolveError, State};
+use pliant_shells::element::{Elasticity, Wall};
 
 /// What a device that is no good does.
 #[derive(Clone, Copy, Debug)]

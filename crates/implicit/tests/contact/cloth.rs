@@ -6,11 +6,12 @@ use nalgebra::Vector3;
 use pliant_contact::barrier::BarrierSettings;
 use pliant_contact::shape::Shape;
 use pliant_contact::touch::{Contact, Touch, With};
-use pliant_implicit::element::Elasticity;
-use pliant_implicit::{Assembly, BackwardEuler, DynamicSettings, Shell, State, Wall};
+use pliant_implicit::{Assembly, BackwardEuler, DynamicSettings, Shell, State};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::{Constraint, Motion};
+use pliant_shells::element::Elasticity;
+use pliant_shells::element::Wall;
 
 use super::{at_rigid, fixed, surface, touch};
 

@@ -7,13 +7,14 @@ use pliant_contact::barrier::BarrierSettings;
 use pliant_contact::pairs::Surface;
 use pliant_contact::pose::{Pose, Trajectory};
 use pliant_contact::shape::Shape;
-use pliant_implicit::element::Elasticity;
 use pliant_implicit::{
-    Assembly, BackwardEuler, DynamicSettings, Integrator, Shell, State, StaticSettings, Statics, Wall,
+    Assembly, BackwardEuler, DynamicSettings, Integrator, Shell, State, StaticSettings, Statics,
 };
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::{Constraint, Motion};
+use pliant_shells::element::Elasticity;
+use pliant_shells::element::Wall;
 
 use super::{at_rigid, fixed, mean, rigid, surface, touch};
 

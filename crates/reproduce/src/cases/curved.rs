@@ -4,9 +4,10 @@
 
 use nalgebra::{SMatrix, SVector, UnitQuaternion};
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3};
-use pliant_implicit::element::Formulation;
-use pliant_implicit::{Assembly, CurvedSurface, EdgeRule, Patch, Picture, Place, State};
+use pliant_implicit::{Assembly, CurvedSurface, Picture, State};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet, sphere};
+use pliant_shells::element::Formulation;
+use pliant_shells::{EdgeRule, Patch, Place};
 
 use crate::case::{Case, CaseError, Correction, Findings, Row};
 use crate::largest;

@@ -5,8 +5,8 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use pliant_geometry::Mesh;
-use pliant_implicit::element::Formulation;
 use pliant_meshing::{Pattern, Sheet};
+use pliant_shells::element::Formulation;
 
 use super::plate;
 use crate::case::{Case, CaseError, Correction, Findings, Row};

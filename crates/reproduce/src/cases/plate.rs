@@ -2,9 +2,9 @@
 //! its centre sinks by 0.126532 q.
 
 use pliant_geometry::Mesh;
-use pliant_implicit::element::{Bending, Formulation, Membrane};
 use pliant_mechanics::load::LoadKind;
 use pliant_meshing::{Pattern, Sheet};
+use pliant_shells::element::{Bending, Formulation, Membrane};
 use pliant_sim::{Frame, Part, Simulation, World};
 
 use crate::case::{Case, CaseError, Correction, Findings, Row};

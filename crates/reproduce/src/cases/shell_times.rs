@@ -4,11 +4,12 @@
 
 use pliant_bench::{SHELL_STEP, ShellRun, tube};
 use pliant_geometry::Vector3;
-use pliant_implicit::element::Elasticity;
-use pliant_implicit::{Assembly, DynamicSettings, Phases, Shell, State, StaticSettings, Statics, Wall};
+use pliant_implicit::{Assembly, DynamicSettings, Phases, Shell, State, StaticSettings, Statics};
 use pliant_linear::{LinearSolver, Preconditioner};
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::{Constraint, Motion};
+use pliant_shells::element::Elasticity;
+use pliant_shells::element::Wall;
 
 use crate::case::{Case, CaseError, Findings, Row};
 use crate::plot::{Curve, Key, Pen, Plot};

@@ -5,10 +5,10 @@ use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use pliant_geometry::Vector3;
-use pliant_implicit::Carried;
 use pliant_mechanics::Energies;
 use pliant_mechanics::model::Enclosed;
 use pliant_mechanics::tensor::add;
+use pliant_shells::Carried;
 
 use crc32fast::Hasher;
 use pliant_sim::BodyCells;

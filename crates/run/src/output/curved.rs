@@ -1,7 +1,8 @@
 //! The curved surface of shells as a mesh of small triangles.
 
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh};
-use pliant_implicit::{CurvedSurface, EdgeRule, Picture, PictureFields};
+use pliant_implicit::{CurvedSurface, Picture, PictureFields};
+use pliant_shells::EdgeRule;
 use pliant_sim::{BodyCells, ImplicitBodies};
 
 use super::{Frame, fields};

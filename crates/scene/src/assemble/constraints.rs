@@ -3,10 +3,10 @@
 use std::collections::{BTreeMap, HashMap};
 
 use pliant_geometry::{Mesh, Selection, Vector3};
-use pliant_implicit::element::Membrane;
 use pliant_mechanics::curve::Curve;
 use pliant_mechanics::load::{Face, NO_NODE};
 use pliant_mechanics::model::{Constraint, Enclosure, Motion};
+use pliant_shells::element::Membrane;
 use pliant_sim::number;
 
 use super::{Builder, Subject, in_metres};

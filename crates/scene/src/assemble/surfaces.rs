@@ -1,9 +1,10 @@
 //! Surfaces carried by bodies: each point tied to the cell it lies in, or the nearest one.
 
 use pliant_geometry::Mesh;
-use pliant_implicit::{Carried, CurvedSurface, EdgeRule, State};
+use pliant_implicit::{CurvedSurface, State};
 use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::Surface;
+use pliant_shells::{Carried, EdgeRule};
 use pliant_sim::number;
 
 use super::meshes::surface_of;

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
-use pliant_implicit::element::{Bending, Elasticity, Formulation, Layer, Membrane, Orthotropic};
-use pliant_implicit::{ModelError, Shell, Wall};
+use pliant_implicit::{ModelError, Shell};
+use pliant_shells::element::Wall;
+use pliant_shells::element::{Bending, Elasticity, Formulation, Layer, Membrane, Orthotropic};
 use pliant_sim::{BodyCells, counted};
 
 use crate::assemble::bodies::{Draft, nodes};

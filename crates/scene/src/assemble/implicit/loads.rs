@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use pliant_geometry::Vector3;
 use pliant_implicit::Resolution;
-use pliant_implicit::element::Membrane;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
+use pliant_shells::element::Membrane;
 use pliant_sim::{BodyCells, RunControl, Stop, counted, number};
 
 use crate::assemble::{Builder, SCENE, Subject, suggestion};

@@ -31,15 +31,15 @@ pub use bending::discrete_kirchhoff;
 pub(crate) use bending::mean_curvature;
 pub use comas::comas_2010;
 pub(crate) use curved::{CurvedMembrane, Matrix3x18};
-pub use layers::{Layer, Orthotropic};
-pub(crate) use layers::{Section, density, mean, thickness};
+pub use layers::{Layer, Orthotropic, Section};
+pub(crate) use layers::{density, mean, thickness};
 pub(crate) use membrane::andes_higher;
 pub use membrane::{andes_opt, constant_strain};
 
 /// How a shell resists in its plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Membrane {
-    /// The mean strain of the curved triangle (`Opt` on flat facets), which goes with [`Spread::Curved`](crate::Spread::Curved): pressure
+    /// The mean strain of the curved triangle (`Opt` on flat facets), which goes with `Spread::Curved`: pressure
     /// on a curved wall then stretches it and bends it no more than the true load. Not with `Spread::Lumped`: either without the other
     /// scatters displacements from node to node, the more the thinner the wall. Normals of the true surface count: estimated from the
     /// triangles they describe another wall.

@@ -32,7 +32,7 @@ const fn place(row: usize, column: usize) -> usize {
 
 /// What eight facets have at rest; lanes beyond the last one mean nothing.
 #[derive(Clone, Debug)]
-pub(crate) struct FacetPack {
+pub struct FacetPack {
     stiffness: [Pack; HALF],
     tension: [Pack; 18],
     gradient: [Pack; 6],
@@ -43,7 +43,7 @@ pub(crate) struct FacetPack {
 
 impl FacetPack {
     /// Facets in their order, with the positions [m] of nodes at rest.
-    pub(crate) fn all(arch: Arch, facets: &[Facet], rest: impl Fn(u32) -> Vector3<f64>) -> Vec<Self> {
+    pub fn all(arch: Arch, facets: &[Facet], rest: impl Fn(u32) -> Vector3<f64>) -> Vec<Self> {
         let mut work = Work::new();
         facets.chunks(PACK).map(|facets| Self::of(arch, facets, &rest, &mut work)).collect()
     }
@@ -86,7 +86,7 @@ fn put_turn(to: &mut [Pack], lane: usize, turn: &UnitQuaternion<f64>) {
 
 /// Where eight facets are, and what comes of it.
 #[derive(Clone, Debug)]
-pub(crate) struct Work {
+pub struct Work {
     /// Of the nodes.
     position: [Pack; 9],
     rotation: [Pack; 12],
@@ -110,7 +110,9 @@ pub(crate) struct Work {
 }
 
 impl Work {
-    pub(crate) fn new() -> Self {
+    /// Without facets.
+    #[expect(clippy::new_without_default, reason = "it is large")]
+    pub fn new() -> Self {
         let none = [0.0; PACK];
         Self {
             position: [none; 9],
@@ -133,7 +135,7 @@ impl Work {
     }
 
     /// Puts the nodes of a facet into a lane: positions [m] and rotations from rest.
-    pub(crate) fn put(&mut self, lane: usize, x: &[Vector3<f64>; 3], rotation: &[UnitQuaternion<f64>; 3]) {
+    pub fn put(&mut self, lane: usize, x: &[Vector3<f64>; 3], rotation: &[UnitQuaternion<f64>; 3]) {
         for (entry, own) in self.position.iter_mut().zip(x.iter().flatten()) {
             entry[lane] = *own;
         }
@@ -143,7 +145,7 @@ impl Work {
     }
 
     /// Finds energies and forces of the first facets of a pack, and the stiffness if it is wanted.
-    pub(crate) fn find(&mut self, arch: Arch, pack: &FacetPack, facets: usize, tangent: bool) {
+    pub fn find(&mut self, arch: Arch, pack: &FacetPack, facets: usize, tangent: bool) {
         arch.dispatch(Placing { pack, work: self });
         for lane in 0..facets {
             self.broken[lane] = self.turn_far(lane).err();
@@ -173,17 +175,17 @@ impl Work {
     }
 
     /// Why the facet in a lane has no force.
-    pub(crate) fn broken(&self, lane: usize) -> Option<Broken> {
+    pub fn broken(&self, lane: usize) -> Option<Broken> {
         self.broken[lane]
     }
 
     /// Energy [J] and forces [N, N m] in a lane.
-    pub(crate) fn force(&self, lane: usize) -> (f64, Vector18) {
+    pub fn force(&self, lane: usize) -> (f64, Vector18) {
         (self.energy[lane], Vector18::from_fn(|i, _| self.force[i][lane]))
     }
 
     /// The stiffness in a lane.
-    pub(crate) fn take_tangent(&self, lane: usize, tangent: &mut Matrix18) {
+    pub fn take_tangent(&self, lane: usize, tangent: &mut Matrix18) {
         for row in 0..18 {
             for column in 0..=row {
                 let entry = self.tangent[place(row, column)][lane];

@@ -101,7 +101,7 @@ struct Ply {
 
 /// Stiffness of a wall per length, in its axes.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Section {
+pub struct Section {
     /// A [N/m].
     stretch: Matrix3<f64>,
     /// B [N].
@@ -117,7 +117,7 @@ pub(crate) struct Section {
 
 impl Section {
     /// Of layers from the bottom (against the normal) to the top, whose direction is turned by an angle [rad] from the first axis.
-    pub(crate) fn new(layers: &[Layer], direction: f64) -> Self {
+    pub fn new(layers: &[Layer], direction: f64) -> Self {
         let whole = thickness(layers);
         let mut bottom = -0.5 * whole;
         let (mut a, mut b, mut d) = (Matrix3::zeros(), Matrix3::zeros(), Matrix3::zeros());
@@ -141,7 +141,7 @@ impl Section {
     }
 
     /// What a homogeneous wall of the same thickness has that stretches as this one, without bending.
-    pub(crate) fn in_plane(&self) -> PlaneStress {
+    pub fn in_plane(&self) -> PlaneStress {
         PlaneStress { matrix: self.stretch / self.thickness, ..PlaneStress::from(self.mean) }
     }
 

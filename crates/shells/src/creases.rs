@@ -22,7 +22,7 @@ pub struct Normal {
 }
 
 /// The facets at each edge, lower node first, and which of their edges 12, 23, 31 it is.
-pub(crate) fn sides(facets: &[Facet]) -> BTreeMap<[u32; 2], Vec<(usize, usize)>> {
+pub fn sides(facets: &[Facet]) -> BTreeMap<[u32; 2], Vec<(usize, usize)>> {
     let mut sides: BTreeMap<[u32; 2], Vec<(usize, usize)>> = BTreeMap::new();
     for (number, facet) in facets.iter().enumerate() {
         for i in 0..3 {
@@ -35,7 +35,7 @@ pub(crate) fn sides(facets: &[Facet]) -> BTreeMap<[u32; 2], Vec<(usize, usize)>>
 
 /// Control points on the straight edge: at creases, whose sides have normals of their own, and where a normal leans so far from a
 /// facet at the edge that a curve along it would fold.
-pub(crate) fn straight_edges(
+pub fn straight_edges(
     facets: &[Facet],
     corner_normals: &[[u32; 3]],
     normals: &[Normal],

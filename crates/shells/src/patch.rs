@@ -53,7 +53,7 @@ impl Patch {
     }
 
     /// Two unit tangents and the normal.
-    pub(crate) fn frame(&self, weights: [f64; 3]) -> [Vector3<f64>; 3] {
+    pub fn frame(&self, weights: [f64; 3]) -> [Vector3<f64>; 3] {
         let first = self.tangents(weights)[0].normalize();
         let normal = self.normal(weights);
         [first, normal.cross(&first), normal]
@@ -73,6 +73,22 @@ impl Patch {
             j.fixed_columns_mut::<3>(6 * node + 3).copy_from(&(-by_normal * skew(normal)));
         }
         j
+    }
+
+    /// A unit normal that is quadratic between those at the corners and, at the middle of an edge, the one that an S-shaped edge needs
+    /// (Vlachos et al. 2001, in Bernstein's form). It differs from [`Patch::normal`] by a term that falls with the square of the edges, but
+    /// is the same on both sides of an edge.
+    pub fn shading_normal(&self, weights: [f64; 3]) -> Vector3<f64> {
+        let (p, n) = (self.corners(), self.normals());
+        let sum = (0..3).fold(Vector3::zeros(), |sum, i| {
+            let j = (i + 1) % 3;
+            let (e, ends) = (p[j] - p[i], n[i] + n[j]);
+            // The mean of the ends mirrored at the plane across the edge.
+            let middle = ends - e * (2.0 * e.dot(&ends) / e.norm_squared());
+            let middle = middle.try_normalize(0.0).unwrap_or(n[i]);
+            sum + weights[i] * (weights[i] * n[i] + 2.0 * weights[j] * middle)
+        });
+        sum.try_normalize(0.0).unwrap_or(n[0])
     }
 
     /// Where a carried point is, of which this is the patch [m].

@@ -4,12 +4,12 @@
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 /// S(a): S(a) b = a × b.
-pub(crate) fn skew(a: &Vector3<f64>) -> Matrix3<f64> {
+pub fn skew(a: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)
 }
 
 /// Coefficients of the series of arcsin(x)/x in x².
-pub(crate) const ARCSINE: [f64; 13] = {
+pub const ARCSINE: [f64; 13] = {
     let (mut all, mut k) = ([1.0; 13], 0);
     while k < 12 {
         let odd = (2 * k + 1) as f64;
@@ -20,7 +20,7 @@ pub(crate) const ARCSINE: [f64; 13] = {
 };
 
 /// |B₂ₙ|/(2n)! from n = 1 on, with Bernoulli's numbers.
-pub(crate) const BERNOULLI: [f64; 8] = [
+pub const BERNOULLI: [f64; 8] = [
     1.0 / 12.0,
     1.0 / 720.0,
     1.0 / 30_240.0,
@@ -36,7 +36,7 @@ const SERIES: f64 = 0.6;
 
 /// The sine squared of half the angle below which [`logarithm`] takes a series, as of most nodes of shells: in a third of the time of an
 /// arctangent. The angle is then below half a radian.
-pub(crate) const SMALL: f64 = 0.06;
+pub const SMALL: f64 = 0.06;
 
 /// Σ cₖ xᵏ.
 #[inline(always)]
@@ -45,7 +45,7 @@ fn series(x: f64, coefficients: impl DoubleEndedIterator<Item = f64>) -> f64 {
 }
 
 /// The rotation vector [rad] of a rotation, of length at most π; accurate for small and large angles.
-pub(crate) fn logarithm(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
+pub fn logarithm(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
     let sign = if rotation.w < 0.0 { -1.0 } else { 1.0 };
     let (vector, scalar) = (sign * rotation.imag(), sign * rotation.w);
     let squared = vector.norm_squared();
@@ -58,14 +58,14 @@ pub(crate) fn logarithm(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
 }
 
 /// exp(S(a)) as a quaternion.
-pub(crate) fn exponential(a: &Vector3<f64>) -> UnitQuaternion<f64> {
+pub fn exponential(a: &Vector3<f64>) -> UnitQuaternion<f64> {
     let half = 0.5 * a.norm();
     let factor = if half < 1e-4 { 0.5 * (1.0 - half * half / 6.0) } else { 0.5 * half.sin() / half };
     UnitQuaternion::new_normalize(Quaternion::from_parts(half.cos(), factor * a))
 }
 
 /// (1 − (θ/2) cot(θ/2))/θ².
-pub(crate) fn eta(angle: f64) -> f64 {
+pub fn eta(angle: f64) -> f64 {
     let squared = angle * angle;
     if angle < SERIES {
         series(squared, BERNOULLI.into_iter())
@@ -75,7 +75,7 @@ pub(crate) fn eta(angle: f64) -> f64 {
 }
 
 /// (dη/dθ)/θ.
-pub(crate) fn mu(angle: f64) -> f64 {
+pub fn mu(angle: f64) -> f64 {
     let squared = angle * angle;
     // The closed form loses all digits to cancellation as θ⁶/θ⁶.
     if angle < SERIES {
@@ -88,14 +88,14 @@ pub(crate) fn mu(angle: f64) -> f64 {
 }
 
 /// H = I − S(θ)/2 + η S(θ)²: the change δθ = H δω of a rotation vector θ under a spin δω.
-pub(crate) fn spin_to_vector(theta: &Vector3<f64>) -> Matrix3<f64> {
+pub fn spin_to_vector(theta: &Vector3<f64>) -> Matrix3<f64> {
     let s = skew(theta);
     Matrix3::identity() - 0.5 * s + eta(theta.norm()) * s * s
 }
 
 /// ∂(Hᵀ m)/∂θ H for a fixed m: how a moment that is conjugate to spins changes with the spin.
 #[cfg(test)]
-pub(crate) fn moment_correction(theta: &Vector3<f64>, moment: &Vector3<f64>) -> Matrix3<f64> {
+pub fn moment_correction(theta: &Vector3<f64>, moment: &Vector3<f64>) -> Matrix3<f64> {
     let s = skew(theta);
     let angle = theta.norm();
     let outer = Matrix3::from_diagonal_element(theta.dot(moment)) + theta * moment.transpose()

@@ -170,8 +170,6 @@ mod tests {
     use crate::patch::EdgeRule;
     use crate::rotation::exponential;
     use crate::testing::{Pose, moved};
-    use crate::tests::{ball, model};
-    use crate::{CurvedSurface, State};
     use pliant_testing::Random;
 
     const STRAIGHT: [[bool; 6]; 2] = [[false; 6], [true, true, false, false, false, true]];
@@ -274,41 +272,5 @@ mod tests {
             let off = (patch.pressure_forces() - expected).amax();
             assert!(off < 1e-12, "{off:e}");
         }
-    }
-
-    /// A closed surface, shaken: no force and no moment in sum; the change of the forces is symmetric but for −S(m)/2 of the moments,
-    /// which those of the elements balance: 1e-12.
-    #[test]
-    fn a_closed_surface_has_no_resultant_and_a_symmetric_change() {
-        let mut random = Random::new(3);
-        let model = model(ball(1), 0.01);
-        let surface = CurvedSurface::new(&model, EdgeRule::Arc);
-        let mut state = State::at_rest(&model);
-        let shake: Vec<f64> = (0..6 * model.rest.len()).map(|_| 0.1 * random.number()).collect();
-        state.advance(&shake, 1.0);
-        let size = shake.len();
-        let mut forces = nalgebra::DVector::<f64>::zeros(size);
-        let mut change = nalgebra::DMatrix::<f64>::zeros(size, size);
-        for (number, facet) in model.facets.iter().enumerate() {
-            let patch = surface.patch(&model, &state, number as u32);
-            let (own, moved) = (patch.pressure_forces(), patch.pressure_change());
-            let place = |i: usize| 6 * facet.nodes[i / 6] as usize + i % 6;
-            for i in 0..18 {
-                forces[place(i)] += own[i];
-                (0..18).for_each(|j| change[(place(i), place(j))] += moved[(i, j)]);
-            }
-        }
-        let part =
-            |node: usize, first: usize| -> Vector3<f64> { forces.fixed_rows::<3>(6 * node + first).into() };
-        let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
-        for node in 0..model.rest.len() {
-            force += part(node, 0);
-            moment += state.position[node].cross(&part(node, 0)) + part(node, 3);
-            let mut own = change.fixed_view_mut::<3, 3>(6 * node + 3, 6 * node + 3);
-            own += 0.5 * skew(&part(node, 3));
-        }
-        assert!(force.norm() < 1e-12 && moment.norm() < 1e-12, "{force} {moment}");
-        let off = (&change - change.transpose()).amax() / change.amax();
-        assert!(off < 1e-13, "{off:e}");
     }
 }
