@@ -3,8 +3,9 @@
 use std::error::Error;
 use std::path::PathBuf;
 
+use pliant_format::{Scene, open};
 use pliant_run::OutputFolder;
-use pliant_scene::{Scene, World, open};
+use pliant_scene::World;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1).map_or_else(|| PathBuf::from("scenes/cube"), PathBuf::from);

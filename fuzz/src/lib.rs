@@ -15,15 +15,16 @@ use std::io;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
+use pliant_format::Scene;
+use pliant_format::source::Source;
 use pliant_geometry::io::{Format, read_bytes};
 use pliant_haptics::protocol::{Force, Pose};
 use pliant_haptics::trace::Trace;
 use pliant_imaging::{ImageFormat, ReadOptions};
 use pliant_meshing::{Closing, Enclosed};
 use pliant_run::{Checkpoint, OutputFolder, run, snapshot_framed, snapshot_from_bytes, snapshot_to_bytes};
+use pliant_scene::World;
 use pliant_scene::niftysim::import_bytes;
-use pliant_scene::source::Source;
-use pliant_scene::{Scene, World};
 use pliant_sim::Simulation;
 use pliant_viewer::{Break, Done, Hand, Move, Number, Point, Recording, Surface, replay};
 

@@ -12,12 +12,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
+use pliant_format::Scene;
+use pliant_format::source::Source;
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3};
 use pliant_imaging::{Cleaning, Image, LabelImage, ReadOptions, Region, read};
 use pliant_meshing::{Hausdorff, TriangleMesh};
 use pliant_run::{OutputFolder, run};
-use pliant_scene::source::Source;
-use pliant_scene::{Scene, World, build, plan};
+use pliant_scene::{World, build, plan};
 
 /// Density of all tissue [kg/m³].
 const DENSITY: f64 = 1060.0;

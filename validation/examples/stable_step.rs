@@ -7,8 +7,9 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
-use pliant_scene::source::Source;
-use pliant_scene::{Scene, World, open};
+use pliant_format::source::Source;
+use pliant_format::{Scene, open};
+use pliant_scene::World;
 
 /// Times that each motion is run.
 const TURNS: usize = 5;

@@ -4,9 +4,10 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
+use pliant_format::Scene;
+use pliant_format::source::Source;
 use pliant_geometry::{SurfaceLocator, boundary, io};
-use pliant_scene::source::Source;
-use pliant_scene::{Scene, World};
+use pliant_scene::World;
 use pliant_validation::claim;
 
 fn world(source: Source, folder: &Path) -> World {

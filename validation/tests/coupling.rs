@@ -458,7 +458,7 @@ fn a_segmented_liver_is_pulled_with_and_without_its_capsule() {
     let mask = |name: &str| {
         format!("masks = [{:?}]", data.join("abdomen-totalseg").join(name).display().to_string())
     };
-    let mut organ = pliant_scene::OrganScene {
+    let mut organ = pliant_format::OrganScene {
         title: "liver".into(),
         source: format!("{}, clean = {{ keep-largest = true }}, labels = [1]", mask("fast_liver.nii.gz")),
         edge: 0.014,
@@ -467,10 +467,10 @@ fn a_segmented_liver_is_pulled_with_and_without_its_capsule() {
         // Of the mask.
         bounds: [Vector3::new(-0.0655, 0.0848, 0.0928), Vector3::new(0.1355, 0.2708, 0.1828)],
     };
-    let pulled = |organ: &pliant_scene::OrganScene| {
+    let pulled = |organ: &pliant_format::OrganScene| {
         let text = organ.text().replace("until = 3.0", "until = 0.4").replace("to = 2.0", "to = 0.4");
-        let source = pliant_scene::source::Source::parse("liver.toml", text).unwrap();
-        let mut scene = pliant_scene::Scene::from_source(source, ".".into()).unwrap();
+        let source = pliant_format::source::Source::parse("liver.toml", text).unwrap();
+        let mut scene = pliant_format::Scene::from_source(source, ".".into()).unwrap();
         scene.outputs.clear();
         let world = pliant_scene::World::new(&scene).unwrap_or_else(|errors| panic!("{}", errors.plain()));
         let out = tempfile::tempdir().unwrap();

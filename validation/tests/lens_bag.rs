@@ -5,8 +5,9 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 use pliant_contact::barrier::advance::Kind;
+use pliant_format::{Scene, open};
 use pliant_geometry::{CellKind, Mesh};
-use pliant_scene::{Scene, World, open};
+use pliant_scene::World;
 use rayon::prelude::*;
 
 /// Where the tube ends along y [m].

@@ -5,11 +5,12 @@ use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
 use pliant_explicit::{CentralDifference, State};
+use pliant_format::Scene;
+use pliant_format::source::Source;
+use pliant_format::tables::StepChoice;
 use pliant_geometry::io;
 use pliant_mechanics::tensor::{Vector, dot, sub};
-use pliant_scene::format::StepChoice;
-use pliant_scene::source::Source;
-use pliant_scene::{Scene, niftysim};
+use pliant_scene::niftysim;
 use pliant_validation::{claim, data_file, largest};
 
 /// Steps after which NiftySim wrote its answer: it takes one more than the total time holds, and its "step 400", counted

@@ -6,8 +6,9 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 use pliant_contact::pose::Stance;
-use pliant_scene::source::Source;
-use pliant_scene::{Scene, World};
+use pliant_format::Scene;
+use pliant_format::source::Source;
+use pliant_scene::World;
 use pliant_validation::claim;
 
 /// Seconds from one press to the next.

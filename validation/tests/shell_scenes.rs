@@ -3,8 +3,9 @@
 
 use std::path::Path;
 
+use pliant_format::{Scene, open};
 use pliant_run::{OutputFolder, run};
-use pliant_scene::{Scene, World, open};
+use pliant_scene::World;
 use pliant_validation::{claim, numbers, reference};
 
 /// The table over time that a scene wrote.

@@ -289,7 +289,7 @@ pub(crate) unsafe fn give_bytes(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pliant_scene::source::Source;
+    use pliant_format::source::Source;
 
     fn scene(context: &PliantContext) -> u64 {
         let source = Source::parse("scene.toml", "").unwrap();

@@ -4,9 +4,10 @@ use std::ffi::c_char;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
+use pliant_format::Scene;
+use pliant_format::source::{Given, Source};
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
-use pliant_scene::source::{Given, Source};
-use pliant_scene::{Scene, World};
+use pliant_scene::World;
 
 use crate::context::{Item, PliantContext, array, call, finite, give, hold, needed, some_text, text};
 use crate::status::{Fault, PliantError, PliantStatus};
@@ -73,7 +74,7 @@ pub unsafe extern "C" fn pliant_scene_load(
         call(context, 0, error, |context| {
             needed(scene, "scene")?;
             let path = Path::new(text(path, "path")?);
-            let (source, folder) = pliant_scene::open(path).map_err(|error| Fault::read(&error))?;
+            let (source, folder) = pliant_format::open(path).map_err(|error| Fault::read(&error))?;
             let open = OpenScene::new(source, folder);
             give(scene, "scene", context.open(Item::Scene(Arc::new(Mutex::new(open)))))
         })

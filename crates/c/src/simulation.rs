@@ -3,8 +3,8 @@
 use std::ffi::c_char;
 use std::sync::{Arc, Mutex, MutexGuard};
 
+use pliant_format::tables::MOST_THREADS;
 use pliant_scene::World;
-use pliant_scene::format::MOST_THREADS;
 use pliant_sim::{Simulation, StopFlag};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 

@@ -3,9 +3,9 @@
 use std::ffi::c_char;
 use std::mem::MaybeUninit;
 
-use pliant_scene::ReadError;
-use pliant_scene::diagnostic::SceneErrors;
-use pliant_scene::source::Source;
+use pliant_format::ReadError;
+use pliant_format::diagnostic::SceneErrors;
+use pliant_format::source::Source;
 use pliant_sim::Failure;
 
 /// What a call returns.

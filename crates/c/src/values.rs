@@ -2,9 +2,9 @@
 
 use std::ffi::c_char;
 
+use pliant_format::tables::At;
 use pliant_mechanics::Energies;
 use pliant_run::FieldReader;
-use pliant_scene::format::At;
 
 use crate::buffer::PliantBuffer;
 use crate::context::{PliantContext, give, needed, some_text, text};

@@ -6,8 +6,9 @@ use std::ptr;
 use std::time::Instant;
 
 use pliant_c::*;
-use pliant_scene::source::Source;
-use pliant_scene::{Scene, World};
+use pliant_format::Scene;
+use pliant_format::source::Source;
+use pliant_scene::World;
 
 /// A block of so many cells, whose steps take next to no time where they are few.
 fn block(cells: &str) -> String {

@@ -6,10 +6,10 @@ use std::str::FromStr;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand, ValueEnum};
 use pliant_bench::Instructions;
+use pliant_format::tables::{BackgroundName, Choice, LookColour, LookTable, MapName, TextureName};
 use pliant_geometry::CellLabel;
 use pliant_imaging::LabelChoice;
 use pliant_run::SweepPart;
-use pliant_scene::format::{BackgroundName, Choice, LookColour, LookTable, MapName, TextureName};
 
 /// Real-time simulation of soft organs.
 #[derive(Debug, Parser)]

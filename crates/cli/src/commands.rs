@@ -4,11 +4,12 @@ use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::{Reads, Scene, reference, registry};
+use pliant_geometry::words::number;
 use pliant_gpu::{Adapter, GpuError};
 use pliant_run::{Checkpoint, Draw, Options, OutputFolder, Sweep, SweepOptions, SweepPart};
-use pliant_scene::diagnostic::Diagnostic;
-use pliant_scene::{Reads, Scene, World, reference, registry};
-use pliant_sim::number;
+use pliant_scene::World;
 use serde_json::{Value as Json, json};
 
 use crate::SUCCESS;
@@ -53,7 +54,7 @@ pub fn execute(command: Command) -> Result<u8, Failure> {
 
 /// The folder of a run that starts at rest.
 fn fresh_folder(arguments: &Run, scene: &Scene) -> Result<OutputFolder, Failure> {
-    let file = pliant_scene::scene_file(&arguments.scene);
+    let file = pliant_format::scene_file(&arguments.scene);
     let path = arguments.out.clone().unwrap_or_else(|| OutputFolder::default_for(&file));
     OutputFolder::prepare(path, scene, arguments.force).map_err(|error| Failure::plain(&error, error.remedy))
 }
@@ -192,7 +193,7 @@ fn sweep(arguments: &arguments::Sweep) -> Result<u8, Failure> {
         return Ok(SUCCESS);
     }
     let path = arguments.out.clone().unwrap_or_else(|| {
-        let mut path = OutputFolder::default_for(&pliant_scene::scene_file(&arguments.scene));
+        let mut path = OutputFolder::default_for(&pliant_format::scene_file(&arguments.scene));
         path.as_mut_os_string().push("-sweep");
         path
     });
@@ -299,7 +300,7 @@ fn new(name: &Path) -> Result<u8, Failure> {
         return Err(Failure::plain(format!("`{}` exists already", file.display()), "choose another name"));
     }
     let title = name.file_name().unwrap_or(name.as_os_str()).to_string_lossy();
-    fs::create_dir_all(name).and_then(|()| fs::write(&file, pliant_scene::starter(&title))).map_err(
+    fs::create_dir_all(name).and_then(|()| fs::write(&file, pliant_format::starter(&title))).map_err(
         |error| {
             let help = "check the folder, its permissions and the free space, or choose another name";
             Failure::plain(format!("`{}` cannot be written: {error}", file.display()), help)

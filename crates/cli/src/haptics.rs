@@ -6,6 +6,7 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use nalgebra::{Isometry3, Vector3};
+use pliant_format::Scene;
 use pliant_haptics::coupling::Coupling;
 use pliant_haptics::error::HapticsError;
 use pliant_haptics::estimate::Estimate;
@@ -18,7 +19,7 @@ use pliant_haptics::replay::Replay;
 use pliant_haptics::statistics::Spread;
 use pliant_haptics::thread::{Haptics as Thread, Report};
 use pliant_haptics::trace::Trace;
-use pliant_scene::{Scene, World};
+use pliant_scene::World;
 use pliant_sim::contact::touch::{With, lattice};
 use pliant_sim::{Frame, Simulation, State};
 

@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
+use pliant_format::foreign_file;
 use pliant_geometry::io::{self, MeshFile};
+use pliant_geometry::words::number;
 use pliant_geometry::{CellKind, Mesh, QualityReport, Spread, Vector3, boundary, diagnose};
 use pliant_meshing::{Curvature, Hausdorff, Percentiles, Thickness, TriangleMesh};
-use pliant_scene::{SizeDoubt, foreign_file};
-use pliant_sim::number;
+use pliant_scene::SizeDoubt;
 use serde_json::{Map, Value as Json, json};
 
 use crate::SUCCESS;

@@ -1,9 +1,9 @@
 //! The look of a picture or window that the `[view]` of a scene requests.
 
+use pliant_format::Scene;
+use pliant_format::tables::{BackgroundName, FieldName, MapName, TextureName, UpName};
 use pliant_geometry::Vector3;
 use pliant_picture::{Axis, Background, Camera, ColourMap, Legend, Look, Plane, Projection, Style, Texture};
-use pliant_scene::Scene;
-use pliant_scene::format::{BackgroundName, FieldName, MapName, TextureName, UpName};
 
 /// The view that a scene requests.
 pub fn look_of(scene: &Scene) -> Look {
@@ -103,7 +103,7 @@ pub fn colour_by_name(look: &mut Look, name: &str) {
 
 #[cfg(test)]
 mod tests {
-    use pliant_scene::format::Choice;
+    use pliant_format::tables::Choice;
 
     use super::*;
 

@@ -2,15 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
+use pliant_format::Scene;
+use pliant_format::registry::OutputTable;
+use pliant_format::tables::{ClipTable, VtuTable};
 use pliant_geometry::{CellLabel, Labels, Mesh, RegionNames, Vector3, io};
 use pliant_picture::{
     AnimatedPng, Axis, Film, Graphics, Legend, Look, Picture, PictureError, Plane, Projection, Regions,
     Series, SeriesError, Style, ffmpeg,
 };
 use pliant_run::{Draw, Options, OutputFolder};
-use pliant_scene::format::{ClipTable, VtuTable};
-use pliant_scene::registry::OutputTable;
-use pliant_scene::{Scene, World};
+use pliant_scene::World;
 use pliant_viewer::{coat_of, regions_of};
 
 use crate::SUCCESS;
@@ -179,7 +180,7 @@ fn labelled_mesh(arguments: &Render) -> Result<Option<Mesh>, Failure> {
     let of_cells = matches!(arguments.colour.as_deref(), None | Some("label" | "none"));
     let runs = arguments.film.is_some() || arguments.frames.is_some() || changes_a_run(arguments);
     let marks = arguments.critical || arguments.fibres || arguments.contacts || arguments.marks;
-    if !of_cells || runs || marks || !pliant_scene::is_mesh(&arguments.what) {
+    if !of_cells || runs || marks || !pliant_format::is_mesh(&arguments.what) {
         return Ok(None);
     }
     let file = io::read(&arguments.what).map_err(|error| Failure::plain(error, "check the path"))?;

@@ -4,10 +4,11 @@ use std::cell::OnceCell;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::source::{Source, Value};
+use pliant_format::{Reads, Scene};
 use pliant_geometry::io;
-use pliant_scene::diagnostic::Diagnostic;
-use pliant_scene::source::{Source, Value};
-use pliant_scene::{MeshCache, Meshing, Reads, Scene, World, niftysim};
+use pliant_scene::{MeshCache, Meshing, World, niftysim};
 use tempfile::TempDir;
 
 use crate::arguments::{DeviceName, Overrides, Precision};
@@ -100,16 +101,16 @@ pub fn open(path: &Path, sandbox: bool, allow_partial: bool) -> Result<Opened, F
         let failed = |error| format!("the folder `{}` cannot be read: {error}", folder.display());
         reads.map_err(|error| Failure::plain(failed(error), "check the path and the permissions"))
     };
-    let file = pliant_scene::scene_file(path);
+    let file = pliant_format::scene_file(path);
     let own = reads(file.parent().unwrap_or(Path::new("")))?;
-    if pliant_scene::is_mesh(path) {
+    if pliant_format::is_mesh(path) {
         let help = "`pliant info` reads a mesh file on its own";
-        let made = pliant_scene::scene_of_mesh(path).map_err(|error| Failure::plain(error, help))?;
+        let made = pliant_format::scene_of_mesh(path).map_err(|error| Failure::plain(error, help))?;
         let source = Source::parse(path.display().to_string(), made.text)?.reading(own);
         return Ok(Opened { source, folder: made.folder, assumed: Some(made.assumed), _translated: None });
     }
     if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml")) {
-        let (source, folder) = pliant_scene::open_within(path, own)?;
+        let (source, folder) = pliant_format::open_within(path, own)?;
         return Ok(Opened { source, folder, assumed: None, _translated: None });
     }
     let folder = tempfile::tempdir().map_err(|error| {
@@ -120,7 +121,7 @@ pub fn open(path: &Path, sandbox: bool, allow_partial: bool) -> Result<Opened, F
     })?;
     let notes = translate(path, &own, &folder.path().join("scene.toml"), allow_partial)?;
     notes.iter().for_each(|note| eprintln!("note: {note}"));
-    let (source, place) = pliant_scene::open_within(folder.path(), reads(folder.path())?)?;
+    let (source, place) = pliant_format::open_within(folder.path(), reads(folder.path())?)?;
     Ok(Opened { source, folder: place, assumed: None, _translated: Some(folder) })
 }
 

@@ -8,12 +8,13 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::Diagnostic;
+use pliant_format::diagnostic::SceneErrors;
+use pliant_format::{ReadError, printable};
 use pliant_geometry::io::MeshFileError;
+use pliant_geometry::words::number;
 use pliant_gpu::Adapter;
 use pliant_run::{Progress, ResumeError, Summary, SweepProgress, failed_input};
-use pliant_scene::diagnostic::SceneErrors;
-use pliant_scene::{ReadError, printable};
-use pliant_sim::{LoadStepProgress, number};
+use pliant_sim::LoadStepProgress;
 use serde_json::json;
 
 /// Invalid input (exit code 2), or failed output.

@@ -4,9 +4,9 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
+use pliant_geometry::words::number;
 use pliant_picture::Series;
 use pliant_scene::World;
-use pliant_sim::number;
 use pliant_viewer::{
     Break, FinishedRun, Lags, Opening, Recording, SelfTest, WindowError, open, open_finished,
     replay_in_real_time, replay_until,
@@ -58,7 +58,7 @@ pub fn view(arguments: &View) -> Result<u8, Failure> {
     };
     let told = open(Opening {
         look: look_of,
-        file: pliant_scene::scene_file(&arguments.scene),
+        file: pliant_format::scene_file(&arguments.scene),
         world,
         read: Arc::new(read),
         record: arguments.record.clone(),

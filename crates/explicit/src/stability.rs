@@ -37,7 +37,6 @@ use pliant_mechanics::law::plane_stress::InPlane;
 use pliant_mechanics::model::{Cells, Model, Solid, with_cells};
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cast, dot, sub};
 use rayon::prelude::*;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Scalar;
@@ -68,7 +67,7 @@ const SHARE: usize = 256;
 const LEAST: usize = PACK / 2;
 
 /// What a run does when the limit falls below its step.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OnUnstable {
     /// Cut the steps into equal parts until the limit recovers.

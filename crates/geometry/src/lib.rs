@@ -53,6 +53,7 @@ mod split;
 mod surface;
 #[cfg(test)]
 mod testing;
+pub mod words;
 
 pub use bezier::{ControlWeights, CurvedTriangle, EDGES, EdgeRule};
 pub use cell::{CellId, body_blocks};

@@ -9,8 +9,8 @@ use rayon::prelude::*;
 use crate::assembly::Assembly;
 use crate::state::State;
 use crate::surface::CurvedSurface;
-use pliant_shells::rotation::logarithm;
 use pliant_shells::Place;
+use pliant_shells::rotation::logarithm;
 
 /// Points and triangles that show the surface.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,9 +1,9 @@
 //! Errors of the engine as the exceptions of `pliant.errors`, with their places.
 
 use miette::{GraphicalReportHandler, GraphicalTheme};
+use pliant_format::diagnostic::{SceneErrors, Severity};
+use pliant_format::source::Source;
 use pliant_run::{OutputError, ResumeError};
-use pliant_scene::diagnostic::{SceneErrors, Severity};
-use pliant_scene::source::Source;
 use pliant_sim::Failure;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -134,7 +134,7 @@ fn underlined(errors: &SceneErrors) -> String {
 pub fn diagnostics<'py>(py: Python<'py>, errors: &SceneErrors) -> PyResult<Vec<Bound<'py, PyAny>>> {
     let class = py.import("pliant.errors")?.getattr("Diagnostic")?;
     let source = Source::parse(errors.name(), errors.text());
-    let one = |found: &pliant_scene::diagnostic::Diagnostic| {
+    let one = |found: &pliant_format::diagnostic::Diagnostic| {
         let place = errors.line_and_column(found);
         let severity = match found.severity {
             Severity::Error => "error",

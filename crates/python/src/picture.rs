@@ -3,9 +3,9 @@
 use std::sync::Mutex;
 
 use numpy::PyArray2;
+use pliant_format::tables::ColourBy;
 use pliant_picture::{Graphics, Picture};
 use pliant_run::field_named;
-use pliant_scene::format::ColourBy;
 use pyo3::prelude::*;
 
 use crate::arrays::array;

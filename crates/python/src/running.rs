@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
+use pliant_format::tables::{At, FieldName, VtuTable};
 use pliant_geometry::{Mesh, SurfaceLocator, Vector3, patch};
 use pliant_mechanics::grip::Grip;
 use pliant_run::{FieldReader, Live, field_named};
 use pliant_scene::World;
-use pliant_scene::format::{At, FieldName, VtuTable};
 use pliant_sim::{Reals, Simulation};
 
 use crate::errors::Trouble;

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use pliant_scene::source::{Given, Node, Source, Value};
-use pliant_scene::{MeshCache, Scene, World, scene_file};
+use pliant_format::source::{Given, Node, Source, Value};
+use pliant_format::{Scene, scene_file};
+use pliant_scene::{MeshCache, World};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -89,8 +90,8 @@ pub fn parse<'py>(py: Python<'py>, text: String, name: String) -> PyResult<Bound
 #[pyfunction]
 pub fn read(path: PathBuf) -> Result<(String, String, PathBuf), Trouble> {
     let file = scene_file(&path);
-    let (source, folder) = pliant_scene::open(&path).map_err(|error| match error {
-        pliant_scene::ReadError::Scene(errors) => errors.into(),
+    let (source, folder) = pliant_format::open(&path).map_err(|error| match error {
+        pliant_format::ReadError::Scene(errors) => errors.into(),
         error => Trouble::Value(error.to_string()),
     })?;
     Ok((source.text().to_owned(), file.display().to_string(), folder))
@@ -99,7 +100,7 @@ pub fn read(path: PathBuf) -> Result<(String, String, PathBuf), Trouble> {
 /// The text of the scene that a mesh alone is; it takes the mesh as `given` by a name.
 #[pyfunction]
 pub fn scene_of_mesh(mesh: &Mesh, name: &str) -> String {
-    pliant_scene::scene_of_given(&mesh.0, name).text
+    pliant_format::scene_of_given(&mesh.0, name).text
 }
 
 fn plain<'py>(py: Python<'py>, node: &Node) -> PyResult<Bound<'py, PyAny>> {

@@ -7,9 +7,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use numpy::ndarray::ArrayView2;
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray2};
+use pliant_format::tables::At;
 use pliant_mechanics::grip::Grip;
 use pliant_run::{Live, field_named};
-use pliant_scene::format::At;
 use pliant_sim::pose_of;
 use pliant_sim::{Reals, StopFlag, panicked};
 use pyo3::prelude::*;

@@ -1,11 +1,11 @@
 //! One result of the literature: its content, corrections to the source, and the result here.
 
 use pliant_explicit::StepError;
+use pliant_format::diagnostic::SceneErrors;
 use pliant_gpu::{GpuError, StepFailure};
 use pliant_implicit::{ModelError, SolveError};
 use pliant_mechanics::model::Contradiction;
 use pliant_meshing::MeshingError;
-use pliant_scene::diagnostic::SceneErrors;
 use pliant_sim::Failure;
 use serde::Serialize;
 

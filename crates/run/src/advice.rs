@@ -1,11 +1,12 @@
 //! What to try after a failed step. It depends on what the run does already: nobody is told to switch on what is on, or to damp more where
 //! damping is the trouble.
 
-use pliant_explicit::stability::OnUnstable;
+use pliant_format::tables::OnUnstableName;
+use pliant_geometry::words::{counted, number};
 use pliant_sim::contact::touch::{Contact, With};
-use pliant_sim::{Failure, Instant, Precision, counted, number};
+use pliant_sim::{Failure, Instant, Precision};
 
-use pliant_scene::format::SolverName;
+use pliant_format::tables::SolverName;
 use pliant_scene::{Built, Part};
 
 /// Damping [1/s] times step [s] from which on a step does not resolve the damping: central differences take
@@ -31,19 +32,19 @@ pub(crate) fn remedy(failure: &Failure, part: &Part, now: &dyn Instant) -> Optio
     };
     let shorter = format!("a `step` of {} s or less", number(0.5 * step));
     let told = match (failure.kind, on_unstable) {
-        ("unstable", OnUnstable::Substep) => format!(
+        ("unstable", OnUnstableName::Substep) => format!(
             "{cuts}, into 100 parts at the most, and that is not enough: try a slower or smaller motion, a coarser mesh there, or {shorter}"
         ),
         ("unstable", _) => {
             "try a smaller `step` or a slower motion, or let the run cut its steps (`on-unstable = \"substep\"`)".into()
         }
-        ("inverted", OnUnstable::Substep) => {
+        ("inverted", OnUnstableName::Substep) => {
             format!("{cuts}: try {shorter}, a slower or smaller motion or load, more damping, or a finer mesh there")
         }
         ("inverted", _) => "try a slower or smaller motion or load, `on-unstable = \"substep\"`, a smaller `step`, more damping, or a finer \
                             mesh there"
             .into(),
-        ("not-finite" | "unbalanced", OnUnstable::Report) => {
+        ("not-finite" | "unbalanced", OnUnstableName::Report) => {
             let limit = seen.map_or(String::new(), |ratio| format!(" (smallest stable step seen: {ratio:.2} × the step)"));
             format!(
                 "try a smaller `step` or `on-unstable = \"substep\"`{limit}; else a slower motion or a smoother curve"
@@ -52,7 +53,7 @@ pub(crate) fn remedy(failure: &Failure, part: &Part, now: &dyn Instant) -> Optio
         ("not-finite" | "unbalanced", _) => {
             let single = plan.target.precision == Precision::Single;
             let precise = if single { ", or `precision = \"double\"`" } else { "" };
-            let held = if on_unstable == OnUnstable::Substep { &cuts } else { "the step is below the limit" };
+            let held = if on_unstable == OnUnstableName::Substep { &cuts } else { "the step is below the limit" };
             format!("{held}: try {shorter}, a slower motion, a smoother curve or a smaller load{precise}")
         }
         _ => return None,

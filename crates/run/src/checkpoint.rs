@@ -10,13 +10,14 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::read_limited;
+use pliant_geometry::words::{counted, number};
 use pliant_mechanics::{count, fingerprint};
-use pliant_sim::{Precision, Schedule, State, counted, number};
+use pliant_sim::{Precision, Schedule, State};
 use serde::{Deserialize, Serialize};
 
 use crate::output::{History, OutputError, OutputFolder, Watched, Written, replace};
 use crate::rollback::Point;
-use pliant_scene::format::{LoadSteps, SolverName};
+use pliant_format::tables::{LoadSteps, SolverName};
 use pliant_scene::{Part, World};
 
 /// The first bytes of every checkpoint.

@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
+use pliant_format::tables::{At, FieldName, VtuTable};
 use pliant_scene::World;
-use pliant_scene::format::{At, FieldName, VtuTable};
 use pliant_sim::{Failure, Simulation};
 
 use crate::output::{FieldMesh, frames};

@@ -4,7 +4,8 @@
 //!
 //! ```
 //! use pliant_run::{OutputFolder, run};
-//! use pliant_scene::{Scene, World, source::Source};
+//! use pliant_scene::World;
+//! use pliant_format::{Scene, source::Source};
 //!
 //! let text = r#"
 //!     [scene]

@@ -12,8 +12,8 @@ use pliant_sim::gpu::{DeviceMapping, DevicePoints, PointValue};
 use pliant_sim::{Failure, Simulation, State};
 
 use crate::output::{Column, FieldMesh, Frame, Samples, frames};
+use pliant_format::tables::VtuTable;
 use pliant_scene::World;
-use pliant_scene::format::VtuTable;
 
 /// Instants after the start at which ways are sampled.
 const INSTANTS: u32 = 32;

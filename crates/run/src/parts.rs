@@ -195,7 +195,7 @@ fn open_rows(path: &Path) -> io::Result<(File, String)> {
 
 #[cfg(test)]
 mod tests {
-    use pliant_scene::source::Source;
+    use pliant_format::source::Source;
 
     use super::*;
     use crate::testing::CUBE;

@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
+use pliant_geometry::words::number;
 use pliant_mechanics::{Energies, fingerprint};
-use pliant_sim::{StopFlag, number};
+use pliant_sim::StopFlag;
 use serde::{Deserialize, Serialize};
 
 use crate::output::{
@@ -16,10 +17,11 @@ use crate::output::{
     plot_of_sweep,
 };
 use crate::run::{Options, run_with};
-use pliant_scene::diagnostic::{Diagnostic, Place, SceneErrors};
-use pliant_scene::registry::OutputTable;
-use pliant_scene::source::{SET, Source};
-use pliant_scene::{MeshCache, Scene, World};
+use pliant_format::Scene;
+use pliant_format::diagnostic::{Diagnostic, Place, SceneErrors};
+use pliant_format::registry::OutputTable;
+use pliant_format::source::{SET, Source};
+use pliant_scene::{MeshCache, World};
 
 /// The table of a sweep.
 pub const SWEEP: &str = "sweep.csv";

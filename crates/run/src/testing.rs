@@ -1,7 +1,7 @@
 //! Small scenes for the tests of this crate.
 
-use pliant_scene::Scene;
-use pliant_scene::source::Source;
+use pliant_format::Scene;
+use pliant_format::source::Source;
 pub(crate) use pliant_testing::CUBE;
 
 /// The scene of [`CUBE`] with more tables.

@@ -5,14 +5,15 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 use pliant_geometry::SurfaceLocator;
+use pliant_geometry::words::number;
+use pliant_sim::Guests;
 use pliant_sim::contact::pairs::Surface;
 use pliant_sim::contact::touch::{Contact, Touch, With};
-use pliant_sim::{Guests, number};
 
 use crate::assemble::{Meet, overlaps, told_distance, told_overlap, usual_distance};
-use crate::diagnostic::Diagnostic;
-use crate::format::SolverName;
 use crate::world::World;
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::tables::SolverName;
 
 /// How bodies of two participants can touch.
 const HOW: &str = "a solid with `explicit` steps on the CPU and bodies with `implicit` ones touch each other; or put both bodies into one participant";

@@ -1,7 +1,7 @@
-//! Scene files: a text is read into a [`Scene`] and built into a [`World`], which `pliant-run` runs with its outputs.
+//! From the tables of a scene to a [`World`], which `pliant-run` runs with its outputs.
 //!
 //! ```
-//! use pliant_scene::{Scene, source::Source};
+//! use pliant_format::{Scene, source::Source};
 //!
 //! let text = r#"
 //!     [scene]
@@ -29,33 +29,19 @@
 //! assert_eq!(block.built.model.node_count(), 27);
 //! let limits = block.plan.limits.as_ref().unwrap();
 //! assert!(limits.critical.bound.step <= limits.critical.assembled.step);
-//! # Ok::<(), pliant_scene::diagnostic::SceneErrors>(())
+//! # Ok::<(), pliant_format::diagnostic::SceneErrors>(())
 //! ```
 
 mod assemble;
 mod bound;
 mod cache;
-pub mod checker;
-pub mod diagnostic;
-mod foreign;
-pub mod format;
 mod guests;
 mod method;
-mod nearest;
 pub mod niftysim;
-mod of_mesh;
-mod organ_scene;
-mod participants;
 mod penalty;
 mod plan;
-mod plausible;
-mod printable;
-mod reads;
-pub mod reference;
-pub mod registry;
-mod scene;
-pub mod source;
-mod starter;
+#[cfg(test)]
+mod starter_scenes;
 mod target;
 #[cfg(test)]
 mod testing;
@@ -67,13 +53,6 @@ pub use assemble::{
 };
 pub use bound::element_bound;
 pub use cache::{MeshCache, cache_folder};
-pub use foreign::foreign_file;
-pub use of_mesh::{SceneOfMesh, is_mesh, scene_of_given, scene_of_mesh};
-pub use organ_scene::OrganScene;
 pub use plan::{LimitingElement, Limits, Plan, plan};
-pub use printable::printable;
-pub use reads::Reads;
-pub use scene::{ReadError, Scene, open, open_within, scene_file};
-pub use starter::starter;
 pub use target::Target;
 pub use world::{Part, World};

@@ -2,13 +2,21 @@
 
 use std::sync::Arc;
 
+use pliant_explicit::stability::OnUnstable;
 use pliant_implicit::{DynamicSettings, Integrator, StaticSettings};
 use pliant_linear::{LinearSolver, Preconditioner};
-use pliant_sim::{Explicit, ImplicitBodies, LongSteps, Method, ShortSteps};
+use pliant_sim::{Explicit, ImplicitBodies, LongSteps, Method, Precision, ShortSteps};
 
-use crate::format::{IntegratorName, LinearName, LinearTable, PreconditionerName, RunTable, SolverName};
 use crate::plan::Plan;
 use crate::world::Part;
+#[cfg(feature = "gpu")]
+use pliant_format::tables::DesignName;
+use pliant_format::tables::{
+    IntegratorName, LinearName, LinearTable, OnUnstableName, PrecisionName, PreconditionerName, RunTable,
+    SolverName,
+};
+#[cfg(feature = "gpu")]
+use pliant_sim::gpu::Design;
 
 /// Iterations of Newton's method at most in contact, if none are given. The longest step of a lens that snaps out of its tube takes 160 to 210;
 /// halved before its end it would take them twice.
@@ -28,7 +36,7 @@ impl Part {
             }
             None => Method::Explicit(Explicit {
                 precision,
-                on_unstable: run.on_unstable.unwrap_or_default(),
+                on_unstable: on_unstable(run.on_unstable.unwrap_or_default()),
                 critical_step: plan
                     .limits
                     .as_ref()
@@ -38,7 +46,7 @@ impl Part {
                 #[cfg(feature = "gpu")]
                 device: plan.target.device.clone(),
                 #[cfg(feature = "gpu")]
-                design: run.design,
+                design: run.design.map(design),
             }),
         };
         pliant_sim::Part {
@@ -47,6 +55,33 @@ impl Part {
             method,
             steps: plan.steps.clone(),
         }
+    }
+}
+
+/// The number type of a word.
+pub(crate) fn precision(name: PrecisionName) -> Precision {
+    match name {
+        PrecisionName::Single => Precision::Single,
+        PrecisionName::Double => Precision::Double,
+    }
+}
+
+fn on_unstable(name: OnUnstableName) -> OnUnstable {
+    match name {
+        OnUnstableName::Substep => OnUnstable::Substep,
+        OnUnstableName::Stop => OnUnstable::Stop,
+        OnUnstableName::Report => OnUnstable::Report,
+    }
+}
+
+/// The design of a word.
+#[cfg(feature = "gpu")]
+pub(crate) fn design(name: DesignName) -> Design {
+    match name {
+        DesignName::Gather => Design::Gather,
+        DesignName::Blocks => Design::Blocks,
+        DesignName::FloatAtomics => Design::FloatAtomics,
+        DesignName::Fast => Design::Fast,
     }
 }
 

@@ -2,15 +2,16 @@
 //! model.
 
 use pliant_explicit::critical_step::ElementBound;
+use pliant_geometry::words::{counted, number};
 use pliant_implicit::Explicit;
-use pliant_sim::{Critical, ImplicitBodies, SAFETY, Steps, counted, number};
+use pliant_sim::{Critical, ImplicitBodies, SAFETY, Steps};
 use serde::Serialize;
 
 use crate::assemble::Built;
-use crate::diagnostic::{Diagnostic, SceneErrors};
-use crate::format::{SolverName, StepChoice};
-use crate::scene::Scene;
 use crate::target::Target;
+use pliant_format::Scene;
+use pliant_format::diagnostic::{Diagnostic, SceneErrors};
+use pliant_format::tables::{SolverName, StepChoice};
 
 /// A step that is shortened by more than this part is reported.
 const SHORTENED: f64 = 1e-3;

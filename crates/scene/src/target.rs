@@ -5,10 +5,15 @@ use pliant_sim::Precision;
 use pliant_sim::gpu::{Design, Device, GpuError, GpuShells, Kind};
 
 use crate::assemble::Built;
-use crate::diagnostic::Diagnostic;
-use crate::format::{DeviceName, FieldName, LinearName, PreconditionerName, RunTable, SolverName};
-use crate::registry::OutputTable;
-use crate::scene::Scene;
+#[cfg(feature = "gpu")]
+use crate::method::design;
+use crate::method::precision;
+use pliant_format::Scene;
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::registry::OutputTable;
+use pliant_format::tables::{
+    DeviceName, FieldName, LinearName, PrecisionName, PreconditionerName, RunTable, SolverName,
+};
 
 /// The device of a run, and its number type.
 #[derive(Clone, Debug)]
@@ -125,7 +130,7 @@ impl Target {
         Self {
             #[cfg(feature = "gpu")]
             device: None,
-            precision: run.precision.unwrap_or(Precision::Double),
+            precision: run.precision.map_or(Precision::Double, precision),
             note,
         }
     }
@@ -156,7 +161,6 @@ fn key_of_gpu(run: &RunTable) -> Option<&'static str> {
     if run.adapter.is_some() {
         return Some("adapter");
     }
-    #[cfg(feature = "gpu")]
     if run.design.is_some() {
         return Some("design");
     }
@@ -172,7 +176,7 @@ fn with_design(scene: &Scene, built: &Built) -> Result<(), Box<Diagnostic>> {
             "`design` is given, but it is about explicit solids, and these are shells or solved equations";
         return Err(Box::new(Diagnostic::error(message).at(place, "not used").help("leave `design` out")));
     }
-    let Some(design @ Design::Blocks) = scene.run.design else { return Ok(()) };
+    let Some(design @ Design::Blocks) = scene.run.design.map(design) else { return Ok(()) };
     let error = match (&built.contacts, built.model.ties.is_empty()) {
         (Some(_), _) => GpuError::NoContact { design: design.to_string() },
         (None, false) => GpuError::NoTies { design: design.to_string() },
@@ -225,7 +229,7 @@ fn processor_only(scene: &Scene, built: &Built) -> Option<(&'static str, String,
         let help = "set `device = \"cpu\"`, or `solver = \"explicit\"`";
         return Some(("solver", "the solver `quasi-static`".into(), help));
     }
-    if run.precision == Some(Precision::Double) {
+    if run.precision == Some(PrecisionName::Double) {
         let help = "set `device = \"cpu\"`, or leave `precision` out";
         return Some(("precision", "double precision".into(), help));
     }
@@ -238,7 +242,7 @@ fn shells_only(run: &RunTable, built: &Built) -> Option<(&'static str, String, &
     if !built.meets.is_empty() {
         return Some(("device", "contact between participants".into(), help));
     }
-    if run.precision == Some(Precision::Double) {
+    if run.precision == Some(PrecisionName::Double) {
         return Some((
             "precision",
             "double precision".into(),

@@ -7,9 +7,9 @@ use pliant_meshing::{Block, Resolution, VolumeCell};
 pub(crate) use pliant_testing::CUBE;
 
 use crate::assemble::{Built, build};
-use crate::diagnostic::SceneErrors;
-use crate::scene::Scene;
-use crate::source::Source;
+use pliant_format::Scene;
+use pliant_format::diagnostic::SceneErrors;
+use pliant_format::source::Source;
 
 /// The scene of [`CUBE`] with more tables.
 pub(crate) fn scene(more: &str) -> Scene {

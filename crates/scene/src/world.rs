@@ -8,10 +8,10 @@ use pliant_sim::{Failure, Guests, PenaltyTie, Simulation};
 
 use crate::assemble::{Built, Meshing, build_watched};
 use crate::cache::MeshCache;
-use crate::diagnostic::{Diagnostic, SceneErrors};
-use crate::format::FieldName;
 use crate::plan::{Plan, plan, steps};
-use crate::scene::Scene;
+use pliant_format::Scene;
+use pliant_format::diagnostic::{Diagnostic, SceneErrors};
+use pliant_format::tables::FieldName;
 
 /// A scene with its participants.
 #[derive(Clone, Debug)]

@@ -1,11 +1,12 @@
 //! Failures of a simulation.
 
+use std::any::Any;
 use std::fmt;
 
 use pliant_explicit::{RelaxationError, StepError};
 use serde::Serialize;
 
-use crate::words::number;
+use pliant_geometry::words::number;
 
 /// The kind of a run that someone stopped.
 pub const INTERRUPTED: &str = "interrupted";
@@ -160,4 +161,10 @@ impl From<&StepError> for Failure {
             ..Self::new(kind, message, Some(time))
         }
     }
+}
+
+/// What a panic says.
+pub fn panicked(panic: &(dyn Any + Send)) -> &str {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message")
 }

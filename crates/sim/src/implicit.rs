@@ -36,7 +36,7 @@ use crate::participant::Participant;
 use crate::solids::SolidCells;
 use crate::solver::LoadStepProgress;
 use crate::steps::Steps;
-use crate::words::{counted, number};
+use pliant_geometry::words::{counted, number};
 
 /// Stiffness of the firmest grip over that of the stiffest cell.
 const FIRM: f64 = 10.0;

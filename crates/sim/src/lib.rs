@@ -57,12 +57,11 @@ mod solver;
 mod start;
 mod steps;
 mod tools;
-mod words;
 
 pub use bodies::{BodyCells, ImplicitBodies, RunControl, Stop};
 #[cfg(feature = "gpu")]
 pub use device::{MappedPoint, OnDevice};
-pub use failure::{BlockedDriver, FailedLoadStep, Failure, INTERRUPTED};
+pub use failure::{BlockedDriver, FailedLoadStep, Failure, INTERRUPTED, panicked};
 pub use guests::{Guests, GuestsNow};
 pub use instant::{CellsNow, Effort, Instant};
 pub use part::{Explicit, LongSteps, Method, Part, Precision, ShortSteps};
@@ -73,7 +72,6 @@ pub use simulation::{Frame, Observer, Simulation, State, World};
 pub use solver::{Equilibria, LoadStepProgress};
 pub use steps::{Critical, SAFETY, Steps};
 pub use tools::{ToolNow, pose_of};
-pub use words::{counted, number, panicked};
 
 /// Ends long work early.
 pub use pliant_mechanics::StopFlag;

@@ -8,7 +8,6 @@ use pliant_explicit::stability::{Monitor, OnUnstable};
 use pliant_gpu::{Design, Device};
 use pliant_implicit::{Assembly, DynamicSettings, StaticSettings};
 use pliant_mechanics::Model;
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::bodies::ImplicitBodies;
@@ -16,7 +15,7 @@ use crate::failure::Failure;
 use crate::steps::{Critical, Steps};
 
 /// Number type of the solver.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Precision {
     /// 32-bit numbers: faster, about six digits.

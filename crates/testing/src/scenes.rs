@@ -5,14 +5,15 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use pliant_format::Scene;
+use pliant_format::diagnostic::{Diagnostic, MOST_SHOWN, SceneErrors};
+use pliant_format::source::Source;
 use pliant_geometry::io::{self, MeshFile};
 use pliant_run::{
     Checkpoint, Options, OutputFolder, Summary, Sweep, SweepOptions, SweepSummary, failed_input,
     failed_output, overview,
 };
-use pliant_scene::diagnostic::{Diagnostic, MOST_SHOWN, SceneErrors};
-use pliant_scene::source::Source;
-use pliant_scene::{MeshCache, Scene, World};
+use pliant_scene::{MeshCache, World};
 use pliant_sim::{Simulation, State, StopFlag};
 use serde_json::{Value, json};
 use tempfile::TempDir;

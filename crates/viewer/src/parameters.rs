@@ -1,10 +1,11 @@
 //! The numbers of a scene that can be others while it is played, and the scene with them.
 
-use pliant_scene::diagnostic::SceneErrors;
-use pliant_scene::reference::{Parameter as Described, describe};
-use pliant_scene::registry::{Section, sections};
-use pliant_scene::source::{Node, Value};
-use pliant_scene::{MeshCache, Scene, World};
+use pliant_format::Scene;
+use pliant_format::diagnostic::SceneErrors;
+use pliant_format::reference::{Parameter as Described, describe};
+use pliant_format::registry::{Section, sections};
+use pliant_format::source::{Node, Value};
+use pliant_scene::{MeshCache, World};
 use serde::{Deserialize, Serialize};
 
 /// A number of a scene.

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use pliant_format::tables::{MOST_CURVED, ViewTable};
 use pliant_geometry::CellLabel;
 use pliant_scene::World;
-use pliant_scene::format::{MOST_CURVED, ViewTable};
 use serde::{Deserialize, Serialize};
 
 use crate::hand::{Hand, Which};

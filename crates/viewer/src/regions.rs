@@ -1,8 +1,8 @@
 //! Regions as a view has them, for pictures.
 
+use pliant_format::tables::{LookColour, LookTable, ViewTable};
 use pliant_geometry::RegionNames;
 use pliant_picture::{Coat, Material, Paint, Regions};
-use pliant_scene::format::{LookColour, LookTable, ViewTable};
 
 /// What a view hides of some regions, and those with a look of their own.
 pub fn regions_of(view: &ViewTable, names: &RegionNames) -> Regions {
@@ -34,7 +34,7 @@ fn paint_of(colour: LookColour) -> Paint {
 
 #[cfg(test)]
 mod tests {
-    use pliant_scene::format::Choice;
+    use pliant_format::tables::Choice;
 
     use super::*;
 

@@ -3,10 +3,10 @@
 
 use std::time::{Duration, Instant};
 
+use pliant_format::tables::ViewTable;
 use pliant_geometry::Vector3;
 use pliant_picture::{Subject, visible};
 use pliant_run::Live;
-use pliant_scene::format::ViewTable;
 use pliant_sim::{State, StopFlag};
 use serde::Serialize;
 

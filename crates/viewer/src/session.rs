@@ -9,6 +9,8 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use pliant_explicit::Wanted;
+use pliant_format::tables::ViewTable;
+use pliant_geometry::words::number;
 use pliant_geometry::{Region, Vector3};
 use pliant_mechanics::Energies;
 use pliant_picture::{
@@ -17,9 +19,8 @@ use pliant_picture::{
 };
 use pliant_run::{Column, Live};
 use pliant_scene::World;
-use pliant_scene::format::ViewTable;
 use pliant_sim::gpu::{DevicePoints, PointValue};
-use pliant_sim::{Failure, State, StopFlag, number};
+use pliant_sim::{Failure, State, StopFlag};
 
 use crate::device::{Seen, point_value};
 use crate::followed::{Followed, FollowedPoint};

@@ -5,11 +5,11 @@ mod support;
 
 use std::time::Duration;
 
+use pliant_format::tables::{ColourBy, FieldName, ViewTable};
 use pliant_geometry::Vector3;
 use pliant_picture::{Camera, Drawn, Plane, Renderer, Section, Style, Subject, Target};
 use pliant_run::Live;
 use pliant_scene::World;
-use pliant_scene::format::{ColourBy, FieldName, ViewTable};
 use pliant_sim::gpu::{Device, DevicePoints, PointValue};
 use pliant_testing::found_or_skipped;
 use pliant_viewer::{Frame, Hand, Order, Point, Session};

@@ -5,11 +5,11 @@ mod support;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use pliant_format::tables::ViewTable;
 use pliant_geometry::{CellLabel, Vector3};
 use pliant_picture::{Camera, Projection, Subject};
 use pliant_run::Column;
 use pliant_scene::World;
-use pliant_scene::format::ViewTable;
 use pliant_sim::StopFlag;
 use pliant_testing::pressed_cube;
 use pliant_viewer::{
@@ -626,7 +626,7 @@ fn the_examples_start_and_play() {
     let folders = entries.filter(|entry| entry.path().is_dir());
     for name in folders.map(|folder| folder.file_name().into_string().unwrap()) {
         let name = name.as_str();
-        let (mut source, folder) = pliant_scene::open(&scenes.join(name)).unwrap();
+        let (mut source, folder) = pliant_format::open(&scenes.join(name)).unwrap();
         let settings: &[(&[&str], f64)] = match name {
             "colon" => &[(&["body", "colon", "mesh", "edge"], 0.008)],
             "liver" => {

@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use pliant_format::OrganScene;
 use pliant_geometry::Vector3;
 use pliant_imaging::{Choice, Image, LabelChoice};
-use pliant_scene::OrganScene;
 
 use super::input::{image, is_mesh_file, label_failure, regions_in};
 use crate::SUCCESS;

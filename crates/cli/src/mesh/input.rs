@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::{self, Format, MeshFile};
+use pliant_geometry::words::number;
 use pliant_geometry::{CellLabel, Labels as CellLabels, UnknownLabel};
 use pliant_imaging::{
     Border, Choice, Cleaned, Cleaning, Image, ImageError, ImageProblem, LabelChoice, LabelError, LabelImage,
@@ -11,7 +12,6 @@ use pliant_imaging::{
 };
 use pliant_meshing::{Anatomy, DEFAULT_CELL_LIMIT, MeshingError, OrganTets};
 use pliant_scene::SizeDoubt;
-use pliant_sim::number;
 use serde_json::{Value as Json, json};
 
 use crate::arguments::MeshImage;

@@ -360,7 +360,7 @@ fn the_schema_knows_every_key_of_the_shipped_scenes() {
         .filter(|path| path.is_dir())
         .map(|folder| fs::read_to_string(folder.join("scene.toml")).expect("a scene"))
         .collect();
-    scenes.extend([BLOCK.to_owned(), pliant_scene::starter("a scene"), FROM_FILE.to_owned()]);
+    scenes.extend([BLOCK.to_owned(), pliant_format::starter("a scene"), FROM_FILE.to_owned()]);
     for text in scenes {
         let scene: toml::Table = toml::from_str(&text).unwrap();
         assert_known(&toml::Value::Table(scene), &[&schema], &schema, "");

@@ -4,9 +4,10 @@
 
 use pliant_bench::{Clocked, Spread, Timed};
 use pliant_explicit::State;
+use pliant_format::Scene;
+use pliant_format::source::Source;
 use pliant_run::OutputFolder;
-use pliant_scene::source::Source;
-use pliant_scene::{Scene, World};
+use pliant_scene::World;
 use pliant_sim::SAFETY;
 use rayon::ThreadPoolBuilder;
 

@@ -4,9 +4,10 @@
 use std::fs;
 use std::time::Instant;
 
+use pliant_format::Scene;
+use pliant_format::source::Source;
 use pliant_geometry::{CellKind, Mesh, Vector3};
-use pliant_scene::source::Source;
-use pliant_scene::{Scene, World};
+use pliant_scene::World;
 use pliant_sim::{Frame, Simulation};
 
 use crate::case::{Case, CaseError, Findings, Row};

@@ -4,11 +4,12 @@
 //! The source has no numbers. Instead: after relaxation, the tissue must equal an elastic one of modulus (1 − α) μ,
 //! (1 − α) η and the same κ in equilibrium, which another solver computes.
 
+use pliant_format::Scene;
+use pliant_format::source::Source;
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::Cells;
 use pliant_mechanics::prony::Prony;
-use pliant_scene::source::Source;
-use pliant_scene::{Built, Scene};
+use pliant_scene::Built;
 use pliant_sim::{Precision, Simulation};
 use serde_json::json;
 

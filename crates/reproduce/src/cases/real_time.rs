@@ -4,11 +4,12 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use pliant_format::Scene;
+use pliant_format::source::{Source, Value};
 use pliant_geometry::Mesh;
 use pliant_gpu::{Device, GpuError, PointValue};
 use pliant_run::Live;
-use pliant_scene::source::{Source, Value};
-use pliant_scene::{Scene, World};
+use pliant_scene::World;
 
 use crate::CaseError;
 use crate::case::{Case, Findings, Row};

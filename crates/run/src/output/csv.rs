@@ -16,7 +16,7 @@ use pliant_sim::contact::touch::With;
 
 use super::file::{create, reopen};
 use super::{Frame, Output, OutputError, Recovered, Written, fields, time_of};
-use pliant_scene::format::{CsvTable, FieldName, ProbeTable};
+use pliant_format::tables::{CsvTable, FieldName, ProbeTable};
 use pliant_scene::{Built, Part, World};
 
 pub(super) struct Rows {

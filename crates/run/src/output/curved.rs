@@ -6,8 +6,8 @@ use pliant_shells::EdgeRule;
 use pliant_sim::{BodyCells, ImplicitBodies};
 
 use super::{Frame, fields};
+use pliant_format::tables::FieldName;
 use pliant_scene::Built;
-use pliant_scene::format::FieldName;
 
 /// The curved surface of one shell or of all.
 pub(super) struct Curved {

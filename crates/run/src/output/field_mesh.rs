@@ -10,7 +10,7 @@ use pliant_sim::{BodyCells, ImplicitBodies};
 
 use super::merged::merged;
 use super::{CellNumbers, Frame, fields};
-use pliant_scene::format::{At, BodyModel, FieldName, VtuTable};
+use pliant_format::tables::{At, BodyModel, FieldName, VtuTable};
 use pliant_scene::{Built, World};
 
 /// A mesh that takes the fields of instants: of a body, a carried surface or all bodies, of any participants.
@@ -571,8 +571,8 @@ mod tests {
     use pliant_geometry::io;
 
     use super::*;
-    use pliant_scene::Scene;
-    use pliant_scene::source::Source;
+    use pliant_format::Scene;
+    use pliant_format::source::Source;
 
     /// A square of two labels as a shell, and as a surface that it carries.
     const WALL: &str = r#"

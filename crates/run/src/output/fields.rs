@@ -9,7 +9,7 @@ use pliant_mechanics::tensor::Symmetric;
 use rayon::prelude::*;
 
 use super::Frame;
-use pliant_scene::format::FieldName;
+use pliant_format::tables::FieldName;
 
 /// A value of up to nine numbers.
 pub(super) type Value = [f64; 9];

@@ -8,8 +8,8 @@ use std::sync::Arc;
 use super::file::{check_own, check_own_folder, is_at, replace, temporary};
 use super::{OutputError, Written, csv, vtu};
 use crate::checkpoint::{Checkpoint, ResumeError, steps_of};
-use pliant_scene::Scene;
-use pliant_scene::registry::OutputTable;
+use pliant_format::Scene;
+use pliant_format::registry::OutputTable;
 
 /// The page to read after a run.
 pub(crate) const SUMMARY: &str = "summary.md";

@@ -45,7 +45,7 @@ pub(crate) use outputs::Outputs;
 pub(crate) use plot::{MOST_CURVES, Reactions, constraints, plot, plot_of_sweep};
 pub(crate) use summary::{bodies, interrupted, markdown, output_failure, summarise, told_limit};
 
-use pliant_scene::format::FieldName;
+use pliant_format::tables::FieldName;
 use pliant_scene::{Built, Part, World};
 
 /// An output that could not be written.
@@ -204,8 +204,8 @@ mod tests {
 
     use pliant_explicit::State;
     use pliant_explicit::recover::Recovery;
-    use pliant_scene::Scene;
-    use pliant_scene::source::Source;
+    use pliant_format::Scene;
+    use pliant_format::source::Source;
 
     use super::*;
 

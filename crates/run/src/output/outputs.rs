@@ -7,8 +7,8 @@ use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::thread::{Scope, ScopedJoinHandle};
 
 use pliant_explicit::Wanted;
+use pliant_format::registry::OutputTable;
 use pliant_scene::World;
-use pliant_scene::registry::OutputTable;
 use pliant_sim::{Failure, Schedule, Simulation, State};
 
 use super::{Output, OutputError, Written, csv, frames, output_failure, vtu};

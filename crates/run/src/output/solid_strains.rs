@@ -4,9 +4,10 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Matrix3, SymmetricEigen};
 use pliant_explicit::recover::CellFields;
+use pliant_geometry::words::number;
 use pliant_mechanics::Model;
 use pliant_mechanics::model::{Cells, Solid};
-use pliant_sim::{Instant, number};
+use pliant_sim::Instant;
 use serde::{Deserialize, Serialize};
 
 /// Poisson's ratio at rest from which on a body counts as nearly incompressible. Bodies with fibres do with any ratio.

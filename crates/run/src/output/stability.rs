@@ -3,9 +3,11 @@
 use std::fmt;
 
 use pliant_explicit::BALANCE_LIMIT;
-use pliant_explicit::stability::{OnUnstable, StepLimit};
+use pliant_explicit::stability::StepLimit;
+use pliant_format::tables::OnUnstableName;
+use pliant_geometry::words::{counted, number};
 use pliant_mechanics::Energies;
-use pliant_sim::{Failure, counted, number};
+use pliant_sim::Failure;
 use serde::Serialize;
 
 use super::outcome::HeldBack;
@@ -19,7 +21,7 @@ const MUCH_HOURGLASS: f64 = 0.05;
 #[derive(Clone, Debug, Serialize)]
 pub struct StabilitySummary {
     /// What the run does when the limit falls below its step.
-    pub on_unstable: OnUnstable,
+    pub on_unstable: OnUnstableName,
     /// How often the limit was checked.
     pub checks: u64,
     /// The smallest limit seen [s]; `None` if it was never checked.
@@ -72,7 +74,7 @@ impl StabilitySummary {
     /// Why the result may be wrong.
     fn doubt(&self) -> Option<String> {
         let fell = self.limit_over_step.is_some_and(|ratio| ratio < 1.0);
-        (fell && self.on_unstable == OnUnstable::Report)
+        (fell && self.on_unstable == OnUnstableName::Report)
             .then(|| format!("{self}; take a smaller `step`, or `on-unstable = \"substep\"`"))
     }
 }

@@ -1,7 +1,8 @@
 //! Largest strains of shells, and the warning where they exceed the range of small-strain elasticity.
 
+use pliant_geometry::words::number;
 use pliant_implicit::State;
-use pliant_sim::{BodyCells, number};
+use pliant_sim::BodyCells;
 use serde::{Deserialize, Serialize};
 
 use pliant_scene::Built;

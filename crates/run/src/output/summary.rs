@@ -3,16 +3,18 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use pliant_geometry::words::{counted, number};
 use pliant_mechanics::Energies;
 use pliant_mechanics::model::{Constraint, Enclosed};
-use pliant_sim::{Critical, Effort, Equilibria, Failure, INTERRUPTED, counted, number};
+use pliant_sim::{Critical, Effort, Equilibria, Failure, INTERRUPTED};
 use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
 
 use super::stability::{AddedMass, StabilitySummary, doubts};
 use super::{GuestSummary, History, Intersections, Outcome, PartOutcome, TieSummary};
 use super::{OutputError, StrainSummary, VolumeChange, constraints};
-use pliant_scene::{Built, LimitingElement, Limits, Part, World, printable};
+use pliant_format::printable;
+use pliant_scene::{Built, LimitingElement, Limits, Part, World};
 
 /// The result of a run.
 #[derive(Clone, Debug, Serialize)]

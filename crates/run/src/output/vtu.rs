@@ -12,8 +12,8 @@ use pliant_geometry::io::{
 use super::field_mesh::FieldMesh;
 use super::file::{check_own_folder, is_at, reopen, replace};
 use super::{Frame, Output, OutputError, Written, time_of};
+use pliant_format::tables::VtuTable;
 use pliant_scene::World;
-use pliant_scene::format::VtuTable;
 
 pub(super) struct Series {
     folder: PathBuf,

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use pliant_scene::registry::scene_schema;
+use pliant_format::registry::scene_schema;
 use pliant_testing::scenes::{Told, Workshop, changed, resumable};
 
 /// The setting of a number of threads.

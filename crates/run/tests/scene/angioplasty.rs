@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
-use pliant_scene::source::Source;
-use pliant_scene::{Scene, World};
+use pliant_format::Scene;
+use pliant_format::source::Source;
+use pliant_scene::World;
 
 /// Pressure [Pa] in the balloon.
 fn pressure(time: f64) -> f64 {

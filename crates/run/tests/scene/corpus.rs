@@ -5,10 +5,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use pliant_format::Scene;
+use pliant_format::source::Source;
 use pliant_run::{Checkpoint, OutputFolder};
+use pliant_scene::World;
 use pliant_scene::niftysim::import_bytes;
-use pliant_scene::source::Source;
-use pliant_scene::{Scene, World};
 
 use pliant_testing::{PeakMemory, Random};
 

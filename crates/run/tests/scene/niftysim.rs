@@ -3,13 +3,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use pliant_format::Scene;
+use pliant_format::registry::LoadTable;
+use pliant_format::source::Source;
+use pliant_format::tables::{ByLabel, Hourglass};
 use pliant_geometry::{CellKind, io};
 use pliant_mechanics::load::LoadKind;
-use pliant_scene::format::{ByLabel, Hourglass};
+use pliant_scene::Built;
 use pliant_scene::niftysim::{ImportError, Imported, import};
-use pliant_scene::registry::LoadTable;
-use pliant_scene::source::Source;
-use pliant_scene::{Built, Scene};
 use pliant_testing::Random;
 
 fn sample(name: &str) -> PathBuf {

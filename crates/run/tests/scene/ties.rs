@@ -1,7 +1,8 @@
 //! Bodies tied to others whose meshes do not match, with every solver, and what is refused.
 
+use pliant_format::Scene;
 #[cfg(feature = "gpu")]
-use pliant_scene::{Scene, World};
+use pliant_scene::World;
 #[cfg(feature = "gpu")]
 use pliant_testing::scenes::taken_up;
 use pliant_testing::scenes::{assert_rows_agree, last_row, resumes, world};
@@ -482,7 +483,7 @@ fn a_liver_in_its_capsule_with_its_vessels_moves_on_a_device_as_on_the_processor
     assert!(text.contains("precision = \"single\""));
     let worlds = ["precision = \"double\"", "device = \"gpu\""].map(|run| {
         let text = text.replace("precision = \"single\"", run);
-        let source = pliant_scene::source::Source::parse("scene.toml", text).unwrap();
+        let source = pliant_format::source::Source::parse("scene.toml", text).unwrap();
         World::new(&Scene::from_source(source, folder.clone()).unwrap()).unwrap()
     });
     agrees_on_a_device(worlds.each_ref(), 0.1, "pull");

@@ -3,13 +3,13 @@
 use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
+use pliant_geometry::words::{counted, number};
 use pliant_implicit::{State, Touching};
 use pliant_sim::contact::barrier::{BarrierSettings, Meeting};
 use pliant_sim::contact::touch::{Contacts, With};
-use pliant_sim::{counted, number};
 
 use super::{Builder, Partner, in_metres};
-use crate::format::ContactTable;
+use pliant_format::tables::ContactTable;
 
 /// The distance of a barrier over the diagonal of all bodies, if none is given.
 const DISTANCE: f64 = 1e-3;

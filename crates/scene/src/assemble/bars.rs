@@ -7,7 +7,7 @@ use pliant_mechanics::model::Cells;
 use super::Builder;
 use super::bodies::{Draft, nodes};
 use super::meshes::MeshOrigin;
-use crate::format::MeshTable;
+use pliant_format::tables::MeshTable;
 
 /// Most bars of a path.
 const MOST: f64 = 1e6;
@@ -53,7 +53,7 @@ impl Builder<'_> {
         }
         let count = lines.len() / 2;
         let mesh = Mesh { points, blocks: vec![CellBlock::new(CellKind::Line, lines)], ..Mesh::default() };
-        Some(MeshOrigin { mesh, origin: format!("lines, {}", pliant_sim::counted(count, "bar")) })
+        Some(MeshOrigin { mesh, origin: format!("lines, {}", pliant_geometry::words::counted(count, "bar")) })
     }
 
     /// Some lines of a block as bars.

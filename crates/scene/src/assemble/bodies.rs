@@ -2,17 +2,20 @@
 
 use std::collections::BTreeMap;
 
+use pliant_geometry::words::counted;
 use pliant_geometry::{
     CellBlock, CellKind, CellLabel, Labels, Mesh, Surface, UnknownLabel, body_blocks, boundary,
 };
 use pliant_mechanics::model::{Averaging, Cells, Material, Solid};
 use pliant_mechanics::prony::{Prony, PronyError};
-use pliant_sim::counted;
 
-use super::{Builder, BuiltBody, SCENE, suggestion};
-use crate::diagnostic::Diagnostic;
-use crate::format::{BodyModel, BodyTable, ByLabel, Density, Element, Hourglass, Thickness, ThicknessRule};
-use crate::registry::LawTable;
+use super::{Builder, BuiltBody};
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::registry::LawTable;
+use pliant_format::tables::{
+    BodyModel, BodyTable, ByLabel, Density, Element, Hourglass, Thickness, ThicknessRule,
+};
+use pliant_format::{SCENE, suggestion};
 
 /// A body that is being built.
 pub(super) struct Draft<'a> {

@@ -2,17 +2,17 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use pliant_geometry::words::number;
 use pliant_geometry::{Mesh, Selection, Vector3};
 use pliant_mechanics::curve::Curve;
 use pliant_mechanics::load::{Face, NO_NODE};
 use pliant_mechanics::model::{Constraint, Enclosure, Motion};
 use pliant_shells::element::Membrane;
-use pliant_sim::number;
 
 use super::{Builder, Subject, in_metres};
-use crate::diagnostic::Diagnostic;
-use crate::format::{MoveTable, RotateTable, SolverName, Vectors, VolumeTable};
-use crate::registry::{ConstraintTable, LoadTable};
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::registry::{ConstraintTable, LoadTable};
+use pliant_format::tables::{MoveTable, RotateTable, SolverName, Vectors, VolumeTable};
 
 impl Builder<'_> {
     pub(super) fn add_constraints(&mut self) {

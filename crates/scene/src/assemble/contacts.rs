@@ -6,6 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use pliant_explicit::State;
+use pliant_geometry::words::{counted, number};
 use pliant_geometry::{Locator, Selection, SurfaceLocator, Vector3};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::load::NO_NODE;
@@ -16,12 +17,12 @@ use pliant_sim::contact::pose::{Pose, Trajectory};
 use pliant_sim::contact::profile::{Corner, Profile};
 use pliant_sim::contact::shape::Shape;
 use pliant_sim::contact::touch::{Contact, Contacts, Jaw, Rigid, Touch, With, lattice, parts_of};
-use pliant_sim::{counted, number};
 
 use super::barriers::BarrierTables;
-use super::{Builder, BuiltBody, Subject, in_metres, suggestion};
-use crate::format::{ContactTable, GrowthTable, ShapeName, SolverName, ToolTable};
-use crate::reads::{rows_of, table as table_file};
+use super::{Builder, BuiltBody, Subject, in_metres};
+use pliant_format::suggestion;
+use pliant_format::tables::{ContactTable, GrowthTable, ShapeName, SolverName, ToolTable};
+use pliant_format::{rows_of, table as table_file};
 
 /// What a row of a table of poses holds.
 const ROW: &str =

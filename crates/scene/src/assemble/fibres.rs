@@ -2,16 +2,17 @@
 //! point of the surface. Walls take the gradient of a harmonic function on the body's own elements. A cell without a direction is an error
 //! that names it.
 
+use pliant_geometry::words::counted;
 use pliant_geometry::{CellBlock, CellId, CellKind, Selection, SurfaceLocator, Vector3};
 use pliant_mechanics::harmonic::Laplacian;
-use pliant_sim::counted;
 
+use super::Builder;
 use super::bodies::{Draft, nodes};
 use super::meshes::list_cells;
-use super::{Builder, suggestion};
-use crate::diagnostic::Diagnostic;
-use crate::format::{BodyModel, Fibre, FibreRule};
-use crate::registry::LawTable;
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::registry::LawTable;
+use pliant_format::suggestion;
+use pliant_format::tables::{BodyModel, Fibre, FibreRule};
 
 /// Directions shorter than this are zero.
 const ZERO: f64 = 1e-12;
@@ -292,7 +293,7 @@ mod tests {
     use crate::assemble::{Built, build};
     use crate::testing::read;
 
-    fn scene(mesh: &str, fibre: &str) -> crate::Scene {
+    fn scene(mesh: &str, fibre: &str) -> pliant_format::Scene {
         read(&format!(
             "[scene]\nuntil = 1\n[law.muscle]\ntype = 'transversely-isotropic'\nyoung-modulus = 1e4\n\
              poisson-ratio = 0.3\nfibre-modulus = 5e3\n[body.organ]\nmesh = {{ {mesh} }}\nlaw = 'muscle'\n\

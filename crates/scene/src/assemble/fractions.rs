@@ -3,10 +3,11 @@
 use pliant_geometry::{CellBlock, CellId};
 use pliant_meshing::Voxels;
 
+use super::Builder;
 use super::bodies::Draft;
 use super::meshes::list_cells;
-use super::{Builder, suggestion};
-use crate::format::Cells;
+use pliant_format::suggestion;
+use pliant_format::tables::Cells;
 
 impl Builder<'_> {
     /// How much of each of some cells of a body is filled; diagnostics where the data are missing or wrong.
@@ -54,9 +55,9 @@ mod tests {
     use pliant_geometry::io;
 
     use crate::assemble::build;
-    use crate::scene::Scene;
-    use crate::source::Source;
     use crate::testing::{CUBE, built_alone};
+    use pliant_format::Scene;
+    use pliant_format::source::Source;
 
     /// The volume of a body and the names of its kinds of cells.
     fn volume(built: &crate::Built) -> f64 {

@@ -18,8 +18,8 @@ use pliant_meshing::{
 use super::mesh_files::{MeshFault, words};
 use super::{Builder, MeshOrigin, Meshing};
 use crate::cache::{Kept, Key};
-use crate::diagnostic::Diagnostic;
-use crate::format::{Cells, CleanTable, Label, MeshTable};
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::tables::{Cells, CleanTable, Label, MeshTable};
 
 /// Faces that meet at more than this angle meet at a crease, which even triangles keep [rad].
 const CREASE: f64 = FRAC_PI_3;

@@ -4,12 +4,12 @@ use pliant_geometry::{Mesh, Selection, Surface, Vector3, boundary};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE, face_areas};
 
-use super::{Builder, SCENE, Subject, labels_of, suggestion};
-use crate::format::{
-    At, BodyModel, ColourBy, Component, CsvTable, FieldName, ForceTable, ProbeTable, Timing, Vectors,
-    VtuTable,
+use super::{Builder, Subject, labels_of};
+use pliant_format::registry::{LoadTable, OutputTable};
+use pliant_format::tables::{
+    At, BodyModel, ColourBy, Component, CsvTable, FieldName, ForceTable, ProbeTable, Vectors, VtuTable,
 };
-use crate::registry::{LoadTable, OutputTable};
+use pliant_format::{SCENE, suggestion};
 
 impl Builder<'_> {
     pub(super) fn add_loads(&mut self) {
@@ -442,32 +442,6 @@ impl Builder<'_> {
             let message = format!("surfaces have no `{}`", field.name());
             self.error(path, message, "not on a surface", "write it on the body");
         }
-    }
-}
-
-impl LoadTable {
-    /// Its curve over time.
-    pub(super) fn timing(&self) -> &Timing {
-        match self {
-            Self::Force(load) => &load.timing,
-            Self::Moment(load) => &load.timing,
-            Self::Edge(load) => &load.timing,
-            Self::Traction(load) => &load.timing,
-            Self::Pressure(load) => &load.timing,
-            Self::Gravity(load) => &load.timing,
-        }
-    }
-
-    /// What it acts on; `None`: everything.
-    pub(crate) fn on(&self) -> Option<&str> {
-        Some(match self {
-            Self::Force(load) => &load.on,
-            Self::Moment(load) => &load.on,
-            Self::Edge(load) => &load.on,
-            Self::Traction(load) => &load.on,
-            Self::Pressure(load) => &load.on,
-            Self::Gravity(load) => return load.on.as_deref(),
-        })
     }
 }
 

@@ -4,11 +4,11 @@ use std::path::Path;
 
 use pliant_geometry::Mesh;
 use pliant_geometry::io::{self, MeshFile, MeshFileError};
-use pliant_sim::number;
+use pliant_geometry::words::number;
 
 use super::Builder;
-use crate::foreign::foreign_file;
-use crate::format::{Cells, MeshTable};
+use pliant_format::foreign_file;
+use pliant_format::tables::{Cells, MeshTable};
 
 /// An organ smaller than the first or larger than the last [m] is probably in other units; from the second on it may be.
 const PLAUSIBLE_SIZE: [f64; 3] = [1e-3, 2.0, 10.0];

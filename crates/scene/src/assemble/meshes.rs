@@ -2,6 +2,7 @@
 
 use nalgebra::Rotation3;
 use pliant_geometry::io::MeshFile;
+use pliant_geometry::words::counted;
 use pliant_geometry::{
     CellBlock, CellId, CellKind, DataArray, Diagnosis, Mesh, Vector3, boundary, diagnose,
     faces_met_by_two_tets, reorder,
@@ -10,12 +11,11 @@ use pliant_meshing::{
     Block, DEFAULT_CELL_LIMIT, Ellipsoid, FieldMesh, ImplicitField, MeshingError, Phantom, Resolution,
     Stuffing, Tube, VolumeCell, Voxels, brain_label,
 };
-use pliant_sim::counted;
 
 use super::Builder;
 use super::mesh_files::{MeshFault, SizeDoubt, words};
-use crate::diagnostic::Diagnostic;
-use crate::format::{BodyModel, BodyTable, Cells, Fix, MeshTable, Organ};
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::tables::{BodyModel, BodyTable, Cells, Fix, MeshTable, Organ};
 
 /// A mesh and where it comes from.
 pub(crate) struct MeshOrigin {
@@ -474,10 +474,10 @@ mod tests {
                     "{ half-space = { point = [0, 0, 0.01], normal = [0, 0, -1] } }",
                 );
             assert!(text.contains(table) && text.contains("half-space"));
-            let source = crate::source::Source::parse("cube.toml", text).unwrap();
+            let source = pliant_format::source::Source::parse("cube.toml", text).unwrap();
             let meshes = [(given.to_owned(), std::sync::Arc::clone(&mesh))].into();
-            let source = source.giving(crate::source::Given { meshes, ..Default::default() });
-            crate::Scene::from_source(source, ".".into()).and_then(|scene| crate::build(&scene))
+            let source = source.giving(pliant_format::source::Given { meshes, ..Default::default() });
+            pliant_format::Scene::from_source(source, ".".into()).and_then(|scene| crate::build(&scene))
         };
         let built = with("{ given = 'mine' }", "mine").unwrap_or_else(|error| panic!("{}", error.plain()));
         assert_eq!(built.bodies[0].mesh.points, mesh.points);

@@ -36,11 +36,11 @@ use pliant_sim::contact::touch::Contacts;
 use pliant_sim::{BodyCells, ImplicitBodies, RunControl};
 
 use crate::cache::MeshCache;
-use crate::diagnostic::{Diagnostic, SceneErrors};
-use crate::format::{CurveShape, SolverName, StepChoice, Timing};
-use crate::nearest::nearest;
-use crate::scene::Scene;
-use crate::source::Source;
+use pliant_format::Scene;
+use pliant_format::diagnostic::{Diagnostic, SceneErrors};
+use pliant_format::source::Source;
+use pliant_format::tables::{CurveShape, SolverName, StepChoice, Timing};
+use pliant_format::{SCENE, suggestion};
 
 use barriers::BarrierTables;
 use contacts::Partner;
@@ -522,25 +522,10 @@ impl<'s> Builder<'s> {
     }
 }
 
-/// Whose names are meant, in suggestions.
-pub(crate) const SCENE: &str = "the scene";
-
 /// A place [m] in messages.
 fn in_metres(place: impl Into<[f64; 3]>) -> String {
-    let [x, y, z] = place.into().map(pliant_sim::number);
+    let [x, y, z] = place.into().map(pliant_geometry::words::number);
     format!("({x}, {y}, {z}) m")
-}
-
-/// "did you mean …?" or a list of what there is; `owner` is `the scene` or another that has such names.
-pub(crate) fn suggestion(word: &str, known: &[&str], owner: &str, what: &str) -> String {
-    match nearest(word, known.iter().copied()) {
-        Some(name) => format!("did you mean `{name}`?"),
-        None if known.is_empty() => format!("{owner} has no {what}"),
-        None => {
-            let list = known.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
-            format!("{what} of {owner}: {list}")
-        }
-    }
 }
 
 #[cfg(test)]
@@ -557,15 +542,6 @@ mod tests {
         let told = told.plain().to_string();
         assert!(told.contains("there is no body or surface `cub` (help: did you mean `cube`?)"), "{told}");
         assert!(told.contains("there is no constraint `bse` (help: did you mean `base`?)"), "{told}");
-    }
-
-    #[test]
-    fn names_without_a_near_one_are_listed() {
-        assert_eq!(
-            suggestion("x", &["tissue", "bone"], SCENE, "laws"),
-            "laws of the scene: `tissue`, `bone`"
-        );
-        assert_eq!(suggestion("x", &[], "the mesh", "cell data"), "the mesh has no cell data");
     }
 
     #[test]

@@ -2,16 +2,16 @@
 
 use std::collections::BTreeSet;
 
+use pliant_geometry::words::number;
 use pliant_geometry::{
     Face, Locator, MortarRow, MortarRows, MortarSide, SurfaceLocator, Vector3, mortar_rows,
 };
 use pliant_mechanics::mapping::Weights;
-use pliant_sim::number;
 
 use super::ties::{Attached, GAP, doubt_points, median_edge};
 use super::{Builder, BuiltBody, in_metres};
-use crate::diagnostic::Diagnostic;
-use crate::format::{BodyModel, TieMethod, TieTable};
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::tables::{BodyModel, TieMethod, TieTable};
 
 /// A place that is off by less than this part of the median edge is right.
 const ROUNDING: f64 = 1e-13;

@@ -9,12 +9,12 @@ use std::sync::Arc;
 use nalgebra::Vector3 as Vector;
 use pliant_explicit::State;
 use pliant_explicit::recover::Recovery;
+use pliant_geometry::words::{counted, number};
 use pliant_geometry::{Locator, SurfaceLocator, Vector3};
 use pliant_mechanics::model::FREE;
 use pliant_sim::contact::barrier::IntersectionCheck;
 use pliant_sim::contact::pairs::{Pairs, Surface};
 use pliant_sim::contact::touch::{Contact, Contacts, Rigid, With, lattice, parts_of};
-use pliant_sim::{counted, number};
 
 use super::contacts::{OVERLAP, hang};
 use super::{Builder, BuiltBody, in_metres};

@@ -3,12 +3,12 @@
 use std::f64::consts::FRAC_PI_2;
 
 use pliant_geometry::Mesh;
+use pliant_geometry::words::number;
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Distortion, Lens, Pattern, Sheet, sphere};
-use pliant_sim::number;
 
 use super::Builder;
 use super::meshes::MeshOrigin;
-use crate::format::{MeshTable, PatternName, SheetGrid};
+use pliant_format::tables::{MeshTable, PatternName, SheetGrid};
 
 /// A shape on a grid, with the lengths [m] of its grid axes.
 struct OnGrid<'t> {
@@ -17,39 +17,37 @@ struct OnGrid<'t> {
     grid: &'t SheetGrid,
 }
 
-impl MeshTable {
-    /// Whether it is a built-in shape of triangles.
-    pub(in crate::assemble) fn is_sheet(&self) -> bool {
-        self.sphere.is_some() || self.lens.is_some() || self.sheet().is_some()
-    }
+/// Whether it is a built-in shape of triangles.
+pub(in crate::assemble) fn is_sheet(table: &MeshTable) -> bool {
+    table.sphere.is_some() || table.lens.is_some() || on_grid(table).is_some()
+}
 
-    /// The shape on a grid that it names.
-    fn sheet(&self) -> Option<OnGrid<'_>> {
-        let made = |sheet, lengths, grid| Some(OnGrid { sheet, lengths, grid });
-        if let Some(plate) = &self.plate {
-            return made(Sheet::Plate { size: plate.size }, plate.size, &plate.grid);
-        }
-        if let Some(shape) = &self.cylinder {
-            let (from, span) = (shape.from.to_radians(), shape.span.to_radians());
-            let sheet = Sheet::Cylinder { radius: shape.radius, length: shape.length, from, span };
-            return made(sheet, [shape.radius * span, shape.length], &shape.grid);
-        }
-        if let Some(shape) = &self.hemisphere {
-            let (hole, span) = (shape.hole.to_radians(), shape.span.to_radians());
-            let sheet = Sheet::Hemisphere { radius: shape.radius, hole, span };
-            return made(sheet, [shape.radius * span, shape.radius * (FRAC_PI_2 - hole)], &shape.grid);
-        }
-        if let Some(shape) = &self.annulus {
-            let span = shape.span.to_radians();
-            let sheet = Sheet::Annulus { inner: shape.inner, outer: shape.outer, span };
-            let lengths = [shape.outer - shape.inner, 0.5 * (shape.outer + shape.inner) * span];
-            return made(sheet, lengths, &shape.grid);
-        }
-        let shape = self.twisted_strip.as_ref()?;
-        let sheet =
-            Sheet::TwistedStrip { length: shape.length, width: shape.width, twist: shape.twist.to_radians() };
-        made(sheet, [shape.length, shape.width], &shape.grid)
+/// The shape on a grid that it names.
+fn on_grid(table: &MeshTable) -> Option<OnGrid<'_>> {
+    let made = |sheet, lengths, grid| Some(OnGrid { sheet, lengths, grid });
+    if let Some(plate) = &table.plate {
+        return made(Sheet::Plate { size: plate.size }, plate.size, &plate.grid);
     }
+    if let Some(shape) = &table.cylinder {
+        let (from, span) = (shape.from.to_radians(), shape.span.to_radians());
+        let sheet = Sheet::Cylinder { radius: shape.radius, length: shape.length, from, span };
+        return made(sheet, [shape.radius * span, shape.length], &shape.grid);
+    }
+    if let Some(shape) = &table.hemisphere {
+        let (hole, span) = (shape.hole.to_radians(), shape.span.to_radians());
+        let sheet = Sheet::Hemisphere { radius: shape.radius, hole, span };
+        return made(sheet, [shape.radius * span, shape.radius * (FRAC_PI_2 - hole)], &shape.grid);
+    }
+    if let Some(shape) = &table.annulus {
+        let span = shape.span.to_radians();
+        let sheet = Sheet::Annulus { inner: shape.inner, outer: shape.outer, span };
+        let lengths = [shape.outer - shape.inner, 0.5 * (shape.outer + shape.inner) * span];
+        return made(sheet, lengths, &shape.grid);
+    }
+    let shape = table.twisted_strip.as_ref()?;
+    let sheet =
+        Sheet::TwistedStrip { length: shape.length, width: shape.width, twist: shape.twist.to_radians() };
+    made(sheet, [shape.length, shape.width], &shape.grid)
 }
 
 impl Builder<'_> {
@@ -88,7 +86,7 @@ impl Builder<'_> {
                 };
                 lens.mesh(edge, DEFAULT_CELL_LIMIT)
             }),
-            (None, None) => table.sheet().and_then(|shape| {
+            (None, None) => on_grid(table).and_then(|shape| {
                 let counts = match (shape.grid.cells, table.edge) {
                     (Some(cells), None) => cells.map(|n| n as usize),
                     (None, Some(edge)) => {

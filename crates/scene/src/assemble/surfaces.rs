@@ -1,15 +1,15 @@
 //! Surfaces carried by bodies: each point tied to the cell it lies in, or the nearest one.
 
 use pliant_geometry::Mesh;
+use pliant_geometry::words::number;
 use pliant_implicit::{CurvedSurface, State};
 use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::Surface;
 use pliant_shells::{Carried, EdgeRule};
-use pliant_sim::number;
 
 use super::meshes::surface_of;
 use super::{Builder, MeshOrigin};
-use crate::diagnostic::Diagnostic;
+use pliant_format::diagnostic::Diagnostic;
 
 /// A point farther from its body than this fraction of the body's size gives a warning.
 const FAR: f64 = 0.05;

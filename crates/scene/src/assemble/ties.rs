@@ -1,18 +1,18 @@
 //! Ties: nodes of one body that follow the cells of another.
 
+use pliant_geometry::words::{counted, number};
 use pliant_geometry::{CellId, Mesh, QualityReport};
 use pliant_implicit::CarriedTurn;
 use pliant_mechanics::Model;
 use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::Cells;
 use pliant_mechanics::tie::TieError;
-use pliant_sim::{counted, number};
 
 use super::mortar::Joint;
 use super::{Builder, BuiltBody, in_metres};
-use crate::diagnostic::Diagnostic;
-use crate::format::{Rotations, TieTable};
-use crate::source::Source;
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::source::Source;
+use pliant_format::tables::{Rotations, TieTable};
 
 /// Part of the median edge of the followed body that a gap may have.
 pub(super) const GAP: f64 = 0.1;

@@ -3,10 +3,10 @@
 use std::collections::HashSet;
 use std::f64::consts::TAU;
 
+use pliant_geometry::words::number;
 use pliant_geometry::{CellId, Face, Vector3, gradient_integrals};
 use pliant_implicit::CarriedTurn;
 use pliant_mechanics::model::Constraint;
-use pliant_sim::number;
 
 use super::Builder;
 

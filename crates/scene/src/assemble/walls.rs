@@ -7,8 +7,8 @@ use pliant_mechanics::tensor::{cross, dot, sub};
 
 use super::Builder;
 use super::bodies::{Draft, Shape, nodes};
-use crate::format::{BodyModel, BodyTable, Rotations};
-use crate::registry::LawTable;
+use pliant_format::registry::LawTable;
+use pliant_format::tables::{BodyModel, BodyTable, Rotations};
 
 /// A fibre whose part in the plane of its triangle is shorter than this has no direction there.
 const ACROSS: f64 = 1e-3;

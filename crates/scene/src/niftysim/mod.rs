@@ -26,7 +26,7 @@ use pliant_geometry::io::{self, MeshFile, MeshFileError, parse_xml};
 
 pub use error::{ImportError, ImportProblem};
 
-use crate::reads::{LONGEST_TABLE, Reads};
+use pliant_format::{LONGEST_TABLE, Reads};
 
 /// Where mesh files of a model are.
 struct Files<'a> {

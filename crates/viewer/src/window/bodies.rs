@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use eframe::egui;
+use pliant_format::tables::{Choice, LookColour, LookTable};
 use pliant_geometry::{CellLabel, Region, RegionNames};
 use pliant_picture::{Coat, Regions, label_colour};
-use pliant_scene::format::{Choice, LookColour, LookTable};
 
 use super::App;
 use crate::regions::{coat_of, regions_of};

@@ -8,12 +8,12 @@ use std::time::{Duration, Instant};
 
 use eframe::egui::{self, Align2, Key, PointerButton, vec2};
 use eframe::egui_wgpu::WgpuConfiguration;
+use pliant_format::tables::FieldName;
 use pliant_geometry::{CellKind, Mesh, RegionNames, Vector3};
 use pliant_picture::{
     ColourMap, Look, Outermost, Series, SeriesError, Style, Subject, Texture, deformed_points, field_choices,
     nodal_values,
 };
-use pliant_scene::format::FieldName;
 
 use super::NARROW;
 use super::bodies::Listed;

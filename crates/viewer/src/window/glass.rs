@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use eframe::egui::Color32;
-use pliant_scene::format::LookTable;
+use pliant_format::tables::LookTable;
 
 use super::App;
 use super::keep::Taking;

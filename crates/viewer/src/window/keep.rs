@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use eframe::egui::{self, ColorImage, Pos2, Rect, vec2};
+use pliant_format::diagnostic::Place;
+use pliant_format::source::{Source, Value};
+use pliant_format::tables::{Choice, ColourBy, LookColour, ViewTable};
 use pliant_geometry::CellLabel;
 use pliant_picture::{Background, Camera, Picture, Plane, Projection, Style, Texture};
-use pliant_scene::diagnostic::Place;
-use pliant_scene::format::{Choice, ColourBy, LookColour, ViewTable};
-use pliant_scene::source::{Source, Value};
 
 use super::App;
 use super::panels::make_room;
@@ -256,10 +256,10 @@ impl App {
 
 #[cfg(test)]
 mod tests {
+    use pliant_format::Scene;
+    use pliant_format::tables::UpName;
     use pliant_geometry::Vector3;
     use pliant_picture::{Axis, ColourMap};
-    use pliant_scene::Scene;
-    use pliant_scene::format::UpName;
 
     use super::*;
 

@@ -29,11 +29,11 @@ use std::time::{Duration, Instant, SystemTime};
 
 use eframe::egui::{self, Key};
 use eframe::egui_wgpu::WgpuConfiguration;
+use pliant_format::Scene;
+use pliant_format::tables::{FieldName, ViewTable};
 use pliant_geometry::{RegionNames, Vector3};
 use pliant_mechanics::StopFlag;
 use pliant_picture::Look;
-use pliant_scene::Scene;
-use pliant_scene::format::{FieldName, ViewTable};
 use pliant_sim::gpu::Device;
 
 use self::filming::Filming;

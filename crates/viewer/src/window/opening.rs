@@ -91,8 +91,8 @@ fn entries(folder: &Path) -> Vec<Entry> {
     let read = fs::read_dir(folder).into_iter().flatten().flatten();
     let entry = |path: PathBuf| {
         let hidden = path.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'));
-        let scene =
-            path.extension().is_some_and(|end| end == "toml" || end == "xml") || pliant_scene::is_mesh(&path);
+        let scene = path.extension().is_some_and(|end| end == "toml" || end == "xml")
+            || pliant_format::is_mesh(&path);
         match path.is_dir() {
             _ if hidden => None,
             true if path.join("scene.toml").is_file() => Some(Entry::Scene(path)),

@@ -1,10 +1,10 @@
 //! The panels around the picture: what is played and shown, and plots.
 
 use eframe::egui;
+use pliant_format::tables::{BodyModel, ColourBy, Component, FieldName, Labels, Nothing, SolverName};
 use pliant_geometry::Vector3;
 use pliant_picture::{Background, ColourMap, Texture};
 use pliant_scene::Part;
-use pliant_scene::format::{BodyModel, ColourBy, Component, FieldName, Labels, Nothing, SolverName};
 
 use super::App;
 use super::told::Told;

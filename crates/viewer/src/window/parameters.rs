@@ -3,7 +3,7 @@
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use eframe::egui;
-use pliant_scene::Scene;
+use pliant_format::Scene;
 
 use super::told::Told;
 use super::undo::Act;

@@ -4,10 +4,10 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use pliant_format::Scene;
+use pliant_format::source::Source;
 use pliant_picture::Subject;
-use pliant_scene::Scene;
 use pliant_scene::World;
-use pliant_scene::source::Source;
 use pliant_viewer::{Frame, Session};
 
 /// A ball held at one end.

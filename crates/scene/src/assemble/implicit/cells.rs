@@ -2,17 +2,20 @@
 
 use std::collections::BTreeMap;
 
+use pliant_geometry::words::counted;
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use pliant_implicit::{ModelError, Shell};
 use pliant_shells::element::Wall;
 use pliant_shells::element::{Bending, Elasticity, Formulation, Layer, Membrane, Orthotropic};
-use pliant_sim::{BodyCells, counted};
+use pliant_sim::BodyCells;
 
 use crate::assemble::bodies::{Draft, nodes};
 use crate::assemble::meshes::surface_of;
-use crate::assemble::{Builder, SCENE, bodies, suggestion};
-use crate::diagnostic::Diagnostic;
-use crate::format::{BodyTable, ByLabel, Element, Normals, SolverName, Thickness, ThicknessRule};
+use crate::assemble::sheets::is_sheet;
+use crate::assemble::{Builder, bodies};
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::tables::{BodyTable, ByLabel, Element, Normals, SolverName, Thickness, ThicknessRule};
+use pliant_format::{SCENE, suggestion};
 
 /// Stiffness against drilling of `dkt-cst` and `membrane`, as a part of G t A/3 a node.
 const DRILLING: f64 = 0.01;
@@ -378,7 +381,7 @@ impl Builder<'_> {
                         "`{name}` is curved by the normals of its mesh, but for {} without one, which may be creases",
                         counted(creased, "node")
                     ));
-                } else if !table.mesh.is_sheet() {
+                } else if !is_sheet(&table.mesh) {
                     self.notes.push(format!("`{name}` is curved by the normals of its mesh"));
                 }
                 Some(given)

@@ -5,7 +5,7 @@ use pliant_implicit::Spring;
 use pliant_mechanics::model::Motion;
 
 use crate::assemble::Builder;
-use crate::format::{Axis, MoveTable, SpringTable, Vectors};
+use pliant_format::tables::{Axis, MoveTable, SpringTable, Vectors};
 
 impl Builder<'_> {
     /// Whether the nodes of a body turn.

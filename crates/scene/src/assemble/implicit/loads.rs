@@ -3,18 +3,20 @@
 use std::collections::BTreeMap;
 
 use pliant_geometry::Vector3;
+use pliant_geometry::words::{counted, number};
 use pliant_implicit::Resolution;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_shells::element::Membrane;
-use pliant_sim::{BodyCells, RunControl, Stop, counted, number};
+use pliant_sim::{BodyCells, RunControl, Stop};
 
-use crate::assemble::{Builder, SCENE, Subject, suggestion};
-use crate::diagnostic::Diagnostic;
-use crate::format::{
+use crate::assemble::{Builder, Subject};
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::registry::LoadTable;
+use pliant_format::tables::{
     Axis, ControlTable, ControlledNode, GravityTable, MomentTable, PressureTable, SpreadName, StopTable,
 };
-use crate::registry::LoadTable;
+use pliant_format::{SCENE, suggestion};
 
 /// What acts, and the carried surface whose points it numbers.
 type Acting = (LoadKind, Option<usize>);

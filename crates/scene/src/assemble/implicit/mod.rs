@@ -5,12 +5,12 @@ mod constraints;
 mod loads;
 
 use pliant_geometry::Vector3;
+use pliant_geometry::words::counted;
 use pliant_implicit::State;
-use pliant_sim::{Precision, counted};
 
 use crate::assemble::Builder;
-use crate::format::{BodyModel, DeviceName, Element, SolverName};
-use crate::registry::OutputTable;
+use pliant_format::registry::OutputTable;
+use pliant_format::tables::{BodyModel, DeviceName, Element, PrecisionName, SolverName};
 
 impl Builder<'_> {
     /// Rejects scenes of both kinds of bodies without a common solver, and keys that do not go with the model of the implicit solvers.
@@ -53,7 +53,7 @@ impl Builder<'_> {
             None => format!("runs with `solver = \"{solver}\"`"),
         };
         let on_gpu = scene.run.solver == SolverName::Explicit && scene.run.device == DeviceName::Gpu;
-        if scene.run.precision == Some(Precision::Single) && !on_gpu {
+        if scene.run.precision == Some(PrecisionName::Single) && !on_gpu {
             let message = format!("{what} are computed in double precision only on the CPU");
             self.error(&scene.run_at("precision"), message, "not for these bodies", "leave `precision` out");
         }
@@ -277,8 +277,8 @@ mod tests {
     use pliant_implicit::Forces;
 
     use crate::assemble::build;
-    use crate::scene::Scene;
-    use crate::source::Source;
+    use pliant_format::Scene;
+    use pliant_format::source::Source;
 
     /// A sphere of 20 triangles, whose mesh has the normals of an ellipsoid.
     #[test]

@@ -10,13 +10,13 @@ use serde_json::{Map, Value as Json, json};
 
 use crate::checker::{check_skipping, read_table};
 use crate::diagnostic::Diagnostic;
-use crate::format::{
-    BodyTable, ContactTable, CsvTable, EdgeLoadTable, FixTable, ForceTable, GravityTable, LawExtras,
-    MeanTable, MomentTable, MoveTable, ParticipantTable, PressureTable, RigidTable, RunTable, SceneTable,
-    SpringTable, SurfaceTable, TieTable, ToolTable, TractionTable, ViewTable, VolumeTable, VtuTable,
-};
 use crate::nearest::nearest;
 use crate::source::{Source, Value};
+use crate::tables::{
+    BodyTable, ContactTable, CsvTable, EdgeLoadTable, FixTable, ForceTable, GravityTable, LawExtras,
+    MeanTable, MomentTable, MoveTable, ParticipantTable, PressureTable, RigidTable, RunTable, SceneTable,
+    SpringTable, SurfaceTable, TieTable, Timing, ToolTable, TractionTable, ViewTable, VolumeTable, VtuTable,
+};
 
 /// A kind of table whose parameters depend on its `type`.
 pub trait Typed: Sized {
@@ -269,6 +269,32 @@ pub fn scene_schema() -> Json {
         "additionalProperties": false,
         "$defs": definitions,
     })
+}
+
+impl LoadTable {
+    /// Its curve over time.
+    pub fn timing(&self) -> &Timing {
+        match self {
+            Self::Force(load) => &load.timing,
+            Self::Moment(load) => &load.timing,
+            Self::Edge(load) => &load.timing,
+            Self::Traction(load) => &load.timing,
+            Self::Pressure(load) => &load.timing,
+            Self::Gravity(load) => &load.timing,
+        }
+    }
+
+    /// What it acts on; `None`: everything.
+    pub fn on(&self) -> Option<&str> {
+        Some(match self {
+            Self::Force(load) => &load.on,
+            Self::Moment(load) => &load.on,
+            Self::Edge(load) => &load.on,
+            Self::Traction(load) => &load.on,
+            Self::Pressure(load) => &load.on,
+            Self::Gravity(load) => return load.on.as_deref(),
+        })
+    }
 }
 
 #[cfg(test)]

@@ -33,9 +33,9 @@ const BY_WORD: [(&str, &str, &str); 3] = [
 /// What a file is and what to do, if its ending names the format of another program.
 ///
 /// ```
-/// let [what, help] = pliant_scene::foreign_file("model.INP".as_ref()).unwrap();
+/// let [what, help] = pliant_format::foreign_file("model.INP".as_ref()).unwrap();
 /// assert!(what.contains("Abaqus") && help.contains("meshio"));
-/// assert_eq!(pliant_scene::foreign_file("model.vtu".as_ref()), None);
+/// assert_eq!(pliant_format::foreign_file("model.vtu".as_ref()), None);
 /// ```
 pub fn foreign_file(path: &Path) -> Option<[&'static str; 2]> {
     let ending = path.extension()?.to_str()?;

@@ -2,7 +2,7 @@
 
 use pliant_geometry::Vector3;
 
-use crate::of_mesh::calming;
+use super::of_mesh::calming;
 
 /// Young's modulus [Pa] and Poisson's ratio of tissue, capsule and vessels.
 const TISSUE: [f64; 2] = [5e3, 0.45];
@@ -33,7 +33,7 @@ impl OrganScene {
     ///
     /// ```
     /// use pliant_geometry::Vector3;
-    /// let organ = pliant_scene::OrganScene {
+    /// let organ = pliant_format::OrganScene {
     ///     title: "liver".into(),
     ///     source: "image = \"seg.nii.gz\", labels = [5], vessels = [6]".into(),
     ///     edge: 0.008,

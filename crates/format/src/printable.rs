@@ -17,7 +17,7 @@ fn commands(c: char) -> bool {
 /// that places in the text stay where they are.
 ///
 /// ```
-/// use pliant_scene::printable;
+/// use pliant_format::printable;
 /// assert_eq!(printable("\u{1b}[31mliver\n"), "?[31mliver\n");
 /// ```
 pub fn printable(text: &str) -> Cow<'_, str> {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use pliant_geometry::CellLabel;
+use pliant_geometry::{CellLabel, Region, RegionNames};
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -383,6 +383,27 @@ impl UpName {
             Self::MinusY => [0.0, -1.0, 0.0],
             Self::MinusZ => [0.0, 0.0, -1.0],
         }
+    }
+}
+
+impl ViewTable {
+    /// Whether the colours are those of labels.
+    pub fn shows_labels(&self) -> bool {
+        matches!(self.colour, Some(ColourBy::Labels(_)))
+    }
+
+    /// The regions that it hides of those there are. Others are left out: a scene that asks for them is refused when it is built.
+    pub fn hidden(&self, names: &RegionNames) -> Vec<Region> {
+        self.hide.iter().filter_map(|name| names.find(name).ok()).flatten().collect()
+    }
+
+    /// The regions with a look of their own, of those there are.
+    pub fn looks(&self, names: &RegionNames) -> Vec<(Region, LookTable)> {
+        let regions = |name: &String| names.find(&CellLabel::Name(name.clone())).unwrap_or_default();
+        let of = |(name, look): (&String, &LookTable)| {
+            regions(name).into_iter().map(|region| (region, *look)).collect::<Vec<_>>()
+        };
+        self.look.iter().flat_map(of).collect()
     }
 }
 

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use miette::{
     LabeledSpan, MietteError, MietteSpanContents, NamedSource, SourceCode, SourceSpan, SpanContents,
 };
-use pliant_sim::counted;
+use pliant_geometry::words::counted;
 
 use crate::printable::{boundary_after, boundary_before, printable, shortened};
 
@@ -54,7 +54,7 @@ impl From<Range<usize>> for Place {
 /// One error or warning about a scene.
 ///
 /// ```
-/// use pliant_scene::diagnostic::Diagnostic;
+/// use pliant_format::diagnostic::Diagnostic;
 /// let diagnostic = Diagnostic::error("unknown law `parenchima`")
 ///     .at(41..53, "no [law.parenchima] in this file")
 ///     .help("did you mean `parenchyma`?");

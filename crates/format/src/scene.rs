@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 
 use crate::checker::read_table;
 use crate::diagnostic::{Diagnostic, SceneErrors};
-use crate::format::{
-    BodyModel, BodyTable, ContactTable, ParticipantTable, RunTable, SceneTable, SurfaceTable, TieTable,
-    ToolTable, ViewTable,
-};
 use crate::nearest::nearest;
 use crate::reads::{LONGEST_SCENE, Reads};
 use crate::registry::{ConstraintTable, LawTable, LoadTable, OutputTable, read_law, read_typed};
 use crate::source::{Node, Source, Value};
+use crate::tables::{
+    BodyModel, BodyTable, ContactTable, ParticipantTable, RunTable, SceneTable, SurfaceTable, TieTable,
+    ToolTable, ViewTable,
+};
 
 /// A scene file and what it says.
 #[derive(Clone, Debug)]
@@ -35,7 +35,7 @@ pub struct Scene {
     /// `[tie.NAME]`
     pub ties: Vec<(String, TieTable)>,
     /// Bodies that ties to other participants hold.
-    pub(crate) tied_outside: Vec<String>,
+    pub tied_outside: Vec<String>,
     /// `[surface.NAME]`
     pub surfaces: Vec<(String, SurfaceTable)>,
     /// `[constraint.NAME]`
@@ -49,17 +49,17 @@ pub struct Scene {
     /// `[contact.NAME]`
     pub contacts: Vec<(String, ContactTable)>,
     /// Those between a body of this scene and one of another participant.
-    pub(crate) meets: Vec<(String, ContactTable)>,
+    pub meets: Vec<(String, ContactTable)>,
     /// `[output.NAME]`
     pub outputs: Vec<(String, OutputTable)>,
     /// `[view]`
     pub view: ViewTable,
     /// Doubts about values by themselves.
-    pub(crate) doubts: Vec<Diagnostic>,
+    pub doubts: Vec<Diagnostic>,
     /// Of the scene of one participant: the table that its run comes from.
-    pub(crate) own: Option<String>,
+    pub own: Option<String>,
     /// Whether it is the scene of one participant of several.
-    pub(crate) is_part: bool,
+    pub is_part: bool,
 }
 
 /// The tables a scene file can have.
@@ -127,7 +127,7 @@ impl Scene {
     ///
     /// # Errors
     /// If it may not be read.
-    pub(crate) fn file(&self, name: &Path) -> std::io::Result<PathBuf> {
+    pub fn file(&self, name: &Path) -> std::io::Result<PathBuf> {
         self.source.reads().allow(&self.folder.join(name))
     }
 

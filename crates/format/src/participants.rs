@@ -2,18 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use crate::assemble::{SCENE, suggestion};
 use crate::diagnostic::{Diagnostic, SceneErrors};
-use crate::format::{
+use crate::nearest::{SCENE, suggestion};
+use crate::registry::{ConstraintTable, OutputTable};
+use crate::scene::Scene;
+use crate::tables::{
     BodyModel, BodyTable, ColourBy, ContactTable, DeviceName, FieldName, ParticipantTable, RunTable,
     SolverName, ViewTable,
 };
-use crate::registry::{ConstraintTable, OutputTable};
-use crate::scene::Scene;
 
 impl ConstraintTable {
     /// The body whose nodes it is about.
-    pub(crate) fn body(&self) -> &str {
+    pub fn body(&self) -> &str {
         match self {
             Self::Fix(table) => &table.body,
             Self::Move(table) => &table.body,
@@ -42,7 +42,7 @@ impl Scene {
     /// # Errors
     /// If a participant names a body that there is not, or that goes with another one, or none; or if a table of a scene of several
     /// participants names a body or a surface that there is not.
-    pub(crate) fn split(&self) -> Result<Vec<(String, Self)>, SceneErrors> {
+    pub fn split(&self) -> Result<Vec<(String, Self)>, SceneErrors> {
         let mut out = Vec::new();
         let groups = self.groups(&mut out);
         if !out.is_empty() {
@@ -369,10 +369,7 @@ impl Scene {
         }
         if !total_lagrangian {
             (run.precision, run.device, run.adapter) = (None, DeviceName::Cpu, None);
-            #[cfg(feature = "gpu")]
-            {
-                run.design = None;
-            }
+            run.design = None;
         }
         if !solver.solves_equations() {
             run = RunTable {
@@ -392,7 +389,7 @@ impl Scene {
     }
 
     /// Whether the run of this scene, or of this participant, has a key of its own.
-    pub(crate) fn gives(&self, key: &str) -> bool {
+    pub fn gives(&self, key: &str) -> bool {
         match &self.own {
             Some(own) => self.source.node(&["participant", own, key]).is_some(),
             None => !self.is_part && self.source.node(&["run", key]).is_some(),
@@ -400,7 +397,7 @@ impl Scene {
     }
 
     /// Where a key of the run stands: in the table of the participant if it is given there, else in `[run]`.
-    pub(crate) fn run_at<'k>(&'k self, key: &'k str) -> Vec<&'k str> {
+    pub fn run_at<'k>(&'k self, key: &'k str) -> Vec<&'k str> {
         if let Some(own) = &self.own {
             let path = vec!["participant", own.as_str(), key];
             if self.source.node(&path).is_some() {
@@ -411,7 +408,7 @@ impl Scene {
     }
 
     /// Whether its bodies go with the implicit solvers' model: shells, and solids whose equations are solved.
-    pub(crate) fn is_implicit(&self) -> bool {
+    pub fn is_implicit(&self) -> bool {
         self.run.solver.solves_equations()
             || self.bodies.iter().any(|(_, body)| body.model == BodyModel::Shell)
     }

@@ -1,14 +1,11 @@
 //! Participants: bodies that one stepper advances together, apart from the others of the scene.
 
-use pliant_explicit::stability::OnUnstable;
-#[cfg(feature = "gpu")]
-use pliant_sim::gpu::Design;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{
-    ControlTable, DeviceName, IntegratorName, LinearWay, LoadSteps, MassScalingTable, Precision, RunTable,
-    SolverName, StepChoice,
+    ControlTable, DesignName, DeviceName, IntegratorName, LinearWay, LoadSteps, MassScalingTable,
+    OnUnstableName, PrecisionName, RunTable, SolverName, StepChoice,
 };
 
 /// Bodies with a solver and a step of their own. Bodies that no participant names follow `[run]`: with the solvers `implicit` and
@@ -28,7 +25,7 @@ pub struct ParticipantTable {
     pub step: Option<StepChoice>,
     /// As in `[run]`.
     #[serde(default)]
-    pub on_unstable: Option<OnUnstable>,
+    pub on_unstable: Option<OnUnstableName>,
     /// As in `[run]`.
     #[serde(default)]
     pub mass_scaling: Option<MassScalingTable>,
@@ -61,7 +58,7 @@ pub struct ParticipantTable {
     pub control: Option<ControlTable>,
     /// As in `[run]`.
     #[serde(default)]
-    pub precision: Option<Precision>,
+    pub precision: Option<PrecisionName>,
     /// As in `[run]`.
     #[serde(default)]
     pub device: Option<DeviceName>,
@@ -69,9 +66,8 @@ pub struct ParticipantTable {
     #[serde(default)]
     pub adapter: Option<String>,
     /// As in `[run]`.
-    #[cfg(feature = "gpu")]
     #[serde(default)]
-    pub design: Option<Design>,
+    pub design: Option<DesignName>,
 }
 
 impl ParticipantTable {
@@ -94,7 +90,6 @@ impl ParticipantTable {
             precision: self.precision.or(run.precision),
             device: self.device.unwrap_or(run.device),
             adapter: self.adapter.clone().or(run.adapter),
-            #[cfg(feature = "gpu")]
             design: self.design.or(run.design),
             allow_hourglass: run.allow_hourglass,
             threads: run.threads,

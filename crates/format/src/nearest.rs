@@ -4,7 +4,7 @@
 ///
 /// Near is a third of the letters added, left out, changed or swapped, or one name at the beginning of the other; case,
 /// `-`, `_` and spaces don't count.
-pub(crate) fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let plain = |name: &str| name.to_lowercase().replace(['_', ' '], "-");
     let word = plain(word);
     // What the distance costs grows with the square of the length; no name is as long as this.
@@ -31,6 +31,21 @@ pub(crate) fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) 
     best.map(|(_, name)| name).or(beginning)
 }
 
+/// Whose names are meant, in suggestions.
+pub const SCENE: &str = "the scene";
+
+/// "did you mean …?" or a list of what there is; `owner` is `the scene` or another that has such names.
+pub fn suggestion(word: &str, known: &[&str], owner: &str, what: &str) -> String {
+    match nearest(word, known.iter().copied()) {
+        Some(name) => format!("did you mean `{name}`?"),
+        None if known.is_empty() => format!("{owner} has no {what}"),
+        None => {
+            let list = known.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+            format!("{what} of {owner}: {list}")
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -46,5 +61,14 @@ mod tests {
         assert_eq!(nearest("density", known), None);
         assert_eq!(nearest("", known), None);
         assert_eq!(nearest(&"x".repeat(100_000), known), None);
+    }
+
+    #[test]
+    fn names_without_a_near_one_are_listed() {
+        assert_eq!(
+            suggestion("x", &["tissue", "bone"], SCENE, "laws"),
+            "laws of the scene: `tissue`, `bone`"
+        );
+        assert_eq!(suggestion("x", &[], "the mesh", "cell data"), "the mesh has no cell data");
     }
 }

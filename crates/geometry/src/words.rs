@@ -1,6 +1,11 @@
-//! Numbers and panics in messages.
-
-use std::any::Any;
+//! Numbers in messages.
+//!
+//! ```
+//! use pliant_geometry::words::{counted, number};
+//!
+//! assert_eq!([number(0.12345678), number(2e-6)], ["0.12346", "2.000e-6"]);
+//! assert_eq!([counted(1, "node"), counted(2, "node")], ["1 node", "2 nodes"]);
+//! ```
 
 /// A number in a few digits.
 pub fn number(value: f64) -> String {
@@ -13,12 +18,6 @@ pub fn number(value: f64) -> String {
     }
     let digits = if size == 0.0 { 0 } else { (3 - size.log10().floor() as i32).clamp(0, 6) };
     format!("{value:.*}", digits as usize)
-}
-
-/// What a panic says.
-pub fn panicked(panic: &(dyn Any + Send)) -> &str {
-    let text = panic.downcast_ref::<String>().map(String::as_str);
-    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message")
 }
 
 /// A number of things, as "1 node" or "2 nodes".

@@ -37,11 +37,7 @@ pub use view::{
     MapName, Nothing, TextureName, UpName, ViewTable,
 };
 
-use pliant_explicit::stability::OnUnstable;
 use pliant_mechanics::prony::{PronyTerm, PronyUpdate};
-use pliant_sim::Precision;
-#[cfg(feature = "gpu")]
-use pliant_sim::gpu::Design;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -66,6 +62,46 @@ pub struct SceneTable {
     pub gravity: Option<[f64; 3]>,
 }
 
+/// A design of the kernels of a GPU; all give the same answers within round-off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum DesignName {
+    /// Cells write forces into slots of their own, nodes gather them in a fixed order. The same bits every time.
+    Gather,
+    /// Blocks of neighbouring nodes do a step in one kernel: they find the forces of all cells at their nodes in shared memory
+    /// and move them. Cells at the borders of blocks are found by each. The same bits every time, forces of a limited range.
+    Blocks,
+    /// Cells add their forces to those of the nodes by floating-point atomics, in any order: the last bits vary from run to
+    /// run.
+    FloatAtomics,
+    /// Blocks of neighbouring cells add their forces up in shared memory, nodes gather the sums of their blocks; shapes of
+    /// plain tetrahedra at rest are found again from their nodes. The same bits every time.
+    Fast,
+}
+
+/// Number type of the solver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum PrecisionName {
+    /// 32-bit numbers: faster, about six digits.
+    Single,
+    /// 64-bit numbers: the reference.
+    Double,
+}
+
+/// What a run does when the limit falls below its step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum OnUnstableName {
+    /// Cut the steps into equal parts until the limit recovers.
+    #[default]
+    Substep,
+    /// End with an error.
+    Stop,
+    /// Go on at the same step; the smallest limit is reported.
+    Report,
+}
+
 /// How the scene is run.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
@@ -78,13 +114,12 @@ pub struct RunTable {
     pub adapter: Option<String>,
     /// How the kernels of a GPU bring forces from cells to nodes; if not given, the ways that measured best: `fast`, and `gather` on
     /// adapters that are software.
-    #[cfg(feature = "gpu")]
     #[serde(default)]
-    pub design: Option<Design>,
+    pub design: Option<DesignName>,
     /// Number type of the solver; if not given, `double` on the CPU and `single` on a GPU, which has
     /// no other.
     #[serde(default)]
-    pub precision: Option<Precision>,
+    pub precision: Option<PrecisionName>,
     /// How the state goes from instant to instant.
     #[serde(default)]
     pub solver: SolverName,
@@ -95,7 +130,7 @@ pub struct RunTable {
     /// What an explicit run does when the largest stable step of the deformed model, watched during the run, falls below
     /// its step; if not given, `substep`.
     #[serde(default)]
-    pub on_unstable: Option<OnUnstable>,
+    pub on_unstable: Option<OnUnstableName>,
     /// Makes the nodes that limit an explicit step heavier.
     #[serde(default)]
     pub mass_scaling: Option<MassScalingTable>,
@@ -197,7 +232,7 @@ impl Default for LoadSteps {
 
 impl LoadSteps {
     /// The first one of a scene of a duration [s].
-    pub(crate) fn first(&self, until: f64) -> f64 {
+    pub fn first(&self, until: f64) -> f64 {
         match self {
             Self::Count(count) => until / f64::from(*count),
             Self::Times(_) => self.ends(until).and_then(|ends| ends.first().copied()).unwrap_or(until),
@@ -205,7 +240,7 @@ impl LoadSteps {
     }
 
     /// Where unequal ones end [s]; the last one with the scene.
-    pub(crate) fn ends(&self, until: f64) -> Option<Vec<f64>> {
+    pub fn ends(&self, until: f64) -> Option<Vec<f64>> {
         let Self::Times(LoadTimes { times }) = self else { return None };
         let within = times.iter().copied().filter(|&time| time < until * (1.0 - 1e-9));
         Some(within.chain([until]).collect())

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use pliant_geometry::io::read_limited;
 
 /// Longest scene file [bytes].
-pub(crate) const LONGEST_SCENE: u64 = 1 << 26;
+pub const LONGEST_SCENE: u64 = 1 << 26;
 /// Longest table and XML model [bytes].
-pub(crate) const LONGEST_TABLE: u64 = 1 << 30;
+pub const LONGEST_TABLE: u64 = 1 << 30;
 
 /// Which files may be read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -58,18 +58,18 @@ impl Reads {
     ///
     /// # Errors
     /// If it may not be read, is no regular file or is longer than `longest` bytes.
-    pub(crate) fn read(&self, path: &Path, longest: u64) -> io::Result<Vec<u8>> {
+    pub fn read(&self, path: &Path, longest: u64) -> io::Result<Vec<u8>> {
         read_limited(&self.allow(path)?, longest)
     }
 }
 
 /// The text of a table beside a scene.
-pub(crate) fn table(path: &Path) -> io::Result<String> {
+pub fn table(path: &Path) -> io::Result<String> {
     String::from_utf8(read_limited(path, LONGEST_TABLE)?).map_err(io::Error::other)
 }
 
 /// The rows of a table with the numbers of their lines. Empty lines and what follows a # are passed over.
-pub(crate) fn rows_of(text: &str) -> impl Iterator<Item = (&str, usize)> {
+pub fn rows_of(text: &str) -> impl Iterator<Item = (&str, usize)> {
     let lines = text.strip_prefix('\u{feff}').unwrap_or(text).lines().zip(1..);
     let rows = lines.map(|(line, number)| (line.split('#').next().unwrap_or("").trim(), number));
     rows.filter(|(row, _)| !row.is_empty())
