@@ -22,9 +22,9 @@ use pliant_haptics::protocol::{Force, Pose};
 use pliant_haptics::trace::Trace;
 use pliant_imaging::{ImageFormat, ReadOptions};
 use pliant_meshing::{Closing, Enclosed};
+use pliant_niftysim::import_bytes;
 use pliant_run::{Checkpoint, OutputFolder, run, snapshot_framed, snapshot_from_bytes, snapshot_to_bytes};
 use pliant_scene::World;
-use pliant_scene::niftysim::import_bytes;
 use pliant_sim::Simulation;
 use pliant_viewer::{Break, Done, Hand, Move, Number, Point, Recording, Surface, replay};
 

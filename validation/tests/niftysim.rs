@@ -10,7 +10,7 @@ use pliant_format::source::Source;
 use pliant_format::tables::StepChoice;
 use pliant_geometry::io;
 use pliant_mechanics::tensor::{Vector, dot, sub};
-use pliant_scene::niftysim;
+
 use pliant_validation::{claim, data_file, largest};
 
 /// Steps after which NiftySim wrote its answer: it takes one more than the total time holds, and its "step 400", counted
@@ -23,7 +23,7 @@ fn displacements(name: &str) -> Vec<Vector<f64>> {
 }
 
 fn displacements_of(model: &Path) -> Vec<Vector<f64>> {
-    let imported = niftysim::import(model).unwrap();
+    let imported = pliant_niftysim::import(model).unwrap();
     let temporary = tempfile::tempdir().unwrap();
     let folder = temporary.path().to_owned();
     for (file, mesh) in &imported.meshes {

@@ -8,7 +8,7 @@ use pliant_format::diagnostic::Diagnostic;
 use pliant_format::source::{Source, Value};
 use pliant_format::{Reads, Scene};
 use pliant_geometry::io;
-use pliant_scene::{MeshCache, Meshing, World, niftysim};
+use pliant_scene::{MeshCache, Meshing, World};
 use tempfile::TempDir;
 
 use crate::arguments::{DeviceName, Overrides, Precision};
@@ -133,7 +133,7 @@ pub fn translate(
     file: &Path,
     allow_partial: bool,
 ) -> Result<Vec<String>, Failure> {
-    let imported = niftysim::import_within(model, reads).map_err(|error| Failure::plain(error, ""))?;
+    let imported = pliant_niftysim::import_within(model, reads).map_err(|error| Failure::plain(error, ""))?;
     if !imported.missing.is_empty() && !allow_partial {
         let missing = imported.missing.join("; ");
         let message = format!("`{}` has parts that Pliant does not support: {missing}", model.display());

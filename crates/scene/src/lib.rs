@@ -37,7 +37,6 @@ mod bound;
 mod cache;
 mod guests;
 mod method;
-pub mod niftysim;
 mod penalty;
 mod plan;
 #[cfg(test)]

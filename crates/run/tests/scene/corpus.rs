@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 
 use pliant_format::Scene;
 use pliant_format::source::Source;
+use pliant_niftysim::import_bytes;
 use pliant_run::{Checkpoint, OutputFolder};
 use pliant_scene::World;
-use pliant_scene::niftysim::import_bytes;
 
 use pliant_testing::{PeakMemory, Random};
 

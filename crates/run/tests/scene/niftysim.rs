@@ -9,8 +9,8 @@ use pliant_format::source::Source;
 use pliant_format::tables::{ByLabel, Hourglass};
 use pliant_geometry::{CellKind, io};
 use pliant_mechanics::load::LoadKind;
+use pliant_niftysim::{ImportError, Imported, import};
 use pliant_scene::Built;
-use pliant_scene::niftysim::{ImportError, Imported, import};
 use pliant_testing::Random;
 
 fn sample(name: &str) -> PathBuf {

@@ -8,8 +8,8 @@ use nalgebra::Vector3;
 use pliant_format::Scene;
 use pliant_format::source::Source;
 use pliant_geometry::{Locator, Mesh, SurfaceLocator, boundary, io};
+use pliant_niftysim::{Imported, import};
 use pliant_scene::World;
-use pliant_scene::niftysim::{Imported, import};
 use pliant_sim::contact::touch::With;
 
 const MU: f64 = 1000.0;

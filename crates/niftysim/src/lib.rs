@@ -4,6 +4,12 @@
 //! stiffness by λ + 2μ, backward Euler for relaxation, tractions that pull against the vector they are given by. The
 //! notes name each. Load shapes act at the same steps as NiftySim's, which sets a load after a step for the next one.
 //! Leaves out: shells that bend, radii that change, reduced bases, values read from files; [`Imported::missing`] names them.
+//!
+//! ```
+//! let imported = pliant_niftysim::import("../../validation/data/niftysim/H8_NH.xml".as_ref())?;
+//! assert!(imported.scene.contains("[law.") && imported.missing.is_empty());
+//! # Ok::<(), pliant_niftysim::ImportError>(())
+//! ```
 
 mod conditions;
 mod contact;
