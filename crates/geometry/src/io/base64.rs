@@ -100,7 +100,7 @@ impl<'a> Base64<'a> {
             characters += 1;
         }
         let [_, bytes @ ..] = bits.to_be_bytes();
-        (padding <= 2).then_some((bytes, 3 - padding))
+        (padding <= 2).then(|| (bytes, 3 - padding))
     }
 }
 
@@ -144,6 +144,14 @@ mod tests {
             let mut encoded = Vec::new();
             encode(bytes.as_bytes(), &mut encoded);
             assert_eq!(encoded, text.as_bytes());
+        }
+    }
+
+    /// Found by AFL++: a fourth `=` was counted off three bytes.
+    #[test]
+    fn groups_of_nothing_but_padding_hold_no_bytes() {
+        for text in ["====", "A===", "Zg======"] {
+            assert_eq!(Base64::new(text.as_bytes()).rest(), None, "{text}");
         }
     }
 
