@@ -4,6 +4,7 @@
 //! Only the equilibria count. So where motion leads to them, masses are those with which all cells have about the same critical step, and
 //! motion is damped.
 
+use pliant_implicit::AssemblySolver;
 use std::f64::consts::PI;
 use std::sync::Arc;
 

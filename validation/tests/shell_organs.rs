@@ -1,6 +1,7 @@
 //! Shells of real shapes, read through `PLIANT_DATA`: the leaflets of a patient's aortic valve closing under their pressure, an aneurysm and
 //! a rectum blown up. What is told: time, residual, and how far the answer moves with the mesh and with the numbering.
 
+use pliant_implicit::AssemblySolver;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

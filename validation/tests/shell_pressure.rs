@@ -5,7 +5,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use pliant_geometry::{Mesh, Vector3};
-use pliant_implicit::{Assembly, Explicit, State, StaticSettings, Statics, Step};
+use pliant_implicit::{Assembly, ExplicitShells, State, StaticSettings, Statics, Step};
 use pliant_mechanics::load::{LoadKind, Spread};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Pattern, Sheet, sphere};
 use pliant_shells::element::{Bending, Formulation, Membrane};
@@ -342,8 +342,8 @@ fn an_explicit_cylinder_comes_to_rest_in_equilibrium() {
     // A quarter of the breathing frequency √(E/ρ)/R.
     let damping = 0.5 * (1.0_f64 / 1000.0).sqrt();
     model.model_mut().bodies[0].damping = damping;
-    let step = 0.9 * Explicit::stable_step(model);
-    let mut solver = Explicit::new(model.clone(), step).unwrap();
+    let step = 0.9 * ExplicitShells::stable_step(model);
+    let mut solver = ExplicitShells::new(model.clone(), step).unwrap();
     let mut state = State::at_rest(model);
     let steps = (40.0 / damping / step) as usize;
     for _ in 0..steps {

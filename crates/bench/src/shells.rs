@@ -2,6 +2,7 @@
 //! pressure that pulses between 0 and 1 kPa twice a second, in steps of 40 ms with one linear solution each. Conjugate gradients run to a
 //! residual of 0.1 % on the CPU, and on the best GPU.
 
+use pliant_implicit::AssemblySolver;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::sync::Arc;

@@ -96,7 +96,7 @@
 //!
 //! # Shells
 //!
-//! [`GpuShells`] advances shells as `pliant_implicit::Explicit` does (`shells.rs`). A state is read back after each call; whoever wants forces,
+//! [`GpuShells`] advances shells as `pliant_implicit::ExplicitShells` does (`shells.rs`). A state is read back after each call; whoever wants forces,
 //! energies or reactions there finds them on the CPU.
 //!
 //! # Tests

@@ -1,4 +1,4 @@
-//! Explicit shells on a device: the central differences of `pliant_implicit::Explicit` in single precision.
+//! Explicit shells on a device: the central differences of `pliant_implicit::ExplicitShells` in single precision.
 //!
 //! Two kernels a step. A facet finds the forces on its corners, and those of pressure. A node sums those of its corners in the order of the
 //! facets, adds its loads and moves. The state on the device is displacements, rotations, velocities and spins. Factors of loads and
@@ -85,7 +85,7 @@ struct Moved {
 }
 
 impl GpuShells {
-    /// A stepper for steps of a length [s]; those above `Explicit::stable_step` are unstable.
+    /// A stepper for steps of a length [s]; those above `ExplicitShells::stable_step` are unstable.
     ///
     /// # Errors
     /// If something of the model [runs on the CPU only](Self::unsupported), or the device can't take the model.

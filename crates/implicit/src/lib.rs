@@ -3,7 +3,7 @@
 //!
 //! A shell element is the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980) with the ANDES membrane (Felippa 2003), which takes the
 //! mean strain of the curved triangle, six degrees of freedom a node, in a frame that turns
-//! with the facet; its force is the gradient of its energy. An [`Assembly`] is constant: a model with shells. A [`State`] changes; [`Statics`] finds equilibria, [`BackwardEuler`] and [`Explicit`] move a state in time; [`CurvedSurface`] is the smooth
+//! with the facet; its force is the gradient of its energy. An [`Assembly`] is constant: a model with shells. A [`State`] changes; [`Statics`] finds equilibria, [`BackwardEuler`] and [`ExplicitShells`] move a state in time; [`CurvedSurface`] is the smooth
 //! surface of the shells for pictures and for forces on any of its points.
 //!
 //! ```
@@ -31,46 +31,29 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod assembly;
-mod carry;
-mod conditions;
-mod descent;
-mod dynamics;
-mod error;
-mod followers;
-mod forces;
-mod gathering;
-mod initial;
-mod limited;
-mod mapping;
-mod picture;
-mod prescribed;
-mod recover;
-mod relaxation;
-mod resolution;
-mod samples;
+mod curved;
+mod model;
 mod solid;
-mod state;
-mod statics;
-mod surface;
+mod steps;
 mod system;
 #[cfg(test)]
 mod tests;
-mod touching;
-mod turns;
 
-pub use assembly::{Assembly, Notes, Shell, Spring};
-pub use dynamics::{BackwardEuler, DynamicSettings, DynamicStep, Explicit, Integrator};
-pub use error::{ModelError, SolveError};
-pub use forces::Forces;
-pub use mapping::CarriedPoints;
-pub use picture::{Picture, PictureFields};
-pub use recover::{ShellFields, von_mises};
-pub use relaxation::History;
-pub use resolution::Resolution;
-pub use state::State;
-pub use statics::{Attempted, Control, StaticSettings, Statics, Step, check_held};
-pub use surface::CurvedSurface;
-pub use system::{Phases, bytes_of_factors};
-pub use touching::{Touching, TouchingNow, TouchingSystem};
-pub use turns::CarriedTurn;
+pub use curved::mapping::CarriedPoints;
+pub use curved::picture::{Picture, PictureFields};
+pub use curved::recover::{ShellFields, von_mises};
+pub use curved::surface::CurvedSurface;
+pub use model::assembly::{Assembly, Notes, Shell, Spring};
+pub use model::contact::Touching;
+pub use model::error::{ModelError, SolveError};
+pub use model::resolution::Resolution;
+pub use model::state::State;
+pub use model::turns::CarriedTurn;
+pub use solid::relaxation::History;
+pub use steps::backward_euler::{BackwardEuler, DynamicSettings, DynamicStep, Integrator};
+pub use steps::explicit_shells::ExplicitShells;
+pub use steps::forces::Forces;
+pub use steps::solver::AssemblySolver;
+pub use steps::statics::{Attempted, Control, StaticSettings, Statics, Step, check_held};
+pub use system::contact::{TouchingNow, TouchingSystem, apart_counts, meetings};
+pub use system::{Phases, System, bytes_of_factors};

@@ -15,6 +15,7 @@ use pliant_shells::{Carried, EdgeRule, Place};
 use pliant_testing::Random;
 
 mod devices;
+mod motion;
 mod surfaces;
 
 pub(crate) const MATERIAL: Wall = Wall { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };

@@ -3,7 +3,7 @@
 
 use pliant_explicit::critical_step::ElementBound;
 use pliant_geometry::words::{counted, number};
-use pliant_implicit::Explicit;
+use pliant_implicit::ExplicitShells;
 use pliant_sim::{Critical, ImplicitBodies, SAFETY, Steps};
 use serde::Serialize;
 
@@ -107,7 +107,7 @@ pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
 /// Compares an explicit step of shells with the critical one.
 fn check_explicit_step(scene: &Scene, part: &ImplicitBodies) -> Result<Option<String>, Box<Diagnostic>> {
     let StepChoice::Seconds(step) = scene.run.step else { return Ok(None) };
-    let stable = Explicit::stable_step(&part.model);
+    let stable = ExplicitShells::stable_step(&part.model);
     if scene.run.solver != SolverName::Explicit || step <= stable {
         return Ok(None);
     }
@@ -169,7 +169,7 @@ pub(crate) fn steps(limits: Option<&Limits>, scene: &Scene, built: &Built, until
             }
             (SolverName::QuasiStatic | SolverName::Static, ..) => scene.run.load_steps.first(until),
             (SolverName::Explicit, Some(limits), _) => limits.critical.automatic(),
-            (SolverName::Explicit, None, Some(part)) => SAFETY * Explicit::stable_step(&part.model),
+            (SolverName::Explicit, None, Some(part)) => SAFETY * ExplicitShells::stable_step(&part.model),
             _ => IMPLICIT_STEP.min(until),
         },
     };

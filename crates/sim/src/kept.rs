@@ -15,7 +15,7 @@ use pliant_mechanics::{Energies, Model};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::implicit::Path;
+use crate::assembled::Path;
 use crate::instant::Effort;
 use crate::part::{Method, Part, Precision};
 use crate::solver::Memory;

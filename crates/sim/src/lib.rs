@@ -38,12 +38,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod assembled;
 mod bodies;
 #[cfg(feature = "gpu")]
 mod device;
 mod failure;
 mod guests;
-mod implicit;
 mod instant;
 mod kept;
 mod part;

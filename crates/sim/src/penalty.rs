@@ -308,7 +308,7 @@ impl Springs {
 fn room(part: &Part) -> f64 {
     let critical = match (&part.method, part.method.bodies()) {
         (Method::Explicit(settings), _) => settings.critical_step,
-        (_, Some(bodies)) => pliant_implicit::Explicit::stable_step(&bodies.model),
+        (_, Some(bodies)) => pliant_implicit::ExplicitShells::stable_step(&bodies.model),
         _ => f64::INFINITY,
     };
     (ALL - (part.steps.step / critical).powi(2)).max(LEAST)

@@ -3,8 +3,8 @@
 use pliant_explicit::{Clock, State};
 use pliant_mechanics::Model;
 
+use crate::assembled::Assembled;
 use crate::failure::Failure;
-use crate::implicit::Implicit;
 use crate::kept::Kept;
 use crate::part::{Explicit, Method, Part, Precision};
 use crate::participant::Participant;
@@ -17,7 +17,7 @@ use crate::solver::Memory;
 /// If its stepper can't be made.
 pub(crate) fn begin(part: &Part) -> Result<Box<dyn Participant>, Failure> {
     Ok(match (part.method.bodies(), part.method.precision()) {
-        (Some(bodies), _) => Box::new(Implicit::new(part, bodies)?),
+        (Some(bodies), _) => Box::new(Assembled::new(part, bodies)?),
         (None, Precision::Single) => Box::new(Solids::<f32>::new(part, at_start(part)?)?),
         (None, Precision::Double) => Box::new(Solids::<f64>::new(part, at_start(part)?)?),
     })
@@ -63,7 +63,7 @@ pub(crate) fn go_on(
     }
     Ok(match (kept, part.method.bodies(), part.method.precision()) {
         (Kept::Implicit(state), Some(bodies), _) => {
-            let mut participant = Implicit::new(part, bodies)?;
+            let mut participant = Assembled::new(part, bodies)?;
             participant.resume(*state)?;
             Some(Box::new(participant))
         }

@@ -59,7 +59,7 @@ fn parts(shear: f64) -> Vec<Part> {
     let Method::Implicit(bodies, _) = &implicit.method else { unreachable!("an implicit part") };
     let shells =
         Part { method: Method::ExplicitShells(bodies.clone(), ShortSteps::default()), ..implicit.clone() };
-    let stable = pliant_implicit::Explicit::stable_step(&bodies.model);
+    let stable = pliant_implicit::ExplicitShells::stable_step(&bodies.model);
     let shells = Part { steps: pliant_sim::Steps::within(DURATION, 0.9 * stable), ..shells };
     vec![explicit, single, quasi_static, equilibria, implicit, shells, relaxing(shear)]
 }

@@ -1,5 +1,6 @@
 //! Equations of implicit steps on the device, against the CPU.
 
+use pliant_implicit::AssemblySolver;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 

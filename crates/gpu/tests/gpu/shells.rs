@@ -6,7 +6,7 @@ use std::time::Instant;
 use nalgebra::{UnitQuaternion, Vector3};
 use pliant_geometry::Mesh;
 use pliant_gpu::{Device, GpuError, GpuShells};
-use pliant_implicit::{Assembly, Explicit, Spring, State};
+use pliant_implicit::{Assembly, ExplicitShells, Spring, State};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_mechanics::model::{Constraint, Motion};
@@ -49,7 +49,7 @@ fn turn(model: &mut Assembly, nodes: Vec<u32>, by: [f64; 3], turn: [f64; 3]) {
 }
 
 fn step(model: &Assembly) -> f64 {
-    0.9 * Explicit::stable_step(model)
+    0.9 * ExplicitShells::stable_step(model)
 }
 
 /// A tube under pressure and its weight, clamped at one end; the other one is moved and turned.
@@ -115,15 +115,15 @@ fn both(
             (0..6).for_each(|c| held[6 * node as usize + c] |= constraint.components[c]);
         }
     }
-    let power = |solver: &Explicit, state: &State| -> f64 {
+    let power = |solver: &ExplicitShells, state: &State| -> f64 {
         let forces = solver.forces();
         let rate =
             |i: usize| if i % 6 < 3 { state.velocity[i / 6][i % 6] } else { state.spin[i / 6][i % 6 - 3] };
         let outside = |i: usize| if held[i] { forces.internal()[i] } else { forces.loads()[i] };
         (0..held.len()).map(|i| outside(i) * rate(i)).sum()
     };
-    let mut solver = Explicit::new(model.clone(), step).unwrap();
-    solver.push(pushed);
+    let mut solver = ExplicitShells::new(model.clone(), step).unwrap();
+    solver.forces_mut().push(pushed);
     let mut exact = start.clone();
     let mut work = [0.0; 2];
     solver.evaluate(&exact).unwrap();
@@ -245,7 +245,7 @@ fn a_facet_that_is_broken_stops_the_device_at_its_instant() {
     let Some(device) = support::device() else { return };
     let mut model = plate();
     add(&mut model, LoadKind::force([84], [0.0, 0.0, 500.0]), Shape::Hold);
-    let mut solver = Explicit::new(model.clone(), step(&model)).unwrap();
+    let mut solver = ExplicitShells::new(model.clone(), step(&model)).unwrap();
     let mut exact = State::at_rest(&model);
     let mut steps = 0;
     while solver.advance(&mut exact).is_ok() {
@@ -307,7 +307,7 @@ fn time_of_a_step() {
         let model = tube(size);
         let (step, facets) = (step(&model), model.facets.len());
         let steps = (2_000_000 / facets as u64).clamp(40, 2000);
-        let mut solver = Explicit::new(model.clone(), step).unwrap();
+        let mut solver = ExplicitShells::new(model.clone(), step).unwrap();
         let mut shells = GpuShells::new(&device, model.clone(), step).unwrap();
         let [mut cpu, mut gpu] = [State::at_rest(&model), State::at_rest(&model)];
         let per = |begun: Instant| begun.elapsed().as_secs_f64() * 1e9 / (steps as f64 * facets as f64);

@@ -9,6 +9,7 @@
 mod bar;
 mod closed;
 mod membrane;
+pub(crate) mod relaxation;
 mod star;
 #[cfg(test)]
 mod tests;
@@ -21,7 +22,7 @@ use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cross, dot, scale
 
 use pliant_shells::Broken;
 
-use crate::relaxation::Lag;
+use self::relaxation::Lag;
 pub(crate) use star::Stars;
 
 /// The most components of a cell: three a node of a hexahedron.

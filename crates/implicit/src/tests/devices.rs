@@ -1,5 +1,6 @@
 //! Steps on devices that fail.
 
+use crate::AssemblySolver;
 use std::sync::Arc;
 
 use nalgebra::Vector3;

@@ -1,5 +1,6 @@
 //! Solid blocks on planes: Coulomb's friction on an incline and in all directions.
 
+use pliant_implicit::AssemblySolver;
 use std::f64::consts::TAU;
 
 use nalgebra::Vector3;

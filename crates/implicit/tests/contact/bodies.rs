@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 use pliant_contact::barrier::BarrierSettings;
 use pliant_contact::pressure::{faces, pressures};
 use pliant_contact::touch::{Contact, Contacts, Touch, With};
+use pliant_implicit::AssemblySolver;
 use pliant_implicit::{Assembly, BackwardEuler, DynamicSettings, State, StaticSettings, Statics};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};

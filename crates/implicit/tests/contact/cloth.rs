@@ -1,5 +1,6 @@
 //! Cloth over a sphere, and a strip that is twisted into itself.
 
+use pliant_implicit::AssemblySolver;
 use std::time::Instant;
 
 use nalgebra::Vector3;

@@ -7,6 +7,7 @@ use pliant_contact::pairs::Surface;
 use pliant_contact::pose::Trajectory;
 use pliant_contact::shape::Shape;
 use pliant_contact::touch::{Contact, Contacts, Rigid, Touch, With};
+use pliant_implicit::AssemblySolver;
 use pliant_implicit::{Assembly, BackwardEuler, DynamicSettings, State};
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 use pliant_mechanics::load::Load;

@@ -1,5 +1,6 @@
 //! A soft ball pushed through a funnel and a tube that is narrower than it (S8).
 
+use pliant_implicit::AssemblySolver;
 use std::sync::Arc;
 
 use nalgebra::Vector3;

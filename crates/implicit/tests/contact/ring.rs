@@ -1,5 +1,6 @@
 //! Thin rings: pressed between two plates, and dropped.
 
+use pliant_implicit::AssemblySolver;
 use std::f64::consts::TAU;
 
 use nalgebra::Vector3;

@@ -1,5 +1,6 @@
 //! A block that a spring pulls over a floor sticks and slips (S3): held to the closed form of a mass under Coulomb's friction.
 
+use pliant_implicit::AssemblySolver;
 use std::f64::consts::TAU;
 
 use nalgebra::Vector3;

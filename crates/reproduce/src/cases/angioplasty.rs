@@ -3,6 +3,7 @@
 //!
 //! The wall is as thick as a third of its radius, so both are solids. A quarter of one half is computed, the planes between them are held.
 
+use pliant_implicit::AssemblySolver;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::ops::Range;
 use std::sync::Arc;

@@ -4,6 +4,7 @@
 
 use pliant_bench::{SHELL_STEP, ShellRun, tube};
 use pliant_geometry::Vector3;
+use pliant_implicit::AssemblySolver;
 use pliant_implicit::{Assembly, DynamicSettings, Phases, Shell, State, StaticSettings, Statics};
 use pliant_linear::{LinearSolver, Preconditioner};
 use pliant_mechanics::load::{Load, LoadKind};

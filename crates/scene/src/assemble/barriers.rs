@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
 use pliant_geometry::words::{counted, number};
-use pliant_implicit::{State, Touching};
+use pliant_implicit::{State, Touching, apart_counts, meetings};
 use pliant_sim::contact::barrier::{BarrierSettings, Meeting};
 use pliant_sim::contact::touch::{Contacts, With};
 
@@ -127,7 +127,7 @@ impl Builder<'_> {
         if !barriers.tables.iter().any(is_asked) {
             return;
         }
-        let met = barriers.touching(contacts).meetings(&self.assembly, start);
+        let met = meetings(&barriers.touching(contacts), &self.assembly, start);
         let names = met.iter().map(|one| &barriers.tables[one.contact as usize]);
         self.overlapping = names.into_iter().find(|name| is_asked(name)).cloned();
     }
@@ -136,13 +136,13 @@ impl Builder<'_> {
     pub(super) fn touch(&mut self, contacts: &Arc<Contacts>, barriers: BarrierTables, start: &State) {
         let touching = barriers.touching(contacts);
         let tables = barriers.tables;
-        let met = touching.meetings(&self.assembly, start);
+        let met = meetings(&touching, &self.assembly, start);
         let mut of_contacts = BTreeMap::<u32, Vec<Meeting>>::new();
         met.into_iter().for_each(|one| of_contacts.entry(one.contact).or_default().push(one));
         for (contact, met) in &of_contacts {
             self.refuse_meetings(&contacts.contacts[*contact as usize].name, &tables[*contact as usize], met);
         }
-        for (contact, count) in contacts.contacts.iter().zip(touching.apart_counts(&self.assembly)) {
+        for (contact, count) in contacts.contacts.iter().zip(apart_counts(&touching, &self.assembly)) {
             if count > 0 {
                 self.notes.push(format!(
                     "contact `{}`: {} of nodes with triangles or of edges never touch, since they are in one place at rest",

@@ -1,0 +1,7 @@
+//! The curved surface of a model's shells: its points, what follows it, pictures of it, and fields of cells.
+
+pub(crate) mod carry;
+pub(crate) mod mapping;
+pub(crate) mod picture;
+pub(crate) mod recover;
+pub(crate) mod surface;

@@ -1,0 +1,19 @@
+//! Which surfaces of a model touch each other by barriers, and how.
+
+use std::sync::Arc;
+
+use pliant_contact::barrier::BarrierSettings;
+use pliant_contact::touch::Contacts;
+
+/// Contacts by a barrier: surfaces never go into each other. Rigid things move as their courses say.
+#[derive(Clone, Debug)]
+pub struct Touching {
+    /// Who touches whom.
+    pub contacts: Arc<Contacts>,
+    /// How each contact acts.
+    pub settings: Vec<BarrierSettings>,
+    /// How often triangles of shells are divided into four on their curved surface, for each contact; empty: never.
+    pub levels: Vec<u8>,
+    /// Whether each state that is accepted is searched for edges that go through triangles, which would be an error of the program.
+    pub check_crossings: bool,
+}

@@ -1,0 +1,476 @@
+//! A step in contact: Newton's method on the energy of a step, each iteration filtered so that nothing goes into anything else (Li et al.
+//! 2020, algorithm 1). Energy is that of cells, inertia, barriers and lagged friction, less the work of loads along an iteration by the
+//! trapezoidal rule, which is exact for loads that do not follow.
+//!
+//! * What moves by itself (rigid things, prescribed components) goes its whole way at once, as far as the filter lets it, and the equations
+//!   know what is left of it. Until it is there, energy may grow.
+//! * A direction of a stiffness that is not positive definite is none: its diagonal is raised (Levenberg 1944) until it is.
+//! * A step is found where the residual is below its tolerance, or where the unfiltered Newton step with fresh factors moves nothing by more than
+//!   counts for a gap and the residual is not far above its tolerance, or by less than is asked for; that step is still made.
+//! * A full Newton step that is hardly shorter than the one before is made longer while the energy falls.
+//! * In time, no Newton step takes a node further than a mean edge: longer ones are nearly always halved.
+//! * Friction is then taken anew from the state found, while its size changes by more than a tenth.
+
+use crate::model::error::SolveError;
+use crate::model::state::State;
+use crate::system::System;
+use pliant_linear::dot;
+
+/// Part of every gap that an iteration keeps, twice over, and that the guess keeps.
+const KEEP: [f64; 2] = [0.1, 0.5];
+/// How often an iteration is halved.
+const HALVINGS: usize = 16;
+/// Additions to the diagonal, over it: the first one, the growth, and how many.
+const RAISED: (f64, f64, usize) = (1e-5, 10.0, 8);
+/// Change of the friction that is held, over it, above which it is taken anew.
+const LAGGED: f64 = 0.1;
+/// Residual over what is allowed below which the size of a Newton step tells that a step is found.
+const LOOSE: f64 = 100.0;
+/// A Newton step over the one before from which on it is made longer.
+const SLOW: f64 = 0.6;
+/// How often it is doubled at most.
+const DOUBLINGS: usize = 3;
+/// Round-off of an energy, over the sizes of its parts.
+const ROUND_OFF: f64 = 1e-12;
+
+/// What a step in contact needs of a solver.
+pub(crate) trait Contacting {
+    /// Whether steps have inertia.
+    const INERTIA: bool;
+
+    /// The equations.
+    fn system(&mut self) -> &mut System;
+
+    /// The vectors of an iteration.
+    fn vectors(&mut self) -> Vectors<'_>;
+
+    /// Finds forces, and the stiffness if it is wanted, at a state.
+    fn evaluate(&mut self, state: &State, time: f64, tangent: bool) -> Result<(), SolveError>;
+
+    /// Finds the residual at the state last evaluated: its norm, and what is allowed.
+    fn find_residual(&mut self, state: &State) -> (f64, f64);
+
+    /// The energy [J] of inertia and damping at the state last evaluated.
+    fn potential(&mut self) -> f64;
+
+    /// Adds to the stiffness what is not of cells and contacts.
+    fn complete(&mut self);
+
+    /// The part of the increment that may be made, for other reasons than contact.
+    fn part(&self) -> f64;
+
+    /// Whether a residual along the increment, before and after it, makes up for an energy that has not fallen.
+    fn accepts(&self, before: f64, after: f64) -> bool;
+
+    /// The node with the largest residual.
+    fn worst(&self) -> u32;
+}
+
+/// Vectors of an iteration.
+pub(crate) struct Vectors<'a> {
+    pub system: &'a mut System,
+    /// Increments of prescribed components still to come, six a node.
+    pub pending: &'a mut [f64],
+    pub increment: &'a mut [f64],
+    pub residual: &'a mut [f64],
+    pub solution: &'a mut [f64],
+}
+
+/// How long to try.
+pub(crate) struct Limits {
+    pub iterations: usize,
+    /// How often friction is taken anew.
+    pub lags: usize,
+    /// A Newton step [m] that is the last one, whatever the residual.
+    pub close: Option<f64>,
+    /// Whether a state is good enough when iterations run out or the energy does not fall any more.
+    pub accept: bool,
+    /// How far [m] an iteration takes nodes at most once all that moves by itself has gone its way: what is found at a state tells nothing of
+    /// what is further away, and pairs need not be listed so far.
+    pub farthest: f64,
+}
+
+/// What an iteration started from.
+struct Before {
+    state: State,
+    share: f64,
+    energy: f64,
+    /// Sum of the sizes of the parts of the energy [J].
+    size: f64,
+    loads: Vec<f64>,
+    along: f64,
+}
+
+/// Finds the state at the end of a step, or takes what iterations reach; whether it is found. Residuals go to `found` with what is allowed.
+pub(crate) fn descend(
+    solver: &mut impl Contacting,
+    state: &mut State,
+    time: f64,
+    guess: Option<&[f64]>,
+    limits: &Limits,
+    found: &mut dyn FnMut(f64, f64),
+) -> Result<bool, SolveError> {
+    let times = [state.time, time];
+    begin(solver, state, times, guess);
+    // Whether forces and stiffness of the state are known.
+    let mut known = match guess {
+        Some(guess) => start_from(solver, state, time, guess)?,
+        None => false,
+    };
+    let mut before = Before {
+        state: state.clone(),
+        share: 0.0,
+        energy: 0.0,
+        size: 0.0,
+        loads: vec![0.0; 6 * state.position.len()],
+        along: 0.0,
+    };
+    let (mut raised, mut lags, mut previous) = (0.0, 0, f64::INFINITY);
+    for iteration in 0..=limits.iterations {
+        if !std::mem::take(&mut known) {
+            solver.evaluate(state, time, true)?;
+        }
+        let (norm, allowed) = solver.find_residual(state);
+        found(norm, allowed);
+        let complete = is_complete(solver);
+        if complete && iteration > 0 && norm <= allowed {
+            if lags < limits.lags && lag(solver) {
+                lags += 1;
+                continue;
+            }
+            return check(solver, time).map(|()| true);
+        }
+        if iteration == limits.iterations || !norm.is_finite() {
+            // A single iteration is not checked, but what moves by itself must have come to its end.
+            let single = limits.iterations == 1;
+            return if complete && (single || limits.accept) && norm.is_finite() {
+                check(solver, time).map(|()| single)
+            } else {
+                Err(not_found(solver, time, iteration))
+            };
+        }
+        let (largest, is_newton) = find_direction(solver, &mut raised)?;
+        let is_close = match limits.close {
+            Some(close) => largest <= close,
+            None => largest <= close(solver) && norm <= LOOSE * allowed,
+        };
+        let last = complete && is_newton && is_close;
+        let Vectors { system, pending, increment, residual, solution } = solver.vectors();
+        increment.copy_from_slice(pending);
+        system.spread(solution, increment);
+        before.along = dot(solution, residual);
+        before.state.clone_from(state);
+        before.loads.copy_from_slice(&own_loads(system));
+        before.share = share(system);
+        let farthest = if complete && largest > limits.farthest { limits.farthest / largest } else { 1.0 };
+        let part = solver.part().min(farthest);
+        let Vectors { system, increment, .. } = solver.vectors();
+        let part = match &mut system.touching {
+            Some(touching) => touching.allowed(state, increment, [KEEP[0], part]),
+            None => part,
+        };
+        (before.energy, before.size) = energy(solver);
+        let is_slow = is_newton && largest > SLOW * std::mem::replace(&mut previous, largest);
+        let expands = is_slow && complete && part == 1.0 && iteration > 1;
+        let tries = Tries { part, complete, goes_on: complete && !last && !expands };
+        if let Some(first) = search(solver, state, time, &before, tries)? {
+            if !last {
+                if expands && first {
+                    expand(solver, state, time, &mut before)?;
+                }
+                known = tries.goes_on;
+                continue;
+            }
+            if lags < limits.lags && lag(solver) {
+                lags += 1;
+                continue;
+            }
+            return check(solver, time).map(|()| true);
+        }
+        // Nothing falls any more: round-off, or a direction that is none.
+        state.clone_from(&before.state);
+        put(solver, before.share);
+        solver.evaluate(state, time, false)?;
+        if complete && (last || before.along.abs() <= ROUND_OFF * before.size) {
+            return check(solver, time).map(|()| true);
+        }
+        if !complete {
+            return Err(not_found(solver, time, iteration + 1));
+        }
+        if limits.accept {
+            return check(solver, time).map(|()| false);
+        }
+        let node = solver.worst();
+        return Err(SolveError::Uphill { time, node, iterations: iteration + 1 });
+    }
+    Ok(true)
+}
+
+/// Tells the contacts of the step and what is expected to move in it.
+fn begin(solver: &mut impl Contacting, state: &State, times: [f64; 2], guess: Option<&[f64]>) {
+    let Vectors { system, pending, increment, .. } = solver.vectors();
+    match guess {
+        Some(guess) => increment.copy_from_slice(guess),
+        None => increment.fill(0.0),
+    }
+    for (own, &pending) in increment.iter_mut().zip(pending.iter()) {
+        if pending != 0.0 {
+            *own = pending;
+        }
+    }
+    system.follow(increment);
+    if let Some(touching) = &mut system.touching {
+        touching.begin(state, increment, times);
+    }
+}
+
+/// Goes to where the motion of before leads, as far as the filter lets it and cells can follow. Whether the energy is less there is not
+/// asked: it seldom is, but what moves would have to start from rest else, in more iterations and short of where it comes to. Whether it went,
+/// and so found forces and stiffness there.
+fn start_from(
+    solver: &mut impl Contacting,
+    state: &mut State,
+    time: f64,
+    guess: &[f64],
+) -> Result<bool, SolveError> {
+    let here = state.clone();
+    let Vectors { system, pending, increment, .. } = solver.vectors();
+    increment.copy_from_slice(guess);
+    for ((own, &pending), number) in increment.iter_mut().zip(pending.iter()).zip(&system.equations.number) {
+        if *number == pliant_linear::sparse::NONE {
+            *own = pending;
+        }
+    }
+    system.follow(increment);
+    let Some(touching) = &mut system.touching else { return Ok(false) };
+    let part = touching.allowed(state, increment, [KEEP[1], 1.0]);
+    system.advance(state, increment, part);
+    put(solver, part);
+    let Vectors { pending, .. } = solver.vectors();
+    let whole = pending.to_vec();
+    pending.iter_mut().for_each(|p| *p *= 1.0 - part);
+    let possible = match solver.evaluate(state, time, true) {
+        Ok(()) => energy(solver).0.is_finite(),
+        Err(SolveError::Broken { .. }) => false,
+        Err(error) => return Err(error),
+    };
+    if !possible {
+        solver.vectors().pending.copy_from_slice(&whole);
+        *state = here;
+        put(solver, 0.0);
+    }
+    Ok(possible)
+}
+
+/// Sets how far rigid things have gone.
+fn put(solver: &mut impl Contacting, share: f64) {
+    if let Some(touching) = &mut solver.system().touching {
+        touching.share = share;
+    }
+}
+
+fn share(system: &System) -> f64 {
+    system.touching.as_ref().map_or(1.0, |touching| touching.share)
+}
+
+fn close(solver: &mut impl Contacting) -> f64 {
+    solver.system().touching.as_ref().map_or(0.0, |touching| touching.close)
+}
+
+/// Whether all that moves by itself has gone its way.
+fn is_complete(solver: &mut impl Contacting) -> bool {
+    let Vectors { system, pending, .. } = solver.vectors();
+    share(system) == 1.0 && pending.iter().all(|&p| p == 0.0) && system.conditions.are_closed()
+}
+
+/// Loads but for the forces of contacts, six a node.
+fn own_loads(system: &System) -> Vec<f64> {
+    match &system.touching {
+        Some(touching) => {
+            system.external.iter().zip(&touching.given).map(|(load, force)| load - force).collect()
+        }
+        None => system.external.clone(),
+    }
+}
+
+/// Work [J] of loads along the whole increment, by the mean of those before and those now.
+fn work(solver: &mut impl Contacting, before: &[f64]) -> f64 {
+    let now = own_loads(solver.system());
+    let Vectors { increment, .. } = solver.vectors();
+    let mean = before.iter().zip(&now).map(|(a, b)| 0.5 * (a + b));
+    mean.zip(increment.iter()).map(|(load, way)| load * way).sum()
+}
+
+/// The energy [J] at the state last evaluated, without loads, and the sum of the sizes of its parts.
+fn energy(solver: &mut impl Contacting) -> (f64, f64) {
+    let potential = solver.potential();
+    let system = solver.system();
+    let touching = system.touching.as_ref().map_or(0.0, |touching| touching.energy);
+    let parts = [system.energy, touching, potential];
+    (parts.iter().sum(), parts.iter().map(|part| part.abs()).sum())
+}
+
+/// Solves for the residual with a stiffness that is positive definite; the largest translation of it [m], and whether its diagonal is as it
+/// was: else the step tells nothing of how far the solution is.
+fn find_direction(solver: &mut impl Contacting, raised: &mut f64) -> Result<(f64, bool), SolveError> {
+    solver.complete();
+    let diagonal: Vec<f64> =
+        (0..solver.system().equations.count()).map(|k| solver.system().matrix.diagonal(k).abs()).collect();
+    let (first, growth, times) = RAISED;
+    let mut added = 0.0;
+    for _ in 0..=times {
+        let system = solver.system();
+        let by = *raised - added;
+        if by > 0.0 {
+            system.matrix.add_to_each_diagonal(|k| by * diagonal[k]);
+            added = *raised;
+        }
+        let definite = match system.prepare() {
+            Ok(negative) => negative == 0,
+            Err(SolveError::Singular { .. } | SolveError::Indefinite { .. }) => false,
+            Err(error) => return Err(error),
+        };
+        if definite {
+            let Vectors { system, residual, solution, .. } = solver.vectors();
+            match system.solve(residual, solution) {
+                Ok(()) => {
+                    let components = system.equations.component.iter().zip(solution.iter());
+                    let ways =
+                        components.filter(|(component, _)| **component % 6 < 3).map(|(_, way)| way.abs());
+                    *raised = if added > first { added / growth } else { 0.0 };
+                    return Ok((ways.fold(0.0, f64::max), added == 0.0));
+                }
+                Err(SolveError::Indefinite { .. }) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        *raised = (growth * added).max(first);
+    }
+    Err(SolveError::Impossible(
+        "the stiffness in contact is not positive definite, whatever is added to it; take smaller steps",
+    ))
+}
+
+/// How an increment is made.
+#[derive(Clone, Copy)]
+struct Tries {
+    /// The part to begin with.
+    part: f64,
+    /// Whether energy has to fall.
+    complete: bool,
+    /// Whether the stiffness where it leads is found at once, since it is nearly always the next to be asked for.
+    goes_on: bool,
+}
+
+/// Goes along the increment, in halves until the energy has fallen: whether the first try was it; none if it does not fall.
+fn search(
+    solver: &mut impl Contacting,
+    state: &mut State,
+    time: f64,
+    before: &Before,
+    tries: Tries,
+) -> Result<Option<bool>, SolveError> {
+    let Tries { mut part, complete, goes_on } = tries;
+    let mut broken = None;
+    for halving in 0..=HALVINGS {
+        state.clone_from(&before.state);
+        let Vectors { system, increment, .. } = solver.vectors();
+        system.advance(state, increment, part);
+        let gone = if before.share + part * (1.0 - before.share) >= 1.0 || part == 1.0 {
+            1.0
+        } else {
+            before.share + part * (1.0 - before.share)
+        };
+        put(solver, gone);
+        match solver.evaluate(state, time, goes_on) {
+            Ok(()) if energy(solver).0.is_finite() => {
+                let fallen = energy(solver).0 - part * work(solver, &before.loads) - before.energy;
+                let accepted = !complete || fallen <= ROUND_OFF * before.size || {
+                    solver.find_residual(state);
+                    let Vectors { residual, solution, .. } = solver.vectors();
+                    let after = dot(solution, residual);
+                    solver.accepts(before.along, after)
+                };
+                if accepted {
+                    let Vectors { pending, .. } = solver.vectors();
+                    pending.iter_mut().for_each(|p| *p *= 1.0 - part);
+                    return Ok(Some(halving == 0));
+                }
+            }
+            Ok(()) => broken = None,
+            Err(error @ SolveError::Broken { .. }) => broken = Some(error),
+            Err(error) => return Err(error),
+        }
+        part *= 0.5;
+        let Vectors { system, increment, .. } = solver.vectors();
+        if let Some(touching) = system.touching.as_mut().filter(|touching| touching.is_curved()) {
+            touching.share = before.share;
+            part = touching.allowed(&before.state, increment, [KEEP[0], part]);
+        }
+    }
+    broken.map_or(Ok(None), Err)
+}
+
+/// Goes on along an increment that was made in full, two, four and eight times as far while the energy falls and nothing is in the way.
+fn expand(
+    solver: &mut impl Contacting,
+    state: &mut State,
+    time: f64,
+    before: &mut Before,
+) -> Result<(), SolveError> {
+    for doubling in 0..DOUBLINGS {
+        before.state.clone_from(state);
+        (before.energy, before.size) = energy(solver);
+        before.loads.copy_from_slice(&own_loads(solver.system()));
+        let Vectors { system, increment, .. } = solver.vectors();
+        if doubling > 0 {
+            increment.iter_mut().for_each(|way| *way *= 2.0);
+        }
+        let Some(touching) = &mut system.touching else { return Ok(()) };
+        let part = touching.allowed(state, increment, [KEEP[0], 1.0]);
+        let falls = part == 1.0 && {
+            system.advance(state, increment, 1.0);
+            match solver.evaluate(state, time, false) {
+                Ok(()) => energy(solver).0 - work(solver, &before.loads) < before.energy,
+                Err(SolveError::Broken { .. }) => false,
+                Err(error) => return Err(error),
+            }
+        };
+        if !falls {
+            state.clone_from(&before.state);
+            return Ok(());
+        }
+    }
+    Ok(())
+}
+
+/// Takes friction anew if its size has changed by more than counts; whether it has.
+fn lag(solver: &mut impl Contacting) -> bool {
+    let Some(touching) = &mut solver.system().touching else { return false };
+    let [held, now] = touching.barriers.friction_limits();
+    let changed = (now - held).abs() > LAGGED * held.max(now);
+    if changed {
+        touching.barriers.hold();
+    }
+    changed
+}
+
+/// Searches the state found for crossings, if that is wanted.
+fn check(solver: &mut impl Contacting, time: f64) -> Result<(), SolveError> {
+    solver.system().touching.as_ref().map_or(Ok(()), |touching| touching.check(time))
+}
+
+/// Why a step was not found.
+fn not_found(solver: &mut impl Contacting, time: f64, iterations: usize) -> SolveError {
+    let blocked = !is_complete(solver);
+    if let (true, Some(touching)) = (blocked, &solver.system().touching) {
+        return SolveError::Blocked {
+            time,
+            driver: None,
+            part: touching.share,
+            gap: f64::INFINITY,
+            iterations,
+        };
+    }
+    SolveError::NotConverged { time, node: solver.worst(), residuals: Vec::new(), broken: None }
+}

@@ -1,0 +1,90 @@
+//! What acts on the nodes of a model at a state, without a solver: for reactions, energies and whoever looks at a run.
+
+use std::sync::Arc;
+
+use pliant_mechanics::model::Enclosed;
+
+use crate::model::assembly::{Assembly, Spring};
+use crate::model::error::SolveError;
+use crate::model::state::State;
+use crate::system::System;
+
+/// Forces and moments on the nodes of a model at the state last evaluated.
+pub struct Forces {
+    pub(crate) system: System,
+    /// Forces of contacts, six a node; empty for none.
+    touching: Vec<f64>,
+}
+
+impl Forces {
+    /// For a model; nothing is known before the first evaluation.
+    pub fn new(model: impl Into<Arc<Assembly>>) -> Self {
+        Self { system: System::forces_only(model.into()), touching: Vec::new() }
+    }
+
+    /// Finds the forces at a state and its time.
+    ///
+    /// # Errors
+    /// If an element collapses or folds over.
+    pub fn evaluate(&mut self, state: &State) -> Result<(), SolveError> {
+        self.system.stand(&state.history);
+        self.system.evaluate(state, state.time, None)?;
+        let system = &mut self.system;
+        for (load, controlled) in system.external.iter_mut().zip(&system.controlled) {
+            *load += state.load_factor * controlled;
+        }
+        system.external.iter_mut().zip(&self.touching).for_each(|(load, force)| *load += force);
+        Ok(())
+    }
+
+    /// Takes hold of nodes: these springs and no others act from the next evaluation on, beside those of the model. Their forces are
+    /// loads.
+    pub fn hold(&mut self, springs: &[Spring]) {
+        self.system.hold(springs);
+    }
+
+    /// Takes forces [N] on nodes: they and no others act from the next evaluation on, as loads.
+    pub fn push(&mut self, forces: &[(u32, [f64; 3])]) {
+        self.system.push(forces);
+    }
+
+    /// Takes the forces of contacts, six numbers a node: they are loads from the next evaluation on.
+    pub fn touch(&mut self, forces: &[f64]) {
+        self.touching.clear();
+        self.touching.extend_from_slice(forces);
+        self.system.give_back(&mut self.touching);
+    }
+
+    /// Force [N] and moment [N m] that elements and springs resist with, six numbers a node.
+    pub fn internal(&self) -> &[f64] {
+        &self.system.internal
+    }
+
+    /// Force [N] and moment [N m] of all loads, six numbers a node.
+    pub fn loads(&self) -> &[f64] {
+        &self.system.external
+    }
+
+    /// What a node resists with beyond its loads [N].
+    pub fn resisting(&self, node: u32) -> [f64; 3] {
+        let at = 6 * node as usize;
+        [at, at + 1, at + 2].map(|at| self.system.internal[at] - self.system.external[at])
+    }
+
+    /// What a constraint of volume encloses at the state last evaluated, which is given, and the force [N] and moment [N m] of its pressure by components,
+    /// six a node; `None` of other constraints. The pressure is the one that balances what its nodes resist with, by least squares: exact
+    /// in equilibrium.
+    pub fn enclosed(&self, constraint: usize, state: &State) -> Option<(Enclosed, Vec<(usize, f64)>)> {
+        self.system.enclosed(constraint, state)
+    }
+
+    /// Energy stored in elements and springs [J], and the work of stresses that relax.
+    pub fn strain_energy(&self) -> f64 {
+        self.system.energy
+    }
+
+    /// What hourglass control holds of it [J].
+    pub fn hourglass_energy(&self) -> f64 {
+        self.system.hourglass
+    }
+}

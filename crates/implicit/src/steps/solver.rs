@@ -1,0 +1,86 @@
+//! What the solvers of the equations of a model have in common.
+
+use pliant_contact::lag::Lag;
+use pliant_mechanics::StopFlag;
+
+use crate::model::assembly::Spring;
+use crate::model::error::SolveError;
+use crate::steps::statics::Attempted;
+use crate::system::contact::TouchingSystem;
+use crate::system::{Phases, System};
+
+/// A solver of the equations of a model: [`Statics`](crate::Statics) or [`BackwardEuler`](crate::BackwardEuler).
+pub trait AssemblySolver {
+    /// The equations.
+    fn system(&self) -> &System;
+
+    /// The same to change.
+    fn system_mut(&mut self) -> &mut System;
+
+    /// The attempts of the last step, one after the other, with their relative residuals.
+    fn attempts(&self) -> &[Attempted];
+
+    /// The relative residual that is allowed.
+    fn tolerance(&self) -> f64;
+
+    /// Time spent in the parts of the solver so far.
+    fn phases(&self) -> Phases {
+        self.system().phases
+    }
+
+    /// Contacts, at the state of the last step; `None` without any.
+    fn touching(&self) -> Option<&TouchingSystem> {
+        self.system().touching.as_deref()
+    }
+
+    /// The same to change.
+    fn touching_mut(&mut self) -> Option<&mut TouchingSystem> {
+        self.system_mut().touching.as_deref_mut()
+    }
+
+    /// Takes a pattern of the equations with [`pairs`](TouchingSystem::pairs) of nodes that contacts added where another solver stood: so this
+    /// one goes on with the same bits.
+    ///
+    /// # Errors
+    /// If the equations are too many for the solver chosen.
+    fn take_contact_pairs(&mut self, pairs: Vec<[u32; 2]>) -> Result<(), SolveError> {
+        self.system_mut().take_pairs(pairs)
+    }
+
+    /// Values of the older matrix whose factors precondition the next one, if there is one: without them another solver takes other
+    /// iterations.
+    fn factored(&self) -> Option<&[f64]> {
+        self.system().factored()
+    }
+
+    /// Takes the [factors](Self::factored) of another solver with the same [pairs](Self::take_contact_pairs): to continue with the same bits.
+    fn precondition_with(&mut self, values: Vec<f64>) {
+        self.system_mut().precondition_with(values);
+    }
+
+    /// Looks at a flag from now on, before each solution, and stops where it asks.
+    fn stop_on(&mut self, flag: &StopFlag) {
+        self.system_mut().stop = flag.clone();
+    }
+
+    /// How far moved nodes whose force is limited are behind their motion, and volumes [m³] whose pressure is limited behind theirs, along
+    /// the first axis, by their constraints.
+    fn lags(&self) -> &[Lag] {
+        &self.system().lags
+    }
+
+    /// Takes the lags of another solver, whose run this one continues.
+    fn take_lags(&mut self, lags: Vec<Lag>) {
+        self.system_mut().lags = lags;
+    }
+
+    /// Takes hold of nodes, as [`Forces::hold`](crate::Forces::hold).
+    fn hold(&mut self, springs: &[Spring]) {
+        self.system_mut().hold(springs);
+    }
+
+    /// Takes forces [N] on nodes, as [`Forces::push`](crate::Forces::push).
+    fn push(&mut self, forces: &[(u32, [f64; 3])]) {
+        self.system_mut().push(forces);
+    }
+}

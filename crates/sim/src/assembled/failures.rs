@@ -1,0 +1,86 @@
+//! Failures of solvers in words.
+
+use pliant_implicit::SolveError;
+
+use crate::bodies::ImplicitBodies;
+use crate::failure::{BlockedDriver, Failure};
+use pliant_geometry::words::number;
+
+/// The report of a step that failed after a time.
+pub(super) fn failure(
+    error: &SolveError,
+    model: &pliant_mechanics::Model,
+    bodies: &ImplicitBodies,
+    time: f64,
+) -> Failure {
+    let body_of = |node: u32| model.bodies.iter().find(|body| body.nodes.contains(&node));
+    let (kind, node, cell) = match error {
+        SolveError::NotConverged { node, .. } => ("not-converged", Some(*node), None),
+        SolveError::Uphill { node, .. } => ("not-converged", Some(*node), None),
+        SolveError::Snaps { .. } | SolveError::Stalled { .. } => ("not-converged", None, None),
+        SolveError::Blocked { .. } => ("blocked", None, None),
+        SolveError::Crossed { edge, .. } => ("intersecting", Some(edge[0]), None),
+        SolveError::Singular { node, .. } | SolveError::FreeBody { node, .. } => {
+            ("singular", Some(*node), None)
+        }
+        SolveError::Indefinite { .. } => ("unstable", None, None),
+        SolveError::Broken { cell, .. } => ("inverted", None, bodies.cell(*cell)),
+        SolveError::Stopped => return Failure::stopped(time),
+        SolveError::Device(_) => ("device", None, None),
+        SolveError::OutOfMemory(_) => ("memory", None, None),
+        SolveError::Open(_) | SolveError::Impossible(_) => ("input", None, None),
+    };
+    let owner = match error {
+        SolveError::Snaps { node, .. } => body_of(*node),
+        _ => node.and_then(body_of),
+    };
+    let own_node = node.zip(owner).map(|(node, body)| node - body.nodes.start);
+    let body = owner.map(|body| body.name.clone()).or_else(|| Some(model.bodies[cell?.0].name.clone()));
+    let place = body.as_ref().map(|name| format!(" in `{name}`")).unwrap_or_default();
+    let of_body =
+        |cell| bodies.cell(cell).filter(|(owner, _)| body.as_ref() == Some(&model.bodies[*owner].name));
+    let told = numbered(error, own_node, |cell| of_body(cell).map(|(_, cell)| cell));
+    let slack = node.or_else(|| Some(bodies.model.facets.get(error.broken()?.0)?.nodes[0]));
+    let hint = match slack.is_some_and(|node| bodies.is_slack(node)) {
+        true => {
+            "; a membrane resists bending and compression across by nothing: hold it on all sides, give it `pre-tension`, or take \
+             an element with bending"
+        }
+        false => "",
+    };
+    let message =
+        format!("after t = {} s{place}: {told}{hint}; what was written before stays readable", number(time));
+    let element = cell.map(|(_, cell)| cell);
+    let blocked = match error {
+        SolveError::Blocked { driver: Some((driver, force)), part, gap, .. } => {
+            Some(Box::new(BlockedDriver { driver: driver.clone(), force: *force, part: *part, gap: *gap }))
+        }
+        _ => None,
+    };
+    let body = body.map(String::into_boxed_str);
+    Failure { body, element, node: own_node, blocked, ..Failure::new(kind, message, Some(time)) }
+}
+
+/// An error with the numbers that a node and a cell have in their body.
+pub(super) fn numbered(
+    error: &SolveError,
+    own_node: Option<u32>,
+    own_cell: impl Fn(usize) -> Option<u32>,
+) -> SolveError {
+    let mut own = error.clone();
+    if let SolveError::NotConverged { node, .. }
+    | SolveError::Singular { node, .. }
+    | SolveError::Uphill { node, .. }
+    | SolveError::FreeBody { node, .. } = &mut own
+    {
+        *node = own_node.unwrap_or(*node);
+    }
+    match &mut own {
+        SolveError::Broken { cell, .. } => *cell = own_cell(*cell).map_or(*cell, |cell| cell as usize),
+        SolveError::NotConverged { broken, .. } => {
+            *broken = broken.and_then(|(cell, why)| Some((own_cell(cell)? as usize, why)));
+        }
+        _ => {}
+    }
+    own
+}

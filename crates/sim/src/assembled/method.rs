@@ -1,0 +1,87 @@
+//! Its solver.
+
+use pliant_contact::lag::Lag;
+use pliant_implicit::{
+    AssemblySolver, Attempted, BackwardEuler, ExplicitShells, Forces, SolveError, State, Statics,
+    TouchingSystem,
+};
+
+/// A solver, and the forces at an instant: an explicit one finds them anyway.
+pub(super) enum SolverMethod {
+    Static(Box<Statics>, Forces),
+    Implicit(Box<BackwardEuler>, Forces),
+    Explicit(Box<ExplicitShells>),
+}
+
+impl SolverMethod {
+    /// The forces last found.
+    pub(super) fn forces(&self) -> &Forces {
+        match self {
+            Self::Static(_, forces) | Self::Implicit(_, forces) => forces,
+            Self::Explicit(solver) => solver.forces(),
+        }
+    }
+
+    /// The solver of equations; `None` for explicit steps.
+    pub(super) fn equations(&self) -> Option<&dyn AssemblySolver> {
+        match self {
+            Self::Static(solver, _) => Some(&**solver),
+            Self::Implicit(solver, _) => Some(&**solver),
+            Self::Explicit(_) => None,
+        }
+    }
+
+    pub(super) fn equations_mut(&mut self) -> Option<&mut dyn AssemblySolver> {
+        match self {
+            Self::Static(solver, _) => Some(&mut **solver),
+            Self::Implicit(solver, _) => Some(&mut **solver),
+            Self::Explicit(_) => None,
+        }
+    }
+
+    /// Contacts; `None` without any.
+    pub(super) fn touching(&self) -> Option<&TouchingSystem> {
+        self.equations().and_then(|solver| solver.touching())
+    }
+
+    pub(super) fn touching_mut(&mut self) -> Option<&mut TouchingSystem> {
+        self.equations_mut().and_then(|solver| solver.touching_mut())
+    }
+
+    /// Has something act on what finds forces at an instant, and on the solver of equations.
+    pub(super) fn act(
+        &mut self,
+        forces: impl FnOnce(&mut Forces),
+        equations: impl FnOnce(&mut dyn AssemblySolver),
+    ) {
+        match self {
+            Self::Static(solver, own) => {
+                equations(&mut **solver);
+                forces(own);
+            }
+            Self::Implicit(solver, own) => {
+                equations(&mut **solver);
+                forces(own);
+            }
+            Self::Explicit(solver) => forces(solver.forces_mut()),
+        }
+    }
+
+    /// The attempts of the last step, one after the other.
+    pub(super) fn attempts(&self) -> &[Attempted] {
+        self.equations().map_or(&[], |solver| solver.attempts())
+    }
+
+    /// How far moved nodes whose force is limited are behind their motion.
+    pub(super) fn lags(&self) -> &[Lag] {
+        self.equations().map_or(&[], |solver| solver.lags())
+    }
+
+    /// Finds the forces at a state.
+    pub(super) fn evaluate(&mut self, state: &State) -> Result<(), SolveError> {
+        match self {
+            Self::Static(_, forces) | Self::Implicit(_, forces) => forces.evaluate(state),
+            Self::Explicit(solver) => solver.evaluate(state),
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! How a simulation leads it.
+
+use pliant_contact::pose::Leg;
+use pliant_explicit::{Clock, Wanted};
+use pliant_mechanics::grip::{Grip, ROOM};
+use pliant_mechanics::mapping::Mapping;
+use pliant_mechanics::tensor::Vector;
+use pliant_mechanics::{StopFlag, fingerprint};
+
+use super::*;
+use crate::failure::Failure;
+use crate::kept::Kept;
+use crate::participant::Participant;
+use crate::solver::LoadStepProgress;
+
+impl Participant for Assembled {
+    fn evaluate(&mut self, _wanted: Wanted) -> Result<(), Failure> {
+        if self.evaluated {
+            return Ok(());
+        }
+        self.put_springs();
+        if self.touching.is_none() {
+            self.touching = self.method.touching_mut().map(|own| own.at(&self.state));
+        }
+        if let (Some(now), SolverMethod::Static(_, forces) | SolverMethod::Implicit(_, forces)) =
+            (&self.touching, &mut self.method)
+        {
+            forces.touch(&now.forces);
+        }
+        let found = self.method.evaluate(&self.state);
+        found.map_err(|error| failure(&error, &self.model, &self.bodies, self.time))?;
+        self.find_energies();
+        self.find_reactions();
+        if let Some(solids) = &mut self.solids {
+            let places = self.bodies.model.places();
+            for (own, (now, rest)) in
+                solids.displacement.iter_mut().zip(self.state.position.iter().zip(places))
+            {
+                *own = (now - rest).into();
+            }
+            for ((own, solid), tensors) in
+                solids.history.iter_mut().zip(&self.model.solids).zip(&self.state.history.tensors)
+            {
+                let slots = tensors.len() / solid.cells.len();
+                for (cell, tensors) in tensors.chunks_exact(slots.max(1)).enumerate() {
+                    own.set_cell(cell, tensors);
+                }
+            }
+        }
+        (self.evaluated, self.entered) = (true, true);
+        Ok(())
+    }
+
+    fn advance(&mut self, steps: u64, _watch: &mut dyn FnMut(LoadStepProgress)) -> Result<(), Failure> {
+        debug_assert!(steps <= self.stride(), "{steps} steps in one go");
+        self.put_springs();
+        #[cfg(feature = "gpu")]
+        if self.device.is_some() {
+            return self.advance_with_device(steps);
+        }
+        self.advance_on_processor()
+    }
+
+    /// A grip pulls by where its nodes are at each step.
+    #[cfg(feature = "gpu")]
+    fn stride(&self) -> u64 {
+        if self.device.is_some() && self.grips.is_empty() { STRIDE } else { 1 }
+    }
+
+    fn hold(&mut self, grips: &[Grip]) -> bool {
+        self.grips.clear();
+        self.grips.extend_from_slice(grips);
+        self.evaluated = false;
+        true
+    }
+
+    fn push(&mut self, forces: &[Vector<f64>]) {
+        let acting = (0..).zip(forces.iter().copied()).filter(|(_, force)| *force != [0.0; 3]);
+        let acting: Vec<_> = acting.collect();
+        self.method.act(|forces| forces.push(&acting), |solver| solver.push(&acting));
+        #[cfg(feature = "gpu")]
+        if let Some(device) = &mut self.device {
+            device.pushed = acting;
+        }
+        self.evaluated = false;
+    }
+
+    fn drive(&mut self, rigid: usize, leg: Leg) {
+        if let Some(own) = self.method.touching_mut() {
+            own.legs_mut().insert(rigid as u32, leg);
+        }
+    }
+
+    /// Explicit steps of 0.9 of the stable step stay stable up to it, as those of solids do. Assembled ones are stable with any, and
+    /// their equations stay well conditioned.
+    fn stiffest(&self, grip: &Grip) -> f64 {
+        if !matches!(self.method, SolverMethod::Explicit(_)) {
+            return FIRM * self.bodies.model.stiffest();
+        }
+        let mass = |&(node, weight): &(u32, f64)| self.bodies.model.mass[node as usize] / weight;
+        let lightest = grip.nodes.iter().map(mass).fold(f64::INFINITY, f64::min);
+        ROOM * 4.0 * lightest / (self.steps.step * self.steps.step)
+    }
+
+    fn last_velocity(&self, node: usize) -> [f64; 3] {
+        self.state.velocity[node].into()
+    }
+
+    fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2] {
+        [grip.position(&self.state, 0), grip.force(&self.state)]
+    }
+
+    /// What was spent since then counts.
+    fn goes_back_to(&self, kept: &Kept) -> bool {
+        // What is touched at the start is not known before contacts are looked at.
+        matches!(kept, Kept::Implicit(state) if state.contact.is_some() || self.method.touching().is_none())
+    }
+
+    fn go_back(&mut self, kept: &Kept, _steps: Option<(Clock, f64)>) -> Result<(), Failure> {
+        let Kept::Implicit(state) = kept else { return Ok(()) };
+        let spent = (self.effort.clone(), self.effort_before.clone());
+        let convergence = std::mem::take(&mut self.convergence);
+        self.resume((**state).clone())?;
+        (self.effort, self.effort_before) = spent;
+        self.convergence = convergence;
+        Ok(())
+    }
+
+    fn stop_on(&mut self, flag: &StopFlag) {
+        if let Some(solver) = self.method.equations_mut() {
+            solver.stop_on(flag);
+        }
+    }
+
+    fn kept(&self) -> Kept {
+        Kept::Implicit(Box::new(self.snapshot()))
+    }
+
+    fn add_log(&self, kept: &mut Kept) {
+        if let Kept::Implicit(state) = kept {
+            state.convergence.clone_from(&self.convergence);
+        }
+    }
+
+    fn cut_log(&mut self) {
+        let done = self.done;
+        self.convergence.retain(|row| row.step <= done);
+    }
+
+    fn fingerprint(&self) -> u64 {
+        let bits = |numbers: &[f64]| -> Vec<u64> { numbers.iter().map(|x| x.to_bits()).collect() };
+        let positions = self.state.position.iter().flat_map(|x| bits(x.as_slice()));
+        let rotations = self.state.rotation.iter().flat_map(|q| bits(q.coords.as_slice()));
+        fingerprint(&(positions.collect::<Vec<_>>(), rotations.collect::<Vec<_>>()))
+    }
+
+    /// A static state stands at the last equilibrium found, which may lie within the step that failed.
+    fn keeps_what_it_found(&mut self) -> bool {
+        let is_static = matches!(self.method, SolverMethod::Static(..));
+        if is_static && self.state.time > self.time {
+            self.time = self.state.time;
+            // Contacts without friction: that of the part of the step that was found is not known.
+            self.touching = None;
+            (self.evaluated, self.entered) = (false, false);
+        }
+        is_static
+    }
+}
