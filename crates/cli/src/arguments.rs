@@ -5,7 +5,6 @@ use std::str::FromStr;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand, ValueEnum};
-use pliant_bench::Instructions;
 use pliant_format::tables::{BackgroundName, Choice, LookColour, LookTable, MapName, TextureName};
 use pliant_geometry::CellLabel;
 use pliant_imaging::LabelChoice;
@@ -87,15 +86,12 @@ pub enum Command {
     /// Make a mesh from labels of a segmented image or from a closed surface: tets, hexes, a surface or curved shells.
     #[command(after_help = MESH_HELP)]
     Mesh(Box<MeshImage>),
-    /// Compute the results of the thesis and compare them with the published ones.
-    #[command(
-        after_help = "Examples:\n  pliant reproduce\n  pliant reproduce --list\n  pliant reproduce --only fig-6.3 --out shear\n\n\
-                      Exit codes: 0 all numbers within their tolerance, 1 some are not, 2 invalid input."
-    )]
-    Reproduce(Reproduce),
-    /// Measure the cost of a step on this machine.
-    #[command(after_help = BENCH_HELP)]
-    Bench(Bench),
+    /// Moved into the laboratory.
+    #[command(hide = true, disable_help_flag = true)]
+    Reproduce(Moved),
+    /// Moved into the laboratory.
+    #[command(hide = true, disable_help_flag = true)]
+    Bench(Moved),
     /// Open a scene in a window: play it, pull it, turn the view. Or a finished run: scrub and play its frames.
     #[command(
         after_help = "Examples:\n  pliant view scenes/liver\n  pliant view out/liver\n  pliant view scenes/cube --threads 1 --set run.precision=single\n  \
@@ -435,83 +431,11 @@ fn size(typed: &str) -> Result<[u32; 2], String> {
     }
 }
 
-const BENCH_HELP: &str = "\
-Examples:
-  pliant bench                                   two minutes: all laws and elements, the thesis's series of meshes
-  pliant bench --full                            also meshes up to two million elements
-  pliant bench --designs                         the kernel designs on a GPU
-  pliant bench --shells                          implicit steps of shells, on the CPU and on a GPU
-  pliant bench --list
-  pliant bench --only tet4-nh-55566 --only tet4-nh-55566-all
-  pliant bench --json > bench.json
-  pliant bench --full --table docs/performance.md
-
-Keep the machine otherwise idle; the least and the most of the repeats reveal other load.";
-
+/// The words of a command that `pliant-lab` has now.
 #[derive(Debug, clap::Args)]
-pub struct Bench {
-    /// Measure all rows, not only the default selection.
-    #[arg(long, conflicts_with = "only")]
-    pub full: bool,
-    /// Measure the kernel designs on the best GPU instead; with `--full` also on large meshes.
-    #[arg(long, conflicts_with = "only")]
-    pub designs: bool,
-    /// Measure implicit steps of 800 to 50,000 shells instead, on the CPU and, where there is one, with a GPU for their equations.
-    #[arg(long, conflicts_with_all = ["full", "designs", "list", "only", "lanes", "json", "table"])]
-    pub shells: bool,
-    /// List the rows without measuring.
-    #[arg(long)]
-    pub list: bool,
-    /// Measure only this row; may be repeated. Three or more meshes of a series also give its linear cost.
-    #[arg(long, value_name = "ID")]
-    pub only: Vec<String>,
-    /// Repeats of each row; the table shows their median.
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1000))]
-    pub repeats: u16,
-    /// Wall time of a repeat [s]. On a busy machine the least of many short repeats is undisturbed.
-    #[arg(long, value_name = "S", default_value_t = 0.2, value_parser = seconds)]
-    pub seconds: f64,
-    /// Instruction set instead of the widest available; `plain` is scalar.
-    #[arg(long, value_name = "WORD", value_parser = instructions())]
-    pub lanes: Option<Instructions>,
-    /// Print one JSON object on standard output.
-    #[arg(long)]
-    pub json: bool,
-    /// Also update the tables in a Markdown file, between its two marks.
-    #[arg(long, value_name = "FILE")]
-    pub table: Option<PathBuf>,
-}
-
-fn seconds(typed: &str) -> Result<f64, String> {
-    match typed.parse() {
-        Ok(seconds) if (0.001..=60.0).contains(&seconds) => Ok(seconds),
-        _ => Err("a repeat must take between 0.001 and 60 seconds".into()),
-    }
-}
-
-fn instructions() -> impl TypedValueParser<Value = Instructions> {
-    let of = |word: &String| Instructions::ALL.into_iter().find(|known| known.name() == word);
-    PossibleValuesParser::new(Instructions::ALL.map(Instructions::name))
-        .try_map(move |word| of(&word).ok_or_else(|| format!("no instruction set is called `{word}`")))
-}
-
-#[derive(Debug, clap::Args)]
-pub struct Reproduce {
-    /// Folder for index.html and results.json.
-    #[arg(long, value_name = "DIR", default_value = "reproduce")]
-    pub out: PathBuf,
-    /// Write into a folder with other files.
-    #[arg(long)]
-    pub force: bool,
-    /// List the cases without computing.
-    #[arg(long)]
-    pub list: bool,
-    /// Compute only this case; may be repeated.
-    #[arg(long, value_name = "ID")]
-    pub only: Vec<String>,
-    /// Also update the table of results in a Markdown file, between its two marks.
-    #[arg(long, value_name = "FILE", conflicts_with = "only")]
-    pub table: Option<PathBuf>,
+pub struct Moved {
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    pub words: Vec<String>,
 }
 
 #[derive(Clone, Debug, clap::Args)]
@@ -914,7 +838,7 @@ impl Command {
             Self::Info(info) => info.json,
             Self::Labels(labels) => labels.json,
             Self::Mesh(mesh) => mesh.json,
-            Self::Bench(bench) => bench.json,
+            Self::Reproduce(moved) | Self::Bench(moved) => moved.words.iter().any(|word| word == "--json"),
             Self::Devices { json } => *json,
             Self::Sweep(_)
             | Self::Check(_)
@@ -923,8 +847,7 @@ impl Command {
             | Self::Import { .. }
             | Self::Render(_)
             | Self::View(_)
-            | Self::Haptics(_)
-            | Self::Reproduce(_) => false,
+            | Self::Haptics(_) => false,
         }
     }
 }

@@ -13,15 +13,13 @@ use pliant_scene::World;
 use serde_json::{Value as Json, json};
 
 use crate::SUCCESS;
-use crate::arguments::{self, Check, Command, Run};
-use crate::bench::bench;
+use crate::arguments::{self, Check, Command, Moved, Run};
 use crate::haptics::haptics;
 use crate::info::info;
 use crate::mesh;
 use crate::pictures;
 use crate::prepare::{Opened, mesh_cache, open, prepare, translate};
 use crate::report::{self, Bar, Failure, say};
-use crate::reproduce::reproduce;
 use crate::signals;
 
 pub fn execute(command: Command) -> Result<u8, Failure> {
@@ -43,13 +41,20 @@ pub fn execute(command: Command) -> Result<u8, Failure> {
         Command::Labels(arguments) => mesh::labels(&arguments),
         Command::Mesh(arguments) => mesh::mesh(&arguments),
         Command::Import { model, out, allow_partial } => import(&model, &out, allow_partial),
-        Command::Reproduce(arguments) => reproduce(&arguments),
-        Command::Bench(arguments) => bench(&arguments),
+        Command::Reproduce(arguments) => Err(moved("reproduce", &arguments)),
+        Command::Bench(arguments) => Err(moved("bench", &arguments)),
         Command::View(arguments) => pictures::view(&arguments),
         Command::Render(arguments) => pictures::render(&arguments),
         Command::Haptics(arguments) => haptics(&arguments),
         Command::Devices { json } => devices(json),
     }
+}
+
+/// A command that the laboratory has now, with the one to type.
+fn moved(command: &str, arguments: &Moved) -> Failure {
+    let words = [&[command.to_owned()][..], &arguments.words].concat().join(" ");
+    let help = format!("in a checkout of Pliant type `cargo run --release -p pliant-lab -- {words}`");
+    Failure::plain(format!("`{command}` is a command of `pliant-lab`"), help)
 }
 
 /// The folder of a run that starts at rest.

@@ -13,7 +13,6 @@ macro_rules! eprintln {
 }
 
 mod arguments;
-mod bench;
 mod commands;
 #[cfg(feature = "viewer")]
 mod gallery;
@@ -22,12 +21,10 @@ mod info;
 #[cfg(feature = "viewer")]
 mod look;
 mod mesh;
-mod page;
 #[cfg_attr(not(feature = "viewer"), path = "no_pictures.rs")]
 mod pictures;
 mod prepare;
 mod report;
-mod reproduce;
 mod signals;
 #[cfg(feature = "viewer")]
 mod view;

@@ -168,10 +168,6 @@ impl Bar {
         self.show(progress.part, progress.words(runs));
     }
 
-    pub fn update_bench(&self, progress: &pliant_bench::Progress) {
-        self.show(progress.part, progress.now.clone());
-    }
-
     /// A fraction of the work from 0 to 1, and the current task.
     pub fn update_mesh(&self, part: f64, now: impl Into<Cow<'static, str>>) {
         self.show(part, now);

@@ -9,7 +9,7 @@
 //! on the glued cube it stays at 0.94 where the critical time step falls to 0.83. A cell slower than the assembly thus counts with its own
 //! limit, and one that the assembly holds back, with its change. Compared with the critical time step of deformed bodies, the estimate is 0 to
 //! 25 % too small; with fibres that carry tension only, whose stiffness jumps at rest, up to 4.3 % too large:
-//! `validation/tests/stability.rs`.
+//! `lab/validation/tests/stability.rs`.
 //!
 //! *When.* Every [`CHECK_EVERY`] steps, and at once where the least J or the largest stretch √(1 + |C − I|) has changed by [`CHANGE`]. The
 //! force pass finds both at no cost. Checks that leave the parts as they are, as far as can be foreseen, are passed over (`foresight.rs`).

@@ -34,6 +34,7 @@ pub mod rotation;
 mod stop;
 pub mod tensor;
 pub mod tie;
+pub mod tissue;
 
 pub use energies::Energies;
 pub use fingerprint::fingerprint;

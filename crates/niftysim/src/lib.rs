@@ -6,7 +6,7 @@
 //! Leaves out: shells that bend, radii that change, reduced bases, values read from files; [`Imported::missing`] names them.
 //!
 //! ```
-//! let imported = pliant_niftysim::import("../../validation/data/niftysim/H8_NH.xml".as_ref())?;
+//! let imported = pliant_niftysim::import("../../lab/validation/data/niftysim/H8_NH.xml".as_ref())?;
 //! assert!(imported.scene.contains("[law.") && imported.missing.is_empty());
 //! # Ok::<(), pliant_niftysim::ImportError>(())
 //! ```

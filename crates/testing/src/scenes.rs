@@ -5,6 +5,10 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+mod said;
+
+use std::process::Command;
+
 use pliant_format::Scene;
 use pliant_format::diagnostic::{Diagnostic, MOST_SHOWN, SceneErrors};
 use pliant_format::source::Source;
@@ -17,6 +21,8 @@ use pliant_scene::{MeshCache, World};
 use pliant_sim::{Simulation, State, StopFlag};
 use serde_json::{Value, json};
 use tempfile::TempDir;
+
+pub use said::Said;
 
 /// The repository.
 pub const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
@@ -432,6 +438,14 @@ impl Workshop {
         let workshop = Self { case: folder.path().join("case"), folder };
         workshop.write("case/scene.toml", scene);
         workshop
+    }
+
+    /// A program, to be run in the folder with a cache of its own.
+    pub fn program(&self, binary: &str, arguments: &[&str]) -> Command {
+        let mut command = Command::new(binary);
+        command.args(arguments).current_dir(self.path(""));
+        command.env("PLIANT_CACHE", self.path("cache"));
+        command
     }
 
     /// A folder for the outputs of a scene of the project, which stays where it is.

@@ -7,12 +7,12 @@ mod skin;
 
 use std::collections::BTreeMap;
 
-use pliant_bench::{elastic, law, liver_matrix, soft_tissue};
 use pliant_format::foreign_file;
 use pliant_geometry::io::{self, Format};
 use pliant_geometry::words::number;
 use pliant_geometry::{CellKind, Mesh, QualityReport, Vector3, diagnose};
 use pliant_imaging::{LabelChoice, LabelError, RegionReport, Smoothing};
+use pliant_mechanics::tissue::{elastic, law, liver_matrix, soft_tissue};
 use pliant_meshing::{
     Anatomy, Assessment, Closing, Deviation, Enclosed, LabelReport, MeshingError, Missed, OrganTets,
     SurfaceCheck, TetReport, Voxels, require_room_for,

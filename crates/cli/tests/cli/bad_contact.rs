@@ -1,7 +1,7 @@
 //! Bad input of scenes in contact by a barrier, through the real binary: each has an answer, by the rows of the table of the contact specification (9.4),
 //! and none ends in a panic or writes a number that is none.
 
-use crate::support::{CORNERS, TETS, Told, Workshop, changed, vtk};
+use crate::support::{CORNERS, Said, TETS, Workshop, changed, vtk};
 
 /// A cube of 0.1 m a tenth of a millimetre above a floor.
 const SOLID: &str = r#"[scene]
@@ -41,7 +41,7 @@ fn shell() -> String {
     changed(SOLID, "[body.organ]\n", "[body.organ]\nmodel = \"shell\"\nthickness = 1e-4\n")
 }
 
-fn run(scene: &str, mesh: &str) -> (Told, Workshop) {
+fn run(scene: &str, mesh: &str) -> (Said, Workshop) {
     let workshop = Workshop::new(scene);
     workshop.write("case/organ.vtk", mesh);
     (workshop.run(&[]), workshop)

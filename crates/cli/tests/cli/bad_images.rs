@@ -4,12 +4,12 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{BLOCK, Told, Workshop};
+use crate::support::{BLOCK, Said, Workshop};
 use pliant_testing::image_files::{Form, Syntax, Volume, dicom, nifti1, nifti2};
 
 fn assert_refused(workshop: &Workshop, image: &str, says: &[&str]) {
     let mesh = ["mesh", image, "--label", "1", "--edge", "5mm", "-o", "out.vtu", "--json"];
-    let told: [Told; 2] = [workshop.pliant(&mesh), workshop.pliant(&["labels", image, "--json"])];
+    let told: [Said; 2] = [workshop.pliant(&mesh), workshop.pliant(&["labels", image, "--json"])];
     for told in told {
         assert_eq!(told.code, 2, "{image}: {}{}", told.err, told.out);
         assert_eq!(told.json()["error"]["kind"], "input");

@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{BLOCK, FROM_FILE, Told, Workshop, changed, series};
+use crate::support::{BLOCK, FROM_FILE, Said, Workshop, changed, series};
 
 /// Asserts that a scene is rejected with these words and with one of these lines underlined, and that the folder does
 /// not change.
@@ -18,7 +18,7 @@ fn assert_refused(workshop: &Workshop, lines: &[&str], says: &[&str]) {
 
 /// Asserts exit code 2, these words on standard error, and one JSON object that says so.
 #[track_caller]
-fn assert_invalid(told: &Told, says: &[&str]) {
+fn assert_invalid(told: &Said, says: &[&str]) {
     assert_eq!(told.code, 2, "{}\n{}", told.err, told.out);
     let words = told.words();
     for piece in says {
@@ -126,7 +126,7 @@ fn a_filled_folder_needs_force_and_keeps_what_is_not_ours() {
 
 /// Asserts that a run ended with exit code 1 because a file could not be written.
 #[track_caller]
-fn assert_disk_full(told: &Told, file: &str, reason: &str) {
+fn assert_disk_full(told: &Said, file: &str, reason: &str) {
     assert_eq!(told.code, 1, "{}", told.err);
     let json = told.json();
     assert_eq!(json["status"], "failed");
@@ -150,7 +150,7 @@ fn halves(folder: &Path) -> Vec<String> {
 /// Runs the scene with a limit on the file size in blocks of 512 or 1024 bytes, so that writing fails as on a full
 /// disk.
 #[cfg(unix)]
-fn run_limited(workshop: &Workshop, blocks: u32, trap: &str) -> Told {
+fn run_limited(workshop: &Workshop, blocks: u32, trap: &str) -> Said {
     let limited = format!("{trap} ulimit -f {blocks}; exec \"$0\" run case --force --json");
     let output = std::process::Command::new("sh")
         .args(["-c", &limited, env!("CARGO_BIN_EXE_pliant")])

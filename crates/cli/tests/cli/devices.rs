@@ -1,6 +1,6 @@
 //! GPUs through the real binary: the list of them, and what is said where there is none.
 
-use crate::support::{BLOCK, Told, Workshop, changed, has_gpu};
+use crate::support::{BLOCK, Said, Workshop, changed, has_gpu};
 
 /// [`BLOCK`] on a device.
 fn on(device: &str) -> Workshop {
@@ -8,7 +8,7 @@ fn on(device: &str) -> Workshop {
 }
 
 /// The message without an adapter: on Linux none answers to Direct3D.
-fn without_adapters(workshop: &Workshop, arguments: &[&str]) -> Told {
+fn without_adapters(workshop: &Workshop, arguments: &[&str]) -> Said {
     let mut command = workshop.command(arguments);
     command.env("WGPU_BACKEND", "dx12").output().expect("the binary starts").into()
 }

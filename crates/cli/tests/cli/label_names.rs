@@ -4,7 +4,7 @@
 use pliant_geometry::{Labels, io};
 use pliant_testing::image_files::layered_segmentation;
 
-use crate::support::{Told, Workshop, from_names};
+use crate::support::{Said, Workshop, from_names};
 
 fn workshop(changes: &[[&str; 2]]) -> Workshop {
     let workshop = Workshop::new(&from_names(changes));
@@ -13,7 +13,7 @@ fn workshop(changes: &[[&str; 2]]) -> Workshop {
 }
 
 #[track_caller]
-fn done(told: Told) -> Told {
+fn done(told: Said) -> Said {
     assert_eq!(told.code, 0, "{}", told.err);
     told
 }

@@ -4,14 +4,12 @@
 mod bad_contact;
 mod bad_images;
 mod bad_input;
-mod bench;
 mod devices;
 mod haptics;
 mod label_names;
 mod meshing_images;
 mod meshing_surfaces;
 mod pictures;
-mod reproduce;
 mod resuming;
 mod running;
 mod setting;

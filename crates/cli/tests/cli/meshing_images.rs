@@ -7,7 +7,7 @@ use pliant_geometry::io;
 use pliant_testing::image_files::{Form, Volume, nifti1};
 use serde_json::Value;
 
-use crate::support::{FROM_IMAGE, Told, Workshop, changed};
+use crate::support::{FROM_IMAGE, Said, Workshop, changed};
 
 fn with_image() -> Workshop {
     let workshop = Workshop::new(FROM_IMAGE);
@@ -16,7 +16,7 @@ fn with_image() -> Workshop {
 }
 
 /// Runs `pliant mesh case/seg.nii.gz …`.
-fn mesh(workshop: &Workshop, more: &[&str]) -> Told {
+fn mesh(workshop: &Workshop, more: &[&str]) -> Said {
     workshop.pliant(&[&["mesh", "case/seg.nii.gz"], more].concat())
 }
 
@@ -352,7 +352,7 @@ fn a_full_disk_is_a_failure_of_the_output() {
     let workshop = with_image();
     // A file may have 8 blocks of 512 or 1024 bytes: then writing fails, as on a full disk.
     let limited = "trap '' XFSZ; ulimit -f 8; exec \"$0\" mesh case/seg.nii.gz --label 5 --edge 0.006 -o out.vtu --json";
-    let told: Told = std::process::Command::new("sh")
+    let told: Said = std::process::Command::new("sh")
         .args(["-c", limited, env!("CARGO_BIN_EXE_pliant")])
         .current_dir(workshop.path(""))
         .output()

@@ -1,6 +1,6 @@
 //! Tets and hexes of closed surfaces, and what `pliant info` measures on surfaces, through the real binary.
 
-use crate::support::{BLOCK, Told, Workshop};
+use crate::support::{BLOCK, Said, Workshop};
 use pliant_geometry::io::{self, Format};
 use pliant_geometry::{CellKind, Mesh, Vector3};
 use pliant_meshing::{Pattern, Sheet, sphere};
@@ -80,14 +80,14 @@ fn put(workshop: &Workshop, name: &str, mesh: &Mesh) {
 }
 
 /// Runs `pliant mesh NAME --scale 0.001 --edge 5mm -o out.vtu --json …`; what follows comes in place of these.
-fn mesh(workshop: &Workshop, name: &str, more: &[&str]) -> Told {
+fn mesh(workshop: &Workshop, name: &str, more: &[&str]) -> Said {
     let usual = [["--scale", "0.001"], ["--edge", "5mm"]];
     let missing = usual.iter().filter(|option| !more.contains(&option[0])).flatten().copied();
     let arguments: Vec<&str> = ["mesh", name, "-o", "out.vtu", "--json"].into_iter().chain(missing).collect();
     workshop.pliant(&[&arguments[..], more].concat())
 }
 
-fn done(told: &Told) -> Value {
+fn done(told: &Said) -> Value {
     assert_eq!(told.code, 0, "{}{}", told.err, told.out);
     told.json()
 }
@@ -297,7 +297,7 @@ fn a_full_disk_leaves_the_old_mesh() {
     let before = std::fs::read(workshop.path("out.vtu")).expect("a mesh");
     let limited =
         "trap '' XFSZ; ulimit -f 8; exec \"$0\" mesh ball.ply --scale 0.001 --edge 3mm -o out.vtu --json";
-    let told: Told = std::process::Command::new("sh")
+    let told: Said = std::process::Command::new("sh")
         .args(["-c", limited, env!("CARGO_BIN_EXE_pliant")])
         .current_dir(workshop.path(""))
         .output()

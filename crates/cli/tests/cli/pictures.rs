@@ -23,7 +23,7 @@ mod with_pictures {
 
     use pliant_picture::Picture;
 
-    use crate::support::{BLOCK, Told, Workshop, changed, has_gpu};
+    use crate::support::{BLOCK, Said, Workshop, changed, has_gpu};
 
     /// The sizes of a PNG file, and the number of its frames if it is animated.
     fn png(workshop: &Workshop, name: &str) -> ([u32; 2], Option<u32>) {
@@ -40,7 +40,7 @@ mod with_pictures {
     }
 
     #[track_caller]
-    fn done(told: &Told) -> &Told {
+    fn done(told: &Said) -> &Said {
         assert_eq!(told.code, 0, "{}", told.err);
         told
     }
@@ -110,7 +110,7 @@ mod with_pictures {
             assert_eq!(&bytes[4..8], b"ftyp");
         }
         let mut without = workshop.command(&[&arguments[..], &["--force"]].concat());
-        let told: Told = without.env("PATH", "").output().unwrap().into();
+        let told: Said = without.env("PATH", "").output().unwrap().into();
         assert!(done(&told).err.contains("ffmpeg was not found"), "{}", told.err);
         assert_eq!(png(&workshop, "film.png"), ([81, 61], Some(6)));
     }
@@ -316,7 +316,7 @@ mod with_pictures {
         let workshop = short("");
         for arguments in [&["render", "case"][..], &["run", "case", "--picture"]] {
             // On Linux nothing answers to Direct3D.
-            let told: Told = workshop.command(arguments).env("WGPU_BACKEND", "dx12").output().unwrap().into();
+            let told: Said = workshop.command(arguments).env("WGPU_BACKEND", "dx12").output().unwrap().into();
             assert_eq!(told.code, 2, "{}", told.err);
             assert!(told.err.contains("mesa-vulkan-drivers libvulkan1"), "{}", told.err);
         }

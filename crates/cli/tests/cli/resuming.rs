@@ -3,7 +3,7 @@
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::support::{BLOCK, Told, Workshop, changed, resumable};
+use crate::support::{BLOCK, Said, Workshop, changed, resumable};
 
 /// Waits until a run has written its second checkpoint, kills it, and waits for its end.
 fn kill_at_second_checkpoint(mut child: Child, workshop: &Workshop, folder: &str) {
@@ -39,7 +39,7 @@ fn a_killed_run_goes_on_to_the_files_of_one_that_was_not() {
 fn a_run_that_cannot_be_resumed_is_refused_and_one_that_can_goes_on_longer() {
     let workshop = Workshop::new(&resumable("hex8", "step = 5e-4", true));
     workshop.run(&[]).done();
-    let refused = |told: &Told, pieces: &[&str]| {
+    let refused = |told: &Said, pieces: &[&str]| {
         assert_eq!(told.code, 2, "{}", told.err);
         assert_eq!(told.json()["status"], "invalid");
         assert!(pieces.iter().all(|piece| told.words().contains(piece)), "{}", told.err);
@@ -77,7 +77,7 @@ fn ctrl_c_leaves_a_checkpoint_and_says_how_to_go_on() {
         }
         let killed = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status();
         assert!(killed.unwrap().success());
-        (workshop, Told::from(child.wait_with_output().unwrap()))
+        (workshop, Said::from(child.wait_with_output().unwrap()))
     };
     let (workshop, told) = interrupt(&long, "out/parts");
     assert_eq!((told.code, &told.json()["status"]), (130, &"interrupted".into()), "{}", told.err);

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use pliant_testing::scenes::ROOT;
 use serde_json::Value;
 
-use crate::support::{BLOCK, CORNERS, FROM_FILE, TETS, Told, Workshop, changed, labels, series, vtk};
+use crate::support::{BLOCK, CORNERS, FROM_FILE, Said, TETS, Workshop, changed, labels, series, vtk};
 
 #[track_caller]
 fn assert_close(found: f64, expected: f64, tolerance: f64, what: &str) {
@@ -116,7 +116,7 @@ fn a_folder_means_its_scene_and_names_the_outputs() {
     let told = workshop.pliant(&["run", "case/scene.toml", "--until", "0.002"]);
     assert_eq!(told.code, 2, "the folder of the scene holds a run already: {}", told.out);
     let mut inside = workshop.command(&["run", ".", "--until", "0.002"]);
-    let told = Told::from(inside.current_dir(workshop.path("case")).output().unwrap());
+    let told = Said::from(inside.current_dir(workshop.path("case")).output().unwrap());
     assert_eq!(told.code, 0, "{}", told.err);
     assert!(workshop.path("case/out/case/summary.md").exists());
 }
@@ -400,7 +400,7 @@ fn a_reader_that_leaves_early_is_no_mistake() {
     let mut child =
         workshop.command(&["schema"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     drop(child.stdout.take());
-    let told = Told::from(child.wait_with_output().unwrap());
+    let told = Said::from(child.wait_with_output().unwrap());
     assert_eq!((told.code, told.err.as_str()), (0, ""));
 }
 

@@ -1,8 +1,8 @@
 //! Values set on the command line, through the real binary.
 
-use crate::support::{BLOCK, Told, Workshop, changed};
+use crate::support::{BLOCK, Said, Workshop, changed};
 
-fn check(workshop: &Workshop, set: &[&str]) -> Told {
+fn check(workshop: &Workshop, set: &[&str]) -> Said {
     let options: Vec<&str> = set.iter().flat_map(|set| ["--set", *set]).collect();
     workshop.pliant(&[&["check", "case"], options.as_slice()].concat())
 }

@@ -1,7 +1,7 @@
 //! `pliant mesh --as shells`, then `pliant run` with a pressure on what it wrote: closed surfaces with a flap, a thin gap and a sharp rim.
 //! Organs from files are read through `PLIANT_DATA`; without it that test prints a notice and passes.
 
-use crate::support::{Told, Workshop};
+use crate::support::{Said, Workshop};
 use pliant_geometry::{CellKind, Mesh, Vector3, io};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, ImplicitField, TriangleMesh};
 
@@ -90,14 +90,14 @@ fn normals(mesh: &Mesh) -> (f64, usize) {
 }
 
 /// Makes shells of a body and runs them under pressure; the report of the fit, and what the run says.
-fn pressed(body: Body, goal: [&str; 2]) -> (serde_json::Value, Mesh, Told) {
+fn pressed(body: Body, goal: [&str; 2]) -> (serde_json::Value, Mesh, Said) {
     let surface = TriangleMesh::of_field(&body, 0.001, DEFAULT_CELL_LIMIT).unwrap();
     let workshop = Workshop::new(SCENE);
     io::write(&workshop.path("body.ply"), &surface.to_mesh()).unwrap();
     pressed_file(&workshop, "body.ply", &goal)
 }
 
-fn pressed_file(workshop: &Workshop, file: &str, more: &[&str]) -> (serde_json::Value, Mesh, Told) {
+fn pressed_file(workshop: &Workshop, file: &str, more: &[&str]) -> (serde_json::Value, Mesh, Said) {
     let words = ["mesh", file, "--as", "shells", "-o", "shells.vtu", "--json"];
     let told = workshop.pliant(&[&words, more].concat());
     let done = told.done();

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::support::{BLOCK, Told, Workshop, changed};
+use crate::support::{BLOCK, Said, Workshop, changed};
 
 /// A run of many seconds that writes often.
 fn long() -> Workshop {
@@ -49,7 +49,7 @@ fn sigterm_and_sighup_end_a_run_as_ctrl_c_does() {
         };
         let child = started(&workshop, &mut command);
         send(signal, &child);
-        let told = Told::from(child.wait_with_output().unwrap());
+        let told = Said::from(child.wait_with_output().unwrap());
         assert_eq!((told.code, &told.json()["status"]), (code, &"interrupted".into()), "{}", told.err);
         assert!(told.words().contains("go on with `--resume out/case/checkpoint-"), "{}", told.err);
         assert!(workshop.read("out/case/summary.md").contains("**Interrupted**"));
@@ -66,7 +66,7 @@ fn a_run_under_nohup_outlives_the_terminal() {
     command.arg(env!("CARGO_BIN_EXE_pliant")).args(["run", "case", "--json"]).current_dir(workshop.path(""));
     let child = started(&workshop, &mut command);
     send("-HUP", &child);
-    Told::from(child.wait_with_output().unwrap()).done();
+    Said::from(child.wait_with_output().unwrap()).done();
 }
 
 #[test]
@@ -183,7 +183,7 @@ fn standard_error_that_cannot_be_written_stops_no_run() {
     let full = || Stdio::from(File::options().write(true).open("/dev/full").unwrap());
     let workshop = doubtful();
     let output = workshop.command(&["run", "case", "--json"]).stderr(full()).output().unwrap();
-    Told::from(output).done();
+    Said::from(output).done();
     // A pipe that nobody reads.
     let closed = || {
         let mut child = Command::new("true").stdin(Stdio::piped()).spawn().unwrap();
@@ -192,15 +192,15 @@ fn standard_error_that_cannot_be_written_stops_no_run() {
         Stdio::from(pipe)
     };
     let output = workshop.command(&["run", "case", "--json", "--force"]).stderr(closed()).output().unwrap();
-    Told::from(output).done();
+    Said::from(output).done();
     let shell = "exec \"$0\" run case --json --force 2>&-";
     let mut command = Command::new("sh");
     command.args(["-c", shell, env!("CARGO_BIN_EXE_pliant")]).current_dir(workshop.path(""));
-    Told::from(command.output().unwrap()).done();
+    Said::from(command.output().unwrap()).done();
     // Only the exit code reports the error.
     workshop.write("case/scene.toml", "until = ");
     let output = workshop.command(&["check", "case"]).stderr(full()).output().unwrap();
-    assert_eq!(Told::from(output).code, 2);
+    assert_eq!(Said::from(output).code, 2);
 }
 
 #[test]
@@ -210,7 +210,7 @@ fn standard_output_that_cannot_be_written_is_reported() {
     let workshop = Workshop::new(BLOCK);
     for arguments in [&["schema"][..], &["run", "case"], &["run", "case", "--json", "--force"]] {
         let output = workshop.command(arguments).stdout(full()).output().unwrap();
-        let told = Told::from(output);
+        let told = Said::from(output);
         assert_eq!(told.code, 1, "{arguments:?}: {}", told.err);
         assert!(told.err.contains("error: standard output cannot be written"), "{}", told.err);
     }
@@ -244,7 +244,7 @@ fn what_killed_runs_left_unfinished_is_removed() {
 }
 
 /// Runs the binary, which must not wait for ever.
-fn within_seconds(workshop: &Workshop, arguments: &[&str]) -> Told {
+fn within_seconds(workshop: &Workshop, arguments: &[&str]) -> Said {
     let mut command = workshop.command(arguments);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let patience = Instant::now();

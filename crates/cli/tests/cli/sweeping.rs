@@ -4,9 +4,9 @@ use std::fs;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::support::{BLOCK, Told, Workshop};
+use crate::support::{BLOCK, Said, Workshop};
 
-fn sweep(workshop: &Workshop, arguments: &[&str]) -> Told {
+fn sweep(workshop: &Workshop, arguments: &[&str]) -> Said {
     workshop.pliant(&[&["sweep", "case"], arguments].concat())
 }
 
@@ -129,7 +129,7 @@ fn ctrl_c_ends_a_sweep_with_what_it_has() {
     }
     let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
     assert!(killed.unwrap().success());
-    let told = Told::from(child.wait_with_output().unwrap());
+    let told = Said::from(child.wait_with_output().unwrap());
     assert_eq!(told.code, 130, "{}", told.err);
     assert!(told.words().contains("the table contains the finished runs"), "{}", told.err);
     let rows = workshop.cells("out/case-sweep/sweep.csv");

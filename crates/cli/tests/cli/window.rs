@@ -12,7 +12,7 @@ use pliant_viewer::{Break, Recording};
 
 use x11rb::protocol::xproto::ConnectionExt as _;
 
-use crate::support::{BLOCK, Told, Workshop, changed, has_gpu};
+use crate::support::{BLOCK, Said, Workshop, changed, has_gpu};
 
 /// A screen, closed on drop.
 struct Screen {
@@ -49,7 +49,7 @@ impl Drop for Screen {
 /// A window whose pixels take a software adapter little time.
 const SMALL: &[&str] = &["--size", "800x600"];
 
-fn view(workshop: &Workshop, screen: &Screen, more: &[&str]) -> Told {
+fn view(workshop: &Workshop, screen: &Screen, more: &[&str]) -> Said {
     let mut command = workshop.command(&[&["view", "case"], more].concat());
     command.env("DISPLAY", &screen.display).env_remove("WAYLAND_DISPLAY");
     command.output().expect("the binary starts").into()
@@ -200,7 +200,7 @@ fn the_window_takes_a_picture_of_itself_and_reads_a_scene_that_changed_while_it_
         command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary starts")
     };
     let window = start("0.1");
-    let told: Told = window.wait_with_output().unwrap().into();
+    let told: Said = window.wait_with_output().unwrap().into();
     assert_eq!(told.code, 0, "{}", told.err);
     assert!(told.out.starts_with("A ball at t = "), "{}", told.out);
     assert!(std::fs::read(workshop.path("window.png")).unwrap().starts_with(b"\x89PNG"));
@@ -209,7 +209,7 @@ fn the_window_takes_a_picture_of_itself_and_reads_a_scene_that_changed_while_it_
     let window = start("8");
     std::thread::sleep(Duration::from_secs(5));
     workshop.write("case/scene.toml", changed(BALL, "A ball", "Another ball"));
-    let told: Told = window.wait_with_output().unwrap().into();
+    let told: Said = window.wait_with_output().unwrap().into();
     assert_eq!(told.code, 0, "{}", told.err);
     assert!(told.out.starts_with("Another ball at t = "), "{}", told.out);
     assert!(told.out.contains("the scene was read anew"), "{}", told.out);
@@ -229,7 +229,7 @@ fn a_finished_run_is_looked_at_over_its_timeline() {
     let workshop = Workshop::new(&format!("{BALL}{fields}"));
     let told = workshop.pliant(&["run", "case", "--until", "0.2", "--out", "out"]);
     assert_eq!(told.code, 0, "{}", told.err);
-    let open = |what: &str, more: &[&str]| -> Told {
+    let open = |what: &str, more: &[&str]| -> Said {
         let mut command = workshop.command(&[&["view", what], more].concat());
         command.env("DISPLAY", &screen.display).env_remove("WAYLAND_DISPLAY");
         command.output().expect("the binary starts").into()
@@ -254,7 +254,7 @@ fn a_finished_run_is_looked_at_over_its_timeline() {
 fn without_a_screen_it_says_what_it_needs() {
     let workshop = Workshop::new(BLOCK);
     let mut command = workshop.command(&[&["view", "case", "--rehearse"][..], SMALL].concat());
-    let told: Told = command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").output().unwrap().into();
+    let told: Said = command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").output().unwrap().into();
     assert_eq!(told.code, 2, "{}", told.err);
     assert!(
         told.err.contains("no window can be opened") && told.err.contains("pliant render"),

@@ -1,6 +1,6 @@
 //! Names, ranges, masks and units in `pliant labels`, `pliant mesh` and scenes of scans, and the replies.
 
-use crate::support::{BLOCK, Told, Workshop};
+use crate::support::{BLOCK, Said, Workshop};
 #[allow(dead_code)]
 use pliant_geometry::io;
 use pliant_meshing::sphere;
@@ -40,12 +40,12 @@ fn workshop() -> Workshop {
 }
 
 /// `pliant mesh … --edge 8mm -o out.vtu --json`
-fn mesh(workshop: &Workshop, more: &[&str]) -> Told {
+fn mesh(workshop: &Workshop, more: &[&str]) -> Said {
     workshop.pliant(&[&["mesh", "--edge", "8mm", "-o", "out.vtu", "--json"], more].concat())
 }
 
 #[track_caller]
-fn refused(told: &Told, says: &[&str]) {
+fn refused(told: &Said, says: &[&str]) {
     assert_eq!(told.code, 2, "{}{}", told.err, told.out);
     for part in says {
         assert!(told.words().contains(part), "no `{part}` in: {}", told.err);
@@ -54,7 +54,7 @@ fn refused(told: &Told, says: &[&str]) {
 
 /// Labels of the materials of a mesh that was made.
 #[track_caller]
-fn materials(told: &Told) -> Vec<i64> {
+fn materials(told: &Said) -> Vec<i64> {
     assert_eq!(told.code, 0, "{}", told.err);
     told.json()["materials"].as_array().unwrap().iter().map(|one| one["label"].as_i64().unwrap()).collect()
 }
@@ -305,4 +305,16 @@ fn pipes_are_refused_at_once() {
         assert!(made.is_ok_and(|status| status.success()));
         refused(&mesh(&workshop, &[name, "--label", "1"]), &["not a regular file"]);
     }
+}
+
+#[test]
+fn commands_of_the_laboratory_are_answered_with_the_ones_to_type() {
+    let workshop = Workshop::new("");
+    let said = workshop.pliant(&["reproduce", "--only", "fig-6.3", "--help"]);
+    assert_eq!(said.code, 2);
+    let typed = "`cargo run --release -p pliant-lab -- reproduce --only fig-6.3 --help`";
+    assert!(said.words().contains(typed), "{}", said.err);
+    let said = workshop.pliant(&["bench", "--json"]);
+    assert_eq!((said.code, said.json()["status"].as_str()), (2, Some("failed")), "{}", said.out);
+    assert!(!workshop.pliant(&["--help"]).out.contains("reproduce"));
 }

@@ -149,7 +149,7 @@ mod tests {
     /// there is a tenth of the first one at most.
     #[test]
     fn times_of_impact_are_never_late_and_seldom_early() {
-        let text = include_str!("../../../../validation/data/coupling/ipc_primitives.json");
+        let text = include_str!("../../../../lab/validation/data/coupling/ipc_primitives.json");
         let reference: Value = serde_json::from_str(text).unwrap();
         let (mut early, mut lowest) = (0, 1.0_f64);
         for case in reference["ccd_cases"].as_array().unwrap() {

@@ -209,7 +209,7 @@ mod tests {
     }
 
     fn reference() -> Value {
-        let text = include_str!("../../../../validation/data/coupling/ipc_primitives.json");
+        let text = include_str!("../../../../lab/validation/data/coupling/ipc_primitives.json");
         serde_json::from_str(text).unwrap()
     }
 

@@ -3,7 +3,7 @@
 //! changes a bit.
 //!
 //! Cells lie in packs of [`PACK`], number by number, the last pack filled up with cells of no volume. History lies so too, in the state
-//! and in checkpoints. The cost is counted in `crates/bench/src/count.rs`. Runs on the current rayon pool.
+//! and in checkpoints. The cost is counted in `lab/bench/src/count.rs`. Runs on the current rayon pool.
 //!
 //! A force field works through batches of four packs of points (`batch.rs`): displacement gradients, then stresses of the law, then nodal forces. So
 //! elements and laws are each compiled once per kind of lanes, never each law in each element, and the law is chosen once per batch.

@@ -98,7 +98,7 @@ fn pressed(edges: u32, thickness: f64, approach: f64, steps: u32) -> Vec<[f64; 2
 
 /// The force at an approach, of the elastica reference.
 fn reference(approach: f64) -> f64 {
-    let text = include_str!("../../../../validation/data/coupling/elastica_contact.json");
+    let text = include_str!("../../../../lab/validation/data/coupling/elastica_contact.json");
     let all: serde_json::Value = serde_json::from_str(text).unwrap();
     let number = |row: &serde_json::Value, key: &str| row[key].as_f64().unwrap();
     let rows = all["ring"]["rows"].as_array().unwrap();

@@ -77,7 +77,7 @@ fn broken_models_give_errors() {
         let error = import_bytes(nowhere, &bytes).map(|_| ()).unwrap_err();
         println!("{name}: {error}");
     }
-    let seed = fs::read(folder().join("../../../../validation/data/niftysim/H8_NH.xml")).unwrap();
+    let seed = fs::read(folder().join("../../../../lab/validation/data/niftysim/H8_NH.xml")).unwrap();
     assert!(import_bytes(nowhere, &seed).is_ok());
     let (before, mut noise, mut outcomes) = (PeakMemory::now(), Random::new(20_261_122), [0; 2]);
     for _ in 0..1500 {

@@ -14,7 +14,7 @@ use pliant_scene::Built;
 use pliant_testing::Random;
 
 fn sample(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../validation/data/niftysim").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../lab/validation/data/niftysim").join(name)
 }
 
 /// A folder that is removed when a test ends.
