@@ -268,3 +268,15 @@ fn a_run_of_more_than_a_day_asks_for_consent() {
     child.kill().unwrap();
     child.wait().unwrap();
 }
+
+#[test]
+fn commands_of_the_laboratory_are_answered_with_the_ones_to_type() {
+    let workshop = Workshop::new("");
+    let said = workshop.pliant(&["reproduce", "--only", "fig-6.3", "--help"]);
+    assert_eq!(said.code, 2);
+    let typed = "`cargo run --release -p pliant-lab -- reproduce --only fig-6.3 --help`";
+    assert!(said.words().contains(typed), "{}", said.err);
+    let said = workshop.pliant(&["bench", "--json"]);
+    assert_eq!((said.code, said.json()["status"].as_str()), (2, Some("invalid")), "{}", said.out);
+    assert!(!workshop.pliant(&["--help"]).out.contains("reproduce"));
+}

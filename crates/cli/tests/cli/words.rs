@@ -306,15 +306,3 @@ fn pipes_are_refused_at_once() {
         refused(&mesh(&workshop, &[name, "--label", "1"]), &["not a regular file"]);
     }
 }
-
-#[test]
-fn commands_of_the_laboratory_are_answered_with_the_ones_to_type() {
-    let workshop = Workshop::new("");
-    let said = workshop.pliant(&["reproduce", "--only", "fig-6.3", "--help"]);
-    assert_eq!(said.code, 2);
-    let typed = "`cargo run --release -p pliant-lab -- reproduce --only fig-6.3 --help`";
-    assert!(said.words().contains(typed), "{}", said.err);
-    let said = workshop.pliant(&["bench", "--json"]);
-    assert_eq!((said.code, said.json()["status"].as_str()), (2, Some("failed")), "{}", said.out);
-    assert!(!workshop.pliant(&["--help"]).out.contains("reproduce"));
-}
