@@ -22,96 +22,49 @@
 
 // Units stand in brackets; rustdoc takes [m] for a link.
 
-mod anatomy;
-mod assessment;
-mod boxes;
-mod complex;
-mod crossings;
-mod curvature;
-mod cut;
-mod decimate;
-mod deviation;
-mod edges;
-mod enclosed;
 mod error;
-mod extent;
-mod field;
-mod flip;
-mod given;
-mod grading;
-mod guard;
-mod hausdorff;
-mod isosurface;
-mod lattice;
-mod lens;
-mod long_edges;
-mod lost;
-mod manifold;
-mod missed;
-mod near_materials;
-mod nesting;
-mod octree;
-#[cfg(feature = "imaging")]
-mod of_image;
-mod optimise;
-mod percentiles;
-mod phantom;
-mod regions;
-mod remesh;
-mod request;
-mod sampled;
-mod sheets;
+mod input;
+mod report;
+mod shapes;
 mod shells;
-mod soundness;
-mod stencil;
-mod structured;
-mod stuffing;
-mod surface_volume;
-mod surfaces;
-mod taubin;
-mod tears;
+mod surface;
 mod tets;
-mod thickness;
-mod topology;
-mod triangles;
-mod voxels;
-mod winding;
 
 use pliant_geometry::Mesh;
 
-pub use anatomy::Anatomy;
-pub use assessment::Assessment;
-pub use complex::MOST_MATERIALS;
-pub use curvature::Curvature;
-pub use decimate::Fewer;
-pub use deviation::Deviation;
-pub use enclosed::{Closing, Enclosed, EnclosedReport};
 pub use error::MeshingError;
-pub use extent::require_room_for;
-pub use field::{Ellipsoid, ImplicitField};
-pub use given::MeasuredTo;
-pub use hausdorff::Hausdorff;
-pub use lens::Lens;
-pub use missed::Missed;
+pub use input::anatomy::Anatomy;
+pub use input::enclosed::{Closing, Enclosed, EnclosedReport};
+pub use input::extent::require_room_for;
+pub use input::field::{Ellipsoid, ImplicitField};
+pub use input::given::MeasuredTo;
 #[cfg(feature = "imaging")]
-pub use of_image::{SURFACE_PAIRS, SURFACE_SMOOTHING};
-pub use percentiles::Percentiles;
-pub use phantom::{Organ, Phantom, brain_label};
-pub use regions::{InterfaceReport, LabelReport, Regions};
-pub use request::OrganTets;
-pub use sampled::SampledDistances;
-pub use sheets::{Distortion, Pattern, Sheet, sphere};
+pub use input::of_image::{SURFACE_PAIRS, SURFACE_SMOOTHING};
+pub use report::assessment::Assessment;
+pub use report::deviation::Deviation;
+pub use report::hausdorff::Hausdorff;
+pub use report::percentiles::Percentiles;
+pub use report::regions::{InterfaceReport, LabelReport, Regions};
+pub use report::soundness::SurfaceCheck;
+pub use shapes::lens::Lens;
+pub use shapes::phantom::{Organ, Phantom, brain_label};
+pub use shapes::sheets::{Distortion, Pattern, Sheet, sphere};
+pub use shapes::structured::{Block, Resolution, Tube, VolumeCell};
 pub use shells::{FitProgress, FittedShells, Flaw, ShellGoal, ShellReport};
-pub use soundness::SurfaceCheck;
-pub use structured::{Block, Resolution, Tube, VolumeCell};
-pub use stuffing::Stuffing;
-pub use surface_volume::{LabelVolume, SurfaceVolume};
-pub use tets::{
+pub use surface::curvature::Curvature;
+pub use surface::decimate::Fewer;
+pub use surface::sampled::SampledDistances;
+pub use surface::surface_volume::{LabelVolume, SurfaceVolume};
+pub use surface::thickness::Thickness;
+pub use surface::triangles::{SurfaceRepairs, TriangleMesh};
+pub use tets::complex::MOST_MATERIALS;
+pub use tets::missed::Missed;
+pub use tets::organ::{
     DistanceReport, EdgeLengths, LostReport, MaterialReport, OrganMesh, Repairs, Steps, Tears, TetReport,
 };
-pub use thickness::Thickness;
-pub use triangles::{SurfaceRepairs, TriangleMesh};
-pub use voxels::Voxels;
+pub use tets::request::OrganTets;
+pub use tets::stuffing::Stuffing;
+pub use tets::voxels::Voxels;
 
 /// Cells allowed in a mesh unless the caller says otherwise. Limits above 2²⁵ (34 million) act as 2²⁵.
 pub const DEFAULT_CELL_LIMIT: usize = 5_000_000;

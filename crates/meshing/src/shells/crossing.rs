@@ -12,8 +12,8 @@ use rstar::{AABB, RTree, primitives::Rectangle};
 use super::Shells;
 use super::effort::Effort;
 use super::measure::pieces;
-use crate::crossings::crossing_groups;
-use crate::hausdorff::lattice;
+use crate::report::hausdorff::lattice;
+use crate::surface::crossings::crossing_groups;
 
 /// Parts of an edge between the corners of pieces: while the fit goes on, and at its end if the shells are few.
 pub(super) const COARSE: usize = 4;

@@ -11,7 +11,7 @@ use super::measure::Distances;
 use super::part::Part;
 use super::target::Target;
 use super::{POOR, Shells, worst};
-use crate::edges::key;
+use crate::surface::edges::key;
 
 /// Where edges collapse, distances stay below this part of the largest.
 const SPARE: f64 = 0.75;
@@ -253,7 +253,7 @@ mod tests {
     use pliant_geometry::Vector3;
 
     use super::*;
-    use crate::triangles::TriangleMesh;
+    use crate::surface::triangles::TriangleMesh;
     use crate::{DEFAULT_CELL_LIMIT, ImplicitField, sphere};
 
     /// A ball of 20 mm with a knob of 5 mm on it, joined smoothly over 4 mm.

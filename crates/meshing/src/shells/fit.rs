@@ -12,7 +12,7 @@ use super::measure::Landing;
 use super::solve::{POWER, Row, ShellBlock, UNKNOWNS, solve};
 use super::target::Target;
 use super::{LEAST_SHAPE, Shells};
-use crate::hausdorff::lattice;
+use crate::report::hausdorff::lattice;
 
 /// Parts of an edge between the places of a shell at which it is fitted.
 const PARTS: usize = 5;

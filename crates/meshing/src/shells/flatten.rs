@@ -70,7 +70,7 @@ impl Shells {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::triangles::TriangleMesh;
+    use crate::surface::triangles::TriangleMesh;
 
     /// Two squares 0.13 apart, of four triangles each, with normals of which the shells of each bulge by 0.08 towards the other.
     fn bulging() -> Shells {

@@ -9,8 +9,8 @@ use super::effort::{Effort, LANDING};
 use super::report::{Flaw, ShellReport};
 use super::target::{Detail, FACING, Target};
 use super::{FittedShells, ShellGoal, Shells};
-use crate::hausdorff::{Hausdorff, Sample, distance, lattice, locator, samples, spread};
-use crate::triangles::shape;
+use crate::report::hausdorff::{Hausdorff, Sample, distance, lattice, locator, samples, spread};
+use crate::surface::triangles::shape;
 
 /// Parts of an edge of the flat triangles among which the nearest place of the shells is looked for.
 const FACETS: usize = 8;

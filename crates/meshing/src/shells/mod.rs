@@ -30,7 +30,7 @@ mod upright;
 use pliant_geometry::{CurvedTriangle, EdgeRule, Mesh, Vector3};
 
 use crate::error::{MeshingError, require_positive};
-use crate::triangles::TriangleMesh;
+use crate::surface::triangles::TriangleMesh;
 use effort::Effort;
 use measure::Distances;
 pub use report::{Flaw, ShellReport};

@@ -6,7 +6,7 @@ use super::effort::Effort;
 use super::fit::frame;
 use super::target::Target;
 use super::{LEAST_SHAPE, Shells};
-use crate::triangles::{cross, shape};
+use crate::surface::triangles::{cross, shape};
 
 /// Triangles of a better shape than this are left alone by moves that would make them worse.
 const GOOD_SHAPE: f64 = 0.75;

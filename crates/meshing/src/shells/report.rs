@@ -6,7 +6,7 @@ use pliant_geometry::Vector3;
 use serde::Serialize;
 
 use crate::error::counted;
-use crate::hausdorff::Hausdorff;
+use crate::report::hausdorff::Hausdorff;
 
 /// How close shells are to their target, and of what shape.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -4,7 +4,7 @@
 use pliant_geometry::DisjointSets;
 
 use super::ShellGoal;
-use crate::triangles::TriangleMesh;
+use crate::surface::triangles::TriangleMesh;
 
 /// Faces that meet at more than this angle [rad] make a sharp edge: the angle at which shells without given normals have creases.
 const SHARP: f64 = std::f64::consts::FRAC_PI_4;

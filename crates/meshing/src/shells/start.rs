@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use super::ShellGoal;
 use super::target::Target;
-use crate::hausdorff::{distance, locator};
-use crate::triangles::TriangleMesh;
+use crate::report::hausdorff::{distance, locator};
+use crate::surface::triangles::TriangleMesh;
 
 /// Shells to start from where an error is asked for.
 const START: usize = 100;

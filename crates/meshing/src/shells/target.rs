@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use pliant_geometry::Vector3;
 use rayon::prelude::*;
 
-use crate::hausdorff::{Sample, samples};
-use crate::remesh::Reference;
-use crate::triangles::TriangleMesh;
+use crate::report::hausdorff::{Sample, samples};
+use crate::surface::remesh::Reference;
+use crate::surface::triangles::TriangleMesh;
 
 /// Points of the target at most that are looked at in each round, and when all seems well.
 const MOST_COARSE: usize = 20_000;

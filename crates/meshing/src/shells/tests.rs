@@ -75,7 +75,7 @@ fn shells_whose_triangles_cross_are_fitted_again_from_some_that_never_did() {
     let crossing = |uncrossed: usize| {
         let start = Starts::new(&mesh, goal, &target, uncrossed).first;
         let (points, triangles) = start.compact();
-        crate::crossings::crossings(&points, &triangles).0.len()
+        crate::surface::crossings::crossings(&points, &triangles).0.len()
     };
     assert!(crossing(60) > 0);
     assert_eq!(crossing(usize::MAX), 0);

@@ -1,0 +1,8 @@
+//! How far a mesh is from its body.
+
+pub(crate) mod assessment;
+pub(crate) mod deviation;
+pub(crate) mod hausdorff;
+pub(crate) mod percentiles;
+pub(crate) mod regions;
+pub(crate) mod soundness;
