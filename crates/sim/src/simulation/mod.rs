@@ -1,210 +1,32 @@
 //! A simulation: a world and its state, brought from one common instant of all participants to the next, each at its own step.
 
+mod observer;
+mod state;
+mod world;
+
 use std::sync::Arc;
 
 use pliant_contact::pose::Leg;
-use pliant_explicit::{Clock, Wanted};
-use pliant_mechanics::count::is_time;
+use pliant_explicit::Wanted;
 use pliant_mechanics::grip::Grip;
-use pliant_mechanics::model::Enclosed;
 use pliant_mechanics::tensor::Vector;
 use pliant_mechanics::{Energies, Model, StopFlag, fingerprint};
-use serde::{Deserialize, Serialize};
 
+pub use self::observer::{Frame, Observer};
+pub use self::state::State;
+use self::state::{Between, OwnState};
+pub use self::world::World;
 #[cfg(feature = "gpu")]
 use crate::device::OnDevice;
 use crate::failure::Failure;
-use crate::guests::{GuestMemory, Guests, GuestsNow, Meetings};
+use crate::guests::{GuestsNow, Meetings};
 use crate::instant::Instant;
-use crate::kept::Kept;
 use crate::part::Part;
 use crate::participant::Participant;
-use crate::penalty::{PenaltyTie, Springs, TieMemory, TieNow};
+use crate::penalty::{Springs, TieNow};
 use crate::schedule::steps_to;
 use crate::solver::LoadStepProgress;
 use crate::start::{Before, begin, go_on};
-
-/// The participants of a simulation: constant while it runs.
-#[derive(Clone, Debug)]
-pub struct World {
-    /// Bodies that one stepper advances together: at least one participant.
-    pub parts: Vec<Part>,
-    /// Ties between participants.
-    pub ties: Vec<PenaltyTie>,
-    /// Nodes of participants that others touch.
-    pub guests: Vec<Guests>,
-}
-
-impl World {
-    /// Participants that meet at common instants: the steps of each become a multiple of those of the participant with the fewest.
-    /// All have the same duration.
-    pub fn new(mut parts: Vec<Part>) -> Self {
-        let common = parts.iter().map(|part| part.steps.number).min().unwrap_or(1);
-        for part in &mut parts {
-            let duration = part.steps.step * part.steps.number as f64;
-            part.steps.meet(common, duration);
-        }
-        Self { parts, ties: Vec::new(), guests: Vec::new() }
-    }
-
-    /// A fingerprint of its bodies with their meshes, and of its tools and obstacles, by name; not of laws, loads or steps.
-    pub fn fingerprint_of_bodies(&self) -> u64 {
-        fn of(part: &Part) -> (Vec<(String, u64)>, Vec<&str>) {
-            let things = part.method.contacts().into_iter().flat_map(|all| &all.rigids);
-            (meshes(&part.model), things.map(|rigid| rigid.name.as_str()).collect())
-        }
-        fingerprint(&self.parts.iter().map(of).collect::<Vec<_>>())
-    }
-
-    /// Steps of each participant between two common instants.
-    fn ratios(&self) -> Vec<u64> {
-        let numbers = || self.parts.iter().map(|part| part.steps.number.max(1));
-        let common = numbers().min().unwrap_or(1);
-        numbers().map(|number| number / common).collect()
-    }
-
-    /// Whether the steps of a participant are cut where they are too long, so that those of a run can be halved.
-    pub fn cuts_steps(&self) -> bool {
-        self.parts.iter().any(Part::cuts_steps)
-    }
-
-    /// Whether shorter steps may avoid a failure: of a participant whose steps are cut.
-    pub fn shorter_steps_may_avoid(&self, failure: &Failure) -> bool {
-        let of_body = |part: &Part| {
-            part.model.bodies.iter().any(|body| failure.body.as_deref() == Some(body.name.as_str()))
-        };
-        matches!(failure.kind, "not-finite" | "inverted" | "unbalanced" | "unstable")
-            && self.parts.iter().any(|part| part.cuts_steps() && of_body(part))
-    }
-
-    /// Length [s] of the step of all from a time [s] on.
-    fn step_from(&self, time: f64) -> f64 {
-        let slowest = self.parts.iter().min_by_key(|part| part.steps.number);
-        slowest.map_or(0.0, |part| part.steps.step_from(time))
-    }
-}
-
-impl From<Part> for World {
-    fn from(part: Part) -> Self {
-        Self { parts: vec![part], ties: Vec::new(), guests: Vec::new() }
-    }
-}
-
-impl From<Part> for Arc<World> {
-    fn from(part: Part) -> Self {
-        Self::new(part.into())
-    }
-}
-
-/// The state of a simulation between two steps: a snapshot of all that another one needs to go on from there.
-#[derive(Clone, Debug)]
-pub struct State(Vec<OwnState>, Between);
-
-/// What a restart needs of ties and contacts between participants.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-struct Between {
-    ties: TieMemory,
-    guests: GuestMemory,
-}
-
-impl Between {
-    /// Whether participants have neither ties nor contacts.
-    fn is_empty(&self) -> bool {
-        self.ties.is_empty() && self.guests.is_empty()
-    }
-
-    fn fits(&self, world: &World) -> bool {
-        self.ties.fits(&world.ties) && self.guests.fits(&world.guests)
-    }
-}
-
-/// That of a participant.
-#[derive(Clone, Debug)]
-struct OwnState {
-    kept: Kept,
-    clock: Option<Clock>,
-    /// Length of its steps [s].
-    step: f64,
-}
-
-impl OwnState {
-    /// How its steps are counted, and their length [s].
-    fn steps(&self) -> Option<(Clock, f64)> {
-        self.clock.map(|clock| (clock, self.step))
-    }
-}
-
-impl State {
-    /// The state of each participant as bytes, as [`Simulation::encode`] has it.
-    ///
-    /// # Errors
-    /// If a state can't be encoded.
-    pub fn encode(&self) -> postcard::Result<Vec<Vec<u8>>> {
-        let Self(parts, between) = self;
-        let alone = between.is_empty();
-        let between = (!alone).then(|| postcard::to_stdvec(between));
-        let of = |own: &OwnState| {
-            let steps = postcard::to_stdvec(&own.steps())?;
-            Ok([steps, own.kept.encode()?].concat())
-        };
-        parts.iter().map(of).chain(between).collect()
-    }
-
-    /// Its time [s].
-    pub fn time(&self) -> f64 {
-        self.0.first().map_or(0.0, |own| own.kept.at().0)
-    }
-
-    /// Halves the steps of all participants of its world that [cut theirs](World::cuts_steps) from here on. False where there are none, or
-    /// where that was done [three times](pliant_explicit::stability::MOST_HALVINGS).
-    pub fn halve_steps(&mut self, world: &World) -> bool {
-        let mut cut = self.0.iter_mut().zip(&world.parts).filter(|(_, part)| part.cuts_steps()).peekable();
-        cut.peek().is_some() && cut.all(|(own, _)| own.kept.halve_steps())
-    }
-
-    /// Whether it is one of a world.
-    ///
-    /// # Errors
-    /// If not.
-    fn check(&self, world: &World) -> Result<(), Failure> {
-        let Self(parts, between) = self;
-        let is_own = parts.len() == world.parts.len()
-            && between.fits(world)
-            && parts.iter().zip(&world.parts).all(|(own, part)| own.kept.fits(part));
-        if is_own { Ok(()) } else { Err(Failure::input(&"the state is of another model")) }
-    }
-
-    /// The state whose participants were [encoded](Simulation::encode); `None` where these bytes are none of this world.
-    pub fn decode<B: AsRef<[u8]>>(world: &World, bytes: &[B]) -> Option<Self> {
-        let (participants, between) = bytes.split_at_checked(world.parts.len())?;
-        let between: Between = match between {
-            [] => Between::default(),
-            [between] => postcard::from_bytes(between.as_ref()).ok()?,
-            _ => return None,
-        };
-        let of = |(part, bytes): (&Part, &B)| {
-            let (steps, bytes) = postcard::take_from_bytes::<Option<(Clock, f64)>>(bytes.as_ref()).ok()?;
-            let kept = Kept::decode(part, bytes)?;
-            let done = kept.at().1;
-            let fits = |&(clock, step): &(Clock, f64)| {
-                clock.steps <= done
-                    && is_time(clock.since, step)
-                    && clock.before.is_finite()
-                    && step.is_finite()
-            };
-            if !steps.iter().all(fits) {
-                return None;
-            }
-            Some(OwnState {
-                kept,
-                clock: steps.map(|of| of.0),
-                step: steps.map_or(part.steps.step, |of| of.1),
-            })
-        };
-        let parts = world.parts.iter().zip(participants).map(of).collect::<Option<_>>()?;
-        between.fits(world).then_some(Self(parts, between))
-    }
-}
 
 /// A world under way. It owns all it needs, so it can be kept anywhere and moved to another thread. After a failure it stays at the last
 /// good instant.
@@ -911,80 +733,6 @@ impl Simulation {
     }
 }
 
-/// Looks at a run ([`Simulation::observe`]) and changes nothing.
-///
-/// An observer that samples the height of a body every tenth of a second:
-///
-/// ```
-/// use pliant_sim::{Failure, Observer, Schedule, Simulation};
-///
-/// struct Height {
-///     schedule: Schedule,
-///     samples: Vec<f64>,
-/// }
-///
-/// impl Observer for Height {
-///     fn stride(&self, simulation: &Simulation) -> u64 {
-///         self.schedule.stride(simulation.time(), simulation.step_length())
-///     }
-///
-///     fn see(&mut self, simulation: &Simulation, last: bool) -> Result<(), Failure> {
-///         if self.schedule.is_due(simulation.time(), simulation.step_length(), last) {
-///             self.samples.extend(simulation.instants().map(|now| now.displacement(3)[2]));
-///         }
-///         Ok(())
-///     }
-/// }
-/// # use pliant_mechanics::Model;
-/// # use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
-/// # use pliant_mechanics::load::Load;
-/// # use pliant_mechanics::model::{Cells, Material, Solid};
-/// # let mut model = Model::default();
-/// # let tet = model.add_body("tet", &[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]);
-/// # let law = AnyLaw::NeoHookean(NeoHookean { shear: 1000.0, volumetric: Volumetric::quadratic(10_000.0) });
-/// # let cells = Cells::tet4(vec![[0, 1, 2, 3]], &model.rest);
-/// # model.add_solid(Solid::new(tet, Material::elastic(law, 1000.0), cells));
-/// # model.fix("base", vec![0, 1, 2]);
-/// # model.loads.push(Load::gravity(tet, [0.0, 0.0, -9.81]));
-/// # let part = pliant_sim::Part::explicit("tet", model, 0.5)?;
-///
-/// let mut height = Height { schedule: Schedule::new(0.1), samples: Vec::new() };
-/// Simulation::new(part)?.observe(0.5, &mut height)?;
-/// assert_eq!(height.samples.len(), 6);
-/// # Ok::<(), Failure>(())
-/// ```
-pub trait Observer {
-    /// The most common steps from here that miss no instant it has to see; at least one.
-    fn stride(&self, _simulation: &Simulation) -> u64 {
-        1
-    }
-
-    /// What it reads at an instant, the last or not.
-    fn wanted(&self, _simulation: &Simulation, _last: bool) -> Wanted {
-        Wanted::Everything
-    }
-
-    /// Reads an instant whose forces are found.
-    ///
-    /// # Errors
-    /// Whatever shall end the run.
-    fn see(&mut self, simulation: &Simulation, last: bool) -> Result<(), Failure>;
-
-    /// Follows a step, or one that was stopped before its end and not taken. Forces are not found yet.
-    ///
-    /// # Errors
-    /// Whatever shall end the run.
-    fn stepped(&mut self, _simulation: &mut Simulation, _last: bool) -> Result<(), Failure> {
-        Ok(())
-    }
-
-    /// Follows a step that failed.
-    fn step_failed(&mut self, _simulation: &mut Simulation) {}
-
-    /// Hears how far a load step is.
-    fn watch(&mut self, _progress: LoadStepProgress) {}
-}
-
 #[cfg(feature = "gpu")]
 impl Simulation {
     /// Steps without read-backs and points on the GPU, where all bodies go together on one; `None` on the CPU.
@@ -1023,71 +771,4 @@ fn same_mesh(a: &Part, b: &Part) -> bool {
 /// Fingerprints of the meshes of a model.
 fn meshes(model: &Model) -> Vec<(String, u64)> {
     model.fingerprints().into_iter().filter(|(part, _)| part.starts_with("mesh of")).collect()
-}
-
-/// A simulation at an instant whose forces are found.
-#[derive(Clone, Copy)]
-pub struct Frame<'a> {
-    pub(crate) simulation: &'a Simulation,
-}
-
-impl<'a> Frame<'a> {
-    /// Time [s].
-    pub fn time(&self) -> f64 {
-        self.simulation.time()
-    }
-
-    /// The participants.
-    pub fn parts(&self) -> impl Iterator<Item = (&'a Part, &'a dyn Instant)> {
-        self.simulation.world.parts.iter().zip(self.simulation.instants())
-    }
-
-    /// Energies of all participants together [J].
-    pub fn energies(&self) -> Energies {
-        self.simulation.energies()
-    }
-
-    /// Displacements [m] of the nodes of a body; `None` without a body of this name.
-    pub fn displacements(&self, body: &str) -> Option<Vec<[f64; 3]>> {
-        self.nodal(body, |now, node| now.displacement(node))
-    }
-
-    /// Velocities [m/s] of the nodes of a body; `None` without a body of this name.
-    pub fn velocities(&self, body: &str) -> Option<Vec<[f64; 3]>> {
-        self.nodal(body, |now, node| now.velocity(node))
-    }
-
-    fn nodal(&self, body: &str, value: impl Fn(&dyn Instant, usize) -> [f64; 3]) -> Option<Vec<[f64; 3]>> {
-        let (now, nodes) = self.parts().find_map(|(part, now)| {
-            let found = part.model.bodies.iter().find(|own| own.name == body)?;
-            Some((now, found.nodes.clone()))
-        })?;
-        Some(nodes.map(|node| value(now, node as usize)).collect())
-    }
-
-    /// Force [N] by which a constraint holds or moves its nodes; `None` without one of this name.
-    pub fn reaction(&self, constraint: &str) -> Option<[f64; 3]> {
-        let forces = self.parts().flat_map(|(part, now)| {
-            let own = part.model.constraints.iter().enumerate().filter(|(_, own)| own.name == constraint);
-            own.map(|(index, _)| now.reaction(index))
-        });
-        forces.reduce(|a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]])
-    }
-
-    /// The volume that a constraint of volume encloses, and its pressure; `None` without one of this name.
-    pub fn enclosed(&self, constraint: &str) -> Option<Enclosed> {
-        self.parts().find_map(|(part, now)| {
-            let index = part.model.constraints.iter().position(|own| own.name == constraint)?;
-            now.enclosed(index)
-        })
-    }
-
-    /// Force [N] of a contact on the obstacle or tool that it is with; `None` without one of this name.
-    pub fn contact_force(&self, contact: &str) -> Option<[f64; 3]> {
-        self.parts().find_map(|(part, now)| {
-            let contacts = &part.method.contacts()?.contacts;
-            let index = contacts.iter().position(|own| own.name == contact)?;
-            now.contact_forces().get(index).copied()
-        })
-    }
 }

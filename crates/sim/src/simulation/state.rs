@@ -1,0 +1,121 @@
+//! Snapshots.
+
+use super::World;
+use crate::failure::Failure;
+use crate::guests::GuestMemory;
+use crate::kept::Kept;
+use crate::part::Part;
+use crate::penalty::TieMemory;
+use pliant_explicit::Clock;
+use pliant_mechanics::count::is_time;
+use serde::{Deserialize, Serialize};
+
+/// The state of a simulation between two steps: a snapshot of all that another one needs to go on from there.
+#[derive(Clone, Debug)]
+pub struct State(pub(super) Vec<OwnState>, pub(super) Between);
+
+/// What a restart needs of ties and contacts between participants.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub(super) struct Between {
+    pub(super) ties: TieMemory,
+    pub(super) guests: GuestMemory,
+}
+
+impl Between {
+    /// Whether participants have neither ties nor contacts.
+    pub(super) fn is_empty(&self) -> bool {
+        self.ties.is_empty() && self.guests.is_empty()
+    }
+
+    pub(super) fn fits(&self, world: &World) -> bool {
+        self.ties.fits(&world.ties) && self.guests.fits(&world.guests)
+    }
+}
+
+/// That of a participant.
+#[derive(Clone, Debug)]
+pub(super) struct OwnState {
+    pub(super) kept: Kept,
+    pub(super) clock: Option<Clock>,
+    /// Length of its steps [s].
+    pub(super) step: f64,
+}
+
+impl OwnState {
+    /// How its steps are counted, and their length [s].
+    pub(super) fn steps(&self) -> Option<(Clock, f64)> {
+        self.clock.map(|clock| (clock, self.step))
+    }
+}
+
+impl State {
+    /// The state of each participant as bytes, as [`Simulation::encode`] has it.
+    ///
+    /// # Errors
+    /// If a state can't be encoded.
+    pub fn encode(&self) -> postcard::Result<Vec<Vec<u8>>> {
+        let Self(parts, between) = self;
+        let alone = between.is_empty();
+        let between = (!alone).then(|| postcard::to_stdvec(between));
+        let of = |own: &OwnState| {
+            let steps = postcard::to_stdvec(&own.steps())?;
+            Ok([steps, own.kept.encode()?].concat())
+        };
+        parts.iter().map(of).chain(between).collect()
+    }
+
+    /// Its time [s].
+    pub fn time(&self) -> f64 {
+        self.0.first().map_or(0.0, |own| own.kept.at().0)
+    }
+
+    /// Halves the steps of all participants of its world that [cut theirs](World::cuts_steps) from here on. False where there are none, or
+    /// where that was done [three times](pliant_explicit::stability::MOST_HALVINGS).
+    pub fn halve_steps(&mut self, world: &World) -> bool {
+        let mut cut = self.0.iter_mut().zip(&world.parts).filter(|(_, part)| part.cuts_steps()).peekable();
+        cut.peek().is_some() && cut.all(|(own, _)| own.kept.halve_steps())
+    }
+
+    /// Whether it is one of a world.
+    ///
+    /// # Errors
+    /// If not.
+    pub(super) fn check(&self, world: &World) -> Result<(), Failure> {
+        let Self(parts, between) = self;
+        let is_own = parts.len() == world.parts.len()
+            && between.fits(world)
+            && parts.iter().zip(&world.parts).all(|(own, part)| own.kept.fits(part));
+        if is_own { Ok(()) } else { Err(Failure::input(&"the state is of another model")) }
+    }
+
+    /// The state whose participants were [encoded](Simulation::encode); `None` where these bytes are none of this world.
+    pub fn decode<B: AsRef<[u8]>>(world: &World, bytes: &[B]) -> Option<Self> {
+        let (participants, between) = bytes.split_at_checked(world.parts.len())?;
+        let between: Between = match between {
+            [] => Between::default(),
+            [between] => postcard::from_bytes(between.as_ref()).ok()?,
+            _ => return None,
+        };
+        let of = |(part, bytes): (&Part, &B)| {
+            let (steps, bytes) = postcard::take_from_bytes::<Option<(Clock, f64)>>(bytes.as_ref()).ok()?;
+            let kept = Kept::decode(part, bytes)?;
+            let done = kept.at().1;
+            let fits = |&(clock, step): &(Clock, f64)| {
+                clock.steps <= done
+                    && is_time(clock.since, step)
+                    && clock.before.is_finite()
+                    && step.is_finite()
+            };
+            if !steps.iter().all(fits) {
+                return None;
+            }
+            Some(OwnState {
+                kept,
+                clock: steps.map(|of| of.0),
+                step: steps.map_or(part.steps.step, |of| of.1),
+            })
+        };
+        let parts = world.parts.iter().zip(participants).map(of).collect::<Option<_>>()?;
+        between.fits(world).then_some(Self(parts, between))
+    }
+}

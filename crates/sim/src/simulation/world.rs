@@ -1,0 +1,81 @@
+//! What is constant.
+
+use super::meshes;
+use crate::failure::Failure;
+use crate::guests::Guests;
+use crate::part::Part;
+use crate::penalty::PenaltyTie;
+use pliant_mechanics::fingerprint;
+use std::sync::Arc;
+
+/// The participants of a simulation: constant while it runs.
+#[derive(Clone, Debug)]
+pub struct World {
+    /// Bodies that one stepper advances together: at least one participant.
+    pub parts: Vec<Part>,
+    /// Ties between participants.
+    pub ties: Vec<PenaltyTie>,
+    /// Nodes of participants that others touch.
+    pub guests: Vec<Guests>,
+}
+
+impl World {
+    /// Participants that meet at common instants: the steps of each become a multiple of those of the participant with the fewest.
+    /// All have the same duration.
+    pub fn new(mut parts: Vec<Part>) -> Self {
+        let common = parts.iter().map(|part| part.steps.number).min().unwrap_or(1);
+        for part in &mut parts {
+            let duration = part.steps.step * part.steps.number as f64;
+            part.steps.meet(common, duration);
+        }
+        Self { parts, ties: Vec::new(), guests: Vec::new() }
+    }
+
+    /// A fingerprint of its bodies with their meshes, and of its tools and obstacles, by name; not of laws, loads or steps.
+    pub fn fingerprint_of_bodies(&self) -> u64 {
+        fn of(part: &Part) -> (Vec<(String, u64)>, Vec<&str>) {
+            let things = part.method.contacts().into_iter().flat_map(|all| &all.rigids);
+            (meshes(&part.model), things.map(|rigid| rigid.name.as_str()).collect())
+        }
+        fingerprint(&self.parts.iter().map(of).collect::<Vec<_>>())
+    }
+
+    /// Steps of each participant between two common instants.
+    pub(super) fn ratios(&self) -> Vec<u64> {
+        let numbers = || self.parts.iter().map(|part| part.steps.number.max(1));
+        let common = numbers().min().unwrap_or(1);
+        numbers().map(|number| number / common).collect()
+    }
+
+    /// Whether the steps of a participant are cut where they are too long, so that those of a run can be halved.
+    pub fn cuts_steps(&self) -> bool {
+        self.parts.iter().any(Part::cuts_steps)
+    }
+
+    /// Whether shorter steps may avoid a failure: of a participant whose steps are cut.
+    pub fn shorter_steps_may_avoid(&self, failure: &Failure) -> bool {
+        let of_body = |part: &Part| {
+            part.model.bodies.iter().any(|body| failure.body.as_deref() == Some(body.name.as_str()))
+        };
+        matches!(failure.kind, "not-finite" | "inverted" | "unbalanced" | "unstable")
+            && self.parts.iter().any(|part| part.cuts_steps() && of_body(part))
+    }
+
+    /// Length [s] of the step of all from a time [s] on.
+    pub(super) fn step_from(&self, time: f64) -> f64 {
+        let slowest = self.parts.iter().min_by_key(|part| part.steps.number);
+        slowest.map_or(0.0, |part| part.steps.step_from(time))
+    }
+}
+
+impl From<Part> for World {
+    fn from(part: Part) -> Self {
+        Self { parts: vec![part], ties: Vec::new(), guests: Vec::new() }
+    }
+}
+
+impl From<Part> for Arc<World> {
+    fn from(part: Part) -> Self {
+        Self::new(part.into())
+    }
+}

@@ -1,0 +1,240 @@
+//! A scene on a thread of its own: it is played there in real time, and handed over frame by frame. Neither side ever waits for the
+//! other: orders go through a channel, the newest frame lies in one of three places of which each side holds one.
+
+mod playback;
+mod player;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use pliant_format::tables::ViewTable;
+use pliant_geometry::Vector3;
+use pliant_mechanics::Energies;
+use pliant_picture::{Mark, PointForce, Subject};
+use pliant_run::Live;
+use pliant_scene::World;
+use pliant_sim::gpu::DevicePoints;
+use pliant_sim::{Failure, State, StopFlag};
+
+use self::player::play;
+use crate::followed::FollowedPoint;
+use crate::hand::{Hand, Point, Which};
+use crate::parameters::Number;
+use crate::recording::Recording;
+use crate::samples::Sample;
+
+/// Wall time between frames.
+pub(crate) const FRAME: Duration = Duration::from_micros(16_667);
+/// Simulated time [s] from sample to sample; longer steps have one each.
+const SAMPLED: f64 = 0.005;
+/// Wall time from one writing of a recording to the next.
+const WRITTEN: Duration = Duration::from_secs(1);
+/// Wall time that the solver may fall behind before it gives up catching up.
+const BEHIND: f64 = 0.1;
+
+/// What the window asks of the solver.
+#[derive(Clone, Debug)]
+pub enum Order {
+    /// Goes on, or stands still.
+    Play(bool),
+    /// Goes so many steps on.
+    Step(u64),
+    /// Starts anew at rest.
+    Reset,
+    /// Goes back to the newest kept state of no more than so many steps, and lets go.
+    Back(u64),
+    /// Simulated seconds a second.
+    Speed(f64),
+    /// Changes what the first hand or a pin holds.
+    Hand(Hand),
+    /// Changes what the second hand or a pin holds.
+    Second(Hand),
+    /// Goes on as another world from the next step on, from where the run stands: that of numbers which are others than in the file.
+    Change(Box<World>, Vec<Number>),
+    /// Finds where bodies are held, moved and loaded in each frame, or not any more.
+    Marks(bool),
+    /// Follows a point.
+    Probe(Point),
+    /// Follows no point any more but those that the scene names.
+    ForgetProbes,
+    /// Keeps what is done to the run from now on.
+    Record,
+    /// The same, written into a file each second.
+    RecordTo(PathBuf),
+    /// Halves the steps.
+    Halve,
+    /// Shows another field, or another surface.
+    Show(Box<ViewTable>),
+    /// Brings every frame to ordinary memory where the state lies on a device, as a section needs it; or only some.
+    Memory(bool),
+    /// Ends.
+    Quit,
+}
+
+/// An instant as the window shows it.
+#[derive(Clone, Debug, Default)]
+pub struct Frame {
+    /// How many frames came before.
+    pub number: u64,
+    /// What is drawn: points and triangles at rest. Another one where another surface is shown.
+    pub subject: Arc<Subject>,
+    /// Where obstacles, tools and driven nodes come [m], see [`Live::ways`].
+    pub ways: Arc<Vec<Vector3>>,
+    /// Simulated time [s].
+    pub time: f64,
+    /// Steps done.
+    pub steps: u64,
+    /// Whether it goes on.
+    pub playing: bool,
+    /// Points on the device where the state lies, at this instant, to be drawn from there; `None` of a state in ordinary memory.
+    pub on_device: Option<DevicePoints>,
+    /// How many inspections there were. Points, values, energies, and what is held are of the last one: of this instant unless
+    /// the state lies on a device, where inspections are rare ([`INSPECTION`](crate::INSPECTION)).
+    pub inspections: u64,
+    /// What was read back from the device so far.
+    pub read_backs: u64,
+    /// Positions [m].
+    pub points: Vec<Vector3>,
+    /// Values of the field that is shown; empty for none.
+    pub values: Vec<f64>,
+    /// The cell with the smallest step, where that is asked for.
+    pub critical: Option<u32>,
+    /// Energies [J].
+    pub energies: Energies,
+    /// The least gap [m] in contacts with barriers; `None` where nothing is near.
+    pub least_gap: Option<f64>,
+    /// Steps that were taken though they had not converged.
+    pub unconverged: u64,
+    /// What is held: the point [m] and the force on the body [N] of each hand that holds something, then of each pin.
+    pub held: Vec<[[f64; 3]; 2]>,
+    /// Where each hand is among what is held; `None` of one that holds nothing.
+    pub hands: [Option<usize>; 2],
+    /// Forces of contacts on the nodes, where they are asked for.
+    pub contacts: Vec<PointForce>,
+    /// Where bodies are held, moved and loaded, where that is asked for.
+    pub marks: Vec<Mark>,
+    /// Points that the user follows, in the order in which they were picked.
+    pub followed: Vec<FollowedPoint>,
+    /// The tool that each hand holds.
+    pub tools: [Option<String>; 2],
+    /// Whether each triangle of the subject can be taken hold of: those of bodies and tools, not those of obstacles.
+    pub movable: Arc<[bool]>,
+    /// A triangle of each tool.
+    pub tool_triangles: Arc<[u32]>,
+    /// Steps since the frame before.
+    pub steps_a_frame: u64,
+    /// Mean wall time of a step [s].
+    pub step_seconds: f64,
+    /// Wall time to prepare this frame [s]: forces, fields and their values at the points.
+    pub prepare_seconds: f64,
+    /// Simulated over wall time, lately.
+    pub real_time_factor: f64,
+    /// The same if the solver did nothing but steps.
+    pub possible_factor: f64,
+    /// From a hand's move to the first step in which it acted [s], of the last one.
+    pub input_lag: Option<f64>,
+    /// How often a pull broke the run, which then went back to a state before it.
+    pub breaks: u64,
+    /// The numbers that are others than in the file.
+    pub numbers: Vec<Number>,
+    /// How often changed numbers broke the run at once; it then went on with those before.
+    pub refusals: u64,
+    /// Why it cannot go on: what happened, where, and what to try.
+    pub failure: Option<String>,
+    /// What else to tell.
+    pub note: Option<String>,
+}
+
+impl Frame {
+    /// What each pin holds: the point [m] and the force on the body [N].
+    pub fn pins(&self) -> &[[[f64; 3]; 2]] {
+        let hands = self.hands.iter().flatten().count();
+        self.held.get(hands..).unwrap_or_default()
+    }
+
+    /// What a hand holds: the point [m] and the force on the body [N].
+    pub fn hand(&self, which: Which) -> Option<[[f64; 3]; 2]> {
+        self.held.get(self.hands[which as usize]?).copied()
+    }
+}
+
+/// A scene that is played on another thread.
+#[derive(Debug)]
+pub struct Session {
+    orders: Sender<(Instant, Order)>,
+    samples: Receiver<Sample>,
+    frames: triple_buffer::Output<Frame>,
+    /// Ends a step that takes long.
+    stop: StopFlag,
+    thread: Option<JoinHandle<Recording>>,
+}
+
+/// Begins to play a world, from where a run of another one stands if it can be; whether it goes on from there.
+///
+/// # Errors
+/// If a stepper can't be made.
+pub(crate) fn enter(world: &World, from: Option<(World, Option<State>)>) -> Result<(Live, bool), String> {
+    let told = |failure: Failure| failure.message;
+    let world = Arc::new(world.clone());
+    if let Some((before, Some(snapshot))) = from
+        && let Some(live) = Live::go_on(&world, snapshot, &before).map_err(told)?
+    {
+        return Ok((live, true));
+    }
+    Ok((Live::new(&world).map_err(told)?, false))
+}
+
+impl Session {
+    /// Starts to play a scene, snapshot still. `wake` is called after each frame.
+    pub fn start(world: World, wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
+        let (input, frames) = triple_buffer::TripleBuffer::new(&Frame::default()).split();
+        let (orders, inbox) = channel();
+        let (sampled, samples) = channel();
+        let threads = world.scene.run.threads as usize;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.map_err(std::io::Error::other)?;
+        let stop = StopFlag::default();
+        let asked = stop.clone();
+        let run = move || pool.install(move || play(world, &inbox, input, sampled, &wake, asked));
+        let thread = std::thread::Builder::new().name("solver".into()).spawn(run)?;
+        Ok(Self { orders, samples, frames, stop, thread: Some(thread) })
+    }
+
+    /// Gives an order; it is forgotten where the solver has ended.
+    pub fn order(&self, order: Order) {
+        let _ = self.orders.send((Instant::now(), order));
+    }
+
+    /// The newest frame; whether it is a new one.
+    pub fn look(&mut self) -> (bool, &Frame) {
+        (self.frames.update(), self.frames.output_buffer())
+    }
+
+    /// The samples since the last call, in the order in which they were taken.
+    pub fn samples(&self) -> impl Iterator<Item = Sample> + '_ {
+        self.samples.try_iter()
+    }
+
+    /// Whether the solver's thread has ended.
+    pub fn has_ended(&self) -> bool {
+        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+}
+
+impl Session {
+    /// Ends it; what was done since it was told to record or was last reset. `None` after a panic, which was told there.
+    pub fn end(&mut self) -> Option<Recording> {
+        self.order(Order::Quit);
+        self.stop.ask();
+        self.thread.take()?.join().ok()
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
