@@ -18,16 +18,23 @@
 //! *Error of the displacements.* In double precision |M⁻¹ r|/(ω² |u|), in the norm of M, with ω² of the slowest mode. In single precision,
 //! where round-off fills the residual, from the work of the residual along the load step.
 
+mod accuracy;
+mod path;
+mod settings;
+
 use std::sync::Arc;
 
-use pliant_mechanics::count;
 use pliant_mechanics::load::Load;
 use pliant_mechanics::model::{Constraint, Contradiction, Enclosed, FREE, Model};
 use pliant_mechanics::tensor::{Vector, add, cast, scale, sub};
 use pliant_mechanics::{Energies, StopFlag};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
+use self::accuracy::{Accuracy, Extremes, follow};
+pub use self::path::{Equilibrium, Way};
+use self::path::{Instant, LoadPath};
+use self::settings::is_single;
+pub use self::settings::{Convergence, Iteration, PATIENCE, RelaxationError, RelaxationSettings};
 use crate::Scalar;
 use crate::applied::AppliedForces;
 use crate::collective::{Collective, Predicted, enclosed};
@@ -35,7 +42,6 @@ use crate::forces::InternalForces;
 use crate::history::History;
 use crate::recover::Recovery;
 use crate::state::State;
-use crate::step_error::at_corner;
 use crate::stepper::{Observable, owned_only, sum_owned};
 
 /// Nodes per parallel task.
@@ -53,253 +59,14 @@ const RAMP_DAMPING: f64 = 0.02;
 const ADAPT: [f64; 2] = [0.90, 1.02];
 /// Iterations from one report to the next.
 const REPORT: usize = 20;
-/// Iterations for which a search that has reached its residual goes on for the displacements.
-pub const PATIENCE: usize = 4000;
 /// Where the residual is below this many tolerances, round-off of single precision makes the slowest mode look faster than it is:
 /// from then on its estimate grows by [`FASTEST`] at the most.
 const ROUGH: f64 = 10.0;
 const FASTEST: f64 = 1.5;
-/// Reports over which an error of displacements is averaged in single precision.
-const AVERAGED: usize = 10;
 /// A way shorter than this part of another one doesn't tell how forces bend along that one.
 const SHORTEST: f64 = 0.1;
 /// The motion starts anew where the residual grows by this factor over its least.
 const RUNAWAY: f64 = 10.0;
-
-/// When a load step counts as converged, and when as failed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RelaxationSettings {
-    /// Largest residual force on a free component, over the largest internal force.
-    pub tolerance: f64,
-    /// Estimated error of the displacements over the largest one, in single precision, where round-off hides how far an equilibrium
-    /// is in the residual of slender bodies: a search goes on for it, though not for more than `PATIENCE` iterations.
-    pub displacement: f64,
-    /// Iterations after which a load step has failed.
-    pub iterations: usize,
-    /// How often a failed load step may be halved.
-    pub halvings: u32,
-}
-
-impl RelaxationSettings {
-    /// The usual ones for a number type.
-    pub fn usual<R: Scalar>() -> Self {
-        let precise = Self::default();
-        match is_single::<R>() {
-            true => Self { tolerance: 100.0 * precise.tolerance, displacement: 1e-3, ..precise },
-            false => precise,
-        }
-    }
-}
-
-fn is_single<R: Scalar>() -> bool {
-    R::EPSILON > 1e-10
-}
-
-impl Default for RelaxationSettings {
-    fn default() -> Self {
-        Self { tolerance: 1e-6, displacement: f64::INFINITY, iterations: 20_000, halvings: 6 }
-    }
-}
-
-/// Why an equilibrium was not found.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum RelaxationError {
-    /// Still moving after the allowed iterations.
-    #[error(
-        "no equilibrium at t = {time:.6} s: residual {residual:.2e} > {tolerance:.0e} after {iterations} iterations, \
-         largest at node {node} of `{body}`"
-    )]
-    NotConverged {
-        /// The body of the node of the largest residual.
-        body: String,
-        /// That node, numbered in its body.
-        node: u32,
-        /// The relative residual.
-        residual: f64,
-        /// What was asked for.
-        tolerance: f64,
-        /// Iterations spent on the last try.
-        iterations: usize,
-        /// Time [s].
-        time: f64,
-    },
-    /// A cell turns inside out however small the load step.
-    #[error(
-        "element {element} of `{body}` is inverted{} (det F = {determinant:.3e}) on the way to t = {time:.6} s, after \
-         {iterations} iterations",
-        at_corner(*corner, *node)
-    )]
-    Inverted {
-        /// The body.
-        body: String,
-        /// The element, numbered as in the user's mesh.
-        element: u32,
-        /// Its first node, or that of the corner, numbered in its body.
-        node: u32,
-        /// Whether it is a corner of a hexahedron, not its middle.
-        corner: bool,
-        /// det F there.
-        determinant: f64,
-        /// Iterations spent on the last try.
-        iterations: usize,
-        /// Time [s].
-        time: f64,
-    },
-    /// A displacement is not a number or infinite.
-    #[error(
-        "the displacement of node {node} of `{body}` is no longer finite on the way to t = {time:.6} s, after \
-         {iterations} iterations"
-    )]
-    NotFinite {
-        /// The body.
-        body: String,
-        /// The node, numbered in its body.
-        node: u32,
-        /// Iterations spent on the last try.
-        iterations: usize,
-        /// Time [s].
-        time: f64,
-    },
-    /// Someone [asked](DynamicRelaxation::stop_on) for it.
-    #[error("the search for the equilibrium at t = {time:.6} s was stopped")]
-    Stopped {
-        /// Time [s].
-        time: f64,
-    },
-}
-
-impl RelaxationError {
-    /// What to try.
-    pub fn remedy(&self) -> &'static str {
-        match self {
-            Self::Inverted { time, .. } | Self::NotConverged { time, .. } | Self::NotFinite { time, .. }
-                if *time == 0.0 =>
-            {
-                "what acts at t = 0 comes at once: let it grow over time (`curve = \"smooth-step\"`), or make it smaller; a body \
-                 that nothing holds has no equilibrium"
-            }
-            Self::NotConverged { .. } => {
-                "try more load steps, a looser tolerance or double precision; a body that nothing holds has no equilibrium"
-            }
-            Self::Inverted { .. } => "try more load steps, a smaller motion, or a finer mesh there",
-            Self::NotFinite { .. } => "try more load steps; a body that nothing holds has no equilibrium",
-            Self::Stopped { .. } => "the state is that of the equilibrium before",
-        }
-    }
-}
-
-/// How a load step went.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Convergence {
-    /// Iterations, those of failed tries included.
-    pub iterations: usize,
-    /// Relative residual at the end.
-    pub residual: f64,
-    /// Parts the load step was cut into.
-    pub parts: u32,
-}
-
-/// How far the search for an equilibrium is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Iteration {
-    /// Time [s] of the last equilibrium and of the one that is sought.
-    pub span: [f64; 2],
-    /// Iterations of this try.
-    pub number: usize,
-    /// Relative residual.
-    pub residual: f64,
-    /// Part of the way, in orders of magnitude of the residual; 0 while the load is brought on.
-    pub fraction: f64,
-}
-
-/// Sums and extremes over the nodes of one task.
-#[derive(Clone, Copy, Debug, Default)]
-struct Extremes {
-    stiffness: f64,
-    mass: f64,
-    largest_residual: f64,
-    residual_node: usize,
-    largest_force: f64,
-    finite: bool,
-}
-
-impl Extremes {
-    fn merge(self, b: &Self) -> Self {
-        let worse = b.largest_residual > self.largest_residual;
-        Self {
-            stiffness: self.stiffness + b.stiffness,
-            mass: self.mass + b.mass,
-            largest_residual: if worse { b.largest_residual } else { self.largest_residual },
-            residual_node: if worse { b.residual_node } else { self.residual_node },
-            largest_force: self.largest_force.max(b.largest_force),
-            finite: self.finite && b.finite,
-        }
-    }
-
-    fn relative_residual(&self) -> f64 {
-        if self.largest_residual == 0.0 { 0.0 } else { self.largest_residual / self.largest_force }
-    }
-}
-
-/// What is known of the equilibrium a state stands at, beside the state: what a restart needs to show it again.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Equilibrium<R> {
-    /// Energies [J].
-    pub energies: Energies,
-    /// Internal minus applied force [N] of each node.
-    pub residual: Vec<Vector<R>>,
-    /// How it was reached.
-    pub way: Way<R>,
-}
-
-/// The way through the equilibria found so far, as far as the work along it needs it.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Way<R> {
-    /// Equilibria found.
-    #[serde(deserialize_with = "count::read")]
-    pub equilibria: u64,
-    /// Estimated error of the external work [J]: the trapezia less the integral. That of a first one is known where the next way
-    /// isn't much shorter.
-    pub error: Option<f64>,
-    /// Estimated error of the displacements over the largest one, at worst.
-    pub displacement_error: f64,
-    /// From the last equilibrium but one to the last, of each node: the motion [m] and the change of load and reaction [N].
-    last: Vec<[Vector<R>; 2]>,
-}
-
-impl<R> Way<R> {
-    /// Whether it is one of a model with so many nodes.
-    pub fn fits(&self, nodes: usize) -> bool {
-        self.last.len() == if self.equilibria > 0 { nodes } else { 0 }
-    }
-}
-
-impl<R: Scalar> Way<R> {
-    /// Goes on by motions [m] and changes of the forces from outside [N].
-    fn go_on(&mut self, next: Vec<[Vector<R>; 2]>) {
-        let square = |way: &[[Vector<R>; 2]]| -> f64 {
-            way.iter().flat_map(|[motion, _]| motion).map(|x| x.to_f64().powi(2)).sum()
-        };
-        let [a, b] = [&self.last, &next].map(|way| square(way).sqrt());
-        if a > 0.0 && b > 0.0 {
-            let product =
-                |u: &Vector<R>, f: &Vector<R>| -> f64 { (0..3).map(|c| u[c].to_f64() * f[c].to_f64()).sum() };
-            // T_ab − T_a − T_b.
-            let difference: f64 = (self.last.iter().zip(&next))
-                .map(|([u, f], [v, g])| 0.5 * (product(u, g) - product(v, f)))
-                .sum();
-            let of = |own: f64, other: f64| difference * own * own / (3.0 * other * (own + other));
-            // A short way says little about a long one.
-            let own = of(b, a.max(SHORTEST * b));
-            self.error = match self.error {
-                None if self.equilibria == 1 && b >= SHORTEST * a => Some(own + of(a, b)),
-                before => before.map(|before| before + own),
-            };
-        }
-        self.equilibria += 1;
-        self.last = next;
-    }
-}
 
 /// Finds equilibria of one model. Holds constants, scratch and the [`Equilibrium`] last found; the next one comes from
 /// the state alone.
@@ -327,36 +94,6 @@ pub struct DynamicRelaxation<R> {
     stop: StopFlag,
     energies: Energies,
     way: Way<R>,
-}
-
-/// An instant that is sought or passed: the loads and motions of a time [s], or at the start a part of those of time 0.
-#[derive(Clone, Copy, Debug)]
-struct Instant {
-    time: f64,
-    part: f64,
-}
-
-/// What grows on the way to the next equilibrium.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum LoadPath {
-    /// The part of what acts at time 0, from 0 to 1.
-    Start,
-    /// Time.
-    Time,
-}
-
-impl LoadPath {
-    fn instant(self, reached: f64) -> Instant {
-        match self {
-            Self::Start => Instant { time: 0.0, part: reached },
-            Self::Time => Instant { time: reached, part: 1.0 },
-        }
-    }
-
-    /// The time [s] over which laws relax.
-    fn duration(self, from: f64, to: f64) -> f64 {
-        self.instant(to).time - self.instant(from).time
-    }
 }
 
 /// At the last equilibrium. Kinetic energy, damping and velocities are none.
@@ -954,51 +691,6 @@ struct Start<R> {
     missing: Vec<Vector<R>>,
     /// What the instantaneous laws and hourglass control hold [J].
     stored: f64,
-}
-
-/// What a search in single precision knows of its displacements.
-#[derive(Default)]
-struct Accuracy {
-    /// The last parts of the way that were left.
-    left: Vec<f64>,
-    /// The estimate of the slowest mode's squared frequency where the residual became rough.
-    slowest: Option<f64>,
-    /// Iterations at which the residual was low enough.
-    waited: usize,
-}
-
-impl Accuracy {
-    fn note(&mut self, left: f64) {
-        if self.left.len() == AVERAGED {
-            self.left.remove(0);
-        }
-        self.left.push(left);
-    }
-
-    fn mean(&self) -> f64 {
-        self.left.iter().sum::<f64>().abs() / self.left.len().max(1) as f64
-    }
-
-    /// Whether displacements, asked for at an equilibrium of the forces, are good enough, or won't become so.
-    fn suffices(&mut self, tolerance: f64) -> bool {
-        self.waited += 1;
-        self.waited > PATIENCE || self.mean() <= tolerance
-    }
-
-    fn hold_back(&mut self, slowest: f64) -> f64 {
-        let first = *self.slowest.get_or_insert(slowest);
-        if first > 0.0 { slowest.min(FASTEST * first) } else { slowest }
-    }
-}
-
-/// The next estimate of the slowest mode's squared frequency.
-fn follow(slowest: f64, sums: &Extremes) -> f64 {
-    let estimate = sums.stiffness / sums.mass;
-    if !(estimate.is_finite() && estimate > 0.0) {
-        return slowest;
-    }
-    let estimate = estimate.min(HIGHEST);
-    if slowest == 0.0 { estimate } else { estimate.clamp(slowest * ADAPT[0], slowest * ADAPT[1]) }
 }
 
 /// Masses with which no mode is faster than 2/√s per iteration.

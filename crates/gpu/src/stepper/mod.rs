@@ -1,5 +1,8 @@
 //! The central difference method on a device; the stepper of `pliant-explicit` has its formulas.
 
+mod going;
+mod results;
+
 use std::sync::Arc;
 use std::time::{Duration, Instant as Clock};
 
@@ -7,8 +10,7 @@ use pliant_contact::touch::Contacts;
 use pliant_explicit::recover::stored_at_start;
 use pliant_explicit::stability::{Monitor, Stability};
 use pliant_explicit::{
-    CentralDifference, DampingFactors, Deformed, Lengths, Observable, State, StepControl, StepError, Sums,
-    Wanted, model_balance_floor,
+    DampingFactors, Deformed, Lengths, Observable, State, StepControl, StepError, Wanted, model_balance_floor,
 };
 use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
@@ -22,9 +24,9 @@ use crate::grips::DeviceGrips;
 use crate::kernel::{Kernel, Memory};
 use crate::loads::DeviceLoads;
 use crate::mapping::{DeviceMapping, PointValue};
-use crate::nodes::{DeviceNodes, NodeKernels, OF_NODE, SUMS, fours};
+use crate::nodes::{DeviceNodes, NodeKernels, OF_NODE, fours};
 use crate::paths::Paths;
-use crate::run::{Instant, Instants, StepFailure, UNLISTED, flags, room, table_constants};
+use crate::run::{Instants, StepFailure, flags, table_constants};
 use crate::solids::DeviceSolid;
 use crate::ties::DeviceTies;
 use crate::transfer::Four;
@@ -44,24 +46,6 @@ struct Origin {
     steps: u64,
     time: f64,
     stability: Stability,
-}
-
-/// The results of an evaluation.
-struct Results {
-    sums: Sums,
-    hourglass: f64,
-    /// ⅛ Δt⁻² Σ m|a|² [J].
-    error: f64,
-    /// Internal and external work and damping power of the instants passed over.
-    passed: [f64; 3],
-    /// The first instant at which a cell is broken, and the first at which a force is out of range.
-    broken: Option<u32>,
-    overflown: Option<u32>,
-    /// The first instant that waits for lists of candidates for contact.
-    unlisted: Option<u32>,
-    deformed: Deformed,
-    reactions: Vec<Four>,
-    contact_forces: Vec<Four>,
 }
 
 /// Steps a state of one model by one step size, in single precision, on a device. The current state is on the device: of the
@@ -546,329 +530,6 @@ impl GpuStepper {
             solid.bring_back(&mut self.transfer, &self.device, history)?;
         }
         Ok(())
-    }
-
-    /// Goes whole steps on without looking; the last submission, which may not be done yet. Where bodies touch each other, one number is
-    /// read back to see whether the device has stopped for lists of candidates.
-    fn go(&mut self, state: &mut State<f32>, steps: u64) -> Result<Option<wgpu::SubmissionIndex>, GpuError> {
-        let end = state.steps + steps;
-        let mut last = self.go_to(state, end)?;
-        while let Some(at) = self.unlisted()? {
-            self.go_back(state, at);
-            self.list()?;
-            last = self.go_to(state, end)?;
-        }
-        Ok(last)
-    }
-
-    /// The instant at which the device waits for lists of candidates, unless it has failed before.
-    fn unlisted(&mut self) -> Result<Option<u32>, GpuError> {
-        if !self.contacts.as_ref().is_some_and(DeviceContacts::has_pairs) {
-            return Ok(None);
-        }
-        let mut found = u32::MAX;
-        let findings = &self.instants.findings;
-        self.transfer.read::<u32>(&self.device, findings, UNLISTED + 1, |all| found = all[UNLISTED])?;
-        Ok((found != u32::MAX).then_some(found))
-    }
-
-    /// Lists candidates for contact anew.
-    fn list(&mut self) -> Result<(), GpuError> {
-        self.listed = true;
-        let Some(contacts) = self.contacts.as_mut().filter(|own| own.has_pairs()) else { return Ok(()) };
-        let (nodes, device) = (&self.nodes, &self.device);
-        let (from, mut listed) = (&nodes.displacement[self.side], Ok(()));
-        self.transfer
-            .read::<Four>(device, from, nodes.count, |all| listed = contacts.list(device, nodes, all))?;
-        self.instants.go_on(device);
-        listed
-    }
-
-    /// Goes on to a number of whole steps without looking.
-    fn go_to(&mut self, state: &mut State<f32>, end: u64) -> Result<Option<wgpu::SubmissionIndex>, GpuError> {
-        let mut from_look = std::mem::take(&mut self.evaluated);
-        if from_look {
-            state.work.advance();
-        }
-        self.entered = false;
-        let mut side = self.side;
-        let mut running: Option<(wgpu::SubmissionIndex, usize)> = None;
-        let mut begun = Clock::now();
-        while state.steps < end {
-            let most = room(self.pace);
-            while state.steps < end && self.instants.len() < most {
-                let lengths = match self.since {
-                    0 => self.lengths,
-                    _ => Lengths { before: self.lengths.next, next: self.lengths.next },
-                };
-                let damping = self.damping_factors(state, lengths.before);
-                let instant = Instant::new(self.since, flags::MOVES, lengths, damping);
-                let of = (self.model.as_ref(), &state.driven[..]);
-                self.instants.push(of, state.time, lengths.next, instant);
-                self.count(state);
-            }
-            let count = self.instants.len();
-            if !from_look || count > 1 {
-                self.relax(self.lengths.next);
-            }
-            let submitted = self.submit_steps(from_look, side);
-            side = self.side;
-            from_look = false;
-            // One submission waits while another runs.
-            if let Some((earlier, count)) = running.replace((submitted.clone(), count)) {
-                self.wait_for(earlier, &mut begun, count)?;
-            } else if self.pace.is_none() {
-                self.wait_for(submitted, &mut begun, count)?;
-            }
-        }
-        self.device.check()?;
-        Ok(running.map(|(last, _)| last))
-    }
-
-    /// Waits for a submission of some instants, and notes how long one takes.
-    fn wait_for(
-        &mut self,
-        submission: wgpu::SubmissionIndex,
-        begun: &mut Clock,
-        instants: usize,
-    ) -> Result<(), GpuError> {
-        self.device.wait_for(submission)?;
-        self.pace = Some(begun.elapsed().as_secs_f64() / instants as f64);
-        *begun = Clock::now();
-        Ok(())
-    }
-
-    /// Moves the clock on by an instant. Whole steps that begin without a look are noted here.
-    fn count(&mut self, state: &mut State<f32>) {
-        if self.since > 0 {
-            // The step after a look moves nodes in place.
-            self.side = 1 - self.side;
-            if state.is_between_steps() {
-                self.control.note(state);
-            }
-        }
-        self.control.count(state);
-        self.since += 1;
-    }
-
-    /// Looks at the limit where that is due, and chooses the parts of the step to come.
-    fn watch(
-        &mut self,
-        state: &mut State<f32>,
-        deformed: &Deformed,
-    ) -> Result<Result<(), StepError>, GpuError> {
-        if self.control.is_due(state, deformed) && !self.control.pass(state, deformed) {
-            let displacement = &mut state.displacement;
-            self.transfer.read::<Four>(
-                &self.device,
-                &self.nodes.displacement[self.side],
-                self.nodes.count,
-                |fours| {
-                    displacement.iter_mut().zip(fours).for_each(|(to, &[x, y, z, _])| *to = [x, y, z]);
-                },
-            )?;
-            self.control.look(&self.model, &self.owners, state, deformed);
-        }
-        let below = self.control.choose(&self.model, state);
-        self.control.note(state);
-        Ok(below)
-    }
-
-    /// Relaxes from now on over steps of `step` seconds.
-    fn relax(&mut self, step: f64) {
-        if self.relaxing != Some(step) {
-            self.relaxing = Some(step);
-            for (on_device, solid) in self.solids.iter().zip(&self.model.solids) {
-                on_device.set_step(&self.device, solid, step);
-            }
-        }
-    }
-
-    /// Evaluates an instant once candidates for contact are listed for it, with the forces of cells found anew or as they stand.
-    fn evaluate_listed(&mut self, state: &State<f32>, flags: u32, anew: bool) -> Result<Results, GpuError> {
-        loop {
-            let results = self.submit_evaluation(state, flags, anew)?;
-            if results.unlisted.is_none() {
-                return Ok(results);
-            }
-            self.list()?;
-        }
-    }
-
-    /// Evaluates an instant, with the forces of cells found anew or as they stand.
-    fn submit_evaluation(&mut self, state: &State<f32>, flags: u32, anew: bool) -> Result<Results, GpuError> {
-        let damping = self.damping_factors(state, self.lengths.before);
-        let instant = Instant::new(self.since, flags, self.lengths, damping);
-        self.instants.push((&self.model, &state.driven), state.time, self.lengths.next, instant);
-        let (nodes, side, contacts) = (&self.kernels, self.side, &self.contacts);
-        let forces = || force_kernels(&self.loads, &self.grips, &self.solids, &self.ties);
-        self.instants.submit(&self.device, |pass, bound, _, offset| {
-            let before = contacts.iter().filter_map(|contacts| contacts.before.as_ref());
-            before.for_each(|kernel| kernel.run(pass, bound, offset, side));
-            if anew {
-                forces().for_each(|kernel| kernel.run(pass, bound, offset, side));
-            }
-            if let Some(contacts) = contacts {
-                contacts.kernels.iter().for_each(|kernel| kernel.run(pass, bound, offset, side));
-                contacts.sum.run(pass, bound, offset, side);
-            }
-            nodes.pass.run(pass, bound, offset, side);
-        });
-        self.results()
-    }
-
-    /// Goes on from the instants that are pushed, at first with a side; the first of them may be an evaluated one.
-    fn submit_steps(&mut self, from_look: bool, mut side: usize) -> wgpu::SubmissionIndex {
-        let nodes = &self.kernels;
-        let forces = || force_kernels(&self.loads, &self.grips, &self.solids, &self.ties);
-        let (moves, contacts) = (self.paths.moves, &self.contacts);
-        let follow = self.ties.as_ref().map(|ties| &ties.follow);
-        self.instants.submit(&self.device, |pass, bound, place, offset| {
-            if from_look && place == 0 {
-                nodes.advance.run(pass, bound, offset, side);
-                follow.iter().for_each(|kernel| kernel.run(pass, bound, offset, side));
-                return;
-            }
-            let before = contacts.iter().filter_map(|contacts| contacts.before.as_ref());
-            before.for_each(|kernel| kernel.run(pass, bound, offset, side));
-            forces().for_each(|kernel| kernel.run(pass, bound, offset, side));
-            let touching = contacts.iter().flat_map(|contacts| &contacts.kernels);
-            touching.for_each(|kernel| kernel.run(pass, bound, offset, side));
-            if !moves {
-                nodes.pass.run(pass, bound, offset, side);
-                follow.iter().for_each(|kernel| kernel.run(pass, bound, offset, side));
-            }
-            side = 1 - side;
-        })
-    }
-
-    /// Reads what the last evaluation and the instants before it found.
-    fn results(&mut self) -> Result<Results, GpuError> {
-        let (nodes, findings) = (&self.nodes, &self.instants.findings);
-        let bytes = |count: usize| (count * size_of::<f32>()) as u64;
-        let mut arrays = vec![
-            (&nodes.sums, bytes(nodes.groups * SUMS)),
-            (findings, bytes(UNLISTED + 1)),
-            (&nodes.reactions, bytes(nodes.held.len() * 4)),
-        ];
-        arrays.extend(self.contacts.iter().map(|own| (&own.sums, bytes(self.contact_forces.len() * 4))));
-        let mut read = None;
-        self.transfer.read_all(&self.device, &arrays, |parts| {
-            let mut sums = [0.0; SUMS];
-            for group in bytemuck::cast_slice::<u8, [f32; SUMS]>(parts[0]) {
-                sums.iter_mut().zip(group).for_each(|(sum, &number)| *sum += f64::from(number));
-            }
-            let found: &[u32] = bytemuck::cast_slice(parts[1]);
-            read = Some((
-                sums,
-                [found[0], found[1], found[2], found[3], found[UNLISTED]],
-                bytemuck::cast_slice(parts[2]).to_vec(),
-                parts.get(3).map_or_else(Vec::new, |forces| bytemuck::cast_slice(forces).to_vec()),
-            ));
-        })?;
-        let (sums, [broken, overflown, least, largest, unlisted], reactions, contact_forces) =
-            read.unwrap_or_default();
-        Ok(Results {
-            sums: Sums {
-                kinetic: sums[0],
-                damping_power: sums[1],
-                internal_before: sums[2],
-                internal_after: sums[3],
-                external_before: sums[4],
-                external_after: sums[5],
-            },
-            hourglass: sums[6],
-            error: sums[7],
-            passed: [sums[8], sums[9], sums[10]],
-            broken: (broken != u32::MAX).then_some(broken),
-            overflown: (overflown != u32::MAX).then_some(overflown),
-            unlisted: (unlisted != u32::MAX).then_some(unlisted),
-            deformed: Deformed {
-                least_volume_ratio: f64::from(f32::from_bits(least)),
-                largest_strain: f64::from(f32::from_bits(largest)),
-            },
-            reactions,
-            contact_forces,
-        })
-    }
-
-    /// Enters the work of the instants passed over, `step` seconds from one to the next, once.
-    fn enter_passed(&mut self, state: &mut State<f32>, results: &Results, step: f64) {
-        if self.since > 1 && !self.entered {
-            let [internal, external, power] = results.passed;
-            state.work.pass_over(internal, external, power, step);
-        }
-        self.entered = true;
-    }
-
-    fn enter_reactions(&mut self, forces: &[Four]) {
-        self.held_reactions.copy_from_slice(forces);
-        for (sum, owned) in self.reactions.iter_mut().zip(&self.owned) {
-            *sum = [0.0; 3];
-            for &(hold, owns) in owned {
-                for c in (0..3).filter(|&c| owns[c]) {
-                    sum[c] += f64::from(forces[hold as usize][c]);
-                }
-            }
-        }
-    }
-
-    /// ½ Σ m v² of the velocities given at the start [J].
-    fn kinetic_at_start(&self) -> f64 {
-        let of_node = |(node, velocity): (usize, &Vector<f64>)| {
-            let square: f64 =
-                (0..3).filter(|&c| self.owners[node][c] == FREE).map(|c| velocity[c] * velocity[c]).sum();
-            0.5 * self.model.inertia(node) * square
-        };
-        self.model.initial_velocity.iter().take(self.nodes.count).enumerate().map(of_node).sum()
-    }
-
-    /// # Errors
-    /// If a check failed at an instant, where the device then stopped.
-    fn check(&mut self, state: &mut State<f32>, results: &Results) -> Result<(), StepFailure> {
-        match (results.broken, results.overflown) {
-            // The forces of a broken cell may be of any size.
-            (Some(broken), overflown) if overflown.is_none_or(|other| broken <= other) => {
-                Err(self.fail(state, broken))
-            }
-            (_, Some(overflown)) => {
-                self.go_back(state, overflown);
-                self.bring_arrays_back(state)?;
-                Err(GpuError::Overflow { design: self.design.to_string(), time: state.time }.into())
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// Sets the clock to one of the instants since the last look.
-    fn go_back(&mut self, state: &mut State<f32>, to: u32) {
-        if let Some(Origin { side, steps, time, stability }) = self.origin {
-            (state.steps, state.time, state.stability) = (steps, time, stability);
-            self.side = side;
-            self.since = 0;
-            while self.since < to {
-                self.count(state);
-            }
-        }
-    }
-
-    /// Reads the state back as it was at an instant whose checks failed. The CPU then finds the cause.
-    fn fail(&mut self, state: &mut State<f32>, at: u32) -> StepFailure {
-        self.go_back(state, at);
-        if let Err(error) = self.bring_arrays_back(state) {
-            return error.into();
-        }
-        let mut copy = State { work: Default::default(), ..state.clone() };
-        let found = CentralDifference::new(Arc::clone(&self.model), self.control.step())
-            .map_err(|error| error.to_string())
-            .and_then(|mut stepper| match stepper.evaluate(&mut copy) {
-                Err(error) => Ok(error),
-                Ok(()) => Err("a cell that it reports as broken is valid on the CPU".to_owned()),
-            });
-        match found {
-            Ok(error) => error.into(),
-            Err(reason) => GpuError::Internal { adapter: self.device.adapter().name.clone(), reason }.into(),
-        }
     }
 }
 

@@ -1,0 +1,153 @@
+//! Settings, errors, and what a solution took.
+
+use crate::Scalar;
+use crate::step_error::at_corner;
+
+/// Iterations for which a search that has reached its residual goes on for the displacements.
+pub const PATIENCE: usize = 4000;
+
+/// When a load step counts as converged, and when as failed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RelaxationSettings {
+    /// Largest residual force on a free component, over the largest internal force.
+    pub tolerance: f64,
+    /// Estimated error of the displacements over the largest one, in single precision, where round-off hides how far an equilibrium
+    /// is in the residual of slender bodies: a search goes on for it, though not for more than `PATIENCE` iterations.
+    pub displacement: f64,
+    /// Iterations after which a load step has failed.
+    pub iterations: usize,
+    /// How often a failed load step may be halved.
+    pub halvings: u32,
+}
+
+impl RelaxationSettings {
+    /// The usual ones for a number type.
+    pub fn usual<R: Scalar>() -> Self {
+        let precise = Self::default();
+        match is_single::<R>() {
+            true => Self { tolerance: 100.0 * precise.tolerance, displacement: 1e-3, ..precise },
+            false => precise,
+        }
+    }
+}
+
+pub(super) fn is_single<R: Scalar>() -> bool {
+    R::EPSILON > 1e-10
+}
+
+impl Default for RelaxationSettings {
+    fn default() -> Self {
+        Self { tolerance: 1e-6, displacement: f64::INFINITY, iterations: 20_000, halvings: 6 }
+    }
+}
+
+/// Why an equilibrium was not found.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RelaxationError {
+    /// Still moving after the allowed iterations.
+    #[error(
+        "no equilibrium at t = {time:.6} s: residual {residual:.2e} > {tolerance:.0e} after {iterations} iterations, \
+         largest at node {node} of `{body}`"
+    )]
+    NotConverged {
+        /// The body of the node of the largest residual.
+        body: String,
+        /// That node, numbered in its body.
+        node: u32,
+        /// The relative residual.
+        residual: f64,
+        /// What was asked for.
+        tolerance: f64,
+        /// Iterations spent on the last try.
+        iterations: usize,
+        /// Time [s].
+        time: f64,
+    },
+    /// A cell turns inside out however small the load step.
+    #[error(
+        "element {element} of `{body}` is inverted{} (det F = {determinant:.3e}) on the way to t = {time:.6} s, after \
+         {iterations} iterations",
+        at_corner(*corner, *node)
+    )]
+    Inverted {
+        /// The body.
+        body: String,
+        /// The element, numbered as in the user's mesh.
+        element: u32,
+        /// Its first node, or that of the corner, numbered in its body.
+        node: u32,
+        /// Whether it is a corner of a hexahedron, not its middle.
+        corner: bool,
+        /// det F there.
+        determinant: f64,
+        /// Iterations spent on the last try.
+        iterations: usize,
+        /// Time [s].
+        time: f64,
+    },
+    /// A displacement is not a number or infinite.
+    #[error(
+        "the displacement of node {node} of `{body}` is no longer finite on the way to t = {time:.6} s, after \
+         {iterations} iterations"
+    )]
+    NotFinite {
+        /// The body.
+        body: String,
+        /// The node, numbered in its body.
+        node: u32,
+        /// Iterations spent on the last try.
+        iterations: usize,
+        /// Time [s].
+        time: f64,
+    },
+    /// Someone [asked](DynamicRelaxation::stop_on) for it.
+    #[error("the search for the equilibrium at t = {time:.6} s was stopped")]
+    Stopped {
+        /// Time [s].
+        time: f64,
+    },
+}
+
+impl RelaxationError {
+    /// What to try.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::Inverted { time, .. } | Self::NotConverged { time, .. } | Self::NotFinite { time, .. }
+                if *time == 0.0 =>
+            {
+                "what acts at t = 0 comes at once: let it grow over time (`curve = \"smooth-step\"`), or make it smaller; a body \
+                 that nothing holds has no equilibrium"
+            }
+            Self::NotConverged { .. } => {
+                "try more load steps, a looser tolerance or double precision; a body that nothing holds has no equilibrium"
+            }
+            Self::Inverted { .. } => "try more load steps, a smaller motion, or a finer mesh there",
+            Self::NotFinite { .. } => "try more load steps; a body that nothing holds has no equilibrium",
+            Self::Stopped { .. } => "the state is that of the equilibrium before",
+        }
+    }
+}
+
+/// How a load step went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Convergence {
+    /// Iterations, those of failed tries included.
+    pub iterations: usize,
+    /// Relative residual at the end.
+    pub residual: f64,
+    /// Parts the load step was cut into.
+    pub parts: u32,
+}
+
+/// How far the search for an equilibrium is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Iteration {
+    /// Time [s] of the last equilibrium and of the one that is sought.
+    pub span: [f64; 2],
+    /// Iterations of this try.
+    pub number: usize,
+    /// Relative residual.
+    pub residual: f64,
+    /// Part of the way, in orders of magnitude of the residual; 0 while the load is brought on.
+    pub fraction: f64,
+}

@@ -1,0 +1,283 @@
+//! Obstacles and tools of a contact, and how they move and grow.
+
+use super::super::Builder;
+use pliant_format::tables::{GrowthTable, ShapeName, ToolTable};
+use pliant_format::{rows_of, table as table_file};
+use pliant_geometry::Vector3;
+use pliant_geometry::words::number;
+use pliant_mechanics::curve::{Curve, Shape as CurveShape};
+use pliant_sim::contact::pose::{Pose, Trajectory};
+use pliant_sim::contact::profile::{Corner, Profile};
+use pliant_sim::contact::shape::Shape;
+use pliant_sim::contact::touch::{Jaw, Rigid};
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+
+impl Builder<'_> {
+    /// The rigid thing of a table, or its two jaws.
+    pub(super) fn rigids(&mut self, kind: &str, name: &str, table: &ToolTable) -> Option<Vec<Rigid>> {
+        let path = [kind, name];
+        let at = |key| [kind, name, key];
+        let jaws = matches!(table.shape, ShapeName::Jaws(_));
+        for (key, given) in [("opening", table.opening.is_some()), ("ideal-grip", table.ideal_grip.is_some())]
+        {
+            if given && !jaws {
+                let help =
+                    "`shape = { jaws = { length = 0.03, width = 0.008, thickness = 0.004 } }` has jaws";
+                self.error(&at(key), format!("`{key}` is for a tool with jaws"), "no jaws", help);
+                return None;
+            }
+        }
+        let shape = match &table.shape {
+            ShapeName::Sphere(of) => Shape::Sphere { radius: of.radius },
+            ShapeName::Capsule(of) => Shape::Capsule { radius: of.radius, length: of.length },
+            ShapeName::Cylinder(of) => Shape::Cylinder { radius: of.radius, length: of.length },
+            ShapeName::Box(of) if of.size.iter().any(|&edge| edge <= 0.0) => {
+                self.error(&at("shape"), "a box without a volume", "its edges", "give three lengths above 0");
+                return None;
+            }
+            ShapeName::Box(of) => Shape::Cuboid { size: of.size },
+            ShapeName::Cone(of) => Shape::Cone { radius: of.radius, height: of.height },
+            ShapeName::HalfSpace => Shape::HalfSpace,
+            ShapeName::Revolved(of) => {
+                let corners = of.outline.iter().map(|&[z, r, rounding]| Corner { at: [z, r], rounding });
+                match Profile::new(corners.collect()) {
+                    Ok(profile) => Shape::Revolved(Arc::new(profile)),
+                    Err(error) => {
+                        let help = "points are `[height, distance from the axis, radius of the arc]`, counted from 0";
+                        self.error(&at("shape"), error.to_string(), "this outline", help);
+                        return None;
+                    }
+                }
+            }
+            ShapeName::Jaws(of) => Shape::Cuboid { size: [of.width, of.thickness, of.length] },
+            ShapeName::Mesh(of) => self.shape_of_mesh(of, &[kind, name, "shape", "mesh"])?,
+            ShapeName::Image(of) => self.shape_of_image(of, &[kind, name, "shape", "image"])?,
+        };
+        self.note_turns(&format!("{kind} `{name}`: `turn`"), Vector3::from(table.turn).norm());
+        let start = Pose::new(table.at.into(), table.turn.into());
+        let ways = [table.by.is_some(), table.rotate.is_some(), table.poses.is_some()];
+        if ways.iter().filter(|&&given| given).count() > 1 {
+            let help = "leave all but one out";
+            self.error(&path, "it moves by one of `by`, `rotate` and `poses`", "several", help);
+            return None;
+        }
+        let trajectory = if let Some(shift) = table.by {
+            Trajectory::by(start, shift, self.curve(&table.timing, &path)?)
+        } else if let Some(rotate) = table.rotate {
+            let axis = Vector3::from(rotate.axis);
+            let Some(axis) = axis.try_normalize(0.0) else {
+                self.error(
+                    &at("rotate"),
+                    "the axis of the rotation is zero",
+                    "this axis",
+                    "give a direction",
+                );
+                return None;
+            };
+            let angle = self.angle(&at("rotate"), rotate.angle, rotate.degrees)?;
+            let curve = self.curve(&table.timing, &path)?;
+            Trajectory::turn(start, axis.into(), rotate.centre, angle, curve)
+        } else if let Some(file) = &table.poses {
+            let text = self.scene.file(file).and_then(|found| table_file(&found));
+            let reach = shape.reach();
+            let trajectory = poses(file, text).map(|poses| {
+                let (poses, jump) = slowed(poses, reach);
+                Trajectory::table(start, poses).map(|trajectory| (trajectory, jump))
+            });
+            match trajectory {
+                Ok(Some((trajectory, jump))) => {
+                    if let Some(Jump { time, speed, late }) = jump {
+                        self.notes.push(format!(
+                            "{kind} `{name}`: by its table of poses it goes at {} m/s from t = {} s on; it goes at {FASTEST} m/s and is late by up to \
+                             {} s",
+                            number(speed),
+                            number(time),
+                            number(late)
+                        ));
+                    }
+                    trajectory
+                }
+                Ok(None) => {
+                    let message = format!("`{}` has no poses, or its times do not increase", file.display());
+                    self.error(&at("poses"), message, "this table", ROW);
+                    return None;
+                }
+                Err(message) => {
+                    self.error(&at("poses"), message, "this table", ROW);
+                    return None;
+                }
+            }
+        } else {
+            Trajectory::fixed(start)
+        };
+        let trajectory = match table.force_limit {
+            Some(limit) => trajectory.limited(limit),
+            None => trajectory,
+        };
+        let trajectory = match &table.grows {
+            Some(growth) => {
+                self.growing(trajectory, growth, &shape, (jaws, table.inside), [kind, name, "grows"])?
+            }
+            None => trajectory,
+        };
+        let ShapeName::Jaws(of) = &table.shape else {
+            return Some(vec![Rigid {
+                name: name.into(),
+                shape,
+                trajectory,
+                inside: table.inside,
+                jaw: None,
+            }]);
+        };
+        if table.inside {
+            let help = "bodies are between the jaws, and outside of each";
+            self.error(&at("inside"), "no body is inside of a jaw", "of a tool with jaws", help);
+            return None;
+        }
+        let opening = match &table.opening {
+            Some(opening) => {
+                let angle = self.angle(&at("opening"), opening.angle, opening.degrees)?;
+                (angle, self.curve(&opening.timing, &at("opening"))?)
+            }
+            None => (0.0, Curve { shape: CurveShape::Hold, from: 0.0, to: 1.0 }),
+        };
+        self.note_turns(&format!("{kind} `{name}`: `ideal-grip`"), table.ideal_grip.unwrap_or_default());
+        // The upper one turns from z towards y, against the axis x.
+        let sides = [("upper", 1.0), ("lower", -1.0)];
+        let rigids = sides.map(|(side, sign)| Rigid {
+            name: format!("{name}.{side}"),
+            shape: shape.clone(),
+            trajectory: trajectory.clone(),
+            inside: false,
+            jaw: Some(Jaw {
+                tool: name.into(),
+                part: -0.5 * sign,
+                opening: opening.clone(),
+                place: Pose::translation(0.0, 0.5 * sign * of.thickness, 0.5 * of.length),
+                grip: table.ideal_grip,
+            }),
+        });
+        Some(rigids.into())
+    }
+
+    /// A trajectory with the growth of a table; `path` is that of its table.
+    pub(super) fn growing(
+        &mut self,
+        trajectory: Trajectory,
+        growth: &GrowthTable,
+        shape: &Shape,
+        (jaws, inside): (bool, bool),
+        path: [&str; 3],
+    ) -> Option<Trajectory> {
+        if jaws {
+            self.error(
+                &path,
+                "jaws do not grow",
+                "of a tool with jaws",
+                "leave it out, or take another shape",
+            );
+            return None;
+        }
+        let curve = self.curve(&growth.timing, &path)?;
+        let [low, high] = curve.range().map(|part| part * growth.by);
+        let (least, thinnest) = (low.min(high), shape.thinnest());
+        let round = matches!(shape, Shape::Sphere { .. } | Shape::Capsule { .. });
+        if least < 0.0 && (inside || !round) {
+            let message = format!(
+                "it shrinks to {} m within its shape, which only balls and capsules can",
+                number(least)
+            );
+            let help = "give the shape its smallest size, and let it grow from there";
+            self.error(&path, message, "below 0", help);
+            return None;
+        }
+        if least <= -thinnest {
+            let message =
+                format!("it shrinks by {} m, and its radius is {} m", number(-least), number(thinnest));
+            self.error(&path, message, "nothing is left", "let it shrink by less");
+            return None;
+        }
+        Some(trajectory.growing(growth.by, curve))
+    }
+}
+
+/// What a row of a table of poses holds.
+pub(super) const ROW: &str =
+    "each row is `t,x,y,z,qw,qx,qy,qz`: a time in seconds, a position in metres, a unit quaternion";
+
+/// The fastest that a tool goes by a table of poses [m/s]: faster than hands, and slow enough for nodes to be pushed along.
+pub(super) const FASTEST: f64 = 10.0;
+
+/// How far the length of a quaternion may be off 1.
+pub(super) const UNIT: f64 = 1e-3;
+
+/// A part of a table of poses that is too fast.
+pub(super) struct Jump {
+    /// When the fastest one begins [s].
+    pub(super) time: f64,
+    /// How fast it is [m/s].
+    pub(super) speed: f64,
+    /// How late the tool comes to a row at most [s].
+    pub(super) late: f64,
+}
+
+/// A table of poses without motions that are faster than [`FASTEST`]: rows come later where the tool cannot be there before, and it catches up
+/// after them. The tool has a radius [m].
+pub(super) fn slowed(poses: Vec<(f64, Pose)>, reach: f64) -> (Vec<(f64, Pose)>, Option<Jump>) {
+    if poses.windows(2).any(|rows| rows[0].0 >= rows[1].0) {
+        return (poses, None);
+    }
+    let mut jump: Option<Jump> = None;
+    let mut slowed: Vec<(f64, Pose)> = Vec::with_capacity(poses.len());
+    let mut before: Option<(f64, Pose)> = None;
+    for &(time, pose) in &poses {
+        let (Some((asked, from)), Some(&(then, _))) = (before.replace((time, pose)), slowed.last()) else {
+            slowed.push((time, pose));
+            continue;
+        };
+        let way = (pose.translation.vector - from.translation.vector).norm()
+            + from.rotation.angle_to(&pose.rotation) * reach;
+        let (speed, arrives) = (way / (time - asked), time.max(then + way / FASTEST));
+        if speed > FASTEST {
+            let known = jump.get_or_insert(Jump { time: asked, speed, late: 0.0 });
+            if speed > known.speed {
+                (known.time, known.speed) = (asked, speed);
+            }
+        }
+        if let Some(jump) = &mut jump {
+            jump.late = jump.late.max(arrives - time);
+        }
+        // A tool that rests while it is late has no row there.
+        if arrives > then {
+            slowed.push((arrives, pose));
+        }
+    }
+    (slowed, jump)
+}
+
+/// The poses of a table. Empty lines, a header and what follows a # are passed over.
+pub(super) fn poses(file: &Path, text: io::Result<String>) -> Result<Vec<(f64, Pose)>, String> {
+    let text = text.map_err(|error| format!("`{}` cannot be read: {error}", file.display()))?;
+    let shown = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
+    let mut all = Vec::new();
+    for (row, line) in rows_of(&text) {
+        let columns: Vec<&str> = row.split(',').map(str::trim).collect();
+        if all.is_empty() && columns[0].eq_ignore_ascii_case("t") {
+            continue;
+        }
+        let numbers: Option<Vec<f64>> =
+            columns.iter().map(|text| text.parse().ok().filter(|x: &f64| x.is_finite())).collect();
+        let Some(Ok([t, x, y, z, w, i, j, k])) = numbers.map(<[f64; 8]>::try_from) else {
+            return Err(format!("{shown}:{line}: a row has 8 finite numbers, found `{row}`"));
+        };
+        let turn = nalgebra::Quaternion::new(w, i, j, k);
+        if (turn.norm() - 1.0).abs() > UNIT {
+            return Err(format!("{shown}:{line}: the quaternion has length {}, not 1", number(turn.norm())));
+        }
+        let turn = nalgebra::UnitQuaternion::from_quaternion(turn);
+        all.push((t, Pose::from_parts(Vector3::new(x, y, z).into(), turn)));
+    }
+    Ok(all)
+}
