@@ -167,7 +167,7 @@ impl From<Failure> for Fault {
     fn from(failure: Failure) -> Self {
         let Failure { kind, body, element, node, time, message, .. } = failure;
         let body = body.map(String::from).unwrap_or_default();
-        let place = Place { kind, body, node, element, time, ..Place::default() };
+        let place = Place { kind: kind.word(), body, node, element, time, ..Place::default() };
         Self { status: PliantStatus::Failed, message, place: Some(Box::new(place)) }
     }
 }

@@ -4,7 +4,7 @@ use miette::{GraphicalReportHandler, GraphicalTheme};
 use pliant_format::diagnostic::{SceneErrors, Severity};
 use pliant_format::source::Source;
 use pliant_run::{OutputError, ResumeError};
-use pliant_sim::Failure;
+use pliant_sim::{Failure, FailureKind};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -43,8 +43,8 @@ impl From<SceneErrors> for Trouble {
 impl From<Failure> for Trouble {
     fn from(failure: Failure) -> Self {
         match failure.kind {
-            "device" => Self::Device(failure.message),
-            "input" => Self::Value(failure.message),
+            FailureKind::Device => Self::Device(failure.message),
+            FailureKind::Input => Self::Value(failure.message),
             _ => Self::Failure(Box::new(failure)),
         }
     }
@@ -77,25 +77,28 @@ impl Trouble {
                 ("SceneError", underlined(&errors))
             }
             Self::Failure(failure) => {
-                fields.set_item("kind", failure.kind)?;
+                fields.set_item("kind", failure.kind.word())?;
                 fields.set_item("body", failure.body.as_deref())?;
                 fields.set_item("element", failure.element)?;
                 fields.set_item("node", failure.node)?;
                 fields.set_item("time", failure.time)?;
                 let step = failure.load_step.as_deref();
                 let class = match failure.kind {
-                    "not-converged" | "singular" => {
+                    FailureKind::NotConverged | FailureKind::Singular => {
                         fields.set_item("load_step", step.map(|step| step.number))?;
                         fields.set_item("residual", step.and_then(|step| step.residual))?;
                         "ConvergenceError"
                     }
-                    "blocked" => {
+                    FailureKind::Blocked => {
                         let blocked = failure.blocked.as_deref();
                         fields.set_item("driver", blocked.map(|own| own.driver.clone()))?;
                         fields.set_item("force", blocked.map(|own| own.force))?;
                         "BlockedError"
                     }
-                    "not-finite" | "inverted" | "unbalanced" | "unstable" => "UnstableError",
+                    FailureKind::NotFinite
+                    | FailureKind::Inverted
+                    | FailureKind::Unbalanced
+                    | FailureKind::Unstable => "UnstableError",
                     _ => "SimulationError",
                 };
                 (class, failure.message)

@@ -4,7 +4,7 @@
 use pliant_format::tables::OnUnstableName;
 use pliant_geometry::words::{counted, number};
 use pliant_sim::contact::touch::{Contact, With};
-use pliant_sim::{Failure, Instant, Precision};
+use pliant_sim::{Failure, FailureKind, Instant, Precision};
 
 use pliant_format::tables::SolverName;
 use pliant_scene::{Built, Part};
@@ -32,25 +32,25 @@ pub(crate) fn remedy(failure: &Failure, part: &Part, now: &dyn Instant) -> Optio
     };
     let shorter = format!("a `step` of {} s or less", number(0.5 * step));
     let told = match (failure.kind, on_unstable) {
-        ("unstable", OnUnstableName::Substep) => format!(
+        (FailureKind::Unstable, OnUnstableName::Substep) => format!(
             "{cuts}, into 100 parts at the most, and that is not enough: try a slower or smaller motion, a coarser mesh there, or {shorter}"
         ),
-        ("unstable", _) => {
+        (FailureKind::Unstable, _) => {
             "try a smaller `step` or a slower motion, or let the run cut its steps (`on-unstable = \"substep\"`)".into()
         }
-        ("inverted", OnUnstableName::Substep) => {
+        (FailureKind::Inverted, OnUnstableName::Substep) => {
             format!("{cuts}: try {shorter}, a slower or smaller motion or load, more damping, or a finer mesh there")
         }
-        ("inverted", _) => "try a slower or smaller motion or load, `on-unstable = \"substep\"`, a smaller `step`, more damping, or a finer \
+        (FailureKind::Inverted, _) => "try a slower or smaller motion or load, `on-unstable = \"substep\"`, a smaller `step`, more damping, or a finer \
                             mesh there"
             .into(),
-        ("not-finite" | "unbalanced", OnUnstableName::Report) => {
+        (FailureKind::NotFinite | FailureKind::Unbalanced, OnUnstableName::Report) => {
             let limit = seen.map_or(String::new(), |ratio| format!(" (smallest stable step seen: {ratio:.2} × the step)"));
             format!(
                 "try a smaller `step` or `on-unstable = \"substep\"`{limit}; else a slower motion or a smoother curve"
             )
         }
-        ("not-finite" | "unbalanced", _) => {
+        (FailureKind::NotFinite | FailureKind::Unbalanced, _) => {
             let single = plan.target.precision == Precision::Single;
             let precise = if single { ", or `precision = \"double\"`" } else { "" };
             let held = if on_unstable == OnUnstableName::Substep { &cuts } else { "the step is below the limit" };

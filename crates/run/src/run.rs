@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use pliant_explicit::Wanted;
 use pliant_geometry::Mesh;
 use pliant_sim::contact::barrier::IntersectionCheck;
-use pliant_sim::{Failure, LoadStepProgress, Observer, Schedule, Simulation, StopFlag};
+use pliant_sim::{Failure, FailureKind, LoadStepProgress, Observer, Schedule, Simulation, StopFlag};
 
 use crate::advice::remedy;
 use crate::checkpoint::{Checkpoint, Checkpoints, Progressed};
@@ -108,8 +108,10 @@ fn write_pages(world: &World, folder: &OutputFolder, outcome: &mut Outcome) -> R
         let Some(table) = &own.convergence else { continue };
         let file = part.prefix().map_or(CONVERGENCE.to_owned(), |name| format!("convergence-{name}.csv"));
         outcome.files.push(folder.write(&file, table)?);
-        if let Some(failure) =
-            outcome.failure.as_mut().filter(|failure| matches!(failure.kind, "not-converged" | "blocked"))
+        if let Some(failure) = outcome
+            .failure
+            .as_mut()
+            .filter(|failure| matches!(failure.kind, FailureKind::NotConverged | FailureKind::Blocked))
         {
             failure.message.push_str(&format!("; the residuals of all iterations are in `{file}`"));
         }

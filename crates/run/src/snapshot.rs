@@ -4,7 +4,7 @@
 //! before it (u32); little-endian.
 
 use pliant_mechanics::fingerprint;
-use pliant_sim::{Failure, State, World};
+use pliant_sim::{Failure, FailureKind, State, World};
 
 use crate::checkpoint::FORMAT;
 
@@ -19,7 +19,7 @@ const CRC: usize = 4;
 /// # Errors
 /// If it can't be encoded.
 pub fn snapshot_to_bytes(world: &World, state: &State) -> Result<Vec<u8>, Failure> {
-    let failed = |error: postcard::Error| Failure::new("output", error.to_string(), None);
+    let failed = |error: postcard::Error| Failure::new(FailureKind::Output, error.to_string(), None);
     let body = state.encode().and_then(|parts| postcard::to_stdvec(&parts)).map_err(failed)?;
     Ok(snapshot_framed(world, &body))
 }

@@ -7,7 +7,7 @@ use pliant_explicit::{Clock, Observable, State, Wanted};
 use pliant_gpu::{DeviceMapping, GpuError, GpuStepper, PointValue, StepFailure};
 use pliant_mechanics::grip::Grip;
 
-use crate::failure::Failure;
+use crate::failure::{Failure, FailureKind};
 use crate::part::{Method, Part};
 use crate::solver::{LoadStepProgress, Solver};
 
@@ -50,7 +50,7 @@ impl OnDevice<'_> {
 impl Failure {
     /// A device that failed, at a time of the simulation.
     pub(crate) fn device(error: &GpuError, time: Option<f64>) -> Self {
-        Self::new("device", format!("{error}; {}", error.remedy()), time)
+        Self::new(FailureKind::Device, format!("{error}; {}", error.remedy()), time)
     }
 
     /// Steps on a device that could not be taken.

@@ -4,18 +4,87 @@ use std::any::Any;
 use std::fmt;
 
 use pliant_explicit::{RelaxationError, StepError};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use pliant_geometry::words::number;
 
-/// The kind of a run that someone stopped.
-pub const INTERRUPTED: &str = "interrupted";
+/// What kind of failure it is: words of `--json` and of exceptions in Python.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FailureKind {
+    /// A displacement is not finite.
+    NotFinite,
+    /// An element is inverted.
+    Inverted,
+    /// Energies do not balance.
+    Unbalanced,
+    /// The largest stable step fell below the step.
+    Unstable,
+    /// The stiffness is singular.
+    Singular,
+    /// No equilibrium was found.
+    NotConverged,
+    /// A tool or a constraint cannot go on.
+    Blocked,
+    /// Surfaces go through each other.
+    Intersecting,
+    /// Hourglass modes hold much of the energy.
+    Hourglass,
+    /// The system has no room.
+    Memory,
+    /// The GPU failed.
+    Device,
+    /// An output could not be written.
+    Output,
+    /// What was asked for cannot be simulated.
+    Input,
+    /// Someone stopped the run.
+    Interrupted,
+}
+
+impl FailureKind {
+    /// Its word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::NotFinite => "not-finite",
+            Self::Inverted => "inverted",
+            Self::Unbalanced => "unbalanced",
+            Self::Unstable => "unstable",
+            Self::Singular => "singular",
+            Self::NotConverged => "not-converged",
+            Self::Blocked => "blocked",
+            Self::Intersecting => "intersecting",
+            Self::Hourglass => "hourglass",
+            Self::Memory => "memory",
+            Self::Device => "device",
+            Self::Output => "output",
+            Self::Input => "input",
+            Self::Interrupted => "interrupted",
+        }
+    }
+
+    /// Whether shorter steps may help: what explicit steps that are too long end by.
+    pub fn is_of_long_steps(self) -> bool {
+        matches!(self, Self::NotFinite | Self::Inverted | Self::Unbalanced | Self::Unstable)
+    }
+}
+
+impl Serialize for FailureKind {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.word())
+    }
+}
+
+impl fmt::Display for FailureKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.word())
+    }
+}
 
 /// A failure, with its place and time.
 #[derive(Clone, Debug, Serialize)]
 pub struct Failure {
-    /// `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `blocked`, `intersecting`, `hourglass`, `device`, `output`, `input` or `interrupted`.
-    pub kind: &'static str,
+    /// Its kind.
+    pub kind: FailureKind,
     /// The body, where it is about one.
     pub body: Option<Box<str>>,
     /// The element, counted from 0.
@@ -71,7 +140,7 @@ impl std::error::Error for Failure {}
 
 impl Failure {
     /// A failure of a kind, at a time [s] of the simulation.
-    pub fn new(kind: &'static str, message: String, time: Option<f64>) -> Self {
+    pub fn new(kind: FailureKind, message: String, time: Option<f64>) -> Self {
         Self {
             kind,
             body: None,
@@ -87,18 +156,18 @@ impl Failure {
 
     /// An input that can't be simulated.
     pub fn input(error: &dyn fmt::Display) -> Self {
-        Self::new("input", error.to_string(), None)
+        Self::new(FailureKind::Input, error.to_string(), None)
     }
 
     /// A step that was stopped before its end, at the time [s] of its start.
     pub(crate) fn stopped(time: f64) -> Self {
         let message = format!("stopped within the step after t = {} s, which was not taken", number(time));
-        Self::new(INTERRUPTED, message, Some(time))
+        Self::new(FailureKind::Interrupted, message, Some(time))
     }
 
     /// Whether someone asked for it.
     pub fn is_interrupted(&self) -> bool {
-        self.kind == INTERRUPTED
+        self.kind == FailureKind::Interrupted
     }
 
     /// The same failure with another remedy.
@@ -119,15 +188,17 @@ impl Failure {
         };
         let message = format!("{which}: {error}; {}", error.remedy());
         let (kind, body, element, node, time, iterations, residual) = match error {
-            RelaxationError::Stopped { time } => return Self::new(INTERRUPTED, message, Some(*time)),
+            RelaxationError::Stopped { time } => {
+                return Self::new(FailureKind::Interrupted, message, Some(*time));
+            }
             RelaxationError::NotFinite { body, node, iterations, time, .. } => {
-                ("not-finite", body, None, *node, *time, *iterations, None)
+                (FailureKind::NotFinite, body, None, *node, *time, *iterations, None)
             }
             RelaxationError::Inverted { body, element, node, iterations, time, .. } => {
-                ("inverted", body, Some(*element), *node, *time, *iterations, None)
+                (FailureKind::Inverted, body, Some(*element), *node, *time, *iterations, None)
             }
             RelaxationError::NotConverged { body, node, residual, iterations, time, .. } => {
-                ("not-converged", body, None, *node, *time, *iterations, Some(*residual))
+                (FailureKind::NotConverged, body, None, *node, *time, *iterations, Some(*residual))
             }
         };
         Self {
@@ -144,14 +215,16 @@ impl From<&StepError> for Failure {
     fn from(error: &StepError) -> Self {
         let message = format!("{error}; {}", error.remedy());
         let (kind, body, element, node, time) = match error {
-            StepError::NotFinite { body, node, time } => ("not-finite", body, None, *node, *time),
+            StepError::NotFinite { body, node, time } => (FailureKind::NotFinite, body, None, *node, *time),
             StepError::Inverted { body, element, node, time, .. } => {
-                ("inverted", body, Some(*element), *node, *time)
+                (FailureKind::Inverted, body, Some(*element), *node, *time)
             }
             StepError::BelowLimit { body, element, node, time, .. } => {
-                ("unstable", body, Some(*element), *node, *time)
+                (FailureKind::Unstable, body, Some(*element), *node, *time)
             }
-            StepError::Unbalanced { body, node, time, .. } => ("unbalanced", body, None, *node, *time),
+            StepError::Unbalanced { body, node, time, .. } => {
+                (FailureKind::Unbalanced, body, None, *node, *time)
+            }
         };
         Self {
             body: Some(body.as_str().into()),

@@ -61,7 +61,7 @@ mod tools;
 pub use bodies::{BodyCells, ImplicitBodies, RunControl, Stop};
 #[cfg(feature = "gpu")]
 pub use device::{MappedPoint, OnDevice};
-pub use failure::{BlockedDriver, FailedLoadStep, Failure, INTERRUPTED, panicked};
+pub use failure::{BlockedDriver, FailedLoadStep, Failure, FailureKind, panicked};
 pub use guests::{Guests, GuestsNow};
 pub use instant::{CellsNow, Effort, Instant};
 pub use part::{Explicit, LongSteps, Method, Part, Precision, ShortSteps};

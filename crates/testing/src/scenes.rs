@@ -18,7 +18,7 @@ use pliant_run::{
     failed_output, overview,
 };
 use pliant_scene::{MeshCache, World};
-use pliant_sim::{Simulation, State, StopFlag};
+use pliant_sim::{FailureKind, Simulation, State, StopFlag};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -320,7 +320,7 @@ pub fn run_world(world: &World, folder: &Path) -> Summary {
 /// Meshes of tests are coarse, so a run may end with much energy in hourglass modes; all its outputs are there.
 #[track_caller]
 pub fn assert_complete(summary: &Summary) {
-    let is_coarse = summary.error.as_ref().is_some_and(|error| error.kind == "hourglass");
+    let is_coarse = summary.error.as_ref().is_some_and(|error| error.kind == FailureKind::Hourglass);
     assert!(summary.status == "done" || is_coarse, "{:?}", summary.error);
 }
 

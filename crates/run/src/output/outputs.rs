@@ -9,7 +9,7 @@ use std::thread::{Scope, ScopedJoinHandle};
 use pliant_explicit::Wanted;
 use pliant_format::registry::OutputTable;
 use pliant_scene::World;
-use pliant_sim::{Failure, Schedule, Simulation, State};
+use pliant_sim::{Failure, FailureKind, Schedule, Simulation, State};
 
 use super::{Output, OutputError, Written, csv, frames, output_failure, vtu};
 
@@ -187,7 +187,7 @@ impl<'scope> Far<'scope> {
 fn work(world: &World, mut outputs: Vec<Own>, tasks: &Receiver<Task>) -> Result<(), Failure> {
     // Parallel loops stay on this thread, which is all of a pool of its own.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
-    let _pool = pool.map_err(|error| Failure::new("output", error.to_string(), None))?;
+    let _pool = pool.map_err(|error| Failure::new(FailureKind::Output, error.to_string(), None))?;
     let mut simulation: Option<Simulation> = None;
     for task in tasks {
         match task {

@@ -7,7 +7,7 @@ use pliant_explicit::stability::StepLimit;
 use pliant_format::tables::OnUnstableName;
 use pliant_geometry::words::{counted, number};
 use pliant_mechanics::Energies;
-use pliant_sim::Failure;
+use pliant_sim::{Failure, FailureKind};
 use serde::Serialize;
 
 use super::outcome::HeldBack;
@@ -164,7 +164,7 @@ pub(crate) fn hourglass_failure(world: &World, outcome: &Outcome) -> Option<Fail
     let most = format!("{} % that `allow-hourglass` of `[run]` allows at the end", number(allowed * 100.0));
     let remedy = format!("{HOURGLASS_REMEDY}; outputs are complete");
     let message = held_by_hourglass(&part.built, share, outcome.time, &most, &remedy);
-    Some(Failure::new("hourglass", message, Some(outcome.time)))
+    Some(Failure::new(FailureKind::Hourglass, message, Some(outcome.time)))
 }
 
 /// That hourglass control holds a share of the internal energy at a time [s].

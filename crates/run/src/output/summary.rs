@@ -6,7 +6,7 @@ use std::path::Path;
 use pliant_geometry::words::{counted, number};
 use pliant_mechanics::Energies;
 use pliant_mechanics::model::{Constraint, Enclosed};
-use pliant_sim::{Critical, Effort, Equilibria, Failure, INTERRUPTED};
+use pliant_sim::{Critical, Effort, Equilibria, Failure, FailureKind};
 use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
 
@@ -158,7 +158,7 @@ fn as_map<S: Serializer, T: Serialize>(pairs: &[(String, T)], serializer: S) -> 
 
 /// The JSON object of a rejected input: the keys of [`Summary`], empty where nothing was built.
 pub fn failed_input(message: &str) -> Json {
-    empty("invalid", Failure::new("input", message.into(), None))
+    empty("invalid", Failure::new(FailureKind::Input, message.into(), None))
 }
 
 /// The JSON object of a run whose outputs could not be opened or finished.
@@ -179,7 +179,7 @@ fn empty(status: &str, error: Failure) -> Json {
 /// The failure of an output that could not be written, at a time [s] of the run.
 pub(crate) fn output_failure(error: &OutputError, time: Option<f64>) -> Failure {
     let message = format!("{error}; what was written before stays readable; {}", error.remedy);
-    Failure::new("output", message, time)
+    Failure::new(FailureKind::Output, message, time)
 }
 
 /// That of a stopped run, and the checkpoint it left.
@@ -193,7 +193,7 @@ pub(crate) fn interrupted(time: f64, checkpoint: Option<&Path>) -> Failure {
         }
     };
     let message = format!("the run was interrupted at t = {} s; {way}", number(time));
-    Failure::new(INTERRUPTED, message, Some(time))
+    Failure::new(FailureKind::Interrupted, message, Some(time))
 }
 
 /// The bodies of a model.
@@ -238,7 +238,7 @@ pub(crate) fn summarise(world: &World, outcome: &Outcome) -> Summary {
     Summary {
         status: match &outcome.failure {
             None => "done",
-            Some(failure) if failure.is_interrupted() => INTERRUPTED,
+            Some(failure) if failure.is_interrupted() => FailureKind::Interrupted.word(),
             Some(_) => "failed",
         },
         error: outcome.failure.clone(),

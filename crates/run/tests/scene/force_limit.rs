@@ -234,7 +234,7 @@ fn what_is_blocked_tells_its_force() {
                 blocked.gap,
                 pressure * side * side
             );
-            assert!(failure.kind == "blocked" && blocked.driver == driver, "{failure}");
+            assert!(failure.kind.word() == "blocked" && blocked.driver == driver, "{failure}");
             assert!((blocked.force / (pressure * side * side) - 1.0).abs() < 1e-4, "{failure}");
             assert!(failure.message.contains(&format!("`{driver}` is blocked, pushing with")), "{failure}");
         }

@@ -88,7 +88,7 @@ fn a_run_that_ends_in_hourglass_modes_fails_after_its_outputs() {
         };
         let ended = of("");
         let error = ended.error.unwrap();
-        assert_eq!((ended.status, error.kind), ("failed", "hourglass"), "{solver}: {error}");
+        assert_eq!((ended.status, error.kind.word()), ("failed", "hourglass"), "{solver}: {error}");
         for piece in
             ["of the internal energy", "more than 10.00 % that `allow-hourglass`", "`b`", "hex8-full"]
         {

@@ -3,7 +3,7 @@
 use pliant_implicit::SolveError;
 
 use crate::bodies::ImplicitBodies;
-use crate::failure::{BlockedDriver, Failure};
+use crate::failure::{BlockedDriver, Failure, FailureKind};
 use pliant_geometry::words::number;
 
 /// The report of a step that failed after a time.
@@ -15,20 +15,20 @@ pub(super) fn failure(
 ) -> Failure {
     let body_of = |node: u32| model.bodies.iter().find(|body| body.nodes.contains(&node));
     let (kind, node, cell) = match error {
-        SolveError::NotConverged { node, .. } => ("not-converged", Some(*node), None),
-        SolveError::Uphill { node, .. } => ("not-converged", Some(*node), None),
-        SolveError::Snaps { .. } | SolveError::Stalled { .. } => ("not-converged", None, None),
-        SolveError::Blocked { .. } => ("blocked", None, None),
-        SolveError::Crossed { edge, .. } => ("intersecting", Some(edge[0]), None),
+        SolveError::NotConverged { node, .. } => (FailureKind::NotConverged, Some(*node), None),
+        SolveError::Uphill { node, .. } => (FailureKind::NotConverged, Some(*node), None),
+        SolveError::Snaps { .. } | SolveError::Stalled { .. } => (FailureKind::NotConverged, None, None),
+        SolveError::Blocked { .. } => (FailureKind::Blocked, None, None),
+        SolveError::Crossed { edge, .. } => (FailureKind::Intersecting, Some(edge[0]), None),
         SolveError::Singular { node, .. } | SolveError::FreeBody { node, .. } => {
-            ("singular", Some(*node), None)
+            (FailureKind::Singular, Some(*node), None)
         }
-        SolveError::Indefinite { .. } => ("unstable", None, None),
-        SolveError::Broken { cell, .. } => ("inverted", None, bodies.cell(*cell)),
+        SolveError::Indefinite { .. } => (FailureKind::Unstable, None, None),
+        SolveError::Broken { cell, .. } => (FailureKind::Inverted, None, bodies.cell(*cell)),
         SolveError::Stopped => return Failure::stopped(time),
-        SolveError::Device(_) => ("device", None, None),
-        SolveError::OutOfMemory(_) => ("memory", None, None),
-        SolveError::Open(_) | SolveError::Impossible(_) => ("input", None, None),
+        SolveError::Device(_) => (FailureKind::Device, None, None),
+        SolveError::OutOfMemory(_) => (FailureKind::Memory, None, None),
+        SolveError::Open(_) | SolveError::Impossible(_) => (FailureKind::Input, None, None),
     };
     let owner = match error {
         SolveError::Snaps { node, .. } => body_of(*node),

@@ -34,7 +34,7 @@ use self::method::SolverMethod;
 pub(crate) use self::path::Path;
 use self::path::part_of;
 use crate::bodies::{ImplicitBodies, RunControl};
-use crate::failure::{FailedLoadStep, Failure};
+use crate::failure::{FailedLoadStep, Failure, FailureKind};
 use crate::instant::Effort;
 use crate::kept::{ContactState, ImplicitState, Iterated, PlainState};
 use crate::part::{self, Part};
@@ -167,7 +167,7 @@ impl Assembled {
         let number = self.done + 1;
         self.go(number).map_err(|error| {
             let failed = failure(&error, &self.model, &self.bodies, self.state.time);
-            let step = self.method.attempts().last().filter(|_| failed.kind == "not-converged");
+            let step = self.method.attempts().last().filter(|_| failed.kind == FailureKind::NotConverged);
             let load_step = step.map(|last| Box::new(self.failed_step(number, last)));
             Failure { load_step, ..failed }
         })?;

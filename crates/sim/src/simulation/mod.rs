@@ -18,7 +18,7 @@ use self::state::{Between, OwnState};
 pub use self::world::World;
 #[cfg(feature = "gpu")]
 use crate::device::OnDevice;
-use crate::failure::Failure;
+use crate::failure::{Failure, FailureKind};
 use crate::guests::{GuestsNow, Meetings};
 use crate::instant::Instant;
 use crate::part::Part;
@@ -593,7 +593,9 @@ impl Simulation {
     /// If a device fails, or a state can't be encoded.
     pub fn encode(&mut self) -> Result<Vec<Vec<u8>>, Failure> {
         let state = self.state()?;
-        state.encode().map_err(|error| Failure::new("output", error.to_string(), Some(self.time())))
+        state
+            .encode()
+            .map_err(|error| Failure::new(FailureKind::Output, error.to_string(), Some(self.time())))
     }
 
     fn between(&self) -> Between {
@@ -690,7 +692,7 @@ impl Simulation {
         if !forces.is_empty() && !self.world.parts.iter().all(|part| part.method.takes_forces()) {
             let remedy =
                 "forces on nodes act on the CPU only: choose `device = \"cpu\"`, or hold nodes by grips";
-            return Err(Failure::new("device", remedy.to_owned(), Some(self.time())));
+            return Err(Failure::new(FailureKind::Device, remedy.to_owned(), Some(self.time())));
         }
         self.pushed.clear();
         self.pushed.extend_from_slice(forces);

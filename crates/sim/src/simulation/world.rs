@@ -57,8 +57,7 @@ impl World {
         let of_body = |part: &Part| {
             part.model.bodies.iter().any(|body| failure.body.as_deref() == Some(body.name.as_str()))
         };
-        matches!(failure.kind, "not-finite" | "inverted" | "unbalanced" | "unstable")
-            && self.parts.iter().any(|part| part.cuts_steps() && of_body(part))
+        failure.kind.is_of_long_steps() && self.parts.iter().any(|part| part.cuts_steps() && of_body(part))
     }
 
     /// Length [s] of the step of all from a time [s] on.
