@@ -3,7 +3,7 @@
 //! lattice, cut points, warp, stencils (`stencil.rs`), largest component (`topology.rs`). Two things differ from
 //! the paper. All points are warped at once, so their order does not matter. The diagonals of `stencil.rs`
 //! favour the time step, so the paper's bound of 10.8° on dihedral angles does not hold: the smallest observed
-//! is 8.2° (brain at 5 mm; example `measure`). Leaves out: grading; the later steps of `tets.rs` (optimisation,
+//! is 8.2° (brain at 5 mm; example `measure`). Leaves out: grading; the later steps of `organ.rs` (optimisation,
 //! materials, repair of non-manifold edges).
 
 use pliant_geometry::{CellKind, Vector3};

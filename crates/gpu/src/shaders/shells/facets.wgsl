@@ -1,4 +1,4 @@
-// Forces and moments of a facet on its corners: `facets.rs` of pliant-implicit, from displacements instead of positions, so that small
+// Forces and moments of a facet on its corners: `facet_packs` of pliant-shells, from displacements instead of positions, so that small
 // strains keep their digits. With H = Σ u ⊗ ∇N in the axes at rest, C − I = H + Hᵀ + HᵀH gives U − I; the frame is the least rotation to the
 // normal and the polar rotation in the plane.
 
