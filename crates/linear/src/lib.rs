@@ -139,7 +139,7 @@ impl Workspace {
             _ => blocks,
         };
         let coarse = blocks.as_ref().filter(|_| preconditioner == Some(Preconditioner::Aggregates));
-        let coarse = coarse.map(Coarse::new).map(|coarse| coarse.ok_or(LinearError::TooLarge)).transpose()?;
+        let coarse = coarse.map(Coarse::new).transpose()?;
         let on_device = match (device, &blocks) {
             (Some(device), Some(blocks)) => {
                 let kept = before.as_mut().and_then(|before| before.on_device.take());

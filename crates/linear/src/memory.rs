@@ -49,16 +49,31 @@ pub fn free() -> Option<u64> {
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
 }
 
+/// Whether the system has room for so many bytes more. Asked before arrays that follow from the size of a mesh are made: what they need at least.
+///
+/// # Errors
+/// If it has not.
+pub fn room_for(bytes: u64) -> Result<(), OutOfMemory> {
+    // Linux gives more than it has, and ends the program that uses it.
+    if let Some(free) = free_for(bytes) {
+        return Err(OutOfMemory { bytes, free: Some(free) });
+    }
+    let count = usize::try_from(bytes).unwrap_or(usize::MAX);
+    Vec::<u8>::new().try_reserve_exact(count).map_err(|_| OutOfMemory { bytes, free: None })
+}
+
+/// What is free where that is less than an array takes; small ones are not compared.
+fn free_for(bytes: u64) -> Option<u64> {
+    if bytes > LARGE { free().filter(|&free| free < bytes) } else { None }
+}
+
 /// So many zeros.
 ///
 /// # Errors
 /// If the system has no room for them.
 pub fn zeros(count: usize) -> Result<Vec<f64>, OutOfMemory> {
     let bytes = (count as u64).saturating_mul(8);
-    // Linux gives more than it has, and ends the program that uses it.
-    if let Some(free) =
-        Some(bytes).filter(|&bytes| bytes > LARGE).and_then(|_| free()).filter(|&free| free < bytes)
-    {
+    if let Some(free) = free_for(bytes) {
         return Err(OutOfMemory { bytes, free: Some(free) });
     }
     let mut all = Vec::new();

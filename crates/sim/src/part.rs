@@ -7,11 +7,12 @@ use pliant_explicit::stability::{Monitor, OnUnstable};
 #[cfg(feature = "gpu")]
 use pliant_gpu::{Design, Device};
 use pliant_implicit::{Assembly, DynamicSettings, StaticSettings};
+use pliant_linear::memory::room_for;
 use pliant_mechanics::Model;
 use serde::{Deserialize, Serialize};
 
 use crate::bodies::ImplicitBodies;
-use crate::failure::Failure;
+use crate::failure::{Failure, FailureKind};
 use crate::steps::{Critical, Steps};
 
 /// Number type of the solver.
@@ -166,7 +167,36 @@ impl Method {
     }
 }
 
+/// Bytes that a solver takes at least for a tet or hex and for a shell, beside the model: by the largest memory of `pliant run` less that of
+/// `pliant check` with growing blocks and plates, 172, 3,250 and 7,800.
+const EXPLICIT_CELL: u64 = 150;
+const IMPLICIT_CELL: u64 = 3000;
+const IMPLICIT_SHELL: u64 = 7000;
+
 impl Part {
+    /// Bytes that its solver takes at least, beside the model.
+    fn bytes(&self) -> u64 {
+        let cells = self.model.cell_count() as u64;
+        match &self.method {
+            Method::Explicit(_) | Method::QuasiStatic { .. } => EXPLICIT_CELL * cells,
+            Method::ExplicitShells(..) => 0,
+            Method::Static(bodies, _) | Method::Implicit(bodies, _) => {
+                IMPLICIT_CELL * cells + IMPLICIT_SHELL * bodies.model.facets.len() as u64
+            }
+        }
+    }
+
+    /// Whether the system has room for its solver.
+    ///
+    /// # Errors
+    /// If it has not.
+    pub(crate) fn has_room(&self) -> Result<(), Failure> {
+        room_for(self.bytes()).map_err(|error| {
+            let message = format!("there is no room for the solver: {error}; use a coarser mesh");
+            Failure::new(FailureKind::Memory, message, None)
+        })
+    }
+
     /// Whether its steps are cut where they are too long.
     pub(crate) fn cuts_steps(&self) -> bool {
         let Method::Explicit(settings) = &self.method else { return false };

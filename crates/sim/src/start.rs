@@ -16,6 +16,7 @@ use crate::solver::Memory;
 /// # Errors
 /// If its stepper can't be made.
 pub(crate) fn begin(part: &Part) -> Result<Box<dyn Participant>, Failure> {
+    part.has_room()?;
     Ok(match (part.method.bodies(), part.method.precision()) {
         (Some(bodies), _) => Box::new(Assembled::new(part, bodies)?),
         (None, Precision::Single) => Box::new(Solids::<f32>::new(part, at_start(part)?)?),

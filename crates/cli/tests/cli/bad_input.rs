@@ -280,3 +280,29 @@ fn commands_of_the_laboratory_are_answered_with_the_ones_to_type() {
     assert_eq!((said.code, said.json()["status"].as_str()), (2, Some("invalid")), "{}", said.out);
     assert!(!workshop.pliant(&["--help"]).out.contains("reproduce"));
 }
+
+/// A program with an address space that is too small, as a container has.
+#[test]
+#[cfg(target_os = "linux")]
+fn models_and_solvers_without_room_are_an_error() {
+    let wall = "[scene]\nuntil = 1e-3\n[run]\nsolver = 'static'\n[law.tissue]\ntype = 'st-venant-kirchhoff'\nyoung-modulus = 3e3\n\
+                poisson-ratio = 0.3\n[body.wall]\nmodel = 'shell'\nmesh = { plate = { size = [0.1, 0.1], cells = [400, 400] } }\n\
+                law = 'tissue'\ndensity = 1000\nthickness = 1e-3\n[constraint.base]\ntype = 'fix'\nbody = 'wall'\n\
+                nodes = { set = 'x-min' }\n";
+    let block = "[scene]\nuntil = 1e-3\n[run]\nsolver = 'implicit'\nstep = 1e-3\nlinear = 'conjugate-gradients'\n[law.tissue]\n\
+                 type = 'neo-hookean'\nyoung-modulus = 3e3\npoisson-ratio = 0.45\n[body.block]\n\
+                 mesh = { block = { size = [0.1, 0.1, 0.1], cells = [40, 40, 40] } }\nlaw = 'tissue'\ndensity = 1000\n\
+                 [constraint.base]\ntype = 'fix'\nbody = 'block'\nnodes = { set = 'x-min' }\n";
+    for (scene, code, kind, says) in [
+        (wall, 2, "input", "there is no room for the model of `wall`: 2.9 GB of memory are needed"),
+        (block, 1, "memory", "there is no room for the solver: 1.2 GB of memory are needed"),
+    ] {
+        let workshop = Workshop::new(scene);
+        let program = env!("CARGO_BIN_EXE_pliant");
+        let script = format!("ulimit -v 1200000; exec {program} run case --threads 1 --json");
+        let said: Said = workshop.program("sh", &["-c", &script]).output().expect("a shell starts").into();
+        assert_eq!(said.code, code, "{}", said.err);
+        assert_eq!(said.json()["error"]["kind"], kind, "{}", said.out);
+        assert!(said.words().contains(says) && said.words().contains("use a coarser mesh"), "{}", said.err);
+    }
+}

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use pliant_mechanics::Model;
 use pliant_mechanics::load::LoadKind;
-use pliant_mechanics::model::Solid;
+use pliant_mechanics::model::{Constraint, Motion, Solid};
 
 use crate::model::contact::Touching;
 use crate::model::error::ModelError;
@@ -134,6 +134,14 @@ impl Deref for Assembly {
 }
 
 impl Assembly {
+    /// The nodes that turn with a solid: not those of rigid parts, which turn with these.
+    pub(crate) fn carried_turns(&self) -> impl Iterator<Item = &CarriedTurn> {
+        let rigid = |constraint: &Constraint| matches!(constraint.motion, Motion::Rigid);
+        let bound =
+            move |node: u32| self.constraints.iter().any(|own| rigid(own) && own.nodes.contains(&node));
+        self.turns.iter().filter(move |turn| !bound(turn.node))
+    }
+
     /// One body of nodes at rest [m] and nothing else.
     pub fn new(name: &str, rest: impl IntoIterator<Item = Vector3<f64>>) -> Self {
         let mut assembly = Self::default();

@@ -5,9 +5,30 @@ use pliant_mechanics::StopFlag;
 
 use crate::model::assembly::Spring;
 use crate::model::error::SolveError;
-use crate::steps::statics::Attempted;
 use crate::system::contact::TouchingSystem;
 use crate::system::{Phases, System};
+
+/// An attempt to find an equilibrium.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Attempted {
+    /// The time that it was to reach.
+    pub time: f64,
+    /// Factor of the controlled loads at its end.
+    pub load_factor: f64,
+    /// Whether it found one.
+    pub found: bool,
+    /// Norm of the residual [N] before each iteration and at the end.
+    pub residuals: Vec<f64>,
+    /// What was allowed at the end [N].
+    pub allowed: f64,
+}
+
+impl Attempted {
+    /// Iterations of Newton's method: at least one.
+    pub fn iterations(&self) -> usize {
+        self.residuals.len().saturating_sub(1).max(1)
+    }
+}
 
 /// A solver of the equations of a model: [`Statics`](crate::Statics) or [`BackwardEuler`](crate::BackwardEuler).
 pub trait AssemblySolver {

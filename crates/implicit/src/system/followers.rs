@@ -13,7 +13,6 @@ use pliant_mechanics::tie::Tie;
 
 use crate::Assembly;
 use crate::model::state::State;
-use crate::model::turns::carried_turns;
 use crate::system::turns::Turn;
 use pliant_linear::sparse::{Cell, Equations, LowerMatrix, NONE};
 use pliant_shells::rotation::skew;
@@ -126,7 +125,7 @@ impl Followers {
             row_of[*node as usize] = number;
         }
         turned.sort_unstable();
-        let mut turns: Vec<Turn> = carried_turns(model).map(Turn::new).collect();
+        let mut turns: Vec<Turn> = model.carried_turns().map(Turn::new).collect();
         turns.sort_by_key(|turn| turn.node);
         let some = !rows.is_empty() || !turns.is_empty();
         some.then_some(Self { row_of, rows, held, parts, turned, turns })
@@ -482,7 +481,7 @@ impl Assembly {
             let along = row.map(|(followed, w)| moved(followed as usize).component_mul(&Vector3::from(w)));
             state.position[node as usize] = self.place(node as usize) + along.sum::<Vector3<f64>>();
         }
-        for turn in carried_turns(self) {
+        for turn in self.carried_turns() {
             state.rotation[turn.node as usize] = Turn::new(turn).rotation(state);
         }
     }

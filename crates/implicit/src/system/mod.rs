@@ -31,7 +31,6 @@ use crate::curved::surface::CurvedSurface;
 use crate::model::assembly::{Assembly, Spring};
 use crate::model::error::SolveError;
 use crate::model::state::State;
-use crate::model::turns::carried_turns;
 use crate::solid::relaxation::{History, Relaxation};
 use crate::solid::{Response, Stars};
 use crate::system::conditions::Conditions;
@@ -250,7 +249,7 @@ impl System {
         for &node in model.ties.iter().flat_map(|tie| &tie.nodes) {
             free[6 * node as usize..6 * node as usize + 3].fill(false);
         }
-        for turn in carried_turns(&model) {
+        for turn in model.carried_turns() {
             free[6 * turn.node as usize + 3..6 * turn.node as usize + 6].fill(false);
         }
         let arch = Arch::new();

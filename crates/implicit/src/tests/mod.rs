@@ -1,6 +1,7 @@
 //! Models and solvers together, on small specimens.
 
 mod balloons;
+mod descent;
 mod devices;
 mod equations;
 mod layers;

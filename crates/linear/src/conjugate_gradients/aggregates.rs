@@ -207,7 +207,7 @@ fn add_rigid(block: &Block, arm: &Vector3<f64>, to: &mut Block) {
 }
 
 impl Coarse {
-    pub(crate) fn new(fine: &BlockMatrix) -> Option<Self> {
+    pub(crate) fn new(fine: &BlockMatrix) -> Result<Self, LinearError> {
         let count = fine.aggregate_start.len() - 1;
         let mut aggregate = vec![0; fine.nodes()];
         for (number, ends) in fine.aggregate_start.windows(2).enumerate() {
@@ -227,11 +227,11 @@ impl Coarse {
         let equations = Equations::new(&vec![true; 6 * count]);
         let ends: Vec<[u32; 2]> = pairs.iter().map(|(row, column, _)| [*row, *column]).collect();
         let matrix = LowerMatrix::new(&equations, ends.iter().map(|pair| &pair[..]), &[]);
-        Some(Self {
+        Ok(Self {
             arm: vec![Vector3::zeros(); fine.nodes()],
             aggregate,
             projected,
-            factors: Factors::new(&matrix).ok()?,
+            factors: Factors::new(&matrix)?,
             matrix,
             value: vec![Block::zeros(); pairs.len()],
             pairs,

@@ -19,7 +19,7 @@ use crate::model::error::SolveError;
 use crate::model::state::State;
 use crate::steps::descent::{Contacting, Limits, Vectors, descend};
 use crate::steps::limits::within_limits;
-use crate::steps::solver::AssemblySolver;
+use crate::steps::solver::{AssemblySolver, Attempted};
 use crate::system::System;
 use pliant_linear::sparse::NONE;
 use pliant_linear::{LinearSolver, dot};
@@ -79,28 +79,6 @@ pub struct Step {
     pub negative_pivots: usize,
     /// Load steps that it took: 1, or more where it was halved.
     pub parts: usize,
-}
-
-/// An attempt to find an equilibrium.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Attempted {
-    /// The time that it was to reach.
-    pub time: f64,
-    /// Factor of the controlled loads at its end.
-    pub load_factor: f64,
-    /// Whether it found one.
-    pub found: bool,
-    /// Norm of the residual [N] before each iteration and at the end.
-    pub residuals: Vec<f64>,
-    /// What was allowed at the end [N].
-    pub allowed: f64,
-}
-
-impl Attempted {
-    /// Iterations of Newton's method: at least one.
-    pub fn iterations(&self) -> usize {
-        self.residuals.len().saturating_sub(1).max(1)
-    }
 }
 
 /// A static solver.
