@@ -65,6 +65,7 @@ pub struct SceneTable {
 /// A design of the kernels of a GPU; all give the same answers within round-off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[schemars(rename = "Design")]
 pub enum DesignName {
     /// Cells write forces into slots of their own, nodes gather them in a fixed order. The same bits every time.
     Gather,
@@ -82,6 +83,7 @@ pub enum DesignName {
 /// Number type of the solver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[schemars(rename = "Precision")]
 pub enum PrecisionName {
     /// 32-bit numbers: faster, about six digits.
     Single,
@@ -92,6 +94,7 @@ pub enum PrecisionName {
 /// What a run does when the limit falls below its step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
+#[schemars(rename = "OnUnstable")]
 pub enum OnUnstableName {
     /// Cut the steps into equal parts until the limit recovers.
     #[default]
