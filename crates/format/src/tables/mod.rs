@@ -62,7 +62,7 @@ pub struct SceneTable {
     pub gravity: Option<[f64; 3]>,
 }
 
-/// A design of the kernels of a GPU; all give the same answers within round-off.
+/// A design of the kernels; all give the same answers within round-off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[schemars(rename = "Design")]
