@@ -3,7 +3,7 @@
 //! ```
 //! use pliant_geometry::words::{counted, number};
 //!
-//! assert_eq!([number(0.12345678), number(2e-6)], ["0.12346", "2.000e-6"]);
+//! assert_eq!([number(0.12345678), number(2e-6)], ["0.1235", "2.000e-6"]);
 //! assert_eq!([counted(1, "node"), counted(2, "node")], ["1 node", "2 nodes"]);
 //! ```
 
