@@ -5,7 +5,7 @@ use serde_json::json;
 
 use crate::arguments::Bench;
 use crate::page::Page;
-use crate::report::{Bar, Failure, SUCCESS, say};
+use pliant_command::{Bar, Failure, SUCCESS, say, tell};
 
 pub fn bench(arguments: &Bench) -> Result<u8, Failure> {
     if arguments.list {
@@ -30,7 +30,7 @@ pub fn bench(arguments: &Bench) -> Result<u8, Failure> {
             return Err(Failure::plain(missing.to_string(), help));
         }
         Err(error) => {
-            eprintln!("error: {error}");
+            tell(format_args!("error: {error}"));
             if arguments.json {
                 say(json!({ "error": error.to_string() }))?;
             }
@@ -56,7 +56,7 @@ fn shells() -> Result<u8, Failure> {
     match result {
         Ok(report) => say(report.table()).map(|()| SUCCESS),
         Err(error) => {
-            eprintln!("error: {error}");
+            tell(format_args!("error: {error}"));
             Ok(1)
         }
     }

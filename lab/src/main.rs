@@ -4,17 +4,16 @@
 mod arguments;
 mod bench;
 mod page;
-mod report;
 mod reproduce;
-
-use clap::Parser;
 
 use crate::arguments::{Arguments, Command};
 
 fn main() -> std::process::ExitCode {
-    let (json, result) = match Arguments::parse().command {
-        Command::Reproduce(arguments) => (false, reproduce::reproduce(&arguments)),
-        Command::Bench(arguments) => (arguments.json, bench::bench(&arguments)),
+    let wants_json =
+        |arguments: &Arguments| matches!(&arguments.command, Command::Bench(bench) if bench.json);
+    let execute = |arguments: Arguments| match arguments.command {
+        Command::Reproduce(arguments) => reproduce::reproduce(&arguments),
+        Command::Bench(arguments) => bench::bench(&arguments),
     };
-    result.unwrap_or_else(|failure| failure.tell(json)).into()
+    pliant_command::program(std::env::args_os(), wants_json, execute).into()
 }

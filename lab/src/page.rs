@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::report::Failure;
+use pliant_command::{Failure, tell};
 
 /// A page with a place for the table of a command.
 pub struct Page {
@@ -40,7 +40,7 @@ impl Page {
             let message = format!("`{}` cannot be written: {error}", path.display());
             Failure::plain(message, "check the file and its permissions")
         })?;
-        eprintln!("updated the table in {}", path.display());
+        tell(format_args!("updated the table in {}", path.display()));
         Ok(())
     }
 }

@@ -8,7 +8,7 @@ use pliant_run::OutputFolder;
 
 use crate::arguments::Reproduce;
 use crate::page::Page;
-use crate::report::{Failure, SUCCESS, say};
+use pliant_command::{Failure, SUCCESS, say, tell};
 
 pub fn reproduce(arguments: &Reproduce) -> Result<u8, Failure> {
     if arguments.list {
@@ -23,7 +23,7 @@ pub fn reproduce(arguments: &Reproduce) -> Result<u8, Failure> {
     let report = compute(&cases);
     for (name, content) in report.files() {
         let path = folder.write(name, &content).map_err(|error| Failure::plain(&error, error.remedy))?;
-        eprintln!("wrote {}", path.display());
+        tell(format_args!("wrote {}", path.display()));
     }
     if let Some(page) = page {
         page.renew(&report.table())?;

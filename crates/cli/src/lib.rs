@@ -35,6 +35,7 @@ use clap::Parser;
 
 #[cfg(feature = "viewer")]
 pub use pictures::{FinalPicture, look_of_world};
+pub use report::{Bar, Failure, say, tell};
 
 /// The code of a process that did what it was to do.
 pub const SUCCESS: u8 = 0;
@@ -42,17 +43,25 @@ pub const SUCCESS: u8 = 0;
 /// Does what a command line says, whose first word is the program: prints, writes files, opens a window. The code that the process is to
 /// end with.
 pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
+    let wants_json = |arguments: &arguments::Arguments| arguments.command.wants_json();
+    program(words, wants_json, |arguments| commands::execute(arguments.command))
+}
+
+/// Does what a command line says, of any program with commands: reads it, executes it, and prints errors, as an object on standard output,
+/// too, where that is promised. The code that the process is to end with.
+pub fn program<A: Parser>(
+    words: impl IntoIterator<Item = OsString>,
+    wants_json: impl FnOnce(&A) -> bool,
+    execute: impl FnOnce(A) -> Result<u8, Failure>,
+) -> u8 {
     signals::outlive_large_files();
     let words: Vec<OsString> = words.into_iter().collect();
-    let arguments = match arguments::Arguments::try_parse_from(&words) {
+    let arguments = match A::try_parse_from(&words) {
         Ok(arguments) => arguments,
         Err(error) => return mistyped(&error, &words),
     };
-    let json = arguments.command.wants_json();
-    match commands::execute(arguments.command) {
-        Ok(code) => code,
-        Err(failure) => report::failure(&failure, json),
-    }
+    let json = wants_json(&arguments);
+    execute(arguments).unwrap_or_else(|failure| report::failure(&failure, json))
 }
 
 /// An invalid command line, or a request for help.

@@ -404,7 +404,7 @@ fn shoot(
     let bar = Bar::new();
     let done = look.pictures(graphics, series, &frames, |count, picture| {
         save(folder, &picture_name(frames[count]), &picture)?;
-        bar.update_mesh(count as f64 / frames.len() as f64, "drawing pictures");
+        bar.show(count as f64 / frames.len() as f64, "drawing pictures");
         reel.add(&picture)
     });
     bar.finish();

@@ -73,7 +73,7 @@ fn build(scene: &Scene, cache: &MeshCache) -> Result<World, Failure> {
     let bar: OnceCell<Bar> = OnceCell::new();
     let built = World::assemble(scene, cache, &|meshing| {
         let Meshing { body, part, now } = meshing;
-        bar.get_or_init(Bar::new).update_mesh(part, format!("mesh of `{body}`: {now}"));
+        bar.get_or_init(Bar::new).show(part, format!("mesh of `{body}`: {now}"));
     });
     if let Some(bar) = bar.get() {
         bar.finish();

@@ -23,12 +23,18 @@ pub enum Failure {
     /// A scene with errors.
     Scene(SceneErrors),
     /// Any other error, with a remedy.
-    Plain { message: String, help: String },
+    Plain {
+        /// What is wrong.
+        message: String,
+        /// What helps.
+        help: String,
+    },
     /// Standard output can't be written; the input is valid (exit code 1).
     Output(io::Error),
 }
 
 impl Failure {
+    /// An error with a remedy, which may be empty.
     pub fn plain(message: impl ToString, help: impl ToString) -> Self {
         Self::Plain { message: message.to_string(), help: help.to_string() }
     }
@@ -126,6 +132,8 @@ pub struct Bar {
 }
 
 impl Bar {
+    /// At the start of the work.
+    #[expect(clippy::new_without_default, reason = "it begins to draw")]
     pub fn new() -> Self {
         let bar = ProgressBar::new(1000);
         let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}  {eta} left");
@@ -136,7 +144,7 @@ impl Bar {
     }
 
     /// Shows a part of the work from 0 to 1 and what is being done.
-    fn show(&self, part: f64, now: impl Into<Cow<'static, str>>) {
+    pub fn show(&self, part: f64, now: impl Into<Cow<'static, str>>) {
         let now = now.into();
         if let Some(last) = &self.last
             && let Ok(mut last) = last.lock()
@@ -149,7 +157,7 @@ impl Bar {
         self.bar.set_message(now);
     }
 
-    pub fn update(&self, progress: Progress) {
+    pub(crate) fn update(&self, progress: Progress) {
         let Progress { time, until, wall, load_step } = progress;
         let now = match load_step {
             Some(LoadStepProgress { number, of, iteration, tolerance }) => format!(
@@ -164,15 +172,11 @@ impl Bar {
         self.show(time / until, now);
     }
 
-    pub fn update_sweep(&self, progress: SweepProgress, runs: usize) {
+    pub(crate) fn update_sweep(&self, progress: SweepProgress, runs: usize) {
         self.show(progress.part, progress.words(runs));
     }
 
-    /// A fraction of the work from 0 to 1, and the current task.
-    pub fn update_mesh(&self, part: f64, now: impl Into<Cow<'static, str>>) {
-        self.show(part, now);
-    }
-
+    /// At its end.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
     }
@@ -218,6 +222,9 @@ pub fn adapters(found: &[Adapter]) -> String {
 }
 
 /// Prints a line on standard output. A closed pipe (`pliant schema | head`) is not an error.
+///
+/// # Errors
+/// If it can't be written.
 pub fn say(text: impl Display) -> Result<(), Failure> {
     let text = text.to_string();
     let written = writeln!(io::stdout(), "{}", printable(&text)).and_then(|()| io::stdout().flush());

@@ -175,6 +175,8 @@ fn an_unknown_row_is_answered_with_the_nearest() {
     assert_eq!(told.code, 2);
     assert!(told.err.contains("did you mean `tet4-nh-55566`?"), "{}", told.err);
     assert!(told.out.contains("tet4-nh-5556"), "{}", told.out);
+    let mistyped = workshop.lab(&["bench", "--json", "--ful"]);
+    assert_eq!((mistyped.code, mistyped.json()["status"].as_str()), (2, Some("invalid")), "{}", mistyped.out);
     assert_eq!(workshop.lab(&["bench", "--repeats", "0"]).code, 2);
     assert_eq!(workshop.lab(&["bench", "--seconds", "0"]).code, 2);
     workshop.write("page.md", "# Page\n");

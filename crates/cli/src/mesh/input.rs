@@ -32,7 +32,7 @@ impl Source<'_> {
         let table = self.names.map(LabelNames::read).transpose().map_err(|error| image_failure(&error))?;
         let each = share / self.files.len() as f64;
         let read = |(at, path): (usize, &&PathBuf)| {
-            let progress = |done: f64| bar.update_mesh(each * (at as f64 + done), "reading the image");
+            let progress = |done: f64| bar.show(each * (at as f64 + done), "reading the image");
             read_with(path, &self.options(), &progress).map_err(|error| image_failure(&error))
         };
         let mut images = self.files.iter().enumerate().map(read).collect::<Result<Vec<_>, _>>()?;
@@ -144,7 +144,7 @@ pub fn regions_in(mut image: Image, arguments: &MeshImage, bar: &Bar) -> Result<
     let protect = protected(arguments, chosen, &names)?;
     let finest = arguments.edge.or(arguments.distance).map(|edge| tets(arguments, edge, &protect).finest());
     let coarsest = finest.map_or(f64::INFINITY, |finest| finest * COARSEST);
-    let progress = |done: f64| bar.update_mesh(READING * (1.0 + done), "cutting the body out");
+    let progress = |done: f64| bar.show(READING * (1.0 + done), "cutting the body out");
     let cut = image.cut(&choice, coarsest, &progress).map_err(|error| match (&error, &choice) {
         (LabelError::Absent { .. }, Choice::From(least)) => {
             Failure::plain(format!("no voxel is {least} or more"), "use a lower `--threshold`")
@@ -280,7 +280,7 @@ pub fn anatomy(
         keep_largest: arguments.keep_largest,
     };
     let rest = PARTS[0] - 2.0 * READING;
-    let field = |done: f64| bar.update_mesh(2.0 * READING + rest * done, "smoothing the surface");
+    let field = |done: f64| bar.show(2.0 * READING + rest * done, "smoothing the surface");
     Anatomy::from_image(&found.labels, &found.chosen, &cleaning, smoothing, &field)
         .map_err(|error| label_failure(&error))
 }

@@ -38,7 +38,7 @@ pub fn labels(arguments: &Labels) -> Result<u8, Failure> {
         force: arguments.force,
     };
     let found = source.read(&bar, 0.7).and_then(|image| {
-        let regions = image.regions(&|done| bar.update_mesh(0.7 + 0.3 * done, "finding the labels"));
+        let regions = image.regions(&|done| bar.show(0.7 + 0.3 * done, "finding the labels"));
         Ok((regions.map_err(|error| label_failure(&error))?, image))
     });
     bar.finish();
@@ -155,7 +155,7 @@ fn make(arguments: &MeshImage, bar: &Bar) -> Result<MadeMesh, Failure> {
     let force = arguments.force;
     let found = if is_mesh_file(arguments) { enclosed(arguments, bar) } else { segmented(arguments, bar) }?;
     let (anatomy, edge) = (&found.anatomy, found.edge);
-    let filling = |done: f64| bar.update_mesh(PARTS[0] + PARTS[1] * done, "making cells");
+    let filling = |done: f64| bar.show(PARTS[0] + PARTS[1] * done, "making cells");
     let cell_limit = cell_limit(arguments);
     let refused = |error: MeshingError| meshing_failure(&error, force);
     let (mesh, cells) = match arguments.cells {
@@ -175,7 +175,7 @@ fn make(arguments: &MeshImage, bar: &Bar) -> Result<MadeMesh, Failure> {
             (made.mesh, Cells::Hexes { immersed, dropped, surface })
         }
     };
-    bar.update_mesh(PARTS[0] + PARTS[1], "measuring distances");
+    bar.show(PARTS[0] + PARTS[1], "measuring distances");
     let assessment = Assessment::of(&mesh, anatomy, edge).map_err(refused)?;
     let mut warnings = found.warnings;
     warnings.extend(assessment.missed.iter().map(warning));
@@ -275,11 +275,11 @@ fn enclosed(arguments: &MeshImage, bar: &Bar) -> Result<Input, Failure> {
     }
     let mut warnings = Vec::new();
     let file = mesh_file(arguments, &mut warnings)?;
-    bar.update_mesh(0.0, "repairing the surface");
+    bar.show(0.0, "repairing the surface");
     let edge = edge_of(arguments, file.mesh.bounds().unwrap_or_default().into());
     let surface = Enclosed::new(&file.mesh, edge, &closing).map_err(refused)?;
     require_few(arguments, edge, surface.volume())?;
-    let progress = |done: f64| bar.update_mesh(PARTS[0] * done, "measuring distances from the surface");
+    let progress = |done: f64| bar.show(PARTS[0] * done, "measuring distances from the surface");
     let label = match arguments.label.first() {
         None => 1,
         Some(LabelChoice::One(label)) => *label,

@@ -143,10 +143,10 @@ fn make(arguments: &MeshImage, found: &InputSurface, goal: Goal, bar: &Bar) -> R
     let refused = |error| meshing_failure(&error, arguments.force);
     let InputSurface { surface: input, anatomy, .. } = found;
     let mut surface = input.clone();
-    bar.update_mesh(0.5, "making triangles");
+    bar.show(0.5, "making triangles");
     match goal {
         Goal::Shells(goal) => {
-            bar.update_mesh(0.3, "making the initial triangles");
+            bar.show(0.3, "making the initial triangles");
             let progress = |now: FitProgress| {
                 let words = format!(
                     "fitting: round {}, {} shells, {:.2} % off",
@@ -154,7 +154,7 @@ fn make(arguments: &MeshImage, found: &InputSurface, goal: Goal, bar: &Bar) -> R
                     now.shells,
                     100.0 * now.off
                 );
-                bar.update_mesh(0.3 + 0.7 * now.part, words);
+                bar.show(0.3 + 0.7 * now.part, words);
             };
             return FittedShells::new(input, goal, &progress).map(shells).map_err(refused);
         }
@@ -166,7 +166,7 @@ fn make(arguments: &MeshImage, found: &InputSurface, goal: Goal, bar: &Bar) -> R
             surface.decimate(Fewer::Triangles(number)).map_err(refused)?;
         }
     }
-    bar.update_mesh(0.8, "measuring distances");
+    bar.show(0.8, "measuring distances");
     let kept = anatomy.as_ref().and_then(|anatomy| surface.keep_volume(anatomy));
     let diagonal = input.diagonal();
     let mesh = surface.to_parted_mesh();
