@@ -563,10 +563,6 @@ impl AssemblySolver for BackwardEuler {
 impl Contacting for BackwardEuler {
     const INERTIA: bool = true;
 
-    fn system(&mut self) -> &mut System {
-        &mut self.system
-    }
-
     fn vectors(&mut self) -> Vectors<'_> {
         let Self { system, pending, increment, residual, solution, .. } = self;
         Vectors { system, pending, increment, residual, solution }

@@ -13,6 +13,7 @@
 
 use crate::model::error::SolveError;
 use crate::model::state::State;
+use crate::steps::solver::AssemblySolver;
 use crate::system::System;
 use pliant_linear::dot;
 
@@ -34,12 +35,9 @@ const DOUBLINGS: usize = 3;
 const ROUND_OFF: f64 = 1e-12;
 
 /// What a step in contact needs of a solver.
-pub(crate) trait Contacting {
+pub(crate) trait Contacting: AssemblySolver {
     /// Whether steps have inertia.
     const INERTIA: bool;
-
-    /// The equations.
-    fn system(&mut self) -> &mut System;
 
     /// The vectors of an iteration.
     fn vectors(&mut self) -> Vectors<'_>;
@@ -264,7 +262,7 @@ fn start_from(
 
 /// Sets how far rigid things have gone.
 fn put(solver: &mut impl Contacting, share: f64) {
-    if let Some(touching) = &mut solver.system().touching {
+    if let Some(touching) = &mut solver.system_mut().touching {
         touching.share = share;
     }
 }
@@ -273,7 +271,7 @@ fn share(system: &System) -> f64 {
     system.touching.as_ref().map_or(1.0, |touching| touching.share)
 }
 
-fn close(solver: &mut impl Contacting) -> f64 {
+fn close(solver: &impl Contacting) -> f64 {
     solver.system().touching.as_ref().map_or(0.0, |touching| touching.close)
 }
 
@@ -304,7 +302,7 @@ fn work(solver: &mut impl Contacting, before: &[f64]) -> f64 {
 /// The energy [J] at the state last evaluated, without loads, and the sum of the sizes of its parts.
 fn energy(solver: &mut impl Contacting) -> (f64, f64) {
     let potential = solver.potential();
-    let system = solver.system();
+    let system = solver.system_mut();
     let touching = system.touching.as_ref().map_or(0.0, |touching| touching.energy);
     let parts = [system.energy, touching, potential];
     (parts.iter().sum(), parts.iter().map(|part| part.abs()).sum())
@@ -319,7 +317,7 @@ fn find_direction(solver: &mut impl Contacting, raised: &mut f64) -> Result<(f64
     let (first, growth, times) = RAISED;
     let mut added = 0.0;
     for _ in 0..=times {
-        let system = solver.system();
+        let system = solver.system_mut();
         let by = *raised - added;
         if by > 0.0 {
             system.matrix.add_to_each_diagonal(|k| by * diagonal[k]);
@@ -446,7 +444,7 @@ fn expand(
 
 /// Takes friction anew if its size has changed by more than counts; whether it has.
 fn lag(solver: &mut impl Contacting) -> bool {
-    let Some(touching) = &mut solver.system().touching else { return false };
+    let Some(touching) = &mut solver.system_mut().touching else { return false };
     let [held, now] = touching.barriers.friction_limits();
     let changed = (now - held).abs() > LAGGED * held.max(now);
     if changed {

@@ -132,8 +132,8 @@ pub(crate) fn within_limits<S: Contacting, T, E: From<SolveError>>(
     time: f64,
     mut solve: impl FnMut(&mut S, &mut State) -> Result<T, E>,
 ) -> Result<T, E> {
-    let mut guesses = solver.system().guesses();
-    let mut valves = solver.system().valves();
+    let mut guesses = solver.system_mut().guesses();
+    let mut valves = solver.system_mut().valves();
     if guesses.is_empty() && valves.is_empty() {
         return solve(solver, state);
     }
@@ -146,16 +146,16 @@ pub(crate) fn within_limits<S: Contacting, T, E: From<SolveError>>(
         system.hold_back([start.time, time], &mut guesses, pending);
         valves.iter().for_each(|own| system.conditions.give_pressure(own.constraint, own.given));
         let solved = solve(solver, state)?;
-        if !valves.is_empty() && solver.system().touching.is_some() {
+        if !valves.is_empty() && solver.system_mut().touching.is_some() {
             // The last motion of a step in contact was made without a look at what is left.
             solver.find_residual(state);
         }
-        let unkept = solver.system().unkept(&mut valves);
+        let unkept = solver.system_mut().unkept(&mut valves);
         let mut agree = unkept.is_none();
         if let Some(own) = unkept.filter(|own| own.changes > CHANGES || tries == 0) {
-            return Err(own.snaps(&solver.system().model, time, S::INERTIA).into());
+            return Err(own.snaps(&solver.system_mut().model, time, S::INERTIA).into());
         }
-        for (guess, force) in guesses.iter_mut().zip(solver.system().bear_on()) {
+        for (guess, force) in guesses.iter_mut().zip(solver.system_mut().bear_on()) {
             agree &= guess.take(force);
         }
         if agree || tries == 0 {

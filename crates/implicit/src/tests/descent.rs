@@ -5,7 +5,7 @@ use crate::model::error::SolveError;
 use crate::model::state::State;
 use crate::steps::descent::{Contacting, Limits, Vectors, descend};
 use crate::system::System;
-use crate::{StaticSettings, Statics};
+use crate::{AssemblySolver, Attempted, StaticSettings, Statics};
 
 /// A solver whose energy grows by 1 J each time it is asked.
 struct Stuck {
@@ -13,12 +13,26 @@ struct Stuck {
     asked: u32,
 }
 
-impl Contacting for Stuck {
-    const INERTIA: bool = false;
-
-    fn system(&mut self) -> &mut System {
+impl AssemblySolver for Stuck {
+    fn system(&self) -> &System {
         self.solver.system()
     }
+
+    fn system_mut(&mut self) -> &mut System {
+        self.solver.system_mut()
+    }
+
+    fn attempts(&self) -> &[Attempted] {
+        self.solver.attempts()
+    }
+
+    fn tolerance(&self) -> f64 {
+        self.solver.tolerance()
+    }
+}
+
+impl Contacting for Stuck {
+    const INERTIA: bool = false;
 
     fn vectors(&mut self) -> Vectors<'_> {
         self.solver.vectors()

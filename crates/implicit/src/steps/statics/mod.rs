@@ -510,10 +510,6 @@ impl AssemblySolver for Statics {
 impl Contacting for Statics {
     const INERTIA: bool = false;
 
-    fn system(&mut self) -> &mut System {
-        &mut self.system
-    }
-
     fn vectors(&mut self) -> Vectors<'_> {
         let Self { system, pending, increment, residual, solution, .. } = self;
         Vectors { system, pending, increment, residual, solution }
