@@ -49,22 +49,12 @@ pub fn free() -> Option<u64> {
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
 }
 
-/// Whether the system has room for so many bytes more. Asked before arrays that follow from the size of a mesh are made: what they need at least.
+/// Asks the system for so many bytes and gives them back. A caller asks for the least that a mesh needs before it makes the arrays of the mesh.
 ///
 /// # Errors
 /// If it has not.
 pub fn room_for(bytes: u64) -> Result<(), OutOfMemory> {
-    // Linux gives more than it has, and ends the program that uses it.
-    if let Some(free) = free_for(bytes) {
-        return Err(OutOfMemory { bytes, free: Some(free) });
-    }
-    let count = usize::try_from(bytes).unwrap_or(usize::MAX);
-    Vec::<u8>::new().try_reserve_exact(count).map_err(|_| OutOfMemory { bytes, free: None })
-}
-
-/// What is free where that is less than an array takes; small ones are not compared.
-fn free_for(bytes: u64) -> Option<u64> {
-    if bytes > LARGE { free().filter(|&free| free < bytes) } else { None }
+    reserved::<u8>(usize::try_from(bytes).unwrap_or(usize::MAX)).map(|_| ())
 }
 
 /// So many zeros.
@@ -72,12 +62,21 @@ fn free_for(bytes: u64) -> Option<u64> {
 /// # Errors
 /// If the system has no room for them.
 pub fn zeros(count: usize) -> Result<Vec<f64>, OutOfMemory> {
-    let bytes = (count as u64).saturating_mul(8);
-    if let Some(free) = free_for(bytes) {
+    let mut all = reserved(count)?;
+    all.resize(count, 0.0);
+    Ok(all)
+}
+
+/// An empty array with room for so many.
+fn reserved<T>(count: usize) -> Result<Vec<T>, OutOfMemory> {
+    let bytes = (count as u64).saturating_mul(size_of::<T>() as u64);
+    // Linux gives more than it has, and ends the program that uses it.
+    if bytes > LARGE
+        && let Some(free) = free().filter(|&free| free < bytes)
+    {
         return Err(OutOfMemory { bytes, free: Some(free) });
     }
     let mut all = Vec::new();
     all.try_reserve_exact(count).map_err(|_| OutOfMemory { bytes, free: None })?;
-    all.resize(count, 0.0);
     Ok(all)
 }

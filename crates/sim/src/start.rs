@@ -62,6 +62,7 @@ pub(crate) fn go_on(
     if !kept.fits(part) {
         return Ok(None);
     }
+    part.has_room()?;
     Ok(match (kept, part.method.bodies(), part.method.precision()) {
         (Kept::Implicit(state), Some(bodies), _) => {
             let mut participant = Assembled::new(part, bodies)?;
