@@ -10,7 +10,7 @@ use pliant_mechanics::model::Model;
 use pliant_mechanics::tensor::{Vector, add, scale};
 use rayon::prelude::*;
 
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 
 /// Nodes whose forces are passed over together where nothing acts on them.
 pub(crate) const BLOCK: usize = 128;
@@ -44,7 +44,7 @@ fn is_gravity(load: &Load) -> bool {
     matches!(load.kind, LoadKind::Gravity { .. })
 }
 
-impl<R: Scalar> AppliedForces<R> {
+impl<R: LaneNumber> AppliedForces<R> {
     pub(crate) fn new(model: Arc<Model>) -> Self {
         let weighs = model.loads.iter().any(is_gravity);
         let mut body_of = vec![0; model.node_count()];
@@ -158,7 +158,7 @@ impl<R: Scalar> AppliedForces<R> {
 
     /// The force [N] on a node.
     #[inline(always)]
-    pub(crate) fn at<N: Scalar>(&self, node: usize) -> Vector<N> {
+    pub(crate) fn at<N: LaneNumber>(&self, node: usize) -> Vector<N> {
         let gravity = self.gravity[self.body_of[node] as usize];
         let mass = self.model.mass[node];
         let force = |c: usize| N::of(self.nodal[node][c] + mass * gravity[c]);

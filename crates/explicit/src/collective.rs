@@ -17,7 +17,7 @@ use pliant_mechanics::model::{Constraint, Enclosed, Enclosure, Model, Motion};
 use pliant_mechanics::rotation::nearest_rotation;
 use pliant_mechanics::tensor::{Vector, add, cast, dot, scale, sub};
 
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 
 /// Steps of Newton's method for a rotation; three are usual.
 const MOST_TURNS: usize = 8;
@@ -141,7 +141,12 @@ impl Collective {
 
     /// Makes forces [N] that were found step by step, one a node of the model, those of the constraint where the nodes are displaced by so much [m] now:
     /// of a volume those of its pressure, of a rigid part without resultant and moment. Those of a mean stay.
-    pub fn renew<R: Scalar>(&mut self, model: &Model, displacement: &[Vector<R>], forces: &mut [Vector<R>]) {
+    pub fn renew<R: LaneNumber>(
+        &mut self,
+        model: &Model,
+        displacement: &[Vector<R>],
+        forces: &mut [Vector<R>],
+    ) {
         let constraint = &model.constraints[self.constraint];
         let place = |at: u32| {
             let node = constraint.nodes[at as usize] as usize;

@@ -12,10 +12,10 @@ use pliant_mechanics::model::{Cells, Contradiction, FREE, Model, Solid};
 use pliant_mechanics::tensor::{Vector, add, cast, dot, sub};
 use rayon::prelude::*;
 
-use crate::Scalar;
 use crate::damping_force::damped;
 use crate::forces::InternalForces;
 use crate::history::History;
+use crate::lanes::LaneNumber;
 
 /// The smallest element bound of a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -133,7 +133,7 @@ pub(crate) fn assembled_about(
 ///
 /// The `forces` of the run are used where they can be; afterwards they are those of the last evaluation again. In single precision a step
 /// that is not `enough` is found again in double precision.
-pub(crate) fn limit_about<R: Scalar>(
+pub(crate) fn limit_about<R: LaneNumber>(
     model: &Model,
     owners: &[[u32; 3]],
     forces: Option<&mut InternalForces<R>>,
@@ -163,7 +163,7 @@ pub(crate) fn limit_about<R: Scalar>(
 }
 
 /// The same by forces in double precision.
-fn limit_or_enough<R: Scalar>(
+fn limit_or_enough<R: LaneNumber>(
     model: &Model,
     owners: &[[u32; 3]],
     forces: &mut InternalForces<R>,
@@ -178,7 +178,7 @@ fn limit_or_enough<R: Scalar>(
 
 /// The critical time step [s] by forces in single precision, if it is at least `enough` [s]; `None` also where round-off is too large for
 /// small differences.
-fn limit_if_enough<R: Scalar>(
+fn limit_if_enough<R: LaneNumber>(
     model: &Model,
     owners: &[[u32; 3]],
     forces: &mut InternalForces<R>,
@@ -252,7 +252,7 @@ fn cell_sizes(model: &Model) -> [f64; 2] {
 }
 
 /// Finds the forces on some nodes from `first` on, at most [`SHARE`].
-fn forces_from<R: Scalar>(forces: &InternalForces<R>, first: usize, to: &mut [Vector<R>]) {
+fn forces_from<R: LaneNumber>(forces: &InternalForces<R>, first: usize, to: &mut [Vector<R>]) {
     forces.at_nodes(first..first + to.len(), &mut [[R::ZERO; 4]; SHARE], to);
 }
 
@@ -273,7 +273,7 @@ struct Operator<'a, R> {
     calls: usize,
 }
 
-impl<'a, R: Scalar> Operator<'a, R> {
+impl<'a, R: LaneNumber> Operator<'a, R> {
     fn new(
         model: &'a Model,
         owners: &[[u32; 3]],
@@ -348,7 +348,7 @@ enum Until {
 }
 
 /// Largest eigenvalue by Lanczos, with its residual added, and the relative residual; `None` where the search was in vain.
-fn largest_eigenvalue<R: Scalar>(operator: &mut Operator<'_, R>, until: Until) -> Option<(f64, f64)> {
+fn largest_eigenvalue<R: LaneNumber>(operator: &mut Operator<'_, R>, until: Until) -> Option<(f64, f64)> {
     let nodes = operator.inverse_root_mass.len();
     let mut v = start_vector(nodes, &operator.inverse_root_mass);
     let mut before = vec![[R::ZERO; 3]; nodes];
@@ -414,7 +414,7 @@ fn largest_eigenvalue<R: Scalar>(operator: &mut Operator<'_, R>, until: Until) -
 }
 
 /// A unit vector without pattern, the same in every run, zero on held components.
-fn start_vector<R: Scalar>(nodes: usize, mask: &[Vector<R>]) -> Vec<Vector<R>> {
+fn start_vector<R: LaneNumber>(nodes: usize, mask: &[Vector<R>]) -> Vec<Vector<R>> {
     let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
     let mut random = || {
         seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -430,7 +430,7 @@ fn start_vector<R: Scalar>(nodes: usize, mask: &[Vector<R>]) -> Vec<Vector<R>> {
 }
 
 /// a · b in double precision.
-fn wide_dot<R: Scalar>(a: Vector<R>, b: Vector<R>) -> f64 {
+fn wide_dot<R: LaneNumber>(a: Vector<R>, b: Vector<R>) -> f64 {
     dot(a.map(R::to_f64), b.map(R::to_f64))
 }
 
@@ -544,7 +544,7 @@ mod tests {
     }
 
     /// The limit, once with what has found other forces with a history, which stay.
-    fn found_with_and_without_forces<R: Scalar>(
+    fn found_with_and_without_forces<R: LaneNumber>(
         name: &str,
         model: &Model,
         displacement: &[Vector<R>],

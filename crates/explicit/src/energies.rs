@@ -3,11 +3,11 @@
 use pliant_mechanics::Energies;
 use pliant_mechanics::model::Model;
 
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 use crate::state::Work;
 
 /// The balance is judged once an energy exceeds this fraction of Σ V (λ+2μ): below it, round-off counts.
-pub fn balance_floor<R: Scalar>() -> f64 {
+pub fn balance_floor<R: LaneNumber>() -> f64 {
     // 1e-9 in double and 1e-6 in single precision.
     (R::EPSILON * 10.0).max(1e-9)
 }
@@ -56,7 +56,7 @@ impl Sums {
 }
 
 /// Energy [J] above which the balance of a model is judged.
-pub fn model_balance_floor<R: Scalar>(model: &Model) -> f64 {
+pub fn model_balance_floor<R: LaneNumber>(model: &Model) -> f64 {
     let stiffness: f64 = (model.solids.iter())
         .map(|solid| {
             let volume: f64 = (0..solid.cells.len()).map(|cell| solid.cells.volume(cell)).sum();

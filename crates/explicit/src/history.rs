@@ -4,7 +4,7 @@ use pliant_mechanics::model::Solid;
 use pliant_mechanics::tensor::Symmetric;
 use serde::{Deserialize, Serialize};
 
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 use crate::lanes::{PACK, Pack};
 
 /// What a relaxing law remembers of a solid.
@@ -16,7 +16,7 @@ pub struct History<R> {
     pub pressures: Vec<Pack<R>>,
 }
 
-impl<R: Scalar> History<R> {
+impl<R: LaneNumber> History<R> {
     /// At rest.
     pub(crate) fn at_rest(solid: &Solid) -> Self {
         let packs = |count: usize, slots: usize| vec![Pack::ZERO; count.div_ceil(PACK) * slots];

@@ -15,11 +15,9 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Range, Sub, SubAssign};
 use pulp::{Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
-use pliant_mechanics::Number;
 use pliant_mechanics::closer_to_inverse_cbrt;
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector};
-
-use crate::Scalar;
+use pliant_mechanics::{Number, Real};
 
 /// Numbers in a pack: the widest register in single precision.
 pub const PACK: usize = 16;
@@ -30,7 +28,7 @@ pub const PACK: usize = 16;
 #[repr(C, align(64))]
 pub struct Pack<R>(pub [R; PACK]);
 
-impl<R: Scalar> Pack<R> {
+impl<R: LaneNumber> Pack<R> {
     /// All zeros.
     pub(crate) const ZERO: Self = Self([R::ZERO; PACK]);
 
@@ -42,7 +40,7 @@ impl<R: Scalar> Pack<R> {
 
 /// The number of an entry in a row of packs.
 #[inline(always)]
-pub(crate) fn entry<R: Scalar>(packs: &[Pack<R>], index: usize) -> R {
+pub(crate) fn entry<R: LaneNumber>(packs: &[Pack<R>], index: usize) -> R {
     packs[index / PACK].0[index % PACK]
 }
 
@@ -69,15 +67,34 @@ pub trait Lanes<R>: Number {
     fn call<W: LaneWork<R>>(work: W) -> W::Output;
 }
 
+/// A number type that lanes hold. By itself the narrowest of lanes.
+pub trait LaneNumber: Real + Lanes<Self> {
+    /// As many of them as a register of the CPU holds.
+    #[doc(hidden)]
+    type Wide<S: Simd>: Lanes<Self>;
+}
+
+impl LaneNumber for f32 {
+    type Wide<S: Simd> = WideF32<S>;
+}
+
+impl LaneNumber for f64 {
+    type Wide<S: Simd> = WideF64<S>;
+}
+
 /// The lanes' part of a vector of packs.
 #[inline(always)]
-pub(crate) fn load_vector<R: Scalar, L: Lanes<R>>(from: &Vector<Pack<R>>, at: usize) -> Vector<L> {
+pub(crate) fn load_vector<R: LaneNumber, L: Lanes<R>>(from: &Vector<Pack<R>>, at: usize) -> Vector<L> {
     [L::load(&from[0], at), L::load(&from[1], at), L::load(&from[2], at)]
 }
 
 /// Writes a vector into packs.
 #[inline(always)]
-pub(crate) fn store_vector<R: Scalar, L: Lanes<R>>(vector: Vector<L>, to: &mut Vector<Pack<R>>, at: usize) {
+pub(crate) fn store_vector<R: LaneNumber, L: Lanes<R>>(
+    vector: Vector<L>,
+    to: &mut Vector<Pack<R>>,
+    at: usize,
+) {
     for (number, pack) in vector.into_iter().zip(to) {
         number.store(pack, at);
     }
@@ -85,14 +102,17 @@ pub(crate) fn store_vector<R: Scalar, L: Lanes<R>>(vector: Vector<L>, to: &mut V
 
 /// The lanes' part of a tensor of packs.
 #[inline(always)]
-pub(crate) fn load_tensor<R: Scalar, L: Lanes<R>>(from: &Tensor<Pack<R>>, at: usize) -> Tensor<L> {
+pub(crate) fn load_tensor<R: LaneNumber, L: Lanes<R>>(from: &Tensor<Pack<R>>, at: usize) -> Tensor<L> {
     let rows = &from.0;
     Tensor([load_vector(&rows[0], at), load_vector(&rows[1], at), load_vector(&rows[2], at)])
 }
 
 /// The lanes' part of a symmetric tensor of packs.
 #[inline(always)]
-pub(crate) fn load_symmetric<R: Scalar, L: Lanes<R>>(from: &Symmetric<Pack<R>>, at: usize) -> Symmetric<L> {
+pub(crate) fn load_symmetric<R: LaneNumber, L: Lanes<R>>(
+    from: &Symmetric<Pack<R>>,
+    at: usize,
+) -> Symmetric<L> {
     let mut symmetric = Symmetric::ZERO;
     for (number, pack) in symmetric.0.iter_mut().zip(&from.0) {
         *number = L::load(pack, at);
@@ -102,7 +122,7 @@ pub(crate) fn load_symmetric<R: Scalar, L: Lanes<R>>(from: &Symmetric<Pack<R>>, 
 
 /// Writes a symmetric tensor into packs.
 #[inline(always)]
-pub(crate) fn store_symmetric<R: Scalar, L: Lanes<R>>(
+pub(crate) fn store_symmetric<R: LaneNumber, L: Lanes<R>>(
     symmetric: Symmetric<L>,
     to: &mut Symmetric<Pack<R>>,
     at: usize,
@@ -221,7 +241,7 @@ impl Processor {
 
     /// Does the work in these lanes.
     #[inline]
-    pub(crate) fn run<R: Scalar, W: LaneWork<R>>(self, work: W) -> W::Output {
+    pub(crate) fn run<R: LaneNumber, W: LaneWork<R>>(self, work: W) -> W::Output {
         match self {
             #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
             Self::Avx512(simd) => Simd::vectorize(simd, InLanes(work, std::marker::PhantomData::<R>)),
@@ -239,7 +259,7 @@ impl Processor {
 /// Work on its way into a function compiled for `S`.
 struct InLanes<R, W>(W, std::marker::PhantomData<R>);
 
-impl<R: Scalar, W: LaneWork<R>> WithSimd for InLanes<R, W> {
+impl<R: LaneNumber, W: LaneWork<R>> WithSimd for InLanes<R, W> {
     type Output = W::Output;
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> W::Output {
@@ -251,7 +271,7 @@ impl<R: Scalar, W: LaneWork<R>> WithSimd for InLanes<R, W> {
 ///
 /// # Safety
 /// Only where `S` has been detected. All uses are in methods of the wide types below. Their values and functions are
-/// reached through [`Scalar::Wide`] alone, which nothing but [`InLanes`] names, and `InLanes` is handed the proof.
+/// reached through [`LaneNumber::Wide`] alone, which nothing but [`InLanes`] names, and `InLanes` is handed the proof.
 #[inline(always)]
 unsafe fn proof<S: Simd>() -> S {
     const { assert!(size_of::<S>() == 0) };
@@ -279,7 +299,7 @@ const fn units<R>() -> usize {
     size_of::<[R; 4]>() / size_of::<Unit>()
 }
 
-impl<R: Scalar, const N: usize> Places<R, N> {
+impl<R: LaneNumber, const N: usize> Places<R, N> {
     /// From the numbers of the nodes of packs of cells, and how many packs a block has.
     pub(crate) fn new(packs: impl Iterator<Item = [[u16; PACK]; N]>, per_block: usize) -> Self {
         const { assert!(units::<R>() * crate::forces::MOST_PACKS * PACK * N <= 1 << 16) };
@@ -327,7 +347,7 @@ pub(crate) struct Local<'a, R, const N: usize> {
     offsets: &'a [[[u16; PACK]; N]],
 }
 
-impl<R: Scalar, const N: usize> Local<'_, R, N> {
+impl<R: LaneNumber, const N: usize> Local<'_, R, N> {
     /// The vectors of a node of each cell of a pack, from lane `at` on, component by component.
     #[inline(always)]
     pub(crate) fn gather<L: Lanes<R>>(&self, pack: usize, node: usize, at: usize) -> [L; 4] {
@@ -388,7 +408,7 @@ unsafe fn at_offset_mut<R>(vectors: &mut [[R; 4]], offset: u16) -> *mut [R; 4] {
 
 /// a + b. Both are read before anything is written, or the compiler takes number by number.
 #[inline(always)]
-pub(crate) fn plus<R: Scalar>(a: [R; 4], b: [R; 4]) -> [R; 4] {
+pub(crate) fn plus<R: LaneNumber>(a: [R; 4], b: [R; 4]) -> [R; 4] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
 }
 

@@ -45,6 +45,7 @@ pub mod mass_scaling;
 mod node_pass;
 pub mod recover;
 mod relaxation;
+mod scalar;
 pub mod stability;
 mod stability_record;
 mod state;
@@ -59,10 +60,11 @@ pub use dynamic_relaxation::{
     Convergence, DynamicRelaxation, Equilibrium, Iteration, RelaxationError, RelaxationSettings, Way,
 };
 pub use energies::{BALANCE_LIMIT, BALANCE_STEPS, Sums, balance_floor, model_balance_floor};
-pub use forces::{Deformed, Scalar};
+pub use forces::Deformed;
 pub use history::History;
 pub use lanes::{Instructions, MissingInstructions, PACK, Pack};
 pub use relaxation::{Relaxation, Series};
+pub use scalar::Scalar;
 pub use state::{State, Work};
 pub use step_control::{Clock, Lengths, StepControl};
 pub use step_error::StepError;

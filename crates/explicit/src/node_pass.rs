@@ -4,11 +4,11 @@
 use pliant_mechanics::model::{Amplitudes, FREE, component, placed};
 use pliant_mechanics::tensor::Vector;
 
-use crate::Scalar;
 use crate::applied::{AppliedForces, BLOCK};
 use crate::damping_force::Past;
 use crate::energies::Sums;
 use crate::forces::{InternalForces, Quad};
+use crate::lanes::LaneNumber;
 use crate::lanes::{LaneWork, Lanes};
 use crate::step_control::Lengths;
 
@@ -67,7 +67,7 @@ pub(crate) struct Pace<R> {
     per_two_means: R,
 }
 
-impl<R: Scalar> Pace<R> {
+impl<R: LaneNumber> Pace<R> {
     pub(crate) fn new(lengths: Lengths) -> Self {
         let step_squared = lengths.next * lengths.mean();
         Self {
@@ -104,7 +104,7 @@ pub(crate) struct NodePass<'a, R> {
     pub(crate) internal: &'a mut [Vector<R>],
 }
 
-impl<R: Scalar> LaneWork<R> for NodePass<'_, R> {
+impl<R: LaneNumber> LaneWork<R> for NodePass<'_, R> {
     type Output = Sums;
 
     /// Plain loops over a block of components, which the compiler makes wide. Each loop goes over a whole block. Numbers that were written
@@ -164,7 +164,7 @@ pub(crate) struct Add<'a, R> {
     pub(crate) to: &'a mut [Vector<R>],
 }
 
-impl<R: Scalar> LaneWork<R> for Add<'_, R> {
+impl<R: LaneNumber> LaneWork<R> for Add<'_, R> {
     type Output = ();
 
     #[inline(always)]
@@ -186,14 +186,14 @@ struct Known<T> {
 /// That of whole blocks.
 type Whole<'a, R> = Known<&'a [Vector<R>; BLOCK]>;
 
-impl<R: Scalar> Known<[Vector<R>; BLOCK]> {
+impl<R: LaneNumber> Known<[Vector<R>; BLOCK]> {
     fn at_rest() -> Self {
         let zero = [[R::ZERO; 3]; BLOCK];
         Self { before: zero, mass: [[R::ONE; 3]; BLOCK], damping: zero }
     }
 }
 
-impl<'a, R: Scalar> Known<&'a [Vector<R>]> {
+impl<'a, R: LaneNumber> Known<&'a [Vector<R>]> {
     /// With nodes at rest beyond the last one, for which there is room.
     #[inline(always)]
     fn filled_up(self, room: &'a mut Known<[Vector<R>; BLOCK]>) -> Whole<'a, R> {
@@ -224,7 +224,7 @@ struct Block<R> {
     damping: [Vector<R>; BLOCK],
 }
 
-impl<R: Scalar> Block<R> {
+impl<R: LaneNumber> Block<R> {
     #[inline(always)]
     fn at_rest() -> Self {
         let zero = [[R::ZERO; 3]; BLOCK];

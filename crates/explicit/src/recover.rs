@@ -10,9 +10,9 @@ use pliant_mechanics::model::{Averaging, Cells, LocalNodes, Material, Model, Sol
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cast, cross, dot, scale, sub};
 use rayon::prelude::*;
 
-use crate::Scalar;
 use crate::forces::pressure;
 use crate::history::History;
+use crate::lanes::LaneNumber;
 use crate::lanes::{
     LaneWork, Lanes, PACK, Pack, Processor, load_symmetric, load_tensor, load_vector, store_symmetric,
     store_vector,
@@ -77,7 +77,7 @@ pub struct Recovery<'a, R> {
 }
 
 /// The energy [J] stored in a state whose nodes start displaced, with that of hourglass control [J].
-pub fn stored_at_start<R: Scalar>(model: &Model, state: &State<R>, hourglass: f64) -> f64 {
+pub fn stored_at_start<R: LaneNumber>(model: &Model, state: &State<R>, hourglass: f64) -> f64 {
     let is_moved = state.displacement.iter().flatten().any(|&u| u != R::ZERO);
     if is_moved { Recovery::new(model, state).stored_energy() + hourglass } else { 0.0 }
 }
@@ -103,7 +103,7 @@ struct Dilatation {
     energy: f64,
 }
 
-impl<'a, R: Scalar> Recovery<'a, R> {
+impl<'a, R: LaneNumber> Recovery<'a, R> {
     /// Finds the averages that the elements take; the rest is found cell by cell.
     pub fn new(model: &'a Model, state: &'a State<R>) -> Self {
         let averages =
@@ -499,7 +499,7 @@ fn mean(points: impl Iterator<Item = (CellFields, f64)>, volume: f64) -> CellFie
     weighted.fold(nothing, add_up)
 }
 
-fn averages<R: Scalar>(solid: &Solid, history: &History<R>, displacement: &[Vector<R>]) -> Averages {
+fn averages<R: LaneNumber>(solid: &Solid, history: &History<R>, displacement: &[Vector<R>]) -> Averages {
     let Material { law, prony, .. } = &solid.material;
     let relaxed =
         |index: usize, change: f64| prony.pressure(pressure(law, change), &history.of_pressure(solid, index));
@@ -561,7 +561,7 @@ fn averages<R: Scalar>(solid: &Solid, history: &History<R>, displacement: &[Vect
 }
 
 /// The centre of a cell in its current place [m].
-pub fn cell_centre<R: Scalar>(model: &Model, state: &State<R>, solid: usize, cell: usize) -> Vector<f64> {
+pub fn cell_centre<R: LaneNumber>(model: &Model, state: &State<R>, solid: usize, cell: usize) -> Vector<f64> {
     let nodes = model.solids[solid].cells.nodes(cell);
     let place = |&node: &u32| add(model.rest[node as usize], cast(state.displacement[node as usize]));
     scale(nodes.iter().map(place).fold([0.0; 3], add), 1.0 / nodes.len() as f64)

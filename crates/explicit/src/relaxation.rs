@@ -4,7 +4,7 @@ use pliant_mechanics::law::Split;
 use pliant_mechanics::prony::{Prony, PronyUpdate};
 use pliant_mechanics::tensor::Symmetric;
 
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 use crate::lanes::{Lanes, Pack};
 
 /// The coefficients of a series for one step size.
@@ -23,7 +23,7 @@ pub struct Series<R> {
     pub terms: Vec<(R, R)>,
 }
 
-impl<R: Scalar> Series<R> {
+impl<R: LaneNumber> Series<R> {
     fn new(terms: &[(f64, f64)], update: PronyUpdate, step: f64) -> Self {
         let mut series = Self {
             remaining: R::of(1.0 - terms.iter().map(|(weight, _)| weight).sum::<f64>()),
@@ -75,7 +75,7 @@ impl<R: Scalar> Series<R> {
     }
 }
 
-impl<R: Scalar> Relaxation<R> {
+impl<R: LaneNumber> Relaxation<R> {
     /// Coefficients for steps of `step` seconds.
     pub fn new(prony: &Prony, step: f64) -> Self {
         Self {

@@ -39,9 +39,9 @@ use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cast, dot, sub};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::Scalar;
 use crate::critical_step::{limit_alone, scaled_bound};
 use crate::damping_force::{damped, undamped};
+use crate::lanes::LaneNumber;
 use crate::lanes::{LaneWork, Lanes, PACK, Pack, Processor, load_symmetric, load_tensor};
 pub use crate::stability_record::{MOST_SUBSTEPS, Stability, StepLimit};
 use crate::state::State;
@@ -169,7 +169,7 @@ impl Monitor {
 
     /// The limit of a deformed state: the estimate [s], the solid and the cell that set it; `None` without cells or
     /// where no cell's stiffness is a number. `reference` is the state whose critical time step is known.
-    pub fn limit<R: Scalar>(
+    pub fn limit<R: LaneNumber>(
         &mut self,
         model: &Model,
         displacement: &[Vector<R>],
@@ -187,7 +187,7 @@ impl Monitor {
     }
 
     /// The same with every cell checked closely, as a measure of what [`limit`](Self::limit) leaves out.
-    pub fn limit_of_all<R: Scalar>(
+    pub fn limit_of_all<R: LaneNumber>(
         &self,
         model: &Model,
         displacement: &[Vector<R>],
@@ -248,7 +248,7 @@ impl Watch {
     }
 
     /// Finds both ranks of every cell: the squared speed by an isotropic guess, and the squared stretch.
-    fn rank<R: Scalar>(&mut self, solid: &Solid, displacement: &[Vector<R>]) {
+    fn rank<R: LaneNumber>(&mut self, solid: &Solid, displacement: &[Vector<R>]) {
         let rest = solid.longitudinal_modulus();
         let bulk = match &solid.cells {
             // In plane stress the volume hardly counts, in a bar not at all.
@@ -290,7 +290,7 @@ impl Watch {
     }
 
     /// The smallest limit [s] of the cells that were picked, and its cell.
-    fn smallest<R: Scalar>(
+    fn smallest<R: LaneNumber>(
         &mut self,
         model: &Model,
         solid: &Solid,
@@ -311,7 +311,7 @@ impl Watch {
     }
 
     /// The limits [s] that some cells set, at most [`PACK`], and their stiffnesses in the reference state.
-    fn check<R: Scalar>(
+    fn check<R: LaneNumber>(
         &self,
         model: &Model,
         solid: &Solid,
@@ -349,12 +349,17 @@ fn smallest(found: &[(f64, Stiffness)], cells: &[u32]) -> Option<(f64, usize)> {
 
 /// The limit [s] of a cell alone in a deformed state, Δt_e above: no assembly is unstable at the smallest one. Displacements
 /// [m], one per node.
-pub fn cell_limit<R: Scalar>(model: &Model, solid: usize, cell: usize, displacement: &[Vector<R>]) -> f64 {
+pub fn cell_limit<R: LaneNumber>(
+    model: &Model,
+    solid: usize,
+    cell: usize,
+    displacement: &[Vector<R>],
+) -> f64 {
     limits_alone(model, &model.solids[solid], &[cell as u32], displacement)[0]
 }
 
 /// The same of all cells of a solid.
-pub fn cell_limits<R: Scalar>(model: &Model, solid: usize, displacement: &[Vector<R>]) -> Vec<f64> {
+pub fn cell_limits<R: LaneNumber>(model: &Model, solid: usize, displacement: &[Vector<R>]) -> Vec<f64> {
     let solid = &model.solids[solid];
     let cells: Vec<u32> = (0..solid.cells.len() as u32).collect();
     let of = |cells: &[u32]| {
@@ -365,7 +370,7 @@ pub fn cell_limits<R: Scalar>(model: &Model, solid: usize, displacement: &[Vecto
 }
 
 /// The same of a pack of cells.
-fn limits_alone<R: Scalar>(
+fn limits_alone<R: LaneNumber>(
     model: &Model,
     solid: &Solid,
     cells: &[u32],
@@ -422,7 +427,11 @@ fn gradient_square_of(solid: &Solid, cell: usize) -> Symmetric<f64> {
 
 /// ∂u/∂X, the mean over the cell; of a membrane in the frame of the triangle, thinned as if it kept its volume.
 #[inline(always)]
-fn displacement_gradient<R: Scalar>(solid: &Solid, cell: usize, displacement: &[Vector<R>]) -> Tensor<f64> {
+fn displacement_gradient<R: LaneNumber>(
+    solid: &Solid,
+    cell: usize,
+    displacement: &[Vector<R>],
+) -> Tensor<f64> {
     // Four columns at once, of which the last has no meaning. Behind the gradient of each node but the last there is another one to read, so
     // the last is the origin.
     let mut rows = [[0.0; 4]; 3];
@@ -482,7 +491,7 @@ struct Ranks<'a, R> {
     stretches: &'a mut [u64],
 }
 
-impl<R: Scalar> LaneWork<f64> for Ranks<'_, R> {
+impl<R: LaneNumber> LaneWork<f64> for Ranks<'_, R> {
     type Output = ();
 
     #[inline(always)]

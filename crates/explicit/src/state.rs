@@ -8,8 +8,8 @@ use pliant_mechanics::model::{self, Constraint, FREE, Model, Motion, fill, place
 use pliant_mechanics::tensor::{Vector, add};
 use serde::{Deserialize, Serialize};
 
-use crate::Scalar;
 use crate::history::History;
+use crate::lanes::LaneNumber;
 use crate::stability::MOST_HALVINGS;
 #[cfg(doc)]
 use crate::stability::OnUnstable;
@@ -109,7 +109,7 @@ fn place_collective(model: &Model, own: &Constraint, owners: &[[u32; 3]], displa
     fill(displacement, wanted, &mut gradient, volume, advance);
 }
 
-impl<R: Scalar> State<R> {
+impl<R: LaneNumber> State<R> {
     /// At rest at time 0, prescribed nodes and all that follows them where their motion starts. Nodes of a mean shift together, those around a
     /// prescribed volume along its gradient.
     pub fn at_rest(model: &Model) -> Self {

@@ -4,10 +4,10 @@ use pliant_mechanics::count;
 use pliant_mechanics::model::Model;
 use serde::{Deserialize, Serialize};
 
-use crate::Scalar;
 use crate::critical_step::limit_about;
 use crate::damping_force::{damped, undamped};
 use crate::forces::{Deformed, InternalForces};
+use crate::lanes::LaneNumber;
 use crate::stability::{
     CHANGE, CHECK_EVERY, Monitor, OnUnstable, REJOIN_AFTER, RESERVE, StepLimit, substeps,
 };
@@ -142,7 +142,7 @@ impl StepControl {
 
     /// The time [s] over which relaxing laws come to the state's instant: what acts at the start came at once, and where forces were found
     /// before, the laws are there.
-    pub fn relaxing<R: Scalar>(&self, state: &State<R>) -> f64 {
+    pub fn relaxing<R: LaneNumber>(&self, state: &State<R>) -> f64 {
         if state.is_at_start() || state.evaluated { 0.0 } else { self.lengths(state).before }
     }
 
@@ -175,19 +175,13 @@ impl StepControl {
         counted.min(deformed).max(1)
     }
 
-    /// Looks at the limit of a state.
-    pub fn look<R: Scalar>(
-        &mut self,
-        model: &Model,
-        owners: &[[u32; 3]],
-        state: &mut State<R>,
-        deformed: &Deformed,
-    ) {
+    /// Looks at the limit of a state in single precision, as a GPU steps it.
+    pub fn look(&mut self, model: &Model, owners: &[[u32; 3]], state: &mut State<f32>, deformed: &Deformed) {
         self.look_with(model, owners, None, state, deformed);
     }
 
     /// The same with what has found the forces of the state, which it still has afterwards.
-    pub(crate) fn look_with<R: Scalar>(
+    pub(crate) fn look_with<R: LaneNumber>(
         &mut self,
         model: &Model,
         owners: &[[u32; 3]],
@@ -262,7 +256,7 @@ impl StepControl {
 }
 
 /// Finds the critical time step [s] of a state, at least whether it is `enough`, and makes it the reference of what follows.
-fn take_as_reference<R: Scalar>(
+fn take_as_reference<R: LaneNumber>(
     model: &Model,
     owners: &[[u32; 3]],
     forces: Option<&mut InternalForces<R>>,

@@ -3,7 +3,7 @@
 use pliant_mechanics::model::Model;
 use pliant_mechanics::tensor::cast;
 
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 use crate::stability::StepLimit;
 use crate::state::State;
 
@@ -99,7 +99,11 @@ impl StepError {
     }
 
     /// Of a hexahedron with a corner turned inside out.
-    pub(crate) fn folded<R: Scalar>(model: &Model, (solid, cell): (usize, usize), state: &State<R>) -> Self {
+    pub(crate) fn folded<R: LaneNumber>(
+        model: &Model,
+        (solid, cell): (usize, usize),
+        state: &State<R>,
+    ) -> Self {
         let solid = &model.solids[solid];
         let worst = solid.cells.worst_corner(cell, |node| cast(state.displacement[node as usize]));
         let (node, determinant) = worst.unwrap_or((solid.cells.nodes(cell)[0], 0.0));

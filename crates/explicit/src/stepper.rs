@@ -24,12 +24,12 @@ use pliant_mechanics::model::{Contradiction, Enclosed, FREE, Model};
 use pliant_mechanics::tensor::{Vector, add};
 use rayon::prelude::*;
 
-use crate::Scalar;
 use crate::applied::AppliedForces;
 use crate::collective::{Collective, Predicted, enclosed};
 use crate::damping_force::{DampingFactors, Past};
 use crate::energies::{Sums, model_balance_floor};
 use crate::forces::{Deformed, Found, InternalForces};
+use crate::lanes::LaneNumber;
 use crate::lanes::{Instructions, MissingInstructions, Processor};
 use crate::node_pass::{Add, CHUNK, Held, NodePass, Pace, held};
 use crate::recover::stored_at_start;
@@ -94,6 +94,53 @@ pub trait Observable<R> {
     }
 }
 
+/// The number types of [`CentralDifference`], and what is compiled for them here and not again where a model is stepped.
+pub trait SteppedIn: LaneNumber {
+    /// As [`CentralDifference::new`].
+    #[doc(hidden)]
+    fn stepper(model: Arc<Model>, step: f64) -> Result<CentralDifference<Self>, Contradiction>;
+
+    /// As [`CentralDifference::evaluate`].
+    #[doc(hidden)]
+    fn evaluate(stepper: &mut CentralDifference<Self>, state: &mut State<Self>) -> Result<(), StepError>;
+
+    /// As [`CentralDifference::advance`].
+    #[doc(hidden)]
+    fn advance(stepper: &mut CentralDifference<Self>, state: &mut State<Self>);
+
+    /// As [`Observable::contact_nodes`].
+    #[doc(hidden)]
+    fn contact_nodes(stepper: &CentralDifference<Self>, state: &State<Self>) -> Vec<NodeContact>;
+}
+
+macro_rules! stepped_in {
+    ($number:ty) => {
+        impl SteppedIn for $number {
+            fn stepper(model: Arc<Model>, step: f64) -> Result<CentralDifference<Self>, Contradiction> {
+                CentralDifference::of_model(model, step)
+            }
+
+            fn evaluate(
+                stepper: &mut CentralDifference<Self>,
+                state: &mut State<Self>,
+            ) -> Result<(), StepError> {
+                stepper.find_forces(state)
+            }
+
+            fn advance(stepper: &mut CentralDifference<Self>, state: &mut State<Self>) {
+                stepper.move_nodes(state);
+            }
+
+            fn contact_nodes(stepper: &CentralDifference<Self>, state: &State<Self>) -> Vec<NodeContact> {
+                stepper.touching.as_ref().map_or_else(Vec::new, |touching| touching.nodal(state))
+            }
+        }
+    };
+}
+
+stepped_in!(f32);
+stepped_in!(f64);
+
 /// Steps a state of one model by one step size. Holds constants in its number type and scratch, nothing that a restart
 /// would lose.
 pub struct CentralDifference<R> {
@@ -130,7 +177,7 @@ pub struct CentralDifference<R> {
 }
 
 /// At the last evaluation.
-impl<R: Scalar> Observable<R> for CentralDifference<R> {
+impl<R: SteppedIn> Observable<R> for CentralDifference<R> {
     fn energies(&self) -> &Energies {
         &self.energies
     }
@@ -161,7 +208,7 @@ impl<R: Scalar> Observable<R> for CentralDifference<R> {
     }
 
     fn contact_nodes(&self, state: &State<R>) -> Vec<NodeContact> {
-        self.touching.as_ref().map_or_else(Vec::new, |touching| touching.nodal(state))
+        R::contact_nodes(self, state)
     }
 
     fn velocity(&self, state: &State<R>, node: usize) -> Vector<f64> {
@@ -179,12 +226,12 @@ impl<R: Scalar> Observable<R> for CentralDifference<R> {
 }
 
 /// A force [N] on the components of a node that have an owner.
-pub(crate) fn owned_only<R: Scalar>(owner: &[u32; 3], force: Vector<R>) -> Vector<f64> {
+pub(crate) fn owned_only<R: LaneNumber>(owner: &[u32; 3], force: Vector<R>) -> Vector<f64> {
     [0, 1, 2].map(|c| if owner[c] == FREE { 0.0 } else { force[c].to_f64() })
 }
 
 /// The sum of forces over the components that a constraint owns.
-pub(crate) fn sum_owned<R: Scalar>(
+pub(crate) fn sum_owned<R: LaneNumber>(
     model: &Model,
     owners: &[[u32; 3]],
     constraint: usize,
@@ -201,13 +248,16 @@ pub(crate) fn sum_owned<R: Scalar>(
     sum
 }
 
-impl<R: Scalar> CentralDifference<R> {
+impl<R: SteppedIn> CentralDifference<R> {
     /// A stepper for steps of `step` seconds.
     ///
     /// # Errors
     /// If constraints contradict each other.
     pub fn new(model: impl Into<Arc<Model>>, step: f64) -> Result<Self, Contradiction> {
-        let model = model.into();
+        R::stepper(model.into(), step)
+    }
+
+    fn of_model(model: Arc<Model>, step: f64) -> Result<Self, Contradiction> {
         let nodes = model.node_count();
         let mut damping = vec![[R::ZERO; 3]; nodes];
         for body in &model.bodies {
@@ -336,6 +386,10 @@ impl<R: Scalar> CentralDifference<R> {
     /// If the state is not finite, a cell is inverted, the energies do not balance, or the step is above the limit and
     /// must not be cut.
     pub fn evaluate(&mut self, state: &mut State<R>) -> Result<(), StepError> {
+        R::evaluate(self, state)
+    }
+
+    fn find_forces(&mut self, state: &mut State<R>) -> Result<(), StepError> {
         self.control.keep(state);
         if self.damps_by_forces() {
             state.keep_forces();
@@ -386,6 +440,10 @@ impl<R: Scalar> CentralDifference<R> {
 
     /// Moves to the next instant, at the end of the step or of a part of it; [`evaluate`](Self::evaluate) has gone before.
     pub fn advance(&mut self, state: &mut State<R>) {
+        R::advance(self, state);
+    }
+
+    fn move_nodes(&mut self, state: &mut State<R>) {
         std::mem::swap(&mut state.increment, &mut self.next);
         let chunks = state.displacement.par_chunks_mut(CHUNK).zip(state.increment.par_chunks(CHUNK));
         chunks.enumerate().with_min_len(self.least_chunks()).for_each(|(task, (displacement, increment))| {

@@ -23,7 +23,7 @@ use pliant_contact::touch::{
 };
 use pliant_mechanics::tensor::{Vector, add};
 
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 use at_rigid::{AtRigid, Seen};
 use guests::Guests;
 pub use nodal::NodeContact;
@@ -144,7 +144,7 @@ pub(crate) struct Touching<R> {
     pub moments: Vec<Vector<f64>>,
 }
 
-impl<R: Scalar> Touching<R> {
+impl<R: LaneNumber> Touching<R> {
     /// Those of a model with these nodes at rest [m].
     pub fn new(contacts: Arc<Contacts>, rest: &[Vector<f64>]) -> Self {
         let numbers = contacts.nodes();

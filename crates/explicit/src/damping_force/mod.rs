@@ -23,7 +23,7 @@
 
 use pliant_mechanics::tensor::Vector;
 
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 use crate::state::State;
 
 /// η.
@@ -63,7 +63,7 @@ pub(crate) struct Past<'a, R> {
     forces: [&'a [Vector<R>]; 2],
 }
 
-impl<'a, R: Scalar> Past<'a, R> {
+impl<'a, R: LaneNumber> Past<'a, R> {
     /// The forces that a state has kept.
     pub(crate) fn of(state: &'a State<R>, factors: DampingFactors) -> Self {
         let DampingFactors { dissipation, extrapolation, stiffness } = factors;

@@ -35,11 +35,11 @@ pub use self::path::{Equilibrium, Way};
 use self::path::{Instant, LoadPath};
 use self::settings::is_single;
 pub use self::settings::{Convergence, Iteration, PATIENCE, RelaxationError, RelaxationSettings};
-use crate::Scalar;
 use crate::applied::AppliedForces;
 use crate::collective::{Collective, Predicted, enclosed};
 use crate::forces::InternalForces;
 use crate::history::History;
+use crate::lanes::LaneNumber;
 use crate::recover::Recovery;
 use crate::state::State;
 use crate::stepper::{Observable, owned_only, sum_owned};
@@ -96,8 +96,66 @@ pub struct DynamicRelaxation<R> {
     way: Way<R>,
 }
 
+/// The number types of [`DynamicRelaxation`], and what is compiled for them here and not again where a model is solved.
+pub trait RelaxedIn: LaneNumber {
+    /// As [`DynamicRelaxation::new`].
+    #[doc(hidden)]
+    fn relaxation(
+        model: Arc<Model>,
+        settings: RelaxationSettings,
+    ) -> Result<DynamicRelaxation<Self>, Contradiction>;
+
+    /// As [`DynamicRelaxation::begin`].
+    #[doc(hidden)]
+    fn begin(
+        relaxation: &mut DynamicRelaxation<Self>,
+        state: &mut State<Self>,
+    ) -> Result<(), RelaxationError>;
+
+    /// As [`DynamicRelaxation::solve_watched`].
+    #[doc(hidden)]
+    fn solve(
+        relaxation: &mut DynamicRelaxation<Self>,
+        state: &mut State<Self>,
+        time: f64,
+        watch: &mut dyn FnMut(Iteration),
+    ) -> Result<Convergence, RelaxationError>;
+}
+
+macro_rules! relaxed_in {
+    ($number:ty) => {
+        impl RelaxedIn for $number {
+            fn relaxation(
+                model: Arc<Model>,
+                settings: RelaxationSettings,
+            ) -> Result<DynamicRelaxation<Self>, Contradiction> {
+                DynamicRelaxation::of_model(model, settings)
+            }
+
+            fn begin(
+                relaxation: &mut DynamicRelaxation<Self>,
+                state: &mut State<Self>,
+            ) -> Result<(), RelaxationError> {
+                relaxation.relax_at_start(state)
+            }
+
+            fn solve(
+                relaxation: &mut DynamicRelaxation<Self>,
+                state: &mut State<Self>,
+                time: f64,
+                watch: &mut dyn FnMut(Iteration),
+            ) -> Result<Convergence, RelaxationError> {
+                relaxation.relax_until(state, time, watch)
+            }
+        }
+    };
+}
+
+relaxed_in!(f32);
+relaxed_in!(f64);
+
 /// At the last equilibrium. Kinetic energy, damping and velocities are none.
-impl<R: Scalar> Observable<R> for DynamicRelaxation<R> {
+impl<R: RelaxedIn> Observable<R> for DynamicRelaxation<R> {
     fn energies(&self) -> &Energies {
         &self.energies
     }
@@ -124,13 +182,16 @@ impl<R: Scalar> Observable<R> for DynamicRelaxation<R> {
     }
 }
 
-impl<R: Scalar> DynamicRelaxation<R> {
+impl<R: RelaxedIn> DynamicRelaxation<R> {
     /// A solver for a model.
     ///
     /// # Errors
     /// If constraints contradict each other.
     pub fn new(model: impl Into<Arc<Model>>, settings: RelaxationSettings) -> Result<Self, Contradiction> {
-        let model = model.into();
+        R::relaxation(model.into(), settings)
+    }
+
+    fn of_model(model: Arc<Model>, settings: RelaxationSettings) -> Result<Self, Contradiction> {
         let nodes = model.node_count();
         Ok(Self {
             settings,
@@ -180,6 +241,10 @@ impl<R: Scalar> DynamicRelaxation<R> {
     /// # Errors
     /// If no equilibrium is found, however small the parts in which loads and motions are brought on.
     pub fn begin(&mut self, state: &mut State<R>) -> Result<(), RelaxationError> {
+        R::begin(self, state)
+    }
+
+    fn relax_at_start(&mut self, state: &mut State<R>) -> Result<(), RelaxationError> {
         let moved = |u: &Vector<R>| u.iter().any(|&x| x != R::ZERO);
         let acts = |load: &Load| load.curve.value(0.0) != 0.0;
         let at_rest = !state.displacement.iter().any(moved) && !self.model.loads.iter().any(acts);
@@ -210,6 +275,15 @@ impl<R: Scalar> DynamicRelaxation<R> {
     /// # Errors
     /// If no equilibrium is found in load steps of the least allowed size.
     pub fn solve_watched(
+        &mut self,
+        state: &mut State<R>,
+        time: f64,
+        watch: &mut dyn FnMut(Iteration),
+    ) -> Result<Convergence, RelaxationError> {
+        R::solve(self, state, time, watch)
+    }
+
+    fn relax_until(
         &mut self,
         state: &mut State<R>,
         time: f64,

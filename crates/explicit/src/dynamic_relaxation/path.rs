@@ -1,7 +1,7 @@
 //! The way of loads to an instant, and equilibria before it.
 
 use super::SHORTEST;
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 use pliant_mechanics::Energies;
 use pliant_mechanics::count;
 use pliant_mechanics::tensor::Vector;
@@ -40,7 +40,7 @@ impl<R> Way<R> {
     }
 }
 
-impl<R: Scalar> Way<R> {
+impl<R: LaneNumber> Way<R> {
     /// Goes on by motions [m] and changes of the forces from outside [N].
     pub(super) fn go_on(&mut self, next: Vec<[Vector<R>; 2]>) {
         let square = |way: &[[Vector<R>; 2]]| -> f64 {

@@ -1,6 +1,6 @@
 //! Settings, errors, and what a solution took.
 
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 use crate::step_error::at_corner;
 
 /// Iterations for which a search that has reached its residual goes on for the displacements.
@@ -22,7 +22,7 @@ pub struct RelaxationSettings {
 
 impl RelaxationSettings {
     /// The usual ones for a number type.
-    pub fn usual<R: Scalar>() -> Self {
+    pub fn usual<R: LaneNumber>() -> Self {
         let precise = Self::default();
         match is_single::<R>() {
             true => Self { tolerance: 100.0 * precise.tolerance, displacement: 1e-3, ..precise },
@@ -31,7 +31,7 @@ impl RelaxationSettings {
     }
 }
 
-pub(super) fn is_single<R: Scalar>() -> bool {
+pub(super) fn is_single<R: LaneNumber>() -> bool {
     R::EPSILON > 1e-10
 }
 

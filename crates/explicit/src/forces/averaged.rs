@@ -21,8 +21,8 @@ use super::{
     Findings, ForceField, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, own_packs,
     relative,
 };
-use crate::Scalar;
 use crate::history::History;
+use crate::lanes::LaneNumber;
 use crate::lanes::{LaneWork, Lanes, Local, PACK, Pack, Processor, entry, load_tensor};
 use crate::relaxation::Relaxation;
 
@@ -52,7 +52,7 @@ struct AveragedConstants<R> {
     volumetric_slots: usize,
 }
 
-impl<R: Scalar> AveragedTets<R> {
+impl<R: LaneNumber> AveragedTets<R> {
     pub(super) fn new(solid: &Solid, cells: &CellBlock<4>, averaging: Averaging, step: f64) -> Self {
         let local = LocalNodes::new(cells);
         let volume_at = |node| local.cells_at(node).map(|cell| 0.25 * cells.rest[cell].volume).sum::<f64>();
@@ -114,7 +114,7 @@ impl<R: Scalar> AveragedTets<R> {
     }
 }
 
-impl<R: Scalar> AveragedConstants<R> {
+impl<R: LaneNumber> AveragedConstants<R> {
     /// Tensors of history per cell.
     fn cell_slots(&self) -> usize {
         self.isochoric_slots + if self.averaging == Averaging::NiftySim { self.volumetric_slots } else { 0 }
@@ -136,7 +136,7 @@ struct VolumeChanges<'a, R> {
     task: Task<'a, R>,
 }
 
-impl<R: Scalar> LaneWork<R> for VolumeChanges<'_, R> {
+impl<R: LaneNumber> LaneWork<R> for VolumeChanges<'_, R> {
     type Output = Findings<R>;
 
     #[inline(always)]
@@ -165,7 +165,7 @@ struct CellPressures<'a, R> {
     task: Task<'a, R>,
 }
 
-impl<R: Scalar> LaneWork<R> for CellPressures<'_, R> {
+impl<R: LaneNumber> LaneWork<R> for CellPressures<'_, R> {
     type Output = Findings<R>;
 
     #[inline(always)]
@@ -201,7 +201,7 @@ impl<R: Scalar> LaneWork<R> for CellPressures<'_, R> {
 
 /// The means of what the four nodes of cells carry beside their displacements.
 #[inline(always)]
-fn average<R: Scalar, L: Lanes<R>>(local: &Local<'_, R, 4>, pack: usize, at: usize) -> L {
+fn average<R: LaneNumber, L: Lanes<R>>(local: &Local<'_, R, 4>, pack: usize, at: usize) -> L {
     let mut sum = L::ZERO;
     for node in 0..4 {
         sum += local.gather::<L>(pack, node, at)[3];
@@ -216,7 +216,7 @@ struct NodePressures<'a, R> {
     history: &'a mut [Pack<R>],
 }
 
-impl<R: Scalar> LaneWork<R> for NodePressures<'_, R> {
+impl<R: LaneNumber> LaneWork<R> for NodePressures<'_, R> {
     type Output = ();
 
     #[inline(always)]
@@ -229,7 +229,7 @@ impl<R: Scalar> LaneWork<R> for NodePressures<'_, R> {
 
 /// Up to [`PACKS`] packs of J − 1 become pressures [Pa], which relax where there is a history.
 #[inline(always)]
-pub(super) fn relaxed_pressures<R: Scalar, L: Lanes<R>>(
+pub(super) fn relaxed_pressures<R: LaneNumber, L: Lanes<R>>(
     law: &AnyLaw,
     relaxation: &Relaxation<R>,
     slots: usize,
@@ -254,7 +254,7 @@ struct AveragedPass<'a, R> {
     task: Task<'a, R>,
 }
 
-impl<R: Scalar> LaneWork<R> for AveragedPass<'_, R> {
+impl<R: LaneNumber> LaneWork<R> for AveragedPass<'_, R> {
     type Output = Findings<R>;
 
     #[inline(always)]
@@ -333,7 +333,7 @@ fn dilated<L: pliant_mechanics::Number>(h: &Tensor<L>, volume_ratio: L, change: 
     scaled
 }
 
-impl<R: Scalar> AveragedConstants<R> {
+impl<R: LaneNumber> AveragedConstants<R> {
     /// The first Piola–Kirchhoff stress: of the law where the deformation is averaged, else of its isochoric part and the
     /// pressure of the nodes, F S_iso + p cof F.
     #[inline(always)]
@@ -353,7 +353,7 @@ impl<R: Scalar> AveragedConstants<R> {
     }
 }
 
-impl<R: Scalar> ForceField<R> for AveragedTets<R> {
+impl<R: LaneNumber> ForceField<R> for AveragedTets<R> {
     fn blocks(&self) -> &Blocks {
         &self.moved.blocks
     }

@@ -10,7 +10,7 @@ use pliant_mechanics::tensor::{Symmetric, Vector, add, cast, dot, scale};
 use super::blocks::Task;
 use super::one_pass::{Element, OnePass};
 use super::{Findings, PackedCells, by_cell, own_packs, relative};
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 use crate::lanes::{Lanes, PACK, Pack, load_vector};
 use crate::relaxation::Relaxation;
 
@@ -41,7 +41,7 @@ struct PackedBar<R> {
     area: Pack<R>,
 }
 
-impl<R: Scalar> Bars<R> {
+impl<R: LaneNumber> Bars<R> {
     pub(super) fn new(solid: &Solid, cells: &CellBlock<2>, cord: &Cord, step: f64) -> Self {
         let (packed, blocks) = PackedCells::new(solid, cells);
         let young = solid.material.law.small_strain().young();
@@ -67,7 +67,7 @@ impl<R: Scalar> Bars<R> {
     }
 }
 
-impl<R: Scalar> Element<R> for BarConstants<R> {
+impl<R: LaneNumber> Element<R> for BarConstants<R> {
     fn slots(&self) -> [usize; 2] {
         [self.history, 0]
     }

@@ -7,7 +7,7 @@ use pliant_mechanics::law::{AnyLaw, Deformation, Law, MOST_FAMILIES, Split, with
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, dot};
 
 use super::Findings;
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 use crate::lanes::{
     LaneWork, Lanes, PACK, Pack, Processor, load_symmetric, load_tensor, load_vector, store_symmetric,
     store_vector,
@@ -41,7 +41,7 @@ pub(crate) struct Batch<R> {
     pub strain: [Pack<R>; PACKS],
 }
 
-impl<R: Scalar> Batch<R> {
+impl<R: LaneNumber> Batch<R> {
     pub(crate) fn new() -> Self {
         let stress = Symmetric([Pack::ZERO; 6]);
         Self {
@@ -156,7 +156,7 @@ struct Stresses<'a, R, T> {
     fibres: &'a [Vector<Pack<R>>],
 }
 
-impl<R: Scalar, T: Law> LaneWork<R> for Stresses<'_, R, T> {
+impl<R: LaneNumber, T: Law> LaneWork<R> for Stresses<'_, R, T> {
     type Output = ();
 
     #[inline(always)]
@@ -193,7 +193,11 @@ impl<R: Scalar, T: Law> LaneWork<R> for Stresses<'_, R, T> {
 /// U'(J) [Pa] of a law whose volumetric stress is J U'(J) C⁻¹, at up to [`PACKS`] packs of J − 1, from its stress in a pure
 /// dilation F = J^(1/3) I.
 #[inline(always)]
-pub(super) fn pressures<R: Scalar, L: Lanes<R>>(law: &AnyLaw, values: &mut [Pack<R>], batch: &mut Batch<R>) {
+pub(super) fn pressures<R: LaneNumber, L: Lanes<R>>(
+    law: &AnyLaw,
+    values: &mut [Pack<R>],
+    batch: &mut Batch<R>,
+) {
     for (pack, change) in values.iter().enumerate() {
         for at in (0..PACK).step_by(L::WIDTH) {
             let x = L::load(change, at);

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::Findings;
 use super::batch::PACKS;
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 use crate::lanes::{PACK, Pack};
 
 /// Packs of cells in a block of a large model. Of 55,566 tets on one thread 32 take 3 % longer; with 128 hexes leave the first cache.
@@ -201,7 +201,7 @@ pub(super) struct Task<'a, R> {
     pub pressures: &'a mut [Pack<R>],
 }
 
-impl<R: Scalar> Task<'_, R> {
+impl<R: LaneNumber> Task<'_, R> {
     /// Copies the displacements of its nodes in.
     #[inline(always)]
     pub(super) fn copy_in(&mut self, displacement: &[Vector<R>]) {
@@ -212,7 +212,7 @@ impl<R: Scalar> Task<'_, R> {
     }
 }
 
-impl<R: Scalar> Moved<R> {
+impl<R: LaneNumber> Moved<R> {
     pub(super) fn new(blocks: Blocks) -> Self {
         Self { vectors: vec![[R::ZERO; 4]; blocks.room()], blocks }
     }
@@ -243,7 +243,7 @@ impl<R: Scalar> Moved<R> {
 }
 
 /// The history of each block; where there is none, none for each.
-fn in_blocks<R: Scalar>(
+fn in_blocks<R: LaneNumber>(
     history: &mut [Pack<R>],
     per_block: usize,
     blocks: usize,

@@ -12,13 +12,13 @@ use pliant_mechanics::tensor::{Vector, add, cross, dot, sub};
 use rayon::prelude::*;
 
 use super::{PackedCells, relative};
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 use crate::lanes::{LaneWork, Lanes, Local, PACK, Pack, load_vector};
 
 /// Nodes of packs of hexahedra at rest, relative to their first ones [m].
 pub(super) struct PackedCorners<R>([Vector<Pack<R>>; 7]);
 
-impl<R: Scalar> PackedCorners<R> {
+impl<R: LaneNumber> PackedCorners<R> {
     /// Where a pack is filled up, those of the last cell again.
     pub(super) fn of<const N: usize>(packed: &PackedCells<R, N>, offsets: &[[Vector<f64>; N]]) -> Vec<Self> {
         let last = packed.count.max(1) - 1;
@@ -56,30 +56,30 @@ fn depth_at<N: Number>(x: &[Vector<N>; 8], corner: usize) -> N {
 
 /// Whether a cell is so flat that its corners count: by its volume over that at rest.
 #[inline(always)]
-pub(super) fn is_flat<R: Scalar>(flatness: R) -> bool {
+pub(super) fn is_flat<R: LaneNumber>(flatness: R) -> bool {
     flatness < R::of(FLAT_HEX)
 }
 
 /// The square of what J is divided by for the flatness of a uniform-strain hexahedron, about its least stretch: nearly incompressible
 /// cells keep their volume when they are squeezed flat.
 #[inline(always)]
-fn widening<R: Scalar>(strain: R) -> R {
+fn widening<R: LaneNumber>(strain: R) -> R {
     R::ONE + R::of(0.5) * strain
 }
 
 /// J over √(1 + S/2) of the cells of a pack.
-pub(super) fn flatness<R: Scalar>(ratio: &Pack<R>, strain: &Pack<R>) -> Pack<R> {
+pub(super) fn flatness<R: LaneNumber>(ratio: &Pack<R>, strain: &Pack<R>) -> Pack<R> {
     Pack::from_fn(|lane| ratio.0[lane] / widening(strain.0[lane]).sqrt())
 }
 
 /// The first flat cell of a pack of which a corner's determinant, with its sign turned, is not below zero.
-fn first_folded<R: Scalar>(depths: &Pack<R>, flatness: &Pack<R>) -> Option<usize> {
+fn first_folded<R: LaneNumber>(depths: &Pack<R>, flatness: &Pack<R>) -> Option<usize> {
     (0..PACK).find(|&lane| depths.0[lane] >= R::ZERO && is_flat(flatness.0[lane]))
 }
 
 /// Whether one of the cells of a pack may have an inverted corner, from 3/2 κ² |q|², J and |C − I|².
 #[inline(always)]
-pub(super) fn may_fold<R: Scalar>(reach: &Pack<R>, ratio: &Pack<R>, strain: &Pack<R>) -> bool {
+pub(super) fn may_fold<R: LaneNumber>(reach: &Pack<R>, ratio: &Pack<R>, strain: &Pack<R>) -> bool {
     let mut sound = true;
     for lane in 0..PACK {
         let square = ratio.0[lane] * ratio.0[lane];
@@ -99,7 +99,7 @@ pub(super) struct CornerCheck<'a, 'l, R, const N: usize, const M: usize> {
     pub pack: usize,
 }
 
-impl<R: Scalar, const N: usize, const M: usize> LaneWork<R> for CornerCheck<'_, '_, R, N, M> {
+impl<R: LaneNumber, const N: usize, const M: usize> LaneWork<R> for CornerCheck<'_, '_, R, N, M> {
     /// The first lane with an inverted corner.
     type Output = Option<usize>;
 

@@ -12,7 +12,7 @@ use super::blocks::Task;
 use super::corners::{CornerCheck, PackedCorners, is_flat};
 use super::one_pass::{Element, OnePass};
 use super::{Findings, PackedCells, by_cell, displacement_gradient, own_packs, relative};
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 use crate::lanes::{Lanes, PACK, Pack, load_vector, store_vector};
 use crate::relaxation::Relaxation;
 
@@ -39,7 +39,7 @@ struct Point<R> {
     weight: Pack<R>,
 }
 
-impl<R: Scalar> FullHexes<R> {
+impl<R: LaneNumber> FullHexes<R> {
     pub(super) fn new(solid: &Solid, cells: &CellBlock<8>, points: &[GaussPoints], step: f64) -> Self {
         let prony = &solid.material.prony;
         let (packed, blocks) = PackedCells::new(solid, cells);
@@ -65,7 +65,7 @@ impl<R: Scalar> FullHexes<R> {
     }
 }
 
-impl<R: Scalar> Element<R> for FullHexConstants<R> {
+impl<R: LaneNumber> Element<R> for FullHexConstants<R> {
     fn slots(&self) -> [usize; 2] {
         [8 * 6 * self.isochoric_slots, self.volumetric_slots]
     }

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::PackedCells;
 use super::batch::{Batch, PACKS, Wanted};
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 use crate::lanes::{
     LaneWork, Lanes, PACK, Pack, load_symmetric, load_tensor, load_vector, store_symmetric, store_vector,
 };
@@ -28,7 +28,7 @@ pub(super) struct PackedHourglass<R> {
     reach: Pack<R>,
 }
 
-impl<R: Scalar> PackedHourglass<R> {
+impl<R: LaneNumber> PackedHourglass<R> {
     pub(super) fn of<const N: usize>(packed: &PackedCells<R, N>, control: &Hourglass<f64, N>) -> Vec<Self> {
         let of_pack = |pack: usize| Self {
             moments: [0, 1, 2, 3].map(|c| packed.vector(pack, |cell| cast(control.moments[cell][c]))),
@@ -43,7 +43,7 @@ impl<R: Scalar> PackedHourglass<R> {
 #[derive(Clone, Copy)]
 pub(super) struct Resistance<R>([Vector<Pack<R>>; 4]);
 
-impl<R: Scalar> Resistance<R> {
+impl<R: LaneNumber> Resistance<R> {
     pub(super) fn new() -> Self {
         Self([[Pack::ZERO; 3]; 4])
     }
@@ -114,7 +114,7 @@ pub(super) struct Growth<R> {
     stress: Option<[Symmetric<Pack<R>>; PACKS]>,
 }
 
-impl<R: Scalar> Growth<R> {
+impl<R: LaneNumber> Growth<R> {
     pub(super) fn new() -> Self {
         Self { constant: [Pack::ZERO; PACKS], stress: None }
     }
@@ -150,7 +150,7 @@ pub(super) struct FindGrowth<'a, R> {
     pub growth: &'a mut Growth<R>,
 }
 
-impl<R: Scalar> LaneWork<R> for FindGrowth<'_, R> {
+impl<R: LaneNumber> LaneWork<R> for FindGrowth<'_, R> {
     type Output = ();
 
     #[inline(always)]
@@ -206,7 +206,7 @@ impl<R: Scalar> LaneWork<R> for FindGrowth<'_, R> {
 
 /// The growth of points of a batch, with their deformation.
 #[inline(always)]
-fn grown<R: Scalar, L: Lanes<R>>(
+fn grown<R: LaneNumber, L: Lanes<R>>(
     batch: &Batch<R>,
     wanted: Wanted,
     shear: f64,
@@ -220,7 +220,7 @@ fn grown<R: Scalar, L: Lanes<R>>(
 
 /// The factors g of a pack of points, from a batch whose first pack has their elastic stresses.
 #[inline(always)]
-pub(crate) fn growth<R: Scalar, L: Lanes<R>>(batch: &Batch<R>, shear: f64, at: usize) -> L {
+pub(crate) fn growth<R: LaneNumber, L: Lanes<R>>(batch: &Batch<R>, shear: f64, at: usize) -> L {
     grown::<R, L>(batch, Wanted::Whole, shear, 0, at).1.factor
 }
 

@@ -19,7 +19,7 @@ use super::batch::{Batch, PACKS, Wanted};
 use super::blocks::Task;
 use super::one_pass::{Element, OnePass};
 use super::{Findings, PackedCells, by_cell, own_packs, relative};
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 use crate::lanes::{Lanes, PACK, Pack, load_vector};
 use crate::relaxation::Relaxation;
 
@@ -51,7 +51,7 @@ struct PackedTriangle<R> {
     volume: Pack<R>,
 }
 
-impl<R: Scalar> Membranes<R> {
+impl<R: LaneNumber> Membranes<R> {
     pub(super) fn new(solid: &Solid, cells: &CellBlock<3>, sheets: &[Sheet], step: f64) -> Self {
         let (packed, blocks) = PackedCells::new(solid, cells);
         let rest = |pack: usize| PackedTriangle {
@@ -80,7 +80,7 @@ impl<R: Scalar> Membranes<R> {
     }
 }
 
-impl<R: Scalar> PackedTriangle<R> {
+impl<R: LaneNumber> PackedTriangle<R> {
     /// The changes of the tangents ∂u/∂X_i.
     #[inline(always)]
     fn changes<L: Lanes<R>>(&self, u: &[Vector<L>; 2], at: usize) -> [Vector<L>; 2] {
@@ -128,7 +128,7 @@ struct Walls<R> {
     change: [Pack<R>; PACKS],
 }
 
-impl<R: Scalar> Walls<R> {
+impl<R: LaneNumber> Walls<R> {
     fn new() -> Self {
         Self {
             plane: [[Pack::ZERO; 6]; PACKS],
@@ -276,7 +276,7 @@ impl<L: Number> NeoHookeanWall<L> {
 
 /// The stress of a law that relaxes, from the elastic one: S₁₁, S₂₂ and S₁₂.
 #[inline(always)]
-fn relaxed<R: Scalar, L: Lanes<R>>(
+fn relaxed<R: LaneNumber, L: Lanes<R>>(
     relaxation: &Relaxation<R>,
     [xx, yy, xy]: [L; 3],
     history: &mut [Pack<R>],
@@ -290,14 +290,14 @@ fn relaxed<R: Scalar, L: Lanes<R>>(
 
 /// Notes the deformation of a pack of the batch; walls that are folded flat count as inverted.
 #[inline(always)]
-fn note<R: Scalar>(batch: &mut Batch<R>, index: usize, pack: usize, findings: &mut Findings<R>) {
+fn note<R: LaneNumber>(batch: &mut Batch<R>, index: usize, pack: usize, findings: &mut Findings<R>) {
     for ratio in &mut batch.volume_ratio[index].0 {
         *ratio = if *ratio < R::of(FLAT_WALL) { R::ZERO } else { *ratio };
     }
     batch.note(index, pack * PACK, findings);
 }
 
-impl<R: Scalar> Element<R> for MembraneConstants<R> {
+impl<R: LaneNumber> Element<R> for MembraneConstants<R> {
     fn slots(&self) -> [usize; 2] {
         [self.history, 0]
     }

@@ -30,17 +30,16 @@ pub(crate) use blocks::MOST_PACKS;
 pub(crate) use hourglass::growth;
 use std::ops::Range;
 
-use pliant_mechanics::Real;
 use pliant_mechanics::model::{CellBlock, Cells, Model, Solid};
 use pliant_mechanics::prony::Prony;
 use pliant_mechanics::tensor::{Tensor, Vector, add, cast, sub};
 use pliant_mechanics::tie::Tie;
-use pulp::Simd;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::history::History;
-use crate::lanes::{Lanes, Local, PACK, Pack, Places, Processor, WideF32, WideF64, load_vector, plus};
+use crate::lanes::LaneNumber;
+use crate::lanes::{Lanes, Local, PACK, Pack, Places, Processor, load_vector, plus};
 pub(crate) use blocks::Quad;
 use blocks::{Blocks, Shares};
 use full_hex::FullHexes;
@@ -62,7 +61,7 @@ pub struct Findings<R> {
     largest_strain: Pack<R>,
 }
 
-impl<R: Scalar> Default for Findings<R> {
+impl<R: LaneNumber> Default for Findings<R> {
     fn default() -> Self {
         let least_volume_ratio = Pack([R::ONE; PACK]);
         Self {
@@ -163,7 +162,7 @@ struct PackedCells<R, const N: usize> {
     families: usize,
 }
 
-impl<R: Scalar, const N: usize> PackedCells<R, N> {
+impl<R: LaneNumber, const N: usize> PackedCells<R, N> {
     fn new(solid: &Solid, cells: &CellBlock<N>) -> (Self, Blocks) {
         let (blocks, local) = Blocks::new(&cells.nodes);
         let last = local.len().max(1) - 1;
@@ -221,7 +220,7 @@ struct PackedRest<R, const M: usize> {
     volume: Pack<R>,
 }
 
-impl<R: Scalar, const M: usize> PackedRest<R, M> {
+impl<R: LaneNumber, const M: usize> PackedRest<R, M> {
     fn of<const N: usize>(packed: &PackedCells<R, N>, cells: &CellBlock<N>) -> Vec<Self> {
         const { assert!(M + 1 == N) };
         let rest = |pack: usize| Self {
@@ -237,7 +236,7 @@ impl<R: Scalar, const M: usize> PackedRest<R, M> {
 /// u_a − u_0 of all nodes but the first: keeps the digits of small strains in cells that have moved far. Beside them what
 /// else the nodes carry, summed.
 #[inline(always)]
-fn relative<R: Scalar, L: Lanes<R>, const N: usize, const M: usize>(
+fn relative<R: LaneNumber, L: Lanes<R>, const N: usize, const M: usize>(
     local: &Local<'_, R, N>,
     pack: usize,
     at: usize,
@@ -254,7 +253,7 @@ fn relative<R: Scalar, L: Lanes<R>, const N: usize, const M: usize>(
 
 /// ∂u/∂X from the displacements relative to the first node.
 #[inline(always)]
-fn displacement_gradient<R: Scalar, L: Lanes<R>, const M: usize>(
+fn displacement_gradient<R: LaneNumber, L: Lanes<R>, const M: usize>(
     u: &[Vector<L>; M],
     gradient: &[Vector<Pack<R>>; M],
     at: usize,
@@ -268,7 +267,7 @@ fn displacement_gradient<R: Scalar, L: Lanes<R>, const M: usize>(
 
 /// V P B_a of all nodes but the first, from V P.
 #[inline(always)]
-fn nodal_forces<R: Scalar, L: Lanes<R>, const M: usize>(
+fn nodal_forces<R: LaneNumber, L: Lanes<R>, const M: usize>(
     piola: &Tensor<L>,
     gradient: &[Vector<Pack<R>>; M],
     at: usize,
@@ -282,7 +281,7 @@ fn nodal_forces<R: Scalar, L: Lanes<R>, const M: usize>(
 
 /// Writes the forces on all nodes as vectors, [`Lanes::row_of_lane`] by lane; the first node takes what makes the sum zero.
 #[inline(always)]
-fn by_cell<R: Scalar, L: Lanes<R>, const N: usize, const M: usize>(
+fn by_cell<R: LaneNumber, L: Lanes<R>, const N: usize, const M: usize>(
     forces: &[Vector<L>; M],
     to: &mut [Pack<Quad<R>>; N],
     at: usize,
@@ -295,33 +294,8 @@ fn by_cell<R: Scalar, L: Lanes<R>, const N: usize, const M: usize>(
     L::spread([-sum[0], -sum[1], -sum[2], L::ZERO], &mut to[0], at);
 }
 
-/// A number type in which steps run: kernels are compiled for it here, and not again in every crate that steps a model. By itself the
-/// narrowest of lanes.
-pub trait Scalar: Real + Lanes<Self> {
-    /// As many of them as a register of the CPU holds.
-    #[doc(hidden)]
-    type Wide<S: Simd>: Lanes<Self>;
-    /// The forces of a solid.
-    #[doc(hidden)]
-    fn force_field(solid: &Solid, step: f64) -> Box<dyn ForceField<Self>>;
-}
-
-impl Scalar for f32 {
-    type Wide<S: Simd> = WideF32<S>;
-    fn force_field(solid: &Solid, step: f64) -> Box<dyn ForceField<Self>> {
-        force_field(solid, step)
-    }
-}
-
-impl Scalar for f64 {
-    type Wide<S: Simd> = WideF64<S>;
-    fn force_field(solid: &Solid, step: f64) -> Box<dyn ForceField<Self>> {
-        force_field(solid, step)
-    }
-}
-
 /// The force field of a solid for steps of `step` seconds.
-fn force_field<R: Scalar>(solid: &Solid, step: f64) -> Box<dyn ForceField<R>> {
+fn force_field<R: LaneNumber>(solid: &Solid, step: f64) -> Box<dyn ForceField<R>> {
     match &solid.cells {
         Cells::Tet4(cells) => Box::new(SolidForces::<R, 4, 3>::new(solid, cells, step)),
         Cells::AveragedTet4(cells, averaging) => Box::new(AveragedTets::new(solid, cells, *averaging, step)),
@@ -334,7 +308,7 @@ fn force_field<R: Scalar>(solid: &Solid, step: f64) -> Box<dyn ForceField<R>> {
 
 /// Evaluates fields side by side: a small one, such as a vessel, has no work for several threads by itself. Forces begin at the first of
 /// the offsets.
-fn side_by_side<R: Scalar>(
+fn side_by_side<R: LaneNumber>(
     fields: &mut [Box<dyn ForceField<R>>],
     offsets: &[usize],
     displacement: &[Vector<R>],
@@ -381,7 +355,7 @@ struct Tied<R> {
     forces: Vec<Vector<R>>,
 }
 
-impl<R: Scalar> Tied<R> {
+impl<R: LaneNumber> Tied<R> {
     /// Of a model whose cells leave their forces at some places before `first`; with the places that the followed nodes take over.
     fn new(model: &Model, places: &[(u32, u32)], first: usize, none: u32) -> (Self, Vec<(u32, u32)>) {
         let mut number = vec![u32::MAX; model.node_count()];
@@ -424,9 +398,9 @@ impl<R: Scalar> Tied<R> {
     }
 }
 
-impl<R: Scalar> InternalForces<R> {
+impl<R: LaneNumber> InternalForces<R> {
     pub(crate) fn new(model: &Model, step: f64) -> Self {
-        let fields: Vec<_> = model.solids.iter().map(|solid| R::force_field(solid, step)).collect();
+        let fields: Vec<_> = model.solids.iter().map(|solid| force_field(solid, step)).collect();
         let mut field_offsets = vec![0];
         for field in &fields {
             field_offsets.push(field_offsets[field_offsets.len() - 1] + field.blocks().room());

@@ -5,13 +5,13 @@ use pliant_mechanics::tensor::Vector;
 
 use super::blocks::{Blocks, Moved, Quad, Task};
 use super::{Findings, ForceField};
-use crate::Scalar;
 use crate::history::History;
+use crate::lanes::LaneNumber;
 use crate::lanes::{LaneWork, Lanes, Processor};
 use crate::relaxation::Relaxation;
 
 /// What an element knows of its cells that does not change from step to step.
-pub(super) trait Element<R: Scalar>: Send + Sync {
+pub(super) trait Element<R: LaneNumber>: Send + Sync {
     /// Packs of history for a pack of cells, and of that of their pressures.
     fn slots(&self) -> [usize; 2];
 
@@ -29,7 +29,7 @@ pub(super) struct OnePass<R, E> {
     element: E,
 }
 
-impl<R: Scalar, E: Element<R>> OnePass<R, E> {
+impl<R: LaneNumber, E: Element<R>> OnePass<R, E> {
     pub(super) fn of(blocks: Blocks, element: E) -> Self {
         Self { processor: Processor::detect(), moved: Moved::new(blocks), element }
     }
@@ -42,7 +42,7 @@ struct Pass<'a, R, E> {
     task: Task<'a, R>,
 }
 
-impl<R: Scalar, E: Element<R>> LaneWork<R> for Pass<'_, R, E> {
+impl<R: LaneNumber, E: Element<R>> LaneWork<R> for Pass<'_, R, E> {
     type Output = Findings<R>;
 
     #[inline(always)]
@@ -51,7 +51,7 @@ impl<R: Scalar, E: Element<R>> LaneWork<R> for Pass<'_, R, E> {
     }
 }
 
-impl<R: Scalar, E: Element<R>> ForceField<R> for OnePass<R, E> {
+impl<R: LaneNumber, E: Element<R>> ForceField<R> for OnePass<R, E> {
     fn blocks(&self) -> &Blocks {
         &self.moved.blocks
     }

@@ -12,7 +12,7 @@ use super::one_pass::{Element, OnePass};
 use super::{
     Findings, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, own_packs, relative,
 };
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 use crate::lanes::{Lanes, PACK, Pack};
 use crate::relaxation::Relaxation;
 
@@ -34,7 +34,7 @@ pub(super) struct PlainConstants<R, const N: usize, const M: usize> {
     history: usize,
 }
 
-impl<R: Scalar, const N: usize, const M: usize> SolidForces<R, N, M> {
+impl<R: LaneNumber, const N: usize, const M: usize> SolidForces<R, N, M> {
     pub(super) fn new(solid: &Solid, cells: &CellBlock<N>, step: f64) -> Self {
         let (packed, blocks) = PackedCells::new(solid, cells);
         let hourglass = cells.hourglass.as_ref().map(|control| PackedHourglass::of(&packed, control));
@@ -56,7 +56,7 @@ impl<R: Scalar, const N: usize, const M: usize> SolidForces<R, N, M> {
     }
 }
 
-impl<R: Scalar, const N: usize, const M: usize> Element<R> for PlainConstants<R, N, M> {
+impl<R: LaneNumber, const N: usize, const M: usize> Element<R> for PlainConstants<R, N, M> {
     fn slots(&self) -> [usize; 2] {
         [self.history, 0]
     }

@@ -584,7 +584,7 @@ fn an_inverted_cell_is_found() {
 }
 
 /// Forces on the nodes and how far the cells are deformed, on some processor, after a motion of three steps.
-fn moved_on<R: Scalar>(processor: Processor, model: &Model) -> (Vec<Vector<f64>>, Deformed) {
+fn moved_on<R: LaneNumber>(processor: Processor, model: &Model) -> (Vec<Vector<f64>>, Deformed) {
     let mut internal = InternalForces::<R>::new(model, 0.1);
     internal.set_processor(processor);
     let mut history = State::<R>::at_rest(model).history;

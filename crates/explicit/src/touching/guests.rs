@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use pliant_mechanics::tensor::{Vector, add};
 
 use super::{Free, Nodes};
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 
 /// The guests of a model.
 pub(super) struct Guests {
@@ -74,7 +74,7 @@ impl Guests {
     }
 
     /// Finds where nodes are before the step [m], by their places among `numbers`.
-    pub fn place<R: Scalar>(
+    pub fn place<R: LaneNumber>(
         &self,
         nodes: impl Iterator<Item = u32>,
         numbers: &[u32],
@@ -88,7 +88,7 @@ impl Guests {
     }
 
     /// Where a node is before the step [m], by its number and its place at rest.
-    pub fn place_at<R: Scalar>(
+    pub fn place_at<R: LaneNumber>(
         &self,
         number: u32,
         rest: &Vector3<f64>,

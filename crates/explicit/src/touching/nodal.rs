@@ -6,7 +6,8 @@ use pliant_contact::shape::Near;
 use pliant_mechanics::tensor::Vector;
 
 use super::{Own, Touching, over};
-use crate::{Scalar, State};
+use crate::State;
+use crate::lanes::LaneNumber;
 
 /// Gap, over the margin of a surface at a thing, up to which a touch lasts that nothing bears on.
 const LASTS: f64 = 0.1;
@@ -26,7 +27,7 @@ pub struct NodeContact {
     pub slip: Option<f64>,
 }
 
-impl<R: Scalar> Touching<R> {
+impl<R: LaneNumber> Touching<R> {
     /// All nodes that may touch, increasing, at the instant whose forces were found last. `state` is that of the model then.
     pub fn nodal(&self, state: &State<R>) -> Vec<NodeContact> {
         let place =

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use pliant_mechanics::tensor::Vector;
 
-use crate::Scalar;
+use crate::lanes::LaneNumber;
 use crate::lanes::{LaneWork, Lanes, Processor};
 
 /// Components that are compared at once.
@@ -22,7 +22,7 @@ pub(crate) struct Nodes<'a, R> {
     pub processor: Processor,
 }
 
-impl<R: Scalar> Nodes<'_, R> {
+impl<R: LaneNumber> Nodes<'_, R> {
     /// Bounds [m] on the motion of these nodes in the step, from that in the step before, and on their motion since they were listed.
     pub fn ways(&self, nodes: Range<usize>, listed: &[Vector<R>]) -> [f64; 2] {
         let increment = self.increment[nodes.clone()].as_flattened();
@@ -39,7 +39,7 @@ struct Largest<'a, R> {
     listed: &'a [R],
 }
 
-impl<R: Scalar> LaneWork<R> for Largest<'_, R> {
+impl<R: LaneNumber> LaneWork<R> for Largest<'_, R> {
     type Output = [f64; 2];
 
     #[inline(always)]
@@ -63,7 +63,7 @@ impl<R: Scalar> LaneWork<R> for Largest<'_, R> {
 
 /// Takes the squares of differences where they are larger.
 #[inline(always)]
-fn take_larger<R: Scalar>(most: &mut [R; WIDTH], a: &[R], b: &[R]) {
+fn take_larger<R: LaneNumber>(most: &mut [R; WIDTH], a: &[R], b: &[R]) {
     for (most, (&a, &b)) in most.iter_mut().zip(a.iter().zip(b)) {
         let squared = (a - b) * (a - b);
         *most = if squared > *most { squared } else { *most };
