@@ -149,12 +149,12 @@ mod tests {
         let mut system = crate::system::System::forces_only(model.clone().into());
         system.evaluate(&state, 1.0, None).unwrap();
         let at = |of: &[f64], at: usize| Vector3::new(of[at], of[at + 1], of[at + 2]);
-        let (nodal, moment) = (at(&system.external, 6 * 17), at(&system.external, 6 * 17 + 3));
+        let (nodal, moment) = (at(&system.forces.external, 6 * 17), at(&system.forces.external, 6 * 17 + 3));
         assert!((nodal - force).norm() < 1e-9 && (moment - arm.cross(&force)).norm() < 1e-9);
         // The clamp bears it all: Σ over its nodes of internal forces, and of moments about the origin.
         let (mut sum, mut turning) = (force, point.cross(&force));
         for node in [0, 9, 18] {
-            let (f, m) = (at(&system.internal, 6 * node), at(&system.internal, 6 * node + 3));
+            let (f, m) = (at(&system.forces.internal, 6 * node), at(&system.forces.internal, 6 * node + 3));
             sum += f;
             turning += state.position[node].cross(&f) + m;
         }

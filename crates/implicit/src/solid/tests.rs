@@ -118,10 +118,10 @@ fn assert_derivatives(what: &str, system: &mut System, state: &State) {
     let mut random = Random::new(5);
     let still = vec![0.0; 6 * nodes];
     system.evaluate(state, 0.0, Some(&still)).unwrap();
-    let (force, size) = (system.internal.clone(), system.equations.count());
+    let (force, size) = (system.forces.internal.clone(), system.stiffness.equations.count());
     let along: Vec<f64> = (0..size).map(|_| random.number()).collect();
     let mut predicted = vec![0.0; size];
-    system.matrix.multiply_values(&system.matrix.value, &along, &mut predicted);
+    system.stiffness.matrix.multiply_values(&system.stiffness.matrix.value, &along, &mut predicted);
     let h = 1e-7;
     let mut at = |by: f64| {
         let mut moved = vec![0.0; 6 * nodes];
@@ -129,7 +129,7 @@ fn assert_derivatives(what: &str, system: &mut System, state: &State) {
         let mut state = state.clone();
         state.advance(&moved, by);
         system.evaluate(&state, 0.0, None).unwrap();
-        (system.energy, system.internal.clone())
+        (system.forces.energy, system.forces.internal.clone())
     };
     let (ahead, behind) = (at(h), at(-h));
     let gather = |all: &[f64]| {
@@ -178,18 +178,19 @@ fn pressures_on_faces_have_their_stiffness() {
         let curve = Curve { shape: Shape::Hold, from: 0.0, to: 0.0 };
         model.model_mut().loads.push(Load::new("press", kind, curve));
         let mut pressed = stiffness(&model, &state);
-        let size = pressed.equations.count();
+        let size = pressed.stiffness.equations.count();
         let along: Vec<f64> = (0..size).map(|_| random.number()).collect();
         let mut predicted = vec![0.0; size];
         let own: Vec<f64> = pressed
+            .stiffness
             .matrix
             .value
             .iter()
-            .zip(&bare.matrix.value)
+            .zip(&bare.stiffness.matrix.value)
             .map(|(with, without)| with - without)
             .collect();
-        pressed.matrix.multiply_values(&own, &along, &mut predicted);
-        let sum: f64 = pressed.external.iter().sum();
+        pressed.stiffness.matrix.multiply_values(&own, &along, &mut predicted);
+        let sum: f64 = pressed.forces.external.iter().sum();
         assert!(sum.abs() < 1e-10, "{element}: closed faces push with {sum} N");
         let h = 1e-6;
         let mut at = |by: f64| {
@@ -199,7 +200,7 @@ fn pressures_on_faces_have_their_stiffness() {
             state.advance(&moved, by);
             pressed.evaluate(&state, 1.0, None).unwrap();
             let mut loads = vec![0.0; size];
-            pressed.gather(&pressed.external, &mut loads);
+            pressed.gather(&pressed.forces.external, &mut loads);
             loads
         };
         let (ahead, behind) = (at(h), at(-h));
@@ -229,7 +230,7 @@ fn loads_on_carried_surfaces_act_through_their_mapping() {
         let mut system = System::new(model.clone().into(), LinearSolver::Direct).unwrap();
         let still = vec![0.0; 6 * model.rest.len()];
         system.evaluate(&state, 1.0, Some(&still)).unwrap();
-        system.external
+        system.forces.external
     };
     let load = |kind| Load::new("load", kind, Curve { shape: Shape::Hold, from: 0.0, to: 0.0 });
     let carried = |kind| Load { surface: Some(0), ..load(kind) };
@@ -345,16 +346,16 @@ fn a_held_strain_relaxes_by_its_series() {
                     let before = state.clone();
                     system.begin_step(&state.history, step);
                     system.evaluate(&state, 0.0, None).unwrap();
-                    let within = system.internal.clone();
+                    let within = system.forces.internal.clone();
                     system.end_step(Some(&before), &mut state, step);
                     system.stand(&state.history);
                     system.evaluate(&state, 0.0, None).unwrap();
                     let largest = within.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
-                    let off = within.iter().zip(&system.internal).map(|(a, b)| (a - b).abs());
+                    let off = within.iter().zip(&system.forces.internal).map(|(a, b)| (a - b).abs());
                     assert!(off.fold(0.0, f64::max) < 1e-12 * largest, "{element}");
                 }
                 assert!((state.history.work[0] - loaded).abs() < 1e-14 * loaded);
-                system.internal.clone()
+                system.forces.internal.clone()
             };
             let (first, last) = (after(&[0.0]), after(&[1e12]));
             let expected = match update {

@@ -207,7 +207,7 @@ impl BackwardEuler {
     ) -> Result<Self, SolveError> {
         let model = model.into();
         let system = System::on(device, Arc::clone(&model), settings.linear)?;
-        let (all, free) = (6 * model.rest.len(), system.equations.count());
+        let (all, free) = (6 * model.rest.len(), system.stiffness.equations.count());
         Ok(Self {
             settings,
             length: model.mean_edge(),
@@ -303,7 +303,7 @@ impl BackwardEuler {
             within_limits(self, state, time, |solver, state| solver.newton_without_contact(state, h))?
         };
         self.end(state, time);
-        let linear = self.system.last_solution;
+        let linear = self.system.stiffness.last_solution;
         let residuals = self.attempts.last_mut().map(|attempt| {
             attempt.found = converged;
             attempt.residuals.clone()
@@ -333,7 +333,7 @@ impl BackwardEuler {
             }
             self.system.evaluate(state, time, Some(&self.pending))?;
             if iteration == 0 {
-                self.system.take_damper();
+                self.system.stiffness.take_damper();
             }
             let (norm, scale) = self.find_residual(state);
             self.note(&[if scale > 0.0 { norm / scale } else { 0.0 }]);
@@ -363,7 +363,7 @@ impl BackwardEuler {
                     self.system.evaluate(state, time, tangent)?;
                     self.find_residual(state);
                     let found = self.find_direction(going_on);
-                    self.system.exact_pressure = true;
+                    self.system.facets.exact_pressure = true;
                     found?;
                 }
                 found => found?,
@@ -381,13 +381,13 @@ impl BackwardEuler {
     fn newton_in_contact(&mut self, state: &mut State, h: f64) -> Result<bool, SolveError> {
         let time = state.time + h;
         self.moved.fill(0.0);
-        if !self.system.damper.is_empty() {
+        if !self.system.stiffness.damper.is_empty() {
             // Without friction, which the step has yet to find.
             if let Some(touching) = &mut self.system.touching {
                 touching.stand(state);
             }
             self.system.evaluate(state, time, Some(&self.pending))?;
-            self.system.take_damper();
+            self.system.stiffness.take_damper();
         }
         let rates = state.velocity.iter().zip(&state.spin);
         let guess: Vec<f64> =
@@ -434,7 +434,7 @@ impl BackwardEuler {
     fn find_direction(&mut self, going_on: f64) -> Result<(), SolveError> {
         self.add_inertia();
         self.system.prepare()?;
-        for (guess, &component) in self.solution.iter_mut().zip(&self.system.equations.component) {
+        for (guess, &component) in self.solution.iter_mut().zip(&self.system.stiffness.equations.component) {
             let (node, c) = (component as usize / 6, component as usize % 6);
             let rate = if c < 3 { self.start.velocity[node][c] } else { self.start.spin[node][c - 3] };
             *guess = going_on * rate;
@@ -471,29 +471,34 @@ impl BackwardEuler {
             };
             for first in [0, 3] {
                 let weight = if first == 0 { 1.0 } else { arm };
-                let load =
-                    part(&system.external, first) + state.load_factor * part(&system.controlled, first);
-                let internal = part(&system.internal, first);
+                let load = part(&system.forces.external, first)
+                    + state.load_factor * part(&system.forces.controlled, first);
+                let internal = part(&system.forces.internal, first);
                 let momentum = momentum.of(node, first);
                 loads += weight * load.norm_squared();
                 resistance += weight * internal.norm_squared();
                 inertia += weight * momentum.norm_squared();
                 let sum = load - internal - momentum;
                 for c in 0..3 {
-                    let equation = system.equations.number[at + first + c];
+                    let equation = system.stiffness.equations.number[at + first + c];
                     if equation != pliant_linear::sparse::NONE {
                         self.residual[equation as usize] = sum[c];
                     }
                 }
             }
         }
-        if !system.damper.is_empty() {
+        if !system.stiffness.damper.is_empty() {
             system.gather(moved, &mut self.solution);
             if !shift.is_empty() {
-                let shifted = system.equations.component.iter().map(|&component| shift[component as usize]);
+                let shifted =
+                    system.stiffness.equations.component.iter().map(|&component| shift[component as usize]);
                 self.solution.iter_mut().zip(shifted).for_each(|(moved, shift)| *moved -= shift);
             }
-            system.matrix.multiply_values(&system.damper, &self.solution, &mut self.product);
+            system.stiffness.matrix.multiply_values(
+                &system.stiffness.damper,
+                &self.solution,
+                &mut self.product,
+            );
             let factor = model.stiffness_damping / h;
             self.residual.iter_mut().zip(&self.product).for_each(|(r, p)| *r -= factor * p);
         }
@@ -504,10 +509,10 @@ impl BackwardEuler {
         system.give_inertia_back(force, moment, &mut self.residual);
         system.conditions.relieve(&mut self.residual);
         let mut norm = 0.0;
-        for (&component, residual) in system.equations.component.iter().zip(&self.residual) {
+        for (&component, residual) in system.stiffness.equations.component.iter().zip(&self.residual) {
             norm += residual * residual * if component % 6 < 3 { 1.0 } else { arm };
         }
-        self.residual.iter_mut().zip(&system.coupling).for_each(|(r, c)| *r -= c);
+        self.residual.iter_mut().zip(&system.stiffness.coupling).for_each(|(r, c)| *r -= c);
         (norm.sqrt(), f64::max(loads, f64::max(resistance, inertia)).sqrt())
     }
 
@@ -515,12 +520,18 @@ impl BackwardEuler {
     fn add_inertia(&mut self) {
         let (model, h) = (Arc::clone(&self.system.model), self.differences.step);
         let factor = model.stiffness_damping / h;
-        self.system.matrix.value.iter_mut().zip(&self.system.damper).for_each(|(k, d)| *k += factor * d);
+        self.system
+            .stiffness
+            .matrix
+            .value
+            .iter_mut()
+            .zip(&self.system.stiffness.damper)
+            .for_each(|(k, d)| *k += factor * d);
         let Self { system, differences, start, moved, damping, .. } = self;
         let momentum = Momentum { model: &model, differences, start, moved, damping };
         let rate = |node: u32| 1.0 / (h * h) + damping[node as usize] / h;
-        let components = &system.equations.component;
-        system.matrix.add_to_each_diagonal(|equation| {
+        let components = &system.stiffness.equations.component;
+        system.stiffness.matrix.add_to_each_diagonal(|equation| {
             let (node, component) = (components[equation] / 6, components[equation] % 6);
             let masses = if component < 3 { &model.mass } else { &model.rotary_inertia };
             rate(node) * masses[node as usize]
@@ -533,7 +544,7 @@ impl BackwardEuler {
     }
 
     fn worst_node(&self) -> u32 {
-        let all = self.system.equations.component.iter().zip(&self.residual);
+        let all = self.system.stiffness.equations.component.iter().zip(&self.residual);
         let largest = all.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         largest.map_or(0, |(component, _)| component / 6)
     }
@@ -594,14 +605,18 @@ impl Contacting for BackwardEuler {
                 sum += 0.5 * self.damping[node] * mass / h * moved.norm_squared();
             }
         }
-        if !self.system.damper.is_empty() {
+        if !self.system.stiffness.damper.is_empty() {
             let mut moved = vec![0.0; self.product.len()];
             self.system.gather(&self.moved, &mut moved);
             let shift =
                 |component: &u32| self.differences.shift.get(*component as usize).copied().unwrap_or(0.0);
-            let components = &self.system.equations.component;
+            let components = &self.system.stiffness.equations.component;
             moved.iter_mut().zip(components).for_each(|(moved, component)| *moved -= shift(component));
-            self.system.matrix.multiply_values(&self.system.damper, &moved, &mut self.product);
+            self.system.stiffness.matrix.multiply_values(
+                &self.system.stiffness.damper,
+                &moved,
+                &mut self.product,
+            );
             sum += 0.5 * model.stiffness_damping / h * dot(&moved, &self.product);
         }
         sum

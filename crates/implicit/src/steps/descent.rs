@@ -234,7 +234,9 @@ fn start_from(
     let here = state.clone();
     let Vectors { system, pending, increment, .. } = solver.vectors();
     increment.copy_from_slice(guess);
-    for ((own, &pending), number) in increment.iter_mut().zip(pending.iter()).zip(&system.equations.number) {
+    for ((own, &pending), number) in
+        increment.iter_mut().zip(pending.iter()).zip(&system.stiffness.equations.number)
+    {
         if *number == pliant_linear::sparse::NONE {
             *own = pending;
         }
@@ -285,9 +287,9 @@ fn is_complete(solver: &mut impl Contacting) -> bool {
 fn own_loads(system: &System) -> Vec<f64> {
     match &system.touching {
         Some(touching) => {
-            system.external.iter().zip(&touching.given).map(|(load, force)| load - force).collect()
+            system.forces.external.iter().zip(&touching.given).map(|(load, force)| load - force).collect()
         }
-        None => system.external.clone(),
+        None => system.forces.external.clone(),
     }
 }
 
@@ -304,7 +306,7 @@ fn energy(solver: &mut impl Contacting) -> (f64, f64) {
     let potential = solver.potential();
     let system = solver.system_mut();
     let touching = system.touching.as_ref().map_or(0.0, |touching| touching.energy);
-    let parts = [system.energy, touching, potential];
+    let parts = [system.forces.energy, touching, potential];
     (parts.iter().sum(), parts.iter().map(|part| part.abs()).sum())
 }
 
@@ -312,15 +314,16 @@ fn energy(solver: &mut impl Contacting) -> (f64, f64) {
 /// was: else the step tells nothing of how far the solution is.
 fn find_direction(solver: &mut impl Contacting, raised: &mut f64) -> Result<(f64, bool), SolveError> {
     solver.complete();
-    let diagonal: Vec<f64> =
-        (0..solver.system().equations.count()).map(|k| solver.system().matrix.diagonal(k).abs()).collect();
+    let diagonal: Vec<f64> = (0..solver.system().stiffness.equations.count())
+        .map(|k| solver.system().stiffness.matrix.diagonal(k).abs())
+        .collect();
     let (first, growth, times) = RAISED;
     let mut added = 0.0;
     for _ in 0..=times {
         let system = solver.system_mut();
         let by = *raised - added;
         if by > 0.0 {
-            system.matrix.add_to_each_diagonal(|k| by * diagonal[k]);
+            system.stiffness.matrix.add_to_each_diagonal(|k| by * diagonal[k]);
             added = *raised;
         }
         let definite = match system.prepare() {
@@ -332,7 +335,7 @@ fn find_direction(solver: &mut impl Contacting, raised: &mut f64) -> Result<(f64
             let Vectors { system, residual, solution, .. } = solver.vectors();
             match system.solve(residual, solution) {
                 Ok(()) => {
-                    let components = system.equations.component.iter().zip(solution.iter());
+                    let components = system.stiffness.equations.component.iter().zip(solution.iter());
                     let ways =
                         components.filter(|(component, _)| **component % 6 < 3).map(|(_, way)| way.abs());
                     *raised = if added > first { added / growth } else { 0.0 };

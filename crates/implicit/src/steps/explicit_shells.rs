@@ -129,10 +129,10 @@ impl ExplicitShells {
             let velocity = |first: usize, now: Vector3<f64>, mass: f64| {
                 Vector3::from_fn(|c, _| {
                     let at = 6 * node + first + c;
-                    if system.equations.number[at] == pliant_linear::sparse::NONE {
+                    if system.stiffness.equations.number[at] == pliant_linear::sparse::NONE {
                         return self.pending[at] / h;
                     }
-                    kept * now[c] + gained * (system.external[at] - system.internal[at]) / mass
+                    kept * now[c] + gained * (system.forces.external[at] - system.forces.internal[at]) / mass
                 })
             };
             let (v, w) = (

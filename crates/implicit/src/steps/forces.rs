@@ -30,10 +30,10 @@ impl Forces {
         self.system.stand(&state.history);
         self.system.evaluate(state, state.time, None)?;
         let system = &mut self.system;
-        for (load, controlled) in system.external.iter_mut().zip(&system.controlled) {
+        for (load, controlled) in system.forces.external.iter_mut().zip(&system.forces.controlled) {
             *load += state.load_factor * controlled;
         }
-        system.external.iter_mut().zip(&self.touching).for_each(|(load, force)| *load += force);
+        system.forces.external.iter_mut().zip(&self.touching).for_each(|(load, force)| *load += force);
         Ok(())
     }
 
@@ -57,18 +57,18 @@ impl Forces {
 
     /// Force [N] and moment [N m] that elements and springs resist with, six numbers a node.
     pub fn internal(&self) -> &[f64] {
-        &self.system.internal
+        &self.system.forces.internal
     }
 
     /// Force [N] and moment [N m] of all loads, six numbers a node.
     pub fn loads(&self) -> &[f64] {
-        &self.system.external
+        &self.system.forces.external
     }
 
     /// What a node resists with beyond its loads [N].
     pub fn resisting(&self, node: u32) -> [f64; 3] {
         let at = 6 * node as usize;
-        [at, at + 1, at + 2].map(|at| self.system.internal[at] - self.system.external[at])
+        [at, at + 1, at + 2].map(|at| self.system.forces.internal[at] - self.system.forces.external[at])
     }
 
     /// What a constraint of volume encloses at the state last evaluated, which is given, and the force [N] and moment [N m] of its pressure by components,
@@ -80,11 +80,11 @@ impl Forces {
 
     /// Energy stored in elements and springs [J], and the work of stresses that relax.
     pub fn strain_energy(&self) -> f64 {
-        self.system.energy
+        self.system.forces.energy
     }
 
     /// What hourglass control holds of it [J].
     pub fn hourglass_energy(&self) -> f64 {
-        self.system.hourglass
+        self.system.forces.hourglass
     }
 }

@@ -234,7 +234,7 @@ impl System {
             let mut force = Vector3::zeros();
             for at in own.nodes.iter().map(|&node| 6 * node as usize) {
                 let held = (0..3).filter(|&c| own.components[c]);
-                held.for_each(|c| force[c] += self.internal[at + c] - self.external[at + c]);
+                held.for_each(|c| force[c] += self.forces.internal[at + c] - self.forces.external[at + c]);
             }
             lag.found(force);
             forces.push(force);

@@ -71,12 +71,12 @@ pub trait AssemblySolver {
     /// Values of the older matrix whose factors precondition the next one, if there is one: without them another solver takes other
     /// iterations.
     fn factored(&self) -> Option<&[f64]> {
-        self.system().factored()
+        self.system().stiffness.factored()
     }
 
     /// Takes the [factors](Self::factored) of another solver with the same [pairs](Self::take_contact_pairs): to continue with the same bits.
     fn precondition_with(&mut self, values: Vec<f64>) {
-        self.system_mut().precondition_with(values);
+        self.system_mut().stiffness.precondition_with(values);
     }
 
     /// Looks at a flag from now on, before each solution, and stops where it asks.

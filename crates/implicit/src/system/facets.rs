@@ -1,41 +1,107 @@
 //! Forces and stiffness of facets, packs of eight in parallel, added node by node in their order.
 
-use super::{FACETS, System};
-use crate::model::error::SolveError;
-use crate::model::state::State;
-use crate::system::gathering::{ColumnSums, Corners, NodeSums};
 use nalgebra::Vector3;
 use pliant_linear::lanes::PACK;
-use pliant_linear::sparse::{Cell, Equations, LowerMatrix, NONE};
-use pliant_shells::Patch;
-use pliant_shells::Vector18;
-use pliant_shells::facet_packs::Work;
+use pliant_linear::sparse::{Cell, Equations, NONE};
+use pliant_mechanics::load::{Load, LoadKind, Spread};
+use pliant_mechanics::model::{Constraint, Motion};
+use pliant_shells::facet_packs::{FacetPack, Work};
 use pliant_shells::rotation::skew;
-use pliant_shells::{Broken, Facet, Matrix18, symmetrise};
+use pliant_shells::{Broken, EdgeRule, Facet, Matrix18, Patch, Vector18, symmetrise};
+use pulp::Arch;
 use rayon::prelude::*;
-use std::sync::Arc;
 
-impl System {
-    pub(super) fn evaluate_facets(&mut self, state: &State, moved: Option<&[f64]>) -> Result<(), SolveError> {
-        let [mut now, mut next] = std::mem::take(&mut self.results);
-        let found = self.evaluate_chunks(state, moved, [&mut now, &mut next]);
-        self.results = [now, next];
-        found
+use super::followers::Followers;
+use super::gathering::{ColumnSums, Corners, NodeSums};
+use super::stiffness::Stiffness;
+use super::{FACETS, Sums};
+use crate::curved::surface::CurvedSurface;
+use crate::model::assembly::Assembly;
+use crate::model::error::SolveError;
+use crate::model::state::State;
+
+/// What facets need beside the model.
+pub(crate) struct Facets {
+    /// At rest.
+    packs: Vec<FacetPack>,
+    /// The instructions of the processor.
+    arch: Arch,
+    pub(super) pressure: Vec<Pressure>,
+    /// The curved surface, if a load acts on it.
+    pub(super) surface: Option<CurvedSurface>,
+    /// Whether the stiffness has the change of pressures on the curved surface, or that on the flat facets in its place, with which
+    /// conjugate gradients converge more often and Newton's method slowly.
+    pub(crate) exact_pressure: bool,
+    /// Places in the matrix.
+    places: Vec<Vec<u32>>,
+    /// Those with nodes that follow others.
+    bound: Vec<bool>,
+    /// Of each chunk.
+    corners: Vec<Corners>,
+    /// Of a chunk of facets that is found and of the one before, whose nodes take it up.
+    results: [ChunkResults; 2],
+}
+
+impl Facets {
+    pub(super) fn new(model: &Assembly) -> Self {
+        let arch = Arch::new();
+        Self {
+            packs: FacetPack::all(arch, &model.facets, |node| model.place(node as usize)),
+            arch,
+            pressure: vec![Pressure::default(); model.facets.len()],
+            surface: needs_surface(model).then(|| CurvedSurface::new(model, EdgeRule::Arc)),
+            exact_pressure: true,
+            places: Vec::new(),
+            bound: Vec::new(),
+            corners: model.facets.chunks(FACETS).map(corners_of).collect(),
+            // The second only where there is a second chunk.
+            results: [0, FACETS]
+                .map(|first| ChunkResults::new(FACETS.min(model.facets.len().saturating_sub(first)))),
+        }
     }
 
-    /// The nodes of a chunk of facets take it up while the next one is found, so that threads seldom wait for each other.
-    pub(super) fn evaluate_chunks(
+    /// Takes the places of facets.
+    pub(super) fn take_places(
         &mut self,
+        model: &Assembly,
+        followers: Option<&Followers>,
+        places: impl Fn(&[u32]) -> Vec<u32>,
+    ) {
+        let follows = |own: &Followers, facet: &Facet| own.expanded(&facet.nodes, true).is_some();
+        let is_bound = |facet: &Facet| followers.is_some_and(|own| follows(own, facet));
+        self.places = model.facets.iter().map(|facet| places(&facet.nodes)).collect();
+        self.bound = model.facets.iter().map(is_bound).collect();
+    }
+
+    /// The places of one.
+    pub(super) fn places_of(&self, facet: u32) -> &[u32] {
+        &self.places[facet as usize]
+    }
+
+    /// Whether a pressure acts on the curved surface.
+    pub(super) fn are_pressed(&self) -> bool {
+        self.pressure.iter().any(|pressure| pressure.curved != [0.0; 2])
+    }
+
+    /// Adds forces and, with prescribed increments, the stiffness. The nodes of a chunk of facets take it up while the next one is found, so
+    /// that threads seldom wait for each other.
+    pub(super) fn add(
+        &mut self,
+        model: &Assembly,
         state: &State,
         moved: Option<&[f64]>,
-        [mut now, mut next]: [&mut ChunkResults; 2],
+        sums: &mut Sums<'_>,
     ) -> Result<(), SolveError> {
-        let symmetric = self.matrix.mirror.is_empty();
-        let tangent = moved.is_some();
-        let wanted = Wanted { tangent, symmetric, exact_pressure: self.exact_pressure };
+        let Self { packs, arch, pressure, surface, exact_pressure, places, bound, corners, results } = self;
+        let (symmetric, tangent) = (sums.stiffness.is_symmetric(), moved.is_some());
+        let wanted = Wanted { tangent, symmetric, exact_pressure: *exact_pressure };
+        let finding =
+            Finding { model, state, wanted, packs, arch: *arch, pressure, surface: surface.as_ref() };
         let coupled = moved.filter(|moved| moved.iter().any(|&by| by != 0.0));
-        let count = self.model.facets.len();
-        self.find_facets(0, state, wanted, now);
+        let gathering = Gathering { model, tangent, moved: coupled, pressure, places, bound };
+        let [mut now, mut next] = results.each_mut();
+        let count = model.facets.len();
+        finding.find(0, now);
         for first in (0..count).step_by(FACETS) {
             let heads = &now.heads[..FACETS.min(count - first)];
             if let Some((cell, why)) =
@@ -44,37 +110,37 @@ impl System {
                 return Err(SolveError::Broken { cell, why });
             }
             for head in heads {
-                self.energy += head.energy;
-                self.largest = self.largest.max(head.largest);
+                sums.forces.energy += head.energy;
+                sums.forces.largest = sums.forces.largest.max(head.largest);
             }
-            let mut sums = self.lend_sums();
             rayon::join(
-                || self.gather_facets(first / FACETS, &now.results, tangent, coupled, &mut sums),
-                || self.find_facets(first + FACETS, state, wanted, next),
+                || gathering.gather((first, &corners[first / FACETS]), &now.results, sums),
+                || finding.find(first + FACETS, next),
             );
-            self.take_back(sums);
-            self.add_bound_facets(first, &now.results, moved);
+            if let Some(moved) = moved {
+                gathering.add_bound(first, &now.results, moved, sums);
+            }
             std::mem::swap(&mut now, &mut next);
         }
         Ok(())
     }
+}
 
-    pub(super) fn lend_sums(&mut self) -> FacetSums {
-        let forces = [&mut self.internal, &mut self.external, &mut self.controlled];
-        FacetSums {
-            matrix: std::mem::take(&mut self.matrix),
-            coupling: std::mem::take(&mut self.coupling),
-            forces: forces.map(std::mem::take),
-        }
-    }
+/// What forces of facets are found from.
+struct Finding<'a> {
+    model: &'a Assembly,
+    state: &'a State,
+    wanted: Wanted,
+    packs: &'a [FacetPack],
+    arch: Arch,
+    pressure: &'a [Pressure],
+    surface: Option<&'a CurvedSurface>,
+}
 
-    pub(super) fn take_back(&mut self, FacetSums { matrix, coupling, forces }: FacetSums) {
-        (self.matrix, self.coupling) = (matrix, coupling);
-        [self.internal, self.external, self.controlled] = forces;
-    }
-
+impl Finding<'_> {
     /// Finds forces of the facets from one on, at most a chunk, and their stiffness if it is wanted.
-    pub(super) fn find_facets(&self, first: usize, state: &State, wanted: Wanted, found: &mut ChunkResults) {
+    fn find(&self, first: usize, found: &mut ChunkResults) {
+        let Self { state, wanted, .. } = *self;
         let facets = self.model.facets.get(first..).unwrap_or_default();
         let heads = found.heads.par_chunks_mut(PACK).zip(found.results.par_chunks_mut(PACK));
         let packs = heads.zip(facets.par_chunks(PACK)).enumerate().with_min_len(2);
@@ -89,34 +155,40 @@ impl System {
             for ((number, facet), (head, result)) in (from..).zip(facets).zip(heads.iter().zip(results)) {
                 let pressure = self.pressure[number];
                 if pressure != Pressure::default() && head.broken.is_none() {
-                    let patch = || {
-                        self.surface.as_ref().map(|surface| surface.patch(&self.model, state, number as u32))
-                    };
+                    let patch =
+                        || self.surface.map(|surface| surface.patch(self.model, state, number as u32));
                     let (x, _) = state.corners(facet.nodes);
                     result.press(&x, pressure, patch, state.load_factor, wanted);
                 }
             }
         });
     }
+}
 
+/// How what is found of facets is added up.
+struct Gathering<'a> {
+    model: &'a Assembly,
+    /// Whether the stiffness, too.
+    tangent: bool,
+    /// Prescribed increments, where there are some.
+    moved: Option<&'a [f64]>,
+    pressure: &'a [Pressure],
+    places: &'a [Vec<u32>],
+    bound: &'a [bool],
+}
+
+impl Gathering<'_> {
     /// Adds forces of a chunk of facets and, if it is wanted, the stiffness of those whose nodes follow no others; with what it makes of
     /// prescribed motions.
-    pub(super) fn gather_facets(
-        &self,
-        chunk: usize,
-        results: &[FacetResult],
-        tangent: bool,
-        moved: Option<&[f64]>,
-        FacetSums { matrix, coupling, forces }: &mut FacetSums,
-    ) {
-        let stiffness = tangent.then(|| {
+    fn gather(&self, (first, corners): (usize, &Corners), results: &[FacetResult], sums: &mut Sums<'_>) {
+        let Stiffness { equations, matrix, coupling, .. } = &mut *sums.stiffness;
+        let equations = &*equations;
+        let stiffness = self.tangent.then(|| {
             let (values, column_start) = matrix.values();
             ColumnSums { first: 0, coupling, values, column_start }
         });
-        let forces = forces.each_mut().map(|own| &mut own[..]);
-        let (first, equations) = (chunk * FACETS, &self.equations);
+        let forces = sums.forces.all();
         let (facets, pressure) = (&self.model.facets[first..], &self.pressure[first..]);
-        let (places, bound) = (&self.places, &self.bound);
         let take = |node: u32, corners: &[u32], sums: &mut NodeSums<'_>| {
             for &corner in corners {
                 let (at, corner) = (corner as usize / 3, corner as usize % 3);
@@ -127,35 +199,43 @@ impl System {
                     node - sums.first,
                     &mut sums.forces,
                 );
-                let Some(sums) = sums.stiffness.as_mut().filter(|_| !bound[first + at]) else { continue };
-                let entries = result.tangent.as_slice();
-                let cell = Cell { nodes: &facet.nodes, components: 6, places: &places[first + at], entries };
+                let Some(sums) = sums.stiffness.as_mut().filter(|_| !self.bound[first + at]) else {
+                    continue;
+                };
+                let (places, entries) = (&self.places[first + at][..], result.tangent.as_slice());
+                let cell = Cell { nodes: &facet.nodes, components: 6, places, entries };
                 sums.values.add(equations, &cell, corner);
-                if let Some(moved) = moved {
+                if let Some(moved) = self.moved {
                     result.couple(facet, corner, moved, equations, sums);
                 }
             }
         };
-        self.corners[chunk].visit(equations, NodeSums { first: 0, forces, stiffness }, &take);
+        corners.visit(equations, NodeSums { first: 0, forces, stiffness }, &take);
     }
 
     /// Adds the stiffness of those facets of a chunk whose nodes follow others.
-    pub(super) fn add_bound_facets(&mut self, first: usize, results: &[FacetResult], moved: Option<&[f64]>) {
-        let model = Arc::clone(&self.model);
-        let Some(moved) = moved else { return };
-        for (number, result) in (first..model.facets.len()).zip(results) {
+    fn add_bound(&self, first: usize, results: &[FacetResult], moved: &[f64], sums: &mut Sums<'_>) {
+        let Some(followers) = sums.followers else { return };
+        for (number, result) in (first..self.model.facets.len()).zip(results) {
             if !self.bound[number] {
                 continue;
             }
-            let nodes = &model.facets[number].nodes;
-            let Some(followers) = &self.followers else { continue };
+            let nodes = &self.model.facets[number].nodes;
             let Some(expanded) = followers.expanded(nodes, true) else { continue };
             let whole = followers.condensed(nodes, 6, &expanded, result.tangent.as_slice());
-            let places = std::mem::take(&mut self.places[number]);
-            self.add_block(&expanded.0, expanded.1, &places, &whole, moved);
-            self.places[number] = places;
+            sums.stiffness.add_block((&expanded.0, expanded.1), &self.places[number], &whole, moved);
         }
     }
+}
+
+/// Whether something acts on the curved surface of shells.
+fn needs_surface(model: &Assembly) -> bool {
+    let loads = |load: &Load| {
+        let curved = matches!(load.kind, LoadKind::ShellPressure { spread: Spread::Curved, .. });
+        curved || load.surface.is_some_and(|surface| model.carried.contains_key(&surface))
+    };
+    let encloses = |own: &Constraint| matches!(&own.motion, Motion::Volume { enclosure, .. } if !enclosure.facets.is_empty());
+    model.loads.iter().any(loads) || model.constraints.iter().any(encloses)
 }
 
 /// Pressures on a facet [Pa], each fixed and controlled.
@@ -167,74 +247,66 @@ pub(super) struct Pressure {
 
 /// What is found of the facets of a chunk.
 #[derive(Default)]
-pub(super) struct ChunkResults {
+struct ChunkResults {
     /// Apart from the rest: one thread looks at all of them.
-    pub(super) heads: Vec<FacetHead>,
-    pub(super) results: Vec<FacetResult>,
+    heads: Vec<FacetHead>,
+    results: Vec<FacetResult>,
 }
 
 #[derive(Clone, Copy, Default)]
-pub(super) struct FacetHead {
-    pub(super) energy: f64,
+struct FacetHead {
+    energy: f64,
     /// Largest force on a node [N].
-    pub(super) largest: f64,
-    pub(super) broken: Option<Broken>,
+    largest: f64,
+    broken: Option<Broken>,
 }
 
 #[derive(Clone)]
-pub(super) struct FacetResult {
-    pub(super) force: Vector18,
+struct FacetResult {
+    force: Vector18,
     /// What the fixed and the controlled pressures make.
-    pub(super) loads: [Vector18; 2],
-    pub(super) tangent: Matrix18,
-}
-
-/// What facets are added to.
-pub(super) struct FacetSums {
-    pub(super) matrix: LowerMatrix,
-    pub(super) coupling: Vec<f64>,
-    /// Internal forces, and fixed and controlled loads.
-    pub(super) forces: [Vec<f64>; 3],
+    loads: [Vector18; 2],
+    tangent: Matrix18,
 }
 
 /// The corners of facets by nodes.
-pub(super) fn corners_of(facets: &[Facet]) -> Corners {
+fn corners_of(facets: &[Facet]) -> Corners {
     Corners::of(facets.iter().map(|facet| facet.nodes))
 }
 
 /// A third of the area times the normal on each corner, as six numbers a node [m²].
-pub(super) fn flat_forces([a, b, c]: &[Vector3<f64>; 3]) -> Vector18 {
+fn flat_forces([a, b, c]: &[Vector3<f64>; 3]) -> Vector18 {
     let third = (b - a).cross(&(c - a)) / 6.0;
     Vector18::from_fn(|i, _| if i % 6 < 3 { third[i % 6] } else { 0.0 })
 }
 
 /// What is wanted of facets.
 #[derive(Clone, Copy)]
-pub(super) struct Wanted {
+struct Wanted {
     /// Whether their stiffness, too.
-    pub(super) tangent: bool,
+    tangent: bool,
     /// Whether only the symmetric part of it.
-    pub(super) symmetric: bool,
+    symmetric: bool,
     /// Whether the change of pressures on the curved surface is that of the flat facets.
-    pub(super) exact_pressure: bool,
+    exact_pressure: bool,
 }
 
 impl ChunkResults {
     /// With room for some facets.
-    pub(super) fn new(facets: usize) -> Self {
+    fn new(facets: usize) -> Self {
         Self { heads: vec![FacetHead::default(); facets], results: vec![FacetResult::none(); facets] }
     }
 }
 
 impl FacetResult {
-    pub(super) fn none() -> Self {
+    fn none() -> Self {
         let loads = [Vector18::zeros(); 2];
         let (force, tangent) = (Vector18::zeros(), Matrix18::zeros());
         Self { force, loads, tangent }
     }
 
     /// Adds what a corner is given to the sums of a node, a number of nodes after the first.
-    pub(super) fn add_forces(
+    fn add_forces(
         &self,
         corner: usize,
         pressed: bool,
@@ -254,7 +326,7 @@ impl FacetResult {
     }
 
     /// Adds what prescribed increments, six a node, make of the forces on a corner.
-    pub(super) fn couple(
+    fn couple(
         &self,
         facet: &Facet,
         corner: usize,
@@ -275,7 +347,7 @@ impl FacetResult {
     }
 
     /// Takes up the pressures.
-    pub(super) fn press(
+    fn press(
         &mut self,
         x: &[Vector3<f64>; 3],
         Pressure { lumped, curved }: Pressure,
@@ -309,7 +381,7 @@ impl FacetResult {
 }
 
 /// Takes what was found of each lane.
-pub(super) fn take(work: &Work, wanted: Wanted, heads: &mut [FacetHead], results: &mut [FacetResult]) {
+fn take(work: &Work, wanted: Wanted, heads: &mut [FacetHead], results: &mut [FacetResult]) {
     for (lane, (head, result)) in heads.iter_mut().zip(results).enumerate() {
         let energy;
         (energy, result.force) = work.force(lane);
@@ -323,7 +395,7 @@ pub(super) fn take(work: &Work, wanted: Wanted, heads: &mut [FacetHead], results
 }
 
 /// Takes from a stiffness how p A n/3 changes with the corners, or the symmetric part of that.
-pub(super) fn follow(k: &mut Matrix18, x: &[Vector3<f64>; 3], pressure: f64, symmetric: bool) {
+fn follow(k: &mut Matrix18, x: &[Vector3<f64>; 3], pressure: f64, symmetric: bool) {
     let opposite = [0, 1, 2].map(|j| (x[(j + 2) % 3] - x[(j + 1) % 3]) * (pressure / 6.0));
     for (i, j) in (0..3).flat_map(|j| (0..3).map(move |i| (i, j))) {
         // Of a block S(a) and its mirror S(b)ᵀ = −S(b) the mean.

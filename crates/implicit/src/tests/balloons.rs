@@ -75,7 +75,7 @@ pub(super) fn pressure_on_the_curved_surface_acts_on_its_area() {
         model.model_mut().loads[0].kind = LoadKind::ShellPressure { facets: cells, pressure: 1.0, spread };
         let mut system = System::new(model.clone().into(), LinearSolver::Direct).unwrap();
         system.evaluate(&State::at_rest(&model), 0.0, None).unwrap();
-        (0..3).map(|c| system.controlled.iter().skip(c).step_by(6).sum()).collect::<Vec<f64>>()
+        (0..3).map(|c| system.forces.controlled.iter().skip(c).step_by(6).sum()).collect::<Vec<f64>>()
     };
     let (flat, curved) = (half(&model, Spread::Lumped), half(&model, Spread::Curved));
     assert!(curved[0].abs() < 1e-12 && curved[1].abs() < 1e-12, "{curved:?}");

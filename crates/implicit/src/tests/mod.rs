@@ -252,17 +252,19 @@ fn the_assembled_stiffness_is_the_derivative_of_the_forces() {
     let none = vec![0.0; 6 * model.rest.len()];
     system.evaluate(&state, 0.0, Some(&none)).unwrap();
     let mut random = Random::new(3);
-    let size = system.equations.count();
+    let size = system.stiffness.equations.count();
     let direction: Vec<f64> = (0..size).map(|_| random.number()).collect();
     let mut product = vec![0.0; size];
     for column in 0..size {
-        let (start, end) =
-            (system.matrix.column_start[column] as usize, system.matrix.column_start[column + 1] as usize);
+        let (start, end) = (
+            system.stiffness.matrix.column_start[column] as usize,
+            system.stiffness.matrix.column_start[column + 1] as usize,
+        );
         for at in start..end {
-            let row = system.matrix.row[at] as usize;
-            product[row] += system.matrix.value[at] * direction[column];
+            let row = system.stiffness.matrix.row[at] as usize;
+            product[row] += system.stiffness.matrix.value[at] * direction[column];
             if row != column {
-                product[column] += system.matrix.mirror[at] * direction[row];
+                product[column] += system.stiffness.matrix.mirror[at] * direction[row];
             }
         }
     }
@@ -273,7 +275,9 @@ fn the_assembled_stiffness_is_the_derivative_of_the_forces() {
         moved.advance(&increment, h);
         system.evaluate(&moved, 0.0, None).unwrap();
         let all: Vec<f64> = (0..6 * model.rest.len())
-            .map(|c| system.internal[c] - system.external[c] - 2.0 * system.controlled[c])
+            .map(|c| {
+                system.forces.internal[c] - system.forces.external[c] - 2.0 * system.forces.controlled[c]
+            })
             .collect();
         let mut free = vec![0.0; size];
         system.gather(&all, &mut free);

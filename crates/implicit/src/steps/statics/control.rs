@@ -106,9 +106,9 @@ impl Statics {
     ) -> Result<f64, Attempt> {
         let system = &mut self.system;
         let fatal = |error| Attempt { error, retry: false };
-        system.gather(&system.controlled, &mut self.controlled);
+        system.gather(&system.forces.controlled, &mut self.controlled);
         system.respond(&self.controlled, &mut self.response).map_err(fatal)?;
-        let components = &system.equations.component;
+        let components = &system.stiffness.equations.component;
         let along = |x: &[f64], all: &[f64]| -> f64 {
             components.iter().zip(x).map(|(&c, x)| all[c as usize] * x).sum()
         };

@@ -134,7 +134,7 @@ impl Statics {
         let model = model.into();
         check_held(&model)?;
         let system = System::new(Arc::clone(&model), settings.linear)?;
-        let (all, free) = (6 * model.rest.len(), system.equations.count());
+        let (all, free) = (6 * model.rest.len(), system.stiffness.equations.count());
         let (slack, extent) = slack(&model, &system);
         Ok(Self {
             settings,
@@ -176,7 +176,8 @@ impl Statics {
     /// Forces and moments on each node of the model that its elements resist with, less its loads, at the last evaluation:
     /// on held components these are the reactions [N, N m], six a node.
     pub fn reactions(&self) -> impl Iterator<Item = [f64; 6]> {
-        let nodes = self.system.internal.chunks_exact(6).zip(self.system.external.chunks_exact(6));
+        let nodes =
+            self.system.forces.internal.chunks_exact(6).zip(self.system.forces.external.chunks_exact(6));
         nodes.map(|(internal, external)| [0, 1, 2, 3, 4, 5].map(|c| internal[c] - external[c]))
     }
 
@@ -335,7 +336,7 @@ impl Statics {
                     self.system.evaluate(state, time, tangent).map_err(failed)?;
                     self.find_residual(state);
                     let pivots = self.find_direction();
-                    self.system.exact_pressure = true;
+                    self.system.facets.exact_pressure = true;
                     pivots.map_err(failed)?
                 }
                 found => found.map_err(failed)?,
@@ -413,27 +414,34 @@ impl Statics {
     /// Loads less internal forces on the free components; its norm and what is allowed [N].
     fn find_residual(&mut self, state: &State) -> (f64, f64) {
         let system = &mut self.system;
-        for (load, controlled) in system.external.iter_mut().zip(&system.controlled) {
+        for (load, controlled) in system.forces.external.iter_mut().zip(&system.forces.controlled) {
             *load += state.load_factor * controlled;
         }
         let arm = self.length;
         let norm = |values: &mut dyn Iterator<Item = (usize, f64)>| {
             values.map(|(c, v)| if c % 6 < 3 { v * v } else { v * v / (arm * arm) }).sum::<f64>().sqrt()
         };
-        let external = norm(&mut system.external.iter().copied().enumerate());
-        let internal = norm(&mut system.internal.iter().copied().enumerate());
-        for (&component, residual) in system.equations.component.iter().zip(&mut self.residual) {
-            *residual = system.external[component as usize] - system.internal[component as usize];
+        let external = norm(&mut system.forces.external.iter().copied().enumerate());
+        let internal = norm(&mut system.forces.internal.iter().copied().enumerate());
+        for (&component, residual) in system.stiffness.equations.component.iter().zip(&mut self.residual) {
+            *residual =
+                system.forces.external[component as usize] - system.forces.internal[component as usize];
         }
         system.conditions.relieve(&mut self.residual);
         let free = norm(
-            &mut system.equations.component.iter().map(|&c| c as usize).zip(self.residual.iter().copied()),
+            &mut system
+                .stiffness
+                .equations
+                .component
+                .iter()
+                .map(|&c| c as usize)
+                .zip(self.residual.iter().copied()),
         );
-        for (residual, coupling) in self.residual.iter_mut().zip(&system.coupling) {
+        for (residual, coupling) in self.residual.iter_mut().zip(&system.stiffness.coupling) {
             *residual -= coupling;
         }
         let StaticSettings { tolerance, floor, .. } = self.settings;
-        let allowed = tolerance * external.max(internal) + floor * system.largest + self.round_off;
+        let allowed = tolerance * external.max(internal) + floor * system.forces.largest + self.round_off;
         (free, allowed)
     }
 
@@ -443,7 +451,7 @@ impl Statics {
         let largest = self.slack.iter().map(force).fold(0.0, f64::max);
         let stiffness = (largest / self.reach).max(self.least);
         for &equation in &self.slack {
-            self.system.matrix.add_diagonal(equation as usize, stiffness);
+            self.system.stiffness.matrix.add_diagonal(equation as usize, stiffness);
         }
     }
 
@@ -452,7 +460,7 @@ impl Statics {
         let size = |(&component, &residual): (&u32, &f64)| {
             (if component % 6 < 3 { residual.abs() } else { residual.abs() / self.length }, component / 6)
         };
-        let all = system.equations.component.iter().zip(&self.residual).map(size);
+        let all = system.stiffness.equations.component.iter().zip(&self.residual).map(size);
         all.fold((f64::NEG_INFINITY, 0), |worst, next| if next.0 > worst.0 { next } else { worst }).1
     }
 
@@ -561,7 +569,8 @@ fn slack(model: &Assembly, system: &System) -> (Vec<u32>, f64) {
     for &node in &nodes {
         (low, high) = (low.inf(&model.place(node)), high.sup(&model.place(node)));
     }
-    let equations = nodes.iter().flat_map(|node| (0..3).map(move |c| system.equations.number[6 * node + c]));
+    let equations =
+        nodes.iter().flat_map(|node| (0..3).map(move |c| system.stiffness.equations.number[6 * node + c]));
     (equations.filter(|&equation| equation != NONE).collect(), (high - low).norm())
 }
 

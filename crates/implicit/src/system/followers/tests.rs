@@ -93,10 +93,10 @@ fn stiffness_is_the_change_of_forces(model: Assembly, unknowns: usize) {
     let mut state = State::at_rest(&model);
     let still = vec![0.0; 6 * model.rest.len()];
     system.evaluate(&state, 0.0, Some(&still)).unwrap();
-    let count = system.equations.count();
+    let count = system.stiffness.equations.count();
     assert_eq!(count, unknowns);
     let mut direction = |size: f64| -> Vec<f64> {
-        let turning = |e: usize| system.equations.component[e] % 6 >= 3;
+        let turning = |e: usize| system.stiffness.equations.component[e] % 6 >= 3;
         (0..count).map(|e| size * if turning(e) { 100.0 } else { 1.0 } * random.vector()[0]).collect()
     };
     let (first, way) = (direction(3e-3), direction(1e-3));
@@ -113,8 +113,8 @@ fn stiffness_is_the_change_of_forces(model: Assembly, unknowns: usize) {
         system.advance(&mut moved, &all, part);
         system.evaluate(&moved, 0.0, None).unwrap();
         let mut own = vec![0.0; count];
-        system.gather(&system.internal, &mut own);
-        (dot(&own, &way), system.energy)
+        system.gather(&system.forces.internal, &mut own);
+        (dot(&own, &way), system.forces.energy)
     };
     let h = 1e-4;
     let [(ahead, above), (behind, below)] = [h, -h].map(|part| forces(&mut system, part));
@@ -122,7 +122,7 @@ fn stiffness_is_the_change_of_forces(model: Assembly, unknowns: usize) {
     assert!(((above - below) / (2.0 * h) - here).abs() < 1e-6 * here.abs(), "force");
     system.evaluate(&state, 0.0, Some(&still)).unwrap();
     let mut product = vec![0.0; count];
-    system.matrix.multiply_values(&system.matrix.value, &way, &mut product);
+    system.stiffness.matrix.multiply_values(&system.stiffness.matrix.value, &way, &mut product);
     let (own, wanted) = (dot(&product, &way), (ahead - behind) / (2.0 * h));
     println!("{own} {wanted}");
     assert!((own - wanted).abs() < 1e-6 * wanted.abs(), "{own} {wanted}");
