@@ -195,7 +195,7 @@ impl OnDevice {
         coarse: Option<&Coarse>,
     ) -> Result<(), DeviceError> {
         if !self.is_arranged {
-            self.solver.arrange(&blocks.pattern(coarse))?;
+            self.solver.arrange(&blocks.pattern(coarse.map(Coarse::touching)))?;
             self.is_arranged = true;
         }
         Ok(())

@@ -4,7 +4,7 @@ use nalgebra::SMatrix;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::aggregates::{Coarse, aggregates};
+use super::aggregates::aggregates;
 use crate::device::BlockPattern;
 use crate::lanes::{PACK, Pack};
 use crate::sparse::{Equations, LowerMatrix, NONE};
@@ -140,7 +140,7 @@ impl BlockMatrix {
     }
 
     /// Where everything is, for a device; with the pairs of touching aggregates where they are wanted.
-    pub(crate) fn pattern<'a>(&'a self, coarse: Option<&Coarse>) -> BlockPattern<'a> {
+    pub(crate) fn pattern(&self, touching: Option<Vec<[u32; 2]>>) -> BlockPattern<'_> {
         let bit = |(c, &equation): (usize, &u32)| u32::from(equation != NONE) << c;
         BlockPattern {
             row_start: &self.row_start,
@@ -148,7 +148,7 @@ impl BlockMatrix {
             source: self.source.as_flattened(),
             free: self.equations.iter().map(|own| own.iter().enumerate().map(bit).sum()).collect(),
             aggregate_start: &self.aggregate_start,
-            touching: coarse.map(|own| own.pairs.iter().map(|(row, column, _)| [*row, *column]).collect()),
+            touching,
         }
     }
 

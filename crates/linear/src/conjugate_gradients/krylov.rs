@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::aggregates::Coarse;
 use super::blocks::{BlockMatrix, Node};
+use super::coarse::Coarse;
 use super::kernels::{Advance, Multiply, Precision, product, squared};
 use crate::factors::Factors;
 use crate::report::{LinearError, LinearReport};

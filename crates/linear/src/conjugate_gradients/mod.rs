@@ -5,11 +5,12 @@
 
 mod aggregates;
 mod blocks;
+mod coarse;
 mod kernels;
 mod krylov;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use self::aggregates::Coarse;
 pub(crate) use self::blocks::{Block, BlockMatrix};
+pub(crate) use self::coarse::Coarse;
 pub(crate) use self::krylov::{Approximation, KrylovVectors};
