@@ -1,5 +1,5 @@
 //! Linear equations with a sparse matrix, of nodes with six components each: factors L D Lᵀ (`factors.rs`) or L U (`unsymmetric.rs`), or
-//! conjugate gradients (`conjugate_gradients/`), also on a device (`device.rs`). Knows no mechanics. Factors are found on one thread, and sums
+//! conjugate gradients (`conjugate_gradients/`), also on a device (`on_device.rs`). Knows no mechanics. Factors are found on one thread, and sums
 //! run in one order, so results do not depend on the number of threads.
 //!
 //! ```
@@ -25,6 +25,7 @@ mod factors;
 mod fronts;
 pub mod lanes;
 pub mod memory;
+mod on_device;
 mod report;
 pub mod sparse;
 mod supernodes;
@@ -35,12 +36,10 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use self::conjugate_gradients::{Approximation, BlockMatrix, Coarse, KrylovVectors};
-pub use self::device::{
-    BlockPattern, BlockValues, DeviceError, DeviceSolver, DeviceTimes, LinearDevice, Pass, PassEnd,
-};
-use self::device::{Found, OnDevice};
+pub use self::device::{BlockPattern, BlockValues, DeviceSolver, DeviceTimes, LinearDevice, Pass, PassEnd};
 pub use self::factors::{Factors, Pivots, ZERO_PIVOT};
-pub use self::report::{LinearError, LinearReport};
+use self::on_device::{Found, OnDevice};
+pub use self::report::{DeviceError, LinearError, LinearReport};
 use self::sparse::{Equations, LowerMatrix};
 use self::unsymmetric::LuFactors;
 

@@ -2,7 +2,6 @@
 
 use faer::sparse::FaerError;
 
-use crate::device::DeviceError;
 use crate::memory::OutOfMemory;
 
 /// What a solution took.
@@ -36,6 +35,11 @@ pub enum LinearError {
     #[error("after {} iterations the residual is {:e}", .0.iterations, .0.residual)]
     Stalled(LinearReport),
 }
+
+/// Why a device solves no equations, with a remedy.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct DeviceError(pub String);
 
 impl From<FaerError> for LinearError {
     fn from(error: FaerError) -> Self {

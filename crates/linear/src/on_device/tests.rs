@@ -3,8 +3,9 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::*;
-use crate::sparse::Equations;
+use crate::device::{BlockPattern, BlockValues, DeviceSolver, DeviceTimes, LinearDevice, Pass, PassEnd};
+use crate::report::{DeviceError, LinearError};
+use crate::sparse::{Equations, LowerMatrix};
 use crate::{LinearSolver, Preconditioner, Workspace};
 
 /// A device whose solver finds no room for its second pattern the first time, and leaves each solution to the CPU. Each pattern takes it
