@@ -2,7 +2,7 @@
 
 use std::ffi::c_void;
 
-use crate::context::needed;
+use crate::pointers::needed;
 use crate::status::{Fault, PliantStatus};
 
 /// Numbers are `float`.

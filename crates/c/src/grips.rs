@@ -1,57 +1,12 @@
 //! Hands and pins: springs between a part of a body and a place that the program moves.
 
-use std::collections::BTreeMap;
-
 use pliant_mechanics::grip::Grip;
-use pliant_sim::Simulation;
 
-use crate::context::{PliantContext, array, finite, give, needed, numbers};
-use crate::simulation::{PliantSimulation, Running, running};
+use crate::context::PliantContext;
+use crate::open::Running;
+use crate::pointers::{array, finite, give, needed, numbers};
+use crate::simulation::{PliantSimulation, running};
 use crate::status::{Fault, PliantError, PliantStatus};
-
-/// What a program holds.
-#[derive(Default)]
-pub(crate) struct Held {
-    /// Grips by their number.
-    grips: BTreeMap<u32, Grip>,
-    /// The number of the next one: those of grips that were released are not used again.
-    next: u32,
-}
-
-impl Held {
-    fn all(&self) -> Vec<Grip> {
-        self.grips.values().cloned().collect()
-    }
-
-    /// Lets all grips act.
-    pub(crate) fn put_on(&self, simulation: &mut Simulation) -> Result<(), Fault> {
-        match simulation.hold(&self.all()) {
-            true => Ok(()),
-            false => {
-                let message = "nothing can be held here: the solver knows no hands, or a grip has nodes of several participants";
-                Err(Fault::new(PliantStatus::Unsupported, message))
-            }
-        }
-    }
-
-    fn get(&mut self, number: u32) -> Result<&mut Grip, Fault> {
-        match self.grips.get_mut(&number) {
-            Some(grip) => Ok(grip),
-            None if number < self.next => {
-                Err(Fault::new(PliantStatus::Closed, format!("the grip {number} is released")))
-            }
-            None => Err(Fault::new(PliantStatus::BadHandle, format!("there is no grip {number}"))),
-        }
-    }
-
-    /// Takes one more grip; its number.
-    fn add(&mut self, grip: Grip) -> u32 {
-        let number = self.next;
-        self.next += 1;
-        self.grips.insert(number, grip);
-        number
-    }
-}
 
 impl Running {
     /// Holds a combination of nodes where it is, as firmly as asked and stable.
@@ -70,7 +25,7 @@ impl Running {
         [grip.place, _] = self.simulation.pulled(&grip);
         let number = self.held.add(grip);
         if let Err(fault) = self.held.put_on(&mut self.simulation) {
-            self.held.grips.remove(&number);
+            self.held.remove(number);
             let _ = self.held.put_on(&mut self.simulation);
             return Err(fault);
         }
@@ -225,7 +180,7 @@ pub unsafe extern "C" fn pliant_grip_release(
     unsafe {
         running(context, simulation, error, |own| {
             own.held.get(grip)?;
-            own.held.grips.remove(&grip);
+            own.held.remove(grip);
             own.held.put_on(&mut own.simulation)
         })
     }

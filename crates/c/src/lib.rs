@@ -19,6 +19,9 @@
 mod buffer;
 mod context;
 mod grips;
+mod lock;
+mod open;
+mod pointers;
 mod scene;
 mod simulation;
 mod snapshot;

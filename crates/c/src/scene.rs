@@ -1,15 +1,16 @@
 //! Scenes: from a file or a text, with other values and meshes of the program, until simulations are made of them.
 
 use std::ffi::c_char;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-use pliant_format::Scene;
-use pliant_format::source::{Given, Source};
+use pliant_format::source::Source;
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
-use pliant_scene::World;
 
-use crate::context::{Item, PliantContext, array, call, finite, give, hold, needed, some_text, text};
+use crate::context::{Item, PliantContext, call};
+use crate::lock::hold;
+use crate::open::OpenScene;
+use crate::pointers::{array, finite, give, needed, some_text, text};
 use crate::status::{Fault, PliantError, PliantStatus};
 
 /// A scene that is open: a number that `pliant_scene_load` or `pliant_scene_parse` gives, never 0.
@@ -38,27 +39,6 @@ pub struct PliantCells {
     pub nodes: *const u32,
     /// A label for each cell, or null.
     pub labels: *const i32,
-}
-
-/// A scene before a simulation is made of it.
-pub(crate) struct OpenScene {
-    source: Source,
-    folder: PathBuf,
-    given: Given,
-}
-
-impl OpenScene {
-    pub(crate) fn new(source: Source, folder: PathBuf) -> Self {
-        Self { source, folder, given: Given::default() }
-    }
-
-    /// The world of the scene as it is now.
-    pub(crate) fn world(&self) -> Result<World, Fault> {
-        let source = self.source.clone().giving(self.given.clone());
-        let fault = |errors| Fault::scene(&errors, Some(&source));
-        let scene = Scene::from_source(source.clone(), self.folder.clone()).map_err(fault)?;
-        World::new(&scene).map_err(fault)
-    }
 }
 
 /// Opens a scene: the path of a scene file, or of a folder with a `scene.toml`. A simulation that is made of it reports mistakes in its values.

@@ -1,97 +1,21 @@
 //! Simulations under way: made of a scene, stepped, and asked for numbers.
 
 use std::ffi::c_char;
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::Arc;
 
 use pliant_format::tables::MOST_THREADS;
-use pliant_scene::World;
 use pliant_sim::{Simulation, StopFlag};
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use rayon::ThreadPoolBuilder;
 
-use crate::context::{Item, PliantContext, array, call, finite, give, hold, needed};
-use crate::grips::Held;
+use crate::context::{Item, PliantContext, call};
+use crate::lock::hold;
+use crate::open::{Held, Running, Shared};
+use crate::pointers::{array, finite, give, give_bytes, needed};
 use crate::scene::PliantScene;
 use crate::status::{Fault, PliantError, PliantStatus};
-use crate::surface::OpenSurface;
-use crate::values::OpenField;
 
 /// A simulation that is open: a number that `pliant_simulation_open` gives, never 0.
 pub type PliantSimulation = u64;
-
-/// What threads share of a simulation: one of them runs it, any of them stops it.
-pub(crate) struct Shared {
-    running: Mutex<Running>,
-    stopped: StopFlag,
-    /// The process that made it: its threads don't come along into a fork.
-    process: u32,
-}
-
-impl Shared {
-    /// The simulation, for the one thread that uses it now.
-    fn hold(&self) -> Result<MutexGuard<'_, Running>, Fault> {
-        if std::process::id() != self.process {
-            let message = "the simulation was opened before a fork, which leaves its threads behind: open it in the new process";
-            return Err(Fault::new(PliantStatus::Busy, message));
-        }
-        hold(&self.running)
-    }
-
-    pub(crate) fn stop(&self) {
-        self.stopped.ask();
-    }
-}
-
-/// A simulation with what the program has asked of it.
-pub(crate) struct Running {
-    pub(crate) world: Arc<World>,
-    pub(crate) simulation: Simulation,
-    /// The threads that it computes on: its numbers do not depend on the state of the caller's.
-    pool: ThreadPool,
-    pub(crate) surfaces: Vec<OpenSurface>,
-    pub(crate) fields: Vec<OpenField>,
-    pub(crate) held: Held,
-}
-
-impl Running {
-    /// Does something on the threads of the simulation.
-    pub(crate) fn compute<T: Send>(&mut self, what: impl FnOnce(&mut Computing<'_>) -> T + Send) -> T {
-        let Self { world, simulation, pool, fields, .. } = self;
-        pool.install(|| what(&mut Computing { world, simulation, fields }))
-    }
-
-    /// Whether the state lies on a GPU.
-    fn is_on_device(&self) -> bool {
-        #[cfg(feature = "gpu")]
-        return self.world.device().is_some();
-        #[cfg(not(feature = "gpu"))]
-        false
-    }
-
-    /// Finds forces at the instant, and reads back what lies on a device.
-    pub(crate) fn look(&mut self) -> Result<(), Fault> {
-        if self.simulation.is_evaluated() && !self.is_on_device() {
-            return Ok(());
-        }
-        self.compute(|now| now.simulation.frame().map(|_| ()))?;
-        Ok(())
-    }
-
-    /// Brings places of nodes to ordinary memory.
-    pub(crate) fn see_places(&mut self) -> Result<(), Fault> {
-        if self.is_on_device() { self.look() } else { Ok(()) }
-    }
-
-    pub(crate) fn nodes(&self) -> usize {
-        self.simulation.world().parts.iter().map(|part| part.model.node_count()).sum()
-    }
-}
-
-/// What is computed with on the threads of a simulation.
-pub(crate) struct Computing<'r> {
-    pub(crate) world: &'r Arc<World>,
-    pub(crate) simulation: &'r mut Simulation,
-    pub(crate) fields: &'r mut Vec<OpenField>,
-}
 
 /// A call about a simulation that no other thread has a call on.
 ///
@@ -148,8 +72,8 @@ pub unsafe extern "C" fn pliant_simulation_open(
                 fields: Vec::new(),
                 held: Held::default(),
             };
-            let shared = Shared { running: Mutex::new(running), stopped, process: std::process::id() };
-            give(simulation, "simulation", context.open(Item::Simulation(Arc::new(shared))))
+            let shared = Arc::new(Shared::new(running, stopped));
+            give(simulation, "simulation", context.open(Item::Simulation(shared)))
         })
     }
 }
@@ -368,7 +292,7 @@ pub unsafe extern "C" fn pliant_name(
                 let message = format!("there are {} of this kind", names.len());
                 return Err(Fault::new(PliantStatus::Unknown, message));
             };
-            crate::context::give_bytes(name.as_bytes(), buffer.cast(), capacity, length, true)
+            give_bytes(name.as_bytes(), buffer.cast(), capacity, length, true)
         })
     }
 }

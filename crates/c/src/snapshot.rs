@@ -3,20 +3,15 @@
 use std::sync::Arc;
 
 use pliant_run::{snapshot_from_bytes, snapshot_to_bytes};
-use pliant_sim::{State, World};
 
-use crate::context::{Item, PliantContext, array, call, give, give_bytes, needed};
+use crate::context::{Item, PliantContext, call};
+use crate::open::OpenSnapshot;
+use crate::pointers::{array, give, give_bytes, needed};
 use crate::simulation::{PliantSimulation, running};
 use crate::status::{Fault, PliantError, PliantStatus};
 
 /// A snapshot that is open: a number that `pliant_snapshot_take` gives, never 0.
 pub type PliantSnapshot = u64;
-
-/// A state, and the world that it is of.
-pub(crate) struct OpenSnapshot {
-    world: Arc<World>,
-    state: State,
-}
 
 /// A context that is not null.
 ///

@@ -5,25 +5,11 @@ use std::ffi::c_char;
 use pliant_run::Skin;
 
 use crate::buffer::PliantBuffer;
-use crate::context::{PliantContext, give, needed, some_text};
-use crate::simulation::{PLIANT_BODIES, PLIANT_SURFACES, PliantSimulation, Running, names, running};
+use crate::context::PliantContext;
+use crate::open::{OpenSurface, Running, Vertices};
+use crate::pointers::{give, needed, some_text};
+use crate::simulation::{PLIANT_BODIES, PLIANT_SURFACES, PliantSimulation, names, running};
 use crate::status::{Fault, PliantError, PliantStatus};
-
-/// A surface with places and normals of its vertices.
-pub(crate) struct OpenSurface {
-    pub(crate) skin: Skin,
-    /// Those that were lent: they change when they are lent again.
-    lent: Vertices,
-    /// Those that normals are copied from.
-    own: Vertices,
-}
-
-/// Places [m] and unit normals.
-#[derive(Clone)]
-struct Vertices {
-    places: Vec<[f64; 3]>,
-    normals: Vec<[f64; 3]>,
-}
 
 impl Running {
     pub(crate) fn surface(&mut self, number: u32) -> Result<&mut OpenSurface, Fault> {

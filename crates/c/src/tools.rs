@@ -5,8 +5,10 @@ use std::ffi::c_char;
 use pliant_sim::contact::pose::Pose;
 use pliant_sim::pose_of;
 
-use crate::context::{PliantContext, finite, give, needed, numbers, text};
-use crate::simulation::{PLIANT_TOOLS, PliantSimulation, Running, running};
+use crate::context::PliantContext;
+use crate::open::Running;
+use crate::pointers::{finite, give, needed, numbers, text};
+use crate::simulation::{PLIANT_TOOLS, PliantSimulation, running};
 use crate::status::{Fault, PliantError, PliantStatus};
 use crate::values::unknown;
 

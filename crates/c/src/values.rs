@@ -7,9 +7,11 @@ use pliant_mechanics::Energies;
 use pliant_run::FieldReader;
 
 use crate::buffer::PliantBuffer;
-use crate::context::{PliantContext, give, needed, some_text, text};
+use crate::context::PliantContext;
+use crate::open::{OpenField, Running};
+use crate::pointers::{give, needed, some_text, text};
 use crate::simulation::{
-    PLIANT_BODIES, PLIANT_CONSTRAINTS, PLIANT_CONTACTS, PliantSimulation, Running, names, running,
+    PLIANT_BODIES, PLIANT_CONSTRAINTS, PLIANT_CONTACTS, PliantSimulation, names, running,
 };
 use crate::status::{Fault, PliantError, PliantStatus};
 
@@ -119,14 +121,6 @@ pub unsafe extern "C" fn pliant_nodes(
             Ok(())
         })
     }
-}
-
-/// A field that is read again and again.
-pub(crate) struct OpenField {
-    on: String,
-    name: String,
-    at: u32,
-    reader: FieldReader,
 }
 
 /// Fields are read at the points of a body's mesh: those of elements as means of those around.

@@ -3,7 +3,8 @@
 use std::ffi::c_char;
 use std::mem::MaybeUninit;
 
-use crate::context::{PliantContext, give, needed};
+use crate::context::PliantContext;
+use crate::pointers::{give, needed};
 use crate::status::{Fault, PliantError, PliantStatus, reported};
 
 /// The version of this interface: a program passes `PLIANT_ABI` of the header that it was built with to `pliant_context_open`. It grows where a change

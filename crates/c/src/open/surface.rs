@@ -1,0 +1,19 @@
+//! A surface of a simulation that is open.
+
+use pliant_run::Skin;
+
+/// A surface with places and normals of its vertices.
+pub(crate) struct OpenSurface {
+    pub(crate) skin: Skin,
+    /// Those that were lent: they change when they are lent again.
+    pub(crate) lent: Vertices,
+    /// Those that normals are copied from.
+    pub(crate) own: Vertices,
+}
+
+/// Places [m] and unit normals.
+#[derive(Clone)]
+pub(crate) struct Vertices {
+    pub(crate) places: Vec<[f64; 3]>,
+    pub(crate) normals: Vec<[f64; 3]>,
+}
