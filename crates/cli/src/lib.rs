@@ -14,8 +14,6 @@ macro_rules! eprintln {
 
 mod arguments;
 mod commands;
-#[cfg(feature = "viewer")]
-mod gallery;
 mod haptics;
 mod info;
 #[cfg(feature = "viewer")]

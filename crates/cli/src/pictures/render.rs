@@ -1,4 +1,4 @@
-//! `pliant render`, and the picture of `pliant run --picture`.
+//! Pictures and films of a scene, of a finished run or of a mesh, and the picture of `pliant run --picture`.
 
 use std::path::{Path, PathBuf};
 
@@ -16,12 +16,10 @@ use pliant_viewer::{coat_of, regions_of};
 
 use crate::SUCCESS;
 use crate::arguments::{Frames, Overrides, Render};
-use crate::gallery;
 use crate::look::{background_of, colour_by_name, look_of, map_of, texture_of};
 use crate::prepare::prepare_changed;
 use crate::report::{Bar, Failure, say};
 use crate::signals;
-pub use crate::view::view;
 
 impl From<PictureError> for Failure {
     fn from(error: PictureError) -> Self {
@@ -108,15 +106,8 @@ impl Draw for FinalPicture {
     }
 }
 
-pub fn render(arguments: &Render) -> Result<u8, Failure> {
-    let film = arguments.film.as_deref().map(film_kind).transpose()?;
-    if arguments.gallery {
-        return gallery::renew(&arguments.what);
-    }
-    let scenes = gallery::scenes_in(&arguments.what);
-    if !scenes.is_empty() {
-        return gallery::page(arguments, &scenes);
-    }
+/// Draws a scene, a finished run or a mesh.
+pub(super) fn draw(arguments: &Render, film: Option<FilmKind>) -> Result<u8, Failure> {
     let graphics = Graphics::open()?;
     let folder = claim(arguments, is_picture)?;
     if is_folder_of_run(&arguments.what) {
@@ -209,13 +200,13 @@ fn portrait(
     Ok(SUCCESS)
 }
 
-pub(crate) fn claim(arguments: &Render, own: fn(&str) -> bool) -> Result<OutputFolder, Failure> {
+pub(super) fn claim(arguments: &Render, own: fn(&str) -> bool) -> Result<OutputFolder, Failure> {
     OutputFolder::claim(arguments.out.clone(), arguments.force, own)
         .map_err(|error| Failure::plain(&error, error.remedy))
 }
 
 /// A scene after the run for its pictures.
-pub(crate) struct Shown {
+pub(super) struct Shown {
     pub look: Look,
     pub series: Series,
     pub title: String,
@@ -225,7 +216,7 @@ pub(crate) struct Shown {
 }
 
 /// Runs a scene with only the displayed series as its output; `None` if it was interrupted.
-pub(crate) fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>, Failure> {
+pub(super) fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>, Failure> {
     let space = tempfile::tempdir().map_err(|error| {
         Failure::plain(
             format!("no temporary folder can be made: {error}"),
@@ -271,7 +262,7 @@ pub(crate) fn run_scene(path: &Path, arguments: &Render) -> Result<Option<Shown>
 }
 
 /// Whether a path is the folder of a run, not of a scene.
-pub(crate) fn is_folder_of_run(path: &Path) -> bool {
+pub(super) fn is_folder_of_run(path: &Path) -> bool {
     path.is_dir() && !path.join("scene.toml").exists()
 }
 
@@ -349,13 +340,13 @@ fn is_picture(name: &str) -> bool {
 
 /// The format of a film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum FilmKind {
+pub(super) enum FilmKind {
     Mp4,
     Png,
 }
 
 /// By the file extension.
-fn film_kind(path: &Path) -> Result<FilmKind, Failure> {
+pub(super) fn film_kind(path: &Path) -> Result<FilmKind, Failure> {
     match path.extension().and_then(|ending| ending.to_str()) {
         Some("mp4") => Ok(FilmKind::Mp4),
         Some("png" | "apng") => Ok(FilmKind::Png),
@@ -423,7 +414,7 @@ fn shoot(
 }
 
 /// Writes a picture into the folder.
-pub(crate) fn save(folder: &OutputFolder, name: &str, picture: &Picture) -> Result<(), PictureError> {
+pub(super) fn save(folder: &OutputFolder, name: &str, picture: &Picture) -> Result<(), PictureError> {
     let written = folder.write(name, picture.png()?);
     written.map(|_| ()).map_err(|error| PictureError::Write { path: error.path, reason: error.reason })
 }

@@ -1,4 +1,4 @@
-//! Pictures of all scenes: a page with one of each, and the pictures that a folder lists, made anew where they do not fit their scenes. Files
+//! `pliant render`, also of all scenes: a page with one of each, and the pictures that a folder lists, made anew where they do not fit their scenes. Files
 //! keep no times that last, so a picture has a hash of the scene and the options that it was made of.
 
 use std::collections::BTreeMap;
@@ -9,11 +9,21 @@ use clap::Parser;
 use pliant_picture::Graphics;
 use sha2::{Digest, Sha256};
 
+use super::render::{claim, draw, film_kind, is_folder_of_run, run_scene, save};
 use crate::SUCCESS;
 use crate::arguments::{Arguments, Command, Render};
-use crate::pictures::{claim, is_folder_of_run, render, run_scene, save};
 use crate::report::{Failure, say};
 use crate::signals;
+
+/// Draws what a command line names; of a folder of scenes it makes a page, or the pictures that the folder lists.
+pub fn render(arguments: &Render) -> Result<u8, Failure> {
+    let film = arguments.film.as_deref().map(film_kind).transpose()?;
+    if arguments.gallery {
+        return renew(&arguments.what);
+    }
+    let scenes = scenes_in(&arguments.what);
+    if scenes.is_empty() { draw(arguments, film) } else { page(arguments, &scenes) }
+}
 
 /// The list of pictures in a folder of scenes, and what they were made of.
 const LIST: &str = "gallery.txt";
@@ -143,7 +153,7 @@ fn outdated(folder: &Path) -> Result<Vec<(Entry, String)>, Failure> {
 }
 
 /// Makes the pictures anew that do not fit their scenes.
-pub fn renew(folder: &Path) -> Result<u8, Failure> {
+fn renew(folder: &Path) -> Result<u8, Failure> {
     let old = outdated(folder)?;
     let space =
         tempfile::tempdir().map_err(|error| Failure::plain(error, "check the free space, or set TMPDIR"))?;
@@ -176,7 +186,7 @@ pub fn renew(folder: &Path) -> Result<u8, Failure> {
 const GALLERY_WIDTH: u32 = 640;
 
 /// The scenes in a folder that is not a scene itself, in alphabetical order.
-pub fn scenes_in(folder: &Path) -> Vec<PathBuf> {
+fn scenes_in(folder: &Path) -> Vec<PathBuf> {
     if !is_folder_of_run(folder) {
         return Vec::new();
     }
@@ -188,7 +198,7 @@ pub fn scenes_in(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Runs scenes and makes a page with the last picture of each.
-pub fn page(arguments: &Render, scenes: &[PathBuf]) -> Result<u8, Failure> {
+fn page(arguments: &Render, scenes: &[PathBuf]) -> Result<u8, Failure> {
     if arguments.film.is_some() || arguments.frames.is_some() || arguments.series.is_some() {
         let message = "a gallery has the last picture of each scene";
         return Err(Failure::plain(message, "omit `--film`, `--frames` and `--series`, or give one scene"));
