@@ -11,11 +11,12 @@ use std::path::{Path, PathBuf};
 
 use pliant_geometry::io::read_limited;
 use pliant_geometry::words::{counted, number};
-use pliant_mechanics::{count, fingerprint};
+use pliant_mechanics::fingerprint;
 use pliant_sim::{Precision, Schedule, State};
 use serde::{Deserialize, Serialize};
 
-use crate::output::{History, OutputError, OutputFolder, Watched, Written, replace};
+use crate::output::{OutputError, OutputFolder, replace};
+use crate::progressed::Progressed;
 use crate::rollback::Point;
 use pliant_format::tables::{LoadSteps, SolverName};
 use pliant_scene::{Part, World};
@@ -51,22 +52,6 @@ struct OwnOrigin {
     step: f64,
     /// The parts of the model, with their fingerprints.
     parts: Vec<(String, u64)>,
-}
-
-/// How far a run and its outputs were.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Progressed {
-    pub time: f64,
-    #[serde(deserialize_with = "count::read")]
-    pub steps: u64,
-    pub wall_seconds: f64,
-    /// The worst that was seen of each participant.
-    pub watched: Vec<Watched>,
-    /// Samples for plot and summary.
-    pub history: History,
-    pub sampling: Schedule,
-    /// Of each output of the scene.
-    pub outputs: Vec<(Schedule, Written)>,
 }
 
 /// Why a run cannot be resumed.
@@ -583,6 +568,7 @@ fn checkpoints_in(folder: &Path) -> std::io::Result<Vec<(u64, PathBuf)>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::output::{History, Watched};
     use crate::testing::{CUBE, read, scene};
 
     const CHECKPOINTED: &str = "[run]\nprecision = 'single'\ncheckpoint = { every = 0.05 }\n";

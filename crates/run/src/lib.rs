@@ -43,6 +43,7 @@ mod live;
 mod output;
 mod overview;
 mod parts;
+mod progressed;
 mod rollback;
 mod run;
 mod skin;

@@ -5,7 +5,7 @@
 
 use pliant_sim::{Failure, Simulation, State, World};
 
-use crate::checkpoint::Progressed;
+use crate::progressed::Progressed;
 
 /// Steps from one point to the next, of the participant that takes the most.
 const EVERY: u64 = 1000;

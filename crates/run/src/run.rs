@@ -11,12 +11,13 @@ use pliant_sim::contact::barrier::IntersectionCheck;
 use pliant_sim::{Failure, FailureKind, LoadStepProgress, Observer, Schedule, Simulation, StopFlag};
 
 use crate::advice::remedy;
-use crate::checkpoint::{Checkpoint, Checkpoints, Progressed};
+use crate::checkpoint::{Checkpoint, Checkpoints};
 use crate::output::{
     CONVERGENCE, FieldMesh, GuestSummary, History, Outcome, OutputError, OutputFolder, Outputs, PICTURE,
     PLOT, PartOutcome, SUMMARY, Summary, TieSummary, Watched, frames, hourglass_failure, interrupted,
     markdown, output_failure, plot, summarise,
 };
+use crate::progressed::Progressed;
 use crate::rollback::{Point, RollbackPoints};
 use pliant_scene::{Part, World};
 
