@@ -97,6 +97,11 @@ impl Section {
         }
     }
 
+    /// The number of the kind of the cell at each corner.
+    pub(crate) fn kinds(&self) -> impl Iterator<Item = u32> {
+        self.corners.iter().map(|corner| corner.edges >> KIND)
+    }
+
     /// Values in the section, of cells that show theirs.
     pub fn values(&self, subject: &Subject, regions: &Regions) -> impl Iterator<Item = f64> {
         let shows = subject.showing(regions);

@@ -294,7 +294,7 @@ impl Common {
             self.extremes.add(section.values(subject, regions));
         }
         if style.labels {
-            self.labels.extend(subject.labels_seen(regions, |point| is_seen(&point), &section));
+            self.labels.extend(subject.labels_seen(regions, |point| is_seen(&point), section.kinds()));
         }
         let surface = subject.surface_points();
         self.points.add(surface.iter().map(|&point| frame.points[point as usize]));

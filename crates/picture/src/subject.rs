@@ -11,7 +11,6 @@ use pliant_geometry::{
 
 use crate::lines::{Fibres, Line, outline};
 use crate::regions::{Kind, Paint, Regions};
-use crate::section::Section;
 
 /// Cosine of the angle between faces [75°] from which on their edge is sharp: the round sides of a coarse organ stay smooth.
 const SHARP: f64 = 0.26;
@@ -213,12 +212,12 @@ impl Subject {
     }
 
     /// Labels of which something is seen in colours of labels, of some points that are: on the surface, on the borders within bodies that one
-    /// sees through, and in a section.
+    /// sees through, and of the kinds of cells that a section cuts.
     pub(crate) fn labels_seen(
         &self,
         regions: &Regions,
         is_seen: impl Fn(u32) -> bool,
-        section: &Section,
+        cut: impl Iterator<Item = u32>,
     ) -> BTreeSet<i32> {
         let through = self.kinds.iter().any(|kind| regions.coat(*kind).opacity < 1.0);
         let drawn = if through { &self.triangles[..] } else { &self.triangles[..self.outer] };
@@ -227,7 +226,6 @@ impl Subject {
         };
         let surface = drawn.iter().filter(seen).map(|triangle| triangle[3] >> KIND);
         let beyond = self.beyond.iter().copied().filter(|_| through);
-        let cut = section.corners.iter().map(|corner| corner.edges >> KIND);
         let kinds: BTreeSet<u32> = surface.chain(beyond).chain(cut).collect();
         let kinds = kinds.into_iter().filter_map(|number| self.kinds.get(number as usize));
         kinds
