@@ -1,6 +1,7 @@
 //! From a scene to a model: meshes read or made, laws assigned to cells, selections resolved, references checked.
 //! All mistakes are collected with the user's own lines.
 
+mod attach;
 mod barriers;
 mod bars;
 mod bodies;
@@ -42,12 +43,13 @@ use pliant_format::source::Source;
 use pliant_format::tables::{CurveShape, SolverName, StepChoice, Timing};
 use pliant_format::{SCENE, suggestion};
 
+pub(crate) use attach::{Placed, attach, doubt_points};
 use barriers::BarrierTables;
 use contacts::Partner;
 pub(crate) use contacts::{Meet, overlaps, told_distance, told_overlap, touches, usual_distance};
 pub use mesh_files::SizeDoubt;
 pub(crate) use meshes::MeshOrigin;
-pub(crate) use ties::{Placed, attach, doubt_points, holds_nothing};
+pub(crate) use ties::holds_nothing;
 
 /// A model, and what the outputs need beside it.
 #[derive(Clone, Debug)]

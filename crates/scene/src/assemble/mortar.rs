@@ -8,7 +8,7 @@ use pliant_geometry::{
 };
 use pliant_mechanics::mapping::Weights;
 
-use super::ties::{Attached, GAP, doubt_points, median_edge};
+use super::attach::{Attached, GAP, doubt_points, median_edge};
 use super::{Builder, BuiltBody, in_metres};
 use pliant_format::diagnostic::Diagnostic;
 use pliant_format::tables::{BodyModel, TieMethod, TieTable};
