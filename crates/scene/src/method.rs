@@ -5,18 +5,15 @@ use std::sync::Arc;
 use pliant_explicit::stability::OnUnstable;
 use pliant_implicit::{DynamicSettings, Integrator, StaticSettings};
 use pliant_linear::{LinearSolver, Preconditioner};
-use pliant_sim::{Explicit, ImplicitBodies, LongSteps, Method, Precision, ShortSteps};
+use pliant_sim::{Explicit, ImplicitBodies, LongSteps, Method, ShortSteps};
 
+use crate::assemble::Built;
 use crate::plan::Plan;
-use crate::world::Part;
 #[cfg(feature = "gpu")]
-use pliant_format::tables::DesignName;
+use crate::target::design;
 use pliant_format::tables::{
-    IntegratorName, LinearName, LinearTable, OnUnstableName, PrecisionName, PreconditionerName, RunTable,
-    SolverName,
+    IntegratorName, LinearName, LinearTable, OnUnstableName, PreconditionerName, RunTable, SolverName,
 };
-#[cfg(feature = "gpu")]
-use pliant_sim::gpu::Design;
 
 /// Iterations of Newton's method at most in contact, if none are given. The longest step of a lens that snaps out of its tube takes 160 to 210;
 /// halved before its end it would take them twice.
@@ -24,45 +21,28 @@ const IN_CONTACT: usize = 300;
 /// Iterations from which on a lagged factorisation is made anew.
 const RENEW_AFTER: usize = 10;
 
-impl Part {
-    /// The same without its tables.
-    pub(crate) fn simulated(&self) -> pliant_sim::Part {
-        let Self { name, scene, built, plan } = self;
-        let (run, precision) = (&scene.run, plan.target.precision);
-        let method = match &built.implicit {
-            Some(bodies) => method_of(bodies, run, plan),
-            None if run.solver == SolverName::QuasiStatic => {
-                Method::QuasiStatic { precision, tolerance: run.tolerance }
-            }
-            None => Method::Explicit(Explicit {
-                precision,
-                on_unstable: on_unstable(run.on_unstable.unwrap_or_default()),
-                critical_step: plan
-                    .limits
-                    .as_ref()
-                    .map_or(f64::INFINITY, |limits| limits.critical.assembled.step),
-                contacts: built.contacts.clone(),
-                start: built.pushed.clone(),
-                #[cfg(feature = "gpu")]
-                device: plan.target.device.clone(),
-                #[cfg(feature = "gpu")]
-                design: run.design.map(design),
-            }),
-        };
-        pliant_sim::Part {
-            name: name.clone(),
-            model: Arc::clone(&built.model),
-            method,
-            steps: plan.steps.clone(),
+/// How the bodies of a participant are stepped.
+pub(crate) fn method(built: &Built, run: &RunTable, plan: &Plan) -> Method {
+    let precision = plan.target.precision;
+    match &built.implicit {
+        Some(bodies) => method_of(bodies, run, plan),
+        None if run.solver == SolverName::QuasiStatic => {
+            Method::QuasiStatic { precision, tolerance: run.tolerance }
         }
-    }
-}
-
-/// The number type of a word.
-pub(crate) fn precision(name: PrecisionName) -> Precision {
-    match name {
-        PrecisionName::Single => Precision::Single,
-        PrecisionName::Double => Precision::Double,
+        None => Method::Explicit(Explicit {
+            precision,
+            on_unstable: on_unstable(run.on_unstable.unwrap_or_default()),
+            critical_step: plan
+                .limits
+                .as_ref()
+                .map_or(f64::INFINITY, |limits| limits.critical.assembled.step),
+            contacts: built.contacts.clone(),
+            start: built.pushed.clone(),
+            #[cfg(feature = "gpu")]
+            device: plan.target.device.clone(),
+            #[cfg(feature = "gpu")]
+            design: run.design.map(design),
+        }),
     }
 }
 
@@ -71,17 +51,6 @@ fn on_unstable(name: OnUnstableName) -> OnUnstable {
         OnUnstableName::Substep => OnUnstable::Substep,
         OnUnstableName::Stop => OnUnstable::Stop,
         OnUnstableName::Report => OnUnstable::Report,
-    }
-}
-
-/// The design of a word.
-#[cfg(feature = "gpu")]
-pub(crate) fn design(name: DesignName) -> Design {
-    match name {
-        DesignName::Gather => Design::Gather,
-        DesignName::Blocks => Design::Blocks,
-        DesignName::FloatAtomics => Design::FloatAtomics,
-        DesignName::Fast => Design::Fast,
     }
 }
 

@@ -5,12 +5,11 @@ use pliant_sim::Precision;
 use pliant_sim::gpu::{Design, Device, GpuError, GpuShells, Kind};
 
 use crate::assemble::Built;
-#[cfg(feature = "gpu")]
-use crate::method::design;
-use crate::method::precision;
 use pliant_format::Scene;
 use pliant_format::diagnostic::Diagnostic;
 use pliant_format::registry::OutputTable;
+#[cfg(feature = "gpu")]
+use pliant_format::tables::DesignName;
 use pliant_format::tables::{
     DeviceName, FieldName, LinearName, PrecisionName, PreconditionerName, RunTable, SolverName,
 };
@@ -150,6 +149,25 @@ impl Target {
             return &device.adapter().name;
         }
         "cpu"
+    }
+}
+
+/// The number type of a word.
+fn precision(name: PrecisionName) -> Precision {
+    match name {
+        PrecisionName::Single => Precision::Single,
+        PrecisionName::Double => Precision::Double,
+    }
+}
+
+/// The design of a word.
+#[cfg(feature = "gpu")]
+pub(crate) fn design(name: DesignName) -> Design {
+    match name {
+        DesignName::Gather => Design::Gather,
+        DesignName::Blocks => Design::Blocks,
+        DesignName::FloatAtomics => Design::FloatAtomics,
+        DesignName::Fast => Design::Fast,
     }
 }
 

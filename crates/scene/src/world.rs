@@ -8,6 +8,7 @@ use pliant_sim::{Failure, Guests, PenaltyTie, Simulation};
 
 use crate::assemble::{Built, Meshing, build_watched};
 use crate::cache::MeshCache;
+use crate::method::method;
 use crate::plan::{Plan, plan, steps};
 use pliant_format::Scene;
 use pliant_format::diagnostic::{Diagnostic, SceneErrors};
@@ -224,6 +225,17 @@ impl World {
 }
 
 impl Part {
+    /// The same without its tables.
+    fn simulated(&self) -> pliant_sim::Part {
+        let Self { name, scene, built, plan } = self;
+        pliant_sim::Part {
+            name: name.clone(),
+            model: Arc::clone(&built.model),
+            method: method(built, &scene.run, plan),
+            steps: plan.steps.clone(),
+        }
+    }
+
     /// Whether it has the body or the surface of a name, or all are meant.
     pub fn shows(&self, on: Option<&str>) -> bool {
         on.is_none_or(|on| self.scene.has(on))
