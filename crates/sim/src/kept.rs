@@ -15,9 +15,9 @@ use pliant_mechanics::{Energies, Model};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::assembled::Path;
 use crate::instant::Effort;
 use crate::part::{Method, Part, Precision};
+use crate::path::Path;
 use crate::solver::Memory;
 
 /// The state of a participant with all that a restart needs beside it.

@@ -48,6 +48,7 @@ mod instant;
 mod kept;
 mod part;
 mod participant;
+mod path;
 mod penalty;
 mod reals;
 mod schedule;

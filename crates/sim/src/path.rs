@@ -11,15 +11,15 @@ use pliant_geometry::words::{counted, number};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Path {
     /// Load factor at the step before.
-    pub(super) factor: f64,
+    pub(crate) factor: f64,
     /// Its last change.
-    pub(super) change: f64,
+    pub(crate) change: f64,
     #[serde(deserialize_with = "count::read")]
-    pub(super) limit_points: u32,
+    pub(crate) limit_points: u32,
     /// Why it ended before its last step.
-    pub(super) ended: Option<String>,
+    pub(crate) ended: Option<String>,
     /// Of a path that is kept, [where it goes on](Statics::direction).
-    pub(super) direction: Vec<f64>,
+    pub(crate) direction: Vec<f64>,
 }
 
 impl Path {
@@ -29,14 +29,14 @@ impl Path {
     }
 
     /// Takes the load factor of the next equilibrium.
-    pub(super) fn go_on(&mut self, factor: f64) {
+    pub(crate) fn go_on(&mut self, factor: f64) {
         let change = factor - self.factor;
         self.limit_points += u32::from(change * self.change < 0.0);
         (self.factor, self.change) = (factor, change);
     }
 
     /// Why it ends here, if it does.
-    pub(super) fn end(&self, stop: &Stop, state: &State, model: &Assembly) -> Option<String> {
+    pub(crate) fn end(&self, stop: &Stop, state: &State, model: &Assembly) -> Option<String> {
         let limit = number(stop.load_factor.unwrap_or(f64::INFINITY));
         if stop.load_factor.is_some_and(|limit| self.factor.abs() >= limit) {
             return Some(format!("the load factor is {}, at least {limit} in size", number(self.factor)));
@@ -53,7 +53,7 @@ impl Path {
 }
 
 /// What the load step of a number (counted from 1) prescribes.
-pub(super) fn part_of(control: RunControl, number: u64, of: u64) -> pliant_implicit::Control {
+pub(crate) fn part_of(control: RunControl, number: u64, of: u64) -> pliant_implicit::Control {
     match control {
         RunControl::Displacement { node, component, by } => {
             pliant_implicit::Control::Displacement { node, component, by: by / of as f64 }

@@ -6,7 +6,6 @@ mod failures;
 mod instant;
 mod method;
 mod participant;
-mod path;
 #[cfg(test)]
 mod tests;
 
@@ -31,13 +30,12 @@ use pliant_mechanics::model::{Enclosed, Motion};
 use self::device::{STRIDE, ShellsOnDevice};
 use self::failures::failure;
 use self::method::SolverMethod;
-pub(crate) use self::path::Path;
-use self::path::part_of;
 use crate::bodies::{ImplicitBodies, RunControl};
 use crate::failure::{FailedLoadStep, Failure, FailureKind};
 use crate::instant::Effort;
 use crate::kept::{ContactState, ImplicitState, Iterated, PlainState};
 use crate::part::{self, Part};
+use crate::path::{Path, part_of};
 use crate::steps::Steps;
 
 /// Stiffness of the firmest grip over that of the stiffest cell.
