@@ -468,7 +468,7 @@ mod tests {
     use super::*;
     use crate::State;
     use crate::forces::tests::{distorted_cube, laws};
-    use crate::stability::RESERVE;
+    use crate::substeps::RESERVE;
 
     /// Calls `check` with cubes of every element and of laws with and without fibres, also one that stiffens, free and held, and with uneven displacements that press
     /// or shear them.

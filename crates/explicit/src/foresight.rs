@@ -8,7 +8,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::forces::Deformed;
-use crate::stability::margin;
+use crate::substeps::margin;
 
 /// Checks are made where the deformation has changed by this factor since the last one …
 const CALM: f64 = 1.02;

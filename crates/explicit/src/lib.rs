@@ -52,6 +52,7 @@ mod state;
 mod step_control;
 mod step_error;
 mod stepper;
+mod substeps;
 mod tangent;
 mod touching;
 

@@ -43,22 +43,16 @@ use crate::critical_step::{limit_alone, scaled_bound};
 use crate::damping_force::{damped, undamped};
 use crate::lanes::LaneNumber;
 use crate::lanes::{LaneWork, Lanes, PACK, Pack, Processor, load_symmetric, load_tensor};
-pub use crate::stability_record::{MOST_SUBSTEPS, Stability, StepLimit};
+pub use crate::stability_record::{Stability, StepLimit};
 use crate::state::State;
+use crate::substeps::substeps;
+pub use crate::substeps::{KEEP, MOST_HALVINGS, MOST_SUBSTEPS, REJOIN_AFTER, RESERVE};
 use crate::tangent::{Stiffness, gradient_square, stiffness};
 
 /// Steps between two checks of the limit.
 pub const CHECK_EVERY: u64 = 50;
 /// The limit is checked earlier where the least J or the largest stretch has changed by this factor.
 pub const CHANGE: f64 = 1.1;
-/// Substeps are chosen so that they reach this part of the limit at the most.
-pub const RESERVE: f64 = 0.95;
-/// They are kept up to this part: the limit may fall before the next check.
-pub const KEEP: f64 = 0.97;
-/// Steps for which the limit has to allow fewer parts before they are used.
-pub const REJOIN_AFTER: u64 = 1000;
-/// How often the steps of a run are halved at most.
-pub const MOST_HALVINGS: u32 = 3;
 /// Steps between two critical time steps, except where a run would stop.
 pub const REFERENCE_EVERY: u64 = 1000;
 /// One in this many cells is checked closely, for each of the two orders …
@@ -77,29 +71,6 @@ pub enum OnUnstable {
     Stop,
     /// Go on at the same step; the smallest limit is reported.
     Report,
-}
-
-/// The parts into which a step is cut, from how many there are now and the limit; `None` if more than
-/// [`MOST_SUBSTEPS`] are needed. Fewer than now only where they keep the reserve, so that a limit that hovers at a
-/// number of parts does not make it change all the time.
-pub(crate) fn substeps(step: f64, limit: f64, now: u32) -> Option<u32> {
-    let enough = (step / (RESERVE * limit)).ceil();
-    if enough > f64::from(MOST_SUBSTEPS) || enough.is_nan() {
-        return None;
-    }
-    let enough = (enough as u32).max(1);
-    let stable = step / f64::from(now) <= KEEP * limit;
-    Some(if stable { now.min(enough) } else { enough })
-}
-
-/// By which factor the limit may change before [`substeps`] chooses other parts than these, as a logarithm; zero where it asks for more now.
-/// Where it allows fewer already, only more count: fewer are not used at once.
-pub(crate) fn margin(step: f64, limit: f64, parts: u32) -> f64 {
-    let more = f64::from(parts) * KEEP * limit / step;
-    // One part cannot become fewer.
-    let fewer = step / (RESERVE * limit * f64::from(parts - 1));
-    let nearest = if fewer > 1.0 { more.min(fewer) } else { more };
-    nearest.ln().max(0.0)
 }
 
 /// Watches the largest stable step of a model. Holds constants and scratch, and what follows from the reference.

@@ -7,10 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::damping_force::{DISSIPATION, DampingFactors};
 use crate::forces::Deformed;
 use crate::foresight::Foresight;
-use crate::stability::MOST_HALVINGS;
-
-/// The most substeps a step is cut into.
-pub const MOST_SUBSTEPS: u32 = 100;
+use crate::substeps::{MOST_HALVINGS, MOST_SUBSTEPS};
 
 /// How a run cuts its steps, and the limits that its checks found. The state holds this record, so a copy of the state continues with the
 /// same bits.

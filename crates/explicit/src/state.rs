@@ -10,10 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::history::History;
 use crate::lanes::LaneNumber;
-use crate::stability::MOST_HALVINGS;
-#[cfg(doc)]
-use crate::stability::OnUnstable;
 use crate::stability_record::Stability;
+use crate::substeps::MOST_HALVINGS;
 
 /// What a stepper advances.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -185,7 +183,7 @@ impl<R: LaneNumber> State<R> {
         self.reference.fill([R::ZERO; 3]);
     }
 
-    /// Halves all steps from here on, in a run that [cuts steps](OnUnstable::Substep); false where that was done [`MOST_HALVINGS`] times.
+    /// Halves all steps from here on, in a run that [cuts steps](crate::stability::OnUnstable::Substep); false where that was done [`MOST_HALVINGS`] times.
     pub fn halve_steps(&mut self) -> bool {
         let may = self.stability.halvings < MOST_HALVINGS;
         self.stability.halvings += u32::from(may);

@@ -8,11 +8,10 @@ use crate::critical_step::limit_about;
 use crate::damping_force::{damped, undamped};
 use crate::forces::{Deformed, InternalForces};
 use crate::lanes::LaneNumber;
-use crate::stability::{
-    CHANGE, CHECK_EVERY, Monitor, OnUnstable, REJOIN_AFTER, RESERVE, StepLimit, substeps,
-};
+use crate::stability::{CHANGE, CHECK_EVERY, Monitor, OnUnstable, StepLimit};
 use crate::state::State;
 use crate::step_error::StepError;
+use crate::substeps::{REJOIN_AFTER, RESERVE, substeps};
 
 /// Lengths of the (sub)steps at an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]

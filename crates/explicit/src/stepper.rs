@@ -525,7 +525,7 @@ impl<R: SteppedIn> CentralDifference<R> {
         let (external, internal): (Vector<f64>, _) = (self.applied.at(at), self.forces.at(at));
         let mut lost = [[R::ZERO; 3]];
         if self.damps_by_forces() {
-            Past::of(state, self.damping_factors(state)).from(at).damp(&[internal], &mut lost);
+            Past::of(&state.forces, self.damping_factors(state)).from(at).damp(&[internal], &mut lost);
         }
         let inertia = m * (1.0 + a);
         let place = [0, 1, 2].map(|c| {
@@ -621,7 +621,7 @@ impl<R: SteppedIn> CentralDifference<R> {
         let mut reaction = std::mem::take(&mut self.reaction);
         let mut sums = std::mem::take(&mut self.sums);
         let mut internal = std::mem::take(&mut self.internal);
-        let past = self.damps_by_forces().then(|| Past::of(state, self.damping_factors(state)));
+        let past = self.damps_by_forces().then(|| Past::of(&state.forces, self.damping_factors(state)));
         let (increment, pace) = (state.increment.par_chunks(CHUNK), Pace::new(self.lengths));
         let found = internal.par_chunks_mut(CHUNK).zip(&mut sums);
         (next.par_chunks_mut(CHUNK).zip(reaction.par_chunks_mut(CHUNK)).zip(increment).zip(found))

@@ -24,7 +24,6 @@
 use pliant_mechanics::tensor::Vector;
 
 use crate::lanes::LaneNumber;
-use crate::state::State;
 
 /// η.
 pub const DISSIPATION: f64 = 0.005;
@@ -64,11 +63,11 @@ pub(crate) struct Past<'a, R> {
 }
 
 impl<'a, R: LaneNumber> Past<'a, R> {
-    /// The forces that a state has kept.
-    pub(crate) fn of(state: &'a State<R>, factors: DampingFactors) -> Self {
+    /// The forces [N] that a state has kept, the later ones first.
+    pub(crate) fn of(forces: &'a [Vec<Vector<R>>; 2], factors: DampingFactors) -> Self {
         let DampingFactors { dissipation, extrapolation, stiffness } = factors;
         let [dissipation, extrapolation, stiffness] = [dissipation, extrapolation, stiffness].map(R::of);
-        let [last, before] = &state.forces;
+        let [last, before] = forces;
         Self { dissipation, extrapolation, stiffness, forces: [last, before] }
     }
 

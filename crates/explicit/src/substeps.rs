@@ -1,0 +1,35 @@
+//! Into how many parts a step is cut, from the largest stable one.
+
+/// The most substeps a step is cut into.
+pub const MOST_SUBSTEPS: u32 = 100;
+/// Substeps are chosen so that they reach this part of the limit at the most.
+pub const RESERVE: f64 = 0.95;
+/// They are kept up to this part: the limit may fall before the next check.
+pub const KEEP: f64 = 0.97;
+/// Steps for which the limit has to allow fewer parts before they are used.
+pub const REJOIN_AFTER: u64 = 1000;
+/// How often the steps of a run are halved at most.
+pub const MOST_HALVINGS: u32 = 3;
+
+/// The parts into which a step is cut, from how many there are now and the limit; `None` if more than
+/// [`MOST_SUBSTEPS`] are needed. Fewer than now only where they keep the reserve, so that a limit that hovers at a
+/// number of parts does not make it change all the time.
+pub(crate) fn substeps(step: f64, limit: f64, now: u32) -> Option<u32> {
+    let enough = (step / (RESERVE * limit)).ceil();
+    if enough > f64::from(MOST_SUBSTEPS) || enough.is_nan() {
+        return None;
+    }
+    let enough = (enough as u32).max(1);
+    let stable = step / f64::from(now) <= KEEP * limit;
+    Some(if stable { now.min(enough) } else { enough })
+}
+
+/// By which factor the limit may change before [`substeps`] chooses other parts than these, as a logarithm; zero where it asks for more now.
+/// Where it allows fewer already, only more count: fewer are not used at once.
+pub(crate) fn margin(step: f64, limit: f64, parts: u32) -> f64 {
+    let more = f64::from(parts) * KEEP * limit / step;
+    // One part cannot become fewer.
+    let fewer = step / (RESERVE * limit * f64::from(parts - 1));
+    let nearest = if fewer > 1.0 { more.min(fewer) } else { more };
+    nearest.ln().max(0.0)
+}
