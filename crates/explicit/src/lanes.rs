@@ -300,9 +300,13 @@ const fn units<R>() -> usize {
 }
 
 impl<R: LaneNumber, const N: usize> Places<R, N> {
-    /// From the numbers of the nodes of packs of cells, and how many packs a block has.
+    /// Whether offsets reach all nodes of a block of so many packs.
+    pub(crate) const fn can_number(packs: usize) -> bool {
+        units::<R>() * packs * PACK * N <= 1 << 16
+    }
+
+    /// From the numbers of the nodes of packs of cells, and how many packs a block has: not more than [they reach](Self::can_number).
     pub(crate) fn new(packs: impl Iterator<Item = [[u16; PACK]; N]>, per_block: usize) -> Self {
-        const { assert!(units::<R>() * crate::forces::MOST_PACKS * PACK * N <= 1 << 16) };
         let offset = |place: u16| place * units::<R>() as u16;
         let offsets: Vec<_> = packs.map(|pack| pack.map(|places| places.map(offset))).collect();
         let most = |block: &[[[u16; PACK]; N]]| {

@@ -17,9 +17,10 @@ use rayon::prelude::*;
 
 use super::batch::{Batch, PACKS, Wanted, pressures, volume_change};
 use super::blocks::{Blocks, Moved, Quad, Shares, Task};
-use super::{
-    Findings, ForceField, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, own_packs,
-    relative,
+use super::field::ForceField;
+use super::findings::Findings;
+use super::packed::{
+    PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, own_packs, relative,
 };
 use crate::history::History;
 use crate::lanes::LaneNumber;

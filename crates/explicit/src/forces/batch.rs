@@ -6,7 +6,7 @@ use pliant_mechanics::Number;
 use pliant_mechanics::law::{AnyLaw, Deformation, Law, MOST_FAMILIES, Split, with_law};
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, dot};
 
-use super::Findings;
+use super::findings::Findings;
 use crate::lanes::LaneNumber;
 use crate::lanes::{
     LaneWork, Lanes, PACK, Pack, Processor, load_symmetric, load_tensor, load_vector, store_symmetric,

@@ -9,8 +9,8 @@ use pliant_mechanics::tensor::Vector;
 use rayon::iter::{Either, repeat_n};
 use rayon::prelude::*;
 
-use super::Findings;
 use super::batch::PACKS;
+use super::findings::Findings;
 use crate::lanes::LaneNumber;
 use crate::lanes::{PACK, Pack};
 
@@ -21,7 +21,7 @@ const BLOCK: usize = 64;
 const SPARE: usize = 8;
 
 /// The most packs of a block.
-pub(crate) const MOST_PACKS: usize = BLOCK + SPARE;
+pub(super) const MOST_PACKS: usize = BLOCK + SPARE;
 
 /// Nodes of packs of cells, each pack with its own, that are worth a second thread on every machine. 1,000 hexes are below: two threads took 0.68 of the
 /// time of one where cores answer each other fast, and 1.15 to 1.4 of it on the same machine where they did not.

@@ -11,7 +11,7 @@ use pliant_mechanics::element::{FLAT_HEX, HEX_EDGES};
 use pliant_mechanics::tensor::{Vector, add, cross, dot, sub};
 use rayon::prelude::*;
 
-use super::{PackedCells, relative};
+use super::packed::{PackedCells, relative};
 use crate::lanes::LaneNumber;
 use crate::lanes::{LaneWork, Lanes, Local, PACK, Pack, load_vector};
 

@@ -11,8 +11,8 @@ use pliant_mechanics::model::Hourglass;
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, add, cast, dot, scale, sub};
 use rayon::prelude::*;
 
-use super::PackedCells;
 use super::batch::{Batch, PACKS, Wanted};
+use super::packed::PackedCells;
 use crate::lanes::LaneNumber;
 use crate::lanes::{
     LaneWork, Lanes, PACK, Pack, load_symmetric, load_tensor, load_vector, store_symmetric, store_vector,

@@ -17,8 +17,9 @@ use pliant_mechanics::tensor::{Symmetric, Vector, add, cast, dot, scale};
 
 use super::batch::{Batch, PACKS, Wanted};
 use super::blocks::Task;
+use super::findings::Findings;
 use super::one_pass::{Element, OnePass};
-use super::{Findings, PackedCells, by_cell, own_packs, relative};
+use super::packed::{PackedCells, by_cell, own_packs, relative};
 use crate::lanes::LaneNumber;
 use crate::lanes::{Lanes, PACK, Pack, load_vector};
 use crate::relaxation::Relaxation;

@@ -15,284 +15,40 @@ mod bar;
 mod batch;
 mod blocks;
 mod corners;
+mod field;
+mod findings;
 mod full_hex;
 mod hourglass;
 mod membrane;
 mod one_pass;
+mod packed;
 mod plain;
 #[cfg(test)]
 pub(crate) mod tests;
 
+use std::ops::Range;
+
+use pliant_mechanics::model::{Cells, Model, Solid};
+use pliant_mechanics::tensor::{Vector, add, cast};
+use pliant_mechanics::tie::Tie;
+
 use averaged::AveragedTets;
 use bar::Bars;
 pub(crate) use batch::{Batch, Wanted, pressure};
-pub(crate) use blocks::MOST_PACKS;
-pub(crate) use hourglass::growth;
-use std::ops::Range;
-
-use pliant_mechanics::model::{CellBlock, Cells, Model, Solid};
-use pliant_mechanics::prony::Prony;
-use pliant_mechanics::tensor::{Tensor, Vector, add, cast, sub};
-use pliant_mechanics::tie::Tie;
-use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
-
-use crate::history::History;
-use crate::lanes::LaneNumber;
-use crate::lanes::{Lanes, Local, PACK, Pack, Places, Processor, load_vector, plus};
 pub(crate) use blocks::Quad;
-use blocks::{Blocks, Shares};
+use blocks::Shares;
+use field::ForceField;
+pub use findings::Deformed;
+use findings::Findings;
+pub(crate) use findings::Found;
 use full_hex::FullHexes;
+pub(crate) use hourglass::growth;
 use membrane::Membranes;
 use plain::SolidForces;
 
-/// What a pass over some packs of cells found, lane by lane.
-#[derive(Clone, Copy, Debug)]
-pub struct Findings<R> {
-    /// Energy held by hourglass patterns [J].
-    hourglass: Pack<R>,
-    /// The first cell of the pass with det F ≤ 0 or not a number, and its det F.
-    inverted: Option<(usize, f64)>,
-    /// A cell of the pass with a corner turned inside out.
-    folded: Option<usize>,
-    /// The least det F.
-    least_volume_ratio: Pack<R>,
-    /// The largest |C − I|².
-    largest_strain: Pack<R>,
-}
-
-impl<R: LaneNumber> Default for Findings<R> {
-    fn default() -> Self {
-        let least_volume_ratio = Pack([R::ONE; PACK]);
-        Self {
-            hourglass: Pack::ZERO,
-            inverted: None,
-            folded: None,
-            least_volume_ratio,
-            largest_strain: Pack::ZERO,
-        }
-    }
-}
-
-/// The extremes of deformation over some cells.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Deformed {
-    /// The least det F.
-    pub least_volume_ratio: f64,
-    /// The largest |C − I|².
-    pub largest_strain: f64,
-}
-
-impl Default for Deformed {
-    fn default() -> Self {
-        Self { least_volume_ratio: 1.0, largest_strain: 0.0 }
-    }
-}
-
-impl Deformed {
-    fn merge(self, other: Self) -> Self {
-        Self {
-            least_volume_ratio: self.least_volume_ratio.min(other.least_volume_ratio),
-            largest_strain: self.largest_strain.max(other.largest_strain),
-        }
-    }
-
-    /// Whether the least J or the largest stretch, taken as √(1 + |C − I|), differ by more than a factor.
-    pub fn differs(&self, other: &Self, factor: f64) -> bool {
-        self.change(other) > factor
-    }
-
-    /// The factor, 1 or more, by which one of these two differs.
-    pub fn change(&self, other: &Self) -> f64 {
-        let stretch = |d: &Self| (1.0 + d.largest_strain.sqrt()).sqrt();
-        let apart = |a: f64, b: f64| (a / b).max(b / a);
-        apart(self.least_volume_ratio, other.least_volume_ratio).max(apart(stretch(self), stretch(other)))
-    }
-}
-
-/// What an evaluation of all cells found.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Found {
-    /// Energy held by hourglass patterns [J].
-    pub hourglass: f64,
-    /// The first inverted cell as (solid, cell, det F).
-    pub inverted: Option<(usize, usize, f64)>,
-    /// The first hexahedron of which a corner is turned inside out, as (solid, cell).
-    pub folded: Option<(usize, usize)>,
-    /// How far the cells are deformed.
-    pub(crate) deformed: Deformed,
-}
-
-/// Internal forces of one solid, compiled for its element and number type.
-pub trait ForceField<R>: Send + Sync {
-    /// The blocks of its cells.
-    fn blocks(&self) -> &Blocks;
-
-    /// Forces [N] of each block of cells on the nodes of the block, in [`Blocks::room`] entries. With `history`
-    /// the stress relaxes and the history advances to this state; an empty `history` gives the instantaneous elastic
-    /// response. `findings` has one entry per block.
-    fn evaluate(
-        &mut self,
-        displacement: &[Vector<R>],
-        history: &mut History<R>,
-        forces: &mut [Quad<R>],
-        findings: &mut [Findings<R>],
-    );
-
-    /// Relaxes from now on over steps of `step` seconds.
-    fn set_step(&mut self, prony: &Prony, step: f64);
-
-    /// Runs from now on in other lanes.
-    fn set_processor(&mut self, processor: Processor);
-}
-
-/// Where the history of one of several points lies, `each` packs a point, in a history of `all` packs; nowhere in an empty one.
-#[inline(always)]
-fn own_packs(point: usize, each: usize, all: usize) -> Range<usize> {
-    (point * each).min(all)..((point + 1) * each).min(all)
-}
-
-/// What all elements need of their cells, in packs.
-struct PackedCells<R, const N: usize> {
-    count: usize,
-    /// Nodes of packs of cells in their block.
-    places: Places<R, N>,
-    /// Directions of the families.
-    fibre: Vec<Vector<Pack<R>>>,
-    families: usize,
-}
-
-impl<R: LaneNumber, const N: usize> PackedCells<R, N> {
-    fn new(solid: &Solid, cells: &CellBlock<N>) -> (Self, Blocks) {
-        let (blocks, local) = Blocks::new(&cells.nodes);
-        let last = local.len().max(1) - 1;
-        let nodes = |pack: usize| {
-            let node = |a: usize| std::array::from_fn(|lane| local[last.min(pack * PACK + lane)][a]);
-            std::array::from_fn(node)
-        };
-        let mut packed = Self {
-            count: local.len(),
-            places: Places::new((0..local.len().div_ceil(PACK)).map(nodes), blocks.packs()),
-            fibre: Vec::new(),
-            families: solid.material.law.families(),
-        };
-        for pack in packed.packs() {
-            for family in 0..packed.families {
-                packed.fibre.push(packed.vector(pack, |cell| cast(solid.law_fibres(cell)[family])));
-            }
-        }
-        (packed, blocks)
-    }
-
-    fn packs(&self) -> Range<usize> {
-        0..self.count.div_ceil(PACK)
-    }
-
-    /// The packs of a block.
-    #[inline(always)]
-    fn packs_of(&self, block: usize) -> Range<usize> {
-        self.places.packs_of(block)
-    }
-
-    /// A number of each cell of a pack; zero beyond the last one.
-    fn pack(&self, pack: usize, of_cell: impl Fn(usize) -> R) -> Pack<R> {
-        Pack::from_fn(|lane| {
-            let cell = pack * PACK + lane;
-            if cell < self.count { of_cell(cell) } else { R::ZERO }
-        })
-    }
-
-    fn vector(&self, pack: usize, of_cell: impl Fn(usize) -> Vector<R>) -> Vector<Pack<R>> {
-        [0, 1, 2].map(|component| self.pack(pack, |cell| of_cell(cell)[component]))
-    }
-
-    /// The directions in some packs.
-    #[inline(always)]
-    fn fibres(&self, first: usize, packs: usize) -> &[Vector<Pack<R>>] {
-        &self.fibre[first * self.families..(first + packs) * self.families]
-    }
-}
-
-/// Gradients of the shape functions [1/m] of packs of cells, of all nodes but the first (they sum to zero), and volumes
-/// [m³], zero where a pack is filled up.
-struct PackedRest<R, const M: usize> {
-    gradient: [Vector<Pack<R>>; M],
-    volume: Pack<R>,
-}
-
-impl<R: LaneNumber, const M: usize> PackedRest<R, M> {
-    fn of<const N: usize>(packed: &PackedCells<R, N>, cells: &CellBlock<N>) -> Vec<Self> {
-        const { assert!(M + 1 == N) };
-        let rest = |pack: usize| Self {
-            gradient: std::array::from_fn(|a| {
-                packed.vector(pack, |cell| cast(cells.rest[cell].gradient[a + 1]))
-            }),
-            volume: packed.pack(pack, |cell| R::of(cells.rest[cell].volume)),
-        };
-        packed.packs().into_par_iter().map(rest).collect()
-    }
-}
-
-/// u_a − u_0 of all nodes but the first: keeps the digits of small strains in cells that have moved far. Beside them what
-/// else the nodes carry, summed.
-#[inline(always)]
-fn relative<R: LaneNumber, L: Lanes<R>, const N: usize, const M: usize>(
-    local: &Local<'_, R, N>,
-    pack: usize,
-    at: usize,
-) -> ([Vector<L>; M], L) {
-    let [x, y, z, mut sum] = local.gather(pack, 0, at);
-    let mut relative = [[L::ZERO; 3]; M];
-    for (u, node) in relative.iter_mut().zip(1..) {
-        let [ux, uy, uz, beside] = local.gather(pack, node, at);
-        *u = sub([ux, uy, uz], [x, y, z]);
-        sum += beside;
-    }
-    (relative, sum)
-}
-
-/// ∂u/∂X from the displacements relative to the first node.
-#[inline(always)]
-fn displacement_gradient<R: LaneNumber, L: Lanes<R>, const M: usize>(
-    u: &[Vector<L>; M],
-    gradient: &[Vector<Pack<R>>; M],
-    at: usize,
-) -> Tensor<L> {
-    let mut h = Tensor::ZERO;
-    for (ua, ba) in u.iter().zip(gradient) {
-        h.add_outer(*ua, load_vector(ba, at));
-    }
-    h
-}
-
-/// V P B_a of all nodes but the first, from V P.
-#[inline(always)]
-fn nodal_forces<R: LaneNumber, L: Lanes<R>, const M: usize>(
-    piola: &Tensor<L>,
-    gradient: &[Vector<Pack<R>>; M],
-    at: usize,
-) -> [Vector<L>; M] {
-    let mut forces = [[L::ZERO; 3]; M];
-    for (force, b) in forces.iter_mut().zip(gradient) {
-        *force = piola.apply(load_vector(b, at));
-    }
-    forces
-}
-
-/// Writes the forces on all nodes as vectors, [`Lanes::row_of_lane`] by lane; the first node takes what makes the sum zero.
-#[inline(always)]
-fn by_cell<R: LaneNumber, L: Lanes<R>, const N: usize, const M: usize>(
-    forces: &[Vector<L>; M],
-    to: &mut [Pack<Quad<R>>; N],
-    at: usize,
-) {
-    let mut sum = [L::ZERO; 3];
-    for (force, to) in forces.iter().zip(&mut to[1..]) {
-        sum = add(sum, *force);
-        L::spread([force[0], force[1], force[2], L::ZERO], to, at);
-    }
-    L::spread([-sum[0], -sum[1], -sum[2], L::ZERO], &mut to[0], at);
-}
+use crate::history::History;
+use crate::lanes::LaneNumber;
+use crate::lanes::{PACK, Processor, plus};
 
 /// The force field of a solid for steps of `step` seconds.
 fn force_field<R: LaneNumber>(solid: &Solid, step: f64) -> Box<dyn ForceField<R>> {

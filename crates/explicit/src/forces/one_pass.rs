@@ -4,7 +4,8 @@ use pliant_mechanics::prony::Prony;
 use pliant_mechanics::tensor::Vector;
 
 use super::blocks::{Blocks, Moved, Quad, Task};
-use super::{Findings, ForceField};
+use super::field::ForceField;
+use super::findings::Findings;
 use crate::history::History;
 use crate::lanes::LaneNumber;
 use crate::lanes::{LaneWork, Lanes, Processor};

@@ -7,10 +7,11 @@ use pliant_mechanics::tensor::Vector;
 use super::batch::{Batch, PACKS, Wanted};
 use super::blocks::Task;
 use super::corners::{CornerCheck, PackedCorners, flatness, may_fold};
+use super::findings::Findings;
 use super::hourglass::{FindGrowth, Growth, PackedHourglass, Resistance};
 use super::one_pass::{Element, OnePass};
-use super::{
-    Findings, PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, own_packs, relative,
+use super::packed::{
+    PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, own_packs, relative,
 };
 use crate::lanes::LaneNumber;
 use crate::lanes::{Lanes, PACK, Pack};

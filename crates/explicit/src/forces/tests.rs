@@ -8,7 +8,7 @@ use pliant_mechanics::law::{AnyLaw, Deformation, NeoHookean, Split, Transversely
 use pliant_mechanics::model::{Averaging, Body, Cells, LocalNodes, Material};
 use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
 use pliant_mechanics::tensor::scale as times;
-use pliant_mechanics::tensor::{cross, dot, scale};
+use pliant_mechanics::tensor::{Tensor, cross, dot, scale, sub};
 use pliant_testing::Random;
 use serde_json::json;
 
