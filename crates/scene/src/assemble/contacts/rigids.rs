@@ -1,7 +1,7 @@
 //! Obstacles and tools of a contact, and how they move and grow.
 
 use super::super::Builder;
-use pliant_format::tables::{GrowthTable, ShapeName, ToolTable};
+use pliant_format::tables::{GrowthTable, JawsTool, RotateTable, ShapeName, ToolTable};
 use pliant_format::{rows_of, table as table_file};
 use pliant_geometry::Vector3;
 use pliant_geometry::words::number;
@@ -14,27 +14,68 @@ use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
+/// An obstacle or a tool of a scene.
+#[derive(Clone, Copy)]
+struct Thing<'t> {
+    /// The table that it is in: `obstacle` or `tool`.
+    kind: &'t str,
+    name: &'t str,
+    table: &'t ToolTable,
+}
+
+impl<'t> Thing<'t> {
+    /// The path of its table.
+    fn path(self) -> [&'t str; 2] {
+        [self.kind, self.name]
+    }
+
+    /// The path of a key of its table.
+    fn at(self, key: &'t str) -> [&'t str; 3] {
+        [self.kind, self.name, key]
+    }
+
+    fn has_jaws(self) -> bool {
+        matches!(self.table.shape, ShapeName::Jaws(_))
+    }
+}
+
 impl Builder<'_> {
     /// The rigid thing of a table, or its two jaws.
     pub(super) fn rigids(&mut self, kind: &str, name: &str, table: &ToolTable) -> Option<Vec<Rigid>> {
-        let path = [kind, name];
-        let at = |key| [kind, name, key];
-        let jaws = matches!(table.shape, ShapeName::Jaws(_));
-        for (key, given) in [("opening", table.opening.is_some()), ("ideal-grip", table.ideal_grip.is_some())]
-        {
-            if given && !jaws {
-                let help =
-                    "`shape = { jaws = { length = 0.03, width = 0.008, thickness = 0.004 } }` has jaws";
-                self.error(&at(key), format!("`{key}` is for a tool with jaws"), "no jaws", help);
-                return None;
+        let thing = Thing { kind, name, table };
+        let only_of_jaws = [("opening", table.opening.is_some()), ("ideal-grip", table.ideal_grip.is_some())];
+        if let Some((key, _)) = only_of_jaws.into_iter().find(|(_, given)| *given && !thing.has_jaws()) {
+            let help = "`shape = { jaws = { length = 0.03, width = 0.008, thickness = 0.004 } }` has jaws";
+            self.error(&thing.at(key), format!("`{key}` is for a tool with jaws"), "no jaws", help);
+            return None;
+        }
+        let shape = self.shape_of(thing)?;
+        let mut trajectory = self.trajectory(thing, &shape)?;
+        if let Some(limit) = table.force_limit {
+            trajectory = trajectory.limited(limit);
+        }
+        if let Some(growth) = &table.grows {
+            trajectory = self.growing(thing, growth, &shape, trajectory)?;
+        }
+        match &table.shape {
+            ShapeName::Jaws(of) => self.jaws(thing, of, shape, trajectory),
+            _ => {
+                let inside = table.inside;
+                Some(vec![Rigid { name: name.into(), shape, trajectory, inside, jaw: None }])
             }
         }
-        let shape = match &table.shape {
+    }
+
+    /// The shape of a thing, or of each of its jaws.
+    fn shape_of(&mut self, thing: Thing<'_>) -> Option<Shape> {
+        let at = thing.at("shape");
+        let within = |key| [thing.kind, thing.name, "shape", key];
+        Some(match &thing.table.shape {
             ShapeName::Sphere(of) => Shape::Sphere { radius: of.radius },
             ShapeName::Capsule(of) => Shape::Capsule { radius: of.radius, length: of.length },
             ShapeName::Cylinder(of) => Shape::Cylinder { radius: of.radius, length: of.length },
             ShapeName::Box(of) if of.size.iter().any(|&edge| edge <= 0.0) => {
-                self.error(&at("shape"), "a box without a volume", "its edges", "give three lengths above 0");
+                self.error(&at, "a box without a volume", "its edges", "give three lengths above 0");
                 return None;
             }
             ShapeName::Box(of) => Shape::Cuboid { size: of.size },
@@ -46,100 +87,99 @@ impl Builder<'_> {
                     Ok(profile) => Shape::Revolved(Arc::new(profile)),
                     Err(error) => {
                         let help = "points are `[height, distance from the axis, radius of the arc]`, counted from 0";
-                        self.error(&at("shape"), error.to_string(), "this outline", help);
+                        self.error(&at, error.to_string(), "this outline", help);
                         return None;
                     }
                 }
             }
             ShapeName::Jaws(of) => Shape::Cuboid { size: [of.width, of.thickness, of.length] },
-            ShapeName::Mesh(of) => self.shape_of_mesh(of, &[kind, name, "shape", "mesh"])?,
-            ShapeName::Image(of) => self.shape_of_image(of, &[kind, name, "shape", "image"])?,
-        };
+            ShapeName::Mesh(of) => self.shape_of_mesh(of, &within("mesh"))?,
+            ShapeName::Image(of) => self.shape_of_image(of, &within("image"))?,
+        })
+    }
+
+    /// How a thing of a shape moves, without limits.
+    fn trajectory(&mut self, thing: Thing<'_>, shape: &Shape) -> Option<Trajectory> {
+        let Thing { kind, name, table } = thing;
         self.note_turns(&format!("{kind} `{name}`: `turn`"), Vector3::from(table.turn).norm());
         let start = Pose::new(table.at.into(), table.turn.into());
         let ways = [table.by.is_some(), table.rotate.is_some(), table.poses.is_some()];
         if ways.iter().filter(|&&given| given).count() > 1 {
             let help = "leave all but one out";
-            self.error(&path, "it moves by one of `by`, `rotate` and `poses`", "several", help);
+            self.error(&thing.path(), "it moves by one of `by`, `rotate` and `poses`", "several", help);
             return None;
         }
-        let trajectory = if let Some(shift) = table.by {
-            Trajectory::by(start, shift, self.curve(&table.timing, &path)?)
-        } else if let Some(rotate) = table.rotate {
-            let axis = Vector3::from(rotate.axis);
-            let Some(axis) = axis.try_normalize(0.0) else {
-                self.error(
-                    &at("rotate"),
-                    "the axis of the rotation is zero",
-                    "this axis",
-                    "give a direction",
-                );
+        if let Some(shift) = table.by {
+            return Some(Trajectory::by(start, shift, self.curve(&table.timing, &thing.path())?));
+        }
+        if let Some(rotate) = table.rotate {
+            return self.rotating(thing, rotate, start);
+        }
+        if let Some(file) = &table.poses {
+            return self.by_poses(thing, file, start, shape.reach());
+        }
+        Some(Trajectory::fixed(start))
+    }
+
+    fn rotating(&mut self, thing: Thing<'_>, rotate: RotateTable, start: Pose) -> Option<Trajectory> {
+        let at = thing.at("rotate");
+        let Some(axis) = Vector3::from(rotate.axis).try_normalize(0.0) else {
+            self.error(&at, "the axis of the rotation is zero", "this axis", "give a direction");
+            return None;
+        };
+        let angle = self.angle(&at, rotate.angle, rotate.degrees)?;
+        let curve = self.curve(&thing.table.timing, &thing.path())?;
+        Some(Trajectory::turn(start, axis.into(), rotate.centre, angle, curve))
+    }
+
+    /// Along a table of poses, for a thing of a radius [m].
+    fn by_poses(&mut self, thing: Thing<'_>, file: &Path, start: Pose, reach: f64) -> Option<Trajectory> {
+        let text = self.scene.file(file).and_then(|found| table_file(&found));
+        let found = poses(file, text).and_then(|poses| {
+            let (poses, jump) = slowed(poses, reach);
+            let none = || format!("`{}` has no poses, or its times do not increase", file.display());
+            Ok((Trajectory::table(start, poses).ok_or_else(none)?, jump))
+        });
+        let (trajectory, jump) = match found {
+            Ok(found) => found,
+            Err(message) => {
+                self.error(&thing.at("poses"), message, "this table", ROW);
                 return None;
-            };
-            let angle = self.angle(&at("rotate"), rotate.angle, rotate.degrees)?;
-            let curve = self.curve(&table.timing, &path)?;
-            Trajectory::turn(start, axis.into(), rotate.centre, angle, curve)
-        } else if let Some(file) = &table.poses {
-            let text = self.scene.file(file).and_then(|found| table_file(&found));
-            let reach = shape.reach();
-            let trajectory = poses(file, text).map(|poses| {
-                let (poses, jump) = slowed(poses, reach);
-                Trajectory::table(start, poses).map(|trajectory| (trajectory, jump))
-            });
-            match trajectory {
-                Ok(Some((trajectory, jump))) => {
-                    if let Some(Jump { time, speed, late }) = jump {
-                        self.notes.push(format!(
-                            "{kind} `{name}`: by its table of poses it goes at {} m/s from t = {} s on; it goes at {FASTEST} m/s and is late by up to \
-                             {} s",
-                            number(speed),
-                            number(time),
-                            number(late)
-                        ));
-                    }
-                    trajectory
-                }
-                Ok(None) => {
-                    let message = format!("`{}` has no poses, or its times do not increase", file.display());
-                    self.error(&at("poses"), message, "this table", ROW);
-                    return None;
-                }
-                Err(message) => {
-                    self.error(&at("poses"), message, "this table", ROW);
-                    return None;
-                }
             }
-        } else {
-            Trajectory::fixed(start)
         };
-        let trajectory = match table.force_limit {
-            Some(limit) => trajectory.limited(limit),
-            None => trajectory,
-        };
-        let trajectory = match &table.grows {
-            Some(growth) => {
-                self.growing(trajectory, growth, &shape, (jaws, table.inside), [kind, name, "grows"])?
-            }
-            None => trajectory,
-        };
-        let ShapeName::Jaws(of) = &table.shape else {
-            return Some(vec![Rigid {
-                name: name.into(),
-                shape,
-                trajectory,
-                inside: table.inside,
-                jaw: None,
-            }]);
-        };
+        self.notes.extend(jump.map(|Jump { time, speed, late }| {
+            format!(
+                "{} `{}`: by its table of poses it goes at {} m/s from t = {} s on; it goes at {FASTEST} m/s and is late by up to \
+                 {} s",
+                thing.kind,
+                thing.name,
+                number(speed),
+                number(time),
+                number(late)
+            )
+        }));
+        Some(trajectory)
+    }
+
+    /// The jaws of a tool: boxes of a shape that move together.
+    fn jaws(
+        &mut self,
+        thing: Thing<'_>,
+        of: &JawsTool,
+        shape: Shape,
+        trajectory: Trajectory,
+    ) -> Option<Vec<Rigid>> {
+        let Thing { kind, name, table } = thing;
         if table.inside {
             let help = "bodies are between the jaws, and outside of each";
-            self.error(&at("inside"), "no body is inside of a jaw", "of a tool with jaws", help);
+            self.error(&thing.at("inside"), "no body is inside of a jaw", "of a tool with jaws", help);
             return None;
         }
         let opening = match &table.opening {
             Some(opening) => {
-                let angle = self.angle(&at("opening"), opening.angle, opening.degrees)?;
-                (angle, self.curve(&opening.timing, &at("opening"))?)
+                let at = thing.at("opening");
+                let angle = self.angle(&at, opening.angle, opening.degrees)?;
+                (angle, self.curve(&opening.timing, &at)?)
             }
             None => (0.0, Curve { shape: CurveShape::Hold, from: 0.0, to: 1.0 }),
         };
@@ -162,29 +202,25 @@ impl Builder<'_> {
         Some(rigids.into())
     }
 
-    /// A trajectory with the growth of a table; `path` is that of its table.
-    pub(super) fn growing(
+    /// The trajectory of a thing of a shape with its growth.
+    fn growing(
         &mut self,
-        trajectory: Trajectory,
+        thing: Thing<'_>,
         growth: &GrowthTable,
         shape: &Shape,
-        (jaws, inside): (bool, bool),
-        path: [&str; 3],
+        trajectory: Trajectory,
     ) -> Option<Trajectory> {
-        if jaws {
-            self.error(
-                &path,
-                "jaws do not grow",
-                "of a tool with jaws",
-                "leave it out, or take another shape",
-            );
+        let path = thing.at("grows");
+        if thing.has_jaws() {
+            let help = "leave it out, or take another shape";
+            self.error(&path, "jaws do not grow", "of a tool with jaws", help);
             return None;
         }
         let curve = self.curve(&growth.timing, &path)?;
         let [low, high] = curve.range().map(|part| part * growth.by);
         let (least, thinnest) = (low.min(high), shape.thinnest());
         let round = matches!(shape, Shape::Sphere { .. } | Shape::Capsule { .. });
-        if least < 0.0 && (inside || !round) {
+        if least < 0.0 && (thing.table.inside || !round) {
             let message = format!(
                 "it shrinks to {} m within its shape, which only balls and capsules can",
                 number(least)
