@@ -255,38 +255,91 @@ impl Builder<'_> {
         rigids: &[Rigid],
         barriers: &mut BarrierTables,
     ) -> Option<Vec<Contact>> {
-        let run = &self.scene.run;
-        let is_barrier = run.solver.solves_equations();
-        if run.solver != SolverName::Explicit && !is_barrier {
-            let message = format!(
-                "contact is for the solvers `explicit`, `implicit` and `static`, and this scene goes with `{}`",
-                run.solver.word()
-            );
-            self.error(&["contact", name, "between"], message, "not for this solver", EXPLICIT);
+        let is_barrier = self.scene.run.solver.solves_equations();
+        if !self.check_contact(name, table, is_barrier) {
             return None;
         }
-        if !self.check_keys_of_contact(name, table, is_barrier) {
+        let pairs = self.pairs(name, table, rigids)?;
+        barriers.check |= table.check_intersections;
+        let with_bodies = pairs.iter().any(|(_, with)| with.body().is_some());
+        if table.check_intersections && !is_barrier && !with_bodies {
+            let message = "`check-intersections` is for bodies that touch each other or themselves with the solver `explicit`";
+            let path = ["contact", name, "check-intersections"];
+            self.error(&path, message, "no bodies that touch each other", "leave it out");
             return None;
+        }
+        let several = pairs.len() > 1;
+        let mut all = Vec::new();
+        for (body, partner) in pairs {
+            let own = &self.bodies[body].name;
+            let full = match partner {
+                _ if !several => name.into(),
+                Partner::Rigid(rigid) => format!("{name}.{own}-{}", rigids[rigid].name),
+                Partner::Body(other) => format!("{name}.{own}-{}", self.bodies[other].name),
+            };
+            let surface = self.surface_of(name, table, body, 0)?;
+            let with = match partner {
+                Partner::Rigid(rigid) => With::Rigid(rigid),
+                Partner::Body(other) if other == body => With::Itself,
+                Partner::Body(other) => With::Body(self.surface_of(name, table, other, 1)?),
+            };
+            let offset = match is_barrier {
+                true => self.barrier(name, table, [Partner::Body(body), partner], barriers)?,
+                false => self.distance_to_keep(table, &surface, &with),
+            };
+            match (&with, partner) {
+                _ if is_barrier => {}
+                (With::Rigid(rigid), _) => self.check_apart(name, table, body, &rigids[*rigid], &surface),
+                (With::Body(second), Partner::Body(other)) => {
+                    self.check_bodies_apart(name, table, [body, other], [&surface, second]);
+                }
+                _ => self.note_apart(&full, &surface, table.thickness),
+            }
+            let touch = Touch { friction: table.friction, offset };
+            all.push(Contact { name: full, surface, with, touch });
+            self.gaps.push(table.gap);
+        }
+        Some(all)
+    }
+
+    /// Whether the solver knows contact, and the keys of a table go with it and with each other; mistakes are reported.
+    fn check_contact(&mut self, name: &str, table: &ContactTable, is_barrier: bool) -> bool {
+        let solver = self.scene.run.solver;
+        if solver != SolverName::Explicit && !is_barrier {
+            let message = format!(
+                "contact is for the solvers `explicit`, `implicit` and `static`, and this scene goes with `{}`",
+                solver.word()
+            );
+            self.error(&["contact", name, "between"], message, "not for this solver", EXPLICIT);
+            return false;
+        }
+        if !self.check_keys_of_contact(name, table, is_barrier) {
+            return false;
         }
         if table.separate && table.gap.is_some() {
             let message =
                 "`gap` and `separate` part the same bodies: shapes at rest, or the state at the start";
             self.error(&["contact", name, "gap"], message, "one too many", "leave one of them out");
-            return None;
+            return false;
         }
+        true
+    }
+
+    /// The bodies of a contact, each with what it touches; every pair once.
+    fn pairs(&mut self, name: &str, table: &ContactTable, rigids: &[Rigid]) -> Option<Vec<(usize, Partner)>> {
         let [first, second] = [0, 1].map(|side| self.partners(name, table, side, rigids));
         let (first, second) = (first?, second?);
         let mut pairs = Vec::new();
         for &a in &first {
             for &b in &second {
                 let pair = match (a, b) {
-                    (Partner::Rigid(_), Partner::Body(_)) => [b, a],
-                    (Partner::Body(one), Partner::Body(other)) if other < one && first.len() > 1 => [b, a],
-                    _ => [a, b],
+                    (Partner::Rigid(_), Partner::Rigid(_)) => continue,
+                    (Partner::Rigid(_), Partner::Body(body)) => (body, a),
+                    (Partner::Body(one), Partner::Body(other)) if other < one && first.len() > 1 => {
+                        (other, a)
+                    }
+                    (Partner::Body(body), _) => (body, b),
                 };
-                if pair != [a, b] && pairs.contains(&pair) || matches!(pair, [Partner::Rigid(_), _]) {
-                    continue;
-                }
                 if !pairs.contains(&pair) {
                     pairs.push(pair);
                 }
@@ -297,50 +350,7 @@ impl Builder<'_> {
             self.error(&["contact", name, "between"], "no body touches anything here", "no body", help);
             return None;
         }
-        barriers.check |= table.check_intersections;
-        let of_bodies = |[_, with]: &[Partner; 2]| with.body().is_some();
-        if table.check_intersections && !is_barrier && !pairs.iter().any(of_bodies) {
-            let message = "`check-intersections` is for bodies that touch each other or themselves with the solver `explicit`";
-            let path = ["contact", name, "check-intersections"];
-            self.error(&path, message, "no bodies that touch each other", "leave it out");
-            return None;
-        }
-        let several = pairs.len() > 1;
-        let mut all = Vec::new();
-        for [own, with] in pairs {
-            let Partner::Body(body) = own else { continue };
-            let other = match with {
-                Partner::Rigid(rigid) => rigids[rigid].name.clone(),
-                Partner::Body(other) => self.bodies[other].name.clone(),
-            };
-            let full =
-                if several { format!("{name}.{}-{other}", self.bodies[body].name) } else { name.into() };
-            let surface = self.surface_of(name, table, body, 0)?;
-            let (touches, with) = (
-                with,
-                match with {
-                    Partner::Rigid(rigid) => With::Rigid(rigid),
-                    Partner::Body(other) if other == body => With::Itself,
-                    Partner::Body(other) => With::Body(self.surface_of(name, table, other, 1)?),
-                },
-            );
-            let offset = match is_barrier {
-                true => self.barrier(name, table, [own, touches], barriers)?,
-                false => self.distance_to_keep(table, &surface, &with),
-            };
-            let touch = Touch { friction: table.friction, offset };
-            match (&with, touches) {
-                _ if is_barrier => {}
-                (With::Rigid(rigid), _) => self.check_apart(name, table, body, &rigids[*rigid], &surface),
-                (With::Body(second), Partner::Body(other)) => {
-                    self.check_bodies_apart(name, table, [body, other], [&surface, second]);
-                }
-                _ => self.note_apart(&full, &surface, table.thickness),
-            }
-            all.push(Contact { name: full, surface, with, touch });
-            self.gaps.push(table.gap);
-        }
-        Some(all)
+        Some(pairs)
     }
 
     /// The distance [m] that surfaces keep without a barrier.
