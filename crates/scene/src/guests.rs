@@ -13,117 +13,170 @@ use pliant_sim::contact::touch::{Contact, Touch, With};
 use crate::assemble::{Meet, overlaps, told_distance, told_overlap, usual_distance};
 use crate::world::World;
 use pliant_format::diagnostic::Diagnostic;
-use pliant_format::tables::SolverName;
+use pliant_format::tables::{ContactTable, SolverName};
 
 /// How bodies of two participants can touch.
 const HOW: &str = "a solid with `explicit` steps on the CPU and bodies with `implicit` ones touch each other; or put both bodies into one participant";
+
+/// Why bodies of two participants cannot touch.
+struct Mistake {
+    message: String,
+    label: &'static str,
+    help: &'static str,
+}
+
+/// Nodes of a participant as guests of another one.
+struct Numbers {
+    /// The number of the first.
+    first: u32,
+    /// Their numbers in their own participant, increasing.
+    nodes: Vec<u32>,
+}
+
+impl Numbers {
+    /// The number of a node as a guest.
+    fn of(&self, node: u32) -> u32 {
+        self.first + self.nodes.partition_point(|&known| known < node) as u32
+    }
+}
 
 impl World {
     /// Finds the contacts between participants; mistakes go to `out`.
     pub(crate) fn find_guests(&mut self, out: &mut Vec<Diagnostic>) {
         let mut notes = Vec::new();
         let mut met: Vec<(Contact, [usize; 2])> = Vec::new();
-        let mut nodes: BTreeMap<[usize; 2], Vec<u32>> = BTreeMap::new();
         for (name, table) in &self.scene.contacts {
-            let sides = self.participants.iter().enumerate().flat_map(|(part, own)| {
-                let meets = own.built.meets.iter().filter(|meet| meet.contact == *name);
-                meets.map(move |meet| (part, meet))
-            });
-            let mut sides: Vec<(usize, &Meet)> = sides.collect();
-            sides.sort_by_key(|(part, _)| {
-                let own = &self.participants[*part];
-                own.built.implicit.is_some() || own.scene.run.solver != SolverName::Explicit
-            });
-            let [(host, own), (of, other)] = sides[..] else { continue };
-            let path = ["contact", name.as_str(), "between"];
-            let place = self.scene.source.span(&path);
-            let solvers = [host, of].map(|part| self.participants[part].scene.run.solver);
-            if solvers != [SolverName::Explicit, SolverName::Implicit] {
-                let message = format!(
-                    "`{}` and `{}` are of two participants that cannot touch each other",
-                    table.between[0], table.between[1]
-                );
-                out.push(Diagnostic::error(message).at(place, "two participants").help(HOW));
-                continue;
+            let Some(sides) = self.sides(name) else { continue };
+            match self.meeting(name, table, sides, &mut notes) {
+                Ok(contact) => met.push((contact, sides.map(|(part, _)| part))),
+                Err(Mistake { message, label, help }) => {
+                    let place = self.scene.source.span(&["contact", name, "between"]);
+                    out.push(Diagnostic::error(message).at(place, label).help(help));
+                }
             }
-            if own.surface.faces.is_empty() || other.surface.faces.is_empty() {
-                let message = "bodies of two participants touch each other by faces, and bars have none";
-                let help = "name the solid beside it, or let it touch obstacles and tools only";
-                out.push(Diagnostic::error(message).at(place, "no faces").help(help));
-                continue;
-            }
-            if !self.ties.is_empty() {
-                let message = "participants are tied to each other or touch each other, not both";
-                let help = "put bodies that are tied into one participant";
-                out.push(Diagnostic::error(message).at(place, "beside a tie").help(help));
-                continue;
-            }
-            let mut surface = other.surface.clone();
-            if self.is_behind([(host, own), (of, other)]) {
-                surface.faces.iter_mut().for_each(|face| face.swap(1, 2));
-                notes.push(format!(
-                    "contact `{name}`: `{}` touches by its nearer side, which its normals point away from",
-                    table.between[other.side]
-                ));
-            }
-            let sides = [(host, own), (of, other)];
-            if let Some(told) = self.overlap(sides, &surface) {
-                let help = "move one of them (`at` of its mesh)";
-                out.push(Diagnostic::error(told).at(place, "overlapping").help(help));
-                continue;
-            }
-            let (second, place) = self.side_by_side(sides, &surface);
-            let offset = table.thickness.unwrap_or_else(|| {
-                // Half of the thickness of shells, or what solids keep.
-                let usual = own.offset + other.offset;
-                if usual > 0.0 { usual } else { usual_distance(&own.surface, Some(&second), place) }
-            });
-            if table.thickness.is_none() && own.offset + other.offset == 0.0 {
-                notes.push(told_distance(name, [offset; 2]));
-            }
-            let touch = Touch { friction: table.friction, offset };
-            nodes.entry([host, of]).or_default().extend(&other.surface.nodes);
-            let contact = Contact {
-                name: name.clone(),
-                surface: own.surface.clone(),
-                with: With::Body(surface),
-                touch,
-            };
-            met.push((contact, [host, of]));
         }
         notes.into_iter().for_each(|note| self.note(note));
-        let mut counts: BTreeMap<usize, u32> = BTreeMap::new();
-        let mut first: BTreeMap<[usize; 2], u32> = BTreeMap::new();
-        for (&[host, of], own) in &mut nodes {
-            own.sort_unstable();
-            own.dedup();
-            let model = &self.participants[host].built.model;
-            let taken = counts.entry(host).or_insert(model.node_count() as u32);
-            first.insert([host, of], *taken);
-            *taken += own.len() as u32;
+        let numbers = self.add_guests(&met);
+        for (contact, pair) in met {
+            self.add_contact(contact, pair[0], &numbers[&pair]);
+        }
+    }
+
+    /// The two participants of a contact with the surfaces that touch, first the one whose guests are nodes of the other.
+    fn sides(&self, name: &str) -> Option<[(usize, &Meet); 2]> {
+        let sides = self.participants.iter().enumerate().flat_map(|(part, own)| {
+            let meets = own.built.meets.iter().filter(|meet| meet.contact == name);
+            meets.map(move |meet| (part, meet))
+        });
+        let mut sides: Vec<(usize, &Meet)> = sides.collect();
+        sides.sort_by_key(|(part, _)| {
+            let own = &self.participants[*part];
+            own.built.implicit.is_some() || own.scene.run.solver != SolverName::Explicit
+        });
+        sides.try_into().ok()
+    }
+
+    /// The contact of two sides, with nodes by their numbers in their own participants.
+    fn meeting(
+        &self,
+        name: &str,
+        table: &ContactTable,
+        sides: [(usize, &Meet); 2],
+        notes: &mut Vec<String>,
+    ) -> Result<Contact, Mistake> {
+        self.can_meet(table, sides)?;
+        let [own, other] = sides.map(|(_, meet)| meet);
+        let mut surface = other.surface.clone();
+        if self.is_behind(sides) {
+            surface.faces.iter_mut().for_each(|face| face.swap(1, 2));
+            notes.push(format!(
+                "contact `{name}`: `{}` touches by its nearer side, which its normals point away from",
+                table.between[other.side]
+            ));
+        }
+        if let Some(message) = self.overlap(sides, &surface) {
+            let help = "move one of them (`at` of its mesh)";
+            return Err(Mistake { message, label: "overlapping", help });
+        }
+        // Half of the thickness of shells, or what solids keep.
+        let usual = own.offset + other.offset;
+        let offset = table.thickness.unwrap_or_else(|| {
+            let (second, place) = self.side_by_side(sides, &surface);
+            if usual > 0.0 { usual } else { usual_distance(&own.surface, Some(&second), place) }
+        });
+        if table.thickness.is_none() && usual == 0.0 {
+            notes.push(told_distance(name, [offset; 2]));
+        }
+        let touch = Touch { friction: table.friction, offset };
+        Ok(Contact { name: name.into(), surface: own.surface.clone(), with: With::Body(surface), touch })
+    }
+
+    /// Whether the solvers, bodies and ties of two participants let them touch.
+    fn can_meet(&self, table: &ContactTable, sides: [(usize, &Meet); 2]) -> Result<(), Mistake> {
+        let solvers = sides.map(|(part, _)| self.participants[part].scene.run.solver);
+        if solvers != [SolverName::Explicit, SolverName::Implicit] {
+            let [first, second] = &table.between;
+            let message =
+                format!("`{first}` and `{second}` are of two participants that cannot touch each other");
+            return Err(Mistake { message, label: "two participants", help: HOW });
+        }
+        if sides.iter().any(|(_, meet)| meet.surface.faces.is_empty()) {
+            return Err(Mistake {
+                message: "bodies of two participants touch each other by faces, and bars have none".into(),
+                label: "no faces",
+                help: "name the solid beside it, or let it touch obstacles and tools only",
+            });
+        }
+        if !self.ties.is_empty() {
+            return Err(Mistake {
+                message: "participants are tied to each other or touch each other, not both".into(),
+                label: "beside a tie",
+                help: "put bodies that are tied into one participant",
+            });
+        }
+        Ok(())
+    }
+
+    /// Makes the nodes of second surfaces guests of the first participants; their numbers for each pair of participants.
+    fn add_guests(&mut self, met: &[(Contact, [usize; 2])]) -> BTreeMap<[usize; 2], Numbers> {
+        let mut nodes: BTreeMap<[usize; 2], Vec<u32>> = BTreeMap::new();
+        for (contact, pair) in met {
+            if let With::Body(surface) = &contact.with {
+                nodes.entry(*pair).or_default().extend(&surface.nodes);
+            }
+        }
+        let add = |(pair, mut nodes): ([usize; 2], Vec<u32>)| {
+            nodes.sort_unstable();
+            nodes.dedup();
+            let [host, of] = pair;
             let rest = &self.participants[of].built.model.rest;
-            let places: Vec<[f64; 3]> = own.iter().map(|&node| rest[node as usize]).collect();
+            let places: Vec<[f64; 3]> = nodes.iter().map(|&node| rest[node as usize]).collect();
             let built = Arc::make_mut(&mut self.participants[host].built);
-            Arc::make_mut(built.contacts.get_or_insert_default()).guests.extend(places);
-            self.guests.push(Guests { host, of, nodes: own.clone() });
+            let guests = &mut Arc::make_mut(built.contacts.get_or_insert_default()).guests;
+            let first = (built.model.node_count() + guests.len()) as u32;
+            guests.extend(places);
+            self.guests.push(Guests { host, of, nodes: nodes.clone() });
+            (pair, Numbers { first, nodes })
+        };
+        nodes.into_iter().map(add).collect()
+    }
+
+    /// Adds a contact to its first participant, with these numbers of the nodes of its second surface.
+    fn add_contact(&mut self, mut contact: Contact, host: usize, numbers: &Numbers) {
+        if let With::Body(surface) = &mut contact.with {
+            *surface = surface.numbered(|node| numbers.of(node));
         }
-        for (mut contact, pair) in met {
-            let (own, first) = (&nodes[&pair], first[&pair]);
-            if let With::Body(surface) = &mut contact.with {
-                *surface = surface.numbered(|node| first + own.partition_point(|&known| known < node) as u32);
-            }
-            let built = Arc::make_mut(&mut self.participants[pair[0]].built);
-            let (rest, contacts) = (&built.model.rest, Arc::make_mut(built.contacts.get_or_insert_default()));
-            let place = |node: u32| -> Vector3<f64> {
-                let node = node as usize;
-                rest.get(node).unwrap_or_else(|| &contacts.guests[node - rest.len()]).to_owned().into()
-            };
-            let near = contact.pairs(|node| node, place).map(|(mut pairs, _)| pairs.nearer(place));
-            if let Some(near) = near.filter(|near| !near.is_empty()) {
-                contacts.near.insert(contacts.contacts.len(), near);
-            }
-            contacts.contacts.push(contact);
+        let built = Arc::make_mut(&mut self.participants[host].built);
+        let (rest, contacts) = (&built.model.rest, Arc::make_mut(built.contacts.get_or_insert_default()));
+        let place = |node: u32| -> Vector3<f64> {
+            let node = node as usize;
+            rest.get(node).unwrap_or_else(|| &contacts.guests[node - rest.len()]).to_owned().into()
+        };
+        let near = contact.pairs(|node| node, place).map(|(mut pairs, _)| pairs.nearer(place));
+        if let Some(near) = near.filter(|near| !near.is_empty()) {
+            contacts.near.insert(contacts.contacts.len(), near);
         }
+        contacts.contacts.push(contact);
     }
 
     /// Whether the second body is a sheet whose side towards the first one is that which its normals point away from.
