@@ -59,8 +59,9 @@ pub use surface::thickness::Thickness;
 pub use surface::triangles::{SurfaceRepairs, TriangleMesh};
 pub use tets::complex::MOST_MATERIALS;
 pub use tets::missed::Missed;
+pub use tets::optimise::Steps;
 pub use tets::organ::{
-    DistanceReport, EdgeLengths, LostReport, MaterialReport, OrganMesh, Repairs, Steps, Tears, TetReport,
+    DistanceReport, EdgeLengths, LostReport, MaterialReport, OrganMesh, Repairs, Tears, TetReport,
 };
 pub use tets::request::OrganTets;
 pub use tets::stuffing::Stuffing;

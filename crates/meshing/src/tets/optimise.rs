@@ -7,6 +7,7 @@ use std::cell::OnceCell;
 
 use pliant_geometry::{CellKind, Vector3};
 use rayon::prelude::*;
+use serde::Serialize;
 
 use crate::input::surfaces::Surfaces;
 use crate::tets::complex::{Complex, OUTSIDE, Sides, acoustic_length};
@@ -54,14 +55,20 @@ const POLISH: f64 = 0.9;
 const VOLUME_TOLERANCE: f64 = 2e-3;
 
 /// The steps of the optimiser.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Optimised {
-    pub(crate) rounds: usize,
-    pub(crate) peeled: usize,
-    pub(crate) given: usize,
-    pub(crate) collapsed: usize,
-    pub(crate) flipped: usize,
-    pub(crate) moved: usize,
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Steps {
+    /// Rounds run.
+    pub rounds: usize,
+    /// Tets taken off the boundary.
+    pub peeled: usize,
+    /// Flat tets between materials given to the other one.
+    pub given: usize,
+    /// Edges collapsed.
+    pub collapsed: usize,
+    /// Edges and faces flipped.
+    pub flipped: usize,
+    /// Moves of points.
+    pub moved: usize,
 }
 
 /// The optimiser of one mesh.
@@ -75,12 +82,12 @@ pub(crate) struct Optimiser<'a> {
     /// Rejects what would let the boundary intersect itself, if it is there.
     guard: Option<Guard>,
     noise: u64,
-    done: Optimised,
+    done: Steps,
 }
 
 impl<'a> Optimiser<'a> {
     pub(crate) fn new(complex: &'a mut Complex, surfaces: Surfaces<'a>, guard: Option<Guard>) -> Self {
-        let (slack, lines_are_free, done) = (0.0, false, Optimised::default());
+        let (slack, lines_are_free, done) = (0.0, false, Steps::default());
         Self { complex, surfaces, slack, lines_are_free, guard, noise: 1, done }
     }
 
@@ -109,7 +116,7 @@ impl<'a> Optimiser<'a> {
         rounds: usize,
         volumes: &dyn Fn(&Complex) -> Vec<Option<f64>>,
         progress: &dyn Fn(f64),
-    ) -> Optimised {
+    ) -> Steps {
         let aim = (AIM * target).min(1.0);
         self.improve(aim, rounds, RAMP, &|done| progress(0.6 * done));
         let mut wanted = None;

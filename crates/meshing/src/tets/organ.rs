@@ -22,7 +22,7 @@ use crate::tets::long_edges::halve_long_edges;
 use crate::tets::lost::{LostPart, Samples};
 use crate::tets::manifold::{crowded_edges, mend, pinched_points};
 use crate::tets::octree::{Octree, around};
-use crate::tets::optimise::{Optimised, Optimiser};
+use crate::tets::optimise::{Optimiser, Steps};
 use crate::tets::request::{OrganTets, SMALLEST_PART};
 
 /// Meshes made at most until a distance is held.
@@ -197,33 +197,9 @@ impl OrganTets {
             samples.as_ref().map_or_else(Vec::new, |own| own.lost(&own.within_tets(complex), far))
         };
         let volumes = |complex: &Complex| wanted_volumes(anatomy, &lost(complex));
-        let improved = |complex: &mut Complex, guard: Option<Guard>, onward: &dyn Fn(f64)| {
-            let surfaces = Surfaces::new(anatomy, self.edge);
-            let mut guard = guard;
-            let long_edges = halve_long_edges(complex, &surfaces, &mut guard);
-            let optimised = match self.target > 0.0 {
-                true => {
-                    Optimiser::new(complex, surfaces, guard).run(self.target, self.rounds, &volumes, onward)
-                }
-                false => Optimised::default(),
-            };
-            (long_edges, optimised)
-        };
-        // Few bodies have banks that could meet, and guarding all moves takes long: it is done where the body touched itself, or where the
-        // result intersects itself without.
         let is_tight = mended.doubled + mended.parted > 0;
-        let mut made = None;
-        if !is_tight {
-            let mut free = complex.clone();
-            let done = improved(&mut free, None, &|done| progress(0.1 + 0.85 * done));
-            let is_sound = self_intersections(&free.points, &free.outer_faces()).0.is_empty();
-            made = is_sound.then_some((free, done));
-        }
-        let (complex, (long_edges, optimised)) = made.unwrap_or_else(|| {
-            let guard = Guard::new(&complex);
-            let done = improved(&mut complex, Some(guard), &|done| progress(0.1 + 0.85 * done));
-            (complex, done)
-        });
+        let (complex, long_edges, steps) =
+            self.improved(complex, anatomy, is_tight, &volumes, &|done| progress(0.1 + 0.85 * done));
         let repairs = Repairs {
             dropped_pieces,
             dropped_cells,
@@ -235,15 +211,7 @@ impl OrganTets {
             long_edges,
             closed_tears,
         };
-        let steps = Steps {
-            rounds: optimised.rounds,
-            peeled: optimised.peeled,
-            given: optimised.given,
-            collapsed: optimised.collapsed,
-            flipped: optimised.flipped,
-            moved: optimised.moved,
-        };
-        let left = crowded_edges(&complex).len();
+        let crowded_edges_left = crowded_edges(&complex).len();
         let pinched = pinched_points(&complex);
         let pinched_points = pinched.iter().map(|&point| complex.points[point as usize].into()).collect();
         let lost = lost(&complex);
@@ -252,19 +220,44 @@ impl OrganTets {
         let mesh = labelled(points, nodes, &material, &anatomy.labels());
         let surface = SurfaceCheck::of(&mesh).with_body(anatomy.field(), self.edge);
         let tears = Tears { number: tears.len(), first: tears.first().map(|tear| tear.places[0].into()) };
-        let of_complex = OfComplex {
-            raw,
-            acoustic_part,
-            edges,
-            crowded_edges_left: left,
-            pinched_points,
-            surface,
-            tears,
-            lost,
-        };
+        let of_complex =
+            OfComplex { raw, acoustic_part, edges, crowded_edges_left, pinched_points, surface, tears, lost };
         let report = TetReport::new(&mesh, &material, anatomy, of_complex, repairs, steps);
         progress(1.0);
         Ok(OrganMesh { mesh, report })
+    }
+
+    /// Halves long edges and optimises; how many were halved, and the steps. Few bodies have banks that could meet, and guarding all moves
+    /// takes long: it is done where the body touched itself (`is_tight`), or where the result intersects itself without.
+    fn improved(
+        &self,
+        mut complex: Complex,
+        anatomy: &Anatomy<'_>,
+        is_tight: bool,
+        volumes: &dyn Fn(&Complex) -> Vec<Option<f64>>,
+        progress: &dyn Fn(f64),
+    ) -> (Complex, usize, Steps) {
+        let improve = |complex: &mut Complex, mut guard: Option<Guard>| {
+            let surfaces = Surfaces::new(anatomy, self.edge);
+            let long_edges = halve_long_edges(complex, &surfaces, &mut guard);
+            let steps = match self.target > 0.0 {
+                true => {
+                    Optimiser::new(complex, surfaces, guard).run(self.target, self.rounds, volumes, progress)
+                }
+                false => Steps::default(),
+            };
+            (long_edges, steps)
+        };
+        if !is_tight {
+            let mut free = complex.clone();
+            let (long_edges, steps) = improve(&mut free, None);
+            if self_intersections(&free.points, &free.outer_faces()).0.is_empty() {
+                return (free, long_edges, steps);
+            }
+        }
+        let guard = Guard::new(&complex);
+        let (long_edges, steps) = improve(&mut complex, Some(guard));
+        (complex, long_edges, steps)
     }
 }
 
@@ -337,21 +330,47 @@ pub struct Repairs {
     pub closed_tears: usize,
 }
 
-/// The steps of the optimiser.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Steps {
-    /// Rounds run.
-    pub rounds: usize,
-    /// Tets taken off the boundary.
-    pub peeled: usize,
-    /// Flat tets between materials given to the other one.
-    pub given: usize,
-    /// Edges collapsed.
-    pub collapsed: usize,
-    /// Edges and faces flipped.
-    pub flipped: usize,
-    /// Moves of points.
-    pub moved: usize,
+impl Repairs {
+    /// The lines of those that were needed.
+    fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            dropped_pieces,
+            dropped_cells,
+            bridges,
+            crowded_edges,
+            doubled_points,
+            halved_edges,
+            parted_points,
+            long_edges,
+            closed_tears,
+        } = *self;
+        if dropped_pieces > 0 {
+            writeln!(f, "left out         {dropped_cells} cells in {dropped_pieces} small pieces")?;
+        }
+        if bridges > 0 {
+            writeln!(f, "gaps cut out     {bridges} edges bridged gaps thinner than the lattice")?;
+        }
+        if crowded_edges > 0 {
+            writeln!(
+                f,
+                "parted           {crowded_edges} edges where the body touched itself ({doubled_points} points doubled, \
+                 {halved_edges} edges halved)"
+            )?;
+        }
+        if parted_points > 0 {
+            writeln!(f, "parted           {parted_points} points where the boundary touched itself")?;
+        }
+        if long_edges > 0 {
+            writeln!(
+                f,
+                "halved           {long_edges} edges too long for the size requested at their location"
+            )?;
+        }
+        if closed_tears > 0 {
+            writeln!(f, "refined          {closed_tears} places where thin parts would be torn")?;
+        }
+        Ok(())
+    }
 }
 
 /// Lengths of the edges of a mesh [m].
@@ -627,10 +646,9 @@ impl TetReport {
             lost,
         }
     }
-}
 
-impl fmt::Display for TetReport {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    /// The lines of what its cells are like.
+    fn write_cells(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "nodes            {}", self.nodes)?;
         writeln!(f, "tets             {}", self.tets)?;
         for material in &self.materials {
@@ -671,43 +689,11 @@ impl fmt::Display for TetReport {
             least * 1e3,
             longest * 1e3,
             median * 1e3
-        )?;
-        let Repairs {
-            dropped_pieces,
-            dropped_cells,
-            bridges,
-            crowded_edges,
-            doubled_points,
-            halved_edges,
-            parted_points,
-            long_edges,
-            closed_tears,
-        } = self.repairs;
-        if dropped_pieces > 0 {
-            writeln!(f, "left out         {dropped_cells} cells in {dropped_pieces} small pieces")?;
-        }
-        if bridges > 0 {
-            writeln!(f, "gaps cut out     {bridges} edges bridged gaps thinner than the lattice")?;
-        }
-        if crowded_edges > 0 {
-            writeln!(
-                f,
-                "parted           {crowded_edges} edges where the body touched itself ({doubled_points} points doubled, \
-                 {halved_edges} edges halved)"
-            )?;
-        }
-        if parted_points > 0 {
-            writeln!(f, "parted           {parted_points} points where the boundary touched itself")?;
-        }
-        if long_edges > 0 {
-            writeln!(
-                f,
-                "halved           {long_edges} edges too long for the size requested at their location"
-            )?;
-        }
-        if closed_tears > 0 {
-            writeln!(f, "refined          {closed_tears} places where thin parts would be torn")?;
-        }
+        )
+    }
+
+    /// The lines of what is not as in the body.
+    fn write_flaws(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(lost) = LostReport::in_words(&self.lost) {
             writeln!(f, "lost             {lost}")?;
         }
@@ -725,6 +711,15 @@ impl fmt::Display for TetReport {
                 z * 1e3
             )?;
         }
+        Ok(())
+    }
+}
+
+impl fmt::Display for TetReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.write_cells(f)?;
+        self.repairs.write(f)?;
+        self.write_flaws(f)?;
         if let Some(DistanceReport { asked, reached, passes, to }) = self.distance {
             writeln!(
                 f,
