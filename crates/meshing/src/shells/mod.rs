@@ -300,8 +300,24 @@ struct Fit<'t> {
     /// Whether distances are looked at closely.
     closely: bool,
     best: Option<(Rank, Shells)>,
+    /// The largest part of the goal so far, and the round that reached it.
+    nearest: (f64, usize),
+    /// Rounds that are left once the goal is reached, and those to mend shells in.
+    left: usize,
+    mending: usize,
     /// Whether nothing else is tried if it fails.
     is_last: bool,
+}
+
+/// How a fit ends.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum End {
+    /// More rounds do not help.
+    Done,
+    /// It comes no nearer, and another one can.
+    GivenUp,
+    /// After all rounds, or all the work allowed.
+    Spent,
 }
 
 /// How good shells are; the least is best. Whether the goal is missed, how many shells cross or have creases, whether triangles are poor,
@@ -316,7 +332,20 @@ impl<'t> Fit<'t> {
         };
         let mut shells = Shells::new(mesh, target);
         shells.place_border(target);
-        Self { target, goal, aim, shells, rounds: 0, effort, closely: false, best: None, is_last }
+        Self {
+            target,
+            goal,
+            aim,
+            shells,
+            rounds: 0,
+            effort,
+            closely: false,
+            best: None,
+            nearest: (0.0, 0),
+            left: LAST_ROUNDS,
+            mending: MENDING_ROUNDS,
+            is_last,
+        }
     }
 
     /// The shells of the triangles that it starts from, which do not cross, with the normals of the target.
@@ -333,9 +362,6 @@ impl<'t> Fit<'t> {
         let target = self.target;
         self.shells.even_out(target, 10, &mut self.effort);
         let mut now = self.shells.distances(&target.coarse, target);
-        let (mut left, mut mending) = (LAST_ROUNDS, MENDING_ROUNDS);
-        let (mut ended, mut nearest, mut nearest_in) = (false, 0.0, 0);
-        let mut given_up = false;
         while self.rounds < MOST_ROUNDS && !self.effort.is_spent() {
             self.rounds += 1;
             let times = if self.shells.moving() > MANY { 1 } else { 4 };
@@ -343,54 +369,14 @@ impl<'t> Fit<'t> {
             let far = now.far();
             let (part, bound, room) = self.bounds(&far);
             progress(self.progress(&far, part));
-            if part > NEARER * nearest {
-                (nearest, nearest_in) = (part, self.rounds);
+            if self.is_stuck(part) {
+                return self.end(End::GivenUp, progress);
             }
-            let stays = nearest < UPRIGHT_FROM && self.rounds >= nearest_in + STUCK;
-            given_up = !self.is_last && stays && self.effort.part() > GIVEN_UP;
-            if given_up {
-                break;
-            }
-            if !self.shells.strict && (part >= UPRIGHT_FROM || self.effort.part() >= UPRIGHT_AFTER) {
-                // Those before may cross.
-                self.best = None;
-                self.shells.require_upright();
-                self.shells.uncross(&mut self.effort);
-                now = self.shells.distances(&target.coarse, target);
-                self.effort.search(target.coarse.samples.len(), effort::LANDING);
-                self.shells.activate(self.shells.corners_of(&now.far(), bound));
+            if let Some(anew) = self.measured_anew(part, bound) {
+                now = anew;
                 continue;
             }
-            if !self.closely && part >= CLOSELY {
-                self.closely = true;
-                now = self.shells.distances(&target.fine, target);
-                self.effort.search(target.fine.samples.len(), effort::LANDING);
-                self.shells.activate(self.shells.corners_of(&now.far(), bound));
-                continue;
-            }
-            let [creased, crossing] = if self.shells.strict { self.flaws() } else { Default::default() };
-            let rank = self.rank(&far, part, creased.len() + crossing.len());
-            // Halving what has a crease helps where a fold is wide enough for smaller shells, and not where it is sharp.
-            let fewer = self.best.as_ref().is_none_or(|(best, _)| best.0 || rank.1 < best.1);
-            let mut flawed = crossing;
-            flawed.extend(creased.into_iter().filter(|_| fewer && part >= 1.0));
-            if self.best.as_ref().is_none_or(|(best, _)| rank < *best) {
-                self.best = Some((rank, self.shells.clone()));
-            }
-            if part >= 1.0 {
-                let mends = !flawed.is_empty() && mending > 0;
-                // As many as asked for come nearer by exchange.
-                let is_near = match self.goal {
-                    ShellGoal::Error(_) => !rank.2 && rank.3 <= self.aim,
-                    ShellGoal::Shells(_) => true,
-                };
-                if !mends && (left == 0 || is_near) {
-                    ended = true;
-                    break;
-                }
-                flawed.retain(|_| mends);
-                *(if mends { &mut mending } else { &mut left }) -= 1;
-            }
+            let Some(flawed) = self.flawed(&far, part) else { return self.end(End::Done, progress) };
             let mut wanted = far;
             for shell in flawed {
                 wanted[shell as usize] = 2.0 * wanted[shell as usize].max(bound);
@@ -399,8 +385,7 @@ impl<'t> Fit<'t> {
                 wanted[shell as usize] = 0.0;
             }
             if self.shells.refine(&wanted, bound, room, target) == 0 && part < 1.0 {
-                ended = true;
-                break;
+                return self.end(End::Done, progress);
             }
             self.shells.even_out(target, 3, &mut self.effort);
             if self.shells.strict {
@@ -408,11 +393,76 @@ impl<'t> Fit<'t> {
             }
             now = self.shells.distances_after(&now, target, &mut self.effort);
         }
+        self.end(End::Spent, progress)
+    }
+
+    /// Whether it is given up, since it comes no nearer; takes note of the part of the goal that is reached.
+    fn is_stuck(&mut self, part: f64) -> bool {
+        if part > NEARER * self.nearest.0 {
+            self.nearest = (part, self.rounds);
+        }
+        let (nearest, nearest_in) = self.nearest;
+        let stays = nearest < UPRIGHT_FROM && self.rounds >= nearest_in + STUCK;
+        !self.is_last && stays && self.effort.part() > GIVEN_UP
+    }
+
+    /// Makes normals stand on their triangles, or looks at distances closely, where it is time for that; the distances then.
+    fn measured_anew(&mut self, part: f64, bound: f64) -> Option<Distances> {
+        let target = self.target;
+        let detail = if !self.shells.strict && (part >= UPRIGHT_FROM || self.effort.part() >= UPRIGHT_AFTER) {
+            // Those before may cross.
+            self.best = None;
+            self.shells.require_upright();
+            self.shells.uncross(&mut self.effort);
+            &target.coarse
+        } else if !self.closely && part >= CLOSELY {
+            self.closely = true;
+            &target.fine
+        } else {
+            return None;
+        };
+        let now = self.shells.distances(detail, target);
+        self.effort.search(detail.samples.len(), effort::LANDING);
+        self.shells.activate(self.shells.corners_of(&now.far(), bound));
+        Some(now)
+    }
+
+    /// Keeps the shells if they are the best so far. Those to be halved for what is wrong with them; `None` where no round helps any more.
+    fn flawed(&mut self, far: &[f64], part: f64) -> Option<Vec<u32>> {
+        let [creased, crossing] = if self.shells.strict { self.flaws() } else { Default::default() };
+        let rank = self.rank(far, part, creased.len() + crossing.len());
+        // Halving what has a crease helps where a fold is wide enough for smaller shells, and not where it is sharp.
+        let fewer = self.best.as_ref().is_none_or(|(best, _)| best.0 || rank.1 < best.1);
+        let mut flawed = crossing;
+        flawed.extend(creased.into_iter().filter(|_| fewer && part >= 1.0));
+        if self.best.as_ref().is_none_or(|(best, _)| rank < *best) {
+            self.best = Some((rank, self.shells.clone()));
+        }
+        if part < 1.0 {
+            return Some(flawed);
+        }
+        let mends = !flawed.is_empty() && self.mending > 0;
+        // As many as asked for come nearer by exchange.
+        let is_near = match self.goal {
+            ShellGoal::Error(_) => !rank.2 && rank.3 <= self.aim,
+            ShellGoal::Shells(_) => true,
+        };
+        if !mends && (self.left == 0 || is_near) {
+            return None;
+        }
+        flawed.retain(|_| mends);
+        *(if mends { &mut self.mending } else { &mut self.left }) -= 1;
+        Some(flawed)
+    }
+
+    /// The best shells so far, exchanged and repaired unless it is given up, and the work done.
+    fn end(mut self, end: End, progress: &dyn Fn(FitProgress)) -> (Found, Effort) {
+        let target = self.target;
         let mut shells = self.best.map_or(self.shells, |(_, best)| best);
         shells.require_upright();
         shells.activate((0..shells.mesh.points.len() as u32).collect());
         shells.uncross(&mut self.effort);
-        if !given_up {
+        if end != End::GivenUp {
             if let ShellGoal::Shells(number) = self.goal {
                 self.effort = self.effort.with_left(EXCHANGE);
                 let (rounds, diagonal) = (self.rounds, target.diagonal);
@@ -423,7 +473,7 @@ impl<'t> Fit<'t> {
             shells.repair(target);
             shells.crease_crossing();
         }
-        let fitted = shells.finished(target, self.rounds, self.goal, !ended);
+        let fitted = shells.finished(target, self.rounds, self.goal, end != End::Done);
         (Found { shells, fitted }, self.effort)
     }
 
