@@ -91,41 +91,7 @@ impl Lens {
     /// Triangles of a lattice of this spacing [m], cut at the outline.
     fn cut(&self, spacing: f64) -> Mesh {
         let line = self.line();
-        let height = spacing * 0.75_f64.sqrt();
-        let half = 0.5 * self.overall;
-        let rows = (half / height).ceil() as i32 + 1;
-        let columns = (half / spacing).ceil() as i32 + 2;
-        let wide = (2 * columns + 1) as u32;
-        let mut points = Vec::new();
-        let mut outside = Vec::new();
-        for row in -rows..=rows {
-            for column in -columns..=columns {
-                let shift = if row % 2 == 0 { 0.0 } else { 0.5 };
-                let mut x = Vector3::new((f64::from(column) + shift) * spacing, f64::from(row) * height, 0.0);
-                let mut out = self.outside(&line, &x);
-                if out.abs() < SNAP * spacing {
-                    let h = 1e-3 * spacing;
-                    let slope = |by: Vector3| {
-                        (self.outside(&line, &(x + by)) - self.outside(&line, &(x - by))) / (2.0 * h)
-                    };
-                    let direction = Vector3::new(slope(Vector3::x() * h), slope(Vector3::y() * h), 0.0);
-                    x -= direction * out;
-                    out = 0.0;
-                }
-                points.push(x);
-                outside.push(out);
-            }
-        }
-        let mut triangles = Vec::new();
-        for row in 0..2 * rows as u32 {
-            for column in 0..wide - 1 {
-                let [a, b] = [row * wide + column, row * wide + column + 1];
-                let [c, d] = [a, b].map(|node| node + wide);
-                // Rows are shifted to the right from every other one on.
-                let shifted = (row as i32 - rows) % 2 != 0;
-                triangles.extend(if shifted { [[a, b, d], [a, d, c]] } else { [[a, b, c], [b, d, c]] });
-            }
-        }
+        let Lattice { mut points, outside, triangles } = self.lattice(&line, spacing);
         let mut ends = BTreeMap::new();
         let mut kept = Vec::new();
         for corners in triangles {
@@ -171,6 +137,61 @@ impl Lens {
             ..Mesh::default()
         }
     }
+
+    /// A lattice of a spacing [m] that covers the lens, its points moved onto the outline where that is near.
+    fn lattice(&self, line: &[Vector3], spacing: f64) -> Lattice {
+        let height = spacing * 0.75_f64.sqrt();
+        let half = 0.5 * self.overall;
+        let rows = (half / height).ceil() as i32 + 1;
+        let columns = (half / spacing).ceil() as i32 + 2;
+        let wide = (2 * columns + 1) as u32;
+        let mut lattice = Lattice::default();
+        for row in -rows..=rows {
+            for column in -columns..=columns {
+                let shift = if row % 2 == 0 { 0.0 } else { 0.5 };
+                let x = Vector3::new((f64::from(column) + shift) * spacing, f64::from(row) * height, 0.0);
+                let (x, out) = self.snapped(line, x, spacing);
+                lattice.points.push(x);
+                lattice.outside.push(out);
+            }
+        }
+        for row in 0..2 * rows as u32 {
+            for column in 0..wide - 1 {
+                let [a, b] = [row * wide + column, row * wide + column + 1];
+                let [c, d] = [a, b].map(|node| node + wide);
+                // Rows are shifted to the right from every other one on.
+                let shifted = (row as i32 - rows) % 2 != 0;
+                lattice.triangles.extend(if shifted {
+                    [[a, b, d], [a, d, c]]
+                } else {
+                    [[a, b, c], [b, d, c]]
+                });
+            }
+        }
+        lattice
+    }
+
+    /// A point of a lattice of a spacing [m], on the outline if that is near, and how far [m] it is out of the lens.
+    fn snapped(&self, line: &[Vector3], x: Vector3, spacing: f64) -> (Vector3, f64) {
+        let out = self.outside(line, &x);
+        if out.abs() < SNAP * spacing {
+            let h = 1e-3 * spacing;
+            let slope =
+                |by: Vector3| (self.outside(line, &(x + by)) - self.outside(line, &(x - by))) / (2.0 * h);
+            let direction = Vector3::new(slope(Vector3::x() * h), slope(Vector3::y() * h), 0.0);
+            return (x - direction * out, 0.0);
+        }
+        (x, out)
+    }
+}
+
+/// A lattice around a lens.
+#[derive(Default)]
+struct Lattice {
+    points: Vec<Vector3>,
+    /// How far [m] each point is out of the lens.
+    outside: Vec<f64>,
+    triangles: Vec<[u32; 3]>,
 }
 
 #[cfg(test)]
