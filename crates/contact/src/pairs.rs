@@ -526,16 +526,11 @@ impl Pairs {
             kept: self.kept_by([&[(node, 1.0)], &[(a, u), (b, v), (c, w)]]),
             in_order: true,
         };
-        // The nearest edge or corner: its distance, the way from there, the normals of its triangles, its triangle and weights.
-        let mut nearest = (f64::INFINITY, Vector3::zeros(), Vector3::zeros(), 0, [0.0; 3]);
-        // Of the triangles that the node lies beneath, the nearest one: whoever is inside leaves by the shortest way.
-        let mut beneath: Option<Pair> = None;
-        let mut above = f64::INFINITY;
+        let mut nearest = Nearest::default();
+        let mut seen = Seen { beneath: None, above: f64::INFINITY, on: ON * self.depth, rows };
         // The least distance from a triangle that faces away: no contact, but perhaps a shorter way out.
         let mut hidden = f64::INFINITY;
-        // Whether the nearest edge or corner is of a triangle that does not.
-        let mut faces = false;
-        rows.clear();
+        seen.rows.clear();
         for face in list {
             let nodes = other.faces[face as usize];
             let [a, b, c] = nodes;
@@ -554,49 +549,98 @@ impl Pairs {
                 continue;
             }
             if here.is_inner {
-                let pair = pair(nodes, here.weights, here.normal, here.height);
-                if here.height >= -ON * self.depth {
-                    above = above.min(here.height);
-                    rows.push((face, pair));
-                } else if beneath.is_none_or(|known| known.distance < here.height) {
-                    beneath = Some(pair);
-                }
-                continue;
-            }
-            let distance = here.distance();
-            let (known, ..) = nearest;
-            if distance < known * (1.0 - SAME) {
-                nearest = (distance, here.way, here.normal, face, here.weights);
-                faces = !faces_away;
-            } else if distance <= known * (1.0 + SAME) {
-                nearest.2 += here.normal;
-                faces |= !faces_away;
+                seen.add(face, pair(nodes, here.weights, here.normal, here.height));
+            } else {
+                nearest.take(face, &here, faces_away);
             }
         }
-        let (distance, way, normals, face, weights) = nearest;
-        if faces && distance < above.min(hidden) * (1.0 - SAME) {
-            // In one plane with a triangle, beside it, is not beneath it.
-            let sign = if way.dot(&normals) < -SAME * distance * normals.norm() { -1.0 } else { 1.0 };
-            // Who is behind a border is beside the surface.
-            let nodes = other.faces[face as usize];
-            let mut on = nodes.iter().zip(&weights).filter(|(_, weight)| **weight != 0.0);
-            let beside = sign < 0.0 && on.all(|(node, _)| other.border.binary_search(node).is_ok());
-            let normal = (way * sign).try_normalize(ON * self.depth).or_else(|| normals.try_normalize(0.0));
-            if let Some(normal) = normal.filter(|_| !beside) {
-                let pair = pair(nodes, weights, normal, sign * distance);
-                if pair.distance >= -ON * self.depth {
-                    above = pair.distance;
-                    rows.insert(rows.partition_point(|&(known, _)| known < face), (face, pair));
-                } else if beneath.is_none_or(|known| known.distance < pair.distance) {
-                    beneath = Some(pair);
-                }
-            }
+        if nearest.faces
+            && nearest.distance < seen.above.min(hidden) * (1.0 - SAME)
+            && let Some((normal, distance)) = nearest.outward(other, seen.on)
+        {
+            let nodes = other.faces[nearest.face as usize];
+            seen.add(nearest.face, pair(nodes, nearest.weights, normal, distance));
         }
-        match beneath {
+        match seen.beneath {
             Some(Pair { distance, .. }) if -distance > hidden && -distance > SLIGHT * self.depth => {}
-            Some(pair) if -pair.distance < above => found(pair),
-            _ => rows.drain(..).for_each(|(_, pair)| found(pair)),
+            Some(pair) if -pair.distance < seen.above => found(pair),
+            _ => seen.rows.drain(..).for_each(|(_, pair)| found(pair)),
         }
+    }
+}
+
+/// What a node sees of a surface.
+struct Seen<'r> {
+    /// Of the triangles that it lies beneath, the nearest one: whoever is inside leaves by the shortest way.
+    beneath: Option<Pair>,
+    /// The least distance [m] from those that it lies above, or on.
+    above: f64,
+    /// The overlap [m] up to which it lies on a triangle.
+    on: f64,
+    /// The pairs with these, by increasing triangles.
+    rows: &'r mut Vec<(u32, Pair)>,
+}
+
+impl Seen<'_> {
+    #[inline]
+    fn add(&mut self, face: u32, pair: Pair) {
+        if pair.distance >= -self.on {
+            self.above = self.above.min(pair.distance);
+            self.rows.insert(self.rows.partition_point(|&(known, _)| known < face), (face, pair));
+        } else if self.beneath.is_none_or(|known| known.distance < pair.distance) {
+            self.beneath = Some(pair);
+        }
+    }
+}
+
+/// The nearest edge or corner of a surface to a node.
+struct Nearest {
+    distance: f64,
+    /// The way [m] from there.
+    way: Vector3<f64>,
+    /// The sum of the normals of its triangles.
+    normals: Vector3<f64>,
+    /// Whether one of these does not face away.
+    faces: bool,
+    /// The first of its triangles, and the weights in it.
+    face: u32,
+    weights: [f64; 3],
+}
+
+impl Default for Nearest {
+    #[inline]
+    fn default() -> Self {
+        let none = Vector3::zeros();
+        Self { distance: f64::INFINITY, way: none, normals: none, faces: false, face: 0, weights: [0.0; 3] }
+    }
+}
+
+impl Nearest {
+    /// Takes what is nearest of a triangle, if nothing was nearer.
+    #[inline]
+    fn take(&mut self, face: u32, here: &Above, faces_away: bool) {
+        let distance = here.distance();
+        if distance < self.distance * (1.0 - SAME) {
+            let (way, normals, weights) = (here.way, here.normal, here.weights);
+            *self = Self { distance, way, normals, faces: !faces_away, face, weights };
+        } else if distance <= self.distance * (1.0 + SAME) {
+            self.normals += here.normal;
+            self.faces |= !faces_away;
+        }
+    }
+
+    /// The outward normal there and the distance [m] along it, with the overlap [m] up to which a node lies on it; `None` beside an open surface.
+    #[inline]
+    fn outward(&self, surface: &Side, on: f64) -> Option<(Vector3<f64>, f64)> {
+        let Self { distance, way, normals, .. } = self;
+        // In one plane with a triangle, beside it, is not beneath it.
+        let sign = if way.dot(normals) < -SAME * distance * normals.norm() { -1.0 } else { 1.0 };
+        // Who is behind a border is beside the surface.
+        let nodes = surface.faces[self.face as usize];
+        let mut at = nodes.iter().zip(&self.weights).filter(|(_, weight)| **weight != 0.0);
+        let beside = sign < 0.0 && at.all(|(node, _)| surface.border.binary_search(node).is_ok());
+        let normal = (way * sign).try_normalize(on).or_else(|| normals.try_normalize(0.0));
+        normal.filter(|_| !beside).map(|normal| (normal, sign * distance))
     }
 }
 
