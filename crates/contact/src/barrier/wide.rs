@@ -291,46 +291,60 @@ impl Wide {
             return;
         }
         sides.iter_mut().for_each(|side| side.refit(at, margin));
-        let sides = &*sides;
-        let (mut met, mut own) = (Vec::new(), Vec::new());
-        // Neighbours at rest are most of what boxes meet: they are marked, and seen no further.
         left_out.fill(0);
-        for (number, side) in sides.iter().enumerate() {
-            let against = other(sides, number);
-            let [_, of_faces] = skins.of(Sort::Point(number), sides.len());
-            for (&node, point) in side.points.iter().zip(0..) {
-                let wanted = around([node], &at, &margin);
-                met.clear();
-                let mark = point + 1;
-                apart[0].of(point).iter().for_each(|&face| left_out[face as usize] = mark);
-                against.face_tree.near(&wanted, |face| {
-                    if left_out[face as usize] != mark && against.face_boxes[face as usize].touches(&wanted) {
-                        met.push(face);
-                    }
-                });
-                for &face in &met {
-                    let corners = against.faces[face as usize];
-                    if corners.contains(&node) {
-                        continue;
-                    }
-                    let limit = within + skin[node as usize] + of_faces[face as usize];
-                    let [b, c, d] = corners.map(|node| &place[node as usize]);
-                    let points = [&place[node as usize], b, c, d];
-                    if !Kind::PointTriangle.is_beyond(points, limit * (1.0 + ROUND_OFF)) {
-                        own.push((face, Kind::PointTriangle.bound(points)));
-                    }
-                }
-                pairs[number].add(&mut own);
-            }
+        for number in 0..sides.len() {
+            self.find_points(sides, number, &apart[0]);
         }
-        left_out.fill(0);
+        self.left_out.fill(0);
+        self.find_edges(sides, &apart[1]);
+    }
+
+    /// Finds the pairs of points of a side with faces.
+    fn find_points(&mut self, sides: &[BarrierSide], number: usize, apart: &Apart) {
+        let Self { pairs, skin, place, within, left_out, skins, .. } = self;
+        let at = |node: u32| place[node as usize];
+        let margin = |node: u32| skin[node as usize] + 0.5 * *within;
+        let against = other(sides, number);
+        let [_, of_faces] = skins.of(Sort::Point(number), sides.len());
+        let (mut met, mut own) = (Vec::new(), Vec::new());
+        for (&node, point) in sides[number].points.iter().zip(0..) {
+            let wanted = around([node], &at, &margin);
+            met.clear();
+            // Neighbours at rest are most of what boxes meet: they are marked, and seen no further.
+            let mark = point + 1;
+            apart.of(point).iter().for_each(|&face| left_out[face as usize] = mark);
+            against.face_tree.near(&wanted, |face| {
+                if left_out[face as usize] != mark && against.face_boxes[face as usize].touches(&wanted) {
+                    met.push(face);
+                }
+            });
+            for &face in &met {
+                let corners = against.faces[face as usize];
+                if corners.contains(&node) {
+                    continue;
+                }
+                let limit = *within + skin[node as usize] + of_faces[face as usize];
+                let [b, c, d] = corners.map(|node| &place[node as usize]);
+                let points = [&place[node as usize], b, c, d];
+                if !Kind::PointTriangle.is_beyond(points, limit * (1.0 + ROUND_OFF)) {
+                    own.push((face, Kind::PointTriangle.bound(points)));
+                }
+            }
+            pairs[number].add(&mut own);
+        }
+    }
+
+    /// Finds the pairs of edges, leaving neighbours out like those of points.
+    fn find_edges(&mut self, sides: &[BarrierSide], apart: &Apart) {
+        let Self { pairs, place, within, left_out, skins, .. } = self;
         let (side, against) = (&sides[0], other(sides, 0));
         let [own_skins, of_others] = skins.of(Sort::Edges, sides.len());
+        let (mut met, mut own) = (Vec::new(), Vec::new());
         for (edge, number) in side.edges.iter().zip(0..) {
             let wanted = side.edge_boxes[number as usize];
             met.clear();
             let mark = number + 1;
-            apart[1].of(number).iter().for_each(|&edge| left_out[edge as usize] = mark);
+            apart.of(number).iter().for_each(|&edge| left_out[edge as usize] = mark);
             against.edge_tree.near(&wanted, |other| {
                 if (sides.len() > 1 || other > number)
                     && left_out[other as usize] != mark
@@ -344,7 +358,7 @@ impl Wide {
                 if edge.iter().any(|end| ends.contains(end)) {
                     continue;
                 }
-                let limit = within + own_skins[number as usize] + of_others[second as usize];
+                let limit = *within + own_skins[number as usize] + of_others[second as usize];
                 let points = [edge[0], edge[1], ends[0], ends[1]].map(|node| &place[node as usize]);
                 if !Kind::EdgeEdge.is_beyond(points, limit * (1.0 + ROUND_OFF)) {
                     own.push((second, Kind::EdgeEdge.bound(points)));
