@@ -262,6 +262,26 @@ struct Now<S: Simd> {
     energy: Lane<S>,
 }
 
+/// Blocks of the stiffness over spins.
+struct OverSpins<S: Simd> {
+    /// Of turns and translations.
+    mixed: [[Square<S>; 3]; 3],
+    /// Of turns, on and below the diagonal.
+    turned: [Square<S>; 6],
+    /// Symmetric parts of the change of moments.
+    corrections: [Square<S>; 3],
+    /// What rigid turns make of each row.
+    of_rigid: [Square<S>; 6],
+}
+
+impl<S: Simd> OverSpins<S> {
+    /// A block of turns.
+    #[inline(always)]
+    fn turns(&self, i: usize, j: usize) -> Square<S> {
+        if i >= j { self.turned[place(i, j)] } else { transpose(&self.turned[place(j, i)]) }
+    }
+}
+
 #[inline(always)]
 fn load3<S: Simd>(simd: S, from: &[Pack], at: usize, register: usize) -> Three<S> {
     three(|k| Lane::load(simd, &from[at + k], register))
@@ -393,46 +413,65 @@ impl<S: Simd> Now<S> {
     /// Writes the stiffness, in space.
     #[inline(always)]
     fn tangent(&self, pack: &FacetPack, work: &mut Work, register: usize) {
-        let zero = Lane::splat(self.simd, 0.0);
-        let none = [[zero; 3]; 3];
-        // Over spins: Hᵀ K H. Blocks of turns and translations, and of turns. In loops: closures of `map` are left as calls, without the
-        // instructions of this kernel, and take most of its time.
-        let (mut mixed, mut turned, mut corrections) = ([[none; 3]; 3], [none; 6], [none; 3]);
+        let none = [[Lane::splat(self.simd, 0.0); 3]; 3];
+        let mut over = OverSpins {
+            mixed: [[none; 3]; 3],
+            turned: [none; 6],
+            corrections: [none; 3],
+            of_rigid: [none; 6],
+        };
+        self.spin(&mut over, pack, work, register);
+        self.turn_rigidly(&mut over, pack, register);
+        let whole = self.of_rigid_from_rigid(&over);
+        self.write_translations(pack, &over, &whole, work, register);
+        self.write_turns(&over, work, register);
+    }
+
+    /// Finds Hᵀ K H but for translations alone, and the corrections. In loops: closures of `map` are left as calls, without the instructions of
+    /// this kernel, and take most of its time.
+    #[inline(always)]
+    fn spin(&self, over: &mut OverSpins<S>, pack: &FacetPack, work: &Work, register: usize) {
         for i in 0..3 {
             let back = transpose(&self.turn[i]);
-            for (j, mixed) in mixed[i].iter_mut().enumerate() {
+            for (j, mixed) in over.mixed[i].iter_mut().enumerate() {
                 *mixed = times(&back, &block(self.simd, pack, register, [2 * i + 1, 2 * j]));
             }
             for j in 0..=i {
-                turned[place(i, j)] = times(
+                over.turned[place(i, j)] = times(
                     &times(&back, &block(self.simd, pack, register, [2 * i + 1, 2 * j + 1])),
                     &self.turn[j],
                 );
             }
-            corrections[i] = self.correction(i, work, register);
+            over.corrections[i] = self.correction(i, work, register);
         }
-        let of_turns = |i: usize, j: usize| {
-            if i >= j { turned[place(i, j)] } else { transpose(&turned[place(j, i)]) }
-        };
+    }
 
-        // What rigid turns make of it, and its symmetric part seen from them.
-        let mut of_rigid = [none; 6];
+    /// Finds what rigid turns make of it.
+    #[inline(always)]
+    fn turn_rigidly(&self, over: &mut OverSpins<S>, pack: &FacetPack, register: usize) {
         for i in 0..3 {
             for (j, arm) in self.arm.iter().enumerate() {
-                let turns = difference(&of_turns(i, j), &arm.after(&mixed[i][j]));
-                of_rigid[2 * i + 1] = if j == 0 { turns } else { sum(&of_rigid[2 * i + 1], &turns) };
+                let turns = difference(&over.turns(i, j), &arm.after(&over.mixed[i][j]));
+                over.of_rigid[2 * i + 1] =
+                    if j == 0 { turns } else { sum(&over.of_rigid[2 * i + 1], &turns) };
                 let ways = difference(
-                    &transpose(&mixed[j][i]),
+                    &transpose(&over.mixed[j][i]),
                     &arm.after(&block(self.simd, pack, register, [2 * i, 2 * j])),
                 );
-                of_rigid[2 * i] = if j == 0 { ways } else { sum(&of_rigid[2 * i], &ways) };
+                over.of_rigid[2 * i] = if j == 0 { ways } else { sum(&over.of_rigid[2 * i], &ways) };
             }
         }
-        let mut whole = none;
+    }
+
+    /// Half of the symmetric part of what rigid turns make of it, seen from them: ½ W.
+    #[inline(always)]
+    fn of_rigid_from_rigid(&self, over: &OverSpins<S>) -> Square<S> {
+        let zero = Lane::splat(self.simd, 0.0);
+        let mut whole = [[zero; 3]; 3];
         for i in 0..3 {
-            whole = sum(&whole, &of_rigid[2 * i + 1]);
-            whole = difference(&whole, &self.arm[i].transposed_before(&of_rigid[2 * i]));
-            whole = sum(&whole, &corrections[i]);
+            whole = sum(&whole, &over.of_rigid[2 * i + 1]);
+            whole = difference(&whole, &self.arm[i].transposed_before(&over.of_rigid[2 * i]));
+            whole = sum(&whole, &over.corrections[i]);
             let [x, y, z] = self.spun[2 * i];
             let skew = [[zero, -z, y], [z, zero, -x], [-y, x, zero]];
             whole = sum(&whole, &self.arm[i].after(&skew));
@@ -443,17 +482,29 @@ impl<S: Simd> Now<S> {
                 *entry = entry.half();
             }
         }
+        whole
+    }
 
-        let mut left = [none; 3];
-        for i in 0..3 {
-            let mut own = of_rigid[2 * i];
+    /// Writes the blocks of translations.
+    #[inline(always)]
+    fn write_translations(
+        &self,
+        pack: &FacetPack,
+        over: &OverSpins<S>,
+        whole: &Square<S>,
+        work: &mut Work,
+        register: usize,
+    ) {
+        let mut left = [[[Lane::splat(self.simd, 0.0); 3]; 3]; 3];
+        for (i, left) in left.iter_mut().enumerate() {
+            let mut own = over.of_rigid[2 * i];
             let [p, f] = [&self.projected[2 * i], &self.spun[2 * i]];
             add_half_skew(&mut own, &[p[0] + f[0], p[1] + f[1], p[2] + f[2]]);
             // Of the change of G: the frame tilts with the corners.
             let g = &self.spin[i];
             let tilt = (g.xz * self.moment[1]).less(g.yz, self.moment[0]);
             own[2][2] = own[2][2] - tilt.half();
-            left[i] = difference(&own, &g.transposed_before(&whole));
+            *left = difference(&own, &g.transposed_before(whole));
         }
         for i in 0..3 {
             for j in 0..=i {
@@ -466,10 +517,15 @@ impl<S: Simd> Now<S> {
                 self.write(work, register, [2 * i, 2 * j], &own);
             }
         }
+    }
+
+    /// Writes the blocks of turns with translations, and of turns.
+    #[inline(always)]
+    fn write_turns(&self, over: &OverSpins<S>, work: &mut Work, register: usize) {
         for i in 0..3 {
-            let mut own = sum(&of_rigid[2 * i + 1], &corrections[i]);
+            let mut own = sum(&over.of_rigid[2 * i + 1], &over.corrections[i]);
             add_half_skew(&mut own, &self.projected[2 * i + 1]);
-            for (j, block) in mixed[i].iter().enumerate() {
+            for (j, block) in over.mixed[i].iter().enumerate() {
                 let own = difference(block, &self.spin[j].after(&own));
                 if i >= j {
                     self.write(work, register, [2 * i + 1, 2 * j], &own);
@@ -478,8 +534,8 @@ impl<S: Simd> Now<S> {
                 }
             }
             for j in 0..=i {
-                let own = turned[place(i, j)];
-                let own = if i == j { sum(&own, &corrections[i]) } else { own };
+                let own = over.turned[place(i, j)];
+                let own = if i == j { sum(&own, &over.corrections[i]) } else { own };
                 self.write(work, register, [2 * i + 1, 2 * j + 1], &own);
             }
         }
