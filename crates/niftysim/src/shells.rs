@@ -72,58 +72,27 @@ pub(super) fn read(
         .attribute("type")
         .map_or_else(|| attribute(elements, "Type", "Type=\"SURFACE\""), Ok)?
         .trim();
-    let of_surface = kind == "SURFACE";
-    let mut leave_out = |what: String| remarks.missing.push(what);
-    let at = line(elements);
     if geometry.solid == Solid::H8 || kind == "Q4" {
-        leave_out(format!(
-            "the shells of line {at} (on quads; a scene's membranes of NiftySim are triangles on tets)"
+        remarks.missing.push(format!(
+            "the shells of line {} (on quads; a scene's membranes of NiftySim are triangles on tets)",
+            line(elements)
         ));
         return Ok(Vec::new());
     }
-    let triangles: Vec<Vec<u32>> = match kind {
-        "SURFACE" => boundary(&geometry.mesh).faces.iter().map(|face| face.nodes().to_vec()).collect(),
-        "T3" => {
-            let nodes = indices(elements, "node", geometry.node_count())?;
-            check_listed(elements, "NumEls", "node indices", nodes.len(), 3)?;
-            nodes.chunks_exact(3).map(<[u32]>::to_vec).collect()
-        }
-        other => {
-            let (what, known) = ("type of shell elements", "T3, SURFACE");
-            return Err(fault(elements, ImportProblem::Unknown { what, found: other.into(), known }));
-        }
-    };
+    let triangles = triangles(elements, kind, geometry)?;
     let mut taken = vec![false; triangles.len()];
     let mut all = Vec::new();
     for set in children(of, "ShellElementSet") {
-        let line = line(set);
-        let members = match attribute(set, "Size", "Size=\"all\" or a number")? {
-            "all" => (0..triangles.len() as u32).collect(),
-            word => {
-                let size = count(set, word)?;
-                let listed = indices(set, "shell element", triangles.len())?;
-                run_of_indices(set, listed, size, "shell element", "shell elements", triangles.len())?
-            }
-        };
-        if of_surface && members.len() < triangles.len() {
-            leave_out(format!(
-                "the shells of line {line} (a part of the surface, whose triangles only NiftySim counts; list them with \
-                 Type=\"T3\")"
+        let members = members(set, triangles.len())?;
+        if kind == "SURFACE" && members.len() < triangles.len() {
+            remarks.missing.push(format!(
+                "the shells of line {} (a part of the surface, whose triangles only NiftySim counts; list them with \
+                 Type=\"T3\")",
+                line(set)
             ));
             continue;
         }
-        let material = needed(set, "Material", MATERIAL)?;
-        let Some(law) = law(material)? else {
-            let name = attribute(material, "Type", MATERIAL)?;
-            leave_out(format!(
-                "the shells of line {line} ({name} bends, which walls of `solver = \"explicit\"` do not; take Linear or \
-                 NeoHookean, or write a scene with `model = \"shell\"` and `solver = \"implicit\"`)"
-            ));
-            continue;
-        };
-        let density = positive(needed(material, "Density", "<Density>1000</Density>")?, "the density")?;
-        let thickness =
-            positive(needed(material, "Thickness", "<Thickness>1e-3</Thickness>")?, "the thickness")?;
+        let Some(mut membrane) = without_faces(set, remarks)? else { continue };
         for &member in &members {
             if std::mem::replace(&mut taken[member as usize], true) {
                 let what = format!("shell element {member} is in two sets");
@@ -132,14 +101,60 @@ pub(super) fn read(
             }
         }
         if child(set, "ClampedNodes").is_some() {
-            remarks
-                .notes
-                .push(format!("line {line}: <ClampedNodes> is for shells that bend; membranes do not"));
+            remarks.notes.push(format!(
+                "line {}: <ClampedNodes> is for shells that bend; membranes do not",
+                membrane.line
+            ));
         }
-        let faces = members.iter().map(|&member| triangles[member as usize].clone()).collect();
-        all.push(Membrane { line, law, density, thickness, faces });
+        membrane.faces = members.iter().map(|&member| triangles[member as usize].clone()).collect();
+        all.push(membrane);
     }
     Ok(all)
+}
+
+/// The triangles of elements of a type, by their nodes.
+fn triangles(of: XmlElement<'_>, kind: &str, geometry: &Geometry) -> Result<Vec<Vec<u32>>, Fault> {
+    match kind {
+        "SURFACE" => Ok(boundary(&geometry.mesh).faces.iter().map(|face| face.nodes().to_vec()).collect()),
+        "T3" => {
+            let nodes = indices(of, "node", geometry.node_count())?;
+            check_listed(of, "NumEls", "node indices", nodes.len(), 3)?;
+            Ok(nodes.chunks_exact(3).map(<[u32]>::to_vec).collect())
+        }
+        other => {
+            let (what, known) = ("type of shell elements", "T3, SURFACE");
+            Err(fault(of, ImportProblem::Unknown { what, found: other.into(), known }))
+        }
+    }
+}
+
+/// The elements of a set, of so many.
+fn members(set: XmlElement<'_>, all: usize) -> Result<Vec<u32>, Fault> {
+    match attribute(set, "Size", "Size=\"all\" or a number")? {
+        "all" => Ok((0..all as u32).collect()),
+        word => {
+            let size = count(set, word)?;
+            let listed = indices(set, "shell element", all)?;
+            run_of_indices(set, listed, size, "shell element", "shell elements", all)
+        }
+    }
+}
+
+/// The membrane of a set, still without triangles; `None` of one that bends, which is left out.
+fn without_faces(set: XmlElement<'_>, remarks: &mut Remarks) -> Result<Option<Membrane>, Fault> {
+    let line = line(set);
+    let material = needed(set, "Material", MATERIAL)?;
+    let Some(law) = law(material)? else {
+        let name = attribute(material, "Type", MATERIAL)?;
+        remarks.missing.push(format!(
+            "the shells of line {line} ({name} bends, which walls of `solver = \"explicit\"` do not; take Linear or \
+             NeoHookean, or write a scene with `model = \"shell\"` and `solver = \"implicit\"`)"
+        ));
+        return Ok(None);
+    };
+    let density = positive(needed(material, "Density", "<Density>1000</Density>")?, "the density")?;
+    let thickness = positive(needed(material, "Thickness", "<Thickness>1e-3</Thickness>")?, "the thickness")?;
+    Ok(Some(Membrane { line, law, density, thickness, faces: Vec::new() }))
 }
 
 /// The law of a material; `None` of one that bends.
