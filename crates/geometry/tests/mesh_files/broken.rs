@@ -22,120 +22,142 @@ pub(super) fn error(content: &str, format: Format) -> (Place, MeshFileProblem, S
     }
 }
 
-/// Types of a cell in VTK and in Gmsh, and its nodes.
-pub(super) type FileCell = (u8, u8, Vec<usize>);
+/// A cell of a column.
+struct FileCell {
+    /// Its type in VTK and in Gmsh.
+    vtk: u8,
+    gmsh: u8,
+    /// 1 of tets, 2 of wedges, 3 of others.
+    label: u8,
+    nodes: Vec<usize>,
+}
 
-/// A column of three cubes: of tets, of wedges, and of a hex under a pyramid, in files of a format. Cells are numbered from 1 to 11.
-pub(super) fn column(format: &str) -> String {
-    let points: Vec<[usize; 3]> = (0..16).map(|at| [at % 2, at / 2 % 2, at / 4]).collect();
-    let point = |[x, y, z]: &[usize; 3]| format!("{x} {y} {z}");
-    let mut points: Vec<String> = points.iter().map(point).collect();
-    points.push("0.5 0.5 4".to_owned());
-    let mut cells: Vec<FileCell> = Vec::new();
-    for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
-        cells.push((10, 4, vec![0, a, b, 7]));
-    }
-    cells.push((13, 6, vec![4, 5, 7, 8, 9, 11]));
-    // The other order.
-    cells.push((13, 6, vec![8, 11, 10, 4, 7, 6]));
-    cells.push((12, 5, vec![8, 9, 11, 10, 12, 13, 15, 14]));
-    cells.push((14, 7, vec![12, 13, 15, 14, 16]));
-    cells.push((5, 2, vec![0, 2, 3]));
-    let first = usize::from(format.starts_with("msh"));
-    let nodes = |cell: &[usize]| {
-        let words: Vec<String> = cell.iter().map(|node| (node + first).to_string()).collect();
+impl FileCell {
+    /// Its nodes, numbered from `first` on.
+    fn words(&self, first: usize) -> String {
+        let words: Vec<String> = self.nodes.iter().map(|node| (node + first).to_string()).collect();
         words.join(" ")
-    };
-    let numbered = |lines: Vec<String>| -> String {
-        lines.iter().zip(1..).map(|(line, number)| format!("{number} {line}\n")).collect()
-    };
-    // Labels: 1 of tets, 2 of wedges, 3 of the hex and the pyramid.
-    let label = |vtk: u8| match vtk {
-        10 => 1,
-        13 => 2,
-        _ => 3,
-    };
-    let each = |line: &dyn Fn(&FileCell) -> String| cells.iter().map(line).collect::<Vec<String>>();
-    match format {
-        "msh 1" => format!(
-            "$NOD\n17\n{}$ENDNOD\n$ELM\n11\n{}$ENDELM\n",
-            numbered(points),
-            numbered(each(&|(vtk, own, cell)| format!(
-                "{own} {} 1 {} {}",
-                label(*vtk),
-                cell.len(),
-                nodes(cell)
-            )))
-        ),
-        "msh 2" => format!(
-            "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n17\n{}$EndNodes\n$Elements\n11\n{}$EndElements\n",
-            numbered(points),
-            numbered(each(&|(vtk, own, cell)| format!("{own} 2 {} 1 {}", label(*vtk), nodes(cell))))
-        ),
-        "msh 4" => {
-            let tags: String = (1..=17).map(|tag| format!("{tag}\n")).collect();
-            let blocks: String = cells
-                .iter()
-                .zip(1..)
-                .map(|((vtk, own, cell), number)| {
-                    let dimension = if *own == 2 { 2 } else { 3 };
-                    format!("{dimension} {} {own} 1\n{number} {}\n", label(*vtk), nodes(cell))
-                })
-                .collect();
-            let entities: String = (1..=3).map(|tag| format!("{tag} 0 0 0 1 1 4 1 {tag} 0\n")).collect();
-            format!(
-                "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 1 3\n3 0 0 0 1 1 4 0 0\n{entities}$EndEntities\n$Nodes\n\
-                 1 17 1 17\n3 1 0 17\n{tags}{}\n$EndNodes\n$Elements\n11 11 1 11\n{blocks}$EndElements\n",
-                points.join("\n")
-            )
-        }
-        "vtk" => {
-            let lines = each(&|(_, _, cell)| format!("{} {}", cell.len(), nodes(cell)));
-            let numbers: usize = cells.iter().map(|(.., cell)| cell.len() + 1).sum();
-            format!(
-                "# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 17 double\n{}\nCELLS 11 {numbers}\n{}\n\
-                 CELL_TYPES 11\n{}\nCELL_DATA 11\nSCALARS label int\nLOOKUP_TABLE default\n{}\n",
-                points.join("\n"),
-                lines.join("\n"),
-                each(&|(vtk, ..)| vtk.to_string()).join("\n"),
-                each(&|(vtk, ..)| label(*vtk).to_string()).join("\n")
-            )
-        }
-        _ => {
-            let mut end = 0;
-            let ends = cells.iter().map(|(.., cell)| {
-                end += cell.len();
-                end.to_string()
-            });
-            let ends = ends.collect::<Vec<_>>().join(" ");
-            let array = |name: &str, kind: &str, text: String| {
-                format!("<DataArray type=\"{kind}\" Name=\"{name}\" format=\"ascii\">{text}</DataArray>")
-            };
-            format!(
-                "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" byte_order=\"LittleEndian\"><UnstructuredGrid>\
-                 <Piece NumberOfPoints=\"17\" NumberOfCells=\"11\"><Points>\
-                 <DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">{}</DataArray></Points><Cells>{}{}{}</Cells>\
-                 <CellData>{}</CellData></Piece></UnstructuredGrid></VTKFile>",
-                points.join(" "),
-                array("connectivity", "Int64", each(&|(.., cell)| nodes(cell)).join(" ")),
-                array("offsets", "Int64", ends),
-                array("types", "UInt8", each(&|(vtk, ..)| vtk.to_string()).join(" ")),
-                array("label", "Int32", each(&|(vtk, ..)| label(*vtk).to_string()).join(" "))
-            )
-        }
     }
+}
+
+/// A column of three cubes: of tets, of wedges, and of a hex under a pyramid.
+struct Column {
+    points: Vec<String>,
+    cells: Vec<FileCell>,
+}
+
+impl Column {
+    fn new() -> Self {
+        let point = |at: usize| format!("{} {} {}", at % 2, at / 2 % 2, at / 4);
+        let mut points: Vec<String> = (0..16).map(point).collect();
+        points.push("0.5 0.5 4".to_owned());
+        let mut cells = Vec::new();
+        let mut add = |vtk, gmsh, label, nodes: &[usize]| {
+            cells.push(FileCell { vtk, gmsh, label, nodes: nodes.to_vec() });
+        };
+        for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
+            add(10, 4, 1, &[0, a, b, 7]);
+        }
+        add(13, 6, 2, &[4, 5, 7, 8, 9, 11]);
+        // The other order.
+        add(13, 6, 2, &[8, 11, 10, 4, 7, 6]);
+        add(12, 5, 3, &[8, 9, 11, 10, 12, 13, 15, 14]);
+        add(14, 7, 3, &[12, 13, 15, 14, 16]);
+        add(5, 2, 3, &[0, 2, 3]);
+        Self { points, cells }
+    }
+
+    fn each(&self, line: impl Fn(&FileCell) -> String) -> Vec<String> {
+        self.cells.iter().map(line).collect()
+    }
+
+    fn msh1(&self) -> String {
+        let cell = |cell: &FileCell| {
+            format!("{} {} 1 {} {}", cell.gmsh, cell.label, cell.nodes.len(), cell.words(1))
+        };
+        format!(
+            "$NOD\n17\n{}$ENDNOD\n$ELM\n11\n{}$ENDELM\n",
+            numbered(&self.points),
+            numbered(&self.each(cell))
+        )
+    }
+
+    fn msh2(&self) -> String {
+        let cell = |cell: &FileCell| format!("{} 2 {} 1 {}", cell.gmsh, cell.label, cell.words(1));
+        format!(
+            "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n17\n{}$EndNodes\n$Elements\n11\n{}$EndElements\n",
+            numbered(&self.points),
+            numbered(&self.each(cell))
+        )
+    }
+
+    fn msh4(&self) -> String {
+        let tags: String = (1..=17).map(|tag| format!("{tag}\n")).collect();
+        let block = |(cell, number): (&FileCell, usize)| {
+            let dimension = if cell.gmsh == 2 { 2 } else { 3 };
+            format!("{dimension} {} {} 1\n{number} {}\n", cell.label, cell.gmsh, cell.words(1))
+        };
+        let blocks: String = self.cells.iter().zip(1..).map(block).collect();
+        let entities: String = (1..=3).map(|tag| format!("{tag} 0 0 0 1 1 4 1 {tag} 0\n")).collect();
+        format!(
+            "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 1 3\n3 0 0 0 1 1 4 0 0\n{entities}$EndEntities\n$Nodes\n\
+             1 17 1 17\n3 1 0 17\n{tags}{}\n$EndNodes\n$Elements\n11 11 1 11\n{blocks}$EndElements\n",
+            self.points.join("\n")
+        )
+    }
+
+    fn vtk(&self) -> String {
+        let lines = self.each(|cell| format!("{} {}", cell.nodes.len(), cell.words(0)));
+        let numbers: usize = self.cells.iter().map(|cell| cell.nodes.len() + 1).sum();
+        format!(
+            "# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 17 double\n{}\nCELLS 11 {numbers}\n{}\n\
+             CELL_TYPES 11\n{}\nCELL_DATA 11\nSCALARS label int\nLOOKUP_TABLE default\n{}\n",
+            self.points.join("\n"),
+            lines.join("\n"),
+            self.each(|cell| cell.vtk.to_string()).join("\n"),
+            self.each(|cell| cell.label.to_string()).join("\n")
+        )
+    }
+
+    fn vtu(&self) -> String {
+        let ends = self.cells.iter().scan(0, |end, cell| {
+            *end += cell.nodes.len();
+            Some(end.to_string())
+        });
+        let array = |name: &str, kind: &str, words: Vec<String>| {
+            let text = words.join(" ");
+            format!("<DataArray type=\"{kind}\" Name=\"{name}\" format=\"ascii\">{text}</DataArray>")
+        };
+        format!(
+            "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" byte_order=\"LittleEndian\"><UnstructuredGrid>\
+             <Piece NumberOfPoints=\"17\" NumberOfCells=\"11\"><Points>\
+             <DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">{}</DataArray></Points><Cells>{}{}{}</Cells>\
+             <CellData>{}</CellData></Piece></UnstructuredGrid></VTKFile>",
+            self.points.join(" "),
+            array("connectivity", "Int64", self.each(|cell| cell.words(0))),
+            array("offsets", "Int64", ends.collect()),
+            array("types", "UInt8", self.each(|cell| cell.vtk.to_string())),
+            array("label", "Int32", self.each(|cell| cell.label.to_string()))
+        )
+    }
+}
+
+/// Lines with numbers from 1 on.
+fn numbered(lines: &[String]) -> String {
+    lines.iter().zip(1..).map(|(line, number)| format!("{number} {line}\n")).collect()
 }
 
 #[test]
 pub(super) fn wedges_and_pyramids_are_read_as_tets_that_fit() {
-    for (name, format) in [
-        ("msh 1", Format::Gmsh),
-        ("msh 2", Format::Gmsh),
-        ("msh 4", Format::Gmsh),
-        ("vtk", Format::Vtk),
-        ("vtu", Format::Vtu),
+    let column = Column::new();
+    for (name, text, format) in [
+        ("msh 1", column.msh1(), Format::Gmsh),
+        ("msh 2", column.msh2(), Format::Gmsh),
+        ("msh 4", column.msh4(), Format::Gmsh),
+        ("vtk", column.vtk(), Format::Vtk),
+        ("vtu", column.vtu(), Format::Vtu),
     ] {
-        let file = read_bytes(column(name).as_bytes(), format).unwrap_or_else(|error| panic!("{error}"));
+        let file = read_bytes(text.as_bytes(), format).unwrap_or_else(|error| panic!("{error}"));
         let mesh = &file.mesh;
         let tets = mesh.block(CellKind::Tet).unwrap();
         assert!(mesh.block(CellKind::Hex).is_none(), "{name}: a hex next to a wedge stays a hex");
@@ -160,7 +182,7 @@ pub(super) fn wedges_and_pyramids_are_read_as_tets_that_fit() {
 
 #[test]
 pub(super) fn a_body_that_would_lack_cells_is_an_error() {
-    let text = column("vtk");
+    let text = Column::new().vtk();
     // The hex as 25 (quadratic) has too few nodes, which nobody looks at.
     let quadratic = text.replace("10\n13\n13\n12\n14\n5\n", "10\n13\n13\n25\n14\n5\n");
     let (_, problem, message) = error(&quadratic, Format::Vtk);
