@@ -100,6 +100,12 @@ impl Volume {
     fn origin_lps(&self) -> [f64; 3] {
         [-self.origin.x, -self.origin.y, self.origin.z]
     }
+
+    /// The centre of the first voxel of a slice in LPS.
+    fn slice_lps(&self, k: usize) -> [f64; 3] {
+        let position = self.origin + self.axes.column(2) * k as f64;
+        [-position.x, -position.y, position.z]
+    }
 }
 
 /// Numbers put into a header.
@@ -294,53 +300,129 @@ pub enum Syntax {
     BigEndian,
 }
 
+impl Syntax {
+    fn uid(self) -> &'static str {
+        match self {
+            Self::Implicit => "1.2.840.10008.1.2",
+            Self::Explicit => "1.2.840.10008.1.2.1",
+            Self::Deflated => "1.2.840.10008.1.2.1.99",
+            Self::BigEndian => "1.2.840.10008.1.2.2",
+        }
+    }
+}
+
+/// Elements of DICOM in an encoding.
+struct Elements {
+    bytes: Vec<u8>,
+    syntax: Syntax,
+}
+
+impl Elements {
+    fn new(syntax: Syntax) -> Self {
+        Self { bytes: Vec::new(), syntax }
+    }
+
+    fn short(&mut self, number: u16) {
+        let is_big = self.syntax == Syntax::BigEndian;
+        self.bytes.extend(if is_big { number.to_be_bytes() } else { number.to_le_bytes() });
+    }
+
+    fn long(&mut self, number: u32) {
+        let is_big = self.syntax == Syntax::BigEndian;
+        self.bytes.extend(if is_big { number.to_be_bytes() } else { number.to_le_bytes() });
+    }
+
+    fn tag(&mut self, tag: u32) {
+        self.short((tag >> 16) as u16);
+        self.short(tag as u16);
+    }
+
+    fn put(&mut self, tag: u32, vr: &[u8; 2], value: &[u8]) {
+        self.tag(tag);
+        let mut value = value.to_vec();
+        if value.len() % 2 == 1 {
+            value.push(if vr == b"UI" { 0 } else { b' ' });
+        }
+        // Sequences are written with undefined length; their delimiters are in the value.
+        let length = if vr == b"SQ" { u32::MAX } else { value.len() as u32 };
+        if self.syntax == Syntax::Implicit {
+            self.long(length);
+        } else {
+            self.bytes.extend(vr);
+            if matches!(vr, b"OW" | b"SQ") {
+                self.bytes.extend([0, 0]);
+                self.long(length);
+            } else {
+                self.short(length as u16);
+            }
+        }
+        self.bytes.extend(value);
+    }
+
+    fn count(&mut self, tag: u32, number: usize) {
+        let mut value = Self::new(self.syntax);
+        value.short(number as u16);
+        self.put(tag, b"US", &value.bytes);
+    }
+
+    fn decimals(&mut self, tag: u32, values: &[f64]) {
+        let words: Vec<String> = values.iter().map(|x| format!("{x:.14}")).collect();
+        self.put(tag, b"DS", words.join("\\").as_bytes());
+    }
+
+    fn sequence(&mut self, tag: u32, items: &[Self]) {
+        let mut content = Self::new(self.syntax);
+        for item in items {
+            content.tag(0xFFFE_E000);
+            content.long(item.bytes.len() as u32);
+            content.bytes.extend(&item.bytes);
+        }
+        content.tag(0xFFFE_E0DD);
+        content.long(0);
+        self.put(tag, b"SQ", &content.bytes);
+    }
+
+    /// A file of these elements.
+    fn file(self) -> Vec<u8> {
+        let mut file = Self { bytes: vec![0; 128], syntax: Syntax::Explicit };
+        file.bytes.extend(b"DICM");
+        file.put(0x0002_0010, b"UI", self.syntax.uid().as_bytes());
+        file.bytes.extend(match self.syntax {
+            Syntax::Deflated => {
+                let mut packed = DeflateEncoder::new(Vec::new(), Compression::fast());
+                packed.write_all(&self.bytes).unwrap();
+                packed.finish().unwrap()
+            }
+            _ => self.bytes,
+        });
+        file.bytes
+    }
+}
+
 /// The slice `k` of a volume.
 pub fn dicom(volume: &Volume, k: usize, syntax: Syntax, series: &str) -> Vec<u8> {
-    let uid = match syntax {
-        Syntax::Implicit => "1.2.840.10008.1.2",
-        Syntax::Explicit => "1.2.840.10008.1.2.1",
-        Syntax::Deflated => "1.2.840.10008.1.2.1.99",
-        Syntax::BigEndian => "1.2.840.10008.1.2.2",
-    };
-    let mut file = vec![0; 128];
-    file.extend(b"DICM");
-    element(&mut file, 0x0002_0010, b"UI", uid.as_bytes(), Syntax::Explicit);
-    let position = volume.origin + volume.axes.column(2) * k as f64;
-    let text = |values: &[f64]| {
-        values.iter().map(|x| format!("{x:.14}")).collect::<Vec<_>>().join("\\").into_bytes()
-    };
     let [row, column, _] = volume.directions_lps();
     let [along, down, _] = volume.spacing();
-    let number = |x: usize| {
-        if syntax == Syntax::BigEndian { (x as u16).to_be_bytes() } else { (x as u16).to_le_bytes() }
-    };
-    let mut set = Vec::new();
-    let mut put = |tag, vr: &[u8; 2], value: &[u8]| element(&mut set, tag, vr, value, syntax);
-    put(0x0008_103E, b"LO", b"a test ");
+    let mut set = Elements::new(syntax);
+    set.put(0x0008_103E, b"LO", b"a test ");
     // A sequence with its own position, different from that of the slice.
-    put(0x0008_1140, b"SQ", &nested(syntax));
-    put(0x0020_000E, b"UI", series.as_bytes());
-    put(0x0020_0032, b"DS", &text(&[-position.x, -position.y, position.z]));
-    put(0x0020_0037, b"DS", &text(&[row, column].concat()));
-    put(0x0028_0002, b"US", &number(1));
-    put(0x0028_0004, b"CS", b"MONOCHROME2");
-    put(0x0028_0010, b"US", &number(volume.dims[1]));
-    put(0x0028_0011, b"US", &number(volume.dims[0]));
-    put(0x0028_0030, b"DS", &text(&[down, along]));
-    put(0x0028_0100, b"US", &number(16));
-    put(0x0028_0101, b"US", &number(16));
-    put(0x0028_0102, b"US", &number(15));
-    put(0x0028_0103, b"US", &number(1));
+    set.put(0x0008_1140, b"SQ", &nested(syntax));
+    set.put(0x0020_000E, b"UI", series.as_bytes());
+    set.decimals(0x0020_0032, &volume.slice_lps(k));
+    set.decimals(0x0020_0037, &[row, column].concat());
+    set.count(0x0028_0002, 1);
+    set.put(0x0028_0004, b"CS", b"MONOCHROME2");
+    set.count(0x0028_0010, volume.dims[1]);
+    set.count(0x0028_0011, volume.dims[0]);
+    set.decimals(0x0028_0030, &[down, along]);
+    set.count(0x0028_0100, 16);
+    set.count(0x0028_0101, 16);
+    set.count(0x0028_0102, 15);
+    set.count(0x0028_0103, 1);
     let plane = volume.dims[0] * volume.dims[1];
     let slice = Volume { values: volume.values[k * plane..(k + 1) * plane].to_vec(), ..volume.clone() };
-    put(0x7FE0_0010, b"OW", &slice.bytes(syntax == Syntax::BigEndian));
-    if syntax == Syntax::Deflated {
-        let mut packed = DeflateEncoder::new(Vec::new(), Compression::fast());
-        packed.write_all(&set).unwrap();
-        set = packed.finish().unwrap();
-    }
-    file.extend(set);
-    file
+    set.put(0x7FE0_0010, b"OW", &slice.bytes(syntax == Syntax::BigEndian));
+    set.file()
 }
 
 /// The encoding of the inside in a segmentation.
@@ -356,168 +438,110 @@ pub enum Segments {
 
 /// A segmentation of the labels of a volume by PS3.3 C.8.20, with the names of its segments. Frames without any voxel are left out.
 pub fn segmentation(volume: &Volume, kind: Segments, names: &[&str], syntax: Syntax) -> Vec<u8> {
-    let [nx, ny, nz] = volume.dims;
-    let (plane, [row, column, _], [along, down, between]) =
-        (nx * ny, volume.directions_lps(), volume.spacing());
-    let text = |values: &[f64]| {
-        values.iter().map(|x| format!("{x:.14}")).collect::<Vec<_>>().join("\\").into_bytes()
+    let (frames, pixels) = frames(volume, kind, names.len(), syntax);
+    let (class, word, bits) = match kind {
+        Segments::Bits => ("1.2.840.10008.5.1.4.1.1.66.4", "BINARY", 1),
+        Segments::Fractions => ("1.2.840.10008.5.1.4.1.1.66.4", "FRACTIONAL", 8),
+        Segments::Labels => ("1.2.840.10008.5.1.4.1.1.66.7", "LABELMAP", 8),
     };
-    let number = |x: usize| {
-        if syntax == Syntax::BigEndian { (x as u16).to_be_bytes() } else { (x as u16).to_le_bytes() }
-    };
-    let item = |content: &[u8]| {
-        let mut item = Vec::new();
-        tag(&mut item, 0xFFFE_E000, syntax);
-        let length = content.len() as u32;
-        item.extend(if syntax == Syntax::BigEndian { length.to_be_bytes() } else { length.to_le_bytes() });
-        item.extend(content);
-        item
-    };
-    let sequence = |out: &mut Vec<u8>, number: u32, items: &[Vec<u8>]| {
-        let mut content: Vec<u8> = items.iter().flat_map(|content| item(content)).collect();
-        tag(&mut content, 0xFFFE_E0DD, syntax);
-        content.extend([0; 4]);
-        element(out, number, b"SQ", &content, syntax);
-    };
-    let segments: Vec<i16> =
-        if kind == Segments::Labels { vec![0] } else { (1..=names.len() as i16).collect() };
+    let named = (1..).zip(names).map(|(label, name)| {
+        let mut segment = Elements::new(syntax);
+        segment.count(0x0062_0004, label);
+        segment.put(0x0062_0005, b"LO", name.as_bytes());
+        segment
+    });
+    let mut set = Elements::new(syntax);
+    set.put(0x0008_0016, b"UI", class.as_bytes());
+    set.put(0x0020_000E, b"UI", b"1.9");
+    set.count(0x0028_0002, 1);
+    set.put(0x0028_0004, b"CS", b"MONOCHROME2");
+    set.put(0x0028_0008, b"IS", frames.len().to_string().as_bytes());
+    set.count(0x0028_0010, volume.dims[1]);
+    set.count(0x0028_0011, volume.dims[0]);
+    set.count(0x0028_0100, bits);
+    set.count(0x0028_0101, bits);
+    set.count(0x0028_0102, bits - 1);
+    set.count(0x0028_0103, 0);
+    set.put(0x0062_0001, b"CS", word.as_bytes());
+    set.sequence(0x0062_0002, &named.collect::<Vec<_>>());
+    if kind == Segments::Fractions {
+        set.count(0x0062_000E, 200);
+    }
+    set.sequence(0x5200_9229, &[shared_by_frames(volume, syntax)]);
+    set.sequence(0x5200_9230, &frames);
+    set.put(0x7FE0_0010, b"OW", &pixels);
+    set.file()
+}
+
+/// The frames of so many segments, and the pixels of all.
+fn frames(volume: &Volume, kind: Segments, segments: usize, syntax: Syntax) -> (Vec<Elements>, Vec<u8>) {
+    let plane = volume.dims[0] * volume.dims[1];
+    let segments = if kind == Segments::Labels { 0..=0 } else { 1..=segments };
     let (mut frames, mut pixels) = (Vec::new(), Vec::new());
-    for &segment in &segments {
-        for k in 0..nz {
-            let values = &volume.values[k * plane..(k + 1) * plane];
-            if !values.iter().any(|&value| value != 0 && (segment == 0 || value == segment)) {
+    for segment in segments {
+        let is_in = |value: i16| value != 0 && (segment == 0 || value == segment as i16);
+        for (k, values) in volume.values.chunks_exact(plane).enumerate() {
+            if !values.iter().any(|&value| is_in(value)) {
                 continue;
             }
-            let mut frame = Vec::new();
-            let position = volume.origin + volume.axes.column(2) * k as f64;
-            let mut place = Vec::new();
-            element(&mut place, 0x0020_0032, b"DS", &text(&[-position.x, -position.y, position.z]), syntax);
-            sequence(&mut frame, 0x0020_9113, &[place]);
-            let mut which = Vec::new();
-            element(&mut which, 0x0062_000B, b"US", &number(segment as usize), syntax);
-            sequence(&mut frame, 0x0062_000A, &[which]);
+            let mut place = Elements::new(syntax);
+            place.decimals(0x0020_0032, &volume.slice_lps(k));
+            let mut which = Elements::new(syntax);
+            which.count(0x0062_000B, segment);
+            let mut frame = Elements::new(syntax);
+            frame.sequence(0x0020_9113, &[place]);
+            frame.sequence(0x0062_000A, &[which]);
             frames.push(frame);
             pixels.extend(values.iter().map(|&value| match kind {
                 Segments::Labels => value as u8,
-                _ => u8::from(value == segment),
+                _ => u8::from(is_in(value)),
             }));
         }
     }
-    let pixels: Vec<u8> = match kind {
+    let pixels = match kind {
         Segments::Bits => {
             pixels.chunks(8).map(|bits| bits.iter().rev().fold(0, |byte, bit| byte << 1 | bit)).collect()
         }
         Segments::Fractions => pixels.iter().map(|inside| if *inside == 1 { 100 } else { 99 }).collect(),
         Segments::Labels => pixels,
     };
-    let mut shared = Vec::new();
-    let mut directions = Vec::new();
-    element(&mut directions, 0x0020_0037, b"DS", &text(&[row, column].concat()), syntax);
-    sequence(&mut shared, 0x0020_9116, &[directions]);
-    let mut measures = Vec::new();
-    element(&mut measures, 0x0018_0050, b"DS", &text(&[between]), syntax);
-    element(&mut measures, 0x0018_0088, b"DS", &text(&[between]), syntax);
-    element(&mut measures, 0x0028_0030, b"DS", &text(&[down, along]), syntax);
-    sequence(&mut shared, 0x0028_9110, &[measures]);
-    let named = (1..).zip(names).map(|(label, name)| {
-        let mut segment = Vec::new();
-        element(&mut segment, 0x0062_0004, b"US", &number(label), syntax);
-        element(&mut segment, 0x0062_0005, b"LO", name.as_bytes(), syntax);
-        segment
-    });
-    let uid = match syntax {
-        Syntax::Implicit => "1.2.840.10008.1.2",
-        Syntax::BigEndian => "1.2.840.10008.1.2.2",
-        _ => "1.2.840.10008.1.2.1",
-    };
-    let mut file = vec![0; 128];
-    file.extend(b"DICM");
-    element(&mut file, 0x0002_0010, b"UI", uid.as_bytes(), Syntax::Explicit);
-    let class = if kind == Segments::Labels {
-        "1.2.840.10008.5.1.4.1.1.66.7"
-    } else {
-        "1.2.840.10008.5.1.4.1.1.66.4"
-    };
-    let bits = if kind == Segments::Bits { 1 } else { 8 };
-    let word: &[u8] = match kind {
-        Segments::Bits => b"BINARY",
-        Segments::Fractions => b"FRACTIONAL",
-        Segments::Labels => b"LABELMAP",
-    };
-    element(&mut file, 0x0008_0016, b"UI", class.as_bytes(), syntax);
-    element(&mut file, 0x0020_000E, b"UI", b"1.9", syntax);
-    element(&mut file, 0x0028_0002, b"US", &number(1), syntax);
-    element(&mut file, 0x0028_0004, b"CS", b"MONOCHROME2", syntax);
-    element(&mut file, 0x0028_0008, b"IS", frames.len().to_string().as_bytes(), syntax);
-    element(&mut file, 0x0028_0010, b"US", &number(ny), syntax);
-    element(&mut file, 0x0028_0011, b"US", &number(nx), syntax);
-    element(&mut file, 0x0028_0100, b"US", &number(bits), syntax);
-    element(&mut file, 0x0028_0101, b"US", &number(bits), syntax);
-    element(&mut file, 0x0028_0102, b"US", &number(bits - 1), syntax);
-    element(&mut file, 0x0028_0103, b"US", &number(0), syntax);
-    element(&mut file, 0x0062_0001, b"CS", word, syntax);
-    sequence(&mut file, 0x0062_0002, &named.collect::<Vec<_>>());
-    if kind == Segments::Fractions {
-        element(&mut file, 0x0062_000E, b"US", &number(200), syntax);
-    }
-    sequence(&mut file, 0x5200_9229, &[shared]);
-    sequence(&mut file, 0x5200_9230, &frames);
-    element(&mut file, 0x7FE0_0010, b"OW", &pixels, syntax);
-    file
+    (frames, pixels)
+}
+
+/// Directions and spacing of all frames.
+fn shared_by_frames(volume: &Volume, syntax: Syntax) -> Elements {
+    let ([row, column, _], [along, down, between]) = (volume.directions_lps(), volume.spacing());
+    let mut directions = Elements::new(syntax);
+    directions.decimals(0x0020_0037, &[row, column].concat());
+    let mut measures = Elements::new(syntax);
+    measures.decimals(0x0018_0050, &[between]);
+    measures.decimals(0x0018_0088, &[between]);
+    measures.decimals(0x0028_0030, &[down, along]);
+    let mut shared = Elements::new(syntax);
+    shared.sequence(0x0020_9116, &[directions]);
+    shared.sequence(0x0028_9110, &[measures]);
+    shared
 }
 
 /// A structure set: contours, no pixels.
 pub fn structure_set() -> Vec<u8> {
-    let mut file = vec![0; 128];
-    file.extend(b"DICM");
-    element(&mut file, 0x0002_0010, b"UI", b"1.2.840.10008.1.2.1", Syntax::Explicit);
-    element(&mut file, 0x0008_0016, b"UI", b"1.2.840.10008.5.1.4.1.1.481.3", Syntax::Explicit);
-    element(&mut file, 0x3006_0002, b"SH", b"organs", Syntax::Explicit);
-    file
+    let mut set = Elements::new(Syntax::Explicit);
+    set.put(0x0008_0016, b"UI", b"1.2.840.10008.5.1.4.1.1.481.3");
+    set.put(0x3006_0002, b"SH", b"organs");
+    set.file()
 }
 
 /// An item of undefined length with ImagePositionPatient in it, ended by its delimiters.
 fn nested(syntax: Syntax) -> Vec<u8> {
-    let mut item = Vec::new();
-    tag(&mut item, 0xFFFE_E000, syntax);
-    item.extend([0xFF; 4]);
-    element(&mut item, 0x0020_0032, b"DS", b"1\\2\\3 ", syntax);
-    for delimiter in [0xFFFE_E00D, 0xFFFE_E0DD_u32] {
-        tag(&mut item, delimiter, syntax);
-        item.extend([0; 4]);
+    let mut item = Elements::new(syntax);
+    item.tag(0xFFFE_E000);
+    item.long(u32::MAX);
+    item.put(0x0020_0032, b"DS", b"1\\2\\3 ");
+    for delimiter in [0xFFFE_E00D, 0xFFFE_E0DD] {
+        item.tag(delimiter);
+        item.long(0);
     }
-    item
-}
-
-fn tag(out: &mut Vec<u8>, tag: u32, syntax: Syntax) {
-    for half in [(tag >> 16) as u16, tag as u16] {
-        out.extend(if syntax == Syntax::BigEndian { half.to_be_bytes() } else { half.to_le_bytes() });
-    }
-}
-
-fn element(out: &mut Vec<u8>, number: u32, vr: &[u8; 2], value: &[u8], syntax: Syntax) {
-    tag(out, number, syntax);
-    let big = syntax == Syntax::BigEndian;
-    let mut value = value.to_vec();
-    if value.len() % 2 == 1 {
-        value.push(if vr == b"UI" { 0 } else { b' ' });
-    }
-    // Sequences are written with undefined length; their delimiters are in the value.
-    let length = if vr == b"SQ" { u32::MAX } else { value.len() as u32 };
-    let long = if big { length.to_be_bytes() } else { length.to_le_bytes() };
-    if syntax == Syntax::Implicit {
-        out.extend(long);
-    } else {
-        out.extend(vr);
-        if matches!(vr, b"OW" | b"SQ") {
-            out.extend([0, 0]);
-            out.extend(long);
-        } else {
-            let short = length as u16;
-            out.extend(if big { short.to_be_bytes() } else { short.to_le_bytes() });
-        }
-    }
-    out.extend(value);
+    item.bytes
 }
 
 /// A block of 24 × 12 × 12 voxels of 1 mm as 3D Slicer writes it: the left half is liver, the right one spleen, and a tumour lies in the
