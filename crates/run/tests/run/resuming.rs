@@ -364,14 +364,19 @@ fn refused(told: &Told, pieces: &[&str]) {
     }
 }
 
-#[test]
-fn a_checkpoint_that_does_not_fit_is_refused_with_a_reason() {
-    let scene = resumable("hex8", "", true);
-    let workshop = Workshop::new(&scene);
+/// A run in `out/case` that has come to the first of its two checkpoints.
+fn interrupted(scene: &str) -> Workshop {
+    let workshop = Workshop::new(scene);
     workshop.run(&[]).done();
-    let all = workshop.checkpoints("out/case");
+    fs::remove_file(&workshop.checkpoints("out/case")[1]).unwrap();
+    workshop
+}
+
+#[test]
+fn a_checkpoint_of_another_scene_is_refused_with_what_differs() {
+    let scene = resumable("hex8", "", true);
+    let workshop = interrupted(&scene);
     let before = workshop.files("out/case");
-    fs::remove_file(&all[1]).unwrap();
     for (good, other, pieces) in [
         ("edge = 0.025", "edge = 0.02", ["mesh of body `block`", "differ"]),
         ("young-modulus = 10e3", "young-modulus = 11e3", ["material of body `block`", "differs"]),
@@ -409,10 +414,14 @@ fn a_checkpoint_that_does_not_fit_is_refused_with_a_reason() {
     workshop.run_into("out/stepped", &[]).done();
     let told = workshop.resume("out/stepped", &["body.block.stiffness-damping=1e-5"]);
     refused(&told, &["damping by stiffness of solids differs", "run from the start"]);
-    workshop.write("case/scene.toml", &scene);
+    assert!(workshop.files("out/case") == before);
+}
 
-    // Problems of the file.
-    let bytes = fs::read(&all[0]).unwrap();
+#[test]
+fn a_file_that_is_no_checkpoint_is_refused_with_a_reason() {
+    let workshop = interrupted(&resumable("hex8", "", true));
+    let before = workshop.files("out/case");
+    let bytes = fs::read(&workshop.checkpoints("out/case")[0]).unwrap();
     let file = |content: &[u8]| {
         workshop.write("x.pliant", content);
         workshop.resume_in("x.pliant", "out/case")
@@ -429,8 +438,13 @@ fn a_checkpoint_that_does_not_fit_is_refused_with_a_reason() {
     refused(&file(&newer), &["has format 99; this version of pliant reads format 20"]);
     refused(&workshop.resume("none.pliant", &[]), &["`none.pliant` cannot be read"]);
     refused(&workshop.resume("case", &[]), &["there is no checkpoint in `case`", "every = 1.0"]);
+    assert!(workshop.files("out/case") == before);
+}
 
-    // Problems of the folder.
+#[test]
+fn a_folder_that_does_not_hold_what_a_checkpoint_continues_is_refused() {
+    let workshop = interrupted(&resumable("hex8", "", true));
+    let before = workshop.files("out/case");
     let outputs = "does not hold what the checkpoint continues";
     let told = workshop.resume_in("out/case", "elsewhere");
     refused(&told, &[outputs, "there is no such folder", "`--out DIR`"]);
