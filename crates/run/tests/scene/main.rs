@@ -37,6 +37,13 @@ mod turns;
 mod volumes;
 mod walls;
 
+/// Panics unless a scene is refused, in words that contain all pieces.
+#[track_caller]
+fn assert_refused(text: &str, pieces: &[&str]) {
+    let told = pliant_testing::scenes::world(text).err().unwrap_or_else(|| panic!("accepted:\n{text}"));
+    assert!(pieces.iter().all(|piece| told.contains(piece)), "{told}");
+}
+
 #[cfg(feature = "gpu")]
 fn has_gpu() -> bool {
     pliant_testing::has_gpu(pliant_sim::gpu::adapters().len())
