@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use crate::diagnostic::{Diagnostic, SceneErrors};
 use crate::nearest::{SCENE, suggestion};
-use crate::registry::{ConstraintTable, OutputTable};
+use crate::registry::{ConstraintTable, LawTable, OutputTable};
 use crate::scene::Scene;
 use crate::tables::{
     BodyModel, BodyTable, ColourBy, ContactTable, DeviceName, FieldName, ParticipantTable, RunTable,
-    SolverName, ViewTable,
+    SolverName, TieTable, ViewTable,
 };
 
 impl ConstraintTable {
@@ -34,6 +34,116 @@ struct Owners {
 /// The group that a body goes with.
 fn group_of<'g>(groups: &'g [(String, Vec<String>)], body: &String) -> Option<&'g (String, Vec<String>)> {
     groups.iter().find(|(_, bodies)| bodies.contains(body))
+}
+
+/// The tables of which something holds.
+fn those<T: Clone>(tables: &[(String, T)], holds: impl Fn(&String, &T) -> bool) -> Vec<(String, T)> {
+    tables.iter().filter(|(name, table)| holds(name, table)).cloned().collect()
+}
+
+/// Whether a body uses a law, in a layer or as a whole.
+fn uses(bodies: &[(String, BodyTable)], law: &String) -> bool {
+    let layered = |body: &BodyTable| body.layers.iter().any(|layer| layer.law.as_ref() == Some(law));
+    bodies.iter().any(|(_, body)| body.law.values().contains(&law) || layered(body))
+}
+
+/// What a participant has of a scene. What belongs to none, as it is wrong, goes with the first one, to be reported once.
+struct Part<'s> {
+    scene: &'s Scene,
+    index: usize,
+    owners: &'s Owners,
+    bodies: Vec<(String, BodyTable)>,
+    models: Vec<BodyModel>,
+    contacts: Vec<(String, ContactTable)>,
+    /// Contacts with bodies of other participants.
+    meets: Vec<(String, ContactTable)>,
+}
+
+impl<'s> Part<'s> {
+    fn new(scene: &'s Scene, index: usize, owners: &'s Owners) -> Self {
+        let owns = |on: &str| owners.of.get(on) == Some(&index);
+        let is_known = |name: &String| owners.of.contains_key(name);
+        let bodies = those(&scene.bodies, |body, _| owns(body));
+        let apart = |ContactTable { between: [first, second], .. }: &ContactTable| {
+            is_known(first) && is_known(second) && owns(first) != owns(second)
+        };
+        let is_own = |between: &[String; 2]| match between.iter().find(|name| is_known(name)) {
+            Some(name) => owns(name),
+            None => index == 0 || between.iter().any(|name| name == "all"),
+        };
+        Self {
+            models: bodies.iter().map(|(_, body)| body.model).collect(),
+            contacts: those(&scene.contacts, |_, table| !apart(table) && is_own(&table.between)),
+            meets: those(&scene.contacts, |_, table| apart(table)),
+            scene,
+            index,
+            owners,
+            bodies,
+        }
+    }
+
+    fn owns(&self, on: &str) -> bool {
+        self.owners.of.get(on) == Some(&self.index)
+    }
+
+    fn touches_something(&self) -> bool {
+        !(self.contacts.is_empty() && self.meets.is_empty())
+    }
+
+    /// Whether it shows a field: one of its bodies has it, or none of the scene.
+    fn shows(&self, field: FieldName) -> bool {
+        let Scene { bodies, contacts, .. } = self.scene;
+        let can_be = |touches: bool| touches || !field.is_of_contact();
+        let has = can_be(self.touches_something()) && self.models.iter().any(|&model| field.is_of(model));
+        let is_known = can_be(!contacts.is_empty()) && bodies.iter().any(|(_, body)| field.is_of(body.model));
+        has || (self.index == 0 && !is_known)
+    }
+
+    /// The laws that its bodies use, or none of the scene.
+    fn laws(&self) -> Vec<(String, LawTable)> {
+        let is_spare = |law: &String| self.index == 0 && !uses(&self.scene.bodies, law);
+        those(&self.scene.laws, |law, _| uses(&self.bodies, law) || is_spare(law))
+    }
+
+    /// The outputs of what it has.
+    fn outputs(&self) -> Vec<(String, OutputTable)> {
+        let mut outputs = self.scene.outputs.clone();
+        outputs.retain_mut(|(_, output)| match output {
+            OutputTable::Vtu(table) => {
+                if table.on.is_none() {
+                    table.data.retain(|&field| self.shows(field));
+                    let is_shell = |(_, body): &(String, BodyTable)| body.model == BodyModel::Shell;
+                    if !self.bodies.iter().any(is_shell) && self.scene.bodies.iter().any(is_shell) {
+                        table.curved = None;
+                    }
+                }
+                table.on.as_deref().is_none_or(|on| self.owns(on))
+            }
+            OutputTable::Csv(table) => {
+                let is_own =
+                    |constraint: &String| self.owners.constraints.get(constraint) == Some(&self.index);
+                table.reactions.iter_mut().for_each(|reactions| reactions.retain(is_own));
+                table.probes.retain(|_, probe| self.owns(&probe.on));
+                true
+            }
+        });
+        outputs
+    }
+
+    /// The view, as far as it is of what it has.
+    fn view(&self) -> ViewTable {
+        let mut view = self.scene.view.clone();
+        let seen = view.on.as_deref().is_none_or(|on| self.owns(on));
+        let is_hidden = |colour: &ColourBy| matches!(colour, ColourBy::Field(field) if !self.shows(*field));
+        if !seen {
+            view = ViewTable { on: None, colour: None, ..view };
+        } else if view.colour.as_ref().is_some_and(is_hidden) {
+            view.colour = None;
+        }
+        view.contacts &=
+            seen && (self.touches_something() || self.scene.contacts.is_empty() && self.index == 0);
+        view
+    }
 }
 
 impl Scene {
@@ -242,116 +352,34 @@ impl Scene {
 
     /// The scene of one participant.
     fn part(&self, index: usize, name: &str, owners: &Owners) -> Self {
-        let owns = |on: &str| owners.of.get(on) == Some(&index);
+        let part = Part::new(self, index, owners);
         let table = self.participants.iter().find(|(known, _)| known == name);
-        let bodies: Vec<_> = self.bodies.iter().filter(|(body, _)| owns(body)).cloned().collect();
-        let models: Vec<BodyModel> = bodies.iter().map(|(_, body)| body.model).collect();
-        let apart = |table: &ContactTable| {
-            let [first, second] = &table.between;
-            owners.of.contains_key(first) && owners.of.contains_key(second) && owns(first) != owns(second)
-        };
-        let meets: Vec<_> = self.contacts.iter().filter(|(_, table)| apart(table)).cloned().collect();
-        let contacts: Vec<_> = self
-            .contacts
-            .iter()
-            .filter(|(_, table)| {
-                let body = table.between.iter().find(|name| owners.of.contains_key(*name));
-                !apart(table)
-                    && body.map_or(index == 0 || table.between.iter().any(|name| name == "all"), |name| {
-                        owns(name)
-                    })
-            })
-            .cloned()
-            .collect();
-        let touches_something = !(contacts.is_empty() && meets.is_empty());
-        let has = |field: FieldName| {
-            let touches = touches_something || !field.is_of_contact();
-            touches && models.iter().any(|&model| field.is_of(model))
-        };
-        // A field that no body of the scene has is reported once, with the first participant.
-        let strange = |field: FieldName| {
-            let touches = !self.contacts.is_empty() || !field.is_of_contact();
-            !touches || !self.bodies.iter().any(|(_, body)| field.is_of(body.model))
-        };
-        let uses = |bodies: &[(String, BodyTable)], law: &String| {
-            let layered = |body: &BodyTable| body.layers.iter().any(|layer| layer.law.as_ref() == Some(law));
-            bodies.iter().any(|(_, body)| body.law.values().contains(&law) || layered(body))
-        };
-        // Laws that no body uses are reported once, too.
-        let kept = |law: &String| uses(&bodies, law) || (index == 0 && !uses(&self.bodies, law));
-        let laws = self.laws.iter().filter(|(law, _)| kept(law)).cloned().collect();
-        let mut outputs = Vec::new();
-        for (name, output) in &self.outputs {
-            let mut output = output.clone();
-            let shown = match &mut output {
-                OutputTable::Vtu(table) => {
-                    if table.on.is_none() {
-                        table.data.retain(|&field| has(field) || (index == 0 && strange(field)));
-                        if !models.contains(&BodyModel::Shell)
-                            && self.bodies.iter().any(|(_, body)| body.model == BodyModel::Shell)
-                        {
-                            table.curved = None;
-                        }
-                    }
-                    table.on.as_deref().is_none_or(owns)
-                }
-                OutputTable::Csv(table) => {
-                    if let Some(reactions) = &mut table.reactions {
-                        reactions.retain(|constraint| owners.constraints.get(constraint) == Some(&index));
-                    }
-                    table.probes.retain(|_, probe| owns(&probe.on));
-                    true
-                }
-            };
-            if shown {
-                outputs.push((name.clone(), output));
-            }
-        }
-        let mut view = self.view.clone();
-        let seen = view.on.as_deref().is_none_or(owns);
-        let coloured = match view.colour {
-            Some(ColourBy::Field(field)) => has(field) || (index == 0 && strange(field)),
-            _ => true,
-        };
-        if !seen {
-            view = ViewTable { on: None, colour: None, ..view };
-        } else if !coloured {
-            view.colour = None;
-        }
-        view.contacts &= seen && (touches_something || self.contacts.is_empty() && index == 0);
-        let on_part = |on: Option<&str>| on.is_none_or(owns);
+        let owns = |on: &str| part.owns(on);
+        let is_whole = |tie: &TieTable| tie.between.iter().all(|on| owns(on));
         Self {
-            run: self.run_of(table.map(|(_, table)| table), &models),
+            run: self.run_of(table.map(|(_, table)| table), &part.models),
             own: table.map(|(name, _)| name.clone()),
             is_part: true,
             participants: Vec::new(),
-            laws,
-            bodies,
-            ties: self
-                .ties
-                .iter()
-                .filter(|(_, tie)| tie.between.iter().all(|on| owns(on)))
-                .cloned()
-                .collect(),
-            tied_outside: self
-                .ties
-                .iter()
-                .filter(|(_, tie)| !tie.between.iter().all(|on| owns(on)))
+            laws: part.laws(),
+            ties: those(&self.ties, |_, tie| is_whole(tie)),
+            tied_outside: (self.ties.iter().filter(|(_, tie)| !is_whole(tie)))
                 .flat_map(|(_, tie)| tie.between.clone())
                 .collect(),
-            surfaces: self.surfaces.iter().filter(|(_, surface)| owns(&surface.on)).cloned().collect(),
-            constraints: self.constraints.iter().filter(|(_, table)| owns(table.body())).cloned().collect(),
+            surfaces: those(&self.surfaces, |_, surface| owns(&surface.on)),
+            constraints: those(&self.constraints, |_, table| owns(table.body())),
             obstacles: self.obstacles.clone(),
             tools: self.tools.clone(),
-            contacts,
-            meets,
-            loads: self.loads.iter().filter(|(_, load)| on_part(load.on())).cloned().collect(),
-            outputs,
-            view,
+            loads: those(&self.loads, |_, load| load.on().is_none_or(owns)),
+            outputs: part.outputs(),
+            view: part.view(),
             doubts: if index == 0 { self.doubts.clone() } else { Vec::new() },
             source: self.source.clone(),
             folder: self.folder.clone(),
             scene: self.scene.clone(),
+            bodies: part.bodies,
+            contacts: part.contacts,
+            meets: part.meets,
         }
     }
 
