@@ -120,74 +120,8 @@ impl Renderer {
             bind_group_layouts: &[Some(&view), Some(&shape), Some(&textures(device, 1))],
             immediate_size: 0,
         });
-        let pipeline = |vertex: &str, fragment: &str, kind: Kind| {
-            let (write, compare) = match kind {
-                Kind::Behind => (false, wgpu::CompareFunction::Always),
-                Kind::Solid | Kind::Wire | Kind::Cut => (true, wgpu::CompareFunction::Less),
-                Kind::Veil | Kind::Line | Kind::Glass => (false, wgpu::CompareFunction::Less),
-                Kind::Mark => (false, wgpu::CompareFunction::Always),
-            };
-            let over = wgpu::BlendComponent {
-                src_factor: wgpu::BlendFactor::SrcAlpha,
-                dst_factor: wgpu::BlendFactor::OneMinusSrcAlpha,
-                operation: wgpu::BlendOperation::Add,
-            };
-            // What covers in part counts so, but for a veil.
-            let veil = matches!(kind, Kind::Veil);
-            let cover = wgpu::BlendComponent {
-                src_factor: if veil { wgpu::BlendFactor::Zero } else { wgpu::BlendFactor::One },
-                dst_factor: if veil { wgpu::BlendFactor::One } else { wgpu::BlendFactor::OneMinusSrcAlpha },
-                operation: wgpu::BlendOperation::Add,
-            };
-            let mixed = !matches!(kind, Kind::Behind | Kind::Solid);
-            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some(fragment),
-                layout: Some(&pipelines),
-                vertex: wgpu::VertexState {
-                    module: &module,
-                    entry_point: Some(vertex),
-                    compilation_options: Default::default(),
-                    buffers: &[],
-                },
-                primitive: wgpu::PrimitiveState {
-                    cull_mode: veil.then_some(wgpu::Face::Back),
-                    ..Default::default()
-                },
-                depth_stencil: Some(wgpu::DepthStencilState {
-                    format: target.depth,
-                    depth_write_enabled: Some(write),
-                    depth_compare: Some(compare),
-                    stencil: Default::default(),
-                    bias: Default::default(),
-                }),
-                multisample: wgpu::MultisampleState { count: target.samples, ..Default::default() },
-                fragment: Some(wgpu::FragmentState {
-                    module: &module,
-                    entry_point: Some(fragment),
-                    compilation_options: Default::default(),
-                    targets: &[Some(wgpu::ColorTargetState {
-                        format: target.format,
-                        blend: mixed.then_some(wgpu::BlendState { color: over, alpha: cover }),
-                        write_mask: wgpu::ColorWrites::ALL,
-                    })],
-                }),
-                multiview_mask: None,
-                cache: None,
-            })
-        };
-        let compute_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("normals"),
-            bind_group_layouts: &[Some(&normals)],
-            immediate_size: 0,
-        });
-        let compute = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some("normals"),
-            layout: Some(&compute_layout),
-            module: &device.create_shader_module(wgpu::include_wgsl!("normals.wgsl")),
-            entry_point: Some("main"),
-            compilation_options: Default::default(),
-            cache: None,
-        });
+        let drawing = Drawing { device, module: &module, layout: &pipelines, target };
+        let pipeline = |vertex, fragment, kind| drawing.pipeline(vertex, fragment, kind);
         Self {
             device: device.clone(),
             target,
@@ -202,7 +136,7 @@ impl Renderer {
             mark: pipeline("line", "stroke", Kind::Mark),
             section: pipeline("section", "opaque", Kind::Cut),
             ghost: pipeline("resting", "ghost", Kind::Veil),
-            compute,
+            compute: kernel(device, &normals),
             view,
             shape,
             normals,
@@ -222,6 +156,99 @@ enum Kind {
     Line,
     /// Seen through everything.
     Mark,
+}
+
+impl Kind {
+    /// Whether its depth is kept for what is drawn later, and how it is compared with what was drawn before.
+    fn depth(&self) -> (bool, wgpu::CompareFunction) {
+        match self {
+            Self::Behind | Self::Mark => (false, wgpu::CompareFunction::Always),
+            Self::Solid | Self::Wire | Self::Cut => (true, wgpu::CompareFunction::Less),
+            Self::Veil | Self::Line | Self::Glass => (false, wgpu::CompareFunction::Less),
+        }
+    }
+
+    /// How its colour mixes with the one behind, if it does.
+    fn blend(&self) -> Option<wgpu::BlendState> {
+        use wgpu::BlendFactor::{One, OneMinusSrcAlpha, SrcAlpha, Zero};
+        let sum = |src_factor, dst_factor| wgpu::BlendComponent {
+            src_factor,
+            dst_factor,
+            operation: wgpu::BlendOperation::Add,
+        };
+        let color = sum(SrcAlpha, OneMinusSrcAlpha);
+        match self {
+            Self::Behind | Self::Solid => None,
+            // What covers in part counts so, but for a veil.
+            Self::Veil => Some(wgpu::BlendState { color, alpha: sum(Zero, One) }),
+            _ => Some(wgpu::BlendState { color, alpha: sum(One, OneMinusSrcAlpha) }),
+        }
+    }
+}
+
+/// What the pipelines that draw have in common.
+struct Drawing<'a> {
+    device: &'a wgpu::Device,
+    module: &'a wgpu::ShaderModule,
+    layout: &'a wgpu::PipelineLayout,
+    target: Target,
+}
+
+impl Drawing<'_> {
+    fn pipeline(&self, vertex: &str, fragment: &str, kind: Kind) -> wgpu::RenderPipeline {
+        let (write, compare) = kind.depth();
+        self.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(fragment),
+            layout: Some(self.layout),
+            vertex: wgpu::VertexState {
+                module: self.module,
+                entry_point: Some(vertex),
+                compilation_options: Default::default(),
+                buffers: &[],
+            },
+            primitive: wgpu::PrimitiveState {
+                cull_mode: matches!(kind, Kind::Veil).then_some(wgpu::Face::Back),
+                ..Default::default()
+            },
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: self.target.depth,
+                depth_write_enabled: Some(write),
+                depth_compare: Some(compare),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: wgpu::MultisampleState { count: self.target.samples, ..Default::default() },
+            fragment: Some(wgpu::FragmentState {
+                module: self.module,
+                entry_point: Some(fragment),
+                compilation_options: Default::default(),
+                targets: &[Some(wgpu::ColorTargetState {
+                    format: self.target.format,
+                    blend: kind.blend(),
+                    write_mask: wgpu::ColorWrites::ALL,
+                })],
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+    }
+}
+
+/// The kernel of normals.
+fn kernel(device: &wgpu::Device, normals: &wgpu::BindGroupLayout) -> wgpu::ComputePipeline {
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("normals"),
+        bind_group_layouts: &[Some(normals)],
+        immediate_size: 0,
+    });
+    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some("normals"),
+        layout: Some(&layout),
+        module: &device.create_shader_module(wgpu::include_wgsl!("normals.wgsl")),
+        entry_point: Some("main"),
+        compilation_options: Default::default(),
+        cache: None,
+    })
 }
 
 /// A subject on the device.
@@ -343,17 +370,7 @@ impl Drawn {
         let regions = Regions::default();
         let lights = storage(device, &lights_of(&kinds, &regions, false));
         let view_group = group(device, &renderer.view, &[&view, &colours, &lights]);
-        let used = subject.surface_points();
-        let low =
-            used.iter().fold(Vector3::repeat(f64::INFINITY), |low, &p| low.inf(&subject.points[p as usize]));
-        let high = used
-            .iter()
-            .fold(Vector3::repeat(f64::NEG_INFINITY), |high, &p| high.sup(&subject.points[p as usize]));
-        let (middle, size) = if used.is_empty() {
-            (Vector3::zeros(), 1.0)
-        } else {
-            (0.5 * (low + high), 0.5 * (high - low).norm())
-        };
+        let (middle, size) = bounds(subject);
         Self {
             triangles,
             vertices,
@@ -607,6 +624,20 @@ impl Drawn {
             pass.set_pipeline(&renderer.mark);
             pass.draw(0..6 * self.mark_lines, 1..2);
         }
+    }
+}
+
+/// The middle of a subject at rest [m], and how far its surface reaches from there [m].
+fn bounds(subject: &Subject) -> (Vector3, f64) {
+    let used = subject.surface_points();
+    let end = |begin: f64, farther: fn(&Vector3, &Vector3) -> Vector3| {
+        used.iter().fold(Vector3::repeat(begin), |end, &p| farther(&end, &subject.points[p as usize]))
+    };
+    let low = end(f64::INFINITY, Vector3::inf);
+    let high = end(f64::NEG_INFINITY, Vector3::sup);
+    match used.is_empty() {
+        true => (Vector3::zeros(), 1.0),
+        false => (0.5 * (low + high), 0.5 * (high - low).norm()),
     }
 }
 
