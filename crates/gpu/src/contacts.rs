@@ -118,42 +118,16 @@ impl DeviceContacts {
             queue: memory.zeros("the faces that touch", lists.queue() * size_of::<u32>())?,
         };
         let bound = bound(device, nodes, &arrays, [&forces, &sums], pairs.as_ref());
-        let constants = [constants, &lists.constants].concat();
-        let counts = [
-            ("PASSES", PASSES),
-            ("ROUNDS", ROUNDS),
-            ("LOOKED", LOOKED),
-            ("SIDES", SIDES),
-            ("LIFTS", LIFTS),
-            ("ROWS", NODE_ROWS),
-            ("FACE_ROW", FACE_ROW),
-            ("SOLVERS", solvers(device)),
-        ];
-        let counts = counts.map(|(name, count)| format!("const {name} = {count}u;\n"));
-        let parts = [("FOUND", FOUND), ("OFF", OFF), ("LIFTED", LIFTED), ("BAND", BAND)];
-        let parts = parts.map(|(name, part)| format!("const {name} = {:e}f;\n", part as f32));
         // Whether several nodes have rows in common.
         let is_shared = lists.faces > 0 || pairs.is_some();
-        let limits = [counts.concat(), parts.concat(), format!("const IS_SHARED = {is_shared};\n")].concat();
-        let things = shader(&contacts.rigids);
-        let of_pairs = match pairs {
-            Some(_) => [
-                &pairs_shader(),
-                include_str!("shaders/pairs.wgsl"),
-                include_str!("shaders/pair_levels.wgsl"),
-            ]
-            .concat(),
-            None => include_str!("shaders/no_pairs.wgsl").to_owned(),
+        let source = Source {
+            device,
+            constants: [constants, &lists.constants].concat(),
+            common: common(device, contacts, is_shared, pairs.is_some()),
         };
-        let touching = [
-            include_str!("shaders/instant.wgsl"),
-            &limits,
-            &things,
-            include_str!("shaders/touching.wgsl"),
-            &of_pairs,
-        ];
-        let loaded = loads.map(|loads| Bound::new(device, &loads.bindings()));
         let groups = [instant, gathered, &bound];
+        let with = |entry: &str, invocations: usize| source.kernel(&[entry], &groups, invocations);
+        let loaded = loads.map(|loads| Bound::new(device, &loads.bindings()));
         let with_loads: Vec<&Bound> = groups.into_iter().chain(&loaded).collect();
         let predicting = [
             gather,
@@ -163,13 +137,7 @@ impl DeviceContacts {
             MOTION,
             include_str!("shaders/touch_nodes.wgsl"),
         ];
-        let predicting = [&touching[..], &predicting].concat();
-        let mut kernels =
-            vec![Kernel::new(device, "contacts", &constants, &predicting, &with_loads, lists.nodes)?];
-        let with = |entry: &str, invocations: usize| {
-            let snippets = [&touching[..], &[entry]].concat();
-            Kernel::new(device, "contacts", &constants, &snippets, &groups, invocations)
-        };
+        let mut kernels = vec![source.kernel(&predicting, &with_loads, lists.nodes)?];
         if lists.faces > 0 {
             let faces = [&face_points_shader(), include_str!("shaders/touch_faces.wgsl")].concat();
             kernels.push(with(&faces, lists.faces)?);
@@ -215,6 +183,54 @@ impl DeviceContacts {
         self.kernels[self.finder].resize(pairs.finders);
         Ok(())
     }
+}
+
+/// What all kernels of contacts begin with.
+struct Source<'a> {
+    device: &'a Device,
+    constants: Vec<(&'a str, usize)>,
+    common: String,
+}
+
+impl Source<'_> {
+    /// The kernel that ends with these snippets.
+    fn kernel(&self, snippets: &[&str], bound: &[&Bound], invocations: usize) -> Result<Kernel, GpuError> {
+        let snippets = [&[self.common.as_str()], snippets].concat();
+        Kernel::new(self.device, "contacts", &self.constants, &snippets, bound, invocations)
+    }
+}
+
+/// The WGSL that all kernels of contacts have.
+fn common(device: &Device, contacts: &Contacts, is_shared: bool, has_pairs: bool) -> String {
+    let counts = [
+        ("PASSES", PASSES),
+        ("ROUNDS", ROUNDS),
+        ("LOOKED", LOOKED),
+        ("SIDES", SIDES),
+        ("LIFTS", LIFTS),
+        ("ROWS", NODE_ROWS),
+        ("FACE_ROW", FACE_ROW),
+        ("SOLVERS", solvers(device)),
+    ];
+    let counts = counts.map(|(name, count)| format!("const {name} = {count}u;\n"));
+    let parts = [("FOUND", FOUND), ("OFF", OFF), ("LIFTED", LIFTED), ("BAND", BAND)];
+    let parts = parts.map(|(name, part)| format!("const {name} = {:e}f;\n", part as f32));
+    let limits = [counts.concat(), parts.concat(), format!("const IS_SHARED = {is_shared};\n")].concat();
+    let of_pairs = match has_pairs {
+        true => {
+            [&pairs_shader(), include_str!("shaders/pairs.wgsl"), include_str!("shaders/pair_levels.wgsl")]
+                .concat()
+        }
+        false => include_str!("shaders/no_pairs.wgsl").to_owned(),
+    };
+    [
+        include_str!("shaders/instant.wgsl"),
+        &limits,
+        &shader(&contacts.rigids),
+        include_str!("shaders/touching.wgsl"),
+        &of_pairs,
+    ]
+    .join("\n")
 }
 
 /// Rows, with those of pairs.
@@ -275,24 +291,24 @@ struct Face {
     contacts: Vec<(usize, [bool; 3])>,
 }
 
-/// What touching.wgsl reads.
-struct Lists {
-    surface: Vec<Four>,
+/// Contacts with things, and what touches these.
+struct Touched {
+    /// The things, the contacts, and points of faces.
     things: Vec<f32>,
-    numbers: Vec<u32>,
-    nodes: usize,
-    faces: usize,
-    colours: usize,
-    /// Length of `rows`.
-    rows: usize,
-    constants: Vec<(&'static str, usize)>,
+    first_contact: usize,
+    first_point: usize,
+    /// The contacts of each node.
+    at_node: Vec<Vec<usize>>,
+    /// In the order of their colours.
+    faces: Vec<([u32; 3], Face)>,
+    /// Most points of a face, of each contact.
+    points_of: Vec<usize>,
 }
 
-impl Lists {
-    /// Of the nodes that touch, and from where the ways of things begin in a row of the table.
+impl Touched {
     fn new(
         Contacts { rigids, contacts, .. }: &Contacts,
-        nodes: Vec<u32>,
+        nodes: &[u32],
         rest: &[Vector<f64>],
         passages: usize,
     ) -> Self {
@@ -334,22 +350,61 @@ impl Lists {
         let first_point = things.len();
         things.extend(points.as_flattened().iter().map(|&weight| weight as f32));
         let faces = coloured(faces, nodes.len());
+        Self { things, first_contact, first_point, at_node, faces, points_of }
+    }
+}
+
+/// Where rows are.
+struct Places {
+    /// Length of `rows`.
+    rows: usize,
+    /// The rows of each contact.
+    of_contacts: Vec<Vec<u32>>,
+}
+
+impl Places {
+    /// Gives a contact the next fours of `rows`; where they begin.
+    fn next(&mut self, contact: usize, fours: usize) -> u32 {
+        let begin = self.rows as u32;
+        self.of_contacts[contact].push(begin);
+        self.rows += fours;
+        begin
+    }
+}
+
+/// What touching.wgsl reads.
+struct Lists {
+    surface: Vec<Four>,
+    things: Vec<f32>,
+    numbers: Vec<u32>,
+    nodes: usize,
+    faces: usize,
+    colours: usize,
+    /// Length of `rows`.
+    rows: usize,
+    constants: Vec<(&'static str, usize)>,
+}
+
+impl Lists {
+    /// Of the nodes that touch, and from where the ways of things begin in a row of the table.
+    fn new(contacts: &Contacts, nodes: Vec<u32>, rest: &[Vector<f64>], passages: usize) -> Self {
+        let Touched { things, first_contact, first_point, at_node, faces, points_of } =
+            Touched::new(contacts, &nodes, rest, passages);
         let colours = faces.last().map_or(0, |(_, face)| face.colour + 1);
+        let mut places = Places { rows: 0, of_contacts: vec![Vec::new(); contacts.contacts.len()] };
 
         let mut surface = Vec::with_capacity(2 * nodes.len() + 2);
         let mut numbers: Vec<u32> = Vec::new();
-        let mut sums = vec![Vec::new(); contacts.len()];
         for (&node, touched) in nodes.iter().zip(&at_node) {
             let [[a, b, c], [d, e, f]] = split(rest[node as usize].into());
             surface
                 .extend([[a, b, c, f32::from_bits(node)], [d, e, f, f32::from_bits(numbers.len() as u32)]]);
             for &contact in touched {
-                sums[contact].push((NODE_ROWS * numbers.len()) as u32);
+                places.next(contact, NODE_ROWS);
                 numbers.push(contact as u32);
             }
         }
         surface.extend([[0.0; 4], [0.0, 0.0, 0.0, f32::from_bits(numbers.len() as u32)]]);
-        let mut rows = NODE_ROWS * numbers.len();
 
         let first_face = numbers.len();
         let mut of_faces: Vec<u32> = Vec::new();
@@ -357,10 +412,9 @@ impl Lists {
             numbers.extend(corners);
             numbers.extend([face.colour as u32, of_faces.len() as u32 / 3]);
             for &(contact, edges) in &face.contacts {
-                sums[contact].push(rows as u32);
+                let row = places.next(contact, 1 + FACE_ROW * points_of[contact]);
                 let bits = (0..3).map(|k| u32::from(edges[k]) << k).sum();
-                of_faces.extend([contact as u32, rows as u32, bits]);
-                rows += 1 + FACE_ROW * points_of[contact];
+                of_faces.extend([contact as u32, row, bits]);
             }
         }
         numbers.extend([0, 0, 0, 0, of_faces.len() as u32 / 3]);
@@ -370,13 +424,14 @@ impl Lists {
         let begins = |colour: usize| faces.partition_point(|(_, face)| face.colour < colour) as u32;
         numbers.extend((0..colours).map(begins));
         let first_sum = numbers.len();
-        let mut end = first_sum + contacts.len() + 1;
-        for own in &sums {
+        let mut end = first_sum + places.of_contacts.len() + 1;
+        for own in &places.of_contacts {
             numbers.push(end as u32);
             end += own.len();
         }
         numbers.push(end as u32);
-        numbers.extend(sums.concat());
+        numbers.extend(places.of_contacts.concat());
+        let rows = places.rows;
         let constants = vec![
             ("TOUCHING", nodes.len()),
             ("FACES", faces.len()),

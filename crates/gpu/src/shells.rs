@@ -127,7 +127,7 @@ impl GpuShells {
         model: Arc<Assembly>,
         step: f64,
     ) -> Result<Self, GpuError> {
-        let (nodes, facets) = (model.rest.len(), model.facets.len());
+        let nodes = model.rest.len();
         let (moved, motions) = moved_nodes(&model);
         let stride = model.loads.len() + 6 * motions.iter().filter(|&&place| place != NONE).count();
         let places = memory.zeros("the places of nodes", nodes * 32)?;
@@ -135,63 +135,11 @@ impl GpuShells {
         let rows = Rows::new(memory, device, stride)?;
         let broken = memory.filled("the findings", &[NONE])?;
         let bound = Bound::new(device, &[rows.instant(), Binding::Write(&broken), rows.table()]);
-        let constants = [("FACETS", facets), ("NODES", nodes)];
-        let head =
-            concat!(include_str!("shaders/shells/instant.wgsl"), include_str!("shaders/shells/facets.wgsl"));
-        let corners: Vec<[u32; 4]> =
-            model.facets.iter().map(|facet| [facet.nodes[0], facet.nodes[1], facet.nodes[2], 0]).collect();
-        let corners = memory.filled("the facets", &corners)?;
-        let rest = memory.filled("the stiffness of facets", &at_rest(&model))?;
-        let forces = memory.zeros("the forces of facets", facets * 96)?;
-        let own = Bound::new(
-            device,
-            &[Binding::Read(&places), Binding::Read(&corners), Binding::Read(&rest), Binding::Write(&forces)],
-        );
-        let pressed = Pressed::new(memory, device, &model)?;
-        let (press, mut groups) = match &pressed {
-            None => (include_str!("shaders/shells/unpressed.wgsl"), vec![&bound, &own]),
-            Some(_) => (include_str!("shaders/shells/pressure.wgsl"), vec![&bound, &own]),
-        };
-        groups.extend(pressed.iter().map(|pressed| &pressed.bound));
-        let facet_kernel = Kernel::new(device, "facets", &constants, &[head, press], &groups, facets)?;
-
-        let kinds = memory.filled("the masses of nodes", &kinds(&model, step))?;
-        let motions = memory.filled("the motions of nodes", &motions)?;
-        let corners = model.facets.iter().enumerate().flat_map(|(facet, own)| {
-            own.nodes.into_iter().zip(0..).map(move |(node, corner)| (node, 3 * facet as u32 + corner))
-        });
-        let (corner_starts, corners) = by_rows(nodes, corners);
-        let corner_starts = memory.filled("the corners of nodes", &corner_starts)?;
-        let corners = memory.filled("the corners of nodes", &corners)?;
-        let (load_starts, loads) = by_rows(nodes, nodal_loads(&model));
+        let kernels =
+            Kernels { memory, device, model: &model, bound: &bound, places: &places, rates: &rates };
+        let of_facets = kernels.facets()?;
         let pushes = memory.zeros("the forces on nodes", nodes * 16)?;
-        let load_starts = memory.filled("the loads of nodes", &load_starts)?;
-        let loads = memory.filled("the loads of nodes", &loads)?;
-        let own = Bound::new(
-            device,
-            &[
-                Binding::Write(&places),
-                Binding::Write(&rates),
-                Binding::Read(&kinds),
-                Binding::Read(&motions),
-                Binding::Read(&corner_starts),
-                Binding::Read(&corners),
-                Binding::Read(&forces),
-                Binding::Read(&load_starts),
-                Binding::Read(&loads),
-                Binding::Read(&pushes),
-            ],
-        );
-        let head =
-            concat!(include_str!("shaders/shells/instant.wgsl"), include_str!("shaders/shells/nodes.wgsl"));
-        let given = pressed.as_ref().map(|pressed| Bound::new(device, &[Binding::Read(&pressed.given)]));
-        let give = match &given {
-            None => include_str!("shaders/shells/not_given.wgsl"),
-            Some(_) => include_str!("shaders/shells/given.wgsl"),
-        };
-        let mut groups = vec![&bound, &own];
-        groups.extend(&given);
-        let node_kernel = Kernel::new(device, "shell nodes", &constants, &[head, give], &groups, nodes)?;
+        let node_kernel = kernels.nodes(&of_facets, step, &motions, &pushes)?;
         Ok(Self {
             device: device.clone(),
             step,
@@ -203,7 +151,7 @@ impl GpuShells {
             rates,
             pushes,
             pushed: false,
-            facets: facet_kernel,
+            facets: of_facets.kernel,
             nodes: node_kernel,
             transfer: Transfer::default(),
             loaded: false,
@@ -331,6 +279,110 @@ impl GpuShells {
             }
         })?;
         Ok(read)
+    }
+}
+
+/// What both kernels are made of.
+struct Kernels<'a> {
+    memory: &'a Memory<'a>,
+    device: &'a Device,
+    model: &'a Assembly,
+    bound: &'a Bound,
+    places: &'a wgpu::Buffer,
+    rates: &'a wgpu::Buffer,
+}
+
+/// The kernel of facets, and the forces that it finds.
+struct FacetForces {
+    kernel: Kernel,
+    /// On the corners.
+    forces: wgpu::Buffer,
+    pressed: Option<Pressed>,
+}
+
+impl Kernels<'_> {
+    /// A kernel that works on its own arrays and, where there are pressures, on these.
+    fn kernel(
+        &self,
+        name: &str,
+        snippets: [&str; 2],
+        (own, pressure): (&[Binding<'_>], Option<&Bound>),
+        invocations: usize,
+    ) -> Result<Kernel, GpuError> {
+        let constants = [("FACETS", self.model.facets.len()), ("NODES", self.model.rest.len())];
+        let own = Bound::new(self.device, own);
+        let groups: Vec<&Bound> = [self.bound, &own].into_iter().chain(pressure).collect();
+        Kernel::new(self.device, name, &constants, &snippets, &groups, invocations)
+    }
+
+    /// Finds the forces of facets.
+    fn facets(&self) -> Result<FacetForces, GpuError> {
+        let Self { memory, device, model, .. } = self;
+        let facets = &model.facets;
+        let corners: Vec<[u32; 4]> =
+            facets.iter().map(|facet| [facet.nodes[0], facet.nodes[1], facet.nodes[2], 0]).collect();
+        let corners = memory.filled("the facets", &corners)?;
+        let rest = memory.filled("the stiffness of facets", &at_rest(model))?;
+        let forces = memory.zeros("the forces of facets", facets.len() * 96)?;
+        let pressed = Pressed::new(memory, device, model)?;
+        let own = [
+            Binding::Read(self.places),
+            Binding::Read(&corners),
+            Binding::Read(&rest),
+            Binding::Write(&forces),
+        ];
+        let head =
+            concat!(include_str!("shaders/shells/instant.wgsl"), include_str!("shaders/shells/facets.wgsl"));
+        let press = match pressed {
+            None => include_str!("shaders/shells/unpressed.wgsl"),
+            Some(_) => include_str!("shaders/shells/pressure.wgsl"),
+        };
+        let pressure = pressed.as_ref().map(|pressed| &pressed.bound);
+        let kernel = self.kernel("facets", [head, press], (&own, pressure), facets.len())?;
+        Ok(FacetForces { kernel, forces, pressed })
+    }
+
+    /// Moves nodes by a step [s], with where their motions are in a row of the table, and forces from outside.
+    fn nodes(
+        &self,
+        FacetForces { forces, pressed, .. }: &FacetForces,
+        step: f64,
+        motions: &[u32],
+        pushes: &wgpu::Buffer,
+    ) -> Result<Kernel, GpuError> {
+        let Self { memory, device, model, .. } = self;
+        let nodes = model.rest.len();
+        let kinds = memory.filled("the masses of nodes", &kinds(model, step))?;
+        let motions = memory.filled("the motions of nodes", motions)?;
+        let corners = model.facets.iter().enumerate().flat_map(|(facet, own)| {
+            own.nodes.into_iter().zip(0..).map(move |(node, corner)| (node, 3 * facet as u32 + corner))
+        });
+        let (corner_starts, corners) = by_rows(nodes, corners);
+        let corner_starts = memory.filled("the corners of nodes", &corner_starts)?;
+        let corners = memory.filled("the corners of nodes", &corners)?;
+        let (load_starts, loads) = by_rows(nodes, nodal_loads(model));
+        let load_starts = memory.filled("the loads of nodes", &load_starts)?;
+        let loads = memory.filled("the loads of nodes", &loads)?;
+        let own = [
+            Binding::Write(self.places),
+            Binding::Write(self.rates),
+            Binding::Read(&kinds),
+            Binding::Read(&motions),
+            Binding::Read(&corner_starts),
+            Binding::Read(&corners),
+            Binding::Read(forces),
+            Binding::Read(&load_starts),
+            Binding::Read(&loads),
+            Binding::Read(pushes),
+        ];
+        let head =
+            concat!(include_str!("shaders/shells/instant.wgsl"), include_str!("shaders/shells/nodes.wgsl"));
+        let give = match pressed {
+            None => include_str!("shaders/shells/not_given.wgsl"),
+            Some(_) => include_str!("shaders/shells/given.wgsl"),
+        };
+        let given = pressed.as_ref().map(|pressed| Bound::new(device, &[Binding::Read(&pressed.given)]));
+        self.kernel("shell nodes", [head, give], (&own, given.as_ref()), nodes)
     }
 }
 
