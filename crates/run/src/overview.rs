@@ -7,16 +7,16 @@ use pliant_geometry::words::{counted, number};
 use pliant_implicit::bytes_of_factors;
 use pliant_linear::memory;
 use pliant_mechanics::load::{Load, LoadKind};
-use pliant_mechanics::model::Motion;
+use pliant_mechanics::model::{Constraint, Material, Motion, Solid};
 use pliant_shells::Facet;
 use pliant_sim::contact::touch::With;
 use pliant_sim::{BodyCells, Critical, ImplicitBodies};
 
-use crate::output::{AddedMass, bodies, told_limit};
+use crate::output::{AddedMass, BodySummary, bodies, told_limit};
 use pliant_format::Scene;
 use pliant_format::registry::OutputTable;
 use pliant_format::tables::{LinearName, PreconditionerName, SolverName};
-use pliant_scene::{Built, Limits, Plan, World};
+use pliant_scene::{Built, BuiltBody, Limits, Plan, World};
 
 /// The model in words: bodies, quality, constraints, loads, critical step, expected cost.
 pub fn overview(world: &World) -> String {
@@ -58,46 +58,7 @@ fn write_overview(page: &mut String, world: &World) -> fmt::Result {
 
 fn write_model(page: &mut String, built: &Built) -> fmt::Result {
     for (summary, body) in bodies(built).iter().zip(&built.bodies) {
-        let quality = QualityReport::new(&body.mesh);
-        writeln!(page, "body `{}`: {}", body.name, body.origin)?;
-        writeln!(page, "  {} nodes, {} elements", summary.nodes, summary.elements)?;
-        writeln!(page, "  volume {} m³, mass {} kg", number(summary.volume), number(summary.mass))?;
-        for solid in
-            built.model.solids.iter().filter(|solid| built.model.bodies[solid.body].name == body.name)
-        {
-            let moduli = solid.material.law.small_strain();
-            writeln!(
-                page,
-                "  {} {} with law {}: shear modulus {} Pa, bulk modulus {} Pa, {}",
-                solid.cells.len(),
-                solid.cells.element(),
-                solid.material.law.name(),
-                number(moduli.shear),
-                number(moduli.bulk),
-                counted(
-                    solid.material.prony.isochoric.len() + solid.material.prony.volumetric.len(),
-                    "relaxing term"
-                ),
-            )?;
-        }
-        if let Some(part) = &built.implicit {
-            write_implicit(page, part, &body.name, built)?;
-        }
-        if let Some([least, most]) = quality.dihedral {
-            writeln!(page, "  dihedral angles {least:.1}° to {most:.1}°")?;
-        }
-        if let Some(jacobian) = quality.scaled_jacobian {
-            writeln!(page, "  smallest scaled Jacobian {jacobian:.3}")?;
-        }
-        if let Some(edge) = quality.edge_length {
-            let [min, median, max] = [edge.min, edge.median, edge.max].map(number);
-            writeln!(page, "  edges {min} to {max} m, median {median} m")?;
-        }
-        if quality.acoustic_length.is_some() {
-            writeln!(page, "  quality (acoustic length relative to the ideal cell of the same volume):")?;
-            quality.histogram_lines().iter().try_for_each(|line| writeln!(page, "    {line}"))?;
-        }
-        writeln!(page)?;
+        write_body(page, summary, body, built)?;
     }
     for (surface, mesh) in built.model.surfaces.iter().zip(&built.surfaces) {
         let body = &built.model.bodies[surface.body].name;
@@ -110,25 +71,7 @@ fn write_model(page: &mut String, built: &Built) -> fmt::Result {
         )?;
     }
     for constraint in &built.model.constraints {
-        let axes: String =
-            "xyz".chars().zip(constraint.components).filter(|(_, on)| *on).map(|(c, _)| c).collect();
-        let what = match constraint.motion {
-            Motion::Fixed => "fixes",
-            Motion::Displacement(..)
-            | Motion::Displacements(..)
-            | Motion::Turn { .. }
-            | Motion::Velocity(..) => "moves",
-            Motion::Rotation { .. } => "rotates",
-            Motion::Mean { .. } => "moves the mean",
-            Motion::Rigid => "keeps the shape,",
-            Motion::Volume { .. } => "fills the volume within",
-        };
-        let turns = &constraint.components[3..];
-        let rotations: Vec<&str> =
-            ["rx", "ry", "rz"].into_iter().zip(turns).filter(|(_, on)| **on).map(|(axis, _)| axis).collect();
-        let axes = [axes, rotations.join(" ")].join(" ").trim().to_owned();
-        let nodes = counted(constraint.nodes.len(), "node");
-        writeln!(page, "constraint `{}`: {what} {axes} of {nodes}", constraint.name)?;
+        write_constraint(page, constraint)?;
     }
     for contact in built.contacts.iter().flat_map(|all| &all.contacts) {
         let thing = match (&contact.with, &built.contacts) {
@@ -147,6 +90,68 @@ fn write_model(page: &mut String, built: &Built) -> fmt::Result {
         writeln!(page, "{} to points", counted(springs, "spring"))?;
     }
     Ok(())
+}
+
+/// A body: its mesh, its laws, and the quality of its elements.
+fn write_body(page: &mut String, summary: &BodySummary, body: &BuiltBody, built: &Built) -> fmt::Result {
+    let quality = QualityReport::new(&body.mesh);
+    writeln!(page, "body `{}`: {}", body.name, body.origin)?;
+    writeln!(page, "  {} nodes, {} elements", summary.nodes, summary.elements)?;
+    writeln!(page, "  volume {} m³, mass {} kg", number(summary.volume), number(summary.mass))?;
+    let is_own = |solid: &&Solid| built.model.bodies[solid.body].name == body.name;
+    for solid in built.model.solids.iter().filter(is_own) {
+        let Material { law, prony, .. } = &solid.material;
+        let moduli = law.small_strain();
+        writeln!(
+            page,
+            "  {} {} with law {}: shear modulus {} Pa, bulk modulus {} Pa, {}",
+            solid.cells.len(),
+            solid.cells.element(),
+            law.name(),
+            number(moduli.shear),
+            number(moduli.bulk),
+            counted(prony.isochoric.len() + prony.volumetric.len(), "relaxing term"),
+        )?;
+    }
+    if let Some(part) = &built.implicit {
+        write_implicit(page, part, &body.name, built)?;
+    }
+    if let Some([least, most]) = quality.dihedral {
+        writeln!(page, "  dihedral angles {least:.1}° to {most:.1}°")?;
+    }
+    if let Some(jacobian) = quality.scaled_jacobian {
+        writeln!(page, "  smallest scaled Jacobian {jacobian:.3}")?;
+    }
+    if let Some(edge) = quality.edge_length {
+        let [min, median, max] = [edge.min, edge.median, edge.max].map(number);
+        writeln!(page, "  edges {min} to {max} m, median {median} m")?;
+    }
+    if quality.acoustic_length.is_some() {
+        writeln!(page, "  quality (acoustic length relative to the ideal cell of the same volume):")?;
+        quality.histogram_lines().iter().try_for_each(|line| writeln!(page, "    {line}"))?;
+    }
+    writeln!(page)
+}
+
+/// What a constraint does, and with how many nodes.
+fn write_constraint(page: &mut String, constraint: &Constraint) -> fmt::Result {
+    let what = match constraint.motion {
+        Motion::Fixed => "fixes",
+        Motion::Displacement(..) | Motion::Displacements(..) | Motion::Turn { .. } | Motion::Velocity(..) => {
+            "moves"
+        }
+        Motion::Rotation { .. } => "rotates",
+        Motion::Mean { .. } => "moves the mean",
+        Motion::Rigid => "keeps the shape,",
+        Motion::Volume { .. } => "fills the volume within",
+    };
+    let (moves, turns) = constraint.components.split_at(3);
+    let axes: String = "xyz".chars().zip(moves).filter(|(_, on)| **on).map(|(c, _)| c).collect();
+    let rotations: Vec<&str> =
+        ["rx", "ry", "rz"].into_iter().zip(turns).filter(|(_, on)| **on).map(|(axis, _)| axis).collect();
+    let axes = [axes, rotations.join(" ")].join(" ").trim().to_owned();
+    let nodes = counted(constraint.nodes.len(), "node");
+    writeln!(page, "constraint `{}`: {what} {axes} of {nodes}", constraint.name)
 }
 
 fn write_outputs(page: &mut String, scene: &Scene) -> fmt::Result {
