@@ -21,7 +21,7 @@ use pliant_haptics::thread::{Haptics as Thread, Report};
 use pliant_haptics::trace::Trace;
 use pliant_scene::World;
 use pliant_sim::contact::touch::{With, lattice};
-use pliant_sim::{Frame, Simulation, State};
+use pliant_sim::{Frame, Simulation, State, StopFlag};
 
 use crate::SUCCESS;
 use crate::arguments::Haptics;
@@ -110,88 +110,132 @@ fn run(
     trace: Option<Trace>,
     settings: Settings,
 ) -> Result<u8, Failure> {
-    let failed = |failure: pliant_sim::Failure| Failure::plain(failure.message, "");
     let mut simulation = world.simulation().map_err(failed)?;
-    let around = Around { tool, samples: face_samples() };
-    let started = simulation.frame().map_err(failed)?.tool(tool).map(|now| now.pose);
-    let Some(start) = started else {
+    if simulation.frame().map_err(failed)?.tool(tool).is_none() {
         return Err(Failure::plain(
             format!("nothing touches `{tool}`"),
             "add a contact with it, solved by `explicit` on the CPU",
         ));
-    };
-    let thread = match (trace, arguments.listen) {
-        (Some(trace), _) => {
-            let [first, _] = trace.times();
-            let arrival = simulation.drive(tool, trace.at(first), APPROACH).map_err(failed)?;
-            simulation.run(arrival, |_| ()).map_err(failed)?;
-            let hand = arguments.hand.then(Hand::default);
-            Thread::start(settings, Replay::new(trace, Duration::from_millis(1), hand))
-        }
-        (None, address) => {
-            let link = Link::open(address, arguments.remote).map_err(refused)?;
-            eprintln!("listening at {}; Ctrl-C ends it", link.address());
-            Thread::start(settings, link)
-        }
-    };
-    let mut thread = thread.map_err(refused)?;
-    let mut pace = Pace::new(&simulation, arguments.rate);
-    let mut estimate = Estimate::new(settings.coupling.stiffness, STIFFNESS);
-    let mut last = start;
-    let mut pressed: Option<LocalModel> = None;
+    }
+    let thread = start(arguments, settings, trace, &mut simulation, tool)?;
+    let pace = Pace::new(&simulation, arguments.rate);
     let stop = signals::stop();
-    let mut kept = Kept::new(&mut simulation).map_err(failed)?;
-    let mut ended = None;
-    while !thread.is_over() && !stop.is_asked() {
-        let state = thread.state();
-        if state.ticks > 0 {
-            last = state.proxy;
-        }
-        match step(&mut simulation, &around, (state.ticks > 0).then_some(&last), pace.until()) {
-            Ok(period) => {
-                estimate.add(period.place, period.force);
-                let model = local_model(&period, &estimate, pace.done()).map_err(refused)?;
-                let deeper = |before: &LocalModel| model.force().norm() > before.force().norm();
-                if pressed.as_ref().is_none_or(deeper) {
-                    pressed = Some(model.clone());
-                }
-                thread.publish(model);
-                kept.keep(&mut simulation).map_err(failed)?;
-                pace.wait();
-            }
-            Err(failure) => {
-                if !kept.go_back(&mut simulation) {
-                    ended = Some(failure);
-                    break;
-                }
-                pace.go_back(&simulation);
-                eprintln!(
-                    "note: the simulation went back to t = {:.3} s: {}",
-                    simulation.time(),
-                    failure.message
-                );
-            }
-        }
-    }
-    let state = thread.state();
-    let report = thread.finish().map_err(refused)?;
-    say(words(&report, &pace, &estimate))?;
-    if kept.failures > 0 {
-        say(format_args!("went back        {} times", kept.failures))?;
-    }
-    if let Some(force) = simulation.frame().ok().and_then(|frame| frame.tool(tool)).map(|now| now.force) {
-        let device: [f64; 3] = state.force.into();
-        say(format_args!("last force       device {}, simulation {} N", vector(device), vector(force)))?;
-    }
-    if let Some(model) = pressed.filter(|model| model.force().norm() > 0.0) {
-        say(stiffest(&model, settings).map_err(refused)?)?;
-    }
+    let mut session = Session {
+        around: Around { tool, samples: face_samples() },
+        thread,
+        pace,
+        estimate: Estimate::new(settings.coupling.stiffness, STIFFNESS),
+        kept: Kept::new(&mut simulation).map_err(failed)?,
+        pressed: None,
+        simulation,
+    };
+    let ended = session.run(stop)?;
+    session.finish(settings)?;
     match ended {
         Some(failure) => {
             eprintln!("error: {failure}");
             Ok(1)
         }
         None => Ok(SUCCESS),
+    }
+}
+
+fn failed(failure: pliant_sim::Failure) -> Failure {
+    Failure::plain(failure.message, "")
+}
+
+/// Starts the haptic thread: with a trace, after the tool has come to where this begins, or with a device.
+fn start(
+    arguments: &Haptics,
+    settings: Settings,
+    trace: Option<Trace>,
+    simulation: &mut Simulation,
+    tool: &str,
+) -> Result<Thread, Failure> {
+    let thread = match trace {
+        Some(trace) => {
+            let [first, _] = trace.times();
+            let arrival = simulation.drive(tool, trace.at(first), APPROACH).map_err(failed)?;
+            simulation.run(arrival, |_| ()).map_err(failed)?;
+            let hand = arguments.hand.then(Hand::default);
+            Thread::start(settings, Replay::new(trace, Duration::from_millis(1), hand))
+        }
+        None => {
+            let link = Link::open(arguments.listen, arguments.remote).map_err(refused)?;
+            eprintln!("listening at {}; Ctrl-C ends it", link.address());
+            Thread::start(settings, link)
+        }
+    };
+    thread.map_err(refused)
+}
+
+/// A tool in a hand.
+struct Session<'a> {
+    simulation: Simulation,
+    around: Around<'a>,
+    thread: Thread,
+    pace: Pace,
+    estimate: Estimate,
+    kept: Kept,
+    /// The model of the largest force so far.
+    pressed: Option<LocalModel>,
+}
+
+impl Session<'_> {
+    /// Steps until the device or the user ends it; the failure that does, where it can't go back to a state before.
+    fn run(&mut self, stop: &StopFlag) -> Result<Option<pliant_sim::Failure>, Failure> {
+        while !self.thread.is_over() && !stop.is_asked() {
+            let state = self.thread.state();
+            let goal = (state.ticks > 0).then_some(&state.proxy);
+            match step(&mut self.simulation, &self.around, goal, self.pace.until()) {
+                Ok(period) => self.publish(&period)?,
+                Err(failure) => {
+                    if !self.kept.go_back(&mut self.simulation) {
+                        return Ok(Some(failure));
+                    }
+                    self.pace.go_back(&self.simulation);
+                    eprintln!(
+                        "note: the simulation went back to t = {:.3} s: {}",
+                        self.simulation.time(),
+                        failure.message
+                    );
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// Publishes the contact of a period, and waits until this ends.
+    fn publish(&mut self, period: &Period) -> Result<(), Failure> {
+        self.estimate.add(period.place, period.force);
+        let model = local_model(period, &self.estimate, self.pace.done()).map_err(refused)?;
+        let deeper = |before: &LocalModel| model.force().norm() > before.force().norm();
+        if self.pressed.as_ref().is_none_or(deeper) {
+            self.pressed = Some(model.clone());
+        }
+        self.thread.publish(model);
+        self.kept.keep(&mut self.simulation).map_err(failed)?;
+        self.pace.wait();
+        Ok(())
+    }
+
+    /// Ends the thread and tells how it went.
+    fn finish(self, settings: Settings) -> Result<(), Failure> {
+        let Self { mut simulation, around, mut thread, pace, estimate, kept, pressed } = self;
+        let device: [f64; 3] = thread.state().force.into();
+        let report = thread.finish().map_err(refused)?;
+        say(words(&report, &pace, &estimate))?;
+        if kept.failures > 0 {
+            say(format_args!("went back        {} times", kept.failures))?;
+        }
+        if let Some(now) = simulation.frame().ok().and_then(|frame| frame.tool(around.tool)) {
+            let (device, simulation) = (vector(device), vector(now.force));
+            say(format_args!("last force       device {device}, simulation {simulation} N"))?;
+        }
+        if let Some(model) = pressed.filter(|model| model.force().norm() > 0.0) {
+            say(stiffest(&model, settings).map_err(refused)?)?;
+        }
+        Ok(())
     }
 }
 
