@@ -4,7 +4,7 @@
 use pliant_mechanics::element::GaussPoints;
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::{CellBlock, Solid};
-use pliant_mechanics::tensor::{Vector, add, cast};
+use pliant_mechanics::tensor::{Tensor, Vector, add, cast};
 
 use super::averaged::relaxed_pressures;
 use super::batch::{Batch, PACKS, Wanted, volume_change};
@@ -14,7 +14,7 @@ use super::findings::Findings;
 use super::one_pass::{Element, OnePass};
 use super::packed::{PackedCells, by_cell, displacement_gradient, own_packs, relative};
 use crate::lanes::LaneNumber;
-use crate::lanes::{Lanes, PACK, Pack, load_vector, store_vector};
+use crate::lanes::{Lanes, Local, PACK, Pack, load_vector, store_vector};
 use crate::relaxation::Relaxation;
 
 pub(super) type FullHexes<R> = OnePass<R, FullHexConstants<R>>;
@@ -66,6 +66,72 @@ impl<R: LaneNumber> FullHexes<R> {
     }
 }
 
+impl<R: LaneNumber> Point<R> {
+    /// Adds the forces of a first Piola–Kirchhoff stress to those on all nodes but the first.
+    #[inline(always)]
+    fn add_forces<L: Lanes<R>>(&self, piola: &Tensor<L>, nodal: &mut [Vector<Pack<R>>; 7], at: usize) {
+        let piola = piola.scaled(L::load(&self.weight, at));
+        for (force, b) in nodal.iter_mut().zip(&self.gradient) {
+            let own = piola.apply(load_vector(b, at));
+            store_vector(add(load_vector(force, at), own), force, at);
+        }
+    }
+}
+
+/// Vectors of all nodes but the first, in the lanes from `at` on.
+#[inline(always)]
+fn load_all<R: LaneNumber, L: Lanes<R>>(packed: &[Vector<Pack<R>>; 7], at: usize) -> [Vector<L>; 7] {
+    let mut all = [[L::ZERO; 3]; 7];
+    for (to, from) in all.iter_mut().zip(packed) {
+        *to = load_vector(from, at);
+    }
+    all
+}
+
+impl<R: LaneNumber> FullHexConstants<R> {
+    /// v/V − 1 of a pack, by its number in all and in the block; `u` takes the displacements of all nodes but the first, relative to it.
+    #[inline(always)]
+    fn volume_change<L: Lanes<R>>(
+        &self,
+        local: &Local<'_, R, 8>,
+        [pack, pack_of_block]: [usize; 2],
+        u: &mut [Vector<Pack<R>>; 7],
+    ) -> Pack<R> {
+        let mut changes = Pack::ZERO;
+        for at in (0..PACK).step_by(L::WIDTH) {
+            let (relative, _) = relative::<R, L, 8, 7>(local, pack_of_block, at);
+            for (u, relative) in u.iter_mut().zip(relative) {
+                store_vector(relative, u, at);
+            }
+            let mut change = L::ZERO;
+            for Point { gradient, weight } in &self.points[pack] {
+                let h = displacement_gradient(&relative, gradient, at);
+                change += L::load(weight, at) * volume_change(&h);
+            }
+            (change * L::load(&self.inverse_volume[pack], at)).store(&mut changes, at);
+        }
+        changes
+    }
+
+    /// The first cell of such a pack with a corner turned inside out, from v/V − 1.
+    #[inline(always)]
+    fn folded<L: Lanes<R>>(
+        &self,
+        local: &Local<'_, R, 8>,
+        [pack, pack_of_block]: [usize; 2],
+        changes: &Pack<R>,
+    ) -> Option<usize> {
+        let mut ratio = *changes;
+        ratio.0.iter_mut().for_each(|change| *change += R::ONE);
+        if !ratio.0.iter().any(|&ratio| is_flat(ratio)) {
+            return None;
+        }
+        let corners = &self.corners[pack];
+        let look = CornerCheck::<R, 8, 7> { corners, local, flatness: &ratio, pack: pack_of_block };
+        L::call(look).map(|lane| pack * PACK + lane)
+    }
+}
+
 impl<R: LaneNumber> Element<R> for FullHexConstants<R> {
     fn slots(&self) -> [usize; 2] {
         [8 * 6 * self.isochoric_slots, self.volumetric_slots]
@@ -76,7 +142,7 @@ impl<R: LaneNumber> Element<R> for FullHexConstants<R> {
 
     #[inline(always)]
     fn pass<L: Lanes<R>>(&self, displacement: &[Vector<R>], mut task: Task<'_, R>) -> Findings<R> {
-        let FullHexConstants { law, cells, points, corners, inverse_volume, relaxation, .. } = self;
+        let FullHexConstants { law, cells, points, relaxation, .. } = self;
         task.copy_in(displacement);
         let Task { block, moved, forces: sums, history, pressures, .. } = task;
         sums.fill([R::ZERO; 4]);
@@ -89,52 +155,28 @@ impl<R: LaneNumber> Element<R> for FullHexConstants<R> {
         let packs = cells.packs_of(block);
         let mut local = cells.places.at_work(block, moved, sums);
         for pack in packs.clone() {
-            let mut pressure = Pack::ZERO;
-            for at in (0..PACK).step_by(L::WIDTH) {
-                let (relative, _) = relative::<R, L, 8, 7>(&local, pack - packs.start, at);
-                for (u, relative) in u.iter_mut().zip(relative) {
-                    store_vector(relative, u, at);
-                }
-                // v/V − 1.
-                let mut change = L::ZERO;
-                for Point { gradient, weight } in &points[pack] {
-                    let h = displacement_gradient(&relative, gradient, at);
-                    change += L::load(weight, at) * volume_change(&h);
-                }
-                (change * L::load(&inverse_volume[pack], at)).store(&mut pressure, at);
-            }
-            let mut ratio = pressure;
-            ratio.0.iter_mut().for_each(|change| *change += R::ONE);
-            if findings.folded.is_none() && ratio.0.iter().any(|&ratio| is_flat(ratio)) {
-                let pack_of_block = pack - packs.start;
-                let look = CornerCheck::<R, 8, 7> {
-                    corners: &corners[pack],
-                    local: &local,
-                    flatness: &ratio,
-                    pack: pack_of_block,
-                };
-                findings.folded = L::call(look).map(|lane| pack * PACK + lane);
+            let pack_of_block = pack - packs.start;
+            let mut pressure = self.volume_change::<L>(&local, [pack, pack_of_block], &mut u);
+            if findings.folded.is_none() {
+                findings.folded = self.folded::<L>(&local, [pack, pack_of_block], &pressure);
             }
             // U'(v/V), relaxed where the law's volumetric part relaxes.
             let slots = self.volumetric_slots;
-            let own = own_packs(pack - packs.start, slots, pressures.len());
+            let own = own_packs(pack_of_block, slots, pressures.len());
             let values = std::slice::from_mut(&mut pressure);
             relaxed_pressures::<R, L>(law, relaxation, slots, values, &mut pressures[own], &mut batch);
             nodal.fill([Pack::ZERO; 3]);
             for (part, points) in points[pack].chunks(PACKS).enumerate() {
                 for (index, point) in points.iter().enumerate() {
                     for at in (0..PACK).step_by(L::WIDTH) {
-                        let mut relative = [[L::ZERO; 3]; 7];
-                        for (relative, u) in relative.iter_mut().zip(&u) {
-                            *relative = load_vector(u, at);
-                        }
+                        let relative = load_all::<R, L>(&u, at);
                         batch.set(index, at, &displacement_gradient(&relative, &point.gradient, at));
                     }
                 }
                 batch.evaluate::<L>(law, Wanted::Isochoric, PACKS, PACKS, cells.fibres(pack, 1));
                 for (index, point) in points.iter().enumerate() {
                     batch.note(index, pack * PACK, &mut findings);
-                    let number = (pack - packs.start) * 8 + part * PACKS + index;
+                    let number = pack_of_block * 8 + part * PACKS + index;
                     let own = own_packs(number, per_point, history.len());
                     for at in (0..PACK).step_by(L::WIDTH) {
                         let isochoric = batch.stress::<L>(index, at);
@@ -142,22 +184,14 @@ impl<R: LaneNumber> Element<R> for FullHexConstants<R> {
                         let f = batch.deformation_gradient::<L>(index, at);
                         let piola = f.times_symmetric(&stress);
                         let piola = piola.plus_scaled(&f.cofactor(), L::load(&pressure, at));
-                        let piola = piola.scaled(L::load(&point.weight, at));
-                        for (force, b) in nodal.iter_mut().zip(&point.gradient) {
-                            let own = piola.apply(load_vector(b, at));
-                            store_vector(add(load_vector(force, at), own), force, at);
-                        }
+                        point.add_forces(&piola, &mut nodal, at);
                     }
                 }
             }
             for at in (0..PACK).step_by(L::WIDTH) {
-                let mut own = [[L::ZERO; 3]; 7];
-                for (own, force) in own.iter_mut().zip(&nodal) {
-                    *own = load_vector(force, at);
-                }
-                by_cell(&own, &mut forces, at);
+                by_cell(&load_all::<R, L>(&nodal, at), &mut forces, at);
             }
-            local.add::<L>(pack - packs.start, &forces);
+            local.add::<L>(pack_of_block, &forces);
         }
         findings
     }

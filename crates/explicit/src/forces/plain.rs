@@ -5,7 +5,7 @@ use pliant_mechanics::model::{CellBlock, Solid};
 use pliant_mechanics::tensor::Vector;
 
 use super::batch::{Batch, PACKS, Wanted};
-use super::blocks::Task;
+use super::blocks::{Quad, Task};
 use super::corners::{CornerCheck, PackedCorners, flatness, may_fold};
 use super::findings::Findings;
 use super::hourglass::{FindGrowth, Growth, PackedHourglass, Resistance};
@@ -14,7 +14,7 @@ use super::packed::{
     PackedCells, PackedRest, by_cell, displacement_gradient, nodal_forces, own_packs, relative,
 };
 use crate::lanes::LaneNumber;
-use crate::lanes::{Lanes, PACK, Pack};
+use crate::lanes::{Lanes, Local, PACK, Pack};
 use crate::relaxation::Relaxation;
 
 /// Cells of `N` nodes with one evaluation point; `M` is one less.
@@ -57,6 +57,99 @@ impl<R: LaneNumber, const N: usize, const M: usize> SolidForces<R, N, M> {
     }
 }
 
+/// A batch of packs of cells.
+struct AtWork<R> {
+    batch: Batch<R>,
+    resistance: [Resistance<R>; PACKS],
+    grown: Growth<R>,
+    /// 3/2 κ² |q|²; see `corners.rs`.
+    reach: [Pack<R>; PACKS],
+}
+
+impl<R: LaneNumber, const N: usize, const M: usize> PlainConstants<R, N, M> {
+    /// Finds the displacement gradients of a pack, by its number in all and in the block, and its resistance to hourglass patterns; adds the
+    /// energy of these where their stiffness does not grow.
+    #[inline(always)]
+    fn deform<L: Lanes<R>>(
+        &self,
+        local: &Local<'_, R, N>,
+        [pack, pack_of_block]: [usize; 2],
+        index: usize,
+        work: &mut AtWork<R>,
+        hourglass: &mut Pack<R>,
+    ) {
+        let AtWork { batch, resistance, grown, reach } = work;
+        for at in (0..PACK).step_by(L::WIDTH) {
+            let (u, _) = relative::<R, L, N, M>(local, pack_of_block, at);
+            let h = displacement_gradient(&u, &self.rest[pack].gradient, at);
+            batch.set(index, at, &h);
+            if let Some(control) = &self.hourglass {
+                let [energy, far] = resistance[index].find(&control[pack], &u, &h, at);
+                far.store(&mut reach[index], at);
+                if self.growth.is_some() {
+                    energy.store(&mut grown.constant[index], at);
+                } else {
+                    (energy + L::load(hourglass, at)).store(hourglass, at);
+                }
+            }
+        }
+    }
+
+    /// The first cell of such a pack with a corner turned inside out.
+    #[inline(always)]
+    fn folded<L: Lanes<R>>(
+        &self,
+        local: &Local<'_, R, N>,
+        [pack, pack_of_block]: [usize; 2],
+        index: usize,
+        AtWork { batch, reach, .. }: &AtWork<R>,
+    ) -> Option<usize> {
+        let (ratio, strain) = (&batch.volume_ratio[index], &batch.strain[index]);
+        if self.hourglass.is_none() || !may_fold(&reach[index], ratio, strain) {
+            return None;
+        }
+        let look = CornerCheck::<R, N, M> {
+            corners: &self.corners[pack],
+            local,
+            flatness: &flatness(ratio, strain),
+            pack: pack_of_block,
+        };
+        L::call(look).map(|lane| pack * PACK + lane)
+    }
+
+    /// The forces of a pack on its nodes, from the stresses that the law found. They relax where there is a history.
+    #[inline(always)]
+    fn forces<L: Lanes<R>>(
+        &self,
+        pack: usize,
+        index: usize,
+        AtWork { batch, resistance, grown, .. }: &AtWork<R>,
+        history: &mut [Pack<R>],
+        forces: &mut [Pack<Quad<R>>; N],
+    ) {
+        let PackedRest { gradient, volume } = &self.rest[pack];
+        for at in (0..PACK).step_by(L::WIDTH) {
+            let stress = match history.is_empty() {
+                true => batch.stress::<L>(index, at),
+                false => self.relaxation.advance(batch.parts(index, at), history, at),
+            };
+            let piola = batch.deformation_gradient::<L>(index, at).times_symmetric(&stress);
+            let mut piola = piola.scaled(L::load(volume, at));
+            if self.growth.is_some() {
+                grown.add_to(&mut piola, batch, index, at);
+            }
+            if let Some(control) = &self.hourglass {
+                resistance[index].turn(&control[pack], &mut piola, at);
+            }
+            let mut nodal = nodal_forces(&piola, gradient, at);
+            if self.hourglass.is_some() {
+                resistance[index].add_to(&mut nodal, at);
+            }
+            by_cell(&nodal, forces, at);
+        }
+    }
+}
+
 impl<R: LaneNumber, const N: usize, const M: usize> Element<R> for PlainConstants<R, N, M> {
     fn slots(&self) -> [usize; 2] {
         [self.history, 0]
@@ -67,90 +160,50 @@ impl<R: LaneNumber, const N: usize, const M: usize> Element<R> for PlainConstant
 
     #[inline(always)]
     fn pass<L: Lanes<R>>(&self, displacement: &[Vector<R>], mut task: Task<'_, R>) -> Findings<R> {
-        let PlainConstants { law, cells, rest, hourglass, growth, corners, relaxation, history: per_pack } =
-            self;
+        let PlainConstants { law, cells, growth, history: per_pack, .. } = self;
         task.copy_in(displacement);
         let Task { block, moved, forces: sums, history, .. } = task;
         sums.fill([R::ZERO; 4]);
-        let relaxes = !history.is_empty();
-        let wanted = if relaxes { Wanted::Parts } else { Wanted::Whole };
+        let wanted = if history.is_empty() { Wanted::Whole } else { Wanted::Parts };
         let mut findings = Findings::default();
-        let mut batch = Batch::new();
-        let mut resistance = [Resistance::new(); PACKS];
-        let mut grown = Growth::new();
-        let mut reach = [Pack::ZERO; PACKS];
+        let mut work = AtWork {
+            batch: Batch::new(),
+            resistance: [Resistance::new(); PACKS],
+            grown: Growth::new(),
+            reach: [Pack::ZERO; PACKS],
+        };
         let mut forces = [Pack([[R::ZERO; 4]; PACK]); N];
         let packs = cells.packs_of(block);
         let mut local = cells.places.at_work(block, moved, sums);
         for first in packs.clone().step_by(PACKS) {
             let count = PACKS.min(packs.end - first);
-            for (index, resistance) in resistance[..count].iter_mut().enumerate() {
-                let pack = first + index;
-                for at in (0..PACK).step_by(L::WIDTH) {
-                    let (u, _) = relative::<R, L, N, M>(&local, pack - packs.start, at);
-                    let h = displacement_gradient(&u, &rest[pack].gradient, at);
-                    batch.set(index, at, &h);
-                    if let Some(control) = hourglass {
-                        let [energy, far] = resistance.find(&control[pack], &u, &h, at);
-                        far.store(&mut reach[index], at);
-                        if growth.is_some() {
-                            energy.store(&mut grown.constant[index], at);
-                        } else {
-                            (energy + L::load(&findings.hourglass, at)).store(&mut findings.hourglass, at);
-                        }
-                    }
-                }
+            for index in 0..count {
+                let pack = [first + index, first + index - packs.start];
+                self.deform::<L>(&local, pack, index, &mut work, &mut findings.hourglass);
             }
             let fibres = cells.fibres(first, count);
-            batch.evaluate::<L>(law, wanted, count, 1, fibres);
+            work.batch.evaluate::<L>(law, wanted, count, 1, fibres);
             if let Some(shear) = *growth {
                 L::call(FindGrowth {
                     law,
                     shear,
                     fibres,
                     wanted,
-                    batch: &batch,
-                    resistance: &mut resistance[..count],
+                    batch: &work.batch,
+                    resistance: &mut work.resistance[..count],
                     energy: &mut findings.hourglass,
-                    growth: &mut grown,
+                    growth: &mut work.grown,
                 });
             }
-            for (index, resistance) in resistance[..count].iter().enumerate() {
-                let pack = first + index;
-                batch.note(index, pack * PACK, &mut findings);
-                let (ratio, strain) = (&batch.volume_ratio[index], &batch.strain[index]);
-                if hourglass.is_some() && may_fold(&reach[index], ratio, strain) && findings.folded.is_none()
-                {
-                    let pack_of_block = pack - packs.start;
-                    let look = CornerCheck::<R, N, M> {
-                        corners: &corners[pack],
-                        local: &local,
-                        flatness: &flatness(ratio, strain),
-                        pack: pack_of_block,
-                    };
-                    findings.folded = L::call(look).map(|lane| pack * PACK + lane);
+            for index in 0..count {
+                let pack = [first + index, first + index - packs.start];
+                work.batch.note(index, pack[0] * PACK, &mut findings);
+                if findings.folded.is_none() {
+                    findings.folded = self.folded::<L>(&local, pack, index, &work);
                 }
-                let own = own_packs(pack - packs.start, *per_pack, history.len());
-                for at in (0..PACK).step_by(L::WIDTH) {
-                    let stress = match relaxes {
-                        true => relaxation.advance(batch.parts(index, at), &mut history[own.clone()], at),
-                        false => batch.stress::<L>(index, at),
-                    };
-                    let piola = batch.deformation_gradient::<L>(index, at).times_symmetric(&stress);
-                    let mut piola = piola.scaled(L::load(&rest[pack].volume, at));
-                    if growth.is_some() {
-                        grown.add_to(&mut piola, &batch, index, at);
-                    }
-                    if let Some(control) = hourglass {
-                        resistance.turn(&control[pack], &mut piola, at);
-                    }
-                    let mut nodal = nodal_forces(&piola, &rest[pack].gradient, at);
-                    if hourglass.is_some() {
-                        resistance.add_to(&mut nodal, at);
-                    }
-                    by_cell(&nodal, &mut forces, at);
-                }
-                local.add::<L>(pack - packs.start, &forces);
+                let own = own_packs(pack[1], *per_pack, history.len());
+                self.forces::<L>(pack[0], index, &work, &mut history[own], &mut forces);
+                local.add::<L>(pack[1], &forces);
             }
         }
         findings
