@@ -1,7 +1,7 @@
 //! The battery every element runs through: patch test, rigid motion, f = dE/du, Σf = 0, Στ = 0. A new element is one
 //! line in [`ELEMENTS`] and its energy in [`energy`].
 
-use pliant_mechanics::element::Cord;
+use pliant_mechanics::element::{Cord, GaussPoints};
 use pliant_mechanics::law::plane_stress::InPlane;
 use pliant_mechanics::law::samples::{every_law, law};
 use pliant_mechanics::law::{AnyLaw, Deformation, NeoHookean, Split, TransverselyIsotropic, Volumetric};
@@ -123,64 +123,85 @@ fn forces(model: &Model, displacement: &[Vector<f64>]) -> (Vec<Vector<f64>>, f64
     ((0..model.node_count()).map(|node| internal.at(node)).collect(), hourglass)
 }
 
+/// A solid whose nodes have moved.
+struct MovedSolid<'m> {
+    solid: &'m Solid,
+    displacement: &'m [Vector<f64>],
+}
+
+impl MovedSolid<'_> {
+    fn gradient(&self, cell: usize, shape: &[Vector<f64>]) -> Tensor<f64> {
+        let mut h = Tensor::ZERO;
+        for (&node, &b) in self.solid.cells.nodes(cell).iter().zip(shape) {
+            h.add_outer(self.displacement[node as usize], b);
+        }
+        h
+    }
+
+    fn split(&self, h: &Tensor<f64>) -> Split<f64> {
+        self.solid.material.law.energy(&Deformation::from_displacement_gradient(h), self.solid.fibres(0))
+    }
+
+    /// U(J) from a pure dilation.
+    fn dilation(&self, change: f64) -> f64 {
+        let stretch = (1.0 + change).cbrt() - 1.0;
+        let h = Tensor([[stretch, 0.0, 0.0], [0.0, stretch, 0.0], [0.0, 0.0, stretch]]);
+        self.split(&h).volumetric
+    }
+
+    fn of_full_hexes(&self, block: &CellBlock<8>, points: &[GaussPoints]) -> f64 {
+        let stored = |cell: usize| {
+            let (mut shape, mut v) = (0.0, 0.0);
+            for (gradients, w) in points[cell].gradient.iter().zip(points[cell].weight) {
+                let h = self.gradient(cell, gradients);
+                shape += w * self.split(&h).isochoric;
+                v += w * volume_change(&h);
+            }
+            let volume = block.rest[cell].volume;
+            shape + volume * self.dilation(v / volume)
+        };
+        (0..block.nodes.len()).map(stored).sum()
+    }
+
+    fn of_averaged_tets(&self, block: &CellBlock<4>, averaging: Averaging) -> f64 {
+        let local = LocalNodes::new(block);
+        let volume = |cell: usize| block.rest[cell].volume;
+        let h: Vec<_> =
+            (0..block.nodes.len()).map(|cell| self.gradient(cell, &block.rest[cell].gradient)).collect();
+        let shape: f64 = h.iter().enumerate().map(|(cell, h)| volume(cell) * self.split(h).isochoric).sum();
+        let nodal = |node: usize| {
+            let own: f64 = local.cells_at(node).map(volume).sum();
+            let changes = local.cells_at(node).map(|cell| volume(cell) * volume_change(&h[cell]));
+            (own, changes.sum::<f64>() / own)
+        };
+        let averaged: Vec<(f64, f64)> = (0..local.len()).map(nodal).collect();
+        let of_cell = |cell: usize| {
+            let mean = local.nodes[cell].iter().map(|&n| 0.25 * averaged[n as usize].1).sum();
+            volume(cell) * self.dilation(mean)
+        };
+        shape
+            + match averaging {
+                Averaging::Nodal => averaged.iter().map(|(v, x)| 0.25 * v * self.dilation(*x)).sum::<f64>(),
+                _ => (0..h.len()).map(of_cell).sum(),
+            }
+    }
+}
+
+fn volume_change(h: &Tensor<f64>) -> f64 {
+    h.determinant() + h.second_invariant() + h.trace()
+}
+
 /// The energy [J] that an element's force is the gradient of.
 fn energy(model: &Model, displacement: &[Vector<f64>]) -> f64 {
     let solid = &model.solids[0];
     let law = &solid.material.law;
-    let fibres = solid.fibres(0);
-    let gradient = |cell: usize, shape: &[Vector<f64>]| {
-        let mut h = Tensor::ZERO;
-        for (&node, &b) in solid.cells.nodes(cell).iter().zip(shape) {
-            h.add_outer(displacement[node as usize], b);
-        }
-        h
-    };
-    let split = |h: &Tensor<f64>| law.energy(&Deformation::from_displacement_gradient(h), fibres);
-    let change = |h: &Tensor<f64>| h.determinant() + h.second_invariant() + h.trace();
-    // U(J) from a pure dilation.
-    let dilation = |x: f64| {
-        let stretch = (1.0 + x).cbrt() - 1.0;
-        let h = Tensor([[stretch, 0.0, 0.0], [0.0, stretch, 0.0], [0.0, 0.0, stretch]]);
-        law.energy(&Deformation::from_displacement_gradient(&h), fibres).volumetric
-    };
+    let moved = MovedSolid { solid, displacement };
     match &solid.cells {
-        Cells::FullHex8(block, points) => (0..block.nodes.len())
-            .map(|cell| {
-                let (mut shape, mut v) = (0.0, 0.0);
-                for (gradients, w) in points[cell].gradient.iter().zip(points[cell].weight) {
-                    let h = gradient(cell, gradients);
-                    shape += w * split(&h).isochoric;
-                    v += w * change(&h);
-                }
-                let volume = block.rest[cell].volume;
-                shape + volume * dilation(v / volume)
-            })
-            .sum(),
-        Cells::AveragedTet4(block, averaging) => {
-            let local = LocalNodes::new(block);
-            let volume = |cell: usize| block.rest[cell].volume;
-            let h: Vec<_> =
-                (0..block.nodes.len()).map(|cell| gradient(cell, &block.rest[cell].gradient)).collect();
-            let shape: f64 = h.iter().enumerate().map(|(cell, h)| volume(cell) * split(h).isochoric).sum();
-            let nodal = |node: usize| {
-                let own: f64 = local.cells_at(node).map(volume).sum();
-                (own, local.cells_at(node).map(|cell| volume(cell) * change(&h[cell])).sum::<f64>() / own)
-            };
-            let averaged: Vec<(f64, f64)> = (0..local.len()).map(nodal).collect();
-            shape
-                + match averaging {
-                    Averaging::Nodal => averaged.iter().map(|(v, x)| 0.25 * v * dilation(*x)).sum::<f64>(),
-                    _ => (0..h.len())
-                        .map(|cell| {
-                            let mean = local.nodes[cell].iter().map(|&n| 0.25 * averaged[n as usize].1).sum();
-                            volume(cell) * dilation(mean)
-                        })
-                        .sum(),
-                }
-        }
+        Cells::FullHex8(block, points) => moved.of_full_hexes(block, points),
+        Cells::AveragedTet4(block, averaging) => moved.of_averaged_tets(block, *averaging),
         Cells::Membrane(block, sheets) => {
             let stored = |cell: usize| {
-                let h = gradient(cell, &block.rest[cell].gradient);
+                let h = moved.gradient(cell, &block.rest[cell].gradient);
                 let axes = sheets[cell].axes;
                 let plane = InPlane::from_changes(&axes, &axes.map(|axis| h.apply(axis)));
                 let fibres = solid.law_fibres(cell);
@@ -198,8 +219,8 @@ fn energy(model: &Model, displacement: &[Vector<f64>]) -> f64 {
         }
         cells => {
             let stored = |cell: usize| {
-                let h = pliant_mechanics::model::with_cells!(cells, block => gradient(cell, &block.rest[cell].gradient));
-                let Split { isochoric, volumetric } = split(&h);
+                let h = pliant_mechanics::model::with_cells!(cells, block => moved.gradient(cell, &block.rest[cell].gradient));
+                let Split { isochoric, volumetric } = moved.split(&h);
                 cells.volume(cell) * (isochoric + volumetric)
             };
             (0..cells.len()).map(stored).sum::<f64>() + forces(model, displacement).1
