@@ -30,7 +30,7 @@ use pliant_mechanics::tensor::{Vector, add, cast, scale, sub};
 use pliant_mechanics::{Energies, StopFlag};
 use rayon::prelude::*;
 
-use self::accuracy::{Accuracy, Extremes, follow};
+use self::accuracy::{Extremes, Search};
 pub use self::path::{Equilibrium, Way};
 use self::path::{Instant, LoadPath};
 use self::settings::is_single;
@@ -49,24 +49,16 @@ const CHUNK: usize = 512;
 /// s: margin of the fictitious masses against stiffening. Doubled when a load step fails: cells at a glued edge stiffen
 /// many times over in compression, and a motion too fast for them turns them inside out.
 const MASS_MARGIN: f64 = 1.25;
-/// A_m.
-const HIGHEST: f64 = 4.0;
 /// Iterations over which a load step is brought on.
 const RAMP: usize = 200;
 /// c while the load is brought on.
 const RAMP_DAMPING: f64 = 0.02;
-/// Largest relative change of A₀ an iteration, down and up.
-const ADAPT: [f64; 2] = [0.90, 1.02];
 /// Iterations from one report to the next.
 const REPORT: usize = 20;
-/// Where the residual is below this many tolerances, round-off of single precision makes the slowest mode look faster than it is:
-/// from then on its estimate grows by [`FASTEST`] at the most.
+/// Where the residual is below this many tolerances, round-off of single precision makes the slowest mode look faster than it is.
 const ROUGH: f64 = 10.0;
-const FASTEST: f64 = 1.5;
 /// A way shorter than this part of another one doesn't tell how forces bend along that one.
 const SHORTEST: f64 = 0.1;
-/// The motion starts anew where the residual grows by this factor over its least.
-const RUNAWAY: f64 = 10.0;
 
 /// Finds equilibria of one model. Holds constants, scratch and the [`Equilibrium`] last found; the next one comes from
 /// the state alone.
@@ -348,60 +340,42 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         self.increment.fill([R::ZERO; 3]);
         self.bound.fill([R::ZERO; 3]);
         self.collectives.iter_mut().for_each(|own| own.enclosed.pressure = 0.0);
-        let (mut slowest, mut least) = (0.0, f64::INFINITY);
-        let mut accuracy = Accuracy::default();
-        let (mut greatest, mut reached) = (0.0_f64, f64::INFINITY);
+        let (single, tolerance) = (is_single::<R>(), self.settings.tolerance);
+        let mut search = Search::default();
         for iteration in 0..self.settings.iterations {
-            let s = ((iteration + 1) as f64 / RAMP as f64).min(1.0);
             let ramped = iteration >= RAMP;
-            let instant =
-                if ramped { end } else { path.instant(from + (to - from) * s * s * (3.0 - 2.0 * s)) };
+            let instant = if ramped { end } else { path.instant(brought_on([from, to], iteration)) };
             self.prescribe(state, instant);
             let sums = self.evaluate(&mut forces, state, instant, iteration)?;
+            let residual = sums.relative_residual();
             convergence.iterations += 1;
-            convergence.residual = sums.relative_residual();
-            if ramped && is_single::<R>() && iteration % REPORT == 0 {
-                accuracy.note(self.left_along_the_way(&forces, state, &start));
+            convergence.residual = residual;
+            if ramped && single && iteration % REPORT == 0 {
+                search.accuracy.note(self.left_along_the_way(&forces, state, &start));
             }
-            if ramped
-                && convergence.residual <= self.settings.tolerance
-                && accuracy.suffices(self.settings.displacement)
-            {
+            if ramped && residual <= tolerance && search.accuracy.suffices(self.settings.displacement) {
                 self.check_corners(state, iteration, end.time)?;
-                let error = match is_single::<R>() {
-                    true => accuracy.mean(),
-                    false => self.error_of_slowest(state, slowest),
+                let error = match single {
+                    true => search.accuracy.mean(),
+                    false => self.error_of_slowest(state, search.slowest),
                 };
                 self.way.displacement_error = self.way.displacement_error.max(error);
                 self.commit(&mut forces, state, &start, end, duration);
                 return Ok(());
             }
-            if ramped && convergence.residual > RUNAWAY * least {
+            if search.runs_away(residual, ramped) {
                 self.increment.fill([R::ZERO; 3]);
-                least = convergence.residual;
-            }
-            least = least.min(convergence.residual);
-            greatest = greatest.max(convergence.residual);
-            if ramped {
-                reached = reached.min(convergence.residual);
             }
             if iteration % REPORT == 0 {
-                let tolerance = self.settings.tolerance;
-                let fraction = ((greatest / reached).ln() / (greatest / tolerance).ln()).clamp(0.0, 1.0);
-                let (span, residual) = ([state.time, end.time], convergence.residual);
+                let (span, fraction) = ([state.time, end.time], search.fraction(tolerance));
                 watch(Iteration { span, number: iteration, residual, fraction });
                 if self.stop.is_asked() {
                     return Err(RelaxationError::Stopped { time: end.time });
                 }
             }
-            let damping = if ramped {
-                slowest = follow(slowest, &sums);
-                if is_single::<R>() && convergence.residual < ROUGH * self.settings.tolerance {
-                    slowest = accuracy.hold_back(slowest);
-                }
-                2.0 * (slowest * HIGHEST / (slowest + HIGHEST)).sqrt()
-            } else {
-                RAMP_DAMPING
+            let damping = match ramped {
+                true => search.damping(&sums, single && residual < ROUGH * tolerance),
+                false => RAMP_DAMPING,
             };
             self.advance(state, damping, instant);
         }
@@ -410,7 +384,7 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
             body: self.model.bodies[body].name.clone(),
             node,
             residual: convergence.residual,
-            tolerance: self.settings.tolerance,
+            tolerance,
             iterations: self.settings.iterations,
             time: end.time,
         })
@@ -756,6 +730,12 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
     }
 }
 
+/// How far on the way of a load step the load is at an iteration before [`RAMP`].
+fn brought_on([from, to]: [f64; 2], iteration: usize) -> f64 {
+    let s = (iteration + 1) as f64 / RAMP as f64;
+    from + (to - from) * s * s * (3.0 - 2.0 * s)
+}
+
 /// The equilibrium a load step starts from.
 struct Start<R> {
     displacement: Vec<Vector<R>>,
@@ -787,18 +767,4 @@ fn fictitious_masses(model: &Model) -> Vec<f64> {
         *mass = if follows { 1.0 } else { *mass };
     }
     mass
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_estimate_of_the_slowest_mode_moves_slowly() {
-        let sums = |ratio| Extremes { stiffness: ratio, mass: 1.0, ..Extremes::default() };
-        assert_eq!(follow(0.0, &sums(0.3)), 0.3);
-        assert_eq!(follow(1.0, &sums(0.3)), 0.9);
-        assert_eq!(follow(1.0, &sums(3.0)), 1.02);
-        assert_eq!(follow(1.0, &sums(-1.0)), 1.0);
-    }
 }
