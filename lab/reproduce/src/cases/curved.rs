@@ -400,47 +400,39 @@ impl Ellipsoid {
     }
 }
 
-fn rendering() -> Result<Findings, CaseError> {
-    let mut findings = Findings::default();
+/// How far the surfaces of a sphere of so many shells are off: the one here, and the thesis's at its gaps, with the largest distance, the mean
+/// one and the gap of a prototype.
+fn distances(levels: u32, count: u32, ours: [f64; 2], theirs: f64) -> Result<[Row; 3], CaseError> {
     let source = "prototype of the formulas; tolerance 10 %";
-    for (levels, count, ours, theirs) in [(0, 20_u32, [0.558, 0.264], 3.06), (1, 80, [0.0499, 0.0187], 0.441)]
-    {
-        let ball = Ellipsoid::new(levels, [1.0; 3])?;
-        let surface = CurvedSurface::new(&ball.model, EdgeRule::Arc);
-        let mut off = Vec::new();
-        for facet in 0..count {
-            let patch = surface.patch(&ball.model, &ball.state, facet);
-            let lattice = (0..=12_u32).flat_map(|i| (0..=12 - i).map(move |j| [i, j, 12 - i - j]));
-            let points = lattice.map(|w| patch.point(w.map(|w| f64::from(w) / 12.0)));
-            off.extend(points.map(|p| 100.0 * (p.norm() - 1.0).abs() / ball.diagonal()));
-        }
-        let rms = (off.iter().map(|d| d * d).sum::<f64>() / off.len() as f64).sqrt();
-        for (what, expected, found) in [("largest", ours[0], largest(off)), ("rms", ours[1], rms)] {
+    let ball = Ellipsoid::new(levels, [1.0; 3])?;
+    let surface = CurvedSurface::new(&ball.model, EdgeRule::Arc);
+    let mut off = Vec::new();
+    for facet in 0..count {
+        let patch = surface.patch(&ball.model, &ball.state, facet);
+        let lattice = (0..=12_u32).flat_map(|i| (0..=12 - i).map(move |j| [i, j, 12 - i - j]));
+        let points = lattice.map(|w| patch.point(w.map(|w| f64::from(w) / 12.0)));
+        off.extend(points.map(|p| 100.0 * (p.norm() - 1.0).abs() / ball.diagonal()));
+    }
+    let rms = (off.iter().map(|d| d * d).sum::<f64>() / off.len() as f64).sqrt();
+    let [most, mean] =
+        [("largest", ours[0], largest(off)), ("rms", ours[1], rms)].map(|(what, expected, found)| {
             let quantity =
                 format!("sphere of {count} shells: {what} distance of the surface, part of the diagonal");
-            findings.rows.push(Row::judged(quantity, "%", [expected, 0.1 * expected], found, source));
-        }
-        let quantity =
-            format!("sphere of {count} shells: gap at edges of the thesis's surface, part of the diagonal");
-        let gap = 100.0 * ball.gap();
-        let row = Row::shown(quantity, "%", gap, "prototype of the formulas");
-        findings.rows.push(Row { reference: Some(theirs), ..row });
-    }
+            Row::judged(quantity, "%", [expected, 0.1 * expected], found, source)
+        });
+    let quantity =
+        format!("sphere of {count} shells: gap at edges of the thesis's surface, part of the diagonal");
+    let gap = Row::shown(quantity, "%", 100.0 * ball.gap(), "prototype of the formulas");
+    Ok([most, mean, Row { reference: Some(theirs), ..gap }])
+}
 
-    let rest = Ellipsoid::new(0, [1.0; 3])?;
-    let ball = Ellipsoid::new(0, [1.3, 1.0, 0.7])?;
-    let surface = CurvedSurface::new(&ball.model, EdgeRule::Arc);
-    let Picture { places, triangles, .. } = surface.picture(&ball.model, 12);
-    let made =
-        |of: &dyn Fn(&Place) -> Vector3| triangle_mesh(places.iter().map(of).collect(), triangles.clone());
-    let flat_mesh = made(&|p| flat(&ball.model, &ball.state, p));
-    let curved = made(&|p| surface.patch(&ball.model, &ball.state, p.facet).point(p.weights));
-    // Each facet by itself, as gaps part them.
+/// The thesis's surface: each facet by itself, as gaps part them.
+fn with_gaps(ball: &Ellipsoid, Picture { places, triangles, .. }: &Picture) -> Mesh {
     let (mut points, mut cut) = (Vec::new(), Vec::new());
     for facet in 0..ball.model.facets.len() {
         let deflected = ball.deflected(facet);
         let mut own = std::collections::BTreeMap::new();
-        for triangle in &triangles {
+        for triangle in triangles {
             let weights = triangle.map(|at| weights_in(&ball.model, &places[at as usize], facet));
             let [Some(a), Some(b), Some(c)] = weights else { continue };
             cut.push([a, b, c].map(|w| {
@@ -451,8 +443,11 @@ fn rendering() -> Result<Findings, CaseError> {
             }));
         }
     }
-    let gaping = triangle_mesh(points, cut);
-    // A sphere of 1,280 triangles, rotated so that no part of it lies on the edges of the shells.
+    triangle_mesh(points, cut)
+}
+
+/// A sphere of 1,280 triangles that shells carry from rest to where they are now, rotated so that no part of it lies on their edges.
+fn irregular(rest: &Ellipsoid, ball: &Ellipsoid, surface: &CurvedSurface) -> Result<Mesh, CaseError> {
     let mut irregular = sphere(1.0, 3, DEFAULT_CELL_LIMIT)?;
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, 0.5, -0.2));
     irregular.points.iter_mut().for_each(|p| *p = turn * *p);
@@ -465,6 +460,25 @@ fn rendering() -> Result<Findings, CaseError> {
         let bound = surface.carry(&rest.model, &rest.state, *point, near as u32);
         *point = surface.carried(&ball.model, &ball.state, &bound);
     }
+    Ok(irregular)
+}
+
+fn rendering() -> Result<Findings, CaseError> {
+    let mut findings = Findings::default();
+    findings.rows.extend(distances(0, 20, [0.558, 0.264], 3.06)?);
+    findings.rows.extend(distances(1, 80, [0.0499, 0.0187], 0.441)?);
+
+    let rest = Ellipsoid::new(0, [1.0; 3])?;
+    let ball = Ellipsoid::new(0, [1.3, 1.0, 0.7])?;
+    let surface = CurvedSurface::new(&ball.model, EdgeRule::Arc);
+    let picture = surface.picture(&ball.model, 12);
+    let made = |of: &dyn Fn(&Place) -> Vector3| {
+        triangle_mesh(picture.places.iter().map(of).collect(), picture.triangles.clone())
+    };
+    let flat_mesh = made(&|p| flat(&ball.model, &ball.state, p));
+    let curved = made(&|p| surface.patch(&ball.model, &ball.state, p.facet).point(p.weights));
+    let gaping = with_gaps(&ball, &picture);
+    let irregular = irregular(&rest, &ball, &surface)?;
     let off = |mesh: &Mesh| 100.0 * largest(mesh.points.iter().map(|p| ball.distance(p))) / ball.diagonal();
     for (name, mesh) in [("flat", &flat_mesh), ("curved", &curved), ("carried, bound at rest", &irregular)] {
         let quantity =
