@@ -76,7 +76,7 @@ fn last_force(said: &str) -> f64 {
 #[test]
 fn a_finger_presses_the_liver_in_c_and_cpp() {
     let folder = tempfile::tempdir().unwrap();
-    let examples = Path::new(OWN).join("../../examples/embed");
+    let examples = Path::new(OWN).join("../../examples/6_embed");
     let mut forces = Vec::new();
     for (compiler, standard, file) in [("cc", "-std=c11", "press.c"), ("c++", "-std=c++17", "press.cpp")] {
         if !there_is(compiler) {

@@ -1,6 +1,8 @@
-"""A device for `pliant haptics SCENE --listen 127.0.0.1:4270`: moves the tool up and down and prints the force (docs/haptics.md).
+"""7: a haptic device in Python. It moves the tool of `pliant haptics SCENE --listen 127.0.0.1:4270` up and down and prints the force.
 
-    python3 examples/haptic_client.py [HOST:PORT] [X,Y,Z] [SECONDS]
+Run: `python3 examples/7_haptic_client.py [HOST:PORT] [X,Y,Z] [SECONDS]`
+
+Read before: 1 and `docs/haptics.md`.
 """
 
 import math

@@ -1,6 +1,11 @@
-/* A loop at 60 Hz with a tool that presses the liver, in C:
- *   cc press.c -I crates/c/include -L target/release -lpliant_c -o press && ./press scenes/palpation
- * The finger goes down as a hand would lead it; positions go into a vertex buffer, and its force is printed. */
+/* 6: a loop at 60 Hz with a tool that presses the liver, in C. The finger goes down as a hand would lead it; positions go into a vertex buffer,
+ * and its force is printed.
+ *
+ * Run: cargo build --release -p pliant-c
+ *      cc examples/6_embed/press.c -I crates/c/include -L target/release -lpliant_c -Wl,-rpath,target/release -o target/press
+ *      target/press scenes/palpation
+ *
+ * Read before: 1 and docs/embedding.md. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

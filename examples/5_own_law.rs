@@ -1,6 +1,8 @@
-//! A law of one's own: quadratic in the strain and in the logarithm of the volume, on a cube stretched between
-//! plates:
-//! `cargo run --release --bin own-law`.
+//! 5: a law of one's own: quadratic in the strain and in the logarithm of the volume, on a cube stretched between plates.
+//!
+//! Run: `cargo run --release --bin 5-own-law`
+//!
+//! Read before: 2 and `docs/add-a-law.md`.
 
 use std::error::Error;
 

@@ -1,5 +1,8 @@
-//! A body from arrays, without a scene file: a column of five cubes of six tetrahedra each that sags under its weight, found by dynamic
-//! relaxation: `cargo run --release --bin body-from-arrays`.
+//! 3: a body from longer arrays: a column of five cubes of six tetrahedra each that sags under its weight, found by dynamic relaxation.
+//!
+//! Run: `cargo run --release --bin 3-body-from-arrays`
+//!
+//! Read before: 2.
 
 use std::error::Error;
 

@@ -1,4 +1,8 @@
-//! A step loop that reads a displacement and a reaction: a cube of one hexahedron, pulled at its top: `cargo run --release --bin step-loop`.
+//! 2: a step loop that reads a displacement and a reaction: a cube of one hexahedron, pulled at its top.
+//!
+//! Run: `cargo run --release --bin 2-step-loop`
+//!
+//! Read before: 1.
 
 use std::error::Error;
 

@@ -1,5 +1,10 @@
-// A loop at 60 Hz with a tool that presses the liver, in C++:
-//   c++ -std=c++17 press.cpp -I crates/c/include -L target/release -lpliant_c -o press && ./press scenes/palpation
+// 6: a loop at 60 Hz with a tool that presses the liver, in C++.
+//
+// Run: cargo build --release -p pliant-c
+//      c++ -std=c++17 examples/6_embed/press.cpp -I crates/c/include -L target/release -lpliant_c -Wl,-rpath,target/release -o target/press
+//      target/press scenes/palpation
+//
+// Read before: press.c.
 #include <cstdio>
 #include <cstdlib>
 #include <vector>

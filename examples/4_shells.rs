@@ -1,4 +1,8 @@
-//! A shell: a strip clamped at one end and lifted at the other: `cargo run --release --bin shells`.
+//! 4: a shell: a strip clamped at one end and lifted at the other.
+//!
+//! Run: `cargo run --release --bin 4-shells`
+//!
+//! Read before: 3 and `docs/shells.md`.
 
 use std::error::Error;
 

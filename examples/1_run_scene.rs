@@ -1,4 +1,8 @@
-//! Loads a scene and runs it: `cargo run --release --bin run-scene -- scenes/cube`.
+//! 1: a scene is loaded, a value of it changed, and it is run.
+//!
+//! Run: `cargo run --release --bin 1-run-scene -- scenes/cube`
+//!
+//! Read before: nothing.
 
 use std::error::Error;
 use std::path::PathBuf;
