@@ -1,6 +1,6 @@
 //! `pliant view`: input of the window, and its final message.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -8,8 +8,8 @@ use pliant_geometry::words::number;
 use pliant_picture::Series;
 use pliant_scene::World;
 use pliant_viewer::{
-    Break, FinishedRun, Lags, Opening, Recording, SelfTest, WindowError, open, open_finished,
-    replay_in_real_time, replay_until,
+    Break, FinishedRun, Lags, Opening, Recording, WindowError, open, open_finished, replay_in_real_time,
+    replay_until,
 };
 
 use crate::SUCCESS;
@@ -63,7 +63,7 @@ pub fn view(arguments: &View) -> Result<u8, Failure> {
         read: Arc::new(read),
         record: arguments.record.clone(),
         stop: stop().clone(),
-        self_test: self_test(arguments),
+        portrait: portrait(arguments),
         size: arguments.size,
         began,
     })?;
@@ -84,7 +84,6 @@ fn finished_run(arguments: &View) -> Result<Option<FinishedRun>, Failure> {
     let options = [
         ("--record", arguments.record.is_some()),
         ("--replay", arguments.replay.is_some()),
-        ("--rehearse", arguments.rehearse),
         ("--set", !arguments.overrides.set.is_empty()),
     ];
     if let Some((option, _)) = options.into_iter().find(|(_, given)| *given) {
@@ -96,18 +95,12 @@ fn finished_run(arguments: &View) -> Result<Option<FinishedRun>, Failure> {
     let series = path.file_stem().filter(|_| is_series).map(|stem| stem.to_string_lossy().into_owned());
     let folder = if is_series { path.parent().unwrap_or(path) } else { path };
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder }.to_owned();
-    let portrait = arguments.screenshot.clone().map(|file| (arguments.after, file));
-    Ok(Some(FinishedRun { folder, series, portrait, size: arguments.size }))
+    Ok(Some(FinishedRun { folder, series, portrait: portrait(arguments), size: arguments.size }))
 }
 
-/// The automatic task of the window.
-fn self_test(arguments: &View) -> Option<SelfTest> {
-    let file = arguments.screenshot.clone();
-    match file {
-        _ if arguments.rehearse => Some(SelfTest::Rehearsal { file }),
-        Some(file) => Some(SelfTest::Portrait { after: arguments.after, file }),
-        None => None,
-    }
+/// When the window takes a picture of itself, and the file of this.
+fn portrait(arguments: &View) -> Option<(f64, PathBuf)> {
+    arguments.screenshot.clone().map(|file| (arguments.after, file))
 }
 
 /// Replays a recording without a window and prints the result; optionally also in real time, to measure the input lag.

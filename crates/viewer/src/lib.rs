@@ -26,4 +26,4 @@ pub use replay::{Lags, Replayed, replay, replay_in_real_time, replay_until};
 pub use samples::{Sample, Samples};
 pub use session::{Frame, Order, Session};
 #[cfg(feature = "window")]
-pub use window::{FinishedRun, Opening, SelfTest, WindowError, open, open_finished};
+pub use window::{FinishedRun, Opening, WindowError, open, open_finished};

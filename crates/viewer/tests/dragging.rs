@@ -11,6 +11,8 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use pliant_geometry::Vector3;
+use pliant_picture::Subject;
+use pliant_scene::World;
 use pliant_testing::Random;
 use pliant_viewer::{Frame, Hand, Order, Point, Session};
 use support::{BALL, LIVER, subject, wait, wait_up_to, world};
@@ -87,85 +89,118 @@ impl Until {
     }
 }
 
+/// A body that is dragged, and what came of it so far.
+struct Dragged {
+    session: Session,
+    subject: Subject,
+    /// Its longest side [m].
+    size: f64,
+    /// Steps of a pull.
+    steps: u64,
+    random: Random,
+    /// How often the run went back, and the strongest pull [N].
+    broken: u64,
+    strongest: f64,
+}
+
+impl Dragged {
+    fn new(world: World) -> Self {
+        let steps = (1.0 / 60.0 / world.step()).ceil() as u64;
+        let subject = subject(&world);
+        let surface = subject.surface_points();
+        let extent = |axis: usize| {
+            let along = surface.iter().map(|&point| subject.points[point as usize][axis]);
+            along.clone().fold(f64::NEG_INFINITY, f64::max) - along.fold(f64::INFINITY, f64::min)
+        };
+        let size = (0..3).map(extent).fold(0.0, f64::max);
+        let session = Session::start(world, || ()).unwrap();
+        Self { session, subject, size, steps, random: Random::new(1), broken: 0, strongest: 0.0 }
+    }
+
+    /// A drag of a second at a place and with a stiffness of its own; whether the run is where the hand brought it.
+    fn drag(&mut self, drag: u64) -> bool {
+        let Self { session, random, .. } = self;
+        let triangle = (random.part() * self.subject.triangle_count() as f64) as u32;
+        let stiffness = 20.0 * 25.0_f64.powf(random.part());
+        session.order(Order::Hand(Hand::Take(Point { triangle, weights: [0.2, 0.3, 0.5] }, stiffness)));
+        let taken = wait(session, |frame| !frame.held.is_empty() || frame.failure.is_some());
+        assert_eq!(taken.failure, None, "before drag {drag}");
+        // What the last steps of a broken drag did counts, too.
+        self.broken = taken.breaks;
+        let mut place = Vector3::from(taken.held[0][0]);
+        let goal = taken.steps + self.steps * u64::from(PULLS);
+        for _ in 0..PULLS {
+            place += walk(random) * WALK * self.size;
+            session.order(Order::Hand(Hand::Pull(place.into())));
+            session.order(Order::Step(self.steps));
+        }
+        let ends =
+            |frame: &Frame| frame.steps >= goal || frame.breaks > taken.breaks || frame.failure.is_some();
+        let frame = wait_up_to(PATIENCE, session, ends);
+        assert_eq!(frame.failure, None, "in drag {drag}");
+        assert!(frame.points.iter().flat_map(|point| point.iter()).all(|x| x.is_finite()));
+        assert!(frame.values.iter().all(|x| x.is_finite()));
+        assert!(session.samples().all(|sample| sample.values.iter().all(|x| x.is_finite())));
+        session.order(Order::Hand(Hand::Release));
+        if frame.breaks > self.broken {
+            self.broken = frame.breaks;
+            assert_is_told(frame.note.as_deref().unwrap_or_default(), drag);
+            return false;
+        }
+        self.strongest = self.strongest.max(Vector3::from(frame.held[0][1]).norm());
+        wait(session, |frame| frame.held.is_empty());
+        true
+    }
+
+    /// Goes back: that makes a second simulation before the first one is dropped, so where runs break, memory takes that much once.
+    fn go_back(&mut self) {
+        self.session.order(Order::Back(u64::MAX));
+        wait(&mut self.session, |frame| {
+            frame.note.as_deref().is_some_and(|told| told.contains("went back to"))
+        });
+    }
+}
+
+/// What broke a drag is told: the body is turned inside out, squeezed until it is too stiff for the step, or gains energy.
+fn assert_is_told(told: &str, drag: u64) {
+    let reasons = ["is inverted", "the largest stable step has fallen", "the energies are off balance"];
+    let is_told = reasons.iter().any(|why| told.contains(why));
+    assert!(is_told && told.contains("went back to"), "in drag {drag}: {told}");
+}
+
 /// Drags of a second each at a body, each at a place of its own, with a stiffness between 20 and 500 N/m. The run never ends: after a pull
 /// that would break it, it is where it was before. All that is shown is a number, and after the first tenth memory no longer
 /// grows. Returns how often the run went back, and how many drags there were.
 fn drag(text: &str, until: &Until) -> [u64; 2] {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
-    let world = world(text);
-    let steps = (1.0 / 60.0 / world.step()).ceil() as u64;
-    let subject = subject(&world);
-    let surface = subject.surface_points();
-    let extent = |axis: usize| {
-        let along = surface.iter().map(|&point| subject.points[point as usize][axis]);
-        along.clone().fold(f64::NEG_INFINITY, f64::max) - along.fold(f64::INFINITY, f64::min)
-    };
-    let size = (0..3).map(extent).fold(0.0, f64::max);
-    let mut session = Session::start(world, || ()).unwrap();
-    let (mut random, mut before, mut strongest) = (Random::new(1), None, 0.0_f64);
-    let (mut total, mut broken, mut drag) = (0, 0, 0);
+    let mut dragged = Dragged::new(world(text));
+    let (mut before, mut drags) = (None, 0);
     // Drags in a row that broke nothing, and the most bytes after a drag before and after the first tenth.
     let (mut whole, mut warm, mut most) = (0, false, [0; 2]);
     let began = Instant::now();
-    while until.part(drag, began) < 1.0 {
-        drag += 1;
-        let triangle = (random.part() * subject.triangle_count() as f64) as u32;
-        let stiffness = 20.0 * 25.0_f64.powf(random.part());
-        session.order(Order::Hand(Hand::Take(Point { triangle, weights: [0.2, 0.3, 0.5] }, stiffness)));
-        let taken = wait(&mut session, |frame| !frame.held.is_empty() || frame.failure.is_some());
-        assert_eq!(taken.failure, None, "before drag {drag}");
-        // What the last steps of a broken drag did counts, too.
-        broken = taken.breaks;
-        let mut place = Vector3::from(taken.held[0][0]);
-        let goal = taken.steps + steps * u64::from(PULLS);
-        for _ in 0..PULLS {
-            place += walk(&mut random) * WALK * size;
-            session.order(Order::Hand(Hand::Pull(place.into())));
-            session.order(Order::Step(steps));
-            total += steps;
-        }
-        let ends = |frame: &Frame| frame.steps >= goal || frame.breaks > broken || frame.failure.is_some();
-        let frame = wait_up_to(PATIENCE, &mut session, ends);
-        assert_eq!(frame.failure, None, "in drag {drag}");
-        assert!(frame.points.iter().flat_map(|point| point.iter()).all(|x| x.is_finite()));
-        assert!(frame.values.iter().all(|x| x.is_finite()));
-        assert!(session.samples().all(|sample| sample.values.iter().all(|x| x.is_finite())));
-        if frame.breaks > broken {
-            broken = frame.breaks;
-            let told = frame.note.as_deref().unwrap_or_default();
-            // It is turned inside out, squeezed until it is too stiff for the step, or gains energy.
-            let is_told =
-                ["is inverted", "the largest stable step has fallen", "the energies are off balance"]
-                    .iter()
-                    .any(|why| told.contains(why));
-            assert!(is_told && told.contains("went back to"), "in drag {drag}: {told}");
-            session.order(Order::Hand(Hand::Release));
+    while until.part(drags, began) < 1.0 {
+        drags += 1;
+        if !dragged.drag(drags) {
             whole = 0;
             continue;
         }
-        strongest = strongest.max(Vector3::from(frame.held[0][1]).norm());
-        session.order(Order::Hand(Hand::Release));
-        wait(&mut session, |frame| frame.held.is_empty());
         whole += 1;
         let most = &mut most[usize::from(warm)];
         *most = (*most).max(ALLOCATED.load(Ordering::Relaxed));
         if !warm {
-            // Going back makes a second simulation before the first one is dropped: where runs break, memory takes that much once.
             if matches!(until, Until::Wall(_)) {
-                session.order(Order::Back(u64::MAX));
-                wait(&mut session, |frame| {
-                    frame.note.as_deref().is_some_and(|told| told.contains("went back to"))
-                });
+                dragged.go_back();
             }
-            if until.part(drag, began) >= 0.1 && whole >= FULL {
+            if until.part(drags, began) >= 0.1 && whole >= FULL {
                 (warm, before) = (true, resident());
             }
         }
     }
-    let drags = drag;
+    let Dragged { broken, strongest, steps, .. } = dragged;
     println!(
-        "{drags} drags in {:.0} s, {total} steps, up to {strongest:.2} N, went back {broken} times",
-        began.elapsed().as_secs_f64()
+        "{drags} drags in {:.0} s, {} steps, up to {strongest:.2} N, went back {broken} times",
+        began.elapsed().as_secs_f64(),
+        drags * steps * u64::from(PULLS)
     );
     let [early, late] = most;
     println!("at most {early} bytes allocated in the first tenth, {late} later");

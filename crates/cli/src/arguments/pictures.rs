@@ -29,9 +29,6 @@ pub struct View {
     /// Size of the window at its start, in pixels of a screen at 100 %.
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x800", conflicts_with = "replay")]
     pub size: [u32; 2],
-    /// Test mouse and keys automatically, report the result and close. A picture of the window shows the hand pulling.
-    #[arg(long, conflicts_with = "replay")]
-    pub rehearse: bool,
     #[command(flatten)]
     pub overrides: Overrides,
 }

@@ -350,6 +350,6 @@ mod tests {
         }
     }
 
-    /// Made by `pliant view --rehearse`, and of a brain from an image.
+    /// Made by `pliant view --screenshot` while the mouse pulls, and of a brain from an image.
     const ELSEWHERE: [&str; 2] = ["window.png", "labels.png"];
 }

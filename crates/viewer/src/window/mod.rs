@@ -5,8 +5,6 @@ mod device;
 mod filming;
 mod finished;
 mod followed;
-mod glass;
-mod grasping;
 mod hands;
 mod keep;
 mod led;
@@ -16,7 +14,9 @@ mod panels;
 mod parameters;
 mod picture;
 mod plots;
-mod self_test;
+mod portrait;
+#[cfg(test)]
+mod rehearsal;
 mod told;
 mod undo;
 mod viewport;
@@ -42,12 +42,11 @@ use self::keep::Taking;
 use self::opening::{Browser, remember};
 use self::paint::SAMPLES;
 use self::parameters::Numbers;
-use self::self_test::RunningTest;
-pub use self::self_test::SelfTest;
+use self::portrait::Portrait;
 use self::told::Told;
 use self::undo::Act;
 use self::viewport::Viewport;
-use crate::hand::{Point, Which};
+use crate::hand::Which;
 use crate::samples::Samples;
 use crate::session::{Frame, Order, Session};
 use pliant_scene::World;
@@ -69,8 +68,8 @@ pub struct Opening {
     pub record: Option<PathBuf>,
     /// Closes the window once it is set.
     pub stop: StopFlag,
-    /// What it does by itself before it closes; without, it stays open.
-    pub self_test: Option<SelfTest>,
+    /// Takes a picture of the window after so much simulated time [s], and closes.
+    pub portrait: Option<(f64, PathBuf)>,
     /// Width and height at its start, in pixels of a screen at 100 %.
     pub size: [u32; 2],
     /// When the user asked for it.
@@ -83,9 +82,9 @@ pub enum WindowError {
     /// Neither a screen nor a GPU, or no thread.
     #[error("no window can be opened: {0}")]
     Window(String),
-    /// A self-test that went wrong.
+    /// A picture of the window that could not be taken.
     #[error("the window: {0}")]
-    SelfTest(String),
+    Portrait(String),
     /// A finished run that cannot be shown.
     #[error("{message}")]
     Run {
@@ -104,7 +103,7 @@ impl WindowError {
                 "a window needs a screen (X11 or Wayland, with libxkbcommon-x11) and Vulkan, Metal or Direct3D 12 (Debian, \
                  Ubuntu: `apt-get install mesa-vulkan-drivers libvulkan1 libxkbcommon-x11-0`); `pliant render` needs no screen"
             }
-            Self::SelfTest(_) => "",
+            Self::Portrait(_) => "",
             Self::Run { remedy, .. } => remedy,
         }
     }
@@ -113,13 +112,13 @@ impl WindowError {
 /// Opens the window, and comes back once it is closed.
 ///
 /// # Errors
-/// If it can't be opened, or its self-test fails.
+/// If it can't be opened, or its picture cannot be taken.
 pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
     let (setup, size) = (device::setup(&opening.world), opening.size);
     run_window(setup, size, |context, outcome| App::new(context, opening, outcome))
 }
 
-/// Where a self-test leaves what came of it.
+/// Where a portrait leaves what came of it.
 type Outcome = Arc<Mutex<Option<Result<String, String>>>>;
 
 /// Opens a window on a device with what is made in it, until it is closed.
@@ -146,7 +145,7 @@ fn run_window<A: eframe::App + 'static>(
     });
     eframe::run_native("Pliant", options, create).map_err(|error| WindowError::Window(error.to_string()))?;
     let outcome = outcome.lock().unwrap_or_else(PoisonError::into_inner).take();
-    outcome.transpose().map_err(WindowError::SelfTest)
+    outcome.transpose().map_err(WindowError::Portrait)
 }
 
 struct App {
@@ -162,8 +161,6 @@ struct App {
     in_memory: bool,
     /// The device of the window, if it is one of a solver.
     device: Option<Device>,
-    /// What lies under the mouse, and where.
-    hover: Option<(Point, Vector3)>,
     stiffness: f64,
     speed: f64,
     /// Where each hand is [m], while it holds something.
@@ -215,9 +212,7 @@ struct App {
     began: Instant,
     /// Wall time [s] from then to the first picture of the scene.
     first_picture: Option<f64>,
-    running_test: Option<RunningTest>,
-    /// Frames drawn.
-    drawn: u64,
+    portrait: Option<Portrait>,
     context: egui::Context,
     record: Option<PathBuf>,
     outcome: Outcome,
@@ -231,11 +226,10 @@ impl App {
     ) -> Result<Self, String> {
         let state = context.wgpu_render_state.as_ref().ok_or("wgpu did not start")?;
         context.egui_ctx.set_visuals(egui::Visuals::light());
-        let Opening { world, look, file, read, record, stop, self_test, size: _, began } = opening;
+        let Opening { world, look, file, read, record, stop, portrait, size: _, began } = opening;
         let port = Viewport::new(context, &look(&world.scene))?;
         let session = begin(&world, &context.egui_ctx)?;
         let device = device::shared(state, &world);
-        let has_tools = !world.scene.tools.is_empty();
         let mut app = Self {
             session,
             frame: Frame::default(),
@@ -247,7 +241,6 @@ impl App {
             world,
             in_memory: false,
             device,
-            hover: None,
             stiffness: 200.0,
             speed: 1.0,
             hands: [None; 2],
@@ -281,8 +274,7 @@ impl App {
             painted: Instant::now(),
             began,
             first_picture: None,
-            running_test: self_test.map(|test| RunningTest::new(test, has_tools)),
-            drawn: 0,
+            portrait: portrait.map(Portrait::new),
             context: context.egui_ctx.clone(),
             record,
             outcome,
@@ -291,13 +283,7 @@ impl App {
         app.show();
         app.show_marks(app.view.marks);
         remember(&app.file);
-        // A self-test plays when it is due, and clicks as slowly as the machine draws.
-        match app.running_test {
-            Some(_) => context
-                .egui_ctx
-                .options_mut(|options| options.input_options.max_click_duration = f64::INFINITY),
-            None => app.order(Order::Play(true)),
-        }
+        app.order(Order::Play(true));
         Ok(app)
     }
 
@@ -310,19 +296,6 @@ impl App {
     fn title(&self) -> String {
         let title = &self.world.scene.scene.title;
         if title.is_empty() { self.file.display().to_string() } else { title.clone() }
-    }
-
-    /// Goes on with a self-test; ends the window once it is done.
-    fn go_on_testing(&mut self) {
-        let Some(mut running_test) = self.running_test.take() else { return };
-        self.context.request_repaint();
-        match running_test.check(self) {
-            None => self.running_test = Some(running_test),
-            Some(told) => {
-                *self.outcome.lock().unwrap_or_else(PoisonError::into_inner) = Some(told);
-                self.context.send_viewport_cmd(egui::ViewportCommand::Close);
-            }
-        }
     }
 
     /// Takes the newest instant.
@@ -540,19 +513,11 @@ impl eframe::App for App {
         }
         egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| self.scene(ui));
         self.browse(&context);
-        self.drawn += 1;
         if !self.frame.points.is_empty() {
             self.first_picture.get_or_insert_with(|| self.began.elapsed().as_secs_f64());
         }
-        self.go_on_testing();
+        self.pose();
         context.request_repaint_after(Duration::from_millis(250));
-    }
-
-    fn raw_input_hook(&mut self, _context: &egui::Context, input: &mut egui::RawInput) {
-        if let Some(mut running_test) = self.running_test.take() {
-            running_test.give(self, &mut input.events);
-            self.running_test = Some(running_test);
-        }
     }
 
     fn on_exit(&mut self) {

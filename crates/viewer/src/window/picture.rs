@@ -97,10 +97,9 @@ impl App {
         let Some(pointer) = context.pointer_latest_pos() else { return };
         let place = self.port.in_picture(pointer);
         let pulls = self.pulls();
-        self.hover = if response.contains_pointer() && !pulls { self.hit(place) } else { None };
         if pulls {
             context.set_cursor_icon(CursorIcon::Grabbing);
-        } else if self.hover.is_some() {
+        } else if response.contains_pointer() && self.hit(place).is_some() {
             context.set_cursor_icon(CursorIcon::Grab);
         }
         let pinning = context.input(|input| input.modifiers.command || input.key_down(Key::P));

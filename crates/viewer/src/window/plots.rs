@@ -59,10 +59,12 @@ fn words(name: &str) -> String {
 /// Height of a plot on the screen.
 const HEIGHT: f32 = 130.0;
 
-/// Draws curves of one unit: the name, and times [s] and values of each.
+/// Draws curves of one unit: the name, and times [s] and values of each, from where these are known.
 fn draw(ui: &mut egui::Ui, unit: &str, mut lines: Vec<(String, Vec<[f64; 2]>)>) {
+    // A point that is followed has no values before.
+    lines.iter_mut().for_each(|(_, line)| line.retain(|[_, value]| value.is_finite()));
     let values = lines.iter().flat_map(|(_, line)| line).map(|[_, value]| value.abs());
-    let (scaled, factor) = readable(unit, values.filter(|size| size.is_finite()).fold(0.0, f64::max));
+    let (scaled, factor) = readable(unit, values.fold(0.0, f64::max));
     lines.iter_mut().flat_map(|(_, line)| line).for_each(|[_, value]| *value *= factor);
     let plot = Plot::new(("curves", unit))
         .height(HEIGHT)
@@ -206,6 +208,8 @@ mod tests {
                 ..Default::default()
             };
             output = context.run_ui(input, |ui| draw(ui, "N", vec![("force".into(), line.to_vec())]));
+            // Nothing is drawn: textures have nowhere to go.
+            output.textures_delta.clear();
         }
         output.shapes.into_iter().map(|clipped| clipped.shape).collect()
     }
@@ -230,6 +234,18 @@ mod tests {
             .iter()
             .filter(|shape| matches!(shape, egui::Shape::Path(path) if path.points.len() > 1000));
         assert_eq!((bands, lines.count()), (0, 1));
+    }
+
+    #[test]
+    fn a_curve_begins_where_it_is_known() {
+        let unknown = (0..5).map(|i| [f64::from(i), f64::NAN]);
+        let known = (5..9).map(|i| [f64::from(i), 1.0 + f64::from(i)]);
+        let line: Vec<[f64; 2]> = unknown.chain(known).collect();
+        for shape in shapes(&line) {
+            if let egui::Shape::Path(path) = shape {
+                assert!(path.points.iter().all(|point| !point.any_nan()), "{:?}", path.points);
+            }
+        }
     }
 
     #[test]
