@@ -5,7 +5,7 @@ use pliant_mechanics::element::{Cord, GaussPoints};
 use pliant_mechanics::law::plane_stress::InPlane;
 use pliant_mechanics::law::samples::{every_law, law};
 use pliant_mechanics::law::{AnyLaw, Deformation, NeoHookean, Split, TransverselyIsotropic, Volumetric};
-use pliant_mechanics::model::{Averaging, Body, Cells, LocalNodes, Material};
+use pliant_mechanics::model::{Averaging, Body, CellBlock, Cells, LocalNodes, Material};
 use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
 use pliant_mechanics::tensor::scale as times;
 use pliant_mechanics::tensor::{Tensor, cross, dot, scale, sub};
