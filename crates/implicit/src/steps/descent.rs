@@ -11,11 +11,12 @@
 //! * In time, no Newton step takes a node further than a mean edge: longer ones are nearly always halved.
 //! * Friction is then taken anew from the state found, while its size changes by more than a tenth.
 
+use pliant_linear::dot;
+
 use crate::model::error::SolveError;
 use crate::model::state::State;
 use crate::steps::solver::AssemblySolver;
 use crate::system::System;
-use pliant_linear::dot;
 
 /// Part of every gap that an iteration keeps, twice over, and that the guess keeps.
 const KEEP: [f64; 2] = [0.1, 0.5];
@@ -99,6 +100,31 @@ struct Before {
     along: f64,
 }
 
+/// What one iteration of a step leaves to the next.
+struct Descent<'a> {
+    limits: &'a Limits,
+    time: f64,
+    before: Before,
+    /// What was added to the diagonal, over it.
+    raised: f64,
+    /// How often friction was taken anew.
+    lags: usize,
+    /// The largest translation [m] of the Newton step before.
+    previous: f64,
+}
+
+/// What an iteration is about to do.
+struct Aim {
+    /// Whether all that moves by itself has gone its way.
+    complete: bool,
+    /// Whether the step is found with this iteration.
+    last: bool,
+    /// Whether an increment made in full is made longer.
+    expands: bool,
+    /// The part of the increment to begin with.
+    part: f64,
+}
+
 /// Finds the state at the end of a step, or takes what iterations reach; whether it is found. Residuals go to `found` with what is allowed.
 pub(crate) fn descend(
     solver: &mut impl Contacting,
@@ -108,22 +134,13 @@ pub(crate) fn descend(
     limits: &Limits,
     found: &mut dyn FnMut(f64, f64),
 ) -> Result<bool, SolveError> {
-    let times = [state.time, time];
-    begin(solver, state, times, guess);
+    begin(solver, state, [state.time, time], guess);
     // Whether forces and stiffness of the state are known.
     let mut known = match guess {
         Some(guess) => start_from(solver, state, time, guess)?,
         None => false,
     };
-    let mut before = Before {
-        state: state.clone(),
-        share: 0.0,
-        energy: 0.0,
-        size: 0.0,
-        loads: vec![0.0; 6 * state.position.len()],
-        along: 0.0,
-    };
-    let (mut raised, mut lags, mut previous) = (0.0, 0, f64::INFINITY);
+    let mut descent = Descent::new(limits, time, state);
     for iteration in 0..=limits.iterations {
         if !std::mem::take(&mut known) {
             solver.evaluate(state, time, true)?;
@@ -132,8 +149,7 @@ pub(crate) fn descend(
         found(norm, allowed);
         let complete = is_complete(solver);
         if complete && iteration > 0 && norm <= allowed {
-            if lags < limits.lags && lag(solver) {
-                lags += 1;
+            if descent.lag(solver) {
                 continue;
             }
             return check(solver, time).map(|()| true);
@@ -147,10 +163,58 @@ pub(crate) fn descend(
                 Err(not_found(solver, time, iteration))
             };
         }
-        let (largest, is_newton) = find_direction(solver, &mut raised)?;
+        let is_small = norm <= LOOSE * allowed;
+        let aim = descent.aim(solver, state, iteration, [complete, is_small])?;
+        let goes_on = complete && !aim.last && !aim.expands;
+        let tries = Tries { part: aim.part, complete, goes_on };
+        match search(solver, state, time, &descent.before, tries)? {
+            Some(first) if !aim.last => {
+                if aim.expands && first {
+                    expand(solver, state, time, &mut descent.before)?;
+                }
+                known = goes_on;
+            }
+            Some(_) if descent.lag(solver) => {}
+            Some(_) => return check(solver, time).map(|()| true),
+            None => return descent.end_uphill(solver, state, &aim, iteration + 1),
+        }
+    }
+    Ok(true)
+}
+
+impl<'a> Descent<'a> {
+    fn new(limits: &'a Limits, time: f64, state: &State) -> Self {
+        let before = Before {
+            state: state.clone(),
+            share: 0.0,
+            energy: 0.0,
+            size: 0.0,
+            loads: vec![0.0; 6 * state.position.len()],
+            along: 0.0,
+        };
+        Self { limits, time, before, raised: 0.0, lags: 0, previous: f64::INFINITY }
+    }
+
+    /// Takes friction anew where it may and its size has changed; whether it has.
+    fn lag(&mut self, solver: &mut impl Contacting) -> bool {
+        let anew = self.lags < self.limits.lags && lag(solver);
+        self.lags += usize::from(anew);
+        anew
+    }
+
+    /// Finds the increment and how much of it may be made, and keeps what the iteration starts from.
+    fn aim(
+        &mut self,
+        solver: &mut impl Contacting,
+        state: &State,
+        iteration: usize,
+        [complete, is_small]: [bool; 2],
+    ) -> Result<Aim, SolveError> {
+        let (limits, before) = (self.limits, &mut self.before);
+        let (largest, is_newton) = find_direction(solver, &mut self.raised)?;
         let is_close = match limits.close {
             Some(close) => largest <= close,
-            None => largest <= close(solver) && norm <= LOOSE * allowed,
+            None => largest <= close(solver) && is_small,
         };
         let last = complete && is_newton && is_close;
         let Vectors { system, pending, increment, residual, solution } = solver.vectors();
@@ -168,40 +232,34 @@ pub(crate) fn descend(
             None => part,
         };
         (before.energy, before.size) = energy(solver);
-        let is_slow = is_newton && largest > SLOW * std::mem::replace(&mut previous, largest);
+        let is_slow = is_newton && largest > SLOW * std::mem::replace(&mut self.previous, largest);
         let expands = is_slow && complete && part == 1.0 && iteration > 1;
-        let tries = Tries { part, complete, goes_on: complete && !last && !expands };
-        if let Some(first) = search(solver, state, time, &before, tries)? {
-            if !last {
-                if expands && first {
-                    expand(solver, state, time, &mut before)?;
-                }
-                known = tries.goes_on;
-                continue;
-            }
-            if lags < limits.lags && lag(solver) {
-                lags += 1;
-                continue;
-            }
-            return check(solver, time).map(|()| true);
-        }
-        // Nothing falls any more: round-off, or a direction that is none.
+        Ok(Aim { complete, last, expands, part })
+    }
+
+    /// Ends a step whose energy does not fall any more: it is round-off, or the direction is none.
+    fn end_uphill(
+        &self,
+        solver: &mut impl Contacting,
+        state: &mut State,
+        aim: &Aim,
+        iterations: usize,
+    ) -> Result<bool, SolveError> {
+        let (before, time) = (&self.before, self.time);
         state.clone_from(&before.state);
         put(solver, before.share);
         solver.evaluate(state, time, false)?;
-        if complete && (last || before.along.abs() <= ROUND_OFF * before.size) {
+        if aim.complete && (aim.last || before.along.abs() <= ROUND_OFF * before.size) {
             return check(solver, time).map(|()| true);
         }
-        if !complete {
-            return Err(not_found(solver, time, iteration + 1));
+        if !aim.complete {
+            return Err(not_found(solver, time, iterations));
         }
-        if limits.accept {
+        if self.limits.accept {
             return check(solver, time).map(|()| false);
         }
-        let node = solver.worst();
-        return Err(SolveError::Uphill { time, node, iterations: iteration + 1 });
+        Err(SolveError::Uphill { time, node: solver.worst(), iterations })
     }
-    Ok(true)
 }
 
 /// Tells the contacts of the step and what is expected to move in it.

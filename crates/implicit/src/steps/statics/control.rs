@@ -1,12 +1,14 @@
 //! Load steps by a displacement, a volume or an arc length.
 
+use std::sync::Arc;
+
+use pliant_linear::dot;
+use pliant_mechanics::load::{Load, LoadKind};
+
 use super::{Attempt, Statics, Step};
 use crate::model::assembly::Assembly;
 use crate::model::error::SolveError;
 use crate::model::state::State;
-use pliant_linear::dot;
-use pliant_mechanics::load::{Load, LoadKind};
-use std::sync::Arc;
 
 impl Statics {
     /// The next equilibrium under a control, which finds the factor of the controlled loads, at a time [s] that other loads and prescribed

@@ -5,15 +5,17 @@
 //! Leaves out: branch switching at bifurcations.
 
 mod control;
+mod held;
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix6, RowVector6, SymmetricEigen, Vector3};
-use pliant_geometry::DisjointSets;
-use pliant_mechanics::model::{Cells, Motion, Solid};
-use pliant_mechanics::tie::Tie;
+use nalgebra::Vector3;
+use pliant_linear::sparse::NONE;
+use pliant_linear::{LinearSolver, dot};
+use pliant_mechanics::model::{Cells, Solid};
 
 pub use self::control::Control;
+pub use self::held::check_held;
 use crate::model::assembly::Assembly;
 use crate::model::error::SolveError;
 use crate::model::state::State;
@@ -21,8 +23,6 @@ use crate::steps::descent::{Contacting, Limits, Vectors, descend};
 use crate::steps::limits::within_limits;
 use crate::steps::solver::{AssemblySolver, Attempted};
 use crate::system::System;
-use pliant_linear::sparse::NONE;
-use pliant_linear::{LinearSolver, dot};
 
 /// How equilibria are sought.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -572,97 +572,4 @@ fn slack(model: &Assembly, system: &System) -> (Vec<u32>, f64) {
     let equations =
         nodes.iter().flat_map(|node| (0..3).map(move |c| system.stiffness.equations.number[6 * node + c]));
     (equations.filter(|&equation| equation != NONE).collect(), (high - low).norm())
-}
-
-/// Whether every part of a model is held: of its six rigid motions none may leave constraints and springs unmoved.
-///
-/// # Errors
-/// If not: a node of a part, and how many motions it is free in.
-pub fn check_held(model: &Assembly) -> Result<(), SolveError> {
-    let nodes = model.rest.len();
-    let mut part = DisjointSets::new(nodes);
-    let mut used = vec![false; nodes];
-    let facets = model.facets.iter().map(|facet| &facet.nodes[..]);
-    for nodes in facets.chain(model.solid_cells()) {
-        for &node in nodes {
-            used[node as usize] = true;
-            part.join(nodes[0] as usize, node as usize);
-        }
-    }
-    for constraint in model.constraints.iter().filter(|own| matches!(own.motion, Motion::Rigid)) {
-        for &node in &constraint.nodes {
-            part.join(constraint.nodes[0] as usize, node as usize);
-        }
-    }
-    for (node, row) in model.ties.iter().flat_map(Tie::rows) {
-        for (followed, _) in row {
-            part.join(node as usize, followed as usize);
-        }
-    }
-    let turning = model.turning();
-    // Per part: Σ of the squares of what its rigid motions (about the first node, in mean edges) do to what holds it.
-    let length = model.mean_edge();
-    let mut held = vec![Matrix6::zeros(); nodes];
-    let row_of = |node: usize, component: usize, first: usize| {
-        let arm = (model.place(node) - model.place(first)) / length;
-        if component < 3 {
-            let along = Vector3::ith(component, 1.0);
-            let turning = arm.cross(&along);
-            RowVector6::new(along.x, along.y, along.z, turning.x, turning.y, turning.z)
-        } else {
-            RowVector6::from_fn(|_, c| f64::from(u8::from(c == component)))
-        }
-    };
-    // The mean of a face holds what its nodes together do.
-    for constraint in &model.constraints {
-        let Motion::Mean { weights, .. } = &constraint.motion else { continue };
-        let first = part.root(constraint.nodes[0] as usize);
-        for component in (0..3).filter(|&c| constraint.components[c]) {
-            let rows = constraint.nodes.iter().map(|&node| row_of(node as usize, component, first));
-            let row = rows.zip(weights).fold(RowVector6::zeros(), |sum, (row, w)| sum + row * *w);
-            held[first] += row.transpose() * row;
-        }
-    }
-    let mut hold = |node: usize, component: usize, held: &mut Vec<Matrix6<f64>>| {
-        let first = part.root(node);
-        let row = row_of(node, component, first);
-        held[first] += row.transpose() * row;
-    };
-    for constraint in model.constraints.iter().filter(|own| !own.motion.is_collective()) {
-        for &node in &constraint.nodes {
-            let components = if turning[node as usize] { 6 } else { 3 };
-            let own = (0..components).filter(|&c| constraint.components[c]);
-            own.for_each(|c| hold(node as usize, c, &mut held));
-        }
-    }
-    // A membrane may hang from a line and be turned by its loads: its nodes count as if they could not turn.
-    for &node in model.facets.iter().filter(|facet| !facet.turns()).flat_map(|facet| &facet.nodes) {
-        (3..6).for_each(|c| hold(node as usize, c, &mut held));
-    }
-    for spring in &model.springs {
-        (0..3).for_each(|c| hold(spring.node as usize, c, &mut held));
-    }
-    // Of bars along a line the turn about it moves nothing: it needs no holding.
-    let mut moved = vec![Matrix6::zeros(); nodes];
-    for node in (0..nodes).filter(|&node| used[node]) {
-        (0..if turning[node] { 6 } else { 3 }).for_each(|c| hold(node, c, &mut moved));
-    }
-    for node in 0..nodes {
-        if used[node] && part.root(node) == node {
-            let SymmetricEigen { eigenvalues, eigenvectors } = SymmetricEigen::new(moved[node]);
-            let limit = 1e-10 * eigenvalues.max().max(1.0);
-            for (value, motion) in eigenvalues.iter().zip(eigenvectors.column_iter()) {
-                if *value < limit {
-                    held[node] += motion * motion.transpose();
-                }
-            }
-            let values = SymmetricEigen::new(held[node]).eigenvalues;
-            let limit = 1e-10 * values.max().max(1.0);
-            let free_modes = values.iter().filter(|&&value| value < limit).count();
-            if free_modes > 0 {
-                return Err(SolveError::FreeBody { node: node as u32, free_modes });
-            }
-        }
-    }
-    Ok(())
 }
