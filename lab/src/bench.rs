@@ -1,11 +1,11 @@
 //! `pliant-lab bench`: the cost of a step on this machine.
 
 use pliant_bench::{BenchError, Case, Instructions, Place, Settings, cases, find, measure, measure_shells};
+use pliant_command::{Bar, Failure, SUCCESS, say, tell};
 use serde_json::json;
 
 use crate::arguments::Bench;
 use crate::page::Page;
-use pliant_command::{Bar, Failure, SUCCESS, say, tell};
 
 pub fn bench(arguments: &Bench) -> Result<u8, Failure> {
     if arguments.list {

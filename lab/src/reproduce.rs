@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use pliant_command::{Failure, SUCCESS, say, tell};
 use pliant_reproduce::{CASES, Case, Report, find, is_own_file};
 use pliant_run::OutputFolder;
 
 use crate::arguments::Reproduce;
 use crate::page::Page;
-use pliant_command::{Failure, SUCCESS, say, tell};
 
 pub fn reproduce(arguments: &Reproduce) -> Result<u8, Failure> {
     if arguments.list {

@@ -1,7 +1,8 @@
 //! Small meshes and repeatable noise for the tests of this crate.
 
-use crate::{CellKind, Mesh, Vector3};
 use pliant_testing::Random;
+
+use crate::{CellKind, Mesh, Vector3};
 
 /// Corners of the unit cube in the order of a hex.
 pub(crate) const UNIT_CUBE: [[f64; 3]; 8] = [

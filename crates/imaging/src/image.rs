@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
+use pliant_geometry::Grid;
 use rayon::prelude::*;
 
 use crate::error::LabelError;
 use crate::names::LabelNames;
-use pliant_geometry::Grid;
 
 /// Type of the numbers of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,12 +4,12 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use pliant_geometry::Grid;
 use serde::Serialize;
 
 use crate::border::Border;
 use crate::error::LabelError;
 use crate::image::{Image, LabelImage};
-use pliant_geometry::Grid;
 
 /// The voxels of one label.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -1,8 +1,9 @@
 //! The box of voxels round a region of an image.
 
+use pliant_geometry::Grid;
+
 use crate::error::LabelError;
 use crate::image::LabelImage;
-use pliant_geometry::Grid;
 
 /// Voxels of a region with its margin: what 32-bit numbers of voxels bear, with room.
 pub(crate) const LARGEST: u64 = 1 << 30;

@@ -6,11 +6,12 @@
 //! assert_eq!(elastic(soft_tissue()).density, 1000.0);
 //! ```
 
+use serde_json::{Value, json};
+
 use crate::law::{AnyLaw, Deformation};
 use crate::model::Material;
 use crate::prony::{Part, Prony, PronyTerm, PronyUpdate};
 use crate::tensor::Tensor;
-use serde_json::{Value, json};
 
 /// A law by its name and parameters in a scene file.
 ///

@@ -27,12 +27,11 @@ mod xml;
 
 use std::path::Path;
 
+use pliant_format::{LONGEST_TABLE, Reads};
 use pliant_geometry::Mesh;
 use pliant_geometry::io::{self, MeshFile, MeshFileError, parse_xml};
 
 pub use error::{ImportError, ImportProblem};
-
-use pliant_format::{LONGEST_TABLE, Reads};
 
 /// Where mesh files of a model are.
 struct Files<'a> {

@@ -9,17 +9,17 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use pliant_format::tables::{LoadSteps, SolverName};
 use pliant_geometry::io::read_limited;
 use pliant_geometry::words::{counted, number};
 use pliant_mechanics::fingerprint;
+use pliant_scene::{Part, World};
 use pliant_sim::{Precision, Schedule, State};
 use serde::{Deserialize, Serialize};
 
 use crate::output::{OutputError, OutputFolder, replace};
 use crate::progressed::Progressed;
 use crate::rollback::Point;
-use pliant_format::tables::{LoadSteps, SolverName};
-use pliant_scene::{Part, World};
 
 /// The first bytes of every checkpoint.
 const MAGIC: [u8; 8] = *b"\x89PLIANT\n";

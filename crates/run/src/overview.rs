@@ -2,21 +2,21 @@
 
 use std::fmt::{self, Write};
 
+use pliant_format::Scene;
+use pliant_format::registry::OutputTable;
+use pliant_format::tables::{LinearName, PreconditionerName, SolverName};
 use pliant_geometry::QualityReport;
 use pliant_geometry::words::{counted, number};
 use pliant_implicit::bytes_of_factors;
 use pliant_linear::memory;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::{Constraint, Material, Motion, Solid};
+use pliant_scene::{Built, BuiltBody, Limits, Plan, World};
 use pliant_shells::Facet;
 use pliant_sim::contact::touch::With;
 use pliant_sim::{BodyCells, Critical, ImplicitBodies};
 
 use crate::output::{AddedMass, BodySummary, bodies, told_limit};
-use pliant_format::Scene;
-use pliant_format::registry::OutputTable;
-use pliant_format::tables::{LinearName, PreconditionerName, SolverName};
-use pliant_scene::{Built, BuiltBody, Limits, Plan, World};
 
 /// The model in words: bodies, quality, constraints, loads, critical step, expected cost.
 pub fn overview(world: &World) -> String {

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use pliant_explicit::Wanted;
 use pliant_geometry::Mesh;
+use pliant_scene::{Part, World};
 use pliant_sim::contact::barrier::IntersectionCheck;
 use pliant_sim::{Failure, FailureKind, LoadStepProgress, Observer, Schedule, Simulation, StopFlag};
 
@@ -19,7 +20,6 @@ use crate::output::{
 };
 use crate::progressed::Progressed;
 use crate::rollback::{Point, RollbackPoints};
-use pliant_scene::{Part, World};
 
 /// Draws an instant of a run.
 pub trait Draw: fmt::Debug + Sync {

@@ -7,8 +7,13 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
+use pliant_format::Scene;
+use pliant_format::diagnostic::{Diagnostic, Place, SceneErrors};
+use pliant_format::registry::OutputTable;
+use pliant_format::source::{SET, Source};
 use pliant_geometry::words::number;
 use pliant_mechanics::{Energies, fingerprint};
+use pliant_scene::{MeshCache, World};
 use pliant_sim::StopFlag;
 use serde::{Deserialize, Serialize};
 
@@ -17,11 +22,6 @@ use crate::output::{
     plot_of_sweep,
 };
 use crate::run::{Options, run_with};
-use pliant_format::Scene;
-use pliant_format::diagnostic::{Diagnostic, Place, SceneErrors};
-use pliant_format::registry::OutputTable;
-use pliant_format::source::{SET, Source};
-use pliant_scene::{MeshCache, World};
 
 /// The table of a sweep.
 pub const SWEEP: &str = "sweep.csv";

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::tables::{ContactTable, SolverName};
 use pliant_geometry::SurfaceLocator;
 use pliant_geometry::words::number;
 use pliant_sim::Guests;
@@ -12,8 +14,6 @@ use pliant_sim::contact::touch::{Contact, Touch, With};
 
 use crate::assemble::{Meet, overlaps, told_distance, told_overlap, usual_distance};
 use crate::world::World;
-use pliant_format::diagnostic::Diagnostic;
-use pliant_format::tables::{ContactTable, SolverName};
 
 /// How bodies of two participants can touch.
 const HOW: &str = "a solid with `explicit` steps on the CPU and bodies with `implicit` ones touch each other; or put both bodies into one participant";

@@ -1,11 +1,11 @@
 //! Ties between participants: found once all are built.
 
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::tables::{Rotations, SolverName, StepChoice, TieMethod, TieTable};
 use pliant_sim::PenaltyTie;
 
 use crate::assemble::{Placed, attach, doubt_points, holds_nothing};
 use crate::world::{Part, World};
-use pliant_format::diagnostic::Diagnostic;
-use pliant_format::tables::{Rotations, SolverName, StepChoice, TieMethod, TieTable};
 
 /// Steps in an automatic one of explicit participants that are tied to others. A body at half of its usual step leaves ties more of the
 /// limit of stability: they are some twenty times stiffer.

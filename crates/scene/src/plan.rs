@@ -2,6 +2,9 @@
 //! model.
 
 use pliant_explicit::critical_step::ElementBound;
+use pliant_format::Scene;
+use pliant_format::diagnostic::{Diagnostic, SceneErrors};
+use pliant_format::tables::{SolverName, StepChoice};
 use pliant_geometry::words::{counted, number};
 use pliant_implicit::ExplicitShells;
 use pliant_sim::{Critical, ImplicitBodies, SAFETY, Steps};
@@ -9,9 +12,6 @@ use serde::Serialize;
 
 use crate::assemble::Built;
 use crate::target::Target;
-use pliant_format::Scene;
-use pliant_format::diagnostic::{Diagnostic, SceneErrors};
-use pliant_format::tables::{SolverName, StepChoice};
 
 /// A step that is shortened by more than this part is reported.
 const SHORTENED: f64 = 1e-3;

@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
+use pliant_format::Scene;
+use pliant_format::diagnostic::SceneErrors;
+use pliant_format::source::Source;
 use pliant_geometry::DataArray;
 use pliant_meshing::{Block, Resolution, VolumeCell};
 pub(crate) use pliant_testing::CUBE;
 
 use crate::assemble::{Built, build};
-use pliant_format::Scene;
-use pliant_format::diagnostic::SceneErrors;
-use pliant_format::source::Source;
 
 /// The scene of [`CUBE`] with more tables.
 pub(crate) fn scene(more: &str) -> Scene {

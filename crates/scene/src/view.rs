@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::tables::ViewTable;
 use pliant_geometry::{CellLabel, Labels, Region, RegionNames};
 use pliant_mechanics::load::{LoadKind, NO_NODE, face_areas};
 use pliant_mechanics::tensor::{add, scale};
 
 use crate::assemble::{Built, labels_of, touches};
 use crate::world::World;
-use pliant_format::diagnostic::Diagnostic;
-use pliant_format::tables::ViewTable;
 
 impl Built {
     /// The forces [N] of loads on each node at a time [s] and displacements [m], without weights. Pressures on shells give a third of their force

@@ -1,11 +1,11 @@
 //! A run by arc length.
 
+use pliant_geometry::words::{counted, number};
 use pliant_implicit::{Assembly, State};
 use pliant_mechanics::count;
 use serde::{Deserialize, Serialize};
 
 use crate::bodies::{RunControl, Stop};
-use pliant_geometry::words::{counted, number};
 
 /// How far a run by arc length is.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

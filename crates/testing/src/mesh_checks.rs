@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::Random;
 use pliant_geometry::{CellKind, Mesh, Vector3};
+
+use crate::Random;
 
 /// Six times the signed volume of a tetrahedron.
 fn determinant([a, b, c, d]: [Vector3; 4]) -> f64 {

@@ -7,6 +7,7 @@ use pliant_format::tables::ViewTable;
 use pliant_geometry::Vector3;
 use pliant_picture::{Subject, visible};
 use pliant_run::Live;
+use pliant_scene::World;
 use pliant_sim::{State, StopFlag};
 use serde::Serialize;
 
@@ -14,7 +15,6 @@ use crate::hand::{Hand, Hold, Which};
 use crate::parameters::{Number, with_numbers};
 use crate::recording::{Break, Done, Move, Recording, Surface};
 use crate::session::{FRAME, Order, Session};
-use pliant_scene::World;
 
 /// What a replay came to.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -9,11 +9,11 @@ use std::thread;
 use pliant_gpu::Design;
 use pliant_mechanics::model::{Averaging, Material};
 use pliant_mechanics::prony::{Prony, PronyUpdate};
+use pliant_mechanics::tissue::{elastic, liver, liver_relaxation, soft_tissue};
 use pliant_meshing::VolumeCell;
 
 use crate::specimen::block;
 use crate::{HOURGLASS, Hexes, Specimen, Tets};
-use pliant_mechanics::tissue::{elastic, liver, liver_relaxation, soft_tissue};
 
 /// Edge of all cubes [m].
 pub(crate) const EDGE: f64 = 0.1;

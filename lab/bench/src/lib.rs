@@ -16,11 +16,12 @@ mod shells;
 mod specimen;
 mod suite;
 
+pub use pliant_explicit::Instructions;
+
 pub use case::{Case, Element, LawKind, Place, Precision, Threads, cases, find};
 pub use clock::{Clocked, ClockedOnDevice, Spread, Timed};
 pub use count::Count;
 pub use machine::Machine;
-pub use pliant_explicit::Instructions;
 pub use rates::Rates;
 pub use report::{Cube, Fit, Limit, Report, Row};
 pub use settings::Settings;

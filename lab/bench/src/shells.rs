@@ -2,13 +2,13 @@
 //! pressure that pulses between 0 and 1 kPa twice a second, in steps of 40 ms with one linear solution each. Conjugate gradients run to a
 //! residual of 0.1 % on the CPU, and on the best GPU.
 
-use pliant_implicit::AssemblySolver;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use pliant_gpu::{Device, GpuError, Kind};
+use pliant_implicit::AssemblySolver;
 use pliant_implicit::{
     Assembly, BackwardEuler, DynamicSettings, ModelError, Phases, Shell, SolveError, State,
 };

@@ -15,13 +15,14 @@ mod report;
 mod run;
 pub mod shells;
 
-pub use case::{Case, CaseError, Correction, Figure, Findings, Row};
-pub use cases::{CASES, find};
-pub use page::is_own_file;
 pub use pliant_bench::{HOURGLASS, Hexes, Specimen, Tets};
 pub use pliant_mechanics::tissue::{
     deformation, elastic, law, liver, liver_matrix, liver_relaxation, soft_tissue,
 };
+
+pub use case::{Case, CaseError, Correction, Figure, Findings, Row};
+pub use cases::{CASES, find};
+pub use page::is_own_file;
 pub use reference::{largest, mesh, numbers, reference};
 pub use report::Report;
 pub use run::{Equilibrium, relax, settle, smooth_step};

@@ -1,7 +1,8 @@
 //! `pliant-lab bench` through the real binary.
 
-use crate::{Said, Workshop, has_gpu};
 use serde_json::Value;
+
+use crate::{Said, Workshop, has_gpu};
 
 const KEYS: [&str; 17] = [
     "mesh",

@@ -1,7 +1,8 @@
 //! `pliant-lab reproduce` through the real binary.
 
-use crate::Workshop;
 use serde_json::Value;
+
+use crate::Workshop;
 
 #[test]
 fn the_list_names_every_case_in_a_line() {

@@ -4,7 +4,6 @@
 //! Only the equilibria count. So where motion leads to them, masses are those with which all cells have about the same critical step, and
 //! motion is damped.
 
-use pliant_implicit::AssemblySolver;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -15,6 +14,7 @@ use pliant_contact::shape::Shape;
 use pliant_contact::touch::{Contact, Contacts, Rigid, Touch, With};
 use pliant_explicit::critical_step::assembled;
 use pliant_explicit::{CentralDifference, Observable, State};
+use pliant_implicit::AssemblySolver;
 use pliant_implicit::{Assembly, StaticSettings, Statics, Touching};
 use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};

@@ -1,7 +1,6 @@
 //! Shells of real shapes, read through `PLIANT_DATA`: the leaflets of a patient's aortic valve closing under their pressure, an aneurysm and
 //! a rectum blown up. What is told: time, residual, and how far the answer moves with the mesh and with the numbering.
 
-use pliant_implicit::AssemblySolver;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,6 +10,7 @@ use pliant_contact::barrier::BarrierSettings;
 use pliant_contact::pairs::Surface;
 use pliant_contact::touch::{Contact, Contacts, Touch, With};
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3, io};
+use pliant_implicit::AssemblySolver;
 use pliant_implicit::{
     Assembly, BackwardEuler, DynamicSettings, Shell, State, StaticSettings, Statics, Touching,
 };

@@ -1,9 +1,10 @@
 //! Options of meshes.
 
+use std::path::PathBuf;
+
 use clap::ValueEnum;
 use pliant_geometry::CellLabel;
 use pliant_imaging::LabelChoice;
-use std::path::PathBuf;
 
 pub(super) const MESH_HELP: &str = "\
 Images: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, a DICOM segmentation, or the folder of a DICOM series. The mesh is

@@ -5,12 +5,13 @@ mod pictures;
 
 use std::path::PathBuf;
 
+use clap::{Parser, Subcommand, ValueEnum};
+use pliant_run::SweepPart;
+
 use self::meshing::MESH_HELP;
 pub use self::meshing::{Labels, MeshCells, MeshImage, Tissue};
 use self::pictures::RENDER_HELP;
 pub use self::pictures::{Frames, Render, View};
-use clap::{Parser, Subcommand, ValueEnum};
-use pliant_run::SweepPart;
 
 /// Real-time simulation of soft organs.
 #[derive(Debug, Parser)]

@@ -1,11 +1,13 @@
 //! Options of pictures and of the window.
 
-use super::Overrides;
+use std::path::PathBuf;
+use std::str::FromStr;
+
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use pliant_format::tables::{BackgroundName, Choice, LookColour, LookTable, MapName, TextureName};
 use pliant_geometry::CellLabel;
-use std::path::PathBuf;
-use std::str::FromStr;
+
+use super::Overrides;
 
 #[derive(Debug, clap::Args)]
 pub struct View {

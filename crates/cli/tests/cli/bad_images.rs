@@ -4,8 +4,9 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{BLOCK, Said, Workshop};
 use pliant_testing::image_files::{Form, Syntax, Volume, dicom, nifti1, nifti2};
+
+use crate::support::{BLOCK, Said, Workshop};
 
 fn assert_refused(workshop: &Workshop, image: &str, says: &[&str]) {
     let mesh = ["mesh", image, "--label", "1", "--edge", "5mm", "-o", "out.vtu", "--json"];

@@ -1,10 +1,11 @@
 //! Tets and hexes of closed surfaces, and what `pliant info` measures on surfaces, through the real binary.
 
-use crate::support::{BLOCK, Said, Workshop};
 use pliant_geometry::io::{self, Format};
 use pliant_geometry::{CellKind, Mesh, Vector3};
 use pliant_meshing::{Pattern, Sheet, sphere};
 use serde_json::Value;
+
+use crate::support::{BLOCK, Said, Workshop};
 
 /// Radius of the balls [mm].
 const RADIUS: f64 = 15.0;

@@ -1,9 +1,10 @@
 //! `pliant mesh --as shells`, then `pliant run` with a pressure on what it wrote: closed surfaces with a flap, a thin gap and a sharp rim.
 //! Organs from files are read through `PLIANT_DATA`; without it that test prints a notice and passes.
 
-use crate::support::{Said, Workshop};
 use pliant_geometry::{CellKind, Mesh, Vector3, io};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, ImplicitField, TriangleMesh};
+
+use crate::support::{Said, Workshop};
 
 const SCENE: &str = r#"[scene]
 until = 0.02

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
+use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_testing::Random;
 
 use super::{BarrierSettings, Barriers, Stencil};
@@ -10,7 +11,6 @@ use crate::pairs::Surface;
 use crate::pose::{Pose, Trajectory};
 use crate::shape::Shape;
 use crate::touch::{Contact, Contacts, Rigid, Touch, With};
-use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 
 /// A sheet of cells of 0.1 m around the origin, in a plane z = 0; nodes from a number on.
 fn sheet(cells: u32, first: u32) -> (Surface, Vec<Vector3<f64>>) {

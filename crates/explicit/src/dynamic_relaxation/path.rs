@@ -1,11 +1,12 @@
 //! The way of loads to an instant, and equilibria before it.
 
-use super::SHORTEST;
-use crate::lanes::LaneNumber;
 use pliant_mechanics::Energies;
 use pliant_mechanics::count;
 use pliant_mechanics::tensor::Vector;
 use serde::{Deserialize, Serialize};
+
+use super::SHORTEST;
+use crate::lanes::LaneNumber;
 
 /// What is known of the equilibrium a state stands at, beside the state: what a restart needs to show it again.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

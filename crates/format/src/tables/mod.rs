@@ -10,6 +10,10 @@ mod participant;
 mod tie;
 mod view;
 
+use pliant_mechanics::prony::{PronyTerm, PronyUpdate};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 pub use body::{
     AnnulusShape, BlockShape, BodyModel, BodyTable, ByLabel, Cells, CleanTable, CylinderShape, Density,
     Element, EllipsoidShape, Fibre, FibreRule, Fix, Fixes, HemisphereShape, Hourglass, Label, LabelGroup,
@@ -36,10 +40,6 @@ pub use view::{
     BackgroundName, CameraTable, Choice, ClipTable, ColourBy, Component, Labels, LookColour, LookTable,
     MapName, Nothing, TextureName, UpName, ViewTable,
 };
-
-use pliant_mechanics::prony::{PronyTerm, PronyUpdate};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Most threads of a run or a simulation.
 pub const MOST_THREADS: u32 = 1024;

@@ -1,12 +1,14 @@
 //! Broken files.
 
-use super::{data, mixed, scratch, with_sets};
-use pliant_geometry::io::{Format, MeshFileError, MeshFileProblem, Place, read, read_bytes, write};
-use pliant_geometry::{CellKind, boundary, volume};
-use pliant_testing::Random;
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
+
+use pliant_geometry::io::{Format, MeshFileError, MeshFileProblem, Place, read, read_bytes, write};
+use pliant_geometry::{CellKind, boundary, volume};
+use pliant_testing::Random;
+
+use super::{data, mixed, scratch, with_sets};
 
 /// The error of a file of some bytes.
 pub(super) fn error(content: &str, format: Format) -> (Place, MeshFileProblem, String) {

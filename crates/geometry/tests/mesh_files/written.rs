@@ -1,12 +1,14 @@
 //! Files that are written, and read again.
 
-use super::{mixed, read_data, scratch, with_sets};
+use std::fs;
+use std::time::Instant;
+
 use pliant_geometry::io::{
     Format, VtuOptions, VtuSeries, pvd_text, read, read_bytes, save_vtu, write, write_vtu,
 };
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
-use std::fs;
-use std::time::Instant;
+
+use super::{mixed, read_data, scratch, with_sets};
 
 #[test]
 pub(super) fn vtu_round_trip_is_exact() {

@@ -1,14 +1,16 @@
 //! Strides of steps: submitted, waited for, checked, and taken back where one failed.
 
+use std::sync::Arc;
+use std::time::Instant as Clock;
+
+use pliant_explicit::{CentralDifference, Deformed, Lengths, State, StepError};
+
 use super::results::Results;
 use super::{GpuStepper, Origin, force_kernels};
 use crate::GpuError;
 use crate::contacts::DeviceContacts;
 use crate::run::{Instant, StepFailure, UNLISTED, flags, room};
 use crate::transfer::Four;
-use pliant_explicit::{CentralDifference, Deformed, Lengths, State, StepError};
-use std::sync::Arc;
-use std::time::Instant as Clock;
 
 impl GpuStepper {
     /// Goes whole steps on without looking; the last submission, which may not be done yet. Where bodies touch each other, one number is

@@ -1,13 +1,14 @@
 //! What a device found at an instant.
 
+use pliant_explicit::{Deformed, State, Sums};
+use pliant_mechanics::model::FREE;
+use pliant_mechanics::tensor::Vector;
+
 use super::{GpuStepper, force_kernels};
 use crate::GpuError;
 use crate::nodes::SUMS;
 use crate::run::{Instant, UNLISTED};
 use crate::transfer::Four;
-use pliant_explicit::{Deformed, State, Sums};
-use pliant_mechanics::model::FREE;
-use pliant_mechanics::tensor::Vector;
 
 impl GpuStepper {
     /// Evaluates an instant once candidates for contact are listed for it, with the forces of cells found anew or as they stand.

@@ -1,7 +1,8 @@
 //! Finding and opening adapters.
 
-use crate::support;
 use pliant_gpu::{Device, GpuError, adapters};
+
+use crate::support;
 
 #[test]
 fn an_adapter_opens_by_a_part_of_its_name_and_is_sound() {

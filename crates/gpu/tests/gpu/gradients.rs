@@ -1,6 +1,5 @@
 //! Equations of implicit steps on the device, against the CPU.
 
-use pliant_implicit::AssemblySolver;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -10,6 +9,7 @@ use pliant_contact::pairs::Surface;
 use pliant_contact::touch::{Contact, Contacts, Touch, With};
 use pliant_geometry::Mesh;
 use pliant_gpu::Device;
+use pliant_implicit::AssemblySolver;
 use pliant_implicit::{Assembly, BackwardEuler, DynamicSettings, Shell, SolveError, State, Touching};
 use pliant_linear::{
     BlockPattern, BlockValues, DeviceSolver, LinearDevice, LinearSolver, PassEnd, Preconditioner,

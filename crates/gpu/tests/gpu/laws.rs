@@ -4,8 +4,6 @@
 //! M (longitudinal modulus without κ; κ): strains are sums of terms of the size of H, each rounded. So small strains
 //! without rotation count relative to their own stress, those under a large rotation to what the rotation leaves of their digits.
 
-use crate::compute::compute;
-use crate::support;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use pliant_gpu::Device;
 use pliant_mechanics::Number;
@@ -14,6 +12,9 @@ use pliant_mechanics::law::{AnyLaw, Deformation};
 use pliant_mechanics::tensor::{Symmetric, Tensor, Vector, cross, dot, scale, sub};
 use pliant_testing::Random;
 use serde_json::json;
+
+use crate::compute::compute;
+use crate::support;
 
 const EPSILON: f64 = f32::EPSILON as f64;
 

@@ -3,6 +3,7 @@
 //! numbers, several volumes.
 
 use nalgebra::Matrix3;
+use pliant_geometry::Grid;
 
 use super::input::Input;
 use super::text::ToWorld;
@@ -10,7 +11,6 @@ use super::{ReadOptions, checked_size};
 use crate::error::{Fault, ImageProblem};
 use crate::image::{Image, Order, Scalar};
 use crate::names::LabelNames;
-use pliant_geometry::Grid;
 
 const HEADER: usize = 256;
 

@@ -4,6 +4,7 @@
 //! Leaves out: several values a voxel, several volumes, data spread over several files, text data.
 
 use nalgebra::Matrix3;
+use pliant_geometry::Grid;
 use pliant_geometry::Vector3;
 
 use super::input::Input;
@@ -12,7 +13,6 @@ use super::{ReadOptions, checked_size};
 use crate::error::{Fault, ImageProblem};
 use crate::image::{Image, Order, Scalar};
 use crate::names::LabelNames;
-use pliant_geometry::Grid;
 
 /// Keys that are read, each with its synonyms; all others are passed over.
 const KEYS: [&[&str]; 15] = [

@@ -4,6 +4,7 @@
 //! Leaves out: several volumes, colours, complex numbers, ANALYZE 7.5 (which has no orientation).
 
 use nalgebra::Matrix3;
+use pliant_geometry::Grid;
 use pliant_geometry::Vector3;
 
 use super::input::Input;
@@ -11,7 +12,6 @@ use super::{ReadOptions, checked_size};
 use crate::error::{Fault, ImageProblem};
 use crate::image::{Image, Order, Scalar};
 use crate::names::{self, LabelNames};
-use pliant_geometry::Grid;
 
 /// Bytes of the extensions that are searched for label names.
 const EXTENSIONS: u64 = 1 << 22;

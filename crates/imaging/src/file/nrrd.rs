@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 
+use pliant_geometry::Grid;
 use pliant_geometry::Vector3;
 
 use super::input::Input;
@@ -14,7 +15,6 @@ use super::{ReadOptions, checked_size};
 use crate::error::{Fault, ImageProblem};
 use crate::image::{Image, Numbers, Order, Scalar};
 use crate::names::LabelNames;
-use pliant_geometry::Grid;
 
 /// Fields that are read, each with its synonyms; all others are passed over.
 const FIELDS: [&[&str]; 16] = [

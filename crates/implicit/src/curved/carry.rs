@@ -5,13 +5,13 @@
 
 use nalgebra::Vector3;
 use pliant_geometry::barycentric_of_closest;
+use pliant_shells::{Carried, Place};
 use rayon::prelude::*;
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
 
 use crate::curved::surface::CurvedSurface;
 use crate::model::assembly::Assembly;
 use crate::model::state::State;
-use pliant_shells::{Carried, Place};
 
 /// A search tree over the curved surface where it was when the tree was made.
 struct Nearest<'s> {

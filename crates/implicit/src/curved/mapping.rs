@@ -2,11 +2,11 @@
 
 use nalgebra::Vector3;
 use pliant_mechanics::mapping::{Configuration, Mapping, Weights};
+use pliant_shells::Carried;
 
 use crate::curved::surface::CurvedSurface;
 use crate::model::assembly::Assembly;
 use crate::model::state::State;
-use pliant_shells::Carried;
 
 impl Configuration for State {
     fn position(&self, node: u32) -> [f64; 3] {

@@ -4,13 +4,13 @@
 //! Leaves out: fewer triangles where the surface is flat.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use pliant_shells::Place;
+use pliant_shells::rotation::logarithm;
 use rayon::prelude::*;
 
 use crate::curved::surface::CurvedSurface;
 use crate::model::assembly::Assembly;
 use crate::model::state::State;
-use pliant_shells::Place;
-use pliant_shells::rotation::logarithm;
 
 /// Points and triangles that show the surface.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,13 +7,13 @@
 //! Fields of solids are those of `pliant-explicit`. Leaves out: shear across the thickness, variation within a facet, averages at nodes.
 
 use nalgebra::{Matrix3, Vector3};
+use pliant_shells::ShellStrain;
+use pliant_shells::{Broken, Facet, Resultants, ShellEnergy};
 use rayon::prelude::*;
 
 use crate::model::assembly::Assembly;
 use crate::model::error::SolveError;
 use crate::model::state::State;
-use pliant_shells::ShellStrain;
-use pliant_shells::{Broken, Facet, Resultants, ShellEnergy};
 
 impl State {
     /// Displacement of a node [m].

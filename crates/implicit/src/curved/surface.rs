@@ -3,11 +3,11 @@
 //! Leaves out: continuous tangents across edges (their jump falls with h²).
 
 use nalgebra::Vector3;
+use pliant_shells::{Carried, EdgeRule, Patch, Place};
+use pliant_shells::{sides, straight_edges};
 
 use crate::model::assembly::Assembly;
 use crate::model::state::State;
-use pliant_shells::{Carried, EdgeRule, Patch, Place};
-use pliant_shells::{sides, straight_edges};
 
 /// The curved surface of a model's shells.
 #[derive(Clone, Debug)]

@@ -8,15 +8,15 @@ use nalgebra::Vector3;
 use pliant_mechanics::Model;
 use pliant_mechanics::load::LoadKind;
 use pliant_mechanics::model::{Constraint, Motion, Solid};
+use pliant_shells::Carried;
+use pliant_shells::Facet;
+use pliant_shells::element::{Formulation, Layer, Wall};
+use pliant_shells::{Normal, straight_edges};
 
 use crate::model::contact::Touching;
 use crate::model::error::ModelError;
 use crate::model::turns::CarriedTurn;
 use crate::solid::refusal;
-use pliant_shells::Carried;
-use pliant_shells::Facet;
-use pliant_shells::element::{Formulation, Layer, Wall};
-use pliant_shells::{Normal, straight_edges};
 
 /// The least part of a direction that lies in a triangle.
 const ALONG: f64 = 1e-3;

@@ -1,12 +1,11 @@
 //! Everything that changes, as arrays over the nodes. A clone is a snapshot.
 
 use nalgebra::{UnitQuaternion, Vector3};
-
 use pliant_mechanics::Model;
+use pliant_shells::rotation::exponential;
 use rayon::prelude::*;
 
 use crate::solid::relaxation::History;
-use pliant_shells::rotation::exponential;
 
 /// Nodes that a thread takes at least.
 pub(crate) const NODES: usize = 1024;

@@ -6,9 +6,9 @@
 use pliant_mechanics::element::{Axes, Rest};
 use pliant_mechanics::law::plane_stress::{FLAT_WALL, InPlane};
 use pliant_mechanics::tensor::{Vector, add, dot, scale};
+use pliant_shells::Broken;
 
 use super::{CellMaterial, Response, Strained, add_to};
-use pliant_shells::Broken;
 
 /// Gradients of the shape functions in the frame of a triangle [1/m].
 pub(super) fn in_frame(rest: &Rest<3>, axes: &Axes) -> [[f64; 2]; 3] {

@@ -1,6 +1,7 @@
 //! The battery of solids: every element with laws of every kind.
 
 use nalgebra::Vector3;
+use pliant_linear::LinearSolver;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::element::Cord;
 use pliant_mechanics::law::{AnyLaw, samples};
@@ -14,7 +15,6 @@ use serde_json::json;
 use crate::system::System;
 use crate::tests::bar;
 use crate::{Assembly, BackwardEuler, DynamicSettings, ModelError, State, StaticSettings, Statics};
-use pliant_linear::LinearSolver;
 
 const ELEMENTS: [&str; 5] = ["tet4", "tet4-anp", "hex8", "growing-hex8", "hex8-full"];
 

@@ -11,6 +11,8 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use pliant_linear::{LinearDevice, LinearReport, LinearSolver, dot};
+use pliant_shells::rotation::{logarithm, spin_to_vector};
 use rayon::prelude::*;
 
 use crate::model::assembly::Assembly;
@@ -20,8 +22,6 @@ use crate::steps::descent::{Contacting, Limits, Vectors, descend};
 use crate::steps::limits::within_limits;
 use crate::steps::solver::{AssemblySolver, Attempted};
 use crate::system::System;
-use pliant_linear::{LinearDevice, LinearReport, LinearSolver, dot};
-use pliant_shells::rotation::{logarithm, spin_to_vector};
 
 /// How an implicit step goes on in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

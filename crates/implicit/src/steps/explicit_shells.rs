@@ -1,17 +1,17 @@
 //! Explicit steps of shells: central differences.
 
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use pliant_mechanics::model::Solid;
+use pliant_shells::rotation::exponential;
+
 use crate::model::assembly::Assembly;
 use crate::model::error::SolveError;
 use crate::model::state::State;
 use crate::solid::highest_frequency_squared;
-
 use crate::steps::forces::Forces;
 use crate::system::Phases;
-use nalgebra::Vector3;
-
-use pliant_mechanics::model::Solid;
-use pliant_shells::rotation::exponential;
-use std::sync::Arc;
 
 /// Central differences: velocities stand half a step before positions.
 pub struct ExplicitShells {

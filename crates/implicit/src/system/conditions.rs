@@ -7,13 +7,13 @@
 //! its limit it is a load, λ a with λ given, and the volume follows.
 
 use nalgebra::{DMatrix, DVector, Dyn, LU};
+use pliant_linear::dot;
+use pliant_linear::sparse::{Equations, LowerMatrix, NONE};
 use pliant_mechanics::model::{Constraint, Enclosure, Motion};
 
 use crate::Assembly;
 use crate::curved::surface::CurvedSurface;
 use crate::model::state::State;
-use pliant_linear::dot;
-use pliant_linear::sparse::{Equations, LowerMatrix, NONE};
 
 /// A gap that counts as none, over the mean edge or over the volume.
 const CLOSED: f64 = 1e-10;

@@ -11,6 +11,7 @@ use pliant_contact::barrier::{Barriers, Meeting, NodeTouch};
 use pliant_contact::lag::Lag;
 use pliant_contact::pose::Leg;
 use pliant_contact::touch::{Contact, Contacts, Rigid, With};
+use pliant_linear::sparse::{Equations, LowerMatrix};
 
 use crate::model::assembly::Assembly;
 use crate::model::contact::Touching;
@@ -18,7 +19,6 @@ use crate::model::error::SolveError;
 use crate::model::state::State;
 use crate::system::followers::Followers;
 use crate::system::samples::{Movers, Samples, acts, movers_of};
-use pliant_linear::sparse::{Equations, LowerMatrix};
 
 /// Pairs of nodes kept in the pattern at most, over those that are needed.
 const ROOM: usize = 2;

@@ -8,14 +8,14 @@
 //! adds (f aᵀ + a fᵀ)/2 − (f·a) to the stiffness of θ, with f what cells resist with less what loads pull with.
 
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, SymmetricEigen, Vector3};
+use pliant_linear::sparse::{Cell, Equations, LowerMatrix, NONE};
 use pliant_mechanics::model::Motion;
 use pliant_mechanics::tie::Tie;
+use pliant_shells::rotation::skew;
 
 use crate::Assembly;
 use crate::model::state::State;
 use crate::system::turns::Turn;
-use pliant_linear::sparse::{Cell, Equations, LowerMatrix, NONE};
-use pliant_shells::rotation::skew;
 
 /// The nodes whose unknowns move a cell, and how many components of each.
 pub(crate) type Expanded = (Vec<u32>, usize);

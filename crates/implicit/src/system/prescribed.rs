@@ -3,13 +3,13 @@
 
 use nalgebra::Vector3;
 use pliant_mechanics::model::{Constraint, Enclosure, Motion, fill};
+use pliant_shells::EdgeRule;
+use pliant_shells::rotation::{exponential, logarithm};
 
 use crate::curved::surface::CurvedSurface;
 use crate::model::assembly::Assembly;
 use crate::model::state::State;
 use crate::system::conditions::add_gradient;
-use pliant_shells::EdgeRule;
-use pliant_shells::rotation::{exponential, logarithm};
 
 /// A distance that counts as none, over the mean edge: what round-off adds up to over many steps.
 const ARRIVED: f64 = 1e-10;

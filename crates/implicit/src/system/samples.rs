@@ -9,13 +9,13 @@ use nalgebra::{SMatrix, Vector3, Vector6};
 use pliant_contact::barrier::{Barriers, Matrix12};
 use pliant_contact::pairs::Surface;
 use pliant_contact::touch::{Contact, Contacts, With};
+use pliant_linear::sparse::{Equations, LowerMatrix};
+use pliant_shells::{EdgeRule, Place};
 
 use crate::curved::surface::CurvedSurface;
 use crate::model::assembly::Assembly;
 use crate::model::state::State;
 use crate::system::followers::Followers;
-use pliant_linear::sparse::{Equations, LowerMatrix};
-use pliant_shells::{EdgeRule, Place};
 
 /// J of a point: its velocity over those of a node and its spin.
 pub(crate) type ByNode = SMatrix<f64, 3, 6>;

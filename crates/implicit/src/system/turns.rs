@@ -7,10 +7,10 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use pliant_mechanics::rotation::nearest_rotation;
+use pliant_shells::rotation::skew;
 
 use crate::model::state::State;
 use crate::model::turns::CarriedTurn;
-use pliant_shells::rotation::skew;
 
 /// A node that turns with a solid, with its J at a state.
 #[derive(Clone, Debug)]

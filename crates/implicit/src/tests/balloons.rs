@@ -1,13 +1,14 @@
 //! Membranes and balloons under pressure.
 
-use super::equations::gradients;
-use super::{FLAT, MATERIAL, ball, balloon, fix, quartered, ramp};
-use crate::system::System;
-use crate::*;
 use nalgebra::Vector3;
 use pliant_linear::{LinearSolver, Preconditioner};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_shells::element::{Elasticity, Formulation, Membrane, Wall};
+
+use super::equations::gradients;
+use super::{FLAT, MATERIAL, ball, balloon, fix, quartered, ramp};
+use crate::system::System;
+use crate::*;
 
 /// A membrane sphere: p = 2 E t u/((1 − ν) r²). Facets are softer; halving them halves what is missing.
 #[test]

@@ -1,6 +1,5 @@
 //! Steps on devices that fail.
 
-use crate::AssemblySolver;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
@@ -10,9 +9,10 @@ use pliant_linear::{
 };
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind};
-
-use crate::{Assembly, BackwardEuler, DynamicSettings, Phases, Shell, SolveError, State};
 use pliant_shells::element::{Elasticity, Wall};
+
+use crate::AssemblySolver;
+use crate::{Assembly, BackwardEuler, DynamicSettings, Phases, Shell, SolveError, State};
 
 /// What a device that is no good does.
 #[derive(Clone, Copy, Debug)]

@@ -1,10 +1,11 @@
 //! Linear solvers find the same equilibrium, with the same bits on any number of threads.
 
-use super::{balloon, cantilever, ramp};
-use crate::*;
 use pliant_linear::{LinearSolver, Preconditioner};
 use pliant_mechanics::load::{LoadKind, Spread};
 use pliant_mechanics::model::{Constraint, Motion};
+
+use super::{balloon, cantilever, ramp};
+use crate::*;
 
 pub(super) fn iterative(preconditioner: Preconditioner) -> LinearSolver {
     LinearSolver::ConjugateGradients { tolerance: 1e-12, iterations: 5000, preconditioner }

@@ -1,11 +1,12 @@
 //! Walls of layers.
 
-use super::{MATERIAL, fix, ramp, strip};
-use crate::*;
 use nalgebra::Vector3;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_shells::element::{Elasticity, Layer, Membrane, Orthotropic};
 use pliant_shells::rotation::exponential;
+
+use super::{MATERIAL, fix, ramp, strip};
+use crate::*;
 
 /// Two layers, the upper one four times as stiff; ν = 0.
 pub(super) fn two_layers() -> [Layer; 2] {

@@ -9,18 +9,18 @@ mod motion;
 mod surfaces;
 
 use nalgebra::Vector3;
+use pliant_linear::LinearSolver;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::law::{AnyLaw, Corotational};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_mechanics::model::{Cells, Constraint, Material, Motion, Solid};
-
-use crate::system::System;
-use crate::*;
-use pliant_linear::LinearSolver;
 use pliant_shells::element::{Bending, Elasticity, Formulation, Membrane, Wall};
 use pliant_shells::rotation::exponential;
 use pliant_shells::{Carried, EdgeRule, Place};
 use pliant_testing::Random;
+
+use crate::system::System;
+use crate::*;
 
 pub(crate) const MATERIAL: Wall = Wall { elastic: Elasticity { young: 1e6, poisson: 0.3 }, density: 1000.0 };
 

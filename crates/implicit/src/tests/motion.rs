@@ -2,14 +2,15 @@
 
 use std::f64::consts::TAU;
 
-use super::*;
-use crate::{Shell, StaticSettings, Statics};
 use pliant_linear::Preconditioner;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::{Constraint, Motion};
 use pliant_shells::element::Elasticity;
 use pliant_shells::element::Wall;
+
+use super::*;
+use crate::{Shell, StaticSettings, Statics};
 
 const LENGTH: f64 = 1.0;
 const THIN: f64 = 0.01;

@@ -1,11 +1,11 @@
 //! Solid blocks on planes: Coulomb's friction on an incline and in all directions.
 
-use pliant_implicit::AssemblySolver;
 use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 use pliant_contact::barrier::BarrierSettings;
 use pliant_contact::shape::Shape;
+use pliant_implicit::AssemblySolver;
 use pliant_implicit::{Assembly, BackwardEuler, DynamicSettings, State};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};

@@ -1,12 +1,12 @@
 //! Cloth over a sphere, and a strip that is twisted into itself.
 
-use pliant_implicit::AssemblySolver;
 use std::time::Instant;
 
 use nalgebra::Vector3;
 use pliant_contact::barrier::BarrierSettings;
 use pliant_contact::shape::Shape;
 use pliant_contact::touch::{Contact, Touch, With};
+use pliant_implicit::AssemblySolver;
 use pliant_implicit::{Assembly, BackwardEuler, DynamicSettings, Shell, State};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::load::{Load, LoadKind};

@@ -1,6 +1,5 @@
 //! A soft ball pushed through a funnel and a tube that is narrower than it (S8).
 
-use pliant_implicit::AssemblySolver;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
@@ -8,6 +7,7 @@ use pliant_contact::barrier::BarrierSettings;
 use pliant_contact::pose::{Pose, Trajectory};
 use pliant_contact::profile::{Corner, Profile};
 use pliant_contact::shape::Shape;
+use pliant_implicit::AssemblySolver;
 use pliant_implicit::{Assembly, BackwardEuler, DynamicSettings, State};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};

@@ -1,6 +1,5 @@
 //! Thin rings: pressed between two plates, and dropped.
 
-use pliant_implicit::AssemblySolver;
 use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
@@ -8,6 +7,7 @@ use pliant_contact::barrier::BarrierSettings;
 use pliant_contact::pairs::Surface;
 use pliant_contact::pose::{Pose, Trajectory};
 use pliant_contact::shape::Shape;
+use pliant_implicit::AssemblySolver;
 use pliant_implicit::{
     Assembly, BackwardEuler, DynamicSettings, Integrator, Shell, State, StaticSettings, Statics,
 };

@@ -1,11 +1,11 @@
 //! A block that a spring pulls over a floor sticks and slips (S3): held to the closed form of a mass under Coulomb's friction.
 
-use pliant_implicit::AssemblySolver;
 use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 use pliant_contact::barrier::BarrierSettings;
 use pliant_contact::shape::Shape;
+use pliant_implicit::AssemblySolver;
 use pliant_implicit::{BackwardEuler, DynamicSettings, Integrator, Spring, State};
 
 use super::blocks::{block, weigh};

@@ -40,6 +40,11 @@ mod battery;
 #[doc(hidden)]
 pub mod samples;
 
+use schemars::{JsonSchema, Schema};
+use serde::de::DeserializeOwned;
+
+use crate::Number;
+use crate::tensor::{Symmetric, Tensor, Vector};
 pub use arruda_boyce::ArrudaBoyce;
 pub use corotational::Corotational;
 pub use coupled_neo_hookean::CoupledNeoHookean;
@@ -64,12 +69,6 @@ pub use transversely_isotropic::{FibreConvention, TransverselyIsotropic};
 pub use veronda_westmann::VerondaWestmann;
 pub use volumetric::{Volumetric, VolumetricEnergy};
 pub use yeoh::Yeoh;
-
-use schemars::{JsonSchema, Schema};
-use serde::de::DeserializeOwned;
-
-use crate::Number;
-use crate::tensor::{Symmetric, Tensor, Vector};
 
 /// The most families of fibres that a law has.
 pub const MOST_FAMILIES: usize = 2;

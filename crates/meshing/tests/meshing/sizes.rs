@@ -6,9 +6,9 @@ use pliant_meshing::{
     Anatomy, Assessment, Closing, DEFAULT_CELL_LIMIT, Ellipsoid, Enclosed, Hausdorff, MeasuredTo,
     MeshingError, Missed, OrganMesh, OrganTets, TriangleMesh, sphere,
 };
+use pliant_testing::mesh_checks::{conforming_boundary, tet_volume};
 
 use crate::organs::{anatomy, check_sound};
-use pliant_testing::mesh_checks::{conforming_boundary, tet_volume};
 
 /// A ball of 30 mm with a spike that ends 55 mm from its centre; its base is a cap of this many
 /// degrees.

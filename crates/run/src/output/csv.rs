@@ -4,20 +4,19 @@ use std::fs::{self, File};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use crc32fast::Hasher;
+use pliant_format::tables::{CsvTable, FieldName, ProbeTable};
 use pliant_geometry::Vector3;
 use pliant_mechanics::Energies;
 use pliant_mechanics::model::Enclosed;
 use pliant_mechanics::tensor::add;
+use pliant_scene::{Built, Part, World};
 use pliant_shells::Carried;
-
-use crc32fast::Hasher;
 use pliant_sim::BodyCells;
 use pliant_sim::contact::touch::With;
 
 use super::file::{create, reopen};
 use super::{Frame, Output, OutputError, Recovered, Written, fields, time_of};
-use pliant_format::tables::{CsvTable, FieldName, ProbeTable};
-use pliant_scene::{Built, Part, World};
 
 pub(super) struct Rows {
     path: PathBuf,

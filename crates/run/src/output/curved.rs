@@ -1,13 +1,13 @@
 //! The curved surface of shells as a mesh of small triangles.
 
+use pliant_format::tables::FieldName;
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh};
 use pliant_implicit::{CurvedSurface, Picture, PictureFields};
+use pliant_scene::Built;
 use pliant_shells::EdgeRule;
 use pliant_sim::{BodyCells, ImplicitBodies};
 
 use super::{Frame, fields};
-use pliant_format::tables::FieldName;
-use pliant_scene::Built;
 
 /// The curved surface of one shell or of all.
 pub(super) struct Curved {

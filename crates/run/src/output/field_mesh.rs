@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 
+use pliant_format::tables::{At, BodyModel, FieldName, VtuTable};
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use pliant_mechanics::model::{Cells, Solid};
+use pliant_scene::{Built, World};
 use pliant_sim::contact::pose::Pose;
 use pliant_sim::contact::touch::Rigid;
 use pliant_sim::{BodyCells, ImplicitBodies};
 
 use super::merged::merged;
 use super::{CellNumbers, Frame, fields};
-use pliant_format::tables::{At, BodyModel, FieldName, VtuTable};
-use pliant_scene::{Built, World};
 
 /// A mesh that takes the fields of instants: of a body, a carried surface or all bodies, of any participants.
 pub(crate) struct FieldMesh {

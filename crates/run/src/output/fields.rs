@@ -3,13 +3,13 @@
 use nalgebra::Matrix3;
 use pliant_explicit::NodeContact;
 use pliant_explicit::recover::CellFields;
+use pliant_format::tables::FieldName;
 use pliant_implicit::{Assembly, ShellFields, State};
 use pliant_mechanics::model::{Model, Motion};
 use pliant_mechanics::tensor::Symmetric;
 use rayon::prelude::*;
 
 use super::Frame;
-use pliant_format::tables::FieldName;
 
 /// A value of up to nine numbers.
 pub(super) type Value = [f64; 9];

@@ -5,11 +5,12 @@ use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use pliant_format::Scene;
+use pliant_format::registry::OutputTable;
+
 use super::file::{check_own, check_own_folder, is_at, replace, temporary};
 use super::{OutputError, Written, csv, vtu};
 use crate::checkpoint::{Checkpoint, ResumeError, steps_of};
-use pliant_format::Scene;
-use pliant_format::registry::OutputTable;
 
 /// The page to read after a run.
 pub(crate) const SUMMARY: &str = "summary.md";

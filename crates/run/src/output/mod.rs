@@ -22,14 +22,21 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use pliant_explicit::recover::CellFields;
+use pliant_format::tables::FieldName;
+use pliant_scene::{Built, Part, World};
 use pliant_sim::{CellsNow, Instant, Simulation};
 use serde::{Deserialize, Serialize};
 
+pub(crate) use csv::{AXES, ENERGIES, Samples, in_columns};
+pub use csv::{Column, sampled_columns};
+pub(crate) use field_mesh::{FieldMesh, carried_on_shell};
 pub(crate) use file::{check_own_folder, replace};
 pub use folder::OutputFolder;
 pub(crate) use folder::{CONVERGENCE, PICTURE, PLOT, SUMMARY};
 pub use outcome::{GuestSummary, Intersections, TieSummary};
 pub(crate) use outcome::{History, Outcome, PartOutcome, Watched};
+pub(crate) use outputs::Outputs;
+pub(crate) use plot::{MOST_CURVES, Reactions, constraints, plot, plot_of_sweep};
 pub(crate) use solid_strains::SolidStrains;
 pub use solid_strains::VolumeChange;
 pub(crate) use stability::hourglass_failure;
@@ -37,16 +44,7 @@ pub use stability::{AddedMass, StabilitySummary};
 pub(crate) use strains::ShellStrains;
 pub use strains::StrainSummary;
 pub use summary::{BodySummary, ParticipantSummary, Summary, failed_input, failed_output};
-
-pub(crate) use csv::{AXES, ENERGIES, Samples, in_columns};
-pub use csv::{Column, sampled_columns};
-pub(crate) use field_mesh::{FieldMesh, carried_on_shell};
-pub(crate) use outputs::Outputs;
-pub(crate) use plot::{MOST_CURVES, Reactions, constraints, plot, plot_of_sweep};
 pub(crate) use summary::{bodies, interrupted, markdown, output_failure, summarise, told_limit};
-
-use pliant_format::tables::FieldName;
-use pliant_scene::{Built, Part, World};
 
 /// An output that could not be written.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -5,18 +5,18 @@ use std::path::PathBuf;
 use nalgebra::Vector3;
 use pliant_explicit::model_balance_floor;
 use pliant_explicit::stability::Stability;
+use pliant_format::tables::SolverName;
 use pliant_geometry::words::{counted, number};
 use pliant_mechanics::Energies;
 use pliant_mechanics::count;
 use pliant_mechanics::model::Enclosed;
+use pliant_scene::{Part, World};
 use pliant_sim::contact::barrier::IntersectionCheck;
 use pliant_sim::contact::lag::Lag;
 use pliant_sim::{Effort, Equilibria, Failure, GuestsNow, Instant, TieNow};
 use serde::{Deserialize, Serialize};
 
 use super::{Frame, ShellStrains, SolidStrains, time_of};
-use pliant_format::tables::SolverName;
-use pliant_scene::{Part, World};
 
 /// The result of a run.
 #[derive(Clone, Debug)]

@@ -1,13 +1,12 @@
 //! SVG plots: of a run the size of each reaction, the energies, and pressure and volume of what constraints fill, over time; of a sweep each
 //! reaction in all runs.
 
+use pliant_mechanics::model::Constraint;
+use pliant_scene::World;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use pliant_mechanics::model::Constraint;
-
 use super::History;
-use pliant_scene::World;
 
 /// Colours that colour-blind eyes tell apart (Okabe and Ito 2008).
 const COLOURS: [RGBColor; 7] = [

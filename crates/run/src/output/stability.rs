@@ -7,12 +7,12 @@ use pliant_explicit::stability::StepLimit;
 use pliant_format::tables::OnUnstableName;
 use pliant_geometry::words::{counted, number};
 use pliant_mechanics::Energies;
+use pliant_scene::{Built, Part, World};
 use pliant_sim::{Failure, FailureKind};
 use serde::Serialize;
 
 use super::outcome::HeldBack;
 use super::{Outcome, PartOutcome};
-use pliant_scene::{Built, Part, World};
 
 /// Hourglass energy, as a fraction of the internal one, above which a run gives a warning.
 const MUCH_HOURGLASS: f64 = 0.05;

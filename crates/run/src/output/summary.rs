@@ -3,9 +3,11 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use pliant_format::printable;
 use pliant_geometry::words::{counted, number};
 use pliant_mechanics::Energies;
 use pliant_mechanics::model::{Constraint, Enclosed};
+use pliant_scene::{Built, LimitingElement, Limits, Part, World};
 use pliant_sim::{Critical, Effort, Equilibria, Failure, FailureKind};
 use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
@@ -13,8 +15,6 @@ use serde_json::{Value as Json, json};
 use super::stability::{AddedMass, StabilitySummary, doubts};
 use super::{GuestSummary, History, Intersections, Outcome, PartOutcome, TieSummary};
 use super::{OutputError, StrainSummary, VolumeChange, constraints};
-use pliant_format::printable;
-use pliant_scene::{Built, LimitingElement, Limits, Part, World};
 
 /// The result of a run.
 #[derive(Clone, Debug, Serialize)]

@@ -5,15 +5,15 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use pliant_format::tables::VtuTable;
 use pliant_geometry::io::{
     MeshFileError, PVD_TAIL, VtuOptions, VtuSeries, pvd_entry, pvd_text, read_pvd, read_torn_pvd,
 };
+use pliant_scene::World;
 
 use super::field_mesh::FieldMesh;
 use super::file::{check_own_folder, is_at, reopen, replace};
 use super::{Frame, Output, OutputError, Written, time_of};
-use pliant_format::tables::VtuTable;
-use pliant_scene::World;
 
 pub(super) struct Series {
     folder: PathBuf,

@@ -1,14 +1,14 @@
 //! Nodes of one body in the cells of another one: where they lie, and doubts about that.
 
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::source::Source;
+use pliant_format::tables::TieTable;
 use pliant_geometry::words::{counted, number};
 use pliant_geometry::{CellId, Mesh, QualityReport};
 use pliant_mechanics::Model;
 use pliant_mechanics::mapping::Weights;
 
 use super::{BuiltBody, in_metres};
-use pliant_format::diagnostic::Diagnostic;
-use pliant_format::source::Source;
-use pliant_format::tables::TieTable;
 
 /// Part of the median edge of the followed body that a gap may have.
 pub(super) const GAP: f64 = 0.1;

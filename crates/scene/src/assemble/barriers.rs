@@ -3,13 +3,13 @@
 use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
+use pliant_format::tables::ContactTable;
 use pliant_geometry::words::{counted, number};
 use pliant_implicit::{State, Touching, apart_counts, meetings};
 use pliant_sim::contact::barrier::{BarrierSettings, Meeting};
 use pliant_sim::contact::touch::{Contacts, With};
 
 use super::{Builder, Partner, in_metres};
-use pliant_format::tables::ContactTable;
 
 /// The distance of a barrier over the diagonal of all bodies, if none is given.
 const DISTANCE: f64 = 1e-3;

@@ -1,5 +1,6 @@
 //! Bars and threads: ligaments, chords of valves, sutures.
 
+use pliant_format::tables::MeshTable;
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3};
 use pliant_mechanics::element::Cord;
 use pliant_mechanics::model::Cells;
@@ -7,7 +8,6 @@ use pliant_mechanics::model::Cells;
 use super::Builder;
 use super::bodies::{Draft, nodes};
 use super::meshes::MeshOrigin;
-use pliant_format::tables::MeshTable;
 
 /// Most bars of a path.
 const MOST: f64 = 1e6;

@@ -2,6 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::registry::LawTable;
+use pliant_format::tables::{
+    BodyModel, BodyTable, ByLabel, Density, Element, Hourglass, Thickness, ThicknessRule,
+};
+use pliant_format::{SCENE, suggestion};
 use pliant_geometry::words::counted;
 use pliant_geometry::{
     CellBlock, CellKind, CellLabel, Labels, Mesh, Surface, UnknownLabel, body_blocks, boundary,
@@ -11,12 +17,6 @@ use pliant_mechanics::model::{Averaging, Cells, Material, Solid};
 use pliant_mechanics::prony::{Prony, PronyError};
 
 use super::{Builder, BuiltBody};
-use pliant_format::diagnostic::Diagnostic;
-use pliant_format::registry::LawTable;
-use pliant_format::tables::{
-    BodyModel, BodyTable, ByLabel, Density, Element, Hourglass, Thickness, ThicknessRule,
-};
-use pliant_format::{SCENE, suggestion};
 
 /// A body that is being built.
 pub(super) struct Draft<'a> {

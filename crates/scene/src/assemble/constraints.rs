@@ -2,6 +2,9 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::registry::{ConstraintTable, LoadTable};
+use pliant_format::tables::{MoveTable, RotateTable, SolverName, Vectors, VolumeTable};
 use pliant_geometry::words::number;
 use pliant_geometry::{Mesh, Selection, Vector3};
 use pliant_mechanics::curve::Curve;
@@ -10,9 +13,6 @@ use pliant_mechanics::model::{Constraint, Enclosure, Motion};
 use pliant_shells::element::Membrane;
 
 use super::{Builder, Subject, in_metres};
-use pliant_format::diagnostic::Diagnostic;
-use pliant_format::registry::{ConstraintTable, LoadTable};
-use pliant_format::tables::{MoveTable, RotateTable, SolverName, Vectors, VolumeTable};
 
 impl Builder<'_> {
     pub(super) fn add_constraints(&mut self) {

@@ -2,6 +2,10 @@
 //! point of the surface. Walls take the gradient of a harmonic function on the body's own elements. A cell without a direction is an error
 //! that names it.
 
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::registry::LawTable;
+use pliant_format::suggestion;
+use pliant_format::tables::{BodyModel, Fibre, FibreRule};
 use pliant_geometry::words::counted;
 use pliant_geometry::{CellBlock, CellId, CellKind, Selection, SurfaceLocator, Vector3};
 use pliant_mechanics::harmonic::Laplacian;
@@ -9,10 +13,6 @@ use pliant_mechanics::harmonic::Laplacian;
 use super::Builder;
 use super::bodies::{Draft, nodes};
 use super::meshes::list_cells;
-use pliant_format::diagnostic::Diagnostic;
-use pliant_format::registry::LawTable;
-use pliant_format::suggestion;
-use pliant_format::tables::{BodyModel, Fibre, FibreRule};
 
 /// Directions shorter than this are zero.
 const ZERO: f64 = 1e-12;

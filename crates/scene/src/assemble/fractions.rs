@@ -1,13 +1,13 @@
 //! How much of each cell its body fills.
 
+use pliant_format::suggestion;
+use pliant_format::tables::Cells;
 use pliant_geometry::{CellBlock, CellId};
 use pliant_meshing::Voxels;
 
 use super::Builder;
 use super::bodies::Draft;
 use super::meshes::list_cells;
-use pliant_format::suggestion;
-use pliant_format::tables::Cells;
 
 impl Builder<'_> {
     /// How much of each of some cells of a body is filled; diagnostics where the data are missing or wrong.

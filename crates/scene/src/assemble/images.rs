@@ -4,6 +4,8 @@ use std::cell::Cell;
 use std::f64::consts::FRAC_PI_3;
 use std::path::{Path, PathBuf};
 
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::tables::{Cells, CleanTable, Label, MeshTable};
 use pliant_geometry::io::MeshFile;
 use pliant_geometry::{CellKind, CellLabel, Labels, Mesh, Vector3, labels};
 use pliant_imaging::{
@@ -18,8 +20,6 @@ use pliant_meshing::{
 use super::mesh_files::{MeshFault, words};
 use super::{Builder, MeshOrigin, Meshing};
 use crate::cache::{Kept, Key};
-use pliant_format::diagnostic::Diagnostic;
-use pliant_format::tables::{Cells, CleanTable, Label, MeshTable};
 
 /// Faces that meet at more than this angle meet at a crease, which even triangles keep [rad].
 const CREASE: f64 = FRAC_PI_3;

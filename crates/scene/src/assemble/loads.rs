@@ -1,15 +1,15 @@
 //! Loads: forces on nodes, tractions and pressures on faces, gravity. And the references of outputs.
 
-use pliant_geometry::{Mesh, Selection, Surface, Vector3, boundary};
-use pliant_mechanics::curve::{Curve, Shape};
-use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE, face_areas};
-
-use super::{Builder, Subject, labels_of};
 use pliant_format::registry::{LoadTable, OutputTable};
 use pliant_format::tables::{
     At, BodyModel, ColourBy, Component, CsvTable, FieldName, ForceTable, ProbeTable, Vectors, VtuTable,
 };
 use pliant_format::{SCENE, suggestion};
+use pliant_geometry::{Mesh, Selection, Surface, Vector3, boundary};
+use pliant_mechanics::curve::{Curve, Shape};
+use pliant_mechanics::load::{Face, Load, LoadKind, NO_NODE, face_areas};
+
+use super::{Builder, Subject, labels_of};
 
 impl Builder<'_> {
     pub(super) fn add_loads(&mut self) {

@@ -1,11 +1,11 @@
 //! Mass scaling, and the keys of `[run]` that are for dynamics only.
 
 use pliant_explicit::mass_scaling::{self, Goal};
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::tables::{LoadSteps, LoadTimes, MassScalingTable, SolverName, StepChoice};
 use pliant_geometry::words::{counted, number};
 
 use super::Builder;
-use pliant_format::diagnostic::Diagnostic;
-use pliant_format::tables::{LoadSteps, LoadTimes, MassScalingTable, SolverName, StepChoice};
 
 /// Added mass, as a fraction, above which a scene gives a warning.
 const MUCH: f64 = 0.05;

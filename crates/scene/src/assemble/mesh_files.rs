@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
+use pliant_format::foreign_file;
+use pliant_format::tables::{Cells, MeshTable};
 use pliant_geometry::Mesh;
 use pliant_geometry::io::{self, MeshFile, MeshFileError};
 use pliant_geometry::words::number;
 
 use super::Builder;
-use pliant_format::foreign_file;
-use pliant_format::tables::{Cells, MeshTable};
 
 /// An organ smaller than the first or larger than the last [m] is probably in other units; from the second on it may be.
 const PLAUSIBLE_SIZE: [f64; 3] = [1e-3, 2.0, 10.0];

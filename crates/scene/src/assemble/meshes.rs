@@ -1,6 +1,8 @@
 //! The mesh of a body or a surface: read from a file or made from a shape, brought to metres, checked and repaired.
 
 use nalgebra::Rotation3;
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::tables::{BodyModel, BodyTable, Cells, Fix, MeshTable, Organ};
 use pliant_geometry::io::MeshFile;
 use pliant_geometry::words::counted;
 use pliant_geometry::{
@@ -14,8 +16,6 @@ use pliant_meshing::{
 
 use super::Builder;
 use super::mesh_files::{MeshFault, SizeDoubt, words};
-use pliant_format::diagnostic::Diagnostic;
-use pliant_format::tables::{BodyModel, BodyTable, Cells, Fix, MeshTable, Organ};
 
 /// A mesh and where it comes from.
 pub(crate) struct MeshOrigin {

@@ -29,6 +29,11 @@ mod walls;
 use std::collections::HashSet;
 use std::sync::Arc;
 
+use pliant_format::Scene;
+use pliant_format::diagnostic::{Diagnostic, SceneErrors};
+use pliant_format::source::Source;
+use pliant_format::tables::{CurveShape, SolverName, StepChoice, Timing};
+use pliant_format::{SCENE, suggestion};
 use pliant_geometry::{CellKind, Labels, Locator, Mesh, Surface, SurfaceLocator, Vector3};
 use pliant_implicit::{Assembly, CurvedSurface};
 use pliant_mechanics::Model;
@@ -37,12 +42,6 @@ use pliant_sim::contact::touch::Contacts;
 use pliant_sim::{BodyCells, ImplicitBodies, RunControl};
 
 use crate::cache::MeshCache;
-use pliant_format::Scene;
-use pliant_format::diagnostic::{Diagnostic, SceneErrors};
-use pliant_format::source::Source;
-use pliant_format::tables::{CurveShape, SolverName, StepChoice, Timing};
-use pliant_format::{SCENE, suggestion};
-
 pub(crate) use attach::{Placed, attach, doubt_points};
 use barriers::BarrierTables;
 use contacts::Partner;

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::tables::{BodyModel, TieMethod, TieTable};
 use pliant_geometry::words::number;
 use pliant_geometry::{
     Face, Locator, MortarRow, MortarRows, MortarSide, SurfaceLocator, Vector3, mortar_rows,
@@ -10,8 +12,6 @@ use pliant_mechanics::mapping::Weights;
 
 use super::attach::{Attached, GAP, doubt_points, median_edge};
 use super::{Builder, BuiltBody, in_metres};
-use pliant_format::diagnostic::Diagnostic;
-use pliant_format::tables::{BodyModel, TieMethod, TieTable};
 
 /// A place that is off by less than this part of the median edge is right.
 const ROUNDING: f64 = 1e-13;

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use pliant_format::suggestion;
+use pliant_format::tables::{NodeVectorSource, NodeVectors};
+use pliant_format::{rows_of, table};
 use pliant_geometry::words::counted;
 use pliant_geometry::{DataArray, Mesh};
 
 use super::Builder;
-use pliant_format::suggestion;
-use pliant_format::tables::{NodeVectorSource, NodeVectors};
-use pliant_format::{rows_of, table};
 
 /// What is wrong with a table of vectors, and what to do about it.
 #[derive(Debug)]

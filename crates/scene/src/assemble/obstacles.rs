@@ -4,6 +4,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::tables::{Cells, ImageTool, LabelOrGroups, MeshTable, MeshTool, Sampling};
 use pliant_geometry::words::number;
 use pliant_geometry::{CellKind, Mesh};
 use pliant_meshing::{Closing, Enclosed, MeshingError};
@@ -14,8 +16,6 @@ use super::images::content_of;
 use super::mesh_files::SizeDoubt;
 use super::{Builder, Meshing};
 use crate::cache::{KeptGrid, Key};
-use pliant_format::diagnostic::Diagnostic;
-use pliant_format::tables::{Cells, ImageTool, LabelOrGroups, MeshTable, MeshTool, Sampling};
 
 /// Steps of a grid along the diagonal of the box, if no `resolution` is given: the error at a surface as round as the box is below 1e-5 of
 /// its diagonal, and 3.4 million points (13 MiB) are the most.

@@ -2,13 +2,13 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use pliant_format::tables::{MeshTable, PatternName, SheetGrid};
 use pliant_geometry::Mesh;
 use pliant_geometry::words::number;
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Distortion, Lens, Pattern, Sheet, sphere};
 
 use super::Builder;
 use super::meshes::MeshOrigin;
-use pliant_format::tables::{MeshTable, PatternName, SheetGrid};
 
 /// A shape on a grid, with the lengths [m] of its grid axes.
 struct OnGrid<'t> {

@@ -1,11 +1,11 @@
 //! Triangles of thin walls that are much longer than high: equations lose their digits there.
 
+use pliant_format::diagnostic::Diagnostic;
 use pliant_geometry::words::number;
 use pliant_geometry::{CellId, CellKind, Mesh};
 
 use super::Builder;
 use super::meshes::list_cells;
-use pliant_format::diagnostic::Diagnostic;
 
 /// The longest edge over the least altitude of a triangle from which on it is doubted, and refused.
 const DOUBTED: f64 = 1e4;

@@ -1,5 +1,6 @@
 //! Surfaces carried by bodies: each point tied to the cell it lies in, or the nearest one.
 
+use pliant_format::diagnostic::Diagnostic;
 use pliant_geometry::Mesh;
 use pliant_geometry::words::number;
 use pliant_implicit::{CurvedSurface, State};
@@ -9,7 +10,6 @@ use pliant_shells::{Carried, EdgeRule};
 
 use super::meshes::surface_of;
 use super::{Builder, MeshOrigin};
-use pliant_format::diagnostic::Diagnostic;
 
 /// A point farther from its body than this fraction of the body's size gives a warning.
 const FAR: f64 = 0.05;

@@ -1,5 +1,8 @@
 //! Ties: nodes of one body that follow the cells of another.
 
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::source::Source;
+use pliant_format::tables::{Rotations, TieTable};
 use pliant_geometry::words::number;
 use pliant_implicit::CarriedTurn;
 use pliant_mechanics::model::Cells;
@@ -8,9 +11,6 @@ use pliant_mechanics::tie::TieError;
 use super::Builder;
 use super::attach::{Placed, attach};
 use super::mortar::Joint;
-use pliant_format::diagnostic::Diagnostic;
-use pliant_format::source::Source;
-use pliant_format::tables::{Rotations, TieTable};
 
 /// A body inside another that takes more of its volume is reported: both are stiff there.
 const CROWDED: f64 = 1e-3;

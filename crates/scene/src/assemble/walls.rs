@@ -1,5 +1,7 @@
 //! Thin walls: membranes, and walls on the boundary of a solid, with its nodes.
 
+use pliant_format::registry::LawTable;
+use pliant_format::tables::{BodyModel, BodyTable, Rotations};
 use pliant_geometry::{CellBlock, DataArray, Mesh, Surface, body_blocks};
 use pliant_mechanics::model::Cells;
 use pliant_mechanics::prony::Prony;
@@ -7,8 +9,6 @@ use pliant_mechanics::tensor::{cross, dot, sub};
 
 use super::Builder;
 use super::bodies::{Draft, Shape, nodes};
-use pliant_format::registry::LawTable;
-use pliant_format::tables::{BodyModel, BodyTable, Rotations};
 
 /// A fibre whose part in the plane of its triangle is shorter than this has no direction there.
 const ACROSS: f64 = 1e-3;

@@ -1,7 +1,7 @@
 use nalgebra::{DMatrix, DVector, SVector, SymmetricEigen};
+use pliant_testing::Random;
 
 use super::*;
-use pliant_testing::Random;
 
 const ELASTIC: Elasticity = Elasticity { young: 1e6, poisson: 0.25 };
 const THICKNESS: f64 = 0.03;

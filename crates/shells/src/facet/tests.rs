@@ -1,15 +1,14 @@
 //! The force is the gradient of the energy, in any pose; packs do as facets do.
 
 use pliant_geometry::EDGES;
-
+use pliant_linear::lanes::PACK;
+use pliant_testing::Random;
 use pulp::Arch;
 
 use super::*;
 use crate::element::Elasticity;
 use crate::facet_packs::{FacetPack, Work};
 use crate::rotation::exponential;
-use pliant_linear::lanes::PACK;
-use pliant_testing::Random;
 
 const MATERIAL: Wall = Wall { elastic: Elasticity { young: 1e3, poisson: 0.3 }, density: 1000.0 };
 

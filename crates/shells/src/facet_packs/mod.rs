@@ -11,16 +11,16 @@
 mod placing;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use pliant_linear::lanes::{
+    Lane, PACK, Pack, Square, Three, add_half_skew, apply, difference, dot, sum, symmetric, three, times,
+    times_transposed, transpose,
+};
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::facet::{Broken, Facet, Matrix18, has_area, not_folded};
 use crate::patch::Vector18;
 use crate::rotation::{SMALL, eta, logarithm, mu};
 use placing::Placing;
-use pliant_linear::lanes::{
-    Lane, PACK, Pack, Square, Three, add_half_skew, apply, difference, dot, sum, symmetric, three, times,
-    times_transposed, transpose,
-};
 
 /// Entries of half of a symmetric matrix of eighteen rows.
 const HALF: usize = 171;

@@ -1,11 +1,11 @@
 //! Where eight facets are: axes, corners, turns of nodes and deformations, as [`Facet::place`](crate::facet::Facet) finds them one by one.
 //! A facet takes about 500 operations. Nodes that have turned by more than half a radian are left to whoever takes the angle of one at a time.
 
+use pliant_linear::lanes::{Lane, PACK, Pack, Square, Three, cross, dot, three};
 use pulp::{Simd, WithSimd};
 
 use super::{FacetPack, Work, load3};
 use crate::rotation::{ARCSINE, BERNOULLI};
-use pliant_linear::lanes::{Lane, PACK, Pack, Square, Three, cross, dot, three};
 
 /// (w, x, y, z).
 type Turn<S> = [Lane<S>; 4];

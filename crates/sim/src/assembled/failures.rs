@@ -1,10 +1,10 @@
 //! Failures of solvers in words.
 
+use pliant_geometry::words::number;
 use pliant_implicit::SolveError;
 
 use crate::bodies::ImplicitBodies;
 use crate::failure::{BlockedDriver, Failure, FailureKind};
-use pliant_geometry::words::number;
 
 /// The report of a step that failed after a time.
 pub(super) fn failure(

@@ -1,13 +1,14 @@
 //! What looks at instants.
 
+use pliant_explicit::Wanted;
+use pliant_mechanics::Energies;
+use pliant_mechanics::model::Enclosed;
+
 use super::Simulation;
 use crate::failure::Failure;
 use crate::instant::Instant;
 use crate::part::Part;
 use crate::solver::LoadStepProgress;
-use pliant_explicit::Wanted;
-use pliant_mechanics::Energies;
-use pliant_mechanics::model::Enclosed;
 
 /// Looks at a run ([`Simulation::observe`]) and changes nothing.
 ///

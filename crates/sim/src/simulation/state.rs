@@ -1,14 +1,15 @@
 //! Snapshots.
 
+use pliant_explicit::Clock;
+use pliant_mechanics::count::is_time;
+use serde::{Deserialize, Serialize};
+
 use super::World;
 use crate::failure::Failure;
 use crate::guests::GuestMemory;
 use crate::kept::Kept;
 use crate::part::Part;
 use crate::penalty::TieMemory;
-use pliant_explicit::Clock;
-use pliant_mechanics::count::is_time;
-use serde::{Deserialize, Serialize};
 
 /// The state of a simulation between two steps: a snapshot of all that another one needs to go on from there.
 #[derive(Clone, Debug)]

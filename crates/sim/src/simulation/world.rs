@@ -1,12 +1,14 @@
 //! What is constant.
 
+use std::sync::Arc;
+
+use pliant_mechanics::fingerprint;
+
 use super::meshes;
 use crate::failure::Failure;
 use crate::guests::Guests;
 use crate::part::Part;
 use crate::penalty::PenaltyTie;
-use pliant_mechanics::fingerprint;
-use std::sync::Arc;
 
 /// The participants of a simulation: constant while it runs.
 #[derive(Clone, Debug)]

@@ -1,5 +1,15 @@
 //! The clock of a session and what is played.
 
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::Sender;
+use std::time::{Duration, Instant};
+
+use pliant_format::tables::ViewTable;
+use pliant_run::Column;
+use pliant_scene::World;
+use pliant_sim::{State, StopFlag};
+
 use super::player::Former;
 use super::{FRAME, WRITTEN};
 use crate::device::Seen;
@@ -8,14 +18,6 @@ use crate::hand::Hold;
 use crate::parameters::Number;
 use crate::recording::{Done, Move, Recording, Surface};
 use crate::samples::Sample;
-use pliant_format::tables::ViewTable;
-use pliant_run::Column;
-use pliant_scene::World;
-use pliant_sim::{State, StopFlag};
-use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::mpsc::Sender;
-use std::time::{Duration, Instant};
 
 /// How fast it goes: simulated time follows wall time from an anchor on.
 pub(super) struct Pace {

@@ -1,15 +1,10 @@
 //! The thread that plays.
 
-use super::playback::Playback;
-use super::{BEHIND, FRAME, Frame, Order, SAMPLED, enter};
-use crate::device::point_value;
-use crate::followed::Followed;
-use crate::hand::{Hand, Hold, Point, Which};
-use crate::marks::marks;
-use crate::parameters::Number;
-use crate::recording::{Break, Done, Recording, Surface};
-use crate::samples::{HAND, SECOND_HAND, Sample};
-use crate::sound::{Sound, SoundStates};
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
+use std::time::{Duration, Instant};
+
 use pliant_explicit::Wanted;
 use pliant_format::tables::ViewTable;
 use pliant_geometry::words::number;
@@ -21,10 +16,17 @@ use pliant_run::{Column, Live};
 use pliant_scene::World;
 use pliant_sim::gpu::{DevicePoints, PointValue};
 use pliant_sim::{Failure, State, StopFlag};
-use std::collections::BTreeSet;
-use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
-use std::time::{Duration, Instant};
+
+use super::playback::Playback;
+use super::{BEHIND, FRAME, Frame, Order, SAMPLED, enter};
+use crate::device::point_value;
+use crate::followed::Followed;
+use crate::hand::{Hand, Hold, Point, Which};
+use crate::marks::marks;
+use crate::parameters::Number;
+use crate::recording::{Break, Done, Recording, Surface};
+use crate::samples::{HAND, SECOND_HAND, Sample};
+use crate::sound::{Sound, SoundStates};
 
 /// Why a world is left.
 pub(super) enum Left {

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use eframe::egui_wgpu::{RenderState, WgpuConfiguration, WgpuSetup, WgpuSetupExisting};
 use pliant_geometry::Vector3;
+use pliant_scene::World;
 use pliant_sim::gpu::{Device, DevicePoints, PointValue};
 
 use super::App;
 use super::told::Told;
 use crate::device::{INSPECTION, point_value};
 use crate::session::Order;
-use pliant_scene::World;
 
 /// Opens the window on the device of a world, if it has one.
 pub(super) fn setup(world: &World) -> WgpuConfiguration {

@@ -34,6 +34,7 @@ use pliant_format::tables::{FieldName, ViewTable};
 use pliant_geometry::{RegionNames, Vector3};
 use pliant_mechanics::StopFlag;
 use pliant_picture::Look;
+use pliant_scene::World;
 use pliant_sim::gpu::Device;
 
 use self::filming::Filming;
@@ -49,7 +50,6 @@ use self::viewport::Viewport;
 use crate::hand::Which;
 use crate::samples::Samples;
 use crate::session::{Frame, Order, Session};
-use pliant_scene::World;
 
 /// Reads a scene; the message of what is wrong with it.
 pub type Read = Arc<dyn Fn(&Path) -> Result<World, String> + Send + Sync>;

@@ -4,6 +4,7 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use eframe::egui;
 use pliant_format::Scene;
+use pliant_scene::World;
 
 use super::told::Told;
 use super::undo::Act;
@@ -11,7 +12,6 @@ use super::viewport::typed_number;
 use super::{App, warnings};
 use crate::parameters::{Number, Parameter, parameters, with_numbers};
 use crate::session::Order;
-use pliant_scene::World;
 
 /// Some numbers, and where the world that is made of them comes from.
 type Making = (Vec<f64>, Receiver<Result<World, String>>);

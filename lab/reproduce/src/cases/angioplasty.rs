@@ -3,12 +3,12 @@
 //!
 //! The wall is as thick as a third of its radius, so both are solids. A quarter of one half is computed, the planes between them are held.
 
-use pliant_implicit::AssemblySolver;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{Vector2, Vector3};
+use pliant_implicit::AssemblySolver;
 use pliant_implicit::{Assembly, State, StaticSettings, Statics, Touching};
 use pliant_mechanics::curve::{Curve as LoadCurve, Shape as CurveShape};
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};

@@ -1,15 +1,17 @@
 //! `mesh` of a body.
 
-use super::{
-    AnnulusShape, BlockShape, CylinderShape, EllipsoidShape, HemisphereShape, LensShape, Organ, PlateShape,
-    SphereShape, TubeShape, TwistedStripShape,
-};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
 use pliant_geometry::CellLabel;
 use pliant_imaging::LabelChoice;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
-use std::path::PathBuf;
+
+use super::{
+    AnnulusShape, BlockShape, CylinderShape, EllipsoidShape, HemisphereShape, LensShape, Organ, PlateShape,
+    SphereShape, TubeShape, TwistedStripShape,
+};
 
 /// A mesh: exactly one of `file`, `image`, `block`, `ellipsoid`, `tube`, `organ`, for shells `plate`, `cylinder`, `sphere`,
 /// `hemisphere`, `annulus`, `twisted-strip`, `lens`, or for bars `lines`.

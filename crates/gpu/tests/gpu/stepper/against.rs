@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use super::cube::smooth;
 use pliant_contact::touch::Contacts;
 use pliant_explicit::Wanted;
 use pliant_explicit::{CentralDifference, Observable, State, critical_step};
@@ -11,6 +10,8 @@ use pliant_mechanics::Energies;
 use pliant_mechanics::load::{Load, LoadKind};
 use pliant_mechanics::model::Model;
 use pliant_mechanics::tensor::Vector;
+
+use super::cube::smooth;
 
 /// Steps of a comparison.
 const STEPS: u64 = 200;

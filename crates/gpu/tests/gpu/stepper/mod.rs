@@ -9,11 +9,6 @@ mod jumble;
 mod playing;
 mod ties;
 
-use crate::support;
-use against::{PLAIN, compare, designs, distance, double, load, numbers, step_of, stepper};
-use cube::{
-    CELLS, EDGE, ELEMENTS, elastic, every_law, free_cube, held_cube, layer, moved_cube, neo_hookean, smooth,
-};
 use pliant_explicit::Wanted;
 use pliant_explicit::mass_scaling::{self, Goal};
 use pliant_explicit::stability::{Monitor, OnUnstable};
@@ -24,6 +19,12 @@ use pliant_mechanics::load::LoadKind;
 use pliant_mechanics::model::{Averaging, Body, Cells, Constraint, Model, Motion, Solid};
 use pliant_mechanics::prony::{Part, Prony, PronyTerm, PronyUpdate};
 use serde_json::json;
+
+use crate::support;
+use against::{PLAIN, compare, designs, distance, double, load, numbers, step_of, stepper};
+use cube::{
+    CELLS, EDGE, ELEMENTS, elastic, every_law, free_cube, held_cube, layer, moved_cube, neo_hookean, smooth,
+};
 
 #[test]
 fn every_element_in_every_design() {

@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use pliant_geometry::Grid;
 use pliant_geometry::Vector3;
 
 use super::text::ToWorld;
@@ -18,7 +19,6 @@ use crate::error::{Fault, ImageError, ImageProblem};
 use crate::image::{Image, Numbers, Order, Scalar};
 use crate::names::LabelNames;
 use elements::{DataSet, Elements, PIXELS};
-use pliant_geometry::Grid;
 
 /// Distances between slices may differ by this part of their median.
 const UNEVEN: f64 = 0.01;

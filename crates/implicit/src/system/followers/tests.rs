@@ -2,19 +2,19 @@
 
 use std::sync::Arc;
 
+use pliant_linear::{LinearSolver, dot};
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::{Cells, Constraint, Material, Solid};
+use pliant_shells::element::Elasticity;
+use pliant_shells::element::Wall;
 use pliant_testing::Random;
 
 use super::*;
 use crate::CarriedTurn;
 use crate::system::System;
 use crate::{BackwardEuler, DynamicSettings, Shell, Spring, StaticSettings, Statics};
-use pliant_linear::{LinearSolver, dot};
-use pliant_shells::element::Elasticity;
-use pliant_shells::element::Wall;
 
 /// A bar of 4 × 1 × 1 cubes of 1 cm with a rigid end, to which two free nodes are tied with a spring each.
 fn model() -> Assembly {

@@ -1,7 +1,8 @@
 //! Meshes that are wrong.
 
-use super::{MESH_LINE, assert_invalid, assert_refused, bad_mesh, repaired, with_mesh};
 use pliant_testing::scenes::{CORNERS, FROM_FILE, TETS, Workshop, changed, labels, vtk};
+
+use super::{MESH_LINE, assert_invalid, assert_refused, bad_mesh, repaired, with_mesh};
 
 #[test]
 pub(super) fn unreadable_and_truncated_meshes_tell_the_line() {

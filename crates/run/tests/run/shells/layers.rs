@@ -1,7 +1,8 @@
 //! Walls of layers.
 
-use super::{THICK, refused, wall};
 use pliant_testing::scenes::Workshop;
+
+use super::{THICK, refused, wall};
 
 /// Two layers, the upper one four times as stiff, without and with a direction.
 pub(super) const LAYERS: &str = "layers = [{ thickness = 0.001 }, { thickness = 0.001, law = \"stiff\" }]";

@@ -1,8 +1,9 @@
 //! Loads of NiftySim.
 
-use super::{RAMP, assert_lines, assert_note, build, imported, with};
 use pliant_format::registry::LoadTable;
 use pliant_geometry::CellKind;
+
+use super::{RAMP, assert_lines, assert_note, build, imported, with};
 
 /// A factor from the part of the total time that has passed.
 pub(super) type Shape = dyn Fn(f64) -> f64;

@@ -6,7 +6,6 @@ mod touching;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use self::touching::contact;
 use pliant_format::Scene;
 use pliant_format::source::Source;
 use pliant_format::tables::{ByLabel, Hourglass};
@@ -15,6 +14,8 @@ use pliant_mechanics::load::LoadKind;
 use pliant_niftysim::{ImportError, Imported, import};
 use pliant_scene::Built;
 use pliant_testing::Random;
+
+use self::touching::contact;
 
 fn sample(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../lab/validation/data/niftysim").join(name)

@@ -6,6 +6,8 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use pliant_explicit::State;
+use pliant_format::suggestion;
+use pliant_format::tables::{ContactTable, SolverName, ToolTable};
 use pliant_geometry::words::{counted, number};
 use pliant_geometry::{Locator, Selection, SurfaceLocator, Vector3};
 use pliant_mechanics::load::NO_NODE;
@@ -17,8 +19,6 @@ use pliant_sim::contact::touch::{Contact, Contacts, Rigid, Touch, With, lattice,
 
 use super::barriers::BarrierTables;
 use super::{Builder, BuiltBody, Subject, in_metres};
-use pliant_format::suggestion;
-use pliant_format::tables::{ContactTable, SolverName, ToolTable};
 
 /// Overlap, over the size of all, above which bodies are in each other.
 pub(super) const OVERLAP: f64 = 1e-9;

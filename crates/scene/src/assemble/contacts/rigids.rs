@@ -1,6 +1,9 @@
 //! Obstacles and tools of a contact, and how they move and grow.
 
-use super::super::Builder;
+use std::io;
+use std::path::Path;
+use std::sync::Arc;
+
 use pliant_format::tables::{GrowthTable, JawsTool, RotateTable, ShapeName, ToolTable};
 use pliant_format::{rows_of, table as table_file};
 use pliant_geometry::Vector3;
@@ -10,9 +13,8 @@ use pliant_sim::contact::pose::{Pose, Trajectory};
 use pliant_sim::contact::profile::{Corner, Profile};
 use pliant_sim::contact::shape::Shape;
 use pliant_sim::contact::touch::{Jaw, Rigid};
-use std::io;
-use std::path::Path;
-use std::sync::Arc;
+
+use super::super::Builder;
 
 /// An obstacle or a tool of a scene.
 #[derive(Clone, Copy)]

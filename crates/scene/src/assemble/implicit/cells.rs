@@ -2,6 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::tables::{BodyTable, ByLabel, Element, Normals, SolverName, Thickness, ThicknessRule};
+use pliant_format::{SCENE, suggestion};
 use pliant_geometry::words::counted;
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 use pliant_implicit::{ModelError, Shell};
@@ -13,9 +16,6 @@ use crate::assemble::bodies::{Draft, nodes};
 use crate::assemble::meshes::surface_of;
 use crate::assemble::sheets::is_sheet;
 use crate::assemble::{Builder, bodies};
-use pliant_format::diagnostic::Diagnostic;
-use pliant_format::tables::{BodyTable, ByLabel, Element, Normals, SolverName, Thickness, ThicknessRule};
-use pliant_format::{SCENE, suggestion};
 
 /// Stiffness against drilling of `dkt-cst` and `membrane`, as a part of G t A/3 a node.
 const DRILLING: f64 = 0.01;

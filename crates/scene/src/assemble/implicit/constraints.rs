@@ -1,11 +1,11 @@
 //! Constraints and springs of the implicit solvers.
 
+use pliant_format::tables::{Axis, MoveTable, SpringTable, Vectors};
 use pliant_geometry::Vector3;
 use pliant_implicit::Spring;
 use pliant_mechanics::model::Motion;
 
 use crate::assemble::Builder;
-use pliant_format::tables::{Axis, MoveTable, SpringTable, Vectors};
 
 impl Builder<'_> {
     /// Whether the nodes of a body turn.

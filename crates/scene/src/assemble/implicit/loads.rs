@@ -2,6 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use pliant_format::diagnostic::Diagnostic;
+use pliant_format::registry::LoadTable;
+use pliant_format::tables::{
+    Axis, ControlTable, ControlledNode, GravityTable, MomentTable, PressureTable, SpreadName, StopTable,
+};
+use pliant_format::{SCENE, suggestion};
 use pliant_geometry::Vector3;
 use pliant_geometry::words::{counted, number};
 use pliant_implicit::Resolution;
@@ -11,12 +17,6 @@ use pliant_shells::element::Membrane;
 use pliant_sim::{BodyCells, RunControl, Stop};
 
 use crate::assemble::{Builder, Subject};
-use pliant_format::diagnostic::Diagnostic;
-use pliant_format::registry::LoadTable;
-use pliant_format::tables::{
-    Axis, ControlTable, ControlledNode, GravityTable, MomentTable, PressureTable, SpreadName, StopTable,
-};
-use pliant_format::{SCENE, suggestion};
 
 /// What acts, and the carried surface whose points it numbers.
 type Acting = (LoadKind, Option<usize>);

@@ -4,13 +4,13 @@ mod cells;
 mod constraints;
 mod loads;
 
+use pliant_format::registry::OutputTable;
+use pliant_format::tables::{BodyModel, DeviceName, Element, PrecisionName, SolverName};
 use pliant_geometry::Vector3;
 use pliant_geometry::words::counted;
 use pliant_implicit::State;
 
 use crate::assemble::Builder;
-use pliant_format::registry::OutputTable;
-use pliant_format::tables::{BodyModel, DeviceName, Element, PrecisionName, SolverName};
 
 impl Builder<'_> {
     /// Rejects scenes of both kinds of bodies without a common solver, and keys that do not go with the model of the implicit solvers.
