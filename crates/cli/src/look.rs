@@ -45,7 +45,7 @@ pub fn look_of(scene: &Scene) -> Look {
     look
 }
 
-pub fn map_of(name: MapName) -> ColourMap {
+pub(crate) fn map_of(name: MapName) -> ColourMap {
     match name {
         MapName::Viridis => ColourMap::Viridis,
         MapName::Cividis => ColourMap::Cividis,
@@ -57,7 +57,7 @@ pub fn map_of(name: MapName) -> ColourMap {
     }
 }
 
-pub fn background_of(name: BackgroundName) -> Background {
+pub(crate) fn background_of(name: BackgroundName) -> Background {
     match name {
         BackgroundName::Light => Background::Light,
         BackgroundName::White => Background::White,
@@ -65,7 +65,7 @@ pub fn background_of(name: BackgroundName) -> Background {
     }
 }
 
-pub fn texture_of(name: TextureName) -> Texture {
+pub(crate) fn texture_of(name: TextureName) -> Texture {
     match name {
         TextureName::None => Texture::None,
         TextureName::Skin => Texture::Skin,
@@ -87,7 +87,7 @@ fn colour_by(look: &mut Look, field: FieldName, component: Option<&str>) {
 }
 
 /// Colours by a field of any name, as in files, or by labels.
-pub fn colour_by_name(look: &mut Look, name: &str) {
+pub(crate) fn colour_by_name(look: &mut Look, name: &str) {
     look.style.labels = name == "label";
     let (own, part) = name.split_once(':').map_or((name, None), |(own, part)| (own, Some(part)));
     if name == "none" || look.style.labels {

@@ -20,7 +20,7 @@ pub fn prepare(path: &Path, overrides: &Overrides) -> Result<World, Failure> {
 }
 
 /// As [`prepare`], for a scene that is changed after reading.
-pub fn prepare_changed(
+pub(crate) fn prepare_changed(
     path: &Path,
     overrides: &Overrides,
     change: impl FnOnce(&mut Scene),
@@ -166,6 +166,6 @@ pub fn translate(
 }
 
 /// This user's cache of meshes made from images.
-pub fn mesh_cache(off: bool) -> MeshCache {
+pub(crate) fn mesh_cache(off: bool) -> MeshCache {
     if off { MeshCache::off() } else { MeshCache::of_user() }
 }

@@ -28,7 +28,7 @@ static ASKED: LazyLock<Asked> = LazyLock::new(|| {
 });
 
 /// Files that grow beyond the limit of their size then end in an error that names them, not in the end of the process.
-pub fn outlive_large_files() {
+pub(crate) fn outlive_large_files() {
     #[cfg(unix)]
     {
         let seen = Arc::default();
@@ -42,7 +42,7 @@ pub fn stop() -> &'static StopFlag {
 }
 
 /// The exit code of a stopped process: 128 + the signal number, as in shells.
-pub fn exit_code() -> u8 {
+pub(crate) fn exit_code() -> u8 {
     128 + ASKED.signal.load(Ordering::Relaxed) as u8
 }
 
@@ -56,7 +56,7 @@ mod unix {
     use super::Asked;
 
     /// Handles SIGTERM and SIGHUP in the same way. Without a handler, they end the process as usual.
-    pub fn heed(asked: &Asked) {
+    pub(crate) fn heed(asked: &Asked) {
         // A closing terminal may send SIGHUP twice; a second SIGTERM is deliberate.
         let _ = flag::register_conditional_shutdown(SIGTERM, 128 + SIGTERM, asked.stop.shared());
         for signal in [SIGTERM, SIGHUP] {

@@ -559,10 +559,3 @@ fn averages<R: LaneNumber>(solid: &Solid, history: &History<R>, displacement: &[
         }
     }
 }
-
-/// The centre of a cell in its current place [m].
-pub fn cell_centre<R: LaneNumber>(model: &Model, state: &State<R>, solid: usize, cell: usize) -> Vector<f64> {
-    let nodes = model.solids[solid].cells.nodes(cell);
-    let place = |&node: &u32| add(model.rest[node as usize], cast(state.displacement[node as usize]));
-    scale(nodes.iter().map(place).fold([0.0; 3], add), 1.0 / nodes.len() as f64)
-}

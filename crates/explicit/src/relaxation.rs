@@ -103,7 +103,7 @@ impl<R: LaneNumber> Relaxation<R> {
     /// The isochoric stress [Pa] at the end of the step; `history` has [`Prony::isochoric_slots`] × 6 packs, of which the
     /// lanes from `at` on are advanced.
     #[inline(always)]
-    pub fn advance_isochoric<L: Lanes<R>>(
+    pub(crate) fn advance_isochoric<L: Lanes<R>>(
         &self,
         elastic: Symmetric<L>,
         history: &mut [Pack<R>],
@@ -114,7 +114,7 @@ impl<R: LaneNumber> Relaxation<R> {
 
     /// The pressure [Pa] at the end of the step; `history` has [`Prony::volumetric_slots`] packs.
     #[inline(always)]
-    pub fn advance_pressure<L: Lanes<R>>(&self, elastic: L, history: &mut [Pack<R>], at: usize) -> L {
+    pub(crate) fn advance_pressure<L: Lanes<R>>(&self, elastic: L, history: &mut [Pack<R>], at: usize) -> L {
         self.volumetric.advance([elastic], history, at)[0]
     }
 

@@ -46,15 +46,15 @@ use crate::lanes::{LaneWork, Lanes, PACK, Pack, Processor, load_symmetric, load_
 pub use crate::stability_record::{Stability, StepLimit};
 use crate::state::State;
 use crate::substeps::substeps;
-pub use crate::substeps::{KEEP, MOST_HALVINGS, MOST_SUBSTEPS, REJOIN_AFTER, RESERVE};
+pub use crate::substeps::{KEEP, MOST_HALVINGS};
 use crate::tangent::{Stiffness, gradient_square, stiffness};
 
 /// Steps between two checks of the limit.
-pub const CHECK_EVERY: u64 = 50;
+pub(crate) const CHECK_EVERY: u64 = 50;
 /// The limit is checked earlier where the least J or the largest stretch has changed by this factor.
 pub const CHANGE: f64 = 1.1;
 /// Steps between two critical time steps, except where a run would stop.
-pub const REFERENCE_EVERY: u64 = 1000;
+pub(crate) const REFERENCE_EVERY: u64 = 1000;
 /// One in this many cells is checked closely, for each of the two orders …
 const SHARE: usize = 256;
 /// … rounded up to a multiple of this, so that both orders fill packs.

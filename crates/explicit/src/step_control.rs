@@ -34,7 +34,7 @@ impl Lengths {
     }
 
     /// The part Δt⁺/(2 h) of a force that moves a node in the first step; the rest is in the increment before that step.
-    pub fn first_part(self) -> f64 {
+    pub(crate) fn first_part(self) -> f64 {
         0.5 * self.next / self.mean()
     }
 

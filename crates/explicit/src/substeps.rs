@@ -1,13 +1,13 @@
 //! Into how many parts a step is cut, from the largest stable one.
 
 /// The most substeps a step is cut into.
-pub const MOST_SUBSTEPS: u32 = 100;
+pub(crate) const MOST_SUBSTEPS: u32 = 100;
 /// Substeps are chosen so that they reach this part of the limit at the most.
-pub const RESERVE: f64 = 0.95;
+pub(crate) const RESERVE: f64 = 0.95;
 /// They are kept up to this part: the limit may fall before the next check.
 pub const KEEP: f64 = 0.97;
 /// Steps for which the limit has to allow fewer parts before they are used.
-pub const REJOIN_AFTER: u64 = 1000;
+pub(crate) const REJOIN_AFTER: u64 = 1000;
 /// How often the steps of a run are halved at most.
 pub const MOST_HALVINGS: u32 = 3;
 

@@ -281,7 +281,7 @@ impl<R: LaneNumber> Touching<R> {
     }
 
     /// Adds the impulses on guests of the step whose forces were found last, over its length [s].
-    pub fn press_guests(&mut self, length: f64) {
+    pub(crate) fn press_guests(&mut self, length: f64) {
         for &near in self.near.iter().rev() {
             let Some(guest) = self.guests.place_of(self.numbers[near as usize]) else { break };
             self.guests.press(guest, self.nodes[near as usize].borne * length);

@@ -45,6 +45,6 @@ pub mod tables;
 pub use foreign::foreign_file;
 pub use nearest::{SCENE, nearest, suggestion};
 pub use printable::printable;
-pub use reads::{LONGEST_SCENE, LONGEST_TABLE, Reads, rows_of, table};
+pub use reads::{LONGEST_TABLE, Reads, rows_of, table};
 pub use scene::{ReadError, Scene, open, open_within, scene_file};
-pub use starters::{OrganScene, SceneOfMesh, calming, is_mesh, scene_of_given, scene_of_mesh, starter};
+pub use starters::{OrganScene, SceneOfMesh, is_mesh, scene_of_given, scene_of_mesh, starter};

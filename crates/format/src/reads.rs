@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use pliant_geometry::io::read_limited;
 
 /// Longest scene file [bytes].
-pub const LONGEST_SCENE: u64 = 1 << 26;
+pub(crate) const LONGEST_SCENE: u64 = 1 << 26;
 /// Longest table and XML model [bytes].
 pub const LONGEST_TABLE: u64 = 1 << 30;
 

@@ -19,7 +19,7 @@ use crate::tables::{
 };
 
 /// A kind of table whose parameters depend on its `type`.
-pub trait Typed: Sized {
+pub(crate) trait Typed: Sized {
     /// The words for `type`.
     const NAMES: &'static [&'static str];
     /// What the table is, in messages: `constraint`, `load`, `output`.

@@ -185,7 +185,7 @@ impl Node {
     }
 
     /// Where the key stands, or the value where it has no key.
-    pub fn key_place(&self) -> Place {
+    pub(crate) fn key_place(&self) -> Place {
         match &self.key_span {
             Some(span) => match &self.place {
                 Place::Option(text, _) => Place::Option(text.clone(), span.clone()),

@@ -186,7 +186,7 @@ impl Labels {
     ///
     /// # Errors
     /// If no cell has such a label, or several labels have the name.
-    pub fn find_all(&self, label: &CellLabel) -> Result<Vec<i32>, UnknownLabel> {
+    pub(crate) fn find_all(&self, label: &CellLabel) -> Result<Vec<i32>, UnknownLabel> {
         let range = match label {
             CellLabel::Name(text) if self.named(text).is_err() => range(text),
             _ => None,

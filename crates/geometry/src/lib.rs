@@ -68,13 +68,13 @@ pub use mesh::{CellBlock, CellKind, DataArray, Mesh};
 pub use mortar::{MortarRow, MortarRows, MortarSide, mortar_rows};
 pub use patch::patch;
 pub use quality::{
-    QualityReport, Spread, acoustic_length, dihedral_angles, gradient_integrals, relative_acoustic_length,
-    scaled_jacobian, vector_area, volume,
+    QualityReport, Spread, acoustic_length, gradient_integrals, relative_acoustic_length, scaled_jacobian,
+    vector_area, volume,
 };
 pub use regions::{Region, RegionNames, cell_body};
 pub use selection::{Selection, SelectionError};
 pub use split::{SplitCells, SplitKind, add_as_tets, faces_met_by_two_tets};
-pub use surface::{Face, Surface, borders, boundary, cell_label, label_boundary, label_nodes, labels};
+pub use surface::{Face, Surface, borders, boundary, cell_label, labels};
 
 /// A point or a vector in space.
 pub type Vector3 = nalgebra::Vector3<f64>;

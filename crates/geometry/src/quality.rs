@@ -89,7 +89,7 @@ pub fn relative_acoustic_length(kind: CellKind, points: &[Vector3]) -> f64 {
 }
 
 /// The six dihedral angles of a tet [°], at the edges 01, 02, 03, 12, 13, 23; 0 to 180, also if inverted.
-pub fn dihedral_angles(points: &[Vector3; 4]) -> [f64; 6] {
+pub(crate) fn dihedral_angles(points: &[Vector3; 4]) -> [f64; 6] {
     let opposite = [[2, 3], [1, 3], [1, 2], [0, 3], [0, 2], [0, 1]];
     std::array::from_fn(|at| {
         let [i, j] = edges(CellKind::Tet)[at];

@@ -172,7 +172,7 @@ impl Surface {
 
     /// Outward unit normals, one per point of the mesh: the mean of the normals of the faces around it,
     /// weighted by area; zero at points that are not on the surface.
-    pub fn node_normals(&self, points: &[Vector3]) -> Vec<Vector3> {
+    pub(crate) fn node_normals(&self, points: &[Vector3]) -> Vec<Vector3> {
         let mut normals = vec![Vector3::zeros(); points.len()];
         for face in &self.faces {
             let area = face.vector_area(points);
@@ -213,7 +213,7 @@ pub fn labels(mesh: &Mesh) -> Vec<i32> {
 }
 
 /// Nodes of the body's cells of one label, increasing, each once.
-pub fn label_nodes(mesh: &Mesh, label: i32) -> Vec<u32> {
+pub(crate) fn label_nodes(mesh: &Mesh, label: i32) -> Vec<u32> {
     let mut nodes = Vec::new();
     for block in body_blocks(mesh) {
         let cells = valid_cells(mesh, block);
@@ -226,7 +226,7 @@ pub fn label_nodes(mesh: &Mesh, label: i32) -> Vec<u32> {
 }
 
 /// Nodes shared by cells of two different labels, increasing, each once: the interface of two regions.
-pub fn label_boundary(mesh: &Mesh, labels: [i32; 2]) -> Vec<u32> {
+pub(crate) fn label_boundary(mesh: &Mesh, labels: [i32; 2]) -> Vec<u32> {
     let [mut nodes, others] = labels.map(|label| label_nodes(mesh, label));
     nodes.retain(|node| others.binary_search(node).is_ok());
     nodes

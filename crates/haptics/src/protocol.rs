@@ -27,9 +27,9 @@ const MAGIC: [u8; 4] = *b"PLHP";
 /// Version of the protocol.
 pub const VERSION: u16 = 1;
 /// Bytes of a pose.
-pub const POSE_LENGTH: usize = 88;
+pub(crate) const POSE_LENGTH: usize = 88;
 /// Bytes of a force.
-pub const FORCE_LENGTH: usize = 48;
+pub(crate) const FORCE_LENGTH: usize = 48;
 
 /// What a device sends.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

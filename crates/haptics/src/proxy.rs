@@ -20,7 +20,7 @@ const FOUND: f64 = 1e-9;
 
 /// The state of a proxy on the planes of a model.
 #[derive(Clone, Debug)]
-pub struct Proxy {
+pub(crate) struct Proxy {
     push: [f64; MOST_PLANES],
     drag: [Vector3<f64>; MOST_PLANES],
     /// The unloaded place [m] after the last tick, from which slip counts.

@@ -20,7 +20,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use crate::error::HapticsError;
 
 /// The names of the columns.
-pub const COLUMNS: &str = "t,x,y,z,qw,qx,qy,qz";
+pub(crate) const COLUMNS: &str = "t,x,y,z,qw,qx,qy,qz";
 /// Time [s] between two poses of generated traces.
 const PERIOD: f64 = 1e-3;
 /// Longest generated trace [s].

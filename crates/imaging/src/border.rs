@@ -36,7 +36,7 @@ impl Border {
     }
 
     /// Whether the region has voxels at the border of the image.
-    pub fn is_touched(&self) -> bool {
+    pub(crate) fn is_touched(&self) -> bool {
         self.sides.as_flattened().iter().any(|(_, voxels)| *voxels > 0)
     }
 }

@@ -28,7 +28,7 @@ pub struct LabelNames(BTreeMap<i32, String>);
 
 impl LabelNames {
     /// The classes of TotalSegmentator v2, task `total`.
-    pub fn total_segmentator() -> Self {
+    pub(crate) fn total_segmentator() -> Self {
         let mut names = Self::default();
         (1..).zip(TOTAL_SEGMENTATOR.split_whitespace()).for_each(|(label, name)| names.insert(label, name));
         names

@@ -102,7 +102,7 @@ impl Factors {
     }
 
     /// Factors a matrix; `None` if it holds a number that is not finite.
-    pub fn factorise(&mut self, matrix: &LowerMatrix) -> Option<Pivots> {
+    pub(crate) fn factorise(&mut self, matrix: &LowerMatrix) -> Option<Pivots> {
         for (diagonal, &equation) in self.diagonal.iter_mut().zip(&self.supernodes.order) {
             let own = matrix.diagonal(equation as usize).abs();
             *diagonal = if own > 0.0 { own } else { 1.0 };

@@ -98,15 +98,6 @@ impl Curve {
             _ => [0.0, 1.0],
         }
     }
-
-    /// True if the factor never changes.
-    pub fn is_constant(&self) -> bool {
-        match &self.shape {
-            Shape::Hold => self.from <= 0.0,
-            Shape::Table(points) => points.len() == 1,
-            _ => false,
-        }
-    }
 }
 
 fn interpolate(points: &[(f64, f64)], time: f64) -> f64 {

@@ -104,7 +104,7 @@ impl Model {
 
     /// Row sums of Jᵀ M J: the masses of nodes that follow others go to these. Where rows have so many negative weights that a followed node
     /// would lose mass by a tie, as beside a much heavier element, all masses of that tie go by the rows without their negative weights.
-    pub fn give_down(&self, masses: &mut [f64]) {
+    pub(crate) fn give_down(&self, masses: &mut [f64]) {
         for tie in &self.ties {
             let given: Vec<f64> =
                 tie.nodes.iter().map(|&node| std::mem::take(&mut masses[node as usize])).collect();

@@ -9,7 +9,7 @@ use crate::tensor::Vector;
 pub const LANES: usize = 16;
 
 /// Cells of a block.
-pub const BLOCK_CELLS: usize = 64 * LANES;
+pub(crate) const BLOCK_CELLS: usize = 64 * LANES;
 
 /// The cells in order, from their centres [m].
 pub fn order(centres: &[Vector<f64>]) -> Vec<u32> {

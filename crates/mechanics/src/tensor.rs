@@ -231,7 +231,7 @@ impl<R: Number> Symmetric<R> {
 
     /// S + s I.
     #[inline(always)]
-    pub fn plus_isotropic(&self, s: R) -> Self {
+    pub(crate) fn plus_isotropic(&self, s: R) -> Self {
         let [xx, yy, zz, xy, yz, xz] = self.0;
         Self([xx + s, yy + s, zz + s, xy, yz, xz])
     }

@@ -88,7 +88,7 @@ impl Geometry {
     }
 
     /// How many parts have no node in common.
-    pub fn piece_count(&self) -> usize {
+    pub(crate) fn piece_count(&self) -> usize {
         let mut pieces = DisjointSets::new(self.node_count());
         let mut used = vec![false; self.node_count()];
         for cell in self.cells().chunks_exact(self.solid.cell().node_count()) {

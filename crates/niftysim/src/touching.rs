@@ -34,7 +34,7 @@ impl Touching {
     }
 
     /// Whether the number of pieces of a body matters.
-    pub fn asks_for_pieces(&self) -> bool {
+    pub(crate) fn asks_for_pieces(&self) -> bool {
         self.contact.bodies.is_some_and(|bodies| !bodies.themselves)
     }
 

@@ -205,7 +205,7 @@ impl Camera {
 
     /// From space to clip space of a picture with this ratio of width to height, for objects within a distance of the
     /// target [m]; depth increases from 0 near to 1 far.
-    pub fn projection_view(&self, aspect: f64, reach: f64) -> Matrix4<f32> {
+    pub(crate) fn projection_view(&self, aspect: f64, reach: f64) -> Matrix4<f32> {
         let [x, y, z] = self.axes();
         let eye = self.eye();
         let row = |axis: Vector3| Vector4::new(axis.x, axis.y, axis.z, -axis.dot(&eye)).transpose();

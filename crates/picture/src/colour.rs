@@ -40,7 +40,7 @@ impl ColourMap {
     }
 
     /// Whether its middle is a colour of its own, which stands for zero.
-    pub const fn is_diverging(self) -> bool {
+    pub(crate) const fn is_diverging(self) -> bool {
         matches!(self, Self::BlueRed)
     }
 

@@ -169,7 +169,7 @@ impl Fibres {
     }
 
     /// The cube that a place lies in.
-    pub fn cube_of(&self, place: &Vector3) -> [i64; 3] {
+    pub(crate) fn cube_of(&self, place: &Vector3) -> [i64; 3] {
         [0, 1, 2].map(|c| (place[c] / self.cube).floor() as i64)
     }
 

@@ -83,7 +83,7 @@ pub fn weight_of(weights: impl Iterator<Item = (Vector3, Vector3)>) -> Option<Ma
 pub const WEIGHT: f64 = 0.12;
 
 /// The marks of a mesh whose points are at some places [m]: those of its fields `constraint`, `load` and `weight`. `None` without the first two.
-pub fn marks_of(mesh: &Mesh, points: &[Vector3]) -> Option<Vec<Mark>> {
+pub(crate) fn marks_of(mesh: &Mesh, points: &[Vector3]) -> Option<Vec<Mark>> {
     let held = mesh.point_data.get("constraint").filter(|array| array.components == 1);
     let loads = mesh.point_data.get("load").filter(|array| array.components == 3);
     if held.is_none() && loads.is_none() {

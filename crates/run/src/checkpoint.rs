@@ -499,7 +499,7 @@ impl<'a> Checkpoints<'a> {
     }
 
     /// Removes those after some steps.
-    pub fn remove_after(&self, steps: u64) -> Result<(), OutputError> {
+    pub(crate) fn remove_after(&self, steps: u64) -> Result<(), OutputError> {
         let folder = self.folder.path();
         let all = checkpoints_in(folder).map_err(|error| OutputError::new(folder, error))?;
         all.iter()

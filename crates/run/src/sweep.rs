@@ -24,9 +24,9 @@ use crate::output::{
 use crate::run::{Options, run_with};
 
 /// The table of a sweep.
-pub const SWEEP: &str = "sweep.csv";
+pub(crate) const SWEEP: &str = "sweep.csv";
 /// Its plot: the reactions of all runs over time.
-pub const SWEEP_PLOT: &str = "sweep.svg";
+pub(crate) const SWEEP_PLOT: &str = "sweep.svg";
 /// Combinations a sweep may have.
 const MOST: usize = 100_000;
 

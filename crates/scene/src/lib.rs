@@ -47,9 +47,7 @@ mod testing;
 mod view;
 mod world;
 
-pub use assemble::{
-    BodyLocator, Built, BuiltBody, Located, Meshing, SizeDoubt, build, build_watched, build_with, mesh_of,
-};
+pub use assemble::{BodyLocator, Built, BuiltBody, Located, Meshing, SizeDoubt, build, build_with, mesh_of};
 pub use bound::element_bound;
 pub use cache::{MeshCache, cache_folder};
 pub use plan::{LimitingElement, Limits, Plan, plan};

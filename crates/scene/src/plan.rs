@@ -16,7 +16,7 @@ use crate::target::Target;
 /// A step that is shortened by more than this part is reported.
 const SHORTENED: f64 = 1e-3;
 /// Automatic step [s] of implicit runs.
-pub const IMPLICIT_STEP: f64 = 0.01;
+pub(crate) const IMPLICIT_STEP: f64 = 0.01;
 
 /// The step of a run and what limits it.
 #[derive(Clone, Debug)]

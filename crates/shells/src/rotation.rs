@@ -9,7 +9,7 @@ pub fn skew(a: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 /// Coefficients of the series of arcsin(x)/x in x².
-pub const ARCSINE: [f64; 13] = {
+pub(crate) const ARCSINE: [f64; 13] = {
     let (mut all, mut k) = ([1.0; 13], 0);
     while k < 12 {
         let odd = (2 * k + 1) as f64;
@@ -20,7 +20,7 @@ pub const ARCSINE: [f64; 13] = {
 };
 
 /// |B₂ₙ|/(2n)! from n = 1 on, with Bernoulli's numbers.
-pub const BERNOULLI: [f64; 8] = [
+pub(crate) const BERNOULLI: [f64; 8] = [
     1.0 / 12.0,
     1.0 / 720.0,
     1.0 / 30_240.0,
@@ -95,7 +95,7 @@ pub fn spin_to_vector(theta: &Vector3<f64>) -> Matrix3<f64> {
 
 /// ∂(Hᵀ m)/∂θ H for a fixed m: how a moment that is conjugate to spins changes with the spin.
 #[cfg(test)]
-pub fn moment_correction(theta: &Vector3<f64>, moment: &Vector3<f64>) -> Matrix3<f64> {
+pub(crate) fn moment_correction(theta: &Vector3<f64>, moment: &Vector3<f64>) -> Matrix3<f64> {
     let s = skew(theta);
     let angle = theta.norm();
     let outer = Matrix3::from_diagonal_element(theta.dot(moment)) + theta * moment.transpose()

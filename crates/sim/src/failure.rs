@@ -63,7 +63,7 @@ impl FailureKind {
     }
 
     /// Whether shorter steps may help: what explicit steps that are too long end by.
-    pub fn is_of_long_steps(self) -> bool {
+    pub(crate) fn is_of_long_steps(self) -> bool {
         matches!(self, Self::NotFinite | Self::Inverted | Self::Unbalanced | Self::Unstable)
     }
 }

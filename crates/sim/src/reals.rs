@@ -31,7 +31,7 @@ pub(crate) enum RealsMut<'a> {
 
 impl RealsMut<'_> {
     /// Moves these numbers to where others were, which end up here; both are as many, in the same precision.
-    pub fn take_place_of(self, other: RealsMut<'_>) {
+    pub(crate) fn take_place_of(self, other: RealsMut<'_>) {
         fn exchange<T: Copy>(here: &mut Vec<T>, there: &mut Vec<T>) {
             if here.len() == there.len() {
                 there.copy_from_slice(here);

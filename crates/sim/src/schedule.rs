@@ -51,7 +51,7 @@ impl Schedule {
 }
 
 /// Steps from a time to the instant nearest to another time, at least one; rather one too few than one too many.
-pub fn steps_to(goal: f64, time: f64, step: f64) -> u64 {
+pub(crate) fn steps_to(goal: f64, time: f64, step: f64) -> u64 {
     (((goal - time) / step - 0.5 - 1e-6).ceil()).max(1.0) as u64
 }
 

@@ -11,7 +11,7 @@ use pliant_sim::gpu::PointValue;
 use crate::followed::FollowedPoint;
 
 /// Wall time between two inspections of a state that lies on a device.
-pub const INSPECTION: Duration = Duration::from_millis(250);
+pub(crate) const INSPECTION: Duration = Duration::from_millis(250);
 
 /// What the last inspection found.
 #[derive(Debug, Default)]
@@ -46,7 +46,7 @@ pub(crate) struct Seen {
 
 impl Seen {
     /// Whether an inspection is due while a run goes on.
-    pub fn is_old(&self) -> bool {
+    pub(crate) fn is_old(&self) -> bool {
         self.at.is_none_or(|at| at.elapsed() >= INSPECTION)
     }
 }

@@ -58,7 +58,7 @@ impl Followed {
     }
 
     /// Another surface is shown: its values are none of this point.
-    pub fn forget_shown(&mut self) {
+    pub(crate) fn forget_shown(&mut self) {
         self.shown.clear();
     }
 

@@ -16,7 +16,6 @@ mod sound;
 #[cfg(feature = "window")]
 mod window;
 
-pub use device::INSPECTION;
 pub use followed::FollowedPoint;
 pub use hand::{Hand, Hold, Point, Which, pick};
 pub use parameters::{Number, Parameter, parameters, with_numbers};

@@ -101,7 +101,7 @@ impl SoundStates {
     }
 
     /// Whether a run of so many steps, of a length [s], has come no farther than one state from where it began.
-    pub fn has_just_begun(&self, steps: u64, step: f64) -> bool {
+    pub(crate) fn has_just_begun(&self, steps: u64, step: f64) -> bool {
         self.first.as_ref().is_some_and(|first| steps <= first.steps + apart(step))
     }
 

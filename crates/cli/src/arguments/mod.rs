@@ -188,7 +188,7 @@ pub struct Moved {
 }
 
 #[derive(Clone, Debug, clap::Args)]
-pub struct Overrides {
+pub(crate) struct Overrides {
     /// Set any value of the scene; may be repeated. KEY is its path, with array items numbered from 0. VALUE is TOML; a single
     /// word needs no quotes.
     #[arg(long, value_name = "KEY=VALUE", allow_hyphen_values = true)]
@@ -325,7 +325,7 @@ pub struct Check {
 }
 
 #[derive(Debug, clap::Args)]
-pub struct Info {
+pub(crate) struct Info {
     /// A mesh file.
     pub mesh: PathBuf,
     /// Factor on all lengths: the size of one unit of the mesh in metres (0.001 for millimetres).

@@ -13,7 +13,7 @@ use crate::arguments::{MeshCells, MeshImage};
 use crate::report::{Bar, Failure, say};
 
 /// Whether the output is a scene.
-pub fn is_scene(arguments: &MeshImage) -> bool {
+pub(crate) fn is_scene(arguments: &MeshImage) -> bool {
     arguments.out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 

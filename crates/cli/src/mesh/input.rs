@@ -60,7 +60,7 @@ impl Source<'_> {
 }
 
 /// Whether the input is a mesh file, by its extension or its first bytes.
-pub fn is_mesh_file(arguments: &MeshImage) -> bool {
+pub(crate) fn is_mesh_file(arguments: &MeshImage) -> bool {
     Format::of_file(&arguments.image).is_some()
 }
 
@@ -122,7 +122,7 @@ pub fn image(arguments: &MeshImage, bar: &Bar) -> Result<Image, Failure> {
 }
 
 /// [`regions`] of an image that is read.
-pub fn regions_in(mut image: Image, arguments: &MeshImage, bar: &Bar) -> Result<Segmented, Failure> {
+pub(crate) fn regions_in(mut image: Image, arguments: &MeshImage, bar: &Bar) -> Result<Segmented, Failure> {
     let refused = |error: LabelError| label_failure(&error);
     let masks = !arguments.masks.is_empty();
     let choice = match arguments.threshold {
@@ -213,7 +213,7 @@ fn image_failure(error: &ImageError) -> Failure {
     Failure::plain(error, help)
 }
 
-pub fn label_failure(error: &LabelError) -> Failure {
+pub(crate) fn label_failure(error: &LabelError) -> Failure {
     let help = match error {
         LabelError::NotWhole { .. } => "`pliant mesh --threshold 0.5` reads a probability map",
         LabelError::Grey { .. } => {
@@ -240,7 +240,7 @@ pub fn label_failure(error: &LabelError) -> Failure {
     Failure::plain(error, help)
 }
 
-pub fn meshing_failure(error: &MeshingError, force: bool) -> Failure {
+pub(crate) fn meshing_failure(error: &MeshingError, force: bool) -> Failure {
     if let MeshingError::OpenSurface { widest, .. } = error {
         // In whole millimetres, or in tenths of them.
         let unit = if *widest > 1e-3 { 1e-3 } else { 1e-4 };
@@ -297,13 +297,13 @@ pub const COARSEST: f64 = 0.25;
 /// Shares of the whole work, for the bar: the field, the cells, the distances.
 pub const PARTS: [f64; 3] = [0.3, 0.6, 0.1];
 
-pub fn image_line(image: &Image) -> String {
+pub(crate) fn image_line(image: &Image) -> String {
     let [nx, ny, nz] = image.grid.dims;
     let [hx, hy, hz] = image.grid.spacing().map(|h| number(h * 1e3));
     format!("{}, {nx} × {ny} × {nz} voxels of {hx} × {hy} × {hz} mm", image.format)
 }
 
-pub fn image_object(image: &Image) -> Json {
+pub(crate) fn image_object(image: &Image) -> Json {
     json!({
         "format": image.format, "size": image.grid.dims, "spacing": image.grid.spacing(), "notes": image.notes,
     })

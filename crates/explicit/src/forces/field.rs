@@ -9,7 +9,7 @@ use crate::history::History;
 use crate::lanes::Processor;
 
 /// Internal forces of one solid, compiled for its element and number type.
-pub trait ForceField<R>: Send + Sync {
+pub(crate) trait ForceField<R>: Send + Sync {
     /// The blocks of its cells.
     fn blocks(&self) -> &Blocks;
 

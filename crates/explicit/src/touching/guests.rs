@@ -88,7 +88,7 @@ impl Guests {
     }
 
     /// Where a node is before the step [m], by its number and its place at rest.
-    pub fn place_at<R: LaneNumber>(
+    pub(crate) fn place_at<R: LaneNumber>(
         &self,
         number: u32,
         rest: &Vector3<f64>,

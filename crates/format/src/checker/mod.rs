@@ -40,7 +40,7 @@ pub fn check(node: &Node, path: &str, schema: &Schema, out: &mut Vec<Diagnostic>
 ///
 /// Keys in `skip` are left to the caller, such as the `type` that chose the struct. A table that the file lacks is
 /// read as an empty one: the defaults, or what is required and missing.
-pub fn read_table<T: DeserializeOwned + JsonSchema>(
+pub(crate) fn read_table<T: DeserializeOwned + JsonSchema>(
     source: &Source,
     path: &[&str],
     skip: &[&str],

@@ -3,7 +3,7 @@
 mod of_mesh;
 mod organ_scene;
 
-pub use of_mesh::{SceneOfMesh, calming, is_mesh, scene_of_given, scene_of_mesh};
+pub use of_mesh::{SceneOfMesh, is_mesh, scene_of_given, scene_of_mesh};
 pub use organ_scene::OrganScene;
 
 /// The text of a starter scene with a title.

@@ -105,7 +105,7 @@ nodes = {{ half-space = {{ point = {point:?}, normal = {normal:?} }} }}
 }
 
 /// Damping [1/s] of a body of a length [m]: half of the critical one of its slowest vibration along it, α = 2 · ½ · (π/2) √(E/ρ)/L.
-pub fn calming(young: f64, density: f64, length: f64) -> f64 {
+pub(super) fn calming(young: f64, density: f64, length: f64) -> f64 {
     0.5 * std::f64::consts::PI * (young / density).sqrt() / length.max(1e-6)
 }
 

@@ -316,7 +316,7 @@ impl FieldName {
     }
 
     /// True for fields of what holds, moves and loads nodes.
-    pub fn is_of_marks(self) -> bool {
+    pub(crate) fn is_of_marks(self) -> bool {
         matches!(self, Self::Constraint | Self::Load | Self::Weight)
     }
 

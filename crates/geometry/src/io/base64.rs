@@ -28,7 +28,7 @@ impl<'a> Base64<'a> {
     }
 
     /// Continues with the next padded piece; drops the rest of the last group.
-    pub fn end_piece(&mut self) {
+    pub(crate) fn end_piece(&mut self) {
         self.pending_len = 0;
     }
 

@@ -89,7 +89,7 @@ impl Cells {
     }
 
     /// The same for a cell of any kind that can be read.
-    pub fn push_of(&mut self, kind: FileKind, nodes: &[u32]) {
+    pub(crate) fn push_of(&mut self, kind: FileKind, nodes: &[u32]) {
         let at = self.blocks.iter().position(|block| block.kind == kind).unwrap_or_else(|| {
             let (data, sets) = (BTreeMap::new(), BTreeMap::new());
             self.blocks.push(Block { kind, nodes: Vec::new(), data, sets });
@@ -108,7 +108,7 @@ impl Cells {
 
     /// Adds a polygon to the open cell of the file: triangle, quad, or a fan of triangles around its first
     /// corner (right for convex polygons).
-    pub fn push_polygon(&mut self, nodes: &[u32]) {
+    pub(crate) fn push_polygon(&mut self, nodes: &[u32]) {
         match nodes {
             [_, _, _] => self.push(CellKind::Triangle, nodes),
             [_, _, _, _] => self.push(CellKind::Quad, nodes),
@@ -134,7 +134,7 @@ impl Cells {
 
     /// Gives the cells their data: one item per cell of the file. In a file with cells of several kinds an
     /// array that is NaN for all cells of a kind is taken as missing there.
-    pub fn add_data(&mut self, name: &str, array: &DataArray) {
+    pub(crate) fn add_data(&mut self, name: &str, array: &DataArray) {
         if let Some(set) = name.strip_prefix(SET_PREFIX)
             && array.components == 1
         {
@@ -147,7 +147,7 @@ impl Cells {
     }
 
     /// Gives the cells their data, one item per cell of the file, in those blocks where `keep` says so.
-    pub fn add_data_where(&mut self, name: &str, array: &DataArray, keep: impl Fn(&[f64]) -> bool) {
+    pub(crate) fn add_data_where(&mut self, name: &str, array: &DataArray, keep: impl Fn(&[f64]) -> bool) {
         let mut split: Vec<Vec<f64>> = vec![Vec::new(); self.blocks.len()];
         for source in 0..self.len() {
             if let Some((block, range)) = self.span(source) {
@@ -164,7 +164,7 @@ impl Cells {
     }
 
     /// Adds cells of the file to a named set. A set without any cell is kept, empty, in the first block.
-    pub fn add_set(&mut self, name: &str, sources: impl IntoIterator<Item = usize>) {
+    pub(crate) fn add_set(&mut self, name: &str, sources: impl IntoIterator<Item = usize>) {
         for source in sources {
             if let Some((block, range)) = self.span(source)
                 && !range.is_empty()
@@ -188,7 +188,7 @@ impl Cells {
 
     /// The mesh, or the reason for its absence; adds notes about skipped and split cells. Cells may be skipped only if their dimension is
     /// below that of the others: a body would have holes without them.
-    pub fn into_mesh(
+    pub(crate) fn into_mesh(
         self,
         points: Vec<Vector3>,
         point_data: BTreeMap<String, DataArray>,

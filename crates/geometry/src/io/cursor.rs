@@ -73,7 +73,7 @@ impl Scalar {
     }
 
     /// All numbers in `bytes` as integers; floating point numbers are cut towards zero.
-    pub fn decode_integers(self, bytes: &[u8], order: Order) -> Vec<i64> {
+    pub(crate) fn decode_integers(self, bytes: &[u8], order: Order) -> Vec<i64> {
         match self {
             Self::I8 => decode!(bytes, order, i8, i64),
             Self::U8 => decode!(bytes, order, u8, i64),
@@ -107,7 +107,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// A cursor for the words of a line, at `place` of the file.
-    pub fn of_line(line: &'a [u8], place: Place) -> Self {
+    pub(crate) fn of_line(line: &'a [u8], place: Place) -> Self {
         Self { only_line: Some(place), ..Self::new(line) }
     }
 
@@ -170,7 +170,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// The next word, which must be there.
-    pub fn need_word(&mut self, reading: impl Display) -> Result<&'a [u8], Fault> {
+    pub(crate) fn need_word(&mut self, reading: impl Display) -> Result<&'a [u8], Fault> {
         match self.word() {
             Some(word) => Ok(word),
             None => Err(self.truncated(reading)),
@@ -239,7 +239,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// The next `count` numbers of a binary block, as bytes.
-    pub fn take_numbers(
+    pub(crate) fn take_numbers(
         &mut self,
         count: usize,
         scalar: Scalar,

@@ -62,7 +62,7 @@ pub(super) struct Connectivity {
 
 impl Connectivity {
     /// From the layout of old legacy files: for each cell its number of nodes and its nodes.
-    pub fn from_counted(counted: &[i64], cells: usize, place: Place) -> Result<Self, Fault> {
+    pub(crate) fn from_counted(counted: &[i64], cells: usize, place: Place) -> Result<Self, Fault> {
         let mut connectivity =
             Self { nodes: Vec::with_capacity(counted.len().saturating_sub(cells)), ends: Vec::new() };
         let mut rest = counted;
@@ -87,7 +87,7 @@ impl Connectivity {
     }
 
     /// From offsets that begin with 0 and have one more entry than there are cells.
-    pub fn from_offsets(offsets: Vec<i64>, nodes: Vec<i64>) -> Self {
+    pub(crate) fn from_offsets(offsets: Vec<i64>, nodes: Vec<i64>) -> Self {
         Self { nodes, ends: offsets.get(1..).map(<[i64]>::to_vec).unwrap_or_default() }
     }
 

@@ -64,7 +64,7 @@ impl<'a> Input<'a> {
     }
 
     /// From now on neighbours are read in this folder only.
-    pub fn stay_within(&mut self, folder: Option<PathBuf>) {
+    pub(crate) fn stay_within(&mut self, folder: Option<PathBuf>) {
         self.within = folder;
     }
 
@@ -75,12 +75,12 @@ impl<'a> Input<'a> {
     }
 
     /// What follows, packed with gzip.
-    pub fn unpack_gzip(self) -> Self {
+    pub(crate) fn unpack_gzip(self) -> Self {
         Self { bytes: Box::new(BufReader::new(MultiGzDecoder::new(self.bytes))), packed: true, ..self }
     }
 
     /// What follows, packed with zlib.
-    pub fn unpack_zlib(self) -> Self {
+    pub(crate) fn unpack_zlib(self) -> Self {
         Self { bytes: Box::new(BufReader::new(ZlibDecoder::new(self.bytes))), packed: true, ..self }
     }
 
@@ -109,7 +109,7 @@ impl<'a> Input<'a> {
     }
 
     /// The name of this file with another extension: `scan.hdr.gz` and `img` give `scan.img` and `scan.img.gz`.
-    pub fn sibling_names(&self, ending: &str) -> Vec<String> {
+    pub(crate) fn sibling_names(&self, ending: &str) -> Vec<String> {
         let name = self.path.as_deref().and_then(|path| path.file_name()?.to_str());
         let stem =
             name.map(|name| name.strip_suffix(".gz").unwrap_or(name)).and_then(|name| name.rsplit_once('.'));
@@ -127,7 +127,7 @@ impl<'a> Input<'a> {
     }
 
     /// Up to `count` bytes.
-    pub fn up_to(&mut self, count: u64, reading: &'static str) -> Result<Vec<u8>, Fault> {
+    pub(crate) fn up_to(&mut self, count: u64, reading: &'static str) -> Result<Vec<u8>, Fault> {
         let mut bytes = Vec::new();
         let result = (&mut self.bytes).take(count).read_to_end(&mut bytes);
         self.at += bytes.len();
@@ -200,7 +200,7 @@ impl<'a> Input<'a> {
     }
 
     /// Bytes of so many numbers, if that many may be read.
-    pub fn within_limit(&self, count: usize, scalar: Scalar) -> Result<u64, ImageProblem> {
+    pub(crate) fn within_limit(&self, count: usize, scalar: Scalar) -> Result<u64, ImageProblem> {
         let (bytes, limit) = (count as u64 * scalar.size() as u64, self.limit);
         if bytes > limit { Err(ImageProblem::TooManyBytes { bytes, limit }) } else { Ok(bytes) }
     }

@@ -46,7 +46,7 @@ pub(super) struct ToWorld {
 }
 
 impl ToWorld {
-    pub const LPS_MILLIMETRES: Self = Self { unit: 1e-3, signs: [-1.0, -1.0, 1.0] };
+    pub(crate) const LPS_MILLIMETRES: Self = Self { unit: 1e-3, signs: [-1.0, -1.0, 1.0] };
 
     pub fn vector(&self, of_file: Vector3) -> Vector3 {
         of_file.component_mul(&Vector3::from(self.signs)) * self.unit

@@ -24,7 +24,7 @@ pub struct Corotational {
 /// Parameters of the co-rotated linear law: Ψ = μ |U − I|² + λ/2 tr²(U − I), λ = κ − 2μ/3. For small strains.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub struct CorotationalParameters {
+pub(crate) struct CorotationalParameters {
     /// The two moduli.
     #[serde(flatten)]
     pub elastic: ElasticConstants,

@@ -20,7 +20,7 @@ pub struct CoupledNeoHookean {
 /// Parameters of the coupled neo-Hookean law: Ψ = μ/2 (I₁ − 3 − 2 ln J) + λ/2 (J − 1)², λ = κ − 2μ/3.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub struct CoupledNeoHookeanParameters {
+pub(crate) struct CoupledNeoHookeanParameters {
     /// The two moduli.
     #[serde(flatten)]
     pub elastic: ElasticConstants,

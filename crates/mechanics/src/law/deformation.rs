@@ -66,19 +66,19 @@ impl<R: Number> Deformation<R> {
 
     /// I₁ of the isochoric C, minus 3, without cancellation in J.
     #[inline(always)]
-    pub fn isochoric_first_invariant_minus_3(&self) -> R {
+    pub(crate) fn isochoric_first_invariant_minus_3(&self) -> R {
         R::of(3.0) * self.isochoric_change + self.isochoric_factor * self.strain_twice.trace()
     }
 
     /// C̄ − I.
     #[inline(always)]
-    pub fn isochoric_strain_twice(&self) -> Symmetric<R> {
+    pub(crate) fn isochoric_strain_twice(&self) -> Symmetric<R> {
         (self.strain_twice * self.isochoric_factor).plus_isotropic(self.isochoric_change)
     }
 
     /// Ī₁ − 3 and Ī₂ − 3. With B = C̄ − I and t = tr B = Ī₁ − 3: Ī₂ − 3 = 2t + ½ (t² − B:B).
     #[inline(always)]
-    pub fn isochoric_invariants_minus_3(&self) -> [R; 2] {
+    pub(crate) fn isochoric_invariants_minus_3(&self) -> [R; 2] {
         let t = self.isochoric_first_invariant_minus_3();
         let b = self.isochoric_strain_twice();
         [t, R::of(2.0) * t + R::of(0.5) * (t * t - b.double_dot(&b))]
@@ -86,13 +86,13 @@ impl<R: Number> Deformation<R> {
 
     /// Ī₄ − 1 of the unit fibre `a`.
     #[inline(always)]
-    pub fn fibre_strain(&self, a: Vector<R>) -> R {
+    pub(crate) fn fibre_strain(&self, a: Vector<R>) -> R {
         self.isochoric_change + self.isochoric_factor * self.strain_twice.quadratic(a)
     }
 
     /// Ī₄ − 1 and Ī₅ − 1 of the unit fibre `a`. With B = C̄ − I: Ī₅ − 1 = 2 a·Ba + |Ba|².
     #[inline(always)]
-    pub fn fibre_strains(&self, a: Vector<R>) -> [R; 2] {
+    pub(crate) fn fibre_strains(&self, a: Vector<R>) -> [R; 2] {
         let ba = self.isochoric_strain_twice().apply(a);
         let strain = dot(a, ba);
         [strain, R::of(2.0) * strain + dot(ba, ba)]
@@ -100,7 +100,7 @@ impl<R: Number> Deformation<R> {
 
     /// S of an energy of Ī₁: 2 W₁ q (E − ⅓ tr X C⁻¹).
     #[inline(always)]
-    pub fn first_invariant_stress(&self, w1: R) -> Symmetric<R> {
+    pub(crate) fn first_invariant_stress(&self, w1: R) -> Symmetric<R> {
         let factor = R::of(2.0) * w1 * self.isochoric_factor;
         let mean = factor * self.strain_twice.trace() * R::of(1.0 / 3.0);
         (self.inverse_strain * (factor + mean)).plus_isotropic(-mean)
@@ -108,7 +108,7 @@ impl<R: Number> Deformation<R> {
 
     /// S of an energy of Ī₁ and Ī₄ of the unit fibre `a`, the multiples of C⁻¹ taken together.
     #[inline(always)]
-    pub fn fibre_reinforced_stress(&self, w1: R, a: Vector<R>, w4: R) -> Symmetric<R> {
+    pub(crate) fn fibre_reinforced_stress(&self, w1: R, a: Vector<R>, w4: R) -> Symmetric<R> {
         let factor = R::of(2.0) * self.isochoric_factor;
         let (matrix, fibre) = (factor * w1, factor * w4);
         let i4 = R::ONE + self.strain_twice.quadratic(a);
@@ -119,7 +119,7 @@ impl<R: Number> Deformation<R> {
 
     /// S of an energy of Ī₁ and Ī₂: with C² − I = 2X + X², M = 2 (W₁ + Ī₁ W₂) q X − 2 W₂ q² (2X + X²).
     #[inline(always)]
-    pub fn isotropic_stress(&self, w1: R, w2: R) -> Symmetric<R> {
+    pub(crate) fn isotropic_stress(&self, w1: R, w2: R) -> Symmetric<R> {
         let (q, x) = (self.isochoric_factor, &self.strain_twice);
         let i1 = R::of(3.0) + self.isochoric_first_invariant_minus_3();
         let factor = R::of(2.0) * q;
@@ -131,7 +131,7 @@ impl<R: Number> Deformation<R> {
 
     /// S of an energy of Ī₄ of the unit fibre `a`: 2 W₄ q (a⊗a − I₄/3 C⁻¹).
     #[inline(always)]
-    pub fn fibre_stress(&self, a: Vector<R>, w4: R) -> Symmetric<R> {
+    pub(crate) fn fibre_stress(&self, a: Vector<R>, w4: R) -> Symmetric<R> {
         let i4 = R::ONE + self.strain_twice.quadratic(a);
         let direction = Symmetric::dyad(a).plus_scaled(&self.inverse_cauchy_green, i4 * R::of(-1.0 / 3.0));
         direction * (R::of(2.0) * w4 * self.isochoric_factor)
@@ -139,7 +139,7 @@ impl<R: Number> Deformation<R> {
 
     /// S of an energy of Ī₄ and Ī₅ of the unit fibre `a`: that of Ī₄ and 2 W₅ q² (a⊗Ca + Ca⊗a − ⅔ |Ca|² C⁻¹).
     #[inline(always)]
-    pub fn fibre_stresses(&self, a: Vector<R>, [w4, w5]: [R; 2]) -> Symmetric<R> {
+    pub(crate) fn fibre_stresses(&self, a: Vector<R>, [w4, w5]: [R; 2]) -> Symmetric<R> {
         let (q, x) = (self.isochoric_factor, self.strain_twice.apply(a));
         let ca = [a[0] + x[0], a[1] + x[1], a[2] + x[2]];
         let pull = self.inverse_cauchy_green * (dot(ca, ca) * R::of(2.0 / 3.0));

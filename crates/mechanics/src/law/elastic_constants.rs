@@ -76,7 +76,7 @@ impl ElasticConstants {
     ///
     /// # Errors
     /// As [`moduli`](Self::moduli), and if ν = ½.
-    pub fn compressible_moduli(&self) -> Result<SmallStrainModuli, ParameterError> {
+    pub(crate) fn compressible_moduli(&self) -> Result<SmallStrainModuli, ParameterError> {
         let moduli = self.moduli()?;
         if moduli.bulk.is_infinite() {
             let message = "this law has no version that keeps the volume (`poisson-ratio` 0.5)".into();

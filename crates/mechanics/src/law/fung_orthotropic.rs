@@ -32,7 +32,7 @@ pub struct FungOrthotropic {
 /// Parameters of the Fung law: Ψ = c/2 (e^Q − 1) + U(J), Q = d·Dd + Σ sₘ (2Eₘ)², d = (E₁₁, E₂₂, E₃₃), m = 12, 23, 13.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub struct FungOrthotropicParameters {
+pub(crate) struct FungOrthotropicParameters {
     /// Modulus c [Pa].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub modulus: f64,

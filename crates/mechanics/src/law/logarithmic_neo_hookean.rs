@@ -20,7 +20,7 @@ pub struct LogarithmicNeoHookean {
 /// Parameters of the ln² neo-Hookean law: Ψ = μ/2 (I₁ − 3 − 2 ln J) + λ/2 ln² J, λ = κ − 2μ/3.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub struct LogarithmicNeoHookeanParameters {
+pub(crate) struct LogarithmicNeoHookeanParameters {
     /// The two moduli.
     #[serde(flatten)]
     pub elastic: ElasticConstants,

@@ -57,7 +57,7 @@ pub use holzapfel_gasser_ogden::HolzapfelGasserOgden;
 pub use logarithmic_neo_hookean::LogarithmicNeoHookean;
 pub use mooney_rivlin::MooneyRivlin;
 pub use neo_hookean::NeoHookean;
-pub use ogden::{MOST_TERMS, Ogden, OgdenTerm};
+pub use ogden::{Ogden, OgdenTerm};
 pub use orthotropic::Orthotropic;
 pub use own::{Own, OwnLaw};
 pub use polynomial::Polynomial;
@@ -118,7 +118,7 @@ pub struct ParameterError {
 }
 
 /// A law that a scene can name.
-pub trait NamedLaw: Law {
+pub(crate) trait NamedLaw: Law {
     /// What a user gives, each parameter with unit and range.
     type Parameters: DeserializeOwned + JsonSchema;
 
@@ -321,7 +321,7 @@ impl AnyLaw {
     }
 
     /// Whether the shear stiffness never rises; see [`Law::keeps_shear_stiffness`].
-    pub fn keeps_shear_stiffness(&self) -> bool {
+    pub(crate) fn keeps_shear_stiffness(&self) -> bool {
         with_law!(self, law => Law::keeps_shear_stiffness(law))
     }
 
@@ -336,7 +336,7 @@ impl AnyLaw {
     }
 
     /// What fibres add to ρc² at rest at most [Pa]; see [`Law::fibre_modulus`].
-    pub fn fibre_modulus(&self) -> f64 {
+    pub(crate) fn fibre_modulus(&self) -> f64 {
         with_law!(self, law => law.fibre_modulus())
     }
 

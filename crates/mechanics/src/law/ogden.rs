@@ -12,7 +12,7 @@ use crate::Number;
 use crate::tensor::{Symmetric, Vector};
 
 /// The most terms a law can have; six serve every fit known to us.
-pub const MOST_TERMS: usize = 6;
+pub(crate) const MOST_TERMS: usize = 6;
 
 /// Sum of powers of the principal stretches.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -27,7 +27,7 @@ pub struct InPlane<R> {
 impl<R: Number> InPlane<R> {
     /// From C₁₁ − 1, C₂₂ − 1 and C₁₂. Not a number where the wall is folded flat.
     #[inline(always)]
-    pub fn from_strain_twice(strain_twice: [R; 3]) -> Self {
+    pub(crate) fn from_strain_twice(strain_twice: [R; 3]) -> Self {
         // √(1 + x) − 1 = x/(1 + √(1 + x)), without cancellation. Written out: closures are not compiled for lanes.
         let [xx, yy, xy] = strain_twice;
         let first = xx / (R::ONE + (R::ONE + xx).sqrt());
@@ -208,7 +208,7 @@ impl AnyLaw {
 
     /// An upper bound of ρc² [Pa] of a wall over all directions at rest: E/(1 − ν²), plus what fibres add. In the plane an incompressible
     /// fibre strains by its whole stretch, not by 2/3 of it: 9/4 of what it adds to the solid.
-    pub fn plane_modulus(&self) -> f64 {
+    pub(crate) fn plane_modulus(&self) -> f64 {
         let SmallStrainModuli { shear, bulk } = self.small_strain();
         let first = bulk - 2.0 / 3.0 * shear;
         let fraction = if bulk.is_infinite() { 1.0 } else { (first + shear) / (first + 2.0 * shear) };

@@ -21,7 +21,7 @@ pub struct StVenantKirchhoff {
 /// Parameters of the St Venant–Kirchhoff law: Ψ = λ/2 (tr E)² + μ E:E, λ = κ − 2μ/3. Collapses under compression.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub struct StVenantKirchhoffParameters {
+pub(crate) struct StVenantKirchhoffParameters {
     /// The two moduli.
     #[serde(flatten)]
     pub elastic: ElasticConstants,

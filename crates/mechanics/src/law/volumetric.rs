@@ -63,7 +63,7 @@ impl Volumetric {
 
     /// J U′(J) [Pa], the Kirchhoff pressure (positive in tension).
     #[inline(always)]
-    pub fn kirchhoff_pressure<R: Number>(&self, deformation: &Deformation<R>) -> R {
+    pub(crate) fn kirchhoff_pressure<R: Number>(&self, deformation: &Deformation<R>) -> R {
         let (j, x) = (deformation.volume_ratio, deformation.volume_change);
         R::of(self.bulk)
             * match self.energy {

@@ -87,7 +87,7 @@ impl FieldMesh {
     }
 
     /// The way of a point of a rigid thing per growth of it; none of a point of a body.
-    pub fn outward_of(&self, point: u32) -> Vector3 {
+    pub(crate) fn outward_of(&self, point: u32) -> Vector3 {
         let part = self.part_of(point).map(|(_, own, point)| (&own.content, point));
         match part {
             Some((Content::Things { outward, .. }, point)) => outward[point],

@@ -47,7 +47,7 @@ pub(crate) struct Outcome {
 
 impl Outcome {
     /// Of a run whose steppers could not be made.
-    pub fn not_begun(failure: Failure, world: &World) -> Self {
+    pub(crate) fn not_begun(failure: Failure, world: &World) -> Self {
         let part = |part: &Part| PartOutcome {
             reactions: vec![[0.0; 3]; part.built.model.constraints.len()],
             ..PartOutcome::default()
@@ -97,7 +97,7 @@ pub(crate) struct PartOutcome {
 
 /// Something that was held back by a limit of its force or its pressure.
 #[derive(Clone, Debug, PartialEq)]
-pub struct HeldBack {
+pub(crate) struct HeldBack {
     /// The tool or the constraint.
     pub name: String,
     /// Whether it is a volume.

@@ -91,7 +91,7 @@ impl<'scope> Outputs<'scope> {
     }
 
     /// Whether any awaits an instant.
-    pub fn are_due(&self, time: f64, step: f64, last: bool) -> bool {
+    pub(crate) fn are_due(&self, time: f64, step: f64, last: bool) -> bool {
         self.schedules.iter().any(|schedule| schedule.awaits(time, step, last))
     }
 
@@ -114,7 +114,7 @@ impl<'scope> Outputs<'scope> {
     }
 
     /// Shows a state that was found in a step that failed to those that have not seen its time. That failure is reported, none of theirs.
-    pub fn see_found(&mut self, simulation: &Simulation, seen: f64) {
+    pub(crate) fn see_found(&mut self, simulation: &Simulation, seen: f64) {
         let (time, step) = (simulation.time(), simulation.step_length());
         let due = |schedule: &mut Schedule| {
             (time > seen || !schedule.has_seen(time)) && schedule.is_due(time, step, true)
@@ -141,7 +141,7 @@ impl<'scope> Outputs<'scope> {
     }
 
     /// Removes rows and frames beyond those that were taken up.
-    pub fn remove_later(&mut self) -> Result<(), OutputError> {
+    pub(crate) fn remove_later(&mut self) -> Result<(), OutputError> {
         self.near.iter_mut().try_for_each(|(_, output)| output.finish())?;
         if let Some(far) = &self.far {
             // A thread that has failed tells why when it is joined.

@@ -211,7 +211,7 @@ pub struct Meshing<'a> {
 ///
 /// # Errors
 /// All mistakes that were found, with their places.
-pub fn build_watched(
+pub(crate) fn build_watched(
     scene: &Scene,
     cache: &MeshCache,
     watch: &dyn Fn(Meshing<'_>),

@@ -22,7 +22,7 @@ mod tests;
 use nalgebra::{Matrix3, SMatrix, Vector2};
 
 /// Nine degrees of freedom squared.
-pub type Matrix9 = SMatrix<f64, 9, 9>;
+pub(crate) type Matrix9 = SMatrix<f64, 9, 9>;
 
 /// Coordinates of the corners of a flat triangle in its plane [m], counter-clockwise.
 pub type Corners = [Vector2<f64>; 3];
@@ -97,7 +97,12 @@ pub struct Formulation {
 
 impl Formulation {
     /// Stiffness of a flat facet against (u, v, θz).
-    pub fn membrane_stiffness(&self, corners: &Corners, elastic: &PlaneStress, thickness: f64) -> Matrix9 {
+    pub(crate) fn membrane_stiffness(
+        &self,
+        corners: &Corners,
+        elastic: &PlaneStress,
+        thickness: f64,
+    ) -> Matrix9 {
         match self.membrane {
             Membrane::Curved { adaptation } | Membrane::Opt { adaptation } => {
                 andes_opt(corners, elastic, thickness, adaptation)
@@ -122,7 +127,12 @@ impl Formulation {
     }
 
     /// Stiffness against (w, θx, θy).
-    pub fn bending_stiffness(&self, corners: &Corners, elastic: &PlaneStress, thickness: f64) -> Matrix9 {
+    pub(crate) fn bending_stiffness(
+        &self,
+        corners: &Corners,
+        elastic: &PlaneStress,
+        thickness: f64,
+    ) -> Matrix9 {
         match self.bending {
             Bending::Dkt => discrete_kirchhoff(corners, elastic, thickness),
             Bending::Comas2010 => comas_2010(corners, elastic, thickness),

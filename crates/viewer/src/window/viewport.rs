@@ -187,7 +187,7 @@ impl Viewport {
     }
 
     /// Looks as a scene asks for.
-    pub fn take_look(&mut self, look: &Look) {
+    pub(crate) fn take_look(&mut self, look: &Look) {
         self.style = look.style;
         // Software takes a twelfth longer for a frame with it.
         self.style.occlusion &= !self.software;
@@ -221,7 +221,7 @@ impl Viewport {
     }
 
     /// The range of the values that are seen, of a unit.
-    pub fn range_seen(&mut self, unit: &str) -> Option<[f64; 2]> {
+    pub(crate) fn range_seen(&mut self, unit: &str) -> Option<[f64; 2]> {
         if self.shown.as_ref() != Some(&self.regions) {
             self.showing = self.subject.showing_points(&self.regions);
             self.shown = Some(self.regions.clone());
@@ -244,7 +244,7 @@ impl Viewport {
     }
 
     /// Takes the range of the values of a unit, unless it is locked.
-    pub fn fit_range(&mut self, unit: &str) {
+    pub(crate) fn fit_range(&mut self, unit: &str) {
         let range = self.range_seen(unit);
         if !self.locked {
             self.style.range = range;
@@ -263,7 +263,7 @@ impl Viewport {
 
     /// Takes what is left of the window, and lets the section follow the body; what the mouse does there. A name of its own keeps a drag
     /// alive where a panel beside it comes or goes.
-    pub fn lay_out(&mut self, ui: &mut egui::Ui) -> egui::Response {
+    pub(crate) fn lay_out(&mut self, ui: &mut egui::Ui) -> egui::Response {
         let rect = ui.available_rect_before_wrap();
         let response = ui.interact(rect, egui::Id::unique("picture"), Sense::click_and_drag());
         let first = self.rect == Rect::ZERO;
@@ -355,7 +355,7 @@ impl Viewport {
     }
 
     /// Learns where something will be or has been; goes on to see all, if it did.
-    pub fn learn(&mut self, reach: Arc<Vec<Vector3>>) {
+    pub(crate) fn learn(&mut self, reach: Arc<Vec<Vector3>>) {
         let (saw_all, at_start) = (self.camera == self.fitted(), self.camera == self.at_start());
         self.reach = reach;
         if at_start {
@@ -430,14 +430,14 @@ impl Viewport {
     }
 
     /// Where a point is seen; `None` behind the eye.
-    pub fn to_screen(&self, point: &Vector3) -> Option<Pos2> {
+    pub(crate) fn to_screen(&self, point: &Vector3) -> Option<Pos2> {
         let half = 0.5 * self.rect.size();
         let [x, y] = self.camera.place(point, self.aspect())?;
         Some(self.rect.center() + vec2(half.x * x as f32, -half.y * y as f32))
     }
 
     /// A place of the window in the picture: x to the right and y up, from −1 to 1.
-    pub fn in_picture(&self, at: Pos2) -> [f64; 2] {
+    pub(crate) fn in_picture(&self, at: Pos2) -> [f64; 2] {
         let from = at - self.rect.center();
         let [width, height] = [self.rect.width(), self.rect.height()].map(|size| size.max(1.0));
         [f64::from(2.0 * from.x / width), f64::from(-2.0 * from.y / height)]
@@ -467,7 +467,7 @@ impl Viewport {
     }
 
     /// The scale of colours with the quantity and its unit, and the grey of parts without a value.
-    pub fn draw_scale(&self, painter: &Painter, quantity: &str, unit: &str) {
+    pub(crate) fn draw_scale(&self, painter: &Painter, quantity: &str, unit: &str) {
         let Some([low, high]) = self.style.range.filter(|_| !self.values.is_empty()) else { return };
         let (rect, ink) = (self.rect, self.ink());
         let (unit, factor) = readable(unit, low.abs().max(high.abs()));
@@ -508,7 +508,7 @@ impl Viewport {
     }
 
     /// A ring around the place of the largest value that is seen, dashed where something hides it, and the number.
-    pub fn draw_maximum(&self, painter: &Painter, unit: &str) {
+    pub(crate) fn draw_maximum(&self, painter: &Painter, unit: &str) {
         let Some([low, high]) = self.style.range.filter(|_| self.style.maximum && !self.values.is_empty())
         else {
             return;
@@ -552,7 +552,7 @@ impl Viewport {
     }
 
     /// The range of colours, typed in the unit of the scale: a typed one is locked. What is wrong with one that is not taken.
-    pub fn edit_range(&mut self, ui: &mut egui::Ui, unit: &str) -> Option<String> {
+    pub(crate) fn edit_range(&mut self, ui: &mut egui::Ui, unit: &str) -> Option<String> {
         let mut refused = None;
         if let Some(range) = self.style.range {
             let size = range[0].abs().max(range[1].abs());
@@ -589,7 +589,7 @@ impl Viewport {
     }
 
     /// The axes and a bar of a round length in the lower left corner.
-    pub fn draw_axes(&self, painter: &Painter) {
+    pub(crate) fn draw_axes(&self, painter: &Painter) {
         let origin = self.rect.left_bottom() + vec2(CORNER, -CORNER);
         for (axis, along) in axes_of(&self.camera) {
             painter.arrow(origin, AXES * along, Stroke::new(2.0, COLOURS[axis]));

@@ -40,7 +40,7 @@ const BARRIER: f64 = 5e-6;
 const SOURCE: &str = "axisymmetric, quadratic elements, felupe; CalculiX within 0.4 %";
 
 /// Figure 9.5.
-pub const CASE: Case = Case {
+pub(crate) const CASE: Case = Case {
     id: "fig-9.5",
     title: "Fig. 9.5: angioplasty",
     shows: "A balloon crushes the deposits in a vessel, which press on its wall and widen it. The thesis shows pictures of tetrahedra in a tube of \
@@ -272,7 +272,7 @@ pub fn exact(young: f64) -> Vec<Widened> {
 }
 
 /// The reference at a radius [m] of the inner surface, a parabola through three rows.
-pub fn exact_at(rows: &[Widened], inner: f64) -> Widened {
+pub(crate) fn exact_at(rows: &[Widened], inner: f64) -> Widened {
     let after = rows.partition_point(|row| row.inner < inner);
     let first = after.saturating_sub(1).min(rows.len().saturating_sub(3));
     let own = &rows[first..first + 3];

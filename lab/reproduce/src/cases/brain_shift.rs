@@ -14,7 +14,7 @@ use crate::plot::{Curve, Key, Pen, Plot};
 use crate::{Hexes, Specimen, Tets, elastic, largest, law, mesh as read_mesh, numbers, reference, relax};
 
 /// The brain-shift case.
-pub const CASE: Case = Case {
+pub(crate) const CASE: Case = Case {
     id: "brain-shift",
     title: "Brain shift on an ellipsoid",
     shows: "The thesis names brain shift as an application that needs accuracy: when a skull is opened, the brain \
@@ -111,7 +111,7 @@ fn quality(mesh: &Mesh, tet: &[u32; 4]) -> f64 {
 
 /// Adds the sets `skull` and `opening` of surface nodes and the point data `shift`, the displacement of the opening [m]:
 /// −10 mm s² (3 − 2s) n with s = (n·X/H − 0.88)/(1 − 0.88), where s ≥ 0.
-pub fn with_regions(mut mesh: Mesh) -> Mesh {
+pub(crate) fn with_regions(mut mesh: Mesh) -> Mesh {
     let surface = boundary(&mesh).nodes();
     let s = |point: &Vector3| (point.dot(&Vector3::from(AXIS)) / HEIGHT - OPENING) / (1.0 - OPENING);
     let among = |wanted: &dyn Fn(&Vector3) -> bool| -> Vec<u32> {

@@ -29,7 +29,7 @@ const ELEMENT_STEPS: usize = 110_000;
 const MODELS: [&str; 4] = ["NHE", "TIE", "NHV", "TIV"];
 
 /// Figure 6.7.
-pub const CASE: Case = Case {
+pub(crate) const CASE: Case = Case {
     id: "fig-6.7",
     title: "Fig. 6.7: cost of anisotropy and viscoelasticity",
     shows: "Time of one step of a cube of 1,000 to 54,872 hexahedra, for a neo-Hookean (NHE), a transversely \

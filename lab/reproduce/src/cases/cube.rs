@@ -11,13 +11,13 @@ use crate::picture::{Body, View, figure};
 use crate::{Specimen, elastic, liver, liver_matrix, relax, settle, smooth_step, soft_tissue};
 
 /// The constraint that moves the platen of an eighth.
-pub const PLATEN: &str = "move x-min";
+pub(crate) const PLATEN: &str = "move x-min";
 
 /// Elements along the edge of the cube of figure 6.5.
 const CELLS: usize = 20;
 
 /// Figure 6.5.
-pub const DEFORMED: Case = Case {
+pub(crate) const DEFORMED: Case = Case {
     id: "fig-6.5",
     title: "Fig. 6.5: a compressed cube without fibres, with fibres across and along a diagonal",
     shows: "A cube is compressed by 30 % along x between platens glued to it. Without fibres it bulges equally to all \
@@ -43,7 +43,7 @@ pub const DEFORMED: Case = Case {
 
 /// An eighth [0, 0.05 m]³ of the cube with its glued platen at x = 0 moving inwards by a part of its edge, and its
 /// symmetry planes at x = 0.05, y = 0 and z = 0.
-pub fn held_as_an_eighth(specimen: Specimen, part: f64, curve: Curve) -> Specimen {
+pub(crate) fn held_as_an_eighth(specimen: Specimen, part: f64, curve: Curve) -> Specimen {
     specimen
         .shift("x-min", part * 0.05, curve)
         .fix("x-min", [false, true, true])

@@ -15,7 +15,7 @@ use crate::picture::{Body, View, figure};
 use crate::shells::{Specimen, sheet};
 
 /// Figure 8.2.
-pub const PATCH: Case = Case {
+pub(crate) const PATCH: Case = Case {
     id: "fig-8.2",
     title: "Fig. 8.2: the curved surface of one shell, and a force on it",
     shows: "A triangle with rotated nodes: (a, b) subdivided three times, flat and curved; (c) a force on the curved \
@@ -55,7 +55,7 @@ pub const LAYERS: Case = Case {
 };
 
 /// Figure 8.4.
-pub const RENDERING: Case = Case {
+pub(crate) const RENDERING: Case = Case {
     id: "fig-8.4",
     title: "Fig. 8.4: shells that are subdivided, and an irregular mesh carried by them",
     shows: "A shell of few elements, rendered by subdividing its triangles, shows the edges between them; a carried \

@@ -53,7 +53,7 @@ const PROTOTYPE: [[f64; 2]; 5] =
     [[-26.6, 10.19], [-32.5, 9.57], [-33.0, 9.47], [-34.83, 9.10], [-34.5, 9.25]];
 
 /// The element study.
-pub const CASE: Case = Case {
+pub(crate) const CASE: Case = Case {
     id: "elements",
     title: "Elements for nearly incompressible tissue",
     shows: "The thesis has only plain tetrahedra and one-point hexahedra. At ν = 0.49 plain tetrahedra lock: a \

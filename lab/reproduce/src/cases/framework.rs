@@ -22,7 +22,7 @@ const REPEATS: usize = 3;
 const STEPS: u64 = 1000;
 
 /// Figure 6.9.
-pub const CASE: Case = Case {
+pub(crate) const CASE: Case = Case {
     id: "fig-6.9",
     title: "Fig. 6.9: the bare step against the whole program",
     shows: "Time of one step of a cube of hexahedra under gravity, with 1,331 to 29,791 nodes: by the solver alone, \

@@ -27,7 +27,7 @@ pub const MESH: Case = Case {
 };
 
 /// Figures 8.7 and 8.8.
-pub const INJECTION: Case = Case {
+pub(crate) const INJECTION: Case = Case {
     id: "fig-8.8",
     title: "Figs. 8.7, 8.8: the lens is folded, injected, and unfolds",
     shows: "The haptics are folded onto the optic, the optic is bent about them, and the lens is pushed through an injector into \

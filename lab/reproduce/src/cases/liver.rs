@@ -19,7 +19,7 @@ use crate::picture::{Body, View, figure};
 use crate::{largest, law, relaxed, run};
 
 /// Figure 6.10.
-pub const CASE: Case = Case {
+pub(crate) const CASE: Case = Case {
     id: "fig-6.10",
     title: "Fig. 6.10: stress in a stretched liver, elastic and relaxed",
     shows: "The von Mises stress in a liver pulled by one lobe, with fibres along one axis: without viscoelasticity \

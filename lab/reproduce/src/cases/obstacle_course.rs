@@ -14,7 +14,7 @@ use crate::plot::{Curve, Key, Pen, Plot};
 use crate::shells::{CLAMPED, FLAT, Specimen, THESIS, sheet, symmetry};
 
 /// The obstacle course.
-pub const CASE: Case = Case {
+pub(crate) const CASE: Case = Case {
     id: "obstacle-course",
     title: "The obstacle course of shell elements",
     shows: "The thesis tests one plate on one mesh. Six problems distinguish shell elements on increasingly fine meshes: bending \

@@ -28,7 +28,7 @@ const PRINTED: [f64; 5] = [0.1218, 0.2475, 0.3747, 0.5050, 0.6374];
 pub const LARGE: [f64; 5] = [0.0890, 0.1310, 0.1588, 0.1801, 0.1977];
 
 /// Table 8.1.
-pub const CASE: Case = Case {
+pub(crate) const CASE: Case = Case {
     id: "table-8.1",
     title: "Table 8.1: a clamped plate under uniform load",
     shows: "The deflection in the middle of a square plate, clamped on all sides, under 1 to 5 Pa. The thesis prints 0.1218 to \

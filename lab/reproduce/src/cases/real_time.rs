@@ -17,7 +17,7 @@ use crate::cases::told;
 use crate::picture::{Body, View, figure};
 
 /// Figure 6.8.
-pub const CASE: Case = Case {
+pub(crate) const CASE: Case = Case {
     id: "fig-6.8",
     title: "Fig. 6.8: tissue in real time",
     shows: "A cube of 55,566 brain-like tetrahedra, one face stretched by 0 to 40 % to and fro, in steps of 0.7 ms, is drawn \

@@ -37,7 +37,7 @@ pub const CAPSULE: Case = Case {
 };
 
 /// Figure 9.3.
-pub const ANEURYSM: Case = Case {
+pub(crate) const ANEURYSM: Case = Case {
     id: "fig-9.3",
     title: "Fig. 9.3: an aneurysm by 772 shells",
     shows: "An aneurysm of 28,368 triangles (a), and the distance of 772 shells from it (b).",

@@ -24,7 +24,7 @@ pub const FROM: f64 = 0.7;
 const SOURCE: &str = "quasi-static, quadratic hexahedra n = 4, felupe";
 
 /// Figure 6.6.
-pub const CASE: Case = Case {
+pub(crate) const CASE: Case = Case {
     id: "fig-6.6",
     title: "Fig. 6.6: reaction of the compressed cube over time",
     shows: "The force on the platens rises during the compression by 30 % in 0.5 s, and decays afterwards. Fibres \

@@ -58,7 +58,7 @@ pub const ELASTIC: Case = Case {
 };
 
 /// Figure 6.4.
-pub const VISCOELASTIC: Case = Case {
+pub(crate) const VISCOELASTIC: Case = Case {
     id: "fig-6.4",
     title: "Fig. 6.4: S₁₁ in simple shear at three rates",
     shows: "The viscoelastic stress S₁₁ at shear rates of 2.5, 0.25 and 0.025/s lies on the analytic lines, between the \

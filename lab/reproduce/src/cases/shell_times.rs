@@ -25,7 +25,7 @@ const SIZES: [(usize, usize); 6] =
     [(200, 50), (800, 50), (4000, 50), (10_000, 25), (20_000, 15), (50_000, 8)];
 
 /// Figure 9.4.
-pub const CASE: Case = Case {
+pub(crate) const CASE: Case = Case {
     id: "fig-9.4",
     title: "Fig. 9.4: time of a step by the number of shells",
     shows: "Time of an implicit step of 40 ms of 200 to 1,000 shells under pressure, with conjugate gradients. On a CPU of 2010 \

@@ -27,7 +27,7 @@ impl<'a> Numbers<'a> {
         self.cursor.place()
     }
 
-    pub fn is_binary(&self) -> bool {
+    pub(crate) fn is_binary(&self) -> bool {
         self.encoding != Encoding::Text
     }
 

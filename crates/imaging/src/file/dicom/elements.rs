@@ -172,14 +172,14 @@ impl<'a> Elements<'a> {
         }
     }
 
-    pub fn require_uncompressed(&self) -> Result<(), ImageProblem> {
+    pub(crate) fn require_uncompressed(&self) -> Result<(), ImageProblem> {
         let Some(syntax) = &self.compressed else { return Ok(()) };
         let what = format!("a slice in transfer syntax {syntax} (compressed)");
         Err(ImageProblem::Unsupported { what, remedy: DECOMPRESS })
     }
 
     /// An error for pixels that are not one uncompressed grey or label value each.
-    pub fn require_plain(&self) -> Result<(), ImageProblem> {
+    pub(crate) fn require_plain(&self) -> Result<(), ImageProblem> {
         self.require_uncompressed()?;
         let samples = self.short(0x0028_0002, "SamplesPerPixel")?;
         let meaning = self.text(0x0028_0004).unwrap_or_default();

@@ -7,7 +7,7 @@ use pliant_picture::{Camera, Projection};
 use crate::window::App;
 
 /// Pixels on the body, and the triangles that cover them, far from all edges.
-pub fn known_pixels(app: &App) -> impl Iterator<Item = (Pos2, u32)> + '_ {
+pub(crate) fn known_pixels(app: &App) -> impl Iterator<Item = (Pos2, u32)> + '_ {
     let rect = app.port.rect;
     let aspect = f64::from(rect.width() / rect.height());
     // Halton's sequence over the picture.
@@ -17,7 +17,7 @@ pub fn known_pixels(app: &App) -> impl Iterator<Item = (Pos2, u32)> + '_ {
 }
 
 /// The place of the pixel of that number.
-pub fn known_place(app: &App, number: usize) -> Pos2 {
+pub(crate) fn known_place(app: &App, number: usize) -> Pos2 {
     known_pixels(app).nth(number).expect("the body covers so many pixels").0
 }
 
