@@ -100,6 +100,39 @@ every = 0.004
 probes.middle = { on = "block", at = [0.05, 0.05, 0.05] }
 "#;
 
+/// A strip of 100 by 20 by 2 mm that is held at one end and bends under its weight: `body` has its keys of mesh and model
+/// (see [`SHELL`], [`HEXES`]), `run` those of the table `[run]`.
+pub fn strip(body: &str, run: &str) -> String {
+    format!(
+        r#"[scene]
+until = 100
+gravity = [0, 0, -9.81]
+[law.wall]
+type = "neo-hookean"
+young-modulus = 1e6
+poisson-ratio = 0.4
+[body.strip]
+{body}
+law = "wall"
+density = 1000
+damping = 20
+[constraint.end]
+type = "fix"
+body = "strip"
+nodes = {{ set = "x-min" }}
+[run]
+{run}
+"#
+    )
+}
+
+/// Keys of a [`strip`] of shells.
+pub const SHELL: &str =
+    "model = 'shell'\nmesh = { plate = { size = [0.1, 0.02] }, edge = 0.01 }\nthickness = 0.002";
+
+/// Keys of a [`strip`] of hexes that are integrated in full.
+pub const HEXES: &str = "mesh = { block = { size = [0.1, 0.02, 0.002], cells = [10, 2, 1] }, as = 'hexes' }\nelement = 'hex8-full'";
+
 /// A scene with a body from a mesh file.
 pub const FROM_FILE: &str = r#"[scene]
 until = 0.01

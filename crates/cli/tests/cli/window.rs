@@ -53,8 +53,8 @@ impl Drop for Screen {
 
 /// A window whose pixels take a software adapter little time.
 const SMALL: &[&str] = &["--size", "800x600"];
-/// In such a window: how far below its top a row of buttons lies, and a place on the ball.
-const BUTTONS: i16 = 12;
+/// In such a window: the button that copies the view, and a place on the ball.
+const COPY_VIEW: [i16; 2] = [45, 35];
 const MIDDLE: [i16; 2] = [270, 240];
 
 fn view(workshop: &Workshop, screen: &Screen, more: &[&str]) -> Said {
@@ -164,15 +164,14 @@ fn mouse_and_keys_of_a_screen_lead_the_window() {
     until("it plays", &mut window, || read().is_some_and(|recording| recording.steps > 0));
     let input = Input::new(&screen);
 
-    // The button is somewhere in the row above the picture.
     let clipboard = input.atom("CLIPBOARD");
     let owner = || input.connection.get_selection_owner(clipboard).unwrap().reply().unwrap().owner;
-    let mut places = (0..).map(|number| [760 - 25 * (number % 20), BUTTONS]);
     until("a button copies the view", &mut window, || {
-        input.go(places.next().unwrap());
+        input.go(COPY_VIEW);
+        std::thread::sleep(Duration::from_millis(500));
         input.button(true);
         input.button(false);
-        std::thread::sleep(Duration::from_millis(100));
+        std::thread::sleep(Duration::from_millis(500));
         owner() != x11rb::NONE
     });
 

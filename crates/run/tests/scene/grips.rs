@@ -9,34 +9,11 @@ use pliant_run::Live;
 use pliant_scene::World;
 use pliant_testing::scenes;
 
-const STRIP: &str = r#"
-[scene]
-until = 10
-gravity = [0, 0, -9.81]
-[law.wall]
-type = "neo-hookean"
-young-modulus = 1e6
-poisson-ratio = 0.4
-[body.strip]
-BODY
-law = "wall"
-density = 1000
-damping = 20
-[constraint.end]
-type = "fix"
-body = "strip"
-nodes = { set = "x-min" }
-"#;
-
-const SHELL: &str =
-    "model = 'shell'\nmesh = { plate = { size = [0.1, 0.02] }, edge = 0.01 }\nthickness = 0.002";
-const SOLID: &str = "mesh = { block = { size = [0.1, 0.02, 0.002], cells = [10, 2, 1] }, as = 'hexes' }\nelement = 'hex8-full'";
-
 /// The weight of both [N].
 const WEIGHT: f64 = 9.81 * 1000.0 * 0.1 * 0.02 * 0.002;
 
 fn world(body: &str, solver: &str) -> Arc<World> {
-    Arc::new(scenes::world(&(STRIP.replace("BODY", body) + "[run]\n" + solver)).unwrap())
+    Arc::new(scenes::world(&scenes::strip(body, solver)).unwrap())
 }
 
 /// The free end of the strip, lifted by a spring from where it is.
@@ -55,11 +32,11 @@ fn lifted(world: &World, live: &Live, stiffness: f64, by: f64) -> Grip {
 fn the_clamp_holds_against_hand_and_weight() {
     let (implicit, still) = ("solver = 'implicit'\nstep = 0.01", "solver = 'static'\nload-steps = 10");
     for (body, solver, steps) in [
-        (SHELL, implicit, 400),
-        (SHELL, still, 10),
-        (SHELL, "", 40_000),
-        (SOLID, implicit, 400),
-        (SOLID, still, 10),
+        (scenes::SHELL, implicit, 400),
+        (scenes::SHELL, still, 10),
+        (scenes::SHELL, "", 40_000),
+        (scenes::HEXES, implicit, 400),
+        (scenes::HEXES, still, 10),
     ] {
         let world = world(body, solver);
         let mut live = Live::new(&world).unwrap();
@@ -84,7 +61,7 @@ fn the_clamp_holds_against_hand_and_weight() {
 
 #[test]
 fn what_is_let_go_of_comes_back() {
-    let world = world(SHELL, "solver = 'implicit'\nstep = 0.01");
+    let world = world(scenes::SHELL, "solver = 'implicit'\nstep = 0.01");
     let settle = |live: &mut Live| {
         (0..400).for_each(|_| assert_eq!(live.simulation.step(1).unwrap(), 1));
         live.mesh().unwrap().point_data["displacement"].values.clone()

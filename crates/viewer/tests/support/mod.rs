@@ -8,6 +8,7 @@ use pliant_format::Scene;
 use pliant_format::source::Source;
 use pliant_picture::Subject;
 use pliant_scene::World;
+use pliant_testing::scenes;
 use pliant_viewer::{Frame, Session};
 
 /// A ball held at one end.
@@ -40,30 +41,8 @@ nodes = { half-space = { point = [-0.095, 0, 0], normal = [-1, 0, 0] } }
 
 /// A strip of a shell, held at one end, with a solver of shells.
 pub fn shell(solver: &str) -> World {
-    let text = r#"
-[scene]
-until = 100
-gravity = [0, 0, -9.81]
-[law.wall]
-type = "neo-hookean"
-young-modulus = 1e6
-poisson-ratio = 0.4
-[body.strip]
-model = "shell"
-mesh = { plate = { size = [0.1, 0.02] }, edge = 0.01 }
-law = "wall"
-density = 1000
-thickness = 0.002
-damping = 20
-[constraint.end]
-type = "fix"
-body = "strip"
-nodes = { set = "x-min" }
-[run]
-threads = 1
-"#;
     let more = if solver == "static" { "load-steps = 10\n" } else { "" };
-    world(&format!("{text}solver = '{solver}'\n{more}"))
+    world(&scenes::strip(scenes::SHELL, &format!("threads = 1\nsolver = '{solver}'\n{more}")))
 }
 
 pub fn world(text: &str) -> World {
