@@ -306,14 +306,14 @@ impl Passage {
             return end;
         }
         let least = self.half_thinnest.max(way / MOST_PARTS);
-        let mut share = 0.0;
-        while share < 1.0 {
-            let stance = self.at(share);
-            let place = now.lerp(predicted, share);
+        let mut time_fraction = 0.0;
+        while time_fraction < 1.0 {
+            let stance = self.at(time_fraction);
+            let place = now.lerp(predicted, time_fraction);
             let Near { distance, normal: outward } = rigid.near(&stance, &place);
             let gap = distance - offset;
             if gap <= MEETS * self.half_thinnest {
-                let left = if share == 0.0 { LEFT * gap.min(0.0) } else { 0.0 };
+                let left = if time_fraction == 0.0 { LEFT * gap.min(0.0) } else { 0.0 };
                 let onward = self.poses[1] * stance.pose.inverse();
                 let normal = onward.rotation * outward;
                 if way <= self.half_thinnest && normal.dot(&end.normal) > ALIKE {
@@ -326,7 +326,7 @@ impl Passage {
                     return Near { distance: distance - left, normal };
                 }
             }
-            share += gap.max(least) / way;
+            time_fraction += gap.max(least) / way;
         }
         end
     }
@@ -362,9 +362,9 @@ impl Passage {
         Stance { pose: self.poses[0], growth: self.growth[0] }
     }
 
-    /// The same after a share of it.
-    fn at(&self, share: f64) -> Stance {
-        Stance::between([&self.before(), &self.stance()], share)
+    /// The same after a fraction of its time.
+    fn at(&self, time_fraction: f64) -> Stance {
+        Stance::between([&self.before(), &self.stance()], time_fraction)
     }
 }
 

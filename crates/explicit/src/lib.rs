@@ -32,6 +32,7 @@
 
 mod applied;
 mod collective;
+mod contact;
 pub mod critical_step;
 mod damping_force;
 mod dynamic_relaxation;
@@ -54,8 +55,8 @@ mod step_error;
 mod stepper;
 mod substeps;
 mod tangent;
-mod touching;
 
+pub use contact::NodeContact;
 pub use damping_force::{DISSIPATION, DampingFactors};
 pub use dynamic_relaxation::{
     Convergence, DynamicRelaxation, Equilibrium, Iteration, RelaxationError, RelaxationSettings, Way,
@@ -70,4 +71,3 @@ pub use state::{State, Work};
 pub use step_control::{Clock, Lengths, StepControl};
 pub use step_error::StepError;
 pub use stepper::{CentralDifference, NO_MASS, Observable, Wanted};
-pub use touching::NodeContact;

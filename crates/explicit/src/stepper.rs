@@ -26,6 +26,7 @@ use rayon::prelude::*;
 
 use crate::applied::AppliedForces;
 use crate::collective::{Collective, Predicted, enclosed};
+use crate::contact::{ContactSolver, Free, NodeContact, Nodes, Posture};
 use crate::damping_force::{DampingFactors, Past};
 use crate::energies::{Sums, model_balance_floor};
 use crate::forces::{Deformed, Found, InternalForces};
@@ -37,7 +38,6 @@ use crate::stability::Monitor;
 use crate::state::State;
 use crate::step_control::{Clock, Lengths, StepControl};
 use crate::step_error::StepError;
-use crate::touching::{Free, NodeContact, Nodes, Posture, Touching};
 
 /// Mass [kg] of a component that is held and of which the mass went elsewhere.
 pub const NO_MASS: f64 = 1e-30;
@@ -132,7 +132,7 @@ macro_rules! stepped_in {
             }
 
             fn contact_nodes(stepper: &CentralDifference<Self>, state: &State<Self>) -> Vec<NodeContact> {
-                stepper.touching.as_ref().map_or_else(Vec::new, |touching| touching.nodal(state))
+                stepper.contact.as_ref().map_or_else(Vec::new, |contact| contact.nodal(state))
             }
         }
     };
@@ -161,7 +161,7 @@ pub struct CentralDifference<R> {
     /// Nodes that are bound to each other.
     collectives: Vec<Collective>,
     /// Contacts with rigid things.
-    touching: Option<Touching<R>>,
+    contact: Option<ContactSolver<R>>,
     /// Whether the highest modes are dissipated.
     dissipates: bool,
     processor: Processor,
@@ -198,12 +198,12 @@ impl<R: SteppedIn> Observable<R> for CentralDifference<R> {
     }
 
     fn contact_forces(&self) -> Vec<Vector<f64>> {
-        let on_nodes = self.touching.iter().flat_map(|touching| &touching.forces);
+        let on_nodes = self.contact.iter().flat_map(|contact| &contact.forces);
         on_nodes.map(|force| force.map(|f| -f)).collect()
     }
 
     fn contact_moments(&self) -> Option<Vec<Vector<f64>>> {
-        let on_nodes = self.touching.iter().flat_map(|touching| &touching.moments);
+        let on_nodes = self.contact.iter().flat_map(|contact| &contact.moments);
         Some(on_nodes.map(|moment| moment.map(|m| -m)).collect())
     }
 
@@ -283,7 +283,7 @@ impl<R: SteppedIn> CentralDifference<R> {
             damping,
             applied,
             collectives: Collective::all(&model),
-            touching: None,
+            contact: None,
             dissipates: false,
             processor: Processor::detect(),
             factors: vec![[[0.0; 2]; 2]; model.constraints.len()],
@@ -322,8 +322,8 @@ impl<R: SteppedIn> CentralDifference<R> {
 
     /// Lets nodes touch rigid things.
     #[must_use]
-    pub fn touching(mut self, contacts: Arc<Contacts>) -> Self {
-        self.touching = Some(Touching::new(contacts, &self.model.rest));
+    pub fn with_contacts(mut self, contacts: Arc<Contacts>) -> Self {
+        self.contact = Some(ContactSolver::new(contacts, &self.model.rest));
         self
     }
 
@@ -333,14 +333,14 @@ impl<R: SteppedIn> CentralDifference<R> {
     /// # Panics
     /// If there are not as many ways as guests.
     pub fn lead_guests(&mut self, times: [f64; 2], ways: &[[Vector<f64>; 2]]) {
-        if let Some(touching) = &mut self.touching {
-            touching.lead(times, ways);
+        if let Some(contact) = &mut self.contact {
+            contact.lead(times, ways);
         }
     }
 
     /// Impulses [N s] of contacts on each guest since it was led, over the steps that have ended.
     pub fn guest_impulses(&self) -> &[Vector<f64>] {
-        self.touching.as_ref().map_or(&[], Touching::impulses)
+        self.contact.as_ref().map_or(&[], ContactSolver::impulses)
     }
 
     /// How another stepper goes on from a state of this one.
@@ -457,10 +457,10 @@ impl<R: SteppedIn> CentralDifference<R> {
             }
         });
         self.model.follow(&mut state.displacement);
-        if let Some(touching) = &mut self.touching {
-            touching.slide(&mut state.slip);
-            state.gripped.append(&mut touching.taken);
-            touching.press_guests(self.lengths.next);
+        if let Some(contact) = &mut self.contact {
+            contact.slide(&mut state.slip);
+            state.gripped.append(&mut contact.taken);
+            contact.press_guests(self.lengths.next);
         }
         if self.damps_by_forces() {
             let [last, before] = &mut state.forces;
@@ -540,7 +540,7 @@ impl<R: SteppedIn> CentralDifference<R> {
 
     /// Adds the forces of contacts, from where nodes would go without them; of their mobility this part counts. Whether there are contacts.
     fn touch(&mut self, state: &mut State<R>, part: f64) -> bool {
-        let Some(mut touching) = self.touching.take() else { return false };
+        let Some(mut contact) = self.contact.take() else { return false };
         let mut gripped = std::mem::take(&mut state.gripped);
         let mut lags = std::mem::take(&mut state.lags);
         let rest = |node: u32| self.model.rest[node as usize];
@@ -561,7 +561,7 @@ impl<R: SteppedIn> CentralDifference<R> {
             Free { then: add(rest(node), displacement), mobility: moves }
         };
         let times = [state.time, state.time + self.lengths.next];
-        touching.lag(&mut lags, times, |rigid| state.leg(rigid));
+        contact.lag(&mut lags, times, |rigid| state.leg(rigid));
         let postures = |number: usize, rigid: &Rigid| {
             let leg = state.leg(number);
             let lag = lags.iter().find(|lag| lag.number() == number);
@@ -572,11 +572,11 @@ impl<R: SteppedIn> CentralDifference<R> {
             };
             Posture { stances: [stance(0), stance(1)], opening: rigid.posture(times[1], leg).1 }
         };
-        touching.find(postures, &now, times, free, &mut gripped);
-        touching.nodal_forces().for_each(|(node, force)| self.applied.add(node, force));
-        touching.bear_on(&mut lags);
+        contact.find(postures, &now, times, free, &mut gripped);
+        contact.nodal_forces().for_each(|(node, force)| self.applied.add(node, force));
+        contact.bear_on(&mut lags);
         (state.gripped, state.lags) = (gripped, lags);
-        self.touching = Some(touching);
+        self.contact = Some(contact);
         true
     }
 

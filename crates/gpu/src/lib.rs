@@ -73,7 +73,7 @@
 //!
 //! # Contact
 //!
-//! [`GpuStepper::touching`] lets nodes, and points on faces, touch rigid things, other bodies and themselves as `touching.rs` does on the CPU. Where a node would go
+//! [`GpuStepper::with_contacts`] lets nodes, and points on faces, touch rigid things, other bodies and themselves as `contact.rs` does on the CPU. Where a node would go
 //! without contact is found before the node pass, from the forces of cells; a group solves the rows of points that share nodes, colour by
 //! colour and level by level; the node pass takes the forces. The ways of tools in a step are numbers of its row of the table. [`processor_only`] names what is
 //! not there.

@@ -114,7 +114,7 @@ impl GpuShells {
             (model.facets.is_empty() || !model.solids.is_empty(), "a solid beside explicit shells"),
             (!model.springs.is_empty(), "a spring on explicit shells"),
             (!model.ties.is_empty() || !model.turns.is_empty(), "a tie of explicit shells"),
-            (model.touching.is_some(), "contact of explicit shells"),
+            (model.contact.is_some(), "contact of explicit shells"),
             (!model.force_limits.is_empty(), "a motion of explicit shells with limited force"),
             (model.stiffness_damping > 0.0, "damping by stiffness of explicit shells"),
         ];

@@ -99,7 +99,7 @@ fn method_of(bodies: &Arc<ImplicitBodies>, run: &RunTable, plan: &Plan) -> Metho
 
 /// Iterations of Newton's method at most: those that are given, or the usual ones; more in contact.
 fn iterations(bodies: &ImplicitBodies, run: &RunTable, usual: usize) -> usize {
-    let usual = if bodies.model.touching.is_some() { IN_CONTACT } else { usual };
+    let usual = if bodies.model.contact.is_some() { IN_CONTACT } else { usual };
     run.iterations.map_or(usual, |n| n as usize)
 }
 

@@ -106,7 +106,7 @@ impl ImplicitBodies {
             ("creases".into(), fingerprint(&(&model.normals, &model.corner_normals))),
             (
                 "barriers of contacts".into(),
-                fingerprint(&model.touching.as_ref().map(|touching| &touching.settings)),
+                fingerprint(&model.contact.as_ref().map(|contact| &contact.settings)),
             ),
             ("rotations that follow solids".into(), fingerprint(&turns)),
             ("damping by stiffness".into(), fingerprint(&model.stiffness_damping)),

@@ -68,7 +68,7 @@ pub(crate) fn on_device(part: &Part, state: &State<f32>) -> Option<Result<Box<dy
     let device = settings.device.as_ref()?;
     let (model, step, design) = (Arc::clone(&part.model), part.steps.step, settings.design);
     let stepper = match &settings.contacts {
-        Some(contacts) => GpuStepper::touching(device, model, Arc::clone(contacts), step, design),
+        Some(contacts) => GpuStepper::with_contacts(device, model, Arc::clone(contacts), step, design),
         None => GpuStepper::new(device, model, step, design),
     };
     Some(stepper.map_err(|error| Failure::device(&error, None)).map(|stepper| {

@@ -141,7 +141,7 @@ impl Method {
         match self {
             Self::Explicit(explicit) => explicit.contacts.as_ref(),
             Self::Static(bodies, _) | Self::Implicit(bodies, _) => {
-                bodies.model.touching.as_ref().map(|touching| &touching.contacts)
+                bodies.model.contact.as_ref().map(|contact| &contact.contacts)
             }
             _ => None,
         }

@@ -156,7 +156,7 @@ pub(crate) fn on_cpu<R: Scalar>(part: &Part) -> Result<Box<dyn Solver<R>>, Failu
             let stepper =
                 CentralDifference::new(model(), part.steps.step).map_err(contradicting)?.dissipating();
             let stepper = match &settings.contacts {
-                Some(contacts) => stepper.touching(Arc::clone(contacts)),
+                Some(contacts) => stepper.with_contacts(Arc::clone(contacts)),
                 None => stepper,
             };
             match settings.monitor(&part.model) {

@@ -15,7 +15,7 @@ use pliant_contact::touch::{Contact, Contacts, Rigid, Touch, With};
 use pliant_explicit::critical_step::assembled;
 use pliant_explicit::{CentralDifference, Observable, State};
 use pliant_implicit::AssemblySolver;
-use pliant_implicit::{Assembly, StaticSettings, Statics, Touching};
+use pliant_implicit::{Assembly, ContactModel, StaticSettings, Statics};
 use pliant_mechanics::Model;
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
@@ -163,7 +163,7 @@ fn pressed(
     let outer = triangles.iter().copied().filter(own).collect();
     let contacts = vec![contact(&around, outer), contact(&pole, Vec::new())];
     let contacts = Arc::new(Contacts { rigids: vec![tool.clone()], contacts, ..Default::default() });
-    let mut stepper = CentralDifference::<f64>::new(model.clone(), step).unwrap().touching(contacts);
+    let mut stepper = CentralDifference::<f64>::new(model.clone(), step).unwrap().with_contacts(contacts);
     let mut state = State::at_rest(&model);
     let force =
         |stepper: &CentralDifference<f64>, which: usize| 4.0 * stepper.contact_forces()[which][2].abs();
@@ -224,11 +224,11 @@ fn pressed_at_a_barrier(quarter: &Quarter, depths: &[f64], near_pole: f64) -> Ve
     let settings = BarrierSettings { distance: BARRIER, stiffness: 1e4, creep_speed: 1e-3 };
     let model = Assembly {
         rotary_inertia: vec![0.0; quarter.model.rest.len()],
-        touching: Some(Touching {
+        contact: Some(ContactModel {
             contacts,
             settings: vec![settings],
             levels: Vec::new(),
-            check_crossings: false,
+            check_intersections: false,
         }),
         model: Arc::new(quarter.model.clone()),
         ..Assembly::default()
@@ -244,7 +244,7 @@ fn pressed_at_a_barrier(quarter: &Quarter, depths: &[f64], near_pole: f64) -> Ve
             let until = f64::from(time) - 1.0 + f64::from(part) / parts;
             iterations += solver.solve(&mut state, until).unwrap().residuals.len();
         }
-        let now = solver.touching().unwrap().now();
+        let now = solver.contact().unwrap().now();
         let mut radii = [0.0_f64, f64::INFINITY];
         for &node in nodes.iter().filter(|&&node| model.rest[node as usize][1].abs() < 1e-9) {
             let from_axis = radius(state.position[node as usize].into());

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
-use pliant_contact::barrier::advance::Kind;
+use pliant_contact::barrier::ccd::Kind;
 use pliant_format::{Scene, open};
 use pliant_geometry::{CellKind, Mesh};
 use pliant_scene::World;

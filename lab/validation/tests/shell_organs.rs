@@ -12,7 +12,7 @@ use pliant_contact::touch::{Contact, Contacts, Touch, With};
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3, io};
 use pliant_implicit::AssemblySolver;
 use pliant_implicit::{
-    Assembly, BackwardEuler, DynamicSettings, Shell, State, StaticSettings, Statics, Touching,
+    Assembly, BackwardEuler, ContactModel, DynamicSettings, Shell, State, StaticSettings, Statics,
 };
 use pliant_linear::{LinearSolver, Preconditioner};
 use pliant_mechanics::curve::{Curve, Shape};
@@ -486,11 +486,11 @@ fn valve_leaflets_coapt_and_hold_their_pressure() {
         touch: Touch { friction: 0.0, offset: LEAFLET },
     };
     let settings = BarrierSettings { distance: barrier, stiffness: 1e5, creep_speed: 1e-3 };
-    valve.model.touching = Some(Touching {
+    valve.model.contact = Some(ContactModel {
         contacts: Arc::new(Contacts { rigids: Vec::new(), contacts: vec![contact], ..Default::default() }),
         settings: vec![settings],
         levels: Vec::new(),
-        check_crossings: true,
+        check_intersections: true,
     });
     let settings = DynamicSettings { iterations: 200, ..DynamicSettings::new(2e-3) };
     let mut solver = BackwardEuler::new(valve.model.clone(), settings).unwrap();
@@ -503,7 +503,7 @@ fn valve_leaflets_coapt_and_hold_their_pressure() {
         iterations += made.residuals.len();
         if state.time >= told {
             told += 0.05;
-            let now = solver.touching().unwrap().now();
+            let now = solver.contact().unwrap().now();
             println!(
                 "{:.3} s: {} nodes touch, least gap {:.1e} m, open {:.3}, {iterations} iterations, {:.0} s",
                 state.time,
@@ -514,7 +514,7 @@ fn valve_leaflets_coapt_and_hold_their_pressure() {
             );
         }
     }
-    let now = solver.touching().unwrap().now();
+    let now = solver.contact().unwrap().now();
     let touching: Vec<u32> = now.nodes.iter().map(|own| own.node).collect();
     let loose = |n: &&u32| valve.held.binary_search(n).is_err();
     let free: Vec<u32> = valve.free.iter().filter(loose).copied().collect();

@@ -2,12 +2,12 @@
 
 use nalgebra::Vector3;
 
-use super::advance::{Kind, Query, allowed};
+use super::broad_phase::{Apart, BroadPhase, ROUND_OFF, Sort, common, other};
+use super::ccd::{Kind, Query, collision_free_fraction};
+use super::collision_mesh::CollisionMesh;
+use super::collisions::{Mollified, NormalCollision, Stencil};
 use super::distance::Mollifier;
 use super::law::{Barrier, Slip};
-use super::rows::{Mollified, Row, Stencil};
-use super::surfaces::BarrierSide;
-use super::wide::{Apart, ROUND_OFF, Sort, Wide, common, other};
 
 /// The reach of parts of one surface that are nearer at rest than that of the contact, over their distance at rest.
 const NEAR: f64 = 0.98;
@@ -44,7 +44,7 @@ struct Candidate {
 
 /// How a contact acts.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Action {
+pub(super) struct ContactParameters {
     /// The distance [m] that surfaces keep, with the radius of a rigid thing that is a point or an edge.
     pub kept: f64,
     /// How far [m] the surface of a rigid thing is outside of that of its shape now.
@@ -60,7 +60,7 @@ pub(super) struct Action {
     pub slip: Slip,
 }
 
-impl Action {
+impl ContactParameters {
     /// The distance ξ [m] below which primitives are in each other.
     pub fn offset(&self) -> f64 {
         self.kept + self.growth
@@ -86,9 +86,15 @@ impl Action {
     }
 
     /// What a distance below the reach makes of a pair; `None` if it is none.
-    pub fn row(&self, stencil: Stencil, area: f64, distance: f64, normal: Vector3<f64>) -> Option<Row> {
+    pub fn collision(
+        &self,
+        stencil: Stencil,
+        area: f64,
+        distance: f64,
+        normal: Vector3<f64>,
+    ) -> Option<NormalCollision> {
         let gap = distance - self.offset();
-        (gap < self.law.distance).then(|| Row {
+        (gap < self.law.distance).then(|| NormalCollision {
             stencil,
             normal,
             distance,
@@ -109,13 +115,13 @@ pub(super) struct Group {
     /// The contact, by its number.
     pub number: u32,
     /// Two surfaces, or one that touches itself.
-    pub sides: Vec<BarrierSide>,
+    pub sides: Vec<CollisionMesh>,
     /// The rigid thing whose distance nodes of the first keep, by its number.
     pub wall: Option<u32>,
     /// The rigid thing of the second, if there is one, by its number; and by how much [m] its surface rises in the motion that is set.
     pub thing: Option<u32>,
     pub rise: f64,
-    pub action: Action,
+    pub parameters: ContactParameters,
     /// Of one surface: places of its nodes at rest [m]; nodes with triangles, and edges, that are in one place there.
     rest: Vec<Vector3<f64>>,
     apart: [Apart; 2],
@@ -125,7 +131,7 @@ pub(super) struct Group {
     bins: Vec<u32>,
     unsorted: Vec<Candidate>,
     /// Pairs that candidates are chosen from.
-    wide: Wide,
+    broad_phase: BroadPhase,
     /// The course [m] for which pairs were listed: a motion of all nodes, less what they have in common; and how much of it they have gone.
     course: Vec<Vector3<f64>>,
     gone: f64,
@@ -145,28 +151,28 @@ pub(super) struct Group {
 impl Group {
     pub fn new(
         number: u32,
-        sides: Vec<BarrierSide>,
+        sides: Vec<CollisionMesh>,
         [wall, thing]: [Option<u32>; 2],
-        action: Action,
+        parameters: ContactParameters,
         rest: &[Vector3<f64>],
     ) -> Self {
         let place = |node: u32| rest[node as usize];
         let edge = sides[0].mean_edge(place);
-        let longest = if sides.len() == 1 { edge } else { (SKINS[1] * action.law.distance).max(edge) };
-        let wide = Wide::new(&sides, rest.len());
+        let longest = if sides.len() == 1 { edge } else { (SKINS[1] * parameters.law.distance).max(edge) };
+        let broad_phase = BroadPhase::new(&sides, rest.len());
         let mut group = Self {
             number,
             sides,
             wall,
             thing,
             rise: 0.0,
-            action,
+            parameters,
             rest: Vec::new(),
             apart: Default::default(),
             candidates: Vec::new(),
             bins: Vec::new(),
             unsorted: Vec::new(),
-            wide,
+            broad_phase,
             course: vec![Vector3::zeros(); rest.len()],
             gone: 0.0,
             skin: vec![0.0; rest.len()],
@@ -179,8 +185,8 @@ impl Group {
         };
         if group.sides.len() == 1 {
             group.rest = rest.to_vec();
-            let near = IN_ONE_PLACE * group.action.law.distance;
-            let [points, edges] = group.wide.within(&mut group.sides, rest, near);
+            let near = IN_ONE_PLACE * group.parameters.law.distance;
+            let [points, edges] = group.broad_phase.within(&mut group.sides, rest, near);
             let side = &group.sides[0];
             group.apart = [Apart::new(points, side.points.len()), Apart::new(edges, side.edges.len())];
         }
@@ -197,12 +203,12 @@ impl Group {
         let common = common(&self.sides, |node| motion[node as usize]);
         let Self { sides, course, skin, whole, .. } = self;
         let nodes = || {
-            let of = |side: &BarrierSide| if side.is_rigid { SKIN[1] } else { SKIN[0] };
+            let of = |side: &CollisionMesh| if side.is_rigid { SKIN[1] } else { SKIN[0] };
             sides.iter().flat_map(move |side| side.points.iter().map(move |&node| (node as usize, of(side))))
         };
         let longest = nodes().map(|(node, _)| (motion[node] - common).norm()).fold(0.0, f64::max);
         let part = if longest > self.longest { self.longest / longest } else { 1.0 };
-        let least = SKINS[0] * self.action.law.distance;
+        let least = SKINS[0] * self.parameters.law.distance;
         for (node, times) in nodes() {
             course[node] = (motion[node] - common) * part;
             let way = course[node].norm();
@@ -211,55 +217,65 @@ impl Group {
         }
         self.moved.fill(0.0);
         (self.gone, self.nearer) = (0.0, 0.0);
-        self.find(place, self.action.reach() + self.rise.max(0.0));
+        self.find(place, self.parameters.reach() + self.rise.max(0.0));
         part
     }
 
     /// Lists what is within a distance [m] and the skins of both.
     fn find(&mut self, place: &[Vector3<f64>], within: f64) {
-        let Self { sides, course, skin, whole, rest, apart, unsorted, wide, action, .. } = self;
+        let Self { sides, course, skin, whole, rest, apart, unsorted, broad_phase, parameters, .. } = self;
         unsorted.clear();
         let mut largest: f64 = 0.0;
-        wide.each(sides, apart, place, whole, [within, action.law.distance], |sides, sort, numbers, most| {
-            let (kind, nodes) = (sort.kind(), sort.nodes(sides, numbers));
-            // Neighbours go along with each other, whatever the length of their course.
-            let nearing = kind.nearing(nodes.map(|node| &course[node as usize]));
-            let limit = most.min(within + nearing + kind.reach(nodes.map(|node| skin[node as usize])));
-            let points = nodes.map(|node| &place[node as usize]);
-            if kind.is_beyond(points, limit * (1.0 + ROUND_OFF)) {
-                return;
-            }
-            let distance = kind.distance(&points.map(|point| *point));
-            if distance >= limit {
-                return;
-            }
-            let [first, second] = numbers.map(|number| number as usize);
-            let (area, threshold) = match sort {
-                Sort::Point(side) if sides[side].is_rigid => (other(sides, side).face_areas[second], 0.0),
-                Sort::Point(side) => (0.25 * sides[side].point_areas[first], 0.0),
-                Sort::Edges => {
-                    let (side, against) = (&sides[0], other(sides, 0));
-                    let own = side.edge_areas[first];
-                    let area = match against.is_rigid {
-                        true => own,
-                        false => 0.25 * (own + against.edge_areas[second]),
-                    };
-                    (area, Mollifier::threshold([side.squares[first], against.squares[second]]))
+        broad_phase.each(
+            sides,
+            apart,
+            place,
+            whole,
+            [within, parameters.law.distance],
+            |sides, sort, numbers, most| {
+                let (kind, nodes) = (sort.kind(), sort.nodes(sides, numbers));
+                // Neighbours go along with each other, whatever the length of their course.
+                let nearing = kind.nearing(nodes.map(|node| &course[node as usize]));
+                let limit = most.min(within + nearing + kind.reach(nodes.map(|node| skin[node as usize])));
+                let points = nodes.map(|node| &place[node as usize]);
+                if kind.is_beyond(points, limit * (1.0 + ROUND_OFF)) {
+                    return;
                 }
-            };
-            let in_order = sort != Sort::Point(1);
-            largest = largest.max(nearing);
-            let most =
-                if rest.is_empty() { f64::INFINITY } else { at_rest(kind, nodes, rest, action.reach()) };
-            unsorted.push(Candidate { kind, nodes, area, threshold, distance, nearing, in_order, most });
-        });
+                let distance = kind.distance(&points.map(|point| *point));
+                if distance >= limit {
+                    return;
+                }
+                let [first, second] = numbers.map(|number| number as usize);
+                let (area, threshold) = match sort {
+                    Sort::Point(side) if sides[side].is_rigid => (other(sides, side).face_areas[second], 0.0),
+                    Sort::Point(side) => (0.25 * sides[side].point_areas[first], 0.0),
+                    Sort::Edges => {
+                        let (side, against) = (&sides[0], other(sides, 0));
+                        let own = side.edge_areas[first];
+                        let area = match against.is_rigid {
+                            true => own,
+                            false => 0.25 * (own + against.edge_areas[second]),
+                        };
+                        (area, Mollifier::threshold([side.squares[first], against.squares[second]]))
+                    }
+                };
+                let in_order = sort != Sort::Point(1);
+                largest = largest.max(nearing);
+                let most = if rest.is_empty() {
+                    f64::INFINITY
+                } else {
+                    at_rest(kind, nodes, rest, parameters.reach())
+                };
+                unsorted.push(Candidate { kind, nodes, area, threshold, distance, nearing, in_order, most });
+            },
+        );
         self.nearing = largest;
         self.sort();
     }
 
     /// The bin of a distance [m].
     fn bin(&self, distance: f64) -> usize {
-        ((distance / (BIN * self.action.law.distance)) as usize).min(BINS)
+        ((distance / (BIN * self.parameters.law.distance)) as usize).min(BINS)
     }
 
     /// Puts candidates into their bins.
@@ -295,7 +311,7 @@ impl Group {
     /// The sum [m] of the largest of some lengths on either side.
     fn largest_of(&self, lengths: &[f64]) -> f64 {
         let of =
-            |side: &BarrierSide| side.points.iter().map(|&node| lengths[node as usize]).fold(0.0, f64::max);
+            |side: &CollisionMesh| side.points.iter().map(|&node| lengths[node as usize]).fold(0.0, f64::max);
         match &self.sides[..] {
             [side] => 2.0 * of(side),
             sides => sides.iter().map(of).sum(),
@@ -346,11 +362,11 @@ impl Group {
     }
 
     /// Adds what acts with nodes at the places [m] last taken; false if there is no gap somewhere.
-    pub fn act(&self, place: &[Vector3<f64>], rows: &mut Vec<Row>) -> bool {
-        let reach = self.action.reach();
+    pub fn act(&self, place: &[Vector3<f64>], normal_collisions: &mut Vec<NormalCollision>) -> bool {
+        let reach = self.parameters.reach();
         for one in self.nearer_than(reach) {
-            let action = self.action.within(one.most);
-            let reach = action.reach();
+            let parameters = self.parameters.within(one.most);
+            let reach = parameters.reach();
             if one.distance - self.moved(one) >= reach {
                 continue;
             }
@@ -367,34 +383,35 @@ impl Group {
                 split: one.kind.split() as u8,
                 in_order: one.in_order,
             };
-            let Some(mut row) = action.row(stencil, one.area, near.distance, near.normal) else {
+            let Some(mut collision) = parameters.collision(stencil, one.area, near.distance, near.normal)
+            else {
                 continue;
             };
-            if row.gap <= 0.0 || row.gap.is_nan() {
+            if collision.gap <= 0.0 || collision.gap.is_nan() {
                 return false;
             }
-            row.region = Some(near.region);
+            collision.region = Some(near.region);
             if one.kind == Kind::EdgeEdge {
                 let mollifier = Mollifier::of(&points, one.threshold);
                 if mollifier.value < 1.0 {
-                    row.mollified = Some(Mollified {
+                    collision.mollified = Some(Mollified {
                         threshold: one.threshold,
                         gradient: mollifier.gradient,
-                        energy: row.energy,
-                        force: row.force,
+                        energy: collision.energy,
+                        force: collision.force,
                     });
-                    row.energy *= mollifier.value;
-                    row.force *= mollifier.value;
-                    row.stiffness *= mollifier.value;
+                    collision.energy *= mollifier.value;
+                    collision.force *= mollifier.value;
+                    collision.stiffness *= mollifier.value;
                 }
             }
-            rows.push(row);
+            normal_collisions.push(collision);
         }
         true
     }
 
     /// The part, `most` or less, of a motion [m] from the places [m] last taken that keeps a part of every gap.
-    pub fn allowed(
+    pub fn collision_free_fraction(
         &mut self,
         place: &[Vector3<f64>],
         motion: &[Vector3<f64>],
@@ -406,26 +423,31 @@ impl Group {
         for &node in sides.iter().flat_map(|side| &side.points) {
             way[node as usize] = (motion[node as usize] - common).norm();
         }
-        let (offset, rise) = (self.action.offset(), self.rise);
+        let (offset, rise) = (self.parameters.offset(), self.rise);
         let widest = (self.largest_of(&self.way) + rise.max(0.0)) * most / (1.0 - keep);
         for one in self.nearer_than(offset + widest) {
-            let offset = self.action.within(one.most).offset();
+            let offset = self.parameters.within(one.most).offset();
             let gap = one.distance - self.moved(one) - offset;
             let way = one.kind.reach(one.nodes.map(|node| self.way[node as usize])) + rise.max(0.0);
             if gap * (1.0 - keep) > way * most {
                 continue;
             }
             let [points, ways] = [place, motion].map(|of| one.nodes.map(|node| of[node as usize]));
-            most = most.min(allowed(one.kind, &points, &ways, Query { offset, rise, keep, most }));
+            most = most.min(collision_free_fraction(
+                one.kind,
+                &points,
+                &ways,
+                Query { offset, rise, keep, most },
+            ));
         }
         most
     }
 
     /// Calls back with the nodes of all pairs within the reach of the barrier and a margin [m] more, at the places [m] last taken.
     pub fn pairs(&self, place: &[Vector3<f64>], margin: f64, mut found: impl FnMut(&[u32; 4])) {
-        let reach = self.action.reach() + margin;
+        let reach = self.parameters.reach() + margin;
         let near = |one: &&Candidate| {
-            let reach = self.action.within(one.most).reach() + margin;
+            let reach = self.parameters.within(one.most).reach() + margin;
             one.distance - self.moved(one) < reach
                 && one.kind.nearest(&one.nodes.map(|node| place[node as usize])).distance < reach
         };
@@ -436,7 +458,7 @@ impl Group {
     pub fn too_close(&self, place: &[Vector3<f64>], mut found: impl FnMut([u32; 4], f64)) {
         for one in &self.candidates {
             let distance = one.kind.nearest(&one.nodes.map(|node| place[node as usize])).distance;
-            let gap = distance - self.action.within(one.most).offset();
+            let gap = distance - self.parameters.within(one.most).offset();
             if gap <= 0.0 {
                 found(one.nodes, gap);
             }

@@ -30,19 +30,19 @@ impl Barriers {
         share: impl Fn(u32, &mut dyn FnMut(u32, f64)),
     ) -> Vec<NodeTouch> {
         let mut all: BTreeMap<u32, (f64, Vector3<f64>, [f64; 2])> = BTreeMap::new();
-        for row in self.rows() {
-            let way = self.way(&row.stencil);
-            let (normal, _) = row.pushes();
+        for collision in self.normal_collisions() {
+            let way = self.way(&collision.stencil);
+            let (normal, _) = collision.pushes();
             let slip = (way - normal * normal.dot(&way)).norm();
-            for (at, (node, c)) in row.stencil.parts().enumerate() {
+            for (at, (node, c)) in collision.stencil.parts().enumerate() {
                 if node as usize >= self.node_count() || c == 0.0 {
                     continue;
                 }
-                let push = row.force_on(at);
+                let push = collision.force_on(at);
                 share(node, &mut |node, part| {
                     let own = all.entry(node).or_insert((f64::INFINITY, Vector3::zeros(), [0.0; 2]));
-                    let load = part * c.abs() * row.force;
-                    own.0 = own.0.min(row.gap);
+                    let load = part * c.abs() * collision.force;
+                    own.0 = own.0.min(collision.gap);
                     own.1 += push * part;
                     own.2 = [own.2[0] + load, own.2[1] + load * slip];
                 });

@@ -1,7 +1,7 @@
 //! The contacts of a model by a barrier: their energy, forces and stiffness at a state, friction over a step, and how far a step may go.
 //!
-//! A step goes from one time to another. How far rigid things have gone in it is its *share*, from 0 to 1: on straight ways and shortest arcs
-//! between their poses, and their growth in proportion. Friction of a step is that of the state where [`Barriers::hold`] was called last, with directions and normal forces
+//! A step goes from one time to another. The part of the way that rigid things have gone in it is its *time fraction*, from 0 to 1: on straight ways and shortest arcs
+//! between their poses, and their growth in proportion. Friction of a step is that of the state where [`Barriers::lag`] was called last, with directions and normal forces
 //! as they were there.
 
 use std::collections::BTreeMap;
@@ -9,15 +9,15 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::advance::ADVANCES;
-use super::candidates::{Action, Group};
-use super::crossing::crossings;
-use super::curvature::{Matrix12, bent, block, of_parallel, of_wall};
+use super::candidates::{ContactParameters, Group};
+use super::ccd::ADVANCES;
+use super::collision_mesh::CollisionMesh;
+use super::collisions::{FrictionCollision, NormalCollision, Stencil};
 use super::distance::Nearest;
 use super::features::Features;
+use super::hessian::{Matrix12, bent, block, of_parallel, of_wall};
+use super::intersections::intersections;
 use super::law::{Barrier, Slip};
-use super::rows::{Held, Row, Stencil};
-use super::surfaces::BarrierSide;
 use crate::pose::{Leg, Stance};
 use crate::shape::Near;
 use crate::touch::{Contacts, Passage, With};
@@ -77,10 +77,10 @@ pub struct Barriers {
     legs: BTreeMap<u32, Leg>,
     /// Rigid things beside their trajectories, by their number: how far [m] at the start and the end of the step.
     shifts: Vec<(u32, [Vector3<f64>; 2])>,
-    rows: Vec<Row>,
-    held: Vec<Held>,
+    normal_collisions: Vec<NormalCollision>,
+    friction_collisions: Vec<FrictionCollision>,
     energy: [f64; 2],
-    /// Whether rows are those of the present places.
+    /// Whether collisions are those of the present places.
     is_current: bool,
 }
 
@@ -108,19 +108,19 @@ impl Barriers {
         let at = |node: u32| places[node as usize];
         let mut groups = Vec::new();
         for ((contact, settings), number) in contacts.contacts.iter().zip(settings).zip(0..) {
-            let own = BarrierSide::of_body(&contact.surface, at);
+            let own = CollisionMesh::of_body(&contact.surface, at);
             let mut offset = contact.touch.offset;
             let (sides, wall, thing) = match &contact.with {
                 With::Itself => (vec![own], None, None),
-                With::Body(other) => (vec![own, BarrierSide::of_body(other, at)], None, None),
+                With::Body(other) => (vec![own, CollisionMesh::of_body(other, at)], None, None),
                 With::Rigid(rigid) => {
                     let (features, first) = &features[*rigid];
                     offset += features.offset;
                     let wall = (!features.is_all).then_some(*rigid as u32);
-                    (vec![own, BarrierSide::of_rigid(features, *first)], wall, Some(*rigid as u32))
+                    (vec![own, CollisionMesh::of_rigid(features, *first)], wall, Some(*rigid as u32))
                 }
             };
-            let action = Action {
+            let parameters = ContactParameters {
                 kept: offset,
                 growth: 0.0,
                 law: Barrier { distance: settings.distance },
@@ -129,7 +129,7 @@ impl Barriers {
                 creep_speed: settings.creep_speed,
                 slip: Slip { creep: 0.0 },
             };
-            groups.push(Group::new(number, sides, [wall, thing], action, &places));
+            groups.push(Group::new(number, sides, [wall, thing], parameters, &places));
         }
         Self {
             wall_distances: groups.iter().map(|group| vec![0.0; group.sides[0].points.len()]).collect(),
@@ -144,8 +144,8 @@ impl Barriers {
             place: places,
             legs: BTreeMap::new(),
             shifts: Vec::new(),
-            rows: Vec::new(),
-            held: Vec::new(),
+            normal_collisions: Vec::new(),
+            friction_collisions: Vec::new(),
             energy: [0.0; 2],
             is_current: false,
             contacts,
@@ -197,29 +197,29 @@ impl Barriers {
             }
         }
         for group in &mut self.groups {
-            let action = &mut group.action;
-            action.slip = Slip { creep: action.creep_speed * (to - from) };
+            let parameters = &mut group.parameters;
+            parameters.slip = Slip { creep: parameters.creep_speed * (to - from) };
         }
-        self.held.clear();
+        self.friction_collisions.clear();
         self.is_current = false;
         self.put(position, 0.0);
         self.start.copy_from_slice(&self.place);
         self.list(motion, 1.0, 0.0);
         self.act();
-        self.hold();
+        self.lag();
     }
 
     /// Drops friction until the next step begins: a state by itself has none.
     pub fn drop_friction(&mut self) {
-        self.held.clear();
+        self.friction_collisions.clear();
     }
 
-    /// Puts nodes at places [m], and rigid things where they are at a share of the step.
-    fn put(&mut self, position: &[Vector3<f64>], share: f64) {
+    /// Puts nodes at places [m], and rigid things where they are at a fraction of the step.
+    fn put(&mut self, position: &[Vector3<f64>], time_fraction: f64) {
         let [from, to, now] = &mut self.stances;
         let mut is_current = self.is_current && self.place[..self.nodes] == *position;
         for ((now, from), to) in now.iter_mut().zip(from).zip(to) {
-            let stance = if share == 1.0 { *to } else { Stance::between([from, to], share) };
+            let stance = if time_fraction == 1.0 { *to } else { Stance::between([from, to], time_fraction) };
             is_current &= *now == stance;
             *now = stance;
         }
@@ -232,17 +232,17 @@ impl Barriers {
             *place = (now[*thing as usize].pose * nalgebra::Point3::from(*x)).coords;
         }
         for group in &mut self.groups {
-            group.action.growth = group.thing.map_or(0.0, |thing| now[thing as usize].growth);
+            group.parameters.growth = group.thing.map_or(0.0, |thing| now[thing as usize].growth);
         }
     }
 
-    /// Sets the motions of all nodes: so many parts of one (six numbers a node), and rigid things from the present share to another.
-    fn set_motion(&mut self, motion: &[f64], part: f64, share: f64) {
+    /// Sets the motions of all nodes: so many parts of one (six numbers a node), and rigid things from the present fraction of time to another.
+    fn set_motion(&mut self, motion: &[f64], part: f64, time_fraction: f64) {
         for (own, way) in self.motion.iter_mut().zip(motion.chunks_exact(6)) {
             *own = Vector3::new(way[0], way[1], way[2]) * part;
         }
         let [from, to, now] = &self.stances;
-        let then = |thing: u32| Stance::between([&from[thing as usize], &to[thing as usize]], share);
+        let then = |thing: u32| Stance::between([&from[thing as usize], &to[thing as usize]], time_fraction);
         for (at, (thing, x)) in self.rigid_nodes.iter().enumerate() {
             let target = (then(*thing).pose * nalgebra::Point3::from(*x)).coords;
             self.motion[self.nodes + at] = target - self.place[self.nodes + at];
@@ -252,10 +252,10 @@ impl Barriers {
         }
     }
 
-    /// Lists pairs that may come near during a part of a motion. Rigid things move from this share of the step to its end. Returns the part of
+    /// Lists pairs that may come near during a part of a motion. Rigid things move from this fraction of the step to its end. Returns the part of
     /// the motion for which the lists hold.
-    fn list(&mut self, motion: &[f64], part: f64, share: f64) -> f64 {
-        self.set_motion(motion, part, if share < 1.0 { 1.0 } else { share });
+    fn list(&mut self, motion: &[f64], part: f64, time_fraction: f64) -> f64 {
+        self.set_motion(motion, part, if time_fraction < 1.0 { 1.0 } else { time_fraction });
         self.list_motion()
     }
 
@@ -302,8 +302,8 @@ impl Barriers {
         if std::mem::replace(&mut self.is_current, true) {
             return;
         }
-        let mut rows = std::mem::take(&mut self.rows);
-        rows.clear();
+        let mut normal_collisions = std::mem::take(&mut self.normal_collisions);
+        normal_collisions.clear();
         if !self.lists_hold() {
             // A rigid thing turns on an arc, and a line search may stop on it outside of the lists.
             self.motion.fill(Vector3::zeros());
@@ -312,21 +312,21 @@ impl Barriers {
         let mut apart = true;
         for number in 0..self.groups.len() {
             apart = apart
-                && self.groups[number].act(&self.place, &mut rows)
-                && self.act_at_wall(number, &mut rows);
+                && self.groups[number].act(&self.place, &mut normal_collisions)
+                && self.act_at_wall(number, &mut normal_collisions);
         }
-        self.rows = rows;
-        let energy: f64 = self.rows.iter().map(|row| row.energy).sum();
+        self.normal_collisions = normal_collisions;
+        let energy: f64 = self.normal_collisions.iter().map(|collision| collision.energy).sum();
         self.energy[0] = if apart { energy } else { f64::INFINITY };
     }
 
     /// Adds what acts on nodes at the wall of a contact; false if one has no gap.
-    fn act_at_wall(&self, number: usize, rows: &mut Vec<Row>) -> bool {
+    fn act_at_wall(&self, number: usize, normal_collisions: &mut Vec<NormalCollision>) -> bool {
         let group = &self.groups[number];
         let Some(wall) = group.wall else { return true };
         let (rigid, stance) = (&self.contacts.rigids[wall as usize], &self.stances[2][wall as usize]);
-        let (travel, action) = (self.travel(wall), group.action.of_wall());
-        let reach = action.reach();
+        let (travel, parameters) = (self.travel(wall), group.parameters.of_wall());
+        let reach = parameters.reach();
         let side = &group.sides[0];
         let points = side.points.iter().zip(&side.point_areas).zip(&self.wall_distances[number]);
         for ((&node, &area), then) in points {
@@ -345,33 +345,33 @@ impl Barriers {
             };
             for (side, near) in (0..).zip(rigid.sides(stance, place)) {
                 let Some(Near { distance, normal }) = near else { continue };
-                let Some(row) = action.row(stencil, area, distance, normal) else { continue };
-                if row.gap <= 0.0 || row.gap.is_nan() {
+                let Some(collision) = parameters.collision(stencil, area, distance, normal) else { continue };
+                if collision.gap <= 0.0 || collision.gap.is_nan() {
                     return false;
                 }
-                rows.push(Row { side, ..row });
+                normal_collisions.push(NormalCollision { side, ..collision });
             }
         }
         true
     }
 
     /// Takes friction from the present state on.
-    pub fn hold(&mut self) {
-        let Self { groups, rows, held, start, .. } = self;
-        held.clear();
-        for row in rows.iter() {
-            let group = &groups[row.stencil.contact as usize];
-            let (normal, force) = row.pushes();
-            let limit = group.action.friction * force;
+    pub fn lag(&mut self) {
+        let Self { groups, normal_collisions, friction_collisions, start, .. } = self;
+        friction_collisions.clear();
+        for collision in normal_collisions.iter() {
+            let group = &groups[collision.stencil.contact as usize];
+            let (normal, force) = collision.pushes();
+            let limit = group.parameters.friction * force;
             if limit <= 0.0 {
                 continue;
             }
-            held.push(Held {
-                stencil: row.stencil,
+            friction_collisions.push(FrictionCollision {
+                stencil: collision.stencil,
                 normal,
                 limit,
-                start: row.stencil.combine(|node| start[node as usize]),
-                wall: group.wall.filter(|_| row.stencil.count == 1),
+                start: collision.stencil.combine(|node| start[node as usize]),
+                wall: group.wall.filter(|_| collision.stencil.count == 1),
                 slip: Vector3::zeros(),
                 stiffness: 0.0,
                 along: 0.0,
@@ -382,33 +382,35 @@ impl Barriers {
 
     /// Σ μ λ [N] of the friction that is held, and of what would be held now.
     pub fn friction_limits(&self) -> [f64; 2] {
-        let of = |row: &Row| self.groups[row.stencil.contact as usize].action.friction * row.pushes().1;
-        let now = self.rows.iter().map(of);
-        [self.held.iter().map(|held| held.limit).sum(), now.sum()]
+        let of = |collision: &NormalCollision| {
+            self.groups[collision.stencil.contact as usize].parameters.friction * collision.pushes().1
+        };
+        let now = self.normal_collisions.iter().map(of);
+        [self.friction_collisions.iter().map(|collision| collision.limit).sum(), now.sum()]
     }
 
     /// Finds the slip of all that friction holds.
     fn slide(&mut self) {
-        let Self { groups, held, place, stances, .. } = self;
+        let Self { groups, friction_collisions, place, stances, .. } = self;
         let [from, _, now] = stances;
         let mut energy = 0.0;
-        for held in held.iter_mut() {
-            let start = match held.wall {
-                Some(wall) => carried([&from[wall as usize], &now[wall as usize]], &held.start),
-                None => held.start,
+        for collision in friction_collisions.iter_mut() {
+            let start = match collision.wall {
+                Some(wall) => carried([&from[wall as usize], &now[wall as usize]], &collision.start),
+                None => collision.start,
             };
-            let way = held.stencil.combine(|node| place[node as usize]) - start;
-            held.slip = way - held.normal * held.normal.dot(&way);
-            let slip = groups[held.stencil.contact as usize].action.slip;
-            let length = held.slip.norm();
-            held.stiffness = held.limit * slip.force_over_slip(length);
-            held.along = held.limit * slip.slope(length);
-            energy += held.limit * slip.energy(length);
+            let way = collision.stencil.combine(|node| place[node as usize]) - start;
+            collision.slip = way - collision.normal * collision.normal.dot(&way);
+            let slip = groups[collision.stencil.contact as usize].parameters.slip;
+            let length = collision.slip.norm();
+            collision.stiffness = collision.limit * slip.force_over_slip(length);
+            collision.along = collision.limit * slip.slope(length);
+            energy += collision.limit * slip.energy(length);
         }
         self.energy[1] = energy;
     }
 
-    /// How far [m] the first primitive of a row has gone from the second in the step: Σ c x less that of its start, which a wall carries along.
+    /// How far [m] the first primitive of a stencil has gone from the second in the step: Σ c x less that of its start, which a wall carries along.
     pub(super) fn way(&self, stencil: &Stencil) -> Vector3<f64> {
         let start = stencil.combine(|node| self.start[node as usize]);
         let wall = self.groups[stencil.contact as usize].wall.filter(|_| stencil.count == 1);
@@ -419,10 +421,10 @@ impl Barriers {
         stencil.combine(|node| self.place[node as usize]) - start
     }
 
-    /// The energy [J] with nodes at places [m] and rigid things at a share of the step, that of friction with it; infinite if there is no gap
+    /// The energy [J] with nodes at places [m] and rigid things at a fraction of the step, that of friction with it; infinite if there is no gap
     /// somewhere.
-    pub fn evaluate(&mut self, position: &[Vector3<f64>], share: f64) -> f64 {
-        self.put(position, share);
+    pub fn evaluate(&mut self, position: &[Vector3<f64>], time_fraction: f64) -> f64 {
+        self.put(position, time_fraction);
         self.act();
         self.slide();
         self.energy[0] + self.energy[1]
@@ -434,18 +436,18 @@ impl Barriers {
     }
 
     /// What acts at the state last evaluated.
-    pub fn rows(&self) -> &[Row] {
-        &self.rows
+    pub fn normal_collisions(&self) -> &[NormalCollision] {
+        &self.normal_collisions
     }
 
     /// What friction holds.
-    pub fn held(&self) -> &[Held] {
-        &self.held
+    pub fn friction_collisions(&self) -> &[FrictionCollision] {
+        &self.friction_collisions
     }
 
     /// The least gap [m] at the state last evaluated; none where nothing is within the reach of the barrier.
     pub fn least_gap(&self) -> Option<f64> {
-        self.rows.iter().map(|row| row.gap).reduce(f64::min)
+        self.normal_collisions.iter().map(|collision| collision.gap).reduce(f64::min)
     }
 
     /// Adds the forces [N] at the state last evaluated to those of nodes, six numbers a node, and sets those of each contact on its second
@@ -466,8 +468,12 @@ impl Barriers {
                 }
             }
         };
-        self.rows.iter().for_each(|row| add(&row.stencil, &|at| row.force_on(at)));
-        self.held.iter().for_each(|held| add(&held.stencil, &|at| held.force_on(at)));
+        self.normal_collisions
+            .iter()
+            .for_each(|collision| add(&collision.stencil, &|at| collision.force_on(at)));
+        self.friction_collisions
+            .iter()
+            .for_each(|collision| add(&collision.stencil, &|at| collision.force_on(at)));
     }
 
     /// Sets the moments [N m] about the origin of the forces of each contact on its second side at the state last evaluated, whose nodes are at these
@@ -484,16 +490,20 @@ impl Barriers {
                 }
             }
         };
-        self.rows.iter().for_each(|row| add(&row.stencil, &|at| row.force_on(at)));
-        self.held.iter().for_each(|held| add(&held.stencil, &|at| held.force_on(at)));
+        self.normal_collisions
+            .iter()
+            .for_each(|collision| add(&collision.stencil, &|at| collision.force_on(at)));
+        self.friction_collisions
+            .iter()
+            .for_each(|collision| add(&collision.stencil, &|at| collision.force_on(at)));
     }
 
-    /// Calls back with the stiffness [N/m] of each row, never negative: its stencil, three rows and columns a node, and the ways [m] that the
-    /// rigid things among its nodes have yet to go in the step from a share on; of one node at a wall the way from the wall. That of barriers
+    /// Calls back with the stiffness [N/m] of each collision, never negative: its stencil, three rows and columns a node, and the ways [m] that the
+    /// rigid things among its nodes have yet to go in the step from a fraction of time on; of one node at a wall the way from the wall. That of barriers
     /// is κ A b″ ∇d ∇dᵀ and the positive part of κ A b′ ∂²d/∂x²; that of friction is exact.
-    pub fn stiffness(&self, share: f64, mut add: impl FnMut(&Stencil, &Matrix12, [Vector3<f64>; 4])) {
+    pub fn stiffness(&self, time_fraction: f64, mut add: impl FnMut(&Stencil, &Matrix12, [Vector3<f64>; 4])) {
         let [from, to, now] = &self.stances;
-        let goes_on = share < 1.0 && from != to;
+        let goes_on = time_fraction < 1.0 && from != to;
         let left = |stencil: &Stencil, wall: Option<u32>, outward: Vector3<f64>| {
             let mut ways = [Vector3::zeros(); 4];
             if !goes_on {
@@ -517,15 +527,15 @@ impl Barriers {
             }
             ways
         };
-        for row in &self.rows {
-            let wall = self.groups[row.stencil.contact as usize].wall;
+        for collision in &self.normal_collisions {
+            let wall = self.groups[collision.stencil.contact as usize].wall;
             let is_inside = wall.is_some_and(|wall| self.contacts.rigids[wall as usize].inside);
-            let outward = if is_inside { -row.normal } else { row.normal };
-            add(&row.stencil, &self.stiffness_of(row), left(&row.stencil, wall, outward));
+            let outward = if is_inside { -collision.normal } else { collision.normal };
+            add(&collision.stencil, &self.stiffness_of(collision), left(&collision.stencil, wall, outward));
         }
-        for held in &self.held {
-            let across = block(&held.stencil.coefficients, &held.stiffness());
-            add(&held.stencil, &across, left(&held.stencil, held.wall, Vector3::zeros()));
+        for collision in &self.friction_collisions {
+            let across = block(&collision.stencil.coefficients, &collision.stiffness());
+            add(&collision.stencil, &across, left(&collision.stencil, collision.wall, Vector3::zeros()));
         }
     }
 
@@ -534,32 +544,34 @@ impl Barriers {
         (node as usize).checked_sub(self.nodes).map(|at| &self.rigid_nodes[at])
     }
 
-    /// The stiffness [N/m] of the barrier of a row.
-    fn stiffness_of(&self, row: &Row) -> Matrix12 {
-        let group = &self.groups[row.stencil.contact as usize];
-        let Stencil { nodes, coefficients, .. } = row.stencil;
-        let along = row.normal * row.normal.transpose() * row.stiffness;
-        let Some(region) = row.region else {
-            let curved = group.wall.map(|wall| self.curved_wall(wall, row, group.action.law.distance));
-            return block(&coefficients, &(along + curved.unwrap_or_default() * row.force));
+    /// The stiffness [N/m] of the barrier of a collision.
+    fn stiffness_of(&self, collision: &NormalCollision) -> Matrix12 {
+        let group = &self.groups[collision.stencil.contact as usize];
+        let Stencil { nodes, coefficients, .. } = collision.stencil;
+        let along = collision.normal * collision.normal.transpose() * collision.stiffness;
+        let Some(region) = collision.region else {
+            let curved =
+                group.wall.map(|wall| self.curved_wall(wall, collision, group.parameters.law.distance));
+            return block(&coefficients, &(along + curved.unwrap_or_default() * collision.force));
         };
         let points = nodes.map(|node| self.place[node as usize]);
-        let near = Nearest { distance: row.distance, coefficients, normal: row.normal, region };
-        match &row.mollified {
-            Some(with) => of_parallel(&points, &near, row.stiffness, with),
-            None => block(&coefficients, &along) + bent(&points, &near) * row.force,
+        let near = Nearest { distance: collision.distance, coefficients, normal: collision.normal, region };
+        match &collision.mollified {
+            Some(with) => of_parallel(&points, &near, collision.stiffness, with),
+            None => block(&coefficients, &along) + bent(&points, &near) * collision.force,
         }
     }
 
-    /// The positive part [1/m] of −∂²d/∂x² of a row at a wall, by differences over a part of the distance [m] of its barrier.
-    fn curved_wall(&self, wall: u32, row: &Row, distance: f64) -> Matrix3<f64> {
+    /// The positive part [1/m] of −∂²d/∂x² of a collision at a wall, by differences over a part of the distance [m] of its barrier.
+    fn curved_wall(&self, wall: u32, collision: &NormalCollision, distance: f64) -> Matrix3<f64> {
         let (rigid, stance) = (&self.contacts.rigids[wall as usize], &self.stances[2][wall as usize]);
         let h = DIFFERENCE * distance;
         let normals = [0, 1, 2].map(|axis| {
             [h, -h].map(|by| {
-                let mut place = self.place[row.stencil.nodes[0] as usize];
+                let mut place = self.place[collision.stencil.nodes[0] as usize];
                 place[axis] += by;
-                rigid.sides(stance, &place)[usize::from(row.side)].map_or(row.normal, |side| side.normal)
+                rigid.sides(stance, &place)[usize::from(collision.side)]
+                    .map_or(collision.normal, |side| side.normal)
             })
         });
         of_wall(normals, h)
@@ -567,15 +579,18 @@ impl Barriers {
 
     /// Calls back with the nodes of the model of each pair that acts or is held.
     pub fn acting(&self, mut found: impl FnMut(&[u32])) {
-        let stencils =
-            self.rows.iter().map(|row| &row.stencil).chain(self.held.iter().map(|held| &held.stencil));
+        let stencils = self
+            .normal_collisions
+            .iter()
+            .map(|collision| &collision.stencil)
+            .chain(self.friction_collisions.iter().map(|collision| &collision.stencil));
         stencils.filter(|stencil| stencil.count > 1).for_each(|stencil| found(&self.own(&stencil.nodes)));
     }
 
     /// Calls back with the nodes of the model of each pair that may act soon: within so many distances of its barrier more than the reach.
     pub fn near(&self, distances: f64, mut found: impl FnMut(&[u32])) {
         for group in &self.groups {
-            let margin = distances * group.action.law.distance;
+            let margin = distances * group.parameters.law.distance;
             group.pairs(&self.place, margin, |nodes| found(&self.own(nodes)));
         }
     }
@@ -590,32 +605,32 @@ impl Barriers {
         self.nodes
     }
 
-    /// The part of a motion (six numbers a node), of so much of it at most, from places [m] at a share of the step that leaves at least half of a
+    /// The part of a motion (six numbers a node), of so much of it at most, from places [m] at a fraction of the step that leaves at least half of a
     /// part of every gap, while rigid things go the same part of the way that is left to them. Pairs are listed anew if need be.
-    pub fn allowed(
+    pub fn collision_free_fraction(
         &mut self,
         position: &[Vector3<f64>],
         motion: &[f64],
-        share: f64,
+        time_fraction: f64,
         [keep, most]: [f64; 2],
     ) -> f64 {
-        self.put(position, share);
+        self.put(position, time_fraction);
         self.set_motion(motion, most, 1.0);
         let mut part = most;
         if !self.lists_hold() || !self.lists_have_motion() {
-            part *= self.list(motion, most, share);
+            part *= self.list(motion, most, time_fraction);
         }
         let [from, to, _] = &self.stances;
-        let turns =
-            share < 1.0 && from.iter().zip(to).any(|(from, to)| from.pose.rotation != to.pose.rotation);
+        let turns = time_fraction < 1.0
+            && from.iter().zip(to).any(|(from, to)| from.pose.rotation != to.pose.rotation);
         for _ in 0..TURNS {
             // Things that turn do not move on a straight way: the way to where they really come is searched.
-            self.set_motion(motion, part, share + part * (1.0 - share));
+            self.set_motion(motion, part, time_fraction + part * (1.0 - time_fraction));
             if turns && !self.lists_have_motion() {
                 part *= SHORTER;
                 continue;
             }
-            let gone = self.filtered(keep, share, part);
+            let gone = self.filtered(keep, time_fraction, part);
             part *= gone;
             if !turns || gone == 1.0 || part == 0.0 {
                 return part;
@@ -626,29 +641,35 @@ impl Barriers {
     }
 
     /// The part of the motion that is set which leaves at least half of a part of every gap.
-    fn filtered(&mut self, keep: f64, share: f64, part: f64) -> f64 {
+    fn filtered(&mut self, keep: f64, time_fraction: f64, part: f64) -> f64 {
         let mut most = 1.0;
         for number in 0..self.groups.len() {
-            most = self.groups[number].allowed(&self.place, &self.motion, keep, most);
+            most = self.groups[number].collision_free_fraction(&self.place, &self.motion, keep, most);
             let Some(wall) = self.groups[number].wall else { continue };
-            most = self.allowed_at_wall(number, wall, [keep, share, part], most);
+            most = self.collision_free_fraction_at_wall(number, wall, [keep, time_fraction, part], most);
         }
         most
     }
 
     /// [`filtered`](Self::filtered) of nodes at a wall: no node comes nearer to it than both go.
-    fn allowed_at_wall(&self, number: usize, wall: u32, [keep, share, part]: [f64; 3], most: f64) -> f64 {
+    fn collision_free_fraction_at_wall(
+        &self,
+        number: usize,
+        wall: u32,
+        [keep, time_fraction, part]: [f64; 3],
+        most: f64,
+    ) -> f64 {
         let group = &self.groups[number];
         let rigid = &self.contacts.rigids[wall as usize];
         let [from, to, now] = [0, 1, 2].map(|k| self.stances[k][wall as usize]);
-        let target = Stance::between([&from, &to], share + part * (1.0 - share));
+        let target = Stance::between([&from, &to], time_fraction + part * (1.0 - time_fraction));
         let travel =
             if target == now { 0.0 } else { Passage::new(rigid, [now, target]).travel_from(rigid, &now) };
         let since = self.travel(wall);
         let mut most: f64 = most;
         for (&node, then) in group.sides[0].points.iter().zip(&self.wall_distances[number]) {
             let (place, motion) = (self.place[node as usize], self.motion[node as usize]);
-            let offset = group.action.kept;
+            let offset = group.parameters.kept;
             let bound = then - (place - self.listed[node as usize]).norm() - since - offset;
             let way = motion.norm() + travel;
             if bound * (1.0 - keep) > way * most {
@@ -702,26 +723,26 @@ impl Barriers {
             group.too_close(&self.place, |at, gap| all.extend(of(group.number, &at, Some(gap))));
             if group.wall.is_some() {
                 let distances = group.sides[0].points.iter().zip(&self.wall_distances[number]);
-                let gaps = distances.map(|(&node, distance)| (node, distance - group.action.kept));
+                let gaps = distances.map(|(&node, distance)| (node, distance - group.parameters.kept));
                 all.extend(
                     gaps.filter(|(_, gap)| *gap <= 0.0)
                         .filter_map(|(node, gap)| of(group.number, &[node], Some(gap))),
                 );
             }
         }
-        self.crossings(|contact, ends, corners| all.extend(of(contact, &[ends[0], corners[0]], None)));
+        self.intersections(|contact, ends, corners| all.extend(of(contact, &[ends[0], corners[0]], None)));
         all
     }
 
     /// Calls back with each edge that goes through a triangle at the state last evaluated, by its contact, ends and corners. Without the lists
     /// that contacts go by.
-    pub fn crossings(&self, mut found: impl FnMut(u32, [u32; 2], [u32; 3])) {
+    pub fn intersections(&self, mut found: impl FnMut(u32, [u32; 2], [u32; 3])) {
         let place = |node: u32| self.place[node as usize];
         for group in &self.groups {
             let (first, second) = (&group.sides[0], group.sides.last().unwrap_or(&group.sides[0]));
-            crossings([first, second], &place, |ends, corners| found(group.number, ends, corners));
+            intersections([first, second], &place, |ends, corners| found(group.number, ends, corners));
             if group.sides.len() > 1 {
-                crossings([second, first], &place, |ends, corners| found(group.number, ends, corners));
+                intersections([second, first], &place, |ends, corners| found(group.number, ends, corners));
             }
         }
     }

@@ -104,13 +104,19 @@ fn forces_are_gradients_and_balance() {
         let mut scene = Scene::new(thing, 0.4);
         let count = scene.places.len();
         scene.begin(&vec![0.0; 6 * count]);
-        let kinds = [0, 1, 2]
-            .map(|contact| scene.barriers.rows().iter().filter(|row| row.stencil.contact == contact).count());
+        let kinds = [0, 1, 2].map(|contact| {
+            scene
+                .barriers
+                .normal_collisions()
+                .iter()
+                .filter(|collision| collision.stencil.contact == contact)
+                .count()
+        });
         assert!(kinds[0] > 10 && kinds[2] > 0, "{shape}: {kinds:?}");
         let mut moved = scene.places.clone();
         moved.iter_mut().for_each(|x| *x += 3e-4 * Vector3::from(random.vector()));
-        let share = 0.4;
-        let energy = scene.barriers.evaluate(&moved, share);
+        let time_fraction = 0.4;
+        let energy = scene.barriers.evaluate(&moved, time_fraction);
         assert!(energy.is_finite() && energy > 0.0);
         let (mut forces, mut totals) = (vec![0.0; 6 * count], vec![Vector3::zeros(); 3]);
         scene.barriers.add_forces(&mut forces, &mut totals);
@@ -121,7 +127,7 @@ fn forces_are_gradients_and_balance() {
             let mut at = |by: f64| {
                 let mut moved = moved.clone();
                 moved[node][c] += by;
-                scene.barriers.evaluate(&moved, share)
+                scene.barriers.evaluate(&moved, time_fraction)
             };
             let slope = (at(h) - at(-h)) / (2.0 * h);
             let own = -forces[6 * node + c];
@@ -143,7 +149,8 @@ fn stiffness_is_never_negative() {
         let count = scene.places.len();
         scene.begin(&vec![0.0; 6 * count]);
         scene.barriers.evaluate(&scene.places.clone(), 0.0);
-        let (rows, held) = (scene.barriers.rows().to_vec(), scene.barriers.held().to_vec());
+        let (normal, friction) =
+            (scene.barriers.normal_collisions().to_vec(), scene.barriers.friction_collisions().to_vec());
         let (mut number, mut at_wall) = (0, 0);
         scene.barriers.stiffness(0.0, |stencil: &Stencil, block, ways| {
             let values = block.symmetric_eigenvalues();
@@ -153,14 +160,14 @@ fn stiffness_is_never_negative() {
             } else {
                 // The thing comes nearer by 2 mm and goes aside by 1 mm.
                 assert!((ways[0] + Vector3::new(0.001, 0.0, 0.002)).norm() < 1e-12, "{shape}: {ways:?}");
-                if let Some(row) = rows.get(number).filter(|row| row.region.is_none()) {
+                if let Some(collision) = normal.get(number).filter(|collision| collision.region.is_none()) {
                     // From within, a sphere bends away from the normal everywhere: (I − n nᵀ)/r.
                     let centre = Vector3::new(0.0, 0.0, 0.407);
                     let r = (scene.places[stencil.nodes[0] as usize] - centre).norm();
-                    let along = row.normal * row.normal.transpose();
+                    let along = collision.normal * collision.normal.transpose();
                     let across =
-                        (Matrix3::identity() - along) * (f64::from(u8::from(inside)) * row.force / r);
-                    let wanted = along * row.stiffness + across;
+                        (Matrix3::identity() - along) * (f64::from(u8::from(inside)) * collision.force / r);
+                    let wanted = along * collision.stiffness + across;
                     let off = (block.fixed_view::<3, 3>(0, 0) - wanted).amax();
                     assert!(off < 1e-5 * wanted.amax(), "{shape}: {off:e} of {:e}", wanted.amax());
                     at_wall += 1;
@@ -168,7 +175,7 @@ fn stiffness_is_never_negative() {
             }
             number += 1;
         });
-        assert!(number == rows.len() + held.len() && at_wall > 3, "{shape}: {at_wall}");
+        assert!(number == normal.len() + friction.len() && at_wall > 3, "{shape}: {at_wall}");
     }
 }
 
@@ -189,17 +196,18 @@ fn no_motion_that_is_allowed_goes_through() {
                 })
                 .collect();
             scene.begin(&motion);
-            let (mut share, mut part) = (0.0, 0.0);
+            let (mut time_fraction, mut part) = (0.0, 0.0);
             for _ in 0..4 {
-                part = scene.barriers.allowed(&scene.places, &motion, share, [0.1, 1.0]);
+                part =
+                    scene.barriers.collision_free_fraction(&scene.places, &motion, time_fraction, [0.1, 1.0]);
                 for (x, way) in scene.places.iter_mut().zip(motion.chunks_exact(6)) {
                     *x += Vector3::new(way[0], way[1], way[2]) * part;
                 }
-                share += part * (1.0 - share);
-                let energy = scene.barriers.evaluate(&scene.places, share);
+                time_fraction += part * (1.0 - time_fraction);
+                let energy = scene.barriers.evaluate(&scene.places, time_fraction);
                 assert!(energy.is_finite(), "{shape} {round}");
                 let mut crossed = 0;
-                scene.barriers.crossings(|_, _, _| crossed += 1);
+                scene.barriers.intersections(|_, _, _| crossed += 1);
                 assert_eq!(crossed, 0, "{shape} {round}");
             }
             let is_small = round == 0 && scene.barriers.contacts().rigids[0].trajectory.growth(1.0) == 0.0;
@@ -225,16 +233,16 @@ fn neighbours_of_a_thick_sheet_keep_the_guarantee() {
         assert_eq!(barriers.apart_counts(), [0]);
         let mut places = flat.clone();
         barriers.begin(&places, &still, [0.0, 1.0]);
-        assert!(barriers.rows().is_empty() && barriers.least_gap().is_none());
+        assert!(barriers.normal_collisions().is_empty() && barriers.least_gap().is_none());
         for _ in 0..6 {
             let motion: Vec<f64> = (0..still.len()).map(|_| 0.3 * (2.0 * random.part() - 1.0)).collect();
             barriers.begin(&places, &motion, [0.0, 1.0]);
-            let part = barriers.allowed(&places, &motion, 0.0, [0.1, 1.0]);
+            let part = barriers.collision_free_fraction(&places, &motion, 0.0, [0.1, 1.0]);
             let ways = motion.chunks_exact(6).map(|way| Vector3::new(way[0], way[1], way[2]) * part);
             places.iter_mut().zip(ways).for_each(|(x, way)| *x += way);
             assert!(barriers.evaluate(&places, 0.0).is_finite(), "{round}");
             let mut crossed = 0;
-            barriers.crossings(|_, _, _| crossed += 1);
+            barriers.intersections(|_, _, _| crossed += 1);
             assert_eq!(crossed, 0, "{round}");
         }
         // Corners across are 0.85 m apart at rest.
@@ -256,11 +264,11 @@ fn what_grows_presses_like_what_is_larger() {
         let curve = Curve { shape: CurveShape::Ramp, from: 0.0, to: 1.0 };
         let mut grown = rigid(thing, at, [0.0; 3]);
         grown.trajectory = grown.trajectory.growing(0.002, curve);
-        let forces = |thing: Rigid, share: f64| {
+        let forces = |thing: Rigid, time_fraction: f64| {
             let mut scene = Scene::new(thing, 0.0);
             let count = scene.places.len();
             scene.begin(&vec![0.0; 6 * count]);
-            assert!(scene.barriers.evaluate(&scene.places.clone(), share).is_finite());
+            assert!(scene.barriers.evaluate(&scene.places.clone(), time_fraction).is_finite());
             let (mut forces, mut totals) = (vec![0.0; 6 * count], vec![Vector3::zeros(); 3]);
             scene.barriers.add_forces(&mut forces, &mut totals);
             (forces, totals[2], scene)
@@ -270,7 +278,7 @@ fn what_grows_presses_like_what_is_larger() {
         let size = wanted.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
         let off = own.iter().zip(&wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(off < 1e-11 * size && (total - same).norm() < 1e-11 * size && total.norm() > 0.0, "{off:e}");
-        // Forces fall by the stiffness times the way that is left: by differences over the share.
+        // Forces fall by the stiffness times the way that is left: by differences over the fraction of time.
         let (_, _, scene) = forces(grown.clone(), 0.5);
         let mut slope = vec![0.0; own.len()];
         scene.barriers.stiffness(0.5, |stencil: &Stencil, block, ways| {
@@ -304,16 +312,18 @@ fn a_turning_thing_goes_through_nothing() {
     scene.places[..49].iter_mut().for_each(|x| x.z += 0.1);
     let still = vec![0.0; 6 * scene.places.len()];
     scene.begin(&still);
-    let mut share = 0.0;
+    let mut time_fraction = 0.0;
     for _ in 0..30 {
-        share += scene.barriers.allowed(&scene.places, &still, share, [0.1, 1.0]) * (1.0 - share);
-        assert!(scene.barriers.evaluate(&scene.places, share).is_finite());
+        time_fraction +=
+            scene.barriers.collision_free_fraction(&scene.places, &still, time_fraction, [0.1, 1.0])
+                * (1.0 - time_fraction);
+        assert!(scene.barriers.evaluate(&scene.places, time_fraction).is_finite());
         let mut crossed = 0;
-        scene.barriers.crossings(|_, _, _| crossed += 1);
-        assert_eq!(crossed, 0, "{share}");
+        scene.barriers.intersections(|_, _, _| crossed += 1);
+        assert_eq!(crossed, 0, "{time_fraction}");
     }
     // Its corner comes to the sheet after 0.9 rad or so.
-    assert!(share > 0.1 && share < 0.5, "{share}");
+    assert!(time_fraction > 0.1 && time_fraction < 0.5, "{time_fraction}");
 }
 
 /// Bodies that start within each other are reported with contact, node and gap.
@@ -340,15 +350,16 @@ fn what_acts_does_not_depend_on_where_one_comes_from() {
             let size = if step % 10 == 9 { 0.05 } else { 0.003 };
             let motion: Vec<f64> = (0..6 * count).map(|_| size * random.number()).collect();
             scene.begin(&motion);
-            let part = scene.barriers.allowed(&scene.places, &motion, 0.0, [0.1, 1.0]);
+            let part = scene.barriers.collision_free_fraction(&scene.places, &motion, 0.0, [0.1, 1.0]);
             let ways = motion.chunks_exact(6).map(|way| Vector3::new(way[0], way[1], way[2]) * part);
             scene.places.iter_mut().zip(ways).for_each(|(x, way)| *x += way);
             let mut fresh = Scene::new(thing.clone(), 0.3);
             fresh.places.clone_from(&scene.places);
             let rows = [&mut scene, &mut fresh].map(|scene| {
                 scene.begin(&vec![0.002; 6 * count]);
-                let rows = scene.barriers.rows().iter();
-                rows.map(|row| (row.stencil.nodes, row.energy.to_bits())).collect::<Vec<_>>()
+                let rows = scene.barriers.normal_collisions().iter();
+                rows.map(|collision| (collision.stencil.nodes, collision.energy.to_bits()))
+                    .collect::<Vec<_>>()
             });
             assert_eq!(rows[0], rows[1], "step {step}");
             acting += rows[0].len();

@@ -77,7 +77,7 @@ pub fn faces(solid: &Solid) -> Vec<[u32; 3]> {
 
 fn stepper(model: &Arc<Model>, contacts: &Arc<Contacts>, part: f64) -> CentralDifference<f64> {
     let step = part * assembled(model).unwrap().step;
-    CentralDifference::new(Arc::clone(model), step).unwrap().touching(Arc::clone(contacts))
+    CentralDifference::new(Arc::clone(model), step).unwrap().with_contacts(Arc::clone(contacts))
 }
 
 /// One step; the energy [J] before it that central differences keep: ½ Σ m v⁻·v⁺ of the velocities before and after the instant, and what

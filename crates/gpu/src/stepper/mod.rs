@@ -156,7 +156,7 @@ impl GpuStepper {
     ///
     /// # Errors
     /// As [`new`](Self::new), and if something of the contacts, or of contact in the design, runs [on the CPU only](processor_only).
-    pub fn touching(
+    pub fn with_contacts(
         device: &Device,
         model: impl Into<Arc<Model>>,
         contacts: Arc<Contacts>,

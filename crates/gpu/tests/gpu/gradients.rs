@@ -10,7 +10,7 @@ use pliant_contact::touch::{Contact, Contacts, Touch, With};
 use pliant_geometry::Mesh;
 use pliant_gpu::Device;
 use pliant_implicit::AssemblySolver;
-use pliant_implicit::{Assembly, BackwardEuler, DynamicSettings, Shell, SolveError, State, Touching};
+use pliant_implicit::{Assembly, BackwardEuler, ContactModel, DynamicSettings, Shell, SolveError, State};
 use pliant_linear::{
     BlockPattern, BlockValues, DeviceSolver, LinearDevice, LinearSolver, PassEnd, Preconditioner,
 };
@@ -167,11 +167,11 @@ fn pressed() -> Assembly {
         with: With::Body(surface(nodes, above)),
         touch: Touch { friction: 0.0, offset: 0.0 },
     };
-    model.touching = Some(Touching {
+    model.contact = Some(ContactModel {
         contacts: Arc::new(Contacts { contacts: vec![contact], ..Default::default() }),
         settings: vec![BarrierSettings { distance: 0.002, stiffness: 1e4, creep_speed: 1e-3 }],
         levels: Vec::new(),
-        check_crossings: true,
+        check_intersections: true,
     });
     model.model_mut().constraints.push(Constraint {
         name: "edges".into(),
@@ -252,7 +252,7 @@ fn contact_that_comes_and_goes_compiles_no_kernel() {
     let before = device.kernels();
     for _ in 0..8 {
         solver.advance(&mut state).unwrap();
-        patterns.push(solver.touching().unwrap().pairs().len());
+        patterns.push(solver.contact().unwrap().pairs().len());
     }
     patterns.dedup();
     println!("pairs of nodes in contact: {patterns:?}");

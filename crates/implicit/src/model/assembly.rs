@@ -13,7 +13,7 @@ use pliant_shells::Facet;
 use pliant_shells::element::{Formulation, Layer, Wall};
 use pliant_shells::{Normal, straight_edges};
 
-use crate::model::contact::Touching;
+use crate::model::contact::ContactModel;
 use crate::model::error::ModelError;
 use crate::model::turns::CarriedTurn;
 use crate::solid::refusal;
@@ -43,7 +43,7 @@ pub struct Assembly {
     /// behind their motion together, and their volumes behind their growth, as the static and the implicit solver find.
     pub force_limits: BTreeMap<usize, f64>,
     /// Contacts, which the static and the implicit solver keep.
-    pub touching: Option<Touching>,
+    pub contact: Option<ContactModel>,
     /// Nodes of shells that turn with the solid that they are in or on. Those of rigid parts turn with these instead.
     pub turns: Vec<CarriedTurn>,
 }

@@ -7,7 +7,7 @@ use pliant_contact::touch::Contacts;
 
 /// Contacts by a barrier: surfaces never go into each other. Rigid things move as their courses say.
 #[derive(Clone, Debug)]
-pub struct Touching {
+pub struct ContactModel {
     /// Who touches whom.
     pub contacts: Arc<Contacts>,
     /// How each contact acts.
@@ -15,5 +15,5 @@ pub struct Touching {
     /// How often triangles of shells are divided into four on their curved surface, for each contact; empty: never.
     pub levels: Vec<u8>,
     /// Whether each state that is accepted is searched for edges that go through triangles, which would be an error of the program.
-    pub check_crossings: bool,
+    pub check_intersections: bool,
 }

@@ -255,7 +255,7 @@ pub enum SolveError {
         /// Iterations of the last attempt.
         iterations: usize,
     },
-    /// An edge in a triangle, found by the check of crossings.
+    /// An edge in a triangle, found by the check of intersections.
     #[error(
         "{count} edges go through triangles at t = {time:.6}, the first that of nodes {} and {} through the triangle of nodes {}, {} and {} in contact \
          {contact}: a fault of the program, please report it with the scene", edge[0], edge[1], triangle[0], triangle[1], triangle[2]

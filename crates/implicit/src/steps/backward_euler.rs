@@ -297,7 +297,7 @@ impl BackwardEuler {
         self.attempts.push(Attempted { time, allowed, ..Attempted::default() });
         self.system.prescribed(state.time, time, &mut self.pending);
         self.system.begin_step(&state.history, h);
-        let converged = if self.system.touching.is_some() {
+        let converged = if self.system.contact.is_some() {
             self.newton_in_contact(state, h)?
         } else {
             within_limits(self, state, time, |solver, state| solver.newton_without_contact(state, h))?
@@ -383,8 +383,8 @@ impl BackwardEuler {
         self.moved.fill(0.0);
         if !self.system.stiffness.damper.is_empty() {
             // Without friction, which the step has yet to find.
-            if let Some(touching) = &mut self.system.touching {
-                touching.stand(state);
+            if let Some(contact) = &mut self.system.contact {
+                contact.stand(state);
             }
             self.system.evaluate(state, time, Some(&self.pending))?;
             self.system.stiffness.take_damper();

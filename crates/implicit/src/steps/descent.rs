@@ -92,7 +92,7 @@ pub(crate) struct Limits {
 /// What an iteration started from.
 struct Before {
     state: State,
-    share: f64,
+    time_fraction: f64,
     energy: f64,
     /// Sum of the sizes of the parts of the energy [J].
     size: f64,
@@ -186,7 +186,7 @@ impl<'a> Descent<'a> {
     fn new(limits: &'a Limits, time: f64, state: &State) -> Self {
         let before = Before {
             state: state.clone(),
-            share: 0.0,
+            time_fraction: 0.0,
             energy: 0.0,
             size: 0.0,
             loads: vec![0.0; 6 * state.position.len()],
@@ -223,12 +223,12 @@ impl<'a> Descent<'a> {
         before.along = dot(solution, residual);
         before.state.clone_from(state);
         before.loads.copy_from_slice(&own_loads(system));
-        before.share = share(system);
+        before.time_fraction = time_fraction(system);
         let farthest = if complete && largest > limits.farthest { limits.farthest / largest } else { 1.0 };
         let part = solver.part().min(farthest);
         let Vectors { system, increment, .. } = solver.vectors();
-        let part = match &mut system.touching {
-            Some(touching) => touching.allowed(state, increment, [KEEP[0], part]),
+        let part = match &mut system.contact {
+            Some(contact) => contact.collision_free_fraction(state, increment, [KEEP[0], part]),
             None => part,
         };
         (before.energy, before.size) = energy(solver);
@@ -247,7 +247,7 @@ impl<'a> Descent<'a> {
     ) -> Result<bool, SolveError> {
         let (before, time) = (&self.before, self.time);
         state.clone_from(&before.state);
-        put(solver, before.share);
+        put(solver, before.time_fraction);
         solver.evaluate(state, time, false)?;
         if aim.complete && (aim.last || before.along.abs() <= ROUND_OFF * before.size) {
             return check(solver, time).map(|()| true);
@@ -275,8 +275,8 @@ fn begin(solver: &mut impl Contacting, state: &State, times: [f64; 2], guess: Op
         }
     }
     system.follow(increment);
-    if let Some(touching) = &mut system.touching {
-        touching.begin(state, increment, times);
+    if let Some(contact) = &mut system.contact {
+        contact.begin(state, increment, times);
     }
 }
 
@@ -300,8 +300,8 @@ fn start_from(
         }
     }
     system.follow(increment);
-    let Some(touching) = &mut system.touching else { return Ok(false) };
-    let part = touching.allowed(state, increment, [KEEP[1], 1.0]);
+    let Some(contact) = &mut system.contact else { return Ok(false) };
+    let part = contact.collision_free_fraction(state, increment, [KEEP[1], 1.0]);
     system.advance(state, increment, part);
     put(solver, part);
     let Vectors { pending, .. } = solver.vectors();
@@ -321,31 +321,31 @@ fn start_from(
 }
 
 /// Sets how far rigid things have gone.
-fn put(solver: &mut impl Contacting, share: f64) {
-    if let Some(touching) = &mut solver.system_mut().touching {
-        touching.share = share;
+fn put(solver: &mut impl Contacting, time_fraction: f64) {
+    if let Some(contact) = &mut solver.system_mut().contact {
+        contact.time_fraction = time_fraction;
     }
 }
 
-fn share(system: &System) -> f64 {
-    system.touching.as_ref().map_or(1.0, |touching| touching.share)
+fn time_fraction(system: &System) -> f64 {
+    system.contact.as_ref().map_or(1.0, |contact| contact.time_fraction)
 }
 
 fn close(solver: &impl Contacting) -> f64 {
-    solver.system().touching.as_ref().map_or(0.0, |touching| touching.close)
+    solver.system().contact.as_ref().map_or(0.0, |contact| contact.close)
 }
 
 /// Whether all that moves by itself has gone its way.
 fn is_complete(solver: &mut impl Contacting) -> bool {
     let Vectors { system, pending, .. } = solver.vectors();
-    share(system) == 1.0 && pending.iter().all(|&p| p == 0.0) && system.conditions.are_closed()
+    time_fraction(system) == 1.0 && pending.iter().all(|&p| p == 0.0) && system.conditions.are_closed()
 }
 
 /// Loads but for the forces of contacts, six a node.
 fn own_loads(system: &System) -> Vec<f64> {
-    match &system.touching {
-        Some(touching) => {
-            system.forces.external.iter().zip(&touching.given).map(|(load, force)| load - force).collect()
+    match &system.contact {
+        Some(contact) => {
+            system.forces.external.iter().zip(&contact.given).map(|(load, force)| load - force).collect()
         }
         None => system.forces.external.clone(),
     }
@@ -363,8 +363,8 @@ fn work(solver: &mut impl Contacting, before: &[f64]) -> f64 {
 fn energy(solver: &mut impl Contacting) -> (f64, f64) {
     let potential = solver.potential();
     let system = solver.system_mut();
-    let touching = system.touching.as_ref().map_or(0.0, |touching| touching.energy);
-    let parts = [system.forces.energy, touching, potential];
+    let contact = system.contact.as_ref().map_or(0.0, |contact| contact.energy);
+    let parts = [system.forces.energy, contact, potential];
     (parts.iter().sum(), parts.iter().map(|part| part.abs()).sum())
 }
 
@@ -435,10 +435,10 @@ fn search(
         state.clone_from(&before.state);
         let Vectors { system, increment, .. } = solver.vectors();
         system.advance(state, increment, part);
-        let gone = if before.share + part * (1.0 - before.share) >= 1.0 || part == 1.0 {
+        let gone = if before.time_fraction + part * (1.0 - before.time_fraction) >= 1.0 || part == 1.0 {
             1.0
         } else {
-            before.share + part * (1.0 - before.share)
+            before.time_fraction + part * (1.0 - before.time_fraction)
         };
         put(solver, gone);
         match solver.evaluate(state, time, goes_on) {
@@ -462,9 +462,9 @@ fn search(
         }
         part *= 0.5;
         let Vectors { system, increment, .. } = solver.vectors();
-        if let Some(touching) = system.touching.as_mut().filter(|touching| touching.is_curved()) {
-            touching.share = before.share;
-            part = touching.allowed(&before.state, increment, [KEEP[0], part]);
+        if let Some(contact) = system.contact.as_mut().filter(|contact| contact.is_curved()) {
+            contact.time_fraction = before.time_fraction;
+            part = contact.collision_free_fraction(&before.state, increment, [KEEP[0], part]);
         }
     }
     broken.map_or(Ok(None), Err)
@@ -485,8 +485,8 @@ fn expand(
         if doubling > 0 {
             increment.iter_mut().for_each(|way| *way *= 2.0);
         }
-        let Some(touching) = &mut system.touching else { return Ok(()) };
-        let part = touching.allowed(state, increment, [KEEP[0], 1.0]);
+        let Some(contact) = &mut system.contact else { return Ok(()) };
+        let part = contact.collision_free_fraction(state, increment, [KEEP[0], 1.0]);
         let falls = part == 1.0 && {
             system.advance(state, increment, 1.0);
             match solver.evaluate(state, time, false) {
@@ -505,28 +505,28 @@ fn expand(
 
 /// Takes friction anew if its size has changed by more than counts; whether it has.
 fn lag(solver: &mut impl Contacting) -> bool {
-    let Some(touching) = &mut solver.system_mut().touching else { return false };
-    let [held, now] = touching.barriers.friction_limits();
+    let Some(contact) = &mut solver.system_mut().contact else { return false };
+    let [held, now] = contact.barriers.friction_limits();
     let changed = (now - held).abs() > LAGGED * held.max(now);
     if changed {
-        touching.barriers.hold();
+        contact.barriers.lag();
     }
     changed
 }
 
-/// Searches the state found for crossings, if that is wanted.
+/// Searches the state found for intersections, if that is wanted.
 fn check(solver: &mut impl Contacting, time: f64) -> Result<(), SolveError> {
-    solver.system().touching.as_ref().map_or(Ok(()), |touching| touching.check(time))
+    solver.system().contact.as_ref().map_or(Ok(()), |contact| contact.check(time))
 }
 
 /// Why a step was not found.
 fn not_found(solver: &mut impl Contacting, time: f64, iterations: usize) -> SolveError {
     let blocked = !is_complete(solver);
-    if let (true, Some(touching)) = (blocked, &solver.system().touching) {
+    if let (true, Some(contact)) = (blocked, &solver.system().contact) {
         return SolveError::Blocked {
             time,
             driver: None,
-            part: touching.share,
+            part: contact.time_fraction,
             gap: f64::INFINITY,
             iterations,
         };

@@ -13,13 +13,13 @@ use crate::system::System;
 pub struct Forces {
     pub(crate) system: System,
     /// Forces of contacts, six a node; empty for none.
-    touching: Vec<f64>,
+    contact: Vec<f64>,
 }
 
 impl Forces {
     /// For a model; nothing is known before the first evaluation.
     pub fn new(model: impl Into<Arc<Assembly>>) -> Self {
-        Self { system: System::forces_only(model.into()), touching: Vec::new() }
+        Self { system: System::forces_only(model.into()), contact: Vec::new() }
     }
 
     /// Finds the forces at a state and its time.
@@ -33,7 +33,7 @@ impl Forces {
         for (load, controlled) in system.forces.external.iter_mut().zip(&system.forces.controlled) {
             *load += state.load_factor * controlled;
         }
-        system.forces.external.iter_mut().zip(&self.touching).for_each(|(load, force)| *load += force);
+        system.forces.external.iter_mut().zip(&self.contact).for_each(|(load, force)| *load += force);
         Ok(())
     }
 
@@ -50,9 +50,9 @@ impl Forces {
 
     /// Takes the forces of contacts, six numbers a node: they are loads from the next evaluation on.
     pub fn touch(&mut self, forces: &[f64]) {
-        self.touching.clear();
-        self.touching.extend_from_slice(forces);
-        self.system.give_back(&mut self.touching);
+        self.contact.clear();
+        self.contact.extend_from_slice(forces);
+        self.system.give_back(&mut self.contact);
     }
 
     /// Force [N] and moment [N m] that elements and springs resist with, six numbers a node.

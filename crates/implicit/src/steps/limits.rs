@@ -146,7 +146,7 @@ pub(crate) fn within_limits<S: Contacting, T, E: From<SolveError>>(
         system.hold_back([start.time, time], &mut guesses, pending);
         valves.iter().for_each(|own| system.conditions.give_pressure(own.constraint, own.given));
         let solved = solve(solver, state)?;
-        if !valves.is_empty() && solver.system_mut().touching.is_some() {
+        if !valves.is_empty() && solver.system_mut().contact.is_some() {
             // The last motion of a step in contact was made without a look at what is left.
             solver.find_residual(state);
         }
@@ -169,7 +169,7 @@ pub(crate) fn within_limits<S: Contacting, T, E: From<SolveError>>(
 impl System {
     /// What tools, and then moved nodes, whose force is limited are to go.
     fn guesses(&self) -> Vec<Guess> {
-        let tools = self.touching.iter().flat_map(|own| own.lags().iter().map(|lag| (lag, own.limit(lag))));
+        let tools = self.contact.iter().flat_map(|own| own.lags().iter().map(|lag| (lag, own.limit(lag))));
         let nodes = self.lags.iter().filter(|lag| !encloses(&self.model, lag));
         let nodes = nodes.map(|lag| (lag, self.model.force_limits[&lag.number()]));
         tools.chain(nodes).map(|(lag, limit)| Guess::new(lag.force(), limit)).collect()
@@ -205,9 +205,9 @@ impl System {
     fn hold_back(&mut self, [from, to]: [f64; 2], guesses: &mut [Guess], pending: &mut [f64]) {
         let moving = self.lags.iter().filter(|lag| !encloses(&self.model, lag)).count();
         let (tools, nodes) = guesses.split_at_mut(guesses.len() - moving);
-        if let Some(touching) = &mut self.touching {
+        if let Some(contact) = &mut self.contact {
             let parts = tools.iter_mut().map(|guess| (guess.ahead, guess.part, &mut guess.into));
-            touching.follow([from, to], parts);
+            contact.follow([from, to], parts);
         }
         let lags = self.lags.iter_mut().filter(|lag| !encloses(&self.model, lag));
         for (lag, guess) in lags.zip(nodes) {
@@ -228,7 +228,7 @@ impl System {
 
     /// Gives each lag the force [N] with which its tool or its nodes push at the state last evaluated; these forces.
     fn bear_on(&mut self) -> Vec<Vector3<f64>> {
-        let mut forces = self.touching.as_mut().map(|own| own.bear_on()).unwrap_or_default();
+        let mut forces = self.contact.as_mut().map(|own| own.bear_on()).unwrap_or_default();
         for lag in self.lags.iter_mut().filter(|lag| !encloses(&self.model, lag)) {
             let own = &self.model.constraints[lag.number()];
             let mut force = Vector3::zeros();

@@ -5,7 +5,7 @@ use pliant_mechanics::StopFlag;
 
 use crate::model::assembly::Spring;
 use crate::model::error::SolveError;
-use crate::system::contact::TouchingSystem;
+use crate::system::contact::ContactSystem;
 use crate::system::{Phases, System};
 
 /// An attempt to find an equilibrium.
@@ -50,16 +50,16 @@ pub trait AssemblySolver {
     }
 
     /// Contacts, at the state of the last step; `None` without any.
-    fn touching(&self) -> Option<&TouchingSystem> {
-        self.system().touching.as_deref()
+    fn contact(&self) -> Option<&ContactSystem> {
+        self.system().contact.as_deref()
     }
 
     /// The same to change.
-    fn touching_mut(&mut self) -> Option<&mut TouchingSystem> {
-        self.system_mut().touching.as_deref_mut()
+    fn contact_mut(&mut self) -> Option<&mut ContactSystem> {
+        self.system_mut().contact.as_deref_mut()
     }
 
-    /// Takes a pattern of the equations with [`pairs`](TouchingSystem::pairs) of nodes that contacts added where another solver stood: so this
+    /// Takes a pattern of the equations with [`pairs`](ContactSystem::pairs) of nodes that contacts added where another solver stood: so this
     /// one goes on with the same bits.
     ///
     /// # Errors

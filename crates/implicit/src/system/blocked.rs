@@ -12,13 +12,13 @@ impl System {
     pub(crate) fn blocked_at(&mut self, state: &State, error: SolveError) -> SolveError {
         let SolveError::Blocked { time, part, iterations, .. } = error else { return error };
         self.stand(&state.history);
-        if let Some(touching) = &mut self.touching {
-            touching.stand(state);
+        if let Some(contact) = &mut self.contact {
+            contact.stand(state);
         }
         if self.evaluate(state, state.time, None).is_err() {
             return error;
         }
-        let gap = self.touching.as_ref().and_then(|own| own.barriers.least_gap()).unwrap_or(f64::INFINITY);
+        let gap = self.contact.as_ref().and_then(|own| own.barriers.least_gap()).unwrap_or(f64::INFINITY);
         let driver = self.hardest_driver([state.time, time]);
         if driver.is_none() && self.conditions.are_closed() {
             // Nothing is driven: loads press what does not come to rest.
@@ -48,7 +48,7 @@ impl System {
             motion if motion.is_collective() => None,
             _ => held(own),
         });
-        let tools = self.touching.iter().flat_map(|own| own.pushing([from, to]));
+        let tools = self.contact.iter().flat_map(|own| own.pushing([from, to]));
         constraints.chain(tools).fold(None, |hardest: Option<(String, f64)>, next| match hardest {
             Some(own) if own.1 >= next.1 => Some(own),
             _ => Some(next),

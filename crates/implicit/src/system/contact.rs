@@ -14,7 +14,7 @@ use pliant_contact::touch::{Contact, Contacts, Rigid, With};
 use pliant_linear::sparse::{Equations, LowerMatrix};
 
 use crate::model::assembly::Assembly;
-use crate::model::contact::Touching;
+use crate::model::contact::ContactModel;
 use crate::model::error::SolveError;
 use crate::model::state::State;
 use crate::system::followers::Followers;
@@ -30,24 +30,24 @@ const SHORTER: f64 = 0.9;
 const SOON: f64 = 0.3;
 
 /// The contacts at work, with nodes at rest where those of a model are, and the points of theirs that are no nodes.
-fn made(touching: &Touching, model: &Assembly) -> (Barriers, Option<Samples>) {
-    match Samples::of(model, &touching.contacts, &touching.levels) {
-        None => (Barriers::new(Arc::clone(&touching.contacts), &touching.settings, &model.rest), None),
+fn made(contact: &ContactModel, model: &Assembly) -> (Barriers, Option<Samples>) {
+    match Samples::of(model, &contact.contacts, &contact.levels) {
+        None => (Barriers::new(Arc::clone(&contact.contacts), &contact.settings, &model.rest), None),
         Some((samples, contacts)) => {
             let rest: Vec<[f64; 3]> = samples.places.iter().map(|&place| place.into()).collect();
-            (Barriers::new(Arc::new(contacts), &touching.settings, &rest), Some(samples))
+            (Barriers::new(Arc::new(contacts), &contact.settings, &rest), Some(samples))
         }
     }
 }
 
 /// Of each contact the pairs that never touch, since they are in one place at rest.
-pub fn apart_counts(touching: &Touching, model: &Assembly) -> Vec<usize> {
-    made(touching, model).0.apart_counts()
+pub fn apart_counts(contact: &ContactModel, model: &Assembly) -> Vec<usize> {
+    made(contact, model).0.apart_counts()
 }
 
 /// Whatever has no gap at a state: a run can't start there.
-pub fn meetings(touching: &Touching, model: &Assembly, state: &State) -> Vec<Meeting> {
-    let (mut barriers, samples) = made(touching, model);
+pub fn meetings(contact: &ContactModel, model: &Assembly, state: &State) -> Vec<Meeting> {
+    let (mut barriers, samples) = made(contact, model);
     let Some(mut samples) = samples else { return barriers.meetings(&state.position, state.time) };
     samples.place(model, state);
     let met = barriers.meetings(&samples.places, state.time);
@@ -56,7 +56,7 @@ pub fn meetings(touching: &Touching, model: &Assembly, state: &State) -> Vec<Mee
 
 /// What contacts do at an instant.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct TouchingNow {
+pub struct ContactNow {
     /// Forces on nodes [N], six numbers a node.
     pub forces: Vec<f64>,
     /// Force [N] of each contact on the second of the two that touch.
@@ -72,13 +72,13 @@ pub struct TouchingNow {
 }
 
 /// Contacts in the equations of a solver.
-pub struct TouchingSystem {
+pub struct ContactSystem {
     model: Arc<Assembly>,
     pub(crate) barriers: Barriers,
     /// Points of contacts that are no nodes, and forces on nodes and them, six each; `None` where surfaces are flat.
     samples: Option<(Samples, Vec<f64>)>,
     /// How far rigid things have gone in the step, from 0 to 1.
-    pub(crate) share: f64,
+    pub(crate) time_fraction: f64,
     /// Time spent so far.
     pub(crate) spent: Duration,
     /// Forces on nodes, six a node, and on the second side of each contact.
@@ -95,7 +95,7 @@ pub struct TouchingSystem {
     lags: Vec<Lag>,
     /// Pairs of nodes in the pattern beside those of cells, increasing.
     pub(crate) pairs: Vec<[u32; 2]>,
-    pub(crate) check_crossings: bool,
+    pub(crate) check_intersections: bool,
     /// Step of unknowns [m] below which a step is found: it changes gaps by less than counts.
     pub(crate) close: f64,
 }
@@ -103,13 +103,12 @@ pub struct TouchingSystem {
 /// A change of unknowns that counts for nothing, over the distance of the barrier.
 const CLOSE: f64 = 1e-3;
 
-impl TouchingSystem {
-    pub(crate) fn new(touching: &Touching, model: &Arc<Assembly>) -> Self {
-        let nearest =
-            touching.settings.iter().map(|settings| settings.distance).fold(f64::INFINITY, f64::min);
-        let rigids = touching.contacts.rigids.iter().zip(0..);
+impl ContactSystem {
+    pub(crate) fn new(contact: &ContactModel, model: &Arc<Assembly>) -> Self {
+        let nearest = contact.settings.iter().map(|settings| settings.distance).fold(f64::INFINITY, f64::min);
+        let rigids = contact.contacts.rigids.iter().zip(0..);
         let limited = rigids.filter(|(rigid, _)| rigid.trajectory.limit().is_some());
-        let (barriers, samples) = made(touching, model);
+        let (barriers, samples) = made(contact, model);
         let samples = samples.map(|samples| {
             let forces = vec![0.0; 6 * samples.places.len()];
             (samples, forces)
@@ -119,16 +118,16 @@ impl TouchingSystem {
             samples,
             lags: limited.map(|(_, number)| Lag::new(number)).collect(),
             barriers,
-            share: 1.0,
+            time_fraction: 1.0,
             spent: Duration::ZERO,
             forces: vec![0.0; 6 * model.rest.len()],
             given: vec![0.0; 6 * model.rest.len()],
-            totals: vec![Vector3::zeros(); touching.settings.len()],
-            moments: vec![Vector3::zeros(); touching.settings.len()],
+            totals: vec![Vector3::zeros(); contact.settings.len()],
+            moments: vec![Vector3::zeros(); contact.settings.len()],
             energy: 0.0,
             touches: Vec::new(),
             pairs: Vec::new(),
-            check_crossings: touching.check_crossings,
+            check_intersections: contact.check_intersections,
             close: CLOSE * nearest,
         }
     }
@@ -144,13 +143,18 @@ impl TouchingSystem {
                 self.barriers.begin(&samples.places, &samples.motion, times);
             }
         }
-        self.share = 0.0;
+        self.time_fraction = 0.0;
         self.spent += begun.elapsed();
     }
 
     /// The part of an increment (six numbers a node), of so much of it at most, from a state on that leaves at least half of a part of every gap.
     /// Points of curved surfaces go on straight ways to where they come: if these are free, nothing has gone through anything.
-    pub(crate) fn allowed(&mut self, state: &State, increment: &[f64], keep_and_most: [f64; 2]) -> f64 {
+    pub(crate) fn collision_free_fraction(
+        &mut self,
+        state: &State,
+        increment: &[f64],
+        keep_and_most: [f64; 2],
+    ) -> f64 {
         let begun = Instant::now();
         let part = self.free_part(state, increment, keep_and_most);
         self.spent += begun.elapsed();
@@ -159,7 +163,12 @@ impl TouchingSystem {
 
     fn free_part(&mut self, state: &State, increment: &[f64], [keep, most]: [f64; 2]) -> f64 {
         let Some((samples, _)) = &mut self.samples else {
-            return self.barriers.allowed(&state.position, increment, self.share, [keep, most]);
+            return self.barriers.collision_free_fraction(
+                &state.position,
+                increment,
+                self.time_fraction,
+                [keep, most],
+            );
         };
         samples.place(&self.model, state);
         let mut part = most;
@@ -168,7 +177,12 @@ impl TouchingSystem {
                 break;
             }
             samples.move_along(&self.model, state, increment, part);
-            let free = self.barriers.allowed(&samples.places, &samples.motion, self.share, [keep, part]);
+            let free = self.barriers.collision_free_fraction(
+                &samples.places,
+                &samples.motion,
+                self.time_fraction,
+                [keep, part],
+            );
             if free >= part {
                 return part;
             }
@@ -188,7 +202,7 @@ impl TouchingSystem {
         self.forces.fill(0.0);
         match &mut self.samples {
             None => {
-                self.energy = self.barriers.evaluate(&state.position, self.share);
+                self.energy = self.barriers.evaluate(&state.position, self.time_fraction);
                 if self.energy.is_finite() {
                     self.barriers.add_forces(&mut self.forces, &mut self.totals);
                     self.barriers.find_moments(&state.position, &mut self.moments);
@@ -196,7 +210,7 @@ impl TouchingSystem {
             }
             Some((samples, all)) => {
                 samples.place(&self.model, state);
-                self.energy = self.barriers.evaluate(&samples.places, self.share);
+                self.energy = self.barriers.evaluate(&samples.places, self.time_fraction);
                 all.fill(0.0);
                 if self.energy.is_finite() {
                     self.barriers.add_forces(all, &mut self.totals);
@@ -213,8 +227,8 @@ impl TouchingSystem {
     }
 
     /// What acts at the state last evaluated.
-    pub fn now(&self) -> TouchingNow {
-        TouchingNow {
+    pub fn now(&self) -> ContactNow {
+        ContactNow {
             forces: self.forces.clone(),
             totals: self.totals.iter().map(|&total| total.into()).collect(),
             moments: self.moments.iter().map(|&moment| moment.into()).collect(),
@@ -225,7 +239,7 @@ impl TouchingSystem {
     }
 
     /// [`now`](Self::now) at a state that no step led to: without friction.
-    pub fn at(&mut self, state: &State) -> TouchingNow {
+    pub fn at(&mut self, state: &State) -> ContactNow {
         self.stand(state);
         self.evaluate(state, None);
         self.touches = self.touched();
@@ -239,7 +253,7 @@ impl TouchingSystem {
         *self.barriers.shifts_mut() = shifts.collect();
         self.begin(state, &still, [state.time; 2]);
         self.barriers.drop_friction();
-        self.share = 1.0;
+        self.time_fraction = 1.0;
     }
 
     /// Ends a step at the state last evaluated, a time [s]: nodes have slid in it, and tools are where they lag.
@@ -394,12 +408,19 @@ impl TouchingSystem {
     ) {
         if let Some((samples, _)) = &self.samples {
             let movers = Movers { model: &self.model, followers, samples: Some(samples) };
-            return movers.add_stiffness(&self.barriers, self.share, equations, matrix, moved, coupling);
+            return movers.add_stiffness(
+                &self.barriers,
+                self.time_fraction,
+                equations,
+                matrix,
+                moved,
+                coupling,
+            );
         }
         let nodes = self.barriers.node_count();
-        // Nodes that move those of a row: their number, its place in the row, and their weight.
+        // Nodes that move those of a collision: their number, its place in the stencil, and their weight.
         let mut movers: Vec<(u32, usize, f64)> = Vec::new();
-        self.barriers.stiffness(self.share, |stencil, block, mut ways| {
+        self.barriers.stiffness(self.time_fraction, |stencil, block, mut ways| {
             let own = |at: usize| stencil.nodes[at] as usize;
             let count = usize::from(stencil.count);
             movers.clear();
@@ -437,11 +458,11 @@ impl TouchingSystem {
 
     /// The least gap, if edges go through triangles at the state last evaluated.
     pub(crate) fn check(&self, time: f64) -> Result<(), SolveError> {
-        if !self.check_crossings {
+        if !self.check_intersections {
             return Ok(());
         }
         let (mut count, mut first) = (0, None);
-        self.barriers.crossings(|contact, ends, corners| {
+        self.barriers.intersections(|contact, ends, corners| {
             count += 1;
             let node = |number: u32| match &self.samples {
                 Some((samples, _)) => samples.node_at(&self.model, number),

@@ -24,9 +24,9 @@ impl System {
         let (model, equations) = (&self.model, &self.stiffness.equations);
         let facets = model.facets.iter().map(|facet| &facet.nodes[..]);
         let stars = self.solids.stars();
-        let pairs = self.touching.as_ref().map_or(&[][..], |touching| touching.pairs());
+        let pairs = self.contact.as_ref().map_or(&[][..], |contact| contact.pairs());
         // Contacts on curved surfaces couple rotations, too.
-        let is_curved = self.touching.as_ref().is_some_and(|touching| touching.is_curved());
+        let is_curved = self.contact.as_ref().is_some_and(|contact| contact.is_curved());
         let (pairs, turning) = if is_curved { (&[][..], pairs) } else { (pairs, &[][..]) };
         let turning = turning.iter().map(|pair| &pair[..]);
         let Some(followers) = &self.followers else {
@@ -60,8 +60,8 @@ impl System {
 
     /// Makes room in the pattern for the contacts that act or soon may.
     pub(crate) fn make_room(&mut self) -> Result<(), SolveError> {
-        let Some(touching) = &mut self.touching else { return Ok(()) };
-        if !touching.grow(&self.stiffness.equations, &self.stiffness.matrix, self.followers.as_ref()) {
+        let Some(contact) = &mut self.contact else { return Ok(()) };
+        if !contact.grow(&self.stiffness.equations, &self.stiffness.matrix, self.followers.as_ref()) {
             return Ok(());
         }
         self.find_pattern()
@@ -69,8 +69,8 @@ impl System {
 
     /// Takes a pattern with these pairs of nodes for contacts.
     pub(crate) fn take_pairs(&mut self, pairs: Vec<[u32; 2]>) -> Result<(), SolveError> {
-        match &mut self.touching {
-            Some(touching) if touching.pairs != pairs => touching.pairs = pairs,
+        match &mut self.contact {
+            Some(contact) if contact.pairs != pairs => contact.pairs = pairs,
             _ => return Ok(()),
         }
         self.find_pattern()

@@ -37,7 +37,7 @@ use crate::model::error::SolveError;
 use crate::model::state::State;
 use crate::solid::relaxation::History;
 use crate::system::conditions::Conditions;
-use crate::system::contact::TouchingSystem;
+use crate::system::contact::ContactSystem;
 use crate::system::followers::Followers;
 use crate::system::prescribed::Gap;
 
@@ -107,7 +107,7 @@ pub struct System {
     /// their constraints; a system of forces alone has none.
     pub(crate) lags: Vec<Lag>,
     /// Contacts; a system of forces alone has none.
-    pub(crate) touching: Option<Box<TouchingSystem>>,
+    pub(crate) contact: Option<Box<ContactSystem>>,
     /// Distances of prescribed components from their curves that are still to come in.
     gap: Option<Gap>,
     pub(crate) phases: Phases,
@@ -149,7 +149,7 @@ impl System {
         let equations = &system.stiffness.equations;
         system.followers = Followers::of(&model, true);
         system.conditions = Conditions::of(&model, equations, system.facets.surface.as_ref());
-        system.touching = model.touching.as_ref().map(|own| Box::new(TouchingSystem::new(own, &model)));
+        system.contact = model.contact.as_ref().map(|own| Box::new(ContactSystem::new(own, &model)));
         system.lags = model.force_limits.keys().map(|&constraint| Lag::new(constraint as u32)).collect();
         system.stiffness.coupling = vec![0.0; equations.count()];
         (system.stiffness.solver, system.stiffness.device) = (solver, device);
@@ -170,7 +170,7 @@ impl System {
             followers: Followers::of(&model, false),
             conditions: Conditions::default(),
             lags: Vec::new(),
-            touching: None,
+            contact: None,
             gap: None,
             phases: Phases::default(),
             stop: StopFlag::default(),
@@ -223,8 +223,8 @@ impl System {
         if let Some(before) = before {
             let time = before.time + step;
             self.lags.iter_mut().for_each(|lag| lag.advance(time));
-            if let Some(touching) = &mut self.touching {
-                touching.end_step(time);
+            if let Some(contact) = &mut self.contact {
+                contact.end_step(time);
             }
         }
         if !self.relaxes() {
@@ -273,8 +273,8 @@ impl System {
 
     /// Finds forces of contacts, and makes room for their stiffness if it is wanted.
     fn find_contacts(&mut self, state: &State, tangent: bool) -> Result<(), SolveError> {
-        let Some(touching) = &mut self.touching else { return Ok(()) };
-        touching.evaluate(state, self.followers.as_ref());
+        let Some(contact) = &mut self.contact else { return Ok(()) };
+        contact.evaluate(state, self.followers.as_ref());
         if tangent { self.make_room() } else { Ok(()) }
     }
 
@@ -336,18 +336,18 @@ impl System {
 
     /// Adds contacts; the time that their stiffness took.
     fn add_contacts(&mut self, tangent: Option<&[f64]>) -> Duration {
-        let Self { forces, stiffness, followers, touching, phases, .. } = self;
-        let Some(touching) = touching else { return Duration::ZERO };
+        let Self { forces, stiffness, followers, contact, phases, .. } = self;
+        let Some(contact) = contact else { return Duration::ZERO };
         let mut spent = Duration::ZERO;
-        forces.external.iter_mut().zip(&touching.given).for_each(|(load, force)| *load += force);
+        forces.external.iter_mut().zip(&contact.given).for_each(|(load, force)| *load += force);
         if let Some(moved) = tangent {
             let begun = Instant::now();
             let Stiffness { equations, matrix, coupling, .. } = stiffness;
-            touching.add_stiffness(equations, matrix, followers.as_ref(), moved, coupling);
+            contact.add_stiffness(equations, matrix, followers.as_ref(), moved, coupling);
             spent = begun.elapsed();
-            touching.spent += spent;
+            contact.spent += spent;
         }
-        phases.contact = touching.spent;
+        phases.contact = contact.spent;
         spent
     }
 

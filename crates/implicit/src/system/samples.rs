@@ -287,14 +287,14 @@ impl Movers<'_> {
     pub(crate) fn add_stiffness(
         self,
         barriers: &Barriers,
-        share: f64,
+        time_fraction: f64,
         equations: &Equations,
         matrix: &mut LowerMatrix,
         moved: &[f64],
         coupling: &mut [f64],
     ) {
         let mut movers: Vec<(u32, usize, ByNode)> = Vec::new();
-        barriers.stiffness(share, |stencil, block, mut ways| {
+        barriers.stiffness(time_fraction, |stencil, block, mut ways| {
             let count = usize::from(stencil.count);
             movers.clear();
             for at in (0..count)

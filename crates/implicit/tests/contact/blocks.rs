@@ -75,7 +75,7 @@ fn slid(friction: f64, step: f64) -> [f64; 2] {
             start = [&state.position, &state.velocity].map(|of| mean(&model, of));
         }
     }
-    let now = solver.touching().unwrap().now();
+    let now = solver.contact().unwrap().now();
     let [place, velocity] = start;
     let way = mean(&model, &state.position) - place;
     // Backward Euler: Σ h v of the steps.
@@ -145,7 +145,7 @@ fn friction_is_mu_times_the_normal_force_in_every_direction() {
             solver.hold(&springs);
             solver.advance(&mut state).unwrap();
         }
-        let [x, y, z] = solver.touching().unwrap().now().totals[0];
+        let [x, y, z] = solver.contact().unwrap().now().totals[0];
         let force = Vector3::new(x, y, 0.0);
         let off = force.cross(&along).norm().atan2(force.dot(&along)).to_degrees();
         println!(

@@ -101,7 +101,7 @@ fn a_uniform_pressure_goes_through_cells_that_do_not_match() {
     for step in 1..=10 {
         iterations += solver.solve(&mut state, 0.1 * f64::from(step)).unwrap().residuals.len();
     }
-    let now = solver.touching().unwrap().now();
+    let now = solver.contact().unwrap().now();
     let pressure = now.totals[0][2].abs() / (SIZE * SIZE);
     let (mut off, mut most, mut volume) = (0.0, 0.0_f64, 0.0);
     for solid in &model.solids {
@@ -125,7 +125,7 @@ fn a_uniform_pressure_goes_through_cells_that_do_not_match() {
     assert!(off / volume < 0.01, "{}", off / volume);
     // 2 % are asked; pairs at a corner or an edge count for each triangle there, so that single nodes are off by more.
     assert!((mean - 1.0).abs() < 0.02 && least > 0.96 && largest < 1.04, "{mean} {least} {largest}");
-    let contacts = solver.touching().unwrap().barriers().contacts();
+    let contacts = solver.contact().unwrap().barriers().contacts();
     let numbers = contacts.nodes();
     let places: Vec<Vector3<f64>> = numbers.iter().map(|&node| state.position[node as usize]).collect();
     let push = |node: &u32| {
@@ -164,7 +164,7 @@ fn forces_between_bodies_have_no_sum_and_no_moment() {
             state.velocity[half..].fill(Vector3::new(-0.03, 0.0, -0.3));
             for _ in 0..60 {
                 solver.advance(&mut state).unwrap();
-                let now = solver.touching().unwrap().now();
+                let now = solver.contact().unwrap().now();
                 let force = |node: usize| {
                     Vector3::new(now.forces[6 * node], now.forces[6 * node + 1], now.forces[6 * node + 2])
                 };

@@ -80,13 +80,13 @@ fn threads_and_a_restart_change_no_bit() {
             let (mut first, mut state) = (solver(&model), State::at_rest(&model));
             for step in 0..30 {
                 if step == stop {
-                    let pairs = first.touching().unwrap().pairs().to_vec();
+                    let pairs = first.contact().unwrap().pairs().to_vec();
                     first = solver(&model);
                     first.take_contact_pairs(pairs).unwrap();
                 }
                 first.advance(&mut state).unwrap();
             }
-            assert!(first.touching().unwrap().now().gap.is_some());
+            assert!(first.contact().unwrap().now().gap.is_some());
             state
         })
     };
@@ -110,8 +110,8 @@ fn draped(cells: u32, friction: f64, until: f64) -> f64 {
         iterations += done.residuals.len();
         halved += usize::from(done.parts > 1);
         steps += 1;
-        rows += solver.touching().unwrap().barriers().rows().len();
-        least = least.min(solver.touching().unwrap().now().gap.unwrap_or(f64::INFINITY));
+        rows += solver.contact().unwrap().barriers().normal_collisions().len();
+        least = least.min(solver.contact().unwrap().now().gap.unwrap_or(f64::INFINITY));
     }
     let border: Vec<usize> = (0..model.rest.len()).filter(|&n| model.place(n).amax() > 0.1499).collect();
     let radius = border.iter().map(|&n| state.position[n].xy().norm()).sum::<f64>() / border.len() as f64;
@@ -195,7 +195,7 @@ fn a_twisted_strip_does_not_go_through_itself() {
     let (start, mut touched, mut halved) = (Instant::now(), 0, 0);
     for _ in 0..100 {
         let done = solver.advance(&mut state).unwrap_or_else(|error| panic!("{error}"));
-        touched += u32::from(solver.touching().is_some_and(|t| t.now().gap.is_some()));
+        touched += u32::from(solver.contact().is_some_and(|t| t.now().gap.is_some()));
         halved += u32::from(done.parts > 1);
     }
     println!(

@@ -86,7 +86,7 @@ fn play(scene: &Scene, is_rigid: bool) -> Result<(), String> {
         steps += 1;
         iterations += done.residuals.len();
         halved += usize::from(done.parts > 1);
-        if let Some(gap) = solver.touching().unwrap().now().gap {
+        if let Some(gap) = solver.contact().unwrap().now().gap {
             (touched, least) = (touched + 1, least.min(gap));
         }
         fastest = state.velocity.iter().fold(fastest, |most, v| most.max(v.norm()));

@@ -75,7 +75,7 @@ fn a_ball_goes_through_a_narrow_tube_and_is_round_again() {
         iterations += done.residuals.len();
         halved += usize::from(done.parts > 1);
         most = most.max(stretched(&state));
-        least = least.min(solver.touching().unwrap().now().gap.unwrap_or(f64::INFINITY));
+        least = least.min(solver.contact().unwrap().now().gap.unwrap_or(f64::INFINITY));
     }
     let lowest = state.position.iter().map(|x| x.z).fold(f64::NEG_INFINITY, f64::max);
     let left = stretched(&state);

@@ -18,7 +18,7 @@ use pliant_contact::pairs::Surface;
 use pliant_contact::pose::{Pose, Trajectory};
 use pliant_contact::shape::Shape;
 use pliant_contact::touch::{Contact, Contacts, Rigid, Touch, With};
-use pliant_implicit::{Assembly, Touching};
+use pliant_implicit::{Assembly, ContactModel};
 
 /// A thing of a shape that goes along a trajectory.
 fn rigid(name: &str, shape: Shape, trajectory: Trajectory) -> Rigid {
@@ -52,8 +52,12 @@ fn at_rigid(own: &Surface, rigids: Vec<Rigid>, friction: f64, offset: f64) -> Co
 /// Gives a model contacts that all act in one way.
 fn touch(model: &mut Assembly, contacts: Contacts, settings: BarrierSettings) {
     let settings = vec![settings; contacts.contacts.len()];
-    model.touching =
-        Some(Touching { contacts: Arc::new(contacts), settings, levels: Vec::new(), check_crossings: true });
+    model.contact = Some(ContactModel {
+        contacts: Arc::new(contacts),
+        settings,
+        levels: Vec::new(),
+        check_intersections: true,
+    });
 }
 
 /// The sum of vectors of nodes by their masses, over the mass.

@@ -84,7 +84,7 @@ fn pressed(edges: u32, thickness: f64, approach: f64, steps: u32) -> Vec<[f64; 2
     for step in 1..=steps {
         let done = solver.solve(&mut state, f64::from(step) / f64::from(steps)).unwrap();
         iterations += done.residuals.len();
-        let now = solver.touching().unwrap().now();
+        let now = solver.contact().unwrap().now();
         let [upper, lower] = [0, 1].map(|plate| now.totals[plate][2]);
         assert!((upper + lower).abs() < 1e-6 * upper.abs(), "{upper} {lower}");
         // At the top, or where a flat part has its ends.
@@ -187,7 +187,7 @@ fn dropped(integrator: Integrator, step: f64) -> Rebound {
     while state.time < 0.2 && !flies_up(&state) {
         iterations += solver.advance(&mut state).unwrap().residuals.len();
         steps += 1;
-        let now = solver.touching().unwrap().now();
+        let now = solver.contact().unwrap().now();
         let next = energy(&state, now.energy);
         rebound.grown = rebound.grown.max((next - last) / start);
         last = next;

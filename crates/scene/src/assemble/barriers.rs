@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use pliant_format::tables::ContactTable;
 use pliant_geometry::words::{counted, number};
-use pliant_implicit::{State, Touching, apart_counts, meetings};
+use pliant_implicit::{ContactModel, State, apart_counts, meetings};
 use pliant_sim::contact::barrier::{BarrierSettings, Meeting};
 use pliant_sim::contact::touch::{Contacts, With};
 
@@ -37,12 +37,12 @@ impl BarrierTables {
         self.settings.iter().map(|settings| settings.distance).collect()
     }
 
-    fn touching(&self, contacts: &Arc<Contacts>) -> Touching {
-        Touching {
+    fn contact_model(&self, contacts: &Arc<Contacts>) -> ContactModel {
+        ContactModel {
             contacts: Arc::clone(contacts),
             settings: self.settings.clone(),
             levels: self.levels.clone(),
-            check_crossings: self.check,
+            check_intersections: self.check,
         }
     }
 }
@@ -127,22 +127,22 @@ impl Builder<'_> {
         if !barriers.tables.iter().any(is_asked) {
             return;
         }
-        let met = meetings(&barriers.touching(contacts), &self.assembly, start);
+        let met = meetings(&barriers.contact_model(contacts), &self.assembly, start);
         let names = met.iter().map(|one| &barriers.tables[one.contact as usize]);
         self.overlapping = names.into_iter().find(|name| is_asked(name)).cloned();
     }
 
     /// Gives the contacts to the model, unless bodies have no gap at the start.
     pub(super) fn touch(&mut self, contacts: &Arc<Contacts>, barriers: BarrierTables, start: &State) {
-        let touching = barriers.touching(contacts);
+        let model = barriers.contact_model(contacts);
         let tables = barriers.tables;
-        let met = meetings(&touching, &self.assembly, start);
+        let met = meetings(&model, &self.assembly, start);
         let mut of_contacts = BTreeMap::<u32, Vec<Meeting>>::new();
         met.into_iter().for_each(|one| of_contacts.entry(one.contact).or_default().push(one));
         for (contact, met) in &of_contacts {
             self.refuse_meetings(&contacts.contacts[*contact as usize].name, &tables[*contact as usize], met);
         }
-        for (contact, count) in contacts.contacts.iter().zip(apart_counts(&touching, &self.assembly)) {
+        for (contact, count) in contacts.contacts.iter().zip(apart_counts(&model, &self.assembly)) {
             if count > 0 {
                 self.notes.push(format!(
                     "contact `{}`: {} of nodes with triangles or of edges never touch, since they are in one place at rest",
@@ -151,7 +151,7 @@ impl Builder<'_> {
                 ));
             }
         }
-        self.assembly.touching = Some(touching);
+        self.assembly.contact = Some(model);
     }
 
     /// How often the triangles of shells among these bodies are divided.

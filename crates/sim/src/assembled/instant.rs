@@ -50,18 +50,18 @@ impl Instant for Assembled {
     }
 
     fn contact_forces(&self) -> Vec<[f64; 3]> {
-        self.touching.as_ref().map(|now| now.totals.clone()).unwrap_or_default()
+        self.contact.as_ref().map(|now| now.totals.clone()).unwrap_or_default()
     }
 
     fn contact_moments(&self) -> Option<Vec<[f64; 3]>> {
-        Some(self.touching.as_ref().map(|now| now.moments.clone()).unwrap_or_default())
+        Some(self.contact.as_ref().map(|now| now.moments.clone()).unwrap_or_default())
     }
 
     fn contact_nodes(&self) -> Vec<NodeContact> {
-        let (Some(now), Some(touching)) = (&self.touching, &self.bodies.model.touching) else {
+        let (Some(now), Some(contact)) = (&self.contact, &self.bodies.model.contact) else {
             return Vec::new();
         };
-        let numbers = touching.contacts.nodes();
+        let numbers = contact.contacts.nodes();
         let touch = |node: u32| {
             let found = now.nodes.binary_search_by_key(&node, |own| own.node);
             found.ok().map(|at| &now.nodes[at])
@@ -72,7 +72,7 @@ impl Instant for Assembled {
             .collect();
         let places: Vec<Vector3<f64>> =
             numbers.iter().map(|&node| self.state.position[node as usize]).collect();
-        let pressures = pressures(&faces(&touching.contacts, &numbers), &pushes, &places);
+        let pressures = pressures(&faces(&contact.contacts, &numbers), &pushes, &places);
         let own = |(node, pressure): (u32, Option<f64>)| {
             let (at, own) = (6 * node as usize, touch(node));
             NodeContact {
@@ -87,11 +87,11 @@ impl Instant for Assembled {
     }
 
     fn leg(&self, rigid: usize) -> Option<&Leg> {
-        self.method.touching()?.legs().get(&(rigid as u32))
+        self.method.contact()?.legs().get(&(rigid as u32))
     }
 
     fn lag(&self, rigid: usize) -> Option<&Lag> {
-        self.method.touching()?.lags().iter().find(|lag| lag.number() == rigid)
+        self.method.contact()?.lags().iter().find(|lag| lag.number() == rigid)
     }
 
     fn lag_of_constraint(&self, constraint: usize) -> Option<&Lag> {
@@ -138,7 +138,7 @@ impl Instant for Assembled {
     }
 
     fn least_gap(&self) -> Option<f64> {
-        self.touching.as_ref()?.gap
+        self.contact.as_ref()?.gap
     }
 
     fn ended(&self) -> Option<&str> {

@@ -2,8 +2,8 @@
 
 use pliant_contact::lag::Lag;
 use pliant_implicit::{
-    AssemblySolver, Attempted, BackwardEuler, ExplicitShells, Forces, SolveError, State, Statics,
-    TouchingSystem,
+    AssemblySolver, Attempted, BackwardEuler, ContactSystem, ExplicitShells, Forces, SolveError, State,
+    Statics,
 };
 
 /// A solver, and the forces at an instant: an explicit one finds them anyway.
@@ -40,12 +40,12 @@ impl SolverMethod {
     }
 
     /// Contacts; `None` without any.
-    pub(super) fn touching(&self) -> Option<&TouchingSystem> {
-        self.equations().and_then(|solver| solver.touching())
+    pub(super) fn contact(&self) -> Option<&ContactSystem> {
+        self.equations().and_then(|solver| solver.contact())
     }
 
-    pub(super) fn touching_mut(&mut self) -> Option<&mut TouchingSystem> {
-        self.equations_mut().and_then(|solver| solver.touching_mut())
+    pub(super) fn contact_mut(&mut self) -> Option<&mut ContactSystem> {
+        self.equations_mut().and_then(|solver| solver.contact_mut())
     }
 
     /// Has something act on what finds forces at an instant, and on the solver of equations.

@@ -16,8 +16,8 @@ use nalgebra::Vector3;
 #[cfg(feature = "gpu")]
 use pliant_gpu::GpuShells;
 use pliant_implicit::{
-    AssemblySolver, Attempted, BackwardEuler, DynamicSettings, ExplicitShells, Forces, Phases, SolveError,
-    Spring, State, Statics, TouchingNow, TouchingSystem,
+    AssemblySolver, Attempted, BackwardEuler, ContactNow, ContactSystem, DynamicSettings, ExplicitShells,
+    Forces, Phases, SolveError, Spring, State, Statics,
 };
 #[cfg(feature = "gpu")]
 use pliant_linear::LinearDevice;
@@ -81,7 +81,7 @@ pub(crate) struct Assembled {
     grips: Vec<Grip>,
     springs: Vec<Spring>,
     /// What contacts do at the instant; `None` without contacts, and at the start before they are looked at.
-    touching: Option<TouchingNow>,
+    contact: Option<ContactNow>,
     /// Displacements of the solids at the instant last evaluated; `None` without solids.
     solids: Option<pliant_explicit::State<f64>>,
     /// What takes explicit steps; `None`: the CPU. Forces at instants are found on the CPU, as are energies and reactions.
@@ -151,7 +151,7 @@ impl Assembled {
             path: Path::default(),
             grips: Vec::new(),
             springs: Vec::new(),
-            touching: None,
+            contact: None,
             solids: (!own.solids.is_empty()).then(|| pliant_explicit::State::at_rest(own)),
             #[cfg(feature = "gpu")]
             device,
@@ -170,7 +170,7 @@ impl Assembled {
             Failure { load_step, ..failed }
         })?;
         (self.done, self.time) = (number, self.state.time);
-        self.touching = self.method.touching().map(TouchingSystem::now);
+        self.contact = self.method.contact().map(ContactSystem::now);
         (self.evaluated, self.entered) = (false, false);
         Ok(())
     }
@@ -430,15 +430,15 @@ impl Assembled {
         self.energies = energies;
         (self.effort, self.effort_before) = (effort.clone(), effort);
         (self.evaluated, self.entered) = (false, entered);
-        if let Some(own) = self.method.touching_mut() {
+        if let Some(own) = self.method.contact_mut() {
             *own.legs_mut() = legs.into_iter().collect();
         }
         if let Some(ContactState { forces, totals, moments, energy, touches, pairs, lags }) = contact {
             let gap = touches.iter().map(|own| own.gap).reduce(f64::min);
-            if let Some(own) = self.method.touching_mut() {
+            if let Some(own) = self.method.contact_mut() {
                 own.go_on_from(touches.clone(), lags);
             }
-            self.touching = Some(TouchingNow { forces, totals, moments, energy, gap, nodes: touches });
+            self.contact = Some(ContactNow { forces, totals, moments, energy, gap, nodes: touches });
             let taken = self.method.equations_mut().map_or(Ok(()), |solver| solver.take_contact_pairs(pairs));
             taken.map_err(|error| failure(&error, &self.model, &self.bodies, self.time))?;
         }
@@ -462,7 +462,7 @@ impl Assembled {
             energies: self.energies,
             effort: self.effort.clone(),
             convergence: VecDeque::new(),
-            contact: self.touching.as_ref().zip(self.method.touching()).map(|(now, own)| ContactState {
+            contact: self.contact.as_ref().zip(self.method.contact()).map(|(now, own)| ContactState {
                 forces: now.forces.clone(),
                 totals: now.totals.clone(),
                 moments: now.moments.clone(),
@@ -471,7 +471,7 @@ impl Assembled {
                 pairs: own.pairs().to_vec(),
                 lags: own.lags().to_vec(),
             }),
-            legs: (self.method.touching().into_iter())
+            legs: (self.method.contact().into_iter())
                 .flat_map(|own| own.legs().iter().map(|(&rigid, &leg)| (rigid, leg)))
                 .collect(),
             path: Path {

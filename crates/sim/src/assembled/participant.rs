@@ -19,11 +19,11 @@ impl Participant for Assembled {
             return Ok(());
         }
         self.put_springs();
-        if self.touching.is_none() {
-            self.touching = self.method.touching_mut().map(|own| own.at(&self.state));
+        if self.contact.is_none() {
+            self.contact = self.method.contact_mut().map(|own| own.at(&self.state));
         }
         if let (Some(now), SolverMethod::Static(_, forces) | SolverMethod::Implicit(_, forces)) =
-            (&self.touching, &mut self.method)
+            (&self.contact, &mut self.method)
         {
             forces.touch(&now.forces);
         }
@@ -86,7 +86,7 @@ impl Participant for Assembled {
     }
 
     fn drive(&mut self, rigid: usize, leg: Leg) {
-        if let Some(own) = self.method.touching_mut() {
+        if let Some(own) = self.method.contact_mut() {
             own.legs_mut().insert(rigid as u32, leg);
         }
     }
@@ -113,7 +113,7 @@ impl Participant for Assembled {
     /// What was spent since then counts.
     fn goes_back_to(&self, kept: &Kept) -> bool {
         // What is touched at the start is not known before contacts are looked at.
-        matches!(kept, Kept::Implicit(state) if state.contact.is_some() || self.method.touching().is_none())
+        matches!(kept, Kept::Implicit(state) if state.contact.is_some() || self.method.contact().is_none())
     }
 
     fn go_back(&mut self, kept: &Kept, _steps: Option<(Clock, f64)>) -> Result<(), Failure> {
@@ -160,7 +160,7 @@ impl Participant for Assembled {
         if is_static && self.state.time > self.time {
             self.time = self.state.time;
             // Contacts without friction: that of the part of the step that was found is not known.
-            self.touching = None;
+            self.contact = None;
             (self.evaluated, self.entered) = (false, false);
         }
         is_static

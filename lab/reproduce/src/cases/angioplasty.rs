@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use nalgebra::{Vector2, Vector3};
 use pliant_implicit::AssemblySolver;
-use pliant_implicit::{Assembly, State, StaticSettings, Statics, Touching};
+use pliant_implicit::{Assembly, ContactModel, State, StaticSettings, Statics};
 use pliant_mechanics::curve::{Curve as LoadCurve, Shape as CurveShape};
 use pliant_mechanics::law::{AnyLaw, NeoHookean, Volumetric};
 use pliant_mechanics::model::{Cells, Constraint, Material, Motion, Solid};
@@ -233,11 +233,11 @@ pub fn widened(divisions: Divisions, young: f64, radii: &[f64]) -> Result<Vec<Wi
         touch: Touch { friction: 0.0, offset: 0.0 },
     };
     let barrier = BarrierSettings { distance: BARRIER, stiffness: 0.1 * young, creep_speed: 1e-3 };
-    vessel.model.touching = Some(Touching {
+    vessel.model.contact = Some(ContactModel {
         contacts: Arc::new(Contacts { rigids: vec![balloon], contacts: vec![contact], ..Default::default() }),
         settings: vec![barrier],
         levels: Vec::new(),
-        check_crossings: false,
+        check_intersections: false,
     });
     let settings = StaticSettings { iterations: 200, ..StaticSettings::default() };
     let mut solver = Statics::new(vessel.model.clone(), settings)?;
@@ -246,7 +246,7 @@ pub fn widened(divisions: Divisions, young: f64, radii: &[f64]) -> Result<Vec<Wi
     let mut found = Vec::new();
     for step in 1..=radii.len() {
         let done = solver.solve(&mut state, step as f64)?;
-        let forces = solver.touching().map(|touching| touching.now().forces).unwrap_or_default();
+        let forces = solver.contact().map(|contact| contact.now().forces).unwrap_or_default();
         let quarter: f64 = forces.chunks_exact(6).map(|force| Vector2::new(force[0], force[1]).norm()).sum();
         found.push(Widened {
             inner: vessel.radius(&state, 0),

@@ -87,14 +87,14 @@ pub fn compare_touching(
 ) -> Vec<Vec<[Vector<f64>; 3]>> {
     let start = vec![[0.0; 3]; model.node_count()];
     let processor = CentralDifference::new(model.clone(), step).unwrap().dissipating();
-    let processor = processor.touching(Arc::clone(contacts));
+    let processor = processor.with_contacts(Arc::clone(contacts));
     let single = CentralDifference::new(model.clone(), step).unwrap().dissipating();
-    let single = single.touching(Arc::clone(contacts));
+    let single = single.with_contacts(Arc::clone(contacts));
     // A gap is known to the round-off of places, which a step makes a velocity: 6e-8 of 0.1 m over a two-hundredth of the run, beside a way
     // of some millimetres.
     run_both(what, (model, &start), (processor, single), (designs, 1e-3), |design| {
         let contacts = Arc::clone(contacts);
-        GpuStepper::touching(device, model.clone(), contacts, step, Some(design)).unwrap().dissipating()
+        GpuStepper::with_contacts(device, model.clone(), contacts, step, Some(design)).unwrap().dissipating()
     })
 }
 

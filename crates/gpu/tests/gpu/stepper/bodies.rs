@@ -198,7 +198,7 @@ fn cubes_keep_their_momentum_and_their_bits_however_the_steps_are_divided() {
     let run = |strides: &[u64]| {
         let mut state = State::<f32>::at_rest(&model);
         let of = (model.clone(), Arc::clone(&contacts));
-        let mut stepper = GpuStepper::touching(&device, of.0, of.1, step, None).unwrap();
+        let mut stepper = GpuStepper::with_contacts(&device, of.0, of.1, step, None).unwrap();
         for &stride in strides {
             stepper.evaluate(&mut state, Wanted::Energies).unwrap();
             stepper.advance(&mut state, stride).unwrap();
@@ -240,7 +240,7 @@ fn the_cost_of_pairs() {
         let contacts = touching(&model, vec![], 0.3);
         let mut stepper = match gap {
             None => GpuStepper::new(&device, model.clone(), step, None),
-            Some(_) => GpuStepper::touching(&device, model.clone(), contacts, step, None),
+            Some(_) => GpuStepper::with_contacts(&device, model.clone(), contacts, step, None),
         }
         .unwrap();
         let spent = time_of(&mut stepper, &model, what);

@@ -227,7 +227,7 @@ fn a_driven_tool_gives_the_same_bits_however_the_steps_are_divided() {
     let run = |strides: &[u64]| {
         let mut state = State::<f32>::at_rest(&model);
         let of = (model.clone(), Arc::clone(&contacts));
-        let mut stepper = GpuStepper::touching(&device, of.0, of.1, step, None).unwrap();
+        let mut stepper = GpuStepper::with_contacts(&device, of.0, of.1, step, None).unwrap();
         stepper.advance(&mut state, 100).unwrap();
         drive(state.time, &mut |leg| state.drive(0, leg));
         for &stride in strides {
@@ -241,7 +241,7 @@ fn a_driven_tool_gives_the_same_bits_however_the_steps_are_divided() {
     assert_eq!(run(&[1, 2, 37, 60]), whole);
     let mut state = State::<f64>::at_rest(&model);
     let processor = CentralDifference::new(model.clone(), step).unwrap();
-    let mut processor = processor.touching(Arc::clone(&contacts));
+    let mut processor = processor.with_contacts(Arc::clone(&contacts));
     for number in 0..200 {
         if number == 100 {
             drive(state.time, &mut |leg| state.drive(0, leg));
@@ -264,7 +264,7 @@ fn a_state_in_contact_goes_from_the_processor_to_the_device_and_back() {
     let step = 0.5 * step_of(&model);
     let on_processor = |state: &mut State<f32>| {
         let stepper = CentralDifference::new(model.clone(), step).unwrap();
-        let mut stepper = stepper.touching(Arc::clone(&contacts));
+        let mut stepper = stepper.with_contacts(Arc::clone(&contacts));
         for _ in 0..60 {
             stepper.evaluate(state).unwrap();
             stepper.advance(state);
@@ -276,7 +276,7 @@ fn a_state_in_contact_goes_from_the_processor_to_the_device_and_back() {
     on_processor(&mut whole);
     on_processor(&mut whole);
     let of = (model.clone(), Arc::clone(&contacts));
-    let mut stepper = GpuStepper::touching(&device, of.0, of.1, step, None).unwrap();
+    let mut stepper = GpuStepper::with_contacts(&device, of.0, of.1, step, None).unwrap();
     stepper.evaluate(&mut mixed, Wanted::Energies).unwrap();
     let read_backs = device.read_backs();
     while mixed.steps < 120 {
@@ -314,7 +314,7 @@ fn the_cost_of_contact() {
             Some((radius, pose)) => {
                 let tool = rigid("tool", Shape::Sphere { radius }, Trajectory::fixed(pose));
                 let contacts = with(&model, vec![tool], 0.3);
-                GpuStepper::touching(&device, model.clone(), contacts, step, None)
+                GpuStepper::with_contacts(&device, model.clone(), contacts, step, None)
             }
         }
         .unwrap();
@@ -366,7 +366,7 @@ fn what_has_no_contact_is_refused_by_name() {
     let contacts = with(&model, vec![floor.clone()], 0.0);
     assert_eq!(processor_only(&contacts), None);
     let stepper = |contacts: Contacts, design| {
-        GpuStepper::touching(&device, model.clone(), Arc::new(contacts), 1e-3, design).err()
+        GpuStepper::with_contacts(&device, model.clone(), Arc::new(contacts), 1e-3, design).err()
     };
     let blocks = stepper(Contacts::clone(&contacts), Some(Design::Blocks));
     assert_eq!(blocks, Some(GpuError::NoContact { design: "blocks".into() }));

@@ -288,7 +288,7 @@ impl Statics {
         let start = state.clone();
         self.system.prescribed(state.time, time, &mut self.pending);
         self.system.begin_step(&start.history, time - start.time);
-        if self.system.touching.is_some() {
+        if self.system.contact.is_some() {
             let step = self.iterate_in_contact(state, time, control)?;
             self.system.end_step(Some(&start), state, time - start.time);
             return Ok(step);

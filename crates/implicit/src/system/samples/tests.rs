@@ -9,9 +9,9 @@ use pliant_contact::touch::{Contact, Contacts, Rigid, Touch, With};
 use pliant_testing::Random;
 
 use crate::model::assembly::Assembly;
-use crate::model::contact::Touching;
+use crate::model::contact::ContactModel;
 use crate::model::state::State;
-use crate::system::contact::{TouchingNow, TouchingSystem};
+use crate::system::contact::{ContactNow, ContactSystem};
 use crate::system::samples::Samples;
 use crate::tests::{ball, cube, model, strip};
 
@@ -23,7 +23,7 @@ fn surface(model: &Assembly) -> Surface {
 }
 
 /// A shell with a ball of a radius at a place.
-fn touching(model: &Assembly, radius: f64, at: Vector3<f64>, level: u8) -> Touching {
+fn contact(model: &Assembly, radius: f64, at: Vector3<f64>, level: u8) -> ContactModel {
     let trajectory = Trajectory::fixed(Pose::translation(at.x, at.y, at.z));
     let rigid =
         Rigid { name: "ball".into(), shape: Shape::Sphere { radius }, trajectory, inside: false, jaw: None };
@@ -33,16 +33,16 @@ fn touching(model: &Assembly, radius: f64, at: Vector3<f64>, level: u8) -> Touch
         with: With::Rigid(0),
         touch: Touch { friction: 0.0, offset: 0.0 },
     };
-    Touching {
+    ContactModel {
         contacts: Arc::new(Contacts { contacts: vec![contact], rigids: vec![rigid], ..Default::default() }),
         settings: vec![BarrierSettings { distance: REACH, stiffness: 1.0, creep_speed: 1e-3 }],
         levels: vec![level],
-        check_crossings: true,
+        check_intersections: true,
     }
 }
 
-fn now(model: &Arc<Assembly>, state: &State, touching: &Touching) -> TouchingNow {
-    TouchingSystem::new(touching, model).at(state)
+fn now(model: &Arc<Assembly>, state: &State, contact: &ContactModel) -> ContactNow {
+    ContactSystem::new(contact, model).at(state)
 }
 
 /// A state that is shaken: six numbers a node, up to a size.
@@ -62,8 +62,8 @@ fn surfaces_of_points_are_watertight() {
         let model = model(shape, 0.01);
         let state = shaken(&model, &mut random, 0.1);
         for level in [1, 2] {
-            let touching = touching(&model, 0.1, Vector3::x() * 9.0, level);
-            let (mut samples, contacts) = Samples::of(&model, &touching.contacts, &[level]).unwrap();
+            let contact = contact(&model, 0.1, Vector3::x() * 9.0, level);
+            let (mut samples, contacts) = Samples::of(&model, &contact.contacts, &[level]).unwrap();
             assert_eq!(contacts.contacts[0].surface.faces.len(), model.facets.len() << (2 * level));
             samples.place(&model, &state);
             let mut shared = 0;
@@ -98,7 +98,7 @@ fn forces_on_points_go_to_nodes_with_their_sum_and_their_moment() {
             let model = Arc::new(model(ball(2), 0.01));
             let state = shaken(&model, &mut random, 0.02);
             let centre = Vector3::from(random.vector()).normalize() * 1.33;
-            let now = now(&model, &state, &touching(&model, 0.3, centre, level));
+            let now = now(&model, &state, &contact(&model, 0.3, centre, level));
             let part = |node: usize, first: usize| {
                 Vector3::from_column_slice(&now.forces[6 * node + first..6 * node + first + 3])
             };
@@ -142,7 +142,7 @@ fn gaps_come_to_those_of_the_sphere_with_the_level() {
             let mut worst = 0.0_f64;
             for _ in 0..30 {
                 let centre = Vector3::from(random.vector()).normalize() * 0.72;
-                let gap = now(&model, &state, &touching(&model, 0.2, centre, level)).gap.unwrap();
+                let gap = now(&model, &state, &contact(&model, 0.2, centre, level)).gap.unwrap();
                 worst = worst.max((gap - 0.08).abs());
             }
             worst
@@ -166,7 +166,7 @@ fn allowed_parts_leave_gaps_on_curved_ways() {
             let model = Arc::new(model(ball(1), 0.01));
             let state = shaken(&model, &mut random, 0.02);
             let centre = Vector3::from(random.vector()).normalize() * 1.4;
-            let mut system = TouchingSystem::new(&touching(&model, 0.3, centre, level), &model);
+            let mut system = ContactSystem::new(&contact(&model, 0.3, centre, level), &model);
             system.at(&state);
             if !system.energy.is_finite() {
                 continue;
@@ -175,7 +175,7 @@ fn allowed_parts_leave_gaps_on_curved_ways() {
             system.begin(&state, &turns, [0.0, 1.0]);
             let mut part = 1.0;
             for _ in 0..3 {
-                part = system.allowed(&state, &turns, [0.1, part]);
+                part = system.collision_free_fraction(&state, &turns, [0.1, part]);
                 shortened += u32::from(part < 1.0);
                 all += 1;
                 let mut there = state.clone();

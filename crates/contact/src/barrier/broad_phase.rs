@@ -1,10 +1,10 @@
-//! Pairs that may come near while nodes stay within wide skins: found by trees of boxes, and kept over lists and steps. Lists are chosen from
+//! The broad phase: pairs that may come near while nodes stay within wide skins: found by trees of boxes, and kept over lists and steps. Lists are chosen from
 //! them by distances alone, in the order of their numbers, so that what is in a list does not depend on when these pairs were found.
 
 use nalgebra::Vector3;
 
-use super::advance::Kind;
-use super::surfaces::{BarrierSide, around};
+use super::ccd::Kind;
+use super::collision_mesh::{CollisionMesh, around};
 
 /// The wide skin of a node over that of a list.
 const WIDER: f64 = 2.5;
@@ -120,7 +120,7 @@ impl Pairs {
 
 /// Pairs of the sides of a contact.
 #[derive(Clone, Debug)]
-pub(super) struct Wide {
+pub(super) struct BroadPhase {
     /// Points of the first side, of the second, and edges.
     pairs: [Pairs; 3],
     /// Of all nodes: skins [m], and places [m] when pairs were found; none before that.
@@ -146,7 +146,7 @@ struct Lengths {
 
 impl Lengths {
     /// Takes those of nodes.
-    fn take(&mut self, sides: &[BarrierSide], of: &[f64]) {
+    fn take(&mut self, sides: &[CollisionMesh], of: &[f64]) {
         let most = |nodes: &[u32]| nodes.iter().map(|&node| of[node as usize]).fold(0.0, f64::max);
         for (number, side) in sides.iter().enumerate() {
             let [points, faces, edges] =
@@ -170,12 +170,12 @@ impl Lengths {
 }
 
 /// The surface on the other side of one.
-pub(super) fn other(sides: &[BarrierSide], side: usize) -> &BarrierSide {
+pub(super) fn other(sides: &[CollisionMesh], side: usize) -> &CollisionMesh {
     if sides.len() == 1 { &sides[0] } else { &sides[1 - side] }
 }
 
 /// How far [m] the whole surface goes that touches itself: what its parts have in common.
-pub(super) fn common(sides: &[BarrierSide], motion: impl Fn(u32) -> Vector3<f64>) -> Vector3<f64> {
+pub(super) fn common(sides: &[CollisionMesh], motion: impl Fn(u32) -> Vector3<f64>) -> Vector3<f64> {
     let points = &sides[0].points;
     if sides.len() > 1 || points.is_empty() {
         return Vector3::zeros();
@@ -183,9 +183,9 @@ pub(super) fn common(sides: &[BarrierSide], motion: impl Fn(u32) -> Vector3<f64>
     points.iter().map(|&node| motion(node)).sum::<Vector3<f64>>() / points.len() as f64
 }
 
-impl Wide {
+impl BroadPhase {
     /// For so many nodes; nothing is found yet.
-    pub fn new(sides: &[BarrierSide], nodes: usize) -> Self {
+    pub fn new(sides: &[CollisionMesh], nodes: usize) -> Self {
         let most = sides.iter().map(|side| side.faces.len().max(side.edges.len())).max().unwrap_or(0);
         Self {
             pairs: Default::default(),
@@ -202,7 +202,7 @@ impl Wide {
     /// Numbers of the pairs within a distance [m] of each other at places [m]: points with faces of one surface, and edges.
     pub fn within(
         &mut self,
-        sides: &mut [BarrierSide],
+        sides: &mut [CollisionMesh],
         place: &[Vector3<f64>],
         within: f64,
     ) -> [Vec<[u32; 2]>; 2] {
@@ -225,12 +225,12 @@ impl Wide {
     /// of the barrier [m].
     pub fn each(
         &mut self,
-        sides: &mut [BarrierSide],
+        sides: &mut [CollisionMesh],
         apart: &[Apart; 2],
         place: &[Vector3<f64>],
         skin: &[f64],
         [within, barrier]: [f64; 2],
-        mut found: impl FnMut(&[BarrierSide], Sort, [u32; 2], f64),
+        mut found: impl FnMut(&[CollisionMesh], Sort, [u32; 2], f64),
     ) {
         if !self.holds(sides, place, skin, within) {
             for &node in sides.iter().flat_map(|side| &side.points) {
@@ -254,7 +254,7 @@ impl Wide {
     }
 
     /// Finds how far nodes have gone, with the skins of a list; whether that is within the wide ones.
-    fn holds(&mut self, sides: &[BarrierSide], place: &[Vector3<f64>], skin: &[f64], within: f64) -> bool {
+    fn holds(&mut self, sides: &[CollisionMesh], place: &[Vector3<f64>], skin: &[f64], within: f64) -> bool {
         if self.place.is_empty() {
             return false;
         }
@@ -271,7 +271,7 @@ impl Wide {
     }
 
     /// Finds the pairs within a distance [m] and the wide skins of both.
-    fn find(&mut self, sides: &mut [BarrierSide], apart: &[Apart; 2], place: &[Vector3<f64>], within: f64) {
+    fn find(&mut self, sides: &mut [CollisionMesh], apart: &[Apart; 2], place: &[Vector3<f64>], within: f64) {
         let Self { pairs, skin, left_out, skins, .. } = self;
         skins.take(sides, skin);
         pairs.iter_mut().for_each(Pairs::clear);
@@ -281,7 +281,7 @@ impl Wide {
         let at = |node: u32| place[node as usize];
         let margin = |node: u32| skin[node as usize] + 0.5 * within;
         // Whole sides first: a tool that waits far away costs no more than their boxes.
-        let whole = |side: &BarrierSide| {
+        let whole = |side: &CollisionMesh| {
             let boxes = side.points.iter().map(|&node| around([node], &at, &margin));
             boxes.reduce(|all, one| all.with(&one))
         };
@@ -300,7 +300,7 @@ impl Wide {
     }
 
     /// Finds the pairs of points of a side with faces.
-    fn find_points(&mut self, sides: &[BarrierSide], number: usize, apart: &Apart) {
+    fn find_points(&mut self, sides: &[CollisionMesh], number: usize, apart: &Apart) {
         let Self { pairs, skin, place, within, left_out, skins, .. } = self;
         let at = |node: u32| place[node as usize];
         let margin = |node: u32| skin[node as usize] + 0.5 * *within;
@@ -335,7 +335,7 @@ impl Wide {
     }
 
     /// Finds the pairs of edges, leaving neighbours out like those of points.
-    fn find_edges(&mut self, sides: &[BarrierSide], apart: &Apart) {
+    fn find_edges(&mut self, sides: &[CollisionMesh], apart: &Apart) {
         let Self { pairs, place, within, left_out, skins, .. } = self;
         let (side, against) = (&sides[0], other(sides, 0));
         let [own_skins, of_others] = skins.of(Sort::Edges, sides.len());
@@ -379,7 +379,7 @@ impl Sort {
     }
 
     /// The nodes of a pair.
-    pub fn nodes(self, sides: &[BarrierSide], [first, second]: [u32; 2]) -> [u32; 4] {
+    pub fn nodes(self, sides: &[CollisionMesh], [first, second]: [u32; 2]) -> [u32; 4] {
         let [first, second] = [first as usize, second as usize];
         match self {
             Self::Point(side) => {

@@ -6,8 +6,8 @@
 
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector3};
 
+use super::collisions::Mollified;
 use super::distance::{Mollifier, Nearest, Region};
-use super::rows::Mollified;
 
 /// Three rows and columns for each of four nodes.
 pub type Matrix12 = SMatrix<f64, 12, 12>;
@@ -190,7 +190,7 @@ mod tests {
     use pliant_testing::Random;
 
     use super::*;
-    use crate::barrier::advance::Kind;
+    use crate::barrier::ccd::Kind;
     use crate::barrier::law::Barrier;
 
     /// The barrier of the pairs, which are at most 3.5 m apart: κ A = 1 N.

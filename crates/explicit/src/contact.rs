@@ -101,7 +101,7 @@ impl Node {
     }
 }
 
-/// What a contact is about, in numbers of nodes of [`Touching`].
+/// What a contact is about, in numbers of nodes of [`ContactSolver`].
 enum Own {
     Rigid(Box<AtRigid>),
     /// Bodies, with a sign ([`Contact::pairs`](pliant_contact::touch::Contact::pairs)).
@@ -109,7 +109,7 @@ enum Own {
 }
 
 /// The contacts of a model, with the nodes that they are about.
-pub(crate) struct Touching<R> {
+pub(crate) struct ContactSolver<R> {
     contacts: Arc<Contacts>,
     /// Their numbers in the model, increasing; those of guests come after it.
     numbers: Vec<u32>,
@@ -144,7 +144,7 @@ pub(crate) struct Touching<R> {
     pub moments: Vec<Vector<f64>>,
 }
 
-impl<R: LaneNumber> Touching<R> {
+impl<R: LaneNumber> ContactSolver<R> {
     /// Those of a model with these nodes at rest [m].
     pub fn new(contacts: Arc<Contacts>, rest: &[Vector<f64>]) -> Self {
         let numbers = contacts.nodes();

@@ -1,4 +1,4 @@
-//! The primitives of a side of a contact, with the areas that they stand for.
+//! A collision mesh: the primitives of a side of a contact, with the areas that they stand for.
 
 use nalgebra::Vector3;
 use pliant_geometry::Vector3 as Point;
@@ -9,7 +9,7 @@ use crate::tree::{Bounds, Tree};
 
 /// Points, edges and triangles of one side of a contact. Nodes of rigid things are numbered after those of the model.
 #[derive(Clone, Debug, Default)]
-pub(super) struct BarrierSide {
+pub(super) struct CollisionMesh {
     /// Nodes, increasing.
     pub points: Vec<u32>,
     /// Edges by their ends.
@@ -31,7 +31,7 @@ pub(super) struct BarrierSide {
     pub(super) edge_boxes: Vec<Bounds>,
 }
 
-impl BarrierSide {
+impl CollisionMesh {
     /// That of a surface of a body, by the places at rest [m].
     pub(super) fn of_body(surface: &Surface, place: impl Fn(u32) -> Point) -> Self {
         let faces = surface.faces.clone();

@@ -5,7 +5,7 @@ use pliant_contact::pressure::pressures;
 use pliant_contact::shape::Near;
 use pliant_mechanics::tensor::Vector;
 
-use super::{Own, Touching, over};
+use super::{ContactSolver, Own, over};
 use crate::State;
 use crate::lanes::LaneNumber;
 
@@ -27,7 +27,7 @@ pub struct NodeContact {
     pub slip: Option<f64>,
 }
 
-impl<R: LaneNumber> Touching<R> {
+impl<R: LaneNumber> ContactSolver<R> {
     /// All nodes that may touch, increasing, at the instant whose forces were found last. `state` is that of the model then.
     pub fn nodal(&self, state: &State<R>) -> Vec<NodeContact> {
         let place =

@@ -14,7 +14,7 @@ pub(super) struct Guests {
     times: [f64; 2],
     ways: Vec<[Vector<f64>; 2]>,
     /// Shares of that time at the beginning and the end of the step.
-    shares: [f64; 2],
+    time_fractions: [f64; 2],
     /// On each since it was led [N s].
     impulses: Vec<Vector<f64>>,
 }
@@ -26,7 +26,7 @@ impl Guests {
             first,
             times: [0.0, 1.0],
             ways: rest.iter().map(|&place| [place; 2]).collect(),
-            shares: [0.0; 2],
+            time_fractions: [0.0; 2],
             impulses: vec![[0.0; 3]; rest.len()],
         }
     }
@@ -50,7 +50,7 @@ impl Guests {
     /// Begins a step between two times [s].
     pub fn go(&mut self, times: [f64; 2]) {
         let [from, to] = self.times;
-        self.shares = times.map(|time| (time - from) / (to - from));
+        self.time_fractions = times.map(|time| (time - from) / (to - from));
     }
 
     pub fn impulses(&self) -> &[Vector<f64>] {
@@ -62,15 +62,15 @@ impl Guests {
         *own = add(*own, impulse.into());
     }
 
-    fn at(&self, guest: usize, share: f64) -> Vector3<f64> {
+    fn at(&self, guest: usize, time_fraction: f64) -> Vector3<f64> {
         let [from, to] = self.ways[guest].map(Vector3::from);
-        from.lerp(&to, share)
+        from.lerp(&to, time_fraction)
     }
 
     /// Where a guest goes; `None` of a node of the model.
     pub fn free(&self, number: u32) -> Option<Free> {
         let guest = self.place_of(number)?;
-        Some(Free { then: self.at(guest, self.shares[1]).into(), mobility: [0.0; 3] })
+        Some(Free { then: self.at(guest, self.time_fractions[1]).into(), mobility: [0.0; 3] })
     }
 
     /// Finds where nodes are before the step [m], by their places among `numbers`.
@@ -96,7 +96,7 @@ impl Guests {
     ) -> Vector3<f64> {
         match self.place_of(number) {
             None => rest + Vector3::from(displacement[number as usize].map(|x| x.to_f64())),
-            Some(guest) => self.at(guest, self.shares[0]),
+            Some(guest) => self.at(guest, self.time_fractions[0]),
         }
     }
 }

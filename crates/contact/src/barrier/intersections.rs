@@ -3,8 +3,8 @@
 
 use nalgebra::Vector3;
 
+use super::collision_mesh::{CollisionMesh, around};
 use super::distance::{Nearest, edge_edge, point_triangle};
-use super::surfaces::{BarrierSide, around};
 use crate::touch::{Contacts, With};
 use crate::tree::{Bounds, Tree};
 
@@ -14,7 +14,7 @@ const SLIGHT: f64 = 1e-4;
 /// Searches bodies that touch each other or themselves for edges that go through triangles.
 pub struct IntersectionCheck {
     /// Contacts by their places, with their surfaces and the depth [m] above which an intersection counts.
-    contacts: Vec<(usize, Vec<BarrierSide>, f64)>,
+    contacts: Vec<(usize, Vec<CollisionMesh>, f64)>,
 }
 
 /// An edge that goes through a triangle.
@@ -44,9 +44,9 @@ impl IntersectionCheck {
                 && contact.surfaces().all(|surface| surface.nodes.iter().all(own))
         });
         let checked = of_bodies.map(|(number, contact)| {
-            let sides = contact.surfaces().map(|surface| BarrierSide::of_body(surface, place));
-            let sides: Vec<BarrierSide> = sides.collect();
-            let count = |side: &BarrierSide| side.edges.len() as f64;
+            let sides = contact.surfaces().map(|surface| CollisionMesh::of_body(surface, place));
+            let sides: Vec<CollisionMesh> = sides.collect();
+            let count = |side: &CollisionMesh| side.edges.len() as f64;
             let length: f64 = sides.iter().map(|side| side.mean_edge(place) * count(side)).sum();
             let all: f64 = sides.iter().map(count).sum();
             (number, sides, SLIGHT * length / all.max(1.0))
@@ -65,7 +65,7 @@ impl IntersectionCheck {
     pub fn find(&self, place: impl Fn(u32) -> Vector3<f64>, mut found: impl FnMut(Intersection)) {
         for (contact, sides, slight) in &self.contacts {
             let mut look = |edges, faces| {
-                crossings([edges, faces], &place, |ends, corners| {
+                intersections([edges, faces], &place, |ends, corners| {
                     let (nodes, out) = way_out(ends, corners, &place);
                     if out.distance > *slight {
                         found(Intersection {
@@ -108,8 +108,8 @@ fn way_out(
 
 /// Edges that go through triangles: calls back with the ends and the corners. Of one side alone those with a node in common count for
 /// nothing.
-pub(super) fn crossings(
-    [edges, faces]: [&BarrierSide; 2],
+pub(super) fn intersections(
+    [edges, faces]: [&CollisionMesh; 2],
     place: &impl Fn(u32) -> Vector3<f64>,
     mut found: impl FnMut([u32; 2], [u32; 3]),
 ) {

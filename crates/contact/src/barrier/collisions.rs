@@ -1,4 +1,4 @@
-//! What acts at the present state: pairs within the reach of the barrier, and pairs that friction holds.
+//! Collisions at the present state: normal ones of pairs within the reach of the barrier, and those of friction.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -7,7 +7,7 @@ use super::distance::Region;
 /// Round-off of the length of a normal.
 const UNIT: f64 = 1e-12;
 
-/// Nodes of a row and their coefficients: four, or one at a wall.
+/// Nodes of a collision and their coefficients: four, or one at a wall.
 #[derive(Clone, Copy, Debug)]
 pub struct Stencil {
     /// The nodes; those of rigid things are numbered after those of the model.
@@ -44,7 +44,7 @@ impl Stencil {
 
 /// A pair within the reach of the barrier.
 #[derive(Clone, Copy, Debug)]
-pub struct Row {
+pub struct NormalCollision {
     /// Its nodes.
     pub stencil: Stencil,
     /// The gradient of the distance by the first: the direction from the second to it.
@@ -67,7 +67,7 @@ pub struct Row {
     pub mollified: Option<Mollified>,
 }
 
-impl Row {
+impl NormalCollision {
     /// Unit direction of the push, and the force [N] along it.
     pub fn pushes(&self) -> (Vector3<f64>, f64) {
         let length = self.normal.norm();
@@ -100,7 +100,7 @@ pub struct Mollified {
 
 /// A pair with friction: normal force, direction and coefficients are those of the last time that it was taken.
 #[derive(Clone, Copy, Debug)]
-pub struct Held {
+pub struct FrictionCollision {
     /// Its nodes.
     pub stencil: Stencil,
     /// The direction across which it slips.
@@ -119,7 +119,7 @@ pub struct Held {
     pub along: f64,
 }
 
-impl Held {
+impl FrictionCollision {
     /// The force [N] on a node, by its place in the stencil.
     pub fn force_on(&self, at: usize) -> Vector3<f64> {
         self.slip * (-self.stiffness * self.stencil.coefficients[at])

@@ -105,7 +105,12 @@ pub struct Query {
 
 /// The part of a motion, `most` or less, on the way to which at least half of `keep` of the gap at the start is left everywhere. Where it is less
 /// than `most`, no more than `keep` is left at its end. Zero where there is no gap at the start.
-pub fn allowed(kind: Kind, from: &[Vector3<f64>; 4], motion: &[Vector3<f64>; 4], query: Query) -> f64 {
+pub fn collision_free_fraction(
+    kind: Kind,
+    from: &[Vector3<f64>; 4],
+    motion: &[Vector3<f64>; 4],
+    query: Query,
+) -> f64 {
     let Query { offset, rise, keep, most } = query;
     let mean = motion.iter().sum::<Vector3<f64>>() / 4.0;
     let way = kind.reach(motion.map(|p| (p - mean).norm())) + rise.max(0.0);
@@ -156,7 +161,12 @@ mod tests {
             let kind = if case["kind"] == "pt" { Kind::PointTriangle } else { Kind::EdgeEdge };
             let (from, to) = (four(&case["x0"]), four(&case["x1"]));
             let motion: [Vector3<f64>; 4] = std::array::from_fn(|i| to[i] - from[i]);
-            let found = allowed(kind, &from, &motion, Query { offset: 0.0, rise: 0.0, keep: 0.1, most: 1.0 });
+            let found = collision_free_fraction(
+                kind,
+                &from,
+                &motion,
+                Query { offset: 0.0, rise: 0.0, keep: 0.1, most: 1.0 },
+            );
             if let Some(exact) = case["toi"].as_f64().filter(|_| case["hit"] == true) {
                 assert!(found <= exact, "{} {}: {found} > {exact}", case["id"], case["category"]);
                 let first = kind.nearest(&from).distance;
@@ -169,7 +179,7 @@ mod tests {
         println!("{early} of 72 hits below 0.8 of the exact time, the lowest at {lowest:.2} of it");
     }
 
-    /// A motion is never allowed beyond a crossing, from any start, with any offset.
+    /// A motion is never allowed beyond an intersection, from any start, with any offset.
     #[test]
     fn what_is_allowed_keeps_a_gap_everywhere_on_the_way() {
         let mut random = Random::new(3);
@@ -181,7 +191,8 @@ mod tests {
             let offset = start * random.part();
             // Every third distance to keep grows or shrinks on the way.
             let rise = if number % 3 == 0 { start * (2.0 * random.part() - 1.0) } else { 0.0 };
-            let part = allowed(kind, &from, &motion, Query { offset, rise, keep: 0.1, most: 1.0 });
+            let part =
+                collision_free_fraction(kind, &from, &motion, Query { offset, rise, keep: 0.1, most: 1.0 });
             for step in 0..=20 {
                 let at = part * f64::from(step) / 20.0;
                 let distance = kind.nearest(&std::array::from_fn(|i| from[i] + motion[i] * at)).distance;
@@ -213,7 +224,7 @@ mod tests {
         let sheet = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]].map(Vector3::from);
         let from = [Vector3::new(0.1, 0.0, 1e-5), sheet[0], sheet[1], sheet[2]];
         let motion = [Vector3::new(0.0, 0.0, -10.0), Vector3::zeros(), Vector3::zeros(), Vector3::zeros()];
-        let part = allowed(
+        let part = collision_free_fraction(
             Kind::PointTriangle,
             &from,
             &motion,
