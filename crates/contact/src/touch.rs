@@ -453,7 +453,7 @@ pub struct Contacts {
     /// Who touches whom.
     pub contacts: Vec<Contact>,
     /// Rest places [m] of nodes that another solver moves: in surfaces they are numbered after the nodes of the model.
-    pub guests: Vec<Vector<f64>>,
+    pub coupled_nodes: Vec<Vector<f64>>,
     /// Of contacts of bodies, by their place, the nodes that keep a smaller distance [m] than their [`Touch`] says, since they are nearer at the start.
     pub near: BTreeMap<usize, Vec<(u32, f64)>>,
 }

@@ -4,7 +4,7 @@
 //! each impulse. A last pass over nodes alone keeps these out of curved rigid things, too.
 
 mod at_rigid;
-mod guests;
+mod coupled_surfaces;
 mod nodal;
 mod rows;
 mod ways;
@@ -25,7 +25,7 @@ use pliant_mechanics::tensor::{Vector, add};
 
 use crate::lanes::LaneNumber;
 use at_rigid::{AtRigid, Seen};
-use guests::Guests;
+use coupled_surfaces::CoupledSurfaces;
 pub use nodal::NodeContact;
 use rows::{NONE, Row, idle, push_alone, take_back};
 pub(crate) use ways::Nodes;
@@ -111,9 +111,9 @@ enum Own {
 /// The contacts of a model, with the nodes that they are about.
 pub(crate) struct ContactSolver<R> {
     contacts: Arc<Contacts>,
-    /// Their numbers in the model, increasing; those of guests come after it.
+    /// Their numbers in the model, increasing; those of coupled nodes come after it.
     numbers: Vec<u32>,
-    guests: Guests,
+    coupled_surfaces: CoupledSurfaces,
     /// Where the nodes are at rest, and before the step [m]; the latter only of those that `placed` has.
     rest: Vec<Vector3<f64>>,
     places: Vec<Vector3<f64>>,
@@ -148,12 +148,12 @@ impl<R: LaneNumber> ContactSolver<R> {
     /// Those of a model with these nodes at rest [m].
     pub fn new(contacts: Arc<Contacts>, rest: &[Vector<f64>]) -> Self {
         let numbers = contacts.nodes();
-        let guests = Guests::new(rest.len(), &contacts.guests);
+        let coupled_surfaces = CoupledSurfaces::new(rest.len(), &contacts.coupled_nodes);
         // Faces are of nodes that touch.
         let number = |node: u32| numbers.partition_point(|&known| known < node) as u32;
         let place = |node: u32| {
             let number = numbers[node as usize] as usize;
-            rest.get(number).map_or_else(|| guests.rest(number), |&rest| rest.into())
+            rest.get(number).map_or_else(|| coupled_surfaces.rest(number), |&rest| rest.into())
         };
         let parts = contacts.contacts.iter().enumerate().map(|(index, contact)| {
             let at_rigid = |rigid: usize| {
@@ -186,7 +186,7 @@ impl<R: LaneNumber> ContactSolver<R> {
             taken: Vec::new(),
             slid: Vec::new(),
             numbers,
-            guests,
+            coupled_surfaces,
             own,
             forces: vec![[0.0; 3]; contacts.contacts.len()],
             moments: vec![[0.0; 3]; contacts.contacts.len()],
@@ -203,7 +203,7 @@ impl<R: LaneNumber> ContactSolver<R> {
         free: impl Fn(u32) -> Free,
         gripped: &mut Vec<Gripped>,
     ) {
-        self.guests.go(times);
+        self.coupled_surfaces.go(times);
         self.taken.clear();
         self.forces.fill([0.0; 3]);
         self.moments.fill([0.0; 3]);
@@ -264,33 +264,34 @@ impl<R: LaneNumber> ContactSolver<R> {
     /// The force [N] on each node that touches something.
     pub fn nodal_forces(&self) -> impl Iterator<Item = (u32, Vector<f64>)> {
         let nodes = self.near.iter().map(|&node| (&self.nodes[node as usize], self.numbers[node as usize]));
-        // Guests are the last ones.
-        let own = nodes.take_while(|(_, number)| self.guests.place_of(*number).is_none());
+        // Coupled nodes are the last ones.
+        let own = nodes.take_while(|(_, number)| self.coupled_surfaces.place_of(*number).is_none());
         let touching = own.filter(|(node, _)| node.then != node.free);
         touching.map(|(node, number)| (number, over(&(node.then - node.free), &node.own).into()))
     }
 
-    /// Says where guests go between two times [s]: from one place [m] to the other, at the same speed. Impulses on them count from now on.
+    /// Says where coupled nodes go between two times [s]: from one place [m] to the other, at the same speed. Impulses on them count from now on.
     pub fn lead(&mut self, times: [f64; 2], ways: &[[Vector<f64>; 2]]) {
-        self.guests.lead(times, ways);
+        self.coupled_surfaces.lead(times, ways);
     }
 
-    /// Impulses [N s] on the guests since they were led.
+    /// Impulses [N s] on the coupled nodes since they were led.
     pub fn impulses(&self) -> &[Vector<f64>] {
-        self.guests.impulses()
+        self.coupled_surfaces.impulses()
     }
 
-    /// Adds the impulses on guests of the step whose forces were found last, over its length [s].
-    pub(crate) fn press_guests(&mut self, length: f64) {
+    /// Adds the impulses on coupled nodes of the step whose forces were found last, over its length [s].
+    pub(crate) fn press_coupled_surfaces(&mut self, length: f64) {
         for &near in self.near.iter().rev() {
-            let Some(guest) = self.guests.place_of(self.numbers[near as usize]) else { break };
-            self.guests.press(guest, self.nodes[near as usize].borne * length);
+            let Some(coupled) = self.coupled_surfaces.place_of(self.numbers[near as usize]) else { break };
+            self.coupled_surfaces.press(coupled, self.nodes[near as usize].borne * length);
         }
     }
 
     /// The nodes of the model between the first and the last that touch.
     fn span(&self) -> Range<usize> {
-        let own = &self.numbers[..self.numbers.partition_point(|&node| self.guests.place_of(node).is_none())];
+        let own = &self.numbers
+            [..self.numbers.partition_point(|&node| self.coupled_surfaces.place_of(node).is_none())];
         match (own.first(), own.last()) {
             (Some(&first), Some(&last)) => first as usize..last as usize + 1,
             _ => 0..0,
@@ -315,7 +316,13 @@ impl<R: LaneNumber> ContactSolver<R> {
         }
         self.listed.clear();
         self.listed.extend_from_slice(&now.displacement[span]);
-        self.guests.place(0..self.numbers.len() as u32, &self.numbers, &self.rest, now, &mut self.places);
+        self.coupled_surfaces.place(
+            0..self.numbers.len() as u32,
+            &self.numbers,
+            &self.rest,
+            now,
+            &mut self.places,
+        );
         self.placed.clone_from(&self.of_bodies);
         for (own, room) in self.own.iter_mut().zip(rooms) {
             if let Own::Rigid(own) = own {
@@ -332,12 +339,12 @@ impl<R: LaneNumber> ContactSolver<R> {
     fn place(&mut self, now: &Nodes<'_, R>, gripped: &[Gripped]) {
         let held = gripped.iter().filter_map(|held| self.numbers.binary_search(&held.node).ok());
         let nodes = self.placed.iter().copied().chain(held.map(|node| node as u32));
-        self.guests.place(nodes, &self.numbers, &self.rest, now, &mut self.places);
+        self.coupled_surfaces.place(nodes, &self.numbers, &self.rest, now, &mut self.places);
     }
 
     /// Finds the nodes that may touch in the step, and where they go; rows of the points near rigid things.
     fn look(&mut self, way: f64, free: impl Fn(u32) -> Free, gripped: &[Gripped]) {
-        let Self { contacts, numbers, guests, places, nodes, near, own, seen, rows, .. } = self;
+        let Self { contacts, numbers, coupled_surfaces, places, nodes, near, own, seen, rows, .. } = self;
         rows.clear();
         let mut mark = |node: u32| {
             if !std::mem::replace(&mut nodes[node as usize].near, true) {
@@ -366,7 +373,7 @@ impl<R: LaneNumber> ContactSolver<R> {
         near.sort_unstable();
         for &node in near.iter() {
             let (node, number) = (&mut nodes[node as usize], numbers[node as usize]);
-            let Free { then, mobility } = guests.free(number).unwrap_or_else(|| free(number));
+            let Free { then, mobility } = coupled_surfaces.free(number).unwrap_or_else(|| free(number));
             (node.free, node.then) = (then.into(), then.into());
             (node.mobility, node.own) = (mobility.into(), mobility.into());
             (node.borne, node.lifted, node.way) = (Vector3::zeros(), Vector3::zeros(), 0.0);

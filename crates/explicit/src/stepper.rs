@@ -327,19 +327,19 @@ impl<R: SteppedIn> CentralDifference<R> {
         self
     }
 
-    /// Says where guests of contacts ([`Contacts::guests`]) go between two times [s], from one place [m] to another, at the same speed, also
+    /// Says where coupled nodes of contacts ([`Contacts::coupled_nodes`]) go between two times [s], from one place [m] to another, at the same speed, also
     /// beyond these times.
     ///
     /// # Panics
-    /// If there are not as many ways as guests.
-    pub fn lead_guests(&mut self, times: [f64; 2], ways: &[[Vector<f64>; 2]]) {
+    /// If there are not as many ways as coupled nodes.
+    pub fn lead_coupled_surfaces(&mut self, times: [f64; 2], ways: &[[Vector<f64>; 2]]) {
         if let Some(contact) = &mut self.contact {
             contact.lead(times, ways);
         }
     }
 
-    /// Impulses [N s] of contacts on each guest since it was led, over the steps that have ended.
-    pub fn guest_impulses(&self) -> &[Vector<f64>] {
+    /// Impulses [N s] of contacts on each coupled node since it was led, over the steps that have ended.
+    pub fn coupled_impulses(&self) -> &[Vector<f64>] {
         self.contact.as_ref().map_or(&[], ContactSolver::impulses)
     }
 
@@ -460,7 +460,7 @@ impl<R: SteppedIn> CentralDifference<R> {
         if let Some(contact) = &mut self.contact {
             contact.slide(&mut state.slip);
             state.gripped.append(&mut contact.taken);
-            contact.press_guests(self.lengths.next);
+            contact.press_coupled_surfaces(self.lengths.next);
         }
         if self.damps_by_forces() {
             let [last, before] = &mut state.forces;

@@ -56,7 +56,7 @@ pub use checkpoint::{Checkpoint, ResumeError};
 pub use field_reader::{FieldReader, field_named};
 pub use live::Live;
 pub use output::{
-    AddedMass, BodySummary, Column, GuestSummary, Intersections, OutputError, OutputFolder,
+    AddedMass, BodySummary, Column, CoupledSurfaceSummary, Intersections, OutputError, OutputFolder,
     ParticipantSummary, StabilitySummary, Summary, TieSummary, failed_input, failed_output, sampled_columns,
 };
 pub use overview::overview;

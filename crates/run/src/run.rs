@@ -14,9 +14,9 @@ use pliant_sim::{Failure, FailureKind, LoadStepProgress, Observer, Schedule, Sim
 use crate::advice::remedy;
 use crate::checkpoint::{Checkpoint, Checkpoints};
 use crate::output::{
-    CONVERGENCE, FieldMesh, GuestSummary, History, Outcome, OutputError, OutputFolder, Outputs, PICTURE,
-    PLOT, PartOutcome, SUMMARY, Summary, TieSummary, Watched, frames, hourglass_failure, interrupted,
-    markdown, output_failure, plot, summarise,
+    CONVERGENCE, CoupledSurfaceSummary, FieldMesh, History, Outcome, OutputError, OutputFolder, Outputs,
+    PICTURE, PLOT, PartOutcome, SUMMARY, Summary, TieSummary, Watched, frames, hourglass_failure,
+    interrupted, markdown, output_failure, plot, summarise,
 };
 use crate::progressed::Progressed;
 use crate::rollback::{Point, RollbackPoints};
@@ -272,7 +272,7 @@ impl<'a, 'env> Run<'a, 'env> {
             energies: simulation.energies(),
             parts: parts.map(|((part, own), watched)| PartOutcome::new(part, own, watched)).collect(),
             ties: simulation.ties().map(|tie| TieSummary::new(world, tie)).collect(),
-            guests: simulation.guests().map(|now| GuestSummary::new(world, now)).collect(),
+            guests: simulation.coupled_surfaces().map(|now| CoupledSurfaceSummary::new(world, now)).collect(),
             ended: simulation.ended().map(ToOwned::to_owned),
             history,
             files: files.into_iter().chain(kept).chain(drawn.clone()).collect(),

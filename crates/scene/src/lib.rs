@@ -35,7 +35,7 @@
 mod assemble;
 mod bound;
 mod cache;
-mod guests;
+mod coupled_surfaces;
 mod method;
 mod penalty;
 mod plan;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 #[cfg(feature = "gpu")]
 use pliant_sim::gpu::Device;
-use pliant_sim::{Failure, Guests, PenaltyTie, Simulation};
+use pliant_sim::{CoupledSurface, Failure, PenaltyTie, Simulation};
 
 use crate::assemble::{Built, Meshing, build_watched};
 use crate::cache::MeshCache;
@@ -24,7 +24,7 @@ pub struct World {
     /// Ties between them.
     pub ties: Vec<PenaltyTie>,
     /// Nodes of participants that others touch.
-    pub guests: Vec<Guests>,
+    pub coupled_surfaces: Vec<CoupledSurface>,
 }
 
 /// A participant: some bodies of a scene, with their model and how it is stepped.
@@ -78,16 +78,17 @@ impl World {
             Ok(Part { name, plan: plan?, scene: part, built: Arc::new(built) })
         };
         let participants = built.into_iter().map(planned).collect::<Result<Vec<_>, SceneErrors>>()?;
-        let mut world = Self { scene: scene.clone(), participants, ties: Vec::new(), guests: Vec::new() };
+        let mut world =
+            Self { scene: scene.clone(), participants, ties: Vec::new(), coupled_surfaces: Vec::new() };
         if world.only().is_none() {
             world.check_load_steps()?;
         }
         let mut found = Vec::new();
         world.find_ties(&mut found);
-        world.find_guests(&mut found);
+        world.find_coupled_surfaces(&mut found);
         world.meet();
         world.check_ties(&mut found);
-        world.check_guests(&mut found);
+        world.check_coupled_surfaces(&mut found);
         world.check_view(&mut found);
         if found.iter().any(Diagnostic::is_error) {
             return Err(scene.source.errors(found));
@@ -112,7 +113,12 @@ impl World {
     pub fn of(scene: &Scene, built: &Arc<Built>, plan: &Plan) -> Self {
         let part =
             Part { name: String::new(), scene: scene.clone(), built: Arc::clone(built), plan: plan.clone() };
-        Self { scene: scene.clone(), participants: vec![part], ties: Vec::new(), guests: Vec::new() }
+        Self {
+            scene: scene.clone(),
+            participants: vec![part],
+            ties: Vec::new(),
+            coupled_surfaces: Vec::new(),
+        }
     }
 
     /// The same of another duration [s].
@@ -174,7 +180,7 @@ impl World {
     /// Its participants without their tables.
     pub fn simulated(&self) -> pliant_sim::World {
         let parts = self.participants.iter().map(Part::simulated).collect();
-        pliant_sim::World { parts, ties: self.ties.clone(), guests: self.guests.clone() }
+        pliant_sim::World { parts, ties: self.ties.clone(), coupled_surfaces: self.coupled_surfaces.clone() }
     }
 
     /// Adds a doubt to those that did not keep the models from being built.

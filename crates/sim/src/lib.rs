@@ -40,10 +40,10 @@
 
 mod assembled;
 mod bodies;
+mod coupled_surfaces;
 #[cfg(feature = "gpu")]
 mod device;
 mod failure;
-mod guests;
 mod instant;
 mod kept;
 mod part;
@@ -60,10 +60,10 @@ mod steps;
 mod tools;
 
 pub use bodies::{BodyCells, ImplicitBodies, RunControl, Stop};
+pub use coupled_surfaces::{CoupledSurface, CoupledSurfaceNow};
 #[cfg(feature = "gpu")]
 pub use device::{MappedPoint, OnDevice};
 pub use failure::{BlockedDriver, FailedLoadStep, Failure, FailureKind, panicked};
-pub use guests::{Guests, GuestsNow};
 pub use instant::{CellsNow, Effort, Instant};
 pub use part::{Explicit, LongSteps, Method, Part, Precision, ShortSteps};
 pub use penalty::{PenaltyTie, TieNow};

@@ -59,11 +59,11 @@ pub(crate) trait Participant: Instant + Send {
     /// The point of a grip now [m], and its force on the body [N].
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2];
 
-    /// Says where guests of its contacts go between two times [s], from one place [m] to another; only explicit solids have some.
-    fn lead_guests(&mut self, _times: [f64; 2], _ways: &[[Vector<f64>; 2]]) {}
+    /// Says where coupled nodes of its contacts go between two times [s], from one place [m] to another; only explicit solids have some.
+    fn lead_coupled_surfaces(&mut self, _times: [f64; 2], _ways: &[[Vector<f64>; 2]]) {}
 
-    /// Impulses [N s] on each guest since it was led.
-    fn guest_impulses(&self) -> &[Vector<f64>] {
+    /// Impulses [N s] on each coupled node since it was led.
+    fn coupled_impulses(&self) -> &[Vector<f64>] {
         &[]
     }
 

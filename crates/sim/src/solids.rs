@@ -313,12 +313,12 @@ impl<R: Numeric> Participant for Solids<R> {
         [grip.position(&nodes, 0), grip.force(&nodes)]
     }
 
-    fn lead_guests(&mut self, times: [f64; 2], ways: &[[Vector<f64>; 2]]) {
-        self.solver.lead_guests(times, ways);
+    fn lead_coupled_surfaces(&mut self, times: [f64; 2], ways: &[[Vector<f64>; 2]]) {
+        self.solver.lead_coupled_surfaces(times, ways);
     }
 
-    fn guest_impulses(&self) -> &[Vector<f64>] {
-        self.solver.guest_impulses()
+    fn coupled_impulses(&self) -> &[Vector<f64>] {
+        self.solver.coupled_impulses()
     }
 
     fn displacements_mut(&mut self) -> Option<RealsMut<'_>> {

@@ -97,11 +97,11 @@ pub(crate) trait Solver<R>: Send {
     /// Takes forces [N], one a node, or none: they and no others act from the next evaluation on. Only where the method takes some.
     fn push(&mut self, _forces: &[Vector<f64>]) {}
 
-    /// Says where guests of contacts go between two times [s], from one place [m] to another.
-    fn lead_guests(&mut self, _times: [f64; 2], _ways: &[[Vector<f64>; 2]]) {}
+    /// Says where coupled nodes of contacts go between two times [s], from one place [m] to another.
+    fn lead_coupled_surfaces(&mut self, _times: [f64; 2], _ways: &[[Vector<f64>; 2]]) {}
 
-    /// Impulses [N s] on each guest since it was led.
-    fn guest_impulses(&self) -> &[Vector<f64>] {
+    /// Impulses [N s] on each coupled node since it was led.
+    fn coupled_impulses(&self) -> &[Vector<f64>] {
         &[]
     }
 
@@ -212,12 +212,12 @@ impl<R: Scalar> Solver<R> for CentralDifference<R> {
         CentralDifference::push(self, forces);
     }
 
-    fn lead_guests(&mut self, times: [f64; 2], ways: &[[Vector<f64>; 2]]) {
-        CentralDifference::lead_guests(self, times, ways);
+    fn lead_coupled_surfaces(&mut self, times: [f64; 2], ways: &[[Vector<f64>; 2]]) {
+        CentralDifference::lead_coupled_surfaces(self, times, ways);
     }
 
-    fn guest_impulses(&self) -> &[Vector<f64>] {
-        CentralDifference::guest_impulses(self)
+    fn coupled_impulses(&self) -> &[Vector<f64>] {
+        CentralDifference::coupled_impulses(self)
     }
 
     fn clock(&self, state: &State<R>) -> Option<Clock> {

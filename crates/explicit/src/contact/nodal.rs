@@ -30,13 +30,14 @@ pub struct NodeContact {
 impl<R: LaneNumber> ContactSolver<R> {
     /// All nodes that may touch, increasing, at the instant whose forces were found last. `state` is that of the model then.
     pub fn nodal(&self, state: &State<R>) -> Vec<NodeContact> {
-        let place =
-            |(rest, &number): (&Vector3<f64>, &u32)| self.guests.place_at(number, rest, &state.displacement);
+        let place = |(rest, &number): (&Vector3<f64>, &u32)| {
+            self.coupled_surfaces.place_at(number, rest, &state.displacement)
+        };
         let places: Vec<Vector3<f64>> = self.rest.iter().zip(&self.numbers).map(place).collect();
         let pressures = pressures(&self.faces, &self.normal_forces(), &places);
         let gaps = self.gaps(&places);
         let parts = self.numbers.iter().zip(&self.nodes).zip(pressures).zip(gaps);
-        let is_own = |node: u32| self.guests.place_of(node).is_none();
+        let is_own = |node: u32| self.coupled_surfaces.place_of(node).is_none();
         parts
             .filter(|(((node, _), _), _)| is_own(**node))
             .map(|(((&node, own), pressure), gap)| NodeContact {
@@ -122,7 +123,7 @@ impl<R: LaneNumber> ContactSolver<R> {
         slid.clear();
         slid.extend(self.near.iter().filter_map(|&index| {
             let node = self.numbers[index as usize];
-            self.guests.place_of(node).is_none().then_some(())?;
+            self.coupled_surfaces.place_of(node).is_none().then_some(())?;
             let way = match (self.slips[index as usize], way_of(slip, node)) {
                 ([load, ways], before) if load > 0.0 => Some(before.unwrap_or(0.0) + ways / load),
                 (_, Some(before)) => self.hovering(index as usize).map(|way| before + way),

@@ -33,7 +33,7 @@ pub(crate) use field_mesh::{FieldMesh, carried_on_shell};
 pub(crate) use file::{check_own_folder, replace};
 pub use folder::OutputFolder;
 pub(crate) use folder::{CONVERGENCE, PICTURE, PLOT, SUMMARY};
-pub use outcome::{GuestSummary, Intersections, TieSummary};
+pub use outcome::{CoupledSurfaceSummary, Intersections, TieSummary};
 pub(crate) use outcome::{History, Outcome, PartOutcome, Watched};
 pub(crate) use outputs::Outputs;
 pub(crate) use plot::{MOST_CURVES, Reactions, constraints, plot, plot_of_sweep};

@@ -13,7 +13,7 @@ use pliant_mechanics::model::Enclosed;
 use pliant_scene::{Part, World};
 use pliant_sim::contact::barrier::IntersectionCheck;
 use pliant_sim::contact::lag::Lag;
-use pliant_sim::{Effort, Equilibria, Failure, GuestsNow, Instant, TieNow};
+use pliant_sim::{CoupledSurfaceNow, Effort, Equilibria, Failure, Instant, TieNow};
 use serde::{Deserialize, Serialize};
 
 use super::{Frame, ShellStrains, SolidStrains, time_of};
@@ -33,7 +33,7 @@ pub(crate) struct Outcome {
     /// The ties between participants.
     pub ties: Vec<TieSummary>,
     /// The contacts between participants.
-    pub guests: Vec<GuestSummary>,
+    pub guests: Vec<CoupledSurfaceSummary>,
     /// Why it ended before the time of the scene was over, without a failure.
     pub ended: Option<String>,
     pub history: History,
@@ -178,7 +178,7 @@ impl TieSummary {
 
 /// The contacts between two participants.
 #[derive(Clone, Debug, Serialize)]
-pub struct GuestSummary {
+pub struct CoupledSurfaceSummary {
     /// The explicit and the implicit participant.
     pub participants: [String; 2],
     /// Mean force [N] over the last step on each.
@@ -189,9 +189,9 @@ pub struct GuestSummary {
     pub worst_difference: f64,
 }
 
-impl GuestSummary {
-    pub(crate) fn new(world: &World, now: GuestsNow) -> Self {
-        let GuestsNow { parts, forces, passes, worst } = now;
+impl CoupledSurfaceSummary {
+    pub(crate) fn new(world: &World, now: CoupledSurfaceNow) -> Self {
+        let CoupledSurfaceNow { parts, forces, passes, worst } = now;
         let participants = parts.map(|part| world.participants[part].name.clone());
         Self { participants, forces, passes, worst_difference: worst }
     }

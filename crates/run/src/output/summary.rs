@@ -13,7 +13,7 @@ use serde::{Serialize, Serializer};
 use serde_json::{Value as Json, json};
 
 use super::stability::{AddedMass, StabilitySummary, doubts};
-use super::{GuestSummary, History, Intersections, Outcome, PartOutcome, TieSummary};
+use super::{CoupledSurfaceSummary, History, Intersections, Outcome, PartOutcome, TieSummary};
 use super::{OutputError, StrainSummary, VolumeChange, constraints};
 
 /// The result of a run.
@@ -44,7 +44,7 @@ pub struct Summary {
     /// The ties between participants.
     pub ties: Vec<TieSummary>,
     /// The contacts between participants.
-    pub guests: Vec<GuestSummary>,
+    pub guests: Vec<CoupledSurfaceSummary>,
     /// Cost of its equations; `null` where none were solved.
     pub solver: Option<Effort>,
     /// How good the equilibria of a quasi-static run are; `null` of others.
@@ -348,7 +348,7 @@ fn write_page(page: &mut String, world: &World, outcome: &Outcome, summary: &Sum
     write_reactions(page, world, outcome)?;
     write_volumes(page, &summary.volumes)?;
     write_ties(page, &outcome.ties)?;
-    write_guests(page, &outcome.guests)?;
+    write_coupled_surfaces(page, &outcome.guests)?;
     writeln!(page, "\n## Cost\n\n| | |\n|---|---|")?;
     writeln!(page, "| wall time | {} s |", number(summary.wall_seconds))?;
     writeln!(page, "| real-time factor | {} |", number(summary.real_time_factor))?;
@@ -582,7 +582,7 @@ fn write_ties(page: &mut String, ties: &[TieSummary]) -> std::fmt::Result {
     writeln!(page, "\nThese ties are springs: they open under load, less with shorter steps.")
 }
 
-fn write_guests(page: &mut String, guests: &[GuestSummary]) -> std::fmt::Result {
+fn write_coupled_surfaces(page: &mut String, guests: &[CoupledSurfaceSummary]) -> std::fmt::Result {
     if guests.is_empty() {
         return Ok(());
     }
@@ -590,7 +590,7 @@ fn write_guests(page: &mut String, guests: &[GuestSummary]) -> std::fmt::Result 
         page,
         "\n## Contact between participants\n\n| participants | force on each at the end [N] | passes per step | largest difference |\n|---|---|---|---|"
     )?;
-    for GuestSummary { participants: [first, second], forces, passes, worst_difference } in guests {
+    for CoupledSurfaceSummary { participants: [first, second], forces, passes, worst_difference } in guests {
         let [one, other] = forces.map(|force| {
             let [x, y, z] = force.map(number);
             format!("({x}, {y}, {z})")

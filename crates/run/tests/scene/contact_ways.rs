@@ -3,7 +3,7 @@
 use pliant_testing::scenes::{last_row, run, world};
 
 use super::contact::{pressed, stacked};
-use super::guests::column;
+use super::coupled_surfaces::column;
 
 /// The force of the tool comes out on the floor, in balance, in the mean of the last 0.2 s: nodes of averaged tets tremble in contact, so that
 /// the two forces of an instant differ by up to 9 %.

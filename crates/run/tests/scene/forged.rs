@@ -15,7 +15,7 @@ use pliant_testing::Random;
 use pliant_testing::forging::{Attempts, forged};
 use pliant_testing::scenes::world;
 
-use super::guests::pressed;
+use super::coupled_surfaces::pressed;
 use super::random_stops::ingredients;
 
 /// Bytes of a snapshot and of a checkpoint before the body, and after it.

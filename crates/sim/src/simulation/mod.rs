@@ -16,10 +16,10 @@ pub use self::observer::{Frame, Observer};
 pub use self::state::State;
 use self::state::{Between, OwnState};
 pub use self::world::World;
+use crate::coupled_surfaces::{CoupledSurfaceNow, Meetings};
 #[cfg(feature = "gpu")]
 use crate::device::OnDevice;
 use crate::failure::{Failure, FailureKind};
-use crate::guests::{GuestsNow, Meetings};
 use crate::instant::Instant;
 use crate::part::Part;
 use crate::participant::Participant;
@@ -150,15 +150,16 @@ impl Simulation {
         let first_nodes = nodes.scan(0, |next, nodes| Some(std::mem::replace(next, *next + nodes))).collect();
         let hands = vec![Vec::new(); participants.len()];
         let mut order: Vec<usize> = (0..participants.len()).collect();
-        // Of the same steps, one whose equations are solved goes last; but its guests go before their hosts.
+        // Of the same steps, one whose equations are solved goes last; but its coupled nodes go before their hosts.
         let solves = |part: usize| world.parts[part].method.solves_steps();
-        order.sort_by_key(|&part| (ratios[part], solves(part) == world.guests.is_empty()));
+        order.sort_by_key(|&part| (ratios[part], solves(part) == world.coupled_surfaces.is_empty()));
         let done = vec![0; participants.len()];
-        if !(world.ties.is_empty() || world.guests.is_empty()) {
+        if !(world.ties.is_empty() || world.coupled_surfaces.is_empty()) {
             return Err(Failure::input(&"participants are tied to each other or touch each other, not both"));
         }
         let springs = Springs::new(&world.ties, &world.parts, between.ties)?;
-        let meetings = Meetings::new(&world.guests, &world.parts, &ratios, between.guests)?;
+        let meetings =
+            Meetings::new(&world.coupled_surfaces, &world.parts, &ratios, between.coupled_surfaces)?;
         let before = Vec::new();
         Ok(Self {
             world,
@@ -413,7 +414,7 @@ impl Simulation {
         for pass in 0.. {
             self.done.fill(0);
             let before = std::mem::take(&mut self.before);
-            // Forces of a host were found with guests where they were expected.
+            // Forces of a host were found with coupled nodes where they were expected.
             let back = self.put_back(&before, |own, part| pass > 0 || own.meetings.is_host(part));
             self.before = before;
             back?;
@@ -472,7 +473,7 @@ impl Simulation {
     }
 
     /// The contacts between participants where they met last.
-    pub fn guests(&self) -> impl Iterator<Item = GuestsNow> {
+    pub fn coupled_surfaces(&self) -> impl Iterator<Item = CoupledSurfaceNow> {
         self.meetings.now()
     }
 
@@ -529,7 +530,12 @@ impl Simulation {
     /// Goes back to a state that fits the world.
     fn go_back(&mut self, State(parts, between): State) -> Result<(), Failure> {
         let springs = Springs::new(&self.world.ties, &self.world.parts, between.ties)?;
-        let meetings = Meetings::new(&self.world.guests, &self.world.parts, &self.ratios, between.guests)?;
+        let meetings = Meetings::new(
+            &self.world.coupled_surfaces,
+            &self.world.parts,
+            &self.ratios,
+            between.coupled_surfaces,
+        )?;
         self.put_back(&parts, |_, _| true)?;
         (self.springs, self.meetings, self.evaluated) = (springs, meetings, false);
         Ok(())
@@ -599,7 +605,7 @@ impl Simulation {
     }
 
     fn between(&self) -> Between {
-        Between { ties: self.springs.memory().clone(), guests: self.meetings.memory().clone() }
+        Between { ties: self.springs.memory().clone(), coupled_surfaces: self.meetings.memory().clone() }
     }
 
     fn bring_back(&mut self) -> Result<(), Failure> {

@@ -5,8 +5,8 @@ use pliant_mechanics::count::is_time;
 use serde::{Deserialize, Serialize};
 
 use super::World;
+use crate::coupled_surfaces::CouplingMemory;
 use crate::failure::Failure;
-use crate::guests::GuestMemory;
 use crate::kept::Kept;
 use crate::part::Part;
 use crate::penalty::TieMemory;
@@ -19,17 +19,17 @@ pub struct State(pub(super) Vec<OwnState>, pub(super) Between);
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Between {
     pub(super) ties: TieMemory,
-    pub(super) guests: GuestMemory,
+    pub(super) coupled_surfaces: CouplingMemory,
 }
 
 impl Between {
     /// Whether participants have neither ties nor contacts.
     pub(super) fn is_empty(&self) -> bool {
-        self.ties.is_empty() && self.guests.is_empty()
+        self.ties.is_empty() && self.coupled_surfaces.is_empty()
     }
 
     pub(super) fn fits(&self, world: &World) -> bool {
-        self.ties.fits(&world.ties) && self.guests.fits(&world.guests)
+        self.ties.fits(&world.ties) && self.coupled_surfaces.fits(&world.coupled_surfaces)
     }
 }
 

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use pliant_mechanics::fingerprint;
 
 use super::meshes;
+use crate::coupled_surfaces::CoupledSurface;
 use crate::failure::Failure;
-use crate::guests::Guests;
 use crate::part::Part;
 use crate::penalty::PenaltyTie;
 
@@ -18,7 +18,7 @@ pub struct World {
     /// Ties between participants.
     pub ties: Vec<PenaltyTie>,
     /// Nodes of participants that others touch.
-    pub guests: Vec<Guests>,
+    pub coupled_surfaces: Vec<CoupledSurface>,
 }
 
 impl World {
@@ -30,7 +30,7 @@ impl World {
             let duration = part.steps.step * part.steps.number as f64;
             part.steps.meet(common, duration);
         }
-        Self { parts, ties: Vec::new(), guests: Vec::new() }
+        Self { parts, ties: Vec::new(), coupled_surfaces: Vec::new() }
     }
 
     /// A fingerprint of its bodies with their meshes, and of its tools and obstacles, by name; not of laws, loads or steps.
@@ -71,7 +71,7 @@ impl World {
 
 impl From<Part> for World {
     fn from(part: Part) -> Self {
-        Self { parts: vec![part], ties: Vec::new(), guests: Vec::new() }
+        Self { parts: vec![part], ties: Vec::new(), coupled_surfaces: Vec::new() }
     }
 }
 

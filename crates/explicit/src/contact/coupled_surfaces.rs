@@ -1,4 +1,4 @@
-//! Guests: nodes of surfaces that another solver moves. That solver gives their places; no impulse moves them, and their impulses are summed for it.
+//! Coupled nodes: nodes of surfaces that another solver moves. That solver gives their places; no impulse moves them, and their impulses are summed for it.
 
 use nalgebra::Vector3;
 use pliant_mechanics::tensor::{Vector, add};
@@ -6,9 +6,9 @@ use pliant_mechanics::tensor::{Vector, add};
 use super::{Free, Nodes};
 use crate::lanes::LaneNumber;
 
-/// The guests of a model.
-pub(super) struct Guests {
-    /// Nodes of the model; guests are numbered from here on.
+/// The coupled nodes of a model.
+pub(super) struct CoupledSurfaces {
+    /// Nodes of the model; coupled nodes are numbered from here on.
     first: usize,
     /// The times [s] between which they go, and where they are then [m].
     times: [f64; 2],
@@ -19,7 +19,7 @@ pub(super) struct Guests {
     impulses: Vec<Vector<f64>>,
 }
 
-impl Guests {
+impl CoupledSurfaces {
     /// Those with these places at rest [m], of a model with so many nodes; they stay until they are led.
     pub fn new(first: usize, rest: &[Vector<f64>]) -> Self {
         Self {
@@ -36,7 +36,7 @@ impl Guests {
         self.ways[number - self.first][0].into()
     }
 
-    /// Its place among the guests; `None` of a node of the model.
+    /// Its place among the coupled nodes; `None` of a node of the model.
     pub fn place_of(&self, number: u32) -> Option<usize> {
         (number as usize).checked_sub(self.first)
     }
@@ -57,20 +57,20 @@ impl Guests {
         &self.impulses
     }
 
-    pub fn press(&mut self, guest: usize, impulse: Vector3<f64>) {
-        let own = &mut self.impulses[guest];
+    pub fn press(&mut self, coupled: usize, impulse: Vector3<f64>) {
+        let own = &mut self.impulses[coupled];
         *own = add(*own, impulse.into());
     }
 
-    fn at(&self, guest: usize, time_fraction: f64) -> Vector3<f64> {
-        let [from, to] = self.ways[guest].map(Vector3::from);
+    fn at(&self, coupled: usize, time_fraction: f64) -> Vector3<f64> {
+        let [from, to] = self.ways[coupled].map(Vector3::from);
         from.lerp(&to, time_fraction)
     }
 
-    /// Where a guest goes; `None` of a node of the model.
+    /// Where a coupled node goes; `None` of a node of the model.
     pub fn free(&self, number: u32) -> Option<Free> {
-        let guest = self.place_of(number)?;
-        Some(Free { then: self.at(guest, self.time_fractions[1]).into(), mobility: [0.0; 3] })
+        let coupled = self.place_of(number)?;
+        Some(Free { then: self.at(coupled, self.time_fractions[1]).into(), mobility: [0.0; 3] })
     }
 
     /// Finds where nodes are before the step [m], by their places among `numbers`.
@@ -96,7 +96,7 @@ impl Guests {
     ) -> Vector3<f64> {
         match self.place_of(number) {
             None => rest + Vector3::from(displacement[number as usize].map(|x| x.to_f64())),
-            Some(guest) => self.at(guest, self.time_fractions[0]),
+            Some(coupled) => self.at(coupled, self.time_fractions[0]),
         }
     }
 }

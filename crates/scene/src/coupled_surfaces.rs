@@ -8,7 +8,7 @@ use pliant_format::diagnostic::Diagnostic;
 use pliant_format::tables::{ContactTable, SolverName};
 use pliant_geometry::SurfaceLocator;
 use pliant_geometry::words::number;
-use pliant_sim::Guests;
+use pliant_sim::CoupledSurface;
 use pliant_sim::contact::pairs::Surface;
 use pliant_sim::contact::touch::{Contact, Touch, With};
 
@@ -25,7 +25,7 @@ struct Mistake {
     help: &'static str,
 }
 
-/// Nodes of a participant as guests of another one.
+/// Nodes of a participant as coupled nodes of another one.
 struct Numbers {
     /// The number of the first.
     first: u32,
@@ -34,7 +34,7 @@ struct Numbers {
 }
 
 impl Numbers {
-    /// The number of a node as a guest.
+    /// The number of a node as a coupled node.
     fn of(&self, node: u32) -> u32 {
         self.first + self.nodes.partition_point(|&known| known < node) as u32
     }
@@ -42,7 +42,7 @@ impl Numbers {
 
 impl World {
     /// Finds the contacts between participants; mistakes go to `out`.
-    pub(crate) fn find_guests(&mut self, out: &mut Vec<Diagnostic>) {
+    pub(crate) fn find_coupled_surfaces(&mut self, out: &mut Vec<Diagnostic>) {
         let mut notes = Vec::new();
         let mut met: Vec<(Contact, [usize; 2])> = Vec::new();
         for (name, table) in &self.scene.contacts {
@@ -56,13 +56,13 @@ impl World {
             }
         }
         notes.into_iter().for_each(|note| self.note(note));
-        let numbers = self.add_guests(&met);
+        let numbers = self.add_coupled_surfaces(&met);
         for (contact, pair) in met {
             self.add_contact(contact, pair[0], &numbers[&pair]);
         }
     }
 
-    /// The two participants of a contact with the surfaces that touch, first the one whose guests are nodes of the other.
+    /// The two participants of a contact with the surfaces that touch, first the one whose coupled nodes are nodes of the other.
     fn sides(&self, name: &str) -> Option<[(usize, &Meet); 2]> {
         let sides = self.participants.iter().enumerate().flat_map(|(part, own)| {
             let meets = own.built.meets.iter().filter(|meet| meet.contact == name);
@@ -137,8 +137,8 @@ impl World {
         Ok(())
     }
 
-    /// Makes the nodes of second surfaces guests of the first participants; their numbers for each pair of participants.
-    fn add_guests(&mut self, met: &[(Contact, [usize; 2])]) -> BTreeMap<[usize; 2], Numbers> {
+    /// Makes the nodes of second surfaces coupled nodes of the first participants; their numbers for each pair of participants.
+    fn add_coupled_surfaces(&mut self, met: &[(Contact, [usize; 2])]) -> BTreeMap<[usize; 2], Numbers> {
         let mut nodes: BTreeMap<[usize; 2], Vec<u32>> = BTreeMap::new();
         for (contact, pair) in met {
             if let With::Body(surface) = &contact.with {
@@ -152,10 +152,10 @@ impl World {
             let rest = &self.participants[of].built.model.rest;
             let places: Vec<[f64; 3]> = nodes.iter().map(|&node| rest[node as usize]).collect();
             let built = Arc::make_mut(&mut self.participants[host].built);
-            let guests = &mut Arc::make_mut(built.contacts.get_or_insert_default()).guests;
-            let first = (built.model.node_count() + guests.len()) as u32;
-            guests.extend(places);
-            self.guests.push(Guests { host, of, nodes: nodes.clone() });
+            let coupled_nodes = &mut Arc::make_mut(built.contacts.get_or_insert_default()).coupled_nodes;
+            let first = (built.model.node_count() + coupled_nodes.len()) as u32;
+            coupled_nodes.extend(places);
+            self.coupled_surfaces.push(CoupledSurface { host, of, nodes: nodes.clone() });
             (pair, Numbers { first, nodes })
         };
         nodes.into_iter().map(add).collect()
@@ -170,7 +170,7 @@ impl World {
         let (rest, contacts) = (&built.model.rest, Arc::make_mut(built.contacts.get_or_insert_default()));
         let place = |node: u32| -> Vector3<f64> {
             let node = node as usize;
-            rest.get(node).unwrap_or_else(|| &contacts.guests[node - rest.len()]).to_owned().into()
+            rest.get(node).unwrap_or_else(|| &contacts.coupled_nodes[node - rest.len()]).to_owned().into()
         };
         let near = contact.pairs(|node| node, place).map(|(mut pairs, _)| pairs.nearer(place));
         if let Some(near) = near.filter(|near| !near.is_empty()) {
@@ -224,9 +224,9 @@ impl World {
     }
 
     /// Refuses contacts between participants whose steps do not fit, once these are chosen.
-    pub(crate) fn check_guests(&self, out: &mut Vec<Diagnostic>) {
+    pub(crate) fn check_coupled_surfaces(&self, out: &mut Vec<Diagnostic>) {
         let common = self.steps();
-        for set in &self.guests {
+        for set in &self.coupled_surfaces {
             let of = &self.participants[set.of];
             if of.plan.steps.number == common {
                 continue;

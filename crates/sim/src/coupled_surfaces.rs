@@ -1,4 +1,4 @@
-//! Contact between participants: the surface of one whose equations are solved is a guest in the contacts of an explicit one.
+//! Contact between participants: the surface of one whose equations are solved is coupled into the contacts of an explicit one.
 //!
 //! The implicit participant takes its step H. Its surface then goes from where it was to where it is, at the same speed, and the explicit one takes
 //! its steps h against it, as against a tool. Their impulses P give the mean force P/H on the implicit participant. The step is repeated with this force until the
@@ -29,10 +29,10 @@ const PASSES: u32 = 6;
 /// k h H/m.
 const FIRM: f64 = 4.0;
 
-/// Nodes of a participant that are guests in the contacts of another one: in the order of these sets, its
-/// [`guests`](pliant_contact::touch::Contacts::guests).
+/// Nodes of a participant that are coupled into the contacts of another one: in the order of these sets, its
+/// [`coupled_nodes`](pliant_contact::touch::Contacts::coupled_nodes).
 #[derive(Clone, Debug)]
-pub struct Guests {
+pub struct CoupledSurface {
     /// The explicit participant, by its place in the world.
     pub host: usize,
     /// The implicit participant whose nodes they are.
@@ -43,7 +43,7 @@ pub struct Guests {
 
 /// The contact of two participants at an instant.
 #[derive(Clone, Copy, Debug)]
-pub struct GuestsNow {
+pub struct CoupledSurfaceNow {
     /// The explicit and the implicit participant, by their places in the world.
     pub parts: [usize; 2],
     /// The mean force [N] over the last step on the explicit and on the implicit one.
@@ -54,11 +54,11 @@ pub struct GuestsNow {
     pub worst: f64,
 }
 
-/// What a restart needs of guests.
+/// What a restart needs of coupled nodes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct GuestMemory {
-    /// Of each guest, its force in the last step [N], and the impulse [N s] that it is still to feel.
-    guests: Vec<[Vector<f64>; 2]>,
+pub(crate) struct CouplingMemory {
+    /// Of each coupled node, its force in the last step [N], and the impulse [N s] that it is still to feel.
+    nodes: Vec<[Vector<f64>; 2]>,
     /// Of each set, steps in contact, and how often they were taken in all.
     counts: Vec<[u64; 2]>,
     /// Of each set, the relative difference of the forces on both sides over the last step, and these [N].
@@ -67,23 +67,23 @@ pub(crate) struct GuestMemory {
     worst: Vec<f64>,
 }
 
-impl GuestMemory {
+impl CouplingMemory {
     /// Whether it is of no sets.
     pub(crate) fn is_empty(&self) -> bool {
         self.counts.is_empty()
     }
 
     /// Whether it is of these sets, or of none.
-    pub(crate) fn fits(&self, sets: &[Guests]) -> bool {
-        let guests: usize = sets.iter().map(|set| set.nodes.len()).sum();
-        let lengths = [self.guests.len(), self.counts.len(), self.last.len(), self.worst.len()];
+    pub(crate) fn fits(&self, sets: &[CoupledSurface]) -> bool {
+        let coupled_nodes: usize = sets.iter().map(|set| set.nodes.len()).sum();
+        let lengths = [self.nodes.len(), self.counts.len(), self.last.len(), self.worst.len()];
         let counted = self.counts.iter().flatten().all(|count| count.can_go_on());
-        counted && (lengths == [0; 4] || lengths == [guests, sets.len(), sets.len(), sets.len()])
+        counted && (lengths == [0; 4] || lengths == [coupled_nodes, sets.len(), sets.len(), sets.len()])
     }
 }
 
-/// A guest.
-struct Guest {
+/// A coupled node.
+struct CoupledNode {
     node: u32,
     /// Its place at rest [m].
     rest: Vector<f64>,
@@ -97,7 +97,7 @@ struct Guest {
     way: [Vector<f64>; 2],
 }
 
-impl Guest {
+impl CoupledNode {
     fn place(&self, own: &dyn Participant) -> Vector<f64> {
         add(self.rest, own.displacement(self.node as usize))
     }
@@ -113,21 +113,21 @@ impl Guest {
     }
 }
 
-/// Where the guests of a set are among all, and among those of its host.
+/// Where the coupled nodes of a set are among all, and among those of its host.
 #[derive(Clone)]
 struct Places {
     all: Range<usize>,
     at_host: Range<usize>,
 }
 
-/// The guests of a simulation.
+/// The coupled nodes of a simulation.
 pub(crate) struct Meetings {
-    sets: Vec<Guests>,
+    sets: Vec<CoupledSurface>,
     places: Vec<Places>,
-    guests: Vec<Guest>,
-    /// Room for the ways of all guests of a host.
+    coupled_nodes: Vec<CoupledNode>,
+    /// Room for the ways of all coupled nodes of a host.
     ways: Vec<[Vector<f64>; 2]>,
-    memory: GuestMemory,
+    memory: CouplingMemory,
 }
 
 impl Meetings {
@@ -136,12 +136,12 @@ impl Meetings {
     /// # Errors
     /// If participants can't meet so.
     pub(crate) fn new(
-        sets: &[Guests],
+        sets: &[CoupledSurface],
         parts: &[Part],
         ratios: &[u64],
-        memory: GuestMemory,
+        memory: CouplingMemory,
     ) -> Result<Self, Failure> {
-        let (mut guests, mut places) = (Vec::new(), Vec::new());
+        let (mut coupled_nodes, mut places) = (Vec::new(), Vec::new());
         let mut counts = vec![0; parts.len()];
         for set in sets {
             set.check(parts)?;
@@ -161,8 +161,8 @@ impl Meetings {
                     "has guests without a face, or its host has no surface that they touch",
                 ));
             }
-            places.push(Places { all: guests.len()..guests.len() + set.nodes.len(), at_host });
-            guests.extend(set.nodes.iter().zip(areas).map(|(&node, area)| Guest {
+            places.push(Places { all: coupled_nodes.len()..coupled_nodes.len() + set.nodes.len(), at_host });
+            coupled_nodes.extend(set.nodes.iter().zip(areas).map(|(&node, area)| CoupledNode {
                 node,
                 rest: rest(node),
                 stiffness: unit * area,
@@ -172,7 +172,7 @@ impl Meetings {
             }));
         }
         for (part, count) in parts.iter().zip(counts) {
-            let awaited = part.method.contacts().map_or(0, |contacts| contacts.guests.len());
+            let awaited = part.method.contacts().map_or(0, |contacts| contacts.coupled_nodes.len());
             if awaited != count {
                 return Err(Failure::input(&format_args!(
                     "contacts of participant `{}` have {awaited} guests, and the world has {count}",
@@ -181,26 +181,26 @@ impl Meetings {
             }
         }
         let memory = match memory.counts.is_empty() {
-            true => GuestMemory {
-                guests: vec![[[0.0; 3]; 2]; guests.len()],
+            true => CouplingMemory {
+                nodes: vec![[[0.0; 3]; 2]; coupled_nodes.len()],
                 counts: vec![[0; 2]; sets.len()],
                 last: vec![(0.0, [[0.0; 3]; 2]); sets.len()],
                 worst: vec![0.0; sets.len()],
             },
             false => memory,
         };
-        Ok(Self { sets: sets.to_vec(), places, guests, ways: Vec::new(), memory })
+        Ok(Self { sets: sets.to_vec(), places, coupled_nodes, ways: Vec::new(), memory })
     }
 
     pub(crate) fn is_empty(&self) -> bool {
         self.sets.is_empty()
     }
 
-    pub(crate) fn memory(&self) -> &GuestMemory {
+    pub(crate) fn memory(&self) -> &CouplingMemory {
         &self.memory
     }
 
-    /// Whether a participant has guests, so that its steps are against them.
+    /// Whether a participant has coupled nodes, so that its steps are against them.
     pub(crate) fn is_host(&self, part: usize) -> bool {
         self.sets.iter().any(|set| set.host == part)
     }
@@ -209,12 +209,12 @@ impl Meetings {
     pub(crate) fn meet(&mut self, parts: &[Part], participants: &mut [Box<dyn Participant>]) {
         for (set, Places { all, .. }) in self.sets.iter().zip(&self.places) {
             let (step, own) = (parts[set.of].steps.step, participants[set.of].as_ref());
-            let remembered = &self.memory.guests[all.clone()];
-            for (guest, &[force, owed]) in self.guests[all.clone()].iter_mut().zip(remembered) {
-                let here = guest.place(own);
-                guest.anchor = add(here, scale(own.last_velocity(guest.node as usize), step));
-                guest.force = add(force, scale(owed, 1.0 / step));
-                guest.way = [here, guest.anchor];
+            let remembered = &self.memory.nodes[all.clone()];
+            for (coupled, &[force, owed]) in self.coupled_nodes[all.clone()].iter_mut().zip(remembered) {
+                let here = coupled.place(own);
+                coupled.anchor = add(here, scale(own.last_velocity(coupled.node as usize), step));
+                coupled.force = add(force, scale(owed, 1.0 / step));
+                coupled.way = [here, coupled.anchor];
             }
         }
         self.lead(|_| true, parts, participants);
@@ -223,36 +223,38 @@ impl Meetings {
     /// Follows the step of a participant, before its hosts take theirs.
     pub(crate) fn after(&mut self, part: usize, parts: &[Part], participants: &mut [Box<dyn Participant>]) {
         for (_, Places { all, .. }) in self.sets.iter().zip(&self.places).filter(|(set, _)| set.of == part) {
-            for guest in &mut self.guests[all.clone()] {
-                guest.way[1] = guest.place(participants[part].as_ref());
+            for coupled in &mut self.coupled_nodes[all.clone()] {
+                coupled.way[1] = coupled.place(participants[part].as_ref());
             }
         }
         self.lead(|set| set.of == part, parts, participants);
     }
 
-    /// Tells the hosts of some sets where their guests go in the step that begins where all participants meet.
+    /// Tells the hosts of some sets where their coupled nodes go in the step that begins where all participants meet.
     fn lead(
         &mut self,
-        of: impl Fn(&Guests) -> bool,
+        of: impl Fn(&CoupledSurface) -> bool,
         parts: &[Part],
         participants: &mut [Box<dyn Participant>],
     ) {
-        let Self { sets, places, guests, ways, .. } = self;
+        let Self { sets, places, coupled_nodes, ways, .. } = self;
         for (host, participant) in participants.iter_mut().enumerate() {
             let own = || sets.iter().zip(&*places).filter(|(set, _)| set.host == host);
             let Some((set, _)) = own().find(|(set, _)| of(set)) else { continue };
             ways.clear();
-            ways.extend(own().flat_map(|(_, places)| &guests[places.all.clone()]).map(|guest| guest.way));
+            ways.extend(
+                own().flat_map(|(_, places)| &coupled_nodes[places.all.clone()]).map(|coupled| coupled.way),
+            );
             let begin = participant.time();
-            participant.lead_guests([begin, begin + parts[set.of].steps.step], ways);
+            participant.lead_coupled_surfaces([begin, begin + parts[set.of].steps.step], ways);
         }
     }
 
     /// Adds what pushes a participant's nodes to grips.
     pub(crate) fn add_to(&self, part: usize, grips: &mut Vec<Grip>) {
         let own = self.sets.iter().zip(&self.places).filter(|(set, _)| set.of == part);
-        let guests = own.flat_map(|(_, places)| &self.guests[places.all.clone()]);
-        grips.extend(guests.filter(|guest| guest.is_pushed()).map(Guest::grip));
+        let coupled_nodes = own.flat_map(|(_, places)| &self.coupled_nodes[places.all.clone()]);
+        grips.extend(coupled_nodes.filter(|coupled| coupled.is_pushed()).map(CoupledNode::grip));
     }
 
     /// Ends a pass: whether the step is found, and taken note of, or has to be taken anew with the forces of this one.
@@ -262,18 +264,19 @@ impl Meetings {
         parts: &[Part],
         participants: &[Box<dyn Participant>],
     ) -> bool {
-        let Self { sets, places, guests, memory, .. } = self;
-        let impulses =
-            |set: &Guests, own: &Places| &participants[set.host].guest_impulses()[own.at_host.clone()];
+        let Self { sets, places, coupled_nodes, memory, .. } = self;
+        let impulses = |set: &CoupledSurface, own: &Places| {
+            &participants[set.host].coupled_impulses()[own.at_host.clone()]
+        };
         let mut is_found = true;
         for (index, (set, own)) in sets.iter().zip(&*places).enumerate() {
             let step = parts[set.of].steps.step;
             let (mut apart, mut size, mut sums) = (0.0, 0.0, [[0.0; 3]; 2]);
-            let remembered = &memory.guests[own.all.clone()];
-            for ((guest, [_, owed]), &impulse) in
-                guests[own.all.clone()].iter().zip(remembered).zip(impulses(set, own))
+            let remembered = &memory.nodes[own.all.clone()];
+            for ((coupled, [_, owed]), &impulse) in
+                coupled_nodes[own.all.clone()].iter().zip(remembered).zip(impulses(set, own))
             {
-                let (wanted, felt) = (scale(add(impulse, *owed), 1.0 / step), guest.felt());
+                let (wanted, felt) = (scale(add(impulse, *owed), 1.0 / step), coupled.felt());
                 let difference = sub(wanted, felt);
                 (apart, size) = (apart + dot(difference, difference), size + dot(wanted, wanted));
                 sums = [sub(sums[0], scale(impulse, 1.0 / step)), add(sums[1], felt)];
@@ -285,17 +288,17 @@ impl Meetings {
         is_found |= pass + 1 == PASSES;
         for (index, (set, own)) in sets.iter().zip(&*places).enumerate() {
             let step = parts[set.of].steps.step;
-            let remembered = memory.guests[own.all.clone()].iter_mut();
+            let remembered = memory.nodes[own.all.clone()].iter_mut();
             let mut touches = false;
-            for ((guest, [force, owed]), &impulse) in
-                guests[own.all.clone()].iter_mut().zip(remembered).zip(impulses(set, own))
+            for ((coupled, [force, owed]), &impulse) in
+                coupled_nodes[own.all.clone()].iter_mut().zip(remembered).zip(impulses(set, own))
             {
                 let mean = scale(impulse, 1.0 / step);
-                touches |= mean != [0.0; 3] || guest.is_pushed();
+                touches |= mean != [0.0; 3] || coupled.is_pushed();
                 if is_found {
-                    (*force, *owed) = (mean, sub(add(*owed, impulse), scale(guest.felt(), step)));
+                    (*force, *owed) = (mean, sub(add(*owed, impulse), scale(coupled.felt(), step)));
                 } else {
-                    (guest.force, guest.anchor) = (add(mean, scale(*owed, 1.0 / step)), guest.way[1]);
+                    (coupled.force, coupled.anchor) = (add(mean, scale(*owed, 1.0 / step)), coupled.way[1]);
                 }
             }
             if is_found && touches {
@@ -308,10 +311,10 @@ impl Meetings {
     }
 
     /// The contacts of participants at the instant where they met last.
-    pub(crate) fn now(&self) -> impl Iterator<Item = GuestsNow> {
-        let GuestMemory { counts, last, worst, .. } = &self.memory;
+    pub(crate) fn now(&self) -> impl Iterator<Item = CoupledSurfaceNow> {
+        let CouplingMemory { counts, last, worst, .. } = &self.memory;
         self.sets.iter().zip(counts).zip(last).zip(worst).map(
-            |(((set, [steps, passes]), (_, forces)), &worst)| GuestsNow {
+            |(((set, [steps, passes]), (_, forces)), &worst)| CoupledSurfaceNow {
                 parts: [set.host, set.of],
                 forces: *forces,
                 passes: *passes as f64 / (*steps).max(1) as f64,
@@ -321,7 +324,7 @@ impl Meetings {
     }
 }
 
-impl Guest {
+impl CoupledNode {
     /// The mean force [N] that it has felt in the step.
     fn felt(&self) -> Vector<f64> {
         match self.is_pushed() {
@@ -331,7 +334,7 @@ impl Guest {
     }
 }
 
-impl Guests {
+impl CoupledSurface {
     /// Whether their participants can meet so.
     ///
     /// # Errors
@@ -367,11 +370,11 @@ impl Guests {
 }
 
 /// Surfaces of a host's contacts that have nodes of a set, and those that touch these.
-fn surfaces<'a>(host: &'a Part, guests: &Range<u32>) -> impl Iterator<Item = &'a Contact> {
-    let guests = guests.clone();
+fn surfaces<'a>(host: &'a Part, coupled_nodes: &Range<u32>) -> impl Iterator<Item = &'a Contact> {
+    let coupled_nodes = coupled_nodes.clone();
     let all = host.method.contacts().into_iter().flat_map(|contacts| &contacts.contacts);
     all.filter(move |contact| {
-        contact.surfaces().any(|surface| surface.nodes.iter().any(|node| guests.contains(node)))
+        contact.surfaces().any(|surface| surface.nodes.iter().any(|node| coupled_nodes.contains(node)))
     })
 }
 
@@ -385,24 +388,28 @@ fn add_areas(surface: &Surface, place: impl Fn(u32) -> Vector<f64>, mut add_to: 
     }
 }
 
-/// The share of each guest [m²] in the surfaces that it is part of, at rest.
-fn areas(host: &Part, guests: &Range<u32>, place: impl Fn(u32) -> Vector<f64>) -> Vec<f64> {
-    let mut areas = vec![0.0_f64; guests.len()];
-    for contact in surfaces(host, guests) {
-        let mut own = vec![0.0; guests.len()];
-        for surface in contact.surfaces().filter(|own| own.nodes.iter().all(|node| guests.contains(node))) {
-            add_areas(surface, &place, |node, area| own[(node - guests.start) as usize] += area);
+/// The share of each coupled node [m²] in the surfaces that it is part of, at rest.
+fn areas(host: &Part, coupled_nodes: &Range<u32>, place: impl Fn(u32) -> Vector<f64>) -> Vec<f64> {
+    let mut areas = vec![0.0_f64; coupled_nodes.len()];
+    for contact in surfaces(host, coupled_nodes) {
+        let mut own = vec![0.0; coupled_nodes.len()];
+        for surface in
+            contact.surfaces().filter(|own| own.nodes.iter().all(|node| coupled_nodes.contains(node)))
+        {
+            add_areas(surface, &place, |node, area| own[(node - coupled_nodes.start) as usize] += area);
         }
         areas.iter_mut().zip(own).for_each(|(area, own)| *area = area.max(own));
     }
     areas
 }
 
-/// Mass of the nodes of a host's surfaces that meet guests, over their area [kg/m²].
-fn mass_per_area(host: &Part, guests: &Range<u32>) -> f64 {
+/// Mass of the nodes of a host's surfaces that meet coupled nodes, over their area [kg/m²].
+fn mass_per_area(host: &Part, coupled_nodes: &Range<u32>) -> f64 {
     let (mut mass, mut area) = (0.0, 0.0);
-    for contact in surfaces(host, guests) {
-        for surface in contact.surfaces().filter(|own| own.nodes.iter().all(|node| !guests.contains(node))) {
+    for contact in surfaces(host, coupled_nodes) {
+        for surface in
+            contact.surfaces().filter(|own| own.nodes.iter().all(|node| !coupled_nodes.contains(node)))
+        {
             mass += surface.nodes.iter().map(|&node| host.model.inertia(node as usize)).sum::<f64>();
             add_areas(surface, |node| host.model.rest[node as usize], |_, third| area += third);
         }
