@@ -150,7 +150,7 @@ pub(crate) unsafe fn call(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lock::hold;
+    use crate::lock::lock;
     use pliant_format::source::Source;
 
     fn scene(context: &PliantContext) -> u64 {
@@ -192,7 +192,7 @@ mod tests {
         // SAFETY: the context and the error are alive.
         let status = unsafe {
             call(&raw const context, handle, error.as_mut_ptr(), |context| {
-                let _held = hold(&*context.scene(handle)?)?.world();
+                let _held = lock(&*context.scene(handle)?)?.world();
                 panic!("a defect")
             })
         };

@@ -8,7 +8,7 @@ use pliant_format::source::Source;
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh, Vector3};
 
 use crate::context::{Item, PliantContext, call};
-use crate::lock::hold;
+use crate::lock::lock;
 use crate::open::OpenScene;
 use crate::pointers::{array, finite, give, needed, some_text, text};
 use crate::status::{Fault, PliantError, PliantStatus};
@@ -109,7 +109,7 @@ pub unsafe extern "C" fn pliant_scene_set(
     unsafe {
         call(context, scene, error, |context| {
             let scene = context.scene(scene)?;
-            let mut scene = hold(&scene)?;
+            let mut scene = lock(&scene)?;
             let assignment = text(assignment, "assignment")?;
             let assigned = scene.source.assign(assignment);
             assigned
@@ -135,7 +135,7 @@ pub unsafe extern "C" fn pliant_scene_give_mesh(
     unsafe {
         call(context, scene, error, |context| {
             let scene = context.scene(scene)?;
-            let mut scene = hold(&scene)?;
+            let mut scene = lock(&scene)?;
             let name = text(name, "name")?;
             let numbers = array(points, point_count.saturating_mul(3), "points")?;
             finite(numbers, "points")?;

@@ -8,7 +8,7 @@ use pliant_sim::{Simulation, StopFlag};
 use rayon::ThreadPoolBuilder;
 
 use crate::context::{Item, PliantContext, call};
-use crate::lock::hold;
+use crate::lock::lock;
 use crate::open::{Held, Running, Shared};
 use crate::pointers::{array, finite, give, give_bytes, needed};
 use crate::scene::PliantScene;
@@ -31,7 +31,7 @@ pub(crate) unsafe fn running(
     unsafe {
         call(context, simulation, error, |context| {
             let shared = context.simulation(simulation)?;
-            let mut running = shared.hold()?;
+            let mut running = shared.lock()?;
             what(&mut running)
         })
     }
@@ -52,7 +52,7 @@ pub unsafe extern "C" fn pliant_simulation_open(
         call(context, scene, error, |context| {
             needed(simulation, "simulation")?;
             let scene = context.scene(scene)?;
-            let world = Arc::new(hold(&scene)?.world()?);
+            let world = Arc::new(lock(&scene)?.world()?);
             if threads > MOST_THREADS {
                 let message =
                     format!("`threads` is {threads}: at most {MOST_THREADS}, or 0 for those of the scene");
@@ -177,7 +177,7 @@ unsafe fn go(
     let status = unsafe {
         call(context, simulation, error, |context| {
             let shared = context.simulation(simulation)?;
-            let mut running = shared.hold()?;
+            let mut running = shared.lock()?;
             let stopped = &shared.stopped;
             let (now, result) = running.compute(|own| {
                 let mut taken = 0;

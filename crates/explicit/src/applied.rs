@@ -69,7 +69,7 @@ impl<R: LaneNumber> AppliedForces<R> {
     }
 
     /// Takes other grips.
-    pub(crate) fn hold(&mut self, grips: &[Grip]) {
+    pub(crate) fn grip(&mut self, grips: &[Grip]) {
         self.grips.clear();
         self.grips.extend_from_slice(grips);
         self.see_whether_loaded();

@@ -224,7 +224,7 @@ impl<R: LaneNumber> ContactSolver<R> {
         self.place(now, gripped);
         self.look(way, free, gripped);
         if !self.near.is_empty() {
-            self.hold(gripped);
+            self.grip(gripped);
             self.measure();
             self.solve();
             self.lift();
@@ -392,7 +392,7 @@ impl<R: LaneNumber> ContactSolver<R> {
     }
 
     /// Takes nodes along that jaws hold.
-    fn hold(&mut self, gripped: &[Gripped]) {
+    fn grip(&mut self, gripped: &[Gripped]) {
         for held in gripped {
             let Some((_, own, node)) = self.holder(held) else { continue };
             let goal = own.passage.place(&held.at.into());

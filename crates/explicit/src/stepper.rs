@@ -354,8 +354,8 @@ impl<R: SteppedIn> CentralDifference<R> {
     }
 
     /// Takes hold of points: these grips and no others act from the next evaluation on. Their work is external.
-    pub fn hold(&mut self, grips: &[Grip]) {
-        self.applied.hold(grips);
+    pub fn grip(&mut self, grips: &[Grip]) {
+        self.applied.grip(grips);
     }
 
     /// Takes forces [N] from outside, one a node, or none: they and no others act from the next evaluation on until they are replaced. Their work

@@ -228,7 +228,7 @@ impl Instants {
     ///
     /// # Errors
     /// If there are too many.
-    pub(crate) fn hold(&mut self, device: &Device, grips: &[Four]) -> Result<(), GpuError> {
+    pub(crate) fn grip(&mut self, device: &Device, grips: &[Four]) -> Result<(), GpuError> {
         if self.grips.size() < size_of_val(grips) as u64 {
             self.grips = Memory::new(device).filled("the grips", grips)?;
             self.bound = bind(device, &self.rows, &self.findings, &self.grips);

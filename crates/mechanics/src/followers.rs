@@ -51,7 +51,7 @@ impl Model {
 
     /// Lets tied nodes follow no longer along components that a constraint holds or moves, of them and of a node of the other body that they follow: both
     /// bodies are held there, as at a plane of symmetry. To be called once constraints and ties are there.
-    pub fn hold_tied(&mut self) {
+    pub fn prescribe_tied(&mut self) {
         let mut held = vec![[false; 3]; self.node_count()];
         for constraint in self.constraints.iter().filter(|own| !own.motion.is_collective()) {
             for &node in &constraint.nodes {
@@ -212,11 +212,11 @@ mod tests {
             motion: Motion::Fixed,
         };
         model.constraints.push(plane(vec![4, 5], [true, true]));
-        model.hold_tied();
+        model.prescribe_tied();
         assert_eq!(model.ties[0].held, [[false; 3]; 2]);
         assert!(model.constrained_components().is_err());
         model.constraints.push(plane(vec![3], [true, false]));
-        model.hold_tied();
+        model.prescribe_tied();
         assert_eq!(model.ties[0].held, [[true, false, false]; 2]);
         model.constraints[0].components[1] = false;
         model.constrained_components().unwrap();

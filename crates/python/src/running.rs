@@ -206,8 +206,8 @@ impl Running {
     }
 
     /// Takes hold of all that is gripped.
-    pub fn hold(&mut self) -> Result<(), Trouble> {
-        if self.live.simulation.hold(&self.grips) {
+    pub fn grip(&mut self) -> Result<(), Trouble> {
+        if self.live.simulation.grip(&self.grips) {
             return Ok(());
         }
         self.grips.clear();

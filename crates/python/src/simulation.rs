@@ -355,7 +355,7 @@ impl Simulation {
                 grip
             };
             running.grips = grips.into_iter().map(grip).collect();
-            running.hold()?;
+            running.grip()?;
             Ok(running.grips.iter().map(|grip| grip.stiffness).collect())
         })?;
         Ok(taken?)
@@ -416,7 +416,7 @@ impl Simulation {
         self.work(py, move |running, _| {
             let state = state.taken(running)?;
             running.live.restore(state)?;
-            running.hold()
+            running.grip()
         })
     }
 
@@ -428,7 +428,7 @@ impl Simulation {
             if goes_on {
                 running.world = world;
                 running.show_again();
-                running.hold()?;
+                running.grip()?;
             }
             Ok(goes_on)
         })

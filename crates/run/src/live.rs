@@ -289,7 +289,7 @@ mod tests {
     fn pulled_for(world: &Arc<World>, steps: u64) -> Live {
         let mut live = Live::new(world).unwrap();
         let grip = Grip { stiffness: 20.0, ..corner(world, &live, 0.5, [0.0, 0.0, 5e-3]) };
-        live.simulation.hold(&[grip]);
+        live.simulation.grip(&[grip]);
         (0..steps).for_each(|_| assert_eq!(live.simulation.step(1).unwrap(), 1));
         live
     }
@@ -299,7 +299,7 @@ mod tests {
     }
 
     /// The grip of [`pulled_for`], as stiff after the change.
-    fn hold_on(live: &mut Live, world: &World) {
+    fn grip(live: &mut Live, world: &World) {
         let last = model(world).node_count() as u32 - 1;
         let [x, y, z] = [last, last - 1]
             .map(|n| live.simulation.rest(n))
@@ -307,7 +307,7 @@ mod tests {
             .zip([0.25, 0.75])
             .fold([0.0; 3], |sum, (x, w)| [0, 1, 2].map(|c| sum[c] + w * x[c]));
         let nodes = vec![(last, 0.25), (last - 1, 0.75)];
-        assert!(live.simulation.hold(&[Grip { nodes, place: [x, y, z + 5e-3], stiffness: 20.0 }]));
+        assert!(live.simulation.grip(&[Grip { nodes, place: [x, y, z + 5e-3], stiffness: 20.0 }]));
     }
 
     #[test]
@@ -323,7 +323,7 @@ mod tests {
         half.mesh().unwrap();
         let state = half.simulation.state().unwrap();
         let mut half = Live::go_on(&again, state, &stage).unwrap().unwrap();
-        hold_on(&mut half, &again);
+        grip(&mut half, &again);
         for _ in 150..300 {
             half.simulation.step(1).unwrap();
         }
@@ -390,7 +390,7 @@ mod tests {
         let (state, time) = (going.simulation.state().unwrap(), going.simulation.time());
         let mut going = Live::go_on(&stiff, state, &soft).unwrap().unwrap();
         assert_eq!(going.simulation.time(), time);
-        hold_on(&mut going, &stiff);
+        grip(&mut going, &stiff);
         going.simulation.step(1).unwrap();
         assert!(
             (going.simulation.time() - time - step(&stiff)).abs() < 1e-12,
@@ -416,10 +416,10 @@ mod tests {
         let mut going = pulled_for(&coarse, 16);
         let state = going.simulation.state().unwrap();
         let mut going = Live::go_on(&fine, state, &coarse).unwrap().unwrap();
-        hold_on(&mut going, &fine);
+        grip(&mut going, &fine);
         (0..68).for_each(|_| assert_eq!(going.simulation.step(1).unwrap(), 1));
         let mut whole = pulled_for(&fine, 0);
-        hold_on(&mut whole, &fine);
+        grip(&mut whole, &fine);
         let mut largest = 0.0_f64;
         for _ in 0..100 {
             whole.simulation.step(1).unwrap();
@@ -440,7 +440,7 @@ mod tests {
         let mut going = pulled_for(&light, 60);
         let state = going.simulation.state().unwrap();
         let mut going = Live::go_on(&heavy, state, &light).unwrap().unwrap();
-        hold_on(&mut going, &heavy);
+        grip(&mut going, &heavy);
         go(&mut going, 400);
         assert!(going.simulation.energies().balance < 0.02, "{:?}", going.simulation.energies());
     }
@@ -462,7 +462,7 @@ mod tests {
         let world = damped();
         let mut live = Live::new(&world).unwrap();
         let grip = corner(&world, &live, 0.5, [0.0, 0.0, 2e-3]);
-        assert!(live.simulation.hold(std::slice::from_ref(&grip)));
+        assert!(live.simulation.grip(std::slice::from_ref(&grip)));
         go(&mut live, 4000);
         let ([_, force], base) = (live.simulation.pulled(&grip), live.reactions()[0]);
         let most = force.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
@@ -472,7 +472,7 @@ mod tests {
         }
         // Its work is external work: the energies balance.
         assert!(live.simulation.energies().balance < 0.01, "{:?}", live.simulation.energies());
-        assert!(live.simulation.hold(&[]));
+        assert!(live.simulation.grip(&[]));
         go(&mut live, 4000);
         let moved = &live.mesh().unwrap().point_data["displacement"].values;
         let left = moved.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
@@ -484,7 +484,7 @@ mod tests {
         let world = damped();
         let mut live = Live::new(&world).unwrap();
         let grip = corner(&world, &live, 1.0, [1e-3, 0.0, 0.0]);
-        live.simulation.hold(&[grip]);
+        live.simulation.grip(&[grip]);
         go(&mut live, 3000);
     }
 

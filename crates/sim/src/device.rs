@@ -106,8 +106,8 @@ impl Solver<f32> for GpuStepper {
         Some(self)
     }
 
-    fn hold(&mut self, grips: &[Grip]) -> bool {
-        GpuStepper::hold(self, grips).is_ok()
+    fn grip(&mut self, grips: &[Grip]) -> bool {
+        GpuStepper::grip(self, grips).is_ok()
     }
 
     fn bring_back(&mut self, state: &mut State<f32>) -> Result<(), Failure> {

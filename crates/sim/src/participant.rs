@@ -42,7 +42,7 @@ pub(crate) trait Participant: Instant + Send {
     }
 
     /// Takes hold of points: these grips and no others act from the next evaluation on. False of a stepper that knows none.
-    fn hold(&mut self, grips: &[Grip]) -> bool;
+    fn grip(&mut self, grips: &[Grip]) -> bool;
 
     /// Takes forces [N], one a node, or none: they and no others act from the next evaluation on. Only where its method takes some.
     fn push(&mut self, forces: &[Vector<f64>]);

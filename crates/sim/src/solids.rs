@@ -287,8 +287,8 @@ impl<R: Numeric> Participant for Solids<R> {
         R::on_device(self)
     }
 
-    fn hold(&mut self, grips: &[Grip]) -> bool {
-        self.solver.hold(grips)
+    fn grip(&mut self, grips: &[Grip]) -> bool {
+        self.solver.grip(grips)
     }
 
     fn push(&mut self, forces: &[Vector<f64>]) {

@@ -90,7 +90,7 @@ pub(crate) trait Solver<R>: Send {
     }
 
     /// Takes hold of points: these grips and no others act from the next evaluation on. False of a solver that knows none.
-    fn hold(&mut self, grips: &[Grip]) -> bool {
+    fn grip(&mut self, grips: &[Grip]) -> bool {
         grips.is_empty()
     }
 
@@ -203,8 +203,8 @@ impl<R: Scalar> Solver<R> for CentralDifference<R> {
         Ok(())
     }
 
-    fn hold(&mut self, grips: &[Grip]) -> bool {
-        CentralDifference::hold(self, grips);
+    fn grip(&mut self, grips: &[Grip]) -> bool {
+        CentralDifference::grip(self, grips);
         true
     }
 

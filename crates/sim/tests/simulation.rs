@@ -215,12 +215,12 @@ fn a_grip_pulls_at_nodes_of_any_participant() {
     let [x, y, z] = simulation.rest(node);
     let grip = Grip { nodes: vec![(node, 1.0)], place: [x, y, z + 0.01], stiffness: 1.0 };
     assert!(simulation.stiffest(&grip) > 1.0);
-    assert!(simulation.hold(std::slice::from_ref(&grip)));
+    assert!(simulation.grip(std::slice::from_ref(&grip)));
     simulation.run(DURATION, |_| ()).unwrap();
     let [place, force] = simulation.pulled(&grip);
     assert!(place[2] > z + 1e-3 && force[2] > 0.0, "{place:?} m, {force:?} N");
     let both = Grip { nodes: vec![(0, 0.5), (node, 0.5)], ..grip };
-    assert!(!simulation.hold(&[both]));
+    assert!(!simulation.grip(&[both]));
 }
 
 #[test]

@@ -303,7 +303,7 @@ impl Hold {
                 }
             }
         }
-        self.hold(live) && found
+        self.grip(live) && found
     }
 
     /// After a step: hands pull on towards their goals. Their forces stay below their limits while what is held gives way.
@@ -313,7 +313,7 @@ impl Hold {
             moved |= self.taken[at].longest.is_finite() && self.stretch(at, live);
         }
         if moved {
-            self.hold(live);
+            self.grip(live);
         }
     }
 
@@ -333,7 +333,7 @@ impl Hold {
     }
 
     /// Holds the same in another run.
-    pub fn hold_on(&mut self, live: &mut Live) -> bool {
+    pub fn grip_again(&mut self, live: &mut Live) -> bool {
         for hand in &mut self.hands {
             if matches!(hand, Holds::Tool(tool) if live.simulation.tool(&tool.name).is_none()) {
                 *hand = Holds::Nothing;
@@ -342,11 +342,11 @@ impl Hold {
         for (grip, taken) in self.grips.iter_mut().zip(&self.taken) {
             grip.stiffness = taken.stiffness.min(live.simulation.stiffest(grip));
         }
-        self.hold(live)
+        self.grip(live)
     }
 
-    fn hold(&mut self, live: &mut Live) -> bool {
-        let held = live.simulation.hold(&self.grips);
+    fn grip(&mut self, live: &mut Live) -> bool {
+        let held = live.simulation.grip(&self.grips);
         if !held {
             *self = Self::default();
         }

@@ -182,7 +182,7 @@ impl<'r> Replay<'r> {
             None => subject_of(world, &world.scene.view, &mut live)?,
         };
         let subject = self.subject.insert(subject);
-        self.hold.hold_on(&mut live);
+        self.hold.grip_again(&mut live);
         loop {
             while let Some((then, rest)) =
                 self.moves.split_first().filter(|(then, _)| then.steps <= self.steps)
@@ -206,7 +206,7 @@ impl<'r> Replay<'r> {
                     }
                     Done::Halve => {
                         live.halve_steps().map_err(|failure| failure.message)?;
-                        self.hold.hold_on(&mut live);
+                        self.hold.grip_again(&mut live);
                     }
                     Done::Numbers(numbers) if self.steps == 0 => return Ok(Ended::Change(None, numbers)),
                     Done::Numbers(numbers) => {

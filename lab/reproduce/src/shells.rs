@@ -106,7 +106,7 @@ impl Specimen {
 
     /// Holds components of nodes.
     #[must_use]
-    pub fn hold(mut self, nodes: Vec<u32>, components: [bool; 6]) -> Self {
+    pub fn prescribe(mut self, nodes: Vec<u32>, components: [bool; 6]) -> Self {
         let name = format!("constraint {}", self.model.constraints.len());
         self.model.model_mut().constraints.push(Constraint {
             name,
@@ -119,9 +119,9 @@ impl Specimen {
 
     /// Holds components of an edge.
     #[must_use]
-    pub fn hold_edge(self, edge: &str, components: [bool; 6]) -> Self {
+    pub fn prescribe_edge(self, edge: &str, components: [bool; 6]) -> Self {
         let nodes = self.edge(edge);
-        self.hold(nodes, components)
+        self.prescribe(nodes, components)
     }
 
     /// A load that grows with time from 0 to 1.

@@ -32,7 +32,7 @@ fn wall(law: AnyLaw, triangles: Vec<[u32; 3]>, rest: &[Vector<f64>], thickness: 
     Solid::new(0, Material::elastic(law, 1000.0), Cells::membrane(triangles, rest, &vec![thickness; count]))
 }
 
-fn hold(model: &mut Model, name: &str, component: usize, nodes: Vec<u32>, motion: Motion) {
+fn prescribe(model: &mut Model, name: &str, component: usize, nodes: Vec<u32>, motion: Motion) {
     let mut components = [false; 6];
     components[component] = true;
     model.constraints.push(Constraint { name: name.into(), nodes, components, motion });
@@ -86,11 +86,11 @@ fn a_coated_block_is_stretched_as_in_closed_form() {
             let at = |component: usize, place: f64| -> Vec<u32> {
                 (0..8).filter(|&n| (corners[n as usize][component] - place).abs() < 1e-9).collect()
             };
-            hold(&mut model, "start", 0, at(0, 0.0), Motion::Fixed);
-            hold(&mut model, "sides", 1, (0..8).collect(), Motion::Fixed);
-            hold(&mut model, "base", 2, at(2, 0.0), Motion::Fixed);
+            prescribe(&mut model, "start", 0, at(0, 0.0), Motion::Fixed);
+            prescribe(&mut model, "sides", 1, (0..8).collect(), Motion::Fixed);
+            prescribe(&mut model, "base", 2, at(2, 0.0), Motion::Fixed);
             let pulled = Motion::Displacement([stretch * length, 0.0, 0.0], RAMP);
-            hold(&mut model, "end", 0, at(0, length), pulled);
+            prescribe(&mut model, "end", 0, at(0, length), pulled);
             let (solver, _) = equilibrium(&model, 3, 1e-9);
             let force = solver.reaction(3)[0];
             let wanted = row[key].as_f64().unwrap();
@@ -124,7 +124,7 @@ fn coated_blocks_stand_where_another_program_puts_them() {
         for component in 0..3 {
             let nodes =
                 fixed.iter().filter(|&&dof| dof as usize % 3 == component).map(|dof| dof / 3).collect();
-            hold(&mut model, "held", component, nodes, Motion::Fixed);
+            prescribe(&mut model, "held", component, nodes, Motion::Fixed);
         }
         let forces = rows(&data[name]["force"]).into_iter().zip(0..);
         let forces = forces.map(|(f, node)| (node, f.try_into().unwrap())).filter(|(_, f)| *f != [0.0; 3]);
@@ -211,8 +211,8 @@ fn block_patch(n: u32, force: f64) -> f64 {
     let on = |component: usize| -> Vec<u32> {
         (0..points.len() as u32).filter(|&node| points[node as usize][component].abs() < 1e-12).collect()
     };
-    hold(&mut model, "x", 0, on(0), Motion::Fixed);
-    hold(&mut model, "y", 1, on(1), Motion::Fixed);
+    prescribe(&mut model, "x", 0, on(0), Motion::Fixed);
+    prescribe(&mut model, "y", 1, on(1), Motion::Fixed);
     model.fix("base", on(2));
     let forces = patch(&top, &points, 0.008, 2, 0.25 * force);
     model.loads.push(Load::new("traction", LoadKind::Forces(forces), RAMP));
@@ -376,12 +376,12 @@ fn tube(layers: &[(Layer, [usize; 2])]) -> Tube {
         let is_on =
             |node: &u32| model.rest[*node as usize][component].abs() < 1e-9 && !follows[*node as usize];
         let nodes = (0..model.node_count() as u32).filter(is_on).collect();
-        hold(&mut model, name, component, nodes, Motion::Fixed);
+        prescribe(&mut model, name, component, nodes, Motion::Fixed);
     };
     on(0, "y axis");
     on(1, "x axis");
     let free = (0..model.node_count() as u32).filter(|&node| !follows[node as usize]).collect();
-    hold(&mut model, "slice", 2, free, Motion::Fixed);
+    prescribe(&mut model, "slice", 2, free, Motion::Fixed);
     let last = rings.len() - 1;
     Tube { surfaces: [rings[0][0].clone(), rings[last][1].clone()], model }
 }

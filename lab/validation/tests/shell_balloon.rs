@@ -52,9 +52,9 @@ fn blown_up(cuts: usize, membrane: Membrane, parts: u32) -> [f64; 4] {
     let spread = if matches!(membrane, Membrane::Curved { .. }) { Spread::Curved } else { Spread::Lumped };
     let cells: Vec<u32> = (0..balloon.model.facets.len() as u32).collect();
     let mut balloon = balloon
-        .hold(vec![0], [true, true, true, false, false, false])
-        .hold(vec![1], [false, true, true, false, false, false])
-        .hold(vec![2], [false, false, true, false, false, false]);
+        .prescribe(vec![0], [true, true, true, false, false, false])
+        .prescribe(vec![1], [false, true, true, false, false, false])
+        .prescribe(vec![2], [false, false, true, false, false, false]);
     balloon = balloon.load(LoadKind::ShellPressure { facets: cells.clone(), pressure: 1.0, spread });
     balloon.model.model_mut().loads[0].controlled = true;
     let model = &balloon.model;

@@ -60,7 +60,7 @@ fn cantilever_under_end_shear() {
     let beam =
         Specimen::new(mesh(sheet, [16, 1], Pattern::Diagonal), [1.2e6, 0.0], 0.1, Formulation::default())
             .unwrap()
-            .hold_edge("x-min", CLAMPED)
+            .prescribe_edge("x-min", CLAMPED)
             .pull_edge("x-max", [0.0, 0.0, 4.0]);
     let tip = beam.edge("x-max");
     let (last, off) =
@@ -81,7 +81,7 @@ fn cantilever_rolled_up() {
     let beam =
         Specimen::new(mesh(sheet, [16, 1], Pattern::Diagonal), [1.2e6, 0.0], 0.1, Formulation::default())
             .unwrap()
-            .hold_edge("x-min", CLAMPED);
+            .prescribe_edge("x-min", CLAMPED);
     let tip = beam.edge("x-max");
     let moment = [0.0, -50.0 * PI / 3.0 / 2.0, 0.0];
     let beam = beam.load(LoadKind::moment(tip.clone(), moment));
@@ -101,7 +101,7 @@ fn annulus(counts: [usize; 2]) -> ([f64; 2], [f64; 2]) {
     let ring =
         Specimen::new(mesh(sheet, counts, Pattern::Diagonal), [21e6, 0.0], 0.03, Formulation::default())
             .unwrap()
-            .hold_edge("end", CLAMPED)
+            .prescribe_edge("end", CLAMPED)
             .pull_edge("start", [0.0, 0.0, 3.2]);
     let lifted = ring.edge("start");
     let (a, b) = (lifted[0] as usize, lifted[lifted.len() - 1] as usize);
@@ -134,11 +134,11 @@ fn hemisphere(cells: usize, membrane: Membrane) -> ([f64; 2], [f64; 2]) {
     let formulation = Formulation { membrane, ..Formulation::default() };
     let shell = Specimen::new(mesh(sheet, [cells; 2], Pattern::Diagonal), [6.825e7, 0.3], 0.04, formulation)
         .unwrap()
-        .hold_edge("start", symmetry(1))
-        .hold_edge("end", symmetry(0));
+        .prescribe_edge("start", symmetry(1))
+        .prescribe_edge("end", symmetry(0));
     let (a, b) = (shell.node(0.0, 10.0, 0.0), shell.node(10.0, 0.0, 0.0));
     let shell = shell
-        .hold(vec![a], [false, false, true, false, false, false])
+        .prescribe(vec![a], [false, false, true, false, false, false])
         .pull(a, [0.0, 200.0, 0.0])
         .pull(b, [-200.0, 0.0, 0.0]);
     follow("hemisphere", &shell, &table("hemisphere_18deg_hole"), LinearSolver::Direct, |state| {
@@ -191,9 +191,9 @@ fn hinged_roof(cells: usize) -> Vec<[f64; 3]> {
         Formulation::default(),
     )
     .unwrap()
-    .hold_edge("z-min", symmetry(2))
-    .hold_edge("start", symmetry(1))
-    .hold_edge("end", [true, true, true, false, false, false]);
+    .prescribe_edge("z-min", symmetry(2))
+    .prescribe_edge("start", symmetry(1))
+    .prescribe_edge("end", [true, true, true, false, false, false]);
     let centre = roof.node(2540.0, 0.0, 0.0);
     let mut roof = roof.pull(centre, [-3000.0 / 4.0, 0.0, 0.0]);
     roof.model.model_mut().loads[0].controlled = true;

@@ -65,10 +65,13 @@ fn pressed(mesh: Mesh, whole: bool, thickness: f64, formulation: Formulation, sp
         let [first, second, third] =
             [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]].map(|[x, y]| cylinder.node(x, y, 0.0));
         cylinder
-            .hold(vec![first, third], [false, true, true, false, false, false])
-            .hold(vec![second], [true, false, true, false, false, false])
+            .prescribe(vec![first, third], [false, true, true, false, false, false])
+            .prescribe(vec![second], [true, false, true, false, false, false])
     } else {
-        cylinder.hold_edge("z-min", symmetry(2)).hold_edge("start", symmetry(1)).hold_edge("end", symmetry(0))
+        cylinder
+            .prescribe_edge("z-min", symmetry(2))
+            .prescribe_edge("start", symmetry(1))
+            .prescribe_edge("end", symmetry(0))
     };
     let cells = (0..cylinder.model.facets.len() as u32).collect();
     cylinder.load(LoadKind::ShellPressure { facets: cells, pressure: 1e-6 * thickness, spread })
@@ -169,15 +172,15 @@ fn a_tube_widens_as_its_ends_allow() {
     for (ends, part) in [("open", 1.0), ("closed", 1.0 - 0.5 * nu), ("held", 1.0 - nu * nu)] {
         let tube = Specimen::new(mesh(), [young, nu], thickness, DEFAULT.0).unwrap();
         let mut tube = tube
-            .hold_edge("z-min", symmetry(2))
-            .hold_edge("start", symmetry(1))
-            .hold_edge("end", symmetry(0));
+            .prescribe_edge("z-min", symmetry(2))
+            .prescribe_edge("start", symmetry(1))
+            .prescribe_edge("end", symmetry(0));
         let cells = (0..tube.model.facets.len() as u32).collect();
         let kind = LoadKind::ShellPressure { facets: cells, pressure, spread: Spread::Curved };
         tube = tube.load(kind);
         match ends {
             "closed" => tube = tube.pull_edge("z-max", [0.0, 0.0, 0.25 * PI * radius * radius * pressure]),
-            "held" => tube = tube.hold_edge("z-max", symmetry(2)),
+            "held" => tube = tube.prescribe_edge("z-max", symmetry(2)),
             _ => {}
         }
         let exact = part * pressure * radius * radius / (young * thickness);
@@ -305,7 +308,7 @@ fn spheres_under_pressure() {
                 DEFAULT.0,
             );
             let cells: Vec<u32> = (0..20 * 4_u32.pow(levels)).collect();
-            let ball = ball.unwrap().hold(vec![0], [true; 6]);
+            let ball = ball.unwrap().prescribe(vec![0], [true; 6]);
             let ball = ball.load(LoadKind::ShellPressure {
                 facets: cells,
                 pressure: 1e-6 * thickness,

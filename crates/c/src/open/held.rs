@@ -23,7 +23,7 @@ impl Held {
 
     /// Lets all grips act.
     pub(crate) fn put_on(&self, simulation: &mut Simulation) -> Result<(), Fault> {
-        match simulation.hold(&self.all()) {
+        match simulation.grip(&self.all()) {
             true => Ok(()),
             false => {
                 let message = "nothing can be held here: the solver knows no hands, or a grip has nodes of several participants";

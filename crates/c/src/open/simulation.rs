@@ -9,7 +9,7 @@ use rayon::ThreadPool;
 use super::field::OpenField;
 use super::held::Held;
 use super::surface::OpenSurface;
-use crate::lock::hold;
+use crate::lock::lock;
 use crate::status::{Fault, PliantStatus};
 
 /// What threads share of a simulation: one of them runs it, any of them stops it.
@@ -27,12 +27,12 @@ impl Shared {
     }
 
     /// The simulation, for the one thread that uses it now.
-    pub(crate) fn hold(&self) -> Result<MutexGuard<'_, Running>, Fault> {
+    pub(crate) fn lock(&self) -> Result<MutexGuard<'_, Running>, Fault> {
         if std::process::id() != self.process {
             let message = "the simulation was opened before a fork, which leaves its threads behind: open it in the new process";
             return Err(Fault::new(PliantStatus::Busy, message));
         }
-        hold(&self.running)
+        lock(&self.running)
     }
 
     pub(crate) fn stop(&self) {

@@ -33,14 +33,14 @@ fn friction_of_a_dragged_block_is_mu_times_the_load_along_the_slip() {
             let press = Curve { shape: CurveShape::SmoothStep, from: 0.0, to: 0.1 };
             let drag = Curve { shape: CurveShape::SmoothStep, from: 0.1, to: 0.2 };
             let drawn = if floor_moves { Vector3::zeros() } else { along * speed };
-            let mut hold = |components: [bool; 3], motion| {
+            let mut prescribe = |components: [bool; 3], motion| {
                 let [x, y, z] = components;
                 let components = [x, y, z, false, false, false];
                 let name = "top".into();
                 model.constraints.push(Constraint { name, nodes: top.clone(), components, motion });
             };
-            hold([false, false, true], Motion::Displacement([0.0, 0.0, -0.001], press));
-            hold([true, true, false], Motion::Velocity(drawn.into(), drag));
+            prescribe([false, false, true], Motion::Displacement([0.0, 0.0, -0.001], press));
+            prescribe([true, true, false], Motion::Velocity(drawn.into(), drag));
             let way = if floor_moves { -along * speed } else { Vector3::zeros() };
             let curve = Curve { shape: CurveShape::Ramp, from: 0.2, to: 1.2 };
             let trajectory = Trajectory::by(Pose::identity(), way.into(), curve);

@@ -468,11 +468,11 @@ impl GpuStepper {
     ///
     /// # Errors
     /// If there are too many for the device.
-    pub fn hold(&mut self, grips: &[Grip]) -> Result<(), GpuError> {
+    pub fn grip(&mut self, grips: &[Grip]) -> Result<(), GpuError> {
         self.nodes.mark(&self.device, &self.grips.nodes, false);
         let numbers = self.grips.take(&self.model, grips);
         self.nodes.mark(&self.device, &self.grips.nodes, true);
-        self.instants.hold(&self.device, &numbers)
+        self.instants.grip(&self.device, &numbers)
     }
 
     /// What finds points on the device that are combinations of nodes, from their places at rest [m] and the nodes and weights of each.

@@ -276,13 +276,13 @@ mod tests {
         let mut model = Assembly::new("shell", points);
         let shell = Shell { formulation, ..Shell::new("cylinder", cells.collect(), 0.02, MATERIAL) };
         model.add_shell(&shell).unwrap();
-        let mut hold = |nodes: Vec<u32>, components| {
+        let mut prescribe = |nodes: Vec<u32>, components| {
             let motion = Motion::Fixed;
             model.model_mut().constraints.push(Constraint { name: "held".into(), nodes, components, motion });
         };
-        hold((0..round).collect(), [false, false, true, false, false, false]);
-        hold(vec![0, round / 2], [false, true, false, false, false, false]);
-        hold(vec![round / 4], [true, false, false, false, false, false]);
+        prescribe((0..round).collect(), [false, false, true, false, false, false]);
+        prescribe(vec![0, round / 2], [false, true, false, false, false, false]);
+        prescribe(vec![round / 4], [true, false, false, false, false, false]);
         let curve = Curve { shape: Shape::Hold, from: 0.0, to: 1.0 };
         let edges: Vec<_> = (0..round).map(|i| [node(i, long), node(i + 1, long)]).collect();
         let cells = (0..model.facets.len() as u32).collect();

@@ -39,8 +39,8 @@ impl Forces {
 
     /// Takes hold of nodes: these springs and no others act from the next evaluation on, beside those of the model. Their forces are
     /// loads.
-    pub fn hold(&mut self, springs: &[Spring]) {
-        self.system.hold(springs);
+    pub fn grip(&mut self, springs: &[Spring]) {
+        self.system.grip(springs);
     }
 
     /// Takes forces [N] on nodes: they and no others act from the next evaluation on, as loads.

@@ -95,9 +95,9 @@ pub trait AssemblySolver {
         self.system_mut().lags = lags;
     }
 
-    /// Takes hold of nodes, as [`Forces::hold`](crate::Forces::hold).
-    fn hold(&mut self, springs: &[Spring]) {
-        self.system_mut().hold(springs);
+    /// Takes hold of nodes, as [`Forces::grip`](crate::Forces::grip).
+    fn grip(&mut self, springs: &[Spring]) {
+        self.system_mut().grip(springs);
     }
 
     /// Takes forces [N] on nodes, as [`Forces::push`](crate::Forces::push).

@@ -194,8 +194,8 @@ impl System {
 
     /// Takes hold of nodes: these springs and no others act from the next evaluation on, beside those of the model. Their forces are
     /// loads.
-    pub(crate) fn hold(&mut self, springs: &[Spring]) {
-        self.forces.hold(springs);
+    pub(crate) fn grip(&mut self, springs: &[Spring]) {
+        self.forces.grip(springs);
     }
 
     /// Takes forces [N] on nodes: they and no others act from the next evaluation on.

@@ -49,7 +49,7 @@ impl NodalForces {
     }
 
     /// Takes hold of nodes: these springs and no others act from now on, beside those of the model.
-    pub(super) fn hold(&mut self, springs: &[Spring]) {
+    pub(super) fn grip(&mut self, springs: &[Spring]) {
         self.held.clear();
         self.held.extend_from_slice(springs);
     }

@@ -142,7 +142,7 @@ fn friction_is_mu_times_the_normal_force_in_every_direction() {
                     stiffness: 50.0,
                 })
                 .collect();
-            solver.hold(&springs);
+            solver.grip(&springs);
             solver.advance(&mut state).unwrap();
         }
         let [x, y, z] = solver.contact().unwrap().now().totals[0];

@@ -45,7 +45,7 @@ fn ring(edges: u32, thickness: f64) -> (Assembly, Surface, f64) {
     (model, own, width)
 }
 
-fn hold(model: &mut Assembly, name: &str, nodes: Vec<u32>, components: [bool; 6]) {
+fn prescribe(model: &mut Assembly, name: &str, nodes: Vec<u32>, components: [bool; 6]) {
     let constraint = Constraint { name: name.into(), nodes, components, motion: Motion::Fixed };
     model.model_mut().constraints.push(constraint);
 }
@@ -54,11 +54,11 @@ fn hold(model: &mut Assembly, name: &str, nodes: Vec<u32>, components: [bool; 6]
 fn pressed(edges: u32, thickness: f64, approach: f64, steps: u32) -> Vec<[f64; 2]> {
     let (mut model, own, width) = ring(edges, thickness);
     // Plane strain; the nodes at the sides stay at their height.
-    hold(&mut model, "plane", (0..2 * edges).collect(), [false, true, false, true, false, true]);
+    prescribe(&mut model, "plane", (0..2 * edges).collect(), [false, true, false, true, false, true]);
     let quarter = edges / 4;
     let sides: Vec<u32> = [quarter, 3 * quarter].iter().flat_map(|k| [2 * k, 2 * k + 1]).collect();
-    hold(&mut model, "sides", sides, [false, false, true, false, true, false]);
-    hold(&mut model, "middle", vec![0, 1, edges, edges + 1], [true, false, false, false, true, false]);
+    prescribe(&mut model, "sides", sides, [false, false, true, false, true, false]);
+    prescribe(&mut model, "middle", vec![0, 1, edges, edges + 1], [true, false, false, false, true, false]);
     let barrier = 0.01 * RADIUS;
     let reach = RADIUS + 0.5 * thickness + barrier;
     let ramp = Curve { shape: CurveShape::Ramp, from: 0.0, to: 1.0 };

@@ -68,7 +68,7 @@ fn a_block_on_a_spring_sticks_and_slips() {
             Spring { node, anchor, stiffness: rate * model.mass[own] }
         };
         let springs: Vec<Spring> = (0..model.rest.len() as u32).map(spring).collect();
-        solver.hold(&springs);
+        solver.grip(&springs);
         solver.advance(&mut state).unwrap();
         let now = mean(&model, &state.position).x - 0.01;
         if time <= 0.0 {

@@ -323,7 +323,7 @@ fn hands_and_forces_move_explicit_shells_on_a_device() {
         let grip = Grip { nodes: vec![(held, 1.0)], place: [x, y, z + 0.005], stiffness: 5.0 };
         let mut forces = vec![[0.0; 3]; nodes];
         forces[pushed] = [0.01, 0.0, 0.0];
-        assert!(simulation.hold(std::slice::from_ref(&grip)));
+        assert!(simulation.grip(std::slice::from_ref(&grip)));
         simulation.push(&forces).unwrap();
         simulation.run(1e-3, |_| ()).unwrap();
         let snapshot = simulation.state().unwrap();
@@ -333,7 +333,7 @@ fn hands_and_forces_move_explicit_shells_on_a_device() {
             let frame = simulation.frame().unwrap();
             ends.push((frame.displacements("tube").unwrap(), frame.energies().external));
             simulation.restore(snapshot.clone()).unwrap();
-            assert!(simulation.hold(std::slice::from_ref(&grip)));
+            assert!(simulation.grip(std::slice::from_ref(&grip)));
             simulation.push(&forces).unwrap();
         }
         ends

@@ -41,7 +41,7 @@ fn the_clamp_holds_against_hand_and_weight() {
         let world = world(body, solver);
         let mut live = Live::new(&world).unwrap();
         let grip = lifted(&world, &live, 5.0, 0.01);
-        assert!(live.simulation.hold(std::slice::from_ref(&grip)), "{solver}");
+        assert!(live.simulation.grip(std::slice::from_ref(&grip)), "{solver}");
         for _ in 0..steps {
             live.simulation.step(1).unwrap_or_else(|failure| panic!("{solver}: {}", failure.message));
         }
@@ -69,9 +69,9 @@ fn what_is_let_go_of_comes_back() {
     let mut free = Live::new(&world).unwrap();
     let hanging = settle(&mut free);
     let grip = lifted(&world, &free, 5.0, 0.02);
-    assert!(free.simulation.hold(&[grip]));
+    assert!(free.simulation.grip(&[grip]));
     let held = settle(&mut free);
-    assert!(free.simulation.hold(&[]));
+    assert!(free.simulation.grip(&[]));
     let let_go = settle(&mut free);
     let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(apart(&hanging, &held) > 0.01 && apart(&hanging, &let_go) < 1e-6);

@@ -60,7 +60,7 @@ impl Builder<'_> {
                 });
             }
         }
-        self.assembly.model_mut().hold_tied();
+        self.assembly.model_mut().prescribe_tied();
         if let Err(contradiction) = self.assembly.constrained_components() {
             let tie = self.scene.ties.iter().find(|(name, _)| *name == contradiction.second);
             let first = self.source().key_span(&["constraint", &contradiction.first]);

@@ -281,7 +281,7 @@ impl Assembled {
                 stiffness: weight * grip.stiffness,
             }));
         }
-        self.method.act(|forces| forces.hold(&self.springs), |solver| solver.hold(&self.springs));
+        self.method.act(|forces| forces.grip(&self.springs), |solver| solver.grip(&self.springs));
     }
 
     /// One step of the method, to the time of its number.

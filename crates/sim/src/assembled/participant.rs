@@ -67,7 +67,7 @@ impl Participant for Assembled {
         if self.device.is_some() && self.grips.is_empty() { STRIDE } else { 1 }
     }
 
-    fn hold(&mut self, grips: &[Grip]) -> bool {
+    fn grip(&mut self, grips: &[Grip]) -> bool {
         self.grips.clear();
         self.grips.extend_from_slice(grips);
         self.evaluated = false;

@@ -292,7 +292,7 @@ impl Simulation {
                 self.meetings.meet(&self.world.parts, &mut self.participants);
                 self.done.fill(0);
                 for part in 0..self.participants.len() {
-                    self.take_hold(part);
+                    self.grip_part(part);
                 }
             }
             self.participants.iter_mut().try_for_each(|participant| participant.evaluate(wanted))?;
@@ -317,7 +317,7 @@ impl Simulation {
             (Err(failure), Some(before)) if failure.is_interrupted() => {
                 self.go_back(before)?;
                 (0..self.participants.len()).for_each(|part| {
-                    self.take_hold(part);
+                    self.grip_part(part);
                 });
                 Err(Failure::stopped(self.time()))
             }
@@ -394,7 +394,7 @@ impl Simulation {
                 self.springs.settle(part, &self.world.parts);
             }
             if !first || self.world.parts[part].method.solves_steps() {
-                self.take_hold(part);
+                self.grip_part(part);
             }
             let participant = &mut self.participants[part];
             if !first {
@@ -422,7 +422,7 @@ impl Simulation {
                 self.heed_stop()?;
                 // Who has not gone back has found the forces of the first step where all met.
                 if pass > 0 || self.done[part] > 0 || self.meetings.is_host(part) {
-                    self.take_hold(part);
+                    self.grip_part(part);
                     self.participants[part].evaluate(Wanted::Energies)?;
                 }
                 self.participants[part].advance(1, watch)?;
@@ -447,13 +447,13 @@ impl Simulation {
     }
 
     /// Lets hands and ties take hold of a participant for its next step; false if it knows no grips.
-    fn take_hold(&mut self, part: usize) -> bool {
+    fn grip_part(&mut self, part: usize) -> bool {
         let mut grips = self.hands[part].clone();
         let ahead = ahead(&self.world.parts, &self.done, part, 1);
         self.springs.before(part, &self.participants, ahead);
         self.springs.add_to(part, &mut grips);
         self.meetings.add_to(part, &mut grips);
-        self.participants[part].hold(&grips)
+        self.participants[part].grip(&grips)
     }
 
     /// Drives a tool or a jaw of a participant.
@@ -523,7 +523,7 @@ impl Simulation {
         state.check(&self.world)?;
         self.go_back(state)?;
         self.participants.iter_mut().for_each(|own| own.cut_log());
-        self.hold(&[]);
+        self.grip(&[]);
         Ok(())
     }
 
@@ -665,7 +665,7 @@ impl Simulation {
 
     /// Takes hold of points: these grips and no others act from the next evaluation on. False where a stepper knows none, or where a grip
     /// holds nodes of several participants.
-    pub fn hold(&mut self, grips: &[Grip]) -> bool {
+    pub fn grip(&mut self, grips: &[Grip]) -> bool {
         let mut of_parts = vec![Vec::new(); self.participants.len()];
         for grip in grips {
             let Some((part, own)) = self.own(grip) else { return false };
@@ -674,7 +674,7 @@ impl Simulation {
         self.hands = of_parts;
         let mut all = true;
         for part in 0..self.participants.len() {
-            all &= self.take_hold(part);
+            all &= self.grip_part(part);
         }
         all
     }

@@ -149,7 +149,7 @@ impl<'s> Player<'s> {
             playback.start_anew();
             playback.note = Some("the mesh or the solver is another one: it starts anew".into());
         }
-        playback.hold.hold_on(&mut live);
+        playback.hold.grip_again(&mut live);
         let on_device = world.device().is_some();
         let known = subject.filter(|_| goes_on);
         let is_known = known.is_some();
@@ -287,8 +287,8 @@ impl<'s> Player<'s> {
                 playback.pace.speed = speed.clamp(1e-6, 1e6);
                 playback.pace.anchor(self.live.simulation.time());
             }
-            Order::Hand(hand) => self.hold(sent, Which::First, &hand),
-            Order::Second(hand) => self.hold(sent, Which::Second, &hand),
+            Order::Hand(hand) => self.grip(sent, Which::First, &hand),
+            Order::Second(hand) => self.grip(sent, Which::Second, &hand),
             Order::Change(world, numbers) => playback.change = Some((world, numbers)),
             Order::Marks(marked) => (playback.marked, playback.seen.at) = (marked, None),
             Order::Probe(point) => self.follow(&point),
@@ -309,7 +309,7 @@ impl<'s> Player<'s> {
         None
     }
 
-    pub(super) fn hold(&mut self, sent: Instant, which: Which, hand: &Hand) {
+    pub(super) fn grip(&mut self, sent: Instant, which: Which, hand: &Hand) {
         // Where it takes hold has to be known.
         if self.on_device && matches!(hand, Hand::Take(..) | Hand::Pin(_)) {
             self.inspect();
@@ -476,7 +476,7 @@ impl<'s> Player<'s> {
     pub(super) fn halve(&mut self) {
         // A device that fails tells so in the next step.
         if self.live.halve_steps().is_ok() {
-            self.playback.hold.hold_on(&mut self.live);
+            self.playback.hold.grip_again(&mut self.live);
             self.playback.record(false, Instant::now(), Done::Halve);
         }
     }

@@ -9,7 +9,7 @@ use crate::hand::{Hand, Point, Which};
 
 impl App {
     /// The hand of the mouse takes hold of a point at a place [m]. A tool that keys lead stays in its hand.
-    pub(super) fn take_hold(&mut self, point: Point, at: Vector3) {
+    pub(super) fn grip(&mut self, point: Point, at: Vector3) {
         if self.is_led(self.mouse) {
             self.mouse = self.mouse.other();
         }

@@ -123,7 +123,7 @@ impl App {
             let origin = context.input(|input| input.pointer.press_origin()).unwrap_or(pointer);
             match self.hit(self.port.in_picture(origin)) {
                 _ if self.take_kept(origin) => {}
-                Some((point, at)) => self.take_hold(point, at),
+                Some((point, at)) => self.grip(point, at),
                 None => self.orbiting = true,
             }
         }

@@ -139,10 +139,10 @@ impl Vessel {
             let material = Material::elastic(neo_hookean(WALL[0]), 1000.0);
             own.model.add_solid("wall", Solid::new(0, material, cells))?;
         }
-        own.hold(0, |[i, _, _]| i == around);
-        own.hold(1, |[i, _, _]| i == 0);
+        own.prescribe(0, |[i, _, _]| i == around);
+        own.prescribe(1, |[i, _, _]| i == 0);
         let last = own.along;
-        own.hold(2, |[_, _, k]| k == 0 || k == last);
+        own.prescribe(2, |[_, _, k]| k == 0 || k == last);
         Ok(own)
     }
 
@@ -164,7 +164,7 @@ impl Vessel {
     }
 
     /// Fixes a component of the nodes of a plane.
-    fn hold(&mut self, component: usize, on: impl Fn([u32; 3]) -> bool) {
+    fn prescribe(&mut self, component: usize, on: impl Fn([u32; 3]) -> bool) {
         let mut components = [false; 6];
         components[component] = true;
         let all = triples([self.along + 1, self.layers[1] + 1, self.around + 1]).map(|(k, j, i)| [i, j, k]);

@@ -41,9 +41,9 @@ pub fn scordelis_lo(cells: usize, formulation: Formulation) -> Result<f64, CaseE
     let span = 40.0 * PI / 180.0;
     let mesh = backward(Sheet::Cylinder { radius: 25.0, length: 25.0, from: 0.0, span }, [cells; 2])?;
     let roof = Specimen::new(mesh, [4.32e8, 0.0], 0.25, formulation)?
-        .hold_edge("z-min", symmetry(2))
-        .hold_edge("start", symmetry(1))
-        .hold_edge("z-max", [true, true, false, false, false, false])
+        .prescribe_edge("z-min", symmetry(2))
+        .prescribe_edge("start", symmetry(1))
+        .prescribe_edge("z-max", [true, true, false, false, false, false])
         .cover([-90.0, 0.0, 0.0]);
     let free = roof.node(25.0 * span.cos(), 25.0 * span.sin(), 0.0);
     Ok(-roof.linear(free)?[0] / 0.3024)
@@ -57,10 +57,10 @@ pub fn pinched_cylinder(cells: usize, formulation: Formulation) -> Result<f64, C
     let mesh =
         backward(Sheet::Cylinder { radius: 300.0, length: 300.0, from: 0.0, span: FRAC_PI_2 }, [cells; 2])?;
     let cylinder = Specimen::new(mesh, [3e6, 0.3], 3.0, formulation)?
-        .hold_edge("z-min", symmetry(2))
-        .hold_edge("start", symmetry(1))
-        .hold_edge("end", symmetry(0))
-        .hold_edge("z-max", [true, true, false, false, false, false]);
+        .prescribe_edge("z-min", symmetry(2))
+        .prescribe_edge("start", symmetry(1))
+        .prescribe_edge("end", symmetry(0))
+        .prescribe_edge("z-max", [true, true, false, false, false, false]);
     let node = cylinder.node(300.0, 0.0, 0.0);
     Ok(-cylinder.pull(node, [-0.25, 0.0, 0.0]).linear(node)?[0] / 1.8248e-5)
 }
@@ -72,11 +72,11 @@ pub fn pinched_cylinder(cells: usize, formulation: Formulation) -> Result<f64, C
 pub fn hemisphere(cells: usize, formulation: Formulation) -> Result<f64, CaseError> {
     let mesh = forward(Sheet::Hemisphere { radius: 10.0, hole: PI / 10.0, span: FRAC_PI_2 }, [cells; 2])?;
     let shell = Specimen::new(mesh, [6.825e7, 0.3], 0.04, formulation)?
-        .hold_edge("start", symmetry(1))
-        .hold_edge("end", symmetry(0));
+        .prescribe_edge("start", symmetry(1))
+        .prescribe_edge("end", symmetry(0));
     let (a, b) = (shell.node(10.0, 0.0, 0.0), shell.node(0.0, 10.0, 0.0));
     let shell = shell
-        .hold(vec![a], [false, false, true, false, false, false])
+        .prescribe(vec![a], [false, false, true, false, false, false])
         .pull(a, [1.0, 0.0, 0.0])
         .pull(b, [0.0, -1.0, 0.0]);
     Ok(0.5 * (shell.linear(a)?[0] - shell.linear(b)?[1]) / 0.094)
@@ -94,8 +94,8 @@ pub fn cook(cells: usize, formulation: Formulation) -> Result<f64, CaseError> {
     }
     let all = (0..mesh.points.len() as u32).collect();
     let cook = Specimen::new(mesh, [1.0, 1.0 / 3.0], 1.0, formulation)?
-        .hold_edge("x-min", CLAMPED)
-        .hold(all, [false, false, true, true, true, false])
+        .prescribe_edge("x-min", CLAMPED)
+        .prescribe(all, [false, false, true, true, true, false])
         .pull_edge("x-max", [0.0, 1.0, 0.0]);
     let middle = cook.node(48.0, 52.0, 0.0);
     Ok(cook.linear(middle)?[1] / 23.96)
@@ -126,7 +126,7 @@ pub fn cantilever(cells: CantileverCells, formulation: Formulation) -> Result<[f
             p.x += if back { -1.0 } else { 1.0 } * if p.y < 0.1 { -shift } else { shift };
         }
     }
-    let beam = Specimen::new(mesh, [1e7, 0.3], 0.1, formulation)?.hold_edge("x-min", CLAMPED);
+    let beam = Specimen::new(mesh, [1e7, 0.3], 0.1, formulation)?.prescribe_edge("x-min", CLAMPED);
     let tip = |component: usize, reference: f64| -> Result<f64, CaseError> {
         let mut total = [0.0; 3];
         total[component] = 1.0;
@@ -150,7 +150,7 @@ pub fn twisted_beam(thin: bool, across: usize, formulation: Formulation) -> Resu
         if thin { (0.0032, 1e-6, [5.256e-3, 1.294e-3]) } else { (0.32, 1.0, [5.424e-3, 1.754e-3]) };
     let strip = Sheet::TwistedStrip { length: 12.0, width: 1.1, twist: FRAC_PI_2 };
     let beam = Specimen::new(forward(strip, [6 * across, across])?, [2.9e7, 0.22], thickness, formulation)?
-        .hold_edge("x-min", CLAMPED);
+        .prescribe_edge("x-min", CLAMPED);
     let tip = beam.node(12.0, 0.0, 0.0);
     // At the tip the width lies along z.
     let along = |component: usize, reference: f64| -> Result<f64, CaseError> {

@@ -74,7 +74,7 @@ pub fn held(mesh: Mesh, formulation: Formulation, components: [bool; 6]) -> Resu
     let plate = Specimen::new(mesh, ELASTIC, THICKNESS, formulation)?;
     Ok(["x-min", "x-max", "y-min", "y-max"]
         .into_iter()
-        .fold(plate, |plate, edge| plate.hold_edge(edge, components)))
+        .fold(plate, |plate, edge| plate.prescribe_edge(edge, components)))
 }
 
 /// Centre deflection of the clamped plate under uniform load by linear theory, over Timoshenko's 0.00126532 q L⁴/D.
@@ -95,10 +95,10 @@ pub fn clamped(mesh: Mesh, formulation: Formulation) -> Result<f64, CaseError> {
 pub fn deflections(loads: &[f64]) -> Result<Vec<f64>, CaseError> {
     let quarter = sheet(Sheet::Plate { size: [0.5 * SIDE; 2] }, [16; 2], Pattern::UnionJack)?;
     let plate = Specimen::new(quarter, ELASTIC, THICKNESS, Formulation::default())?
-        .hold_edge("x-min", CLAMPED)
-        .hold_edge("y-min", CLAMPED)
-        .hold_edge("x-max", symmetry(0))
-        .hold_edge("y-max", symmetry(1))
+        .prescribe_edge("x-min", CLAMPED)
+        .prescribe_edge("y-min", CLAMPED)
+        .prescribe_edge("x-max", symmetry(0))
+        .prescribe_edge("y-max", symmetry(1))
         .cover([0.0, 0.0, 5.0]);
     let centre = plate.node(0.5 * SIDE, 0.5 * SIDE, 0.0) as usize;
     let ends: Vec<f64> = loads.iter().map(|load| load / 5.0).collect();
@@ -120,7 +120,7 @@ fn as_in_the_thesis() -> Result<f64, CaseError> {
     let nodes: Vec<u32> = (0..mesh.points.len() as u32).collect();
     let share = SIDE * SIDE / nodes.len() as f64;
     let plate = held(mesh, bending, CLAMPED)?
-        .hold(nodes.clone(), [true, true, false, false, false, true])
+        .prescribe(nodes.clone(), [true, true, false, false, false, true])
         .load(LoadKind::force(nodes, [0.0, 0.0, share]));
     let centre = plate.node(0.5 * SIDE, 0.5 * SIDE, 0.0);
     Ok(plate.linear(centre)?[2])

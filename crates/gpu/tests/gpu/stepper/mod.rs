@@ -305,14 +305,18 @@ fn are_damped_as_on_the_processor(device: &Device, model: &Model) {
 fn steps_are_cut_where_the_limit_falls_and_end_a_run_where_they_must_not_be() {
     let Some(device) = support::device() else { return };
     let mut model = free_cube("tet4", elastic(neo_hookean()));
-    let hold = |name: &str, z, motion| Constraint {
+    let prescribed = |name: &str, z, motion| Constraint {
         name: name.into(),
         nodes: layer(z),
         components: [true; 6],
         motion,
     };
-    model.constraints.push(hold("base", 0, Motion::Fixed));
-    model.constraints.push(hold("top", CELLS, Motion::Displacement([0.0, 0.0, -0.4 * EDGE], smooth(1.0))));
+    model.constraints.push(prescribed("base", 0, Motion::Fixed));
+    model.constraints.push(prescribed(
+        "top",
+        CELLS,
+        Motion::Displacement([0.0, 0.0, -0.4 * EDGE], smooth(1.0)),
+    ));
     let limit = critical_step::assembled(&model).unwrap().step;
     let step = 0.9 * limit;
     let run = |on_unstable| {

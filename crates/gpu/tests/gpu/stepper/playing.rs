@@ -46,7 +46,7 @@ fn grips_pull_as_on_the_processor_in_every_design_and_let_go() {
     let mut reference = State::<f64>::at_rest(&model);
     let mut processor = CentralDifference::new(model.clone(), step).unwrap();
     let mut go = |grips: &[Grip], steps: u64| {
-        processor.hold(grips);
+        processor.grip(grips);
         // An instant is evaluated once, or its work would be entered twice.
         if reference.is_at_start() {
             processor.evaluate(&mut reference).unwrap();
@@ -65,7 +65,7 @@ fn grips_pull_as_on_the_processor_in_every_design_and_let_go() {
         let mut stepper = stepper(&device, &model, step, design);
         let phases = [(&held[..], 150), (&held[..1], 100), (&[], 100)];
         for ((grips, steps), (displacement, reactions, energies)) in phases.into_iter().zip(&expected) {
-            stepper.hold(grips).unwrap();
+            stepper.grip(grips).unwrap();
             stepper.advance(&mut state, steps).unwrap();
             stepper.evaluate(&mut state, Wanted::Everything).unwrap();
             let moved = distance(displacement, &double(&state.displacement));
@@ -94,7 +94,7 @@ fn many_grips_are_as_many_as_asked_for() {
     let mut state = State::<f32>::at_rest(&model);
     for count in [1, 300, 2] {
         let grip = Grip { stiffness: one.stiffness / f64::from(count), ..one.clone() };
-        stepper.hold(&vec![grip; count as usize]).unwrap();
+        stepper.grip(&vec![grip; count as usize]).unwrap();
         stepper.advance(&mut state, 5).unwrap();
     }
 }

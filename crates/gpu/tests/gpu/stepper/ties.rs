@@ -219,7 +219,7 @@ fn loads_and_grips_on_followers() {
     });
     let mut reference = State::<f64>::at_rest(&model);
     let mut processor = CentralDifference::new(model.clone(), step).unwrap();
-    processor.hold(&[grip.clone()]);
+    processor.grip(&[grip.clone()]);
     for _ in 0..200 {
         processor.evaluate(&mut reference).unwrap();
         processor.advance(&mut reference);
@@ -227,7 +227,7 @@ fn loads_and_grips_on_followers() {
     for design in with_ties(&device) {
         let mut state = State::<f32>::at_rest(&model);
         let mut stepper = stepper(&device, &model, step, design);
-        stepper.hold(&[grip.clone()]).unwrap();
+        stepper.grip(&[grip.clone()]).unwrap();
         stepper.advance(&mut state, 200).unwrap();
         stepper.evaluate(&mut state, Wanted::Everything).unwrap();
         let off = distance(&reference.displacement, &double(&state.displacement));

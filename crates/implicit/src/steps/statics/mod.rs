@@ -405,7 +405,7 @@ impl Statics {
 
     /// Solves for the residual; the negative pivots of the stiffness.
     fn find_direction(&mut self) -> Result<usize, SolveError> {
-        self.hold_slack();
+        self.stiffen_slack();
         let negative_pivots = self.system.prepare()?;
         self.system.solve(&self.residual, &mut self.solution)?;
         Ok(negative_pivots)
@@ -446,7 +446,7 @@ impl Statics {
     }
 
     /// Adds the artificial stiffness of membranes.
-    fn hold_slack(&mut self) {
+    fn stiffen_slack(&mut self) {
         let force = |&equation: &u32| self.residual[equation as usize].abs();
         let largest = self.slack.iter().map(force).fold(0.0, f64::max);
         let stiffness = (largest / self.reach).max(self.least);
@@ -536,7 +536,7 @@ impl Contacting for Statics {
     }
 
     fn complete(&mut self) {
-        self.hold_slack();
+        self.stiffen_slack();
     }
 
     fn part(&self) -> f64 {
