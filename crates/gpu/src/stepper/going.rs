@@ -5,34 +5,48 @@ use std::time::Instant as Clock;
 
 use pliant_explicit::{CentralDifference, Deformed, Lengths, State, StepError};
 
+use super::GpuStepper;
 use super::results::Results;
-use super::{GpuStepper, Origin, force_kernels};
+use super::stage::{Progress, Stage};
 use crate::GpuError;
 use crate::contacts::DeviceContacts;
+use crate::kernel::Kernel;
 use crate::run::{Instant, StepFailure, UNLISTED, flags, room};
 use crate::transfer::Four;
 
 impl GpuStepper {
-    /// Goes whole steps on without looking; the last submission, which may not be done yet. Where bodies touch each other, one number is
+    /// Takes whole steps without an evaluation; the last submission, which may not be done yet. Where bodies touch each other, one number is
     /// read back to see whether the device has stopped for lists of candidates.
     pub(super) fn go(
         &mut self,
         state: &mut State<f32>,
+        mut progress: Progress,
         steps: u64,
     ) -> Result<Option<wgpu::SubmissionIndex>, GpuError> {
-        let end = state.steps + steps;
-        let mut last = self.go_to(state, end)?;
+        let last = self.go_and_list(state, &mut progress, state.steps + steps);
+        // The clock has moved on even where the device fails.
+        self.stage = Stage::Evaluated(progress);
+        last
+    }
+
+    fn go_and_list(
+        &mut self,
+        state: &mut State<f32>,
+        progress: &mut Progress,
+        end: u64,
+    ) -> Result<Option<wgpu::SubmissionIndex>, GpuError> {
+        let mut last = self.go_to(state, progress, end)?;
         while let Some(at) = self.unlisted()? {
-            self.go_back(state, at);
-            self.list()?;
-            last = self.go_to(state, end)?;
+            progress.go_back(&mut self.control, state, at);
+            self.list(progress.side())?;
+            last = self.go_to(state, progress, end)?;
         }
         Ok(last)
     }
 
     /// The instant at which the device waits for lists of candidates, unless it has failed before.
-    pub(super) fn unlisted(&mut self) -> Result<Option<u32>, GpuError> {
-        if !self.contacts.as_ref().is_some_and(DeviceContacts::has_pairs) {
+    fn unlisted(&mut self) -> Result<Option<u32>, GpuError> {
+        if !self.forces.contacts.as_ref().is_some_and(DeviceContacts::has_pairs) {
             return Ok(None);
         }
         let mut found = u32::MAX;
@@ -41,52 +55,50 @@ impl GpuStepper {
         Ok((found != u32::MAX).then_some(found))
     }
 
-    /// Lists candidates for contact anew.
-    pub(super) fn list(&mut self) -> Result<(), GpuError> {
-        self.listed = true;
-        let Some(contacts) = self.contacts.as_mut().filter(|own| own.has_pairs()) else { return Ok(()) };
+    /// Lists candidates for contact anew, from the displacements on a side.
+    pub(super) fn list(&mut self, side: usize) -> Result<(), GpuError> {
+        let Some(contacts) = self.forces.contacts.as_mut().filter(|own| own.has_pairs()) else {
+            return Ok(());
+        };
         let (nodes, device) = (&self.nodes, &self.device);
-        let (from, mut listed) = (&nodes.displacement[self.side], Ok(()));
+        let (from, mut listed) = (&nodes.displacement[side], Ok(()));
         self.transfer
             .read::<Four>(device, from, nodes.count, |all| listed = contacts.list(device, nodes, all))?;
         self.instants.go_on(device);
         listed
     }
 
-    /// Goes on to a number of whole steps without looking.
-    pub(super) fn go_to(
+    /// Goes on to a number of whole steps without an evaluation.
+    fn go_to(
         &mut self,
         state: &mut State<f32>,
+        progress: &mut Progress,
         end: u64,
     ) -> Result<Option<wgpu::SubmissionIndex>, GpuError> {
-        let mut from_look = std::mem::take(&mut self.evaluated);
-        if from_look {
-            state.work.advance();
-        }
-        self.entered = false;
-        let mut side = self.side;
         let mut running: Option<(wgpu::SubmissionIndex, usize)> = None;
         let mut begun = Clock::now();
         while state.steps < end {
+            let (side, from_evaluated) = (progress.side(), progress.instants == 0);
+            if from_evaluated {
+                state.work.advance();
+            }
             let most = room(self.pace);
             while state.steps < end && self.instants.len() < most {
-                let lengths = match self.since {
+                let lengths = match progress.instants {
                     0 => self.lengths,
                     _ => Lengths { before: self.lengths.next, next: self.lengths.next },
                 };
                 let damping = self.damping_factors(state, lengths.before);
-                let instant = Instant::new(self.since, flags::MOVES, lengths, damping);
+                let instant = Instant::new(progress.instants, flags::MOVES, lengths, damping);
                 let of = (self.model.as_ref(), &state.driven[..]);
                 self.instants.push(of, state.time, lengths.next, instant);
-                self.count(state);
+                progress.count(&mut self.control, state);
             }
             let count = self.instants.len();
-            if !from_look || count > 1 {
+            if !from_evaluated || count > 1 {
                 self.relax(self.lengths.next);
             }
-            let submitted = self.submit_steps(from_look, side);
-            side = self.side;
-            from_look = false;
+            let submitted = self.submit_steps(from_evaluated, side);
             // One submission waits while another runs.
             if let Some((earlier, count)) = running.replace((submitted.clone(), count)) {
                 self.wait_for(earlier, &mut begun, count)?;
@@ -99,7 +111,7 @@ impl GpuStepper {
     }
 
     /// Waits for a submission of some instants, and notes how long one takes.
-    pub(super) fn wait_for(
+    fn wait_for(
         &mut self,
         submission: wgpu::SubmissionIndex,
         begun: &mut Clock,
@@ -111,20 +123,7 @@ impl GpuStepper {
         Ok(())
     }
 
-    /// Moves the clock on by an instant. Whole steps that begin without a look are noted here.
-    pub(super) fn count(&mut self, state: &mut State<f32>) {
-        if self.since > 0 {
-            // The step after a look moves nodes in place.
-            self.side = 1 - self.side;
-            if state.is_between_steps() {
-                self.control.note(state);
-            }
-        }
-        self.control.count(state);
-        self.since += 1;
-    }
-
-    /// Looks at the limit where that is due, and chooses the parts of the step to come.
+    /// Checks the limit where that is due, and chooses the parts of the step to come.
     pub(super) fn watch(
         &mut self,
         state: &mut State<f32>,
@@ -134,7 +133,7 @@ impl GpuStepper {
             let displacement = &mut state.displacement;
             self.transfer.read::<Four>(
                 &self.device,
-                &self.nodes.displacement[self.side],
+                &self.nodes.displacement[self.stage.side()],
                 self.nodes.count,
                 |fours| {
                     displacement.iter_mut().zip(fours).for_each(|(to, &[x, y, z, _])| *to = [x, y, z]);
@@ -151,32 +150,27 @@ impl GpuStepper {
     pub(super) fn relax(&mut self, step: f64) {
         if self.relaxing != Some(step) {
             self.relaxing = Some(step);
-            for (on_device, solid) in self.solids.iter().zip(&self.model.solids) {
+            for (on_device, solid) in self.forces.solids.iter().zip(&self.model.solids) {
                 on_device.set_step(&self.device, solid, step);
             }
         }
     }
 
     /// Goes on from the instants that are pushed, at first with a side; the first of them may be an evaluated one.
-    pub(super) fn submit_steps(&mut self, from_look: bool, mut side: usize) -> wgpu::SubmissionIndex {
-        let nodes = &self.kernels;
-        let forces = || force_kernels(&self.loads, &self.grips, &self.solids, &self.ties);
-        let (moves, contacts) = (self.paths.moves, &self.contacts);
-        let follow = self.ties.as_ref().map(|ties| &ties.follow);
+    fn submit_steps(&mut self, from_evaluated: bool, mut side: usize) -> wgpu::SubmissionIndex {
+        let Self { forces, kernels, .. } = self;
+        let follow = forces.ties.as_ref().map(|ties| &ties.follow);
         self.instants.submit(&self.device, |pass, bound, place, offset| {
-            if from_look && place == 0 {
-                nodes.advance.run(pass, bound, offset, side);
-                follow.iter().for_each(|kernel| kernel.run(pass, bound, offset, side));
+            let mut run = |kernel: &Kernel| kernel.run(pass, bound, offset, side);
+            if from_evaluated && place == 0 {
+                run(&kernels.advance);
+                follow.into_iter().for_each(run);
                 return;
             }
-            let before = contacts.iter().filter_map(|contacts| contacts.before.as_ref());
-            before.for_each(|kernel| kernel.run(pass, bound, offset, side));
-            forces().for_each(|kernel| kernel.run(pass, bound, offset, side));
-            let touching = contacts.iter().flat_map(|contacts| &contacts.kernels);
-            touching.for_each(|kernel| kernel.run(pass, bound, offset, side));
-            if !moves {
-                nodes.pass.run(pass, bound, offset, side);
-                follow.iter().for_each(|kernel| kernel.run(pass, bound, offset, side));
+            forces.kernels(true).for_each(&mut run);
+            if !forces.paths.moves {
+                run(&kernels.pass);
+                follow.into_iter().for_each(run);
             }
             side = 1 - side;
         })
@@ -191,30 +185,24 @@ impl GpuStepper {
                 Err(self.fail(state, broken))
             }
             (_, Some(overflown)) => {
-                self.go_back(state, overflown);
-                self.bring_arrays_back(state)?;
+                self.bring_back_at(state, overflown)?;
                 Err(GpuError::Overflow { design: self.design.to_string(), time: state.time }.into())
             }
             _ => Ok(()),
         }
     }
 
-    /// Sets the clock to one of the instants since the last look.
-    pub(super) fn go_back(&mut self, state: &mut State<f32>, to: u32) {
-        if let Some(Origin { side, steps, time, stability }) = self.origin {
-            (state.steps, state.time, state.stability) = (steps, time, stability);
-            self.side = side;
-            self.since = 0;
-            while self.since < to {
-                self.count(state);
-            }
+    /// Reads the state back as it was at an instant after the evaluated one.
+    fn bring_back_at(&mut self, state: &mut State<f32>, at: u32) -> Result<(), GpuError> {
+        if let Stage::Evaluated(progress) = &mut self.stage {
+            progress.go_back(&mut self.control, state, at);
         }
+        self.bring_arrays_back(state)
     }
 
     /// Reads the state back as it was at an instant whose checks failed. The CPU then finds the cause.
     pub(super) fn fail(&mut self, state: &mut State<f32>, at: u32) -> StepFailure {
-        self.go_back(state, at);
-        if let Err(error) = self.bring_arrays_back(state) {
+        if let Err(error) = self.bring_back_at(state, at) {
             return error.into();
         }
         let mut copy = State { work: Default::default(), ..state.clone() };

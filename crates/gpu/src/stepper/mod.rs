@@ -1,16 +1,17 @@
 //! The central difference method on a device; the stepper of `pliant-explicit` has its formulas.
 
+mod forces;
 mod going;
 mod results;
+mod stage;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant as Clock};
 
 use pliant_contact::touch::Contacts;
-use pliant_explicit::recover::stored_at_start;
-use pliant_explicit::stability::{Monitor, Stability};
+use pliant_explicit::stability::Monitor;
 use pliant_explicit::{
-    DampingFactors, Deformed, Lengths, Observable, State, StepControl, StepError, Wanted, model_balance_floor,
+    DampingFactors, Lengths, Observable, State, StepControl, StepError, Wanted, model_balance_floor,
 };
 use pliant_mechanics::Energies;
 use pliant_mechanics::grip::Grip;
@@ -18,35 +19,17 @@ use pliant_mechanics::mapping::weighted;
 use pliant_mechanics::model::{FREE, Model};
 use pliant_mechanics::tensor::Vector;
 
+use self::forces::Forces;
+use self::results::Readings;
+use self::stage::{Interval, Progress, Stage};
 use crate::blocks::NodeBlocks;
-use crate::contacts::{DeviceContacts, processor_only};
-use crate::grips::DeviceGrips;
-use crate::kernel::{Kernel, Memory};
-use crate::loads::DeviceLoads;
+use crate::contacts::processor_only;
+use crate::kernel::Memory;
 use crate::mapping::{DeviceMapping, PointValue};
 use crate::nodes::{DeviceNodes, NodeKernels, OF_NODE, fours};
-use crate::paths::Paths;
-use crate::run::{Instants, StepFailure, flags, table_constants};
-use crate::solids::DeviceSolid;
-use crate::ties::DeviceTies;
-use crate::transfer::Four;
-use crate::transfer::Transfer;
+use crate::run::{Instants, StepFailure, flags};
+use crate::transfer::{Four, Transfer};
 use crate::{Design, Device, GpuError};
-
-/// Most steps between two evaluated instants, with energies, deformation of the cells and checks.
-const EVALUATE_EVERY: u64 = 100;
-
-/// Evaluations are more frequent where the deformation changes by more than this factor from one to the next.
-const CALM: f64 = 1.02;
-
-/// Where a state was when it was evaluated.
-#[derive(Clone, Copy)]
-struct Origin {
-    side: usize,
-    steps: u64,
-    time: f64,
-    stability: Stability,
-}
 
 /// Steps a state of one model by one step size, in single precision, on a device. The current state is on the device: of the
 /// state that is passed in, a call changes the clock, the energies, the record of the critical time step, and what it is asked to read back.
@@ -58,79 +41,53 @@ pub struct GpuStepper {
     design: Design,
     owners: Vec<[u32; 3]>,
     control: StepControl,
+    /// Lengths of the steps before and after the last evaluated instant.
     lengths: Lengths,
     /// Whether the highest modes are dissipated.
     dissipates: bool,
     balance_floor: f64,
-    solids: Vec<DeviceSolid>,
-    paths: Paths,
+    forces: Forces,
     nodes: DeviceNodes,
     kernels: NodeKernels,
-    loads: Option<DeviceLoads>,
-    grips: DeviceGrips,
-    ties: Option<DeviceTies>,
-    contacts: Option<DeviceContacts>,
     instants: Instants,
     transfer: Transfer,
     /// Length of a step [s] that relaxing laws are set to.
     relaxing: Option<f64>,
-    /// Which side of arrays with two is now.
-    side: usize,
-    /// Whether a state was taken up, and whether candidates for contact are listed.
-    loaded: bool,
-    listed: bool,
-    /// Whether its instant is evaluated.
-    evaluated: bool,
-    /// The last evaluated instant, the instants since then and the length of their steps [s].
-    origin: Option<Origin>,
-    since: u32,
-    /// Whether the work of the instants since then is entered.
-    entered: bool,
-    /// How far cells were deformed at the last look, and steps to the next one: those after which energies are to be known, and those to the
-    /// next check of the critical time step.
-    deformed: Deformed,
-    stride: u64,
-    to_check: u64,
+    stage: Stage,
+    interval: Interval,
     /// Time an instant takes [s], once known.
     pace: Option<f64>,
-    energies: Energies,
-    /// Of each constraint, and of each node that is held.
-    reactions: Vec<Vector<f64>>,
-    held_reactions: Vec<Four>,
-    /// The force [N] of each contact on its surface.
-    contact_forces: Vec<Four>,
-    /// Which held nodes each constraint moves, and which of their components.
-    owned: Vec<Vec<(u32, [bool; 3])>>,
-    next: Vec<Vector<f32>>,
+    readings: Readings,
 }
 
 impl Observable<f32> for GpuStepper {
     fn energies(&self) -> &Energies {
-        &self.energies
+        &self.readings.energies
     }
 
     fn reaction(&self, constraint: usize) -> Vector<f64> {
-        self.reactions[constraint]
+        self.readings.reactions[constraint]
     }
 
     fn nodal_reaction(&self, node: usize) -> Vector<f64> {
         let Ok(hold) = self.nodes.held.binary_search(&(node as u32)) else { return [0.0; 3] };
-        let force = self.held_reactions[hold];
+        let force = self.readings.held_reactions[hold];
         [0, 1, 2].map(|c| if self.owners[node][c] == FREE { 0.0 } else { f64::from(force[c]) })
     }
 
     fn contact_forces(&self) -> Vec<Vector<f64>> {
-        self.contact_forces.iter().map(|&[x, y, z, _]| [x, y, z].map(|f| -f64::from(f))).collect()
+        let of_contact = |&[x, y, z, _]: &Four| [x, y, z].map(|f| -f64::from(f));
+        self.readings.contact_forces.iter().map(of_contact).collect()
     }
 
     /// Belongs to the last instant of which everything was wanted.
     fn velocity(&self, state: &State<f32>, node: usize) -> Vector<f64> {
         let own = |node: u32| {
-            let (before, after) = (state.increment[node as usize], self.next[node as usize]);
+            let (before, after) = (state.increment[node as usize], self.readings.next[node as usize]);
             [0, 1, 2].map(|c| self.lengths.velocity(before[c].into(), after[c].into()))
         };
         let alone = own(node as u32);
-        if self.ties.is_none() {
+        if self.forces.ties.is_none() {
             return alone;
         }
         let followed = weighted(self.model.resolved(&[(node as u32, 1.0)]), own);
@@ -208,67 +165,25 @@ impl GpuStepper {
         let blocks = (design == Design::Blocks).then(|| cut.iter().map(NodeBlocks::len).sum());
         let nodes = DeviceNodes::new(memory, model, &owners, blocks)?;
         let instants = Instants::new(memory, device, model, contacts.clone())?;
-        let constants = table_constants(model);
-        let loads = if model.loads.is_empty() {
-            None
-        } else {
-            Some(DeviceLoads::new(memory, device, &instants.bound, model, &nodes.displacement, &constants)?)
-        };
-        let paths = Paths::new(design, memory, device, model, &nodes, loads.as_ref(), cut)?;
-        let solids = (model.solids.iter().enumerate())
-            .map(|solid| DeviceSolid::new(memory, device, &instants.bound, solid, &paths))
-            .collect::<Result<Vec<_>, _>>()?;
-        let gather = (paths.node_snippet.as_str(), &paths.nodes);
-        let touching = contacts.map(|contacts| {
-            let (of, with) = ((model.as_ref(), &contacts), (memory, device));
-            DeviceContacts::new(with, &instants.bound, of, &nodes, gather, loads.as_ref(), &constants)
-        });
-        let contacts = touching.transpose()?;
-        let forces = contacts.as_ref().map(|contacts| &contacts.forces);
-        let kernels = nodes.kernels(device, &instants.bound, gather, loads.as_ref(), forces, &constants)?;
-        let grips = DeviceGrips::new(device, &instants.bound, &nodes.displacement)?;
-        let ties = nodes.followers.as_ref().zip(paths.giving.as_ref()).map(|(followers, giving)| {
-            DeviceTies::new(device, &instants.bound, followers, giving, &nodes.displacement)
-        });
-        let control = StepControl::new(step);
+        let forces = Forces::new((memory, device), (model, contacts), (&nodes, &instants), design, cut)?;
+        let contacts = forces.contacts.as_ref().map_or(0, |own| own.contacts.contacts.len());
         Ok(Self {
             device: device.clone(),
             model: Arc::clone(model),
             design,
-            control,
+            control: StepControl::new(step),
             lengths: Lengths { before: step, next: step },
             dissipates: false,
             balance_floor: model_balance_floor::<f32>(model),
-            solids,
-            paths,
-            kernels,
-            loads,
-            grips,
-            ties: ties.transpose()?,
-            contact_forces: vec![
-                Four::default();
-                contacts.as_ref().map_or(0, |own| own.contacts.contacts.len())
-            ],
-            contacts,
+            kernels: forces.node_kernels(device, model, (&nodes, &instants))?,
+            forces,
             instants,
             transfer: Transfer::default(),
             relaxing: None,
-            side: 0,
-            loaded: false,
-            listed: false,
-            evaluated: false,
-            origin: None,
-            since: 0,
-            entered: true,
-            deformed: Deformed::default(),
-            stride: 1,
-            to_check: 1,
+            stage: Stage::Empty,
+            interval: Interval::default(),
             pace: None,
-            energies: Energies::default(),
-            reactions: vec![[0.0; 3]; model.constraints.len()],
-            held_reactions: vec![Four::default(); nodes.held.len()],
-            owned: owned(model, &owners, &nodes.held),
-            next: vec![[0.0; 3]; nodes.count],
+            readings: Readings::new(model, &owners, &nodes, contacts),
             nodes,
             owners,
         })
@@ -333,16 +248,15 @@ impl GpuStepper {
         };
         let increment = fours((0..self.nodes.count).flat_map(of_node));
         let displacement = fours(state.displacement.iter().copied());
-        queue.write_buffer(&self.nodes.displacement[self.side], 0, bytemuck::cast_slice(&displacement));
-        queue.write_buffer(&self.nodes.increment[self.side], 0, bytemuck::cast_slice(&increment));
-        for (solid, history) in self.solids.iter().zip(&state.history) {
+        self.stage = Stage::Uploaded;
+        let side = self.stage.side();
+        queue.write_buffer(&self.nodes.displacement[side], 0, bytemuck::cast_slice(&displacement));
+        queue.write_buffer(&self.nodes.increment[side], 0, bytemuck::cast_slice(&increment));
+        for (solid, history) in self.forces.solids.iter().zip(&state.history) {
             solid.upload(&self.device, history);
         }
-        self.paths.clear(&self.device);
+        self.forces.paths.clear(&self.device);
         self.instants.forget(&self.device);
-        self.entered = true;
-        (self.loaded, self.evaluated, self.origin, self.since) = (true, false, None, 0);
-        self.listed = false;
     }
 
     /// Forces, coming increments, reactions and energies at the state's instant.
@@ -351,74 +265,71 @@ impl GpuStepper {
     /// If the state is not finite, a cell is inverted, the energies do not balance, the step is above the limit and
     /// must not be cut, or the device fails.
     pub fn evaluate(&mut self, state: &mut State<f32>, wanted: Wanted) -> Result<(), StepFailure> {
-        if self.dissipates || self.model.stiffness_damping > 0.0 {
-            state.keep_forces();
-        }
-        if !self.loaded {
-            self.upload(state);
-        }
-        if !self.evaluated {
-            self.evaluate_anew(state)?;
-        }
+        self.evaluated(state)?;
         if wanted == Wanted::Everything {
             self.bring_back(state)?;
         }
         Ok(())
     }
 
-    fn evaluate_anew(&mut self, state: &mut State<f32>) -> Result<(), StepFailure> {
+    /// Evaluates the state's instant where that is not done yet.
+    fn evaluated(&mut self, state: &mut State<f32>) -> Result<Progress, StepFailure> {
+        if self.dissipates || self.model.stiffness_damping > 0.0 {
+            state.keep_forces();
+        }
+        match self.stage {
+            Stage::Evaluated(progress) if progress.instants == 0 => return Ok(progress),
+            Stage::Empty => self.upload(state),
+            _ => {}
+        }
+        self.evaluate_anew(state)
+    }
+
+    fn evaluate_anew(&mut self, state: &mut State<f32>) -> Result<Progress, StepFailure> {
         self.control.keep(state);
         self.lengths = self.control.lengths(state);
         self.relax(self.control.relaxing(state));
         self.instants.forget_deformation(&self.device);
-        let starts = if state.is_at_start() { flags::STARTS } else { 0 };
-        if !self.listed {
-            self.list()?;
+        if let Stage::Uploaded = self.stage {
+            self.list(self.stage.side())?;
+            self.stage = Stage::Listed;
         }
+        let starts = if state.is_at_start() { flags::STARTS } else { 0 };
         let mut results = self.evaluate_listed(state, flags::MEASURES | starts, true)?;
         self.check(state, &results)?;
         self.enter_passed(state, &results, self.lengths.before);
         let below = if state.is_between_steps() { self.watch(state, &results.deformed)? } else { Ok(()) };
-        let calm = !results.deformed.differs(&self.deformed, CALM);
-        self.stride = if calm { (2 * self.stride).min(EVALUATE_EVERY) } else { (self.stride / 2).max(1) };
-        let passed = self.origin.map_or(1, |origin| state.steps - origin.steps);
-        self.to_check = self.control.steps_to_check(state, &results.deformed, (&self.deformed, passed));
-        self.deformed = results.deformed;
+        let passed = (&self.interval.deformed, self.stage.steps(state));
+        let to_check = self.control.steps_to_check(state, &results.deformed, passed);
+        self.interval.adapt(results.deformed, to_check);
         let shock = results.error;
         if self.lengths != self.control.lengths(state) {
             self.lengths = self.control.lengths(state);
             results = self.evaluate_listed(state, flags::MEASURES, false)?;
         }
         if !results.sums.is_finite() {
-            return Err(self.fail(state, self.since));
+            return Err(self.fail(state, self.stage.instants()));
         }
-        let at_start = state.is_at_start();
-        if at_start {
-            let stored = stored_at_start(&self.model, state, results.hourglass);
-            state.work.begin(self.kinetic_at_start(), stored, shock);
-        }
-        let before = (!at_start).then_some(self.lengths.before);
-        let again = std::mem::replace(&mut state.evaluated, true);
-        let change = self.lengths.change_energy(results.error);
-        self.energies =
-            state.work.settle(&results.sums, results.hourglass, change, before, self.balance_floor, again);
-        self.enter_reactions(&results.reactions);
-        self.contact_forces.clone_from(&results.contact_forces);
-        (self.evaluated, self.since) = (true, 0);
-        self.origin = Some(Origin {
-            side: self.side,
-            steps: state.steps,
-            time: state.time,
-            stability: state.stability,
-        });
+        self.settle(state, &results, shock);
+        let progress = Progress::new(state, self.stage.side());
+        self.stage = Stage::Evaluated(progress);
         if state.work.has_lost_balance() {
-            self.bring_back(state)?;
-            let square = |u: &Vector<f32>| u.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>();
-            let fastest = (0..).zip(&self.next).max_by(|(_, a), (_, b)| square(a).total_cmp(&square(b)));
-            let fastest = fastest.map_or(0, |(node, _)| node);
-            return Err(StepError::unbalanced(&self.model, fastest, self.energies.balance, state.time).into());
+            return Err(self.unbalanced(state));
         }
-        Ok(below?)
+        below?;
+        Ok(progress)
+    }
+
+    /// The end of a run that has lost its balance of energies.
+    fn unbalanced(&mut self, state: &mut State<f32>) -> StepFailure {
+        if let Err(failure) = self.bring_back(state) {
+            return failure;
+        }
+        let Readings { energies, next, .. } = &self.readings;
+        let square = |u: &Vector<f32>| u.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>();
+        let fastest = (0..).zip(next).max_by(|(_, a), (_, b)| square(a).total_cmp(&square(b)));
+        let fastest = fastest.map_or(0, |(node, _)| node);
+        StepError::unbalanced(&self.model, fastest, energies.balance, state.time).into()
     }
 
     /// Goes `steps` whole steps on; an instant that is not evaluated yet is so first.
@@ -428,11 +339,10 @@ impl GpuStepper {
     pub fn advance(&mut self, state: &mut State<f32>, steps: u64) -> Result<(), StepFailure> {
         let mut left = steps;
         while left > 0 {
-            self.evaluate(state, Wanted::Energies)?;
+            let progress = self.evaluated(state)?;
             // While energies are off balance, every step is evaluated.
-            let stride =
-                if state.work.is_off_balance() { 1 } else { left.min(self.stride).min(self.to_check) };
-            self.go(state, stride)?;
+            let stride = if state.work.is_off_balance() { 1 } else { left.min(self.interval.steps()) };
+            self.go(state, progress, stride)?;
             left -= stride;
         }
         Ok(())
@@ -450,17 +360,18 @@ impl GpuStepper {
         steps: u64,
         within: Duration,
     ) -> Result<u64, StepFailure> {
-        // Where work was entered since the last look, sums would enter it again.
-        if !self.evaluated && self.entered {
-            self.evaluate(state, Wanted::Energies)?;
-        }
+        let progress = match self.stage {
+            Stage::Evaluated(progress) if !progress.entered => progress,
+            _ => self.evaluated(state)?,
+        };
         let pace = self.pace.map_or(f64::INFINITY, |pace| pace * f64::from(self.control.substeps()));
         let steps = steps.min((within.as_secs_f64() / pace) as u64).max(1);
-        let (begun, before) = (Clock::now(), self.since);
-        if let Some(last) = self.go(state, steps)? {
+        let begun = Clock::now();
+        if let Some(last) = self.go(state, progress, steps)? {
             self.device.wait_for(last)?;
         }
-        self.pace = Some(begun.elapsed().as_secs_f64() / f64::from((self.since - before).max(1)));
+        let taken = self.stage.instants() - progress.instants;
+        self.pace = Some(begun.elapsed().as_secs_f64() / f64::from(taken.max(1)));
         Ok(steps)
     }
 
@@ -469,9 +380,10 @@ impl GpuStepper {
     /// # Errors
     /// If there are too many for the device.
     pub fn grip(&mut self, grips: &[Grip]) -> Result<(), GpuError> {
-        self.nodes.mark(&self.device, &self.grips.nodes, false);
-        let numbers = self.grips.take(&self.model, grips);
-        self.nodes.mark(&self.device, &self.grips.nodes, true);
+        let held = &mut self.forces.grips;
+        self.nodes.mark(&self.device, &held.nodes, false);
+        let numbers = held.take(&self.model, grips);
+        self.nodes.mark(&self.device, &held.nodes, true);
         self.instants.grip(&self.device, &numbers)
     }
 
@@ -488,18 +400,16 @@ impl GpuStepper {
 
     /// Brings points to the instant at which the steps taken so far end. Nothing comes back.
     pub fn apply(&self, mapping: &DeviceMapping, value: PointValue) {
-        mapping.apply(value, self.side);
+        mapping.apply(value, self.stage.side());
     }
 
     /// Brings displacements, increments and what relaxing laws remember back to the state, and enters its energies.
     ///
     /// # Errors
-    /// If the device fails, or a step since the last look could not be taken.
+    /// If the device fails, or a step since the last evaluation could not be taken.
     pub fn bring_back(&mut self, state: &mut State<f32>) -> Result<(), StepFailure> {
-        if !self.loaded || (!self.evaluated && self.origin.is_none()) {
-            return Ok(());
-        }
-        if !self.evaluated && self.since > 0 {
+        let Stage::Evaluated(progress) = self.stage else { return Ok(()) };
+        if progress.instants > 0 {
             let results = self.results()?;
             self.check(state, &results)?;
             self.enter_passed(state, &results, self.lengths.next);
@@ -515,9 +425,9 @@ impl GpuStepper {
                 fours.chunks_exact(each).enumerate().for_each(|(node, own)| to(node, own));
             })
         };
-        let side = self.side;
+        let side = self.stage.side();
         read(&self.nodes.displacement[side], 1, &mut |node, own| state.displacement[node] = three(&own[0]))?;
-        read(&self.nodes.next[side], OF_NODE, &mut |node, own| self.next[node] = three(&own[0]))?;
+        read(&self.nodes.next[side], OF_NODE, &mut |node, own| self.readings.next[node] = three(&own[0]))?;
         read(&self.nodes.increment[side], OF_NODE, &mut |node, own| {
             state.increment[node] = three(&own[0]);
             for (forces, own) in state.forces.iter_mut().zip(&own[1..]) {
@@ -526,33 +436,9 @@ impl GpuStepper {
                 }
             }
         })?;
-        for (solid, history) in self.solids.iter().zip(&mut state.history) {
+        for (solid, history) in self.forces.solids.iter().zip(&mut state.history) {
             solid.bring_back(&mut self.transfer, &self.device, history)?;
         }
         Ok(())
     }
-}
-
-/// For each constraint the places in `held` of its nodes, and the components it owns.
-fn owned(model: &Model, owners: &[[u32; 3]], held: &[u32]) -> Vec<Vec<(u32, [bool; 3])>> {
-    let of_node = |index: u32, node: u32| {
-        let owns = owners[node as usize].map(|owner| owner == index);
-        held.binary_search(&node).ok().map(|hold| (hold as u32, owns))
-    };
-    (0..)
-        .zip(&model.constraints)
-        .map(|(index, constraint)| constraint.nodes.iter().filter_map(|&node| of_node(index, node)).collect())
-        .collect()
-}
-
-/// What finds the forces at an instant, in order.
-fn force_kernels<'a>(
-    loads: &'a Option<DeviceLoads>,
-    grips: &'a DeviceGrips,
-    solids: &'a [DeviceSolid],
-    ties: &'a Option<DeviceTies>,
-) -> impl Iterator<Item = &'a Kernel> {
-    let pressure = loads.iter().filter_map(|loads| loads.pressure.as_ref());
-    let give = ties.iter().map(|ties| &ties.give);
-    pressure.chain(grips.kernel()).chain(solids.iter().flat_map(DeviceSolid::kernels)).chain(give)
 }

@@ -1,12 +1,15 @@
 //! What a device found at an instant.
 
+use pliant_explicit::recover::stored_at_start;
 use pliant_explicit::{Deformed, State, Sums};
-use pliant_mechanics::model::FREE;
+use pliant_mechanics::Energies;
+use pliant_mechanics::model::{FREE, Model};
 use pliant_mechanics::tensor::Vector;
 
-use super::{GpuStepper, force_kernels};
+use super::GpuStepper;
+use super::stage::Stage;
 use crate::GpuError;
-use crate::nodes::SUMS;
+use crate::nodes::{DeviceNodes, SUMS};
 use crate::run::{Instant, UNLISTED};
 use crate::transfer::Four;
 
@@ -23,33 +26,20 @@ impl GpuStepper {
             if results.unlisted.is_none() {
                 return Ok(results);
             }
-            self.list()?;
+            self.list(self.stage.side())?;
         }
     }
 
     /// Evaluates an instant, with the forces of cells found anew or as they stand.
-    pub(super) fn submit_evaluation(
-        &mut self,
-        state: &State<f32>,
-        flags: u32,
-        anew: bool,
-    ) -> Result<Results, GpuError> {
+    fn submit_evaluation(&mut self, state: &State<f32>, flags: u32, anew: bool) -> Result<Results, GpuError> {
         let damping = self.damping_factors(state, self.lengths.before);
-        let instant = Instant::new(self.since, flags, self.lengths, damping);
+        let instant = Instant::new(self.stage.instants(), flags, self.lengths, damping);
         self.instants.push((&self.model, &state.driven), state.time, self.lengths.next, instant);
-        let (nodes, side, contacts) = (&self.kernels, self.side, &self.contacts);
-        let forces = || force_kernels(&self.loads, &self.grips, &self.solids, &self.ties);
+        let (forces, kernels, side) = (&self.forces, &self.kernels, self.stage.side());
+        let sum = forces.contacts.as_ref().map(|contacts| &contacts.sum);
         self.instants.submit(&self.device, |pass, bound, _, offset| {
-            let before = contacts.iter().filter_map(|contacts| contacts.before.as_ref());
-            before.for_each(|kernel| kernel.run(pass, bound, offset, side));
-            if anew {
-                forces().for_each(|kernel| kernel.run(pass, bound, offset, side));
-            }
-            if let Some(contacts) = contacts {
-                contacts.kernels.iter().for_each(|kernel| kernel.run(pass, bound, offset, side));
-                contacts.sum.run(pass, bound, offset, side);
-            }
-            nodes.pass.run(pass, bound, offset, side);
+            let all = forces.kernels(anew).chain(sum).chain([&kernels.pass]);
+            all.for_each(|kernel| kernel.run(pass, bound, offset, side));
         });
         self.results()
     }
@@ -63,7 +53,8 @@ impl GpuStepper {
             (findings, bytes(UNLISTED + 1)),
             (&nodes.reactions, bytes(nodes.held.len() * 4)),
         ];
-        arrays.extend(self.contacts.iter().map(|own| (&own.sums, bytes(self.contact_forces.len() * 4))));
+        let touching = bytes(self.readings.contact_forces.len() * 4);
+        arrays.extend(self.forces.contacts.iter().map(|own| (&own.sums, touching)));
         let mut read = None;
         self.transfer.read_all(&self.device, &arrays, |parts| {
             let mut sums = [0.0; SUMS];
@@ -106,27 +97,32 @@ impl GpuStepper {
 
     /// Enters the work of the instants passed over, `step` seconds from one to the next, once.
     pub(super) fn enter_passed(&mut self, state: &mut State<f32>, results: &Results, step: f64) {
-        if self.since > 1 && !self.entered {
+        let Stage::Evaluated(progress) = &mut self.stage else { return };
+        if progress.instants > 1 && !progress.entered {
             let [internal, external, power] = results.passed;
             state.work.pass_over(internal, external, power, step);
         }
-        self.entered = true;
+        progress.entered = true;
     }
 
-    pub(super) fn enter_reactions(&mut self, forces: &[Four]) {
-        self.held_reactions.copy_from_slice(forces);
-        for (sum, owned) in self.reactions.iter_mut().zip(&self.owned) {
-            *sum = [0.0; 3];
-            for &(hold, owns) in owned {
-                for c in (0..3).filter(|&c| owns[c]) {
-                    sum[c] += f64::from(forces[hold as usize][c]);
-                }
-            }
+    /// Settles the energies of an instant and keeps the forces found there. `shock` is the error of the step [J] before its length changed.
+    pub(super) fn settle(&mut self, state: &mut State<f32>, results: &Results, shock: f64) {
+        let at_start = state.is_at_start();
+        if at_start {
+            let stored = stored_at_start(&self.model, state, results.hourglass);
+            state.work.begin(self.kinetic_at_start(), stored, shock);
         }
+        let before = (!at_start).then_some(self.lengths.before);
+        let again = std::mem::replace(&mut state.evaluated, true);
+        let change = self.lengths.change_energy(results.error);
+        let Results { sums, hourglass, .. } = results;
+        self.readings.energies =
+            state.work.settle(sums, *hourglass, change, before, self.balance_floor, again);
+        self.readings.keep_forces(results);
     }
 
     /// ½ Σ m v² of the velocities given at the start [J].
-    pub(super) fn kinetic_at_start(&self) -> f64 {
+    fn kinetic_at_start(&self) -> f64 {
         let of_node = |(node, velocity): (usize, &Vector<f64>)| {
             let square: f64 =
                 (0..3).filter(|&c| self.owners[node][c] == FREE).map(|c| velocity[c] * velocity[c]).sum();
@@ -152,4 +148,60 @@ pub(super) struct Results {
     pub(super) deformed: Deformed,
     pub(super) reactions: Vec<Four>,
     pub(super) contact_forces: Vec<Four>,
+}
+
+/// Numbers that were read back for observers.
+pub(super) struct Readings {
+    /// Energies at the last evaluated instant.
+    pub(super) energies: Energies,
+    /// Reaction [N] of each constraint there.
+    pub(super) reactions: Vec<Vector<f64>>,
+    /// Reaction [N] of each held node there.
+    pub(super) held_reactions: Vec<Four>,
+    /// Force [N] of each contact on its surface there.
+    pub(super) contact_forces: Vec<Four>,
+    /// Increment [m] of each node after the last instant that was read back whole.
+    pub(super) next: Vec<Vector<f32>>,
+    /// Of each constraint, the places of its nodes among those held, and the components it owns.
+    owned: Vec<Vec<(u32, [bool; 3])>>,
+}
+
+impl Readings {
+    /// Zeros, with the owners of components and the number of contacts.
+    pub(super) fn new(model: &Model, owners: &[[u32; 3]], nodes: &DeviceNodes, contacts: usize) -> Self {
+        Self {
+            energies: Energies::default(),
+            reactions: vec![[0.0; 3]; model.constraints.len()],
+            held_reactions: vec![Four::default(); nodes.held.len()],
+            contact_forces: vec![Four::default(); contacts],
+            next: vec![[0.0; 3]; nodes.count],
+            owned: owned(model, owners, &nodes.held),
+        }
+    }
+
+    /// Keeps the reactions and the forces of contacts.
+    fn keep_forces(&mut self, results: &Results) {
+        self.contact_forces.clone_from(&results.contact_forces);
+        self.held_reactions.copy_from_slice(&results.reactions);
+        for (sum, owned) in self.reactions.iter_mut().zip(&self.owned) {
+            *sum = [0.0; 3];
+            for &(hold, owns) in owned {
+                for c in (0..3).filter(|&c| owns[c]) {
+                    sum[c] += f64::from(results.reactions[hold as usize][c]);
+                }
+            }
+        }
+    }
+}
+
+/// For each constraint the places in `held` of its nodes, and the components it owns.
+fn owned(model: &Model, owners: &[[u32; 3]], held: &[u32]) -> Vec<Vec<(u32, [bool; 3])>> {
+    let of_node = |index: u32, node: u32| {
+        let owns = owners[node as usize].map(|owner| owner == index);
+        held.binary_search(&node).ok().map(|hold| (hold as u32, owns))
+    };
+    (0..)
+        .zip(&model.constraints)
+        .map(|(index, constraint)| constraint.nodes.iter().filter_map(|&node| of_node(index, node)).collect())
+        .collect()
 }
