@@ -1,4 +1,5 @@
-//! 3: a body from longer arrays: a column of five cubes of six tetrahedra each that sags under its weight, found by dynamic relaxation.
+//! 3: a body from longer arrays: a column of five cubes of six tetrahedra each that sags under its weight,
+//! found by dynamic relaxation.
 //!
 //! Run: `cargo run --release --bin 3-body-from-arrays`
 //!

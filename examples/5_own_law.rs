@@ -1,4 +1,5 @@
-//! 5: a law of one's own: quadratic in the strain and in the logarithm of the volume, on a cube stretched between plates.
+//! 5: a law of one's own: quadratic in the strain and in the logarithm of the volume, on a cube stretched
+//! between plates.
 //!
 //! Run: `cargo run --release --bin 5-own-law`
 //!

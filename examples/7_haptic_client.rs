@@ -1,5 +1,5 @@
-//! 7: a haptic device over datagrams. It moves the tool of `pliant haptics SCENE --listen 127.0.0.1:4270` at its address. Without an address it
-//! presses a wall of its own, of 500 N/m, and checks the force.
+//! 7: a haptic device over datagrams. It moves the tool of `pliant haptics SCENE --listen 127.0.0.1:4270` at
+//! its address. Without an address it presses a wall of its own, of 500 N/m, and checks the force.
 //!
 //! Run: `cargo run --release --bin 7-haptic-client -- 127.0.0.1:4270`
 //!

@@ -1,5 +1,6 @@
-//! A number for the text of everything that makes meshes of images, as `PLIANT_MESHER`: another text, another key in the cache of
-//! meshes. Where the other crates do not lie beside this one, their version stands for them.
+//! A number for the text of everything that makes meshes of images, as `PLIANT_MESHER`: another text, another
+//! key in the cache of meshes. Where the other crates do not lie beside this one, their version stands for
+//! them.
 
 use std::collections::hash_map::DefaultHasher;
 use std::fs;

@@ -1,7 +1,9 @@
-//! The doors of Pliant: each takes any bytes and ends in a result or an error, never in a panic, and takes no memory beyond what the bytes hold.
-//! Those with a checksum get bytes with one that fits, or no change would come past it.
+//! The doors of Pliant: each takes any bytes and ends in a result or an error, never in a panic, and takes no
+//! memory beyond what the bytes hold. Those with a checksum get bytes with one that fits, or no change would
+//! come past it.
 //!
-//! [`seeds`] are small inputs of each. Every test run tries them with changes at random; `.ci/nightly` has AFL++ look for others.
+//! [`seeds`] are small inputs of each. Every test run tries them with changes at random; `.ci/nightly` has
+//! AFL++ look for others.
 //!
 //! ```
 //! let read = |name| pliant_fuzz::DOORS.iter().find(|(own, _)| *own == name).unwrap().1;
@@ -70,8 +72,8 @@ pub fn block() -> &'static World {
     })
 }
 
-/// Small inputs of a door: the files that tests of the readers have, and of checkpoints, datagrams, recordings, snapshots and traces what this version
-/// writes, without head and checksum.
+/// Small inputs of a door: the files that tests of the readers have, and of checkpoints, datagrams,
+/// recordings, snapshots and traces what this version writes, without head and checksum.
 ///
 /// # Errors
 /// If they can't be read or made.

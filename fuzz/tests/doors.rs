@@ -36,7 +36,8 @@ fn every_door_takes_any_bytes() {
     try_doors(|_, _| 100);
 }
 
-/// By hand: `cargo test --release -p pliant-fuzz -- --ignored --nocapture`. Filling a surface and replaying take milliseconds each.
+/// By hand: `cargo test --release -p pliant-fuzz -- --ignored --nocapture`. Filling a surface and replaying
+/// take milliseconds each.
 #[test]
 #[ignore = "ten minutes"]
 fn every_door_takes_many_bytes() {

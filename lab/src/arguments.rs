@@ -51,7 +51,8 @@ pub struct Bench {
     /// Measure the kernel designs on the best GPU instead; with `--full` also on large meshes.
     #[arg(long, conflicts_with = "only")]
     pub designs: bool,
-    /// Measure implicit steps of 800 to 50,000 shells instead, on the CPU and, where there is one, with a GPU for their equations.
+    /// Measure implicit steps of 800 to 50,000 shells instead, on the CPU and, where there is one, with a GPU
+    /// for their equations.
     #[arg(long, conflicts_with_all = ["full", "designs", "list", "only", "lanes", "json", "table"])]
     pub shells: bool,
     /// List the rows without measuring.

@@ -1,5 +1,6 @@
-//! `pliant-lab`: results of the literature, computed again and compared with the published ones, and the cost of a step on this machine. The
-//! libraries in `bench` and `reproduce` compute; `validation` has a test per claim, `peers` measures other programs.
+//! `pliant-lab`: results of the literature, computed again and compared with the published ones, and the cost
+//! of a step on this machine. The libraries in `bench` and `reproduce` compute; `validation` has a test per
+//! claim, `peers` measures other programs.
 
 mod arguments;
 mod bench;

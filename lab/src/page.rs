@@ -1,4 +1,5 @@
-//! Tables in Markdown pages, updated between two marks: `<!-- pliant-lab COMMAND: start -->` and `<!-- pliant-lab COMMAND: end -->`.
+//! Tables in Markdown pages, updated between two marks: `<!-- pliant-lab COMMAND: start -->` and
+//! `<!-- pliant-lab COMMAND: end -->`.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -33,8 +33,9 @@ impl Running {
     }
 }
 
-/// Takes hold of nodes by a spring of a stiffness [N/m]; infinite is a pin. It acts on their mean by `weights`, which need not sum to 1; null weighs all the same.
-/// The stiffness is at most the one with which steps stay stable; `pliant_grip` tells it. `grip` gets its number. It pulls nothing until it is moved.
+/// Takes hold of nodes by a spring of a stiffness [N/m]; infinite is a pin. It acts on their mean by
+/// `weights`, which need not sum to 1; null weighs all the same. The stiffness is at most the one with which
+/// steps stay stable; `pliant_grip` tells it. `grip` gets its number. It pulls nothing until it is moved.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_grip_nodes(
     context: *const PliantContext,
@@ -77,8 +78,9 @@ pub unsafe extern "C" fn pliant_grip_nodes(
     }
 }
 
-/// Takes hold of a surface around its vertex that is nearest to a point [m], as a hand does: of what lies within a radius [m] of it at rest and hangs together with it,
-/// less with the distance; else as `pliant_grip_nodes`. With a radius of 0 it holds the vertex alone.
+/// Takes hold of a surface around its vertex that is nearest to a point [m], as a hand does: of what lies
+/// within a radius [m] of it at rest and hangs together with it, less with the distance; else as
+/// `pliant_grip_nodes`. With a radius of 0 it holds the vertex alone.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_grip_surface(
     context: *const PliantContext,

@@ -91,7 +91,8 @@ pub(crate) fn needed<T>(to: *const T, what: &str) -> Result<(), Fault> {
     if to.is_null() { Err(null(what)) } else { Ok(()) }
 }
 
-/// Gives the caller a text with a zero at its end, and its length without it; a short or null buffer gets the length alone.
+/// Gives the caller a text with a zero at its end, and its length without it; a short or null buffer gets the
+/// length alone.
 ///
 /// # Safety
 /// `to` is null or has so many bytes; `length` is null or may be written.
@@ -117,7 +118,8 @@ pub(crate) unsafe fn give_bytes(
             format!("the buffer has {capacity} bytes, {room} are needed"),
         ));
     }
-    // SAFETY: there is room for all bytes and the zero, and buffers of the caller are not those of the library.
+    // SAFETY: there is room for all bytes and the zero, and buffers of the caller are not those of the
+    // library.
     unsafe {
         to.copy_from_nonoverlapping(bytes.as_ptr(), bytes.len());
         if zero {

@@ -41,8 +41,8 @@ pub unsafe extern "C" fn pliant_snapshot_take(
     }
 }
 
-/// Takes a simulation back, or on, to a snapshot: of itself, or of another simulation of the same scene. What follows has the same bits as it had. Grips and forces
-/// of the program stay.
+/// Takes a simulation back, or on, to a snapshot: of itself, or of another simulation of the same scene. What
+/// follows has the same bits as it had. Grips and forces of the program stay.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_snapshot_restore(
     context: *const PliantContext,
@@ -66,8 +66,8 @@ pub unsafe extern "C" fn pliant_snapshot_restore(
     }
 }
 
-/// Copies a snapshot as bytes, for a file or another process. `length`, if it is not null, gets how many there are; with a null buffer of 0 bytes nothing
-/// else is given.
+/// Copies a snapshot as bytes, for a file or another process. `length`, if it is not null, gets how many
+/// there are; with a null buffer of 0 bytes nothing else is given.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_snapshot_bytes(
     context: *const PliantContext,
@@ -87,7 +87,8 @@ pub unsafe extern "C" fn pliant_snapshot_bytes(
     }
 }
 
-/// Reads a snapshot of a simulation of the same scene from bytes. `PLIANT_STATUS_BAD_SNAPSHOT` tells of others, and of damage.
+/// Reads a snapshot of a simulation of the same scene from bytes. `PLIANT_STATUS_BAD_SNAPSHOT` tells of
+/// others, and of damage.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_snapshot_read(
     context: *const PliantContext,

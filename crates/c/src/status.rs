@@ -50,7 +50,8 @@ pub enum PliantStatus {
     Internal = 17,
 }
 
-/// What went wrong, and where. The caller owns it; it holds no memory of the library. Texts are UTF-8, end with a zero and are cut where they are longer.
+/// What went wrong, and where. The caller owns it; it holds no memory of the library. Texts are UTF-8, end
+/// with a zero and are cut where they are longer.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct PliantError {
@@ -68,7 +69,8 @@ pub struct PliantError {
     pub element: i64,
     /// Time [s] of the simulation; NaN if it is about none.
     pub time: f64,
-    /// Of `PLIANT_STATUS_FAILED`: `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `blocked`, `intersecting`, `hourglass`, `device`, `output` or `input`.
+    /// Of `PLIANT_STATUS_FAILED`: `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`,
+    /// `not-converged`, `blocked`, `intersecting`, `hourglass`, `device`, `output` or `input`.
     pub kind: [c_char; 32],
     /// The body that it is about.
     pub body: [c_char; 64],
@@ -200,7 +202,8 @@ pub(crate) fn reported(
     fault.status
 }
 
-/// Reports that all is well: `status`, and empty texts of kind, key and message. Other fields are not written.
+/// Reports that all is well: `status`, and empty texts of kind, key and message. Other fields are not
+/// written.
 fn clear(to: &mut MaybeUninit<PliantError>) {
     let to = to.as_mut_ptr();
     // SAFETY: `to` points to a whole `PliantError` of the caller, and only places within it are written.

@@ -51,8 +51,8 @@ pub struct PliantSurface {
     pub triangles: u32,
 }
 
-/// Opens the boundary of a body, or a surface that one carries, by name; null is the only body. Of a solid only nodes on the boundary are vertices. It stays
-/// open as long as the simulation.
+/// Opens the boundary of a body, or a surface that one carries, by name; null is the only body. Of a solid
+/// only nodes on the boundary are vertices. It stays open as long as the simulation.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_surface_open(
     context: *const PliantContext,
@@ -90,7 +90,8 @@ pub unsafe extern "C" fn pliant_surface_open(
     }
 }
 
-/// Copies the three vertices of each triangle, counter-clockwise seen from outside. There is room for so many triangles.
+/// Copies the three vertices of each triangle, counter-clockwise seen from outside. There is room for so many
+/// triangles.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_surface_triangles(
     context: *const PliantContext,
@@ -160,8 +161,9 @@ pub unsafe extern "C" fn pliant_surface_normals(
     }
 }
 
-/// Lends positions [m] and unit normals, three `double` a vertex. What is pointed to stays as it is until the next call of this function for this surface,
-/// and is there until the simulation is closed; the pointers stay the same. `normals` may be null, which saves their cost.
+/// Lends positions [m] and unit normals, three `double` a vertex. What is pointed to stays as it is until the
+/// next call of this function for this surface, and is there until the simulation is closed; the pointers
+/// stay the same. `normals` may be null, which saves their cost.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_surface_lend(
     context: *const PliantContext,

@@ -33,7 +33,8 @@ fn known(own: &Running, name: &str) -> Result<(), Fault> {
     own.simulation.tool(name).map(|_| ()).ok_or_else(|| unknown(own, PLIANT_TOOLS, "tool", name))
 }
 
-/// Leads a tool to a pose, its jaws to an angle [rad], or both within a time [s]; `arrival`, if it is not null, gets the time [s] at which they are there.
+/// Leads a tool to a pose, its jaws to an angle [rad], or both within a time [s]; `arrival`, if it is not
+/// null, gets the time [s] at which they are there.
 unsafe fn lead(
     own: &mut Running,
     name: &str,
@@ -56,8 +57,10 @@ unsafe fn goal(position: *const f64, rotation: *const f64) -> Result<Pose, Fault
     pose_of(place, turn).ok_or_else(refused)
 }
 
-/// Leads a tool to a pose within a time [s] from now, on a straight way and the shortest turn; there it stays. Its jaws go on as they were going. `rotation` is a quaternion x, y, z, w of any
-/// length but 0. `arrival`, if it is not null, gets the time [s] at which it is there: later than asked for where nodes would be passed over on the way.
+/// Leads a tool to a pose within a time [s] from now, on a straight way and the shortest turn; there it
+/// stays. Its jaws go on as they were going. `rotation` is a quaternion x, y, z, w of any length but 0.
+/// `arrival`, if it is not null, gets the time [s] at which it is there: later than asked for where nodes
+/// would be passed over on the way.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_tool_lead(
     context: *const PliantContext,
@@ -80,7 +83,8 @@ pub unsafe extern "C" fn pliant_tool_lead(
     }
 }
 
-/// Opens or closes the jaws of a tool to an angle [rad] within a time [s] from now, while it goes on as it was going; else as `pliant_tool_lead`.
+/// Opens or closes the jaws of a tool to an angle [rad] within a time [s] from now, while it goes on as it
+/// was going; else as `pliant_tool_lead`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_tool_open(
     context: *const PliantContext,
@@ -101,7 +105,8 @@ pub unsafe extern "C" fn pliant_tool_open(
     }
 }
 
-/// Leads a tool to a pose and its jaws to an angle [rad], which are there together; else as `pliant_tool_lead`.
+/// Leads a tool to a pose and its jaws to an angle [rad], which are there together; else as
+/// `pliant_tool_lead`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_tool_lead_open(
     context: *const PliantContext,

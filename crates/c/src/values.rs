@@ -48,8 +48,8 @@ fn nodes(own: &Running, body: Option<&str>) -> Result<PliantNodes, Fault> {
     }
 }
 
-/// Tells the nodes of a body by name; null is all bodies. They are numbered as in its mesh file, or in the mesh that was given, unless repairs changed these; a wall
-/// on a solid has only nodes of its own here.
+/// Tells the nodes of a body by name; null is all bodies. They are numbered as in its mesh file, or in the
+/// mesh that was given, unless repairs changed these; a wall on a solid has only nodes of its own here.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_body(
     context: *const PliantContext,
@@ -73,7 +73,8 @@ pub const PLIANT_VELOCITY: u32 = 2;
 /// Where nodes are at rest [m].
 pub const PLIANT_REST: u32 = 3;
 
-/// Copies positions, displacements, velocities (`PLIANT_POSITION`, …) of the nodes of a body by name; null is all bodies.
+/// Copies positions, displacements, velocities (`PLIANT_POSITION`, …) of the nodes of a body by name; null is
+/// all bodies.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_nodes(
     context: *const PliantContext,
@@ -128,9 +129,10 @@ pub const PLIANT_AT_POINTS: u32 = 0;
 /// Fields are read in the elements, as computed.
 pub const PLIANT_AT_CELLS: u32 = 1;
 
-/// Copies a field, such as `von-mises`, of a body or a surface that one carries, by name; null is the only body. Fields have the names, units and components of
-/// `data` in the scene. `items` and `components`, if not null, get how many items there are, and numbers in each; with a null buffer nothing else is given.
-/// A field that a body does not have is NaN there.
+/// Copies a field, such as `von-mises`, of a body or a surface that one carries, by name; null is the only
+/// body. Fields have the names, units and components of `data` in the scene. `items` and `components`, if not
+/// null, get how many items there are, and numbers in each; with a null buffer nothing else is given. A field
+/// that a body does not have is NaN there.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_field(
     context: *const PliantContext,

@@ -7,8 +7,8 @@ use crate::context::PliantContext;
 use crate::pointers::{give, needed};
 use crate::status::{Fault, PliantError, PliantStatus, reported};
 
-/// The version of this interface: a program passes `PLIANT_ABI` of the header that it was built with to `pliant_context_open`. It grows where a change
-/// breaks programs.
+/// The version of this interface: a program passes `PLIANT_ABI` of the header that it was built with to
+/// `pliant_context_open`. It grows where a change breaks programs.
 pub const PLIANT_ABI: u32 = 1;
 
 /// The version of the interface that this library has.
@@ -24,7 +24,8 @@ pub extern "C" fn pliant_version() -> *const c_char {
     VERSION.as_ptr().cast()
 }
 
-/// Opens a context: all that a program opens is in one. `abi` is `PLIANT_ABI`. Contexts know nothing of each other.
+/// Opens a context: all that a program opens is in one. `abi` is `PLIANT_ABI`. Contexts know nothing of each
+/// other.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_context_open(
     abi: u32,
@@ -46,7 +47,8 @@ pub unsafe extern "C" fn pliant_context_open(
     reported(open(), unsafe { error.cast::<MaybeUninit<PliantError>>().as_mut() })
 }
 
-/// Closes a context with all that is open in it. No call on it may be under way, and none may come after; null does nothing.
+/// Closes a context with all that is open in it. No call on it may be under way, and none may come after;
+/// null does nothing.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_context_close(context: *mut PliantContext) {
     if !context.is_null() {

@@ -1,5 +1,6 @@
-//! C and C++ programs against the header and the library as cargo builds them: the examples, every bad input, and times. They are built by `cc` and `c++`, with
-//! sanitizers where these have some; without a compiler they are skipped with a notice.
+//! C and C++ programs against the header and the library as cargo builds them: the examples, every bad input,
+//! and times. They are built by `cc` and `c++`, with sanitizers where these have some; without a compiler
+//! they are skipped with a notice.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -1,5 +1,5 @@
-//! `include/pliant.h` says what the crate says: it is made here from the declarations, which are written plainly for that.
-//! `PLIANT_BLESS=1 cargo test --release -p pliant-c --test header` writes it anew.
+//! `include/pliant.h` says what the crate says: it is made here from the declarations, which are written
+//! plainly for that. `PLIANT_BLESS=1 cargo test --release -p pliant-c --test header` writes it anew.
 
 use std::fmt::Write;
 use std::fs;

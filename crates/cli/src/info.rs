@@ -1,4 +1,5 @@
-//! `pliant info`: contents, quality and defects of a mesh file, the shape of its surface, and its distance from another mesh.
+//! `pliant info`: contents, quality and defects of a mesh file, the shape of its surface, and its distance
+//! from another mesh.
 
 use std::path::Path;
 

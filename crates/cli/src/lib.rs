@@ -1,13 +1,13 @@
-//! `pliant`: real-time simulation of soft organs. This crate parses commands and prints results; the libraries compute. The binary and
-//! the Python package both call [`main`].
+//! `pliant`: real-time simulation of soft organs. This crate parses commands and prints results; the
+//! libraries compute. The binary and the Python package both call [`main`].
 //!
 //! ```
 //! let words = ["pliant", "schema", "--markdown"].map(std::ffi::OsString::from);
 //! assert_eq!(pliant_command::main(words), pliant_command::SUCCESS);
 //! ```
 
-/// A line on standard error. A full disk or a closed pipe must not end a run: unlike the standard library's macro, this one
-/// never panics.
+/// A line on standard error. A full disk or a closed pipe must not end a run: unlike the standard library's
+/// macro, this one never panics.
 macro_rules! eprintln {
     ($($text:tt)*) => { $crate::report::tell(format_args!($($text)*)) };
 }
@@ -38,15 +38,15 @@ pub use report::{Bar, Failure, say, tell};
 /// The code of a process that did what it was to do.
 pub const SUCCESS: u8 = 0;
 
-/// Does what a command line says, whose first word is the program: prints, writes files, opens a window. The code that the process is to
-/// end with.
+/// Does what a command line says, whose first word is the program: prints, writes files, opens a window. The
+/// code that the process is to end with.
 pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     let wants_json = |arguments: &arguments::Arguments| arguments.command.wants_json();
     program(words, wants_json, |arguments| commands::execute(arguments.command))
 }
 
-/// Does what a command line says, of any program with commands: reads it, executes it, and prints errors, as an object on standard output,
-/// too, where that is promised. The code that the process is to end with.
+/// Does what a command line says, of any program with commands: reads it, executes it, and prints errors, as
+/// an object on standard output, too, where that is promised. The code that the process is to end with.
 pub fn program<A: Parser>(
     words: impl IntoIterator<Item = OsString>,
     wants_json: impl FnOnce(&A) -> bool,

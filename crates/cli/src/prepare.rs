@@ -1,4 +1,5 @@
-//! From a path on the command line to a world: scenes, meshes and NiftySim models, with the overrides that were typed.
+//! From a path on the command line to a world: scenes, meshes and NiftySim models, with the overrides that
+//! were typed.
 
 use std::cell::OnceCell;
 use std::fs;
@@ -93,8 +94,8 @@ pub struct Opened {
     pub _translated: Option<TempDir>,
 }
 
-/// Reads the text of a scene. A NiftySim model is translated first; a mesh gets a scene of its own. In a sandbox, the scene reads
-/// only files in its own folder.
+/// Reads the text of a scene. A NiftySim model is translated first; a mesh gets a scene of its own. In a
+/// sandbox, the scene reads only files in its own folder.
 pub fn open(path: &Path, sandbox: bool, allow_partial: bool) -> Result<Opened, Failure> {
     let reads = |folder: &Path| {
         let reads = if sandbox { Reads::within(folder) } else { Ok(Reads::anywhere()) };
@@ -125,8 +126,8 @@ pub fn open(path: &Path, sandbox: bool, allow_partial: bool) -> Result<Opened, F
     Ok(Opened { source, folder: place, assumed: None, _translated: Some(folder) })
 }
 
-/// Writes a NiftySim model as a scene file with its meshes beside it; returns notes. A model with unsupported parts is rejected
-/// unless they may be omitted.
+/// Writes a NiftySim model as a scene file with its meshes beside it; returns notes. A model with unsupported
+/// parts is rejected unless they may be omitted.
 pub fn translate(
     model: &Path,
     reads: &Reads,

@@ -1,4 +1,5 @@
-//! Signals that stop a run: Ctrl-C, and on Unix SIGTERM and SIGHUP. The run stops after its step, or within a long one, and writes its final outputs.
+//! Signals that stop a run: Ctrl-C, and on Unix SIGTERM and SIGHUP. The run stops after its step, or within a
+//! long one, and writes its final outputs.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock};
@@ -27,7 +28,8 @@ static ASKED: LazyLock<Asked> = LazyLock::new(|| {
     asked
 });
 
-/// Files that grow beyond the limit of their size then end in an error that names them, not in the end of the process.
+/// Files that grow beyond the limit of their size then end in an error that names them, not in the end of the
+/// process.
 pub(crate) fn outlive_large_files() {
     #[cfg(unix)]
     {

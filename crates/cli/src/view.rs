@@ -103,7 +103,8 @@ fn portrait(arguments: &View) -> Option<(f64, PathBuf)> {
     arguments.screenshot.clone().map(|file| (arguments.after, file))
 }
 
-/// Replays a recording without a window and prints the result; optionally also in real time, to measure the input lag.
+/// Replays a recording without a window and prints the result; optionally also in real time, to measure the
+/// input lag.
 fn repeat(world: &World, file: &Path, real_time: bool) -> Result<u8, Failure> {
     let wrong = |error: &dyn std::fmt::Display| {
         Failure::plain(

@@ -1,6 +1,7 @@
-// Roots, lengths and sines to the last digits. A device may find a root with errors of some units in the last place, which bend normals and shift
-// gaps: a step of Newton's method takes them away, if `fma` is one operation, and does no harm else. Its sine may have an absolute error of 2⁻¹¹,
-// and has one of 2⁻²¹ on GPUs of NVIDIA: more than a step turns a thing by.
+// Roots, lengths and sines to the last digits. A device may find a root with errors of some units in the last
+// place, which bend normals and shift gaps: a step of Newton's method takes them away, if `fma` is one
+// operation, and does no harm else. Its sine may have an absolute error of 2⁻¹¹, and has one of 2⁻²¹ on GPUs
+// of NVIDIA: more than a step turns a thing by.
 
 const HALF_TURN = 3.1415927;
 

@@ -1,5 +1,6 @@
-//! The points of a face that are kept out of a rigid thing, besides its corners. A ball or a capsule meets a face where the face is nearest to its
-//! centre or its axis: such a point goes along as the thing slides, so that its force does not jump. Other things meet the points of a lattice.
+//! The points of a face that are kept out of a rigid thing, besides its corners. A ball or a capsule meets a
+//! face where the face is nearest to its centre or its axis: such a point goes along as the thing slides, so
+//! that its force does not jump. Other things meet the points of a lattice.
 
 use std::collections::BTreeSet;
 
@@ -51,7 +52,8 @@ impl FacePoints {
     }
 }
 
-/// The points of faces that are nearest to a ball or a capsule: all within a radius of a segment along z, which has no length if it is a ball.
+/// The points of faces that are nearest to a ball or a capsule: all within a radius of a segment along z,
+/// which has no length if it is a ball.
 #[derive(Clone, Debug)]
 pub struct NearestPoints {
     radius: f64,
@@ -62,7 +64,8 @@ pub struct NearestPoints {
 }
 
 impl NearestPoints {
-    /// The weights of the corners at those of a face, by its number, that are nearer than a room [m]; corners [m] are in the frame of the thing.
+    /// The weights of the corners at those of a face, by its number, that are nearer than a room [m]; corners
+    /// [m] are in the frame of the thing.
     pub fn of(&self, face: usize, corners: &[Vector3<f64>; 3], room: f64, mut found: impl FnMut([f64; 3])) {
         let reach = self.radius + room;
         let is_beyond = |c: usize, reach: f64| {
@@ -114,8 +117,8 @@ fn within(corners: &[Vector3<f64>; 3], half: f64, mut found: impl FnMut([f64; 3]
     }
 }
 
-/// Where on an edge, as a part of it, it is nearest to the segment: beside it or at one of its ends. Of an edge along the axis the points nearest
-/// to both ends count as well: it may touch all the way between them.
+/// Where on an edge, as a part of it, it is nearest to the segment: beside it or at one of its ends. Of an
+/// edge along the axis the points nearest to both ends count as well: it may touch all the way between them.
 fn on_edge(from: Vector3<f64>, along: Vector3<f64>, half: f64, mut found: impl FnMut(f64)) {
     let mut take = |part: f64| {
         if part > 0.0 && part < 1.0 {
@@ -141,7 +144,8 @@ mod tests {
     use super::*;
     use pliant_testing::Random;
 
-    /// No point of a face is nearer to a ball or a capsule than the nearest of its corners and points, as long as the axis does not go through it.
+    /// No point of a face is nearer to a ball or a capsule than the nearest of its corners and points, as
+    /// long as the axis does not go through it.
     #[test]
     fn no_point_of_a_face_is_nearer_than_those_found() {
         let mut random = Random::new(11);
@@ -203,7 +207,8 @@ mod tests {
         }
     }
 
-    /// A capsule touches a face or an edge at the points below its axis: upright, along the edge of two faces, and across it.
+    /// A capsule touches a face or an edge at the points below its axis: upright, along the edge of two
+    /// faces, and across it.
     #[test]
     fn capsules_meet_faces_and_edges_beneath_their_axes() {
         let shape = Shape::Capsule { radius: 0.1, length: 0.4 };

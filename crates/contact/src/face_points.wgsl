@@ -54,14 +54,16 @@ fn takes_nearest(thing: u32) -> bool {
     return (HAS_SPHERE && kind == SPHERE || HAS_CAPSULE && kind == CAPSULE) && thing_number(thing + 1u) > 0.0;
 }
 
-// The weights of a point within a face that is nearest to an end of the segment, on the side of that end; else zero.
+// The weights of a point within a face that is nearest to an end of the segment, on the side of that end;
+// else zero.
 fn weights_within(corners: array<vec3f, 3>, end: f32) -> vec3f {
     let weights = nearest_weights(corners[0], corners[1], corners[2], vec3f(0.0, 0.0, end));
     let height = dot(weights, vec3f(corners[0].z, corners[1].z, corners[2].z));
     return select(vec3f(0.0), weights, all(weights > vec3f(0.0)) && height * end >= 0.0);
 }
 
-// Where on an edge, as a part of it, it is nearest to the segment: the first of three is beside it, the others are at its ends. Zero of none.
+// Where on an edge, as a part of it, it is nearest to the segment: the first of three is beside it, the
+// others are at its ends. Zero of none.
 fn part_of_edge(edge: vec3f, along: vec3f, half: f32, which: u32) -> f32 {
     let squared = dot(along, along);
     let across = dot(along.xy, along.xy);
@@ -77,8 +79,8 @@ fn part_of_edge(edge: vec3f, along: vec3f, half: f32, which: u32) -> f32 {
     return 0.0;
 }
 
-// The weights of the corners at a point of a face, with the corners in the frame of the thing, and the edges that no other face has before it as
-// bits; zero where there is no point.
+// The weights of the corners at a point of a face, with the corners in the frame of the thing, and the edges
+// that no other face has before it as bits; zero where there is no point.
 fn nearest_point(thing: u32, point: u32, edges: u32, corners: array<vec3f, 3>) -> vec3f {
     var half = 0.0;
     if HAS_CAPSULE && u32(thing_number(thing)) == CAPSULE {

@@ -6,8 +6,8 @@ use nalgebra::Vector3;
 
 use crate::near::{Near, Triangles};
 
-/// Signed distances [m] at the points of a regular grid, linear in between along each axis. Beyond the grid the distance is that to the
-/// point of the surface that is nearest to the rim of the grid.
+/// Signed distances [m] at the points of a regular grid, linear in between along each axis. Beyond the grid
+/// the distance is that to the point of the surface that is nearest to the rim of the grid.
 #[derive(Clone)]
 pub struct Grid {
     origin: Vector3<f64>,
@@ -37,12 +37,14 @@ impl fmt::Debug for Grid {
     }
 }
 
-/// How far the slope may be below 1, that of a distance, and is still mended; it is where the direction to the surface jumps.
+/// How far the slope may be below 1, that of a distance, and is still mended; it is where the direction to
+/// the surface jumps.
 pub(crate) const FLATTEST: f64 = 0.3;
 
 impl Grid {
-    /// Of distances [m] at the points of a grid from `origin` [m] on, negative inside, x fastest. `None` if their number is not that of the
-    /// points, one of them or a length is not finite, or there are fewer than two points along an axis.
+    /// Of distances [m] at the points of a grid from `origin` [m] on, negative inside, x fastest. `None` if
+    /// their number is not that of the points, one of them or a length is not finite, or there are fewer than
+    /// two points along an axis.
     pub fn new(origin: Vector3<f64>, spacing: f64, counts: [usize; 3], values: Vec<f32>) -> Option<Self> {
         let points = counts.iter().try_fold(1_usize, |points, &count| points.checked_mul(count))?;
         let sound = points == values.len()
@@ -75,8 +77,8 @@ impl Grid {
         })
     }
 
-    /// Samples a function, which is negative inside, in a box of two corners [m]; a point every `spacing` [m] at most. `None` if the
-    /// function or a length is not finite.
+    /// Samples a function, which is negative inside, in a box of two corners [m]; a point every `spacing` [m]
+    /// at most. `None` if the function or a length is not finite.
     pub fn sample(
         [low, high]: [Vector3<f64>; 2],
         spacing: f64,
@@ -160,15 +162,17 @@ impl Grid {
         // Times the spacing.
         let steepness = slope.norm();
         let normal = if steepness > 0.0 { slope * steepness.recip() } else { Vector3::z() };
-        // Chords make the function flatter than a distance: within a step of the surface, about where its tangent reaches zero.
+        // Chords make the function flatter than a distance: within a step of the surface, about where its
+        // tangent reaches zero.
         let close = (1.0 - distance.abs() * self.per_metre).max(0.0);
         let missing = (1.0 - steepness * self.per_metre).clamp(0.0, FLATTEST);
         let distance = distance + distance * close * missing * (1.0 + missing);
         self.beyond([&along, &inner], distance, normal)
     }
 
-    /// The distance at a point [m] by splines of second degree, and its gradient, which is continuous, as that of [`near`](Self::near) is not. They
-    /// round corners by about the spacing, where the gradient is shorter than 1.
+    /// The distance at a point [m] by splines of second degree, and its gradient, which is continuous, as
+    /// that of [`near`](Self::near) is not. They round corners by about the spacing, where the gradient is
+    /// shorter than 1.
     pub fn smooth(&self, point: &Vector3<f64>) -> Near {
         let along = (point - self.origin) * self.per_metre;
         let last = Vector3::from_fn(|c, _| (self.counts[c] - 1) as f64);
@@ -214,7 +218,8 @@ impl Grid {
         self.beyond([&along, &inner], distance, slope * self.per_metre)
     }
 
-    /// A distance and its direction at a point of the grid, as they are at one beyond; both places in spacings.
+    /// A distance and its direction at a point of the grid, as they are at one beyond; both places in
+    /// spacings.
     fn beyond(&self, [along, inner]: [&Vector3<f64>; 2], distance: f64, normal: Vector3<f64>) -> Near {
         if inner == along {
             return Near { distance, normal };
@@ -247,8 +252,9 @@ mod tests {
         Grid::sample([-corner, corner], spacing, |x| x.norm() - RADIUS).unwrap()
     }
 
-    /// Linear interpolation of a function with the second derivatives 1/r, 1/r, 0 is off by at most 2 h²/(8 r) within a cell, times the
-    /// diagonals of its directions: never above 3 h²/(8 r). Halving the spacing quarters it.
+    /// Linear interpolation of a function with the second derivatives 1/r, 1/r, 0 is off by at most 2 h²/(8
+    /// r) within a cell, times the diagonals of its directions: never above 3 h²/(8 r). Halving the spacing
+    /// quarters it.
     #[test]
     fn a_sampled_ball_is_a_ball_to_second_order() {
         let worst = [0.008, 0.004, 0.002, 0.001].map(|spacing| {
@@ -273,7 +279,8 @@ mod tests {
         }
     }
 
-    /// Far away the distance is about that to the ball, and grows outward; it is continuous at the rim of the grid.
+    /// Far away the distance is about that to the ball, and grows outward; it is continuous at the rim of the
+    /// grid.
     #[test]
     fn beyond_the_grid_distances_go_on() {
         let grid = ball(0.005);
@@ -283,7 +290,8 @@ mod tests {
             let near = grid.near(&point);
             let exact = point.norm() - RADIUS;
             if point.amax() > 0.07 {
-                // The way to a point of the ball that is not the nearest one is longer, by up to a part of the radius.
+                // The way to a point of the ball that is not the nearest one is longer, by up to a part of
+                // the radius.
                 let longer = near.distance - exact;
                 assert!((-2e-4..0.5 * RADIUS).contains(&longer), "{point}: {near:?}");
                 assert!(near.normal.dot(&point.normalize()) > 0.95, "{point}: {near:?}");
@@ -319,7 +327,8 @@ mod tests {
         assert!(Grid::sample([Vector3::zeros(), Vector3::repeat(1.0)], 0.5, |_| f64::NAN).is_none());
     }
 
-    /// Two grids that differ in one value are told apart by what they show of themselves, as checkpoints need.
+    /// Two grids that differ in one value are told apart by what they show of themselves, as checkpoints
+    /// need.
     #[test]
     fn another_value_is_another_grid() {
         let mut values = vec![1.0; 27];
@@ -331,7 +340,8 @@ mod tests {
         assert_ne!(before, shown(&values));
     }
 
-    /// Ten thousand points near the surface of a ball against a grid of 128³ points: `cargo test -p pliant-contact ten_thousand -- --nocapture`.
+    /// Ten thousand points near the surface of a ball against a grid of 128³ points:
+    /// `cargo test -p pliant-contact ten_thousand -- --nocapture`.
     #[test]
     fn ten_thousand_points_find_their_distance() {
         let grid = ball(0.14 / 127.0);

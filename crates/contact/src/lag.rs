@@ -1,8 +1,9 @@
 //! Tools and moved nodes that push with no more than a force: how far they lag behind their trajectory.
 //!
-//! A hand that meets something stiffer than it can bear comes to rest there, and goes along again when it is called back. So does a tool with a
-//! limit: of the way that it would go against what it pushes, it goes a part that falls from 1 at half of the limit over 0 at the limit to −1.
-//! What it did not go is its lag, which it makes good over time.
+//! A hand that meets something stiffer than it can bear comes to rest there, and goes along again when it is
+//! called back. So does a tool with a limit: of the way that it would go against what it pushes, it goes a
+//! part that falls from 1 at half of the limit over 0 at the limit to −1. What it did not go is its lag,
+//! which it makes good over time.
 //!
 //! ```
 //! use nalgebra::Vector3;
@@ -43,7 +44,8 @@ pub struct Lag {
 }
 
 impl Lag {
-    /// Of a thing, by its place among the rigid things of the contacts, or of moved nodes, by that of their constraint in its model.
+    /// Of a thing, by its place among the rigid things of the contacts, or of moved nodes, by that of their
+    /// constraint in its model.
     pub fn new(number: u32) -> Self {
         Self { number, ways: [[0.0; 3]; 2], forces: [[0.0; 3]; 2], step: 0.0, longest: (0.0, 0.0) }
     }
@@ -73,18 +75,20 @@ impl Lag {
         self.forces[0].into()
     }
 
-    /// The part of a way against what it pushes that a thing goes, if it pushes with a force [N] under a limit [N].
+    /// The part of a way against what it pushes that a thing goes, if it pushes with a force [N] under a
+    /// limit [N].
     pub fn part(force: f64, limit: f64) -> f64 {
         (2.0 * (1.0 - force / limit)).clamp(-1.0, 1.0)
     }
 
-    /// Finds the lag after a step of a length [s], over which the trajectory goes a way [m], under a limit [N].
+    /// Finds the lag after a step of a length [s], over which the trajectory goes a way [m], under a limit
+    /// [N].
     pub fn follow(&mut self, limit: f64, way: Vector3<f64>, step: f64) {
         self.go(self.force(), Self::part(self.force().norm(), limit), way, step);
     }
 
-    /// Finds the lag after a step of a length [s], over which the trajectory goes a way [m], when of what leads along a force [N] with which it
-    /// pushes it goes a part. How long [m] the whole of that is.
+    /// Finds the lag after a step of a length [s], over which the trajectory goes a way [m], when of what
+    /// leads along a force [N] with which it pushes it goes a part. How long [m] the whole of that is.
     pub fn go(&mut self, force: Vector3<f64>, part: f64, way: Vector3<f64>, step: f64) -> f64 {
         let mut wanted = way - self.now() * (step / CATCHES_UP).min(1.0);
         let ahead = force.try_normalize(0.0).unwrap_or_default();

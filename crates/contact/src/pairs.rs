@@ -1,11 +1,14 @@
-//! Where two deformable surfaces, or parts of a surface, come near each other: a node above a triangle, and two edges that cross. Distances are
-//! signed by the outward side of the surfaces, so that a small overlap is seen as such.
+//! Where two deformable surfaces, or parts of a surface, come near each other: a node above a triangle, and
+//! two edges that cross. Distances are signed by the outward side of the surfaces, so that a small overlap is
+//! seen as such.
 //!
-//! Trees of triangles and edges give lists of candidates. These hold until a node has moved by half of a margin, the skin: till then they have
-//! all that a step looks at, so that results do not depend on when they were made. They do not depend on the order of bodies or threads either.
+//! Trees of triangles and edges give lists of candidates. These hold until a node has moved by half of a
+//! margin, the skin: till then they have all that a step looks at, so that results do not depend on when they
+//! were made. They do not depend on the order of bodies or threads either.
 //!
-//! A node is compared with each triangle that it lies above or beneath, and with the nearest edge or corner if that is nearer still. Two edges
-//! count where the normal between them is in the cones of normals of both (Gauss map). Surfaces that look the same way do not touch.
+//! A node is compared with each triangle that it lies above or beneath, and with the nearest edge or corner
+//! if that is nearer still. Two edges count where the normal between them is in the cones of normals of both
+//! (Gauss map). Surfaces that look the same way do not touch.
 
 mod narrow;
 
@@ -31,13 +34,14 @@ const ROUND_OFF: f64 = 1.0 + 1e-6;
 const DEPTH: f64 = 0.25;
 /// The cosine of the angle between outward normals up to which surfaces face each other.
 pub(crate) const FACING: f64 = 0.3;
-/// How far beside a triangle, over its height, a node whose surface faces it still counts as above it: bodies with common borders hold each
-/// other there, and do not take hold of each other's sides.
+/// How far beside a triangle, over its height, a node whose surface faces it still counts as above it: bodies
+/// with common borders hold each other there, and do not take hold of each other's sides.
 pub(crate) const BESIDE: f64 = 0.02;
 /// Overlap, over the deepest one, that is undone though a side that faces away is nearer.
 pub(crate) const SLIGHT: f64 = 0.1;
-/// Distance from a triangle, edge or corner, over the overlap up to which a surface is seen from behind, at which a node lies on it: it is not beneath,
-/// and the way from there tells no direction. Impulses that are found leave less than that, and round-off of single precision is less.
+/// Distance from a triangle, edge or corner, over the overlap up to which a surface is seen from behind, at
+/// which a node lies on it: it is not beneath, and the way from there tells no direction. Impulses that are
+/// found leave less than that, and round-off of single precision is less.
 pub(crate) const ON: f64 = 1e-4;
 /// Relative difference up to which distances are the same.
 const SAME: f64 = 1e-9;
@@ -112,7 +116,8 @@ struct Side {
     edges: Vec<Edge>,
     /// Nodes at borders of an open surface, increasing.
     border: Vec<u32>,
-    /// Triangles around the nodes, one node after the other: each by its other corners, in order. Where those of each node end.
+    /// Triangles around the nodes, one node after the other: each by its other corners, in order. Where those
+    /// of each node end.
     rings: Vec<[u32; 2]>,
     ring_ends: Vec<usize>,
     face_tree: Tree,
@@ -210,16 +215,18 @@ pub struct Pairs {
     points: [Vec<[u32; 2]>; 2],
     /// Edges of the first with edges of the second.
     crossings: Vec<[u32; 2]>,
-    /// How far [m] beyond what a step looks at candidates were apart when they were listed: points by boxes, then crossings.
+    /// How far [m] beyond what a step looks at candidates were apart when they were listed: points by boxes,
+    /// then crossings.
     room: [Vec<f32>; 3],
-    /// Candidates of one surface that never touch, since they are too near at rest: nodes with triangles, edges with edges.
+    /// Candidates of one surface that never touch, since they are too near at rest: nodes with triangles,
+    /// edges with edges.
     apart: [Vec<[u32; 2]>; 2],
     near: Vec<u32>,
 }
 
 impl Pairs {
-    /// Of two surfaces that keep a distance [m], or of a surface with itself; `place` is where nodes are at rest [m]. Nodes of surfaces are
-    /// increasing.
+    /// Of two surfaces that keep a distance [m], or of a surface with itself; `place` is where nodes are at
+    /// rest [m]. Nodes of surfaces are increasing.
     pub fn new(
         first: &Surface,
         second: Option<&Surface>,
@@ -244,8 +251,9 @@ impl Pairs {
         own
     }
 
-    /// Nodes that keep a smaller distance [m] than the others, with that distance. Parts of a surface that are nearer at rest than others keep may then touch
-    /// each other; only those behind each other never do. `place` is where nodes are at rest [m].
+    /// Nodes that keep a smaller distance [m] than the others, with that distance. Parts of a surface that
+    /// are nearer at rest than others keep may then touch each other; only those behind each other never do.
+    /// `place` is where nodes are at rest [m].
     #[must_use]
     pub fn keeping(
         mut self,
@@ -264,8 +272,8 @@ impl Pairs {
         self
     }
 
-    /// Nodes of pairs whose distance is less than the one to keep, whichever way they look, with the least distance [m]. Of two edges those of the first
-    /// count.
+    /// Nodes of pairs whose distance is less than the one to keep, whichever way they look, with the least
+    /// distance [m]. Of two edges those of the first count.
     pub fn nearer(&mut self, place: impl Fn(u32) -> Vector3<f64>) -> Vec<(u32, f64)> {
         self.list_again(&place);
         let mut least = BTreeMap::<u32, f64>::new();
@@ -292,7 +300,8 @@ impl Pairs {
         self.reach / REACH
     }
 
-    /// The distance [m] that each node keeps, by its number, where some keep less than [`lengths`](Self::lengths) says; the others beyond its end do not.
+    /// The distance [m] that each node keeps, by its number, where some keep less than
+    /// [`lengths`](Self::lengths) says; the others beyond its end do not.
     pub fn kept(&self) -> &[f64] {
         &self.kept
     }
@@ -309,7 +318,8 @@ impl Pairs {
         first.min(second).clamp(0.0, self.offset)
     }
 
-    /// Finds the parts of a surface that are nearer each other at rest than a distance [m]: beside each other, or on both sides of a thin part.
+    /// Finds the parts of a surface that are nearer each other at rest than a distance [m]: beside each
+    /// other, or on both sides of a thin part.
     fn set_apart(&mut self, place: &impl Fn(u32) -> Vector3<f64>, keep: f64) {
         self.list(place, keep.max(2.0 * self.depth) + self.skin);
         let side = &self.sides[0];
@@ -420,7 +430,8 @@ impl Pairs {
         &self.near
     }
 
-    /// The distance to keep, how far beyond that pairs are found, and the overlap up to which a surface is seen from behind [m].
+    /// The distance to keep, how far beyond that pairs are found, and the overlap up to which a surface is
+    /// seen from behind [m].
     pub fn lengths(&self) -> [f64; 3] {
         [self.offset, self.reach, self.depth]
     }
@@ -451,8 +462,8 @@ impl Pairs {
         self.crossings.iter().map(move |&[a, b]| [edge(&self.sides[0], a), edge(self.other(0), b)])
     }
 
-    /// What is nearer than the reach beyond the distance to keep, with nodes at these places [m]. These alone decide what is found, as long as
-    /// the lists hold.
+    /// What is nearer than the reach beyond the distance to keep, with nodes at these places [m]. These alone
+    /// decide what is found, as long as the lists hold.
     pub fn find(&self, place: impl Fn(u32) -> Vector3<f64>, mut found: impl FnMut(Pair)) {
         let (limit, within) = (self.offset + self.reach, self.within());
         let wanted = |pair: &Pair| -self.depth < pair.distance && pair.distance < limit;
@@ -504,7 +515,8 @@ impl Pairs {
         }
     }
 
-    /// Of a node, by its place in its surface, with the triangles that may be near it; `rows` is room for pairs.
+    /// Of a node, by its place in its surface, with the triangles that may be near it; `rows` is room for
+    /// pairs.
     fn find_above(
         &self,
         (own, side): (usize, &Side),
@@ -629,7 +641,8 @@ impl Nearest {
         }
     }
 
-    /// The outward normal there and the distance [m] along it, with the overlap [m] up to which a node lies on it; `None` beside an open surface.
+    /// The outward normal there and the distance [m] along it, with the overlap [m] up to which a node lies
+    /// on it; `None` beside an open surface.
     #[inline]
     fn outward(&self, surface: &Side, on: f64) -> Option<(Vector3<f64>, f64)> {
         let Self { distance, way, normals, .. } = self;

@@ -77,7 +77,8 @@ impl Trajectory {
         self.growth.is_some()
     }
 
-    /// With a force [N] that the thing pushes with at most: it lags behind its trajectory where it would need more.
+    /// With a force [N] that the thing pushes with at most: it lags behind its trajectory where it would need
+    /// more.
     pub fn limited(self, force: f64) -> Self {
         Self { limit: Some(force), ..self }
     }
@@ -103,8 +104,8 @@ impl Trajectory {
         Self::of(start, Motion::Turn { axis, centre, angle, curve })
     }
 
-    /// Poses at increasing times [s], before the start pose: the thing stays at the first one before and at the last one after.
-    /// `None` without any, or where times do not increase.
+    /// Poses at increasing times [s], before the start pose: the thing stays at the first one before and at
+    /// the last one after. `None` without any, or where times do not increase.
     pub fn table(start: Pose, poses: Vec<(f64, Pose)>) -> Option<Self> {
         let increase = poses.windows(2).all(|pair| pair[0].0 < pair[1].0);
         (increase && !poses.is_empty()).then_some(Self::of(start, Motion::Table(poses)))
@@ -146,8 +147,9 @@ pub fn between([from, to]: [&Pose; 2], part: f64) -> Pose {
     Pose::from_parts(place.into(), turn)
 }
 
-/// Where a tool goes that is driven from outside: its pose on a straight way and the shortest arc, the angle between its jaws evenly. At the
-/// goal it stays. Pose and angle have a way each; without one, they follow the trajectory.
+/// Where a tool goes that is driven from outside: its pose on a straight way and the shortest arc, the angle
+/// between its jaws evenly. At the goal it stays. Pose and angle have a way each; without one, they follow
+/// the trajectory.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Leg {
     /// Positions [m] and unit quaternions (i, j, k, w).

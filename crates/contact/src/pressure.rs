@@ -1,11 +1,13 @@
-//! Pressures of contacts on single nodes: p = |N|/A. N is the sum of what contacts push a node by along their normals, and A = Σ ⅓ max(0, −a·N/|N|)
-//! is its share of the vector areas a of its deformed faces, outward, that N presses on.
+//! Pressures of contacts on single nodes: p = |N|/A. N is the sum of what contacts push a node by along their
+//! normals, and A = Σ ⅓ max(0, −a·N/|N|) is its share of the vector areas a of its deformed faces, outward,
+//! that N presses on.
 
 use nalgebra::Vector3;
 
 use crate::touch::{Contact, Contacts};
 
-/// Triangles of all surfaces of contacts, each once, in places of their nodes among `numbers`, which increase.
+/// Triangles of all surfaces of contacts, each once, in places of their nodes among `numbers`, which
+/// increase.
 pub fn faces(contacts: &Contacts, numbers: &[u32]) -> Vec<[u32; 3]> {
     let surfaces = contacts.contacts.iter().flat_map(Contact::surfaces);
     let place = |node: u32| numbers.partition_point(|&known| known < node) as u32;
@@ -16,7 +18,8 @@ pub fn faces(contacts: &Contacts, numbers: &[u32]) -> Vec<[u32; 3]> {
     faces
 }
 
-/// The pressure [Pa] of a force [N] along normals on each node of faces, with the nodes at their places [m]; `None` of nodes without faces.
+/// The pressure [Pa] of a force [N] along normals on each node of faces, with the nodes at their places [m];
+/// `None` of nodes without faces.
 pub fn pressures(faces: &[[u32; 3]], forces: &[Vector3<f64>], places: &[Vector3<f64>]) -> Vec<Option<f64>> {
     let directions: Vec<Vector3<f64>> =
         forces.iter().map(|force| force.try_normalize(0.0).unwrap_or_default()).collect();

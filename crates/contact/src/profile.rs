@@ -1,5 +1,5 @@
-//! The outline of a body of revolution: lines and arcs in the half-plane of height and distance from the axis, without corners, so that the
-//! direction of the signed distance is continuous near the surface.
+//! The outline of a body of revolution: lines and arcs in the half-plane of height and distance from the
+//! axis, without corners, so that the direction of the signed distance is continuous near the surface.
 
 use nalgebra::Vector2;
 
@@ -39,12 +39,13 @@ pub enum ProfileError {
 enum Piece {
     /// From a point along a unit direction over a length [m], with the direction to its outside.
     Line { from: Vector2<f64>, along: Vector2<f64>, length: f64, out: Vector2<f64> },
-    /// Around a centre, with the unit direction to its middle and the cosine of half of its angle. What is round is outside: −1, or inside: 1.
+    /// Around a centre, with the unit direction to its middle and the cosine of half of its angle. What is
+    /// round is outside: −1, or inside: 1.
     Arc { centre: Vector2<f64>, middle: Vector2<f64>, cosine: f64, radius: f64, sign: f64 },
 }
 
-/// The outline of a body of revolution about the z axis: all to the right of the path is in it. Beyond an end that is not on the axis the path
-/// goes straight on.
+/// The outline of a body of revolution about the z axis: all to the right of the path is in it. Beyond an end
+/// that is not on the axis the path goes straight on.
 #[derive(Clone, Debug)]
 pub struct Profile {
     corners: Vec<Corner>,
@@ -229,7 +230,8 @@ mod tests {
         assert!((at(5.8, 1.8).0 + 1.2).abs() < 1e-12);
     }
 
-    /// The direction is the gradient of the distance, which is zero on the outline that is drawn, and its direction does not jump there.
+    /// The direction is the gradient of the distance, which is zero on the outline that is drawn, and its
+    /// direction does not jump there.
     #[test]
     fn directions_are_gradients_without_jumps_at_the_outline() {
         let profile = bag();

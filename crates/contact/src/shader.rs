@@ -1,5 +1,5 @@
-//! Rigid things and pairs of surfaces for GPUs: distances and ways are snippets of WGSL beside their Rust twins. This file joins them, and
-//! writes shapes and passages as they read them.
+//! Rigid things and pairs of surfaces for GPUs: distances and ways are snippets of WGSL beside their Rust
+//! twins. This file joins them, and writes shapes and passages as they read them.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -36,9 +36,9 @@ fn kind(shape: &Shape) -> usize {
 
 /// What bodies find at these rigid things, in WGSL.
 ///
-/// The module around it defines `fn thing_number(at: u32) -> f32` and `fn passage_number(at: u32) -> f32`, the numbers of [`things`] and of
-/// [`Passage::numbers`]. It gives `passage_of(thing, at)`, from where the numbers of both begin, and of a passage `near_after`, `distance_before`,
-/// `meet` and `carried`.
+/// The module around it defines `fn thing_number(at: u32) -> f32` and `fn passage_number(at: u32) -> f32`,
+/// the numbers of [`things`] and of [`Passage::numbers`]. It gives `passage_of(thing, at)`, from where the
+/// numbers of both begin, and of a passage `near_after`, `distance_before`, `meet` and `carried`.
 pub fn shader(rigids: &[Rigid]) -> String {
     let numbers = [
         ("FLATTEST", FLATTEST),
@@ -62,9 +62,11 @@ fn constants(numbers: &[(&str, f64)]) -> String {
     numbers.iter().map(|(name, value)| format!("const {name} = {:e}f;\n", *value as f32)).collect()
 }
 
-/// What surfaces find at each other, in WGSL: `find_above` of a node with triangles, and `find_crossing` of two edges.
+/// What surfaces find at each other, in WGSL: `find_above` of a node with triangles, and `find_crossing` of
+/// two edges.
 ///
-/// The surrounding module includes the [`shader`] of rigid things, and defines where nodes are and how a pair is stored; see narrow.wgsl.
+/// The surrounding module includes the [`shader`] of rigid things, and defines where nodes are and how a pair
+/// is stored; see narrow.wgsl.
 pub fn pairs_shader() -> String {
     let numbers = [
         ("BESIDE", BESIDE),
@@ -77,12 +79,14 @@ pub fn pairs_shader() -> String {
     [&constants(&numbers), include_str!("pairs/narrow.wgsl")].join("\n")
 }
 
-/// Points of faces at balls and capsules, in WGSL, beside [`shader`]: `takes_nearest` of a thing, and `nearest_point` of a face.
+/// Points of faces at balls and capsules, in WGSL, beside [`shader`]: `takes_nearest` of a thing, and
+/// `nearest_point` of a face.
 pub fn face_points_shader() -> String {
     [&constants(&[("ALONG", ALONG)]), include_str!("face_points.wgsl")].join("\n")
 }
 
-/// Rigid things as `thing_number` gives them: [`THING`] numbers each, in their order, then the values of grids.
+/// Rigid things as `thing_number` gives them: [`THING`] numbers each, in their order, then the values of
+/// grids.
 pub fn things(rigids: &[Rigid]) -> Vec<f32> {
     let mut numbers = Vec::with_capacity(rigids.len() * THING);
     let mut values = Vec::new();

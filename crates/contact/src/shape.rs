@@ -81,8 +81,9 @@ impl Shape {
         }
     }
 
-    /// Smooth sides as a point [m] inside sees them: distance, negative inside, and its gradient. Each goes on beyond the corners of the shape, so the
-    /// nearest side is as far as the surface. Sampled distances have one side with a continuous gradient, shorter than 1 where it rounds corners.
+    /// Smooth sides as a point [m] inside sees them: distance, negative inside, and its gradient. Each goes
+    /// on beyond the corners of the shape, so the nearest side is as far as the surface. Sampled distances
+    /// have one side with a continuous gradient, shorter than 1 where it rounds corners.
     pub fn sides(&self, point: &Vector3<f64>) -> Sides {
         let side = |distance, normal| Some(Near { distance, normal });
         let mut all = [None; MOST_SIDES];
@@ -184,11 +185,13 @@ impl Shape {
     }
 }
 
-/// Largest distance that a drawn corner moves where the surface grows by 1: the tip of a sharp cone has no bound of its own.
+/// Largest distance that a drawn corner moves where the surface grows by 1: the tip of a sharp cone has no
+/// bound of its own.
 const FARTHEST: f64 = 3.0;
 
 impl Shape {
-    /// Where points [m] of its drawn surface go as it grows, per distance: sides go straight outward by that, so edges stay sharp in pictures.
+    /// Where points [m] of its drawn surface go as it grows, per distance: sides go straight outward by that,
+    /// so edges stay sharp in pictures.
     pub fn outward(&self, (points, triangles): &Triangles) -> Vec<Vector3<f64>> {
         if matches!(self, Self::Sphere { .. } | Self::Capsule { .. }) {
             return points.iter().map(|point| self.near(point).normal).collect();
@@ -277,7 +280,8 @@ fn cuboid(point: &Vector3<f64>, half: &Vector3<f64>) -> Near {
     Near { distance: beyond[axis], normal }
 }
 
-/// In the half-plane of the distance from the axis and the height, the nearest point of the base or of the slope.
+/// In the half-plane of the distance from the axis and the height, the nearest point of the base or of the
+/// slope.
 fn cone(point: &Vector3<f64>, radius: f64, height: f64) -> Near {
     let from_axis = Vector2::new(point.x, point.y);
     let q = Vector2::new(from_axis.norm(), point.z);
@@ -319,7 +323,8 @@ mod tests {
         Shape::Revolved(Arc::new(Profile::new(corners).unwrap()))
     }
 
-    /// Normals are the gradients of the distance, by central differences, and the distance along them changes as fast as they say.
+    /// Normals are the gradients of the distance, by central differences, and the distance along them changes
+    /// as fast as they say.
     #[test]
     fn normals_are_gradients_of_the_distance() {
         let shapes = [
@@ -358,7 +363,8 @@ mod tests {
         }
     }
 
-    /// A point inside is as far from the surface as from the nearest side; sides have continuous gradients, also at corners.
+    /// A point inside is as far from the surface as from the nearest side; sides have continuous gradients,
+    /// also at corners.
     #[test]
     fn the_nearest_side_is_as_far_as_the_surface() {
         let shapes = [
@@ -421,7 +427,8 @@ mod tests {
         }
     }
 
-    /// A drawn surface that has grown lies on the larger shape. Its edges are excepted: pictures leave them sharp.
+    /// A drawn surface that has grown lies on the larger shape. Its edges are excepted: pictures leave them
+    /// sharp.
     #[test]
     fn drawn_surfaces_grow_outward() {
         let cylinder = Shape::Cylinder { radius: 0.3, length: 0.8 };

@@ -1,7 +1,8 @@
-// Rigid shapes with their signed distance; twin of shape.rs and grid.rs. The module around it gives `thing_number`, and
-// shader.rs the kinds and exact.wgsl.
+// Rigid shapes with their signed distance; twin of shape.rs and grid.rs. The module around it gives
+// `thing_number`, and shader.rs the kinds and exact.wgsl.
 
-// What a shape is at a point: its distance [m], negative inside, and the direction in which the distance grows.
+// What a shape is at a point: its distance [m], negative inside, and the direction in which the distance
+// grows.
 struct Near {
     distance: f32,
     normal: vec3f,
@@ -59,7 +60,8 @@ fn cuboid(point: vec3f, half: vec3f) -> Near {
     return Near(beyond.z, vec3f(0.0, 0.0, signs.z));
 }
 
-// In the half-plane of the distance from the axis and the height, the nearest point of the base or of the slope.
+// In the half-plane of the distance from the axis and the height, the nearest point of the base or of the
+// slope.
 fn cone(point: vec3f, radius: f32, height: f32) -> Near {
     let q = vec2f(flat_norm(point.xy), point.z);
     let rim = vec2f(radius, 0.0);
@@ -83,7 +85,8 @@ fn cone(point: vec3f, radius: f32, height: f32) -> Near {
     return Near(sign * distance, vec3f(radial * flat.x, flat.y));
 }
 
-// Linear in between the points of a grid; beyond it the distance to the point of the surface that is nearest to its rim.
+// Linear in between the points of a grid; beyond it the distance to the point of the surface that is nearest
+// to its rim.
 fn sampled(at: u32, point: vec3f) -> Near {
     let origin = thing_vector(at + 4u);
     let spacing = thing_number(at + 7u);
@@ -118,7 +121,8 @@ fn sampled(at: u32, point: vec3f) -> Near {
     if steepness > 0.0 {
         normal = slope / steepness;
     }
-    // Chords make the function flatter than a distance: within a step of the surface, about where its tangent reaches zero.
+    // Chords make the function flatter than a distance: within a step of the surface, about where its tangent
+    // reaches zero.
     let close = max(1.0 - abs(distance) * per_metre, 0.0);
     let missing = clamp(1.0 - steepness * per_metre, 0.0, FLATTEST);
     distance += distance * close * missing * (1.0 + missing);
@@ -135,8 +139,8 @@ fn sampled(at: u32, point: vec3f) -> Near {
     return Near(far, select(normal, from_surface / far, far > 0.0));
 }
 
-// The distance of a point [m] of its frame from a shape, whose numbers begin at a place, and the direction away from it. Kinds that no thing has
-// are left out, for devices that run all branches.
+// The distance of a point [m] of its frame from a shape, whose numbers begin at a place, and the direction
+// away from it. Kinds that no thing has are left out, for devices that run all branches.
 fn shape_near(at: u32, point: vec3f) -> Near {
     let kind = u32(thing_number(at));
     let a = thing_number(at + 4u);

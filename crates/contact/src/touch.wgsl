@@ -1,4 +1,5 @@
-// The way of rigid things in a step; twin of `Passage` in touch.rs. The module around it gives `thing_number`, and `passage_number`.
+// The way of rigid things in a step; twin of `Passage` in touch.rs. The module around it gives
+// `thing_number`, and `passage_number`.
 
 struct Passage {
     // Where the numbers of the thing begin.
@@ -11,7 +12,8 @@ struct Passage {
     // How its frame is turned before and after the step.
     turned_before: mat3x3f,
     turned_after: mat3x3f,
-    // The way of its origin [m], how its turn in the step differs from none, and as a vector along its axis [rad].
+    // The way of its origin [m], how its turn in the step differs from none, and as a vector along its axis
+    // [rad].
     shift: vec3f,
     turn: mat3x3f,
     angle: vec3f,
@@ -43,7 +45,8 @@ fn near_local(thing: u32, point: vec3f) -> Near {
     return Near(sign * near.distance, sign * near.normal);
 }
 
-// How far a point is from the thing at the end of the step, and the direction away from it; from its place less that of the thing then.
+// How far a point is from the thing at the end of the step, and the direction away from it; from its place
+// less that of the thing then.
 fn near_after(passage: Passage, place: vec3f) -> Near {
     let near = near_local(passage.thing, place * passage.turned_after);
     return Near(near.distance, passage.turned_after * near.normal);
@@ -66,8 +69,8 @@ fn rotated(by: vec3f, v: vec3f) -> vec3f {
     return v + sine(angle) * across + 2.0 * half * half * cross(axis, across);
 }
 
-// The distance of a point that is predicted to go by `moved`, and the direction away from the thing; from its place less that of the thing
-// before. It is followed as `Passage::meet` does.
+// The distance of a point that is predicted to go by `moved`, and the direction away from the thing; from its
+// place less that of the thing before. It is followed as `Passage::meet` does.
 fn meet(passage: Passage, offset: f32, place: vec3f, moved: vec3f) -> Near {
     let relative = moved - passage.shift;
     let way = norm(moved) + passage.travel;

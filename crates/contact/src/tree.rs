@@ -1,5 +1,6 @@
-//! Boxes around moving things in a tree: found anew from the leaves up when the things have moved ([`Tree::refit`]), sorted anew when the
-//! boxes have grown into each other. A flat array with children after their parent, so that a sweep from its end is a refit.
+//! Boxes around moving things in a tree: found anew from the leaves up when the things have moved
+//! ([`Tree::refit`]), sorted anew when the boxes have grown into each other. A flat array with children after
+//! their parent, so that a sweep from its end is a refit.
 
 use nalgebra::Vector3;
 
@@ -54,7 +55,8 @@ impl Bounds {
     }
 }
 
-/// The lesser of each component. Places are finite: what `f64::min` does beside that for what is no number takes a sixth of a refit.
+/// The lesser of each component. Places are finite: what `f64::min` does beside that for what is no number
+/// takes a sixth of a refit.
 #[inline]
 fn lower(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector3<f64> {
     a.zip_map(b, |a, b| if a < b { a } else { b })
@@ -177,7 +179,8 @@ mod tests {
     use super::*;
     use pliant_testing::Random;
 
-    /// The same things as by trying all, after any motion; the order of things does not depend on how often the tree was sorted.
+    /// The same things as by trying all, after any motion; the order of things does not depend on how often
+    /// the tree was sorted.
     #[test]
     fn what_is_near_is_what_brute_force_finds() {
         let mut random = Random::new(5);

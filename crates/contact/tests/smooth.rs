@@ -54,7 +54,8 @@ fn the_gradient_is_that_of_the_distance() {
     }
 }
 
-/// In the corner of a box the gradient turns evenly, where that of linear interpolation jumps from cell to cell.
+/// In the corner of a box the gradient turns evenly, where that of linear interpolation jumps from cell to
+/// cell.
 #[test]
 fn gradients_go_on_evenly_through_cells_and_corners() {
     let grid = sampled(|x| x.amax() - 0.055);

@@ -1,16 +1,20 @@
-//! Constraints that bind nodes to each other: a mean displacement that is prescribed, rigid parts of a body, an enclosed volume. A step predicts where the
-//! nodes go without them and corrects it by the least change in the metric of the masses, so that momentum and angular momentum are
-//! kept, and no wave becomes faster: the critical time step stays. The corrections enter the step as forces, hence the energies too.
+//! Constraints that bind nodes to each other: a mean displacement that is prescribed, rigid parts of a body,
+//! an enclosed volume. A step predicts where the nodes go without them and corrects it by the least change in
+//! the metric of the masses, so that momentum and angular momentum are kept, and no wave becomes faster: the
+//! critical time step stays. The corrections enter the step as forces, hence the energies too.
 //!
-//! *Mean.* Σ wᵢ uᵢ = d with forces wᵢ λ: λ = (d − Σ wᵢ uᵢ*)/Σ wᵢ² yᵢ, uᵢ* the prediction and yᵢ = Δt²/m the mobility of a node.
+//! *Mean.* Σ wᵢ uᵢ = d with forces wᵢ λ: λ = (d − Σ wᵢ uᵢ*)/Σ wᵢ² yᵢ, uᵢ* the prediction and yᵢ = Δt²/m the
+//! mobility of a node.
 //!
-//! *Rigid.* x = c + R (X − X̄), c and X̄ centres of mass, such that the forces have no moment where the nodes are now, about their centre:
-//! Σ mᵢ rᵢ × (R (Xᵢ − X̄) − rᵢ*) = 0 with arms rᵢ now and rᵢ* predicted. This is the discrete rigid body of Moser and Veselov (1991), which
-//! keeps Σ m xⁿ × xⁿ⁺¹ exactly. Newton's method finds R, from the rotation of the polar decomposition of Σ mᵢ rᵢ* ⊗ (Xᵢ − X̄) (Kabsch 1976)
-//! on; nodes on a line keep that one.
+//! *Rigid.* x = c + R (X − X̄), c and X̄ centres of mass, such that the forces have no moment where the nodes
+//! are now, about their centre: Σ mᵢ rᵢ × (R (Xᵢ − X̄) − rᵢ*) = 0 with arms rᵢ now and rᵢ* predicted. This is
+//! the discrete rigid body of Moser and Veselov (1991), which keeps Σ m xⁿ × xⁿ⁺¹ exactly. Newton's method
+//! finds R, from the rotation of the polar decomposition of Σ mᵢ rᵢ* ⊗ (Xᵢ − X̄) (Kabsch 1976) on; nodes on a
+//! line keep that one.
 //!
-//! *Volume.* V(x* + y g p) = V₀ + ΔV with forces p gᵢ, gᵢ = ∂V/∂xᵢ where the nodes are now; V is of third order in p, which Newton's method
-//! finds. The forces of a pressure on a closed surface have no resultant and no moment.
+//! *Volume.* V(x* + y g p) = V₀ + ΔV with forces p gᵢ, gᵢ = ∂V/∂xᵢ where the nodes are now; V is of third
+//! order in p, which Newton's method finds. The forces of a pressure on a closed surface have no resultant
+//! and no moment.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use pliant_mechanics::model::{Constraint, Enclosed, Enclosure, Model, Motion};
@@ -79,7 +83,8 @@ impl Collective {
         collective.map(new).collect()
     }
 
-    /// Finds the forces; `factor` is that of a mean's displacement or of a volume's growth after the step. A pressure is added to the one there is.
+    /// Finds the forces; `factor` is that of a mean's displacement or of a volume's growth after the step. A
+    /// pressure is added to the one there is.
     pub fn find(&mut self, model: &Model, predicted: impl Fn(u32) -> Predicted, factor: f64) {
         let constraint = &model.constraints[self.constraint];
         self.predicted.clear();
@@ -139,8 +144,9 @@ impl Collective {
         self.enclosed.pressure += pressure;
     }
 
-    /// Makes forces [N] that were found step by step, one a node of the model, those of the constraint where the nodes are displaced by so much [m] now:
-    /// of a volume those of its pressure, of a rigid part without resultant and moment. Those of a mean stay.
+    /// Makes forces [N] that were found step by step, one a node of the model, those of the constraint where
+    /// the nodes are displaced by so much [m] now: of a volume those of its pressure, of a rigid part without
+    /// resultant and moment. Those of a mean stay.
     pub fn renew<R: LaneNumber>(
         &mut self,
         model: &Model,
@@ -290,7 +296,8 @@ mod tests {
         sums
     }
 
-    /// An end keeps its shape to round-off while the bar tumbles, and so are momentum and angular momentum kept.
+    /// An end keeps its shape to round-off while the bar tumbles, and so are momentum and angular momentum
+    /// kept.
     #[test]
     fn a_rigid_end_tumbles_without_loss() {
         let model = moving(|_| Motion::Rigid, |x| x[0] > 0.025);

@@ -1,10 +1,11 @@
-//! The largest stable step of the central difference method at rest; see [`stability`](crate::stability) for a run.
+//! The largest stable step of the central difference method at rest; see [`stability`](crate::stability) for
+//! a run.
 //!
-//! *Element bound* (rigorous, Irons and Treharne): λ_max(K_e) ≤ V (λ+2μ) Σ|B_a|², hence
-//! Δt_e = 2/√(n (λ+2μ)/ρ Σ|B_a|²) and Δt_cr ≥ min Δt_e.
-//! *Assembled model*: 2/ω_max of the assembled, constrained operator M⁻¹K by the Lanczos method, the accelerated form of the
-//! power iteration: the same operator calls, far fewer of them. K v = (f(hv) − f(−hv))/2h. During a run, isotropic
-//! laws take (f(u + hv) − f(u))/h, half of the force evaluations. A run in single precision takes forces in its own precision where they suffice.
+//! *Element bound* (rigorous, Irons and Treharne): λ_max(K_e) ≤ V (λ+2μ) Σ|B_a|², hence Δt_e = 2/√(n (λ+2μ)/ρ
+//! Σ|B_a|²) and Δt_cr ≥ min Δt_e. *Assembled model*: 2/ω_max of the assembled, constrained operator M⁻¹K by
+//! the Lanczos method, the accelerated form of the power iteration: the same operator calls, far fewer of
+//! them. K v = (f(hv) − f(−hv))/2h. During a run, isotropic laws take (f(u + hv) − f(u))/h, half of the force
+//! evaluations. A run in single precision takes forces in its own precision where they suffice.
 
 use std::borrow::Cow;
 
@@ -30,14 +31,16 @@ pub struct ElementBound {
 
 /// The bound [s] of one cell, of its material's mass.
 pub fn cell_bound(solid: &Solid, cell: usize) -> f64 {
-    // Hourglass patterns are as fast as a wave of modulus c μ: slower than the law's own for any usual coefficient c.
+    // Hourglass patterns are as fast as a wave of modulus c μ: slower than the law's own for any usual
+    // coefficient c.
     let modulus = solid.longitudinal_modulus().max(solid.cells.hourglass_modulus(cell));
     let wave = modulus / solid.material.density;
     let n = solid.cells.nodes_per_cell() as f64;
     2.0 / (n * wave * solid.cells.gradient_square_sum(cell)).sqrt()
 }
 
-/// The least factor by which mass scaling makes a node of a cell heavier; one that follows others has no mass and counts as it is.
+/// The least factor by which mass scaling makes a node of a cell heavier; one that follows others has no mass
+/// and counts as it is.
 fn mass_factor(model: &Model, solid: &Solid, cell: usize) -> f64 {
     let Some(scaling) = &model.mass_scaling else { return 1.0 };
     let factor = |&node: &u32| {
@@ -77,7 +80,8 @@ pub(crate) fn limit_alone(model: &Model, solid: &Solid, cell: usize, stiffness: 
 pub struct CriticalStep {
     /// Step [s].
     pub step: f64,
-    /// Relative error bound of the largest eigenvalue (residual of its Ritz vector); it is counted in, on the safe side.
+    /// Relative error bound of the largest eigenvalue (residual of its Ritz vector); it is counted in, on the
+    /// safe side.
     pub error: f64,
     /// Force evaluations spent.
     pub force_calls: usize,
@@ -127,12 +131,13 @@ pub(crate) fn assembled_about(
     CriticalStep { step, error, force_calls: operator.calls, seconds_per_call }
 }
 
-/// The critical time step [s] without damping about a deformed state of a run, where the owner of each component is known. Once three looks at Lanczos'
-/// iteration agree to [`ROUGH`] that it is at least `enough` [s], the iteration ends. What it then overlooks is less than
-/// [`RESERVE`](crate::stability::RESERVE) leaves: 2 % of the step at most in the tests below.
+/// The critical time step [s] without damping about a deformed state of a run, where the owner of each
+/// component is known. Once three looks at Lanczos' iteration agree to [`ROUGH`] that it is at least `enough`
+/// [s], the iteration ends. What it then overlooks is less than [`RESERVE`](crate::stability::RESERVE)
+/// leaves: 2 % of the step at most in the tests below.
 ///
-/// The `forces` of the run are used where they can be; afterwards they are those of the last evaluation again. In single precision a step
-/// that is not `enough` is found again in double precision.
+/// The `forces` of the run are used where they can be; afterwards they are those of the last evaluation
+/// again. In single precision a step that is not `enough` is found again in double precision.
 pub(crate) fn limit_about<R: LaneNumber>(
     model: &Model,
     owners: &[[u32; 3]],
@@ -176,8 +181,8 @@ fn limit_or_enough<R: LaneNumber>(
     found.map_or(f64::NAN, |(eigenvalue, _)| step_of(eigenvalue))
 }
 
-/// The critical time step [s] by forces in single precision, if it is at least `enough` [s]; `None` also where round-off is too large for
-/// small differences.
+/// The critical time step [s] by forces in single precision, if it is at least `enough` [s]; `None` also
+/// where round-off is too large for small differences.
 fn limit_if_enough<R: LaneNumber>(
     model: &Model,
     owners: &[[u32; 3]],
@@ -198,12 +203,14 @@ fn limit_if_enough<R: LaneNumber>(
     (limit >= enough).then_some(limit)
 }
 
-/// Whether differences of one side will do: there are no fibres, which have two slopes where they are slack, and no search across walls.
+/// Whether differences of one side will do: there are no fibres, which have two slopes where they are slack,
+/// and no search across walls.
 fn is_smooth(model: &Model) -> bool {
     !has_search_across(model) && model.solids.iter().all(|solid| solid.material.law.is_isotropic())
 }
 
-/// Whether walls in plane stress are searched for their thickness, to a tolerance that small differences of a steep law show.
+/// Whether walls in plane stress are searched for their thickness, to a tolerance that small differences of a
+/// steep law show.
 fn has_search_across(model: &Model) -> bool {
     let is_searched =
         |solid: &Solid| matches!(solid.cells, Cells::Membrane(..)) && !solid.material.law.is_incompressible();
@@ -215,14 +222,15 @@ fn step_of(eigenvalue: f64) -> f64 {
     2.0 / eigenvalue.sqrt()
 }
 
-/// A difference has moves over its size, with their weights in the stiffness, and that size over the one of a cell. It is far from
-/// round-off and from the law's curvature.
+/// A difference has moves over its size, with their weights in the stiffness, and that size over the one of a
+/// cell. It is far from round-off and from the law's curvature.
 type Difference = (&'static [[f64; 2]], f64);
 /// This one takes the mean of two slopes.
 const CENTRAL: Difference = (&[[1.0, 0.5], [-1.0, -0.5]], 1e-6);
 /// This one starts from the forces of the state itself.
 const FORWARD: Difference = (&[[1.0, 1.0]], 1e-7);
-/// Both in single precision. A law that stiffens by e for each 1 % of strain is off by 1 % in the one of one side.
+/// Both in single precision. A law that stiffens by e for each 1 % of strain is off by 1 % in the one of one
+/// side.
 const CENTRAL_IN_SINGLE: Difference = (CENTRAL.0, 2e-3);
 const FORWARD_IN_SINGLE: Difference = (FORWARD.0, 2e-4);
 /// The most that rounding may take of a difference.
@@ -300,7 +308,8 @@ impl<'a, R: LaneNumber> Operator<'a, R> {
         Self { model, about, difference, forces, before, history, inverse_root_mass, displacement, calls: 0 }
     }
 
-    /// Applies it to a vector of which the largest component, over the root of its mass, is known; returns the product of both vectors.
+    /// Applies it to a vector of which the largest component, over the root of its mass, is known; returns
+    /// the product of both vectors.
     fn apply(&mut self, v: &[Vector<R>], largest: f64, out: &mut [Vector<R>]) -> f64 {
         let (moves, amplitude) = self.difference;
         let h = amplitude / largest;
@@ -347,7 +356,8 @@ enum Until {
     Decided(f64),
 }
 
-/// Largest eigenvalue by Lanczos, with its residual added, and the relative residual; `None` where the search was in vain.
+/// Largest eigenvalue by Lanczos, with its residual added, and the relative residual; `None` where the search
+/// was in vain.
 fn largest_eigenvalue<R: LaneNumber>(operator: &mut Operator<'_, R>, until: Until) -> Option<(f64, f64)> {
     let nodes = operator.inverse_root_mass.len();
     let mut v = start_vector(nodes, &operator.inverse_root_mass);
@@ -470,8 +480,8 @@ mod tests {
     use crate::forces::tests::{distorted_cube, laws};
     use crate::substeps::RESERVE;
 
-    /// Calls `check` with cubes of every element and of laws with and without fibres, also one that stiffens, free and held, and with uneven displacements that press
-    /// or shear them.
+    /// Calls `check` with cubes of every element and of laws with and without fibres, also one that stiffens,
+    /// free and held, and with uneven displacements that press or shear them.
     fn of_deformed_cubes(mut check: impl FnMut(&str, &Model, &[Vector<f64>])) {
         let pressed = Tensor([[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, -0.3]]);
         let sheared = Tensor([[0.0, 0.4, 0.0], [0.0; 3], [0.0; 3]]);
@@ -498,8 +508,9 @@ mod tests {
         }
     }
 
-    /// Both eigenvalues are right to the tolerance, so the steps differ by half of it, and slopes on one side add a little. A rough one is at
-    /// most [`ROUGH`] too large, as its residual is counted in, and it overlooks less than [`RESERVE`] leaves. Single precision adds 1e-3 at most.
+    /// Both eigenvalues are right to the tolerance, so the steps differ by half of it, and slopes on one side
+    /// add a little. A rough one is at most [`ROUGH`] too large, as its residual is counted in, and it
+    /// overlooks less than [`RESERVE`] leaves. Single precision adds 1e-3 at most.
     #[test]
     fn the_limit_of_a_run_is_the_critical_time_step() {
         of_deformed_cubes(|name, model, displacement| {
@@ -533,7 +544,8 @@ mod tests {
                     "{name}: {found} for {enough} in single precision"
                 );
             }
-            // Displacements of two metres are rounded to too much for the smaller differences, of a kilometre for all.
+            // Displacements of two metres are rounded to too much for the smaller differences, of a kilometre
+            // for all.
             let away = |far: f64| -> Vec<Vector<f32>> {
                 displacement.iter().map(|&u| cast(add(u, [far, 0.0, 0.0]))).collect()
             };
@@ -563,7 +575,8 @@ mod tests {
         found
     }
 
-    /// Beside a soft cell of a tenth of a millimetre, differences in cells of 0.1 m are below the round-off of single precision.
+    /// Beside a soft cell of a tenth of a millimetre, differences in cells of 0.1 m are below the round-off
+    /// of single precision.
     #[test]
     fn a_small_cell_that_is_not_critical_leaves_the_search_to_double_precision() {
         let mut model = distorted_cube("tet4", laws()[0]);

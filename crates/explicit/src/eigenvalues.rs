@@ -1,8 +1,9 @@
 //! Largest eigenvalues of small symmetric matrices, without a branch, so that many are found side by side.
 //!
-//! *Nine rows*: Householder's reflections leave a tridiagonal matrix. Laguerre's iteration finds the largest root of its characteristic
-//! polynomial; from above, all roots being real, it falls to that root and never below (Wilkinson, *The Algebraic Eigenvalue Problem*, 1965,
-//! ch. 7). *Three rows*: Newton's method finds the cosine of a third of an angle, from above.
+//! *Nine rows*: Householder's reflections leave a tridiagonal matrix. Laguerre's iteration finds the largest
+//! root of its characteristic polynomial; from above, all roots being real, it falls to that root and never
+//! below (Wilkinson, *The Algebraic Eigenvalue Problem*, 1965, ch. 7). *Three rows*: Newton's method finds
+//! the cosine of a third of an angle, from above.
 
 use pliant_mechanics::Number;
 use pliant_mechanics::tensor::{Symmetric, Vector, add, cross, dot, scale};
@@ -10,7 +11,8 @@ use pliant_mechanics::tensor::{Symmetric, Vector, add, cross, dot, scale};
 /// Rows of the matrix of a cell: three directions of displacement by three of its gradient.
 pub(crate) const ROWS: usize = 9;
 
-/// Turns of Laguerre's iteration. Near a simple root each cubes the error; a root met six times out of nine, the worst, leaves half of it.
+/// Turns of Laguerre's iteration. Near a simple root each cubes the error; a root met six times out of nine,
+/// the worst, leaves half of it.
 const TURNS_OF_LAGUERRE: usize = 9;
 /// Turns of Newton's method, from at most 8 % above a cosine.
 const TURNS_OF_NEWTON: usize = 4;

@@ -1,4 +1,5 @@
-//! The book of energies: what is summed over the nodes at an instant becomes work done so far, and is judged for balance.
+//! The book of energies: what is summed over the nodes at an instant becomes work done so far, and is judged
+//! for balance.
 
 use pliant_mechanics::Energies;
 use pliant_mechanics::model::Model;
@@ -15,9 +16,9 @@ pub fn balance_floor<R: LaneNumber>() -> f64 {
 /// A run whose energies are off by more than this fraction of the largest one ends …
 pub const BALANCE_LIMIT: f64 = 0.05;
 
-/// … once they are so for this many steps in a row. A shock unbalances the few steps in which the struck nodes move
-/// but their stress wave is not yet resolved; a stable vibration with more than 5 % of its energy in the step error
-/// (ωΔt > 0.45) passes through zero every seventh step; only a growing one stays.
+/// … once they are so for this many steps in a row. A shock unbalances the few steps in which the struck
+/// nodes move but their stress wave is not yet resolved; a stable vibration with more than 5 % of its energy
+/// in the step error (ωΔt > 0.45) passes through zero every seventh step; only a growing one stays.
 pub const BALANCE_STEPS: u32 = 20;
 
 /// Sums over the nodes at one instant [J], [W].
@@ -72,15 +73,17 @@ impl Work {
         (self.external, self.internal, self.at_start) = (kinetic + stored, stored, shock);
     }
 
-    /// Goes on with another model: a law that is stiffer at once strikes the body as a load would. The balance is judged again from when it
-    /// has held once. `gained` is the kinetic energy [J] of mass that came.
+    /// Goes on with another model: a law that is stiffer at once strikes the body as a load would. The
+    /// balance is judged again from when it has held once. `gained` is the kinetic energy [J] of mass that
+    /// came.
     pub fn shake(&mut self, gained: f64) {
         self.external += gained;
         (self.shaken, self.steps_off_balance) = (true, 0);
     }
 
-    /// Enters the sums of an instant, `before` seconds after the one before; `None` at the start. A change of the step length there adds
-    /// the energy `change` [J]. Judged above `floor`. What was entered before (`again`) is not entered twice.
+    /// Enters the sums of an instant, `before` seconds after the one before; `None` at the start. A change of
+    /// the step length there adds the energy `change` [J]. Judged above `floor`. What was entered before
+    /// (`again`) is not entered twice.
     pub fn settle(
         &mut self,
         sums: &Sums,
@@ -101,7 +104,8 @@ impl Work {
         self.pending_change = change;
         let internal = self.internal - hourglass;
         self.largest = self.largest.max(sums.kinetic).max(internal).max(self.external.abs());
-        // Left is ⅛ Δt⁻² Σ m|a|² of now: small where the step resolves the motion, growing where it is unstable.
+        // Left is ⅛ Δt⁻² Σ m|a|² of now: small where the step resolves the motion, growing where it is
+        // unstable.
         let missing = if before.is_none() {
             0.0
         } else {
@@ -132,8 +136,8 @@ impl Work {
         self.step_changes += self.pending_change;
     }
 
-    /// Goes on over whole instants at once, each `step` seconds after the one before, from those sums of theirs: internal
-    /// and external work [J] and damping power [W].
+    /// Goes on over whole instants at once, each `step` seconds after the one before, from those sums of
+    /// theirs: internal and external work [J] and damping power [W].
     pub fn pass_over(&mut self, internal: f64, external: f64, damping_power: f64, step: f64) {
         self.internal += internal;
         self.external += external;

@@ -1,9 +1,10 @@
-//! Checks of the critical time step that can be passed over. A check ranks all cells and finds the stiffest modes of some, which takes longer than a
-//! step, so only those are made that can cut steps otherwise.
+//! Checks of the critical time step that can be passed over. A check ranks all cells and finds the stiffest
+//! modes of some, which takes longer than a step, so only those are made that can cut steps otherwise.
 //!
-//! From one check to the next, steps keep their parts while the limit stays in a band. The rate at which it changed says when it leaves the
-//! band; up to half of the way there checks are passed over, and near the edge every one is made. Not foreseen: a limit that falls while
-//! neither the least J nor the largest stretch changes by [`CALM`], within [`LONGEST`] steps.
+//! From one check to the next, steps keep their parts while the limit stays in a band. The rate at which it
+//! changed says when it leaves the band; up to half of the way there checks are passed over, and near the
+//! edge every one is made. Not foreseen: a limit that falls while neither the least J nor the largest stretch
+//! changes by [`CALM`], within [`LONGEST`] steps.
 
 use serde::{Deserialize, Serialize};
 
@@ -64,7 +65,8 @@ impl Foresight {
 mod tests {
     use super::*;
 
-    /// A limit that falls evenly through the band of whole steps: checks grow rare in the band and frequent at its edge, where none is missed.
+    /// A limit that falls evenly through the band of whole steps: checks grow rare in the band and frequent
+    /// at its edge, where none is missed.
     #[test]
     fn a_limit_that_leaves_its_band_is_checked_there() {
         let (step, flat) = (0.9, Deformed::default());

@@ -1,13 +1,16 @@
-//! Numbers side by side: kernels written once, generic over [`Lanes`], run sixteen, eight or four cells at a time.
+//! Numbers side by side: kernels written once, generic over [`Lanes`], run sixteen, eight or four cells at a
+//! time.
 //!
-//! Data lie in packs of [`PACK`] numbers whatever the width, so that files and results do not depend on it. The CPU
-//! is queried when a force field is made, by checks of the critical time step and by the recovery of fields: AVX-512 (with the feature `avx512`; 16 numbers in single, 8 in
-//! double precision), AVX2 with FMA (8, 4), SSE4.2 or NEON (4, 2); without any of them the kernels run in plain numbers. Nobody needs
-//! `target-cpu=native`; `CentralDifference::in_lanes` chooses other instructions for forces and nodes. Lanes never mix: with AVX-512 and AVX2 results are the same to the bit
-//! (tested for every law and element in `forces/tests.rs`), elsewhere to round-off.
+//! Data lie in packs of [`PACK`] numbers whatever the width, so that files and results do not depend on it.
+//! The CPU is queried when a force field is made, by checks of the critical time step and by the recovery of
+//! fields: AVX-512 (with the feature `avx512`; 16 numbers in single, 8 in double precision), AVX2 with FMA
+//! (8, 4), SSE4.2 or NEON (4, 2); without any of them the kernels run in plain numbers. Nobody needs
+//! `target-cpu=native`; `CentralDifference::in_lanes` chooses other instructions for forces and nodes. Lanes
+//! never mix: with AVX-512 and AVX2 results are the same to the bit (tested for every law and element in
+//! `forces/tests.rs`), elsewhere to round-off.
 //!
-//! This file holds all `unsafe` code of the crate: registers read from and written to arrays, and nodes of a block read and written
-//! without a comparison each, since all are compared once.
+//! This file holds all `unsafe` code of the crate: registers read from and written to arrays, and nodes of a
+//! block read and written without a comparison each, since all are compared once.
 #![allow(unsafe_code)]
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Range, Sub, SubAssign};
@@ -132,7 +135,8 @@ pub(crate) fn store_symmetric<R: LaneNumber, L: Lanes<R>>(
     }
 }
 
-/// Work that is written for any lanes. Every function that it calls must be `#[inline(always)]`, or it is not compiled for these instructions.
+/// Work that is written for any lanes. Every function that it calls must be `#[inline(always)]`, or it is not
+/// compiled for these instructions.
 pub trait LaneWork<R> {
     /// What comes out.
     type Output;
@@ -267,20 +271,24 @@ impl<R: LaneNumber, W: LaneWork<R>> WithSimd for InLanes<R, W> {
     }
 }
 
-/// The proof that the processor has the instructions of `S`, out of thin air: `Lanes` have no room to carry it.
+/// The proof that the processor has the instructions of `S`, out of thin air: `Lanes` have no room to carry
+/// it.
 ///
 /// # Safety
-/// Only where `S` has been detected. All uses are in methods of the wide types below. Their values and functions are
-/// reached through [`LaneNumber::Wide`] alone, which nothing but [`InLanes`] names, and `InLanes` is handed the proof.
+/// Only where `S` has been detected. All uses are in methods of the wide types below. Their values and
+/// functions are reached through [`LaneNumber::Wide`] alone, which nothing but [`InLanes`] names, and
+/// `InLanes` is handed the proof.
 #[inline(always)]
 unsafe fn proof<S: Simd>() -> S {
     const { assert!(size_of::<S>() == 0) };
-    // SAFETY: a type without size has one value, and no bytes of it are read; that the proof holds is the caller's.
+    // SAFETY: a type without size has one value, and no bytes of it are read; that the proof holds is the
+    // caller's.
     unsafe { std::mem::transmute_copy(&()) }
 }
 
-/// Where packs of cells have their nodes in an array of vectors of their block. Numbers are kept as offsets, which the processor adds to an
-/// address without a shift, and the largest of a block is found once for all steps: a comparison for each access costs a tet 1 ns of 9.
+/// Where packs of cells have their nodes in an array of vectors of their block. Numbers are kept as offsets,
+/// which the processor adds to an address without a shift, and the largest of a block is found once for all
+/// steps: a comparison for each access costs a tet 1 ns of 9.
 pub(crate) struct Places<R, const N: usize> {
     /// In [`Unit`]s, multiples of a vector.
     offsets: Vec<[[u16; PACK]; N]>,
@@ -305,7 +313,8 @@ impl<R: LaneNumber, const N: usize> Places<R, N> {
         units::<R>() * packs * PACK * N <= 1 << 16
     }
 
-    /// From the numbers of the nodes of packs of cells, and how many packs a block has: not more than [they reach](Self::can_number).
+    /// From the numbers of the nodes of packs of cells, and how many packs a block has: not more than
+    /// [they reach](Self::can_number).
     pub(crate) fn new(packs: impl Iterator<Item = [[u16; PACK]; N]>, per_block: usize) -> Self {
         let offset = |place: u16| place * units::<R>() as u16;
         let offsets: Vec<_> = packs.map(|pack| pack.map(|places| places.map(offset))).collect();
@@ -359,7 +368,8 @@ impl<R: LaneNumber, const N: usize> Local<'_, R, N> {
         unsafe { L::gather(self.vectors, &self.offsets[pack][node], at) }
     }
 
-    /// Adds the vectors of a pack of cells, as [`Lanes::spread`] has written them, to the sums of their nodes, cell by cell.
+    /// Adds the vectors of a pack of cells, as [`Lanes::spread`] has written them, to the sums of their
+    /// nodes, cell by cell.
     #[inline(always)]
     pub(crate) fn add<L: Lanes<R>>(&mut self, pack: usize, vectors: &[Pack<[R; 4]>; N]) {
         let offsets = &self.offsets[pack];
@@ -376,7 +386,8 @@ impl<R: LaneNumber, const N: usize> Local<'_, R, N> {
         }
     }
 
-    /// Adds a number of each cell of a pack to the first component of the sums of all its nodes, cell by cell.
+    /// Adds a number of each cell of a pack to the first component of the sums of all its nodes, cell by
+    /// cell.
     #[inline(always)]
     pub(crate) fn add_number(&mut self, pack: usize, numbers: &Pack<R>) {
         let offsets = &self.offsets[pack];
@@ -416,8 +427,9 @@ pub(crate) fn plus<R: LaneNumber>(a: [R; 4], b: [R; 4]) -> [R; 4] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
 }
 
-/// Which lane a row of four numbers becomes where pulp turns four registers full of rows into components: the row at
-/// `place` among the `rows` of a register. Rows are loaded in this order, so that lanes come out in theirs.
+/// Which lane a row of four numbers becomes where pulp turns four registers full of rows into components: the
+/// row at `place` among the `rows` of a register. Rows are loaded in this order, so that lanes come out in
+/// theirs.
 const fn single_lane(_rows: usize, register: usize, place: usize) -> usize {
     4 * place + register
 }
@@ -459,7 +471,8 @@ macro_rules! wide {
                 Self(unsafe { std::mem::transmute_copy(&[value; PACK]) })
             }
 
-            /// Which lane a row of four numbers becomes where four registers full of rows are turned into components.
+            /// Which lane a row of four numbers becomes where four registers full of rows are turned into
+            /// components.
             #[inline(always)]
             const fn lane_of_row(row: usize) -> usize {
                 let per_register = Self::WIDTH.div_ceil(4);
@@ -516,7 +529,8 @@ macro_rules! wide {
                 let [a, b, c, d] = components;
                 let registers = Self::simd().$interleave([a.0, b.0, c.0, d.0]);
                 let rows = &mut to.0[at..at + Self::WIDTH];
-                // SAFETY: vectors are plain numbers (`Pod`), four of them as long as the rows; their alignment is not asked for.
+                // SAFETY: vectors are plain numbers (`Pod`), four of them as long as the rows; their
+                // alignment is not asked for.
                 unsafe { std::ptr::write_unaligned(rows.as_mut_ptr().cast(), registers) };
             }
             #[inline(always)]
@@ -547,7 +561,8 @@ macro_rules! wide {
             }
             #[inline(always)]
             fn inverse_cbrt(self) -> Self {
-                // As in plain numbers; a third of the bits is their sum over 4, 16, 64, … in words of 32 bits each.
+                // As in plain numbers; a third of the bits is their sum over 4, 16, 64, … in words of 32 bits
+                // each.
                 let simd = Self::simd();
                 let bits: S::u32s = pulp::cast(self.0);
                 let over = |bits, power| simd.wrapping_dyn_shr_u32s(bits, simd.splat_u32s(power));

@@ -1,5 +1,5 @@
-//! The nodes of a step: their increments from the forces of an instant, what prescribed ones take to move, and the sums of which energies
-//! come.
+//! The nodes of a step: their increments from the forces of an instant, what prescribed ones take to move,
+//! and the sums of which energies come.
 
 use pliant_mechanics::model::{Amplitudes, FREE, component, placed};
 use pliant_mechanics::tensor::Vector;
@@ -82,7 +82,8 @@ impl<R: LaneNumber> Pace<R> {
     }
 }
 
-/// A pass over the nodes from `first` on: the coming increments, reactions and sums, and the internal forces where these are kept.
+/// A pass over the nodes from `first` on: the coming increments, reactions and sums, and the internal forces
+/// where these are kept.
 pub(crate) struct NodePass<'a, R> {
     pub(crate) first: usize,
     pub(crate) pace: Pace<R>,
@@ -107,8 +108,9 @@ pub(crate) struct NodePass<'a, R> {
 impl<R: LaneNumber> LaneWork<R> for NodePass<'_, R> {
     type Output = Sums;
 
-    /// Plain loops over a block of components, which the compiler makes wide. Each loop goes over a whole block. Numbers that were written
-    /// one by one have then left the processor's queue, or a wide read would wait for them.
+    /// Plain loops over a block of components, which the compiler makes wide. Each loop goes over a whole
+    /// block. Numbers that were written one by one have then left the processor's queue, or a wide read would
+    /// wait for them.
     #[inline(always)]
     fn run<L: Lanes<R>>(self) -> Sums {
         const { assert!(CHUNK.is_multiple_of(BLOCK) && BLOCK.is_multiple_of(LANES)) };
@@ -246,7 +248,8 @@ impl<R: LaneNumber> Block<R> {
         }
     }
 
-    /// The increment and the reaction [N] of a component whose displacement [m] is prescribed now and after the step.
+    /// The increment and the reaction [N] of a component whose displacement [m] is prescribed now and after
+    /// the step.
     #[inline(always)]
     fn prescribe(
         &self,
@@ -263,8 +266,9 @@ impl<R: LaneNumber> Block<R> {
         (next, inertia + self.internal[node][c] + self.damping[node][c] - self.external[node][c])
     }
 
-    /// Adds kinetic energy, damping power and the halves of the internal work to sums kept apart by lane. The products of
-    /// three components are summed as they come, in the precision of the forces; all else in double precision.
+    /// Adds kinetic energy, damping power and the halves of the internal work to sums kept apart by lane. The
+    /// products of three components are summed as they come, in the precision of the forces; all else in
+    /// double precision.
     #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     fn add_motion(

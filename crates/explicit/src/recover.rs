@@ -1,5 +1,5 @@
-//! Fields recovered from a state: strains, stresses and energies of the cells, in double precision. Points of solid cells are taken a pack at a
-//! time, in lanes; triangles of membranes and bars one by one.
+//! Fields recovered from a state: strains, stresses and energies of the cells, in double precision. Points of
+//! solid cells are taken a pack at a time, in lanes; triangles of membranes and bars one by one.
 
 use std::array::from_fn;
 
@@ -24,7 +24,8 @@ use crate::state::State;
 pub struct CellFields {
     /// Deformation gradient F (mean over the cell).
     pub gradient: Tensor<f64>,
-    /// J that the volumetric part of the law sees, to which its pressure belongs: det F, or the average that the element takes.
+    /// J that the volumetric part of the law sees, to which its pressure belongs: det F, or the average that
+    /// the element takes.
     pub volume_ratio: f64,
     /// The cell's own det F (mean over the cell).
     pub cell_volume_ratio: f64,
@@ -34,8 +35,9 @@ pub struct CellFields {
     pub pk2_stress: Symmetric<f64>,
     /// Cauchy stress [Pa].
     pub cauchy_stress: Symmetric<f64>,
-    /// Strain energy per reference volume [J/m³] of the instantaneous elastic law; its volumetric part is that of the averages
-    /// that the element takes, so that Σ V ψ is the energy that the forces are the gradient of.
+    /// Strain energy per reference volume [J/m³] of the instantaneous elastic law; its volumetric part is
+    /// that of the averages that the element takes, so that Σ V ψ is the energy that the forces are the
+    /// gradient of.
     pub energy_density: f64,
     /// Unit fibre at rest; `None` if the law has none.
     pub fibre: Option<Vector<f64>>,
@@ -68,8 +70,9 @@ impl CellFields {
     }
 }
 
-/// Fields of the cells of a state. The history of a relaxing law belongs to the last evaluated instant: ask between
-/// [`evaluate`](crate::CentralDifference::evaluate) and [`advance`](crate::CentralDifference::advance).
+/// Fields of the cells of a state. The history of a relaxing law belongs to the last evaluated instant: ask
+/// between [`evaluate`](crate::CentralDifference::evaluate) and
+/// [`advance`](crate::CentralDifference::advance).
 pub struct Recovery<'a, R> {
     model: &'a Model,
     state: &'a State<R>,
@@ -111,7 +114,8 @@ impl<'a, R: LaneNumber> Recovery<'a, R> {
         Self { model, state, averages: averages.collect() }
     }
 
-    /// Σ V ψ over all cells [J], without what hourglass control holds. The number of threads never changes a bit.
+    /// Σ V ψ over all cells [J], without what hourglass control holds. The number of threads never changes a
+    /// bit.
     pub fn stored_energy(&self) -> f64 {
         let of_solid = |(index, solid): (usize, &Solid)| {
             let densities = self.numbers(index, 1, |_, fields, to| to[0] = fields.energy_density);
@@ -120,7 +124,8 @@ impl<'a, R: LaneNumber> Recovery<'a, R> {
         self.model.solids.iter().enumerate().map(of_solid).sum()
     }
 
-    /// `width` numbers of each cell of a solid, which `of` writes from its number and fields: fields of all cells would take a lot of memory.
+    /// `width` numbers of each cell of a solid, which `of` writes from its number and fields: fields of all
+    /// cells would take a lot of memory.
     pub fn numbers(
         &self,
         solid: usize,
@@ -298,7 +303,8 @@ impl Found {
     }
 }
 
-/// Evaluates a law at a pack of points. Not generic, so that laws are compiled here and not again in every crate that recovers fields.
+/// Evaluates a law at a pack of points. Not generic, so that laws are compiled here and not again in every
+/// crate that recovers fields.
 fn at_points(law: &AnyLaw, given: &Given, found: &mut Found) {
     with_law!(law, law => Processor::detect().run(AtPoints { law: *law, given, found }));
 }
@@ -415,8 +421,8 @@ fn membrane_fields(
     }
 }
 
-/// Fields of a bar: its stress is force over the cross section at rest, in space, and its strains are along it. They know nothing of
-/// its thickness.
+/// Fields of a bar: its stress is force over the cross section at rest, in space, and its strains are along
+/// it. They know nothing of its thickness.
 fn bar_fields(
     solid: &Solid,
     rest: &Rest<2>,

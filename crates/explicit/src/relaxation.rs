@@ -1,4 +1,5 @@
-//! The coefficients of a Prony series ([`pliant_mechanics::prony`]) for one step size, and histories advanced by them in lanes.
+//! The coefficients of a Prony series ([`pliant_mechanics::prony`]) for one step size, and histories advanced
+//! by them in lanes.
 
 use pliant_mechanics::law::Split;
 use pliant_mechanics::prony::{Prony, PronyUpdate};
@@ -40,8 +41,8 @@ impl<R: LaneNumber> Series<R> {
         }
     }
 
-    /// S of one part, and its history advanced in place; `history` is Φⁿ⁻¹ followed by one h per term, each with as many
-    /// packs as S has components.
+    /// S of one part, and its history advanced in place; `history` is Φⁿ⁻¹ followed by one h per term, each
+    /// with as many packs as S has components.
     #[inline(always)]
     fn advance<L: Lanes<R>, const C: usize>(
         &self,
@@ -100,8 +101,8 @@ impl<R: LaneNumber> Relaxation<R> {
         self.volumetric.set_step(&prony.volumetric, prony.update, step);
     }
 
-    /// The isochoric stress [Pa] at the end of the step; `history` has [`Prony::isochoric_slots`] × 6 packs, of which the
-    /// lanes from `at` on are advanced.
+    /// The isochoric stress [Pa] at the end of the step; `history` has [`Prony::isochoric_slots`] × 6 packs,
+    /// of which the lanes from `at` on are advanced.
     #[inline(always)]
     pub(crate) fn advance_isochoric<L: Lanes<R>>(
         &self,

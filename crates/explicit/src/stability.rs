@@ -1,36 +1,43 @@
-//! The critical time step of a deformed state, monitored during a run. A run takes 0.9 of that at rest. It is that of
-//! the assembled model, 2/ω_max, where nothing else is said.
+//! The critical time step of a deformed state, monitored during a run. A run takes 0.9 of that at rest. It is
+//! that of the assembled model, 2/ω_max, where nothing else is said.
 //!
 //! A cell's own limit is Δt_e = 2/√(λ_e n/(ρV)) with λ_e the largest eigenvalue of its current stiffness
-//! (`tangent.rs`); no assembly moves faster than its fastest cell alone (Irons and Treharne). From the critical
-//! time step L of a reference state, at first rest, the current limit is estimated cell by cell: Δt_cr ≈ min_e max(Δt_e, L r_e).
-//! r_e² is the stiffness of the cell in the reference state over the current one, the smaller of two ratios: over all
-//! modes, and over plane waves n⊗y. The first ratio alone misses a compression along one axis, as does any bound V M Σ|b_a|²:
-//! on the glued cube it stays at 0.94 where the critical time step falls to 0.83. A cell slower than the assembly thus counts with its own
-//! limit, and one that the assembly holds back, with its change. Compared with the critical time step of deformed bodies, the estimate is 0 to
-//! 25 % too small; with fibres that carry tension only, whose stiffness jumps at rest, up to 4.3 % too large:
-//! `lab/validation/tests/stability.rs`.
+//! (`tangent.rs`); no assembly moves faster than its fastest cell alone (Irons and Treharne). From the
+//! critical time step L of a reference state, at first rest, the current limit is estimated cell by cell:
+//! Δt_cr ≈ min_e max(Δt_e, L r_e). r_e² is the stiffness of the cell in the reference state over the current
+//! one, the smaller of two ratios: over all modes, and over plane waves n⊗y. The first ratio alone misses a
+//! compression along one axis, as does any bound V M Σ|b_a|²: on the glued cube it stays at 0.94 where the
+//! critical time step falls to 0.83. A cell slower than the assembly thus counts with its own limit, and one
+//! that the assembly holds back, with its change. Compared with the critical time step of deformed bodies,
+//! the estimate is 0 to 25 % too small; with fibres that carry tension only, whose stiffness jumps at rest,
+//! up to 4.3 % too large: `lab/validation/tests/stability.rs`.
 //!
-//! *When.* Every [`CHECK_EVERY`] steps, and at once where the least J or the largest stretch √(1 + |C − I|) has changed by [`CHANGE`]. The
-//! force pass finds both at no cost. Checks that leave the parts as they are, as far as can be foreseen, are passed over (`foresight.rs`).
+//! *When.* Every [`CHECK_EVERY`] steps, and at once where the least J or the largest stretch √(1 + |C − I|)
+//! has changed by [`CHANGE`]. The force pass finds both at no cost. Checks that leave the parts as they are,
+//! as far as can be foreseen, are passed over (`foresight.rs`).
 //!
-//! *Which cells.* Stiffness is computed for the first cells of two cheap orders, one by an isotropic guess of their speed
-//! and one by stretch: 18 stresses and the eigenvalue problems, a pack of cells at a time, cost more than steps of these cells.
-//! Averaged tets and full hexes are taken at their mean deformation with a pressure of their own. Hourglass control counts with its current
-//! factor. Loads that follow the surface do not count.
+//! *Which cells.* Stiffness is computed for the first cells of two cheap orders, one by an isotropic guess of
+//! their speed and one by stretch: 18 stresses and the eigenvalue problems, a pack of cells at a time, cost
+//! more than steps of these cells. Averaged tets and full hexes are taken at their mean deformation with a
+//! pressure of their own. Hourglass control counts with its current factor. Loads that follow the surface do
+//! not count.
 //!
-//! *Then.* If the estimate would change the steps, the critical time step of the current state is computed, by Lanczos' iteration of many force
-//! evaluations, and the current state becomes the reference. This happens once in [`REFERENCE_EVERY`] steps at most, and always before
-//! [`OnUnstable::Stop`] ends a run. If a part of a step takes more than [`KEEP`] of the limit, whole steps are cut into equal parts that
-//! take [`RESERVE`] at most. Fewer parts are used again once they have kept this reserve for [`REJOIN_AFTER`] steps: a vibrating body would be
-//! cut and rejoined in each period, at phases that add energy. Velocities continue (formula in `stepper.rs`), and
-//! relaxing laws take coefficients of the new length. Observers, checkpoints and step counts see whole steps only.
+//! *Then.* If the estimate would change the steps, the critical time step of the current state is computed,
+//! by Lanczos' iteration of many force evaluations, and the current state becomes the reference. This happens
+//! once in [`REFERENCE_EVERY`] steps at most, and always before [`OnUnstable::Stop`] ends a run. If a part of
+//! a step takes more than [`KEEP`] of the limit, whole steps are cut into equal parts that take [`RESERVE`]
+//! at most. Fewer parts are used again once they have kept this reserve for [`REJOIN_AFTER`] steps: a
+//! vibrating body would be cut and rejoined in each period, at phases that add energy. Velocities continue
+//! (formula in `stepper.rs`), and relaxing laws take coefficients of the new length. Observers, checkpoints
+//! and step counts see whole steps only.
 //!
-//! *Halvings.* A run that fails all the same can go back to an earlier state and [halve its steps](State::halve_steps): whole steps are then cut
-//! into parts of at most ½, ¼ or ⅛ of their length for good.
+//! *Halvings.* A run that fails all the same can go back to an earlier state and
+//! [halve its steps](State::halve_steps): whole steps are then cut into parts of at most ½, ¼ or ⅛ of their
+//! length for good.
 //!
-//! The state holds all that monitoring needs to resume ([`Stability`] and [`State::reference`]). Stiffnesses in the reference state are computed
-//! from it again, so a resumed run has the same bits. A new reference allocates memory; nothing else in a step does.
+//! The state holds all that monitoring needs to resume ([`Stability`] and [`State::reference`]). Stiffnesses
+//! in the reference state are computed from it again, so a resumed run has the same bits. A new reference
+//! allocates memory; nothing else in a step does.
 
 use pliant_mechanics::Number;
 use pliant_mechanics::law::plane_stress::InPlane;
@@ -73,7 +80,8 @@ pub enum OnUnstable {
     Report,
 }
 
-/// Watches the largest stable step of a model. Holds constants and scratch, and what follows from the reference.
+/// Watches the largest stable step of a model. Holds constants and scratch, and what follows from the
+/// reference.
 pub struct Monitor {
     on_unstable: OnUnstable,
     solids: Vec<Watch>,
@@ -89,13 +97,17 @@ struct Watch {
     reference: Vec<Option<Stiffness>>,
     /// λ of hourglass control alone at rest, over V [Pa/m²].
     hourglass: Vec<f64>,
-    /// Σ B_a ⊗ B_a [1/m²] of packs of cells, as [`gradient_square_of`]: found once, a check would spend much of its time there.
+    /// Σ B_a ⊗ B_a [1/m²] of packs of cells, as [`gradient_square_of`]: found once, a check would spend much
+    /// of its time there.
     square: Vec<Symmetric<Pack<f64>>>,
-    /// 1/(|G| (λ+2μ) max(Δt_e, L)²) with the element bound Δt_e at rest: brings the guesses of all cells to one scale.
+    /// 1/(|G| (λ+2μ) max(Δt_e, L)²) with the element bound Δt_e at rest: brings the guesses of all cells to
+    /// one scale.
     weight: Vec<f64>,
-    /// The cells with their [ranks](ranked) in two orders; once they are picked, those that stand first come first.
+    /// The cells with their [ranks](ranked) in two orders; once they are picked, those that stand first come
+    /// first.
     order: [Vec<u64>; 2],
-    /// The cells that are checked closely, those of the first order before those of the second, their limits [s] and references.
+    /// The cells that are checked closely, those of the first order before those of the second, their limits
+    /// [s] and references.
     picked: Vec<u32>,
     found: Vec<(f64, Stiffness)>,
 }
@@ -125,7 +137,8 @@ impl Monitor {
         self.reference = reference;
     }
 
-    /// Whether an estimate needs the critical time step: it asks for other than whole steps, and the last one is long past.
+    /// Whether an estimate needs the critical time step: it asks for other than whole steps, and the last one
+    /// is long past.
     pub(crate) fn doubts<R>(&self, state: &State<R>, limit: f64, step: f64, now: u32) -> bool {
         let rested = state
             .stability
@@ -138,8 +151,9 @@ impl Monitor {
         }
     }
 
-    /// The limit of a deformed state: the estimate [s], the solid and the cell that set it; `None` without cells or
-    /// where no cell's stiffness is a number. `reference` is the state whose critical time step is known.
+    /// The limit of a deformed state: the estimate [s], the solid and the cell that set it; `None` without
+    /// cells or where no cell's stiffness is a number. `reference` is the state whose critical time step is
+    /// known.
     pub fn limit<R: LaneNumber>(
         &mut self,
         model: &Model,
@@ -179,8 +193,8 @@ impl Monitor {
     }
 }
 
-/// A rank and its cell as one number, which is less for a larger rank; of equal ranks, in single precision, for a lower cell. So the choice
-/// does not depend on what came before.
+/// A rank and its cell as one number, which is less for a larger rank; of equal ranks, in single precision,
+/// for a lower cell. So the choice does not depend on what came before.
 fn ranked(rank: f64, cell: u32) -> u64 {
     let bits = (rank as f32).to_bits();
     // Of negative numbers all bits count down, of others the sign stands above.
@@ -318,8 +332,8 @@ fn smallest(found: &[(f64, Stiffness)], cells: &[u32]) -> Option<(f64, usize)> {
     limits.map(finite).fold(None, smaller)
 }
 
-/// The limit [s] of a cell alone in a deformed state, Δt_e above: no assembly is unstable at the smallest one. Displacements
-/// [m], one per node.
+/// The limit [s] of a cell alone in a deformed state, Δt_e above: no assembly is unstable at the smallest
+/// one. Displacements [m], one per node.
 pub fn cell_limit<R: LaneNumber>(
     model: &Model,
     solid: usize,
@@ -396,15 +410,16 @@ fn gradient_square_of(solid: &Solid, cell: usize) -> Symmetric<f64> {
     }
 }
 
-/// ∂u/∂X, the mean over the cell; of a membrane in the frame of the triangle, thinned as if it kept its volume.
+/// ∂u/∂X, the mean over the cell; of a membrane in the frame of the triangle, thinned as if it kept its
+/// volume.
 #[inline(always)]
 fn displacement_gradient<R: LaneNumber>(
     solid: &Solid,
     cell: usize,
     displacement: &[Vector<R>],
 ) -> Tensor<f64> {
-    // Four columns at once, of which the last has no meaning. Behind the gradient of each node but the last there is another one to read, so
-    // the last is the origin.
+    // Four columns at once, of which the last has no meaning. Behind the gradient of each node but the last
+    // there is another one to read, so the last is the origin.
     let mut rows = [[0.0; 4]; 3];
     with_cells!(&solid.cells, block => {
         let ([nodes @ .., last], gradient) = (&block.nodes[cell], block.rest[cell].gradient.as_flattened());
@@ -483,7 +498,8 @@ impl<R: LaneNumber> LaneWork<f64> for Ranks<'_, R> {
             let change = h.trace() + h.second_invariant() + h.determinant();
             let j = L::ONE + change;
             let mean = c.trace() * L::of(1.0 / 3.0);
-            // κ J² + |p| J, and the rest of λ + 2μ grown with the mean squared stretch (spec of the current bound).
+            // κ J² + |p| J, and the rest of λ + 2μ grown with the mean squared stretch (spec of the current
+            // bound).
             let modulus = bulk * j * (j + change.max(-change)) + (rest - bulk) * mean;
             // |G C⁻¹| over |G|: how much closer the deformed faces lie, the closest pair counting most.
             let closeness = product_square(&square, &(c.cofactor() * (L::ONE / (j * j)))).sqrt();

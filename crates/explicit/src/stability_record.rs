@@ -9,8 +9,8 @@ use crate::forces::Deformed;
 use crate::foresight::Foresight;
 use crate::substeps::{MOST_HALVINGS, MOST_SUBSTEPS};
 
-/// How a run cuts its steps, and the limits that its checks found. The state holds this record, so a copy of the state continues with the
-/// same bits.
+/// How a run cuts its steps, and the limits that its checks found. The state holds this record, so a copy of
+/// the state continues with the same bits.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stability {
     /// Parts of the step under way, or of the last one.
@@ -47,9 +47,11 @@ pub struct Stability {
     pub halvings: u32,
     /// Steps done when the limit last asked for as many parts as there are.
     pub(crate) needed_at: u64,
-    /// Ratio of the last two steps, by which internal forces are extrapolated; none before the first force is known.
+    /// Ratio of the last two steps, by which internal forces are extrapolated; none before the first force is
+    /// known.
     pub(crate) extrapolation: Option<f64>,
-    /// The last critical time step and the steps done then; its state is [`State::reference`](crate::State::reference).
+    /// The last critical time step and the steps done then; its state is
+    /// [`State::reference`](crate::State::reference).
     pub(crate) reference: Option<(f64, u64)>,
     /// Deformation at the last check.
     pub(crate) deformed: Deformed,
@@ -105,8 +107,8 @@ impl Stability {
             && self.last.iter().chain(&self.smallest).all(known)
     }
 
-    /// Factors of the damping forces after a step of `before` [s], where the highest modes are dissipated or not, with damping by stiffness [s];
-    /// all zero before the first force is known.
+    /// Factors of the damping forces after a step of `before` [s], where the highest modes are dissipated or
+    /// not, with damping by stiffness [s]; all zero before the first force is known.
     pub fn damping_factors(&self, dissipates: bool, damping: f64, before: f64) -> DampingFactors {
         let dissipation = if dissipates { DISSIPATION } else { 0.0 };
         let known =

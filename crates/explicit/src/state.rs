@@ -25,7 +25,8 @@ pub struct State<R> {
     pub displacement: Vec<Vector<R>>,
     /// The last increments, u − u one step before [m].
     pub increment: Vec<Vector<R>>,
-    /// Internal forces [N] at the last two instants, the later ones first; empty where no stepper damps by them.
+    /// Internal forces [N] at the last two instants, the later ones first; empty where no stepper damps by
+    /// them.
     pub forces: [Vec<Vector<R>>; 2],
     /// History of each solid.
     pub history: Vec<History<R>>,
@@ -33,7 +34,8 @@ pub struct State<R> {
     pub work: Work,
     /// How steps are cut, and what was seen of the largest stable one.
     pub stability: Stability,
-    /// Displacements [m] of the state whose critical time step is known, at first rest; see [`Monitor`](crate::stability::Monitor).
+    /// Displacements [m] of the state whose critical time step is known, at first rest; see
+    /// [`Monitor`](crate::stability::Monitor).
     pub reference: Vec<Vector<R>>,
     /// Tools and jaws that were driven from outside, by their place among the rigid things of the contacts.
     pub driven: Vec<(u32, Leg)>,
@@ -43,8 +45,8 @@ pub struct State<R> {
     pub gripped: Vec<Gripped>,
     /// Nodes that touch something, increasing, with how far each has slid on it since its touch began [m].
     pub slip: Vec<(u32, f64)>,
-    /// Whether forces were found at the instant: their work is then entered, laws have relaxed to it, and the limit of the step is known.
-    /// Who finds them again enters nothing twice.
+    /// Whether forces were found at the instant: their work is then entered, laws have relaxed to it, and the
+    /// limit of the step is known. Who finds them again enters nothing twice.
     pub evaluated: bool,
 }
 
@@ -61,7 +63,8 @@ pub struct Work {
     pub step_changes: f64,
     /// Running maximum of kinetic energy, internal and |external| work.
     pub largest: f64,
-    /// ⅛ Δt² Σ m|a|² at the start, which the mean velocity of the method keeps from the kinetic energy from then on.
+    /// ⅛ Δt² Σ m|a|² at the start, which the mean velocity of the method keeps from the kinetic energy from
+    /// then on.
     pub(crate) at_start: f64,
     /// Steps in a row that were off balance.
     #[serde(deserialize_with = "count::read")]
@@ -78,7 +81,8 @@ pub struct Work {
     pub(crate) damping_power: f64,
 }
 
-/// Puts nodes with a prescribed mean or around a prescribed volume where they are at time 0, by displacements [m].
+/// Puts nodes with a prescribed mean or around a prescribed volume where they are at time 0, by displacements
+/// [m].
 fn place_collective(model: &Model, own: &Constraint, owners: &[[u32; 3]], displacement: &mut [Vector<f64>]) {
     let missing = own.missing_mean(0.0, |node| displacement[node as usize]);
     for &node in &own.nodes {
@@ -108,8 +112,8 @@ fn place_collective(model: &Model, own: &Constraint, owners: &[[u32; 3]], displa
 }
 
 impl<R: LaneNumber> State<R> {
-    /// At rest at time 0, prescribed nodes and all that follows them where their motion starts. Nodes of a mean shift together, those around a
-    /// prescribed volume along its gradient.
+    /// At rest at time 0, prescribed nodes and all that follows them where their motion starts. Nodes of a
+    /// mean shift together, those around a prescribed volume along its gradient.
     pub fn at_rest(model: &Model) -> Self {
         let mut displacement = vec![[0.0; 3]; model.node_count()];
         if let Ok(owners) = model.constrained_components() {
@@ -169,8 +173,9 @@ impl<R: LaneNumber> State<R> {
         self.driven.push((rigid as u32, leg));
     }
 
-    /// Brings it from a model to another one of the same mesh, after a (sub)step of a length [s]: displacements, velocities and what
-    /// relaxing laws remember stay. The kinetic energy of mass that comes or goes is external work.
+    /// Brings it from a model to another one of the same mesh, after a (sub)step of a length [s]:
+    /// displacements, velocities and what relaxing laws remember stay. The kinetic energy of mass that comes
+    /// or goes is external work.
     pub fn change_model(&mut self, from: &Model, to: &Model, before: f64) {
         let speed_squared = |u: &Vector<R>| u.iter().map(|x| (x.to_f64() / before).powi(2)).sum::<f64>();
         let gained = self
@@ -183,7 +188,8 @@ impl<R: LaneNumber> State<R> {
         self.reference.fill([R::ZERO; 3]);
     }
 
-    /// Halves all steps from here on, in a run that [cuts steps](crate::stability::OnUnstable::Substep); false where that was done [`MOST_HALVINGS`] times.
+    /// Halves all steps from here on, in a run that [cuts steps](crate::stability::OnUnstable::Substep);
+    /// false where that was done [`MOST_HALVINGS`] times.
     pub fn halve_steps(&mut self) -> bool {
         let may = self.stability.halvings < MOST_HALVINGS;
         self.stability.halvings += u32::from(may);

@@ -33,7 +33,8 @@ impl Lengths {
         0.5 * (self.before + self.next)
     }
 
-    /// The part Δt⁺/(2 h) of a force that moves a node in the first step; the rest is in the increment before that step.
+    /// The part Δt⁺/(2 h) of a force that moves a node in the first step; the rest is in the increment before
+    /// that step.
     pub(crate) fn first_part(self) -> f64 {
         0.5 * self.next / self.mean()
     }
@@ -85,7 +86,8 @@ impl StepControl {
         Clock { since, steps, before: self.lengths(state).before }
     }
 
-    /// Goes on where another control, with steps of length `step` [s], has stood at a state. Steps of the same length are counted on.
+    /// Goes on where another control, with steps of length `step` [s], has stood at a state. Steps of the
+    /// same length are counted on.
     pub fn go_on<R>(&mut self, clock: &Clock, step: f64, state: &State<R>) {
         self.since = if step == self.step { (clock.since, clock.steps) } else { (state.time, state.steps) };
         self.before = Some(clock.before);
@@ -139,13 +141,14 @@ impl StepControl {
         Lengths { before, next: part(self.substeps) }
     }
 
-    /// The time [s] over which relaxing laws come to the state's instant: what acts at the start came at once, and where forces were found
-    /// before, the laws are there.
+    /// The time [s] over which relaxing laws come to the state's instant: what acts at the start came at
+    /// once, and where forces were found before, the laws are there.
     pub fn relaxing<R: LaneNumber>(&self, state: &State<R>) -> f64 {
         if state.is_at_start() || state.evaluated { 0.0 } else { self.lengths(state).before }
     }
 
-    /// Whether a check of the limit is due: the first one, [`CHECK_EVERY`] steps after the last, or where the deformation differs.
+    /// Whether a check of the limit is due: the first one, [`CHECK_EVERY`] steps after the last, or where the
+    /// deformation differs.
     pub fn is_due<R>(&self, state: &State<R>, deformed: &Deformed) -> bool {
         let seen = &state.stability;
         self.monitor.is_some()
@@ -155,8 +158,9 @@ impl StepControl {
                         || deformed.differs(&seen.deformed, CHANGE)))
     }
 
-    /// Steps that pass over no check of the limit, at least one, if the deformation goes on to change as it did within the last `steps`
-    /// steps: half of those to the check that it asks for, so that a change that grows faster is not missed either.
+    /// Steps that pass over no check of the limit, at least one, if the deformation goes on to change as it
+    /// did within the last `steps` steps: half of those to the check that it asks for, so that a change that
+    /// grows faster is not missed either.
     pub fn steps_to_check<R>(
         &self,
         state: &State<R>,
@@ -254,7 +258,8 @@ impl StepControl {
     }
 }
 
-/// Finds the critical time step [s] of a state, at least whether it is `enough`, and makes it the reference of what follows.
+/// Finds the critical time step [s] of a state, at least whether it is `enough`, and makes it the reference
+/// of what follows.
 fn take_as_reference<R: LaneNumber>(
     model: &Model,
     owners: &[[u32; 3]],

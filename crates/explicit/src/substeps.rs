@@ -12,8 +12,8 @@ pub(crate) const REJOIN_AFTER: u64 = 1000;
 pub const MOST_HALVINGS: u32 = 3;
 
 /// The parts into which a step is cut, from how many there are now and the limit; `None` if more than
-/// [`MOST_SUBSTEPS`] are needed. Fewer than now only where they keep the reserve, so that a limit that hovers at a
-/// number of parts does not make it change all the time.
+/// [`MOST_SUBSTEPS`] are needed. Fewer than now only where they keep the reserve, so that a limit that hovers
+/// at a number of parts does not make it change all the time.
 pub(crate) fn substeps(step: f64, limit: f64, now: u32) -> Option<u32> {
     let enough = (step / (RESERVE * limit)).ceil();
     if enough > f64::from(MOST_SUBSTEPS) || enough.is_nan() {
@@ -24,8 +24,9 @@ pub(crate) fn substeps(step: f64, limit: f64, now: u32) -> Option<u32> {
     Some(if stable { now.min(enough) } else { enough })
 }
 
-/// By which factor the limit may change before [`substeps`] chooses other parts than these, as a logarithm; zero where it asks for more now.
-/// Where it allows fewer already, only more count: fewer are not used at once.
+/// By which factor the limit may change before [`substeps`] chooses other parts than these, as a logarithm;
+/// zero where it asks for more now. Where it allows fewer already, only more count: fewer are not used at
+/// once.
 pub(crate) fn margin(step: f64, limit: f64, parts: u32) -> f64 {
     let more = f64::from(parts) * KEEP * limit / step;
     // One part cannot become fewer.

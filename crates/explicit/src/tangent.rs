@@ -1,8 +1,9 @@
-//! The stiffest modes of cells in a deformed state. With one evaluation point K_ab = V B_aᵀ A B_b, A = ∂P/∂F, and the
-//! eigenvalues of K other than zero are those of V Lᵀ A L, where L Lᵀ = G = Σ B_a⊗B_a: a 9×9 problem for any number
-//! of nodes. A comes from the law's stress by central differences, so that it is right for every law: nothing about
-//! stiffening is assumed. The instantaneous response bounds that of a relaxing law. A triangle of a membrane is taken in its own frame,
-//! where it has no gradient across: of the nine modes those have no stiffness. A pack of cells is taken at once, in lanes.
+//! The stiffest modes of cells in a deformed state. With one evaluation point K_ab = V B_aᵀ A B_b, A = ∂P/∂F,
+//! and the eigenvalues of K other than zero are those of V Lᵀ A L, where L Lᵀ = G = Σ B_a⊗B_a: a 9×9 problem
+//! for any number of nodes. A comes from the law's stress by central differences, so that it is right for
+//! every law: nothing about stiffening is assumed. The instantaneous response bounds that of a relaxing law.
+//! A triangle of a membrane is taken in its own frame, where it has no gradient across: of the nine modes
+//! those have no stiffness. A pack of cells is taken at once, in lanes.
 
 use std::array::from_fn;
 
@@ -30,15 +31,16 @@ pub(crate) fn gradient_square(gradient: &[Vector<f64>]) -> Symmetric<f64> {
 pub(crate) struct Stiffness {
     /// The largest eigenvalue of K/V, over all modes.
     pub mode: f64,
-    /// The largest over the modes n⊗y of plane waves. In a mesh it is they that neighbours share, while alone a cell is
-    /// often stiffest in a change of volume, all directions at once: compressed along one of them it hardly changes.
+    /// The largest over the modes n⊗y of plane waves. In a mesh it is they that neighbours share, while alone
+    /// a cell is often stiffest in a change of volume, all directions at once: compressed along one of them
+    /// it hardly changes.
     pub wave: f64,
     /// The factor on the stiffness of hourglass control.
     pub hourglass: f64,
 }
 
-/// How stiff some cells are, at most [`PACK`], each with its displacement gradient and its Σ B_a ⊗ B_a [1/m²]; entries beyond them
-/// mean nothing. Not a number where the law is not defined.
+/// How stiff some cells are, at most [`PACK`], each with its displacement gradient and its Σ B_a ⊗ B_a
+/// [1/m²]; entries beyond them mean nothing. Not a number where the law is not defined.
 pub(crate) fn stiffness(
     solid: &Solid,
     cells: &[u32],
@@ -48,7 +50,8 @@ pub(crate) fn stiffness(
     of_states(solid, &cells, &cells.map(state))
 }
 
-/// Stiffness of cells in known states. Not generic: so laws are compiled here, and not again in every crate that steps a model.
+/// Stiffness of cells in known states. Not generic: so laws are compiled here, and not again in every crate
+/// that steps a model.
 fn of_states(
     solid: &Solid,
     cells: &[usize; PACK],
@@ -74,7 +77,8 @@ fn of_states(
     from_fn(|lane| Stiffness { mode: mode.0[lane], wave: wave.0[lane], hourglass: hourglass.0[lane] })
 }
 
-/// Of a bar, as if it were taut: E/(λ₀ L²) along it, or P/(λ L²) across, twice for its two nodes, with λ₀ the slack.
+/// Of a bar, as if it were taut: E/(λ₀ L²) along it, or P/(λ L²) across, twice for its two nodes, with λ₀ the
+/// slack.
 fn of_bar(solid: &Solid, rest: &Rest<2>, cord: &Cord, h: &Tensor<f64>) -> Stiffness {
     let Pull { length, stress: [stress, _], .. } =
         cord.pull(rest, h.apply(rest.between()), solid.material.law.small_strain().young());
@@ -234,7 +238,8 @@ fn plane_stresses(solid: &Solid, cells: &[usize; PACK], batch: &mut Batch<f64>) 
     }
 }
 
-/// max (n⊗y):A:(n⊗y) over unit n and y, by turns: for one of them kept, the other is an eigenvector of a 3×3 matrix.
+/// max (n⊗y):A:(n⊗y) over unit n and y, by turns: for one of them kept, the other is an eigenvector of a 3×3
+/// matrix.
 #[inline(always)]
 fn stiffest_wave<N: Number>(a: &Matrix<N>) -> N {
     let mut y = [N::ONE, N::ZERO, N::ZERO];
@@ -274,7 +279,8 @@ fn across<N: Number>(a: &Matrix<N>, n: Vector<N>) -> Symmetric<N> {
     contracted(a, n, 1, 3)
 }
 
-/// Contracted twice with a vector over indices that lie `over` rows apart; those that stay lie `kept` rows apart.
+/// Contracted twice with a vector over indices that lie `over` rows apart; those that stay lie `kept` rows
+/// apart.
 #[inline(always)]
 fn contracted<N: Number>(a: &Matrix<N>, with: Vector<N>, kept: usize, over: usize) -> Symmetric<N> {
     let mut found = Symmetric::ZERO;

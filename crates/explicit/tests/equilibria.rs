@@ -1,4 +1,5 @@
-//! Equilibria by dynamic relaxation: what they store, the work done on them, jumps at the start, single precision.
+//! Equilibria by dynamic relaxation: what they store, the work done on them, jumps at the start, single
+//! precision.
 
 #![allow(clippy::unwrap_used)]
 
@@ -154,8 +155,9 @@ fn relaxing() -> Prony {
     Prony::new(&[Part::Isochoric, Part::Volumetric].map(term), PronyUpdate::Exact).unwrap()
 }
 
-/// Both parts relax alike, so that the held cube keeps its shape and all forces fall to 1 − ½ (1 − e^(−t/τ)) = 0.684. They
-/// began at the relaxed half, and came to 0.816, 0.709 and 0.690 in 4, 16 and 64 load steps.
+/// Both parts relax alike, so that the held cube keeps its shape and all forces fall to 1 − ½ (1 −
+/// e^(−t/τ)) = 0.684. They began at the relaxed half, and came to 0.816, 0.709 and 0.690 in 4, 16 and 64 load
+/// steps.
 #[test]
 fn a_jump_relaxes_from_the_instantaneous_law_in_any_number_of_load_steps() {
     for element in ["tet4-anp", "hex8-full"] {
@@ -177,8 +179,8 @@ fn a_jump_relaxes_from_the_instantaneous_law_in_any_number_of_load_steps() {
     }
 }
 
-/// Of a ramp as long as the relaxation time, where the law gives way to the motion. The history takes stresses as linear in a load
-/// step, so that the error falls with its square.
+/// Of a ramp as long as the relaxation time, where the law gives way to the motion. The history takes
+/// stresses as linear in a load step, so that the error falls with its square.
 #[test]
 fn what_relaxing_laws_store_and_dissipate_hardly_depends_on_the_load_steps() {
     let cube = squeezed(0.45, relaxing(), "tet4-anp", ramp());

@@ -1,8 +1,9 @@
 //! Errors and warnings about a scene: each has a message, its place in the user's own file, and a remedy.
 //!
-//! All mistakes of a file are collected; the first [`MOST_SHOWN`] are shown together. [`SceneErrors`] is what a command
-//! line prints: through miette's graphical handler with the lines underlined, or one mistake a line with
-//! [`SceneErrors::plain`]. Control codes of terminals are removed, and long lines and values are shortened.
+//! All mistakes of a file are collected; the first [`MOST_SHOWN`] are shown together. [`SceneErrors`] is what
+//! a command line prints: through miette's graphical handler with the lines underlined, or one mistake a line
+//! with [`SceneErrors::plain`]. Control codes of terminals are removed, and long lines and values are
+//! shortened.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -102,8 +103,8 @@ impl Diagnostic {
         Self::new(Severity::Warning, message.into())
     }
 
-    /// Underlines a place and writes `label` under it. For a value given on the command line the message says so
-    /// instead.
+    /// Underlines a place and writes `label` under it. For a value given on the command line the message says
+    /// so instead.
     pub fn at(mut self, place: impl Into<Place>, label: impl Into<String>) -> Self {
         match place.into() {
             Place::File(span) => {
@@ -163,7 +164,8 @@ impl fmt::Display for Diagnostic {
 
 impl std::error::Error for Diagnostic {}
 
-/// The source text comes from the [`SceneErrors`] that the diagnostic is shown with, unless it is about an option.
+/// The source text comes from the [`SceneErrors`] that the diagnostic is shown with, unless it is about an
+/// option.
 impl miette::Diagnostic for Diagnostic {
     fn source_code(&self) -> Option<&dyn SourceCode> {
         self.option.as_ref().map(|text| text as &dyn SourceCode)
@@ -198,8 +200,8 @@ impl miette::Diagnostic for Diagnostic {
 
 /// All that was found about one scene, with the scene's text to show it in.
 ///
-/// Its `Display` is the headline that miette's handlers print above the underlined lines: the message where there is one
-/// finding, their number where there are several. Logs want [`plain`](Self::plain).
+/// Its `Display` is the headline that miette's handlers print above the underlined lines: the message where
+/// there is one finding, their number where there are several. Logs want [`plain`](Self::plain).
 #[derive(Debug, Clone)]
 pub struct SceneErrors {
     source: NamedSource<Excerpts>,
@@ -325,7 +327,8 @@ impl SceneErrors {
     }
 }
 
-/// The nearest span that lies in the text, on the borders of characters, not longer than what is underlined at most.
+/// The nearest span that lies in the text, on the borders of characters, not longer than what is underlined
+/// at most.
 fn clamp(text: &str, span: Range<usize>) -> Range<usize> {
     let start = boundary_before(text, span.start);
     let end = boundary_after(text, span.end).max(start);

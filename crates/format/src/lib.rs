@@ -1,5 +1,5 @@
-//! Scene files: a text is read into a [`Scene`], tables of plain data whose values keep their places in the file, and all messages about them.
-//! Knows no solver and no GPU; `pliant-scene` builds what a scene says.
+//! Scene files: a text is read into a [`Scene`], tables of plain data whose values keep their places in the
+//! file, and all messages about them. Knows no solver and no GPU; `pliant-scene` builds what a scene says.
 //!
 //! ```
 //! use pliant_format::{Scene, source::Source};

@@ -1,4 +1,5 @@
-//! Which bodies of a scene go together: each participant as a scene of its own, with the tables that are about its bodies.
+//! Which bodies of a scene go together: each participant as a scene of its own, with the tables that are
+//! about its bodies.
 
 use std::collections::BTreeMap;
 
@@ -47,7 +48,8 @@ fn uses(bodies: &[(String, BodyTable)], law: &String) -> bool {
     bodies.iter().any(|(_, body)| body.law.values().contains(&law) || layered(body))
 }
 
-/// What a participant has of a scene. What belongs to none, as it is wrong, goes with the first one, to be reported once.
+/// What a participant has of a scene. What belongs to none, as it is wrong, goes with the first one, to be
+/// reported once.
 struct Part<'s> {
     scene: &'s Scene,
     index: usize,
@@ -150,8 +152,8 @@ impl Scene {
     /// The participants with their names: the scene itself where all bodies go together.
     ///
     /// # Errors
-    /// If a participant names a body that there is not, or that goes with another one, or none; or if a table of a scene of several
-    /// participants names a body or a surface that there is not.
+    /// If a participant names a body that there is not, or that goes with another one, or none; or if a table
+    /// of a scene of several participants names a body or a surface that there is not.
     pub fn split(&self) -> Result<Vec<(String, Self)>, SceneErrors> {
         let mut out = Vec::new();
         let groups = self.groups(&mut out);
@@ -383,7 +385,8 @@ impl Scene {
         }
     }
 
-    /// The run of a participant: its own keys, and those of `[run]` that mean something for its bodies and its solver.
+    /// The run of a participant: its own keys, and those of `[run]` that mean something for its bodies and
+    /// its solver.
     fn run_of(&self, table: Option<&ParticipantTable>, models: &[BodyModel]) -> RunTable {
         let solver = table.and_then(|table| table.solver).unwrap_or(self.run.solver);
         let total_lagrangian = !models.contains(&BodyModel::Shell) && !solver.solves_equations();

@@ -1,5 +1,5 @@
-//! Which values a quantity can have and is likely to have, by its unit. Unlikely values are doubts; properties beyond all sense, which
-//! have to be positive, are mistakes.
+//! Which values a quantity can have and is likely to have, by its unit. Unlikely values are doubts;
+//! properties beyond all sense, which have to be positive, are mistakes.
 
 use std::ops::RangeInclusive;
 
@@ -46,8 +46,8 @@ pub(crate) struct Remark {
     pub help: String,
 }
 
-/// What is to say about a value in a unit; nothing where it is likely. A value that need not be `positive`, such as a load, may be as
-/// small as it likes, and a size beyond all sense is no mistake.
+/// What is to say about a value in a unit; nothing where it is likely. A value that need not be `positive`,
+/// such as a load, may be as small as it likes, and a size beyond all sense is no mistake.
 pub(crate) fn remark(value: f64, unit: &str, positive: bool, shown: &str) -> Option<Remark> {
     let quantity = QUANTITIES.iter().find(|quantity| quantity.unit == unit)?;
     let outside = |range: &RangeInclusive<f64>| {

@@ -18,7 +18,8 @@ pub struct Parameter {
     pub kind: String,
     /// Its unit, such as `Pa`; empty without one.
     pub unit: String,
-    /// Whether the table must have it. One of several keys of which a table must have exactly one is not required.
+    /// Whether the table must have it. One of several keys of which a table must have exactly one is not
+    /// required.
     pub required: bool,
     /// What it is where the table lacks it, if it is anything.
     pub default: Option<Json>,
@@ -32,8 +33,8 @@ pub struct Parameter {
     pub parts: Vec<Parameter>,
 }
 
-/// The page of all tables of a scene, as Markdown. Kinds of values that several tables take, or that hold themselves,
-/// have a section of their own at the end.
+/// The page of all tables of a scene, as Markdown. Kinds of values that several tables take, or that hold
+/// themselves, have a section of their own at the end.
 pub fn page(sections: &[Section]) -> String {
     let mut page = String::from(
         "# Scene reference\n\nWritten by `pliant schema --markdown` from the parameter structs; do not edit.\n\n\

@@ -1,5 +1,5 @@
-//! The one place where a `type` of a scene file meets a parameter struct. Laws have their own registry beside the
-//! laws, in `pliant_mechanics::law`.
+//! The one place where a `type` of a scene file meets a parameter struct. Laws have their own registry beside
+//! the laws, in `pliant_mechanics::law`.
 
 use std::collections::BTreeMap;
 
@@ -246,7 +246,8 @@ pub fn scene_schema() -> Json {
                 }
                 object.insert("title".into(), json!(format!("{header} of type {name}")));
             }
-            // A struct with flattened parts cannot deny unknown keys; the checker does, and so does this schema.
+            // A struct with flattened parts cannot deny unknown keys; the checker does, and so does this
+            // schema.
             object.insert("additionalProperties".into(), json!(false));
         }
         kinds.entry(header.trim_matches(['[', ']'])).or_default().push(schema);
@@ -331,7 +332,8 @@ mod tests {
         all::<OutputTable>();
     }
 
-    /// Lines of TOML between backticks in the descriptions of a schema: how many there are, and those that the checker refuses.
+    /// Lines of TOML between backticks in the descriptions of a schema: how many there are, and those that
+    /// the checker refuses.
     fn lines_refused(scene: &Json) -> (usize, Vec<String>) {
         /// All schemas with the names of their keys, and those around each, the innermost first.
         fn visit<'s>(schema: &'s Json, around: &[&'s Json], seen: &mut dyn FnMut(&[&'s Json])) {

@@ -25,8 +25,8 @@ pub struct Scene {
     pub scene: SceneTable,
     /// `[run]`
     pub run: RunTable,
-    /// `[participant.NAME]`, in the order of the file, as all below but bodies, obstacles, tools and contacts: these are in the order of their
-    /// names, with walls after the other bodies.
+    /// `[participant.NAME]`, in the order of the file, as all below but bodies, obstacles, tools and
+    /// contacts: these are in the order of their names, with walls after the other bodies.
     pub participants: Vec<(String, ParticipantTable)>,
     /// `[law.NAME]`
     pub laws: Vec<(String, LawTable)>,

@@ -22,7 +22,8 @@ impl Scene {
         }
     }
 
-    /// Whether its axes are those of a patient (x to the right, y to the front, z to the head): all bodies are meshed from images.
+    /// Whether its axes are those of a patient (x to the right, y to the front, z to the head): all bodies
+    /// are meshed from images.
     pub fn is_of_patient(&self) -> bool {
         let meshes = self.bodies.iter().filter(|(_, body)| body.on.is_none()).map(|(_, body)| &body.mesh);
         let mut images = meshes.map(|mesh| mesh.image.is_some() || mesh.masks.is_some()).peekable();
@@ -65,8 +66,8 @@ impl Scene {
         view.on.as_ref().is_some_and(|on| self.surfaces.iter().any(|(name, _)| name == on))
     }
 
-    /// All that tables of the scene sample, in one: energies, all reactions, and the probes, under the name of their table too where
-    /// another one has a probe of that name.
+    /// All that tables of the scene sample, in one: energies, all reactions, and the probes, under the name
+    /// of their table too where another one has a probe of that name.
     pub fn sampled(&self) -> CsvTable {
         let mut probes = BTreeMap::new();
         for (name, output) in &self.outputs {
@@ -87,7 +88,8 @@ impl Scene {
         }
     }
 
-    /// A series of constraints and loads, where the view marks them: those of the body that carries a surface which is shown.
+    /// A series of constraints and loads, where the view marks them: those of the body that carries a surface
+    /// which is shown.
     pub fn shown_marks(&self, every: f64) -> Option<VtuTable> {
         let data = vec![FieldName::Displacement, FieldName::Constraint, FieldName::Load, FieldName::Weight];
         let on = self.carrier(self.view.on.as_deref()).map(|(body, _)| body.clone());

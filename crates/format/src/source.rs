@@ -1,7 +1,8 @@
-//! The text of a scene with the place of every key and value in it, so that a mistake is shown where it was made.
+//! The text of a scene with the place of every key and value in it, so that a mistake is shown where it was
+//! made.
 //!
-//! TOML is read with the `toml` crate's spanned tree; the tree here owns its text, keeps the order of the file and
-//! takes values from the command line, which have no place in the file.
+//! TOML is read with the `toml` crate's spanned tree; the tree here owns its text, keeps the order of the
+//! file and takes values from the command line, which have no place in the file.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -53,8 +54,8 @@ const NAMED: [&str; 8] = ["participant", "law", "body", "tie", "surface", "const
 pub struct Node {
     /// Where the value stands: its own text, or the header `[law.liver]` of a table that has one.
     pub place: Place,
-    /// Where its key stands, in the same text as the value; none for items of arrays, the root and what an option with a
-    /// meaning of its own gave.
+    /// Where its key stands, in the same text as the value; none for items of arrays, the root and what an
+    /// option with a meaning of its own gave.
     pub key_span: Option<Range<usize>>,
     /// The value.
     pub value: Value,
@@ -276,7 +277,8 @@ impl Source {
         path.iter().try_fold(&self.root, |node, key| node.get(key))
     }
 
-    /// The keys, joined by points, of the smallest value or table header whose text, or whose key, has the byte at a place; `None` where there is none.
+    /// The keys, joined by points, of the smallest value or table header whose text, or whose key, has the
+    /// byte at a place; `None` where there is none.
     pub fn key_at(&self, byte: usize) -> Option<String> {
         fn smallest(node: &Node, path: &str, byte: usize, found: &mut Option<(usize, String)>) {
             let own = if let Place::File(span) = &node.place { Some(span) } else { None };
@@ -300,8 +302,8 @@ impl Source {
         found.map(|(_, key)| key)
     }
 
-    /// Where the value at a path stands; for a missing one the header or key of the nearest table around it. Of a value
-    /// within a line, in which an option set a part, that part.
+    /// Where the value at a path stands; for a missing one the header or key of the nearest table around it.
+    /// Of a value within a line, in which an option set a part, that part.
     pub fn span(&self, path: &[&str]) -> Place {
         match self.node(path) {
             Some(node) if self.is_header(node) => node.place.clone(),
@@ -348,8 +350,8 @@ impl Source {
         self.put(&steps, Node::of_command_line(value.into()))
     }
 
-    /// Takes an assignment in TOML, as `--set "law.liver.shear-modulus = 2e3"` gives it; a single word on the right
-    /// needs no quotes. An item of an array has its index, counted from 0, as its key.
+    /// Takes an assignment in TOML, as `--set "law.liver.shear-modulus = 2e3"` gives it; a single word on the
+    /// right needs no quotes. An item of an array has its index, counted from 0, as its key.
     ///
     /// Diagnostics about it, here and later, underline it.
     ///

@@ -1,7 +1,7 @@
-//! A curved triangle: the cubic Bézier triangle of three positions and unit normals. Each control point of an edge depends on that
-//! edge's ends alone, so neighbours of the same ends meet without a gap. PN triangles (Vlachos et al. 2001), with control points
-//! along edges placed so that an edge with equal end angles is an arc.
-//! Leaves out: continuous tangents across edges (their jump falls with h²).
+//! A curved triangle: the cubic Bézier triangle of three positions and unit normals. Each control point of an
+//! edge depends on that edge's ends alone, so neighbours of the same ends meet without a gap. PN triangles
+//! (Vlachos et al. 2001), with control points along edges placed so that an edge with equal end angles is an
+//! arc. Leaves out: continuous tangents across edges (their jump falls with h²).
 
 use nalgebra::Matrix3;
 
@@ -11,7 +11,8 @@ use crate::locate::barycentric_of_closest;
 /// Where control points lie along the tangent of an edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EdgeRule {
-    /// 2/(3 c (1 + c)) of the tangent, with c the cosine between edge and tangent: arcs, three to four times closer to spheres.
+    /// 2/(3 c (1 + c)) of the tangent, with c the cosine between edge and tangent: arcs, three to four times
+    /// closer to spheres.
     #[default]
     Arc,
     /// A third: plain PN triangles.
@@ -54,8 +55,8 @@ fn reach(rule: EdgeRule, c: f64) -> [f64; 3] {
 }
 
 impl CurvedTriangle {
-    /// A triangle of corners [m] and unit normals, with control points on the straight edge where told: next to the first and the
-    /// second end of the edges 12, 23 and 31.
+    /// A triangle of corners [m] and unit normals, with control points on the straight edge where told: next
+    /// to the first and the second end of the edges 12, 23 and 31.
     pub fn new(p: [Vector3; 3], n: [Vector3; 3], straight: [bool; 6], rule: EdgeRule) -> Self {
         let mut patch = Self { corners: p, normals: n, edge: [Vector3::zeros(); 6], straight, rule };
         for (k, [i, j]) in EDGES.into_iter().enumerate() {
@@ -102,7 +103,8 @@ impl CurvedTriangle {
         &self.normals
     }
 
-    /// Weights of the corners and of the edges' control points; the middle one is spread over them with quadratic precision.
+    /// Weights of the corners and of the edges' control points; the middle one is spread over them with
+    /// quadratic precision.
     pub fn weights([a, b, c]: [f64; 3]) -> ControlWeights {
         let middle = 6.0 * a * b * c;
         let corner = [a, b, c].map(|w| w * w * w - middle / 6.0);
@@ -160,14 +162,14 @@ impl CurvedTriangle {
         along.cross(&across).normalize()
     }
 
-    /// The nearest point of the patch and its distance [m], by Gauss–Newton: each step moves to the nearest point of the tangent
-    /// triangle, and is halved until it comes closer.
+    /// The nearest point of the patch and its distance [m], by Gauss–Newton: each step moves to the nearest
+    /// point of the tangent triangle, and is halved until it comes closer.
     pub fn closest(&self, point: &Vector3, start: [f64; 3]) -> ([f64; 3], f64) {
         self.closest_in(40, point, start)
     }
 
-    /// The same with a limited number of steps. An early stop returns the distance of a nearby point, which is never
-    /// too small.
+    /// The same with a limited number of steps. An early stop returns the distance of a nearby point, which
+    /// is never too small.
     pub fn closest_in(&self, steps: usize, point: &Vector3, start: [f64; 3]) -> ([f64; 3], f64) {
         let mut at = start;
         let mut distance = (self.point(at) - point).norm();
@@ -190,7 +192,8 @@ impl CurvedTriangle {
         (at, distance)
     }
 
-    /// An upper bound for the distance of its points from the flat facet [m]: it lies in the convex hull of its control points.
+    /// An upper bound for the distance of its points from the flat facet [m]: it lies in the convex hull of
+    /// its control points.
     pub fn bulge(&self) -> f64 {
         let edges: Vector3 = self.edge.iter().sum();
         let corners: Vector3 = self.corners.iter().sum();
@@ -223,8 +226,8 @@ impl CurvedTriangle {
         (g * by_e + slope * t * c_e, g * by_n + slope * t * c_n)
     }
 
-    /// A force on an edge's control point as forces on the edge's vector and on the normal at its start: the transposes of
-    /// [`edge_derivative`](Self::edge_derivative) times the force.
+    /// A force on an edge's control point as forces on the edge's vector and on the normal at its start: the
+    /// transposes of [`edge_derivative`](Self::edge_derivative) times the force.
     pub fn edge_forces(&self, k: usize, force: &Vector3) -> [Vector3; 2] {
         if self.straight[k] {
             return [force / 3.0, Vector3::zeros()];
@@ -246,7 +249,8 @@ impl CurvedTriangle {
         [by_e + pull * c_e, by_n - t * (pull * s / (size * length))]
     }
 
-    /// Second derivatives of w·b of an edge's control point b, for a vector w that stays: ∂²/∂e², ∂²/∂e∂n (rows e) and ∂²/∂n².
+    /// Second derivatives of w·b of an edge's control point b, for a vector w that stays: ∂²/∂e², ∂²/∂e∂n
+    /// (rows e) and ∂²/∂n².
     pub fn edge_second_derivative(&self, k: usize, w: &Vector3) -> [Matrix3<f64>; 3] {
         if self.straight[k] {
             return [Matrix3::zeros(); 3];
@@ -290,7 +294,8 @@ impl CurvedTriangle {
         ]
     }
 
-    /// Derivatives of the sum of the control points with weights, with respect to each corner and to each corner's normal.
+    /// Derivatives of the sum of the control points with weights, with respect to each corner and to each
+    /// corner's normal.
     pub fn derivatives(&self, (corner, edge): ControlWeights) -> [[Matrix3<f64>; 2]; 3] {
         let mut by = corner.map(|w| [Matrix3::from_diagonal_element(w), Matrix3::zeros()]);
         for (k, [start, end]) in EDGES.into_iter().enumerate() {

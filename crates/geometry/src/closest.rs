@@ -1,7 +1,8 @@
-//! The point of a surface that is closest to a given point, and the normal there. Normals are area-weighted means at the nodes, linear
-//! in between: they turn smoothly on a curved surface and are exact on a flat one. Leaves out: which side a point is on.
-//! Triangles are halved at the median of their centres until few are left. The nearer half is searched first; a box farther away than
-//! the best result is skipped. Among equally close triangles, the first found wins.
+//! The point of a surface that is closest to a given point, and the normal there. Normals are area-weighted
+//! means at the nodes, linear in between: they turn smoothly on a curved surface and are exact on a flat one.
+//! Leaves out: which side a point is on. Triangles are halved at the median of their centres until few are
+//! left. The nearer half is searched first; a box farther away than the best result is skipped. Among equally
+//! close triangles, the first found wins.
 
 use crate::locate::{barycentric_of_closest, on_triangle};
 use crate::{Surface, Vector3};
@@ -73,8 +74,8 @@ impl Triangle {
 }
 
 impl SurfaceLocator {
-    /// Sorts some faces of a surface (indices into its faces) into a tree; only they count for the normals. A quad is
-    /// taken as two triangles.
+    /// Sorts some faces of a surface (indices into its faces) into a tree; only they count for the normals. A
+    /// quad is taken as two triangles.
     pub fn new(surface: &Surface, faces: &[u32], points: &[Vector3]) -> Self {
         let part = Surface { faces: faces.iter().map(|&face| surface.faces[face as usize]).collect() };
         let normals = part.node_normals(points);
@@ -120,8 +121,8 @@ impl SurfaceLocator {
         self.search(to, f64::INFINITY, |_| true)
     }
 
-    /// The closest point, less than `within` [m] away, among the faces whose normals have a cosine above `least` with the unit
-    /// vector `facing`; `None` if none is near enough.
+    /// The closest point, less than `within` [m] away, among the faces whose normals have a cosine above
+    /// `least` with the unit vector `facing`; `None` if none is near enough.
     pub fn closest_facing(
         &self,
         to: &Vector3,
@@ -200,7 +201,8 @@ mod tests {
         }
     }
 
-    /// Over the top of a block 4 high: its bottom is closest among downward faces, its sides among lateral ones.
+    /// Over the top of a block 4 high: its bottom is closest among downward faces, its sides among lateral
+    /// ones.
     #[test]
     fn faces_that_look_the_other_way_do_not_count() {
         let mesh = block_of_tets([4, 4, 4]);

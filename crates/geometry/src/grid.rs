@@ -1,5 +1,5 @@
-//! Regular grids of points, as the voxel centres of an image: world = origin + axes · (i, j, k), in metres. A grid may be
-//! mirrored (det < 0) or sheared (tilted gantry).
+//! Regular grids of points, as the voxel centres of an image: world = origin + axes · (i, j, k), in metres. A
+//! grid may be mirrored (det < 0) or sheared (tilted gantry).
 
 use nalgebra::Matrix3;
 use thiserror::Error;
@@ -28,8 +28,8 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// A grid from its size, origin [m] and steps [m]. An error if a number is not finite, a step has no length, or
-    /// the steps lie (nearly) in a plane.
+    /// A grid from its size, origin [m] and steps [m]. An error if a number is not finite, a step has no
+    /// length, or the steps lie (nearly) in a plane.
     pub fn new(dims: [usize; 3], origin: Vector3, axes: Matrix3<f64>) -> Result<Self, FlatGrid> {
         let finite = origin.iter().chain(axes.iter()).all(|x| x.is_finite());
         let lengths = [0, 1, 2].map(|a| axes.column(a).norm());

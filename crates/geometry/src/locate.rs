@@ -1,8 +1,8 @@
-//! Finds the cell that contains a point and the weights of its nodes: p = Σ w_a X_a. A point outside all cells
-//! uses the closest cell, extrapolated. A tet extrapolates with its own (barycentric) coordinates. A hex
-//! inverts its trilinear map by Newton's method. Outside, it takes the weights N_a(ξ) of its closest point and
-//! adds B_a · (p − X(ξ)) with its mean gradients B_a. This stays bounded where the trilinear map itself folds
-//! over, and is as exact: Σ_a X_a ⊗ B_a = I, so linear fields are reproduced everywhere.
+//! Finds the cell that contains a point and the weights of its nodes: p = Σ w_a X_a. A point outside all
+//! cells uses the closest cell, extrapolated. A tet extrapolates with its own (barycentric) coordinates. A
+//! hex inverts its trilinear map by Newton's method. Outside, it takes the weights N_a(ξ) of its closest
+//! point and adds B_a · (p − X(ξ)) with its mean gradients B_a. This stays bounded where the trilinear map
+//! itself folds over, and is as exact: Σ_a X_a ⊗ B_a = I, so linear fields are reproduced everywhere.
 
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
 
@@ -25,8 +25,9 @@ pub struct Location {
     pub kind: CellKind,
     /// The cell's index within the block of its kind.
     pub cell: u32,
-    /// Weights of the cell's nodes, the first `kind.node_count()` of eight. Their sum is 1 and the weighted sum of
-    /// the node positions is the point. Inside the cell all are from 0 to 1 (up to rounding), outside not.
+    /// Weights of the cell's nodes, the first `kind.node_count()` of eight. Their sum is 1 and the weighted
+    /// sum of the node positions is the point. Inside the cell all are from 0 to 1 (up to rounding), outside
+    /// not.
     pub weights: [f64; 8],
     /// Distance to the cell [m], 0 inside.
     pub distance: f64,
@@ -44,10 +45,10 @@ impl Location {
     }
 }
 
-/// A search tree over the tets and hexes of a mesh, with its own copy of them. Outside the mesh, the weights of the
-/// closest cell continue linearly: for a tet its barycentric coordinates; for a hex the weights at its closest
-/// point, plus its mean gradients times the offset from there. Cells with missing or non-finite nodes and cells
-/// without volume are skipped.
+/// A search tree over the tets and hexes of a mesh, with its own copy of them. Outside the mesh, the weights
+/// of the closest cell continue linearly: for a tet its barycentric coordinates; for a hex the weights at its
+/// closest point, plus its mean gradients times the offset from there. Cells with missing or non-finite nodes
+/// and cells without volume are skipped.
 #[derive(Clone, Debug)]
 pub struct Locator {
     tree: RTree<Entry>,
@@ -97,9 +98,9 @@ impl Locator {
         Self { tree: RTree::bulk_load(entries) }
     }
 
-    /// The cell that contains `point` [m], otherwise the closest one; `None` without cells or if the point is not
-    /// finite. On a face between cells it is the first of them. Among equally close cells it is the one with the
-    /// smallest extrapolation, then the first. Tets come before hexes.
+    /// The cell that contains `point` [m], otherwise the closest one; `None` without cells or if the point is
+    /// not finite. On a face between cells it is the first of them. Among equally close cells it is the one
+    /// with the smallest extrapolation, then the first. Tets come before hexes.
     pub fn locate(&self, point: Vector3) -> Option<Location> {
         if !is_finite(&point) {
             return None;
@@ -170,8 +171,8 @@ impl Entry {
         Candidate { id: self.id, weights, distance, tolerance: ROUNDING * self.size() }
     }
 
-    /// Adds B_a · (p − Σ w_a X_a) to the weights, twice: the second time it removes the rounding of the first.
-    /// The sum of the weights stays 1.
+    /// Adds B_a · (p − Σ w_a X_a) to the weights, twice: the second time it removes the rounding of the
+    /// first. The sum of the weights stays 1.
     fn correct(&self, p: &Vector3, weights: &mut [f64; 8]) {
         let (volume, integrals) = gradient_integrals(self.id.kind, self.points());
         for _ in 0..2 {
@@ -331,8 +332,8 @@ pub(crate) fn on_triangle(x: &[Vector3; 3], weights: [f64; 3]) -> Vector3 {
     x[0] * weights[0] + x[1] * weights[1] + x[2] * weights[2]
 }
 
-/// Barycentric coordinates of the point of a triangle closest to `p`: the corner, edge or face in whose Voronoi
-/// region `p` lies (Ericson, Real-Time Collision Detection, 2005, section 5.1.5).
+/// Barycentric coordinates of the point of a triangle closest to `p`: the corner, edge or face in whose
+/// Voronoi region `p` lies (Ericson, Real-Time Collision Detection, 2005, section 5.1.5).
 pub fn barycentric_of_closest([a, b, c]: &[Vector3; 3], p: &Vector3) -> [f64; 3] {
     let (ab, ac) = (b - a, c - a);
     let from = |x: &Vector3| (ab.dot(&(p - x)), ac.dot(&(p - x)));

@@ -251,8 +251,8 @@ impl Mesh {
         used
     }
 
-    /// Removes points that no cell uses (with volume cells: that no volume cell uses), with their data and their
-    /// surface cells; returns the number of points.
+    /// Removes points that no cell uses (with volume cells: that no volume cell uses), with their data and
+    /// their surface cells; returns the number of points.
     pub fn drop_unused_points(&mut self) -> usize {
         let used = self.used_points();
         for block in &mut self.blocks {

@@ -1,21 +1,25 @@
-//! Mortar rows: how the nodes of one surface follow another surface whose mesh does not match, so that a constant stress passes.
+//! Mortar rows: how the nodes of one surface follow another surface whose mesh does not match, so that a
+//! constant stress passes.
 //!
-//! A multiplier ψ_a at each tied node of the follower asks for ∫ ψ_a (u_f − u_m) = 0 over the common area. The ψ_a are dual to the shape
-//! functions N_b of the follower, ∫ ψ_a N_b = δ_ab ∫ N_b (Wohlmuth 2000), so that each tied node has a row of its own,
+//! A multiplier ψ_a at each tied node of the follower asks for ∫ ψ_a (u_f − u_m) = 0 over the common area.
+//! The ψ_a are dual to the shape functions N_b of the follower, ∫ ψ_a N_b = δ_ab ∫ N_b (Wohlmuth 2000), so
+//! that each tied node has a row of its own,
 //!
 //! ```text
 //! u_a = Σ_m M_am u_m / D_a,   M_am = ∫ ψ_a N_m,   D_a = ∫ N_a.
 //! ```
 //!
-//! * *Integration* goes over segments: a face of the other surface is projected on the plane of a follower's face and clipped by it (Puso and
-//!   Laursen 2004), the polygon is split into triangles round its centre, and these have Gauss points. ψ, D and M take the same points, so that
-//!   linear fields are followed to round-off whatever the rule. The rule decides how well forces go on: exactly for triangles and
+//! * *Integration* goes over segments: a face of the other surface is projected on the plane of a follower's
+//!   face and clipped by it (Puso and Laursen 2004), the polygon is split into triangles round its centre,
+//!   and these have Gauss points. ψ, D and M take the same points, so that linear fields are followed to
+//!   round-off whatever the rule. The rule decides how well forces go on: exactly for triangles and
 //!   parallelograms, to about 1e-12 for other quadrilaterals.
-//! * *Borders.* ψ on a face comes from the part that has a counterpart (Cichosz and Bischoff 2011). Nodes of the face that are not
-//!   tied, such as those beyond the end of the other surface, have no ψ. Their shape functions are shared out among those of the tied nodes, so
-//!   that Σ ψ_a = 1 everywhere (as at crosspoints, Puso and Laursen 2004), and they appear in the rows of the others.
-//! * *Curved surfaces.* A row gives Σ X_m ≠ X_a where the meshes are apart; [`MortarRow::offset`] is the rest, which the caller has to
-//!   add by a gradient, so that rotations cost nothing.
+//! * *Borders.* ψ on a face comes from the part that has a counterpart (Cichosz and Bischoff 2011). Nodes of
+//!   the face that are not tied, such as those beyond the end of the other surface, have no ψ. Their shape
+//!   functions are shared out among those of the tied nodes, so that Σ ψ_a = 1 everywhere (as at crosspoints,
+//!   Puso and Laursen 2004), and they appear in the rows of the others.
+//! * *Curved surfaces.* A row gives Σ X_m ≠ X_a where the meshes are apart; [`MortarRow::offset`] is the
+//!   rest, which the caller has to add by a gradient, so that rotations cost nothing.
 
 use std::collections::BTreeMap;
 
@@ -49,7 +53,8 @@ pub struct MortarRow {
     pub followed: Vec<(u32, f64)>,
     /// Nodes of its own side that are not tied, with their weights. All weights of both sides sum to 1.
     pub own: Vec<(u32, f64)>,
-    /// The place of the node less that of the nodes that it follows [m]: zero up to round-off where both surfaces are flat.
+    /// The place of the node less that of the nodes that it follows [m]: zero up to round-off where both
+    /// surfaces are flat.
     pub offset: Vector3,
 }
 
@@ -64,8 +69,8 @@ pub struct MortarRows {
     pub area: f64,
 }
 
-/// The rows of the nodes of `follower` that are tied, over the faces that lie on those of `other` with a gap of at most `reach` [m], or half of
-/// the size of the follower's face.
+/// The rows of the nodes of `follower` that are tied, over the faces that lie on those of `other` with a gap
+/// of at most `reach` [m], or half of the size of the follower's face.
 pub fn mortar_rows(
     follower: MortarSide<'_>,
     other: MortarSide<'_>,
@@ -146,8 +151,9 @@ impl Sums {
     }
 }
 
-/// The coefficients of ψ over the shape functions of a face, a row for each tied node: D G⁻¹ φ with the shape functions of the nodes
-/// that are not tied shared out in φ and G = ∫ φ Nᵀ over those that are. `None` without common area or tied nodes.
+/// The coefficients of ψ over the shape functions of a face, a row for each tied node: D G⁻¹ φ with the shape
+/// functions of the nodes that are not tied shared out in φ and G = ∫ φ Nᵀ over those that are. `None`
+/// without common area or tied nodes.
 fn dual_functions(segments: &[(usize, Vec<Sample>)], nodes: usize, tied: &[usize]) -> Option<DMatrix<f64>> {
     let mut mass = DMatrix::zeros(nodes, nodes);
     for sample in segments.iter().flat_map(|(_, samples)| samples) {
@@ -215,7 +221,8 @@ struct Projected {
 }
 
 impl Projected {
-    /// The part that lies below another face, in Gauss points; `None` if there is none, or the gap at its centre is wider than `reach` [m].
+    /// The part that lies below another face, in Gauss points; `None` if there is none, or the gap at its
+    /// centre is wider than `reach` [m].
     fn segment(&self, other: &Self, reach: f64) -> Option<Vec<Sample>> {
         let polygon = clipped(&other.corners, &self.corners);
         let whole = doubled_area(&self.corners);
@@ -246,9 +253,10 @@ impl Projected {
         Some(samples)
     }
 
-    /// Gauss points along a side of a segment for an error of 1e-13. On triangles and parallelograms the product of two shape functions is of
-    /// fourth order at most. On other quadrilaterals shape functions are not polynomials of the place: they end where the Jacobian
-    /// J₀ + J₁ ξ + J₂ η vanishes, and n points leave ρ^(−2n) with ρ = z + √(z² − 1), z = J₀/(|J₁| + |J₂|).
+    /// Gauss points along a side of a segment for an error of 1e-13. On triangles and parallelograms the
+    /// product of two shape functions is of fourth order at most. On other quadrilaterals shape functions are
+    /// not polynomials of the place: they end where the Jacobian J₀ + J₁ ξ + J₂ η vanishes, and n points
+    /// leave ρ^(−2n) with ρ = z + √(z² − 1), z = J₀/(|J₁| + |J₂|).
     fn gauss_points(&self) -> usize {
         const AFFINE: usize = 3;
         let x = &self.corners;
@@ -325,8 +333,8 @@ fn clipped(polygon: &[Vector2<f64>], by: &[Vector2<f64>]) -> Vec<Vector2<f64>> {
     left
 }
 
-/// Points (s, t) of the triangle s, t ≥ 0, s + t ≤ 1 with their weights, which sum to ½: the product of Gauss rules of `n` points on the square,
-/// collapsed. Exact for polynomials of order 2 n − 2.
+/// Points (s, t) of the triangle s, t ≥ 0, s + t ≤ 1 with their weights, which sum to ½: the product of Gauss
+/// rules of `n` points on the square, collapsed. Exact for polynomials of order 2 n − 2.
 fn triangle_rule(n: usize) -> Vec<([f64; 2], f64)> {
     let line = gauss_rule(n);
     let point =
@@ -372,7 +380,8 @@ mod tests {
 
     type MeshOfCells = fn([u32; 3]) -> Mesh;
 
-    /// A block over [0, 1] × [0, 1] with so many cells each way whose points move by up to a part of a cell, those on its sides along them.
+    /// A block over [0, 1] × [0, 1] with so many cells each way whose points move by up to a part of a cell,
+    /// those on its sides along them.
     fn block(mut mesh: Mesh, cells: [u32; 3], height: f64, seed: u64, amount: f64) -> Mesh {
         let mut random = Random::new(seed);
         for point in &mut mesh.points {
@@ -407,8 +416,8 @@ mod tests {
         areas
     }
 
-    /// Crooked meshes of tets and hexes in every order: a row sums to 1 and follows linear fields, and a constant stress goes on as the other
-    /// mesh has it.
+    /// Crooked meshes of tets and hexes in every order: a row sums to 1 and follows linear fields, and a
+    /// constant stress goes on as the other mesh has it.
     #[test]
     fn rows_pass_linear_fields_and_constant_stresses() {
         let kinds: [(MeshOfCells, &str); 2] = [(block_of_hexes, "hexes"), (block_of_tets, "tets")];
@@ -443,8 +452,9 @@ mod tests {
         }
     }
 
-    /// The other surface ends within faces of the follower: nodes beyond its end are not tied. A row with them sums to 1 and is followed by
-    /// linear fields, and forces of a constant stress on the common area balance at every node.
+    /// The other surface ends within faces of the follower: nodes beyond its end are not tied. A row with
+    /// them sums to 1 and is followed by linear fields, and forces of a constant stress on the common area
+    /// balance at every node.
     #[test]
     fn faces_that_reach_beyond_the_other_surface_count_in_part() {
         for (shift, tied_columns) in [(0.55, 3), (0.5 + 1e-9, 2), (0.749, 3)] {

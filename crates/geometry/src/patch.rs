@@ -7,9 +7,10 @@ use crate::Vector3;
 /// Edges within which a hand holds a surface.
 const REACH: f64 = 2.0;
 
-/// The points of a surface around one of them, with weights that sum to 1: those within a radius [m] that hang together with the triangle
-/// where the point is, in whose corners it has the weights given; two mean edges of that triangle if no radius is given. Weights are those of a Gaussian whose
-/// deviation is half of the radius. Where nothing else is near, the corners with their own weights.
+/// The points of a surface around one of them, with weights that sum to 1: those within a radius [m] that
+/// hang together with the triangle where the point is, in whose corners it has the weights given; two mean
+/// edges of that triangle if no radius is given. Weights are those of a Gaussian whose deviation is half of
+/// the radius. Where nothing else is near, the corners with their own weights.
 ///
 /// ```
 /// use pliant_geometry::{Vector3, patch};

@@ -34,7 +34,8 @@ pub fn vector_area(points: &[Vector3]) -> Vector3 {
 }
 
 /// Volume V [m³] of a tet or a hex and the integrals ∫ ∇N_a dV [m²] of its shape gradients, the first
-/// `kind.node_count()` of eight. Divided by V they are the mean gradients B_a [1/m]. Exact; zero for other kinds.
+/// `kind.node_count()` of eight. Divided by V they are the mean gradients B_a [1/m]. Exact; zero for other
+/// kinds.
 pub fn gradient_integrals(kind: CellKind, points: &[Vector3]) -> (f64, [Vector3; 8]) {
     let mut integrals = [Vector3::zeros(); 8];
     let mut volume = 0.0;
@@ -48,7 +49,8 @@ pub fn gradient_integrals(kind: CellKind, points: &[Vector3]) -> (f64, [Vector3;
             volume = u.dot(&integrals[1]);
         }
         CellKind::Hex => {
-            // dV = det J dξ and ∇N_a det J = cof J ∂N_a/∂ξ are polynomials that the Gauss points integrate exactly.
+            // dV = det J dξ and ∇N_a det J = cof J ∂N_a/∂ξ are polynomials that the Gauss points integrate
+            // exactly.
             for xi in hex_gauss_points() {
                 let local = hex_local_gradients(&xi);
                 let [u, v, w] = hex_tangents(points, &local);
@@ -64,9 +66,9 @@ pub fn gradient_integrals(kind: CellKind, points: &[Vector3]) -> (f64, [Vector3;
     (volume, integrals)
 }
 
-/// Acoustic length l = (Σ_a |B_a|²)^(−1/2) [m] of a tet or a hex, with the mean shape gradients B_a; of a tet,
-/// (Σ 1/h_a²)^(−1/2) with its heights. A time step of l / c is stable, c being the speed of pressure waves.
-/// Negative if inverted, 0 if flat, and 0 for other kinds.
+/// Acoustic length l = (Σ_a |B_a|²)^(−1/2) [m] of a tet or a hex, with the mean shape gradients B_a; of a
+/// tet, (Σ 1/h_a²)^(−1/2) with its heights. A time step of l / c is stable, c being the speed of pressure
+/// waves. Negative if inverted, 0 if flat, and 0 for other kinds.
 pub fn acoustic_length(kind: CellKind, points: &[Vector3]) -> f64 {
     let (volume, integrals) = gradient_integrals(kind, points);
     let norm = integrals.iter().map(|b| b.norm_squared()).sum::<f64>().sqrt();
@@ -74,8 +76,8 @@ pub fn acoustic_length(kind: CellKind, points: &[Vector3]) -> f64 {
 }
 
 /// Acoustic length relative to the ideal cell of the same volume, a regular tet or a cube: 1 ideal, 0 flat,
-/// negative inverted. Dimensionless. No tet exceeds 1. A hex may exceed it slightly (1.007 where the corners of
-/// a cube move by up to 0.4 of its side), because mean gradients don't detect every distortion: check
+/// negative inverted. Dimensionless. No tet exceeds 1. A hex may exceed it slightly (1.007 where the corners
+/// of a cube move by up to 0.4 of its side), because mean gradients don't detect every distortion: check
 /// [`scaled_jacobian`] too.
 pub fn relative_acoustic_length(kind: CellKind, points: &[Vector3]) -> f64 {
     let volume = volume(kind, points);
@@ -156,8 +158,9 @@ pub struct QualityReport {
     pub scaled_jacobian: Option<f64>,
     /// Length of the edges of all cells [m], each edge once.
     pub edge_length: Option<Spread>,
-    /// Tets and hexes by acoustic length relative to the ideal cell of the same volume: bin i counts those from
-    /// i/10 to (i+1)/10. Inverted and flat cells are in the first bin, the few hexes above 1 in the last.
+    /// Tets and hexes by acoustic length relative to the ideal cell of the same volume: bin i counts those
+    /// from i/10 to (i+1)/10. Inverted and flat cells are in the first bin, the few hexes above 1 in the
+    /// last.
     pub histogram: [usize; 10],
 }
 
@@ -345,7 +348,8 @@ mod tests {
         assert!((scaled_jacobian(cube.as_slice().try_into().unwrap()) - 1.0).abs() < 1e-15);
     }
 
-    /// The frustum of a pyramid, sides 2 and 1, height 3: V = 3/3 (4 + 1 + 2) = 7; its hex map is exact for it.
+    /// The frustum of a pyramid, sides 2 and 1, height 3: V = 3/3 (4 + 1 + 2) = 7; its hex map is exact for
+    /// it.
     #[test]
     fn frustum_has_its_textbook_volume() {
         let hex = points(&[

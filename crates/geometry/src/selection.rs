@@ -19,12 +19,12 @@ const PLANE_TOLERANCE: f64 = 1e-5;
 /// Slack of the comparison of angles [°].
 const ANGLE_SLACK: f64 = 1e-6;
 
-/// Nodes or boundary faces of a body, chosen by position, by name or by label. Positions are those of the mesh
-/// before any motion [m].
+/// Nodes or boundary faces of a body, chosen by position, by name or by label. Positions are those of the
+/// mesh before any motion [m].
 ///
-/// Where faces are asked for, a boundary face is selected if all its nodes are; `normal` looks at the face itself,
-/// `label` and sets of volume cells at the cell behind it, and sets of triangles or quads name faces directly. The
-/// boundary of a mesh of triangles and quads alone is the whole mesh.
+/// Where faces are asked for, a boundary face is selected if all its nodes are; `normal` looks at the face
+/// itself, `label` and sets of volume cells at the cell behind it, and sets of triangles or quads name faces
+/// directly. The boundary of a mesh of triangles and quads alone is the whole mesh.
 #[derive(Deserialize, Serialize, JsonSchema, Clone, Debug, PartialEq)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Selection {
@@ -32,11 +32,12 @@ pub enum Selection {
     All,
     /// Everything on the boundary: `"boundary"`.
     Boundary,
-    /// Everything in an axis-aligned box [m]: `{ box = [[0, 0, 0], [0.1, 0.1, 0.02]] }`, the corner of the smallest
-    /// coordinates first. Its sides belong to it, with a slack of 1e-9 of the diagonal of the mesh's bounding box.
+    /// Everything in an axis-aligned box [m]: `{ box = [[0, 0, 0], [0.1, 0.1, 0.02]] }`, the corner of the
+    /// smallest coordinates first. Its sides belong to it, with a slack of 1e-9 of the diagonal of the mesh's
+    /// bounding box.
     Box([[f64; 3]; 2]),
-    /// Everything in a sphere: `{ sphere = { centre = [0, 0, 0], radius = 0.02 } }`. Its surface belongs to it, with
-    /// the slack of `box`.
+    /// Everything in a sphere: `{ sphere = { centre = [0, 0, 0], radius = 0.02 } }`. Its surface belongs to
+    /// it, with the slack of `box`.
     Sphere {
         /// Its centre [m].
         centre: [f64; 3],
@@ -44,8 +45,8 @@ pub enum Selection {
         #[schemars(range(min = 0.0))]
         radius: f64,
     },
-    /// Everything on one side of a plane: `{ half-space = { point = [0, 0, 0.05], normal = [0, 0, 1] } }`. The plane
-    /// belongs to it, with the slack of `box`.
+    /// Everything on one side of a plane: `{ half-space = { point = [0, 0, 0.05], normal = [0, 0, 1] } }`.
+    /// The plane belongs to it, with the slack of `box`.
     HalfSpace {
         /// A point of the plane [m].
         point: [f64; 3],
@@ -58,13 +59,14 @@ pub enum Selection {
         point: [f64; 3],
         /// Perpendicular to the plane; of any length but 0, without unit.
         normal: [f64; 3],
-        /// Greatest distance from the plane [m], 0 or more. Default: 1e-5 of the diagonal of the mesh's bounding box,
-        /// which is 1e-6 m for an organ of 0.1 m.
+        /// Greatest distance from the plane [m], 0 or more. Default: 1e-5 of the diagonal of the mesh's
+        /// bounding box, which is 1e-6 m for an organ of 0.1 m.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = 0.0))]
         tolerance: Option<f64>,
     },
-    /// Boundary faces (and their nodes) that look in a direction: `{ normal = { direction = [0, 0, 1], within = 30 } }`.
+    /// Boundary faces (and their nodes) that look in a direction:
+    /// `{ normal = { direction = [0, 0, 1], within = 30 } }`.
     Normal {
         /// The direction; of any length but 0, without unit.
         direction: [f64; 3],
@@ -72,8 +74,8 @@ pub enum Selection {
         #[schemars(range(min = 0.0, max = 180.0))]
         within: f64,
     },
-    /// The nodes closest to a point: `{ nearest = { point = [0, 0, 0.05] } }`. Of nodes at the same distance, those of
-    /// smaller index.
+    /// The nodes closest to a point: `{ nearest = { point = [0, 0, 0.05] } }`. Of nodes at the same distance,
+    /// those of smaller index.
     Nearest {
         /// The point [m].
         point: [f64; 3],
@@ -84,9 +86,11 @@ pub enum Selection {
     },
     /// A named set of the mesh file, of points or of cells: `{ set = "left-lobe" }`.
     Set(String),
-    /// Everything of the cells with a label (cell data `label`), by number or name: `{ label = 2 }`, `{ label = "liver" }`.
+    /// Everything of the cells with a label (cell data `label`), by number or name: `{ label = 2 }`,
+    /// `{ label = "liver" }`.
     Label(CellLabel),
-    /// Nodes shared by cells of two labels, the interface of two regions: `{ label-boundary = [1, "tumour"] }`.
+    /// Nodes shared by cells of two labels, the interface of two regions:
+    /// `{ label-boundary = [1, "tumour"] }`.
     LabelBoundary([CellLabel; 2]),
     /// Nodes by index, counted from 0: `{ ids = [0, 5, 17] }`.
     Ids(Vec<u32>),
@@ -94,7 +98,8 @@ pub enum Selection {
     Union(Vec<Selection>),
     /// What every one of the selections holds: `{ intersection = ["boundary", { label = 2 }] }`.
     Intersection(Vec<Selection>),
-    /// What the first selection holds and none of the others: `{ difference = ["boundary", { set = "cut" }] }`.
+    /// What the first selection holds and none of the others:
+    /// `{ difference = ["boundary", { set = "cut" }] }`.
     Difference(Vec<Selection>),
 }
 

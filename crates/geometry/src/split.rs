@@ -1,8 +1,9 @@
-//! Wedges and pyramids become tets, because no element of a body has their shape. Each quadrilateral face is cut along the diagonal through
-//! its node of the smallest number, so the cells on both sides of the face agree (Dompierre, Labbé, Vallet and Camarero 1999). A cell is
-//! the cone from its smallest node to the triangles of its other faces. Hexes that share a face with a split cell are split as well: a
-//! hex and two tets on one face fail the patch test. Where two tets already meet a face, their diagonal counts; if a cell then has no node
-//! for a cone, the cone starts from a new node at its centre.
+//! Wedges and pyramids become tets, because no element of a body has their shape. Each quadrilateral face is
+//! cut along the diagonal through its node of the smallest number, so the cells on both sides of the face
+//! agree (Dompierre, Labbé, Vallet and Camarero 1999). A cell is the cone from its smallest node to the
+//! triangles of its other faces. Hexes that share a face with a split cell are split as well: a hex and two
+//! tets on one face fail the patch test. Where two tets already meet a face, their diagonal counts; if a cell
+//! then has no node for a cone, the cone starts from a new node at its centre.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -13,7 +14,8 @@ use crate::{CellKind, DataArray, Mesh, Vector3, volume};
 /// Volume cells that are split into tets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SplitKind {
-    /// Triangular prism: 0–2 one triangle, 3–5 the other one. Either orientation is valid, since VTK and Gmsh differ.
+    /// Triangular prism: 0–2 one triangle, 3–5 the other one. Either orientation is valid, since VTK and Gmsh
+    /// differ.
     Wedge,
     /// Pyramid: 0–3 the base, counter-clockwise seen from the apex, 4 the apex.
     Pyramid,
@@ -118,7 +120,8 @@ pub fn add_as_tets(mesh: &mut Mesh, cells: &[SplitCells]) -> Option<String> {
     Some(format!("split into tets: {}{centres}", counts.join(", ")))
 }
 
-/// Faces of hexes that two tets meet. Nodal forces of the two sides differ there, so bodies of both kinds fail the patch test.
+/// Faces of hexes that two tets meet. Nodal forces of the two sides differ there, so bodies of both kinds
+/// fail the patch test.
 pub fn faces_met_by_two_tets(mesh: &Mesh) -> usize {
     let [Some(hexes), Some(_)] = [CellKind::Hex, CellKind::Tet].map(|kind| mesh.block(kind)) else {
         return 0;
@@ -236,7 +239,8 @@ impl Splitter {
         }
     }
 
-    /// Whether two tets meet a face that are cut from its first to its third node, or from its second to its fourth.
+    /// Whether two tets meet a face that are cut from its first to its third node, or from its second to its
+    /// fourth.
     fn diagonals(&self, [a, b, c, d]: [u32; 4]) -> [bool; 2] {
         let meets = |tets: [[u32; 3]; 2]| tets.iter().all(|face| self.triangles.contains(&face_key(face)));
         [meets([[a, b, c], [a, c, d]]), meets([[a, b, d], [b, c, d]])]
@@ -318,7 +322,8 @@ mod tests {
         SplitCells { kind, nodes: nodes.to_vec(), data: BTreeMap::new(), sets: BTreeMap::new() }
     }
 
-    /// A grid of unit cubes with moved nodes in a random numbering, each cube a hex, two wedges or six pyramids round its centre.
+    /// A grid of unit cubes with moved nodes in a random numbering, each cube a hex, two wedges or six
+    /// pyramids round its centre.
     fn mixed(n: [u32; 3], random: &mut Random) -> (Mesh, Vec<SplitCells>) {
         let count = ((n[0] + 1) * (n[1] + 1) * (n[2] + 1)) as usize;
         let mut order: Vec<u32> = (0..count as u32).collect();
@@ -342,7 +347,8 @@ mod tests {
                     .map(at);
             match random.below(3) {
                 0 => mesh.block_mut(CellKind::Hex).nodes.extend(hex),
-                // The triangles of wedges stand across z, where cubes above and below may be cut otherwise: keep z open.
+                // The triangles of wedges stand across z, where cubes above and below may be cut otherwise:
+                // keep z open.
                 1 if n[2] == 1 => {
                     let [a, b, c, d, e, f, g, h] = hex;
                     wedges.extend([a, b, c, e, f, g]);

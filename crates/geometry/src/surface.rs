@@ -1,5 +1,5 @@
-//! The boundary of a body: the faces that belong to one cell only, turned outwards.
-//! Leaves out: data and sets, which stay with the body's mesh and are reached through the parent cell or node.
+//! The boundary of a body: the faces that belong to one cell only, turned outwards. Leaves out: data and
+//! sets, which stay with the body's mesh and are reached through the parent cell or node.
 
 use crate::cell::{CellId, body_blocks, faces};
 use crate::quality::vector_area;
@@ -304,7 +304,8 @@ mod tests {
 
     #[test]
     fn collapsed_hex_meets_its_neighbour_face_to_face() {
-        // A wedge, written as a hex with its edges 2-3 and 6-7 collapsed, beside a tet on its triangle 0, 1, 2.
+        // A wedge, written as a hex with its edges 2-3 and 6-7 collapsed, beside a tet on its triangle 0,
+        // 1, 2.
         let mut mesh = Mesh { points: points(&UNIT_CUBE), ..Mesh::default() };
         mesh.points.push(Vector3::new(0.5, 0.5, -1.0));
         mesh.block_mut(CellKind::Hex).nodes = vec![0, 1, 2, 2, 4, 5, 6, 6];

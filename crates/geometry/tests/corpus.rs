@@ -1,6 +1,6 @@
-//! A corpus of malformed mesh files, and the files of `data/` truncated and changed at random with a fixed seed. Each gives an error
-//! or a mesh, never a panic, and uses no more memory than the file justifies. The test runs in its own process, whose peak memory is
-//! measured.
+//! A corpus of malformed mesh files, and the files of `data/` truncated and changed at random with a fixed
+//! seed. Each gives an error or a mesh, never a panic, and uses no more memory than the file justifies. The
+//! test runs in its own process, whose peak memory is measured.
 
 use std::fs;
 use std::path::{Path, PathBuf};

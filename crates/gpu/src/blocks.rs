@@ -10,7 +10,8 @@ use crate::{Device, GpuError};
 /// Most nodes of a block: a corner takes one byte.
 const MOST_NODES: usize = 255;
 
-/// Tetrahedra of a block of cells, one an invocation: more than [`GROUP`], since they share more of their nodes.
+/// Tetrahedra of a block of cells, one an invocation: more than [`GROUP`], since they share more of their
+/// nodes.
 const TETS: usize = 256;
 
 /// A block; twin of those in block_cells.wgsl and node_blocks.wgsl.
@@ -56,7 +57,8 @@ struct Bisection<'a> {
 }
 
 impl Bisection<'_> {
-    /// Puts what lies together next to each other; ends of blocks in `ends`. One alone is a block whether it fits or not.
+    /// Puts what lies together next to each other; ends of blocks in `ends`. One alone is a block whether it
+    /// fits or not.
     fn cut(&self, order: &mut [u32], first: usize, ends: &mut Vec<usize>) {
         if order.len() <= 1 || order.len() <= self.whole && (self.fits)(order) {
             if !order.is_empty() {
@@ -91,7 +93,8 @@ impl DeviceBlocks {
     ) -> Result<Self, GpuError> {
         let cells = &solid.cells;
         let per_cell = cells.nodes_per_cell();
-        // Displacements and places at rest of all nodes, forces and energies of all cells, and a force that is zero.
+        // Displacements and places at rest of all nodes, forces and energies of all cells, and a force that
+        // is zero.
         let needed = |group: usize| 4 * (2 * 3 * MOST_NODES + (3 * per_cell + 1) * group + 4);
         let adapter = device.adapter();
         let group = match cells {
@@ -190,7 +193,8 @@ impl DeviceBlocks {
     }
 }
 
-/// Most nodes that a block of nodes moves: 4³, where hexahedra are evaluated 1.95 times each and tetrahedra 1.78 times.
+/// Most nodes that a block of nodes moves: 4³, where hexahedra are evaluated 1.95 times each and tetrahedra
+/// 1.78 times.
 const MOST_OWN: usize = 64;
 
 /// A node of a block of which an earlier solid has left forces.
@@ -199,12 +203,14 @@ const TAKES: u32 = 1 << 31;
 /// A node of a block that a later solid moves.
 const LEAVES: u32 = 1 << 30;
 
-/// Shared memory of a block of nodes [B]: what adds up work, a whole force of each node it moves, and displacements.
+/// Shared memory of a block of nodes [B]: what adds up work, a whole force of each node it moves, and
+/// displacements.
 fn shared_memory(nodes: usize) -> usize {
     16 * GROUP as usize + 16 * MOST_OWN + 16 + 12 * nodes
 }
 
-/// Whether the shapes of cells at rest are found from the places of their nodes: those of linear tetrahedra that are full.
+/// Whether the shapes of cells at rest are found from the places of their nodes: those of linear tetrahedra
+/// that are full.
 pub(crate) fn finds_shapes(cells: &Cells) -> bool {
     let Cells::Tet4(block) = cells else { return false };
     block.rest.iter().all(|rest| {
@@ -229,7 +235,8 @@ pub(crate) struct NodeBlocks {
 }
 
 impl NodeBlocks {
-    /// Cuts each solid. A node of several solids is moved by the last of them, one of none by the last of all.
+    /// Cuts each solid. A node of several solids is moved by the last of them, one of none by the last of
+    /// all.
     ///
     /// # Errors
     /// If what belongs to one node alone does not fit into the memory that a group shares.

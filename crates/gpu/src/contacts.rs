@@ -1,5 +1,6 @@
-//! Contacts on the device: nodes and points between them as rows, found and solved there at every instant. Only the ways of obstacles and tools
-//! go up, with the factors of loads, and lists of candidates for pairs of surfaces when these are to be made anew. Leaves out: ideal grips of jaws, bodies of revolution.
+//! Contacts on the device: nodes and points between them as rows, found and solved there at every instant.
+//! Only the ways of obstacles and tools go up, with the factors of loads, and lists of candidates for pairs
+//! of surfaces when these are to be made anew. Leaves out: ideal grips of jaws, bodies of revolution.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -75,7 +76,8 @@ pub(crate) struct DeviceContacts {
     pub forces: wgpu::Buffer,
     /// The force [N] of each contact on its surface, four numbers each, once [`sum`](Self::sum) has run.
     pub sums: wgpu::Buffer,
-    /// What runs before the forces of cells are found: stops where candidates for pairs are to be listed anew.
+    /// What runs before the forces of cells are found: stops where candidates for pairs are to be listed
+    /// anew.
     pub before: Option<Kernel>,
     /// What finds the forces on nodes, in order.
     pub kernels: Vec<Kernel>,
@@ -263,8 +265,8 @@ fn bound(
     nodes.of_contacts(device, &own)
 }
 
-/// Invocations of the group that solves all rows. It waits after each colour and level; software changes from one part of a group to another
-/// there, and has one part only if the group fills one vector.
+/// Invocations of the group that solves all rows. It waits after each colour and level; software changes from
+/// one part of a group to another there, and has one part only if the group fills one vector.
 fn solvers(device: &Device) -> usize {
     match device.adapter().kind {
         Kind::Software => 8,
@@ -454,7 +456,8 @@ impl Lists {
     }
 }
 
-/// Faces in the order of colours, so that those of a colour share no node: each takes the first one that is free.
+/// Faces in the order of colours, so that those of a colour share no node: each takes the first one that is
+/// free.
 fn coloured(faces: BTreeMap<[u32; 3], Face>, nodes: usize) -> Vec<([u32; 3], Face)> {
     let mut taken: Vec<Vec<usize>> = vec![Vec::new(); nodes];
     let mut faces: Vec<_> = faces.into_iter().collect();

@@ -11,16 +11,18 @@ use crate::Kind;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Design {
-    /// Cells write forces into slots of their own, nodes gather them in a fixed order. The same bits every time.
+    /// Cells write forces into slots of their own, nodes gather them in a fixed order. The same bits every
+    /// time.
     Gather,
-    /// Blocks of neighbouring nodes do a step in one kernel: they find the forces of all cells at their nodes in shared memory
-    /// and move them. Cells at the borders of blocks are found by each. The same bits every time, forces of a limited range.
+    /// Blocks of neighbouring nodes do a step in one kernel: they find the forces of all cells at their nodes
+    /// in shared memory and move them. Cells at the borders of blocks are found by each. The same bits every
+    /// time, forces of a limited range.
     Blocks,
-    /// Cells add their forces to those of the nodes by floating-point atomics, in any order: the last bits vary from run to
-    /// run.
+    /// Cells add their forces to those of the nodes by floating-point atomics, in any order: the last bits
+    /// vary from run to run.
     FloatAtomics,
-    /// Blocks of neighbouring cells add their forces up in shared memory, nodes gather the sums of their blocks; shapes of
-    /// plain tetrahedra at rest are found again from their nodes. The same bits every time.
+    /// Blocks of neighbouring cells add their forces up in shared memory, nodes gather the sums of their
+    /// blocks; shapes of plain tetrahedra at rest are found again from their nodes. The same bits every time.
     Fast,
 }
 
@@ -30,9 +32,10 @@ impl Design {
 
     /// The default.
     ///
-    /// On software adapters `gather` measured best (Mesa's llvmpipe, 55,566 tetrahedra: 78 ns of CPU time per cell and
-    /// step, 113 to 161 for the others). On GPUs `fast` moves the fewest bytes, needs no atomics and has forces of any size. On
-    /// an NVIDIA H100 only `blocks` is faster (0.32 ns for 0.40 ns), which has no contact and forces of a limited range.
+    /// On software adapters `gather` measured best (Mesa's llvmpipe, 55,566 tetrahedra: 78 ns of CPU time per
+    /// cell and step, 113 to 161 for the others). On GPUs `fast` moves the fewest bytes, needs no atomics and
+    /// has forces of any size. On an NVIDIA H100 only `blocks` is faster (0.32 ns for 0.40 ns), which has no
+    /// contact and forces of a limited range.
     pub fn usual(kind: Kind) -> Self {
         match kind {
             Kind::Software => Self::Gather,

@@ -1,9 +1,12 @@
-//! Conjugate gradients of implicit steps, in single precision: inverted blocks of the nodes, and with them rigid motions of aggregates.
+//! Conjugate gradients of implicit steps, in single precision: inverted blocks of the nodes, and with them
+//! rigid motions of aggregates.
 //!
-//! Kernels are compiled once; another pattern changes sizes and arrays. The CPU sends the lower half of the matrix; a kernel makes rows of blocks of it. The coarse matrix is inverted in full, pivot by pivot. An
-//! iteration takes four kernels (three without aggregates): A p; x, r and z = D⁻¹ r with the forces on aggregates; their motions; p.
-//! Sums are found group by group, and every group that needs a sum adds up those of the groups in the same order. The device itself decides
-//! where to stop: what was submitted after that does nothing. So bits depend on no number of submissions.
+//! Kernels are compiled once; another pattern changes sizes and arrays. The CPU sends the lower half of the
+//! matrix; a kernel makes rows of blocks of it. The coarse matrix is inverted in full, pivot by pivot. An
+//! iteration takes four kernels (three without aggregates): A p; x, r and z = D⁻¹ r with the forces on
+//! aggregates; their motions; p. Sums are found group by group, and every group that needs a sum adds up
+//! those of the groups in the same order. The device itself decides where to stop: what was submitted after
+//! that does nothing. So bits depend on no number of submissions.
 //!
 //! `pliant-linear` takes what comes back as a correction under a residual in double precision.
 
@@ -493,7 +496,8 @@ fn homes(pattern: &BlockPattern<'_>) -> Vec<[u32; 2]> {
     nodes.zip(&pattern.free).map(|(own, &free)| [own, free]).collect()
 }
 
-/// A place in ordinary memory that the device copies from; it stays, since a new one of some megabytes takes longer than the copy.
+/// A place in ordinary memory that the device copies from; it stays, since a new one of some megabytes takes
+/// longer than the copy.
 struct Upload {
     staging: wgpu::Buffer,
 }

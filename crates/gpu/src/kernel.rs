@@ -151,14 +151,15 @@ fn array_size(bytes: usize) -> u64 {
     (bytes as u64).max(48).next_multiple_of(16)
 }
 
-/// Bytes of a buffer, a multiple of 16, that takes the place of a smaller one: half more, up to the largest that the adapter allows, or those needed.
+/// Bytes of a buffer, a multiple of 16, that takes the place of a smaller one: half more, up to the largest
+/// that the adapter allows, or those needed.
 pub(crate) fn grown(size: u64, needed: u64, largest: u64) -> u64 {
     let roomy = (size * 3 / 2).next_multiple_of(16);
     roomy.min(largest - largest % 16).max(needed.next_multiple_of(16))
 }
 
-/// An array that has two sides: at an instant one of them is now, the other one is next. Where a kernel changes it in place both
-/// are the same.
+/// An array that has two sides: at an instant one of them is now, the other one is next. Where a kernel
+/// changes it in place both are the same.
 pub(crate) type Sides = [wgpu::Buffer; 2];
 
 /// An array as a kernel sees it.
@@ -354,14 +355,15 @@ impl Kernel {
     }
 }
 
-/// A module without the checks that wgpu adds for programs of strangers: of places in arrays, and counters that end every loop. Without
-/// them steps of tetrahedra take 10 to 20 % less time on an NVIDIA H100.
+/// A module without the checks that wgpu adds for programs of strangers: of places in arrays, and counters
+/// that end every loop. Without them steps of tetrahedra take 10 to 20 % less time on an NVIDIA H100.
 #[expect(unsafe_code, reason = "wgpu has checked and unchecked modules, and no third kind")]
 fn trusted(gpu: &wgpu::Device, name: &str, source: String) -> wgpu::ShaderModule {
     let source = wgpu::ShaderSource::Wgsl(source.into());
     let descriptor = wgpu::ShaderModuleDescriptor { label: Some(name), source };
-    // SAFETY: the text is Pliant's own. Loops end at counts, and places in arrays come from lists, that the CPU has made, or that kernels have made of
-    // them: queues of contact hold each row, face and node once and have room for all. No whole number is divided by zero.
+    // SAFETY: the text is Pliant's own. Loops end at counts, and places in arrays come from lists, that the
+    // CPU has made, or that kernels have made of them: queues of contact hold each row, face and node once
+    // and have room for all. No whole number is divided by zero.
     unsafe { gpu.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked()) }
 }
 

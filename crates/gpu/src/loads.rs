@@ -30,8 +30,8 @@ fn weights(model: &Model, load: &Load, point: u32) -> Vec<(u32, f64)> {
     }
 }
 
-/// A part of an entry by components, for a node that its node follows, or for that node itself where it is held. The weights that are not zero
-/// are the same.
+/// A part of an entry by components, for a node that its node follows, or for that node itself where it is
+/// held. The weights that are not zero are the same.
 fn part_of([x, y, z, w]: Four, weights: Vector<f64>) -> Four {
     let [a, b, c] = weights.map(|weight| weight as f32);
     match w.to_bits() {

@@ -1,4 +1,5 @@
-//! Points that nodes carry, found on the device where they are drawn from: nothing of them goes through ordinary memory.
+//! Points that nodes carry, found on the device where they are drawn from: nothing of them goes through
+//! ordinary memory.
 
 use pliant_mechanics::tensor::Vector;
 
@@ -113,7 +114,8 @@ impl DeviceMapping {
         self.points.device.queue.write_buffer(&self.given, 0, bytemuck::cast_slice(values));
     }
 
-    /// The points; where they are and what their values are changes with each [`GpuStepper::apply`](crate::GpuStepper::apply).
+    /// The points; where they are and what their values are changes with each
+    /// [`GpuStepper::apply`](crate::GpuStepper::apply).
     pub fn points(&self) -> &DevicePoints {
         &self.points
     }

@@ -85,7 +85,8 @@ impl DeviceNodes {
                         amplitudes: amplitudes[node as usize].map(four),
                     });
                 }
-                // Nodes that follow others have no mass, and no force but where they are held: there next to no mass moves with them.
+                // Nodes that follow others have no mass, and no force but where they are held: there next to
+                // no mass moves with them.
                 let follows = followers.as_ref().is_some_and(|followers| followers.number(node).is_some());
                 let inertia = match follows {
                     true if tag == 0 => 1.0,
@@ -120,7 +121,8 @@ impl DeviceNodes {
         })
     }
 
-    /// The passes, with `gather` and `gathered` how forces come from the cells, and the forces of contacts on nodes [N].
+    /// The passes, with `gather` and `gathered` how forces come from the cells, and the forces of contacts on
+    /// nodes [N].
     ///
     /// # Errors
     /// If the adapter allows fewer arrays.

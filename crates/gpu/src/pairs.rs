@@ -1,5 +1,6 @@
-//! Candidates for pairs of points of surfaces: listed in ordinary memory from places that are read back, whenever the device stops because nodes have
-//! left the skin of the lists. Results depend neither on when they are made nor on when the device was looked at.
+//! Candidates for pairs of points of surfaces: listed in ordinary memory from places that are read back,
+//! whenever the device stops because nodes have left the skin of the lists. Results depend neither on when
+//! they are made nor on when the device was looked at.
 
 use nalgebra::Vector3;
 use pliant_contact::pairs::Pairs;
@@ -43,7 +44,8 @@ pub(crate) struct DevicePairs {
 }
 
 impl DevicePairs {
-    /// Those of contacts of bodies, if there are any; `nodes` touch something, and `rest` is where all nodes of the model are at rest [m].
+    /// Those of contacts of bodies, if there are any; `nodes` touch something, and `rest` is where all nodes
+    /// of the model are at rest [m].
     ///
     /// # Errors
     /// If an array is too large.
@@ -88,7 +90,8 @@ impl DevicePairs {
         Ok(Some(all))
     }
 
-    /// Lists candidates with nodes of the model at displacements [m]; uploads them. Whether arrays are others than before.
+    /// Lists candidates with nodes of the model at displacements [m]; uploads them. Whether arrays are others
+    /// than before.
     ///
     /// # Errors
     /// If an array is too large.
@@ -186,7 +189,8 @@ impl DevicePairs {
         (self.numbers.len() - self.numbers[4] as usize) / 5
     }
 
-    /// Makes larger arrays if these are too small for the lists; whether it did. Tells kernels how many rows there can be.
+    /// Makes larger arrays if these are too small for the lists; whether it did. Tells kernels how many rows
+    /// there can be.
     fn grow(&mut self, memory: &Memory<'_>) -> Result<bool, GpuError> {
         let bytes = size_of_val(&self.numbers[..]);
         let rows = self.rows();

@@ -1,8 +1,8 @@
 //! The way forces take from cells to nodes, for each design.
 //!
-//! What an elastic `tet4` moves and computes in a step, counted from the arrays below for six cells a node, each number read once
-//! from memory; operations are those of a prototype's PTX (sm_90, neo-Hookean). The node itself (u, Δu read and written, its
-//! constants) is 80 B, 13 a cell. Times are in docs/performance.md.
+//! What an elastic `tet4` moves and computes in a step, counted from the arrays below for six cells a node,
+//! each number read once from memory; operations are those of a prototype's PTX (sm_90, neo-Hookean). The
+//! node itself (u, Δu read and written, its constants) is 80 B, 13 a cell. Times are in docs/performance.md.
 //!
 //! | design | bytes | operations | where they go |
 //! |---|---|---|---|
@@ -83,9 +83,9 @@ impl Paths {
         }
     }
 
-    /// One kernel a step. Of the forces of a block only whole numbers are kept, 16 bytes a node: in shared memory every GPU adds
-    /// them natively, in any order to the same sum. Slots to gather them from would take 48 bytes or more a cell
-    /// there, which makes blocks smaller and cells at borders more.
+    /// One kernel a step. Of the forces of a block only whole numbers are kept, 16 bytes a node: in shared
+    /// memory every GPU adds them natively, in any order to the same sum. Slots to gather them from would
+    /// take 48 bytes or more a cell there, which makes blocks smaller and cells at borders more.
     fn blocks(
         memory: &Memory<'_>,
         device: &Device,
@@ -248,9 +248,9 @@ impl Paths {
     }
 }
 
-/// The units of forces and energies that are added up as whole numbers of 32 bits. A cell gives at most 2³¹ over the most
-/// cells at a node, so that no sum leaves the range; that much is the force of the stiffest cell at a strain of 1,
-/// V (λ+2μ) |B|. What is more is cut off and reported.
+/// The units of forces and energies that are added up as whole numbers of 32 bits. A cell gives at most 2³¹
+/// over the most cells at a node, so that no sum leaves the range; that much is the force of the stiffest
+/// cell at a strain of 1, V (λ+2μ) |B|. What is more is cut off and reported.
 struct Scale {
     limit: f32,
     per_force: f32,
@@ -298,7 +298,8 @@ fn force_at_unit_strain(solid: &Solid, cell: usize) -> f64 {
     area * solid.longitudinal_modulus()
 }
 
-/// First entry of each of so many rows, and the entries of the rows in their order, from entries with their rows.
+/// First entry of each of so many rows, and the entries of the rows in their order, from entries with their
+/// rows.
 pub(crate) fn by_rows<T: Copy + Default>(
     rows: usize,
     entries: impl Iterator<Item = (u32, T)> + Clone,

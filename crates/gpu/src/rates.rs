@@ -1,7 +1,7 @@
 //! Peak rates of a device, measured: copies, multiply-adds, and kernel launches.
 //!
-//! A chain of the same kernel is submitted again and again, longer and longer until it takes [`ENOUGH`]; the best of the
-//! repeats counts, since other work can only slow it down.
+//! A chain of the same kernel is submitted again and again, longer and longer until it takes [`ENOUGH`]; the
+//! best of the repeats counts, since other work can only slow it down.
 
 use std::time::{Duration, Instant};
 

@@ -43,7 +43,8 @@ pub(crate) fn constants_of(
     ]
 }
 
-/// Whether the hourglass stiffness of a solid grows: 0 if not, 1 of a law with an energy of the volume alone, 2 of others.
+/// Whether the hourglass stiffness of a solid grows: 0 if not, 1 of a law with an energy of the volume alone,
+/// 2 of others.
 fn hourglass_grows(solid: &Solid) -> usize {
     let kind = if solid.material.law.has_volumetric_energy() { 1 } else { 2 };
     solid.hourglass_growth().map_or(0, |_| kind)

@@ -61,7 +61,8 @@ pub(crate) struct DeviceSolid {
     kernels: Vec<Kernel>,
     /// What relaxing laws remember of cells and of averaged pressures.
     histories: [wgpu::Buffer; 2],
-    /// The order of cells and of averaged pressures on the device, by their numbers in the solid; some lie there several times.
+    /// The order of cells and of averaged pressures on the device, by their numbers in the solid; some lie
+    /// there several times.
     orders: [Vec<u32>; 2],
     /// Packs of history for each pack of cells and of averaged pressures.
     packs: [usize; 2],
@@ -198,7 +199,8 @@ impl DeviceSolid {
         self.orders[index].len().div_ceil(PACK) * self.packs[index] * PACK
     }
 
-    /// Visits the numbers of one of the histories: pack and lane in the order of the solid, and the place on the device.
+    /// Visits the numbers of one of the histories: pack and lane in the order of the solid, and the place on
+    /// the device.
     fn for_each_number(&self, index: usize, mut visit: impl FnMut(usize, usize, usize)) {
         let each = self.packs[index];
         for (to, &from) in self.orders[index].iter().enumerate() {

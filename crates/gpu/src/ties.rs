@@ -1,5 +1,6 @@
-//! Nodes on the device that follow others: they are taken along after each motion, and the forces of their cells go to the nodes that they
-//! follow, by the rows of `pliant_mechanics::tie`. Masses have gone there when the model was made.
+//! Nodes on the device that follow others: they are taken along after each motion, and the forces of their
+//! cells go to the nodes that they follow, by the rows of `pliant_mechanics::tie`. Masses have gone there
+//! when the model was made.
 
 use pliant_mechanics::model::Model;
 use pliant_mechanics::tensor::Vector;
@@ -62,8 +63,8 @@ impl Followers {
         self.rows.iter().map(|&[.., followed]| followed)
     }
 
-    /// What gives forces on where each cell has slots, with the slots of followers as [`Followers::number`] counts them, and the first
-    /// of those that the followed nodes take.
+    /// What gives forces on where each cell has slots, with the slots of followers as [`Followers::number`]
+    /// counts them, and the first of those that the followed nodes take.
     pub(crate) fn among_slots(
         &self,
         device: &Device,

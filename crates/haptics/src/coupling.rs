@@ -1,12 +1,12 @@
-//! The virtual coupling between device and proxy, and how stiff it may be. A sampled wall of stiffness K and damping B is passive if the device
-//! itself has the damping
+//! The virtual coupling between device and proxy, and how stiff it may be. A sampled wall of stiffness K and
+//! damping B is passive if the device itself has the damping
 //!
 //! ```text
 //! b > K T / 2 + |B|
 //! ```
 //!
-//! (Colgate and Schenkel 1997, "Passivity of a class of sampled-data systems"). With a delay τ besides, about K < 2 (b − |B|) / (T + 2 τ)
-//! (Diolaiti, Niemeyer, Barbagli and Salisbury 2006).
+//! (Colgate and Schenkel 1997, "Passivity of a class of sampled-data systems"). With a delay τ besides, about
+//! K < 2 (b − |B|) / (T + 2 τ) (Diolaiti, Niemeyer, Barbagli and Salisbury 2006).
 //!
 //! ```
 //! use pliant_haptics::coupling::Coupling;
@@ -28,15 +28,16 @@ pub struct Coupling {
 }
 
 impl Default for Coupling {
-    /// 1000 N/m and 0.2 N s/m: passive at 1 kHz on a device of 0.7 N s/m, or 1.2 N s/m with a force half a tick ahead.
+    /// 1000 N/m and 0.2 N s/m: passive at 1 kHz on a device of 0.7 N s/m, or 1.2 N s/m with a force half a
+    /// tick ahead.
     fn default() -> Self {
         Self { stiffness: 1000.0, damping: 0.2 }
     }
 }
 
 impl Coupling {
-    /// The largest passive stiffness [N/m] on a device of a damping b [N s/m], with a damping B [N s/m] of the coupling, a period T [s] and a
-    /// delay τ [s] besides; 0 where none is passive.
+    /// The largest passive stiffness [N/m] on a device of a damping b [N s/m], with a damping B [N s/m] of
+    /// the coupling, a period T [s] and a delay τ [s] besides; 0 where none is passive.
     pub fn limit(device: f64, damping: f64, period: f64, delay: f64) -> f64 {
         (2.0 * (device - damping.abs()) / (period + 2.0 * delay)).max(0.0)
     }

@@ -1,14 +1,16 @@
-//! How the tissue gives way, from the tool's places p and forces F in successive steps of the simulation. The stiffness along the force is the
-//! slope of the pairs Δd = −n·Δp, ΔF = n·(F − F'), by least squares that forget:
+//! How the tissue gives way, from the tool's places p and forces F in successive steps of the simulation. The
+//! stiffness along the force is the slope of the pairs Δd = −n·Δp, ΔF = n·(F − F'), by least squares that
+//! forget:
 //!
 //! ```text
 //! k = (k₀ s + Σ γʲ Δd ΔF) / (s + Σ γʲ Δd²)
 //! ```
 //!
-//! with a first guess k₀ of the weight s. Across, a body that keeps its volume gives way 1.5 times as much: (1 − ν/2) / (1 − ν) at ν = 0.5
-//! (Mindlin 1949, a round contact that sticks). The estimate is held in bounds. It sets how the force changes between two models, not the
-//! force at rest, which is that of the simulation. One that is too stiff is safe, one below half of the tissue's less half of the
-//! coupling's is not: a step of the simulation then changes the force by more than it was wrong, by −(k − k_m) / (K + k_m).
+//! with a first guess k₀ of the weight s. Across, a body that keeps its volume gives way 1.5 times as much:
+//! (1 − ν/2) / (1 − ν) at ν = 0.5 (Mindlin 1949, a round contact that sticks). The estimate is held in
+//! bounds. It sets how the force changes between two models, not the force at rest, which is that of the
+//! simulation. One that is too stiff is safe, one below half of the tissue's less half of the coupling's is
+//! not: a step of the simulation then changes the force by more than it was wrong, by −(k − k_m) / (K + k_m).
 //!
 //! ```
 //! use nalgebra::Vector3;
@@ -49,7 +51,8 @@ impl Estimate {
         Self { guess, bounds, last: None, sums: [0.0; 2] }
     }
 
-    /// Takes the place [m] of the tool after a step and the force [N] on it. Steps without force teach nothing.
+    /// Takes the place [m] of the tool after a step and the force [N] on it. Steps without force teach
+    /// nothing.
     pub fn add(&mut self, place: Vector3<f64>, force: Vector3<f64>) {
         let last = self.last.replace((place, force));
         let Some((before, force_before)) = last else { return };

@@ -1,13 +1,15 @@
-//! The passivity guard. It adds up the work that the device does against the force, held constant over a tick:
+//! The passivity guard. It adds up the work that the device does against the force, held constant over a
+//! tick:
 //!
 //! ```text
 //! E(n) = E(n−1) − F(n−1)·(x(n) − x(n−1))
 //! ```
 //!
-//! which is exact at the ticks. Where E is below zero the device has got more than it gave, and the guard adds a damping of its own that takes
-//! this back within a tick, up to a limit. Its force changes gently, so that it is not felt as a click. Source: Hannaford and Ryu (2002), "Time-domain passivity control of haptic interfaces"; the exact
-//! sum is that of Ryu, Kim and Hannaford (2004). Friction would fill the sum without end, and hide later trouble: what the guard acts on is
-//! held below a reserve. What is reported is not.
+//! which is exact at the ticks. Where E is below zero the device has got more than it gave, and the guard
+//! adds a damping of its own that takes this back within a tick, up to a limit. Its force changes gently, so
+//! that it is not felt as a click. Source: Hannaford and Ryu (2002), "Time-domain passivity control of haptic
+//! interfaces"; the exact sum is that of Ryu, Kim and Hannaford (2004). Friction would fill the sum without
+//! end, and hide later trouble: what the guard acts on is held below a reserve. What is reported is not.
 
 use nalgebra::Vector3;
 
@@ -67,8 +69,8 @@ impl Observer {
         self.left = (self.left + work).min(reserve);
     }
 
-    /// The force [N] by which a guard damps a device that went a way [m] in the last tick of a period [s]; it goes to zero unless energy is
-    /// missing.
+    /// The force [N] by which a guard damps a device that went a way [m] in the last tick of a period [s]; it
+    /// goes to zero unless energy is missing.
     pub fn damp(&mut self, guard: &Guard, way: &Vector3<f64>, period: f64) -> Vector3<f64> {
         let square = way.norm_squared();
         // α v² T = −E with v = way / T.

@@ -1,12 +1,13 @@
-//! A simulated device in a simulated hand: a mass m with friction b of its bearings, which a spring and a damper of the hand pull to where it
-//! wants to be,
+//! A simulated device in a simulated hand: a mass m with friction b of its bearings, which a spring and a
+//! damper of the hand pull to where it wants to be,
 //!
 //! ```text
 //! m ẍ = F + k (x_w − x) + c (ẋ_w − ẋ) − b ẋ
 //! ```
 //!
-//! with the force F held over a tick, as an amplifier does. It finds out how stiff a coupling may be before the device trembles.
-//! Numbers of a hand: Hasser and Cutkosky (2002), "System identification of the human hand grasping a haptic knob": tens to hundreds of N/m.
+//! with the force F held over a tick, as an amplifier does. It finds out how stiff a coupling may be before
+//! the device trembles. Numbers of a hand: Hasser and Cutkosky (2002), "System identification of the human
+//! hand grasping a haptic knob": tens to hundreds of N/m.
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -48,7 +49,8 @@ pub struct Held {
 }
 
 impl Hand {
-    /// Moves the device over a time [s] under a force [N], while the hand wants to go from one place [m] to another.
+    /// Moves the device over a time [s] under a force [N], while the hand wants to go from one place [m] to
+    /// another.
     pub fn go(&self, held: &mut Held, force: &Vector3<f64>, [from, to]: [Vector3<f64>; 2], time: f64) {
         let step = time / f64::from(STEPS);
         let speed = (to - from) / time;
@@ -62,8 +64,9 @@ impl Hand {
         }
     }
 
-    /// The stiffest coupling [N/m], to 5 %, that lets this device come to rest on a model when the hand is pressed into it by a depth [m]: from that of
-    /// the settings on, down or up to 1 and 10⁶ N/m. Without a guard, it shows the limit of the coupling itself.
+    /// The stiffest coupling [N/m], to 5 %, that lets this device come to rest on a model when the hand is
+    /// pressed into it by a depth [m]: from that of the settings on, down or up to 1 and 10⁶ N/m. Without a
+    /// guard, it shows the limit of the coupling itself.
     ///
     /// # Errors
     /// If a setting is out of range.
@@ -81,8 +84,8 @@ impl Hand {
         Ok(low)
     }
 
-    /// Whether the device comes to rest: pressed for five seconds, the most that it moves in a tick of the last one is below 1 µm, or a tenth
-    /// less than in the one before.
+    /// Whether the device comes to rest: pressed for five seconds, the most that it moves in a tick of the
+    /// last one is below 1 µm, or a tenth less than in the one before.
     fn rests(&self, model: &LocalModel, settings: Settings, depth: f64) -> Result<bool, HapticsError> {
         let mut renderer = Renderer::new(settings)?;
         renderer.take(model.clone());

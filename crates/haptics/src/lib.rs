@@ -1,7 +1,8 @@
-//! Forces for haptic devices at 1 kHz, beside a simulation that takes 2 to 33 ms for a step. The simulation publishes a [local model](model)
-//! of the contact: planes, a compliance, and the force it found. A thread of its own moves a [proxy] over these planes, which a
-//! [virtual coupling](coupling) ties to the device. A [guard] watches the energy that the device gets back. Devices connect over
-//! [datagrams](protocol) on the loopback interface. The crate knows no solver and no scene. SI units throughout.
+//! Forces for haptic devices at 1 kHz, beside a simulation that takes 2 to 33 ms for a step. The simulation
+//! publishes a [local model](model) of the contact: planes, a compliance, and the force it found. A thread of
+//! its own moves a [proxy] over these planes, which a [virtual coupling](coupling) ties to the device. A
+//! [guard] watches the energy that the device gets back. Devices connect over [datagrams](protocol) on the
+//! loopback interface. The crate knows no solver and no scene. SI units throughout.
 //!
 //! A device pressed 4 mm into a wall of 500 N/m through a coupling of 1000 N/m:
 //!

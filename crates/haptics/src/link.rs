@@ -1,5 +1,6 @@
-//! A device over [datagrams](crate::protocol). The first sender of a pose is the device; others are foreign until it was silent for a
-//! second. Every valid pose is answered at once; of several that wait only the newest.
+//! A device over [datagrams](crate::protocol). The first sender of a pose is the device; others are foreign
+//! until it was silent for a second. Every valid pose is answered at once; of several that wait only the
+//! newest.
 //!
 //! ```
 //! use pliant_haptics::link::Link;
@@ -46,11 +47,12 @@ struct Sender {
 }
 
 impl Link {
-    /// Listens at an address; port 0 stands for a free one. `remote` allows addresses that other machines reach: anyone there can then send
-    /// poses.
+    /// Listens at an address; port 0 stands for a free one. `remote` allows addresses that other machines
+    /// reach: anyone there can then send poses.
     ///
     /// # Errors
-    /// If the address is not of the loopback interface and `remote` is not given, or the socket can't be opened.
+    /// If the address is not of the loopback interface and `remote` is not given, or the socket can't be
+    /// opened.
     pub fn open(address: SocketAddr, remote: bool) -> Result<Self, HapticsError> {
         if !remote && !address.ip().is_loopback() {
             return Err(HapticsError::NotLoopback { address });

@@ -1,4 +1,5 @@
-//! The datagrams of devices, of fixed length, little-endian. A device sends a pose; each pose that is used gets a force back.
+//! The datagrams of devices, of fixed length, little-endian. A device sends a pose; each pose that is used
+//! gets a force back.
 //!
 //! | byte | pose (88 bytes) | force (48 bytes) |
 //! |---|---|---|
@@ -53,7 +54,8 @@ pub struct Pose {
 pub struct Force {
     /// That of the pose.
     pub sequence: u32,
-    /// Bit 0: the guard damps; 1: the force is cut to its limit; 2: the pose was invalid and the last one holds.
+    /// Bit 0: the guard damps; 1: the force is cut to its limit; 2: the pose was invalid and the last one
+    /// holds.
     pub state: u32,
     /// That of the pose [µs].
     pub time: u64,
@@ -85,7 +87,8 @@ impl Pose {
         })
     }
 
-    /// The pose; `None` with numbers that are not finite, places beyond 100 m, or a quaternion that is no rotation.
+    /// The pose; `None` with numbers that are not finite, places beyond 100 m, or a quaternion that is no
+    /// rotation.
     pub fn isometry(&self) -> Option<Isometry3<f64>> {
         let [x, y, z] = self.place;
         let [w, i, j, k] = self.quaternion;

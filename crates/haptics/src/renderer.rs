@@ -1,14 +1,14 @@
-//! A tick: the pose of the device in, the force out. Knows no clock, so that tests run it as fast as they like. The force goes
-//! over from one local model to the next in a straight line over the period of the simulation, f = (1−s) f_old(x) + s f_new(x): it does
-//! not jump where a model comes in, and a device that leaves the tissue is free at once. A next model is taken when the last one is
-//! reached.
+//! A tick: the pose of the device in, the force out. Knows no clock, so that tests run it as fast as they
+//! like. The force goes over from one local model to the next in a straight line over the period of the
+//! simulation, f = (1−s) f_old(x) + s f_new(x): it does not jump where a model comes in, and a device that
+//! leaves the tissue is free at once. A next model is taken when the last one is reached.
 //!
-//! The coupling κ (p − x) − (B/T) (p′ − x′) = f with κ = K + B/T holds the proxy p; ′ is the tick before. The proxy has no mass, so the
-//! device feels f, less what the [guard](crate::guard) adds, up to the force limit.
+//! The coupling κ (p − x) − (B/T) (p′ − x′) = f with κ = K + B/T holds the proxy p; ′ is the tick before. The
+//! proxy has no mass, so the device feels f, less what the [guard](crate::guard) adds, up to the force limit.
 //!
-//! The force is that of a place a little ahead, x + v t with t = T/2 by default: held over the tick, it is then about the mean of what a spring
-//! would give on the way. Without this, a spring K that is held gives out K v² T/2 (Gillespie and Cutkosky 1996, "Stable user-specific haptic
-//! rendering of the virtual wall").
+//! The force is that of a place a little ahead, x + v t with t = T/2 by default: held over the tick, it is
+//! then about the mean of what a spring would give on the way. Without this, a spring K that is held gives
+//! out K v² T/2 (Gillespie and Cutkosky 1996, "Stable user-specific haptic rendering of the virtual wall").
 //!
 //! The energy of the record is that of the whole force. Leaves out: moments.
 
@@ -27,12 +27,14 @@ pub struct Settings {
     pub period: f64,
     /// What ties the proxy to the device.
     pub coupling: Coupling,
-    /// Time [s] ahead of the pose for which the force is made; half a period makes up for the hold, a delay of the device adds to it. It damps
-    /// as K times that, which counts in the [limit](Coupling::limit) as a delay does.
+    /// Time [s] ahead of the pose for which the force is made; half a period makes up for the hold, a delay
+    /// of the device adds to it. It damps as K times that, which counts in the [limit](Coupling::limit) as a
+    /// delay does.
     pub ahead: f64,
     /// Largest force [N].
     pub force_limit: f64,
-    /// Largest change [N] of the force from a tick to the next, if it is bound. A bound delays the force where a hand goes fast.
+    /// Largest change [N] of the force from a tick to the next, if it is bound. A bound delays the force
+    /// where a hand goes fast.
     pub most_change: Option<f64>,
     /// The guard, if any.
     pub guard: Option<Guard>,
@@ -165,7 +167,8 @@ impl Renderer {
         self.part >= 1.0
     }
 
-    /// Goes over to another model, over its period. One that comes before [it is wanted](Self::wants_model) makes the force jump.
+    /// Goes over to another model, over its period. One that comes before [it is wanted](Self::wants_model)
+    /// makes the force jump.
     pub fn take(&mut self, model: LocalModel) {
         let stuck = match (self.last, model.force() == Vector3::zeros()) {
             // Slip counts from what gives the present force.
@@ -180,7 +183,8 @@ impl Renderer {
         self.record.models += 1;
     }
 
-    /// The next tick. A pose (of the tool in the scene, m) with numbers that are not finite counts as invalid, and the last one holds.
+    /// The next tick. A pose (of the tool in the scene, m) with numbers that are not finite counts as
+    /// invalid, and the last one holds.
     pub fn tick(&mut self, pose: &Isometry3<f64>) -> Answer {
         self.record.ticks += 1;
         let valid = pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|x| x.is_finite())
@@ -250,8 +254,8 @@ impl Renderer {
         before.lerp(&force, self.part)
     }
 
-    /// After a silence of the device: the next pose counts as a first one, and the force of the tissue comes up softly. What the device felt last goes
-    /// as slowly as forces change.
+    /// After a silence of the device: the next pose counts as a first one, and the force of the tissue comes
+    /// up softly. What the device felt last goes as slowly as forces change.
     pub fn restart(&mut self) {
         (self.last, self.gain) = (None, 0.0);
     }
@@ -353,7 +357,8 @@ mod tests {
         assert!(answer.limited && (answer.force.norm() - 3.3).abs() < 1e-12);
     }
 
-    /// A thrust of 2 m/s into a wall: the force comes as fast as it may, and to where it would without a bound.
+    /// A thrust of 2 m/s into a wall: the force comes as fast as it may, and to where it would without a
+    /// bound.
     #[test]
     fn forces_change_by_no_more_than_they_may() {
         let free = Settings { soft_start: 0.0, guard: None, force_limit: 100.0, ..Settings::default() };

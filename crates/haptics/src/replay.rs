@@ -1,4 +1,5 @@
-//! A device that replays a [trace](crate::trace) in real time, on the clock of the thread that asks it, alone or [held by a hand](crate::hand).
+//! A device that replays a [trace](crate::trace) in real time, on the clock of the thread that asks it, alone
+//! or [held by a hand](crate::hand).
 
 use std::time::{Duration, Instant};
 
@@ -25,7 +26,8 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Poses of a trace, a period apart. With a hand, the device is pulled there and gives way to the force; without, it is exactly there.
+    /// Poses of a trace, a period apart. With a hand, the device is pulled there and gives way to the force;
+    /// without, it is exactly there.
     pub fn new(trace: Trace, period: Duration, hand: Option<Hand>) -> Self {
         let [first, _] = trace.times();
         let held = Held { place: trace.at(first).translation.vector, velocity: Vector3::zeros() };

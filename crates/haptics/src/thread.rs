@@ -1,5 +1,6 @@
-//! The haptic thread. It waits for a pose of the [device](crate::device), makes the [force](crate::renderer) and sends it. The simulation
-//! publishes local models to it and reads the proxy from it through two triple buffers, which never make one wait for the other.
+//! The haptic thread. It waits for a pose of the [device](crate::device), makes the [force](crate::renderer)
+//! and sends it. The simulation publishes local models to it and reads the proxy from it through two triple
+//! buffers, which never make one wait for the other.
 //!
 //! ```
 //! use std::time::Duration;

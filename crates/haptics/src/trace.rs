@@ -1,5 +1,6 @@
-//! Ways of a device over time: read from a table `t,x,y,z,qw,qx,qy,qz`, as that of a scene's poses, or generated: sines, steps, and a tremor of
-//! 8 Hz with noise, as of a surgeon's hand (Elble and Koller 1990: physiological tremor of 8 to 12 Hz).
+//! Ways of a device over time: read from a table `t,x,y,z,qw,qx,qy,qz`, as that of a scene's poses, or
+//! generated: sines, steps, and a tremor of 8 Hz with noise, as of a surgeon's hand (Elble and Koller 1990:
+//! physiological tremor of 8 to 12 Hz).
 //!
 //! ```
 //! use nalgebra::{Isometry3, Vector3};
@@ -31,12 +32,12 @@ const LONGEST: f64 = 3600.0;
 pub struct Trace(Vec<(f64, Isometry3<f64>)>);
 
 impl Trace {
-    /// A table with a first row of names and a row for each pose: time [s], place [m] and quaternion. Lines that are empty or begin with `#`
-    /// are passed over.
+    /// A table with a first row of names and a row for each pose: time [s], place [m] and quaternion. Lines
+    /// that are empty or begin with `#` are passed over.
     ///
     /// # Errors
-    /// If a row has other columns, numbers that are none or not finite, a time that does not increase, or a quaternion that is no rotation; or
-    /// without any row.
+    /// If a row has other columns, numbers that are none or not finite, a time that does not increase, or a
+    /// quaternion that is no rotation; or without any row.
     pub fn read(text: &str) -> Result<Self, HapticsError> {
         let wrong = |line: usize, problem: String| HapticsError::Trace { line, problem };
         let mut poses: Vec<(f64, Isometry3<f64>)> = Vec::new();
@@ -112,7 +113,8 @@ impl Trace {
         [first, last].map(|pose| pose.map_or(0.0, |pose| pose.0))
     }
 
-    /// The pose at a time [s]: between two rows on a straight way and the shortest arc, before the first and after the last at rest.
+    /// The pose at a time [s]: between two rows on a straight way and the shortest arc, before the first and
+    /// after the last at rest.
     pub fn at(&self, time: f64) -> Isometry3<f64> {
         let after = self.0.partition_point(|&(own, _)| own <= time);
         match (after.checked_sub(1).map(|before| self.0[before]), self.0.get(after)) {
@@ -139,8 +141,8 @@ impl Trace {
         Self::of(from, duration, |time| way * (TAU * frequency * time).sin())
     }
 
-    /// From a pose to another place, a vector [m] away, and back in turn, a time `hold` [s] each. Each step takes a time `rise` [s], with the
-    /// least jerk (Flash and Hogan 1985): 10 s³ − 15 s⁴ + 6 s⁵.
+    /// From a pose to another place, a vector [m] away, and back in turn, a time `hold` [s] each. Each step
+    /// takes a time `rise` [s], with the least jerk (Flash and Hogan 1985): 10 s³ − 15 s⁴ + 6 s⁵.
     ///
     /// # Errors
     /// If a number is not finite or not positive, or the duration is not in (0, 3600] s.
@@ -161,8 +163,8 @@ impl Trace {
         })
     }
 
-    /// Another trace with the tremor of a hand: sines [m] along three axes, of 8 Hz and a phase each, and white noise of a standard deviation [m], both
-    /// from a seed.
+    /// Another trace with the tremor of a hand: sines [m] along three axes, of 8 Hz and a phase each, and
+    /// white noise of a standard deviation [m], both from a seed.
     ///
     /// # Errors
     /// If a number is not finite, or the trace is longer than 3600 s.

@@ -1,5 +1,6 @@
-//! The test bench: the renderer between a device and an analytic world, in simulated time. The world is a linear elastic wall z < 0 with friction,
-//! which a slow simulation finds at the place of the proxy, and publishes a period later, with a compliance that may be wrong.
+//! The test bench: the renderer between a device and an analytic world, in simulated time. The world is a
+//! linear elastic wall z < 0 with friction, which a slow simulation finds at the place of the proxy, and
+//! publishes a period later, with a compliance that may be wrong.
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 use pliant_haptics::coupling::Coupling;
@@ -123,7 +124,8 @@ fn at(z: f64) -> Isometry3<f64> {
     Isometry3::translation(0.0, 0.0, z)
 }
 
-/// Presses and scrapes for so long [s]: 8 mm to and fro at 0.7 Hz, 4 mm up and down at 0.23 Hz around the surface.
+/// Presses and scrapes for so long [s]: 8 mm to and fro at 0.7 Hz, 4 mm up and down at 0.23 Hz around the
+/// surface.
 fn press_and_scrape(duration: f64) -> Trace {
     use std::f64::consts::TAU;
     let mut table = String::from("t,x,y,z,qw,qx,qy,qz\n");
@@ -158,8 +160,8 @@ fn at_rest_the_device_feels_the_force_of_the_simulation() {
     }
 }
 
-/// The largest change of the force in a tick at up to 3.3 N, with steps of the simulation of any length. Speeds are those of a hand, up to
-/// 0.25 m/s: a spring k at a speed v has to change by k v T.
+/// The largest change of the force in a tick at up to 3.3 N, with steps of the simulation of any length.
+/// Speeds are those of a hand, up to 0.25 m/s: a spring k at a speed v has to change by k v T.
 #[test]
 fn the_force_does_not_jump() {
     let presses = |depth: f64, frequency: f64| {
@@ -188,8 +190,9 @@ fn the_force_does_not_jump() {
     }
 }
 
-/// A minute of pressing and scraping: the device never gets back more than it has put in. Pressing alone, without friction to take energy: that
-/// holds with a compliance that is right or too stiff. With one that is too soft, most of the force comes late, and the guard is needed.
+/// A minute of pressing and scraping: the device never gets back more than it has put in. Pressing alone,
+/// without friction to take energy: that holds with a compliance that is right or too stiff. With one that is
+/// too soft, most of the force comes late, and the guard is needed.
 #[test]
 fn a_minute_of_pressing_and_scraping_gives_no_energy() {
     let scrape = press_and_scrape(60.0);
@@ -222,8 +225,9 @@ fn a_minute_of_pressing_and_scraping_gives_no_energy() {
     }
 }
 
-/// Colgate and Schenkel: a device of b = 1 N s/m holds 2 b/T = 2000 N/m at 1 kHz. A free mass on such a wall loses b − K T/2 a time, so that the
-/// limit of passivity is also that of stability, to the 5 % of the search.
+/// Colgate and Schenkel: a device of b = 1 N s/m holds 2 b/T = 2000 N/m at 1 kHz. A free mass on such a wall
+/// loses b − K T/2 a time, so that the limit of passivity is also that of stability, to the 5 % of the
+/// search.
 #[test]
 fn colgate_schenkel_1997_stiffest_wall() {
     let zero = Vector3::zeros();

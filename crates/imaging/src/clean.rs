@@ -1,6 +1,6 @@
-//! The region of one label or several, cut out of its image, and its cleaning: keep the largest piece, fill holes, close
-//! gaps. Closing is dilation and erosion by a ball in millimetres, through exact distances, so it is the same along
-//! every axis of an image with thick slices.
+//! The region of one label or several, cut out of its image, and its cleaning: keep the largest piece, fill
+//! holes, close gaps. Closing is dilation and erosion by a ball in millimetres, through exact distances, so
+//! it is the same along every axis of an image with thick slices.
 
 use std::fmt;
 

@@ -1,5 +1,5 @@
-//! Crops an image to the box of a body, and resamples it by majority if the box has too many voxels. Voxels at the border of the image are
-//! reported, because the body may be cut off there.
+//! Crops an image to the box of a body, and resamples it by majority if the box has too many voxels. Voxels
+//! at the border of the image are reported, because the body may be cut off there.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -45,8 +45,8 @@ impl Cut {
 }
 
 impl Image {
-    /// The labels selected by words; an error if the image has no labels, lacks some of them, or has one in a group and elsewhere. The
-    /// labels of a group become one in the image. A note tells of rounded labels.
+    /// The labels selected by words; an error if the image has no labels, lacks some of them, or has one in a
+    /// group and elsewhere. The labels of a group become one in the image. A note tells of rounded labels.
     pub fn choose(&mut self, choices: &[LabelChoice]) -> Result<Choice, LabelError> {
         let present = self.survey()?;
         let (mut chosen, mut groups) = (Vec::new(), Vec::new());
@@ -144,8 +144,8 @@ impl Image {
         }
     }
 
-    /// Cuts a body out. Where its box has more than 322³ voxels, they are resampled to coarser ones of `coarsest` [m] at most. `progress` hears
-    /// fractions from 0 to 1.
+    /// Cuts a body out. Where its box has more than 322³ voxels, they are resampled to coarser ones of
+    /// `coarsest` [m] at most. `progress` hears fractions from 0 to 1.
     pub fn cut(&self, choice: &Choice, coarsest: f64, progress: &dyn Fn(f64)) -> Result<Cut, LabelError> {
         let chosen = match choice {
             Choice::Labels(labels) => labels.clone(),
@@ -190,7 +190,8 @@ impl Image {
         (0..nz).into_par_iter().filter_map(in_slice).reduce_with(wider)
     }
 
-    /// The labels of a choice in a box, in voxels of so many of the image each: the label that most of them have.
+    /// The labels of a choice in a box, in voxels of so many of the image each: the label that most of them
+    /// have.
     fn resampled(
         &self,
         choice: &Choice,

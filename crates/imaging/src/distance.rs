@@ -1,7 +1,7 @@
-//! A smooth field of a region: the signed distance to its surface, clipped, smoothed by a Gaussian, shifted so that its
-//! zero surface encloses the volume of the voxels, and linear in each cell of eight voxel centres. Nearest voxels are
-//! exact (Felzenszwalb, Huttenlocher 2012, row by row along each axis). The surface is half a voxel before the nearest
-//! voxel of the other side, measured along the way to it.
+//! A smooth field of a region: the signed distance to its surface, clipped, smoothed by a Gaussian, shifted
+//! so that its zero surface encloses the volume of the voxels, and linear in each cell of eight voxel
+//! centres. Nearest voxels are exact (Felzenszwalb, Huttenlocher 2012, row by row along each axis). The
+//! surface is half a voxel before the nearest voxel of the other side, measured along the way to it.
 //! Distances use only the step lengths: in a sheared grid they are distances before shearing.
 
 use pliant_geometry::{DistanceField, Grid, Vector3};
@@ -37,8 +37,8 @@ impl Smoothing {
 }
 
 impl Region {
-    /// The smooth signed distance to the surface of the region, whose box has the margin of the smoothing. `progress` hears
-    /// fractions from 0 to 1.
+    /// The smooth signed distance to the surface of the region, whose box has the margin of the smoothing.
+    /// `progress` hears fractions from 0 to 1.
     pub fn distance_field(
         &self,
         smoothing: &Smoothing,
@@ -48,7 +48,8 @@ impl Region {
         self.distance_field_beside(&outside, smoothing, progress)
     }
 
-    /// The same to the surface between the region and another one in the same box; where neither is, by which of them is nearer.
+    /// The same to the surface between the region and another one in the same box; where neither is, by which
+    /// of them is nearer.
     pub(crate) fn distance_field_beside(
         &self,
         other: &[bool],
@@ -82,8 +83,8 @@ fn largest(spacing: [f64; 3]) -> f64 {
     spacing.into_iter().fold(0.0, f64::max)
 }
 
-/// The distance to the surface between a region and another one [m], positive inside, cut at ± `clip`; in voxels of
-/// neither, half of how much nearer the region is.
+/// The distance to the surface between a region and another one [m], positive inside, cut at ± `clip`; in
+/// voxels of neither, half of how much nearer the region is.
 fn signed_distances(region: &Region, other: &[bool], clip: f64, progress: &dyn Fn(f64)) -> Vec<f32> {
     let grid = region.grid;
     let spacing = Vector3::from(grid.spacing());
@@ -172,8 +173,8 @@ struct Envelope {
 }
 
 impl Envelope {
-    /// Replaces each entry of a line by the site that is nearest to it; `height` is the squared distance of a site from
-    /// the line.
+    /// Replaces each entry of a line by the site that is nearest to it; `height` is the squared distance of a
+    /// site from the line.
     fn replace(&mut self, line: &mut [u32], step: f64, height: impl Fn(u32) -> f64) {
         self.parabolas.clear();
         self.from.clear();
@@ -233,8 +234,8 @@ fn smoothed(grid: &Grid, values: Vec<f32>, axis: usize, sigma: f64) -> Vec<f32> 
     out
 }
 
-/// The constant c for which f − c encloses `volume` [m³]. A voxel counts by the part of it, one mean step thick, on the
-/// inner side of a plane at the distance f − c.
+/// The constant c for which f − c encloses `volume` [m³]. A voxel counts by the part of it, one mean step
+/// thick, on the inner side of a plane at the distance f − c.
 fn matching_shift(values: impl Iterator<Item = f32> + Clone, volume: f64, grid: &Grid) -> f64 {
     let step = grid.voxel_volume().cbrt();
     let near: Vec<f64> = values.clone().map(f64::from).filter(|f| f.abs() < 2.0 * step).collect();

@@ -114,7 +114,8 @@ impl Numbers {
     }
 }
 
-/// Labels scaled by a single-precision slope miss whole numbers by this at most, in the usual numbers of labels.
+/// Labels scaled by a single-precision slope miss whole numbers by this at most, in the usual numbers of
+/// labels.
 const ROUND_OFF: f64 = 1e-4;
 
 /// Labels that a program interpolated between equal ones miss whole numbers by this at most.
@@ -151,8 +152,8 @@ impl Counts {
         self
     }
 
-    /// The labels without 0; an error if the values change from voxel to voxel, as in a scan. A run of a label along i is several voxels
-    /// long, a run in a scan hardly more than one, except around the patient.
+    /// The labels without 0; an error if the values change from voxel to voxel, as in a scan. A run of a
+    /// label along i is several voxels long, a run in a scan hardly more than one, except around the patient.
     fn labels(self) -> Result<Vec<i32>, LabelError> {
         let around = self.values.values().max().copied().unwrap_or_default();
         let [voxels, runs] =
@@ -184,8 +185,8 @@ pub struct Image {
 }
 
 impl Image {
-    /// An image from memory: numbers of a type as little-endian bytes, i fastest, and names of its labels. `None` where these are not as many numbers
-    /// as the grid has points.
+    /// An image from memory: numbers of a type as little-endian bytes, i fastest, and names of its labels.
+    /// `None` where these are not as many numbers as the grid has points.
     ///
     /// ```
     /// use pliant_geometry::{Grid, Vector3};
@@ -219,8 +220,8 @@ impl Image {
         slope * self.numbers.value(at) + intercept
     }
 
-    /// The values as labels. Floating-point images count if all their values are whole numbers; a scan, whose values change from voxel
-    /// to voxel, does not.
+    /// The values as labels. Floating-point images count if all their values are whole numbers; a scan, whose
+    /// values change from voxel to voxel, does not.
     pub fn labels(&self) -> Result<LabelImage, LabelError> {
         self.survey()?;
         let labels = (0..self.grid.len()).into_par_iter().map(|at| self.label(at)).collect();
@@ -281,8 +282,9 @@ impl Image {
         }
     }
 
-    /// How far a label may be from a whole number. Scaled integers are within half a step of the label that was stored, and have lost
-    /// labels from a step of 1 on. Interpolation of equal labels misses them by its weights, which do not add up to exactly 1.
+    /// How far a label may be from a whole number. Scaled integers are within half a step of the label that
+    /// was stored, and have lost labels from a step of 1 on. Interpolation of equal labels misses them by its
+    /// weights, which do not add up to exactly 1.
     fn label_tolerance(&self) -> f64 {
         let step = self.scale[0].abs();
         let scaled = if self.numbers.scalar.is_integer() && step < 1.0 { 0.5 * step } else { 0.0 };
@@ -314,8 +316,9 @@ impl Image {
         values.map(|x| [x, x]).reduce(|| [f64::INFINITY, f64::NEG_INFINITY], wider)
     }
 
-    /// Several masks on the same voxels as one label image: the first has label 1, the second 2, and so on, named after their files. Where
-    /// they overlap, the last one wins. A voxel is in a mask if its value is at least `least`, or, without `least`, not 0.
+    /// Several masks on the same voxels as one label image: the first has label 1, the second 2, and so on,
+    /// named after their files. Where they overlap, the last one wins. A voxel is in a mask if its value is
+    /// at least `least`, or, without `least`, not 0.
     pub fn of_masks(masks: &[(PathBuf, Self)], least: Option<f64>) -> Result<Self, LabelError> {
         let Some((_, first)) = masks.first() else {
             return Err(LabelError::NoneChosen { present: Vec::new() });

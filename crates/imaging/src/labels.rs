@@ -1,5 +1,5 @@
-//! What regions an image of labels holds: size, place, and pieces joined through faces of voxels. Runs of equal labels
-//! along i are joined with the runs of neighbouring rows (He, Chao, Suzuki 2008).
+//! What regions an image of labels holds: size, place, and pieces joined through faces of voxels. Runs of
+//! equal labels along i are joined with the runs of neighbouring rows (He, Chao, Suzuki 2008).
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -195,7 +195,8 @@ impl Components {
         sizes
     }
 
-    /// Components that are at least in one row: the first run of the largest one (of equals the first), and how many.
+    /// Components that are at least in one row: the first run of the largest one (of equals the first), and
+    /// how many.
     pub(crate) fn largest(&self) -> Option<(u32, usize)> {
         let sizes = self.sizes();
         let count = sizes.iter().filter(|&&size| size > 0).count();
@@ -213,7 +214,8 @@ impl Components {
 }
 
 impl Image {
-    /// Every label but 0, increasing, with its size, place and pieces. `progress` hears fractions from 0 to 1.
+    /// Every label but 0, increasing, with its size, place and pieces. `progress` hears fractions from 0
+    /// to 1.
     pub fn regions(&self, progress: &dyn Fn(f64)) -> Result<Vec<RegionReport>, LabelError> {
         self.survey()?;
         progress(0.3);

@@ -1,5 +1,5 @@
-//! The parts of a region that have different labels, each with its distances in its own box: all together take about as much memory as the
-//! region, however many they are.
+//! The parts of a region that have different labels, each with its distances in its own box: all together
+//! take about as much memory as the region, however many they are.
 
 use std::collections::BTreeMap;
 
@@ -86,8 +86,9 @@ impl Parts {
         self.parts[part - 1].voxels as f64 * self.grid.voxel_volume()
     }
 
-    /// The smooth signed distance of a part, numbered from 1: positive where the part is nearer than the rest of the region, also outside
-    /// both. Its zero surface continues beyond the surface of the region. `progress` hears fractions from 0 to 1.
+    /// The smooth signed distance of a part, numbered from 1: positive where the part is nearer than the rest
+    /// of the region, also outside both. Its zero surface continues beyond the surface of the region.
+    /// `progress` hears fractions from 0 to 1.
     ///
     /// # Errors
     /// If smoothing leaves nothing of it.
@@ -116,7 +117,8 @@ impl Parts {
         Region { label, grid, inside }.distance_field_beside(&rest, smoothing, progress)
     }
 
-    /// The part of each voxel of the box of the region, numbered from 1, 0 outside. Voxels without any of the labels belong to the first.
+    /// The part of each voxel of the box of the region, numbered from 1, 0 outside. Voxels without any of the
+    /// labels belong to the first.
     pub fn into_numbers(mut self) -> Vec<u8> {
         for number in self.numbers.iter_mut().filter(|number| **number == ADDED) {
             *number = 1;

@@ -8,7 +8,8 @@ use crate::image::LabelImage;
 /// Voxels of a region with its margin: what 32-bit numbers of voxels bear, with room.
 pub(crate) const LARGEST: u64 = 1 << 30;
 
-/// A region of an image: a box of voxels, each inside or not. The box has a margin; it may reach beyond the image.
+/// A region of an image: a box of voxels, each inside or not. The box has a margin; it may reach beyond the
+/// image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
     /// The first label of the region, for messages.

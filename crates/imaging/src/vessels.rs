@@ -1,6 +1,7 @@
-//! The parts of vessels that run inside an organ. A segmentation labels them apart from the tissue round them, and labels of large vessels
-//! go on far outside. A voxel of a vessel is inside if from it most of the 26 ways to its neighbours and on lead through vessels into the
-//! organ: in a tube inside all but those along it do, in one that lies against the organ less than half.
+//! The parts of vessels that run inside an organ. A segmentation labels them apart from the tissue round
+//! them, and labels of large vessels go on far outside. A voxel of a vessel is inside if from it most of the
+//! 26 ways to its neighbours and on lead through vessels into the organ: in a tube inside all but those along
+//! it do, in one that lies against the organ less than half.
 
 use rayon::prelude::*;
 
@@ -10,8 +11,9 @@ use crate::image::{Image, Numbers, Order, Scalar};
 const INSIDE: usize = 14;
 
 impl Image {
-    /// The image of labels with the voxels of vessels inside an organ as voxels of the organ, each with the label that most ways lead to;
-    /// and how many voxels of the vessels are inside and outside. Labels of the organ are no vessels.
+    /// The image of labels with the voxels of vessels inside an organ as voxels of the organ, each with the
+    /// label that most ways lead to; and how many voxels of the vessels are inside and outside. Labels of the
+    /// organ are no vessels.
     pub fn with_vessels_inside(&self, organ: &[i32], vessels: &[i32]) -> (Self, [usize; 2]) {
         let vessels: Vec<i32> = vessels.iter().copied().filter(|label| !organ.contains(label)).collect();
         let dims = self.grid.dims;
@@ -65,7 +67,8 @@ mod tests {
     use super::*;
     use crate::names::LabelNames;
 
-    /// A ball of label 5 with a tube of label 8 through it that goes on outside, and one of label 9 that lies against it.
+    /// A ball of label 5 with a tube of label 8 through it that goes on outside, and one of label 9 that lies
+    /// against it.
     #[test]
     fn a_tube_is_inside_where_the_ball_is_round_it() {
         let grid = Grid::along_axes([41, 41, 61], Vector3::zeros(), [1e-3, 1e-3, 1e-3]).unwrap();

@@ -17,7 +17,8 @@ pub trait LinearDevice: Debug + Send + Sync {
     fn solver(&self) -> Result<Box<dyn DeviceSolver>, DeviceError>;
 }
 
-/// Where the blocks of a symmetric matrix are, row by row. Nodes go aggregate by aggregate, each with six components.
+/// Where the blocks of a symmetric matrix are, row by row. Nodes go aggregate by aggregate, each with six
+/// components.
 #[derive(Clone, Debug)]
 pub struct BlockPattern<'a> {
     /// Where the blocks of each node start, and the end of the last.
@@ -30,7 +31,8 @@ pub struct BlockPattern<'a> {
     pub free: Vec<u32>,
     /// Where the nodes of each aggregate start, and the end of the last.
     pub aggregate_start: &'a [u32],
-    /// Pairs of aggregates (row, column) that touch, row ≥ column; `None` where their motions are not solved for.
+    /// Pairs of aggregates (row, column) that touch, row ≥ column; `None` where their motions are not solved
+    /// for.
     pub touching: Option<Vec<[u32; 2]>>,
 }
 
@@ -81,7 +83,8 @@ pub enum PassEnd {
 
 /// Equations on a device.
 pub trait DeviceSolver: Debug + Send + Sync {
-    /// Takes the pattern of the matrices to come, in place of any before. After an error it has none, and may be given one again.
+    /// Takes the pattern of the matrices to come, in place of any before. After an error it has none, and may
+    /// be given one again.
     ///
     /// # Errors
     /// If the device fails or has no room.
@@ -93,7 +96,8 @@ pub trait DeviceSolver: Debug + Send + Sync {
     /// If the device fails.
     fn take(&mut self, values: &BlockValues<'_>) -> Result<(), DeviceError>;
 
-    /// Solves for a right-hand side of size 1 from 0 on, until the residual is `goal` or so many iterations are done.
+    /// Solves for a right-hand side of size 1 from 0 on, until the residual is `goal` or so many iterations
+    /// are done.
     ///
     /// # Errors
     /// If the device fails.

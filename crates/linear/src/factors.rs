@@ -1,6 +1,7 @@
-//! L D Lᵀ of a symmetric matrix by fronts (multifrontal; Duff and Reid 1983): each supernode adds up its entries of the matrix and what others
-//! have left to it, eliminates its columns and leaves the rest to its parent. Without pivoting: matrices are positive definite or nearly so, and
-//! the signs of pivots are wanted. They are found on one thread; solutions share two parts of the assembly tree between threads. Bits do not
+//! L D Lᵀ of a symmetric matrix by fronts (multifrontal; Duff and Reid 1983): each supernode adds up its
+//! entries of the matrix and what others have left to it, eliminates its columns and leaves the rest to its
+//! parent. Without pivoting: matrices are positive definite or nearly so, and the signs of pivots are wanted.
+//! They are found on one thread; solutions share two parts of the assembly tree between threads. Bits do not
 //! depend on how many there are.
 
 use pulp::{Arch, Simd, WithSimd};
@@ -33,7 +34,8 @@ const SHARED: usize = 1 << 15;
 /// L D Lᵀ of a matrix.
 pub struct Factors {
     supernodes: Supernodes,
-    /// The supernodes up to the first number and from there up to the second have nothing to do with each other; the rest waits for both.
+    /// The supernodes up to the first number and from there up to the second have nothing to do with each
+    /// other; the rest waits for both.
     shares: [usize; 2],
     /// L, panel by panel.
     value: Vec<f64>,
@@ -53,7 +55,8 @@ struct Memory {
     stacks: [Vec<f64>; 2],
     /// The supernodes that left it, of both.
     waiting: Vec<usize>,
-    /// The right-hand side by columns; of each share numbers of the rows below a supernode, and what it takes off the columns of the rest.
+    /// The right-hand side by columns; of each share numbers of the rows below a supernode, and what it takes
+    /// off the columns of the rest.
     right: Vec<f64>,
     below: [Vec<f64>; 2],
     taken: [Vec<f64>; 2],

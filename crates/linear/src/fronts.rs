@@ -1,5 +1,6 @@
-//! Dense parts of factors: panels of columns with rows in multiples of [`PACK`], and kernels for the registers of any processor. Columns are
-//! done in blocks, and these in strips that stay in registers with some of their rows.
+//! Dense parts of factors: panels of columns with rows in multiples of [`PACK`], and kernels for the
+//! registers of any processor. Columns are done in blocks, and these in strips that stay in registers with
+//! some of their rows.
 
 #![expect(
     clippy::needless_range_loop,
@@ -16,8 +17,8 @@ pub(crate) const BLOCK: usize = 48;
 /// Columns of a strip: those of a node.
 const STRIP: usize = 6;
 
-/// Some rows of some columns in registers. They are filled and passed on in place: the compiler leaves `array::from_fn` as a call and copies
-/// arrays that are returned, which took as long as all the rest.
+/// Some rows of some columns in registers. They are filled and passed on in place: the compiler leaves
+/// `array::from_fn` as a call and copies arrays that are returned, which took as long as all the rest.
 type Tile<S, const C: usize, const R: usize> = [[<S as Simd>::f64s; R]; C];
 
 /// A few registers.
@@ -37,8 +38,8 @@ fn store<S: Simd, const R: usize>(numbers: &[S::f64s; R], to: &mut [f64]) {
     }
 }
 
-/// Calls a function of some registers of rows for all rows from one on up to another, both multiples of [`PACK`], as many at once as there are
-/// registers for.
+/// Calls a function of some registers of rows for all rows from one on up to another, both multiples of
+/// [`PACK`], as many at once as there are registers for.
 macro_rules! for_rows {
     ($simd:ident, $from:expr, $to:expr, $row:ident, $registers:ident => $call:expr) => {{
         let mut $row: usize = $from;
@@ -142,7 +143,8 @@ impl Strip<'_> {
         less_products::<S, C, R>(simd, own, [scaled, columns], *height, *at, [row, block + at]);
     }
 
-    /// Solves for L D and L of some rows below the columns of the strip; whose columns before are taken off already, or not yet.
+    /// Solves for L D and L of some rows below the columns of the strip; whose columns before are taken off
+    /// already, or not yet.
     #[inline(always)]
     fn divide<S: Simd, const C: usize, const R: usize>(
         &mut self,
@@ -226,7 +228,8 @@ impl Strip<'_> {
     }
 }
 
-/// Takes (L D) Lᵀ of a number of columns of a panel off some rows of some columns: L D of the rows from one on, L of those from another on.
+/// Takes (L D) Lᵀ of a number of columns of a panel off some rows of some columns: L D of the rows from one
+/// on, L of those from another on.
 #[inline(always)]
 fn less_products<S: Simd, const C: usize, const R: usize>(
     simd: S,
@@ -249,7 +252,8 @@ fn less_products<S: Simd, const C: usize, const R: usize>(
     }
 }
 
-/// Columns of a matrix of which the lower half is wanted, and their place in a panel whose products they take.
+/// Columns of a matrix of which the lower half is wanted, and their place in a panel whose products they
+/// take.
 struct Rest<'a> {
     columns: &'a mut [f64],
     height: usize,
@@ -335,7 +339,8 @@ pub(crate) struct Left<'a> {
 }
 
 impl Left<'_> {
-    /// Adds what comes to the columns of a front from one on up to another to these columns, whose first row is that of the first of them.
+    /// Adds what comes to the columns of a front from one on up to another to these columns, whose first row
+    /// is that of the first of them.
     #[inline(always)]
     pub(crate) fn add_to(&self, columns: &mut [f64], height: usize, [from, to]: [usize; 2]) {
         let is_there = |run: &Run| (from..to).contains(&(run.to as usize));
@@ -346,7 +351,8 @@ impl Left<'_> {
             // Of its own rows those above the diagonal go along: nobody looks at them.
             for run in &self.runs[number..] {
                 let places = [run.from as usize, run.to as usize - from];
-                // Those of a node or of its translations, mostly. Loops: zipped iterators that fold stay calls.
+                // Those of a node or of its translations, mostly. Loops: zipped iterators that fold stay
+                // calls.
                 macro_rules! add_columns {
                     ($add:expr) => {
                         for (own, to) in own.chunks_exact(self.height).zip(to.chunks_exact_mut(height)) {

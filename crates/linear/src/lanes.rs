@@ -1,5 +1,5 @@
-//! Numbers side by side, as wide as the processor's registers: kernels written once, for any [`pulp::Simd`]. Multiplications and additions
-//! are fused where the processor can.
+//! Numbers side by side, as wide as the processor's registers: kernels written once, for any [`pulp::Simd`].
+//! Multiplications and additions are fused where the processor can.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
@@ -113,7 +113,8 @@ pub type Three<S> = [Lane<S>; 3];
 /// A 3 × 3 matrix of them, row by row.
 pub type Square<S> = [Three<S>; 3];
 
-/// Three of anything, by their numbers. The closures of `map` and `from_fn` would stay calls, without the instructions of a kernel.
+/// Three of anything, by their numbers. The closures of `map` and `from_fn` would stay calls, without the
+/// instructions of a kernel.
 #[inline(always)]
 pub fn three<T>(of: impl Fn(usize) -> T) -> [T; 3] {
     [of(0), of(1), of(2)]

@@ -1,6 +1,7 @@
-//! Linear equations with a sparse matrix, of nodes with six components each: factors L D Lᵀ (`factors.rs`) or L U (`unsymmetric.rs`), or
-//! conjugate gradients (`conjugate_gradients/`), also on a device (`on_device.rs`). Knows no mechanics. Factors are found on one thread, and sums
-//! run in one order, so results do not depend on the number of threads.
+//! Linear equations with a sparse matrix, of nodes with six components each: factors L D Lᵀ (`factors.rs`) or
+//! L U (`unsymmetric.rs`), or conjugate gradients (`conjugate_gradients/`), also on a device
+//! (`on_device.rs`). Knows no mechanics. Factors are found on one thread, and sums run in one order, so
+//! results do not depend on the number of threads.
 //!
 //! ```
 //! use pliant_linear::sparse::{Equations, LowerMatrix};
@@ -49,8 +50,8 @@ pub enum LinearSolver {
     /// Factors of the matrix: robust, and they tell unstable equilibria.
     #[default]
     Direct,
-    /// Factors L U with the unsymmetric stiffness of loads: more work, and no sign of instability. Newton's method keeps its quadratic
-    /// convergence under moments about fixed axes and pressures on open surfaces.
+    /// Factors L U with the unsymmetric stiffness of loads: more work, and no sign of instability. Newton's
+    /// method keeps its quadratic convergence under moments about fixed axes and pressures on open surfaces.
     Unsymmetric,
     /// Conjugate gradients: for positive definite matrices only.
     ConjugateGradients {
@@ -76,8 +77,9 @@ impl LinearSolver {
 pub enum Preconditioner {
     /// The inverse of each node's diagonal block.
     BlockJacobi,
-    /// These inverses, deflated by the rigid motions of groups of some sixteen neighbouring nodes: far fewer iterations on many elements.
-    /// A GPU takes about 160 larger groups in all, and adds their correction in place of deflating.
+    /// These inverses, deflated by the rigid motions of groups of some sixteen neighbouring nodes: far fewer
+    /// iterations on many elements. A GPU takes about 160 larger groups in all, and adds their correction in
+    /// place of deflating.
     Aggregates,
     /// The factors of an older matrix, made anew once this many iterations were needed.
     LaggedFactors {
@@ -108,11 +110,12 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// A solver for matrices of one pattern, on a device if one is given. It takes over the device's arrays and kernels from the solver of
-    /// the pattern before.
+    /// A solver for matrices of one pattern, on a device if one is given. It takes over the device's arrays
+    /// and kernels from the solver of the pattern before.
     ///
     /// # Errors
-    /// If there are more equations than can be numbered, no room for the factors, or the device fails or has no room.
+    /// If there are more equations than can be numbered, no room for the factors, or the device fails or has
+    /// no room.
     pub fn new(
         solver: LinearSolver,
         device: Option<&Arc<dyn LinearDevice>>,
@@ -182,7 +185,8 @@ impl Workspace {
     /// Takes a new matrix of the pattern; the signs of its factors where there are some.
     ///
     /// # Errors
-    /// If the matrix is not finite, a diagonal block is not positive definite where conjugate gradients invert it, or the device fails.
+    /// If the matrix is not finite, a diagonal block is not positive definite where conjugate gradients
+    /// invert it, or the device fails.
     pub fn prepare(&mut self, matrix: &LowerMatrix) -> Result<Pivots, LinearError> {
         self.fresh = false;
         if let Some(factors) = &mut self.unsymmetric {
@@ -229,7 +233,8 @@ impl Workspace {
         (self.current && !self.factored.is_empty()).then_some(&self.factored)
     }
 
-    /// Takes the factors of a matrix of this pattern with other values as preconditioner of the next one. Values that have none are left.
+    /// Takes the factors of a matrix of this pattern with other values as preconditioner of the next one.
+    /// Values that have none are left.
     pub fn precondition_with(&mut self, mut values: Vec<f64>, matrix: &mut LowerMatrix) {
         if self.blocks.is_some() && self.factors.is_some() && values.len() == matrix.value.len() {
             std::mem::swap(&mut matrix.value, &mut values);
@@ -243,7 +248,8 @@ impl Workspace {
     /// the x given that leaves the smallest residual.
     ///
     /// # Errors
-    /// If iterations run out or meet a direction without positive stiffness, numbers are not finite, or the device fails.
+    /// If iterations run out or meet a direction without positive stiffness, numbers are not finite, or the
+    /// device fails.
     pub fn solve(
         &mut self,
         matrix: &LowerMatrix,

@@ -1,5 +1,5 @@
-//! Arrays whose size does not follow from that of a mesh alone, as factors of equations: where the system has no room for one that is an error,
-//! not the end of the program.
+//! Arrays whose size does not follow from that of a mesh alone, as factors of equations: where the system has
+//! no room for one that is an error, not the end of the program.
 //!
 //! ```
 //! use pliant_linear::memory::zeros;
@@ -42,14 +42,16 @@ pub fn in_words(bytes: u64) -> String {
     }
 }
 
-/// Bytes of memory that are free, or would be without the system's copies of files; `None` where the system does not say.
+/// Bytes of memory that are free, or would be without the system's copies of files; `None` where the system
+/// does not say.
 pub fn free() -> Option<u64> {
     let told = fs::read_to_string("/proc/meminfo").ok()?;
     let line = told.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
 }
 
-/// Asks the system for so many bytes and gives them back. A caller asks for the least that a mesh needs before it makes the arrays of the mesh.
+/// Asks the system for so many bytes and gives them back. A caller asks for the least that a mesh needs
+/// before it makes the arrays of the mesh.
 ///
 /// # Errors
 /// If it has not.

@@ -1,6 +1,6 @@
-//! Conjugate gradients on a device: the search around its passes. Each pass finds a correction d with A d ≈ r; the residual r = b − A x of
-//! the sum of the corrections is found in double precision on the CPU and alone decides when the solution is good enough. What single
-//! precision cannot solve is left to the CPU.
+//! Conjugate gradients on a device: the search around its passes. Each pass finds a correction d with A d ≈
+//! r; the residual r = b − A x of the sum of the corrections is found in double precision on the CPU and
+//! alone decides when the solution is good enough. What single precision cannot solve is left to the CPU.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -10,7 +10,8 @@ use crate::device::{BlockValues, DeviceSolver, DeviceTimes, PassEnd};
 use crate::report::{DeviceError, LinearError, LinearReport};
 use crate::sparse::LowerMatrix;
 
-/// The least residual over the right-hand side that is asked for in one pass: single precision comes no nearer on stiff walls.
+/// The least residual over the right-hand side that is asked for in one pass: single precision comes no
+/// nearer on stiff walls.
 const LEAST_GOAL: f64 = 1e-4;
 /// The part of the tolerance that a pass aims at, so that round-off seldom makes another pass necessary.
 const MARGIN: f64 = 0.9;
@@ -40,7 +41,8 @@ pub(crate) enum Found {
 }
 
 impl OnDevice {
-    /// The equations of a pattern, on a solver that may have had others before. It gets the pattern with the first matrix at the latest.
+    /// The equations of a pattern, on a solver that may have had others before. It gets the pattern with the
+    /// first matrix at the latest.
     pub(crate) fn new(
         solver: Box<dyn DeviceSolver>,
         matrix: &LowerMatrix,

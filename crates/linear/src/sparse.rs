@@ -142,7 +142,8 @@ impl Values<'_> {
                 let place = |row: u32| base.wrapping_add(row - first) as usize - self.first;
                 let j = node * C + c;
                 if all_free {
-                    // Nearly all nodes: their rows follow one another, those of the column's own node from the diagonal on.
+                    // Nearly all nodes: their rows follow one another, those of the column's own node from
+                    // the diagonal on.
                     let own: &[f64; C] =
                         entries[j * size + a * C..].first_chunk().expect("a cell has all rows");
                     let add = |(value, own): (&mut f64, &f64)| *value += own;
@@ -168,7 +169,8 @@ impl Values<'_> {
 }
 
 impl LowerMatrix {
-    /// The pattern of cells that couple all equations of their nodes, and of pairs of nodes, the lower first, whose translations are coupled.
+    /// The pattern of cells that couple all equations of their nodes, and of pairs of nodes, the lower first,
+    /// whose translations are coupled.
     pub fn new<'a>(
         equations: &Equations,
         cells: impl Iterator<Item = &'a [u32]>,
@@ -240,8 +242,8 @@ impl LowerMatrix {
         (Values { first: 0, value, mirror }, column_start)
     }
 
-    /// Where in the values the rows of node `row` in an equation's column start, had the row node's first equation a place
-    /// there. Wraps below zero.
+    /// Where in the values the rows of node `row` in an equation's column start, had the row node's first
+    /// equation a place there. Wraps below zero.
     fn base(&self, equations: &Equations, row_node: u32, column: u32) -> u32 {
         let start = self.column_start[column as usize];
         let rows = &self.row[start as usize..self.column_start[column as usize + 1] as usize];
@@ -253,7 +255,8 @@ impl LowerMatrix {
         }
     }
 
-    /// The places of a cell: for each ordered pair of its nodes (row, column) and each component of the column.
+    /// The places of a cell: for each ordered pair of its nodes (row, column) and each component of the
+    /// column.
     pub fn places(&self, equations: &Equations, nodes: &[u32], components: usize) -> Vec<u32> {
         let mut places = Vec::with_capacity(nodes.len() * nodes.len() * components);
         for &row_node in nodes {
@@ -275,7 +278,8 @@ impl LowerMatrix {
         (0..cell.nodes.len()).for_each(|node| values.add(equations, cell, node));
     }
 
-    /// Whether the pattern couples the translations of two nodes, the lower number first, or one of them has none that is free.
+    /// Whether the pattern couples the translations of two nodes, the lower number first, or one of them has
+    /// none that is free.
     pub fn couples(&self, equations: &Equations, [low, high]: [u32; 2]) -> bool {
         let [column, row] = [low, high].map(|node| {
             let translations = &equations.number[6 * node as usize..6 * node as usize + 3];
@@ -284,8 +288,8 @@ impl LowerMatrix {
         column == NONE || row == NONE || self.rows(column).binary_search(&row).is_ok()
     }
 
-    /// Adds to so many components of two nodes that the pattern couples, translations first; the first node has the higher number or is the
-    /// same.
+    /// Adds to so many components of two nodes that the pattern couples, translations first; the first node
+    /// has the higher number or is the same.
     pub fn add_node_block(
         &mut self,
         equations: &Equations,
@@ -295,7 +299,8 @@ impl LowerMatrix {
     ) {
         let first = equations.first(row_node);
         let columns = &equations.number[6 * column_node as usize..][..components];
-        // The columns of a node that is free have the same rows, but for those above their diagonals: one search finds the place in all.
+        // The columns of a node that is free have the same rows, but for those above their diagonals: one
+        // search finds the place in all.
         let places = columns.iter().all(|&column| column != NONE && first != NONE).then(|| {
             let start = self.column_start[columns[0] as usize];
             self.base(equations, row_node, columns[0]).wrapping_sub(start)

@@ -1,6 +1,7 @@
-//! What the factors of a matrix look like before they have numbers: the order of elimination, columns that are eliminated together (supernodes),
-//! and which takes up what another one leaves (the assembly tree; Duff and Reid 1983, Liu 1992). Columns with the same rows form one, and others
-//! where that stores few zeros (relaxed amalgamation, Ashcraft and Grimes 1989). A function of the pattern alone.
+//! What the factors of a matrix look like before they have numbers: the order of elimination, columns that
+//! are eliminated together (supernodes), and which takes up what another one leaves (the assembly tree; Duff
+//! and Reid 1983, Liu 1992). Columns with the same rows form one, and others where that stores few zeros
+//! (relaxed amalgamation, Ashcraft and Grimes 1989). A function of the pattern alone.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::amd;
@@ -11,8 +12,8 @@ use crate::sparse::LowerMatrix;
 const NONE: u32 = u32::MAX;
 /// Rows are stored in multiples of this: the widest registers.
 pub(crate) const PACK: usize = 8;
-/// Columns of a supernode up to which it may hold a part of zeros, from narrow ones to any. Wide fronts are worth zeros: of the lens' factors
-/// these take a tenth of the time off.
+/// Columns of a supernode up to which it may hold a part of zeros, from narrow ones to any. Wide fronts are
+/// worth zeros: of the lens' factors these take a tenth of the time off.
 const ZEROS: [(usize, f64); 3] = [(18, 0.3), (48, 0.15), (usize::MAX, 0.05)];
 
 /// A number of rows with those that are stored after them.
@@ -20,8 +21,8 @@ pub(crate) fn padded(rows: usize) -> usize {
     rows.next_multiple_of(PACK)
 }
 
-/// Columns that are eliminated together. Its front has a panel of these columns, with rows for themselves and for those below, either padded, and
-/// what is left for the rows below.
+/// Columns that are eliminated together. Its front has a panel of these columns, with rows for themselves and
+/// for those below, either padded, and what is left for the rows below.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Supernode {
     /// Its first column, and how many it has.
@@ -70,11 +71,13 @@ pub(crate) struct Piece {
     pub across: bool,
 }
 
-/// Equations that follow one another and have the same neighbours, as those of a node. They are ordered as one, which is a sixth of the work.
+/// Equations that follow one another and have the same neighbours, as those of a node. They are ordered as
+/// one, which is a sixth of the work.
 struct Groups {
     /// The first equation of each, and the end.
     start: Vec<u32>,
-    /// Where the rows of each begin: groups that it is coupled to, itself first, then those with higher numbers.
+    /// Where the rows of each begin: groups that it is coupled to, itself first, then those with higher
+    /// numbers.
     row_start: Vec<u32>,
     row: Vec<u32>,
 }
@@ -356,8 +359,9 @@ impl Supernodes {
         self.nodes.get(node).map_or(self.order.len(), |node| node.first)
     }
 
-    /// Two numbers: the supernodes up to the first and from there up to the second are whole subtrees, and all others come after them. Two
-    /// threads take a subtree each, and then one of them the rest; the larger subtree and the rest are together as small as they can be.
+    /// Two numbers: the supernodes up to the first and from there up to the second are whole subtrees, and
+    /// all others come after them. Two threads take a subtree each, and then one of them the rest; the larger
+    /// subtree and the rest are together as small as they can be.
     pub(crate) fn shares(&self) -> [usize; 2] {
         let count = self.nodes.len();
         // What there is to do before each, and the first of its subtree.

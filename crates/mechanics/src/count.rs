@@ -1,4 +1,5 @@
-//! Counts in the bytes of states. One that is so large that counting on would overflow is none that a run has reached.
+//! Counts in the bytes of states. One that is so large that counting on would overflow is none that a run has
+//! reached.
 //!
 //! ```
 //! #[derive(Debug, serde::Deserialize)]

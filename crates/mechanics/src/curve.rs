@@ -72,8 +72,8 @@ impl Curve {
         }
     }
 
-    /// The same curve from 0 on: what it has at time 0 comes in linearly up to a time [s], as a static solver needs that halves its first
-    /// load step. A curve that begins at 0 stays as it is.
+    /// The same curve from 0 on: what it has at time 0 comes in linearly up to a time [s], as a static solver
+    /// needs that halves its first load step. A curve that begins at 0 stays as it is.
     #[must_use]
     pub fn from_rest(self, until: f64) -> Self {
         match self.shape {
@@ -142,7 +142,8 @@ mod tests {
         }
     }
 
-    /// What is there from the start comes in within a first step; later all is as it was, and curves from 0 keep their shape.
+    /// What is there from the start comes in within a first step; later all is as it was, and curves from 0
+    /// keep their shape.
     #[test]
     fn curves_from_rest_begin_at_zero_and_are_the_same_later() {
         let table = |points: &[(f64, f64)]| Shape::Table(points.to_vec());

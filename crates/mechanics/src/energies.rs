@@ -15,7 +15,8 @@ pub struct Energies {
     pub hourglass: f64,
     /// Work of loads and prescribed motions, and the kinetic energy given at the start.
     pub external: f64,
-    /// Energy that explicit steps of changing length added: Σ ⅛ (Δt⁻² − Δt⁺²) Σ m|a|² over the changes from Δt⁻ to Δt⁺.
+    /// Energy that explicit steps of changing length added: Σ ⅛ (Δt⁻² − Δt⁺²) Σ m|a|² over the changes from
+    /// Δt⁻ to Δt⁺.
     pub step_changes: f64,
     /// |kinetic + internal + damping + hourglass − external − step changes| over the largest of them so far, with ⅛ Δt² Σ m|a|² of
     /// the start as part of the kinetic energy: of loads that set in at once it stays behind for good.

@@ -1,5 +1,5 @@
-//! Numbers that tell one model from another, part by part and bit for bit, by FNV-1a in 64 bits: the same on every
-//! machine and in every version of the language.
+//! Numbers that tell one model from another, part by part and bit for bit, by FNV-1a in 64 bits: the same on
+//! every machine and in every version of the language.
 
 use std::fmt::{self, Debug, Write};
 
@@ -35,8 +35,8 @@ impl Write for Fnv {
     }
 }
 
-/// The number of whatever writes itself in full, as derived `Debug` does: floating-point numbers come out with all
-/// their digits.
+/// The number of whatever writes itself in full, as derived `Debug` does: floating-point numbers come out
+/// with all their digits.
 pub fn fingerprint(thing: &impl Debug) -> u64 {
     let mut hash = Fnv::new();
     // Writing to a hash cannot fail.
@@ -45,8 +45,8 @@ pub fn fingerprint(thing: &impl Debug) -> u64 {
 }
 
 impl Model {
-    /// Each part of the model in words, such as ``load `push` ``, with its number. The material of a body is all but its
-    /// mesh: laws, fibres, masses, damping, hourglass control, velocity at the start.
+    /// Each part of the model in words, such as ``load `push` ``, with its number. The material of a body is
+    /// all but its mesh: laws, fibres, masses, damping, hourglass control, velocity at the start.
     pub fn fingerprints(&self) -> Vec<(String, u64)> {
         let damping = fingerprint(&self.stiffness_damping);
         let mut parts = vec![("damping by stiffness of solids".into(), damping)];

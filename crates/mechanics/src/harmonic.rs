@@ -1,11 +1,13 @@
-//! Harmonic functions on a body at rest: ∇²φ = 0 with φ given on some nodes and no flux through the rest of the surface,
-//! by linear tetrahedra and trilinear hexahedra (eight Gauss points), Σ_e ∫ B_a · B_b dV φ_b = 0. Solved by conjugate
-//! gradients with the diagonal as preconditioner (Saad, Iterative Methods for Sparse Linear Systems, 2003, alg. 9.1).
+//! Harmonic functions on a body at rest: ∇²φ = 0 with φ given on some nodes and no flux through the rest of
+//! the surface, by linear tetrahedra and trilinear hexahedra (eight Gauss points), Σ_e ∫ B_a · B_b dV
+//! φ_b = 0. Solved by conjugate gradients with the diagonal as preconditioner (Saad, Iterative Methods for
+//! Sparse Linear Systems, 2003, alg. 9.1).
 
 use crate::element::{gauss_points, hex8, tet4};
 use crate::tensor::{Vector, add, dot, scale};
 
-/// Residual at which the solution is taken, as a part of that at the start (in the norm of the preconditioner).
+/// Residual at which the solution is taken, as a part of that at the start (in the norm of the
+/// preconditioner).
 const TOLERANCE: f64 = 1e-10;
 
 /// Cells of a body at rest, as Laplace's equation sees them.

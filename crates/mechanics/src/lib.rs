@@ -1,6 +1,6 @@
-//! The parts that bodies are made of: constitutive laws with their history, elements at rest, motions, constraints, loads, mappings of
-//! surfaces, energies. Steppers are elsewhere: `pliant-explicit`, `pliant-implicit`, `pliant-gpu`. Knows nothing of files or
-//! windows. SI units throughout.
+//! The parts that bodies are made of: constitutive laws with their history, elements at rest, motions,
+//! constraints, loads, mappings of surfaces, energies. Steppers are elsewhere: `pliant-explicit`,
+//! `pliant-implicit`, `pliant-gpu`. Knows nothing of files or windows. SI units throughout.
 //!
 //! A [`Model`] is constant. The stress of a law at a stretch of 10 %:
 //!

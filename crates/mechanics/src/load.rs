@@ -1,4 +1,5 @@
-//! Loads: nodal forces and moments, tractions per reference area, pressure that follows the deformed surface, gravity.
+//! Loads: nodal forces and moments, tractions per reference area, pressure that follows the deformed surface,
+//! gravity.
 
 use crate::curve::{Curve, Shape};
 use crate::mapping::{Configuration, Mapping, Weights};
@@ -99,8 +100,9 @@ impl Load {
         Self::new("gravity", kind, curve)
     }
 
-    /// Adds the nodal forces [N] at a time. `points` are those of the surface that it acts on. Gravity is not added here, since it acts
-    /// through the masses; nor are loads of shells, which `pliant-implicit` applies.
+    /// Adds the nodal forces [N] at a time. `points` are those of the surface that it acts on. Gravity is not
+    /// added here, since it acts through the masses; nor are loads of shells, which `pliant-implicit`
+    /// applies.
     pub fn add_forces<S: Configuration>(
         &self,
         time: f64,
@@ -143,8 +145,8 @@ impl Load {
     }
 }
 
-/// The part of a face's area vector [m²] that belongs to each of its nodes: ∫ N_a n dA, exact for flat triangles and
-/// for bilinear quads (2×2 Gauss points).
+/// The part of a face's area vector [m²] that belongs to each of its nodes: ∫ N_a n dA, exact for flat
+/// triangles and for bilinear quads (2×2 Gauss points).
 pub fn face_areas(
     face: &Face,
     position: impl Fn(u32) -> Vector<f64>,

@@ -1,5 +1,5 @@
-//! Viscoelasticity by Prony series on the second Piola–Kirchhoff stress, the isochoric and the volumetric part
-//! each with a series of its own: S = (1 − Σ aᵢ) Φ + Σ hᵢ, with Φ the elastic stress of the law.
+//! Viscoelasticity by Prony series on the second Piola–Kirchhoff stress, the isochoric and the volumetric
+//! part each with a series of its own: S = (1 − Σ aᵢ) Φ + Σ hᵢ, with Φ the elastic stress of the law.
 //!
 //! Both updates have the form hᵢⁿ = dᵢ hᵢⁿ⁻¹ + gᵢ (Φⁿ − Φⁿ⁻¹):
 //! *exact* for Φ linear in the step (Taylor, Pister and Goudreau 1970): d = e^(−Δt/τ), g = a (1 − d) τ/Δt;
@@ -168,7 +168,8 @@ impl Prony {
         self.isochoric_slots() + self.volumetric_slots()
     }
 
-    /// Tensors of history per evaluation point, where `averages` says that the pressure is averaged over cells and remembered there.
+    /// Tensors of history per evaluation point, where `averages` says that the pressure is averaged over
+    /// cells and remembered there.
     pub fn point_slots(&self, averages: bool) -> usize {
         if averages { self.isochoric_slots() } else { self.slots() }
     }

@@ -68,8 +68,8 @@ pub trait Real: Number + Default + PartialOrd + Serialize + DeserializeOwned + S
     fn to_f64(self) -> f64;
 }
 
-/// A step of Householder's method of third order: with r = 1 − x y³, y ← y (1 + r/3 + 2r²/9), which leaves 14/3 of the
-/// third power of the relative error.
+/// A step of Householder's method of third order: with r = 1 − x y³, y ← y (1 + r/3 + 2r²/9), which leaves
+/// 14/3 of the third power of the relative error.
 #[inline(always)]
 pub fn closer_to_inverse_cbrt<N: Number>(x: N, y: N) -> N {
     let r = (x * y).mul_add(-(y * y), N::ONE);
@@ -101,7 +101,8 @@ macro_rules! real {
             }
             #[inline(always)]
             fn inverse_cbrt(self) -> Self {
-                // Minus a third of the exponent as first guess (4 % off), then two or three steps without a division.
+                // Minus a third of the exponent as first guess (4 % off), then two or three steps without a
+                // division.
                 let mut y = Self::from_bits($guess - self.to_bits() / 3);
                 for _ in 0..$iterations {
                     y = closer_to_inverse_cbrt(self, y);

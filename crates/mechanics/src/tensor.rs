@@ -1,6 +1,6 @@
-//! Vectors and tensors of three dimensions, generic over the number type of the kernel.
-//! Only what laws and elements need; everything is inlined. Written out component by component: `array::map` is
-//! often left as a call in the inner loop, which costs a third of the speed of a tet.
+//! Vectors and tensors of three dimensions, generic over the number type of the kernel. Only what laws and
+//! elements need; everything is inlined. Written out component by component: `array::map` is often left as a
+//! call in the inner loop, which costs a third of the speed of a tet.
 
 use std::ops::{Add, Mul, Neg, Sub};
 

@@ -1,6 +1,7 @@
-//! Ties: nodes that follow others, x = J x_nodes, such as those of a vessel inside an organ or of a wall whose mesh does not match the
-//! surface below it. They have no equations of their own: forces on them and their masses go to the nodes that they follow, f += Jᵀ f and
-//! m += Jᵀ m, by the same rows. Along components that a constraint holds or moves a node does not follow; forces there are the reaction.
+//! Ties: nodes that follow others, x = J x_nodes, such as those of a vessel inside an organ or of a wall
+//! whose mesh does not match the surface below it. They have no equations of their own: forces on them and
+//! their masses go to the nodes that they follow, f += Jᵀ f and m += Jᵀ m, by the same rows. Along components
+//! that a constraint holds or moves a node does not follow; forces there are the reaction.
 
 use crate::mapping::Weights;
 use crate::tensor::Vector;
@@ -14,7 +15,8 @@ pub struct Tie {
     pub nodes: Vec<u32>,
     /// How each follows, in their order. Each row sums to 1.
     pub mapping: Weights,
-    /// The components of each that a constraint holds or moves; see [`Model::hold_tied`](crate::Model::hold_tied).
+    /// The components of each that a constraint holds or moves; see
+    /// [`Model::hold_tied`](crate::Model::hold_tied).
     pub held: Vec<[bool; 3]>,
 }
 
@@ -24,7 +26,8 @@ impl Tie {
         self.nodes.iter().enumerate().map(|(point, &node)| (node, self.mapping.row(point)))
     }
 
-    /// Each node with what moves it along each component: the nodes that it follows, and itself where it is held.
+    /// Each node with what moves it along each component: the nodes that it follows, and itself where it is
+    /// held.
     pub fn component_rows(
         &self,
     ) -> impl Iterator<Item = (u32, impl Iterator<Item = (u32, Vector<f64>)> + '_)> + '_ {

@@ -1,5 +1,5 @@
-//! Prints size, quality and time of meshes of the label images of the analytic organs (128³ voxels of 1.6 mm) for eight
-//! lattices each: `cargo run --release -p pliant-meshing --example organs [LATTICES]`
+//! Prints size, quality and time of meshes of the label images of the analytic organs (128³ voxels of 1.6 mm)
+//! for eight lattices each: `cargo run --release -p pliant-meshing --example organs [LATTICES]`
 
 use std::time::Instant;
 

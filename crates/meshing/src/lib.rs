@@ -1,7 +1,7 @@
-//! Volume meshes made from shapes: structured blocks and tubes, and bodies of fields, image regions or closed surfaces filled with tetrahedra
-//! (isosurface stuffing) or cubes. Lengths are in metres. The same request gives the same mesh, bit for bit,
-//! on any number of threads.
-//! Surfaces of fields and files in even or few triangles, and curved shells fitted to them.
+//! Volume meshes made from shapes: structured blocks and tubes, and bodies of fields, image regions or closed
+//! surfaces filled with tetrahedra (isosurface stuffing) or cubes. Lengths are in metres. The same request
+//! gives the same mesh, bit for bit, on any number of threads. Surfaces of fields and files in even or few
+//! triangles, and curved shells fitted to them.
 //!
 //! ```
 //! use pliant_meshing::{Block, DEFAULT_CELL_LIMIT, Organ, Phantom, Resolution, Stuffing, VolumeCell};

@@ -1,5 +1,5 @@
-//! Curved shells of closed surfaces that fold: a flap, a thin gap, a sharp rim. Normals stand within 60° of their triangles, or there are
-//! none; shells do not cross; what the report tells is what the mesh holds.
+//! Curved shells of closed surfaces that fold: a flap, a thin gap, a sharp rim. Normals stand within 60° of
+//! their triangles, or there are none; shells do not cross; what the report tells is what the mesh holds.
 
 use pliant_geometry::{CellKind, Mesh, Vector3};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, FittedShells, Flaw, ImplicitField, ShellGoal, TriangleMesh};
@@ -107,8 +107,8 @@ impl ImplicitField for Vessels {
     }
 }
 
-/// 145,000 triangles: few flat ones have lost vessels, so the fit starts from more, reaches the goal within the work allowed, and no shells
-/// cross.
+/// 145,000 triangles: few flat ones have lost vessels, so the fit starts from more, reaches the goal within
+/// the work allowed, and no shells cross.
 #[test]
 #[ignore = "about a minute"]
 fn a_large_organ_with_vessels_is_fitted_without_crossings() {

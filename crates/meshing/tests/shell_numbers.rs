@@ -1,4 +1,5 @@
-//! Few curved shells for known shapes: how many, and how close they are, both ways. Organs from files are in `validation`.
+//! Few curved shells for known shapes: how many, and how close they are, both ways. Organs from files are in
+//! `validation`.
 
 use std::f64::consts::TAU;
 use std::time::Instant;
@@ -43,8 +44,8 @@ fn rim(mesh: &Mesh) -> Vec<Vector3> {
     mesh.points.iter().filter(|x| x.z < 1e-3 || x.z > 2.0 - 1e-3).copied().collect()
 }
 
-/// The target's own facets are within h²/8R = 5e-5 of the cylinder (320 round), 0.0014 % of the diagonal. 12 shells: 0.25 %; 48: 0.02 %.
-/// Nodes of the rims stay on the rims of the target.
+/// The target's own facets are within h²/8R = 5e-5 of the cylinder (320 round), 0.0014 % of the diagonal. 12
+/// shells: 0.25 %; 48: 0.02 %. Nodes of the rims stay on the rims of the target.
 #[test]
 fn an_open_cylinder_by_12_and_48_shells() {
     let fine = cylinder([320, 80]);
@@ -76,7 +77,8 @@ fn a_sphere_by_80_shells() {
     assert!(there <= 0.05 && back <= 0.1, "{}", fitted.report);
 }
 
-/// The phantom liver on a grid of 4 mm: 400 shells for 0.6 %, 700 for 0.35 % of the diagonal, as of its image in `validation`.
+/// The phantom liver on a grid of 4 mm: 400 shells for 0.6 %, 700 for 0.35 % of the diagonal, as of its image
+/// in `validation`.
 #[test]
 fn the_phantom_liver() {
     let liver = Phantom::new(Organ::Liver, 1.0).unwrap();

@@ -1,5 +1,5 @@
-//! Constraints and loads of NiftySim, all of which it calls constraints: on which nodes or faces, how much, and how
-//! they grow.
+//! Constraints and loads of NiftySim, all of which it calls constraints: on which nodes or faces, how much,
+//! and how they grow.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -309,8 +309,8 @@ impl ConditionReader<'_> {
         Ok(Selection::Normal { direction: numbers_of::<3>(normal, "components")?, within })
     }
 
-    /// The faces of a constraint that lie on the boundary, each turned outwards: those given so, and those given the
-    /// other way round.
+    /// The faces of a constraint that lie on the boundary, each turned outwards: those given so, and those
+    /// given the other way round.
     fn faces(&mut self, of: XmlElement<'_>) -> Result<[Vec<Vec<u32>>; 2], Fault> {
         let listed = self.listed_faces(of)?;
         Ok(self.turn_outwards(of, &listed))
@@ -428,8 +428,8 @@ fn repeated(nodes: &[u32]) -> Option<u32> {
     nodes.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0])
 }
 
-/// What the conditions of one body come to together: where NiftySim both holds and displaces, it displaces; what acts
-/// on the same nodes along other axes becomes one.
+/// What the conditions of one body come to together: where NiftySim both holds and displaces, it displaces;
+/// what acts on the same nodes along other axes becomes one.
 pub(super) fn settle(conditions: Vec<Condition>) -> Result<Vec<Condition>, Fault> {
     let mut moved: [BTreeSet<u32>; 3] = Default::default();
     for condition in &conditions {

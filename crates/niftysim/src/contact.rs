@@ -1,8 +1,9 @@
-//! Contact of NiftySim: rigid plates, cylinders, probes and surfaces that nodes of the model touch, and bodies that touch each other.
+//! Contact of NiftySim: rigid plates, cylinders, probes and surfaces that nodes of the model touch, and
+//! bodies that touch each other.
 //!
-//! Plates, cylinders and probes move by POLY345, surfaces in proportion to time. NiftySim moves single nodes out of them; a scene
-//! keeps out the faces whose nodes they are.
-//! Leaves out: `<KinematicContact>`, and what [`Remarks::missing`] names.
+//! Plates, cylinders and probes move by POLY345, surfaces in proportion to time. NiftySim moves single nodes
+//! out of them; a scene keeps out the faces whose nodes they are. Leaves out: `<KinematicContact>`, and what
+//! [`Remarks::missing`] names.
 
 use std::collections::BTreeSet;
 
@@ -166,7 +167,8 @@ impl ContactReader<'_> {
         }
     }
 
-    /// A plate from its corner a along the edges to b and c. Nodes are on the side of the normal (b − a) × (c − a).
+    /// A plate from its corner a along the edges to b and c. Nodes are on the side of the normal (b − a) ×
+    /// (c − a).
     fn plate(&mut self, of: XmlElement<'_>) -> Result<Option<Thing>, Fault> {
         let corner =
             |name, example| numbers_of::<3>(needed(of, name, example)?, "coordinates").map(Vector3::from);
@@ -291,7 +293,8 @@ impl ContactReader<'_> {
         Ok(Some(Thing { friction, margin, ..thing(of, "surface", form, at_rest, motion, nodes)? }))
     }
 
-    /// The motion of a surface, which grows in proportion to time. NiftySim's code reads angles in radians, then the centre.
+    /// The motion of a surface, which grows in proportion to time. NiftySim's code reads angles in radians,
+    /// then the centre.
     fn motion(&mut self, of: XmlElement<'_>) -> Result<RigidMotion, Fault> {
         let mut shift = Vector3::zeros();
         let mut turn: Option<([f64; 3], [f64; 3])> = None;

@@ -1,4 +1,5 @@
-//! The mesh of a model or submodel: listed in the XML, or read from a file and then turned, scaled and shifted.
+//! The mesh of a model or submodel: listed in the XML, or read from a file and then turned, scaled and
+//! shifted.
 
 use std::collections::BTreeMap;
 
@@ -198,9 +199,9 @@ pub(super) fn positive(of: XmlElement<'_>, what: &'static str) -> Result<f64, Fa
     if value > 0.0 { Ok(value) } else { Err(fault(of, problem)) }
 }
 
-/// Puts geometries together. A node closer than `distance` to one that is already there becomes the first such node.
-/// Returns for each geometry the node that each of its nodes became. The distance of NiftySim holds within a submodel
-/// too, except in the first.
+/// Puts geometries together. A node closer than `distance` to one that is already there becomes the first
+/// such node. Returns for each geometry the node that each of its nodes became. The distance of NiftySim
+/// holds within a submodel too, except in the first.
 pub(super) fn join(parts: &[Geometry], distance: Option<f64>) -> (Vec<Vector3>, Vec<u32>, Vec<Vec<u32>>) {
     let mut points: Vec<Vector3> = Vec::new();
     let mut cells = Vec::new();

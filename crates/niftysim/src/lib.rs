@@ -1,9 +1,10 @@
 //! Reads models of NiftySim (UCL; XML) and says the same as a scene and its mesh files.
 //!
-//! What NiftySim computes is kept, also where it is not what its guide says: the published fibre modulus, hourglass
-//! stiffness by λ + 2μ, backward Euler for relaxation, tractions that pull against the vector they are given by. The
-//! notes name each. Load shapes act at the same steps as NiftySim's, which sets a load after a step for the next one.
-//! Leaves out: shells that bend, radii that change, reduced bases, values read from files; [`Imported::missing`] names them.
+//! What NiftySim computes is kept, also where it is not what its guide says: the published fibre modulus,
+//! hourglass stiffness by λ + 2μ, backward Euler for relaxation, tractions that pull against the vector they
+//! are given by. The notes name each. Load shapes act at the same steps as NiftySim's, which sets a load
+//! after a step for the next one. Leaves out: shells that bend, radii that change, reduced bases, values read
+//! from files; [`Imported::missing`] names them.
 //!
 //! ```
 //! let imported = pliant_niftysim::import("../../lab/validation/data/niftysim/H8_NH.xml".as_ref())?;
@@ -60,7 +61,8 @@ impl Files<'_> {
 pub struct Imported {
     /// The text of a scene file.
     pub scene: String,
-    /// The meshes of bodies and rigid surfaces that it names, with their file names, in metres if the model is.
+    /// The meshes of bodies and rigid surfaces that it names, with their file names, in metres if the model
+    /// is.
     pub meshes: Vec<(String, Mesh)>,
     /// The tables that it names, with their file names, as text.
     pub tables: Vec<(String, String)>,

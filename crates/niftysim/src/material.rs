@@ -146,7 +146,8 @@ impl Elastic {
         }
     }
 
-    /// μ and κ [Pa] by which NiftySim scales its hourglass stiffness; of Arruda and Boyce's law the coefficient.
+    /// μ and κ [Pa] by which NiftySim scales its hourglass stiffness; of Arruda and Boyce's law the
+    /// coefficient.
     fn niftysim_moduli(&self) -> [f64; 2] {
         match *self {
             Self::NeoHookean([mu, kappa]) | Self::ArrudaBoyce([mu, _, kappa]) => [mu, kappa],

@@ -1,4 +1,5 @@
-//! A NiftySim model as plain data: parts with their materials and conditions, the system's parameters, the outputs.
+//! A NiftySim model as plain data: parts with their materials and conditions, the system's parameters, the
+//! outputs.
 
 use pliant_geometry::Mesh;
 
@@ -92,7 +93,8 @@ impl Model {
         Ok(())
     }
 
-    /// Submodels stay bodies of their own, unless nodes merge or the model itself has constraints, materials or shells.
+    /// Submodels stay bodies of their own, unless nodes merge or the model itself has constraints, materials
+    /// or shells.
     fn read_submodels(&mut self, root: XmlElement<'_>, files: &Files<'_>) -> Result<(), Fault> {
         let distance = child(root, "SubModelNodeMergerDistance").map(number).transpose()?;
         let whole = distance.is_some_and(|d| d >= 0.0)

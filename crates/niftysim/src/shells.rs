@@ -1,8 +1,10 @@
-//! Membranes of NiftySim: triangles on the nodes of the solid that resist being stretched, but not being bent.
+//! Membranes of NiftySim: triangles on the nodes of the solid that resist being stretched, but not being
+//! bent.
 //!
-//! `NeoHookean` is the incompressible law S = μ (I − λ₃² C⁻¹), a neo-Hookean membrane with ν = 0.5 and E = 3 μ. `Linear` is linear in the
-//! displacements, with axes that stay those at rest; the membrane of St Venant and Kirchhoff with the same E and ν is it for small ones.
-//! Leaves out: shells that bend, and shells on hexahedra; [`Remarks::missing`] names them.
+//! `NeoHookean` is the incompressible law S = μ (I − λ₃² C⁻¹), a neo-Hookean membrane with ν = 0.5 and E = 3
+//! μ. `Linear` is linear in the displacements, with axes that stay those at rest; the membrane of St Venant
+//! and Kirchhoff with the same E and ν is it for small ones. Leaves out: shells that bend, and shells on
+//! hexahedra; [`Remarks::missing`] names them.
 
 use pliant_geometry::boundary;
 

@@ -54,7 +54,8 @@ impl System {
 }
 
 impl System {
-    /// The end of NiftySim's last step [s]: it takes one more than the total time holds, and its outputs come after it.
+    /// The end of NiftySim's last step [s]: it takes one more than the total time holds, and its outputs come
+    /// after it.
     pub fn end(&self) -> f64 {
         let end = ((self.total / self.step).round() + 1.0) * self.step;
         // Rid of the product's round-off, which would be read as intention.

@@ -38,7 +38,8 @@ impl Touching {
         self.contact.bodies.is_some_and(|bodies| !bodies.themselves)
     }
 
-    /// What a body touches; its nodes begin at a number of the whole model. The faces that touch become sets of its mesh.
+    /// What a body touches; its nodes begin at a number of the whole model. The faces that touch become sets
+    /// of its mesh.
     pub fn body(
         &mut self,
         writer: &mut Writer,

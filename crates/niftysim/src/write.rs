@@ -151,7 +151,8 @@ impl Writer {
         mesh
     }
 
-    /// The multiple of the shear modulus by which hexahedra resist hourglass patterns, as written in the scene.
+    /// The multiple of the shear modulus by which hexahedra resist hourglass patterns, as written in the
+    /// scene.
     fn hourglass(&mut self, part: &SubModel, regions: &[Region], body: &str) -> Option<String> {
         let coefficient = self.system.hourglass.filter(|_| part.geometry.solid == Solid::H8)?;
         let of = |region: &Region| self.laws[region.material as usize].elastic.hourglass(coefficient);

@@ -9,8 +9,8 @@ use super::geometry::Solid;
 use super::material::Material;
 use super::system::System;
 
-/// Most pairs by which the curve HILLY is written: one for each step, or straight lines between them that are off by 1e-5 at
-/// the most.
+/// Most pairs by which the curve HILLY is written: one for each step, or straight lines between them that are
+/// off by 1e-5 at the most.
 const HILLY_POINTS: f64 = 2000.0;
 /// π as NiftySim has it, in the curve HILLY.
 #[expect(clippy::approx_constant, reason = "NiftySim's")]

@@ -1,5 +1,5 @@
-//! Forces at points, drawn over a picture: a dot at each point, and an arrow along the force. They are seen through bodies, since points of
-//! contact lie between these.
+//! Forces at points, drawn over a picture: a dot at each point, and an arrow along the force. They are seen
+//! through bodies, since points of contact lie between these.
 
 use pliant_geometry::{Mesh, Vector3};
 
@@ -9,7 +9,8 @@ use crate::picture::Picture;
 
 /// Length of the longest arrow, over the diagonal of the box around what is shown.
 const LENGTH: f64 = 0.14;
-/// Radius of a dot, half the width of a shaft, length and half the width of a head, width of a rim: over the height of the picture.
+/// Radius of a dot, half the width of a shaft, length and half the width of a head, width of a rim: over the
+/// height of the picture.
 pub(crate) const DOT: f32 = 0.0042;
 const SHAFT: f32 = 0.0021;
 const HEAD: [f32; 2] = [0.019, 0.0078];
@@ -21,7 +22,8 @@ pub(crate) const PALE: [u8; 3] = [255, 255, 255];
 /// A point [m] and the force there [N].
 pub type PointForce = [Vector3; 2];
 
-/// The forces of contacts at the points of a mesh, which are at these places [m]: those of its field `contact-force`. `None` without it.
+/// The forces of contacts at the points of a mesh, which are at these places [m]: those of its field
+/// `contact-force`. `None` without it.
 pub fn contact_forces(mesh: &Mesh, points: &[Vector3]) -> Option<Vec<PointForce>> {
     let forces = mesh.point_data.get("contact-force").filter(|array| array.components == 3)?;
     let all = points.iter().zip(forces.values.chunks_exact(3));
@@ -34,7 +36,8 @@ pub fn largest_force(forces: &[PointForce]) -> f64 {
     forces.iter().map(|[_, force]| force.norm()).fold(0.0, f64::max)
 }
 
-/// The length of arrows over their force [m/N], of which the longest one is that of the `largest` force [N], among points [m].
+/// The length of arrows over their force [m/N], of which the longest one is that of the `largest` force [N],
+/// among points [m].
 pub fn arrow_unit<'p>(points: impl IntoIterator<Item = &'p Vector3>, largest: f64) -> f64 {
     let finite = points.into_iter().filter(|point| point.iter().all(|x| x.is_finite()));
     let bounds = finite.map(|point| (*point, *point)).reduce(|(a, b), (c, d)| (a.inf(&c), b.sup(&d)));
@@ -143,7 +146,8 @@ mod tests {
     use super::*;
     use pliant_geometry::DataArray;
 
-    /// The picture has a dot at the point and an arrow above it as long as its force asks; other pixels stay empty.
+    /// The picture has a dot at the point and an arrow above it as long as its force asks; other pixels stay
+    /// empty.
     #[test]
     fn an_arrow_begins_at_its_point_and_is_as_long_as_its_force() {
         let mut picture = Picture { width: 200, height: 200, rgba: vec![0; 160_000] };

@@ -203,8 +203,8 @@ impl Camera {
         2.0 * half.fold(0.0, f64::max)
     }
 
-    /// From space to clip space of a picture with this ratio of width to height, for objects within a distance of the
-    /// target [m]; depth increases from 0 near to 1 far.
+    /// From space to clip space of a picture with this ratio of width to height, for objects within a
+    /// distance of the target [m]; depth increases from 0 near to 1 far.
     pub(crate) fn projection_view(&self, aspect: f64, reach: f64) -> Matrix4<f32> {
         let [x, y, z] = self.axes();
         let eye = self.eye();
@@ -227,7 +227,8 @@ impl Camera {
         (projection * view).cast()
     }
 
-    /// The point and the unit direction of the ray through a place of the picture: x to the right and y up, from −1 to 1.
+    /// The point and the unit direction of the ray through a place of the picture: x to the right and y up,
+    /// from −1 to 1.
     pub fn ray(&self, [x, y]: [f64; 2], aspect: f64) -> (Vector3, Vector3) {
         let [right, up, towards] = self.axes();
         let across = (right * (x * aspect) + up * y) * (0.5 * self.height);

@@ -1,5 +1,5 @@
-//! From values to colours: perceptual maps, most of them safe for the colour-blind, and the range that they span. From labels to
-//! colours: one for each, the same in every picture.
+//! From values to colours: perceptual maps, most of them safe for the colour-blind, and the range that they
+//! span. From labels to colours: one for each, the same in every picture.
 
 /// A map of colours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -44,7 +44,8 @@ impl ColourMap {
         matches!(self, Self::BlueRed)
     }
 
-    /// The part of the map that a value has which all have: the middle of a diverging map, the beginning of the others.
+    /// The part of the map that a value has which all have: the middle of a diverging map, the beginning of
+    /// the others.
     pub const fn part_of_one_value(self) -> f64 {
         if self.is_diverging() { 0.5 } else { 0.0 }
     }
@@ -73,7 +74,8 @@ impl ColourMap {
     }
 }
 
-/// Colours of the labels from 0: grey, then the colours of Okabe and Ito (2008), which colour-blind people can distinguish.
+/// Colours of the labels from 0: grey, then the colours of Okabe and Ito (2008), which colour-blind people
+/// can distinguish.
 const FIRST: [[u8; 3]; 8] = [
     [153, 153, 153],
     [230, 159, 0],
@@ -86,8 +88,8 @@ const FIRST: [[u8; 3]; 8] = [
 ];
 /// Turn of the hue from one label to the next, the golden section: any number of labels spread evenly.
 const TURN: f64 = 0.618_033_988_749_894_9;
-/// Cycle of lightness and chroma (OKLab). Hues repeat nearly after a Fibonacci number of labels; the first one divisible by nine is
-/// 144, so similar hues differ in lightness before.
+/// Cycle of lightness and chroma (OKLab). Hues repeat nearly after a Fibonacci number of labels; the first
+/// one divisible by nine is 144, so similar hues differ in lightness before.
 const TONES: [[f64; 2]; 9] = [
     [0.69, 0.11],
     [0.55, 0.16],
@@ -100,8 +102,8 @@ const TONES: [[f64; 2]; 9] = [
     [0.49, 0.11],
 ];
 
-/// The colour (sRGB) of a label, the same in every picture. The first two dozen are easy to distinguish; among hundreds some look
-/// alike.
+/// The colour (sRGB) of a label, the same in every picture. The first two dozen are easy to distinguish;
+/// among hundreds some look alike.
 pub fn label_colour(label: i32) -> [u8; 3] {
     if let Some(&colour) = usize::try_from(label).ok().and_then(|label| FIRST.get(label)) {
         return colour;
@@ -135,7 +137,8 @@ pub(crate) fn linear(byte: u8) -> f32 {
     if s <= 0.040_45 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Collects values to find the range that colours span: single corners with extreme values do not take the whole map.
+/// Collects values to find the range that colours span: single corners with extreme values do not take the
+/// whole map.
 #[derive(Clone, Debug, Default)]
 pub struct Extremes {
     values: Vec<f32>,
@@ -145,11 +148,13 @@ pub struct Extremes {
 
 /// Part of the values that the range leaves out at each end.
 const LEFT_OUT: f64 = 0.005;
-/// Part of a value by which others differ from it at most that count as equal: some digits of single precision.
+/// Part of a value by which others differ from it at most that count as equal: some digits of single
+/// precision.
 pub(crate) const EQUAL: f64 = 1e-6;
 
-/// The size below which values of a unit are round-off, on bodies of an extent [m]: displacements of a millionth of it, and stresses [Pa] that
-/// strain the softest tissue (100 Pa) by 10⁻⁵. Zero for other units, whose scale is not known.
+/// The size below which values of a unit are round-off, on bodies of an extent [m]: displacements of a
+/// millionth of it, and stresses [Pa] that strain the softest tissue (100 Pa) by 10⁻⁵. Zero for other units,
+/// whose scale is not known.
 pub fn noise(unit: &str, extent: f64) -> f64 {
     match unit {
         "m" => 1e-6 * extent,
@@ -175,8 +180,9 @@ impl Extremes {
         self.values.extend(values.into_iter().filter(|value| value.is_finite()).map(|value| value as f32));
     }
 
-    /// The range without the outermost values: from zero if no value is negative, around zero if many values have either
-    /// sign or the map diverges; of equal values their own, without a length. `None` without values.
+    /// The range without the outermost values: from zero if no value is negative, around zero if many values
+    /// have either sign or the map diverges; of equal values their own, without a length. `None` without
+    /// values.
     pub fn range(mut self, map: ColourMap) -> Option<[f64; 2]> {
         if self.values.is_empty() {
             return None;

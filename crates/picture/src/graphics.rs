@@ -16,8 +16,8 @@ pub struct Graphics {
 }
 
 impl Graphics {
-    /// Opens the best adapter that draws: GPUs first, software drivers last. The variables `WGPU_BACKEND` and `VK_DRIVER_FILES`
-    /// restrict the choice.
+    /// Opens the best adapter that draws: GPUs first, software drivers last. The variables `WGPU_BACKEND` and
+    /// `VK_DRIVER_FILES` restrict the choice.
     ///
     /// # Errors
     /// If none exists, or it does not open.

@@ -1,5 +1,5 @@
-//! The triangles of regions that one sees through: after all others, from the farthest to the nearest. Borders between labels, which lie
-//! inside of bodies, are drawn where one sees them.
+//! The triangles of regions that one sees through: after all others, from the farthest to the nearest.
+//! Borders between labels, which lie inside of bodies, are drawn where one sees them.
 
 use crate::subject::{KIND, Subject};
 
@@ -40,7 +40,8 @@ impl Layers {
         Some(Self { list, opaque, corners, order: Vec::new() })
     }
 
-    /// Orders those that are not opaque by their distance from the eye, with points now [m]; in parallel projection along the view.
+    /// Orders those that are not opaque by their distance from the eye, with points now [m]; in parallel
+    /// projection along the view.
     pub fn sort(&mut self, points: &[[f32; 4]], eye: [f32; 3], towards: Option<[f32; 3]>) -> &[[u32; 4]] {
         let far = |corners: &[u32; 3]| {
             let middle = [0, 1, 2]

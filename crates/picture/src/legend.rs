@@ -1,4 +1,5 @@
-//! Text in a picture: the colour scale with ticks and unit or the colours of labels with their names, a title and the time.
+//! Text in a picture: the colour scale with ticks and unit or the colours of labels with their names, a title
+//! and the time.
 
 use std::collections::BTreeSet;
 
@@ -93,7 +94,8 @@ pub fn ticks([low, high]: [f64; 2], about: usize) -> (Vec<f64>, f64) {
     ((first..=last).map(|n| n as f64 * step).collect(), step)
 }
 
-/// Where a scale of colours has marks, as parts of its length from the low end, and their numbers. Equal ends have one mark, in the middle.
+/// Where a scale of colours has marks, as parts of its length from the low end, and their numbers. Equal ends
+/// have one mark, in the middle.
 pub fn scale_marks([low, high]: [f64; 2], about: usize) -> Vec<(f64, String)> {
     if low == high {
         return vec![(0.5, three_digits(low))];
@@ -121,7 +123,8 @@ pub fn readable(unit: &str, size: f64) -> (String, f64) {
 }
 
 impl Legend {
-    /// The labels with their names. Labels that are seen come first; the names of the others end in "(hidden)".
+    /// The labels with their names. Labels that are seen come first; the names of the others end in
+    /// "(hidden)".
     fn told_labels(&self) -> Vec<(i32, String)> {
         let told = |(label, name): &(i32, String)| match self.hidden.contains(label) {
             true => (*label, format!("{name} (hidden)").trim_start().to_owned()),
@@ -266,7 +269,8 @@ impl Legend {
 /// How much of a body is hidden behind text.
 const GROUND: f32 = 0.82;
 
-/// Lays the background over what is drawn of bodies in a rectangle [pixels] (left, top, right, bottom), so that text on it can be read.
+/// Lays the background over what is drawn of bodies in a rectangle [pixels] (left, top, right, bottom), so
+/// that text on it can be read.
 pub(crate) fn clear_ground(picture: &mut Picture, style: &Style, [left, top, right, bottom]: [f32; 4]) {
     let [above, below] = style.background.colours();
     for y in top.max(0.0) as u32..(bottom.max(0.0) as u32).min(picture.height) {

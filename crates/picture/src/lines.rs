@@ -1,6 +1,6 @@
-//! Lines that follow a body: fibres, and the edges of a marked cell. Each connects two combinations of points, the middle ± half
-//! of it, so the shader draws it in any deformed state from the points alone. A fibre is h F·a₀ with F = Σ x_a ⊗ ∇N_a of its
-//! cell, hence h Σ x_a (∇N_a·a₀).
+//! Lines that follow a body: fibres, and the edges of a marked cell. Each connects two combinations of
+//! points, the middle ± half of it, so the shader draws it in any deformed state from the points alone. A
+//! fibre is h F·a₀ with F = Σ x_a ⊗ ∇N_a of its cell, hence h Σ x_a (∇N_a·a₀).
 
 use std::collections::BTreeSet;
 
@@ -20,7 +20,8 @@ pub(crate) struct Line {
 }
 
 impl Line {
-    /// From a place on an edge to one on another: two nodes each, and the part of the way from the first to the second.
+    /// From a place on an edge to one on another: two nodes each, and the part of the way from the first to
+    /// the second.
     pub fn across([from, to]: [([u32; 2], f64); 2]) -> Self {
         let mut line = Self::default();
         for (at, (nodes, part), sign) in [(0, from, -0.5), (2, to, 0.5)] {

@@ -1,5 +1,6 @@
-//! Marks of constraints and loads, drawn over a picture as forces of contacts are: a square where a node is held, a dot where it is moved, a bar
-//! where it is under a plate, an arrow along the force of loads, and one along the weight of all from its centre.
+//! Marks of constraints and loads, drawn over a picture as forces of contacts are: a square where a node is
+//! held, a dot where it is moved, a bar where it is under a plate, an arrow along the force of loads, and one
+//! along the weight of all from its centre.
 
 use pliant_geometry::{DataArray, Mesh, Vector3};
 
@@ -82,7 +83,8 @@ pub fn weight_of(weights: impl Iterator<Item = (Vector3, Vector3)>) -> Option<Ma
 /// Length of the arrow of a weight over the height of the view.
 pub const WEIGHT: f64 = 0.12;
 
-/// The marks of a mesh whose points are at some places [m]: those of its fields `constraint`, `load` and `weight`. `None` without the first two.
+/// The marks of a mesh whose points are at some places [m]: those of its fields `constraint`, `load` and
+/// `weight`. `None` without the first two.
 pub(crate) fn marks_of(mesh: &Mesh, points: &[Vector3]) -> Option<Vec<Mark>> {
     let held = mesh.point_data.get("constraint").filter(|array| array.components == 1);
     let loads = mesh.point_data.get("load").filter(|array| array.components == 3);

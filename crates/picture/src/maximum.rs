@@ -1,4 +1,5 @@
-//! The largest value that colours tell: a ring at its place, dashed where something hides the place, and the number beside it.
+//! The largest value that colours tell: a ring at its place, dashed where something hides the place, and the
+//! number beside it.
 
 use pliant_geometry::Vector3;
 
@@ -14,15 +15,16 @@ use crate::style::Style;
 use crate::subject::Subject;
 use crate::text::{Align, Pen};
 
-/// The radius of the ring over the height of the picture, half the width of its line, and the width of the rim around it.
+/// The radius of the ring over the height of the picture, half the width of its line, and the width of the
+/// rim around it.
 const RADIUS: f32 = 0.014;
 const LINE: f32 = 0.0022;
 const RIM: f32 = 0.0018;
 /// Dashes of the ring of a hidden place.
 const DASHES: f32 = 6.0;
 
-/// The largest value that is seen in colours, and its place [m]: of points of the surface that a plane leaves, and of the section. `None` where all
-/// values are equal.
+/// The largest value that is seen in colours, and its place [m]: of points of the surface that a plane
+/// leaves, and of the section. `None` where all values are equal.
 pub fn largest_seen(
     subject: &Subject,
     regions: &Regions,

@@ -1,4 +1,5 @@
-// Normals of vertices: the sum of the vector areas of the triangles around each, gathered so that no atomics are needed.
+// Normals of vertices: the sum of the vector areas of the triangles around each, gathered so that no atomics
+// are needed.
 
 @group(0) @binding(0) var<storage, read> points: array<vec4<f32>>;
 @group(0) @binding(1) var<storage, read> triangles: array<vec4<u32>>;

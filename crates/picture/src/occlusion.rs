@@ -1,4 +1,5 @@
-//! Ambient occlusion: what arrives of the light from all sides, in a map of the screen that is made before each picture.
+//! Ambient occlusion: what arrives of the light from all sides, in a map of the screen that is made before
+//! each picture.
 
 use std::ops::Range;
 

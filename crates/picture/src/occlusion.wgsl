@@ -1,5 +1,6 @@
-// Ambient occlusion on the screen, in a map that is coarser than the picture: how much of the light from all sides reaches a place, by the
-// estimator of McGuire, Mara and Luebke (2012, Scalable ambient obscurance). What is flat, convex or folded a little stays as it is.
+// Ambient occlusion on the screen, in a map that is coarser than the picture: how much of the light from all
+// sides reaches a place, by the estimator of McGuire, Mara and Luebke (2012, Scalable ambient obscurance).
+// What is flat, convex or folded a little stays as it is.
 
 struct Solid {
     // Position [m], and 1.
@@ -82,7 +83,8 @@ fn depth_over_reach(place: vec3<f32>) -> f32 {
 
 @group(1) @binding(0) var rough: texture_2d<f32>;
 
-// The mean over four by four pixels, which takes away the pattern of the spirals; those in another depth do not count.
+// The mean over four by four pixels, which takes away the pattern of the spirals; those in another depth do
+// not count.
 @fragment
 fn smoothed(at: Sky) -> @location(0) vec2<f32> {
     let pixel = vec2<i32>(at.clip.xy);
@@ -102,7 +104,8 @@ fn smoothed(at: Sky) -> @location(0) vec2<f32> {
 
 @group(2) @binding(0) var occluded: texture_2d<f32>;
 
-// Part of the light from all sides that reaches a place; all where the map has something else in front or behind.
+// Part of the light from all sides that reaches a place; all where the map has something else in front or
+// behind.
 fn light_at(place: vec3<f32>) -> f32 {
     if view.occlusion.x == 0.0 {
         return 1.0;

@@ -1,4 +1,5 @@
-//! Regions of a picture (labels, bodies, obstacles and tools): which are hidden, through which one sees, and what colours them.
+//! Regions of a picture (labels, bodies, obstacles and tools): which are hidden, through which one sees, and
+//! what colours them.
 
 use pliant_geometry::Region;
 
@@ -66,7 +67,8 @@ impl Regions {
 const OF_VALUE: f32 = -1.0;
 const OF_TISSUE: f32 = -2.0;
 
-/// What the shader takes of cells: light of their colour and opacity, and their finish; with `labels`, colours show labels.
+/// What the shader takes of cells: light of their colour and opacity, and their finish; with `labels`,
+/// colours show labels.
 pub(crate) fn light(kind: Kind, coat: Coat, labels: bool) -> [[f32; 4]; 2] {
     let Finish { shine, sharpness, perfusion } = match coat.paint {
         Paint::Plain(material) => material.finish(),

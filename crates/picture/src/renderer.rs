@@ -262,7 +262,8 @@ pub struct Drawn {
     poses: [Pose; 2],
     view: wgpu::Buffer,
     colours: wgpu::Buffer,
-    /// Light, opacity and finish of each kind of cells, for these regions and with or without colours of labels.
+    /// Light, opacity and finish of each kind of cells, for these regions and with or without colours of
+    /// labels.
     lights: wgpu::Buffer,
     kinds: Vec<CellKind>,
     regions: Regions,
@@ -408,7 +409,8 @@ impl Drawn {
         }
     }
 
-    /// Sets points [m] and a value at each; without values the colour is that of tissue, and grey for non-finite ones.
+    /// Sets points [m] and a value at each; without values the colour is that of tissue, and grey for
+    /// non-finite ones.
     pub fn set(&mut self, queue: &wgpu::Queue, points: &[Vector3], values: &[f64]) {
         self.stage(points, values);
         queue.write_buffer(&self.poses[0].points, 0, bytemuck::cast_slice(&self.staged));
@@ -445,7 +447,8 @@ impl Drawn {
         }
     }
 
-    /// Draws from an external buffer with four numbers per point (position [m], value), such as a solver's on the same device.
+    /// Draws from an external buffer with four numbers per point (position [m], value), such as a solver's on
+    /// the same device.
     pub fn bind_positions(&mut self, device: &wgpu::Device, renderer: &Renderer, points: &wgpu::Buffer) {
         let Self { triangles, vertices, offsets, around, .. } = &*self;
         let normals = &self.poses[0].normals;
@@ -506,7 +509,8 @@ impl Drawn {
         self.bind_shape(device, renderer);
     }
 
-    /// Computes normals, writes the view and finds where less light arrives, for a picture with this ratio of width to height.
+    /// Computes normals, writes the view and finds where less light arrives, for a picture with this ratio of
+    /// width to height.
     pub fn prepare(
         &mut self,
         renderer: &Renderer,
@@ -654,8 +658,8 @@ fn lights_of(kinds: &[CellKind], regions: &Regions, labels: bool) -> Vec<[[f32; 
     kinds.iter().map(|&kind| light(kind, regions.coat(kind), labels)).collect()
 }
 
-/// Strength of the occlusion, its reach [m], the pixels of the map that it has at a metre's distance (everywhere in parallel projection), and
-/// the distance of the target over it.
+/// Strength of the occlusion, its reach [m], the pixels of the map that it has at a metre's distance
+/// (everywhere in parallel projection), and the distance of the target over it.
 fn occlusion(camera: &Camera, style: &Style) -> [f32; 4] {
     let reach = REACH * camera.height;
     let pixels = REACH * f64::from(ROWS);

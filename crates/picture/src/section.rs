@@ -1,5 +1,6 @@
-//! Sections of volume cells by a plane. Linear interpolation gives the intersections of the plane and the cell edges; sorted
-//! around their middle, these points form a convex polygon. A shell is cut along a line. Leaves out: cells so distorted that their section is not convex.
+//! Sections of volume cells by a plane. Linear interpolation gives the intersections of the plane and the
+//! cell edges; sorted around their middle, these points form a convex polygon. A shell is cut along a line.
+//! Leaves out: cells so distorted that their section is not convex.
 
 use std::collections::BTreeSet;
 
@@ -20,7 +21,8 @@ pub(crate) struct Corner {
     pub point: [f32; 4],
     /// Position at rest [m].
     pub rest: [f32; 3],
-    /// A bit for each edge of its triangle, that opposite to the corner, which is one of the polygon; beside them the marks and the kind of the cell.
+    /// A bit for each edge of its triangle, that opposite to the corner, which is one of the polygon; beside
+    /// them the marks and the kind of the cell.
     pub edges: u32,
 }
 

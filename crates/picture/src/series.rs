@@ -235,7 +235,8 @@ pub struct Look {
     pub legend: Legend,
 }
 
-/// Size of a gap [m] below which it is round-off: the finest tissue that is meshed has elements a thousand times as large.
+/// Size of a gap [m] below which it is round-off: the finest tissue that is meshed has elements a thousand
+/// times as large.
 const LEAST_GAP: f64 = 1e-8;
 
 /// What frames have in common.

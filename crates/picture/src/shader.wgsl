@@ -2,14 +2,16 @@
 
 struct View {
     projection_view: mat4x4<f32>,
-    // Unit vectors of the camera; `eye.w` is 1 in perspective, else the eye is infinitely far along `towards`.
+    // Unit vectors of the camera; `eye.w` is 1 in perspective, else the eye is infinitely far along
+    // `towards`.
     right: vec4<f32>,
     up: vec4<f32>,
     towards: vec4<f32>,
     eye: vec4<f32>,
     // What lies on the side of the normal is taken away.
     plane: vec4<f32>,
-    // First value, 1 / span; 1 for colours of values, 2 for colours of labels; whether colours are coded as sRGB here.
+    // First value, 1 / span; 1 for colours of values, 2 for colours of labels; whether colours are coded as
+    // sRGB here.
     range: vec4<f32>,
     plain: vec4<f32>,
     // Of a point without a value among others that have one.
@@ -19,18 +21,20 @@ struct View {
     bottom: vec4<f32>,
     // Strength of the edges.
     edge: vec4<f32>,
-    // Widths of the picture a height; half the width of fibres and of marks over the height; how far lines are lifted [m].
+    // Widths of the picture a height; half the width of fibres and of marks over the height; how far lines
+    // are lifted [m].
     line: vec4<f32>,
     // Of the texture: 1 / size of the body [1/m], strength.
     skin: vec4<f32>,
-    // Strength, reach [m], pixels of the map that the reach has at the eye's unit of distance, depth of the target over the reach.
+    // Strength, reach [m], pixels of the map that the reach has at the eye's unit of distance, depth of the
+    // target over the reach.
     occlusion: vec4<f32>,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> colours: array<vec4<f32>, 256>;
-// Of each kind of cells: light of its colour, or −1 for that of the value, −2 for that of tissue, and opacity; then the strength and the
-// exponent of its highlight, and how much its colour varies.
+// Of each kind of cells: light of its colour, or −1 for that of the value, −2 for that of tissue, and
+// opacity; then the strength and the exponent of its highlight, and how much its colour varies.
 struct Kind {
     light: vec4<f32>,
     finish: vec4<f32>,
@@ -40,8 +44,9 @@ struct Kind {
 
 // Position [m] and value of each point.
 @group(1) @binding(0) var<storage, read> points: array<vec4<f32>>;
-// Three vertices, and a word: bits 0 to 2 tell which edges are drawn, bit 3 that it is of a section, bit 4 that it is of an obstacle or tool, bit 5 of one that holds bodies
-// inside, bits 8 to 31 are the number of its kind.
+// Three vertices, and a word: bits 0 to 2 tell which edges are drawn, bit 3 that it is of a section, bit 4
+// that it is of an obstacle or tool, bit 5 of one that holds bodies inside, bits 8 to 31 are the number of
+// its kind.
 @group(1) @binding(1) var<storage, read> triangles: array<vec4<u32>>;
 // The point of each vertex.
 @group(1) @binding(2) var<storage, read> vertices: array<u32>;
@@ -60,7 +65,8 @@ struct Corner {
     @location(4) @interpolate(flat) edges: u32,
     // At rest, over the size of the body.
     @location(5) rest: vec3<f32>,
-    // The position within the triangle, also where the middle of a pixel is not: there the other one lies beyond it, on outlines far.
+    // The position within the triangle, also where the middle of a pixel is not: there the other one lies
+    // beyond it, on outlines far.
     @location(6) @interpolate(perspective, centroid) place: vec3<f32>,
 }
 
@@ -141,8 +147,8 @@ fn is_cut(at: Corner) -> bool {
     return (at.edges & 8u) != 0u;
 }
 
-// The normal on the side that is seen. Near outlines the smooth normal of a face that is seen may face away: it is turned to the outline, since
-// turned around it would have other light than the faces beside it.
+// The normal on the side that is seen. Near outlines the smooth normal of a face that is seen may face away:
+// it is turned to the outline, since turned around it would have other light than the faces beside it.
 fn seen_normal(at: Corner, front: bool, eye: vec3<f32>) -> vec3<f32> {
     let own = normalize(at.normal);
     let is_front = select(front, dot(own, eye) >= 0.0, is_cut(at));
@@ -150,8 +156,8 @@ fn seen_normal(at: Corner, front: bool, eye: vec3<f32>) -> vec3<f32> {
     return normalize(normal - min(dot(normal, eye) - 1.0e-3, 0.0) * eye);
 }
 
-// Things are drawn from outside, so that one sees through a half-space from its back; those that hold bodies inside from there. The
-// margin keeps outlines of round things whole.
+// Things are drawn from outside, so that one sees through a half-space from its back; those that hold bodies
+// inside from there. The margin keeps outlines of round things whole.
 fn is_behind(at: Corner) -> bool {
     let facing = dot(normalize(at.normal), towards_eye(at.position));
     return is_thing(at) && select((facing < -0.2), (facing > 0.0), (at.edges & 32u) != 0u);
@@ -183,7 +189,8 @@ fn opacity_at(at: Corner, facing: f32) -> f32 {
     return mix(own, sqrt(own), grazing * grazing);
 }
 
-// A key light over the left shoulder, a fill from the right, sky above and ground below (all of them turn with the camera).
+// A key light over the left shoulder, a fill from the right, sky above and ground below (all of them turn
+// with the camera).
 fn lit(albedo: vec3<f32>, normal: vec3<f32>, eye: vec3<f32>, finish: vec2<f32>, light: f32) -> vec3<f32> {
     let key = normalize(view.right.xyz * -0.45 + view.up.xyz * 0.65 + view.towards.xyz * 0.75);
     let fill = normalize(view.right.xyz * 0.8 + view.up.xyz * 0.05 + view.towards.xyz * 0.5);
@@ -306,7 +313,8 @@ fn octaves(place: vec3<f32>, lowest: f32, count: i32, pixel: f32) -> vec4<f32> {
     return sum;
 }
 
-// The normal of the uneven surface: heights over the body at rest, their slope carried to the deformed surface (Mikkelsen 2010).
+// The normal of the uneven surface: heights over the body at rest, their slope carried to the deformed
+// surface (Mikkelsen 2010).
 fn uneven(at: Corner, normal: vec3<f32>) -> vec3<f32> {
     let px = dpdx(at.position);
     let py = dpdy(at.position);

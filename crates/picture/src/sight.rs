@@ -117,8 +117,8 @@ impl<'s> Sight<'s> {
     }
 }
 
-/// How far a triangle is from a place along a unit direction, which goes to the eye, and whether its front is seen from there; `None` if the ray
-/// misses it (Möller and Trumbore 1997).
+/// How far a triangle is from a place along a unit direction, which goes to the eye, and whether its front is
+/// seen from there; `None` if the ray misses it (Möller and Trumbore 1997).
 fn hit([a, b, c]: &[Vector3; 3], from: &Vector3, along: &Vector3) -> Option<(f64, bool)> {
     let (ab, ac) = (b - a, c - a);
     let across = along.cross(&ac);

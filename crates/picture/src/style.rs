@@ -48,7 +48,8 @@ pub enum Texture {
     /// Smooth and dull.
     #[default]
     None,
-    /// Moist tissue, finely uneven: fixed to the body at rest, at any resolution. Under colours of values it is weaker.
+    /// Moist tissue, finely uneven: fixed to the body at rest, at any resolution. Under colours of values it
+    /// is weaker.
     Skin,
 }
 

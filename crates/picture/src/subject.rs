@@ -1,5 +1,5 @@
-//! The drawn parts of a mesh: its surface as triangles whose corners share normals where the surface is smooth, and its
-//! volume cells for sections.
+//! The drawn parts of a mesh: its surface as triangles whose corners share normals where the surface is
+//! smooth, and its volume cells for sections.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -12,7 +12,8 @@ use pliant_geometry::{
 use crate::lines::{Fibres, Line, outline};
 use crate::regions::{Kind, Paint, Regions};
 
-/// Cosine of the angle between faces [75°] from which on their edge is sharp: the round sides of a coarse organ stay smooth.
+/// Cosine of the angle between faces [75°] from which on their edge is sharp: the round sides of a coarse
+/// organ stay smooth.
 const SHARP: f64 = 0.26;
 
 /// The surface and the cells of a mesh, ready to be drawn in any deformed state.
@@ -20,8 +21,9 @@ const SHARP: f64 = 0.26;
 pub struct Subject {
     /// Points at rest [m].
     pub points: Vec<Vector3>,
-    /// Three corners, each a vertex, and a bit for each edge, that opposite to the corner, which is one of a cell; beside these bits
-    /// the marks of things and the kind of the cell. Those of the surface, then those of borders between labels.
+    /// Three corners, each a vertex, and a bit for each edge, that opposite to the corner, which is one of a
+    /// cell; beside these bits the marks of things and the kind of the cell. Those of the surface, then those
+    /// of borders between labels.
     pub(crate) triangles: Vec<[u32; 4]>,
     /// How many are of the surface.
     pub(crate) outer: usize,
@@ -55,7 +57,8 @@ struct Patch {
     edges: u32,
 }
 
-/// Cell data of the triangles of a subdivided element: bit i tells that the side opposite to corner i is an edge of the element.
+/// Cell data of the triangles of a subdivided element: bit i tells that the side opposite to corner i is an
+/// edge of the element.
 const ELEMENT_EDGES: &str = "element-edges";
 
 fn edges_of(block: Option<&CellBlock>, cell: u32) -> u32 {
@@ -84,7 +87,8 @@ struct Kinds {
 }
 
 impl Kinds {
-    /// What the shader takes of a cell beside the bits of edges: the marks of a thing, and the number of its kind.
+    /// What the shader takes of a cell beside the bits of edges: the marks of a thing, and the number of its
+    /// kind.
     fn word(&mut self, block: Option<&CellBlock>, cell: u32) -> u32 {
         let thing = block.and_then(|block| block.data.get(THING)?.values.get(cell as usize).copied());
         let marks = match thing {
@@ -190,7 +194,8 @@ impl Subject {
         !values.is_empty() && points.iter().any(|&point| !values[point as usize].is_finite())
     }
 
-    /// Whether cells of each kind show their values: those of obstacles and tools, of regions with a colour, and of invisible ones do not.
+    /// Whether cells of each kind show their values: those of obstacles and tools, of regions with a colour,
+    /// and of invisible ones do not.
     pub(crate) fn showing(&self, regions: &Regions) -> Vec<bool> {
         let shows = |kind: &Kind| {
             let coat = regions.coat(*kind);
@@ -211,8 +216,8 @@ impl Subject {
         points
     }
 
-    /// Labels of which something is seen in colours of labels, of some points that are: on the surface, on the borders within bodies that one
-    /// sees through, and of the kinds of cells that a section cuts.
+    /// Labels of which something is seen in colours of labels, of some points that are: on the surface, on
+    /// the borders within bodies that one sees through, and of the kinds of cells that a section cuts.
     pub(crate) fn labels_seen(
         &self,
         regions: &Regions,
@@ -325,8 +330,8 @@ fn shown_blocks(mesh: &Mesh) -> impl Iterator<Item = &CellBlock> + Clone {
     mesh.blocks.iter().filter(known)
 }
 
-/// The cell with the smallest stable step (the cell field `element-step`), counted over the cells that have a face; and its
-/// step [s]. `None` without this field.
+/// The cell with the smallest stable step (the cell field `element-step`), counted over the cells that have a
+/// face; and its step [s]. `None` without this field.
 pub fn critical_cell(mesh: &Mesh) -> Option<(u32, f64)> {
     let mut first = 0;
     let mut least: Option<(u32, f64)> = None;
@@ -389,7 +394,8 @@ fn normal(face: &[u32], points: &[Vector3]) -> Vector3 {
     vector_area(&corners).try_normalize(0.0).unwrap_or_default()
 }
 
-/// The triangles around each vertex of a group, which are those of all its vertices: where they begin in the list, and the list.
+/// The triangles around each vertex of a group, which are those of all its vertices: where they begin in the
+/// list, and the list.
 fn around_vertices(triangles: &[[u32; 4]], groups: &[u32]) -> (Vec<u32>, Vec<u32>) {
     let count = groups.iter().max().map_or(0, |last| *last as usize + 1);
     let mut of_group: Vec<Vec<u32>> = vec![Vec::new(); count];
@@ -406,8 +412,8 @@ fn around_vertices(triangles: &[[u32; 4]], groups: &[u32]) -> (Vec<u32>, Vec<u32
     (offsets, around)
 }
 
-/// For each point of a mesh the first one of the same body at the same place at rest: blocks whose nodes are doubled where they meet have one
-/// surface.
+/// For each point of a mesh the first one of the same body at the same place at rest: blocks whose nodes are
+/// doubled where they meet have one surface.
 fn places(mesh: &Mesh, faces: &[Patch]) -> Vec<u32> {
     let mut places: Vec<u32> = (0..mesh.points.len() as u32).collect();
     let mut known: BTreeMap<([u64; 3], i32), u32> = BTreeMap::new();
@@ -432,7 +438,8 @@ struct Split {
     groups: Vec<u32>,
 }
 
-/// Around a place, faces that meet in edges that are not sharp share a vertex, or several with one normal if points are doubled there.
+/// Around a place, faces that meet in edges that are not sharp share a vertex, or several with one normal if
+/// points are doubled there.
 fn split_at_sharp_edges(faces: &[Patch], normals: &[Vector3], places: &[u32]) -> Split {
     let mut at_place: Vec<Vec<(u32, u32)>> = vec![Vec::new(); places.len()];
     for (face, number) in faces.iter().zip(0..) {
@@ -491,7 +498,8 @@ pub fn deformed_points(mesh: &Mesh) -> Vec<Vector3> {
     points
 }
 
-/// Fields of a mesh that colours can show, with their components, by the names that [`nodal_values`] takes; `label` is one of them.
+/// Fields of a mesh that colours can show, with their components, by the names that [`nodal_values`] takes;
+/// `label` is one of them.
 pub fn field_choices(mesh: &Mesh) -> Vec<String> {
     let of_cells = mesh.blocks.iter().flat_map(|block| &block.data);
     let all: BTreeMap<&String, usize> =
@@ -511,9 +519,9 @@ pub fn field_choices(mesh: &Mesh) -> Vec<String> {
     choices
 }
 
-/// The values of a field at the points of a mesh. Vectors count by their norm, or by a component as in `displacement:z`; tensors
-/// need a component, as in `cauchy-stress:xx`. Values of cells are averaged, weighted by volume or area. `None` without this
-/// field.
+/// The values of a field at the points of a mesh. Vectors count by their norm, or by a component as in
+/// `displacement:z`; tensors need a component, as in `cauchy-stress:xx`. Values of cells are averaged,
+/// weighted by volume or area. `None` without this field.
 pub fn nodal_values(mesh: &Mesh, field: &str) -> Option<Vec<f64>> {
     let (name, component) = field.split_once(':').map_or((field, None), |(name, part)| (name, Some(part)));
     let number = |item: &[f64]| -> Option<f64> {

@@ -1,4 +1,5 @@
-//! Pictures do not mislead: the largest value is marked where it is, and nodes that are doubled leave no seam.
+//! Pictures do not mislead: the largest value is marked where it is, and nodes that are doubled leave no
+//! seam.
 
 mod support;
 
@@ -6,7 +7,8 @@ use pliant_geometry::{CellKind, DataArray, Mesh, Vector3};
 use pliant_picture::{Camera, Graphics, Look, Picture, Projection, Style};
 use support::graphics;
 
-/// A square sheet of 8² squares in the plane of y and z, bent around z by 1.6 radians; all of them with nodes of their own if `doubled`.
+/// A square sheet of 8² squares in the plane of y and z, bent around z by 1.6 radians; all of them with nodes
+/// of their own if `doubled`.
 fn sheet(doubled: bool) -> Mesh {
     let mut mesh = Mesh::default();
     let place = |i: u32, j: u32| {
@@ -43,7 +45,8 @@ fn nodes_that_are_doubled_leave_no_seam() {
     assert!(worst <= Some(1), "{worst:?}");
 }
 
-/// The picture of a sheet with the largest value at a node, with and without its mark; and the pixels that differ.
+/// The picture of a sheet with the largest value at a node, with and without its mark; and the pixels that
+/// differ.
 fn marked(graphics: &Graphics, mesh: &mut Mesh, node: usize, azimuth: f64) -> (Picture, Vec<[f64; 2]>) {
     let values = (0..mesh.points.len()).map(|own| if own == node { 5.0 } else { 0.01 * own as f64 });
     mesh.point_data.insert("pressure".into(), DataArray::scalar(values.collect()));

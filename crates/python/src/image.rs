@@ -34,7 +34,8 @@ const NUMBERS: [(&str, Scalar); 10] = [
 
 #[pymethods]
 impl Image {
-    /// From little-endian bytes, i fastest, of numbers of a type, the affine matrix to metres row by row, and names of labels.
+    /// From little-endian bytes, i fastest, of numbers of a type, the affine matrix to metres row by row, and
+    /// names of labels.
     #[new]
     fn new(
         bytes: Vec<u8>,
@@ -68,7 +69,8 @@ impl Image {
     }
 }
 
-/// Values (i fastest), their numbers along i, j and k, the affine matrix to metres row by row, and names of labels.
+/// Values (i fastest), their numbers along i, j and k, the affine matrix to metres row by row, and names of
+/// labels.
 type Read<'py> = (Bound<'py, PyArray1<f64>>, [usize; 3], [[f64; 4]; 3], Vec<(i32, String)>);
 
 /// Reads an image of any format that `pliant labels` reads.

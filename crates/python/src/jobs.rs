@@ -1,4 +1,5 @@
-//! Work that takes a while: it runs on threads of the engine, without the interpreter, and signals are looked at.
+//! Work that takes a while: it runs on threads of the engine, without the interpreter, and signals are looked
+//! at.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, channel};
@@ -13,7 +14,8 @@ use crate::errors::Trouble;
 /// Time between two looks at signals.
 const SLICE: Duration = Duration::from_millis(50);
 
-/// Runs a job on a pool. What a signal raises ends it through `stop`, is waited for, and then raised; the result comes with it.
+/// Runs a job on a pool. What a signal raises ends it through `stop`, is waited for, and then raised; the
+/// result comes with it.
 pub fn on_pool<T: Send + 'static>(
     py: Python<'_>,
     pool: &rayon::ThreadPool,
@@ -47,7 +49,8 @@ pub fn on_pool<T: Send + 'static>(
     }
 }
 
-/// Runs a job on new threads, which a fork has, too. After a signal the job continues, and its result is dropped.
+/// Runs a job on new threads, which a fork has, too. After a signal the job continues, and its result is
+/// dropped.
 pub fn on_thread<T: Send + 'static>(
     py: Python<'_>,
     job: impl FnOnce() -> Result<T, Trouble> + Send + 'static,
@@ -71,8 +74,8 @@ pub fn on_thread<T: Send + 'static>(
     }
 }
 
-/// Time for which the result of a call is awaited awake at first: to wake a thread takes longer than a short step, and that of the pool goes to sleep
-/// meanwhile.
+/// Time for which the result of a call is awaited awake at first: to wake a thread takes longer than a short
+/// step, and that of the pool goes to sleep meanwhile.
 const AWAKE: Duration = Duration::from_micros(200);
 
 /// Waits for a slice of time without the interpreter, at first awake.

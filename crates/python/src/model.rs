@@ -41,7 +41,8 @@ pub struct RunOptions {
     picture: bool,
 }
 
-/// A body: its name, its first node, their number, its mesh, and the number that each node has in the file or the given mesh.
+/// A body: its name, its first node, their number, its mesh, and the number that each node has in the file or
+/// the given mesh.
 type Body<'py> = (String, usize, usize, Mesh, Bound<'py, PyArray1<u32>>);
 
 #[pymethods]
@@ -134,7 +135,8 @@ impl Model {
         selection.nodes(&built.mesh, &built.boundary).map_err(|error| wrong(error.to_string()))
     }
 
-    /// Runs it with the outputs of its scene in a folder. The summary as JSON, the time [s] and the energies [J] at the end.
+    /// Runs it with the outputs of its scene in a folder. The summary as JSON, the time [s] and the energies
+    /// [J] at the end.
     fn run(
         &self,
         py: Python<'_>,

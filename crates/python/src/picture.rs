@@ -15,7 +15,8 @@ use crate::running::Running;
 /// What draws, opened once for all.
 static GRAPHICS: Mutex<Option<Graphics>> = Mutex::new(None);
 
-/// A PNG of the instant as `[view]` shows it, or coloured by another field, seen from another side (azimuth and elevation [degrees]).
+/// A PNG of the instant as `[view]` shows it, or coloured by another field, seen from another side (azimuth
+/// and elevation [degrees]).
 pub fn draw(
     running: &mut Running,
     field: Option<&str>,

@@ -19,7 +19,8 @@ use crate::model::Model;
 /// Longest text of a scene [bytes], as of files.
 const LONGEST: usize = 1 << 26;
 
-/// A scene as Python hands it over: text, its name, the folder of its files, values that are set, meshes and images from memory.
+/// A scene as Python hands it over: text, its name, the folder of its files, values that are set, meshes and
+/// images from memory.
 type Handed<'py> = (String, String, PathBuf, Vec<String>, Meshes<'py>, BTreeMap<String, Bound<'py, Image>>);
 
 type Meshes<'py> = BTreeMap<String, Bound<'py, Mesh>>;

@@ -1,9 +1,10 @@
 //! Checkpoints: all that a run needs to go on as if it had never stopped, in one file.
 //!
-//! The file: [`MAGIC`], the [`FORMAT`] (u32), the length of the body (u64), the body in postcard's encoding, and the
-//! CRC-32 of all before it (u32); little-endian. The body: [`Origin`] (what the run was), [`Progressed`] (how far it
-//! and its outputs were), the states of its participants with what a restart needs beside them, and its rollback points: of each how far the run
-//! was, and the states. A file appears under its name only once it is whole.
+//! The file: [`MAGIC`], the [`FORMAT`] (u32), the length of the body (u64), the body in postcard's encoding,
+//! and the CRC-32 of all before it (u32); little-endian. The body: [`Origin`] (what the run was),
+//! [`Progressed`] (how far it and its outputs were), the states of its participants with what a restart needs
+//! beside them, and its rollback points: of each how far the run was, and the states. A file appears under
+//! its name only once it is whole.
 
 use std::fs;
 use std::io::Write;
@@ -404,12 +405,14 @@ impl Checkpoint {
         self.origin.participants.iter().map(|own| own.step).fold(0.0, f64::max)
     }
 
-    /// Whether a run that ends at a time [s] has no step left: only its last instant may still have to be written.
+    /// Whether a run that ends at a time [s] has no step left: only its last instant may still have to be
+    /// written.
     pub(crate) fn is_at_the_end(&self, until: f64) -> bool {
         self.time() + 0.5 * self.step() >= until
     }
 
-    /// The world that goes on from here, with the steps of the checkpoint. Only `until` may differ from that of the interrupted run.
+    /// The world that goes on from here, with the steps of the checkpoint. Only `until` may differ from that
+    /// of the interrupted run.
     ///
     /// # Errors
     /// If this is not the world of the checkpoint, or it ends before.
@@ -637,8 +640,8 @@ mod tests {
         }
     }
 
-    /// The layout of [`State`] and [`Progressed`] decides what a checkpoint can be read with: whoever changes it gives
-    /// [`FORMAT`] the next number, and this test the new bytes.
+    /// The layout of [`State`] and [`Progressed`] decides what a checkpoint can be read with: whoever changes
+    /// it gives [`FORMAT`] the next number, and this test the new bytes.
     #[test]
     fn the_layout_of_format_20_is_as_it_was() {
         let bytes = |run: &str| {

@@ -26,7 +26,8 @@ pub struct FieldReader {
 }
 
 impl FieldReader {
-    /// A field by its name in outputs (`von-mises`) on a body or a carried surface, at its points or its cells; without a name on all bodies together.
+    /// A field by its name in outputs (`von-mises`) on a body or a carried surface, at its points or its
+    /// cells; without a name on all bodies together.
     ///
     /// # Errors
     /// If there is no such body or field, or the body doesn't have it.
@@ -53,8 +54,8 @@ impl FieldReader {
         self.mesh.fill(&frames(world, simulation));
     }
 
-    /// The values last taken, an item after the other: at points those of the mesh of the body in its order, at cells those of its cells. `NaN` where a body
-    /// has none.
+    /// The values last taken, an item after the other: at points those of the mesh of the body in its order,
+    /// at cells those of its cells. `NaN` where a body has none.
     ///
     /// # Errors
     /// If the body doesn't have the field.

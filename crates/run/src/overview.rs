@@ -219,7 +219,8 @@ fn write_implicit(page: &mut String, part: &ImplicitBodies, name: &str, built: &
     }
 }
 
-/// What the factors of the equations take where a solver needs them, and a warning where that is more than is free.
+/// What the factors of the equations take where a solver needs them, and a warning where that is more than is
+/// free.
 fn write_factors(page: &mut String, scene: &Scene, built: &Built) -> fmt::Result {
     let table = scene.run.linear.table();
     let needs = match table.by {

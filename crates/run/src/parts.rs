@@ -1,4 +1,5 @@
-//! Parts of a sweep, for job arrays: each part is a process of its own and appends a line to its file when a run ends, and the parts are put together at the end.
+//! Parts of a sweep, for job arrays: each part is a process of its own and appends a line to its file when a
+//! run ends, and the parts are put together at the end.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
@@ -68,7 +69,8 @@ pub struct MergedSweep {
 }
 
 impl Sweep {
-    /// Runs a part, but for runs whose rows are in its file already. Any number of parts can run at a time in one folder.
+    /// Runs a part, but for runs whose rows are in its file already. Any number of parts can run at a time in
+    /// one folder.
     ///
     /// # Errors
     /// If the folder or the rows can't be written.

@@ -1,7 +1,9 @@
-//! Rollback points: states of a run that are kept in memory. A run whose explicit step fails goes back to one of them and halves its steps.
+//! Rollback points: states of a run that are kept in memory. A run whose explicit step fails goes back to one
+//! of them and halves its steps.
 //!
-//! Two points are kept, so that the one that is taken lies at least [`EVERY`] steps before the failure: an instability has grown for a while
-//! before it is noticed. They are part of checkpoints, so a resumed run goes back to the same states.
+//! Two points are kept, so that the one that is taken lies at least [`EVERY`] steps before the failure: an
+//! instability has grown for a while before it is noticed. They are part of checkpoints, so a resumed run
+//! goes back to the same states.
 
 use pliant_sim::{Failure, Simulation, State, World};
 
@@ -56,7 +58,8 @@ impl RollbackPoints {
         self.points.push(point);
     }
 
-    /// The point to go back to after a failure, with halved steps; `None` where shorter steps do not help, or were halved often enough.
+    /// The point to go back to after a failure, with halved steps; `None` where shorter steps do not help, or
+    /// were halved often enough.
     pub fn take(&mut self, world: &World, failure: &Failure) -> Option<Point> {
         let point = self.points.first_mut().filter(|_| world.shorter_steps_may_avoid(failure))?;
         if !point.state.halve_steps(world) {

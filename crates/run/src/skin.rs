@@ -1,5 +1,6 @@
-//! The surface of a body, or one that a body carries, as triangles: where its vertices are, and their normals. It is what a renderer, a haptic
-//! loop or another program draws; fields come from [`FieldReader`](crate::FieldReader).
+//! The surface of a body, or one that a body carries, as triangles: where its vertices are, and their
+//! normals. It is what a renderer, a haptic loop or another program draws; fields come from
+//! [`FieldReader`](crate::FieldReader).
 
 use pliant_geometry::{Mesh, Surface, Vector3, boundary, patch};
 use pliant_scene::World;
@@ -7,8 +8,8 @@ use pliant_sim::{Instant, Simulation};
 
 use crate::output::{Frame, carried_on_shell};
 
-/// A surface of a world. It reads displacements as they stand: those of a state on a GPU are known where an instant is
-/// [looked at](Simulation::frame).
+/// A surface of a world. It reads displacements as they stand: those of a state on a GPU are known where an
+/// instant is [looked at](Simulation::frame).
 pub struct Skin {
     /// The participant, by number.
     part: usize,
@@ -27,7 +28,8 @@ enum Follows {
 }
 
 impl Skin {
-    /// The boundary of a body, or a carried surface, by name; without a name that of the only body. `None` where there is none, or none alone.
+    /// The boundary of a body, or a carried surface, by name; without a name that of the only body. `None`
+    /// where there is none, or none alone.
     pub fn new(world: &World, on: Option<&str>) -> Option<Self> {
         for (index, part) in world.participants.iter().enumerate() {
             let built = &part.built;
@@ -49,7 +51,8 @@ impl Skin {
         None
     }
 
-    /// The vertices of each triangle, in the order that makes its normal point outward where the body has an inside.
+    /// The vertices of each triangle, in the order that makes its normal point outward where the body has an
+    /// inside.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
@@ -71,7 +74,8 @@ impl Skin {
         }
     }
 
-    /// The surface around a vertex within a radius [m], as a hand takes hold of it ([`patch`]), as a combination of nodes; with a radius of 0 the vertex alone.
+    /// The surface around a vertex within a radius [m], as a hand takes hold of it ([`patch`]), as a
+    /// combination of nodes; with a radius of 0 the vertex alone.
     pub fn around(&self, simulation: &Simulation, vertex: u32, radius: f64) -> Vec<(u32, f64)> {
         let points: Vec<Vector3> = self.rest.iter().map(|&place| place.into()).collect();
         let at = |triangle: &&[u32; 3]| triangle.contains(&vertex);
@@ -136,7 +140,8 @@ impl Skin {
         }
     }
 
-    /// Unit normals of vertices at these places [m]: the mean of those of the triangles around each, by area; zero where these cancel.
+    /// Unit normals of vertices at these places [m]: the mean of those of the triangles around each, by area;
+    /// zero where these cancel.
     pub fn normals(&self, places: &[[f64; 3]], normals: &mut [[f64; 3]]) {
         normals.fill([0.0; 3]);
         for triangle in &self.triangles {
@@ -155,7 +160,8 @@ impl Skin {
     }
 }
 
-/// Points of a mesh as vertices, the triangles of a surface on them, and the point of each vertex: all points, or only those of the surface.
+/// Points of a mesh as vertices, the triangles of a surface on them, and the point of each vertex: all
+/// points, or only those of the surface.
 fn used(mesh: &Mesh, surface: &Surface, only: bool) -> (Vec<[f64; 3]>, Vec<[u32; 3]>, Vec<u32>) {
     let mut triangles = surface.triangles();
     let vertices = if only { surface.nodes() } else { (0..mesh.points.len() as u32).collect() };

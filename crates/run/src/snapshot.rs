@@ -1,7 +1,7 @@
 //! Snapshots as bytes, for files and other processes.
 //!
-//! [`MAGIC`], the [`FORMAT`] of states (u32), a fingerprint of the model (u64), the length of the body (u64), the body, and the CRC-32 of all
-//! before it (u32); little-endian.
+//! [`MAGIC`], the [`FORMAT`] of states (u32), a fingerprint of the model (u64), the length of the body (u64),
+//! the body, and the CRC-32 of all before it (u32); little-endian.
 
 use pliant_mechanics::fingerprint;
 use pliant_sim::{Failure, FailureKind, State, World};
@@ -24,7 +24,8 @@ pub fn snapshot_to_bytes(world: &World, state: &State) -> Result<Vec<u8>, Failur
     Ok(snapshot_framed(world, &body))
 }
 
-/// The bytes of a snapshot of a world with this body: magic, format, fingerprint and length before it, the CRC-32 after it.
+/// The bytes of a snapshot of a world with this body: magic, format, fingerprint and length before it, the
+/// CRC-32 after it.
 pub fn snapshot_framed(world: &World, body: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEAD + body.len() + CRC);
     bytes.extend(MAGIC);

@@ -1,5 +1,5 @@
-//! Sweeps: one scene run for every combination of some values, each run on one thread, several at a time, and one table
-//! of their results.
+//! Sweeps: one scene run for every combination of some values, each run on one thread, several at a time, and
+//! one table of their results.
 
 use std::fs;
 use std::ops::Range;
@@ -100,8 +100,8 @@ pub(crate) struct Row {
 }
 
 impl Sweep {
-    /// From a scene's text and assignments `KEY=VALUES`, where VALUES are separated by commas outside of brackets and
-    /// quotes, and `FROM..TO/N` stands for N numbers from FROM to TO in equal steps.
+    /// From a scene's text and assignments `KEY=VALUES`, where VALUES are separated by commas outside of
+    /// brackets and quotes, and `FROM..TO/N` stands for N numbers from FROM to TO in equal steps.
     ///
     /// # Errors
     /// If an assignment is none, a key has no value or stands twice, or there are too many combinations.
@@ -178,8 +178,8 @@ impl Sweep {
         World::assemble(&self.scene(run)?, &self.cache, &|_| {})
     }
 
-    /// Reads, builds and plans every combination; runs nothing. The mistakes come with the combination's number, in
-    /// order.
+    /// Reads, builds and plans every combination; runs nothing. The mistakes come with the combination's
+    /// number, in order.
     pub fn check(&self, threads: usize) -> Vec<(usize, SceneErrors)> {
         let mistakes = Mutex::new(Vec::new());
         in_parallel(self.runs(), threads, None, |run| {
@@ -192,8 +192,8 @@ impl Sweep {
         mistakes
     }
 
-    /// Opens the folder of a sweep as [`OutputFolder::prepare`] does that of a run; with `force` what the runs of an
-    /// earlier sweep left in their own folders is removed, too.
+    /// Opens the folder of a sweep as [`OutputFolder::prepare`] does that of a run; with `force` what the
+    /// runs of an earlier sweep left in their own folders is removed, too.
     ///
     /// # Errors
     /// If the first combination is no scene, or the folder holds something or can't be written to.
@@ -214,8 +214,8 @@ impl Sweep {
         Ok(folder)
     }
 
-    /// Runs all combinations, each in its own folder `run-NNNN`, and writes the table after each. A run that fails is a
-    /// row as any other.
+    /// Runs all combinations, each in its own folder `run-NNNN`, and writes the table after each. A run that
+    /// fails is a row as any other.
     ///
     /// # Errors
     /// If the table can't be written.
@@ -465,8 +465,8 @@ fn quoted(text: &str) -> String {
     }
 }
 
-/// Does the work of all runs on some threads, each run on one; after `stop` none is begun. A run's own pool is inside
-/// its thread: a worker of rayon's that waits for it would begin another run meanwhile.
+/// Does the work of all runs on some threads, each run on one; after `stop` none is begun. A run's own pool
+/// is inside its thread: a worker of rayon's that waits for it would begin another run meanwhile.
 pub(crate) fn in_parallel(runs: usize, threads: usize, stop: Option<&StopFlag>, work: impl Fn(usize) + Sync) {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = if threads == 0 { cores } else { threads }.min(runs.max(1));

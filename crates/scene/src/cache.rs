@@ -1,9 +1,11 @@
-//! Cache of meshes made from images and surfaces, and of distances to surfaces. The name of a file is a hash of all inputs: the content of the
-//! image, all parameters and the source text of the mesher, so no mesh is stale. A file appears under its name only once it is complete. A file
-//! that is damaged, or holds a mesh that no mesher makes, counts as missing, so any number of processes can share a folder. Files unused for
+//! Cache of meshes made from images and surfaces, and of distances to surfaces. The name of a file is a hash
+//! of all inputs: the content of the image, all parameters and the source text of the mesher, so no mesh is
+//! stale. A file appears under its name only once it is complete. A file that is damaged, or holds a mesh
+//! that no mesher makes, counts as missing, so any number of processes can share a folder. Files unused for
 //! longest are deleted.
 //!
-//! The file: [`MESH`] or [`GRID`], the CRC-32 of the body (u32, little-endian), the body in postcard's encoding.
+//! The file: [`MESH`] or [`GRID`], the CRC-32 of the body (u32, little-endian), the body in postcard's
+//! encoding.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -80,11 +82,12 @@ impl KeptGrid {
     }
 }
 
-/// The least [`relative_acoustic_length`] of a volume cell. Those that are made have three quarters as a rule.
+/// The least [`relative_acoustic_length`] of a volume cell. Those that are made have three quarters as a
+/// rule.
 const FLATTEST: f64 = 0.05;
 
-/// Whether a mesh is whole, and none of its volume cells is inverted or nearly flat: a checksum says only that it is what
-/// somebody wrote.
+/// Whether a mesh is whole, and none of its volume cells is inverted or nearly flat: a checksum says only
+/// that it is what somebody wrote.
 fn is_sound(mesh: &Mesh) -> bool {
     let fits = |data: &BTreeMap<String, DataArray>, items: usize| {
         data.values().all(|data| data.values.len().checked_div(data.components) == Some(items))
@@ -109,7 +112,8 @@ fn is_sound(mesh: &Mesh) -> bool {
 pub(crate) struct Key(String);
 
 impl Key {
-    /// Of the content of an image or a surface, given in pieces, and a recipe that says in full what is made of it.
+    /// Of the content of an image or a surface, given in pieces, and a recipe that says in full what is made
+    /// of it.
     pub fn new(content: impl FnOnce(&mut dyn FnMut(&[u8])), recipe: &impl std::fmt::Debug) -> Self {
         let mut hash = Sha256::new();
         hash.update(env!("PLIANT_MESHER"));
@@ -122,7 +126,8 @@ impl Key {
     }
 }
 
-/// The folder for what is kept from run to run, and whether the user named it; `None` where nothing is to be kept.
+/// The folder for what is kept from run to run, and whether the user named it; `None` where nothing is to be
+/// kept.
 fn folder_of_user() -> Option<(PathBuf, bool)> {
     match std::env::var_os(VARIABLE).filter(|value| !value.is_empty()) {
         Some(value) if value == "off" => None,
@@ -150,8 +155,8 @@ impl MeshCache {
         Self { folder: Some(folder), limit: DEFAULT_LIMIT }
     }
 
-    /// The folder that the variable `PLIANT_CACHE` names, where it does not say `off`; else `pliant/meshes` in the user's
-    /// folder for caches.
+    /// The folder that the variable `PLIANT_CACHE` names, where it does not say `off`; else `pliant/meshes`
+    /// in the user's folder for caches.
     pub fn of_user() -> Self {
         match folder_of_user() {
             Some((folder, true)) => Self::in_folder(folder),

@@ -7,8 +7,8 @@ use pliant_sim::PenaltyTie;
 use crate::assemble::{Placed, attach, doubt_points, holds_nothing};
 use crate::world::{Part, World};
 
-/// Steps in an automatic one of explicit participants that are tied to others. A body at half of its usual step leaves ties more of the
-/// limit of stability: they are some twenty times stiffer.
+/// Steps in an automatic one of explicit participants that are tied to others. A body at half of its usual
+/// step leaves ties more of the limit of stability: they are some twenty times stiffer.
 const FINER: u64 = 2;
 
 impl World {

@@ -274,7 +274,8 @@ fn shells_only(run: &RunTable, built: &Built) -> Option<(&'static str, String, &
     None
 }
 
-/// The same of shells, and of solids whose equations are solved: a GPU solves those of implicit steps by conjugate gradients.
+/// The same of shells, and of solids whose equations are solved: a GPU solves those of implicit steps by
+/// conjugate gradients.
 fn equations_only(run: &RunTable) -> Option<(&'static str, String, &'static str)> {
     let help = "set `device = \"cpu\"`, or `solver = \"implicit\"` with `linear = \"conjugate-gradients\"`";
     match run.solver {

@@ -22,8 +22,8 @@ pub(crate) fn read(text: &str) -> Scene {
     Scene::from_source(source, ".".into()).unwrap_or_else(|error| panic!("{}", error.plain()))
 }
 
-/// A scene in a folder with a bar of three hexes along x, with the labels 1 (liver), 2 (tumour) and 5: what is given goes on after its
-/// `mesh`. There are the laws `tissue` and `hard`.
+/// A scene in a folder with a bar of three hexes along x, with the labels 1 (liver), 2 (tumour) and 5: what
+/// is given goes on after its `mesh`. There are the laws `tissue` and `hard`.
 pub(crate) fn labelled(folder: &Path, more: &str) -> Scene {
     let block = Block::new([0.3, 0.1, 0.1]);
     let mut mesh = block.mesh(Resolution::Counts([3, 1, 1]), VolumeCell::Hex, 100).unwrap();

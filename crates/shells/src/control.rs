@@ -1,5 +1,5 @@
-//! The control points of a curved triangle, as its corners move them, and points to integrate over it. Counted are nine: three corners,
-//! then six along the edges; the middle one is spread over them.
+//! The control points of a curved triangle, as its corners move them, and points to integrate over it.
+//! Counted are nine: three corners, then six along the edges; the middle one is spread over them.
 
 use std::sync::LazyLock;
 
@@ -20,8 +20,8 @@ pub(crate) struct Point {
     pub(crate) slopes: [[f64; 9]; 2],
 }
 
-/// The rule of 16 points of Dunavant (1985), exact to the eighth degree and the same from each corner: area coordinates and weight of one
-/// point of each kind, which stands for all its permutations.
+/// The rule of 16 points of Dunavant (1985), exact to the eighth degree and the same from each corner: area
+/// coordinates and weight of one point of each kind, which stands for all its permutations.
 const RULE: [([f64; 3], f64); 5] = [
     ([1.0 / 3.0; 3], 0.144_315_607_677_787),
     ([0.081_414_823_414_554, 0.459_292_588_292_723, 0.459_292_588_292_723], 0.095_091_634_267_285),
@@ -64,7 +64,8 @@ impl Patch {
         })
     }
 
-    /// The velocity of the control points along edges: over the velocity of the end from the start, and over the spin of the start.
+    /// The velocity of the control points along edges: over the velocity of the end from the start, and over
+    /// the spin of the start.
     pub(crate) fn edge_maps(&self) -> [[Matrix3<f64>; 2]; 6] {
         std::array::from_fn(|k| {
             let (along, turning) = self.edge_derivative(k);

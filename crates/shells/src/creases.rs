@@ -33,8 +33,8 @@ pub fn sides(facets: &[Facet]) -> BTreeMap<[u32; 2], Vec<(usize, usize)>> {
     sides
 }
 
-/// Control points on the straight edge: at creases, whose sides have normals of their own, and where a normal leans so far from a
-/// facet at the edge that a curve along it would fold.
+/// Control points on the straight edge: at creases, whose sides have normals of their own, and where a normal
+/// leans so far from a facet at the edge that a curve along it would fold.
 pub fn straight_edges(
     facets: &[Facet],
     corner_normals: &[[u32; 3]],

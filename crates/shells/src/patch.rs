@@ -1,7 +1,7 @@
-//! One patch of the curved surface of shells: a cubic Bézier triangle over a facet, from the positions of its nodes and the normals that
-//! turn with them. Its velocity is J times the nodes' velocities and spins; forces on it go back by the transpose of the same J, so their
-//! work is the same. PN triangles (Vlachos et al. 2001), with control points along edges placed so that an edge with equal end angles is
-//! an arc.
+//! One patch of the curved surface of shells: a cubic Bézier triangle over a facet, from the positions of its
+//! nodes and the normals that turn with them. Its velocity is J times the nodes' velocities and spins; forces
+//! on it go back by the transpose of the same J, so their work is the same. PN triangles (Vlachos et al.
+//! 2001), with control points along edges placed so that an edge with equal end angles is an arc.
 
 use std::ops::Deref;
 
@@ -30,7 +30,8 @@ pub struct Carried {
     pub place: Place,
     /// Its height above the foot along the normal [m].
     pub height: f64,
-    /// What is left of its offset [m], along the facet's first tangent and the one across: 0 unless the foot is on a border.
+    /// What is left of its offset [m], along the facet's first tangent and the one across: 0 unless the foot
+    /// is on a border.
     pub aside: [f64; 2],
 }
 
@@ -75,9 +76,10 @@ impl Patch {
         j
     }
 
-    /// A unit normal that is quadratic between those at the corners and, at the middle of an edge, the one that an S-shaped edge needs
-    /// (Vlachos et al. 2001, in Bernstein's form). It differs from [`Patch::normal`] by a term that falls with the square of the edges, but
-    /// is the same on both sides of an edge.
+    /// A unit normal that is quadratic between those at the corners and, at the middle of an edge, the one
+    /// that an S-shaped edge needs (Vlachos et al. 2001, in Bernstein's form). It differs from
+    /// [`Patch::normal`] by a term that falls with the square of the edges, but is the same on both sides of
+    /// an edge.
     pub fn shading_normal(&self, weights: [f64; 3]) -> Vector3<f64> {
         let (p, n) = (self.corners(), self.normals());
         let sum = (0..3).fold(Vector3::zeros(), |sum, i| {
@@ -98,8 +100,8 @@ impl Patch {
         self.point(point.place.weights) + aside + point.height * normal
     }
 
-    /// J of a carried point: that of its foot, and of its offset o = α t + β n × t + h n with t = a/|a| and n = a × b/|a × b| of the
-    /// tangents a and b.
+    /// J of a carried point: that of its foot, and of its offset o = α t + β n × t + h n with t = a/|a| and
+    /// n = a × b/|a × b| of the tangents a and b.
     pub fn carried_jacobian(&self, point: &Carried) -> SMatrix<f64, 3, 18> {
         let weights = point.place.weights;
         let [by_second, by_third] = CurvedTriangle::weight_slopes(weights);
@@ -226,8 +228,8 @@ mod tests {
         assert!(off.norm() < 1e-13, "{off}");
     }
 
-    /// A point off the surface, with its foot on a border: J by central differences with 1e-6, 1e-8; its forces keep their resultants,
-    /// 1e-12, and ⟨J v, f⟩ = ⟨v, Jᵀ f⟩, 1e-13.
+    /// A point off the surface, with its foot on a border: J by central differences with 1e-6, 1e-8; its
+    /// forces keep their resultants, 1e-12, and ⟨J v, f⟩ = ⟨v, Jᵀ f⟩, 1e-13.
     #[test]
     fn forces_on_carried_points_go_back_by_the_transpose() {
         let mut random = Random::new(5);

@@ -1,8 +1,8 @@
-//! Pressure on a curved triangle: the nodal forces and moments ∫ Jᵀ n dA of a pressure of 1, and how they change. With h_a = ∫ F_a n dA on
-//! each control point b_a that is Σ D_aᵀ h_a, where D_a are the control points' velocities. h is a sum of b_b × b_c with constant weights,
-//! so all is exact.
-//! Over a closed surface, or one whose rim does not move, the force is the gradient of the volume, and its change is symmetric; else the
-//! sides at the rim add an unsymmetric part.
+//! Pressure on a curved triangle: the nodal forces and moments ∫ Jᵀ n dA of a pressure of 1, and how they
+//! change. With h_a = ∫ F_a n dA on each control point b_a that is Σ D_aᵀ h_a, where D_a are the control
+//! points' velocities. h is a sum of b_b × b_c with constant weights, so all is exact. Over a closed surface,
+//! or one whose rim does not move, the force is the gradient of the volume, and its change is symmetric; else
+//! the sides at the rim add an unsymmetric part.
 
 use std::sync::LazyLock;
 
@@ -33,7 +33,8 @@ static WEIGHTS: LazyLock<[[[f64; 9]; 9]; 9]> = LazyLock::new(|| {
     all
 });
 
-/// The weights of b_b × b_c on each control point, for the pairs b < c in their order: side by side, the sum takes a fifth less time.
+/// The weights of b_b × b_c on each control point, for the pairs b < c in their order: side by side, the sum
+/// takes a fifth less time.
 static PAIRS: LazyLock<[[f64; 9]; 36]> = LazyLock::new(|| {
     let mut pairs = (0..9).flat_map(|b| (b + 1..9).map(move |c| [b, c]));
     std::array::from_fn(|_| {
@@ -43,7 +44,8 @@ static PAIRS: LazyLock<[[f64; 9]; 36]> = LazyLock::new(|| {
 });
 
 impl Patch {
-    /// Weights of the products b_b × b_c of control points, for the pairs b < c of nine in their order, in ∫ F_a n dA on each.
+    /// Weights of the products b_b × b_c of control points, for the pairs b < c of nine in their order, in ∫
+    /// F_a n dA on each.
     pub fn pressure_weights() -> &'static [[f64; 9]; 36] {
         &PAIRS
     }
@@ -89,7 +91,8 @@ impl Patch {
         forces
     }
 
-    /// The control points from the mean of the corners: no place in space makes a difference but for round-off.
+    /// The control points from the mean of the corners: no place in space makes a difference but for
+    /// round-off.
     fn centred(&self) -> [Vector3<f64>; 9] {
         let centre = self.corners().iter().sum::<Vector3<f64>>() / 3.0;
         self.controls().map(|point| point - centre)
@@ -226,8 +229,9 @@ mod tests {
         }
     }
 
-    /// f = dV + ⅓ ∮ (x × x_s)·dx over the rim, run through with the surface on its left, with the volume V = ⅓ ∫ x·n dA of the cone to the origin: 1e-12. Five points of Gauss are
-    /// exact for the rim, of the eighth degree.
+    /// f = dV + ⅓ ∮ (x × x_s)·dx over the rim, run through with the surface on its left, with the volume V =
+    /// ⅓ ∫ x·n dA of the cone to the origin: 1e-12. Five points of Gauss are exact for the rim, of the eighth
+    /// degree.
     #[test]
     fn forces_are_the_gradient_of_the_volume_and_a_rim() {
         let mut random = Random::new(2);
@@ -247,7 +251,8 @@ mod tests {
                 .collect();
             let gradient: [Vector3<f64>; 9] = gradient.try_into().unwrap();
             let mut expected = back(&gradient, &maps);
-            // The points of one row of the rule on the triangle lie on a line: their weights there by their own rule.
+            // The points of one row of the rule on the triangle lie on a line: their weights there by their
+            // own rule.
             let line = [
                 (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
                 (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),

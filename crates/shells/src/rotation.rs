@@ -1,5 +1,6 @@
-//! Finite rotations as quaternions and rotation vectors: the maps between them and the derivative of the logarithm.
-//! A *spin* δω turns R into exp(S(δω)) R, in space. Felippa and Haugen (2005), appendix; Caselli and Bisegna (2013).
+//! Finite rotations as quaternions and rotation vectors: the maps between them and the derivative of the
+//! logarithm. A *spin* δω turns R into exp(S(δω)) R, in space. Felippa and Haugen (2005), appendix; Caselli
+//! and Bisegna (2013).
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -34,8 +35,8 @@ pub(crate) const BERNOULLI: [f64; 8] = [
 /// The angle [rad] below which the series of [`eta`] and [`mu`] leave out less than a rounding.
 const SERIES: f64 = 0.6;
 
-/// The sine squared of half the angle below which [`logarithm`] takes a series, as of most nodes of shells: in a third of the time of an
-/// arctangent. The angle is then below half a radian.
+/// The sine squared of half the angle below which [`logarithm`] takes a series, as of most nodes of shells:
+/// in a third of the time of an arctangent. The angle is then below half a radian.
 pub const SMALL: f64 = 0.06;
 
 /// Σ cₖ xᵏ.

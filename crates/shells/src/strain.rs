@@ -1,8 +1,8 @@
 //! How far shells are strained, to tell where linear elasticity at small strain no longer holds.
 //!
-//! In the plane: Biot strain U − I of the facet's corners, with F = R U. Across: the mean curvature κ of the discrete Kirchhoff triangle
-//! (Batoz, Bathe, Ho 1980), whose strain at the surfaces is ± κ t/2.
-//! Leaves out: variation within a facet, shear across the thickness.
+//! In the plane: Biot strain U − I of the facet's corners, with F = R U. Across: the mean curvature κ of the
+//! discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980), whose strain at the surfaces is ± κ t/2. Leaves out:
+//! variation within a facet, shear across the thickness.
 
 use nalgebra::Vector3;
 
@@ -16,7 +16,8 @@ pub struct ShellStrain {
 }
 
 impl ShellStrain {
-    /// Of strains (εxx, εyy, γxy) in the middle and curvatures (κxx, κyy, 2 κxy) [1/m] of a wall of a thickness [m].
+    /// Of strains (εxx, εyy, γxy) in the middle and curvatures (κxx, κyy, 2 κxy) [1/m] of a wall of a
+    /// thickness [m].
     pub(crate) fn new(strain: &Vector3<f64>, curvature: &Vector3<f64>, thickness: f64) -> Self {
         let [top, bottom] = [0.5, -0.5].map(|part| largest(&(strain + part * thickness * curvature)));
         Self { membrane: largest(strain), surface: top.max(bottom) }

@@ -26,9 +26,10 @@ pub trait Instant {
     /// Displacement [m] of a node.
     fn displacement(&self, node: usize) -> [f64; 3];
 
-    /// Displacements [m] of all nodes in the stepper's own numbers, where it keeps them; `None` of one that keeps positions. They stay at their
-    /// address as long as the simulation lives, over steps that fail, [`restore`](crate::Simulation::restore) and
-    /// [`exchange`](crate::Simulation::exchange), too. Of a state on a GPU, those last brought back.
+    /// Displacements [m] of all nodes in the stepper's own numbers, where it keeps them; `None` of one that
+    /// keeps positions. They stay at their address as long as the simulation lives, over steps that fail,
+    /// [`restore`](crate::Simulation::restore) and [`exchange`](crate::Simulation::exchange), too. Of a state
+    /// on a GPU, those last brought back.
     fn displacements(&self) -> Option<Reals<'_>> {
         None
     }
@@ -60,8 +61,8 @@ pub trait Instant {
         Vec::new()
     }
 
-    /// Moment [N m] about the origin of the force of each contact on the rigid thing that it is with, in the order of the contacts; `None` where it
-    /// is not found: on a GPU.
+    /// Moment [N m] about the origin of the force of each contact on the rigid thing that it is with, in the
+    /// order of the contacts; `None` where it is not found: on a GPU.
     fn contact_moments(&self) -> Option<Vec<[f64; 3]>> {
         None
     }
@@ -71,17 +72,20 @@ pub trait Instant {
         Vec::new()
     }
 
-    /// Where a tool or a jaw goes that was driven from outside, by its place among the rigid things of the contacts.
+    /// Where a tool or a jaw goes that was driven from outside, by its place among the rigid things of the
+    /// contacts.
     fn leg(&self, _rigid: usize) -> Option<&Leg> {
         None
     }
 
-    /// How far a rigid thing lags behind its trajectory since its force is limited, by its place among those of the contacts.
+    /// How far a rigid thing lags behind its trajectory since its force is limited, by its place among those
+    /// of the contacts.
     fn lag(&self, _rigid: usize) -> Option<&Lag> {
         None
     }
 
-    /// How far the nodes of a constraint lag behind their motion since their force is limited, or its volume [m³], along the first axis, since its pressure is.
+    /// How far the nodes of a constraint lag behind their motion since their force is limited, or its volume
+    /// [m³], along the first axis, since its pressure is.
     fn lag_of_constraint(&self, _constraint: usize) -> Option<&Lag> {
         None
     }
@@ -175,7 +179,8 @@ pub struct Effort {
     pub left_to_cpu: u64,
     /// Residual of the last solution by conjugate gradients over its right-hand side; 0 with factors.
     pub linear_residual: f64,
-    /// Residual of the last step over the largest of loads, internal and inertial forces; `None` where it was not checked.
+    /// Residual of the last step over the largest of loads, internal and inertial forces; `None` where it was
+    /// not checked.
     pub residual: Option<f64>,
     /// Steps that were halved.
     #[serde(deserialize_with = "count::read")]
@@ -200,8 +205,8 @@ pub trait CellsNow: Sync {
     /// The fields of a cell of a solid; its stable step [s], too, if it is wanted.
     fn at(&self, solid: usize, cell: usize, step: bool) -> CellFields;
 
-    /// `width` numbers of each cell of a solid, which `of` writes from its fields. Stable steps [s] are among these if `steps` are wanted; they
-    /// cost far more than the rest.
+    /// `width` numbers of each cell of a solid, which `of` writes from its fields. Stable steps [s] are among
+    /// these if `steps` are wanted; they cost far more than the rest.
     fn numbers(
         &self,
         solid: usize,

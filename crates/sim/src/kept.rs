@@ -115,7 +115,8 @@ pub(crate) struct ImplicitState {
     /// Where tools go that are driven from outside.
     pub legs: Vec<(u32, Leg)>,
     pub path: Path,
-    /// How far moved nodes whose force is limited are behind their motion, and volumes whose pressure is limited behind their growth.
+    /// How far moved nodes whose force is limited are behind their motion, and volumes whose pressure is
+    /// limited behind their growth.
     pub lags: Vec<Lag>,
     /// Values of the older matrix whose factors precondition the next one.
     pub factored: Option<Vec<f64>>,
@@ -255,7 +256,8 @@ pub(crate) struct Iterated {
     pub time: f64,
     #[serde(deserialize_with = "count::read")]
     pub iteration: usize,
-    /// Residual, and what was allowed at the end of the attempt: [N] of static steps, over the largest force of implicit ones.
+    /// Residual, and what was allowed at the end of the attempt: [N] of static steps, over the largest force
+    /// of implicit ones.
     pub residual: f64,
     pub allowed: f64,
     /// Whether the attempt found its equilibrium.

@@ -1,15 +1,18 @@
 //! Ties between participants: springs with dashpots between points of bodies that are stepped apart.
 //!
-//! With the gap g between two points and their relative velocity v, the points pull at each other by f = k g + c v. The participant with the
-//! longer steps H goes first; the other one feels the spring at each of its own steps h, with the first one on a straight way in between. Its
-//! impulses h f, summed over a step of the first one, push that one back in its next step: action equals reaction, later by (H − h)/2.
-//! An implicit participant solves for the force together with its motion.
+//! With the gap g between two points and their relative velocity v, the points pull at each other by f = k
+//! g + c v. The participant with the longer steps H goes first; the other one feels the spring at each of its
+//! own steps h, with the first one on a straight way in between. Its impulses h f, summed over a step of the
+//! first one, push that one back in its next step: action equals reaction, later by (H − h)/2. An implicit
+//! participant solves for the force together with its motion.
 //!
-//! The spring needs the dashpot: with a = k H²/m, b = c H/m and the vibrations Ω = ω² H² of a body, the delayed force leaves the central
-//! differences of that body stable for a/2 < b and Ω + 2 b < 4 (from the characteristic polynomial; with a = 1.5 b, vibrations of two bodies
-//! without damping were seen to grow). Ties take [`SPRING`] for a/b, and a and 2 b of what vibrations leave, summed over the points of a node: they are as stiff as the lightest nodes and the longest step
-//! allow. A body at 0.9 of its critical time step leaves little; at half of that its side of the tie is some twenty times stiffer. A tie opens
-//! by f/k under a lasting force f, which is [reported](TieNow).
+//! The spring needs the dashpot: with a = k H²/m, b = c H/m and the vibrations Ω = ω² H² of a body, the
+//! delayed force leaves the central differences of that body stable for a/2 < b and Ω + 2 b < 4 (from the
+//! characteristic polynomial; with a = 1.5 b, vibrations of two bodies without damping were seen to grow).
+//! Ties take [`SPRING`] for a/b, and a and 2 b of what vibrations leave, summed over the points of a node:
+//! they are as stiff as the lightest nodes and the longest step allow. A body at 0.9 of its critical time
+//! step leaves little; at half of that its side of the tie is some twenty times stiffer. A tie opens by f/k
+//! under a lasting force f, which is [reported](TieNow).
 
 use pliant_mechanics::grip::Grip;
 use pliant_mechanics::mapping::{Weights, weighted};
@@ -45,8 +48,8 @@ pub struct TieNow<'a> {
     pub name: &'a str,
     /// Its points.
     pub points: usize,
-    /// Force [N] on each participant, summed over the points: on the one with the longer steps the mean of what the other one has felt since
-    /// its last step.
+    /// Force [N] on each participant, summed over the points: on the one with the longer steps the mean of
+    /// what the other one has felt since its last step.
     pub forces: [Vector<f64>; 2],
     /// The widest gap of a point [m].
     pub gap: f64,
@@ -57,7 +60,8 @@ pub struct TieNow<'a> {
 /// What a restart needs of the ties of a world.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct TieMemory {
-    /// Of each point, the force on its slower and its faster side [N], and the impulse that the slower one is still to feel [N s].
+    /// Of each point, the force on its slower and its faster side [N], and the impulse that the slower one is
+    /// still to feel [N s].
     points: Vec<[Vector<f64>; 3]>,
     /// The widest gap [m] of each tie.
     widest: Vec<f64>,
@@ -204,8 +208,8 @@ impl Springs {
         &self.memory
     }
 
-    /// Prepares a step of a participant: finds what its springs pull it by. `ahead` is how far [s] others are, each by its place, beyond the
-    /// end of this step.
+    /// Prepares a step of a participant: finds what its springs pull it by. `ahead` is how far [s] others
+    /// are, each by its place, beyond the end of this step.
     pub(crate) fn before(
         &mut self,
         part: usize,
@@ -216,7 +220,8 @@ impl Springs {
             if point.slow.part == part {
                 point.slow.pull(*on_slow, participants);
             } else if point.fast.part == part && point.solved {
-                // k (u′ − u⁺) + c (v′ − (u⁺ − u)/h) at the end, with the displacement u before and u⁺ after the step.
+                // k (u′ − u⁺) + c (v′ − (u⁺ − u)/h) at the end, with the displacement u before and u⁺ after
+                // the step.
                 let velocity = point.slow.velocity(participants);
                 let there = sub(point.slow.moved(participants), scale(velocity, ahead(point.slow.part)));
                 let here = point.fast.moved(participants);
@@ -237,7 +242,8 @@ impl Springs {
         }
     }
 
-    /// Follows a step of a participant: finds the force that its springs pull it by now, and what slower ones are to feel of it.
+    /// Follows a step of a participant: finds the force that its springs pull it by now, and what slower ones
+    /// are to feel of it.
     pub(crate) fn after(
         &mut self,
         part: usize,

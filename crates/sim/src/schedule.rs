@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// When an observer looks: at the first instant, at the one nearest to each multiple of an interval, and at the last.
+/// When an observer looks: at the first instant, at the one nearest to each multiple of an interval, and at
+/// the last.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Schedule {
     every: f64,
@@ -50,7 +51,8 @@ impl Schedule {
     }
 }
 
-/// Steps from a time to the instant nearest to another time, at least one; rather one too few than one too many.
+/// Steps from a time to the instant nearest to another time, at least one; rather one too few than one too
+/// many.
 pub(crate) fn steps_to(goal: f64, time: f64, step: f64) -> u64 {
     (((goal - time) / step - 0.5 - 1e-6).ceil()).max(1.0) as u64
 }

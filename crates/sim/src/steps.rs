@@ -75,7 +75,8 @@ impl Critical {
         Ok(Some(Self { bound, assembled: assembled(model)? }))
     }
 
-    /// The automatic step [s]: [`SAFETY`] of the critical one. If every node is held there is no limit, and the element bound replaces it.
+    /// The automatic step [s]: [`SAFETY`] of the critical one. If every node is held there is no limit, and
+    /// the element bound replaces it.
     pub fn automatic(&self) -> f64 {
         let limit = self.assembled.step;
         SAFETY * if limit.is_finite() { limit } else { self.bound.step }

@@ -23,7 +23,8 @@ pub struct ToolNow {
     pub torque: Option<[f64; 3]>,
 }
 
-/// A pose of a place [m] and a quaternion x, y, z, w of any length but 0; `None` where that has none, or a number is not finite.
+/// A pose of a place [m] and a quaternion x, y, z, w of any length but 0; `None` where that has none, or a
+/// number is not finite.
 pub fn pose_of([x, y, z]: [f64; 3], quaternion: [f64; 4]) -> Option<Pose> {
     let most = quaternion.iter().fold(0.0_f64, |most, part| most.max(part.abs()));
     if !(most > 0.0 && [x, y, z, most].iter().all(|part| part.is_finite())) {
@@ -81,10 +82,11 @@ pub fn pose_of([x, y, z]: [f64; 3], quaternion: [f64; 4]) -> Option<Pose> {
 /// # Ok::<(), pliant_sim::Failure>(())
 /// ```
 impl Simulation {
-    /// Drives a tool or an obstacle to a pose within a time [s], on a straight way and the shortest arc from where it is. There it stays; the
-    /// trajectory that it has in the scene is left. When it arrives [s]: later than asked for where nodes would be passed over on the way, and
-    /// after one step at the earliest. The step under way, if its forces are found, is the last one of the motion before. Its jaws go on as they
-    /// were going.
+    /// Drives a tool or an obstacle to a pose within a time [s], on a straight way and the shortest arc from
+    /// where it is. There it stays; the trajectory that it has in the scene is left. When it arrives [s]:
+    /// later than asked for where nodes would be passed over on the way, and after one step at the earliest.
+    /// The step under way, if its forces are found, is the last one of the motion before. Its jaws go on as
+    /// they were going.
     ///
     /// # Errors
     /// If there is no tool of this name, or a number is not finite.
@@ -92,7 +94,8 @@ impl Simulation {
         self.lead(tool, Some(pose), None, within)
     }
 
-    /// Opens or closes the jaws of a tool to an angle [rad] within a time [s]. When they are there [s]. The tool goes on as it was going.
+    /// Opens or closes the jaws of a tool to an angle [rad] within a time [s]. When they are there [s]. The
+    /// tool goes on as it was going.
     ///
     /// # Errors
     /// If there is no tool of this name, or a number is not finite.
@@ -100,8 +103,8 @@ impl Simulation {
         self.lead(tool, None, Some(opening), within)
     }
 
-    /// Drives a tool to a pose and its jaws to an angle [rad], which arrive together; what is not given goes on as it was going. When they
-    /// are there [s].
+    /// Drives a tool to a pose and its jaws to an angle [rad], which arrive together; what is not given goes
+    /// on as it was going. When they are there [s].
     ///
     /// # Errors
     /// If there is no tool of this name, or a number is not finite.
@@ -117,7 +120,8 @@ impl Simulation {
         let mut legs = Vec::new();
         for (index, (part, now)) in world.parts.iter().zip(self.instants()).enumerate() {
             let step = part.steps.step_from(now.time());
-            // The forces of an explicit step know where the tool goes in it; equations are solved for with the new way.
+            // The forces of an explicit step know where the tool goes in it; equations are solved for with
+            // the new way.
             let is_decided = evaluated && !part.method.takes_long();
             let begin = if is_decided { now.time() + step } else { now.time() };
             let rigids = part.method.contacts().map_or(&[][..], |contacts| &contacts.rigids);
@@ -167,8 +171,8 @@ impl Frame<'_> {
 }
 
 impl Simulation {
-    /// A tool, an obstacle, or a jaw (`grasper.upper`, `grasper.lower`), with the force found last; `None` without one of this name. The pose
-    /// of a jaw is that of its shape.
+    /// A tool, an obstacle, or a jaw (`grasper.upper`, `grasper.lower`), with the force found last; `None`
+    /// without one of this name. The pose of a jaw is that of its shape.
     pub fn tool(&self, name: &str) -> Option<ToolNow> {
         let mut found: Option<ToolNow> = None;
         for (part, now) in self.world().parts.iter().zip(self.instants()) {

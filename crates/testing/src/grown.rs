@@ -1,14 +1,14 @@
-//! Hexahedra that grow outward: a cube of equal cells with layers around it, each of its sides a block of its own. A map makes a ball of it, or
-//! a half-space that is fine where something presses.
+//! Hexahedra that grow outward: a cube of equal cells with layers around it, each of its sides a block of its
+//! own. A map makes a ball of it, or a half-space that is fine where something presses.
 
 use std::collections::BTreeMap;
 
 /// Points and hexahedra of positive volume.
 pub type Hexes = (Vec<[f64; 3]>, Vec<[u32; 8]>);
 
-/// A cube of `cells` cells from 0 to 1 along each axis, or twice as many from −1 where `whole`, in so many layers, each larger than the one
-/// within by the same factor, out to `size`. Points are in coordinates whose largest is 1 on the cube and `size` on the outer surface; `place`
-/// says where they go.
+/// A cube of `cells` cells from 0 to 1 along each axis, or twice as many from −1 where `whole`, in so many
+/// layers, each larger than the one within by the same factor, out to `size`. Points are in coordinates whose
+/// largest is 1 on the cube and `size` on the outer surface; `place` says where they go.
 pub fn grown_hexes(
     cells: i32,
     layers: i32,
@@ -67,7 +67,8 @@ pub fn grown_hexes(
     (points, hexes)
 }
 
-/// A ball of a radius around the origin: `cells` cells from the centre to a cube within, and so many layers around that.
+/// A ball of a radius around the origin: `cells` cells from the centre to a cube within, and so many layers
+/// around that.
 pub fn ball_of_hexes(radius: f64, cells: i32, layers: i32) -> Hexes {
     const SIZE: f64 = 2.0;
     grown_hexes(cells, layers, SIZE, [true; 3], |x| {

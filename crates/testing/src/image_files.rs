@@ -48,8 +48,8 @@ impl Volume {
         }
     }
 
-    /// A ball of label 5 and radius 15 mm around one of label 8 and 7 mm, with a loose voxel of label 5, a hole, and a single voxel of
-    /// label 9.
+    /// A ball of label 5 and radius 15 mm around one of label 8 and 7 mm, with a loose voxel of label 5, a
+    /// hole, and a single voxel of label 9.
     pub fn ball_with_a_core() -> Self {
         Self::of_labels(|[x, y, z]| {
             let r = (x * x + y * y + z * z).sqrt();
@@ -436,7 +436,8 @@ pub enum Segments {
     Labels,
 }
 
-/// A segmentation of the labels of a volume by PS3.3 C.8.20, with the names of its segments. Frames without any voxel are left out.
+/// A segmentation of the labels of a volume by PS3.3 C.8.20, with the names of its segments. Frames without
+/// any voxel are left out.
 pub fn segmentation(volume: &Volume, kind: Segments, names: &[&str], syntax: Syntax) -> Vec<u8> {
     let (frames, pixels) = frames(volume, kind, names.len(), syntax);
     let (class, word, bits) = match kind {
@@ -544,8 +545,8 @@ fn nested(syntax: Syntax) -> Vec<u8> {
     item.bytes
 }
 
-/// A block of 24 × 12 × 12 voxels of 1 mm as 3D Slicer writes it: the left half is liver, the right one spleen, and a tumour lies in the
-/// middle on a separate layer.
+/// A block of 24 × 12 × 12 voxels of 1 mm as 3D Slicer writes it: the left half is liver, the right one
+/// spleen, and a tumour lies in the middle on a separate layer.
 pub fn layered_segmentation() -> Vec<u8> {
     let mut bytes =
         b"NRRD0004\ntype: unsigned char\ndimension: 4\nspace: left-posterior-superior\nsizes: 2 32 20 20\n\

@@ -1,6 +1,7 @@
-//! Helpers of tests: numbers at random that are the same in every run, files damaged by them and [what became of these](forging), hexahedra of simple bodies, and the memory of
-//! the process; with the features `images`, `organs`, `pieces` and `scenes` image files, label images and meshes of analytic organs, small
-//! bodies that meet, and scenes that are checked and run.
+//! Helpers of tests: numbers at random that are the same in every run, files damaged by them and
+//! [what became of these](forging), hexahedra of simple bodies, and the memory of the process; with the
+//! features `images`, `organs`, `pieces` and `scenes` image files, label images and meshes of analytic
+//! organs, small bodies that meet, and scenes that are checked and run.
 //!
 //! ```
 //! let mut random = pliant_testing::Random::new(1);
@@ -116,7 +117,8 @@ body = "cube"
 nodes = { set = "z-min" }
 "#;
 
-/// Whether a test that needs a GPU, or a screen, goes on. Where there is none it prints that the test is skipped.
+/// Whether a test that needs a GPU, or a screen, goes on. Where there is none it prints that the test is
+/// skipped.
 ///
 /// # Panics
 /// Where there is none and `PLIANT_REQUIRE_GPU=1` requires one.
@@ -150,7 +152,8 @@ impl PeakMemory {
         Self(peak.and_then(|peak| peak.split_whitespace().next()?.parse().ok()))
     }
 
-    /// Panics if the peak has risen by `limit` [KiB] or more since this instant. Prints a notice where the system names no peak.
+    /// Panics if the peak has risen by `limit` [KiB] or more since this instant. Prints a notice where the
+    /// system names no peak.
     #[track_caller]
     pub fn assert_rise_below(self, limit: u64) {
         let Some((before, now)) = self.0.zip(Self::now().0) else {

@@ -1,4 +1,5 @@
-//! Label images of the analytic organs as their definition gives them, and the truth to measure meshes against.
+//! Label images of the analytic organs as their definition gives them, and the truth to measure meshes
+//! against.
 
 use pliant_geometry::{CellKind, Grid, Mesh, SurfaceLocator, Vector3, boundary};
 use pliant_imaging::LabelImage;
@@ -67,8 +68,8 @@ pub fn truth(organ: &str) -> Truth {
     Truth::new(&Phantom::new(organ, 1.0).expect("a positive scale"))
 }
 
-/// Largest distance from the mesh's surface to the truth, from the truth to the mesh, and the root mean square of the
-/// first [m]; each face sampled at 15 places.
+/// Largest distance from the mesh's surface to the truth, from the truth to the mesh, and the root mean
+/// square of the first [m]; each face sampled at 15 places.
 pub fn distances(mesh: &Mesh, truth: &Truth) -> [f64; 3] {
     let surface = boundary(mesh);
     let (mut forth, mut squares, mut weight) = (0.0_f64, 0.0, 0.0);
@@ -92,7 +93,8 @@ pub fn distances(mesh: &Mesh, truth: &Truth) -> [f64; 3] {
     [forth, back, (squares / weight).sqrt()]
 }
 
-/// Root mean square distance of the surface of a label from the true one [m], at the corners and middles of its faces.
+/// Root mean square distance of the surface of a label from the true one [m], at the corners and middles of
+/// its faces.
 pub fn interface_rms(mesh: &Mesh, label: i32, organ: Organ) -> f64 {
     let block = mesh.block(CellKind::Tet).expect("the mesh has tets");
     let mut part = Mesh { points: mesh.points.clone(), ..Mesh::default() };

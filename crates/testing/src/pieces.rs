@@ -1,7 +1,8 @@
-//! Small bodies that meet at corners and edges: primitive scenes of rigid-body libraries, and the degenerate ones of Erleben (2018, TOG 37:39).
+//! Small bodies that meet at corners and edges: primitive scenes of rigid-body libraries, and the degenerate
+//! ones of Erleben (2018, TOG 37:39).
 //!
-//! A body is a block of tets whose upper side may be narrowed to a tip or an edge. Bodies that are held stand for rigid ones: a solver may put
-//! shapes of the same size in their place.
+//! A body is a block of tets whose upper side may be narrowed to a tip or an edge. Bodies that are held stand
+//! for rigid ones: a solver may put shapes of the same size in their place.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -128,7 +129,8 @@ pub enum Rigid {
 }
 
 impl Piece {
-    /// A rigid shape as large, and where it is: a box, a cone for a spike, and a blade as thin as the edge of a wedge.
+    /// A rigid shape as large, and where it is: a box, a cone for a spike, and a blade as thin as the edge of
+    /// a wedge.
     pub fn rigid(&self) -> (Rigid, Isometry3<f64>) {
         let [x, y, z] = self.size;
         let (shape, low) = match self.top {
@@ -152,7 +154,8 @@ pub struct Scene {
     pub has_floor: bool,
 }
 
-/// Plays each scene with soft bodies, and again with rigid ones in place of those that are held, if any is (`true`).
+/// Plays each scene with soft bodies, and again with rigid ones in place of those that are held, if any is
+/// (`true`).
 ///
 /// # Panics
 /// With the mistakes of all scenes that went wrong.

@@ -4,7 +4,8 @@ use std::fs::File;
 use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// Makes `NAME-WHAT.EXTENSION` beside the file of a scene, with a number where there is one already: it never overwrites.
+/// Makes `NAME-WHAT.EXTENSION` beside the file of a scene, with a number where there is one already: it never
+/// overwrites.
 ///
 /// # Errors
 /// If the folder cannot be written.

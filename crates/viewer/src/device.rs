@@ -1,5 +1,6 @@
-//! Scenes whose state lies on a GPU: their points are found and drawn there. What needs ordinary memory (energies,
-//! forces, the range of colours, whether all is sound, fields other than displacements) is inspected now and then.
+//! Scenes whose state lies on a GPU: their points are found and drawn there. What needs ordinary memory
+//! (energies, forces, the range of colours, whether all is sound, fields other than displacements) is
+//! inspected now and then.
 
 use std::time::{Duration, Instant};
 

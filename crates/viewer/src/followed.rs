@@ -15,7 +15,8 @@ use crate::hand::{Point, nodes_of};
 pub struct FollowedPoint {
     /// Where it is [m].
     pub place: Vector3,
-    /// The field that is shown; `None` without one, or where another surface is shown than when it was picked.
+    /// The field that is shown; `None` without one, or where another surface is shown than when it was
+    /// picked.
     pub value: Option<f64>,
     /// Body, element and label.
     pub about: Arc<str>,
@@ -33,7 +34,8 @@ pub(crate) struct Followed {
 }
 
 impl Followed {
-    /// A point of what is drawn `on` a body or a surface, without hidden cells; `None` of an obstacle or a tool.
+    /// A point of what is drawn `on` a body or a surface, without hidden cells; `None` of an obstacle or a
+    /// tool.
     pub fn new(
         point: &Point,
         subject: &Subject,

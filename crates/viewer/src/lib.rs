@@ -1,5 +1,6 @@
-//! The window: a scene played in real time on a thread of its own, pulled by hand and pinned, looked at from all sides. All but the
-//! window itself works without one: [`Session`] plays, [`pick`] finds what lies under a pixel, [`replay()`] repeats what a hand did.
+//! The window: a scene played in real time on a thread of its own, pulled by hand and pinned, looked at from
+//! all sides. All but the window itself works without one: [`Session`] plays, [`pick`] finds what lies under
+//! a pixel, [`replay()`] repeats what a hand did.
 
 mod beside;
 mod device;

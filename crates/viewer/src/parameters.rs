@@ -33,7 +33,8 @@ const FIXED: [&str; 6] = ["nodes", "faces", "fibre", "curve", "from", "to"];
 /// Numbers of bodies that can be changed.
 const OF_BODIES: [&str; 3] = ["density", "damping", "stiffness-damping"];
 
-/// The numbers of laws, loads and bodies of a scene that can be changed while it is played, in the order of its file.
+/// The numbers of laws, loads and bodies of a scene that can be changed while it is played, in the order of
+/// its file.
 pub fn parameters(scene: &Scene) -> Vec<Parameter> {
     let sections = sections();
     let mut found = Vec::new();

@@ -78,11 +78,13 @@ impl Surface {
 pub struct Move {
     /// Steps done before.
     pub steps: u64,
-    /// Whether the forces of that instant were found before, so that the step to come knows nothing of it yet.
+    /// Whether the forces of that instant were found before, so that the step to come knows nothing of it
+    /// yet.
     pub evaluated: bool,
     /// Wall time since the first one [s].
     pub seconds: f64,
-    /// Wall time from when it was asked for to the end of the first step in which it acted [s]; `None` while the run stood still.
+    /// Wall time from when it was asked for to the end of the first step in which it acted [s]; `None` while
+    /// the run stood still.
     pub lag: Option<f64>,
     /// What.
     pub done: Done,
@@ -101,7 +103,8 @@ pub struct Recording {
     pub of: u64,
 }
 
-/// The first bytes of a file of a recording, with the version of what follows; the CRC-32 of all before them are the last four.
+/// The first bytes of a file of a recording, with the version of what follows; the CRC-32 of all before them
+/// are the last four.
 const MAGIC: [u8; 8] = *b"\x89PLREC2\n";
 /// Bytes of the checksum.
 const CRC: usize = 4;
@@ -138,7 +141,8 @@ impl Recording {
         bytes
     }
 
-    /// Writes it into another file beside its own, which then takes the place of this one: a file of a recording is whole at any time.
+    /// Writes it into another file beside its own, which then takes the place of this one: a file of a
+    /// recording is whole at any time.
     ///
     /// # Errors
     /// What the system says.

@@ -1,4 +1,5 @@
-//! What is plotted over time: samples of a run, few enough to be kept however long it lasts, and the table that they are written to.
+//! What is plotted over time: samples of a run, few enough to be kept however long it lasts, and the table
+//! that they are written to.
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -60,8 +61,8 @@ impl Samples {
         *self = Self::default();
     }
 
-    /// Takes a sample, if its time is a later one. Of a run that goes back the later ones are forgotten. Where there are too many, every
-    /// second one goes, and from then on comes.
+    /// Takes a sample, if its time is a later one. Of a run that goes back the later ones are forgotten.
+    /// Where there are too many, every second one goes, and from then on comes.
     pub fn take(&mut self, Sample { time, columns, values }: Sample) {
         let last = self.times.last().copied().unwrap_or(-1.0);
         if time < last {
@@ -120,8 +121,8 @@ impl Samples {
         self.times.iter().zip(values).map(|(time, value)| [*time, *value])
     }
 
-    /// Writes a table with a header of names and units, beside the file of a scene: `NAME-probes.csv`, or with a number where there is
-    /// one already. What is not known is empty.
+    /// Writes a table with a header of names and units, beside the file of a scene: `NAME-probes.csv`, or
+    /// with a number where there is one already. What is not known is empty.
     ///
     /// # Errors
     /// What the system says.

@@ -1,5 +1,6 @@
-//! Sound states of the last moments of a run. After a step that fails, the run continues from one of them: hands let go, or without hands
-//! steps are halved. The older states are, the farther they lie from each other, so that they reach over the whole run.
+//! Sound states of the last moments of a run. After a step that fails, the run continues from one of them:
+//! hands let go, or without hands steps are halved. The older states are, the farther they lie from each
+//! other, so that they reach over the whole run.
 
 use std::collections::VecDeque;
 
@@ -88,8 +89,8 @@ impl SoundStates {
         crowded.map(|at| self.later.remove(at));
     }
 
-    /// The newest state of no more than so many steps, of a length [s], and the ones after it are forgotten; the oldest that is kept where all
-    /// have more. The start is one only for a run that was near it.
+    /// The newest state of no more than so many steps, of a length [s], and the ones after it are forgotten;
+    /// the oldest that is kept where all have more. The start is one only for a run that was near it.
     pub fn before(&mut self, steps: u64, step: f64) -> Option<Sound> {
         let older = self.later.partition_point(|sound| sound.steps <= steps);
         let start = self.first.as_ref()?;
@@ -100,12 +101,14 @@ impl SoundStates {
         Some(sound)
     }
 
-    /// Whether a run of so many steps, of a length [s], has come no farther than one state from where it began.
+    /// Whether a run of so many steps, of a length [s], has come no farther than one state from where it
+    /// began.
     pub(crate) fn has_just_begun(&self, steps: u64, step: f64) -> bool {
         self.first.as_ref().is_some_and(|first| steps <= first.steps + apart(step))
     }
 
-    /// The state to halve the steps from: the newest but one, or the first. `None` where hands did something since then: they let go instead.
+    /// The state to halve the steps from: the newest but one, or the first. `None` where hands did something
+    /// since then: they let go instead.
     pub fn untouched(&mut self) -> Option<&mut Sound> {
         let place = self.later.len().checked_sub(2);
         let sound = place.map_or(self.first.as_mut(), |place| self.later.get_mut(place))?;
@@ -117,8 +120,8 @@ impl SoundStates {
         place.map_or(self.first.as_mut(), |place| self.later.get_mut(place))
     }
 
-    /// The state to go back to after a break: the newest one that the run has not gone back to. `None` where hands did nothing and the run
-    /// breaks all the same.
+    /// The state to go back to after a break: the newest one that the run has not gone back to. `None` where
+    /// hands did nothing and the run breaks all the same.
     pub fn take(&mut self) -> Option<Sound> {
         let newest = self.later.pop_back();
         let is_lost = newest.is_none() && self.at_first && !self.touched;

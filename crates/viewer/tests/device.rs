@@ -1,5 +1,5 @@
-//! A scene on a GPU, played and drawn there: nothing comes back to ordinary memory but at the looks. Without any
-//! the tests are skipped with a notice; with `PLIANT_REQUIRE_GPU=1` they fail.
+//! A scene on a GPU, played and drawn there: nothing comes back to ordinary memory but at the looks. Without
+//! any the tests are skipped with a notice; with `PLIANT_REQUIRE_GPU=1` they fail.
 
 mod support;
 

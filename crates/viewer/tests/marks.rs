@@ -38,6 +38,7 @@ fn held_moved_and_loaded_nodes_are_marked_where_they_are() {
     let force: Vector3 = (of(|m| matches!(m, Marked::Loaded(_))).iter())
         .map(|(_, marked)| if let Marked::Loaded(force) = marked { *force } else { Vector3::zeros() })
         .sum();
-    // The pressure times the area of the upper side, which the pull stretches by a tenth and thins, and slopes a little.
+    // The pressure times the area of the upper side, which the pull stretches by a tenth and thins, and
+    // slopes a little.
     assert!(force.z < -0.9 && force.z > -1.2 && force.y.abs() < 1e-3, "{force:?}");
 }

@@ -1,5 +1,6 @@
-//! Detection of contact, on one core: `cargo bench -p pliant-bench --bench contact`. The surface is a ball of 20,480 triangles and 10,242 nodes
-//! that swings by a part of an edge. Printed are quantiles of the times of calls, and their mean processor time, which other programs change less.
+//! Detection of contact, on one core: `cargo bench -p pliant-bench --bench contact`. The surface is a ball of
+//! 20,480 triangles and 10,242 nodes that swings by a part of an edge. Printed are quantiles of the times of
+//! calls, and their mean processor time, which other programs change less.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -129,7 +130,8 @@ fn points_in_a_grid() -> impl FnMut() -> f64 {
     move || points.iter().map(|point| grid.near(point).distance.abs()).sum()
 }
 
-/// A sheet of 20,736 triangles with edges of 1 mm whose halves lie face to face, 0.2 mm apart, and swing: all of its nodes are near others.
+/// A sheet of 20,736 triangles with edges of 1 mm whose halves lie face to face, 0.2 mm apart, and swing: all
+/// of its nodes are near others.
 fn folded() -> Ball {
     let (columns, rows) = (144, 72);
     let node = |i: u32, j: u32| j * (columns + 1) + i;

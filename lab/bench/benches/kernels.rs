@@ -1,5 +1,6 @@
-//! Microbenchmarks of the kernels: stresses of laws, and whole steps of small cubes for each element. `pliant-lab bench` measures
-//! the user's wall time; these help when changing a kernel: `cargo bench -p pliant-bench`.
+//! Microbenchmarks of the kernels: stresses of laws, and whole steps of small cubes for each element.
+//! `pliant-lab bench` measures the user's wall time; these help when changing a kernel:
+//! `cargo bench -p pliant-bench`.
 
 use divan::{Bencher, counter::ItemsCount};
 use pliant_bench::{Clocked, HOURGLASS, Hexes, Specimen, Tets, Timed};

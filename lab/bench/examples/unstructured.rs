@@ -1,6 +1,7 @@
-//! Cost of the order and the shape of a mesh: the liver in stuffed tetrahedra as meshed, with its cells shuffled, and with its
-//! nodes also shuffled, beside a cube of about as many cells. Neo-Hookean, single precision, one thread. The meshes are
-//! stepped alternately, and the fastest of two hundred short repeats counts.
+//! Cost of the order and the shape of a mesh: the liver in stuffed tetrahedra as meshed, with its cells
+//! shuffled, and with its nodes also shuffled, beside a cube of about as many cells. Neo-Hookean, single
+//! precision, one thread. The meshes are stepped alternately, and the fastest of two hundred short repeats
+//! counts.
 
 use std::error::Error;
 

@@ -1,8 +1,8 @@
-//! The cases: cubes of 0.1 m, each of one element, law, precision and place (threads of the CPU, or a design on a
-//! GPU).
+//! The cases: cubes of 0.1 m, each of one element, law, precision and place (threads of the CPU, or a design
+//! on a GPU).
 //!
-//! The edges 10, 16, 25 and 38 are those of thesis Fig. 6.7 (1,331 to 59,319 nodes); the larger ones extend to 10⁶ cells.
-//! All laws are compared on 21³ × 6 tets (55,566) and 30³ hexes (27,000).
+//! The edges 10, 16, 25 and 38 are those of thesis Fig. 6.7 (1,331 to 59,319 nodes); the larger ones extend
+//! to 10⁶ cells. All laws are compared on 21³ × 6 tets (55,566) and 30³ hexes (27,000).
 
 use std::thread;
 
@@ -194,8 +194,8 @@ pub struct Case {
 }
 
 impl Case {
-    /// Its name on the command line: `tet4-nh-55566`, with `-double` and `-all` unless single on one thread, or with the
-    /// design on a GPU.
+    /// Its name on the command line: `tet4-nh-55566`, with `-double` and `-all` unless single on one thread,
+    /// or with the design on a GPU.
     pub fn id(&self) -> String {
         let law = self.law.name().to_lowercase().replace('+', "-");
         let precision = if self.precision == Precision::Double { "-double" } else { "" };
@@ -222,7 +222,8 @@ impl Case {
         matches!(self.place, Place::Device(_))
     }
 
-    /// Whether the default selection contains it: all laws on one mesh per element, and the thesis's series, on the CPU.
+    /// Whether the default selection contains it: all laws on one mesh per element, and the thesis's series,
+    /// on the CPU.
     pub fn is_default(&self) -> bool {
         let [simplest, richest] = [LawKind::NeoHookean, LawKind::FibresProny].map(|law| self.law == law);
         let reference = self.edge == self.element.reference_edge();
@@ -266,7 +267,8 @@ pub fn cases() -> Vec<Case> {
     cases
 }
 
-/// All designs on the mesh on which laws are compared, and for the simplest and the richest law on large ones.
+/// All designs on the mesh on which laws are compared, and for the simplest and the richest law on large
+/// ones.
 fn on_device() -> impl Iterator<Item = Case> {
     let kinds = Element::ALL.into_iter().flat_map(|element| {
         [LawKind::NeoHookean, LawKind::FibresProny].into_iter().map(move |law| (element, law))

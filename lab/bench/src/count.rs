@@ -1,11 +1,12 @@
 //! Bytes and floating-point operations of a step on the CPU, counted by hand from the formulas.
 //!
-//! Left out: GPUs. Each design has arrays and passes of its own for every element, `blocks` finds cells at the borders of blocks several
-//! times, and `fast` finds shapes at rest again. These counts say nothing about them.
+//! Left out: GPUs. Each design has arrays and passes of its own for every element, `blocks` finds cells at
+//! the borders of blocks several times, and `fast` finds shapes at rest again. These counts say nothing about
+//! them.
 //!
-//! **Operations**: every +, −, × and ÷ on real numbers in the formulas of `law/`, `forces/` and the node pass of
-//! `node_pass.rs`; a multiply-add is two. Not counted: index arithmetic, comparisons, and repeated subexpressions. With
-//! N nodes per cell and 3 numbers per node:
+//! **Operations**: every +, −, × and ÷ on real numbers in the formulas of `law/`, `forces/` and the node pass
+//! of `node_pass.rs`; a multiply-add is two. Not counted: index arithmetic, comparisons, and repeated
+//! subexpressions. With N nodes per cell and 3 numbers per node:
 //!
 //! | part | operations | |
 //! |---|---|---|
@@ -24,14 +25,15 @@
 //! | sums of blocks | 3 N | |
 //! | a node's step | 79 | per component 24, of which 12 are energies; 7 once |
 //!
-//! `tet4-anp` computes J in a separate pass and averages it (6 + 4 per cell, 1 per node); `hex8-full` computes J and the
-//! stress at eight points, where f_a = Σ w P B_a takes 18 (N−1) per point.
+//! `tet4-anp` computes J in a separate pass and averages it (6 + 4 per cell, 1 per node); `hex8-full`
+//! computes J and the stress at eight points, where f_a = Σ w P B_a takes 18 (N−1) per point.
 //!
-//! **Bytes**: memory traffic of a step if all intermediate data stay in the caches: a lower bound for any layout. Read: node
-//! numbers (2 bytes each), gradients of all nodes but the first and volume (3 N − 2 numbers), the fibre (3), hourglass moments,
-//! stiffness and reach (14). Read and written: the history (Φ and h, 6 numbers each), and for a node displacement and increment (12
-//! numbers); mass and damping (2) are read. `tet4-anp` reads its cells twice. Not counted: the copies of a block and its sums, each
-//! four numbers per node of a block.
+//! **Bytes**: memory traffic of a step if all intermediate data stay in the caches: a lower bound for any
+//! layout. Read: node numbers (2 bytes each), gradients of all nodes but the first and volume (3 N − 2
+//! numbers), the fibre (3), hourglass moments, stiffness and reach (14). Read and written: the history (Φ and
+//! h, 6 numbers each), and for a node displacement and increment (12 numbers); mass and damping (2) are read.
+//! `tet4-anp` reads its cells twice. Not counted: the copies of a block and its sums, each four numbers per
+//! node of a block.
 
 use crate::case::{Case, Element, LawKind, Precision};
 

@@ -1,10 +1,10 @@
 //! Peak rates of the machine: copy and multiply-add, measured at run time.
 //!
-//! *Copy*: `copy_from_slice` of 128 MiB into another 128 MiB, each thread a part. Bytes read and written are counted, not
-//! the cache lines that the CPU fetches before overwriting them. *Multiply-add*: x ← x a + b on twelve independent wide
-//! registers, which hides the latency of most CPUs; two operations each. `pulp` finds the widest instructions at run time
-//! (AVX-512, AVX2 with FMA, NEON; elsewhere 128 bits or scalar), whatever the target of the build. The best of the repeats
-//! counts, as the least disturbed one.
+//! *Copy*: `copy_from_slice` of 128 MiB into another 128 MiB, each thread a part. Bytes read and written are
+//! counted, not the cache lines that the CPU fetches before overwriting them. *Multiply-add*: x ← x a + b on
+//! twelve independent wide registers, which hides the latency of most CPUs; two operations each. `pulp` finds
+//! the widest instructions at run time (AVX-512, AVX2 with FMA, NEON; elsewhere 128 bits or scalar), whatever
+//! the target of the build. The best of the repeats counts, as the least disturbed one.
 
 use std::hint::black_box;
 use std::time::Instant;

@@ -80,7 +80,8 @@ pub(crate) struct Measured {
     pub threads: Option<usize>,
     pub design: String,
     pub lanes: Option<Instructions>,
-    /// Bytes read and written in copying [1/s] and operations in multiply-adds [1/s], if those of a step are counted.
+    /// Bytes read and written in copying [1/s] and operations in multiply-adds [1/s], if those of a step are
+    /// counted.
     pub peaks: Option<[f64; 2]>,
 }
 

@@ -1,6 +1,7 @@
-//! Implicit steps of shells: a tube like a bowel (radius 20 mm, length 200 mm, wall 2 mm, E = 0.1 MPa, ν = 0.45, both ends fixed) under a
-//! pressure that pulses between 0 and 1 kPa twice a second, in steps of 40 ms with one linear solution each. Conjugate gradients run to a
-//! residual of 0.1 % on the CPU, and on the best GPU.
+//! Implicit steps of shells: a tube like a bowel (radius 20 mm, length 200 mm, wall 2 mm, E = 0.1 MPa, ν =
+//! 0.45, both ends fixed) under a pressure that pulses between 0 and 1 kPa twice a second, in steps of 40 ms
+//! with one linear solution each. Conjugate gradients run to a residual of 0.1 % on the CPU, and on the best
+//! GPU.
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -140,7 +141,8 @@ fn real_time(preconditioner: Preconditioner) -> DynamicSettings {
     DynamicSettings::new(SHELL_STEP).real_time(linear)
 }
 
-/// Measures tubes of 800 to 50,000 shells, on a GPU, too, where there is one; on one that is software up to 4,000.
+/// Measures tubes of 800 to 50,000 shells, on a GPU, too, where there is one; on one that is software up to
+/// 4,000.
 ///
 /// # Errors
 /// If the GPU or a step fails.

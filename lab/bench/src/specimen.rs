@@ -1,5 +1,5 @@
-//! A specimen: a mesh of one material, held, moved and loaded by its faces. The faces of its bounding box are called
-//! `x-min`, `x-max`, `y-min`, `y-max`, `z-min` and `z-max`.
+//! A specimen: a mesh of one material, held, moved and loaded by its faces. The faces of its bounding box are
+//! called `x-min`, `x-max`, `y-min`, `y-max`, `z-min` and `z-max`.
 
 use pliant_explicit::critical_step;
 use pliant_geometry::{CellKind, Mesh, Selection, boundary};
@@ -40,13 +40,14 @@ pub struct Specimen {
 }
 
 impl Specimen {
-    /// The volume cells of a mesh as plain `tet4` and `hex8`, with the fibre direction of every cell for a law that has
-    /// one.
+    /// The volume cells of a mesh as plain `tet4` and `hex8`, with the fibre direction of every cell for a
+    /// law that has one.
     pub fn new(mesh: Mesh, material: &Material, fibre: Vector<f64>) -> Self {
         Self::of_elements(mesh, Tets::Plain, Hexes::UniformStrain(HOURGLASS), material, fibre)
     }
 
-    /// The volume cells of a mesh as certain elements, filled by their fractions where they are immersed cubes.
+    /// The volume cells of a mesh as certain elements, filled by their fractions where they are immersed
+    /// cubes.
     pub fn of_elements(
         mesh: Mesh,
         tets: Tets,
@@ -138,8 +139,8 @@ impl Specimen {
         self.constrain("fix", face, components, Motion::Fixed)
     }
 
-    /// With x held on `x-min`, y on `y-min` and z on `z-min`: an eighth of a symmetric body, or a block that may change
-    /// its width.
+    /// With x held on `x-min`, y on `y-min` and z on `z-min`: an eighth of a symmetric body, or a block that
+    /// may change its width.
     #[must_use]
     pub fn on_rollers(self) -> Self {
         let [x, y, z] = [0, 1, 2].map(|axis| [0, 1, 2].map(|c| c == axis));

@@ -1,8 +1,8 @@
 //! Measuring cases one after another.
 //!
-//! Each cube is fixed at `x-min` and starts compressed and sheared uniformly, with `x-max` fixed in its displaced
-//! position: all cells are deformed from the first step and keep vibrating. After a warm-up, each repeat takes enough
-//! steps for [`Settings::seconds`].
+//! Each cube is fixed at `x-min` and starts compressed and sheared uniformly, with `x-max` fixed in its
+//! displaced position: all cells are deformed from the first step and keep vibrating. After a warm-up, each
+//! repeat takes enough steps for [`Settings::seconds`].
 
 use std::sync::Arc;
 
@@ -22,13 +22,13 @@ use crate::{Machine, Rates, Specimen};
 
 /// Displacement of `x-max` [m]; a node at x has x/[`EDGE`] of it.
 const SQUEEZE: [f64; 3] = [-0.02 * EDGE, 0.01 * EDGE, 0.005 * EDGE];
-/// Up to this many cells the critical time step of the assembled model is computed, which costs as much as some 100 steps
-/// in double precision. For a cube in real time it is always computed.
+/// Up to this many cells the critical time step of the assembled model is computed, which costs as much as
+/// some 100 steps in double precision. For a cube in real time it is always computed.
 const CELLS_OF_ASSEMBLED: usize = 100_000;
 /// Fraction of the limit that a run takes as its step: the critical step of a row.
 const PART_OF_LIMIT: f64 = 0.9;
-/// Fraction of the limit for timed steps. The length of a step does not change its cost. The cubes vibrate for tens of
-/// thousands of steps without damping and without step reduction.
+/// Fraction of the limit for timed steps. The length of a step does not change its cost. The cubes vibrate
+/// for tens of thousands of steps without damping and without step reduction.
 const PART_UNDER_THE_CLOCK: f64 = 0.5;
 
 /// The progress of a measurement.
@@ -72,8 +72,8 @@ pub enum BenchError {
     },
 }
 
-/// Measures cases in their order. A series of three or more meshes also gives its linear cost and the largest cube
-/// in real time.
+/// Measures cases in their order. A series of three or more meshes also gives its linear cost and the largest
+/// cube in real time.
 ///
 /// # Errors
 /// If threads cannot be started or a step fails.
@@ -110,8 +110,9 @@ pub fn measure(
     Ok(Report { machine: bench.machine, settings, rates, device, rows, refused, fits, cubes })
 }
 
-/// The cube of n³ grid cells whose step is predicted to take as long as it simulates: with T = b k n³ for k cells in a
-/// grid cell and Δt = d/n, n⁴ = d/(b k). Computed for the tissues of thesis Fig. 6.7 on all threads.
+/// The cube of n³ grid cells whose step is predicted to take as long as it simulates: with T = b k n³ for k
+/// cells in a grid cell and Δt = d/n, n⁴ = d/(b k). Computed for the tissues of thesis Fig. 6.7 on all
+/// threads.
 fn largest_in_real_time(fit: &Fit, rows: &[Row]) -> Option<Case> {
     let thesis = matches!(fit.case.element, Element::Tet4 | Element::Hex8)
         && matches!(fit.case.law, LawKind::NeoHookean | LawKind::FibresProny)

@@ -21,8 +21,8 @@ fn shown(value: Option<f64>, digits: usize) -> String {
     text
 }
 
-/// A number with a count of significant digits, but whole up to a million; beyond, and below a thousandth, with an
-/// exponent.
+/// A number with a count of significant digits, but whole up to a million; beyond, and below a thousandth,
+/// with an exponent.
 pub(crate) fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();

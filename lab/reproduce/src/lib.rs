@@ -1,8 +1,8 @@
-//! The results of the thesis (Comas 2010, chapters 6, 8, 9.2 and 9.5), computed and compared with the published ones. Each is a [`Case`]
-//! that gives rows of numbers and figures; one page shows all.
+//! The results of the thesis (Comas 2010, chapters 6, 8, 9.2 and 9.5), computed and compared with the
+//! published ones. Each is a [`Case`] that gives rows of numbers and figures; one page shows all.
 //!
-//! If the printed source is wrong, the case gives the correction and its reason. References are embedded, so a
-//! binary needs no repository. The validation tests call the same computations.
+//! If the printed source is wrong, the case gives the correction and its reason. References are embedded, so
+//! a binary needs no repository. The validation tests call the same computations.
 
 mod case;
 pub mod cases;

@@ -1,5 +1,6 @@
-//! Pictures of deformed bodies, drawn by the renderer of `pliant render`: several bodies in one SVG with a common view, the shape
-//! at rest as a ghost, a colour bar. Without the feature `viewer` or an adapter, the page explains their absence.
+//! Pictures of deformed bodies, drawn by the renderer of `pliant render`: several bodies in one SVG with a
+//! common view, the shape at rest as a ghost, a colour bar. Without the feature `viewer` or an adapter, the
+//! page explains their absence.
 
 use pliant_geometry::Mesh;
 use pliant_mechanics::tensor::Vector;
@@ -184,7 +185,8 @@ mod drawn {
         }
     }
 
-    /// A camera that shows all bodies alike, without perspective, and the height of their pictures in the SVG.
+    /// A camera that shows all bodies alike, without perspective, and the height of their pictures in the
+    /// SVG.
     fn camera<'f>(view: &View<'_>, seen: impl Iterator<Item = (Vec<u32>, &'f Frame)>) -> (Camera, f64) {
         let mut camera = Camera {
             projection: Projection::Orthographic,

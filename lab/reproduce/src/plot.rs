@@ -10,7 +10,8 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use crate::CaseError;
 use crate::case::Figure;
 
-/// Units of the drawing per unit on the page: the drawing library rounds to whole ones, which would make curves rough.
+/// Units of the drawing per unit on the page: the drawing library rounds to whole ones, which would make
+/// curves rough.
 const FINE: i32 = 8;
 /// Size of a plot. Two fit side by side on a page, and one above the other on a telephone.
 const SIZE: (u32, u32) = (560 * FINE as u32, 420 * FINE as u32);

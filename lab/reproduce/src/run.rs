@@ -12,8 +12,8 @@ use crate::CaseError;
 /// The name of the only participant.
 const NAME: &str = "model";
 
-/// Steps a model from rest to a time [s] by central differences of a given length [s], which nothing cuts. `look` sees every
-/// instant, both ends included.
+/// Steps a model from rest to a time [s] by central differences of a given length [s], which nothing cuts.
+/// `look` sees every instant, both ends included.
 ///
 /// # Errors
 /// If a step fails or constraints contradict each other.
@@ -74,9 +74,9 @@ impl Equilibrium {
     }
 }
 
-/// Applies the loads and motions of a damped model within `until` seconds and checks that it has come to rest. At its
-/// largest final speed, no node may move by more than 1e-7 of the largest displacement in a tenth of a second. The
-/// slowest overdamped vibration of these models decays at least by e in this time.
+/// Applies the loads and motions of a damped model within `until` seconds and checks that it has come to
+/// rest. At its largest final speed, no node may move by more than 1e-7 of the largest displacement in a
+/// tenth of a second. The slowest overdamped vibration of these models decays at least by e in this time.
 ///
 /// # Errors
 /// If a step fails or the model still moves.
@@ -86,8 +86,8 @@ pub fn settle(model: &Model, step: f64, until: f64) -> Result<Equilibrium, CaseE
     if creep < 1e-7 { Ok(rest) } else { Err(CaseError::Moving { until, creep }) }
 }
 
-/// The equilibrium at 1 s, computed in one load step by dynamic relaxation to a residual of 1e-8 of the largest
-/// force.
+/// The equilibrium at 1 s, computed in one load step by dynamic relaxation to a residual of 1e-8 of the
+/// largest force.
 ///
 /// # Errors
 /// If none exists.

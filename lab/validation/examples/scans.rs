@@ -1,5 +1,5 @@
-//! Real scans, each by one command and then 1 s of simulation: what the mesh is like, what step it allows, what a second costs.
-//! Prints a table in Markdown and leaves each scene with its results in a folder:
+//! Real scans, each by one command and then 1 s of simulation: what the mesh is like, what step it allows,
+//! what a second costs. Prints a table in Markdown and leaves each scene with its results in a folder:
 //! `PLIANT_DATA=… cargo run --release -p pliant-validation --example scans -- FOLDER [NAME …]`.
 //!
 //! The body lies on its back, held there over a fifth of its depth, and its weight grows over the second.
@@ -47,7 +47,8 @@ enum Tissue {
 }
 
 impl Tissue {
-    /// Young's modulus [Pa]; Poisson's ratio is 0.45. The tissues for which `pliant mesh` tells the stable step.
+    /// Young's modulus [Pa]; Poisson's ratio is 0.45. The tissues for which `pliant mesh` tells the stable
+    /// step.
     fn young(self) -> f64 {
         match self {
             Self::Liver => 2.0 * 6568.0 * 1.45,

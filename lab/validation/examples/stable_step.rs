@@ -1,7 +1,9 @@
-//! Larger stable steps: the liver of `scenes/liver`, a brain in stuffed tets and a cube in plain tets, in tets with averaged pressure
-//! and with mass scaling. For each: the step, the wall time of a simulated second on all cores (median of turns), and how far the motion
-//! is from that of plain tets: the largest distance of a node from its place there over the largest displacement.
-//! `cargo run --release -p pliant-validation --example stable_step`; a word after `--` chooses the bodies whose name has it.
+//! Larger stable steps: the liver of `scenes/liver`, a brain in stuffed tets and a cube in plain tets, in
+//! tets with averaged pressure and with mass scaling. For each: the step, the wall time of a simulated second
+//! on all cores (median of turns), and how far the motion is from that of plain tets: the largest distance of
+//! a node from its place there over the largest displacement.
+//! `cargo run --release -p pliant-validation --example stable_step`; a word after `--` chooses the bodies
+//! whose name has it.
 
 use std::error::Error;
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! Running a model, as a test does it: what fails, panics. Tests that read the explicit stepper's own state, errors and cut steps
-//! step it themselves; equilibria come from a simulation.
+//! Running a model, as a test does it: what fails, panics. Tests that read the explicit stepper's own state,
+//! errors and cut steps step it themselves; equilibria come from a simulation.
 
 use pliant_explicit::critical_step::assembled;
 use pliant_explicit::stability::{Monitor, OnUnstable};
@@ -7,8 +7,8 @@ use pliant_explicit::{CentralDifference, Scalar, State, StepError};
 use pliant_mechanics::Model;
 use pliant_reproduce::Equilibrium;
 
-/// Steps a model from rest to a time [s], both ends included. `observe` sees every instant once its forces, reactions
-/// and energies are known. Returns the last instant.
+/// Steps a model from rest to a time [s], both ends included. `observe` sees every instant once its forces,
+/// reactions and energies are known. Returns the last instant.
 ///
 /// # Errors
 /// If a step fails.

@@ -1,5 +1,6 @@
-//! A brain free in its skull, which is its own surface half a millimetre outward, while gravity turns by a right angle: no node goes out of the
-//! skull, the skull carries the weight, and the step is that of the free brain.
+//! A brain free in its skull, which is its own surface half a millimetre outward, while gravity turns by a
+//! right angle: no node goes out of the skull, the skull carries the weight, and the step is that of the free
+//! brain.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +16,8 @@ fn world(source: Source, folder: &Path) -> World {
     World::new(&scene).unwrap_or_else(|e| panic!("{}", e.plain()))
 }
 
-/// Plays a scene of a body `brain` in an obstacle `skull` to its end, at rest on its side; gravity ends along −y.
+/// Plays a scene of a body `brain` in an obstacle `skull` to its end, at rest on its side; gravity ends along
+/// −y.
 fn check(name: &str, text: &str, folder: &Path, grow: f64) {
     let source = |text: &str| Source::parse("scene.toml", text.to_owned()).unwrap();
     let free = text.split_once("[contact.rests]").unwrap();
@@ -79,7 +81,8 @@ fn an_ellipsoid_stays_in_its_skull() {
     check("ellipsoid", &text, &folder, 0.0005);
 }
 
-/// The grey and white matter of the MNI152 average brain, in tets of 12 mm, as a file that the brain and its skull are made of.
+/// The grey and white matter of the MNI152 average brain, in tets of 12 mm, as a file that the brain and its
+/// skull are made of.
 #[test]
 #[ignore = "takes minutes"]
 fn a_real_brain_stays_in_its_skull() {

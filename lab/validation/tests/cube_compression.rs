@@ -1,6 +1,6 @@
-//! The thesis's cube [0, 0.1 m]³ between glued platens, quasi-static, split neo-Hookean with E = 3000 Pa, ν = 0.45
-//! unless said otherwise. At 20 % the answer converges with the mesh; at 30 % it does not (the glued edge is singular
-//! and folds over the platen), so that only solutions on one and the same mesh compare.
+//! The thesis's cube [0, 0.1 m]³ between glued platens, quasi-static, split neo-Hookean with E = 3000 Pa, ν =
+//! 0.45 unless said otherwise. At 20 % the answer converges with the mesh; at 30 % it does not (the glued
+//! edge is singular and folds over the platen), so that only solutions on one and the same mesh compare.
 
 use pliant_geometry::io;
 use pliant_mechanics::law::AnyLaw;
@@ -17,7 +17,8 @@ fn compressed_by_a_fifth(n: usize) -> [f64; 2] {
     [force, bulge]
 }
 
-/// F = 8.75 ± 0.10 N and bulge = 6.62 ± 0.05 mm: the limit of meshes of several elements and codes, with its spread.
+/// F = 8.75 ± 0.10 N and bulge = 6.62 ± 0.05 mm: the limit of meshes of several elements and codes, with its
+/// spread.
 fn check_converged([force, bulge]: [f64; 2]) {
     claim("F off 8.75 N by [N]", (force - 8.75).abs(), 0.10);
     claim("bulge off 6.62 mm by [mm]", (bulge - 6.62).abs(), 0.05);

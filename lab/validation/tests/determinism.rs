@@ -11,7 +11,8 @@ use pliant_validation::{Specimen, claim, liver, run, smooth_step};
 /// Steps of a run.
 const STEPS: f64 = 200.0;
 
-/// Two cubes in one body, one of 1000 hexes and one of 3072 tets: enough for several tasks of nodes and of cells.
+/// Two cubes in one body, one of 1000 hexes and one of 3072 tets: enough for several tasks of nodes and of
+/// cells.
 fn tets_beside_hexes() -> Mesh {
     let cube = |counts, cells, x| {
         let block = Block { origin: Vector3::new(x, 0.0, 0.0), size: [0.1; 3] };
@@ -90,6 +91,7 @@ fn single_precision_stays_within_1e_5_of_double() {
     let pairs = fine.iter().flatten().zip(coarse.iter().flatten());
     let difference = norm(&mut pairs.map(|(a, &b)| a - f64::from(b)));
     let whole = norm(&mut fine.iter().copied().flat_map(Vector::<f64>::into_iter));
-    // 200 steps round off by 6e-8 each, at random signs 1e-6 together; ten times that is left for stiff vibrations.
+    // 200 steps round off by 6e-8 each, at random signs 1e-6 together; ten times that is left for stiff
+    // vibrations.
     claim("‖u₃₂ − u₆₄‖/‖u₆₄‖ after 200 steps", difference / whole, 1e-5);
 }

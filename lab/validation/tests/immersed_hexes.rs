@@ -1,6 +1,7 @@
-//! Immersed hexahedra: every cube that an organ touches, with its stiffness and mass by the part that the organ fills, against
-//! cubes by majority and against tetrahedra, on the analytic liver: volume, the critical time step of the step, and how it hangs under its
-//! weight from a plane that is one of every grid. τ = Δt c / h with h = (V / nodes)^(1/3).
+//! Immersed hexahedra: every cube that an organ touches, with its stiffness and mass by the part that the
+//! organ fills, against cubes by majority and against tetrahedra, on the analytic liver: volume, the critical
+//! time step of the step, and how it hangs under its weight from a plane that is one of every grid. τ = Δt c
+//! / h with h = (V / nodes)^(1/3).
 
 use pliant_geometry::{Locator, Mesh, Vector3};
 use pliant_mechanics::model::{Averaging, Constraint, Motion};
@@ -12,7 +13,8 @@ const YOUNG: f64 = 3000.0;
 const POISSON: f64 = 0.45;
 const DENSITY: f64 = 1000.0;
 
-/// The liver in a box that is the same whole even number of cubes of 8, 10 and 20 mm: all grids share the plane x = −40 mm.
+/// The liver in a box that is the same whole even number of cubes of 8, 10 and 20 mm: all grids share the
+/// plane x = −40 mm.
 struct Boxed(Phantom);
 
 impl ImplicitField for Boxed {
@@ -29,7 +31,8 @@ fn liver() -> Boxed {
     Boxed(Phantom::new(Organ::Liver, 1.0).expect("a positive scale"))
 }
 
-/// A mesh of the liver as hanging tissue: all nodes at x ≤ −40 mm held, a weight of a tenth of the earth's along −z.
+/// A mesh of the liver as hanging tissue: all nodes at x ≤ −40 mm held, a weight of a tenth of the earth's
+/// along −z.
 struct Hanging {
     specimen: Specimen,
     locator: Locator,
@@ -123,8 +126,8 @@ fn immersed_cubes_keep_the_volume_and_the_step() {
     }
 }
 
-/// Cubes by majority are off to either side, by chance; immersed ones are too stiff, as their fractions are smeared over whole cubes:
-/// at 10 mm they are farther off than those by majority.
+/// Cubes by majority are off to either side, by chance; immersed ones are too stiff, as their fractions are
+/// smeared over whole cubes: at 10 mm they are farther off than those by majority.
 #[test]
 #[ignore = "slow: a minute in release"]
 fn how_cubes_and_tets_hang() {

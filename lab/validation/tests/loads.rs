@@ -128,8 +128,8 @@ fn moved_nodes_follow_their_curve_and_a_velocity_adds_up_to_its_integral() {
     }
 }
 
-/// Both ends of a block turn about an axis beside it: every node of theirs stays on its circle, and in equilibrium the block has turned as
-/// a whole, without stress.
+/// Both ends of a block turn about an axis beside it: every node of theirs stays on its circle, and in
+/// equilibrium the block has turned as a whole, without stress.
 #[test]
 fn rotated_nodes_stay_on_their_circles_and_turn_a_body_without_stress() {
     let (axis, centre, angle) = (nalgebra::Vector3::new(1.0, -2.0, 0.5), [0.02, 0.15, -0.03], 2.5);

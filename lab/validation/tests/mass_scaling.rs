@@ -1,4 +1,5 @@
-//! Mass scaling: which critical time step it reaches with how much mass, and what it changes in motion and at rest.
+//! Mass scaling: which critical time step it reaches with how much mass, and what it changes in motion and at
+//! rest.
 
 use pliant_explicit::critical_step::assembled;
 use pliant_explicit::mass_scaling::{Goal, scale_mass};

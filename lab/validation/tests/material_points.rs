@@ -1,5 +1,5 @@
-//! Energies and stresses of the laws at eight deformations, against complex-step derivatives of the energies: one test
-//! a reference material, its parameters as the file's `definition` gives them.
+//! Energies and stresses of the laws at eight deformations, against complex-step derivatives of the energies:
+//! one test a reference material, its parameters as the file's `definition` gives them.
 
 use pliant_mechanics::law::AnyLaw;
 use pliant_validation::{claim, deformation, largest, law, numbers, reference};

@@ -1,4 +1,5 @@
-//! Momentum, angular momentum and free fall of a free body: exact in the central difference method, to round-off.
+//! Momentum, angular momentum and free fall of a free body: exact in the central difference method, to
+//! round-off.
 
 use pliant_explicit::State;
 use pliant_explicit::recover::Recovery;
@@ -34,8 +35,8 @@ fn struck_body_takes_up_the_impulse_and_keeps_momentum_and_angular_momentum() {
     for cells in ELEMENTS {
         let block = block(cells);
         let step = 0.8 * block.element_bound();
-        // A triangle of force in time, peak 0.4 N after 10 steps, gone after 20; its corners lie on steps, so that
-        // the trapezoidal rule of the method integrates it exactly.
+        // A triangle of force in time, peak 0.4 N after 10 steps, gone after 20; its corners lie on steps, so
+        // that the trapezoidal rule of the method integrates it exactly.
         let [rise, end] = [10.0 * step, 20.0 * step];
         let curve =
             Curve { shape: Shape::Table(vec![(0.0, 0.0), (rise, 1.0), (end, 0.0)]), from: 0.0, to: end };

@@ -1,6 +1,7 @@
-//! Meshes of the label images of the analytic organs, made for the time step: the meshing specification's T2, T3 and T5.
-//! τ = Δt c / h with h = (V / nodes)^(1/3) compares meshes of different density; Δt is the critical time step. Of the same organs,
-//! TetGen gives τ = 0.02 to 0.29, fTetWild 0.19, Gmsh 0.29 to 0.52, and the ideal lattice 0.73.
+//! Meshes of the label images of the analytic organs, made for the time step: the meshing specification's T2,
+//! T3 and T5. τ = Δt c / h with h = (V / nodes)^(1/3) compares meshes of different density; Δt is the
+//! critical time step. Of the same organs, TetGen gives τ = 0.02 to 0.29, fTetWild 0.19, Gmsh 0.29 to 0.52,
+//! and the ideal lattice 0.73.
 
 use pliant_geometry::{Mesh, Vector3};
 use pliant_imaging::{Cleaning, LabelImage, ReadOptions, Smoothing, read};
@@ -72,9 +73,10 @@ fn the_liver_at_5_mm_has_the_step_of_the_specification() {
     check("liver", &organs::liver(), &[1], 0.005, 0.56);
 }
 
-/// Everything that the specification asks of meshes of the organs, lattice by lattice, as a table:
-/// `cargo test --release -p pliant-validation --test organ_meshes table -- --ignored --nocapture`. Distances in lattice constants: RMS from
-/// the mesh to the true surface, H both ways, and RMS of the interfaces of ventricles and tumour. Times: the median of three on one core.
+/// Everything that the specification asks of meshes of the organs, lattice by lattice, as a table: `cargo
+/// test --release -p pliant-validation --test organ_meshes table -- --ignored --nocapture`. Distances in
+/// lattice constants: RMS from the mesh to the true surface, H both ways, and RMS of the interfaces of
+/// ventricles and tumour. Times: the median of three on one core.
 #[test]
 #[ignore = "slow: minutes in release"]
 fn table_of_organ_meshes() {
@@ -148,8 +150,8 @@ fn the_critical_step_of_an_organ_is_sharp() {
     println!("1.1 of the critical time step fails after {steps} steps: {failure}");
 }
 
-/// White matter of an average brain, folded as finely as the cells: a boundary in which no two sheets meet in a point or an edge. Meshes
-/// of it once had two such points.
+/// White matter of an average brain, folded as finely as the cells: a boundary in which no two sheets meet in
+/// a point or an edge. Meshes of it once had two such points.
 #[test]
 #[ignore = "slow: real organ"]
 fn white_matter_has_no_pinch_points() {

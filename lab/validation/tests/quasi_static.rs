@@ -14,8 +14,8 @@ use pliant_validation::{
 };
 use serde_json::Value;
 
-/// A load step that comes to no equilibrium, halved or not, leaves displacements, history and work as they were, bit for
-/// bit: the same step by a patient solver then ends where it would have ended.
+/// A load step that comes to no equilibrium, halved or not, leaves displacements, history and work as they
+/// were, bit for bit: the same step by a patient solver then ends where it would have ended.
 #[test]
 fn a_failed_load_step_leaves_the_state_untouched() {
     let material =
@@ -55,8 +55,8 @@ fn compressed(mesh: Mesh, tets: Tets, hexes: Hexes, law: AnyLaw) -> Specimen {
         .fix("x-min", [true; 3])
 }
 
-/// Nodal displacements within a part of the largest, the reaction on x = 0 too. `order` gives the reference's number of
-/// each of our nodes.
+/// Nodal displacements within a part of the largest, the reaction on x = 0 too. `order` gives the reference's
+/// number of each of our nodes.
 fn check(name: &str, cube: &Specimen, expected: &Value, order: impl Fn(usize) -> usize, limit: f64) {
     let rest = relax(&cube.model);
     let length = |v: [f64; 3]| dot(v, v).sqrt();

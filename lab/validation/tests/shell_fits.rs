@@ -1,5 +1,6 @@
-//! Organs by few curved shells, and how close these are both ways: the meshing specification's S3 and the thesis's Figs 9.1 to 9.3.
-//! Organs from files are read through `PLIANT_DATA`; without it those tests print a notice and pass.
+//! Organs by few curved shells, and how close these are both ways: the meshing specification's S3 and the
+//! thesis's Figs 9.1 to 9.3. Organs from files are read through `PLIANT_DATA`; without it those tests print a
+//! notice and pass.
 
 use std::path::PathBuf;
 use std::time::Instant;

@@ -1,6 +1,6 @@
-//! Simple shear of the liver-like tissue at a constant rate, figures 6.3 and 6.4 of the thesis with its factor 2 put
-//! right (Taylor et al. 2009). Reference: closed forms with fifty digits.
-//! *A*: F = I + γ e₂⊗e₁, which stretches fibres along e₁; *B*: F = I + γ e₁⊗e₂, which does not.
+//! Simple shear of the liver-like tissue at a constant rate, figures 6.3 and 6.4 of the thesis with its
+//! factor 2 put right (Taylor et al. 2009). Reference: closed forms with fifty digits. *A*: F = I + γ e₂⊗e₁,
+//! which stretches fibres along e₁; *B*: F = I + γ e₁⊗e₂, which does not.
 
 use pliant_explicit::Pack;
 use pliant_explicit::Relaxation;
@@ -119,8 +119,8 @@ fn thesis_6_4_error_of_the_backward_euler_update_is_the_published_one() {
     );
 }
 
-/// A bound of the error of S from taking the elastic stress Φ as linear in each step: the update solves the rest
-/// exactly, hence |ΔS| = |a/τ ∫ e^(−(t−s)/τ) (Φ − Φ_linear) ds| ≤ a (1 − e^(−t/τ)) max|Φ″| Δt²/8.
+/// A bound of the error of S from taking the elastic stress Φ as linear in each step: the update solves the
+/// rest exactly, hence |ΔS| = |a/τ ∫ e^(−(t−s)/τ) (Φ − Φ_linear) ds| ≤ a (1 − e^(−t/τ)) max|Φ″| Δt²/8.
 fn truncation_bound(case: Case, component: usize, rate: f64, shear: f64) -> f64 {
     let h = 1e-4;
     let stress = |shear: f64| case.elastic(shear).isochoric.0[component];

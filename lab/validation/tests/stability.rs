@@ -118,8 +118,8 @@ fn pressed(law: AnyLaw, element: (VolumeCell, Tets, Hexes)) -> Specimen {
     cube
 }
 
-/// The estimate over the critical time step of the deformed states of a run: the least and the largest, and the largest over
-/// what looking closely at every cell gives.
+/// The estimate over the critical time step of the deformed states of a run: the least and the largest, and
+/// the largest over what looking closely at every cell gives.
 fn estimates(what: &str, specimen: &Specimen, until: f64) -> [f64; 3] {
     let model = &specimen.model;
     let (limit, at_rest) = (specimen.critical_step(), vec![[0.0; 3]; model.node_count()]);
@@ -151,8 +151,9 @@ fn the_estimate_stays_within_its_reserve_of_the_critical_step_of_deformed_bodies
     let uniform = Hexes::UniformStrain(HOURGLASS);
     let averaged = Tets::Averaged(Averaging::Nodal);
     for (name, law) in laws() {
-        // What is kept in reserve for it. Fibres that carry tension only are half stiff at rest, between two slopes, and no
-        // limit found there knows the full one: for them the rest of 0.9 of the limit at rest must do.
+        // What is kept in reserve for it. Fibres that carry tension only are half stiff at rest, between two
+        // slopes, and no limit found there knows the full one: for them the rest of 0.9 of the limit at rest
+        // must do.
         let allowed = if name == "holzapfel-gasser-ogden" { 1.0 / 0.9 } else { 1.0 / KEEP };
         for cells in CELLS {
             let gravity = 9.81 * law.small_strain().shear / 1000.0;

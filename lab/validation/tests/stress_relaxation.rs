@@ -11,7 +11,8 @@ fn relaxes_as_the_reference(model: &str) {
     }
     let [found, expected] = relaxed.last();
     println!("{model}: F(5 s) = {found:.3} N, reference {expected:.3} N (another mesh)");
-    // 1 %: the reference's ratios differ by less than 0.5 % between its meshes; the rest for the waves of the ramp.
+    // 1 %: the reference's ratios differ by less than 0.5 % between its meshes; the rest for the waves of the
+    // ramp.
     claim(&format!("{model}: F(t)/F(5 s) from {FROM} s on"), relaxed.off(), 0.01);
     let [limit, within] = of_fine_meshes(expected);
     claim(&format!("{model}: F(5 s) [N], off the limit of fine meshes"), (found - limit).abs(), within);

@@ -1,5 +1,5 @@
-//! Frictionless uniaxial stress along x: the lateral stretches are those at which the lateral stress vanishes.
-//! Reference: exact homogeneous solutions at forty stretches from 0.6 to 1.4, three tissues.
+//! Frictionless uniaxial stress along x: the lateral stretches are those at which the lateral stress
+//! vanishes. Reference: exact homogeneous solutions at forty stretches from 0.6 to 1.4, three tissues.
 
 use pliant_geometry::Mesh;
 use pliant_mechanics::law::AnyLaw;
@@ -52,7 +52,8 @@ fn normal_stress(tissue: &Tissue, stretch: [f64; 3]) -> [f64; 3] {
     [xx, yy, zz]
 }
 
-/// The stretches (x, y, z) without lateral stress, by Newton's method with the Jacobian from finite differences.
+/// The stretches (x, y, z) without lateral stress, by Newton's method with the Jacobian from finite
+/// differences.
 fn free_to_widen(tissue: &Tissue, along: f64) -> [f64; 3] {
     let [mut y, mut z] = [along.sqrt().recip(); 2];
     for _ in 0..50 {
@@ -97,8 +98,8 @@ fn distorted_block(cells: VolumeCell) -> Mesh {
     mesh
 }
 
-/// On rollers, free to widen, with damping near critical for the slowest vibration, a shear wave between a held and a
-/// free face: ω = π/2 √(μ/ρ)/L.
+/// On rollers, free to widen, with damping near critical for the slowest vibration, a shear wave between a
+/// held and a free face: ω = π/2 √(μ/ρ)/L.
 fn specimen(tissue: &Tissue, cells: VolumeCell) -> Specimen {
     let slowest = std::f64::consts::FRAC_PI_2 * (tissue.law.small_strain().shear / 1000.0).sqrt() / EDGE;
     let material = elastic(tissue.law);

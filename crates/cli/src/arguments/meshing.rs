@@ -46,7 +46,8 @@ pub struct Labels {
     /// More masks on the same voxels: the first image is label 1, these are 2, 3, …, named after their files.
     #[arg(value_name = "MASK")]
     pub masks: Vec<PathBuf>,
-    /// Names of the labels: a table of ITK-SNAP, FreeSurfer or 3D Slicer, lines like `5 liver`, JSON, or the word `totalsegmentator`.
+    /// Names of the labels: a table of ITK-SNAP, FreeSurfer or 3D Slicer, lines like `5 liver`, JSON, or the
+    /// word `totalsegmentator`.
     #[arg(long, value_name = "TABLE")]
     pub names: Option<PathBuf>,
     /// Read an image of more than 2 GiB.
@@ -65,34 +66,39 @@ pub struct MeshImage {
     /// An image file, the folder of a DICOM series, or a mesh file (for tets and hexes a closed surface).
     #[arg(value_name = "INPUT")]
     pub image: PathBuf,
-    /// More masks on the same voxels: the first image is label 1, these are 2, 3, …, named after their files. All are meshed unless
-    /// `--label` selects some. Where masks overlap, the last one wins.
+    /// More masks on the same voxels: the first image is label 1, these are 2, 3, …, named after their files.
+    /// All are meshed unless `--label` selects some. Where masks overlap, the last one wins.
     #[arg(value_name = "MASK")]
     pub masks: Vec<PathBuf>,
     /// Another image on the same voxels, added before `--threshold`, such as grey matter to white matter.
     #[arg(long, value_name = "IMAGE")]
     pub add: Option<PathBuf>,
-    /// Label to mesh: 5, a range 5-8, or a name. Several labels make one mesh of several materials; the first one gets the voxels that
-    /// cleaning adds. For a surface, the label of its cells.
+    /// Label to mesh: 5, a range 5-8, or a name. Several labels make one mesh of several materials; the first
+    /// one gets the voxels that cleaning adds. For a surface, the label of its cells.
     #[arg(long, value_name = "LABEL", allow_hyphen_values = true)]
     pub label: Vec<LabelChoice>,
-    /// Names of the labels: a table of ITK-SNAP, FreeSurfer or 3D Slicer, lines like `5 liver`, JSON, or the word `totalsegmentator`.
+    /// Names of the labels: a table of ITK-SNAP, FreeSurfer or 3D Slicer, lines like `5 liver`, JSON, or the
+    /// word `totalsegmentator`.
     #[arg(long, value_name = "TABLE")]
     pub names: Option<PathBuf>,
-    /// Instead of labels: all voxels with at least this value, for example in a probability map; with several masks, in each of them.
+    /// Instead of labels: all voxels with at least this value, for example in a probability map; with several
+    /// masks, in each of them.
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     pub threshold: Option<f64>,
-    /// Edge of the cells: 0.008 in metres, or 8mm. Tets and hexes need it; a surface gets even triangles of this edge.
+    /// Edge of the cells: 0.008 in metres, or 8mm. Tets and hexes need it; a surface gets even triangles of
+    /// this edge.
     #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
     pub edge: Option<f64>,
-    /// Tets: largest distance between mesh boundary and body in both directions, such as 1mm; cells become smaller where it is
-    /// exceeded. The reference is the triangles of a surface, or the smooth surface of an image. Without `--edge` the first edge is automatic.
+    /// Tets: largest distance between mesh boundary and body in both directions, such as 1mm; cells become
+    /// smaller where it is exceeded. The reference is the triangles of a surface, or the smooth surface of an
+    /// image. Without `--edge` the first edge is automatic.
     #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
     pub distance: Option<f64>,
     /// Tets: longer edge inside, away from the surface, rounded down to 2, 4, 8, ... times `--edge`.
     #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
     pub inner_edge: Option<f64>,
-    /// Tets: a label with smaller cells, by number or name: 4 for half of `--edge`, or tumour=2mm, rounded down to a half, quarter, ... of `--edge`.
+    /// Tets: a label with smaller cells, by number or name: 4 for half of `--edge`, or tumour=2mm, rounded
+    /// down to a half, quarter, ... of `--edge`.
     #[arg(long, value_name = "LABEL[=LENGTH]", value_parser = protected, allow_hyphen_values = true)]
     pub protect: Vec<(CellLabel, Option<f64>)>,
     /// Number of triangles of a surface instead of their edge, placed where the shape needs them.
@@ -101,31 +107,35 @@ pub struct MeshImage {
     /// Number of shells.
     #[arg(long, value_name = "N", conflicts_with_all = ["edge", "triangles"])]
     pub shells: Option<usize>,
-    /// Largest distance between shells and surface in both directions, as a fraction of the diagonal of its box: 0.005 or 0.5%.
+    /// Largest distance between shells and surface in both directions, as a fraction of the diagonal of its
+    /// box: 0.005 or 0.5%.
     #[arg(long, value_name = "PART", value_parser = part, conflicts_with_all = ["edge", "triangles", "shells"])]
     pub error: Option<f64>,
-    /// Factor that converts lengths of a mesh file to metres: 0.001 for millimetres. Images store theirs. A file larger than 10 m needs it.
+    /// Factor that converts lengths of a mesh file to metres: 0.001 for millimetres. Images store theirs. A
+    /// file larger than 10 m needs it.
     #[arg(long, value_name = "FACTOR")]
     pub scale: Option<f64>,
-    /// Also write the curved surface of the shells as small triangles, with the distance from the target as point data.
+    /// Also write the curved surface of the shells as small triangles, with the distance from the target as
+    /// point data.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["edge", "triangles"])]
     pub error_map: Option<PathBuf>,
-    /// Type of mesh: tetrahedra optimised for long stable steps, cubes with a stepped surface, all cubes that the body touches
-    /// with the fraction that it fills (cell data `fraction`), a surface, or curved shells.
+    /// Type of mesh: tetrahedra optimised for long stable steps, cubes with a stepped surface, all cubes that
+    /// the body touches with the fraction that it fills (cell data `fraction`), a surface, or curved shells.
     #[arg(long = "as", value_name = "CELLS", default_value = "tets")]
     pub cells: MeshCells,
-    /// In a scene: a label whose surface is a wall of that thickness, tied to the tissue, such as "portal vein=1mm"; may be repeated.
-    /// Voxels of the label inside the organ become tissue.
+    /// In a scene: a label whose surface is a wall of that thickness, tied to the tissue, such as "portal
+    /// vein=1mm"; may be repeated. Voxels of the label inside the organ become tissue.
     #[arg(long, value_name = "LABEL=LENGTH", value_parser = vessel, allow_hyphen_values = true)]
     pub vessels: Vec<(LabelChoice, f64)>,
     /// In a scene: a capsule of this thickness on the boundary of the tissue, such as 0.1mm.
     #[arg(long, value_name = "LENGTH", value_parser = wall, allow_hyphen_values = true)]
     pub capsule: Option<f64>,
-    /// Name of the mesh: .vtu or .msh, for a surface also .ply, .obj or .stl; or .toml for a scene of the image, with walls and ties.
+    /// Name of the mesh: .vtu or .msh, for a surface also .ply, .obj or .stl; or .toml for a scene of the
+    /// image, with walls and ties.
     #[arg(short, long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Close gaps and channels up to this width, or holes of a surface: 0.003 in metres, or 3mm. Holes of a surface narrower than the
-    /// cells are always closed.
+    /// Close gaps and channels up to this width, or holes of a surface: 0.003 in metres, or 3mm. Holes of a
+    /// surface narrower than the cells are always closed.
     #[arg(long, value_name = "LENGTH", value_parser = length, default_value = "0", allow_hyphen_values = true)]
     pub close_gaps: f64,
     /// Fill closed cavities.
@@ -140,7 +150,8 @@ pub struct MeshImage {
     /// UID of the DICOM series, if the folder holds several.
     #[arg(long, value_name = "UID")]
     pub series: Option<String>,
-    /// Tissue of the reported stable step: brain-like (E = 3000 Pa) or liver-like (E = 19 kPa), both with ν = 0.45; by default both.
+    /// Tissue of the reported stable step: brain-like (E = 3000 Pa) or liver-like (E = 19 kPa), both with ν =
+    /// 0.45; by default both.
     #[arg(long, value_name = "NAME", conflicts_with = "young")]
     pub law: Option<Tissue>,
     /// Young's modulus of the tissue of the reported stable step [Pa].

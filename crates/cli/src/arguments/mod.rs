@@ -70,7 +70,8 @@ pub enum Command {
         /// Folder for the scene and its meshes, or name of the scene file (.toml) with the meshes beside it.
         #[arg(short, long, value_name = "DIR|FILE")]
         out: PathBuf,
-        /// Translate a model with unsupported parts (shells that bend, radii that change) without these parts.
+        /// Translate a model with unsupported parts (shells that bend, radii that change) without these
+        /// parts.
         #[arg(long)]
         allow_partial: bool,
     },
@@ -80,13 +81,15 @@ pub enum Command {
                             pliant info liver.vtu --against liver.stl --against-scale 0.001"
     )]
     Info(Info),
-    /// List the labels of a segmented image: name, volume, location and pieces of each, and where the image cuts it off.
+    /// List the labels of a segmented image: name, volume, location and pieces of each, and where the image
+    /// cuts it off.
     #[command(
         after_help = "Examples:\n  pliant labels seg.nii.gz\n  pliant labels seg.nii.gz --names totalsegmentator\n  \
                             pliant labels liver.nii.gz tumour.nii.gz --json"
     )]
     Labels(Labels),
-    /// Make a mesh from labels of a segmented image or from a closed surface: tets, hexes, a surface or curved shells.
+    /// Make a mesh from labels of a segmented image or from a closed surface: tets, hexes, a surface or
+    /// curved shells.
     #[command(after_help = MESH_HELP)]
     Mesh(Box<MeshImage>),
     /// Moved into the laboratory.
@@ -95,7 +98,8 @@ pub enum Command {
     /// Moved into the laboratory.
     #[command(hide = true, disable_help_flag = true)]
     Bench(Moved),
-    /// Open a scene in a window: play it, pull it, turn the view. Or a finished run: scrub and play its frames.
+    /// Open a scene in a window: play it, pull it, turn the view. Or a finished run: scrub and play its
+    /// frames.
     #[command(
         after_help = "Examples:\n  pliant view scenes/liver\n  pliant view out/liver\n  pliant view scenes/cube --threads 1 --set run.precision=single\n  \
                             pliant view scenes/liver --record drag.pliant && pliant view scenes/liver --replay drag.pliant\n\n\
@@ -189,8 +193,8 @@ pub struct Moved {
 
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct Overrides {
-    /// Set any value of the scene; may be repeated. KEY is its path, with array items numbered from 0. VALUE is TOML; a single
-    /// word needs no quotes.
+    /// Set any value of the scene; may be repeated. KEY is its path, with array items numbered from 0. VALUE
+    /// is TOML; a single word needs no quotes.
     #[arg(long, value_name = "KEY=VALUE", allow_hyphen_values = true)]
     pub set: Vec<String>,
     /// Simulated time [s], instead of the scene's.
@@ -214,7 +218,8 @@ pub(crate) struct Overrides {
     /// Read only files in the folder of the scene, links resolved, for untrusted scenes (see SECURITY.md).
     #[arg(long)]
     pub sandbox: bool,
-    /// Omit parts of a NiftySim model that Pliant does not support (shells that bend, radii that change); this changes the model.
+    /// Omit parts of a NiftySim model that Pliant does not support (shells that bend, radii that change);
+    /// this changes the model.
     #[arg(long)]
     pub allow_partial: bool,
 }
@@ -244,8 +249,9 @@ pub struct Run {
     pub force: bool,
     /// Resume from a checkpoint (a file, or the last one in a folder), in its folder or in `--out`.
     ///
-    /// A scene writes checkpoints with `checkpoint = { every = 1.0 }` in `[run]`. The resumed run has the same bits as an
-    /// uninterrupted one, and its outputs continue from the checkpoint. Only `until` may differ.
+    /// A scene writes checkpoints with `checkpoint = { every = 1.0 }` in `[run]`. The resumed run has the
+    /// same bits as an uninterrupted one, and its outputs continue from the checkpoint. Only `until` may
+    /// differ.
     #[arg(long, value_name = "CHECKPOINT", conflicts_with = "force")]
     pub resume: Option<PathBuf>,
     /// Run even if this takes more than a day.
@@ -292,8 +298,8 @@ pub struct Sweep {
     /// Write into a folder that is not empty.
     #[arg(long)]
     pub force: bool,
-    /// Run only every N-th combination from the I-th on, and append rows to rows-I-of-N.jsonl in the folder: for job arrays. The same command again runs
-    /// what is missing.
+    /// Run only every N-th combination from the I-th on, and append rows to rows-I-of-N.jsonl in the folder:
+    /// for job arrays. The same command again runs what is missing.
     #[arg(long, value_name = "I/N", conflicts_with_all = ["force", "dry_run", "merge"])]
     pub part: Option<SweepPart>,
     /// Put the rows of all parts in the folder together into the table, and name what is missing.

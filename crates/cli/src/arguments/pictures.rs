@@ -56,7 +56,8 @@ Exit codes: 0 done, 1 the run or a picture failed, 2 invalid input or no adapter
 
 #[derive(Debug, clap::Args)]
 pub struct Render {
-    /// Folder of a finished run, scene file, folder with a scene.toml, NiftySim model (.xml), mesh file, or folder of scenes.
+    /// Folder of a finished run, scene file, folder with a scene.toml, NiftySim model (.xml), mesh file, or
+    /// folder of scenes.
     pub what: PathBuf,
     /// Frames: `all`, `last`, a number from 0, or a range: 0..20 (excludes 20), 10.. (to the end).
     #[arg(long, value_name = "FRAMES")]
@@ -67,7 +68,8 @@ pub struct Render {
     /// Write into a folder with other files.
     #[arg(long)]
     pub force: bool,
-    /// Make the pictures anew that a folder of scenes lists in `gallery.txt`, where they do not fit their scenes.
+    /// Make the pictures anew that a folder of scenes lists in `gallery.txt`, where they do not fit their
+    /// scenes.
     #[arg(long, conflicts_with_all = ["frames", "film", "out"])]
     pub gallery: bool,
     /// Also make a film of them (.mp4 or .png).
@@ -79,11 +81,12 @@ pub struct Render {
     /// Width and height [pixels].
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<[u32; 2]>,
-    /// Quantity shown by colours: a field, a component such as `displacement:z` or `cauchy-stress:xx`, `label` for a colour per label,
-    /// or `none`.
+    /// Quantity shown by colours: a field, a component such as `displacement:z` or `cauchy-stress:xx`,
+    /// `label` for a colour per label, or `none`.
     #[arg(long, value_name = "FIELD")]
     pub colour: Option<String>,
-    /// Hide labels, to show the inside, by number, name or range, and bodies, obstacles and tools by name, such as 2,tumour,5-8,grasper.
+    /// Hide labels, to show the inside, by number, name or range, and bodies, obstacles and tools by name,
+    /// such as 2,tumour,5-8,grasper.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', allow_hyphen_values = true)]
     pub hide: Vec<CellLabel>,
     /// See through labels or bodies, or give them one colour; repeatable: liver=0.3, or liver=0.3,liver.
@@ -116,21 +119,24 @@ pub struct Render {
     /// Draw the shape at rest, as a ghost.
     #[arg(long)]
     pub ghost: bool,
-    /// Draw fibres as short lines on the surface and in a section. A finished run needs the field `fibre` on the cells of its series.
+    /// Draw fibres as short lines on the surface and in a section. A finished run needs the field `fibre` on
+    /// the cells of its series.
     #[arg(long)]
     pub fibres: bool,
-    /// Draw the forces of contacts as arrows, through the bodies. A finished run needs the field `contact-force` in its series.
+    /// Draw the forces of contacts as arrows, through the bodies. A finished run needs the field
+    /// `contact-force` in its series.
     #[arg(long)]
     pub contacts: bool,
-    /// Mark constraints and loads, through the bodies: squares where nodes are held, dots where they are moved, arrows of loads. A finished
-    /// run needs the fields `constraint` and `load` in a series.
+    /// Mark constraints and loads, through the bodies: squares where nodes are held, dots where they are
+    /// moved, arrows of loads. A finished run needs the fields `constraint` and `load` in a series.
     #[arg(long)]
     pub marks: bool,
-    /// Mark the element with the smallest stable step, through the body. A finished run needs the field `element-step` on the cells of
-    /// its series.
+    /// Mark the element with the smallest stable step, through the body. A finished run needs the field
+    /// `element-step` on the cells of its series.
     #[arg(long)]
     pub critical: bool,
-    /// Do not mark the largest value that the colours tell. A ring marks it, dashed where something hides the place.
+    /// Do not mark the largest value that the colours tell. A ring marks it, dashed where something hides the
+    /// place.
     #[arg(long)]
     pub no_maximum: bool,
     /// Texture of the surface.
@@ -145,7 +151,8 @@ pub struct Render {
     /// Series of a finished run; by default the first in alphabetical order.
     #[arg(long, value_name = "NAME")]
     pub series: Option<String>,
-    /// Simulated time between frames of a scene [s]; by default that of its first series, otherwise a hundredth of the run.
+    /// Simulated time between frames of a scene [s]; by default that of its first series, otherwise a
+    /// hundredth of the run.
     #[arg(long, value_name = "S", value_parser = factor)]
     pub every: Option<f64>,
     #[command(flatten)]

@@ -98,7 +98,8 @@ pub fn scene(arguments: &MeshImage) -> Result<u8, Failure> {
     Ok(SUCCESS)
 }
 
-/// The image with the vessels inside of the organ as tissue, and their volumes inside and outside [m³]. Masks stay as they are.
+/// The image with the vessels inside of the organ as tissue, and their volumes inside and outside [m³]. Masks
+/// stay as they are.
 fn with_vessels(
     mut image: Image,
     organ: &MeshImage,
@@ -117,7 +118,8 @@ fn with_vessels(
     Ok((filled, Some(voxels.map(|voxels| voxels as f64 * image.grid.voxel_volume()))))
 }
 
-/// Corners of the box that holds all but one in two hundred of the places at either end of each axis: loose voxels do not count.
+/// Corners of the box that holds all but one in two hundred of the places at either end of each axis: loose
+/// voxels do not count.
 fn bulk(places: Vec<Vector3>) -> Option<[Vector3; 2]> {
     let last = places.len().checked_sub(1)?;
     let mut bounds = [Vector3::zeros(); 2];
@@ -142,7 +144,8 @@ struct Sources<'a> {
 }
 
 impl<'a> Sources<'a> {
-    /// Of one image the tissue takes the voxels of the vessels inside of it; masks overlap, and each stands for itself.
+    /// Of one image the tissue takes the voxels of the vessels inside of it; masks overlap, and each stands
+    /// for itself.
     fn of(arguments: &'a MeshImage) -> Result<Self, Failure> {
         let vessels = || arguments.vessels.iter().map(|(label, _)| label);
         if arguments.masks.is_empty() {

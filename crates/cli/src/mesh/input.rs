@@ -101,7 +101,8 @@ pub struct Segmented {
 /// Share of reading and of cropping in the work on an image, for the bar.
 const READING: f64 = 0.1;
 
-/// The chosen labels of an image, or all voxels from a threshold. Very many voxels are resampled to suit the cells.
+/// The chosen labels of an image, or all voxels from a threshold. Very many voxels are resampled to suit the
+/// cells.
 pub fn regions(arguments: &MeshImage, bar: &Bar) -> Result<Segmented, Failure> {
     regions_in(image(arguments, bar)?, arguments, bar)
 }

@@ -1,5 +1,5 @@
-//! `pliant labels` and `pliant mesh`: the labels of a segmented image, and volume meshes of an image or a closed surface. `skin.rs`
-//! makes surfaces and shells, `coupled.rs` scenes.
+//! `pliant labels` and `pliant mesh`: the labels of a segmented image, and volume meshes of an image or a
+//! closed surface. `skin.rs` makes surfaces and shells, `coupled.rs` scenes.
 
 mod coupled;
 mod input;

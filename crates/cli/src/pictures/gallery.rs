@@ -1,5 +1,6 @@
-//! `pliant render`, also of all scenes: a page with one of each, and the pictures that a folder lists, made anew where they do not fit their scenes. Files
-//! keep no times that last, so a picture has a hash of the scene and the options that it was made of.
+//! `pliant render`, also of all scenes: a page with one of each, and the pictures that a folder lists, made
+//! anew where they do not fit their scenes. Files keep no times that last, so a picture has a hash of the
+//! scene and the options that it was made of.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,7 +16,8 @@ use crate::arguments::{Arguments, Command, Render};
 use crate::report::{Failure, say};
 use crate::signals;
 
-/// Draws what a command line names; of a folder of scenes it makes a page, or the pictures that the folder lists.
+/// Draws what a command line names; of a folder of scenes it makes a page, or the pictures that the folder
+/// lists.
 pub fn render(arguments: &Render) -> Result<u8, Failure> {
     let film = arguments.film.as_deref().map(film_kind).transpose()?;
     if arguments.gallery {
@@ -44,7 +46,8 @@ fn entry(line: &str) -> Option<Entry> {
     Some(Entry { file: words.next()?, words: words.collect() })
 }
 
-/// The word before the folder, in the list, of pictures that the renderer is tested by: where these change, it draws otherwise.
+/// The word before the folder, in the list, of pictures that the renderer is tested by: where these change,
+/// it draws otherwise.
 const LOOK: &str = "look";
 
 fn read(path: &Path) -> Result<Vec<u8>, Failure> {
@@ -87,7 +90,8 @@ fn hex(hash: Sha256) -> String {
 }
 
 impl Entry {
-    /// A hash of all that it is made of: how the renderer draws, options, and files of the scene but pictures and texts on it.
+    /// A hash of all that it is made of: how the renderer draws, options, and files of the scene but pictures
+    /// and texts on it.
     fn source(&self, folder: &Path, look: &Sha256) -> Result<String, Failure> {
         let mut hash = look.clone();
         self.words.iter().for_each(|word| hash.update(format!("{word}\0")));
@@ -135,7 +139,8 @@ fn hash_of(file: &Path) -> Option<String> {
     Some(hex(hash))
 }
 
-/// Pictures that are not made of what the list has now, or that are other files than were made; each with the hash of what it is made of.
+/// Pictures that are not made of what the list has now, or that are other files than were made; each with the
+/// hash of what it is made of.
 fn outdated(folder: &Path) -> Result<Vec<(Entry, String)>, Failure> {
     let sums = sums(folder);
     let mut old = Vec::new();
@@ -314,7 +319,8 @@ mod tests {
         assert_ne!(source(), before);
     }
 
-    /// All pictures that texts show are listed, but those of the window and of data that is not here; and so is each scene.
+    /// All pictures that texts show are listed, but those of the window and of data that is not here; and so
+    /// is each scene.
     #[test]
     fn pictures_in_texts_are_listed() {
         let (listed, _) = entries(&repository().join("scenes")).unwrap();

@@ -1,6 +1,7 @@
-//! Distances of a point and a triangle and of two edges, with the points that are nearest. With the coefficients c of the four points, Σ cᵢ xᵢ
-//! is the way from the second primitive to the first and n = Σ cᵢ xᵢ / d its direction; ∂d/∂xᵢ = cᵢ n, since the nearest points
-//! minimise the distance (envelope theorem). Edges that are nearly parallel have a smooth factor beside ([`Mollifier`]).
+//! Distances of a point and a triangle and of two edges, with the points that are nearest. With the
+//! coefficients c of the four points, Σ cᵢ xᵢ is the way from the second primitive to the first and n = Σ cᵢ
+//! xᵢ / d its direction; ∂d/∂xᵢ = cᵢ n, since the nearest points minimise the distance (envelope theorem).
+//! Edges that are nearly parallel have a smooth factor beside ([`Mollifier`]).
 
 use nalgebra::Vector3;
 use pliant_geometry::barycentric_of_closest;
@@ -23,7 +24,8 @@ pub enum Region {
 pub struct Nearest {
     /// Their distance d [m].
     pub distance: f64,
-    /// Coefficients c of the four points: Σ c = 0, Σ c x is the way [m] from the second primitive to the first.
+    /// Coefficients c of the four points: Σ c = 0, Σ c x is the way [m] from the second primitive to the
+    /// first.
     pub coefficients: [f64; 4],
     /// Σ c x / d; zero where the primitives meet.
     pub normal: Vector3<f64>,
@@ -148,8 +150,9 @@ fn nearest_difference([a, b, c, d]: &[Vector3<f64>; 4], [s, t]: [f64; 2]) -> Vec
     (if s < 0.5 { a } else { b }) - (if t < 0.5 { c } else { d })
 }
 
-/// The factor m(x) = (2 − x/e) x/e of two edges whose x = |e₁ × e₂|² is below e = 10⁻³ |E₁|² |E₂|², 1 above: it takes away the jump of the
-/// nearest points of parallel edges (Li et al. 2020, equation 24; E are the edges at rest).
+/// The factor m(x) = (2 − x/e) x/e of two edges whose x = |e₁ × e₂|² is below e = 10⁻³ |E₁|² |E₂|², 1 above:
+/// it takes away the jump of the nearest points of parallel edges (Li et al. 2020, equation 24; E are the
+/// edges at rest).
 #[derive(Clone, Copy, Debug)]
 pub struct Mollifier {
     /// m.
@@ -190,8 +193,8 @@ mod tests {
     use pliant_testing::Random;
     use serde_json::Value;
 
-    /// The distance alone is that of the nearest points, of edges in any position, parallel ones and points among them: 1e-9 of it and of the
-    /// round-off of coordinates.
+    /// The distance alone is that of the nearest points, of edges in any position, parallel ones and points
+    /// among them: 1e-9 of it and of the round-off of coordinates.
     #[test]
     fn distances_of_edges_alone_are_those_of_their_nearest_points() {
         let mut random = Random::new(8);
@@ -240,7 +243,8 @@ mod tests {
         nearest.coefficients.map(|c| nearest.normal * c)
     }
 
-    /// The 100 pairs of a point and a triangle, all regions: distances to 1e-12 or round-off of the coordinates, gradients of distance and barrier to 1e-9.
+    /// The 100 pairs of a point and a triangle, all regions: distances to 1e-12 or round-off of the
+    /// coordinates, gradients of distance and barrier to 1e-9.
     #[test]
     fn point_triangle_pairs_are_those_of_the_reference() {
         let reference = reference();
@@ -270,7 +274,8 @@ mod tests {
         );
     }
 
-    /// The 100 pairs of edges: distances to 1e-12 (near-parallel ones to 1e-8), gradients and those of mollified barriers to 1e-9.
+    /// The 100 pairs of edges: distances to 1e-12 (near-parallel ones to 1e-8), gradients and those of
+    /// mollified barriers to 1e-9.
     #[test]
     fn edge_edge_pairs_are_those_of_the_reference() {
         let reference = reference();
@@ -344,7 +349,8 @@ mod tests {
                 }
                 let slopes =
                     [ahead.0.distance - behind.0.distance, ahead.1 - behind.1].map(|d| d / (2.0 * h));
-                // The mollifier has two pieces, and near-parallel edges jump: they are compared by the product below.
+                // The mollifier has two pieces, and near-parallel edges jump: they are compared by the
+                // product below.
                 if !edges || Mollifier::of(&x, rest).value == 1.0 {
                     assert!(
                         (slopes[0] - near.coefficients[i] * near.normal[c]).abs() < 1e-6,

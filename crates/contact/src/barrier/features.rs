@@ -20,8 +20,9 @@ pub(super) struct Features {
 }
 
 impl Features {
-    /// Those of a shape that bodies are outside of. A sphere is a point and a capsule an edge, with their radius; others are their corners
-    /// and edges, round ones those of the 32 flat sides they are drawn with. Edges between sides in one plane count for nothing.
+    /// Those of a shape that bodies are outside of. A sphere is a point and a capsule an edge, with their
+    /// radius; others are their corners and edges, round ones those of the 32 flat sides they are drawn with.
+    /// Edges between sides in one plane count for nothing.
     pub fn of(shape: &Shape) -> Self {
         match *shape {
             Shape::Sphere { radius } => {

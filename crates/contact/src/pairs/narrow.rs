@@ -8,8 +8,8 @@ pub(crate) const PARALLEL: f64 = 1e-6;
 /// The sine of the angle by which the triangles of an edge may be bent inward and still count as flat.
 pub(crate) const FLAT: f64 = 1e-6;
 
-/// An edge with the nodes across it of the triangles that it is part of: of the one that has its ends in this order, and of the other one, or the
-/// same again at a border.
+/// An edge with the nodes across it of the triangles that it is part of: of the one that has its ends in this
+/// order, and of the other one, or the same again at a border.
 #[derive(Clone, Copy, Debug)]
 pub struct Edge {
     /// Its ends.
@@ -80,7 +80,8 @@ impl Above {
     }
 }
 
-/// Whether a way leads along a normal, or hardly against it: bodies that touch press each other flat, and what is flat is not left to round-off.
+/// Whether a way leads along a normal, or hardly against it: bodies that touch press each other flat, and
+/// what is flat is not left to round-off.
 #[inline]
 fn is_before(normal: &Vector3<f64>, way: &Vector3<f64>) -> bool {
     normal.dot(way) >= -FLAT * way.norm()
@@ -119,7 +120,8 @@ impl Across {
         if normal.dot(&between).abs() > within {
             return None;
         }
-        // The normal leads out of the second and into the first, whose triangles are all behind it or before it.
+        // The normal leads out of the second and into the first, whose triangles are all behind it or before
+        // it.
         let normal = if normal.dot(&second.outward(place)) < 0.0 { -normal } else { normal };
         let behind = second.across.iter().all(|&node| is_before(&-normal, &(place(node) - c)));
         let before = first.across.iter().all(|&node| is_before(&normal, &(place(node) - a)));

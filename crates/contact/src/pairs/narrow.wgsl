@@ -1,8 +1,9 @@
-// Where points lie by triangles, and where edges cross; twin of narrow.rs and of `Pairs::find`. The module around it gives
-// `between(a, b)`, the way [m] from node b to node a before the step; `ring_of(k)`, the other corners, in order, of a triangle around a node, for every second k;
-// `corners_of(row)`, the triangle of a candidate; `at_border(row, corners)`,
-// whether those of its corners that are told are all at borders; `take_pair(row, nodes, weights, normal, distance)`, which notes a pair that is
-// found in the place of its candidate, and `leave_pair(row)`, which notes that there is none; and exact.wgsl.
+// Where points lie by triangles, and where edges cross; twin of narrow.rs and of `Pairs::find`. The module
+// around it gives `between(a, b)`, the way [m] from node b to node a before the step; `ring_of(k)`, the other
+// corners, in order, of a triangle around a node, for every second k; `corners_of(row)`, the triangle of a
+// candidate; `at_border(row, corners)`, whether those of its corners that are told are all at borders;
+// `take_pair(row, nodes, weights, normal, distance)`, which notes a pair that is found in the place of its
+// candidate, and `leave_pair(row)`, which notes that there is none; and exact.wgsl.
 //
 // Places are ways from one of the nodes, so that single precision keeps the digits of gaps.
 
@@ -84,8 +85,8 @@ fn node_outward(node: u32, first: u32, end: u32) -> vec3f {
     return unit(area);
 }
 
-// Finds what a node touches among the triangles of its candidates, from one row to another: `ring` tells those around it; no farther than `within`
-// [m]. `reach` and `depth` [m] are those of the lists.
+// Finds what a node touches among the triangles of its candidates, from one row to another: `ring` tells
+// those around it; no farther than `within` [m]. `reach` and `depth` [m] are those of the lists.
 fn find_above(node: u32, ring: vec2u, first: u32, end: u32, within: f32, reach: f32, depth: f32) {
     var outward = vec3f(0.0);
     var is_oriented = false;
@@ -192,7 +193,8 @@ fn is_before(normal: vec3f, way: vec3f) -> bool {
     return dot(normal, way) >= -FLAT * norm(way);
 }
 
-// Finds where two edges from a to b and from c to d touch from outside, with the nodes across them of their triangles.
+// Finds where two edges from a to b and from c to d touch from outside, with the nodes across them of their
+// triangles.
 fn find_crossing(row: u32, nodes: vec4u, across: vec4u) {
     leave_pair(row);
     // From the first end of each.
@@ -233,7 +235,8 @@ fn find_crossing(row: u32, nodes: vec4u, across: vec4u) {
     }
 }
 
-// The sum of the outward normals of the triangles of an edge, from the ways from its first end to its other one and to the nodes across.
+// The sum of the outward normals of the triangles of an edge, from the ways from its first end to its other
+// one and to the nodes across.
 fn edge_outward(along: vec3f, left: vec3f, right: vec3f, is_border: bool) -> vec3f {
     return unit(cross(along, left)) + select(unit(cross(along, -right)), vec3f(0.0), is_border);
 }

@@ -19,8 +19,8 @@ fn found(pairs: &Pairs, places: &[Vector3<f64>]) -> Vec<Pair> {
     all
 }
 
-/// Two sheets that face each other, shifted: distances and normals are those of the planes, weights give the way between the points, and lists
-/// hold while nodes move by less than half of the skin.
+/// Two sheets that face each other, shifted: distances and normals are those of the planes, weights give the
+/// way between the points, and lists hold while nodes move by less than half of the skin.
 #[test]
 fn sheets_that_face_each_other_are_seen_with_their_distance() {
     let (low, mut places) = square(3, true, 0);
@@ -56,8 +56,8 @@ fn sheets_that_face_each_other_are_seen_with_their_distance() {
     assert!(found(&pairs, &places).is_empty());
 }
 
-/// A sheet that begins askew above another one, at its lower side nearer than both keep: nodes there keep the distance that they have, so that no pair is
-/// pushed apart, and others the whole.
+/// A sheet that begins askew above another one, at its lower side nearer than both keep: nodes there keep the
+/// distance that they have, so that no pair is pushed apart, and others the whole.
 #[test]
 fn what_is_nearer_at_the_start_keeps_that_distance() {
     let (low, mut places) = square(6, true, 0);
@@ -95,7 +95,8 @@ fn what_is_nearer_at_the_start_keeps_that_distance() {
     assert!(least < 0.1, "{least}");
 }
 
-/// Pairs at some places are those of lists made at these places, and of lists with a larger skin, to the last bit.
+/// Pairs at some places are those of lists made at these places, and of lists with a larger skin, to the last
+/// bit.
 #[test]
 fn pairs_do_not_depend_on_when_lists_are_made() {
     let (low, mut rest) = square(6, true, 0);
@@ -144,7 +145,8 @@ fn pairs_do_not_depend_on_when_lists_are_made() {
     }
 }
 
-/// A corner that comes down on the border of a square is above that; of the wall beneath, in one plane with the corner's own wall, it is none.
+/// A corner that comes down on the border of a square is above that; of the wall beneath, in one plane with
+/// the corner's own wall, it is none.
 #[test]
 fn walls_in_one_plane_do_not_touch() {
     // The upper side and the wall x = 0 of a block, and a corner with three sides that faces down and to −x.
@@ -154,7 +156,8 @@ fn walls_in_one_plane_do_not_touch() {
     let block = Surface { nodes: (0..6).collect(), faces: vec![[0, 1, 2], [0, 2, 3], [4, 0, 3], [4, 3, 5]] };
     places.extend([[0.0, 4.0, 0.1], [3.0, 4.0, 0.1], [0.0, 4.0, 3.0], [0.0, 7.0, 3.0]].map(Vector3::from));
     let corner = Surface { nodes: (6..10).collect(), faces: vec![[6, 8, 9], [6, 7, 8], [6, 9, 7]] };
-    // In the plane of the wall, and to rounding before or behind it; close to the border and farther away from it.
+    // In the plane of the wall, and to rounding before or behind it; close to the border and farther away
+    // from it.
     for (shift, height) in [0.0, 1e-15, -1e-15].into_iter().flat_map(|x| [(x, 0.1), (x, 0.4)]) {
         let mut places = places.clone();
         places[6..].iter_mut().for_each(|place| *place += Vector3::new(shift, 0.0, height));
@@ -167,7 +170,8 @@ fn walls_in_one_plane_do_not_touch() {
     }
 }
 
-/// A sheet folded like a U touches itself across the fold, not beside it; the sides of a thin plate do not touch through it.
+/// A sheet folded like a U touches itself across the fold, not beside it; the sides of a thin plate do not
+/// touch through it.
 #[test]
 fn a_folded_sheet_touches_itself_across_the_fold_only() {
     let (sheet, flat) = square(8, true, 0);

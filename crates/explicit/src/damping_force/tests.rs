@@ -33,7 +33,8 @@ fn oscillator() -> Model {
     model
 }
 
-/// By which factor the amplitude of a mode changes in a step, at Ω: a root of the characteristic polynomial by Newton's method.
+/// By which factor the amplitude of a mode changes in a step, at Ω: a root of the characteristic polynomial
+/// by Newton's method.
 fn expected(omega: f64) -> f64 {
     let (eta, square) = (DISSIPATION, omega * omega);
     let mut z = Complex::from_polar(1.0, 2.0 * (0.5 * omega).asin());
@@ -46,7 +47,8 @@ fn expected(omega: f64) -> f64 {
     z.norm()
 }
 
-/// The largest displacement of the node [m] over some steps in the first and in the last ones of a run, and the energies at its end.
+/// The largest displacement of the node [m] over some steps in the first and in the last ones of a run, and
+/// the energies at its end.
 fn run(omega: f64, steps: usize) -> ([f64; 2], pliant_mechanics::Energies) {
     let model = oscillator();
     // 2/ω.
@@ -150,7 +152,8 @@ fn the_critical_time_step_is_that_of_the_damped_scheme() {
     }
 }
 
-/// A mass on a bar decays by √(1 − βω²Δt) each step, as the scheme says, which is its ratio βω/2 where steps are short. What is lost is damping.
+/// A mass on a bar decays by √(1 − βω²Δt) each step, as the scheme says, which is its ratio βω/2 where steps
+/// are short. What is lost is damping.
 #[test]
 fn a_vibration_decays_with_its_ratio() {
     let mut model = Model::default();
@@ -261,7 +264,8 @@ fn a_rotation_is_damped_at_the_rate_that_is_told() {
     assert!((lost / (damping * omega * omega * 4.0) - 1.0).abs() < 0.1, "{lost}");
 }
 
-/// A cube that is squeezed to 60 % stiffens, and its steps are cut in time with damping, too: it comes to rest.
+/// A cube that is squeezed to 60 % stiffens, and its steps are cut in time with damping, too: it comes to
+/// rest.
 #[test]
 fn steps_are_cut_where_damping_and_stiffness_together_ask_for_it() {
     let mut model = distorted_cube("hex8-full", laws()[0]);

@@ -1,22 +1,24 @@
-//! Quasi-static equilibrium by adaptive dynamic relaxation (Joldes, Wittek and Miller 2011): a fictitious damped motion
-//! whose masses make every cell equally fast and whose damping follows the slowest mode still moving,
-//! uⁿ⁺¹ = uⁿ + β (uⁿ − uⁿ⁻¹) − α M⁻¹ r, α = 2/(2+c), β = (2−c)/(2+c), c = 2 √(A₀ A_m/(A₀ + A_m)), A_m = 4,
-//! A₀ a running Rayleigh quotient Δuᵀ Δr / Δuᵀ M Δu of the last increment. Masses: m_a = s/n Σ_e V_e (λ+2μ) Σ|B|²
-//! over the cells at a node, n nodes per cell, s = 1.25.
+//! Quasi-static equilibrium by adaptive dynamic relaxation (Joldes, Wittek and Miller 2011): a fictitious
+//! damped motion whose masses make every cell equally fast and whose damping follows the slowest mode still
+//! moving, uⁿ⁺¹ = uⁿ + β (uⁿ − uⁿ⁻¹) − α M⁻¹ r, α = 2/(2+c), β = (2−c)/(2+c), c = 2 √(A₀ A_m/(A₀ + A_m)),
+//! A_m = 4, A₀ a running Rayleigh quotient Δuᵀ Δr / Δuᵀ M Δu of the last increment. Masses: m_a = s/n Σ_e V_e
+//! (λ+2μ) Σ|B|² over the cells at a node, n nodes per cell, s = 1.25.
 //!
-//! Time is that of loads, motions and relaxing laws; inertia and damping of the bodies play no part. What acts at time 0 already
-//! comes at once: the first equilibrium is that of the instantaneous laws at time 0, reached from rest. A load step that
-//! fails is tried again in halves, with twice the masses. History is committed at convergence only: inside a step every trial starts from the
-//! history of the step before.
+//! Time is that of loads, motions and relaxing laws; inertia and damping of the bodies play no part. What
+//! acts at time 0 already comes at once: the first equilibrium is that of the instantaneous laws at time 0,
+//! reached from rest. A load step that fails is tried again in halves, with twice the masses. History is
+//! committed at convergence only: inside a step every trial starts from the history of the step before.
 //!
-//! *Energies.* Internal is ∫ S:dE: the energy stored by the instantaneous laws, Σ V Ψ, less ∫ (f_Ψ − f)·du with f_Ψ their force and f
-//! the relaxed one, by Simpson's rule over each load step; so it is what is stored and what relaxing laws have dissipated. External is
-//! the work of loads, reactions and prescribed motions, by the trapezoidal rule over each load step. The two have nothing in common but
-//! the displacements. The error of a trapezium over b, after one over a, is estimated from both: (T_ab − T_a − T_b) b²/(3 a (a + b)),
-//! with a and b the lengths of the ways of all nodes.
+//! *Energies.* Internal is ∫ S:dE: the energy stored by the instantaneous laws, Σ V Ψ, less ∫ (f_Ψ − f)·du
+//! with f_Ψ their force and f the relaxed one, by Simpson's rule over each load step; so it is what is stored
+//! and what relaxing laws have dissipated. External is the work of loads, reactions and prescribed motions,
+//! by the trapezoidal rule over each load step. The two have nothing in common but the displacements. The
+//! error of a trapezium over b, after one over a, is estimated from both: (T_ab − T_a − T_b) b²/(3 a (a +
+//! b)), with a and b the lengths of the ways of all nodes.
 //!
-//! *Error of the displacements.* In double precision |M⁻¹ r|/(ω² |u|), in the norm of M, with ω² of the slowest mode. In single precision,
-//! where round-off fills the residual, from the work of the residual along the load step.
+//! *Error of the displacements.* In double precision |M⁻¹ r|/(ω² |u|), in the norm of M, with ω² of the
+//! slowest mode. In single precision, where round-off fills the residual, from the work of the residual along
+//! the load step.
 
 mod accuracy;
 mod path;
@@ -46,8 +48,8 @@ use crate::stepper::{Observable, owned_only, sum_owned};
 
 /// Nodes per parallel task.
 const CHUNK: usize = 512;
-/// s: margin of the fictitious masses against stiffening. Doubled when a load step fails: cells at a glued edge stiffen
-/// many times over in compression, and a motion too fast for them turns them inside out.
+/// s: margin of the fictitious masses against stiffening. Doubled when a load step fails: cells at a glued
+/// edge stiffen many times over in compression, and a motion too fast for them turns them inside out.
 const MASS_MARGIN: f64 = 1.25;
 /// Iterations over which a load step is brought on.
 const RAMP: usize = 200;
@@ -55,13 +57,14 @@ const RAMP: usize = 200;
 const RAMP_DAMPING: f64 = 0.02;
 /// Iterations from one report to the next.
 const REPORT: usize = 20;
-/// Where the residual is below this many tolerances, round-off of single precision makes the slowest mode look faster than it is.
+/// Where the residual is below this many tolerances, round-off of single precision makes the slowest mode
+/// look faster than it is.
 const ROUGH: f64 = 10.0;
 /// A way shorter than this part of another one doesn't tell how forces bend along that one.
 const SHORTEST: f64 = 0.1;
 
-/// Finds equilibria of one model. Holds constants, scratch and the [`Equilibrium`] last found; the next one comes from
-/// the state alone.
+/// Finds equilibria of one model. Holds constants, scratch and the [`Equilibrium`] last found; the next one
+/// comes from the state alone.
 pub struct DynamicRelaxation<R> {
     model: Arc<Model>,
     settings: RelaxationSettings,
@@ -88,7 +91,8 @@ pub struct DynamicRelaxation<R> {
     way: Way<R>,
 }
 
-/// The number types of [`DynamicRelaxation`], and what is compiled for them here and not again where a model is solved.
+/// The number types of [`DynamicRelaxation`], and what is compiled for them here and not again where a model
+/// is solved.
 pub trait RelaxedIn: LaneNumber {
     /// As [`DynamicRelaxation::new`].
     #[doc(hidden)]
@@ -211,8 +215,8 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         Equilibrium { energies: self.energies, residual: self.residual.clone(), way: self.way.clone() }
     }
 
-    /// Takes forces [N] from outside, one a node, or none: they and no others act in the equilibria to come until they are replaced. Their work is
-    /// external.
+    /// Takes forces [N] from outside, one a node, or none: they and no others act in the equilibria to come
+    /// until they are replaced. Their work is external.
     pub fn push(&mut self, forces: &[Vector<f64>]) {
         self.applied.push(forces);
     }
@@ -227,8 +231,8 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         &self.way
     }
 
-    /// Brings a state at time 0 to its equilibrium there, if any load or motion acts then already; else nothing happens, and
-    /// neither where that is done. [`solve`](Self::solve) does it first.
+    /// Brings a state at time 0 to its equilibrium there, if any load or motion acts then already; else
+    /// nothing happens, and neither where that is done. [`solve`](Self::solve) does it first.
     ///
     /// # Errors
     /// If no equilibrium is found, however small the parts in which loads and motions are brought on.
@@ -254,7 +258,8 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         self.stop = flag.clone();
     }
 
-    /// Brings a state to the equilibrium at a later time [s]. On failure the state is that of the last equilibrium.
+    /// Brings a state to the equilibrium at a later time [s]. On failure the state is that of the last
+    /// equilibrium.
     ///
     /// # Errors
     /// If no equilibrium is found in load steps of the least allowed size.
@@ -390,7 +395,8 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         })
     }
 
-    /// Corners of hexahedra are judged in equilibria only: on the way there they may be out of place for a while.
+    /// Corners of hexahedra are judged in equilibria only: on the way there they may be out of place for a
+    /// while.
     fn check_corners(&self, state: &State<R>, iterations: usize, time: f64) -> Result<(), RelaxationError> {
         let Some((solid, cell)) = self.folded else { return Ok(()) };
         let solid = &self.model.solids[solid];
@@ -407,8 +413,8 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         })
     }
 
-    /// The error of the displacements over themselves by the slowest mode, that of a squared frequency: |M⁻¹ r|/(ω² |u|) in the norm
-    /// of the masses.
+    /// The error of the displacements over themselves by the slowest mode, that of a squared frequency: |M⁻¹
+    /// r|/(ω² |u|) in the norm of the masses.
     fn error_of_slowest(&self, state: &State<R>, slowest: f64) -> f64 {
         let (mut left, mut size) = (0.0, 0.0);
         for (node, u) in state.displacement.iter().enumerate() {
@@ -424,8 +430,8 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         if error.is_finite() { error } else { 0.0 }
     }
 
-    /// The work of the residual along the load step over that of the forces from outside: the part of the way that is left, in which
-    /// round-off averages out.
+    /// The work of the residual along the load step over that of the forces from outside: the part of the way
+    /// that is left, in which round-off averages out.
     fn left_along_the_way(&self, forces: &InternalForces<R>, state: &State<R>, start: &Start<R>) -> f64 {
         let (mut left, mut work) = (0.0, 0.0);
         for (node, (u, u0)) in state.displacement.iter().zip(&start.displacement).enumerate() {
@@ -551,7 +557,8 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         self.model.follow(&mut state.displacement);
     }
 
-    /// Adds to the residual the forces of collective constraints, from where their nodes would go without more of them.
+    /// Adds to the residual the forces of collective constraints, from where their nodes would go without
+    /// more of them.
     fn bind(&mut self, state: &State<R>, [alpha, beta]: [R; 2], Instant { time, part }: Instant) {
         let Self { model, collectives, bound, residual, increment, mass, owners, .. } = self;
         for own in collectives {
@@ -581,14 +588,16 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         }
     }
 
-    /// Takes the forces of collective constraints out of the residual: it is internal minus applied force again.
+    /// Takes the forces of collective constraints out of the residual: it is internal minus applied force
+    /// again.
     fn unbind(&mut self) {
         for (residual, bound) in self.residual.iter_mut().zip(&self.bound) {
             (0..3).for_each(|c| residual[c] += bound[c]);
         }
     }
 
-    /// What means of faces and enclosed volumes bear [N], of what each node resists with beyond what is applied: work from outside.
+    /// What means of faces and enclosed volumes bear [N], of what each node resists with beyond what is
+    /// applied: work from outside.
     fn borne(&self, state: &State<R>, resisting: impl Fn(usize) -> Vector<R>) -> Vec<(u32, Vector<R>)> {
         let place = |node: u32| {
             let node = node as usize;
@@ -651,8 +660,9 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         state.time = end.time;
     }
 
-    /// ∫ (f_Ψ − f)·du [J] over a load step that came to an equilibrium: what the instantaneous laws would have stored, but relaxing ones
-    /// did not take up. By Simpson's rule; where a cell is inverted halfway on the straight line, by the trapezoidal rule.
+    /// ∫ (f_Ψ − f)·du [J] over a load step that came to an equilibrium: what the instantaneous laws would
+    /// have stored, but relaxing ones did not take up. By Simpson's rule; where a cell is inverted halfway on
+    /// the straight line, by the trapezoidal rule.
     fn given_up(
         &mut self,
         forces: &mut InternalForces<R>,
@@ -682,7 +692,8 @@ impl<R: RelaxedIn> DynamicRelaxation<R> {
         (0..state.displacement.len()).map(of_node).sum()
     }
 
-    /// f_Ψ − f [N] of the nodes in some place, a step of the forces after the state's history; whether no cell is inverted there.
+    /// f_Ψ − f [N] of the nodes in some place, a step of the forces after the state's history; whether no
+    /// cell is inverted there.
     fn missing(
         &mut self,
         forces: &mut InternalForces<R>,

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::SHORTEST;
 use crate::lanes::LaneNumber;
 
-/// What is known of the equilibrium a state stands at, beside the state: what a restart needs to show it again.
+/// What is known of the equilibrium a state stands at, beside the state: what a restart needs to show it
+/// again.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Equilibrium<R> {
     /// Energies [J].
@@ -25,12 +26,13 @@ pub struct Way<R> {
     /// Equilibria found.
     #[serde(deserialize_with = "count::read")]
     pub equilibria: u64,
-    /// Estimated error of the external work [J]: the trapezia less the integral. That of a first one is known where the next way
-    /// isn't much shorter.
+    /// Estimated error of the external work [J]: the trapezia less the integral. That of a first one is known
+    /// where the next way isn't much shorter.
     pub error: Option<f64>,
     /// Estimated error of the displacements over the largest one, at worst.
     pub displacement_error: f64,
-    /// From the last equilibrium but one to the last, of each node: the motion [m] and the change of load and reaction [N].
+    /// From the last equilibrium but one to the last, of each node: the motion [m] and the change of load and
+    /// reaction [N].
     pub(super) last: Vec<[Vector<R>; 2]>,
 }
 
@@ -68,7 +70,8 @@ impl<R: LaneNumber> Way<R> {
     }
 }
 
-/// An instant that is sought or passed: the loads and motions of a time [s], or at the start a part of those of time 0.
+/// An instant that is sought or passed: the loads and motions of a time [s], or at the start a part of those
+/// of time 0.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Instant {
     pub(super) time: f64,

@@ -11,8 +11,9 @@ pub const PATIENCE: usize = 4000;
 pub struct RelaxationSettings {
     /// Largest residual force on a free component, over the largest internal force.
     pub tolerance: f64,
-    /// Estimated error of the displacements over the largest one, in single precision, where round-off hides how far an equilibrium
-    /// is in the residual of slender bodies: a search goes on for it, though not for more than `PATIENCE` iterations.
+    /// Estimated error of the displacements over the largest one, in single precision, where round-off hides
+    /// how far an equilibrium is in the residual of slender bodies: a search goes on for it, though not for
+    /// more than `PATIENCE` iterations.
     pub displacement: f64,
     /// Iterations after which a load step has failed.
     pub iterations: usize,

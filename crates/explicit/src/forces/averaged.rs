@@ -1,11 +1,12 @@
-//! Linear tetrahedra whose pressure is averaged over nodes, so that they do not lock for nearly incompressible tissue.
+//! Linear tetrahedra whose pressure is averaged over nodes, so that they do not lock for nearly
+//! incompressible tissue.
 //!
-//! *Nodal* (Bonet and Burton 1998): J_n = Σ V_e J_e / Σ V_e over the cells at a node, p_n = U'(J_n), p_e the mean of the
-//! cell's four p_n, f_a = V_e (P_iso + p_e cof F) B_a: exactly the gradient of Σ V_e W_iso + Σ V_n U(J_n).
-//! *Variational*: J̄_e the mean of the four J_n, p_e' = U'(J̄_e), p_n their mean weighted by volume, p_e as above: the
-//! gradient of Σ V_e (W_iso + U(J̄_e)). Softer; watch for pressure modes.
-//! *NiftySim* (Joldes, Wittek and Miller 2009): the whole law at F̄ = (J̄_e/J_e)^(1/3) F, f_a = V_e F̄ S(F̄) B_a. Not the
-//! gradient of an energy: for the answers of imported models only.
+//! *Nodal* (Bonet and Burton 1998): J_n = Σ V_e J_e / Σ V_e over the cells at a node, p_n = U'(J_n), p_e the
+//! mean of the cell's four p_n, f_a = V_e (P_iso + p_e cof F) B_a: exactly the gradient of Σ V_e W_iso + Σ
+//! V_n U(J_n). *Variational*: J̄_e the mean of the four J_n, p_e' = U'(J̄_e), p_n their mean weighted by
+//! volume, p_e as above: the gradient of Σ V_e (W_iso + U(J̄_e)). Softer; watch for pressure modes.
+//! *NiftySim* (Joldes, Wittek and Miller 2009): the whole law at F̄ = (J̄_e/J_e)^(1/3) F, f_a = V_e F̄ S(F̄)
+//! B_a. Not the gradient of an energy: for the answers of imported models only.
 //!
 //! Averages are those of one solid: a node on an interface has a J_n for each material.
 
@@ -335,8 +336,8 @@ fn dilated<L: pliant_mechanics::Number>(h: &Tensor<L>, volume_ratio: L, change: 
 }
 
 impl<R: LaneNumber> AveragedConstants<R> {
-    /// The first Piola–Kirchhoff stress: of the law where the deformation is averaged, else of its isochoric part and the
-    /// pressure of the nodes, F S_iso + p cof F.
+    /// The first Piola–Kirchhoff stress: of the law where the deformation is averaged, else of its isochoric
+    /// part and the pressure of the nodes, F S_iso + p cof F.
     #[inline(always)]
     fn piola<L: Lanes<R>>(
         &self,

@@ -1,4 +1,5 @@
-//! Bars and threads: f = A P (x₂ − x₁)/l with P = E (λ − 1), which relaxes as the law does; of a thread, no compression.
+//! Bars and threads: f = A P (x₂ − x₁)/l with P = E (λ − 1), which relaxes as the law does; of a thread, no
+//! compression.
 //!
 //! A bar takes 24 bytes of displacements and 44 of its own in single precision, and some 40 operations.
 

@@ -1,6 +1,6 @@
-//! Points evaluated together: elements fill in displacement gradients, the law answers with stresses. So an element is
-//! compiled once for each kind of lanes and a law once for each, not every law again in every element; the choice of the
-//! law costs one branch per batch.
+//! Points evaluated together: elements fill in displacement gradients, the law answers with stresses. So an
+//! element is compiled once for each kind of lanes and a law once for each, not every law again in every
+//! element; the choice of the law costs one branch per batch.
 
 use pliant_mechanics::Number;
 use pliant_mechanics::law::{AnyLaw, Deformation, Law, MOST_FAMILIES, Split, with_law};
@@ -74,7 +74,8 @@ impl<R: LaneNumber> Batch<R> {
         }
     }
 
-    /// What is wanted of the stresses of the first packs. `fibres` has the directions of each cell, which has `points` points one after the other.
+    /// What is wanted of the stresses of the first packs. `fibres` has the directions of each cell, which has
+    /// `points` points one after the other.
     #[inline(always)]
     pub(crate) fn evaluate<L: Lanes<R>>(
         &mut self,
@@ -116,8 +117,8 @@ impl<R: LaneNumber> Batch<R> {
         f
     }
 
-    /// Notes how far the points of a pack of cells are deformed, and which cell is the first whose det F is not above
-    /// zero.
+    /// Notes how far the points of a pack of cells are deformed, and which cell is the first whose det F is
+    /// not above zero.
     #[inline(always)]
     pub(crate) fn note(&self, pack: usize, first_cell: usize, findings: &mut Findings<R>) {
         let (ratios, strains) = (&self.volume_ratio[pack].0, &self.strain[pack].0);
@@ -190,8 +191,8 @@ impl<R: LaneNumber, T: Law> LaneWork<R> for Stresses<'_, R, T> {
     }
 }
 
-/// U'(J) [Pa] of a law whose volumetric stress is J U'(J) C⁻¹, at up to [`PACKS`] packs of J − 1, from its stress in a pure
-/// dilation F = J^(1/3) I.
+/// U'(J) [Pa] of a law whose volumetric stress is J U'(J) C⁻¹, at up to [`PACKS`] packs of J − 1, from its
+/// stress in a pure dilation F = J^(1/3) I.
 #[inline(always)]
 pub(super) fn pressures<R: LaneNumber, L: Lanes<R>>(
     law: &AnyLaw,

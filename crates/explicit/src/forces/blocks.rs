@@ -1,7 +1,7 @@
-//! Cells block by block. A block copies the displacements of its nodes in, adds the forces of its cells up cell by cell in
-//! sums of its own, and leaves these for the nodes: each node adds the few blocks at it up in their order. So a block
-//! works in the first caches, and neither its size nor its sums depend on the number of threads. No atomic is needed, and all arrays have
-//! their final length from the start.
+//! Cells block by block. A block copies the displacements of its nodes in, adds the forces of its cells up
+//! cell by cell in sums of its own, and leaves these for the nodes: each node adds the few blocks at it up in
+//! their order. So a block works in the first caches, and neither its size nor its sums depend on the number
+//! of threads. No atomic is needed, and all arrays have their final length from the start.
 
 use std::ops::Range;
 
@@ -14,7 +14,8 @@ use super::findings::Findings;
 use crate::lanes::LaneNumber;
 use crate::lanes::{PACK, Pack};
 
-/// Packs of cells in a block of a large model. Of 55,566 tets on one thread 32 take 3 % longer; with 128 hexes leave the first cache.
+/// Packs of cells in a block of a large model. Of 55,566 tets on one thread 32 take 3 % longer; with 128
+/// hexes leave the first cache.
 const BLOCK: usize = 64;
 
 /// Packs that a block may have more, in place of two further blocks.
@@ -23,12 +24,13 @@ const SPARE: usize = 8;
 /// The most packs of a block.
 pub(super) const MOST_PACKS: usize = BLOCK + SPARE;
 
-/// Nodes of packs of cells, each pack with its own, that are worth a second thread on every machine. 1,000 hexes are below: two threads took 0.68 of the
-/// time of one where cores answer each other fast, and 1.15 to 1.4 of it on the same machine where they did not.
+/// Nodes of packs of cells, each pack with its own, that are worth a second thread on every machine. 1,000
+/// hexes are below: two threads took 0.68 of the time of one where cores answer each other fast, and 1.15 to
+/// 1.4 of it on the same machine where they did not.
 const SHARED: usize = 512;
 
-/// Packs of each block of so many packs of cells with `nodes` nodes. A small model has two, four or six blocks, so that two threads have
-/// as much to do.
+/// Packs of each block of so many packs of cells with `nodes` nodes. A small model has two, four or six
+/// blocks, so that two threads have as much to do.
 fn packs_per_block(packs: usize, nodes: usize) -> usize {
     if packs <= MOST_PACKS && packs * nodes < SHARED {
         return MOST_PACKS;
@@ -126,8 +128,8 @@ impl Blocks {
     }
 }
 
-/// Where the parts of what is summed at each node lie. Most nodes have one part: these come first, without a branch, then
-/// the others, in the order of the nodes and of adding.
+/// Where the parts of what is summed at each node lie. Most nodes have one part: these come first, without a
+/// branch, then the others, in the order of the nodes and of adding.
 #[derive(Clone, Debug)]
 pub(super) struct Shares {
     /// The first part of each node; for a node without any, an entry beyond all parts.
@@ -154,8 +156,8 @@ impl Shares {
         Self { starts: (0..=count / PACK).map(start).collect(), first, further }
     }
 
-    /// Hands out the places of the parts of some nodes: `first` for each node, then `further` in order, each with the number
-    /// of the node among them.
+    /// Hands out the places of the parts of some nodes: `first` for each node, then `further` in order, each
+    /// with the number of the node among them.
     #[inline(always)]
     pub(super) fn visit<T>(
         &self,
@@ -217,8 +219,8 @@ impl<R: LaneNumber> Moved<R> {
         Self { vectors: vec![[R::ZERO; 4]; blocks.room()], blocks }
     }
 
-    /// Does `pass` for every block in parallel; `history` and `pressures` come with how much of them belongs to a pack of
-    /// cells.
+    /// Does `pass` for every block in parallel; `history` and `pressures` come with how much of them belongs
+    /// to a pack of cells.
     pub(super) fn for_each(
         &mut self,
         forces: &mut [Quad<R>],

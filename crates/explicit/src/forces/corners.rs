@@ -1,10 +1,11 @@
-//! Corners of hexahedra that turn inside out while the cell as a whole, or its Gauss points, does not. The determinant of the three
-//! edges at each corner is judged, of cells that are flat.
+//! Corners of hexahedra that turn inside out while the cell as a whole, or its Gauss points, does not. The
+//! determinant of the three edges at each corner is judged, of cells that are flat.
 //!
-//! A uniform-strain hexahedron is looked at closely only where that can be: F at a corner is F̄ + Σ_c q_c ⊗ W_c with the hourglass
-//! displacements q_c, and |Σ_c q_c ⊗ W_c| ≤ κ |q|. While κ |q| stays below the least stretch no corner is inverted; that stretch
-//! is at least J/√(λ₁λ₂), and with |C − I|² = S the two largest eigenvalues of C have √(λ₁λ₂) ≤ 1 + √(S/2), whose square is at most
-//! 3/2 (1 + S). So κ² |q|² 3/2 (1 + S) < J² is enough, which costs five operations a cell.
+//! A uniform-strain hexahedron is looked at closely only where that can be: F at a corner is F̄ + Σ_c q_c ⊗
+//! W_c with the hourglass displacements q_c, and |Σ_c q_c ⊗ W_c| ≤ κ |q|. While κ |q| stays below the least
+//! stretch no corner is inverted; that stretch is at least J/√(λ₁λ₂), and with |C − I|² = S the two largest
+//! eigenvalues of C have √(λ₁λ₂) ≤ 1 + √(S/2), whose square is at most 3/2 (1 + S). So κ² |q|² 3/2 (1 + S) <
+//! J² is enough, which costs five operations a cell.
 
 use pliant_mechanics::Number;
 use pliant_mechanics::element::{FLAT_HEX, HEX_EDGES};
@@ -30,8 +31,8 @@ impl<R: LaneNumber> PackedCorners<R> {
         packed.packs().into_par_iter().map(of_pack).collect()
     }
 
-    /// The least determinant of the edges at a corner, with its sign turned, of the cells from lane `at` on. `u` are the
-    /// displacements of all nodes but the first, relative to it.
+    /// The least determinant of the edges at a corner, with its sign turned, of the cells from lane `at` on.
+    /// `u` are the displacements of all nodes but the first, relative to it.
     #[inline(always)]
     pub(super) fn depth<L: Lanes<R>>(&self, u: &[Vector<L>; 7], at: usize) -> L {
         let mut x = [[L::ZERO; 3]; 8];
@@ -46,7 +47,8 @@ impl<R: LaneNumber> PackedCorners<R> {
     }
 }
 
-/// The determinant of the edges at a corner, with its sign turned. Written out: `array::map` is left as a call here.
+/// The determinant of the edges at a corner, with its sign turned. Written out: `array::map` is left as a
+/// call here.
 #[inline(always)]
 fn depth_at<N: Number>(x: &[Vector<N>; 8], corner: usize) -> N {
     let [a, b, c] = HEX_EDGES[corner];
@@ -60,8 +62,8 @@ pub(super) fn is_flat<R: LaneNumber>(flatness: R) -> bool {
     flatness < R::of(FLAT_HEX)
 }
 
-/// The square of what J is divided by for the flatness of a uniform-strain hexahedron, about its least stretch: nearly incompressible
-/// cells keep their volume when they are squeezed flat.
+/// The square of what J is divided by for the flatness of a uniform-strain hexahedron, about its least
+/// stretch: nearly incompressible cells keep their volume when they are squeezed flat.
 #[inline(always)]
 fn widening<R: LaneNumber>(strain: R) -> R {
     R::ONE + R::of(0.5) * strain

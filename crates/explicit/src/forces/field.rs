@@ -13,9 +13,9 @@ pub(crate) trait ForceField<R>: Send + Sync {
     /// The blocks of its cells.
     fn blocks(&self) -> &Blocks;
 
-    /// Forces [N] of each block of cells on the nodes of the block, in [`Blocks::room`] entries. With `history`
-    /// the stress relaxes and the history advances to this state; an empty `history` gives the instantaneous elastic
-    /// response. `findings` has one entry per block.
+    /// Forces [N] of each block of cells on the nodes of the block, in [`Blocks::room`] entries. With
+    /// `history` the stress relaxes and the history advances to this state; an empty `history` gives the
+    /// instantaneous elastic response. `findings` has one entry per block.
     fn evaluate(
         &mut self,
         displacement: &[Vector<R>],

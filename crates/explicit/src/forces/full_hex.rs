@@ -1,5 +1,5 @@
-//! Hexahedra with 2×2×2 Gauss points for the change of shape and one mean dilatation, W = Σ w W_iso(F_g) + V U(v/V):
-//! no hourglass patterns, no locking, eight stresses a cell. The in-house reference for `hex8`.
+//! Hexahedra with 2×2×2 Gauss points for the change of shape and one mean dilatation, W = Σ w W_iso(F_g) + V
+//! U(v/V): no hourglass patterns, no locking, eight stresses a cell. The in-house reference for `hex8`.
 
 use pliant_mechanics::element::GaussPoints;
 use pliant_mechanics::law::AnyLaw;
@@ -89,7 +89,8 @@ fn load_all<R: LaneNumber, L: Lanes<R>>(packed: &[Vector<Pack<R>>; 7], at: usize
 }
 
 impl<R: LaneNumber> FullHexConstants<R> {
-    /// v/V − 1 of a pack, by its number in all and in the block; `u` takes the displacements of all nodes but the first, relative to it.
+    /// v/V − 1 of a pack, by its number in all and in the block; `u` takes the displacements of all nodes but
+    /// the first, relative to it.
     #[inline(always)]
     fn volume_change<L: Lanes<R>>(
         &self,

@@ -1,9 +1,11 @@
-//! Membranes: triangles of constant strain in their own plane, in plane stress (`pliant_mechanics::law::plane_stress`). With the tangents
-//! f_i = t_i + Σ u_a (B_a·t_i) and S in the frame of the triangle, f_a = V (f_i S_ij (B_a·t_j)), V = A₀ t₀.
+//! Membranes: triangles of constant strain in their own plane, in plane stress
+//! (`pliant_mechanics::law::plane_stress`). With the tangents f_i = t_i + Σ u_a (B_a·t_i) and S in the frame
+//! of the triangle, f_a = V (f_i S_ij (B_a·t_j)), V = A₀ t₀.
 //!
-//! A law works on batches as for solids, in the gradient that Cholesky's factor of C makes. The stretch across is found by a search over
-//! the whole batch, three or four stresses a cell; an incompressible law takes one. The incompressible neo-Hookean law, that of most
-//! capsules, has a closed form, S = μ (I − C⁻¹/det C): it goes past batch and Cholesky's factor, in half the time.
+//! A law works on batches as for solids, in the gradient that Cholesky's factor of C makes. The stretch
+//! across is found by a search over the whole batch, three or four stresses a cell; an incompressible law
+//! takes one. The incompressible neo-Hookean law, that of most capsules, has a closed form, S = μ (I −
+//! C⁻¹/det C): it goes past batch and Cholesky's factor, in half the time.
 
 use pliant_mechanics::Number;
 use pliant_mechanics::element::Sheet;
@@ -258,7 +260,8 @@ struct NeoHookeanWall<L> {
 }
 
 impl<L: Number> NeoHookeanWall<L> {
-    /// From C₁₁ − 1, C₂₂ − 1 and C₁₂, with d = det C − 1: S₁₁ = μ (1 − C₂₂/(1 + d)²) = μ (d (2 + d) − (C₂₂ − 1))/(1 + d)².
+    /// From C₁₁ − 1, C₂₂ − 1 and C₁₂, with d = det C − 1: S₁₁ = μ (1 − C₂₂/(1 + d)²) = μ (d (2 + d) − (C₂₂ −
+    /// 1))/(1 + d)².
     #[inline(always)]
     fn new([xx, yy, xy]: [L; 3], shear: L) -> Self {
         let d = xx.mul_add(yy, xx + yy) - xy * xy;

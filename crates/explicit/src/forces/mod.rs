@@ -1,14 +1,17 @@
-//! Internal forces of solids: f_a = V F S B_a per cell, plus hourglass control, in first Piola–Kirchhoff form without
-//! Voigt matrices. Cells are added up block by block (`blocks.rs`) in a fixed order, so that the number of threads never
-//! changes a bit.
+//! Internal forces of solids: f_a = V F S B_a per cell, plus hourglass control, in first Piola–Kirchhoff form
+//! without Voigt matrices. Cells are added up block by block (`blocks.rs`) in a fixed order, so that the
+//! number of threads never changes a bit.
 //!
-//! Cells lie in packs of [`PACK`], number by number, the last pack filled up with cells of no volume. History lies so too, in the state
-//! and in checkpoints. The cost is counted in `lab/bench/src/count.rs`. Runs on the current rayon pool.
+//! Cells lie in packs of [`PACK`], number by number, the last pack filled up with cells of no volume. History
+//! lies so too, in the state and in checkpoints. The cost is counted in `lab/bench/src/count.rs`. Runs on the
+//! current rayon pool.
 //!
-//! A force field works through batches of four packs of points (`batch.rs`): displacement gradients, then stresses of the law, then nodal forces. So
-//! elements and laws are each compiled once per kind of lanes, never each law in each element, and the law is chosen once per batch.
-//! `plain.rs`: one point per cell, with hourglass control from `hourglass.rs`; `averaged.rs`: tets with averaged pressure; `full_hex.rs`:
-//! eight points; `membrane.rs`: triangles in plane stress; `bar.rs`: bars and threads. Every element whose force is the gradient of an energy runs through the battery in `tests.rs`.
+//! A force field works through batches of four packs of points (`batch.rs`): displacement gradients, then
+//! stresses of the law, then nodal forces. So elements and laws are each compiled once per kind of lanes,
+//! never each law in each element, and the law is chosen once per batch. `plain.rs`: one point per cell, with
+//! hourglass control from `hourglass.rs`; `averaged.rs`: tets with averaged pressure; `full_hex.rs`: eight
+//! points; `membrane.rs`: triangles in plane stress; `bar.rs`: bars and threads. Every element whose force is
+//! the gradient of an energy runs through the battery in `tests.rs`.
 
 mod averaged;
 mod bar;
@@ -62,8 +65,8 @@ fn force_field<R: LaneNumber>(solid: &Solid, step: f64) -> Box<dyn ForceField<R>
     }
 }
 
-/// Evaluates fields side by side: a small one, such as a vessel, has no work for several threads by itself. Forces begin at the first of
-/// the offsets.
+/// Evaluates fields side by side: a small one, such as a vessel, has no work for several threads by itself.
+/// Forces begin at the first of the offsets.
 fn side_by_side<R: LaneNumber>(
     fields: &mut [Box<dyn ForceField<R>>],
     offsets: &[usize],
@@ -104,7 +107,8 @@ struct Tied<R> {
     shares: Shares,
     /// First entry of `given` of each, one more than there are.
     offsets: Vec<u32>,
-    /// How much of each component of the force on it goes to each node that it follows, and stays where it is held.
+    /// How much of each component of the force on it goes to each node that it follows, and stays where it is
+    /// held.
     given: Vec<Vector<R>>,
     /// The first of their places in `forces`.
     first: usize,
@@ -112,7 +116,8 @@ struct Tied<R> {
 }
 
 impl<R: LaneNumber> Tied<R> {
-    /// Of a model whose cells leave their forces at some places before `first`; with the places that the followed nodes take over.
+    /// Of a model whose cells leave their forces at some places before `first`; with the places that the
+    /// followed nodes take over.
     fn new(model: &Model, places: &[(u32, u32)], first: usize, none: u32) -> (Self, Vec<(u32, u32)>) {
         let mut number = vec![u32::MAX; model.node_count()];
         let (mut offsets, mut given, mut taken) = (vec![0], Vec::new(), Vec::new());
@@ -191,7 +196,8 @@ impl<R: LaneNumber> InternalForces<R> {
         self.findings.iter().map(Vec::len).sum::<usize>() > 1
     }
 
-    /// Evaluates all cells. `history` has one entry per solid, each empty for the instantaneous elastic response.
+    /// Evaluates all cells. `history` has one entry per solid, each empty for the instantaneous elastic
+    /// response.
     pub(crate) fn evaluate(&mut self, displacement: &[Vector<R>], history: &mut [History<R>]) -> Found {
         let mut found = Found::default();
         let Self { fields, field_offsets, forces, findings, .. } = self;

@@ -1,4 +1,5 @@
-//! Cells in packs: what all elements need of them, and the steps from displacements to gradients and from stresses to nodal forces.
+//! Cells in packs: what all elements need of them, and the steps from displacements to gradients and from
+//! stresses to nodal forces.
 
 use std::ops::Range;
 
@@ -10,7 +11,8 @@ use super::blocks::{Blocks, MOST_PACKS, Quad};
 use crate::lanes::LaneNumber;
 use crate::lanes::{Lanes, Local, PACK, Pack, Places, load_vector};
 
-/// Where the history of one of several points lies, `each` packs a point, in a history of `all` packs; nowhere in an empty one.
+/// Where the history of one of several points lies, `each` packs a point, in a history of `all` packs;
+/// nowhere in an empty one.
 #[inline(always)]
 pub(super) fn own_packs(point: usize, each: usize, all: usize) -> Range<usize> {
     (point * each).min(all)..((point + 1) * each).min(all)
@@ -78,8 +80,8 @@ impl<R: LaneNumber, const N: usize> PackedCells<R, N> {
     }
 }
 
-/// Gradients of the shape functions [1/m] of packs of cells, of all nodes but the first (they sum to zero), and volumes
-/// [m³], zero where a pack is filled up.
+/// Gradients of the shape functions [1/m] of packs of cells, of all nodes but the first (they sum to zero),
+/// and volumes [m³], zero where a pack is filled up.
 pub(super) struct PackedRest<R, const M: usize> {
     pub(super) gradient: [Vector<Pack<R>>; M],
     pub(super) volume: Pack<R>,
@@ -98,8 +100,8 @@ impl<R: LaneNumber, const M: usize> PackedRest<R, M> {
     }
 }
 
-/// u_a − u_0 of all nodes but the first: keeps the digits of small strains in cells that have moved far. Beside them what
-/// else the nodes carry, summed.
+/// u_a − u_0 of all nodes but the first: keeps the digits of small strains in cells that have moved far.
+/// Beside them what else the nodes carry, summed.
 #[inline(always)]
 pub(super) fn relative<R: LaneNumber, L: Lanes<R>, const N: usize, const M: usize>(
     local: &Local<'_, R, N>,
@@ -144,7 +146,8 @@ pub(super) fn nodal_forces<R: LaneNumber, L: Lanes<R>, const M: usize>(
     forces
 }
 
-/// Writes the forces on all nodes as vectors, [`Lanes::row_of_lane`] by lane; the first node takes what makes the sum zero.
+/// Writes the forces on all nodes as vectors, [`Lanes::row_of_lane`] by lane; the first node takes what makes
+/// the sum zero.
 #[inline(always)]
 pub(super) fn by_cell<R: LaneNumber, L: Lanes<R>, const N: usize, const M: usize>(
     forces: &[Vector<L>; M],

@@ -67,8 +67,8 @@ struct AtWork<R> {
 }
 
 impl<R: LaneNumber, const N: usize, const M: usize> PlainConstants<R, N, M> {
-    /// Finds the displacement gradients of a pack, by its number in all and in the block, and its resistance to hourglass patterns; adds the
-    /// energy of these where their stiffness does not grow.
+    /// Finds the displacement gradients of a pack, by its number in all and in the block, and its resistance
+    /// to hourglass patterns; adds the energy of these where their stiffness does not grow.
     #[inline(always)]
     fn deform<L: Lanes<R>>(
         &self,
@@ -117,7 +117,8 @@ impl<R: LaneNumber, const N: usize, const M: usize> PlainConstants<R, N, M> {
         L::call(look).map(|lane| pack * PACK + lane)
     }
 
-    /// The forces of a pack on its nodes, from the stresses that the law found. They relax where there is a history.
+    /// The forces of a pack on its nodes, from the stresses that the law found. They relax where there is a
+    /// history.
     #[inline(always)]
     fn forces<L: Lanes<R>>(
         &self,

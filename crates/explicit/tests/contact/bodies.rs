@@ -59,8 +59,8 @@ fn step(stepper: &mut CentralDifference<f64>, state: &mut State<f64>) -> ([f64; 
     (force, energies.kinetic + energies.internal)
 }
 
-/// Two equal bars: the wave of the impact goes to the far ends and back, then the first is at rest, and the second flies with its speed
-/// (Saint-Venant). They touch for 2 L/c.
+/// Two equal bars: the wave of the impact goes to the far ends and back, then the first is at rest, and the
+/// second flies with its speed (Saint-Venant). They touch for 2 L/c.
 #[test]
 fn two_bars_that_meet_exchange_their_velocities() {
     let (shear, density, speed, length) = (5e4, 1000.0, 0.02, 0.4);
@@ -131,7 +131,8 @@ fn tumbling() -> Model {
     model
 }
 
-/// Lists made anew in every third step, with a ball beside the bodies too, give the same bits as lists that are held as long as they can be.
+/// Lists made anew in every third step, with a ball beside the bodies too, give the same bits as lists that
+/// are held as long as they can be.
 #[test]
 fn results_do_not_depend_on_when_lists_are_made() {
     let model = Arc::new(tumbling());
@@ -203,7 +204,8 @@ fn impulses_between_bodies_have_no_sum_and_no_moment() {
     }
 }
 
-/// Patch test: blocks of cells that do not match, one on the other, pressed by a uniform load. The stress is the load everywhere (A1).
+/// Patch test: blocks of cells that do not match, one on the other, pressed by a uniform load. The stress is
+/// the load everywhere (A1).
 #[test]
 fn a_uniform_pressure_goes_through_cells_that_do_not_match() {
     let (pressure, shear) = (100.0, 5e3);
@@ -318,8 +320,8 @@ fn a_body_touches_itself() {
     assert!(most < start * 1.001 && stepper.energies().balance.abs() < 0.02, "{:?}", stepper.energies());
 }
 
-/// Bodies, and the arms of a body, that begin nearer than the distance that they keep stay where they are: nothing pushes them. Bodies that begin farther away keep
-/// the whole of it.
+/// Bodies, and the arms of a body, that begin nearer than the distance that they keep stay where they are:
+/// nothing pushes them. Bodies that begin farther away keep the whole of it.
 #[test]
 fn what_begins_nearer_than_the_distance_to_keep_is_not_pushed() {
     for (gap, nearer) in [(0.0, true), (2e-4, true), (2e-3, false)] {

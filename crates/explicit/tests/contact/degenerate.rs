@@ -1,5 +1,6 @@
-//! Bodies that meet at corners and edges (primitive scenes of rigid-body libraries, and the degenerate ones of Erleben 2018): they end, with
-//! finite numbers, in bounds, and no edge of one is ever in a triangle of another; all of them soft, or rigid what is held.
+//! Bodies that meet at corners and edges (primitive scenes of rigid-body libraries, and the degenerate ones
+//! of Erleben 2018): they end, with finite numbers, in bounds, and no edge of one is ever in a triangle of
+//! another; all of them soft, or rigid what is held.
 
 use std::sync::Arc;
 
@@ -20,8 +21,9 @@ use super::stepper;
 /// The distance [m] that bodies keep.
 const OFFSET: f64 = 1e-4;
 
-/// Shear modulus [Pa] of the bodies, and the step over the critical one, of a scene. A tip of 0.8 mm is crushed between softer edges of a crack at
-/// any step: its cells end inverted. On the point of a cone it needs the shorter step that a run would take there.
+/// Shear modulus [Pa] of the bodies, and the step over the critical one, of a scene. A tip of 0.8 mm is
+/// crushed between softer edges of a crack at any step: its cells end inverted. On the point of a cone it
+/// needs the shorter step that a run would take there.
 fn manner(scene: &Scene, is_rigid: bool) -> [f64; 2] {
     match (scene.name, is_rigid) {
         ("spike in a crack", false) => [5e5, 0.5],

@@ -58,7 +58,8 @@ fn settled(cells: [u32; 3], until: f64) -> (Arc<Model>, Arc<Contacts>, CentralDi
     (model, contacts, stepper, state)
 }
 
-/// While a block bounces on its floor, forces of nodes sum to that of the contact, and pressures times shares to its normal part.
+/// While a block bounces on its floor, forces of nodes sum to that of the contact, and pressures times shares
+/// to its normal part.
 #[test]
 fn forces_and_pressures_of_nodes_sum_to_the_force_of_the_contact() {
     for until in [0.05, 0.11, 0.3] {
@@ -78,7 +79,8 @@ fn forces_and_pressures_of_nodes_sum_to_the_force_of_the_contact() {
     }
 }
 
-/// Under a block at rest the pressure is ρ g h. At a corner a quad has shares of a sixth or a third, by its diagonal, for the quarter of its load.
+/// Under a block at rest the pressure is ρ g h. At a corner a quad has shares of a sixth or a third, by its
+/// diagonal, for the quarter of its load.
 #[test]
 fn a_block_presses_on_its_floor_by_its_height() {
     let (model, contacts, stepper, state) = settled([4, 4, 2], 1.0);
@@ -104,7 +106,8 @@ fn a_block_presses_on_its_floor_by_its_height() {
     assert!(corners.iter().all(|ratio| (ratio - 1.0).abs() < 0.01), "{corners:?}");
 }
 
-/// The gap is the distance from a ball, less what is kept, wherever the ball is on its way; where nothing is near there is no force.
+/// The gap is the distance from a ball, less what is kept, wherever the ball is on its way; where nothing is
+/// near there is no force.
 #[test]
 fn gaps_are_distances_from_tools() {
     let model = block([2, 2, 2], 0.01, 3e3, Prony::default());
@@ -136,8 +139,8 @@ fn gaps_are_distances_from_tools() {
     }
 }
 
-/// On an incline of the slope ½ the slip of each lower node is the way that it goes, and with μ > ½ there is none. Once the floor sinks away,
-/// nothing touches any more.
+/// On an incline of the slope ½ the slip of each lower node is the way that it goes, and with μ > ½ there is
+/// none. Once the floor sinks away, nothing touches any more.
 #[test]
 fn slip_on_an_incline_is_the_way_that_nodes_go() {
     let (sine, cosine) = (0.2_f64.sqrt(), 0.8_f64.sqrt());

@@ -37,9 +37,10 @@ pub fn floor() -> Rigid {
     }
 }
 
-/// Slope with a tangent of ½: sticks with μ = ½, and slides by ½ a t² with less (A4 of the acceptance tests of contact). The block is first
-/// pressed on, then tilted, so that it does not hop. At μ = ½ itself nothing holds back what an elastic block still trembles: it creeps by less
-/// than a thousandth of the way without friction. A particle sticks exactly (`pliant-contact`).
+/// Slope with a tangent of ½: sticks with μ = ½, and slides by ½ a t² with less (A4 of the acceptance tests
+/// of contact). The block is first pressed on, then tilted, so that it does not hop. At μ = ½ itself nothing
+/// holds back what an elastic block still trembles: it creeps by less than a thousandth of the way without
+/// friction. A particle sticks exactly (`pliant-contact`).
 #[test]
 fn a_block_on_an_incline_sticks_or_slides_by_coulombs_law() {
     let (sine, cosine) = (0.2_f64.sqrt(), 0.8_f64.sqrt());
@@ -86,8 +87,8 @@ fn height(state: &State<f64>, model: &Model) -> f64 {
     state.displacement.iter().zip(&model.rest).map(|(u, x)| u[2] + x[2]).fold(f64::INFINITY, f64::min)
 }
 
-/// A bar flies against a wall: no node goes through it, the energy never grows beyond the start, the bar flies back, and the step stays
-/// that of the free bar up to 0.99 of the critical one (A7).
+/// A bar flies against a wall: no node goes through it, the energy never grows beyond the start, the bar
+/// flies back, and the step stays that of the free bar up to 0.99 of the critical one (A7).
 #[test]
 fn a_bar_bounces_off_a_wall_at_the_step_of_the_free_bar() {
     for part in [0.5, 0.9, 0.99] {
@@ -120,8 +121,8 @@ fn a_bar_bounces_off_a_wall_at_the_step_of_the_free_bar() {
     }
 }
 
-/// A capsule that is driven into a block, or grows into it, stays free of all nodes, and of points between to a twentieth of its radius; the work
-/// that drives it is the energy of the block.
+/// A capsule that is driven into a block, or grows into it, stays free of all nodes, and of points between to
+/// a twentieth of its radius; the work that drives it is the energy of the block.
 #[test]
 fn a_tool_presses_no_node_into_itself() {
     for (fast, growth) in [(1.0, 0.0), (10.0, 0.0), (10.0, 0.004), (1.0, 0.002)] {
@@ -178,7 +179,8 @@ fn a_tool_presses_no_node_into_itself() {
     }
 }
 
-/// The force that is reported of a thing so fast that its way is followed in parts is that which moves the body.
+/// The force that is reported of a thing so fast that its way is followed in parts is that which moves the
+/// body.
 #[test]
 fn the_force_of_a_fast_tool_is_the_change_of_momentum() {
     let model = Arc::new(block([2, 2, 2], 0.01, 2e3, Prony::default()));

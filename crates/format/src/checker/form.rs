@@ -1,4 +1,5 @@
-//! The forms that a JSON schema gives a value, with references and alternatives resolved, and what they are in words.
+//! The forms that a JSON schema gives a value, with references and alternatives resolved, and what they are
+//! in words.
 
 use serde_json::{Map, Value as Json};
 
@@ -42,7 +43,8 @@ pub(crate) struct Bound {
     pub(crate) exclusive: bool,
 }
 
-/// One form that a value may take: a schema with its references and alternatives resolved, so that it is of one kind.
+/// One form that a value may take: a schema with its references and alternatives resolved, so that it is of
+/// one kind.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Form<'s> {
     /// None for a form that takes any value.

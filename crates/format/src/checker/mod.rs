@@ -1,9 +1,10 @@
-//! Checks the tables of a user against the JSON schema of the parameters. Each mistake is reported with its place.
+//! Checks the tables of a user against the JSON schema of the parameters. Each mistake is reported with its
+//! place.
 //!
-//! The schema is the one that schemars derives from the parameter struct: meaning, unit, range and default are declared
-//! there once. Whatever keys a table's schema does not name are mistakes, whether or not the struct denies unknown
-//! fields, because serde cannot deny them in structs with flattened parts. Names that only serde knows (`alias`) and the
-//! schema's `pattern`, `multipleOf` and `uniqueItems` are ignored.
+//! The schema is the one that schemars derives from the parameter struct: meaning, unit, range and default
+//! are declared there once. Whatever keys a table's schema does not name are mistakes, whether or not the
+//! struct denies unknown fields, because serde cannot deny them in structs with flattened parts. Names that
+//! only serde knows (`alias`) and the schema's `pattern`, `multipleOf` and `uniqueItems` are ignored.
 
 mod form;
 #[cfg(test)]
@@ -27,19 +28,20 @@ use crate::nearest::nearest;
 use crate::plausible::remark;
 use crate::source::{Node, Source, Value};
 
-/// Checks a value of the user against a schema. `path` is the value's name in messages, such as `law.parenchyma`;
-/// `schema` is a root schema, with its definitions in `$defs`.
+/// Checks a value of the user against a schema. `path` is the value's name in messages, such as
+/// `law.parenchyma`; `schema` is a root schema, with its definitions in `$defs`.
 ///
-/// Every mistake goes to `out`. The answer is what the user wrote as JSON, to be deserialised where there was no
-/// mistake; parts with mistakes are missing from it.
+/// Every mistake goes to `out`. The answer is what the user wrote as JSON, to be deserialised where there was
+/// no mistake; parts with mistakes are missing from it.
 pub fn check(node: &Node, path: &str, schema: &Schema, out: &mut Vec<Diagnostic>) -> Json {
     check_skipping(node, path, schema, &[], out)
 }
 
-/// Reads the table at `path` into its parameter struct; `None` where there was a mistake, which is then in `out`.
+/// Reads the table at `path` into its parameter struct; `None` where there was a mistake, which is then in
+/// `out`.
 ///
-/// Keys in `skip` are left to the caller, such as the `type` that chose the struct. A table that the file lacks is
-/// read as an empty one: the defaults, or what is required and missing.
+/// Keys in `skip` are left to the caller, such as the `type` that chose the struct. A table that the file
+/// lacks is read as an empty one: the defaults, or what is required and missing.
 pub(crate) fn read_table<T: DeserializeOwned + JsonSchema>(
     source: &Source,
     path: &[&str],
@@ -194,7 +196,8 @@ impl<'s> Checker<'s, '_> {
         }
     }
 
-    /// Checks a value against the alternatives of its kind and keeps the mistakes of the alternative with the fewest.
+    /// Checks a value against the alternatives of its kind and keeps the mistakes of the alternative with the
+    /// fewest.
     fn best(
         &mut self,
         node: &Node,
@@ -402,8 +405,8 @@ impl<'s> Checker<'s, '_> {
         values.map(Json::Array)
     }
 
-    /// A table that may be one of several: distinguished by a tag, by its keys, or by the best fit. `words` could
-    /// have stood in its place.
+    /// A table that may be one of several: distinguished by a tag, by its keys, or by the best fit. `words`
+    /// could have stood in its place.
     fn choice(
         &mut self,
         node: &Node,

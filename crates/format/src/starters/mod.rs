@@ -1,4 +1,5 @@
-//! Scenes to start from: the one that `pliant new` writes, small, commented, runs as it is; of a mesh; of an organ with vessels and capsule.
+//! Scenes to start from: the one that `pliant new` writes, small, commented, runs as it is; of a mesh; of an
+//! organ with vessels and capsule.
 
 mod of_mesh;
 mod organ_scene;

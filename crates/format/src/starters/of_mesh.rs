@@ -29,8 +29,9 @@ pub fn is_mesh(path: &Path) -> bool {
     Format::of_path(path).is_some()
 }
 
-/// Makes a scene of a mesh file: soft tissue, held where its lowest tenth along its longest side is. What a surface encloses is filled with
-/// tets; the elements of a volume mesh with labels have their colours. Damping is half of the critical one of the slowest vibration along that side.
+/// Makes a scene of a mesh file: soft tissue, held where its lowest tenth along its longest side is. What a
+/// surface encloses is filled with tets; the elements of a volume mesh with labels have their colours.
+/// Damping is half of the critical one of the slowest vibration along that side.
 ///
 /// # Errors
 /// If the file can't be read.
@@ -104,7 +105,8 @@ nodes = {{ half-space = {{ point = {point:?}, normal = {normal:?} }} }}
     SceneOfMesh { text, folder: PathBuf::new(), assumed }
 }
 
-/// Damping [1/s] of a body of a length [m]: half of the critical one of its slowest vibration along it, α = 2 · ½ · (π/2) √(E/ρ)/L.
+/// Damping [1/s] of a body of a length [m]: half of the critical one of its slowest vibration along it, α = 2
+/// · ½ · (π/2) √(E/ρ)/L.
 pub(super) fn calming(young: f64, density: f64, length: f64) -> f64 {
     0.5 * std::f64::consts::PI * (young / density).sqrt() / length.max(1e-6)
 }

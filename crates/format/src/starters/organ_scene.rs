@@ -1,4 +1,5 @@
-//! The scene of a segmented organ: its tissue as tets, vessels of other labels as membranes tied to the tissue, and a capsule on its boundary.
+//! The scene of a segmented organ: its tissue as tets, vessels of other labels as membranes tied to the
+//! tissue, and a capsule on its boundary.
 
 use pliant_geometry::Vector3;
 
@@ -16,7 +17,8 @@ const DENSITY: f64 = 1060.0;
 pub struct OrganScene {
     /// What the scene is called.
     pub title: String,
-    /// Where the tissue comes from, as in the `mesh` of a body: `image = "seg.nii.gz", labels = [5], vessels = [6]`, with names and cleaning.
+    /// Where the tissue comes from, as in the `mesh` of a body:
+    /// `image = "seg.nii.gz", labels = [5], vessels = [6]`, with names and cleaning.
     pub source: String,
     /// Edge of the tets [m].
     pub edge: f64,
@@ -29,7 +31,8 @@ pub struct OrganScene {
 }
 
 impl OrganScene {
-    /// Its text, commented. The organ is held at its lowest tenth along its longest side and pulled at the other end. Damping is half of the critical one of the slowest vibration along that side.
+    /// Its text, commented. The organ is held at its lowest tenth along its longest side and pulled at the
+    /// other end. Damping is half of the critical one of the slowest vibration along that side.
     ///
     /// ```
     /// use pliant_geometry::Vector3;

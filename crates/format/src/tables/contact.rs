@@ -9,8 +9,9 @@ use serde::Deserialize;
 use super::body::{CleanTable, Label};
 use super::load::{RotateTable, Timing};
 
-/// A rigid thing that bodies touch: an obstacle such as a bone, or a tool. It stands where `at` and `turn` put it, and moves by one of `by`,
-/// `rotate` and `poses`, or not at all. Curve: `smooth-step` if not given. What touches it is named by `[contact.NAME]`.
+/// A rigid thing that bodies touch: an obstacle such as a bone, or a tool. It stands where `at` and `turn`
+/// put it, and moves by one of `by`, `rotate` and `poses`, or not at all. Curve: `smooth-step` if not given.
+/// What touches it is named by `[contact.NAME]`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct ToolTable {
@@ -28,13 +29,13 @@ pub struct ToolTable {
     /// How far the jaws are open over time, of a tool with jaws; closed if not given.
     #[serde(default)]
     pub opening: Option<OpeningTable>,
-    /// The angle [rad] between jaws from which on down they hold all that touches their inner faces, as if tied; they let go where they open
-    /// wider. If not given, they hold by the contact's friction.
+    /// The angle [rad] between jaws from which on down they hold all that touches their inner faces, as if
+    /// tied; they let go where they open wider. If not given, they hold by the contact's friction.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub ideal_grip: Option<f64>,
-    /// The force [N] that it pushes with at most. From half of it on it gives way, and lags behind its trajectory; when nothing is in its way any
-    /// more, it catches up.
+    /// The force [N] that it pushes with at most. From half of it on it gives way, and lags behind its
+    /// trajectory; when nothing is in its way any more, it catches up.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub force_limit: Option<f64>,
@@ -47,8 +48,9 @@ pub struct ToolTable {
     /// Rotation about an axis, reached along the curve.
     #[serde(default)]
     pub rotate: Option<RotateTable>,
-    /// A CSV file of poses: a row for each time [s] with a position [m] and a unit quaternion, columns t, x, y, z, qw, qx, qy, qz. In between it
-    /// moves on straight ways and shortest arcs; before the first and after the last row it rests.
+    /// A CSV file of poses: a row for each time [s] with a position [m] and a unit quaternion, columns t, x,
+    /// y, z, qw, qx, qy, qz. In between it moves on straight ways and shortest arcs; before the first and
+    /// after the last row it rests.
     #[serde(default)]
     pub poses: Option<PathBuf>,
     /// Its curve over time.
@@ -72,9 +74,11 @@ pub enum ShapeName {
     Cone(ConeTool),
     /// All below the plane z = 0: `shape = "half-space"`.
     HalfSpace,
-    /// A body of revolution about the z axis, such as a funnel with its tube when `inside = true`. Not on GPUs.
+    /// A body of revolution about the z axis, such as a funnel with its tube when `inside = true`. Not on
+    /// GPUs.
     Revolved(RevolvedTool),
-    /// Two jaws of a grasper: boxes along z from a hinge at the origin, which open about the x axis. They are `NAME.upper` and `NAME.lower`.
+    /// Two jaws of a grasper: boxes along z from a hinge at the origin, which open about the x axis. They are
+    /// `NAME.upper` and `NAME.lower`.
     Jaws(JawsTool),
     /// What the closed surface of a mesh file encloses.
     Mesh(MeshTool),
@@ -139,8 +143,9 @@ pub struct ConeTool {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RevolvedTool {
-    /// Its outline from below upwards: heights, distances from the axis, and radii of the arcs in place of corners [m]. All between it and
-    /// the axis is in it. Beyond an end off the axis the outline goes straight on.
+    /// Its outline from below upwards: heights, distances from the axis, and radii of the arcs in place of
+    /// corners [m]. All between it and the axis is in it. Beyond an end off the axis the outline goes
+    /// straight on.
     pub outline: Vec<[f64; 3]>,
 }
 
@@ -159,8 +164,9 @@ pub struct JawsTool {
     pub thickness: f64,
 }
 
-/// The angle between two jaws: 0 at `from`, `angle` or `degrees` at `to`. `curve = "hold"` keeps them open; a table opens and closes them:
-/// `curve = { table = [[0, 1], [0.5, 0.1]] }`. Curve: `smooth-step` if not given.
+/// The angle between two jaws: 0 at `from`, `angle` or `degrees` at `to`. `curve = "hold"` keeps them open; a
+/// table opens and closes them: `curve = { table = [[0, 1], [0.5, 0.1]] }`. Curve: `smooth-step` if not
+/// given.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct OpeningTable {
@@ -177,9 +183,10 @@ pub struct OpeningTable {
     pub timing: Timing,
 }
 
-/// How a rigid thing grows: its surface moves outward, by 0 at `from` and the whole distance at `to`; of a thing with `inside = true` the room in it grows.
-/// Edges become round. A table lets it shrink again: `curve = { table = [[0, 0], [1, 1], [2, 0.2]] }`. Balls and capsules may shrink below the size of
-/// their shape. Not on GPUs. Curve: `smooth-step` if not given.
+/// How a rigid thing grows: its surface moves outward, by 0 at `from` and the whole distance at `to`; of a
+/// thing with `inside = true` the room in it grows. Edges become round. A table lets it shrink again:
+/// `curve = { table = [[0, 0], [1, 1], [2, 0.2]] }`. Balls and capsules may shrink below the size of their
+/// shape. Not on GPUs. Curve: `smooth-step` if not given.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct GrowthTable {
@@ -190,37 +197,39 @@ pub struct GrowthTable {
     pub timing: Timing,
 }
 
-/// What the surface of a mesh file encloses. Distances to it are sampled once on a grid, and kept in the cache.
+/// What the surface of a mesh file encloses. Distances to it are sampled once on a grid, and kept in the
+/// cache.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct MeshTool {
-    /// A mesh file, relative to the scene: Gmsh (.msh), VTK (.vtk, .vtu, .vtp), OBJ, OFF, STL, PLY, GIfTI, FreeSurfer. Its triangles and
-    /// quads are the surface, or the boundary of its tets and hexes.
+    /// A mesh file, relative to the scene: Gmsh (.msh), VTK (.vtk, .vtu, .vtp), OBJ, OFF, STL, PLY, GIfTI,
+    /// FreeSurfer. Its triangles and quads are the surface, or the boundary of its tets and hexes.
     pub file: PathBuf,
-    /// Factor on all lengths: the size of one unit of the mesh in metres (0.001 for millimetres); 1 if not given. A file that would be
-    /// larger than 10 m needs it.
+    /// Factor on all lengths: the size of one unit of the mesh in metres (0.001 for millimetres); 1 if not
+    /// given. A file that would be larger than 10 m needs it.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub scale: Option<f64>,
     /// Distance [m] by which the surface is moved outward, or inward if it is negative.
     #[serde(default)]
     pub grow: f64,
-    /// Distance [m] between the points of the grid. If not given, 1/256 of the diagonal of the box, or half of the mean edge of the
-    /// triangles if this is less, as far as the grid fits into 64 MiB.
+    /// Distance [m] between the points of the grid. If not given, 1/256 of the diagonal of the box, or half
+    /// of the mean edge of the triangles if this is less, as far as the grid fits into 64 MiB.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub resolution: Option<f64>,
 }
 
-/// A part of a segmented image, with the coordinates of the image. Distances to its surface are sampled once on a grid, and kept in the
-/// cache.
+/// A part of a segmented image, with the coordinates of the image. Distances to its surface are sampled once
+/// on a grid, and kept in the cache.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ImageTool {
-    /// A segmented image, relative to the scene: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, a DICOM segmentation, or the
-    /// folder of a DICOM series.
+    /// A segmented image, relative to the scene: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, a
+    /// DICOM segmentation, or the folder of a DICOM series.
     pub file: PathBuf,
-    /// Names for the labels: a table of ITK-SNAP, FreeSurfer or 3D Slicer, lines like `5 liver`, JSON, or the word `totalsegmentator`.
+    /// Names for the labels: a table of ITK-SNAP, FreeSurfer or 3D Slicer, lines like `5 liver`, JSON, or the
+    /// word `totalsegmentator`.
     #[serde(default)]
     pub names: Option<PathBuf>,
     /// Label of the image, by number or name.
@@ -267,14 +276,17 @@ impl ImageTool {
     }
 }
 
-/// Who touches whom: a body an obstacle or a tool, another body, or itself. With the solver `explicit`, for bodies without bending, impulses keep
-/// surfaces apart; bodies that touch each other are solids. With the solvers `implicit` and `static`, for solids and shells, a barrier does. Only barriers
-/// exclude intersections: no state that is accepted has one. The force on the second is in `csv` outputs as `contact.NAME`.
+/// Who touches whom: a body an obstacle or a tool, another body, or itself. With the solver `explicit`, for
+/// bodies without bending, impulses keep surfaces apart; bodies that touch each other are solids. With the
+/// solvers `implicit` and `static`, for solids and shells, a barrier does. Only barriers exclude
+/// intersections: no state that is accepted has one. The force on the second is in `csv` outputs as
+/// `contact.NAME`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ContactTable {
-    /// The body, and what it touches: `between = ["liver", "probe"]`. The same body twice: itself. `"all"`: all solids, obstacles and tools; with the solvers
-    /// `implicit` and `static` also shells and membranes that are not `on` a solid. Each pair has an entry of its own, `contact.NAME.liver-probe`.
+    /// The body, and what it touches: `between = ["liver", "probe"]`. The same body twice: itself. `"all"`:
+    /// all solids, obstacles and tools; with the solvers `implicit` and `static` also shells and membranes
+    /// that are not `on` a solid. Each pair has an entry of its own, `contact.NAME.liver-probe`.
     pub between: [String; 2],
     /// The faces of the first that touch; if not given, all of its boundary.
     #[serde(default)]
@@ -286,44 +298,47 @@ pub struct ContactTable {
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub friction: f64,
-    /// Distance [m] that the surfaces keep. If not given: with the solver `explicit` 0.5 % of the mean edge between two bodies and of a body with itself, 0 from a
-    /// rigid thing; with the solvers `implicit` and `static` half of the thickness of each shell that takes part. Nodes of explicit bodies that are nearer at
-    /// the start keep the distance that they have.
+    /// Distance [m] that the surfaces keep. If not given: with the solver `explicit` 0.5 % of the mean edge
+    /// between two bodies and of a body with itself, 0 from a rigid thing; with the solvers `implicit` and
+    /// `static` half of the thickness of each shell that takes part. Nodes of explicit bodies that are nearer
+    /// at the start keep the distance that they have.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub thickness: Option<f64>,
-    /// The gap [m], in addition to `thickness`, below which surfaces push each other away, with the solvers `implicit` and `static`; a thousandth of
-    /// the diagonal of all bodies if not given.
+    /// The gap [m], in addition to `thickness`, below which surfaces push each other away, with the solvers
+    /// `implicit` and `static`; a thousandth of the diagonal of all bodies if not given.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub barrier_distance: Option<f64>,
-    /// Stiffness κ [Pa] of the barrier: at the gap y times its distance it presses by κ (2 (y − 1) ln y + (y − 1)²/y). A tenth of Young's modulus of
-    /// the softest body of the contact if not given.
+    /// Stiffness κ [Pa] of the barrier: at the gap y times its distance it presses by κ (2 (y − 1) ln y +
+    /// (y − 1)²/y). A tenth of Young's modulus of the softest body of the contact if not given.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub barrier_stiffness: Option<f64>,
-    /// How often each triangle of a shell is divided into four on its curved surface, which touches in its place: 0, flat triangles, 1 or 2. With the
-    /// solvers `implicit` and `static`.
+    /// How often each triangle of a shell is divided into four on its curved surface, which touches in its
+    /// place: 0, flat triangles, 1 or 2. With the solvers `implicit` and `static`.
     #[serde(default)]
     #[schemars(range(max = 2))]
     pub subdivision: Option<u8>,
-    /// Speed [m/s] below which bodies creep that friction should hold, with the solvers `implicit` and `static`; 0.001 if not given.
+    /// Speed [m/s] below which bodies creep that friction should hold, with the solvers `implicit` and
+    /// `static`; 0.001 if not given.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub creep_speed: Option<f64>,
-    /// Whether states are searched for edges that go through triangles, by a way of its own. With the solvers `implicit` and `static` the search looks at
-    /// each state; an intersection would be a fault of the program, and ends the run. With the solver `explicit` the search looks at the states that
-    /// outputs write and at the last one, and counts the intersections of bodies that are deeper than 1e-4 of the mean edge: a warning, and
-    /// `intersections` in `--json`.
-    /// Holds for all contacts of the solver.
+    /// Whether states are searched for edges that go through triangles, by a way of its own. With the solvers
+    /// `implicit` and `static` the search looks at each state; an intersection would be a fault of the
+    /// program, and ends the run. With the solver `explicit` the search looks at the states that outputs
+    /// write and at the last one, and counts the intersections of bodies that are deeper than 1e-4 of the
+    /// mean edge: a warning, and `intersections` in `--json`. Holds for all contacts of the solver.
     #[serde(default)]
     pub check_intersections: bool,
-    /// Whether bodies that overlap at the start are pushed apart before the run, by the least ways of their nodes. The shape at rest stays as it is, so that
-    /// the run starts deformed. Without it they are refused.
+    /// Whether bodies that overlap at the start are pushed apart before the run, by the least ways of their
+    /// nodes. The shape at rest stays as it is, so that the run starts deformed. Without it they are refused.
     #[serde(default)]
     pub separate: bool,
-    /// Gap [m] between the shapes at rest, beyond the distance that surfaces keep. Where bodies overlap or are nearer, their nodes at rest move apart
-    /// by the least ways, so that the run starts without stress. For organs that touch in one segmentation and are meshed one by one.
+    /// Gap [m] between the shapes at rest, beyond the distance that surfaces keep. Where bodies overlap or
+    /// are nearer, their nodes at rest move apart by the least ways, so that the run starts without stress.
+    /// For organs that touch in one segmentation and are meshed one by one.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub gap: Option<f64>,

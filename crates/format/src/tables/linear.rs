@@ -38,7 +38,8 @@ pub enum LinearName {
     /// Factors of the symmetric stiffness: robust, and unstable equilibria are noticed.
     #[default]
     Direct,
-    /// Factors of the stiffness with the unsymmetric part of loads: twice the work, for moments about fixed axes.
+    /// Factors of the stiffness with the unsymmetric part of loads: twice the work, for moments about fixed
+    /// axes.
     Unsymmetric,
     /// Conjugate gradients: for stable equilibria.
     ConjugateGradients,
@@ -61,8 +62,8 @@ pub struct LinearTable {
     /// What conjugate gradients multiply residuals by.
     #[serde(default)]
     pub preconditioner: PreconditionerName,
-    /// Whether an `implicit` step goes on with what conjugate gradients have reached when their iterations run out, instead of
-    /// ending the run: bounded time, for real time. The summary tells the residual.
+    /// Whether an `implicit` step goes on with what conjugate gradients have reached when their iterations
+    /// run out, instead of ending the run: bounded time, for real time. The summary tells the residual.
     #[serde(default)]
     pub accept_stalled: bool,
 }
@@ -96,13 +97,14 @@ pub enum PreconditionerName {
     LaggedFactors,
     /// The inverse of each node's own block: the least memory.
     BlockJacobi,
-    /// This, and a solution for the rigid motions of groups of neighbouring nodes: far fewer iterations on many elements.
+    /// This, and a solution for the rigid motions of groups of neighbouring nodes: far fewer iterations on
+    /// many elements.
     #[default]
     Aggregates,
 }
 
-/// What a static run prescribes instead of the size of one load: exactly one of `displacement`, `arc-length`, `volume`. It finds the
-/// factor of the load, equal in all its load steps.
+/// What a static run prescribes instead of the size of one load: exactly one of `displacement`, `arc-length`,
+/// `volume`. It finds the factor of the load, equal in all its load steps.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ControlTable {
@@ -111,15 +113,17 @@ pub struct ControlTable {
     /// How a node moves over the whole run, in equal parts.
     #[serde(default)]
     pub displacement: Option<ControlledNode>,
-    /// Length [m] that all displacements together go in a load step, √Σ|Δu|². The path ends where `stop` says, or with the last load
-    /// step.
+    /// Length [m] that all displacements together go in a load step, √Σ|Δu|². The path ends where `stop`
+    /// says, or with the last load step.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub arc_length: Option<f64>,
-    /// Where a path by `arc-length` ends before its last load step; if not given, at a load factor of 1, where the load is as written.
+    /// Where a path by `arc-length` ends before its last load step; if not given, at a load factor of 1,
+    /// where the load is as written.
     #[serde(default)]
     pub stop: Option<StopTable>,
-    /// Volume [m³] that the pressurised triangles, which must be closed, enclose at the end; it changes in equal parts.
+    /// Volume [m³] that the pressurised triangles, which must be closed, enclose at the end; it changes in
+    /// equal parts.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub volume: Option<f64>,
@@ -146,11 +150,12 @@ pub struct StopTable {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum IntegratorName {
-    /// Backward Euler, of first order: robust, and it damps a vibration of f hertz in steps of h seconds by about π f h of critical.
+    /// Backward Euler, of first order: robust, and it damps a vibration of f hertz in steps of h seconds by
+    /// about π f h of critical.
     #[default]
     BackwardEuler,
-    /// The backward differentiation formula of second order: it damps by about 62 (f h)³ of critical, and less accurate steps show
-    /// as vibrations.
+    /// The backward differentiation formula of second order: it damps by about 62 (f h)³ of critical, and
+    /// less accurate steps show as vibrations.
     Bdf2,
 }
 

@@ -43,8 +43,9 @@ pub enum CurveShape {
     Table(Vec<[f64; 2]>),
 }
 
-/// The curve over time: the factor goes from 0 at `from` to 1 at `to`. Where it is not 0 at t = 0, `explicit` and `implicit` runs begin with
-/// moved nodes there, at rest, and count the energy stored as external work; `static` and `quasi-static` get there in the first load step.
+/// The curve over time: the factor goes from 0 at `from` to 1 at `to`. Where it is not 0 at t = 0, `explicit`
+/// and `implicit` runs begin with moved nodes there, at rest, and count the energy stored as external work;
+/// `static` and `quasi-static` get there in the first load step.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct Timing {
@@ -73,9 +74,9 @@ pub struct FixTable {
     pub components: Option<Vec<Axis>>,
 }
 
-/// Nodes whose mean displacement is prescribed, each of them free by itself: a face under a plate that tilts. Weighted by the area of the
-/// boundary at each node where the nodes have whole faces, else equally. Its reaction is the force of the plate. With every solver on
-/// the CPU but explicit shells.
+/// Nodes whose mean displacement is prescribed, each of them free by itself: a face under a plate that tilts.
+/// Weighted by the area of the boundary at each node where the nodes have whole faces, else equally. Its
+/// reaction is the force of the plate. With every solver on the CPU but explicit shells.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct MeanTable {
@@ -93,8 +94,8 @@ pub struct MeanTable {
     pub timing: Timing,
 }
 
-/// A rigid part of a body, such as bone or an implant: its nodes keep their distances, and move and turn together, free in space; those of shells
-/// turn with it. With every solver on the CPU but explicit shells.
+/// A rigid part of a body, such as bone or an implant: its nodes keep their distances, and move and turn
+/// together, free in space; those of shells turn with it. With every solver on the CPU but explicit shells.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct RigidTable {
@@ -104,8 +105,9 @@ pub struct RigidTable {
     pub nodes: Selection,
 }
 
-/// A closed surface whose volume is prescribed by a uniform pressure within, however large: a balloon, an eye, a full bladder. Columns
-/// `volume.NAME` [m³] and `pressure.NAME` [Pa] of tables tell both. With every solver on the CPU but explicit shells.
+/// A closed surface whose volume is prescribed by a uniform pressure within, however large: a balloon, an
+/// eye, a full bladder. Columns `volume.NAME` [m³] and `pressure.NAME` [Pa] of tables tell both. With every
+/// solver on the CPU but explicit shells.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct VolumeTable {
@@ -114,10 +116,11 @@ pub struct VolumeTable {
     /// Which of its faces; if not given, all of its boundary. They close, and may be those of a cavity.
     #[serde(default)]
     pub faces: Option<Selection>,
-    /// By how much the enclosed volume grows from that at rest [m³], along the curve; 0 keeps it, less than 0 empties it.
+    /// By how much the enclosed volume grows from that at rest [m³], along the curve; 0 keeps it, less than 0
+    /// empties it.
     pub by: f64,
-    /// The pressure [Pa] that it takes at most, of suction likewise. There the volume lags behind its curve; when less is needed, it catches up. With the
-    /// solvers `implicit` and `static`.
+    /// The pressure [Pa] that it takes at most, of suction likewise. There the volume lags behind its curve;
+    /// when less is needed, it catches up. With the solvers `implicit` and `static`.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub pressure_limit: Option<f64>,
@@ -126,7 +129,8 @@ pub struct VolumeTable {
     pub timing: Timing,
 }
 
-/// Springs without rest length that pull nodes to points: of shells, and of solids with the solvers `implicit` and `static`.
+/// Springs without rest length that pull nodes to points: of shells, and of solids with the solvers
+/// `implicit` and `static`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct SpringTable {
@@ -142,8 +146,8 @@ pub struct SpringTable {
     pub to: Option<[f64; 3]>,
 }
 
-/// Nodes moved as prescribed: exactly one of `by`, `velocity` and `rotate`; of shells `by`, `turn` or both. Curve: `smooth-step` if not
-/// given.
+/// Nodes moved as prescribed: exactly one of `by`, `velocity` and `rotate`; of shells `by`, `turn` or both.
+/// Curve: `smooth-step` if not given.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct MoveTable {
@@ -157,17 +161,21 @@ pub struct MoveTable {
     /// Velocity [m/s], multiplied by the curve.
     #[serde(default)]
     pub velocity: Option<[f64; 3]>,
-    /// Rotation of nodes of shells about their own places [rad]: about the axis of this vector by its length, reached along the curve.
+    /// Rotation of nodes of shells about their own places [rad]: about the axis of this vector by its length,
+    /// reached along the curve.
     #[serde(default)]
     pub turn: Option<[f64; 3]>,
-    /// Rotation of nodes of a solid about an axis, reached along the curve; each node stays on its circle all the way.
+    /// Rotation of nodes of a solid about an axis, reached along the curve; each node stays on its circle all
+    /// the way.
     #[serde(default)]
     pub rotate: Option<RotateTable>,
-    /// Components prescribed; if not given, all three of the displacement, and with `turn` the rotations. A rotation takes all three.
+    /// Components prescribed; if not given, all three of the displacement, and with `turn` the rotations. A
+    /// rotation takes all three.
     #[serde(default)]
     pub components: Option<Vec<Axis>>,
-    /// The force [N] that they push with at most, as their reaction tells. From half of it on they give way together, and lag behind their motion; when
-    /// nothing is in their way any more, they catch up. With the solvers `implicit` and `static`.
+    /// The force [N] that they push with at most, as their reaction tells. From half of it on they give way
+    /// together, and lag behind their motion; when nothing is in their way any more, they catch up. With the
+    /// solvers `implicit` and `static`.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub force_limit: Option<f64>,
@@ -224,8 +232,8 @@ fn one() -> f64 {
 pub enum NodeVectorSource {
     /// The name of a point-data array of three components in the body's mesh file.
     PointData(String),
-    /// A file beside the scene with a row `node,x,y,z` for each of the nodes, with or without a header; nodes counted
-    /// from 0 in the order of the mesh file.
+    /// A file beside the scene with a row `node,x,y,z` for each of the nodes, with or without a header; nodes
+    /// counted from 0 in the order of the mesh file.
     Csv(PathBuf),
 }
 
@@ -248,7 +256,8 @@ pub struct ForceTable {
     pub timing: Timing,
 }
 
-/// Moments on nodes of shells, about axes that stay in space: exactly one of `each` and `total`. Curve: `smooth-step` if not given.
+/// Moments on nodes of shells, about axes that stay in space: exactly one of `each` and `total`. Curve:
+/// `smooth-step` if not given.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct MomentTable {
@@ -267,8 +276,8 @@ pub struct MomentTable {
     pub timing: Timing,
 }
 
-/// A force per length on edges of shells, of triangles both of whose ends are selected and which only one triangle has. Curve:
-/// `smooth-step` if not given.
+/// A force per length on edges of shells, of triangles both of whose ends are selected and which only one
+/// triangle has. Curve: `smooth-step` if not given.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct EdgeLoadTable {
@@ -306,11 +315,11 @@ pub struct PressureTable {
     pub on: String,
     /// Which faces: those with all nodes selected.
     pub faces: Selection,
-    /// Pressure [Pa]; positive pushes a solid inwards, and a shell to the side that its triangles face (a closed one that faces
-    /// outwards is blown up).
+    /// Pressure [Pa]; positive pushes a solid inwards, and a shell to the side that its triangles face (a
+    /// closed one that faces outwards is blown up).
     pub pressure: f64,
-    /// How it comes to the nodes of a shell; if not given, `curved` with `dkt-curved` and `lumped` with other elements. Only these
-    /// pairs go together.
+    /// How it comes to the nodes of a shell; if not given, `curved` with `dkt-curved` and `lumped` with other
+    /// elements. Only these pairs go together.
     #[serde(default)]
     pub spread: Option<SpreadName>,
     /// Its curve over time.

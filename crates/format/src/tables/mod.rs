@@ -1,5 +1,6 @@
-//! The scene as the user wrote it: plain data, nothing computed. Every parameter is declared here once (or, for a law,
-//! beside its formulas) with meaning, unit, range and default; schema, checks and reference page come from that.
+//! The scene as the user wrote it: plain data, nothing computed. Every parameter is declared here once (or,
+//! for a law, beside its formulas) with meaning, unit, range and default; schema, checks and reference page
+//! come from that.
 
 mod body;
 mod contact;
@@ -67,16 +68,18 @@ pub struct SceneTable {
 #[serde(rename_all = "kebab-case")]
 #[schemars(rename = "Design")]
 pub enum DesignName {
-    /// Cells write forces into slots of their own, nodes gather them in a fixed order. The same bits every time.
+    /// Cells write forces into slots of their own, nodes gather them in a fixed order. The same bits every
+    /// time.
     Gather,
-    /// Blocks of neighbouring nodes do a step in one kernel: they find the forces of all cells at their nodes in shared memory
-    /// and move them. Cells at the borders of blocks are found by each. The same bits every time, forces of a limited range.
+    /// Blocks of neighbouring nodes do a step in one kernel: they find the forces of all cells at their nodes
+    /// in shared memory and move them. Cells at the borders of blocks are found by each. The same bits every
+    /// time, forces of a limited range.
     Blocks,
-    /// Cells add their forces to those of the nodes by floating-point atomics, in any order: the last bits vary from run to
-    /// run.
+    /// Cells add their forces to those of the nodes by floating-point atomics, in any order: the last bits
+    /// vary from run to run.
     FloatAtomics,
-    /// Blocks of neighbouring cells add their forces up in shared memory, nodes gather the sums of their blocks; shapes of
-    /// plain tetrahedra at rest are found again from their nodes. The same bits every time.
+    /// Blocks of neighbouring cells add their forces up in shared memory, nodes gather the sums of their
+    /// blocks; shapes of plain tetrahedra at rest are found again from their nodes. The same bits every time.
     Fast,
 }
 
@@ -115,8 +118,8 @@ pub struct RunTable {
     /// The GPU, by a part of its name in `pliant devices`; if not given, the best one.
     #[serde(default)]
     pub adapter: Option<String>,
-    /// How the kernels of a GPU bring forces from cells to nodes; if not given, the ways that measured best: `fast`, and `gather` on
-    /// adapters that are software.
+    /// How the kernels of a GPU bring forces from cells to nodes; if not given, the ways that measured best:
+    /// `fast`, and `gather` on adapters that are software.
     #[serde(default)]
     pub design: Option<DesignName>,
     /// Number type of the solver; if not given, `double` on the CPU and `single` on a GPU, which has
@@ -126,38 +129,41 @@ pub struct RunTable {
     /// How the state goes from instant to instant.
     #[serde(default)]
     pub solver: SolverName,
-    /// Time step [s], made a little shorter where it does not divide the duration; `auto`: 0.9 × the critical time step of the assembled
-    /// model at rest, `load-steps` where the solver is `quasi-static` or `static`, and 0.01 s where it is `implicit`.
+    /// Time step [s], made a little shorter where it does not divide the duration; `auto`: 0.9 × the critical
+    /// time step of the assembled model at rest, `load-steps` where the solver is `quasi-static` or `static`,
+    /// and 0.01 s where it is `implicit`.
     #[serde(default)]
     pub step: StepChoice,
-    /// What an explicit run does when the largest stable step of the deformed model, watched during the run, falls below
-    /// its step; if not given, `substep`.
+    /// What an explicit run does when the largest stable step of the deformed model, watched during the run,
+    /// falls below its step; if not given, `substep`.
     #[serde(default)]
     pub on_unstable: Option<OnUnstableName>,
     /// Makes the nodes that limit an explicit step heavier.
     #[serde(default)]
     pub mass_scaling: Option<MassScalingTable>,
-    /// Load steps of a quasi-static or static run with `step = "auto"`: so many equal ones, or the times at which they end.
+    /// Load steps of a quasi-static or static run with `step = "auto"`: so many equal ones, or the times at
+    /// which they end.
     #[serde(default)]
     pub load_steps: LoadSteps,
-    /// Largest residual force over the largest internal force (or load, or inertial force) at which an equilibrium is found; if not
-    /// given, 1e-6 in double and 1e-4 in single precision with the solver `quasi-static`, 1e-8 with `static`, 1e-6 with
-    /// `implicit`.
+    /// Largest residual force over the largest internal force (or load, or inertial force) at which an
+    /// equilibrium is found; if not given, 1e-6 in double and 1e-4 in single precision with the solver
+    /// `quasi-static`, 1e-8 with `static`, 1e-6 with `implicit`.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub tolerance: Option<f64>,
-    /// Iterations of Newton's method at the most in a step of `implicit` (20 if not given) or `static` (40). With 1 a step of
-    /// `implicit` is one linear solution, and its residual is not checked: for real time.
+    /// Iterations of Newton's method at the most in a step of `implicit` (20 if not given) or `static` (40).
+    /// With 1 a step of `implicit` is one linear solution, and its residual is not checked: for real time.
     #[serde(default)]
     #[schemars(range(min = 1, max = 10_000))]
     pub iterations: Option<u32>,
-    /// Speed [m/s] of all nodes below which a Newton step of `implicit` in contact is the last one; it is still made. If not given, a step must
-    /// move nothing by more than a thousandth of `barrier-distance`.
+    /// Speed [m/s] of all nodes below which a Newton step of `implicit` in contact is the last one; it is
+    /// still made. If not given, a step must move nothing by more than a thousandth of `barrier-distance`.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub speed_tolerance: Option<f64>,
-    /// Whether a step of `implicit` whose `iterations` run out, or whose energy does not fall any more, goes on with what it has reached instead of
-    /// being halved: bounded time, for real time. In contact that state has no intersection. Summary and window tell how many steps did so.
+    /// Whether a step of `implicit` whose `iterations` run out, or whose energy does not fall any more, goes
+    /// on with what it has reached instead of being halved: bounded time, for real time. In contact that
+    /// state has no intersection. Summary and window tell how many steps did so.
     #[serde(default)]
     pub accept_unconverged: Option<bool>,
     /// How `implicit` goes on in time; `backward-euler` if not given.
@@ -169,8 +175,8 @@ pub struct RunTable {
     /// What a `static` run prescribes instead of the size of a load, so that it goes past limit points.
     #[serde(default)]
     pub control: Option<ControlTable>,
-    /// The part of the internal energy that a run may hold in hourglass modes of `hex8` at its end. With more it writes all outputs and ends
-    /// with an error: the shape of the elements is not resolved.
+    /// The part of the internal energy that a run may hold in hourglass modes of `hex8` at its end. With more
+    /// it writes all outputs and ends with an error: the shape of the elements is not resolved.
     #[serde(default = "tenth")]
     #[schemars(range(min = 0.0))]
     pub allow_hourglass: f64,
@@ -196,16 +202,17 @@ pub struct CheckpointTable {
     pub every: f64,
 }
 
-/// Mass added at the start for a larger critical time step: exactly one of `target-step` and `share`. It resists acceleration (and so
-/// damping acts on it); gravity and other loads act on the mass of the material, so that equilibria and their forces do not change.
+/// Mass added at the start for a larger critical time step: exactly one of `target-step` and `share`. It
+/// resists acceleration (and so damping acts on it); gravity and other loads act on the mass of the material,
+/// so that equilibria and their forces do not change.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum MassScalingTable {
-    /// Critical time step [s] of the assembled model at rest that is reached at least, with little more mass than it needs. The automatic
-    /// `step` is 0.9 × as long.
+    /// Critical time step [s] of the assembled model at rest that is reached at least, with little more mass
+    /// than it needs. The automatic `step` is 0.9 × as long.
     TargetStep(#[schemars(extend("exclusiveMinimum" = 0.0))] f64),
-    /// The most mass that is added, as a part of the mass of the materials: 0.01 is 1 %. The critical time step becomes as long as it
-    /// allows.
+    /// The most mass that is added, as a part of the mass of the materials: 0.01 is 1 %. The critical time
+    /// step becomes as long as it allows.
     Share(#[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0))] f64),
 }
 

@@ -21,8 +21,8 @@ pub enum FieldName {
     Reaction,
     /// Moment [N m] by which constraints hold or turn a node of a shell about itself; zero where it is free.
     ReactionMoment,
-    /// Deformation gradient F of a solid, a membrane or a bar (which keeps its thickness in it), the mean over the element: nine numbers xx, xy, xz, yx, …, zz, of which xy is the change of x
-    /// along y at rest.
+    /// Deformation gradient F of a solid, a membrane or a bar (which keeps its thickness in it), the mean
+    /// over the element: nine numbers xx, xy, xz, yx, …, zz, of which xy is the change of x along y at rest.
     DeformationGradient,
     /// Cauchy stress [Pa].
     CauchyStress,
@@ -38,22 +38,24 @@ pub enum FieldName {
     FibreStretch,
     /// Pressure [Pa], minus a third of the trace of the Cauchy stress.
     Pressure,
-    /// Volume ratio J that the law's volumetric part sees, to which `pressure` belongs: det F of the element, of `tet4-anp` and the
-    /// other averaged tets the mean over its nodes, of `hex8-full` the mean over the element.
+    /// Volume ratio J that the law's volumetric part sees, to which `pressure` belongs: det F of the element,
+    /// of `tet4-anp` and the other averaged tets the mean over its nodes, of `hex8-full` the mean over the
+    /// element.
     #[serde(rename = "J")]
     VolumeRatio,
     /// The element's own det F, whatever its `J` is.
     #[serde(rename = "cell-J")]
     CellVolumeRatio,
-    /// Strain energy of the instantaneous elastic law per volume at rest [J/m³], with the element's averages of volume: times the
-    /// volumes it sums to the stored energy.
+    /// Strain energy of the instantaneous elastic law per volume at rest [J/m³], with the element's averages
+    /// of volume: times the volumes it sums to the stored energy.
     EnergyDensity,
     /// The longest stable step [s] of the element alone, of its stiffness at the instant; of shells that
     /// at rest, which turns with them. The smallest one bounds the step of the whole.
     ElementStep,
     /// Force per length in the wall of a shell or a membrane [N/m], as a tensor in space.
     MembraneForce,
-    /// Moment per length in the wall of a shell [N], as a tensor in space; positive where the top is in tension.
+    /// Moment per length in the wall of a shell [N], as a tensor in space; positive where the top is in
+    /// tension.
     BendingMoment,
     /// Stress at the top of a shell [Pa], half the thickness along its normal.
     StressTop,
@@ -65,33 +67,39 @@ pub enum FieldName {
     MembraneEnergy,
     /// Energy of bending and twisting a shell, per area at rest [J/m²].
     BendingEnergy,
-    /// Energy of nodes of a shell that turn about the normal otherwise than their triangle, per area at rest [J/m²]: not of the
-    /// wall; much of it means that the mesh is too coarse.
+    /// Energy of nodes of a shell that turn about the normal otherwise than their triangle, per area at rest
+    /// [J/m²]: not of the wall; much of it means that the mesh is too coarse.
     DrillingEnergy,
     /// Thickness of a shell or a membrane at rest [m].
     Thickness,
-    /// Thickness [m] with the strain across that plane stress asks for: of a membrane by its law, of a shell t (A/A₀)^(−ν/(1−ν)), which its
-    /// forces do not feel.
+    /// Thickness [m] with the strain across that plane stress asks for: of a membrane by its law, of a shell
+    /// t (A/A₀)^(−ν/(1−ν)), which its forces do not feel.
     CurrentThickness,
     /// Length of a bar over its length without force.
     AxialStretch,
     /// Force along a bar [N], positive where it pulls.
     AxialForce,
-    /// The larger size of the principal strains of a shell at its top and bottom; small-strain elasticity holds to about 0.1.
+    /// The larger size of the principal strains of a shell at its top and bottom; small-strain elasticity
+    /// holds to about 0.1.
     SurfaceStrain,
     /// Sum of the forces [N] of contacts on a node.
     ContactForce,
-    /// Pressure of contacts [Pa]: the force on a node along their normals, over its share of the deformed faces that it presses on, a third of
-    /// each triangle. Zero of nodes that touch nothing; not a number of nodes that cannot.
+    /// Pressure of contacts [Pa]: the force on a node along their normals, over its share of the deformed
+    /// faces that it presses on, a third of each triangle. Zero of nodes that touch nothing; not a number of
+    /// nodes that cannot.
     ContactPressure,
-    /// Least signed distance [m] of a node from the obstacles, tools and bodies that it may touch, less the `thickness` of the contact; bodies
-    /// count up to a quarter of a mean edge. Not a number where there is none.
+    /// Least signed distance [m] of a node from the obstacles, tools and bodies that it may touch, less the
+    /// `thickness` of the contact; bodies count up to a quarter of a mean edge. Not a number where there is
+    /// none.
     Gap,
-    /// How far [m] a node has slid on what it touches since its touch began; not a number where it touches nothing.
+    /// How far [m] a node has slid on what it touches since its touch began; not a number where it touches
+    /// nothing.
     Slip,
-    /// Whether constraints hold a node: 0 where it is free, 1 where it stays where it is at rest, 2 where it is moved, 3 under a plate.
+    /// Whether constraints hold a node: 0 where it is free, 1 where it stays where it is at rest, 2 where it
+    /// is moved, 3 under a plate.
     Constraint,
-    /// Force [N] of loads on a node, without weights. Pressures on shells give a third of their force to each corner.
+    /// Force [N] of loads on a node, without weights. Pressures on shells give a third of their force to each
+    /// corner.
     Load,
     /// Weight [N] of a node: its mass times the acceleration of gravity.
     Weight,
@@ -378,14 +386,15 @@ pub enum At {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct VtuTable {
-    /// The body or the carried surface, which has fields of cells as means at its points; if not given, all bodies together.
+    /// The body or the carried surface, which has fields of cells as means at its points; if not given, all
+    /// bodies together.
     #[serde(default)]
     pub on: Option<String>,
     /// Time between frames [s]; the first and the last instant are always written.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub every: f64,
-    /// The fields. Tensors have nine components xx, xy, xz, yx, yy, yz, zx, zy, zz in this order; `[view]` colours by one of them
-    /// with `component`, and probes of a `csv` output write each into a column.
+    /// The fields. Tensors have nine components xx, xy, xz, yx, yy, yz, zx, zy, zz in this order; `[view]`
+    /// colours by one of them with `component`, and probes of a `csv` output write each into a column.
     #[serde(default = "default_fields")]
     pub data: Vec<FieldName>,
     /// Where fields of cells are written.
@@ -408,12 +417,13 @@ pub struct CsvTable {
     /// Time between rows [s]; the first and the last instant are always written.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub every: f64,
-    /// Constraints whose reaction [N] is written; if not given, all. Columns `reaction.NAME.x`, `.y`, `.z`: the sum of the forces by
-    /// which the constraint holds or moves its nodes.
+    /// Constraints whose reaction [N] is written; if not given, all. Columns `reaction.NAME.x`, `.y`, `.z`:
+    /// the sum of the forces by which the constraint holds or moves its nodes.
     #[serde(default)]
     pub reactions: Option<Vec<String>>,
-    /// A point [m], fixed in space, about which the moments of these reactions are written [N m], in columns `moment.NAME.x`, `.y`, `.z`:
-    /// the sum of (place − point) × force over the nodes where they are, and of shells also of the moments on the nodes.
+    /// A point [m], fixed in space, about which the moments of these reactions are written [N m], in columns
+    /// `moment.NAME.x`, `.y`, `.z`: the sum of (place − point) × force over the nodes where they are, and of
+    /// shells also of the moments on the nodes.
     #[serde(default)]
     pub moments_about: Option<[f64; 3]>,
     /// Whether energies [J] are written.
@@ -436,8 +446,8 @@ pub struct ProbeTable {
     pub on: String,
     /// Its place at rest [m]; outside the body, the nearest cell carries it.
     pub at: [f64; 3],
-    /// The fields, in columns `probe.NAME.FIELD`; vectors with `.x`, `.y`, `.z`, tensors with `.xx`, `.xy`, `.xz`, `.yx`, `.yy`, `.yz`, `.zx`,
-    /// `.zy`, `.zz`, such as `probe.tip.cauchy-stress.xy`.
+    /// The fields, in columns `probe.NAME.FIELD`; vectors with `.x`, `.y`, `.z`, tensors with `.xx`, `.xy`,
+    /// `.xz`, `.yx`, `.yy`, `.yz`, `.zx`, `.zy`, `.zz`, such as `probe.tip.cauchy-stress.xy`.
     #[serde(default = "default_probe_fields")]
     pub data: Vec<FieldName>,
 }

@@ -8,9 +8,10 @@ use super::{
     OnUnstableName, PrecisionName, RunTable, SolverName, StepChoice,
 };
 
-/// Bodies with a solver and a step of their own. Bodies that no participant names follow `[run]`: with the solvers `implicit` and
-/// `static` all together, else the solids together and the shells together. Participants advance at their own steps and meet at common instants, where outputs see them.
-/// A key that is left out is as in `[run]`.
+/// Bodies with a solver and a step of their own. Bodies that no participant names follow `[run]`: with the
+/// solvers `implicit` and `static` all together, else the solids together and the shells together.
+/// Participants advance at their own steps and meet at common instants, where outputs see them. A key that is
+/// left out is as in `[run]`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ParticipantTable {
@@ -19,8 +20,8 @@ pub struct ParticipantTable {
     /// As in `[run]`.
     #[serde(default)]
     pub solver: Option<SolverName>,
-    /// Time step [s], as in `[run]`. Common instants are as far apart as the longest step of all participants; shorter steps are made a
-    /// little shorter where they don't divide it.
+    /// Time step [s], as in `[run]`. Common instants are as far apart as the longest step of all
+    /// participants; shorter steps are made a little shorter where they don't divide it.
     #[serde(default)]
     pub step: Option<StepChoice>,
     /// As in `[run]`.

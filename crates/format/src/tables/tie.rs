@@ -4,17 +4,18 @@ use pliant_geometry::Selection;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Ties the nodes of one body to another body, whose mesh need not match: they follow nodes of the other, and their forces and masses go
-/// there. For vessels inside an organ, walls on a surface, parts that are glued. Bodies of two participants are tied by springs, as stiff as
-/// their steps allow.
+/// Ties the nodes of one body to another body, whose mesh need not match: they follow nodes of the other, and
+/// their forces and masses go there. For vessels inside an organ, walls on a surface, parts that are glued.
+/// Bodies of two participants are tied by springs, as stiff as their steps allow.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct TieTable {
-    /// The body whose nodes follow, and the body that they follow: `between = ["vessels", "liver"]`. With `points`, take the finer or the
-    /// softer one first.
+    /// The body whose nodes follow, and the body that they follow: `between = ["vessels", "liver"]`. With
+    /// `points`, take the finer or the softer one first.
     pub between: [String; 2],
-    /// How nodes follow. If not given, `mortar` where faces of one solid lie on those of another one, and `points` elsewhere: walls, bars, a
-    /// solid inside another one, and gaps wider than the default `tolerance`.
+    /// How nodes follow. If not given, `mortar` where faces of one solid lie on those of another one, and
+    /// `points` elsewhere: walls, bars, a solid inside another one, and gaps wider than the default
+    /// `tolerance`.
     #[serde(default)]
     pub method: Option<TieMethod>,
     /// The nodes of the first body that follow; if not given, all inside or on the second.
@@ -33,7 +34,8 @@ pub struct TieTable {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum TieMethod {
-    /// Weighted means over the common area of faces of two solids, so that a constant stress passes in either order.
+    /// Weighted means over the common area of faces of two solids, so that a constant stress passes in either
+    /// order.
     Mortar,
     /// Each node follows the element of the other body in which it lies, or on whose surface.
     Points,
@@ -46,7 +48,8 @@ pub enum Rotations {
     /// They are unknowns of their own: a hinge.
     #[default]
     Free,
-    /// They follow the solid: the rotation of its deformation gradient there, that of the element that holds the node, or the mean of those behind the
-    /// faces of a wall round it. Moments go to the solid as couples.
+    /// They follow the solid: the rotation of its deformation gradient there, that of the element that holds
+    /// the node, or the mean of those behind the faces of a wall round it. Moments go to the solid as
+    /// couples.
     Follow,
 }

@@ -37,33 +37,38 @@ impl Choice for TextureName {
     const WORDS: &[&str] = &["none", "skin"];
 }
 
-/// How pictures and films of the scene are taken (`pliant render`, `pliant run --picture`) and how the window opens (`pliant view`). It
-/// changes nothing of the run.
+/// How pictures and films of the scene are taken (`pliant render`, `pliant run --picture`) and how the window
+/// opens (`pliant view`). It changes nothing of the run.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct ViewTable {
     /// The body or the carried surface that is shown; if not given, all bodies together.
     #[serde(default)]
     pub on: Option<String>,
-    /// What the colours tell; `label`: the labels of the elements, each in a colour of its own; `none`: the colour of tissue. If not given, `von-mises`, and
-    /// `displacement` on surfaces that shells carry.
+    /// What the colours tell; `label`: the labels of the elements, each in a colour of its own; `none`: the
+    /// colour of tissue. If not given, `von-mises`, and `displacement` on surfaces that shells carry.
     #[serde(default)]
     pub colour: Option<ColourBy>,
-    /// What is left out, so that what lies inside or behind is seen: labels of elements by number, name or range, and bodies, obstacles and tools by
-    /// name, as `[2, "tumour", "5-8", "grasper"]`. A name that both have is that of the label.
+    /// What is left out, so that what lies inside or behind is seen: labels of elements by number, name or
+    /// range, and bodies, obstacles and tools by name, as `[2, "tumour", "5-8", "grasper"]`. A name that both
+    /// have is that of the label.
     #[serde(default)]
     pub hide: Vec<CellLabel>,
-    /// What looks otherwise than the rest, by names as in `hide`: `look.liver = { opacity = 0.3, colour = "liver" }`. The opacity goes from 0
-    /// to 1; the colour is `view` (as the rest), `label`, `tissue`, `liver`, `brain`, `colon`, `artery`, `vein`, `tumour`, `bone` or `steel`.
+    /// What looks otherwise than the rest, by names as in `hide`:
+    /// `look.liver = { opacity = 0.3, colour = "liver" }`. The opacity goes from 0 to 1; the colour is `view`
+    /// (as the rest), `label`, `tissue`, `liver`, `brain`, `colon`, `artery`, `vein`, `tumour`, `bone` or
+    /// `steel`.
     #[serde(default)]
     pub look: BTreeMap<String, LookTable>,
-    /// A component of a vector (`x`, `y`, `z`) or a tensor (`xx`, `xy`, …), instead of the size of a vector; a tensor needs one.
+    /// A component of a vector (`x`, `y`, `z`) or a tensor (`xx`, `xy`, …), instead of the size of a vector;
+    /// a tensor needs one.
     #[serde(default)]
     pub component: Option<Component>,
     /// The map of colours; all but `turbo` are even to eyes that see no red or green.
     #[serde(default)]
     pub map: MapName,
-    /// Values of the first and the last colour, in SI units; if not given, those of all frames without the outermost 0.5 %.
+    /// Values of the first and the last colour, in SI units; if not given, those of all frames without the
+    /// outermost 0.5 %.
     #[serde(default)]
     pub range: Option<[f64; 2]>,
     /// Whether the edges of the elements are drawn.
@@ -78,19 +83,21 @@ pub struct ViewTable {
     /// Whether fibres are drawn on the surface and in a section, as short lines that follow the deformation.
     #[serde(default)]
     pub fibres: bool,
-    /// Whether the forces of contacts are drawn, through the bodies: a dot at each node that touches something, and an arrow along the force on it. The
-    /// note tells what the longest one stands for.
+    /// Whether the forces of contacts are drawn, through the bodies: a dot at each node that touches
+    /// something, and an arrow along the force on it. The note tells what the longest one stands for.
     #[serde(default)]
     pub contacts: bool,
-    /// Whether constraints and loads are marked, through the bodies: squares where nodes are held, dots where they are moved, bars under plates, arrows along
-    /// the forces of loads, and one along the weight of all. At most 300 of each kind are drawn.
+    /// Whether constraints and loads are marked, through the bodies: squares where nodes are held, dots where
+    /// they are moved, bars under plates, arrows along the forces of loads, and one along the weight of all.
+    /// At most 300 of each kind are drawn.
     #[serde(default)]
     pub marks: bool,
-    /// Whether the element with the smallest `element-step` is marked, through the body. Shells are then shown flat.
+    /// Whether the element with the smallest `element-step` is marked, through the body. Shells are then
+    /// shown flat.
     #[serde(default)]
     pub critical: bool,
-    /// Whether the largest value that the colours tell is marked: a ring at its place and the number. The ring is dashed where something hides the
-    /// place.
+    /// Whether the largest value that the colours tell is marked: a ring at its place and the number. The
+    /// ring is dashed where something hides the place.
     #[serde(default = "yes")]
     pub mark_maximum: bool,
     /// Whether folds and contacts are darker, where less light from all sides arrives.
@@ -303,7 +310,8 @@ pub struct ClipTable {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct CameraTable {
-    /// Angle around the axis that points up [°]; with `up = "z"` 0 looks from the side of x, 90 from that of y.
+    /// Angle around the axis that points up [°]; with `up = "z"` 0 looks from the side of x, 90 from that of
+    /// y.
     #[serde(default = "azimuth")]
     pub azimuth: f64,
     /// Angle above the horizon [°].
@@ -392,7 +400,8 @@ impl ViewTable {
         matches!(self.colour, Some(ColourBy::Labels(_)))
     }
 
-    /// The regions that it hides of those there are. Others are left out: a scene that asks for them is refused when it is built.
+    /// The regions that it hides of those there are. Others are left out: a scene that asks for them is
+    /// refused when it is built.
     pub fn hidden(&self, names: &RegionNames) -> Vec<Region> {
         self.hide.iter().filter_map(|name| names.find(name).ok()).flatten().collect()
     }

@@ -122,7 +122,8 @@ impl Cells {
         }
     }
 
-    /// Leaves the open cell of the file out, because its kind is not supported. Its dimension is 3 for a volume.
+    /// Leaves the open cell of the file out, because its kind is not supported. Its dimension is 3 for a
+    /// volume.
     pub fn skip(&mut self, kind: impl Into<String>, dimension: usize) {
         self.skipped.entry(kind.into()).or_insert((dimension, 0)).1 += 1;
     }
@@ -186,8 +187,8 @@ impl Cells {
         }
     }
 
-    /// The mesh, or the reason for its absence; adds notes about skipped and split cells. Cells may be skipped only if their dimension is
-    /// below that of the others: a body would have holes without them.
+    /// The mesh, or the reason for its absence; adds notes about skipped and split cells. Cells may be
+    /// skipped only if their dimension is below that of the others: a body would have holes without them.
     pub(crate) fn into_mesh(
         self,
         points: Vec<Vector3>,

@@ -1,6 +1,6 @@
-//! Reads FreeSurfer's surfaces: the binary format of triangles (`lh.pial`, big-endian) and the text that `mris_convert` writes
-//! (`lh.pial.asc`). Coordinates are millimetres in FreeSurfer's own axes; the footer gives their offset from the scanner's.
-//! Leaves out: the older binary formats of quadrilaterals, patches.
+//! Reads FreeSurfer's surfaces: the binary format of triangles (`lh.pial`, big-endian) and the text that
+//! `mris_convert` writes (`lh.pial.asc`). Coordinates are millimetres in FreeSurfer's own axes; the footer
+//! gives their offset from the scanner's. Leaves out: the older binary formats of quadrilaterals, patches.
 
 use std::collections::BTreeMap;
 

@@ -1,6 +1,6 @@
-//! Reads surfaces in GIfTI (`.gii`): XML with an array of points and one of triangles, as text, base64, or base64 packed with zlib or gzip
-//! (GIfTI Surface Data Format 1.0). Lengths are millimetres by custom.
-//! Leaves out: data in other files, data at the points, transforms (which are reported).
+//! Reads surfaces in GIfTI (`.gii`): XML with an array of points and one of triangles, as text, base64, or
+//! base64 packed with zlib or gzip (GIfTI Surface Data Format 1.0). Lengths are millimetres by custom. Leaves
+//! out: data in other files, data at the points, transforms (which are reported).
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -64,7 +64,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<MeshFile, Fault> {
     Ok(MeshFile { mesh, format: format!("{} {version}", Format::Gifti.name()), notes, time: None })
 }
 
-/// The text without the declaration of its type, which the parser rejects. This function rejects declarations of entities.
+/// The text without the declaration of its type, which the parser rejects. This function rejects declarations
+/// of entities.
 fn without_doctype(text: &str) -> Result<String, Fault> {
     let Some(start) = text.find("<!DOCTYPE") else { return Ok(text.to_owned()) };
     let length =

@@ -1,9 +1,10 @@
 //! Mesh files in and out.
 //!
-//! Reads Gmsh 1, 2 and 4.1 (`.msh`), legacy VTK (`.vtk`), VTK XML (`.vtu`, `.vtp`), Wavefront OBJ, OFF, STL, PLY, GIfTI (`.gii`) and
-//! FreeSurfer surfaces (`lh.pial`), text and binary; writes `.vtu`, Gmsh 4.1, OBJ, STL and PLY. The first bytes select the reader if they
-//! identify a format, otherwise the extension. Cells are linear: vertex, line, triangle, quad, tet, hex. Wedges and pyramids become tets
-//! (`split.rs`). Cells of other kinds are an error if the body would lack them, otherwise they are skipped with a note.
+//! Reads Gmsh 1, 2 and 4.1 (`.msh`), legacy VTK (`.vtk`), VTK XML (`.vtu`, `.vtp`), Wavefront OBJ, OFF, STL,
+//! PLY, GIfTI (`.gii`) and FreeSurfer surfaces (`lh.pial`), text and binary; writes `.vtu`, Gmsh 4.1, OBJ,
+//! STL and PLY. The first bytes select the reader if they identify a format, otherwise the extension. Cells
+//! are linear: vertex, line, triangle, quad, tet, hex. Wedges and pyramids become tets (`split.rs`). Cells of
+//! other kinds are an error if the body would lack them, otherwise they are skipped with a note.
 
 mod base64;
 mod cells;
@@ -228,7 +229,8 @@ fn read_of(path: &Path, bytes: &[u8], format: Format) -> Result<MeshFile, MeshFi
     Ok(file)
 }
 
-/// What 3D Slicer writes into the title or the comments of a mesh file whose x runs to the left and y to the back.
+/// What 3D Slicer writes into the title or the comments of a mesh file whose x runs to the left and y to the
+/// back.
 const LPS: &[u8] = b"SPACE=LPS";
 
 /// Bytes that are searched for it.
@@ -304,8 +306,8 @@ fn save(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Re
 /// The ending of a file that is not whole yet.
 const UNFINISHED: &str = ".tmp";
 
-/// Makes a file that is locked while it is written, so no other process removes it as stale. The file is new: a link of
-/// its name is not followed.
+/// Makes a file that is locked while it is written, so no other process removes it as stale. The file is new:
+/// a link of its name is not followed.
 fn unfinished(path: &Path) -> io::Result<fs::File> {
     loop {
         let file = match fs::File::create_new(path) {

@@ -139,7 +139,8 @@ impl PolyList {
     }
 }
 
-/// Adds the cells of a list of a poly-data file. Points are counted from `first`, of which there are `points`.
+/// Adds the cells of a list of a poly-data file. Points are counted from `first`, of which there are
+/// `points`.
 pub(super) fn add_poly(
     cells: &mut Cells,
     list: PolyList,

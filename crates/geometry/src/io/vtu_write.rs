@@ -20,7 +20,8 @@ use crate::{DataArray, Mesh};
 /// How a `.vtu` file is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VtuOptions {
-    /// Compresses the arrays with zlib; real numbers that it would hardly shorten are stored in its format as they are.
+    /// Compresses the arrays with zlib; real numbers that it would hardly shorten are stored in its format as
+    /// they are.
     pub compress: bool,
     /// Rounds coordinates and data to 32-bit floating point: half the size.
     pub single: bool,
@@ -35,14 +36,15 @@ const BLOCK: usize = 1 << 17;
 /// times the time.
 const LEVEL: u32 = 1;
 
-/// A block of real numbers is stored as it is where fewer than one in so many of its numbers is met again: zlib would take a tenth off
-/// such fields, and as long as the recovery of stresses.
+/// A block of real numbers is stored as it is where fewer than one in so many of its numbers is met again:
+/// zlib would take a tenth off such fields, and as long as the recovery of stresses.
 const REPEATED: usize = 8;
 
 /// Writes a mesh as a `.vtu` file into `writer`, as one piece with all its cells.
 ///
 /// Sets become arrays `set:NAME` of 0 and 1. Cell data that a kind of cells does not have are NaN there.
-/// `label` is written as integers if it is integral everywhere; the names of labels become field data `label-names` (byte codes).
+/// `label` is written as integers if it is integral everywhere; the names of labels become field data
+/// `label-names` (byte codes).
 pub fn write_vtu(writer: impl Write, mesh: &Mesh, options: &VtuOptions) -> Result<(), MeshFileError> {
     let path = Path::new("stream.vtu");
     check(path, mesh)?;
@@ -57,12 +59,14 @@ pub fn save_vtu(path: &Path, mesh: &Mesh, options: &VtuOptions) -> Result<(), Me
     save(path, |out| write(out, mesh, options))
 }
 
-/// Writes a mesh again and again with other data: points, cells and sets, which stay, are encoded once. Each file is as [`write_vtu`] writes it.
+/// Writes a mesh again and again with other data: points, cells and sets, which stay, are encoded once. Each
+/// file is as [`write_vtu`] writes it.
 #[derive(Clone, Debug, Default)]
 pub struct VtuSeries(Option<Lasting>);
 
 impl VtuSeries {
-    /// Writes the next frame into `writer`. Points, cells and sets are those of the first frame, of which they are checked.
+    /// Writes the next frame into `writer`. Points, cells and sets are those of the first frame, of which
+    /// they are checked.
     pub fn write(
         &mut self,
         mut writer: impl Write,
@@ -234,7 +238,8 @@ fn bytes<const N: usize>(numbers: impl Iterator<Item = [u8; N]>) -> Vec<u8> {
     numbers.collect::<Vec<_>>().into_flattened()
 }
 
-/// Adds bytes as they are in zlib's format (RFC 1950, in stored blocks of RFC 1951): a library's level 0 takes five times as long.
+/// Adds bytes as they are in zlib's format (RFC 1950, in stored blocks of RFC 1951): a library's level 0
+/// takes five times as long.
 fn store(bytes: &[u8], to: &mut Vec<u8>) {
     to.extend([0x78, 0x01]);
     let mut blocks = bytes.chunks(usize::from(u16::MAX)).peekable();
@@ -247,7 +252,8 @@ fn store(bytes: &[u8], to: &mut Vec<u8>) {
     to.extend(adler32(&bytes).to_be_bytes());
 }
 
-/// Whether at least one in [`REPEATED`] numbers of so many bytes was met shortly before in a block, as zlib needs it to save space.
+/// Whether at least one in [`REPEATED`] numbers of so many bytes was met shortly before in a block, as zlib
+/// needs it to save space.
 fn repeats<const WIDTH: usize>(block: &[u8]) -> bool {
     const SLOTS: usize = 1024;
     let mut seen = [u64::MAX; SLOTS];
@@ -288,8 +294,8 @@ fn write_with(out: &mut dyn Write, mesh: &Mesh, options: &VtuOptions, lasting: &
     out.write_all(&parts.xml)
 }
 
-/// Writes the time, and the names of labels and bodies: for each a text such as `5 liver` as numbers, its bytes in UTF-8 and a 0. meshio
-/// 5.3.5 reads no file that has an array of type `String`.
+/// Writes the time, and the names of labels and bodies: for each a text such as `5 liver` as numbers, its
+/// bytes in UTF-8 and a 0. meshio 5.3.5 reads no file that has an array of type `String`.
 fn write_field_data(parts: &mut Parts, mesh: &Mesh, options: &VtuOptions) -> io::Result<()> {
     let names = [(LABEL_NAMES, &mesh.label_names), (BODY_NAMES, &mesh.body_names)];
     if options.time.is_none() && names.iter().all(|(_, names)| names.is_empty()) {

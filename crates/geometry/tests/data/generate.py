@@ -146,7 +146,8 @@ writer.SetInputData(poly_data())
 writer.SetFileName("poly.vtp")
 assert writer.Write()
 
-# --- meshio: the mixed mesh as VTU and legacy VTK, as others write them ----------------------------------------
+# --- meshio: the mixed mesh as VTU and legacy VTK, as others write them
+# ----------------------------------------
 mixed = meshio.Mesh(
     POINTS,
     CELLS,
@@ -161,7 +162,8 @@ meshio.vtu.write("meshio-zlib.vtu", mixed, binary=True, compression="zlib")
 meshio.vtk.write("meshio-v42.vtk", mixed, fmt_version="4.2", binary=True)
 meshio.vtk.write("meshio-v51.vtk", mixed, fmt_version="5.1", binary=True)
 
-# --- Gmsh: a box with named groups, and data on nodes and elements ---------------------------------------------
+# --- Gmsh: a box with named groups, and data on nodes and elements
+# ---------------------------------------------
 import gmsh
 
 gmsh.initialize()
@@ -226,8 +228,9 @@ gmsh.option.setNumber("Mesh.Binary", 1)
 gmsh.write("partitioned-binary.msh")
 gmsh.finalize()
 
-# --- surfaces ------------------------------------------------------------------------------------------------
-# A tetrahedron with outward triangles; and a cube of quads.
+# --- surfaces
+# ------------------------------------------------------------------------------------------------ A
+# tetrahedron with outward triangles; and a cube of quads.
 TET = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.5]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 tet = meshio.Mesh(TET, [("triangle", FACES)])

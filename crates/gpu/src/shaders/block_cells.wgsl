@@ -1,5 +1,5 @@
-// A block of neighbouring cells works in shared memory: displacements of its nodes are read once, forces are added up in
-// the order of the cells, and one sum a node is written.
+// A block of neighbouring cells works in shared memory: displacements of its nodes are read once, forces are
+// added up in the order of the cells, and one sum a node is written.
 
 struct Block {
     first_cell: u32,
@@ -17,7 +17,8 @@ struct Block {
 @group(3) @binding(2) var<storage, read> corners: array<u32>;
 // First entry of each node of a block …
 @group(3) @binding(3) var<storage, read> given_offsets: array<u32>;
-// … in the corners there: corner × GROUP + cell, eight to an entry; places left over name the last force, which is zero.
+// … in the corners there: corner × GROUP + cell, eight to an entry; places left over name the last force,
+// which is zero.
 @group(3) @binding(4) var<storage, read> given: array<vec4u>;
 
 var<workgroup> moved: array<f32, 3u * MOST_NODES>;

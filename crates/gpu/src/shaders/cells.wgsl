@@ -1,4 +1,5 @@
-// The cells of a solid. Arrays have a row of all cells for each number of a cell, so that neighbours read side by side.
+// The cells of a solid. Arrays have a row of all cells for each number of a cell, so that neighbours read
+// side by side.
 
 struct Solid {
     parameters: array<vec4f, PARAMETERS>,
@@ -40,7 +41,8 @@ fn strain_square(strain_twice: Symmetric) -> f32 {
     return diagonal + 2.0 * dot(strain_twice.shear, strain_twice.shear);
 }
 
-// Notes a broken cell: det F in its middle or at a corner not above zero, or a force that is not a number. And how far it is deformed, if that is asked.
+// Notes a broken cell: det F in its middle or at a corner not above zero, or a force that is not a number.
+// And how far it is deformed, if that is asked.
 fn note(volume_ratio: f32, strain_twice: Symmetric, force: vec3f) {
     if !(volume_ratio > 0.0 && dot(force, vec3f(1.0)) < 3e38) {
         atomicMin(&findings[BROKEN], instant.index);

@@ -1,5 +1,5 @@
-// Forces of hexahedra with eight Gauss points and one mean dilatation. Rows at rest: the eight B_a of each point, with the
-// point's volume beside the first; 1/V beside the second of the first point.
+// Forces of hexahedra with eight Gauss points and one mean dilatation. Rows at rest: the eight B_a of each
+// point, with the point's volume beside the first; 1/V beside the second of the first point.
 
 const FIRST_CORNER = 64u;
 

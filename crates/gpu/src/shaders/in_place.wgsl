@@ -1,7 +1,8 @@
 // Nodes move where they lie.
 
 @group(2) @binding(0) var<storage, read_write> displacement: array<vec4f>;
-// Of each node its increment before the instant [m], and internal forces at the last instant and the one before it [N].
+// Of each node its increment before the instant [m], and internal forces at the last instant and the one
+// before it [N].
 @group(2) @binding(1) var<storage, read_write> increment: array<vec4f>;
 // The increment after the instant, and the internal force at it.
 @group(2) @binding(2) var<storage, read_write> next_increment: array<vec4f>;

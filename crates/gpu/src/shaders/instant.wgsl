@@ -1,4 +1,5 @@
-// What belongs to one instant of a run; twin of `Instant` in run.rs. Δt⁻ and Δt⁺ are the steps before and after it, h their mean.
+// What belongs to one instant of a run; twin of `Instant` in run.rs. Δt⁻ and Δt⁺ are the steps before and
+// after it, h their mean.
 
 struct Instant {
     // Its number since the last one that was looked at.
@@ -44,14 +45,14 @@ const LARGEST_STRAIN = 3u;
 const UNLISTED = 4u;
 
 @group(0) @binding(0) var<uniform> instant: Instant;
-// The first instants at which a cell is broken and a sum overflows; bits of the least J and of the largest |C − I|²; the first instant for which
-// candidates for contact are to be listed anew.
+// The first instants at which a cell is broken and a sum overflows; bits of the least J and of the
+// largest |C − I|²; the first instant for which candidates for contact are to be listed anew.
 @group(0) @binding(1) var<storage, read_write> findings: array<atomic<u32>, 5>;
 // For each instant of a submission the factors of constraints, those of loads, and the gravity of bodies.
 @group(0) @binding(2) var<storage, read> table: array<f32>;
 
-// How many grips and entries there are; of each grip p − Σ wᵢ Xᵢ [m] and its stiffness [N/m]; the force of each [N]; entries in
-// the order of nodes: a node, its weight wᵢ and its grip.
+// How many grips and entries there are; of each grip p − Σ wᵢ Xᵢ [m] and its stiffness [N/m]; the force of
+// each [N]; entries in the order of nodes: a node, its weight wᵢ and its grip.
 @group(0) @binding(3) var<storage, read_write> grips: array<vec4f>;
 
 fn grip_count() -> u32 {

@@ -1,6 +1,7 @@
-// A step in one kernel: a block of neighbouring nodes reads the displacements of all nodes of the cells there into shared
-// memory, finds the forces of these cells, adds up those on its own nodes and moves them, from one side to the other: other
-// blocks still read where they were. Cells at borders are evaluated by several blocks, each with a history of its own.
+// A step in one kernel: a block of neighbouring nodes reads the displacements of all nodes of the cells there
+// into shared memory, finds the forces of these cells, adds up those on its own nodes and moves them, from
+// one side to the other: other blocks still read where they were. Cells at borders are evaluated by several
+// blocks, each with a history of its own.
 
 struct Block {
     // Its copies of cells.
@@ -70,7 +71,8 @@ fn main(
     if index < BLOCKS {
         block = blocks[index];
     }
-    // Where an earlier instant is not sound all stands still; one that is found not to be so now is whole on its own side.
+    // Where an earlier instant is not sound all stands still; one that is found not to be so now is whole on
+    // its own side.
     let is_sound = group_end(local) >= instant.index;
     let all = extractBits(block.nodes, 0u, 16u);
     own = extractBits(block.nodes, 16u, 16u);

@@ -1,5 +1,6 @@
-// Impulses of pairs, in the order of their rows: a row is in the level after the last one in which an earlier row has one of its nodes.
-// So rows of a level share no node and are solved at once, with the same bits as one after the other.
+// Impulses of pairs, in the order of their rows: a row is in the level after the last one in which an earlier
+// row has one of its nodes. So rows of a level share no node and are solved at once, with the same bits as
+// one after the other.
 
 var<workgroup> in_levels: atomic<u32>;
 var<workgroup> pairs_told: u32;

@@ -1,12 +1,13 @@
 // Pairs of points of surfaces: candidates, and rows of those that are found.
 
-// A head; four numbers of each contact and its rows; triangles around nodes, by their other corners; nodes with triangles; edges; all candidates.
+// A head; four numbers of each contact and its rows; triangles around nodes, by their other corners; nodes
+// with triangles; edges; all candidates.
 @group(2) @binding(16) var<storage, read> candidates: array<u32>;
-// Where each node that touches was when candidates were listed [m], and how far it may go until they are again [m]: negative if it is in
-// none, zero without pairs.
+// Where each node that touches was when candidates were listed [m], and how far it may go until they are
+// again [m]: negative if it is in none, zero without pairs.
 @group(2) @binding(17) var<storage, read> listed: array<vec4f>;
-// How many pairs are found; the first row of each node that is not placed yet; pairs that are found; those that take part, level by level; where
-// levels end.
+// How many pairs are found; the first row of each node that is not placed yet; pairs that are found; those
+// that take part, level by level; where levels end.
 @group(2) @binding(18) var<storage, read_write> pair_queue: array<atomic<u32>>;
 
 // Places in the head.
@@ -46,7 +47,8 @@ fn pair_nodes(row: u32) -> vec4u {
     return vec4u(candidates[at], candidates[at + 1u], candidates[at + 2u], candidates[at + 3u]);
 }
 
-// Which corners are at borders, a bit each; 8 if its force acts against the first surface of the contact; and the contact from bit 4 on.
+// Which corners are at borders, a bit each; 8 if its force acts against the first surface of the contact; and
+// the contact from bit 4 on.
 fn pair_info(row: u32) -> u32 {
     return candidates[record_of(row) + 4u];
 }

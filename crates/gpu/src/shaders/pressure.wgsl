@@ -1,12 +1,13 @@
-// Pressure on deformed faces, twin of load.rs: forces of their corners. A corner is a fixed combination of nodes: one node,
-// or several where a body carries the surface.
+// Pressure on deformed faces, twin of load.rs: forces of their corners. A corner is a fixed combination of
+// nodes: one node, or several where a body carries the surface.
 
 @group(1) @binding(0) var<storage, read> displacement: array<vec4f>;
 // First entry of each corner in `corner_nodes`, four corners a face.
 @group(1) @binding(1) var<storage, read> corner_offsets: array<u32>;
 // A node and its weight.
 @group(1) @binding(2) var<storage, read> corner_nodes: array<vec2u>;
-// Where corners are at rest, from the first one [m]; beside them pressure [Pa], load, and how many corners there are.
+// Where corners are at rest, from the first one [m]; beside them pressure [Pa], load, and how many corners
+// there are.
 @group(1) @binding(3) var<storage, read> corner_rest: array<vec4f>;
 @group(1) @binding(4) var<storage, read_write> corner_forces: array<vec4f>;
 

@@ -1,5 +1,5 @@
-// Relaxation of stresses, twin of prony.rs: h = d h + g (Φ − Φ⁻), S = (1 − Σ a) Φ + Σ h. The history lies in packs of
-// sixteen cells, number by number.
+// Relaxation of stresses, twin of prony.rs: h = d h + g (Φ − Φ⁻), S = (1 − Σ a) Φ + Σ h. The history lies in
+// packs of sixteen cells, number by number.
 
 fn remembered(place: u32) -> Symmetric {
     return Symmetric(
@@ -17,8 +17,8 @@ fn remember(place: u32, s: Symmetric) {
     history[place + 80u] = s.shear.z;
 }
 
-// The relaxed part of a cell's stress: `slot` is its first tensor of history, `remaining` 1 − Σ a, its terms are those
-// from `first` on.
+// The relaxed part of a cell's stress: `slot` is its first tensor of history, `remaining` 1 − Σ a, its terms
+// are those from `first` on.
 fn relaxed(elastic: Symmetric, cell: u32, slot: u32, remaining: f32, first: u32, terms: u32) -> Symmetric {
     if terms == 0u {
         return elastic;

@@ -1,4 +1,5 @@
-// How much stiffer in shear a state is than the law at rest; twin of shear_growth.rs of pliant-mechanics, which has the formulas.
+// How much stiffer in shear a state is than the law at rest; twin of shear_growth.rs of pliant-mechanics,
+// which has the formulas.
 
 struct Growth {
     factor: f32,
@@ -6,7 +7,8 @@ struct Growth {
     gradient: Symmetric,
 }
 
-// ε², δ², and half of the difference of F from which a derivative of the stress is taken: the cube root of the spacing of numbers.
+// ε², δ², and half of the difference of F from which a derivative of the stress is taken: the cube root of
+// the spacing of numbers.
 const SMALL_SQUARE = 1e-2;
 const BEND_SQUARE = 1e-2;
 const GROWTH_DIFFERENCE = 4.9215667e-3;

@@ -1,4 +1,5 @@
-// Predicts where nodes go that may touch something in the step, and measures their gaps. Where only nodes touch rigid things, finds their forces.
+// Predicts where nodes go that may touch something in the step, and measures their gaps. Where only nodes
+// touch rigid things, finds their forces.
 
 @group(2) @binding(1) var<storage, read> increment: array<vec4f>;
 

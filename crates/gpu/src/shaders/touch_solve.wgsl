@@ -1,5 +1,6 @@
-// Finds the impulses of all rows, by projected Gauss–Seidel: those of nodes at once, then those on faces of a colour at once, since
-// such faces share no node, then those of pairs. So the order within a colour changes no bit. Then nodes find the sides of things beside them. One group works, since all wait for each other.
+// Finds the impulses of all rows, by projected Gauss–Seidel: those of nodes at once, then those on faces of a
+// colour at once, since such faces share no node, then those of pairs. So the order within a colour changes
+// no bit. Then nodes find the sides of things beside them. One group works, since all wait for each other.
 
 var<workgroup> change: atomic<u32>;
 var<workgroup> told: u32;

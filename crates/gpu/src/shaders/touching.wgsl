@@ -1,24 +1,28 @@
-// Contacts: where nodes would go, rows of nodes and of points between them, and their impulses; twin of touching.rs. Ways in
-// the step are kept apart from places, so that gaps and slips lose no digits.
+// Contacts: where nodes would go, rows of nodes and of points between them, and their impulses; twin of
+// touching.rs. Ways in the step are kept apart from places, so that gaps and slips lose no digits.
 
 @group(2) @binding(0) var<storage, read> displacement: array<vec4f>;
-// Two of each node that touches: its place at rest [m], as what a number holds and the rest; its number, and its first contact in `lists`.
+// Two of each node that touches: its place at rest [m], as what a number holds and the rest; its number, and
+// its first contact in `lists`.
 @group(2) @binding(8) var<storage, read> surface: array<vec4f>;
 // Rigid things; contacts; weights of the points on faces.
 @group(2) @binding(9) var<storage, read> things: array<f32>;
-// The contacts of nodes; faces; the contacts of faces, with their place in `rows` and their edges; where the faces of each colour begin; places of the forces of
-// each contact.
+// The contacts of nodes; faces; the contacts of faces, with their place in `rows` and their edges; where the
+// faces of each colour begin; places of the forces of each contact.
 @group(2) @binding(10) var<storage, read> lists: array<u32>;
-// Two of each node that touches: its way [m] without contact, with NEAR and the components that are free; what contacts add to it
-// [m], and by how much a force moves it [m/N].
+// Two of each node that touches: its way [m] without contact, with NEAR and the components that are free;
+// what contacts add to it [m], and by how much a force moves it [m/N].
 @group(2) @binding(11) var<storage, read_write> states: array<vec4f>;
-// Of a contact at a node its gap as predicted [m], then the force on it [N]; of one on a face the force and how many of its points take part; then three of each side of the thing at the
-// node, or FACE_ROW of each point of the face: its normal and gap without contact [m]; its slip without contact [m] and its impulse [N]; the force
-// against its slip [N], and whether it takes part; of a point of a face its weights. Then candidates for pairs: the same with their weights.
+// Of a contact at a node its gap as predicted [m], then the force on it [N]; of one on a face the force and
+// how many of its points take part; then three of each side of the thing at the node, or FACE_ROW of each
+// point of the face: its normal and gap without contact [m]; its slip without contact [m] and its impulse
+// [N]; the force against its slip [N], and whether it takes part; of a point of a face its weights. Then
+// candidates for pairs: the same with their weights.
 @group(2) @binding(12) var<storage, read_write> rows: array<vec4f>;
 // The force of contacts on each node of the model [N].
 @group(2) @binding(13) var<storage, read_write> contact_forces: array<vec4f>;
-// Bits of the deepest gap [m]; how many nodes, and how many faces of each colour, take part in this step; then which.
+// Bits of the deepest gap [m]; how many nodes, and how many faces of each colour, take part in this step;
+// then which.
 @group(2) @binding(14) var<storage, read_write> queue: array<atomic<u32>>;
 
 const NEAR = 8u;
@@ -97,7 +101,8 @@ fn mobility_of(n: u32) -> vec3f {
     return states[2u * n + 1u].w * components;
 }
 
-// Writes the row of a point that is predicted to go by `moved` [m] from a place less that of the thing. Its gap [m].
+// Writes the row of a point that is predicted to go by `moved` [m] from a place less that of the thing. Its
+// gap [m].
 fn measure(at: u32, touch: Touch, place: vec3f, moved: vec3f, tag: f32) -> f32 {
     let near = meet(touch.passage, touch.offset, place, moved);
     let gap = near.distance - touch.offset;
@@ -107,7 +112,8 @@ fn measure(at: u32, touch: Touch, place: vec3f, moved: vec3f, tag: f32) -> f32 {
     return gap;
 }
 
-// Takes part in finding the deepest gap: depths [m] above zero compare as their bits do, those of -0 would be above all.
+// Takes part in finding the deepest gap: depths [m] above zero compare as their bits do, those of -0 would be
+// above all.
 fn tell_depth(depth: f32) {
     if depth > 0.0 {
         atomicMax(&queue[DEEPEST], bitcast<u32>(depth));
@@ -195,7 +201,8 @@ fn solve_node(n: u32) -> f32 {
     return most;
 }
 
-// Finds the impulses of the rows of a node alone, until they move it by no more than a length [m]. The largest way of any [m].
+// Finds the impulses of the rows of a node alone, until they move it by no more than a length [m]. The
+// largest way of any [m].
 fn push_alone(n: u32, found: f32) -> f32 {
     var largest = 0.0;
     for (var done = 0u; done < PASSES; done++) {
@@ -235,7 +242,8 @@ fn take_back(n: u32, entry: u32) -> u32 {
     return last;
 }
 
-// The gap of a node to a thing as it lies now, less what may be left of it [m], and the direction away from the thing.
+// The gap of a node to a thing as it lies now, less what may be left of it [m], and the direction away from
+// the thing.
 fn gap_now(n: u32, touch: Touch, place: vec3f) -> Near {
     let goes = states[2u * n].xyz + states[2u * n + 1u].xyz;
     let near = near_after(touch.passage, place + (goes - touch.passage.shift));
@@ -246,7 +254,8 @@ fn gap_now(n: u32, touch: Touch, place: vec3f) -> Near {
     return Near(gap, near.normal);
 }
 
-// Sides of things beside a node, and their impulses; `least` [m] counts as its depth if it is not deeper. How far that moves it [m].
+// Sides of things beside a node, and their impulses; `least` [m] counts as its depth if it is not deeper. How
+// far that moves it [m].
 fn settle(n: u32, least: f32) -> f32 {
     var depth = least;
     for (var entry = first_contact(n); entry < first_contact(n + 1u); entry++) {

@@ -15,8 +15,9 @@ use crate::run::{Instant, StepFailure, UNLISTED, flags, room};
 use crate::transfer::Four;
 
 impl GpuStepper {
-    /// Takes whole steps without an evaluation; the last submission, which may not be done yet. Where bodies touch each other, one number is
-    /// read back to see whether the device has stopped for lists of candidates.
+    /// Takes whole steps without an evaluation; the last submission, which may not be done yet. Where bodies
+    /// touch each other, one number is read back to see whether the device has stopped for lists of
+    /// candidates.
     pub(super) fn go(
         &mut self,
         state: &mut State<f32>,
@@ -156,7 +157,8 @@ impl GpuStepper {
         }
     }
 
-    /// Goes on from the instants that are pushed, at first with a side; the first of them may be an evaluated one.
+    /// Goes on from the instants that are pushed, at first with a side; the first of them may be an evaluated
+    /// one.
     fn submit_steps(&mut self, from_evaluated: bool, mut side: usize) -> wgpu::SubmissionIndex {
         let Self { forces, kernels, .. } = self;
         let follow = forces.ties.as_ref().map(|ties| &ties.follow);

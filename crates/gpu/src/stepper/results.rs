@@ -14,7 +14,8 @@ use crate::run::{Instant, UNLISTED};
 use crate::transfer::Four;
 
 impl GpuStepper {
-    /// Evaluates an instant once candidates for contact are listed for it, with the forces of cells found anew or as they stand.
+    /// Evaluates an instant once candidates for contact are listed for it, with the forces of cells found
+    /// anew or as they stand.
     pub(super) fn evaluate_listed(
         &mut self,
         state: &State<f32>,
@@ -105,7 +106,8 @@ impl GpuStepper {
         progress.entered = true;
     }
 
-    /// Settles the energies of an instant and keeps the forces found there. `shock` is the error of the step [J] before its length changed.
+    /// Settles the energies of an instant and keeps the forces found there. `shock` is the error of the step
+    /// [J] before its length changed.
     pub(super) fn settle(&mut self, state: &mut State<f32>, results: &Results, shock: f64) {
         let at_start = state.is_at_start();
         if at_start {

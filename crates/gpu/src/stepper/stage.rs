@@ -56,8 +56,9 @@ pub(super) struct Progress {
     stability: Stability,
     /// Number of instants after the evaluated one.
     pub(super) instants: u32,
-    /// Whether the state's energies contain the work of these instants. Then the present instant must be evaluated before further steps: the
-    /// device adds to the same sums until an evaluation, so this work would be entered twice.
+    /// Whether the state's energies contain the work of these instants. Then the present instant must be
+    /// evaluated before further steps: the device adds to the same sums until an evaluation, so this work
+    /// would be entered twice.
     pub(super) entered: bool,
 }
 
@@ -68,7 +69,8 @@ impl Progress {
         Self { side, steps, time, stability, instants: 0, entered: false }
     }
 
-    /// Side of the arrays that holds the present instant. The step after an evaluation moves nodes in place, each later one changes sides.
+    /// Side of the arrays that holds the present instant. The step after an evaluation moves nodes in place,
+    /// each later one changes sides.
     pub(super) fn side(&self) -> usize {
         (self.side + self.instants.saturating_sub(1) as usize) % 2
     }

@@ -3,8 +3,8 @@
 use pliant_gpu::Device;
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
-/// Runs `main` of a module over `count` invocations in groups of 64. Bindings of group 0, in order: the arrays `inputs`
-/// for reading, then an array of `outputs` numbers to write, which is returned.
+/// Runs `main` of a module over `count` invocations in groups of 64. Bindings of group 0, in order: the
+/// arrays `inputs` for reading, then an array of `outputs` numbers to write, which is returned.
 pub fn compute(device: &Device, source: &str, count: usize, inputs: &[&[f32]], outputs: usize) -> Vec<f32> {
     let (gpu, queue) = device.wgpu();
     let module = gpu.create_shader_module(wgpu::ShaderModuleDescriptor {

@@ -1,8 +1,10 @@
-//! Every law in WGSL against its Rust twin in double precision, which is held beside the twin in single precision.
+//! Every law in WGSL against its Rust twin in double precision, which is held beside the twin in single
+//! precision.
 //!
-//! An error is measured in the Frobenius norm, part by part, relative to |S| + M |H| with the part's modulus at rest
-//! M (longitudinal modulus without κ; κ): strains are sums of terms of the size of H, each rounded. So small strains
-//! without rotation count relative to their own stress, those under a large rotation to what the rotation leaves of their digits.
+//! An error is measured in the Frobenius norm, part by part, relative to |S| + M |H| with the part's modulus
+//! at rest M (longitudinal modulus without κ; κ): strains are sums of terms of the size of H, each rounded.
+//! So small strains without rotation count relative to their own stress, those under a large rotation to what
+//! the rotation leaves of their digits.
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use pliant_gpu::Device;
@@ -90,8 +92,8 @@ impl Sample {
     }
 }
 
-/// Strains of 1e-6 to 60 %, half of them above 10 %, every other one under a rotation; rest, dilations, nearly
-/// diagonal tensors.
+/// Strains of 1e-6 to 60 %, half of them above 10 %, every other one under a rotation; rest, dilations,
+/// nearly diagonal tensors.
 fn samples() -> Vec<Sample> {
     let mut random = Random::new(7);
     let mut samples: Vec<Sample> = (0..1000)
@@ -192,8 +194,8 @@ fn largest(errors: impl Iterator<Item = f64>) -> f64 {
     errors.fold(0.0, f64::max)
 }
 
-/// The error of the two parts, each relative to its scale; infinite where what is found is not finite. None beyond the limit
-/// of a law that locks.
+/// The error of the two parts, each relative to its scale; infinite where what is found is not finite. None
+/// beyond the limit of a law that locks.
 fn errors(law: &AnyLaw, sample: &Sample, found: &[Symmetric<f32>; 2]) -> [f64; 2] {
     let fibres = sample.fibres.map(|a| a.map(f64::from));
     let exact = law.stress(&sample.deformation(), &fibres[..law.families()]);
@@ -237,8 +239,8 @@ fn stresses_follow_double_precision_as_closely_as_single_precision_does() {
             cpu[1]
         );
         for part in [0, 1] {
-            // The same operations, but in another order, joined, or with divisions and functions that are a few units in
-            // the last place off.
+            // The same operations, but in another order, joined, or with divisions and functions that are a
+            // few units in the last place off.
             let bound = 3.0 * cpu[part] + 4.0 * EPSILON;
             assert!(cpu[part] < 2e-5 && gpu[part] <= bound, "{law:?}: part {part} off by {:e}", gpu[part]);
         }

@@ -58,7 +58,8 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 }
 ";
 
-/// Distances to 1e-6 of the size, normals where they don't jump. Where a point meets a thing is a matter of round-off at few points.
+/// Distances to 1e-6 of the size, normals where they don't jump. Where a point meets a thing is a matter of
+/// round-off at few points.
 #[test]
 fn shapes_and_ways_follow_double_precision() {
     let Some(device) = support::device() else { return };

@@ -100,8 +100,9 @@ fn patch() -> (Assembly, State) {
     (model, state)
 }
 
-/// The states after steps on the device, read back after each of `parts`, and on the CPU; the work on the device [J] with the rest
-/// of its last step, and that on the CPU, by the trapezoidal rule over all steps. Some nodes are pushed [N].
+/// The states after steps on the device, read back after each of `parts`, and on the CPU; the work on the
+/// device [J] with the rest of its last step, and that on the CPU, by the trapezoidal rule over all steps.
+/// Some nodes are pushed [N].
 fn both(
     device: &Device,
     model: &Assembly,
@@ -162,7 +163,8 @@ fn off(model: &Assembly, [one, other]: &[State; 2]) -> [f64; 2] {
     ]
 }
 
-/// After 200 steps places, rotations and the work of forces from outside differ by 1e-5 at most, the round-off of single precision.
+/// After 200 steps places, rotations and the work of forces from outside differ by 1e-5 at most, the
+/// round-off of single precision.
 #[test]
 fn shells_move_as_on_the_cpu() {
     let Some(device) = support::device() else { return };
@@ -225,7 +227,8 @@ fn the_device_gives_the_same_bits_however_steps_are_divided() {
     assert_eq!(whole, run(&[1, 150, 149]));
 }
 
-/// A run resumes from a state that was read back: rotations and velocities have the same bits, places agree to round-off.
+/// A run resumes from a state that was read back: rotations and velocities have the same bits, places agree
+/// to round-off.
 #[test]
 fn another_stepper_goes_on_from_a_state_that_was_read_back() {
     let Some(device) = support::device() else { return };

@@ -1,6 +1,6 @@
-//! GIPL (Guy's Image Processing Lab): 256 bytes of header, then the voxels, all big-endian. Fields follow ITK's
-//! GiplImageIO: the axes are LPS world coordinates and `origin` is the centre of the first voxel. Leaves out: complex
-//! numbers, several volumes.
+//! GIPL (Guy's Image Processing Lab): 256 bytes of header, then the voxels, all big-endian. Fields follow
+//! ITK's GiplImageIO: the axes are LPS world coordinates and `origin` is the centre of the first voxel.
+//! Leaves out: complex numbers, several volumes.
 
 use nalgebra::Matrix3;
 use pliant_geometry::Grid;

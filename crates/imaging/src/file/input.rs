@@ -1,4 +1,5 @@
-//! Bytes of a file, decompressed while reading. Memory grows with the bytes that arrive, never with the header.
+//! Bytes of a file, decompressed while reading. Memory grows with the bytes that arrive, never with the
+//! header.
 
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
@@ -84,8 +85,8 @@ impl<'a> Input<'a> {
         Self { bytes: Box::new(BufReader::new(ZlibDecoder::new(self.bytes))), packed: true, ..self }
     }
 
-    /// The file of this name beside this one, from its start, compressed or not. It starts with voxels, which may look like
-    /// anything.
+    /// The file of this name beside this one, from its start, compressed or not. It starts with voxels, which
+    /// may look like anything.
     pub fn beside(&self, field: &'static str, name: &str) -> Result<Input<'a>, Fault> {
         let Some(path) = &self.path else {
             return Err(ImageProblem::Unsupported {
@@ -108,7 +109,8 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// The name of this file with another extension: `scan.hdr.gz` and `img` give `scan.img` and `scan.img.gz`.
+    /// The name of this file with another extension: `scan.hdr.gz` and `img` give `scan.img` and
+    /// `scan.img.gz`.
     pub(crate) fn sibling_names(&self, ending: &str) -> Vec<String> {
         let name = self.path.as_deref().and_then(|path| path.file_name()?.to_str());
         let stem =

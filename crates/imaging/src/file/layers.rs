@@ -1,5 +1,5 @@
-//! Segmentations of 3D Slicer in layers (`.seg.nrrd` with a first axis of layers): several label images of the same voxels, in which
-//! segments may overlap and use a value again. They become one label image.
+//! Segmentations of 3D Slicer in layers (`.seg.nrrd` with a first axis of layers): several label images of
+//! the same voxels, in which segments may overlap and use a value again. They become one label image.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,8 +14,8 @@ pub(super) struct Segment {
     name: String,
 }
 
-/// The segments of a header in the order of their numbers: `Segment0_LabelValue:=5` beside `Segment0_Layer:=1` and `Segment0_Name:=liver`. One
-/// without a value is left out.
+/// The segments of a header in the order of their numbers: `Segment0_LabelValue:=5` beside
+/// `Segment0_Layer:=1` and `Segment0_Name:=liver`. One without a value is left out.
 pub(super) fn segments(pairs: &[(String, String)]) -> Vec<Segment> {
     let mut found: BTreeMap<u32, (Segment, bool)> = BTreeMap::new();
     for (key, value) in pairs {
@@ -34,8 +34,9 @@ pub(super) fn segments(pairs: &[(String, String)]) -> Vec<Segment> {
     found.into_values().filter(|(_, has_value)| *has_value).map(|(segment, _)| segment).collect()
 }
 
-/// The layers, with the values of each voxel side by side, as one image of labels with their names. Labels are the values of the segments,
-/// or the segment numbers from 1 if a value repeats. Where segments overlap, the later one wins.
+/// The layers, with the values of each voxel side by side, as one image of labels with their names. Labels
+/// are the values of the segments, or the segment numbers from 1 if a value repeats. Where segments overlap,
+/// the later one wins.
 pub(super) fn joined(
     layers: usize,
     numbers: &Numbers,

@@ -1,7 +1,7 @@
-//! MetaImage: a text header, `Key = Value`, that ends with `ElementDataFile`: the voxels follow (`.mha`) or lie in a file
-//! beside it (`.mhd`). Each triple of `TransformMatrix` is the direction of an axis; world coordinates are LPS [mm] (ITK's
-//! MetaImageIO).
-//! Leaves out: several values a voxel, several volumes, data spread over several files, text data.
+//! MetaImage: a text header, `Key = Value`, that ends with `ElementDataFile`: the voxels follow (`.mha`) or
+//! lie in a file beside it (`.mhd`). Each triple of `TransformMatrix` is the direction of an axis; world
+//! coordinates are LPS [mm] (ITK's MetaImageIO). Leaves out: several values a voxel, several volumes, data
+//! spread over several files, text data.
 
 use nalgebra::Matrix3;
 use pliant_geometry::Grid;

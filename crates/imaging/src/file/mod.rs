@@ -1,7 +1,7 @@
-//! Image files in: NIfTI-1 and -2, NRRD, MetaImage, GIPL, DICOM series and segmentations. The first bytes select the reader if
-//! they identify a format, otherwise the extension; gzip is recognised by its own first bytes. Sizes are compared with the limit
-//! and the existing bytes before allocation. Leaves out: more than one value per voxel except for layers of segments, time series,
-//! compressed DICOM slices, contours.
+//! Image files in: NIfTI-1 and -2, NRRD, MetaImage, GIPL, DICOM series and segmentations. The first bytes
+//! select the reader if they identify a format, otherwise the extension; gzip is recognised by its own first
+//! bytes. Sizes are compared with the limit and the existing bytes before allocation. Leaves out: more than
+//! one value per voxel except for layers of segments, time series, compressed DICOM slices, contours.
 
 mod dicom;
 mod gipl;
@@ -119,8 +119,8 @@ pub fn read_with(path: &Path, options: &ReadOptions, progress: &dyn Fn(f64)) -> 
     }
 }
 
-/// Reads an image from the bytes of a file, compressed with gzip or not. Errors name the file `bytes`. Data in a second
-/// file are rejected. A DICOM slice counts as a volume of one slice.
+/// Reads an image from the bytes of a file, compressed with gzip or not. Errors name the file `bytes`. Data
+/// in a second file are rejected. A DICOM slice counts as a volume of one slice.
 pub fn read_bytes(bytes: &[u8], format: ImageFormat, options: &ReadOptions) -> Result<Image, ImageError> {
     let result = match format {
         ImageFormat::Dicom => dicom::read_file(bytes, true, options),

@@ -1,7 +1,8 @@
-//! NIfTI-1 and NIfTI-2, single files (`.nii`) and pairs (`.hdr`, `.img`). Fields and methods 1 to 3 of orientation: nifti1.h
-//! of the NIfTI Data Format Working Group; 540-byte header: nifti2.h. The sform is taken where its code is above 0, else
-//! the qform, else the spacing alone. A table of labels in an extension (Caret, Connectome Workbench, TotalSegmentator) names them.
-//! Leaves out: several volumes, colours, complex numbers, ANALYZE 7.5 (which has no orientation).
+//! NIfTI-1 and NIfTI-2, single files (`.nii`) and pairs (`.hdr`, `.img`). Fields and methods 1 to 3 of
+//! orientation: nifti1.h of the NIfTI Data Format Working Group; 540-byte header: nifti2.h. The sform is
+//! taken where its code is above 0, else the qform, else the spacing alone. A table of labels in an extension
+//! (Caret, Connectome Workbench, TotalSegmentator) names them. Leaves out: several volumes, colours, complex
+//! numbers, ANALYZE 7.5 (which has no orientation).
 
 use nalgebra::Matrix3;
 use pliant_geometry::Grid;

@@ -98,7 +98,8 @@ fn holes_are_filled_and_bays_are_not() {
     assert_eq!(filled.voxels(), before + 8);
 }
 
-/// Two slabs 3 mm apart, along the axis of thick slices and across it: a gap is closed by its width in millimetres.
+/// Two slabs 3 mm apart, along the axis of thick slices and across it: a gap is closed by its width in
+/// millimetres.
 #[test]
 fn gaps_are_closed_by_their_width_along_every_axis() {
     for axis in 0..3 {

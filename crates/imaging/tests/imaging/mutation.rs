@@ -1,5 +1,6 @@
-//! Images with bytes changed, removed, or truncated at random with a fixed seed, and a corpus of earlier problem files.
-//! Each gives an error or an image, never a panic, and no memory beyond the content of the file.
+//! Images with bytes changed, removed, or truncated at random with a fixed seed, and a corpus of earlier
+//! problem files. Each gives an error or an image, never a panic, and no memory beyond the content of the
+//! file.
 
 use std::fs;
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! Images of real organs in the folder PLIANT_DATA: sizes, positions and counts from nibabel, SimpleITK and ITK-SNAP
-//! (`README.md` of that folder).
+//! Images of real organs in the folder PLIANT_DATA: sizes, positions and counts from nibabel, SimpleITK and
+//! ITK-SNAP (`README.md` of that folder).
 
 use std::path::PathBuf;
 

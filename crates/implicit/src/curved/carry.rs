@@ -1,7 +1,8 @@
-//! Visual meshes carried by shells: each of many points finds the nearest place of the curved surface, follows it, and gives forces back.
-//! A search tree holds the flat facets; a patch is at most its bulge away from its facet, so patches are tried from the nearest facet on
-//! until no other can be nearer: the nearest place of all, at a cost per point that grows with the logarithm of the facets.
-//! Leaves out: keeping neighbouring points of a mesh on the same side of a fold.
+//! Visual meshes carried by shells: each of many points finds the nearest place of the curved surface,
+//! follows it, and gives forces back. A search tree holds the flat facets; a patch is at most its bulge away
+//! from its facet, so patches are tried from the nearest facet on until no other can be nearer: the nearest
+//! place of all, at a cost per point that grows with the logarithm of the facets. Leaves out: keeping
+//! neighbouring points of a mesh on the same side of a fold.
 
 use nalgebra::Vector3;
 use pliant_geometry::barycentric_of_closest;
@@ -78,7 +79,8 @@ impl<'s> Nearest<'s> {
 }
 
 impl CurvedSurface {
-    /// Points of a visual mesh [m], each bound to the nearest place of the patches over some facets at a state. `None` without facets.
+    /// Points of a visual mesh [m], each bound to the nearest place of the patches over some facets at a
+    /// state. `None` without facets.
     pub fn carry_all(
         &self,
         model: &Assembly,
@@ -117,8 +119,9 @@ mod tests {
         Vector3::from_fn(|_, _| random.number())
     }
 
-    /// Around a ball, a cube with creases and a strip with borders, points at any distance find the nearest place: no point of a fine
-    /// picture is nearer by more than 1e-6 (Gauss–Newton is slow where the distance is that of the radius), and they stay where they are.
+    /// Around a ball, a cube with creases and a strip with borders, points at any distance find the nearest
+    /// place: no point of a fine picture is nearer by more than 1e-6 (Gauss–Newton is slow where the distance
+    /// is that of the radius), and they stay where they are.
     #[test]
     fn points_find_the_nearest_place_of_all() {
         let mut random = Random::new(3);
@@ -149,7 +152,8 @@ mod tests {
         }
     }
 
-    /// Beyond the border of a plane strip a point has its foot on the border; from a facet far away it is found by walking.
+    /// Beyond the border of a plane strip a point has its foot on the border; from a facet far away it is
+    /// found by walking.
     #[test]
     fn feet_lie_on_borders_and_are_found_from_afar() {
         let model = model(strip(), 0.01);

@@ -1,7 +1,8 @@
-//! Pictures of the curved surface: each patch cut into small triangles, with the fields that a writer or a window needs at their corners.
-//! Facets share the points of an edge where they share its normals; where these differ, at creases, each side has points of its own, at
-//! the same places. The number of points is linear in facets and in the square of the parts of an edge.
-//! Leaves out: fewer triangles where the surface is flat.
+//! Pictures of the curved surface: each patch cut into small triangles, with the fields that a writer or a
+//! window needs at their corners. Facets share the points of an edge where they share its normals; where
+//! these differ, at creases, each side has points of its own, at the same places. The number of points is
+//! linear in facets and in the square of the parts of an edge. Leaves out: fewer triangles where the surface
+//! is flat.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use pliant_shells::Place;
@@ -19,7 +20,8 @@ pub struct Picture {
     pub places: Vec<Place>,
     /// Its triangles, facet by facet.
     pub triangles: Vec<[u32; 3]>,
-    /// A bit set for each triangle: bit i tells that the side opposite to corner i lies on an edge of the facet.
+    /// A bit set for each triangle: bit i tells that the side opposite to corner i lies on an edge of the
+    /// facet.
     pub facet_edges: Vec<u8>,
     /// Its points at rest [m].
     pub rest: Vec<Vector3<f64>>,
@@ -34,9 +36,11 @@ pub struct PictureFields {
     pub position: Vec<Vector3<f64>>,
     /// Displacements [m]: of points of the curved surface from where these are at rest.
     pub displacement: Vec<Vector3<f64>>,
-    /// Rotation vectors [rad], of length at most π, of the mean of the rotations of the facet's nodes weighted by area coordinates.
+    /// Rotation vectors [rad], of length at most π, of the mean of the rotations of the facet's nodes
+    /// weighted by area coordinates.
     pub rotation: Vec<Vector3<f64>>,
-    /// Unit normals for shading, the same on both sides of edges but at creases: quadratic, see [`Patch::shading_normal`].
+    /// Unit normals for shading, the same on both sides of edges but at creases: quadratic, see
+    /// [`Patch::shading_normal`].
     pub normal: Vec<Vector3<f64>>,
 }
 
@@ -155,7 +159,8 @@ impl PictureFields {
     }
 }
 
-/// The rotation vector of the normalised mean of quaternions, taken with the signs of one half of their sphere.
+/// The rotation vector of the normalised mean of quaternions, taken with the signs of one half of their
+/// sphere.
 fn mean_rotation(rotations: [UnitQuaternion<f64>; 3], weights: [f64; 3]) -> Vector3<f64> {
     let first = rotations[0].coords;
     let parts = rotations.iter().zip(weights).map(|(rotation, weight)| {
@@ -193,8 +198,8 @@ mod tests {
         sides.values().all(|&count| count == 101)
     }
 
-    /// A smooth ball is closed by shared points alone, in V + E (k − 1) + F (k − 1)(k − 2)/2 points and F k² triangles: the cost is
-    /// linear in F.
+    /// A smooth ball is closed by shared points alone, in V + E (k − 1) + F (k − 1)(k − 2)/2 points and F k²
+    /// triangles: the cost is linear in F.
     #[test]
     fn pictures_are_watertight_and_their_size_is_linear() {
         for cuts in [1, 2] {
@@ -232,7 +237,8 @@ mod tests {
         }
     }
 
-    /// A cube has creases: points there are doubled, but lie at the same places in any configuration, for any parts.
+    /// A cube has creases: points there are doubled, but lie at the same places in any configuration, for any
+    /// parts.
     #[test]
     fn creases_are_watertight_in_place() {
         let model = model(cube(), 0.01);
@@ -280,7 +286,8 @@ mod tests {
         }
     }
 
-    /// At rest nothing is displaced; a rigid motion is one of every point, its rotation vector that of the body.
+    /// At rest nothing is displaced; a rigid motion is one of every point, its rotation vector that of the
+    /// body.
     #[test]
     fn a_rigid_motion_of_a_picture() {
         let model = model(ball(2), 0.01);

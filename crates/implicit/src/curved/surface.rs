@@ -1,6 +1,6 @@
-//! The curved surface of a shell: a patch over each facet. Each control point of an edge depends on that edge's nodes alone, so the surface
-//! is watertight in every configuration.
-//! Leaves out: continuous tangents across edges (their jump falls with h²).
+//! The curved surface of a shell: a patch over each facet. Each control point of an edge depends on that
+//! edge's nodes alone, so the surface is watertight in every configuration. Leaves out: continuous tangents
+//! across edges (their jump falls with h²).
 
 use nalgebra::Vector3;
 use pliant_shells::{Carried, EdgeRule, Patch, Place};
@@ -41,8 +41,8 @@ impl CurvedSurface {
         Patch::new(p, n, self.straight[facet], self.rule)
     }
 
-    /// The foot of a point on the surface at a state, found from a facet near it: the nearest place of its patch, then those of the
-    /// neighbours across edges on which it lies, as long as they are nearer.
+    /// The foot of a point on the surface at a state, found from a facet near it: the nearest place of its
+    /// patch, then those of the neighbours across edges on which it lies, as long as they are nearer.
     pub fn project(&self, model: &Assembly, state: &State, point: Vector3<f64>, facet: u32) -> Place {
         let nearest = |facet: u32| {
             let (weights, distance) = self.patch(model, state, facet).closest(&point, [1.0 / 3.0; 3]);

@@ -1,4 +1,5 @@
-//! What is constant during a run, and what changes: models with shells, contacts and turns of theirs, states, errors. Knows no equations.
+//! What is constant during a run, and what changes: models with shells, contacts and turns of theirs, states,
+//! errors. Knows no equations.
 
 pub(crate) mod assembly;
 pub(crate) mod contact;

@@ -6,14 +6,15 @@ use nalgebra::Vector3;
 
 use crate::model::assembly::Assembly;
 
-/// How far a node may lie from the mean of its neighbours along the wall, as a part of its edges, in a regular mesh.
+/// How far a node may lie from the mean of its neighbours along the wall, as a part of its edges, in a
+/// regular mesh.
 const REGULAR: f64 = 0.05;
 
 /// What is doubtful of facets under pressure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Resolution {
-    /// Facets of irregular parts of the mesh with an edge above 2 √(R t), where R is the radius of curvature along it and t their
-    /// thickness: there displacements scatter from node to node.
+    /// Facets of irregular parts of the mesh with an edge above 2 √(R t), where R is the radius of curvature
+    /// along it and t their thickness: there displacements scatter from node to node.
     pub coarse: usize,
     /// The one with the longest edge for its wall.
     pub worst: u32,

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 pub struct CarriedTurn {
     /// The node.
     pub node: u32,
-    /// Nodes of the solid with their gradients g at rest [1/m], F = Σ x gᵀ: of a cell its mean shape gradients. They sum to 0.
+    /// Nodes of the solid with their gradients g at rest [1/m], F = Σ x gᵀ: of a cell its mean shape
+    /// gradients. They sum to 0.
     pub gradient: Vec<(u32, Vector3<f64>)>,
 }

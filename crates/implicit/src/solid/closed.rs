@@ -1,5 +1,6 @@
-//! The co-rotated linear law in closed form: P = 2μ (F − R) + λ tr(Rᵀ F − I) R is the exact gradient of its energy, its tangent
-//! symmetric (McAdams et al. 2011, ACM TOG 30:37). A sixth of the cost of the differences that other laws take.
+//! The co-rotated linear law in closed form: P = 2μ (F − R) + λ tr(Rᵀ F − I) R is the exact gradient of its
+//! energy, its tangent symmetric (McAdams et al. 2011, ACM TOG 30:37). A sixth of the cost of the differences
+//! that other laws take.
 
 use nalgebra::{Matrix3, Vector3};
 use pliant_mechanics::law::Corotational;
@@ -52,8 +53,8 @@ pub(super) fn add_point<const N: usize>(
     Ok(mu * (f - r).norm_squared() + 0.5 * lambda * trace * trace)
 }
 
-/// The rotation of the polar decomposition of a matrix with positive determinant: Newton's iteration R ← (R + R⁻ᵀ)/2, scaled
-/// (Higham 1986), to round-off.
+/// The rotation of the polar decomposition of a matrix with positive determinant: Newton's iteration R ← (R +
+/// R⁻ᵀ)/2, scaled (Higham 1986), to round-off.
 fn rotation(f: &Matrix3<f64>) -> Matrix3<f64> {
     let mut r = *f;
     for _ in 0..40 {

@@ -1,10 +1,13 @@
-//! Cells of solids of any hyperelastic law: energy, nodal forces and stiffness at a state, in total Lagrangian form (Belytschko, Liu,
-//! Moran, *Nonlinear Finite Elements*, 4.9 and 6.4): f_a = Σ w F S B_a, K_ab = Σ w (𝔹_aᵀ D 𝔹_b + (B_a·S B_b) I), with D from
-//! [`AnyLaw::tangent`], and that of the co-rotated linear law in closed form (`closed.rs`).
+//! Cells of solids of any hyperelastic law: energy, nodal forces and stiffness at a state, in total
+//! Lagrangian form (Belytschko, Liu, Moran, *Nonlinear Finite Elements*, 4.9 and 6.4): f_a = Σ w F S B_a,
+//! K_ab = Σ w (𝔹_aᵀ D 𝔹_b + (B_a·S B_b) I), with D from [`AnyLaw::tangent`], and that of the co-rotated
+//! linear law in closed form (`closed.rs`).
 //!
-//! `hex8` adds its hourglass control, k γ_a·γ_b I, with the derivatives of its factor g where that follows the law. `hex8-full` takes one mean dilatation J̄ = v/V a cell, whose energy V U(J̄) adds
-//! p cof F B_a to the force, and U″(J̄)/V c_a ⊗ c_b with c_a = Σ w cof F B_a to the stiffness. `tet4-anp` does so for each node with
-//! the tets around it (`star.rs`). Membranes are in plane stress (`membrane.rs`), bars in uniaxial stress (`bar.rs`).
+//! `hex8` adds its hourglass control, k γ_a·γ_b I, with the derivatives of its factor g where that follows
+//! the law. `hex8-full` takes one mean dilatation J̄ = v/V a cell, whose energy V U(J̄) adds p cof F B_a to
+//! the force, and U″(J̄)/V c_a ⊗ c_b with c_a = Σ w cof F B_a to the stiffness. `tet4-anp` does so for each
+//! node with the tets around it (`star.rs`). Membranes are in plane stress (`membrane.rs`), bars in uniaxial
+//! stress (`bar.rs`).
 
 mod bar;
 mod closed;
@@ -50,8 +53,8 @@ impl Response {
         Self { energy: 0.0, hourglass: 0.0, force: [0.0; MOST], tangent: Vec::new(), broken: None }
     }
 
-    /// Finds what a cell makes. `pressure` is the averaged one of a tetrahedron, whose energy is counted at its nodes; `lag` says how its
-    /// stresses relax.
+    /// Finds what a cell makes. `pressure` is the averaged one of a tetrahedron, whose energy is counted at
+    /// its nodes; `lag` says how its stresses relax.
     pub(crate) fn fill(
         &mut self,
         solid: &Solid,
@@ -132,8 +135,8 @@ impl Response {
         Ok(())
     }
 
-    /// Adds the energy ½ k g Σ |q_c|² of hourglass control; g is 1 without a `growth`, which has the shear modulus at rest [Pa] and the
-    /// gradients of the shape functions [1/m].
+    /// Adds the energy ½ k g Σ |q_c|² of hourglass control; g is 1 without a `growth`, which has the shear
+    /// modulus at rest [Pa] and the gradients of the shape functions [1/m].
     fn add_hourglass<const N: usize>(
         &mut self,
         own: CellMaterial<'_>,
@@ -262,8 +265,8 @@ impl CellMaterial<'_> {
     }
 }
 
-/// Size of the differences of F from which the growth of hourglass control is found. Differences of differences lose half of the digits
-/// at a smaller one, so they are of fourth order.
+/// Size of the differences of F from which the growth of hourglass control is found. Differences of
+/// differences lose half of the digits at a smaller one, so they are of fourth order.
 const DIFFERENCE: f64 = 1e-4;
 
 /// (8 (f(h) − f(−h)) − f(2h) + f(−2h))/(12h) has these weights at the h of [`DIFFERENCE`].
@@ -351,7 +354,8 @@ fn is_inverted(determinant: f64) -> bool {
     determinant.is_nan() || determinant <= 0.0
 }
 
-/// Displacements [m] of the nodes of a cell relative to its first one, which keeps the digits of small strains.
+/// Displacements [m] of the nodes of a cell relative to its first one, which keeps the digits of small
+/// strains.
 fn moved<const N: usize>(
     block: &CellBlock<N>,
     cell: usize,
@@ -484,7 +488,8 @@ fn add_second<const N: usize>(tangent: &mut [f64], second: &[[f64; 9]; 9], shape
     }
 }
 
-/// Adds w (𝔹_aᵀ D 𝔹_b + (B_a·S B_b) I), with 𝔹_a the change of the engineering strains with the place of a node.
+/// Adds w (𝔹_aᵀ D 𝔹_b + (B_a·S B_b) I), with 𝔹_a the change of the engineering strains with the place of a
+/// node.
 fn add_material<const N: usize>(
     tangent: &mut [f64],
     f: &Tensor<f64>,
@@ -561,7 +566,8 @@ pub(crate) fn refusal(solid: &Solid) -> Option<&'static str> {
     }
 }
 
-/// An upper bound of a cell's ω² [1/s²] at rest by itself, with its lumped mass: (M Σ w |B|² + k Σγ²)/m, M the longitudinal modulus.
+/// An upper bound of a cell's ω² [1/s²] at rest by itself, with its lumped mass: (M Σ w |B|² + k Σγ²)/m, M
+/// the longitudinal modulus.
 pub(crate) fn highest_frequency_squared(solid: &Solid, cell: usize) -> f64 {
     let cells = &solid.cells;
     let share = solid.material.density * cells.volume(cell) / cells.nodes_per_cell() as f64;

@@ -1,9 +1,11 @@
-//! Relaxing laws ([`pliant_mechanics::prony`]) in equations that are solved. Within a step both updates are affine in the elastic stress
-//! at its end: S = f Φ + k, with f = 1 − Σ aᵢ + Σ gᵢ and k = Σ (dᵢ hᵢ − gᵢ Φ) of the instant before. So a step is the minimum of f ψ + k : E,
-//! and its stiffness is symmetric. At an instant itself f = 1 − Σ aᵢ and k = Σ hᵢ.
+//! Relaxing laws ([`pliant_mechanics::prony`]) in equations that are solved. Within a step both updates are
+//! affine in the elastic stress at its end: S = f Φ + k, with f = 1 − Σ aᵢ + Σ gᵢ and k = Σ (dᵢ hᵢ − gᵢ Φ) of
+//! the instant before. So a step is the minimum of f ψ + k : E, and its stiffness is symmetric. At an instant
+//! itself f = 1 − Σ aᵢ and k = Σ hᵢ.
 //!
-//! A history begins by a step of no time: strains at the start load the instantaneous law. What relaxing stresses did is their work, summed
-//! by the trapezoidal rule. Leaves out: pressures that are averaged over cells, and bars.
+//! A history begins by a step of no time: strains at the start load the instantaneous law. What relaxing
+//! stresses did is their work, summed by the trapezoidal rule. Leaves out: pressures that are averaged over
+//! cells, and bars.
 
 use pliant_mechanics::Model;
 use pliant_mechanics::model::Solid;
@@ -21,8 +23,9 @@ const CHUNK: usize = 256;
 pub struct History {
     /// Whether it has begun.
     pub begun: bool,
-    /// For each solid, cell by cell and point by point, the tensors [Pa] of its series: Φ of the last instant and one h a term, first of the
-    /// isochoric, then of the volumetric part; none of a solid that does not relax.
+    /// For each solid, cell by cell and point by point, the tensors [Pa] of its series: Φ of the last instant
+    /// and one h a term, first of the isochoric, then of the volumetric part; none of a solid that does not
+    /// relax.
     pub tensors: Vec<Vec<Symmetric<f64>>>,
     /// What the stresses of each relaxing solid did so far [J].
     pub work: Vec<f64>,
@@ -61,8 +64,8 @@ pub(crate) struct Lag<'a> {
     pub(crate) factors: [f64; 2],
     /// k of each point [Pa]; empty for none.
     pub(crate) kept: &'a [Symmetric<f64>],
-    /// Whether k : E is counted as energy, and f ψ of the isochoric and the volumetric part: in a step all are; at an instant that of the
-    /// parts that do not relax is.
+    /// Whether k : E is counted as energy, and f ψ of the isochoric and the volumetric part: in a step all
+    /// are; at an instant that of the parts that do not relax is.
     pub(crate) counts: [bool; 3],
 }
 

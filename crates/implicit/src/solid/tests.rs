@@ -84,7 +84,8 @@ fn all() -> impl Iterator<Item = (&'static str, &'static str)> {
     pairs.filter(move |(element, name)| takes_all(element) || law(name).has_volumetric_energy())
 }
 
-/// Central differences at a state of strains up to 20 %, turned far: force from energy and stiffness from force to 1e-7 of their largest.
+/// Central differences at a state of strains up to 20 %, turned far: force from energy and stiffness from
+/// force to 1e-7 of their largest.
 #[test]
 fn force_and_stiffness_are_derivatives() {
     let half = ["neo-hookean", "transversely-isotropic"].map(|name| (name, Some(0.5)));
@@ -147,7 +148,8 @@ fn assert_derivatives(what: &str, system: &mut System, state: &State) {
     }
 }
 
-/// The same of pressures on closed faces, whose stiffness is symmetric: a hexahedron's quads, a tetrahedron's triangles.
+/// The same of pressures on closed faces, whose stiffness is symmetric: a hexahedron's quads, a tetrahedron's
+/// triangles.
 #[test]
 fn pressures_on_faces_have_their_stiffness() {
     let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
@@ -212,8 +214,8 @@ fn pressures_on_faces_have_their_stiffness() {
     }
 }
 
-/// Forces and pressures on a surface that the nodes of a side carry, numbered otherwise, act as those on the side itself; a point amid
-/// four nodes gives a quarter to each.
+/// Forces and pressures on a surface that the nodes of a side carry, numbered otherwise, act as those on the
+/// side itself; a point amid four nodes gives a quarter to each.
 #[test]
 fn loads_on_carried_surfaces_act_through_their_mapping() {
     let loads = |load: Load| {
@@ -267,7 +269,8 @@ fn cantilever(element: &str, law: AnyLaw, force: f64, to: f64) -> Assembly {
     model
 }
 
-/// Residuals of a load in one step fall with the square near the equilibrium, 5 to 20 % of the length away; all elements and laws.
+/// Residuals of a load in one step fall with the square near the equilibrium, 5 to 20 % of the length away;
+/// all elements and laws.
 #[test]
 fn newtons_method_converges_quadratically() {
     for (element, name) in all() {
@@ -278,7 +281,8 @@ fn newtons_method_converges_quadratically() {
         let end = nodes_at(&model, 0.3)[0] as usize;
         println!("{element} {name}: {:.4} m, {:?}", state.displacement(&model, end).z, step.residuals);
         assert!(state.displacement(&model, end).z > 0.015 && step.parts == 1, "{element} {name}");
-        // Over the load: r' < 10 r² where that is above round-off. A factor of a tenth an iteration would leave 1e-5 of 1e-4.
+        // Over the load: r' < 10 r² where that is above round-off. A factor of a tenth an iteration would
+        // leave 1e-5 of 1e-4.
         let relative: Vec<f64> = step.residuals.iter().map(|r| r / step.residuals[0]).collect();
         let close = relative.windows(2).filter(|r| (1e-5..0.1).contains(&r[0]));
         let checked =
@@ -329,8 +333,8 @@ fn relaxing_steps_have_their_energy_and_stiffness() {
     }
 }
 
-/// A strain that is held relaxes by e^(−t/τ), however its steps are cut; with backward Euler by 1/(1 + h/τ) a step. What holds it does no
-/// work.
+/// A strain that is held relaxes by e^(−t/τ), however its steps are cut; with backward Euler by 1/(1 + h/τ) a
+/// step. What holds it does no work.
 #[test]
 fn a_held_strain_relaxes_by_its_series() {
     for element in RELAXING {
@@ -429,8 +433,8 @@ fn solids_without_stiffness_and_broken_ones_are_refused() {
     assert!(far.is_ok());
 }
 
-/// Half of a block is squeezed to a seventh, and one corner pushed through: tets turn inside out, hexahedra are flat and have an inverted
-/// corner. Pushed through alone, it inverts tets only.
+/// Half of a block is squeezed to a seventh, and one corner pushed through: tets turn inside out, hexahedra
+/// are flat and have an inverted corner. Pushed through alone, it inverts tets only.
 #[test]
 fn inverted_cells_are_reported() {
     for element in ELEMENTS {

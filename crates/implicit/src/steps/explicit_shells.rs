@@ -25,8 +25,8 @@ pub struct ExplicitShells {
 }
 
 impl ExplicitShells {
-    /// The longest stable step [s] about rest: 2/√(ω² + max k/m) of the stiffest element and the stiffest springs on a node, a lower bound
-    /// of the model's.
+    /// The longest stable step [s] about rest: 2/√(ω² + max k/m) of the stiffest element and the stiffest
+    /// springs on a node, a lower bound of the model's.
     pub fn stable_step(model: &Assembly) -> f64 {
         let shells = model.facets.iter().map(|facet| facet.highest_frequency_squared());
         let of_solid = |solid: &Solid| {

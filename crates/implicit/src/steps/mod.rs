@@ -1,4 +1,5 @@
-//! Solvers of the equations of a model: equilibria, implicit and explicit steps, and the descent of an energy in contact.
+//! Solvers of the equations of a model: equilibria, implicit and explicit steps, and the descent of an energy
+//! in contact.
 
 pub(crate) mod backward_euler;
 pub(crate) mod descent;

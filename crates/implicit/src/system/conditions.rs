@@ -1,10 +1,12 @@
-//! Means of displacements and enclosed volumes that are prescribed: rows a·u = d beside the equations K u = f + λ a. A row couples all nodes of a
-//! face or a surface, so it is kept out of the matrix. K may be singular without it: a spring at one node of each row, K' = K + σ e eᵀ,
-//! holds it, and is taken back with λ by one small system (Woodbury): two more solutions with K' for each row.
+//! Means of displacements and enclosed volumes that are prescribed: rows a·u = d beside the equations K u =
+//! f + λ a. A row couples all nodes of a face or a surface, so it is kept out of the matrix. K may be
+//! singular without it: a spring at one node of each row, K' = K + σ e eᵀ, holds it, and is taken back with λ
+//! by one small system (Woodbury): two more solutions with K' for each row.
 //!
-//! Of a volume a is the gradient where the nodes are, and λ the pressure, whose change with the nodes belongs to K
-//! ([`System`](crate::system::System) adds it with the pressure that balances what elements and loads leave, by least squares). Where a pressure has come to
-//! its limit it is a load, λ a with λ given, and the volume follows.
+//! Of a volume a is the gradient where the nodes are, and λ the pressure, whose change with the nodes belongs
+//! to K ([`System`](crate::system::System) adds it with the pressure that balances what elements and loads
+//! leave, by least squares). Where a pressure has come to its limit it is a load, λ a with λ given, and the
+//! volume follows.
 
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 use pliant_linear::dot;
@@ -138,7 +140,8 @@ impl Conditions {
         }
     }
 
-    /// The pressure [Pa] of a constraint's volume at the residual last found, how far the volume has yet to grow [m³], and how large it is at rest [m³].
+    /// The pressure [Pa] of a constraint's volume at the residual last found, how far the volume has yet to
+    /// grow [m³], and how large it is at rest [m³].
     pub(crate) fn enclosed(&self, constraint: usize) -> Option<[f64; 3]> {
         let given = self.loose.iter().map(|(row, pressure)| (row, *pressure));
         let all = self.rows.iter().map(|row| (row, -row.force)).chain(given);
@@ -157,7 +160,8 @@ impl Conditions {
         }
     }
 
-    /// Finds how far means and volumes have yet to go to where they are at a time [s], and the gradients of volumes.
+    /// Finds how far means and volumes have yet to go to where they are at a time [s], and the gradients of
+    /// volumes.
     pub(crate) fn find_gaps(
         &mut self,
         model: &Assembly,
@@ -195,7 +199,8 @@ impl Conditions {
         self.pinned = false;
     }
 
-    /// Each volume with the pressure [Pa] that is given, or balances forces [N] of elements beyond loads, six a node, by least squares.
+    /// Each volume with the pressure [Pa] that is given, or balances forces [N] of elements beyond loads, six
+    /// a node, by least squares.
     pub(crate) fn pressures<'a>(
         &self,
         model: &'a Assembly,
@@ -303,8 +308,8 @@ fn into<'a>(equations: &'a Equations, dense: &'a mut [f64]) -> impl FnMut(usize,
     }
 }
 
-/// The volume [m³] that a constraint's enclosure has at a state. Its gradient [m², of rotations m³] goes to `add`, component by component of
-/// the model, six a node. Of facets the curved surface counts.
+/// The volume [m³] that a constraint's enclosure has at a state. Its gradient [m², of rotations m³] goes to
+/// `add`, component by component of the model, six a node. Of facets the curved surface counts.
 pub(crate) fn add_gradient(
     model: &Assembly,
     surface: Option<&CurvedSurface>,

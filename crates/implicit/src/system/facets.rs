@@ -29,8 +29,8 @@ pub(crate) struct Facets {
     pub(super) pressure: Vec<Pressure>,
     /// The curved surface, if a load acts on it.
     pub(super) surface: Option<CurvedSurface>,
-    /// Whether the stiffness has the change of pressures on the curved surface, or that on the flat facets in its place, with which
-    /// conjugate gradients converge more often and Newton's method slowly.
+    /// Whether the stiffness has the change of pressures on the curved surface, or that on the flat facets in
+    /// its place, with which conjugate gradients converge more often and Newton's method slowly.
     pub(crate) exact_pressure: bool,
     /// Places in the matrix.
     places: Vec<Vec<u32>>,
@@ -83,8 +83,8 @@ impl Facets {
         self.pressure.iter().any(|pressure| pressure.curved != [0.0; 2])
     }
 
-    /// Adds forces and, with prescribed increments, the stiffness. The nodes of a chunk of facets take it up while the next one is found, so
-    /// that threads seldom wait for each other.
+    /// Adds forces and, with prescribed increments, the stiffness. The nodes of a chunk of facets take it up
+    /// while the next one is found, so that threads seldom wait for each other.
     pub(super) fn add(
         &mut self,
         model: &Assembly,
@@ -178,8 +178,8 @@ struct Gathering<'a> {
 }
 
 impl Gathering<'_> {
-    /// Adds forces of a chunk of facets and, if it is wanted, the stiffness of those whose nodes follow no others; with what it makes of
-    /// prescribed motions.
+    /// Adds forces of a chunk of facets and, if it is wanted, the stiffness of those whose nodes follow no
+    /// others; with what it makes of prescribed motions.
     fn gather(&self, (first, corners): (usize, &Corners), results: &[FacetResult], sums: &mut Sums<'_>) {
         let Stiffness { equations, matrix, coupling, .. } = &mut *sums.stiffness;
         let equations = &*equations;

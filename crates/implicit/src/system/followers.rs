@@ -1,11 +1,13 @@
-//! Nodes whose translations are no unknowns of a system of equations, since others move them: tied nodes, and the nodes of rigid parts,
-//! which go with six unknowns at the first of them. A cell at such nodes becomes a cell at the nodes that they follow, K ← Tᵀ K T; its
-//! forces go there by Tᵀ. Nodes of shells in a rigid part turn with it, others with the gradient of a solid ([`Turn`]); all other rotations stay
-//! with the node itself.
+//! Nodes whose translations are no unknowns of a system of equations, since others move them: tied nodes, and
+//! the nodes of rigid parts, which go with six unknowns at the first of them. A cell at such nodes becomes a
+//! cell at the nodes that they follow, K ← Tᵀ K T; its forces go there by Tᵀ. Nodes of shells in a rigid part
+//! turn with it, others with the gradient of a solid ([`Turn`]); all other rotations stay with the node
+//! itself.
 //!
-//! In an increment a node goes by Σ w (d + θ × a): d and θ those of the nodes that it follows, a the arm from a first node of a rigid part,
-//! 0 for a tie. Then it stands at x = X + Σ (w u + (R − 1) A), exactly. The second derivative of x by θ, exp(θ) a ≈ a + θ × a + θ × (θ × a)/2,
-//! adds (f aᵀ + a fᵀ)/2 − (f·a) to the stiffness of θ, with f what cells resist with less what loads pull with.
+//! In an increment a node goes by Σ w (d + θ × a): d and θ those of the nodes that it follows, a the arm from
+//! a first node of a rigid part, 0 for a tie. Then it stands at x = X + Σ (w u + (R − 1) A), exactly. The
+//! second derivative of x by θ, exp(θ) a ≈ a + θ × a + θ × (θ × a)/2, adds (f aᵀ + a fᵀ)/2 − (f·a) to the
+//! stiffness of θ, with f what cells resist with less what loads pull with.
 
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, SymmetricEigen, Vector3};
 use pliant_linear::sparse::{Cell, Equations, LowerMatrix, NONE};
@@ -168,8 +170,8 @@ impl Followers {
         }
     }
 
-    /// The nodes whose unknowns move a cell, and how many components of each; `None` if they are its own. Where nodes turn they keep their
-    /// place for that.
+    /// The nodes whose unknowns move a cell, and how many components of each; `None` if they are its own.
+    /// Where nodes turn they keep their place for that.
     pub(crate) fn expanded(&self, nodes: &[u32], turns: bool) -> Option<Expanded> {
         let first = |node: &u32| self.parts.iter().any(|part| part.first == *node);
         let carried = |node: &u32| turns && self.carried(*node).is_some();
@@ -202,7 +204,8 @@ impl Followers {
         own.into_iter().chain(self.followed(node).iter().map(|followed| followed.node))
     }
 
-    /// Tᵀ K T of a cell of so many components a node, on its [`expanded`](Self::expanded) nodes, column by column.
+    /// Tᵀ K T of a cell of so many components a node, on its [`expanded`](Self::expanded) nodes, column by
+    /// column.
     pub(crate) fn condensed(
         &self,
         nodes: &[u32],
@@ -306,7 +309,8 @@ impl Followers {
         }
     }
 
-    /// Gives forces to the nodes that are followed, six components a node; moments on nodes that turn with a solid are given already.
+    /// Gives forces to the nodes that are followed, six components a node; moments on nodes that turn with a
+    /// solid are given already.
     pub(crate) fn give_back(&self, components: &mut [f64]) {
         for [node, first] in self.turned() {
             for c in 3..6 {
@@ -363,7 +367,8 @@ impl Followers {
         }
     }
 
-    /// The places of the translations of a node that may follow others, and its stiffness there, equal along all axes.
+    /// The places of the translations of a node that may follow others, and its stiffness there, equal along
+    /// all axes.
     pub(crate) fn spring(&self, node: u32, stiffness: f64) -> Option<(Expanded, Vec<f64>)> {
         let expanded = self.expanded(&[node], false)?;
         let own = Matrix3::from_diagonal_element(stiffness);
@@ -371,8 +376,8 @@ impl Followers {
         Some((expanded, whole))
     }
 
-    /// What forces [N] and moments [N m] on nodes of rigid parts, and moments on nodes that turn with a solid, are at the unknowns of these,
-    /// component by component.
+    /// What forces [N] and moments [N m] on nodes of rigid parts, and moments on nodes that turn with a
+    /// solid, are at the unknowns of these, component by component.
     pub(crate) fn pull(
         &self,
         force: impl Fn(u32) -> Vector3<f64>,
@@ -398,8 +403,8 @@ impl Followers {
         }
     }
 
-    /// Adds to a stiffness how forces of moments [N m] on nodes that turn with a solid change with that, and what their rotary inertias [N m]
-    /// resist with.
+    /// Adds to a stiffness how forces of moments [N m] on nodes that turn with a solid change with that, and
+    /// what their rotary inertias [N m] resist with.
     pub(crate) fn add_turns(
         &self,
         equations: &Equations,
@@ -427,8 +432,9 @@ impl Followers {
         self.turns.iter().map(|turn| turn.nodes().collect())
     }
 
-    /// Adds to a stiffness what masses [kg/s²] and rotary inertias [N m] of nodes that go with rigid parts resist with, and how the forces [N] that
-    /// they resist with now turn with them; `of` gives the masses with the forces, `rotary` the inertias.
+    /// Adds to a stiffness what masses [kg/s²] and rotary inertias [N m] of nodes that go with rigid parts
+    /// resist with, and how the forces [N] that they resist with now turn with them; `of` gives the masses
+    /// with the forces, `rotary` the inertias.
     pub(crate) fn add_parts(
         &self,
         equations: &Equations,
@@ -488,7 +494,8 @@ impl Assembly {
 }
 
 impl Followed {
-    /// What a force [N] on the node that follows is here: a force and, with an arm, a moment, component by component.
+    /// What a force [N] on the node that follows is here: a force and, with an arm, a moment, component by
+    /// component.
     fn pull(&self, force: &Vector3<f64>, mut add: impl FnMut(usize, f64)) {
         (0..3).for_each(|c| add(c, self.weight * force[c]));
         if self.part.is_some() {

@@ -1,5 +1,5 @@
-//! Sums over the facets of a chunk, node by node. Threads share the nodes. Each node adds the corners that meet there in the order of the
-//! facets, so the number of threads changes no bit.
+//! Sums over the facets of a chunk, node by node. Threads share the nodes. Each node adds the corners that
+//! meet there in the order of the facets, so the number of threads changes no bit.
 
 use pliant_linear::sparse::{Equations, Values};
 
@@ -33,7 +33,8 @@ impl Corners {
         own
     }
 
-    /// Calls, for each node, with its corners (facet in the chunk, corner of it) and the sums of a range of nodes that has it.
+    /// Calls, for each node, with its corners (facet in the chunk, corner of it) and the sums of a range of
+    /// nodes that has it.
     pub(crate) fn visit(
         &self,
         equations: &Equations,
@@ -119,7 +120,8 @@ mod tests {
     use pliant_linear::sparse::{Cell, LowerMatrix};
     use pliant_testing::Random;
 
-    /// Columns of a strip of triangles, some of whose nodes are held, are those of cells added one after the other, bit by bit.
+    /// Columns of a strip of triangles, some of whose nodes are held, are those of cells added one after the
+    /// other, bit by bit.
     #[test]
     fn columns_are_summed_in_the_order_of_the_facets() {
         let mut random = Random::new(5);

@@ -110,8 +110,8 @@ impl System {
         }
     }
 
-    /// What a constraint of volume encloses at the state last evaluated, with the pressure that balances what its nodes resist with, and the
-    /// forces of that, component by component; `None` of other constraints.
+    /// What a constraint of volume encloses at the state last evaluated, with the pressure that balances what
+    /// its nodes resist with, and the forces of that, component by component; `None` of other constraints.
     pub(crate) fn enclosed(&self, constraint: usize, state: &State) -> Option<(Enclosed, Vec<(usize, f64)>)> {
         let own = &self.model.constraints[constraint];
         let Motion::Volume { enclosure, .. } = &own.motion else { return None };

@@ -121,8 +121,8 @@ impl Solids {
         Ok(())
     }
 
-    /// Adds how pressures on faces change with their nodes, its symmetric part unless both halves are kept: all of it where the faces close
-    /// or end at held nodes.
+    /// Adds how pressures on faces change with their nodes, its symmetric part unless both halves are kept:
+    /// all of it where the faces close or end at held nodes.
     pub(super) fn add_faces(
         &self,
         model: &Assembly,
@@ -154,7 +154,8 @@ pub(super) fn press_face(
     sums.add_stiffness(nodes, places, &tangent, moved);
 }
 
-/// The pressures on faces of solids. How those on carried surfaces change with the state is left out of the stiffness.
+/// The pressures on faces of solids. How those on carried surfaces change with the state is left out of the
+/// stiffness.
 fn pressing(model: &Assembly) -> impl Iterator<Item = (&Load, &Vec<Face>, f64)> {
     model.loads.iter().filter_map(|load| match &load.kind {
         LoadKind::Pressure { faces, pressure } if load.surface.is_none() => Some((load, faces, *pressure)),
@@ -167,8 +168,9 @@ pub(super) fn corners(face: &Face) -> &[u32] {
     if face[3] == NO_NODE { &face[..3] } else { face }
 }
 
-/// The derivative of p ∫ N_a n dA of a face by the places of its nodes, column by column: what the pressure pushes against the
-/// outward normal; its symmetric part alone if that is wanted. By differences, exact: the areas are of second order in each place.
+/// The derivative of p ∫ N_a n dA of a face by the places of its nodes, column by column: what the pressure
+/// pushes against the outward normal; its symmetric part alone if that is wanted. By differences, exact: the
+/// areas are of second order in each place.
 fn pressure_change(face: &Face, count: usize, state: &State, pressure: f64, symmetric: bool) -> Vec<f64> {
     let size = 3 * count;
     let mut tangent = vec![0.0; size * size];

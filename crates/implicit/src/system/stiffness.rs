@@ -108,7 +108,8 @@ impl Stiffness {
         }
     }
 
-    /// Adds a stiffness of the first components of nodes at its places, and what prescribed increments make of it.
+    /// Adds a stiffness of the first components of nodes at its places, and what prescribed increments make
+    /// of it.
     pub(super) fn add_block(
         &mut self,
         (nodes, components): (&[u32], usize),
@@ -149,7 +150,8 @@ impl Stiffness {
         }
     }
 
-    /// Subtracts S(m)/2 for the moments m of loads on nodes, whose axes stay in space: their covariant derivative.
+    /// Subtracts S(m)/2 for the moments m of loads on nodes, whose axes stay in space: their covariant
+    /// derivative.
     pub(super) fn turn_moments(&mut self, forces: &NodalForces, factor: f64) {
         for at in (3..forces.external.len()).step_by(6) {
             let moment =
@@ -184,8 +186,8 @@ impl Stiffness {
         Ok(pivots.negative)
     }
 
-    /// Solves with the matrix prepared; conjugate gradients start from a multiple of the solution given, and leave what they reached there if
-    /// iterations run out.
+    /// Solves with the matrix prepared; conjugate gradients start from a multiple of the solution given, and
+    /// leave what they reached there if iterations run out.
     pub(super) fn solve(
         &mut self,
         phases: &mut Phases,

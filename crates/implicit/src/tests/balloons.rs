@@ -32,9 +32,10 @@ pub(super) fn a_balloon_takes_the_volume_it_is_told() {
     assert!(coarse < 0.12 && fine > 0.0 && fine < 0.5 * coarse, "{coarse} {fine}");
 }
 
-/// Twice the volume, 26 % strain. Pressures of both membranes agree to 3 %. With ANDES the nodes of the thin shell tilt by more than 1 rad,
-/// though a sphere stays one: tension loads the drilling of unequal facets, and on a curved mesh drilling moments of
-/// neighbours leave a moment that tilts. It falls with the third power of the edge; without drilling in the strains there is none.
+/// Twice the volume, 26 % strain. Pressures of both membranes agree to 3 %. With ANDES the nodes of the thin
+/// shell tilt by more than 1 rad, though a sphere stays one: tension loads the drilling of unequal facets,
+/// and on a curved mesh drilling moments of neighbours leave a moment that tilts. It falls with the third
+/// power of the edge; without drilling in the strains there is none.
 #[test]
 pub(super) fn a_balloon_doubles_its_volume() {
     let inflate = |membrane| {
@@ -61,7 +62,8 @@ pub(super) fn a_balloon_doubles_its_volume() {
     assert!(cst_turn < 0.05, "{cst_turn}");
 }
 
-/// Pressure on the curved surface of a ball: no resultant, and p times the area of a circle on each half; the flat facets have less.
+/// Pressure on the curved surface of a ball: no resultant, and p times the area of a circle on each half; the
+/// flat facets have less.
 #[test]
 pub(super) fn pressure_on_the_curved_surface_acts_on_its_area() {
     let mut model = balloon(2, 1.0);
@@ -111,7 +113,8 @@ pub(super) fn icosphere() -> (Vec<Vector3<f64>>, Vec<[u32; 3]>) {
     quartered(points, cells, 2)
 }
 
-/// The balloon of 320 shells of the formulas' prototype, R/t = 50, which 500 Pa blow up by 10 %, with the sphere's own normals.
+/// The balloon of 320 shells of the formulas' prototype, R/t = 50, which 500 Pa blow up by 10 %, with the
+/// sphere's own normals.
 pub(super) fn sphere_of_320(formulation: Formulation, spread: Spread) -> Assembly {
     let (points, cells) = icosphere();
     let normals = (0..).zip(points.iter().copied()).collect();
@@ -145,8 +148,9 @@ pub(super) fn blown_up(
     Ok((step, radii(&state)))
 }
 
-/// At most five iterations with the change of the pressure on the curved surface; the sphere stays one to 1e-3. Linear elasticity in the stretch λ
-/// has p = 2 E t (λ − 1)/((1 − ν) R λ²): λ = 1.1072 at 500 Pa. Conjugate gradients meet an indefinite stiffness on the way, and go on.
+/// At most five iterations with the change of the pressure on the curved surface; the sphere stays one to
+/// 1e-3. Linear elasticity in the stretch λ has p = 2 E t (λ − 1)/((1 − ν) R λ²): λ = 1.1072 at 500 Pa.
+/// Conjugate gradients meet an indefinite stiffness on the way, and go on.
 #[test]
 pub(super) fn a_curved_balloon_is_blown_up_in_one_step() {
     let gradients = gradients(Preconditioner::Aggregates);
@@ -181,8 +185,9 @@ pub(super) fn a_balloon_must_be_closed() {
     assert!(error.to_string().contains("1 open border: 3 nodes"), "{error}");
 }
 
-/// A flat round membrane, clamped at its rim, with nothing across but what its tension becomes under pressure. Hencky (1915):
-/// w₀ = 0.653 a (q a/(E t))^⅓ for ν = 0.3; in steps and at once, with factors and with conjugate which called it buckled.
+/// A flat round membrane, clamped at its rim, with nothing across but what its tension becomes under
+/// pressure. Hencky (1915): w₀ = 0.653 a (q a/(E t))^⅓ for ν = 0.3; in steps and at once, with factors and
+/// with conjugate which called it buckled.
 #[test]
 pub(super) fn hencky_slack_membrane_under_pressure() {
     let off = [8, 16, 32].map(|cells| {
@@ -249,8 +254,8 @@ pub(super) fn round_membrane(cells: u32) -> (Assembly, usize) {
     (model, (row * row / 2) as usize)
 }
 
-/// A square membrane of tension n with fixed sides rises by 0.07367 p L²/n under a small pressure, as the series of Poisson's equation has
-/// it; its tension is part of the membrane force.
+/// A square membrane of tension n with fixed sides rises by 0.07367 p L²/n under a small pressure, as the
+/// series of Poisson's equation has it; its tension is part of the membrane force.
 #[test]
 pub(super) fn a_taut_membrane_rises_as_by_poisson() {
     let (cells, tension, pressure) = (16_u32, 100.0, 1e-3);

@@ -32,8 +32,9 @@ pub(super) fn layered(
     model
 }
 
-/// A strip of two layers under a moment at its end, by the theory of beams: bent about its neutral axis with Σ E I, so that its middle
-/// surface stretches (Timoshenko 1925, bimetals); exactly, in statics and where damped motion comes to rest.
+/// A strip of two layers under a moment at its end, by the theory of beams: bent about its neutral axis with
+/// Σ E I, so that its middle surface stretches (Timoshenko 1925, bimetals); exactly, in statics and where
+/// damped motion comes to rest.
 #[test]
 pub(super) fn timoshenko_two_layer_strip_stretches_as_it_bends() {
     let membrane = Membrane::Cst { drilling: 0.01 };
@@ -55,7 +56,8 @@ pub(super) fn timoshenko_two_layer_strip_stretches_as_it_bends() {
     Statics::new(model.clone(), StaticSettings::default()).unwrap().solve(&mut state, 1.0).unwrap();
     for node in [8, 17, 26] {
         let moved = state.displacement(&model, node);
-        // Lifted, so that the stiff top is pressed; the middle lies on the side of the neutral axis that is pulled.
+        // Lifted, so that the stiff top is pressed; the middle lies on the side of the neutral axis that is
+        // pulled.
         let (lift, stretch) = (curvature * 32.0, curvature * neutral * 8.0);
         assert!((moved.z / lift - 1.0).abs() < 1e-6, "{} {lift}", moved.z);
         assert!((moved.x / stretch - 1.0).abs() < 1e-3, "{} {stretch}", moved.x);
@@ -70,8 +72,8 @@ pub(super) fn timoshenko_two_layer_strip_stretches_as_it_bends() {
     assert!((model.mass.iter().sum::<f64>() - 1600.0).abs() < 1e-9);
 }
 
-/// Uniform strains and curvatures of layers at odd angles: no force on inner nodes, and n = A ε + B κ, m = B ε + D κ in every triangle, with
-/// each membrane.
+/// Uniform strains and curvatures of layers at odd angles: no force on inner nodes, and n = A ε + B κ, m = B
+/// ε + D κ in every triangle, with each membrane.
 #[test]
 pub(super) fn layers_pass_the_patch_test() {
     let elastic = Orthotropic { young: [2e6, 0.5e6], poisson: 0.3, shear: 0.2e6 };
@@ -135,7 +137,8 @@ pub(super) fn in_space(tensor: &Vector3<f64>) -> nalgebra::Matrix3<f64> {
     nalgebra::Matrix3::new(tensor.x, tensor.z, 0.0, tensor.z, tensor.y, 0.0, 0.0, 0.0, 0.0)
 }
 
-/// A simply supported plate of layers 0/90/0 under a pressure q sin(π x/a) sin(π y/b): Navier's series has one term (Jones 1999, 5.3).
+/// A simply supported plate of layers 0/90/0 under a pressure q sin(π x/a) sin(π y/b): Navier's series has
+/// one term (Jones 1999, 5.3).
 #[test]
 pub(super) fn navier_orthotropic_plate() {
     let elastic = Orthotropic { young: [25e6, 1e6], poisson: 0.25, shear: 0.5e6 };

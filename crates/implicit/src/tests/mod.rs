@@ -240,8 +240,8 @@ fn a_singular_stiffness_names_its_node() {
     assert!(matches!(error, SolveError::Singular { component: "rotation about z", .. }), "{error}");
 }
 
-/// ∂(internal − loads)/∂q of a whole balloon by differences against the assembled matrix; the whole matrix of the unsymmetric solver
-/// at rest, where no moments are left: 1e-6.
+/// ∂(internal − loads)/∂q of a whole balloon by differences against the assembled matrix; the whole matrix of
+/// the unsymmetric solver at rest, where no moments are left: 1e-6.
 #[test]
 fn the_assembled_stiffness_is_the_derivative_of_the_forces() {
     let mut model = balloon(2, 100.0);
@@ -377,7 +377,8 @@ fn only_the_difference_from_rest_costs_energy() {
     assert!(state.shell_energy(&model).unwrap().membrane > 1.0);
 }
 
-/// Points of edges agree from both sides, bit for bit within 1e-15, in a strongly deformed state; also at a crease.
+/// Points of edges agree from both sides, bit for bit within 1e-15, in a strongly deformed state; also at a
+/// crease.
 #[test]
 fn the_curved_surface_is_watertight() {
     let mut random = Random::new(9);
@@ -407,7 +408,8 @@ fn the_curved_surface_is_watertight() {
     }
 }
 
-/// 128 patches lie twenty times closer to the sphere than their facets; the picture shares the points of edges.
+/// 128 patches lie twenty times closer to the sphere than their facets; the picture shares the points of
+/// edges.
 #[test]
 fn the_curved_surface_of_a_ball_is_round() {
     let model = {
@@ -506,8 +508,8 @@ fn add_block(model: &mut Assembly, cells: &[[u32; 4]], density: f64) {
     model.add_solid("block", Solid::new(0, Material::elastic(law, density), cells)).unwrap();
 }
 
-/// A block pulled by a small stress lengthens by σ/E and thins by ν σ/E, exactly for linear tets; turned by a quarter with its supports it
-/// does the same.
+/// A block pulled by a small stress lengthens by σ/E and thins by ν σ/E, exactly for linear tets; turned by a
+/// quarter with its supports it does the same.
 #[test]
 fn a_block_of_tets_is_stretched_as_by_hooke() {
     let (points, cells) = bar([3, 2, 2], [3.0, 2.0, 2.0]);
@@ -544,7 +546,8 @@ fn a_block_of_tets_is_stretched_as_by_hooke() {
     }
 }
 
-/// Tets and shells share nodes: a shell on a block stiffens it; implicit motion of both comes to rest at the static equilibrium.
+/// Tets and shells share nodes: a shell on a block stiffens it; implicit motion of both comes to rest at the
+/// static equilibrium.
 #[test]
 fn shells_and_tets_move_together() {
     let (points, cells) = bar([8, 1, 1], [8.0, 1.0, 1.0]);
@@ -584,8 +587,9 @@ fn shells_and_tets_move_together() {
     assert!((state.position[8].z - skinned).abs() < 1e-4, "{}", state.position[8].z);
 }
 
-/// A strip of Kirchhoff's theory resists twist with G b t³/3; a bar of the same section with 1 − 0.63 t/b of that (Timoshenko and
-/// Goodier 1951, § 109): the shell is too stiff by that, as shear across the thickness is left out.
+/// A strip of Kirchhoff's theory resists twist with G b t³/3; a bar of the same section with 1 − 0.63 t/b of
+/// that (Timoshenko and Goodier 1951, § 109): the shell is too stiff by that, as shear across the thickness
+/// is left out.
 #[test]
 fn a_twisted_strip_is_one_of_kirchhoff() {
     let width = 2.0;
@@ -620,8 +624,8 @@ fn a_twisted_strip_is_one_of_kirchhoff() {
     assert!((ratios[0] - ratios[1]).abs() < 1e-3, "{ratios:?}");
 }
 
-/// A ball with given normals of which one triangle is flat: its patch is its facet, edges in common are straight on both sides, all others
-/// curved as before.
+/// A ball with given normals of which one triangle is flat: its patch is its facet, edges in common are
+/// straight on both sides, all others curved as before.
 #[test]
 fn flat_triangles_lie_beside_curved_ones() {
     let (points, cells) = ball(1);

@@ -88,8 +88,8 @@ fn a_cantilever_vibrates_at_its_first_frequency() {
     assert!((found / exact - 1.0).abs() < 0.01, "{found} {exact}");
 }
 
-/// A free strip on equal springs for its masses goes to and fro as one body, at 1 Hz: what each integrator makes of it, after a
-/// number of steps a period.
+/// A free strip on equal springs for its masses goes to and fro as one body, at 1 Hz: what each integrator
+/// makes of it, after a number of steps a period.
 fn bobbing(integrator: Integrator, steps: u32, periods: u32) -> State {
     let mut model = strip(THIN);
     for node in 0..model.rest.len() {
@@ -122,8 +122,8 @@ fn differences_of_two_steps_are_of_second_order() {
     }
 }
 
-/// Part of critical damping at 1 Hz in steps of 10, 20 and 40 ms: ω h/2 of backward Euler less terms of third order, 3 to 11 %;
-/// (ω h)³/4 of differences of two steps, 0.006 to 0.4 %.
+/// Part of critical damping at 1 Hz in steps of 10, 20 and 40 ms: ω h/2 of backward Euler less terms of third
+/// order, 3 to 11 %; (ω h)³/4 of differences of two steps, 0.006 to 0.4 %.
 #[test]
 fn each_integrator_damps_as_is_told() {
     for step in [0.01, 0.02, 0.04] {
@@ -144,8 +144,8 @@ fn each_integrator_damps_as_is_told() {
     }
 }
 
-/// A strip that falls about its clamp by more than a right angle: half the step, a quarter of the error; a step halved on the way,
-/// and one taken up by another solver, keep to it.
+/// A strip that falls about its clamp by more than a right angle: half the step, a quarter of the error; a
+/// step halved on the way, and one taken up by another solver, keep to it.
 #[test]
 fn large_motion_is_of_second_order_and_goes_on_elsewhere() {
     let mut model = clamped(THIN);
@@ -200,7 +200,8 @@ fn springs_shorten_the_stable_step() {
     for _ in 0..2000 {
         solver.advance(&mut state).unwrap();
     }
-    // What it starts with, kept within the strip and the spring: 1e-3 m/s over the frequency of the spring, and some.
+    // What it starts with, kept within the strip and the spring: 1e-3 m/s over the frequency of the spring,
+    // and some.
     let off = (state.position[node] - model.place(node)).norm();
     assert!(off < 1e-3 * free, "{off:e}");
 }
@@ -235,7 +236,8 @@ fn explicit_motion_keeps_its_energy() {
     assert!(largest < 0.01, "{largest}");
 }
 
-/// A free strip keeps its momentum and its moment of momentum in implicit steps, to the tolerance of the solution.
+/// A free strip keeps its momentum and its moment of momentum in implicit steps, to the tolerance of the
+/// solution.
 #[test]
 fn a_free_body_keeps_its_momentum() {
     let model = strip(THIN);
@@ -313,8 +315,8 @@ fn real_time_steps_follow_the_converged_motion() {
     assert!((converged - quick).norm() < 0.02 * converged.z.abs(), "{converged} {quick}");
 }
 
-/// Two triangles that fly apart, each damped as its body says: backward Euler slows the one down by 1/(1 + α h) a step, central
-/// differences by (1 − α h/2)/(1 + α h/2), and leave the other alone.
+/// Two triangles that fly apart, each damped as its body says: backward Euler slows the one down by 1/(1 + α
+/// h) a step, central differences by (1 − α h/2)/(1 + α h/2), and leave the other alone.
 #[test]
 fn bodies_are_damped_each_by_itself() {
     let triangle = |x: f64| [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|[a, b]| Vector3::new(x + a, b, 0.0));

@@ -1,4 +1,5 @@
-//! A semicircular arch of wedge-shaped blocks stands by their friction (S3). Sinopoli et al. (1997) give 0.309 as the least coefficient for many blocks.
+//! A semicircular arch of wedge-shaped blocks stands by their friction (S3). Sinopoli et al. (1997) give
+//! 0.309 as the least coefficient for many blocks.
 
 use std::f64::consts::PI;
 
@@ -27,8 +28,8 @@ fn widths() -> [f64; 2] {
     RADII.map(|radius| 2.0 * radius * (0.5 * PI / BLOCKS as f64).tan())
 }
 
-/// The least friction with which the arch stands: over all thrusts H at its crown, at all heights there, the smallest of the largest ratios of shear to thrust in
-/// a joint, where the thrust goes through all joints.
+/// The least friction with which the arch stands: over all thrusts H at its crown, at all heights there, the
+/// smallest of the largest ratios of shear to thrust in a joint, where the thrust goes through all joints.
 fn least_friction() -> f64 {
     let [inner, outer] = widths();
     let angle = PI / BLOCKS as f64;
@@ -107,7 +108,8 @@ fn sunk(friction: f64) -> f64 {
     sunk
 }
 
-/// With a sixth more than the least friction it stands, but for what its joints creep; with a sixth less it falls.
+/// With a sixth more than the least friction it stands, but for what its joints creep; with a sixth less it
+/// falls.
 #[test]
 fn an_arch_stands_by_the_friction_of_its_joints() {
     let least = least_friction();

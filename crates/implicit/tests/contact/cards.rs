@@ -26,7 +26,8 @@ fn sunk(friction: f64) -> f64 {
     let (sine, cosine) = LEAN.sin_cos();
     let mut surfaces = Vec::new();
     for side in [-1.0, 1.0] {
-        // The corners that meet are 0.8 of the barrier's gap apart, and so is the lower inner corner from the floor.
+        // The corners that meet are 0.8 of the barrier's gap apart, and so is the lower inner corner from the
+        // floor.
         let x = side * (0.5 * THICKNESS * cosine + 0.4 * barrier);
         let z = LENGTH * cosine + 0.5 * THICKNESS * sine + 0.8 * barrier;
         let at = Pose::new(Vector3::new(x, 0.0, z), Vector3::y() * (-side * LEAN));
@@ -71,8 +72,8 @@ fn sunk(friction: f64) -> f64 {
     sunk
 }
 
-/// Each card of weight W is pushed apart by H = W/2 (tan α − t/L), which the floor holds by μ W: 0.264 is the limit here. The weight per length bends
-/// the cards by less than 1 µm.
+/// Each card of weight W is pushed apart by H = W/2 (tan α − t/L), which the floor holds by μ W: 0.264 is the
+/// limit here. The weight per length bends the cards by less than 1 µm.
 #[test]
 fn a_house_of_cards_stands_by_friction() {
     let limit = 0.5 * (LEAN.tan() - THICKNESS / LENGTH);

@@ -2,11 +2,13 @@
 
 use crate::sparse::NONE;
 
-/// Nodes of an aggregate. On 20,000 shells 16 take less processor time than 8, 32 (9 %) or 64; on 4,000 these are within 5 % of each other.
+/// Nodes of an aggregate. On 20,000 shells 16 take less processor time than 8, 32 (9 %) or 64; on 4,000 these
+/// are within 5 % of each other.
 const AGGREGATE: usize = 16;
 
-/// Groups of neighbouring nodes, at most about `most`, each grown from the first node left: the nodes in their order, and where each group
-/// starts. Crumbs join the group before them, or a neighbour's. Of more groups those that are a loose part join each other.
+/// Groups of neighbouring nodes, at most about `most`, each grown from the first node left: the nodes in
+/// their order, and where each group starts. Crumbs join the group before them, or a neighbour's. Of more
+/// groups those that are a loose part join each other.
 pub(super) fn aggregates(around: &[Vec<u32>], most: usize) -> (Vec<u32>, Vec<u32>) {
     let size = AGGREGATE.max(around.len().div_ceil(most));
     let mut group = vec![NONE; around.len()];
@@ -50,8 +52,8 @@ pub(super) fn aggregates(around: &[Vec<u32>], most: usize) -> (Vec<u32>, Vec<u32
     (groups.into_iter().flatten().collect(), start)
 }
 
-/// Groups among which loose parts of fewer than `size` nodes go together until they have as many; `is_within` tells whether a node has
-/// neighbours in the group of a number alone.
+/// Groups among which loose parts of fewer than `size` nodes go together until they have as many; `is_within`
+/// tells whether a node has neighbours in the group of a number alone.
 fn joined(groups: Vec<Vec<u32>>, size: usize, is_within: impl Fn(u32, u32) -> bool) -> Vec<Vec<u32>> {
     let mut all: Vec<Vec<u32>> = Vec::new();
     let mut open = None;

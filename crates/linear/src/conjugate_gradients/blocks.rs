@@ -9,7 +9,8 @@ use crate::device::BlockPattern;
 use crate::lanes::{PACK, Pack};
 use crate::sparse::{Equations, LowerMatrix, NONE};
 
-/// Blocks from which on iterations read them in single precision: 9 MB in double precision. Of fewer these are as fast.
+/// Blocks from which on iterations read them in single precision: 9 MB in double precision. Of fewer these
+/// are as fast.
 const MANY: usize = 1 << 15;
 
 /// The tolerance from which on they do.
@@ -18,8 +19,8 @@ const COARSE_TOLERANCE: f64 = 1e-5;
 pub(crate) type Block = SMatrix<f64, 6, 6>;
 pub(crate) type Node = [f64; 6];
 
-/// Both halves of a symmetric matrix as 6 × 6 blocks, row by row; nodes in an order of their own, aggregate by aggregate. Components
-/// without an equation are 0.
+/// Both halves of a symmetric matrix as 6 × 6 blocks, row by row; nodes in an order of their own, aggregate
+/// by aggregate. Components without an equation are 0.
 pub(crate) struct BlockMatrix {
     /// Equations of each node.
     pub(super) equations: Vec<[u32; 6]>,
@@ -41,7 +42,8 @@ pub(crate) struct BlockMatrix {
     pub(super) arch: Arch,
 }
 
-/// A block in single precision, half as much to read: its first four rows column by column, then the last two.
+/// A block in single precision, half as much to read: its first four rows column by column, then the last
+/// two.
 pub(super) type SingleBlock = [f32; 36];
 
 /// The place of an entry in it.
@@ -127,7 +129,8 @@ impl BlockMatrix {
         blocks
     }
 
-    /// Has iterations to a tolerance read the blocks in single precision, if they are many and the tolerance is coarse enough.
+    /// Has iterations to a tolerance read the blocks in single precision, if they are many and the tolerance
+    /// is coarse enough.
     pub(crate) fn read_for(mut self, tolerance: f64) -> Self {
         if self.value.len() >= MANY && tolerance >= COARSE_TOLERANCE {
             self.single = vec![[0.0; 36]; self.value.len()];
@@ -171,8 +174,8 @@ impl BlockMatrix {
         range.start + self.column[range].partition_point(|&c| c < column)
     }
 
-    /// Takes the values of a matrix and inverts the diagonal blocks, while `beside` works with the values on another thread. Whether all
-    /// these blocks are positive definite, and the result of `beside`.
+    /// Takes the values of a matrix and inverts the diagonal blocks, while `beside` works with the values on
+    /// another thread. Whether all these blocks are positive definite, and the result of `beside`.
     pub(crate) fn update<T: Send>(
         &mut self,
         matrix: &LowerMatrix,
@@ -224,10 +227,12 @@ impl BlockMatrix {
     }
 }
 
-/// What the diagonals of inverses grow by: more than six numbers of a row lose by rounding, so that the inverse stays positive definite.
+/// What the diagonals of inverses grow by: more than six numbers of a row lose by rounding, so that the
+/// inverse stays positive definite.
 const GROWN: f64 = 1.0 + 4.0 * f32::EPSILON as f64;
 
-/// Inverts the diagonal blocks of some nodes from one on, with ones where these have no equation; false if one is not positive definite.
+/// Inverts the diagonal blocks of some nodes from one on, with ones where these have no equation; false if
+/// one is not positive definite.
 struct Invert<'a> {
     matrix: &'a BlockMatrix,
     first: usize,
@@ -267,7 +272,8 @@ impl WithSimd for Invert<'_> {
     }
 }
 
-/// Inverts symmetric matrices side by side, by Gauss and Jordan's elimination; false if one is not positive definite.
+/// Inverts symmetric matrices side by side, by Gauss and Jordan's elimination; false if one is not positive
+/// definite.
 #[inline(always)]
 pub(super) fn invert(a: &mut [[Pack; 6]; 6]) -> bool {
     let mut sound = true;

@@ -13,7 +13,8 @@ use crate::sparse::{Equations, LowerMatrix};
 /// Pivots of the coarse matrix above minus this part of the diagonal are zero but for round-off.
 const ROUND_OFF: f64 = 1e-10;
 
-/// Rigid motions of the aggregates: with P that of the nodes by those of aggregates, the coarse matrix is Pᵀ A P.
+/// Rigid motions of the aggregates: with P that of the nodes by those of aggregates, the coarse matrix is Pᵀ
+/// A P.
 pub(crate) struct Coarse {
     /// Arm of each node from the middle of its aggregate [m].
     arm: Vec<Vector3<f64>>,
@@ -203,8 +204,8 @@ impl Coarse {
         (&self.arm, &self.value)
     }
 
-    /// Factors the coarse matrix; its negative pivots. As deflated directions have no part in it, iterations do not meet negative stiffness
-    /// there.
+    /// Factors the coarse matrix; its negative pivots. As deflated directions have no part in it, iterations
+    /// do not meet negative stiffness there.
     pub(crate) fn factorise(&mut self) -> Result<usize, LinearError> {
         for ((row, column, _), value) in self.pairs.iter().zip(&self.value) {
             for j in 0..6 {

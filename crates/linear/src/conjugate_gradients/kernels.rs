@@ -120,7 +120,8 @@ fn add_times(block: &Block, x: &Node, to: &mut Node) {
     }
 }
 
-/// Adds B x, four products at a time: of the first four rows, of even and of odd columns; of the last two rows, of two columns at once.
+/// Adds B x, four products at a time: of the first four rows, of even and of odd columns; of the last two
+/// rows, of two columns at once.
 #[inline(always)]
 fn add_single_times(block: &SingleBlock, x: &Node, sums: &mut [[f64; 4]; 3]) {
     let quads: &[[f32; 4]; 9] = block.as_chunks().0.try_into().expect("nine times four");

@@ -15,7 +15,8 @@ const CHUNK: usize = 64;
 /// Chunks that a thread takes at least.
 const SHARE: usize = 4;
 
-/// The part of the tolerance at which iterations in single precision end, so that the residual in double precision is within it.
+/// The part of the tolerance at which iterations in single precision end, so that the residual in double
+/// precision is within it.
 const MARGIN: f64 = 0.99;
 
 /// An approximate inverse.
@@ -139,7 +140,8 @@ impl KrylovVectors {
         });
     }
 
-    /// x ← A⁻¹ b to a residual of `tolerance` |b|, from a multiple of the x given. What was reached stays in x where the iterations run out.
+    /// x ← A⁻¹ b to a residual of `tolerance` |b|, from a multiple of the x given. What was reached stays in
+    /// x where the iterations run out.
     pub(crate) fn solve(
         &mut self,
         matrix: &BlockMatrix,
@@ -155,8 +157,8 @@ impl KrylovVectors {
         result
     }
 
-    /// x ← the multiple of the x given that leaves the smallest residual, r ← b − A x; |b| and |r|. The motion before is then a good start for
-    /// a step that is slower or goes back, too.
+    /// x ← the multiple of the x given that leaves the smallest residual, r ← b − A x; |b| and |r|. The
+    /// motion before is then a good start for a step that is slower or goes back, too.
     pub(crate) fn begin(&mut self, matrix: &BlockMatrix, b: &[f64], x: &[f64]) -> [f64; 2] {
         matrix.gather(b, &mut self.r);
         matrix.gather(x, &mut self.x);
@@ -234,7 +236,8 @@ impl KrylovVectors {
                     return Err(LinearError::Stalled(report));
                 }
                 Ok(()) | Err(LinearError::Stalled(_)) if report.residual.is_finite() => {}
-                // In single precision this matrix may be indefinite where it is not: double precision decides.
+                // In single precision this matrix may be indefinite where it is not: double precision
+                // decides.
                 _ => {
                     let [_, left] = self.begin(matrix, b, x);
                     report = LinearReport { iterations: 0, residual: left / size };
@@ -245,7 +248,8 @@ impl KrylovVectors {
         Ok(report)
     }
 
-    /// Iterates from x and its residual r until that is a part of a size, or as many iterations are done in all.
+    /// Iterates from x and its residual r until that is a part of a size, or as many iterations are done in
+    /// all.
     fn go_on(
         &mut self,
         matrix: &BlockMatrix,

@@ -88,8 +88,8 @@ fn what_single_precision_leaves_is_found_in_double_precision() {
     assert!((left / size).sqrt() <= 1e-4 && report.residual <= 1e-4, "{left:e} {report:?}");
 }
 
-/// A chain of springs that is held at one end, with every approximation that iterates: in single precision the solution is found as in double,
-/// and where iterations run out it is not that of the start.
+/// A chain of springs that is held at one end, with every approximation that iterates: in single precision
+/// the solution is found as in double, and where iterations run out it is not that of the start.
 #[test]
 fn many_blocks_are_solved_in_single_precision() {
     const NODES: usize = 60;
@@ -169,9 +169,10 @@ fn blocks_are_inverted_side_by_side() {
     assert!(!invert(&mut pack(&indefinite)));
 }
 
-/// A free chain of springs on soil of negative stiffness k: its diagonal blocks are positive definite. Its waves have stiffness
-/// 4 sin²(nπ/120) − k. With k < 0.0027 only the three translations are negative. The factors of the coarse matrix report them, and
-/// deflation finds the solution, since it takes them out. With a larger k the iterations meet another one.
+/// A free chain of springs on soil of negative stiffness k: its diagonal blocks are positive definite. Its
+/// waves have stiffness 4 sin²(nπ/120) − k. With k < 0.0027 only the three translations are negative. The
+/// factors of the coarse matrix report them, and deflation finds the solution, since it takes them out. With
+/// a larger k the iterations meet another one.
 #[test]
 fn negative_stiffness_of_the_coarse_matrix_alone_is_reported_and_solved() {
     const NODES: usize = 60;

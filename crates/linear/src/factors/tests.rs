@@ -6,8 +6,8 @@ use pliant_testing::Random;
 use super::*;
 use crate::sparse::Equations;
 
-/// Nodes in a row of cells that share some with the next ones, pairs of other nodes, and components that are held: widths and heights of
-/// fronts of all kinds, wider than a block for many nodes.
+/// Nodes in a row of cells that share some with the next ones, pairs of other nodes, and components that are
+/// held: widths and heights of fronts of all kinds, wider than a block for many nodes.
 fn pattern(random: &mut Random, nodes: usize, held: usize) -> LowerMatrix {
     let mut free = vec![true; 6 * nodes];
     (0..held).for_each(|_| free[random.below(6 * nodes)] = false);
@@ -38,8 +38,8 @@ fn dense(matrix: &LowerMatrix) -> DMatrix<f64> {
     all
 }
 
-/// A x = b for matrices of 6 to 600 equations, positive definite and not; there are as many negative pivots as eigenvalues (Sylvester). Diagonals outweigh
-/// the rest, so that no pivot is small.
+/// A x = b for matrices of 6 to 600 equations, positive definite and not; there are as many negative pivots
+/// as eigenvalues (Sylvester). Diagonals outweigh the rest, so that no pivot is small.
 #[test]
 fn factors_solve_and_count_negative_eigenvalues() {
     let mut random = Random::new(5);
@@ -82,8 +82,8 @@ fn factors_solve_and_count_negative_eigenvalues() {
     }
 }
 
-/// Springs of 1 between six equations that nothing else holds, a matrix of rank 5: its last pivot is zero but for round-off. So is that of an equation
-/// without stiffness.
+/// Springs of 1 between six equations that nothing else holds, a matrix of rank 5: its last pivot is zero but
+/// for round-off. So is that of an equation without stiffness.
 #[test]
 fn zero_pivots_are_told() {
     let mut matrix = pattern(&mut Random::new(7), 1, 0);

@@ -8,8 +8,8 @@ use crate::report::{DeviceError, LinearError};
 use crate::sparse::{Equations, LowerMatrix};
 use crate::{LinearSolver, Preconditioner, Workspace};
 
-/// A device whose solver finds no room for its second pattern the first time, and leaves each solution to the CPU. Each pattern takes it
-/// a second.
+/// A device whose solver finds no room for its second pattern the first time, and leaves each solution to the
+/// CPU. Each pattern takes it a second.
 #[derive(Debug, Default)]
 struct Narrow {
     calls: u32,

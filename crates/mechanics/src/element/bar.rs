@@ -1,4 +1,5 @@
-//! The bar of two nodes: a ligament, a chord of a valve, a thread. It carries force along its length only, linear in its stretch.
+//! The bar of two nodes: a ligament, a chord of a valve, a thread. It carries force along its length only,
+//! linear in its stretch.
 
 use super::Rest;
 use crate::tensor::{Vector, add, dot, scale, sub};
@@ -58,8 +59,8 @@ impl Rest<2> {
 }
 
 impl Cord {
-    /// What a bar of Young's modulus `young` [Pa] does whose second node has moved by `moved` [m] relative to the first. The change of
-    /// length is found without cancellation.
+    /// What a bar of Young's modulus `young` [Pa] does whose second node has moved by `moved` [m] relative to
+    /// the first. The change of length is found without cancellation.
     pub fn pull(&self, rest: &Rest<2>, moved: Vector<f64>, young: f64) -> Pull {
         let (before, from) = (rest.between(), rest.length());
         let now = add(before, moved);

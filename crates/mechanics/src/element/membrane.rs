@@ -15,8 +15,8 @@ pub struct Sheet {
     pub thickness: f64,
 }
 
-/// The rest quantities of a triangle from its nodes [m] and its thickness [m]. Gradients are in the plane of the triangle; the volume is
-/// that of the wall.
+/// The rest quantities of a triangle from its nodes [m] and its thickness [m]. Gradients are in the plane of
+/// the triangle; the volume is that of the wall.
 pub fn membrane(x: &[Vector<f64>; 3], thickness: f64) -> (Rest<3>, Sheet) {
     let [a, b] = [sub(x[1], x[0]), sub(x[2], x[0])];
     let normal = cross(a, b);

@@ -2,7 +2,8 @@
 //! Ψ = μ Σ Cᵢ/λₘ^(2i−2) (Ī₁ⁱ − 3ⁱ) + U(J), C = 1/2, 1/20, 11/1050, 19/7000, 519/673750.
 //! The shear modulus at rest is 2 W₁(3) = μ (1 + 3/(5 λₘ²) + 99/(175 λₘ⁴) + …), larger than μ.
 //!
-//! Computed as a polynomial of x = Ī₁ − 3, whose coefficients are all positive: nothing cancels at small strain.
+//! Computed as a polynomial of x = Ī₁ − 3, whose coefficients are all positive: nothing cancels at small
+//! strain.
 
 use schemars::JsonSchema;
 use serde::Deserialize;

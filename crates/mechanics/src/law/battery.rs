@@ -81,7 +81,8 @@ fn stress_is_the_derivative_of_energy() {
                         moved.0[i][j] += by;
                         total_energy(&law, &moved)
                     };
-                    // Fourth-order difference: truncation and round-off both near 1e-11 of the largest stress.
+                    // Fourth-order difference: truncation and round-off both near 1e-11 of the largest
+                    // stress.
                     let slope = (8.0 * (shifted(step) - shifted(-step))
                         - (shifted(2.0 * step) - shifted(-2.0 * step)))
                         / (12.0 * step);
@@ -171,8 +172,8 @@ fn small_strains_feel_the_stated_moduli() {
     };
     for law in every_law() {
         let SmallStrainModuli { shear, bulk } = law.small_strain();
-        // Shear in the plane that the fibre (0.6, 0, 0.8) does not feel to first order: e_y with its normal. The second
-        // family, e_y itself, does not feel it either.
+        // Shear in the plane that the fibre (0.6, 0, 0.8) does not feel to first order: e_y with its normal.
+        // The second family, e_y itself, does not feel it either.
         let across = [[0.0, -0.8, 0.0], [0.0; 3], [0.0, 0.6, 0.0]];
         let xy = slope(&law, across, 3) / -0.8;
         if law.name() == "fung-orthotropic" {
@@ -208,8 +209,8 @@ fn volumetric_stress_is_a_pressure_that_knows_only_the_volume() {
     }
 }
 
-/// ρc² at rest of a wave along `n` that moves along `m`: m·(dP n)/ds for H = s m⊗n, the larger of s → +0 and s → −0
-/// (fibres that carry tension only know the difference).
+/// ρc² at rest of a wave along `n` that moves along `m`: m·(dP n)/ds for H = s m⊗n, the larger of s → +0 and
+/// s → −0 (fibres that carry tension only know the difference).
 fn wave_stiffness(law: &AnyLaw, n: [f64; 3], m: [f64; 3]) -> f64 {
     let force = |s: f64| {
         let mut h = Tensor::ZERO;
@@ -245,7 +246,8 @@ fn no_wave_at_rest_is_faster_than_the_longitudinal_modulus_says_and_none_stands_
         }
         assert!(slowest > 0.0, "{law:?}: ρc² = {slowest}");
         assert!(fastest <= bound * (1.0 + 1e-6), "{law:?}: ρc² = {fastest}, bound {bound}");
-        // Tight: exact without fibres and with one family, else as far as the sum of maxima is from the maximum of sums.
+        // Tight: exact without fibres and with one family, else as far as the sum of maxima is from the
+        // maximum of sums.
         let exact = law.is_isotropic() || law.name() == "transversely-isotropic";
         let least = if exact { 1.0 - 1e-6 } else { 0.8 };
         assert!(fastest >= bound * least, "{law:?}: ρc² = {fastest}, bound {bound}");

@@ -1,11 +1,12 @@
-//! What the laws need of a deformation, computed from the displacement gradient H = F − I so that small strains
-//! keep their digits in single precision: J − 1 = tr H + II(H) + det H, C − I = H + Hᵀ + Hᵀ H.
+//! What the laws need of a deformation, computed from the displacement gradient H = F − I so that small
+//! strains keep their digits in single precision: J − 1 = tr H + II(H) + det H, C − I = H + Hᵀ + Hᵀ H.
 //!
-//! A bar is the isochoric measure: C̄ = q C, q = J^(−2/3); Ī₁ = tr C̄, Ī₂ = ½ (Ī₁² − tr C̄²), Ī₄ = a·C̄a, Ī₅ = a·C̄²a.
-//! An energy Ψ(Ī₁, Ī₂, Ī₄, Ī₅) with the derivatives Wₖ = ∂Ψ/∂Īₖ has the stress S = q (Φ − ⅓ (Φ:C) C⁻¹) with
-//! Φ = 2 (W₁ + Ī₁ W₂) I − 2 W₂ C̄ + 2 W₄ a⊗a + 2 W₅ (a⊗C̄a + C̄a⊗a). Here it is put together from terms that vanish at
-//! rest: the isotropic part is C⁻¹ dev M with M a polynomial of X = C − I. By E = I − C⁻¹ it is C⁻¹ X = E and C⁻¹ X² = X − E, so that
-//! no tensors are multiplied. E itself is ((J² − 1 − tr X) I + X − cof X)/J², as cof C = (1 + tr X) I − X + cof X.
+//! A bar is the isochoric measure: C̄ = q C, q = J^(−2/3); Ī₁ = tr C̄, Ī₂ = ½ (Ī₁² − tr C̄²), Ī₄ = a·C̄a,
+//! Ī₅ = a·C̄²a. An energy Ψ(Ī₁, Ī₂, Ī₄, Ī₅) with the derivatives Wₖ = ∂Ψ/∂Īₖ has the stress S = q (Φ − ⅓
+//! (Φ:C) C⁻¹) with Φ = 2 (W₁ + Ī₁ W₂) I − 2 W₂ C̄ + 2 W₄ a⊗a + 2 W₅ (a⊗C̄a + C̄a⊗a). Here it is put together
+//! from terms that vanish at rest: the isotropic part is C⁻¹ dev M with M a polynomial of X = C − I. By E =
+//! I − C⁻¹ it is C⁻¹ X = E and C⁻¹ X² = X − E, so that no tensors are multiplied. E itself is ((J² − 1 − tr
+//! X) I + X − cof X)/J², as cof C = (1 + tr X) I − X + cof X.
 
 use crate::Number;
 use crate::tensor::{Symmetric, Tensor, Vector, dot};
@@ -32,7 +33,8 @@ pub struct Deformation<R> {
 }
 
 impl<R: Number> Deformation<R> {
-    /// From the displacement gradient H = ∂u/∂X. J ≤ 0 is the caller's to report: the measures are then meaningless.
+    /// From the displacement gradient H = ∂u/∂X. J ≤ 0 is the caller's to report: the measures are then
+    /// meaningless.
     #[inline(always)]
     pub fn from_displacement_gradient(h: &Tensor<R>) -> Self {
         let mut gradient = *h;

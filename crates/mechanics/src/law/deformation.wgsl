@@ -1,6 +1,6 @@
-// Tensors, and what the laws need of a deformation; twin of tensor.rs and deformation.rs, which have the formulas.
-// Isotropic stresses are products C⁻¹ M here; deformation.rs writes the same tensors as sums of I − C⁻¹, I and C − I.
-// A mat3x3f has columns, so that h * v is H v.
+// Tensors, and what the laws need of a deformation; twin of tensor.rs and deformation.rs, which have the
+// formulas. Isotropic stresses are products C⁻¹ M here; deformation.rs writes the same tensors as sums of I −
+// C⁻¹, I and C − I. A mat3x3f has columns, so that h * v is H v.
 
 // A symmetric tensor: (11, 22, 33) and (12, 23, 13).
 struct Symmetric {

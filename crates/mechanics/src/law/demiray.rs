@@ -1,5 +1,5 @@
-//! Demiray law (1972), the exponential law of Fung in Ī₁: Ψ = μ/(2b) (e^(b (Ī₁−3)) − 1) + U(J), W₁ = μ/2 e^(b (Ī₁−3)).
-//! The exponential of a large strain overflows to infinity, which stops a run with an error.
+//! Demiray law (1972), the exponential law of Fung in Ī₁: Ψ = μ/(2b) (e^(b (Ī₁−3)) − 1) + U(J), W₁ = μ/2 e^(b
+//! (Ī₁−3)). The exponential of a large strain overflows to infinity, which stops a run with an error.
 
 use schemars::JsonSchema;
 use serde::Deserialize;

@@ -19,7 +19,8 @@ pub struct ElasticConstants {
     /// Young's modulus E [Pa].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub young_modulus: Option<f64>,
-    /// Poisson's ratio ν; soft tissue lies near 0.45 to 0.49. 0.5, a volume that never changes, is for membranes and shells.
+    /// Poisson's ratio ν; soft tissue lies near 0.45 to 0.49. 0.5, a volume that never changes, is for
+    /// membranes and shells.
     #[schemars(extend("exclusiveMinimum" = -1.0, "maximum" = 0.5))]
     pub poisson_ratio: Option<f64>,
 }

@@ -1,7 +1,8 @@
-//! Orthotropic exponential law of Fung (1979): Ψ = c/2 (e^Q − 1) + U(J), Q = d·Dd + Σ sₘ (2Eₘ)², with d = (E₁₁, E₂₂, E₃₃)
-//! and m the shears 12, 23, 13 of the Green–Lagrange strain E in the material axes. S = c e^Q ½ ∂Q/∂E + S_vol.
-//! Not split: E is the whole strain, so that the exponential resists a change of volume too. Strains of a few tens of
-//! percent stiffen it by orders of magnitude; the exponential overflows to infinity, which stops a run with an error.
+//! Orthotropic exponential law of Fung (1979): Ψ = c/2 (e^Q − 1) + U(J), Q = d·Dd + Σ sₘ (2Eₘ)², with d =
+//! (E₁₁, E₂₂, E₃₃) and m the shears 12, 23, 13 of the Green–Lagrange strain E in the material axes. S = c e^Q
+//! ½ ∂Q/∂E + S_vol. Not split: E is the whole strain, so that the exponential resists a change of volume too.
+//! Strains of a few tens of percent stiffen it by orders of magnitude; the exponential overflows to infinity,
+//! which stops a run with an error.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -29,7 +30,8 @@ pub struct FungOrthotropic {
     pub volumetric: Volumetric,
 }
 
-/// Parameters of the Fung law: Ψ = c/2 (e^Q − 1) + U(J), Q = d·Dd + Σ sₘ (2Eₘ)², d = (E₁₁, E₂₂, E₃₃), m = 12, 23, 13.
+/// Parameters of the Fung law: Ψ = c/2 (e^Q − 1) + U(J), Q = d·Dd + Σ sₘ (2Eₘ)², d = (E₁₁, E₂₂, E₃₃), m = 12,
+/// 23, 13.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) struct FungOrthotropicParameters {
@@ -173,8 +175,8 @@ impl Law for FungOrthotropic {
     }
 
     fn longitudinal_modulus(&self) -> f64 {
-        // c d·Dd + c Σ s (2E)² for a strain sym(n⊗m) of norm 1 at most: the largest principal value of the form, in which
-        // a shear counts √2 E.
+        // c d·Dd + c Σ s (2E)² for a strain sym(n⊗m) of norm 1 at most: the largest principal value of the
+        // form, in which a shear counts √2 E.
         let normal = largest(principal(&self.normal).0);
         self.volumetric.bulk + self.modulus * normal.max(2.0 * largest(self.shear))
     }

@@ -1,6 +1,6 @@
-// parameter(1): modulus c [Pa]; parameter(2) to parameter(7): the form D, 11, 22, 33, 12, 23, 13; parameter(8) to
-// parameter(10): the coefficients s of the shears 12, 23, 13; parameter(11) to parameter(19): the material axes, one after
-// the other.
+// parameter(1): modulus c [Pa]; parameter(2) to parameter(7): the form D, 11, 22, 33, 12, 23, 13;
+// parameter(8) to parameter(10): the coefficients s of the shears 12, 23, 13; parameter(11) to parameter(19):
+// the material axes, one after the other.
 
 fn parameters_from(index: u32) -> vec3f {
     return vec3f(parameter(index), parameter(index + 1), parameter(index + 2));

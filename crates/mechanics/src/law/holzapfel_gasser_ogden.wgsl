@@ -1,5 +1,5 @@
-// parameter(1): c/2 [Pa]; parameter(2): k₁ [Pa]; parameter(3): k₂; parameter(4): dispersion κ; parameter(5): 1 − 3κ;
-// parameter(6): families, 1 or 2.
+// parameter(1): c/2 [Pa]; parameter(2): k₁ [Pa]; parameter(3): k₂; parameter(4): dispersion κ; parameter(5):
+// 1 − 3κ; parameter(6): families, 1 or 2.
 
 fn family_stress(d: Deformation, a: vec3f) -> Symmetric {
     let spread = parameter(4) * isochoric_first_invariant_minus_3(d);

@@ -1,5 +1,5 @@
-//! Neo-Hookean law with ln²: Ψ = μ/2 (I₁ − 3 − 2 ln J) + λ/2 ln² J, S = μ (I − C⁻¹) + λ ln J C⁻¹ (Bonet and Wood).
-//! Stiffens without bound at J → 0, but the volumetric term loses convexity beyond J = e.
+//! Neo-Hookean law with ln²: Ψ = μ/2 (I₁ − 3 − 2 ln J) + λ/2 ln² J, S = μ (I − C⁻¹) + λ ln J C⁻¹ (Bonet and
+//! Wood). Stiffens without bound at J → 0, but the volumetric term loses convexity beyond J = e.
 
 use schemars::JsonSchema;
 use serde::Deserialize;

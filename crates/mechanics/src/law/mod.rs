@@ -1,10 +1,10 @@
 //! Constitutive laws: energy and second Piola–Kirchhoff stress from the deformation gradient.
 //!
 //! A law is a small struct of parameters, its methods generic over the number type, so that the same lines
-//! run as reference and as fast path. Most laws are a sum of an isochoric and a volumetric energy and implement
-//! [`SplitLaw`], the others [`Law`] itself. The history of viscoelasticity wraps a law (see [`prony`](crate::prony));
-//! it is not a law of its own. To add a law: its file and that of its WGSL twin here, its line in
-//! the registry below, its line in the samples that tests run.
+//! run as reference and as fast path. Most laws are a sum of an isochoric and a volumetric energy and
+//! implement [`SplitLaw`], the others [`Law`] itself. The history of viscoelasticity wraps a law (see
+//! [`prony`](crate::prony)); it is not a law of its own. To add a law: its file and that of its WGSL twin
+//! here, its line in the registry below, its line in the samples that tests run.
 
 mod arruda_boyce;
 mod check;
@@ -131,8 +131,8 @@ pub(crate) trait NamedLaw: Law {
 
 /// A hyperelastic law.
 pub trait Law: Copy + Send + Sync + 'static {
-    /// True if the volumetric stress is J U′(J) C⁻¹, of an energy of J alone. Elements that average the change of
-    /// volume stand on it: without it they compute another law.
+    /// True if the volumetric stress is J U′(J) C⁻¹, of an energy of J alone. Elements that average the
+    /// change of volume stand on it: without it they compute another law.
     const VOLUMETRIC_ENERGY: bool = true;
 
     /// Strain energy per reference volume [J/m³]. `fibres` are the unit directions of the families at rest.
@@ -169,9 +169,9 @@ pub trait Law: Copy + Send + Sync + 'static {
     /// Moduli at rest, without the fibres; of a law without isotropic matrix the largest shear modulus.
     fn small_strain(&self) -> SmallStrainModuli;
 
-    /// An upper bound of ρc² over all directions at rest [Pa]: λ + 2μ, plus what fibres add. With it the element bound
-    /// of the critical step is rigorous: by Cauchy and Schwarz the nuclear norm of Σ v_a⊗B_a is at most |v| |B|, and a
-    /// positive form is largest over that ball at some n⊗m.
+    /// An upper bound of ρc² over all directions at rest [Pa]: λ + 2μ, plus what fibres add. With it the
+    /// element bound of the critical step is rigorous: by Cauchy and Schwarz the nuclear norm of Σ v_a⊗B_a is
+    /// at most |v| |B|, and a positive form is largest over that ball at some n⊗m.
     fn longitudinal_modulus(&self) -> f64 {
         let SmallStrainModuli { shear, bulk } = self.small_strain();
         bulk + 4.0 / 3.0 * shear + self.fibre_modulus()
@@ -206,8 +206,8 @@ macro_rules! registry {
                 }
             }
 
-            /// A law from its name and its parameters as JSON. An unknown name or a value of the wrong type is
-            /// reported under the key `type`.
+            /// A law from its name and its parameters as JSON. An unknown name or a value of the wrong type
+            /// is reported under the key `type`.
             pub fn from_json(name: &str, parameters: serde_json::Value) -> Result<Self, ParameterError> {
                 let unreadable = |message: String| ParameterError {
                     key: "type",
@@ -340,7 +340,8 @@ impl AnyLaw {
         with_law!(self, law => law.fibre_modulus())
     }
 
-    /// U(J) [J/m³] at a J − 1, of a law with an energy of the volume alone ([`has_volumetric_energy`](Self::has_volumetric_energy)).
+    /// U(J) [J/m³] at a J − 1, of a law with an energy of the volume alone
+    /// ([`has_volumetric_energy`](Self::has_volumetric_energy)).
     pub fn volume_energy(&self, change: f64) -> f64 {
         let any = [[1.0, 0.0, 0.0]; MOST_FAMILIES];
         self.energy(&dilation(change), &any[..self.families()]).volumetric

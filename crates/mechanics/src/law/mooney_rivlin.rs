@@ -18,7 +18,8 @@ pub struct MooneyRivlin {
     pub volumetric: Volumetric,
 }
 
-/// Parameters of the Mooney–Rivlin law: Ψ = c₁₀ (Ī₁ − 3) + c₀₁ (Ī₂ − 3) + U(J); μ = 2 (c₁₀ + c₀₁) > 0 at rest.
+/// Parameters of the Mooney–Rivlin law: Ψ = c₁₀ (Ī₁ − 3) + c₀₁ (Ī₂ − 3) + U(J); μ = 2 (c₁₀ + c₀₁) > 0 at
+/// rest.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct MooneyRivlinParameters {

@@ -1,5 +1,6 @@
-//! Laws that are not in the registry: a program gives its own. They are computed in double precision, a point at a time, by every solver
-//! on the CPU. A law that should run in lanes and on a GPU belongs into the registry.
+//! Laws that are not in the registry: a program gives its own. They are computed in double precision, a point
+//! at a time, by every solver on the CPU. A law that should run in lanes and on a GPU belongs into the
+//! registry.
 
 use std::fmt;
 
@@ -49,7 +50,8 @@ pub trait OwnLaw: fmt::Debug + Send + Sync + 'static {
     /// Strain energy per reference volume [J/m³]; see [`Law::energy`].
     fn energy(&self, deformation: &Deformation<f64>, fibres: &[Vector<f64>]) -> Split<f64>;
 
-    /// Second Piola–Kirchhoff stress [Pa], the derivative of the energy by the Green–Lagrange strain; see [`Law::stress`].
+    /// Second Piola–Kirchhoff stress [Pa], the derivative of the energy by the Green–Lagrange strain; see
+    /// [`Law::stress`].
     fn stress(&self, deformation: &Deformation<f64>, fibres: &[Vector<f64>]) -> Split<Symmetric<f64>>;
 
     /// Moduli at rest; see [`Law::small_strain`].
@@ -65,8 +67,8 @@ pub trait OwnLaw: fmt::Debug + Send + Sync + 'static {
         false
     }
 
-    /// An upper bound of ρc² at rest [Pa], which the critical time step takes; see [`Law::longitudinal_modulus`]. A law with fibres adds
-    /// their stiffness.
+    /// An upper bound of ρc² at rest [Pa], which the critical time step takes; see
+    /// [`Law::longitudinal_modulus`]. A law with fibres adds their stiffness.
     fn longitudinal_modulus(&self) -> f64 {
         let SmallStrainModuli { shear, bulk } = self.small_strain();
         bulk + 4.0 / 3.0 * shear

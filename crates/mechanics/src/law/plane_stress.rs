@@ -1,9 +1,11 @@
-//! Laws in plane stress, for thin walls: the stretch λ₃ across the wall is the one at which the stress across it vanishes.
+//! Laws in plane stress, for thin walls: the stretch λ₃ across the wall is the one at which the stress across
+//! it vanishes.
 //!
-//! In the frame of a wall C is known but for C₃₃ = λ₃². A law sees F = R with Rᵀ R = C, R upper triangular (Cholesky), which differs from
-//! the true F by a rotation that no law feels. λ₃ makes the Kirchhoff stress across, λ₃² S₃₃, zero: a secant search over ln λ₃ that starts
-//! with λ + 2μ as slope. An incompressible law has λ₃ = 1/√det C in the plane, and a pressure that takes S₃₃ away, without a search
-//! (Holzapfel, *Nonlinear Solid Mechanics*, 6.3). So every law of the registry has its plane-stress version.
+//! In the frame of a wall C is known but for C₃₃ = λ₃². A law sees F = R with Rᵀ R = C, R upper triangular
+//! (Cholesky), which differs from the true F by a rotation that no law feels. λ₃ makes the Kirchhoff stress
+//! across, λ₃² S₃₃, zero: a secant search over ln λ₃ that starts with λ + 2μ as slope. An incompressible law
+//! has λ₃ = 1/√det C in the plane, and a pressure that takes S₃₃ away, without a search (Holzapfel,
+//! *Nonlinear Solid Mechanics*, 6.3). So every law of the registry has its plane-stress version.
 
 use super::tangent::{DIFFERENCE, by_differences};
 use super::{AnyLaw, Deformation, SmallStrainModuli, Split};
@@ -28,7 +30,8 @@ impl<R: Number> InPlane<R> {
     /// From C₁₁ − 1, C₂₂ − 1 and C₁₂. Not a number where the wall is folded flat.
     #[inline(always)]
     pub(crate) fn from_strain_twice(strain_twice: [R; 3]) -> Self {
-        // √(1 + x) − 1 = x/(1 + √(1 + x)), without cancellation. Written out: closures are not compiled for lanes.
+        // √(1 + x) − 1 = x/(1 + √(1 + x)), without cancellation. Written out: closures are not compiled for
+        // lanes.
         let [xx, yy, xy] = strain_twice;
         let first = xx / (R::ONE + (R::ONE + xx).sqrt());
         let mixed = xy / (R::ONE + first);
@@ -37,7 +40,8 @@ impl<R: Number> InPlane<R> {
         Self { strain_twice, factor: [first, second, mixed] }
     }
 
-    /// From the changes of the two tangents, ∂u/∂X₁ and ∂u/∂X₂, and the tangents t at rest: C_ij − δ_ij = t_i·u_j + t_j·u_i + u_i·u_j.
+    /// From the changes of the two tangents, ∂u/∂X₁ and ∂u/∂X₂, and the tangents t at rest: C_ij − δ_ij =
+    /// t_i·u_j + t_j·u_i + u_i·u_j.
     #[inline(always)]
     pub fn from_changes(tangents: &[Vector<R>; 2], changes: &[Vector<R>; 2]) -> Self {
         let ([t, s], [u, v]) = (*tangents, *changes);
@@ -83,8 +87,8 @@ impl<R: Number> InPlane<R> {
         -change / (R::ONE + change)
     }
 
-    /// S₁₁, S₂₂ and S₁₂ without the stress across: S − w λ₃² S₃₃ C⁻¹. With w = 1 that is what the pressure of an incompressible law does;
-    /// with w = λ/(λ + 2μ) it takes off what the search for λ₃ has left over.
+    /// S₁₁, S₂₂ and S₁₂ without the stress across: S − w λ₃² S₃₃ C⁻¹. With w = 1 that is what the pressure of
+    /// an incompressible law does; with w = λ/(λ + 2μ) it takes off what the search for λ₃ has left over.
     #[inline(always)]
     pub fn without_stress_across(&self, stress: &Symmetric<R>, thickness_change: R, w: R) -> [R; 3] {
         let [xx, yy, xy] = self.strain_twice;
@@ -206,8 +210,9 @@ impl AnyLaw {
         Across { modulus, coupling: (moduli.bulk - 2.0 / 3.0 * moduli.shear) / modulus }
     }
 
-    /// An upper bound of ρc² [Pa] of a wall over all directions at rest: E/(1 − ν²), plus what fibres add. In the plane an incompressible
-    /// fibre strains by its whole stretch, not by 2/3 of it: 9/4 of what it adds to the solid.
+    /// An upper bound of ρc² [Pa] of a wall over all directions at rest: E/(1 − ν²), plus what fibres add. In
+    /// the plane an incompressible fibre strains by its whole stretch, not by 2/3 of it: 9/4 of what it adds
+    /// to the solid.
     pub(crate) fn plane_modulus(&self) -> f64 {
         let SmallStrainModuli { shear, bulk } = self.small_strain();
         let first = bulk - 2.0 / 3.0 * shear;
@@ -215,7 +220,8 @@ impl AnyLaw {
         4.0 * shear * fraction + 2.25 * self.fibre_modulus()
     }
 
-    /// The wall's stress, energy and stretch across at C₁₁ − 1, C₂₂ − 1 and C₁₂; fibres in the frame of the wall.
+    /// The wall's stress, energy and stretch across at C₁₁ − 1, C₂₂ − 1 and C₁₂; fibres in the frame of the
+    /// wall.
     pub fn plane_stress(&self, strain_twice: [f64; 3], fibres: &[Vector<f64>]) -> PlaneStress {
         let plane = InPlane::from_strain_twice(strain_twice);
         let across = self.across();
@@ -376,7 +382,8 @@ mod tests {
         }
     }
 
-    /// A strip pulled along 1 with a free edge: first Piola–Kirchhoff stress λ S₁₁ and the stretch of its width.
+    /// A strip pulled along 1 with a free edge: first Piola–Kirchhoff stress λ S₁₁ and the stretch of its
+    /// width.
     fn strip(law: &AnyLaw, stretch: f64) -> [f64; 2] {
         let across =
             |width: f64| law.plane_stress([stretch * stretch - 1.0, width * width - 1.0, 0.0], &[]).stress;

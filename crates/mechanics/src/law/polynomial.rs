@@ -19,7 +19,8 @@ pub struct Polynomial {
     pub volumetric: Volumetric,
 }
 
-/// Parameters of the polynomial law: Ψ = Σ cᵢⱼ (Ī₁ − 3)ⁱ (Ī₂ − 3)ʲ + U(J), 1 ≤ i + j ≤ 2; μ = 2 (c₁₀ + c₀₁) > 0 at rest.
+/// Parameters of the polynomial law: Ψ = Σ cᵢⱼ (Ī₁ − 3)ⁱ (Ī₂ − 3)ʲ + U(J), 1 ≤ i + j ≤ 2; μ = 2 (c₁₀ + c₀₁) >
+/// 0 at rest.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct PolynomialParameters {

@@ -1,5 +1,6 @@
-//! Principal values and directions of a symmetric tensor by cyclic Jacobi rotations: no branch, no convergence test,
-//! equal values welcome. Five rounds: each squares the off-diagonal part at least, 10⁻¹ becomes 10⁻¹⁶ in four.
+//! Principal values and directions of a symmetric tensor by cyclic Jacobi rotations: no branch, no
+//! convergence test, equal values welcome. Five rounds: each squares the off-diagonal part at least, 10⁻¹
+//! becomes 10⁻¹⁶ in four.
 
 use crate::Number;
 use crate::tensor::{Symmetric, Vector};
@@ -37,7 +38,8 @@ struct Turning<R> {
 }
 
 impl<R: Number> Turning<R> {
-    /// Turns the axes p and q until the entry between them is zero; r is the third axis (Golub and Van Loan 8.5.2).
+    /// Turns the axes p and q until the entry between them is zero; r is the third axis (Golub and Van Loan
+    /// 8.5.2).
     #[inline(always)]
     fn annihilate(&mut self, p: usize, q: usize, r: usize) {
         let between = self.beside[r];

@@ -1,4 +1,5 @@
-//! The laws that tests run, here, in `pliant-explicit` and in `pliant-gpu`. A new law is one line in [`every_law`].
+//! The laws that tests run, here, in `pliant-explicit` and in `pliant-gpu`. A new law is one line in
+//! [`every_law`].
 
 use serde_json::{Value, json};
 

@@ -1,14 +1,17 @@
-//! The shear stiffness of a deformed state over that at rest, for stiffness against hourglass patterns that follows the law.
+//! The shear stiffness of a deformed state over that at rest, for stiffness against hourglass patterns that
+//! follows the law.
 //!
-//! The modulus |dev τ| / |dev b̄| is that of the neo-Hookean solid with the same Kirchhoff stress τ at the same b̄ = J^(−2/3) F Fᵀ.
-//! In a plane of two principal stretches it is (τᵢ − τⱼ)/(λ̄ᵢ² − λ̄ⱼ²), the tangent modulus of a superposed shear over the mean of λ̄²
-//! (Ogden 1984, *Non-linear Elastic Deformations*, 6.3). The ratio of that modulus to the one at rest is
+//! The modulus |dev τ| / |dev b̄| is that of the neo-Hookean solid with the same Kirchhoff stress τ at the
+//! same b̄ = J^(−2/3) F Fᵀ. In a plane of two principal stretches it is (τᵢ − τⱼ)/(λ̄ᵢ² − λ̄ⱼ²), the tangent
+//! modulus of a superposed shear over the mean of λ̄² (Ogden 1984, *Non-linear Elastic Deformations*, 6.3).
+//! The ratio of that modulus to the one at rest is
 //!
 //! ```text
 //! r = |dev τ| / (μ √(|dev b̄|² + ε²)),   ε = SMALL,
 //! ```
 //!
-//! where ε keeps it below 1 at small strains, at which both norms are round-off. The factor is 1 up to r = 1 and close to r far above:
+//! where ε keeps it below 1 at small strains, at which both norms are round-off. The factor is 1 up to r = 1
+//! and close to r far above:
 //!
 //! ```text
 //! g = 1 + x³/(x² + δ²),   x = max(r − 1, 0),   δ = BEND.
@@ -21,14 +24,15 @@
 //! G = g′ r ((2 T S + S′)/|dev τ|² − ∂|dev b̄|²/∂C / (|dev b̄|² + ε²)),   g′ = (x⁴ + 3 δ² x²)/(x² + δ²)²,   T = S C − ⅓ tr(S C) I,
 //! ```
 //!
-//! where S′ is the derivative of S along δF = dev τ F = F T, found by differences: nothing but the stress is asked of a law. A part J U′(J) C⁻¹
-//! of the stress has no part in G, as 2 T S + S′ of it vanishes.
+//! where S′ is the derivative of S along δF = dev τ F = F T, found by differences: nothing but the stress is
+//! asked of a law. A part J U′(J) C⁻¹ of the stress has no part in G, as 2 T S + S′ of it vanishes.
 
 use super::Deformation;
 use crate::Number;
 use crate::tensor::{Symmetric, Tensor, dot};
 
-/// ε: |dev b̄| of about five per cent of shear. Below a tenth of μ the stress turns no cell over, and fibres make r vary with the direction of strain.
+/// ε: |dev b̄| of about five per cent of shear. Below a tenth of μ the stress turns no cell over, and fibres
+/// make r vary with the direction of strain.
 const SMALL: f64 = 0.1;
 
 /// δ: width of the range of r above 1 in which the factor bends from 1 to r.
@@ -50,7 +54,8 @@ pub struct ShearGrowth<N> {
 }
 
 impl<N: Number> ShearGrowth<N> {
-    /// From the elastic second Piola–Kirchhoff stress [Pa] of a deformation and the shear modulus at rest [Pa].
+    /// From the elastic second Piola–Kirchhoff stress [Pa] of a deformation and the shear modulus at rest
+    /// [Pa].
     #[inline(always)]
     pub fn new(deformation: &Deformation<N>, stress: &Symmetric<N>, shear: N) -> Self {
         let strain = &deformation.strain_twice;

@@ -1,5 +1,6 @@
-//! Laws whose energy is the sum of one of shape and one of volume, Ψ = Ψ_iso(C̄) + U(J): such a law states its
-//! isochoric part and names its [`Volumetric`] energy; this file makes it a [`Law`]. And the parameters all of them share.
+//! Laws whose energy is the sum of one of shape and one of volume, Ψ = Ψ_iso(C̄) + U(J): such a law states
+//! its isochoric part and names its [`Volumetric`] energy; this file makes it a [`Law`]. And the parameters
+//! all of them share.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -21,7 +22,8 @@ pub trait SplitLaw: Copy + Send + Sync + 'static {
     /// Checks and converts the user's parameters.
     fn new(parameters: &Self::Parameters) -> Result<Self, ParameterError>;
 
-    /// Isochoric energy per reference volume [J/m³]. `fibres` are the unit directions of the families at rest.
+    /// Isochoric energy per reference volume [J/m³]. `fibres` are the unit directions of the families at
+    /// rest.
     fn isochoric_energy<R: Number>(&self, deformation: &Deformation<R>, fibres: &[Vector<R>]) -> R;
 
     /// Second Piola–Kirchhoff stress of the isochoric energy [Pa], put together by [`Deformation`].
@@ -56,9 +58,9 @@ pub trait SplitLaw: Copy + Send + Sync + 'static {
     }
 }
 
-/// The largest ρc² [Pa] that fibres of the energy η/2 (Ī₄ − 1)² feel at rest. For a wave along n that moves along m the
-/// rate of Ī₄ is 2 ((a·n)(a·m) − n·m/3); (a·n)(a·m) lies between (n·m − 1)/2 and (n·m + 1)/2, hence |rate| ≤ 4/3, reached
-/// along the fibre: 16/9 η.
+/// The largest ρc² [Pa] that fibres of the energy η/2 (Ī₄ − 1)² feel at rest. For a wave along n that moves
+/// along m the rate of Ī₄ is 2 ((a·n)(a·m) − n·m/3); (a·n)(a·m) lies between (n·m − 1)/2 and (n·m + 1)/2,
+/// hence |rate| ≤ 4/3, reached along the fibre: 16/9 η.
 pub(super) fn fibre_stiffness(modulus: f64) -> f64 {
     16.0 / 9.0 * modulus
 }
@@ -115,7 +117,8 @@ impl<L: SplitLaw> Law for L {
     }
 }
 
-/// The matrix of a split law whose shear modulus is a parameter: two elastic constants and the volumetric energy.
+/// The matrix of a split law whose shear modulus is a parameter: two elastic constants and the volumetric
+/// energy.
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct Matrix {
@@ -146,7 +149,8 @@ pub struct Compressibility {
     /// Bulk modulus κ [Pa].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub bulk_modulus: Option<f64>,
-    /// Poisson's ratio ν at rest; soft tissue lies near 0.45 to 0.49. 0.5, a volume that never changes, is for membranes and shells.
+    /// Poisson's ratio ν at rest; soft tissue lies near 0.45 to 0.49. 0.5, a volume that never changes, is
+    /// for membranes and shells.
     #[schemars(extend("exclusiveMinimum" = -1.0, "maximum" = 0.5))]
     pub poisson_ratio: Option<f64>,
     /// How the energy grows with the change of volume.

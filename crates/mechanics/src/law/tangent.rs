@@ -1,6 +1,6 @@
-//! The tangent of a law, D = ∂S/∂ε with the engineering strains ε = (E₁₁, E₂₂, E₃₃, 2E₁₂, 2E₂₃, 2E₁₃), by central differences along
-//! δF = F⁻ᵀ δE, for which δC = 2 δE up to terms that cancel. Right for every law, to 1e-9 of its largest entry: nothing but the
-//! stress is asked of a law. Twelve stresses a tangent.
+//! The tangent of a law, D = ∂S/∂ε with the engineering strains ε = (E₁₁, E₂₂, E₃₃, 2E₁₂, 2E₂₃, 2E₁₃), by
+//! central differences along δF = F⁻ᵀ δE, for which δC = 2 δE up to terms that cancel. Right for every law,
+//! to 1e-9 of its largest entry: nothing but the stress is asked of a law. Twelve stresses a tangent.
 
 use super::{AnyLaw, Deformation, Split};
 use crate::tensor::{Symmetric, Tensor, Vector};
@@ -12,8 +12,8 @@ pub(super) const DIFFERENCE: f64 = 1e-5;
 const COMPONENTS: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [0, 1], [1, 2], [0, 2]];
 
 impl AnyLaw {
-    /// D [Pa] of a part of the stress, in the order 11, 22, 33, 12, 23, 13, symmetric. `h` is the displacement gradient; its J must
-    /// be positive.
+    /// D [Pa] of a part of the stress, in the order 11, 22, 33, 12, 23, 13, symmetric. `h` is the
+    /// displacement gradient; its J must be positive.
     pub fn tangent(
         &self,
         h: &Tensor<f64>,
@@ -39,7 +39,8 @@ impl AnyLaw {
     }
 }
 
-/// The symmetric matrix of the central differences of stresses [Pa], from those at a component of strain moved by ± [`DIFFERENCE`].
+/// The symmetric matrix of the central differences of stresses [Pa], from those at a component of strain
+/// moved by ± [`DIFFERENCE`].
 pub(super) fn by_differences<const N: usize>(stress: impl Fn(usize, f64) -> [f64; N]) -> [[f64; N]; N] {
     let column = |component: usize| {
         let (ahead, behind) = (stress(component, 1.0), stress(component, -1.0));

@@ -1,5 +1,5 @@
-//! Transversely isotropic law (thesis 6.4–6.5): Ψ = μ/2 (Ī₁ − 3) + η/2 (Ī₄ − 1)² + U(J).
-//! Fibres resist compression as well as tension. The thesis's stress (6.6) misses a factor 2 against its own energy;
+//! Transversely isotropic law (thesis 6.4–6.5): Ψ = μ/2 (Ī₁ − 3) + η/2 (Ī₄ − 1)² + U(J). Fibres resist
+//! compression as well as tension. The thesis's stress (6.6) misses a factor 2 against its own energy;
 //! parameters published with it are half as stiff and are read with `convention = "taylor"`.
 
 use schemars::JsonSchema;
@@ -42,7 +42,8 @@ pub struct TransverselyIsotropicParameters {
     /// Fibre modulus η [Pa].
     #[schemars(range(min = 0.0))]
     pub fibre_modulus: f64,
-    /// `energy`: η belongs to the energy above. `taylor`: η as published with Taylor 2009, NiftySim or SOFA (half).
+    /// `energy`: η belongs to the energy above. `taylor`: η as published with Taylor 2009, NiftySim or SOFA
+    /// (half).
     #[serde(default)]
     pub convention: FibreConvention,
 }

@@ -19,7 +19,8 @@ pub struct VerondaWestmann {
     pub volumetric: Volumetric,
 }
 
-/// Parameters of the Veronda–Westmann law: Ψ = c₁ (e^(c₂ (Ī₁−3)) − 1) − c₁c₂/2 (Ī₂ − 3) + U(J); μ = c₁ c₂ at rest.
+/// Parameters of the Veronda–Westmann law: Ψ = c₁ (e^(c₂ (Ī₁−3)) − 1) − c₁c₂/2 (Ī₂ − 3) + U(J); μ = c₁ c₂ at
+/// rest.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct VerondaWestmannParameters {

@@ -1,4 +1,5 @@
-//! The volumetric energy U(J) of the split laws; its stress is S = J U′(J) C⁻¹. All have the bulk modulus κ at rest.
+//! The volumetric energy U(J) of the split laws; its stress is S = J U′(J) C⁻¹. All have the bulk modulus κ
+//! at rest.
 //!
 //! | name | U(J) | J U′(J) | J² U″(J) | |
 //! |---|---|---|---|---|
@@ -7,8 +8,9 @@
 //! | `ln-squared` | κ/2 ln² J | κ ln J | κ (1 − ln J) | infinite at J → 0; not convex beyond J = e |
 //! | `j-ln-j` | κ (J ln J − J + 1) | κ J ln J | κ J | finite at J → 0, its slope is not |
 //!
-//! The energies of the last three lose digits to cancellation at small volume changes (not the stresses): read them in
-//! double precision. The form is chosen at run time, the same for all lanes; a kernel for each form would be four times the code.
+//! The energies of the last three lose digits to cancellation at small volume changes (not the stresses):
+//! read them in double precision. The form is chosen at run time, the same for all lanes; a kernel for each
+//! form would be four times the code.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -80,7 +82,8 @@ impl Volumetric {
         deformation.inverse_cauchy_green * self.kirchhoff_pressure(deformation)
     }
 
-    /// A law with this energy in WGSL: `snippets` and `own` are the rest of it, its parameters from index 1 on.
+    /// A law with this energy in WGSL: `snippets` and `own` are the rest of it, its parameters from index 1
+    /// on.
     pub(super) fn shader(&self, snippets: &[&str], own: &[f64]) -> Shader {
         let pressure = match self.energy {
             VolumetricEnergy::Quadratic => "j * x",
@@ -133,7 +136,8 @@ mod tests {
                     (8.0 * (f(j + h) - f(j - h)) - (f(j + 2.0 * h) - f(j - 2.0 * h))) / (12.0 * h)
                 };
                 let derivative = |j: f64| volumetric.kirchhoff_pressure(&stretched(j)) / j;
-                // Fourth order: truncation h⁴ U⁽⁵⁾/30, below 1e-12 but for κ/J⁵ at J = 0.4; round-off near 1e-11.
+                // Fourth order: truncation h⁴ U⁽⁵⁾/30, below 1e-12 but for κ/J⁵ at J = 0.4; round-off near
+                // 1e-11.
                 let first = slope(&|j| volumetric.energy(&stretched(j)));
                 assert!((first - derivative(j)).abs() < 1e-9, "{energy:?} at {j}");
                 let second = slope(&derivative);

@@ -1,5 +1,5 @@
-// The volumetric energy U(J), twin of volumetric.rs, which adds `relative_kirchhoff_pressure(j, x)`: J U′(J)/κ, x = J − 1.
-// parameter(0): bulk modulus κ [Pa]. The law's own follow.
+// The volumetric energy U(J), twin of volumetric.rs, which adds `relative_kirchhoff_pressure(j, x)`: J
+// U′(J)/κ, x = J − 1. parameter(0): bulk modulus κ [Pa]. The law's own follow.
 
 // S = J U′(J) C⁻¹ [Pa].
 fn volumetric_stress(d: Deformation) -> Symmetric {

@@ -71,7 +71,8 @@ pub struct Hourglass<R, const N: usize> {
     pub stiffness: Vec<R>,
     /// κ² [1/m²] of each cell: how far corners follow the patterns; see [`Hex8::corner_reach`].
     pub corner_reach: Vec<R>,
-    /// Whether the stiffness grows with the shear stiffness of the law, k g; see [`ShearGrowth`](crate::law::ShearGrowth).
+    /// Whether the stiffness grows with the shear stiffness of the law, k g; see
+    /// [`ShearGrowth`](crate::law::ShearGrowth).
     pub grows: bool,
 }
 
@@ -110,7 +111,8 @@ impl Cells {
         Self::Tet4(CellBlock { nodes, rest: quantities, hourglass: None, offsets: vec![] })
     }
 
-    /// Hexahedra from their nodes; `hourglass` is the coefficient c, `shear` the modulus μ [Pa] that scales it.
+    /// Hexahedra from their nodes; `hourglass` is the coefficient c, `shear` the modulus μ [Pa] that scales
+    /// it.
     pub fn hex8(nodes: Vec<[u32; 8]>, rest: &[Vector<f64>], hourglass: f64, shear: f64) -> Self {
         let hexes: Vec<Hex8> = nodes.iter().map(|cell| hex8(&cell.map(|n| rest[n as usize]))).collect();
         let stiffness =
@@ -129,8 +131,8 @@ impl Cells {
         })
     }
 
-    /// The same cells, whose stiffness against hourglass patterns grows with the shear stiffness of their law. Without it evenly squeezed
-    /// cells of a law that stiffens collapse into these patterns.
+    /// The same cells, whose stiffness against hourglass patterns grows with the shear stiffness of their
+    /// law. Without it evenly squeezed cells of a law that stiffens collapse into these patterns.
     pub fn with_growing_hourglass(mut self) -> Self {
         if let Self::Hex8(CellBlock { hourglass: Some(control), .. }) = &mut self {
             control.grows = true;
@@ -171,9 +173,10 @@ impl Cells {
         Self::Bar(CellBlock { nodes, rest: quantities, hourglass: None, offsets: vec![] }, cord)
     }
 
-    /// The same cells, each filled only in part, as cubes at the border of a body are: its volume and with it its stiffness
-    /// and mass are those of its fraction, one per cell, of [`LEAST_FRACTION`] at least. Gradients stay, and with them element
-    /// bounds. One constant weight a cell is the simplest of the finite cells of Parvizian, Düster and Rank (2007).
+    /// The same cells, each filled only in part, as cubes at the border of a body are: its volume and with it
+    /// its stiffness and mass are those of its fraction, one per cell, of [`LEAST_FRACTION`] at least.
+    /// Gradients stay, and with them element bounds. One constant weight a cell is the simplest of the finite
+    /// cells of Parvizian, Düster and Rank (2007).
     ///
     /// # Panics
     /// If there are not as many fractions as cells.
@@ -249,7 +252,8 @@ impl Cells {
         with_cells!(self, block => block.rest[cell].volume)
     }
 
-    /// The corner of a hexahedron at which det F is least, as its node and that determinant; `None` of others.
+    /// The corner of a hexahedron at which det F is least, as its node and that determinant; `None` of
+    /// others.
     pub fn worst_corner(&self, cell: usize, displacement: impl Fn(u32) -> Vector<f64>) -> Option<(u32, f64)> {
         let (Self::Hex8(block) | Self::FullHex8(block, _)) = self else { return None };
         let (nodes, rest) = (&block.nodes[cell], &block.offsets[cell]);

@@ -18,8 +18,8 @@ pub struct Constraint {
 }
 
 impl Constraint {
-    /// The force λ [N] with which a mean is held, w λ on each node, of the forces [N] that its nodes resist with: by least squares, exact in
-    /// equilibrium. None for other motions.
+    /// The force λ [N] with which a mean is held, w λ on each node, of the forces [N] that its nodes resist
+    /// with: by least squares, exact in equilibrium. None for other motions.
     pub fn mean_force(&self, resisting: impl Fn(u32) -> Vector<f64>) -> Vector<f64> {
         let Motion::Mean { weights, .. } = &self.motion else { return [0.0; 3] };
         let squared: f64 = weights.iter().map(|w| w * w).sum();
@@ -30,8 +30,9 @@ impl Constraint {
         scale(sum, 1.0 / squared)
     }
 
-    /// The forces [N] with which a mean or an enclosed volume is held, node by node, of the forces [N] that its nodes resist with at some places [m]:
-    /// by least squares over the components that are free, exact in equilibrium. None for other motions and on facets of shells.
+    /// The forces [N] with which a mean or an enclosed volume is held, node by node, of the forces [N] that
+    /// its nodes resist with at some places [m]: by least squares over the components that are free, exact in
+    /// equilibrium. None for other motions and on facets of shells.
     pub fn borne(
         &self,
         place: impl Fn(u32) -> Vector<f64>,
@@ -57,8 +58,8 @@ impl Constraint {
         }
     }
 
-    /// Displacement [m] that the nodes of a mean lack at a time [s], on average; zero of other constraints. `displacement` is that of a
-    /// node [m].
+    /// Displacement [m] that the nodes of a mean lack at a time [s], on average; zero of other constraints.
+    /// `displacement` is that of a node [m].
     pub fn missing_mean(&self, time: f64, displacement: impl Fn(u32) -> Vector<f64>) -> Vector<f64> {
         let Motion::Mean { weights, by, curve } = &self.motion else { return [0.0; 3] };
         let add_node = |sum, (&node, &weight): (&u32, &f64)| add(sum, scale(displacement(node), weight));
@@ -85,9 +86,10 @@ pub enum Motion {
     Displacement(Vector<f64>, Curve),
     /// Displacements [m], one per node of the constraint in their order, × curve.
     Displacements(Vec<Vector<f64>>, Curve),
-    /// Displacements [m], one per node, with a rotation vector [rad] that turns each node about its own place, × curve. With all three
-    /// rotations prescribed a node turns by exp(curve · vector) exactly, about any axis by any angle; with fewer, those components of
-    /// its spin are. Constraints with courses of their own on the same node about different axes do not commute.
+    /// Displacements [m], one per node, with a rotation vector [rad] that turns each node about its own
+    /// place, × curve. With all three rotations prescribed a node turns by exp(curve · vector) exactly, about
+    /// any axis by any angle; with fewer, those components of its spin are. Constraints with courses of their
+    /// own on the same node about different axes do not commute.
     Turn {
         /// The displacements [m].
         by: Vec<Vector<f64>>,
@@ -100,15 +102,16 @@ pub enum Motion {
     Velocity(Vector<f64>, Curve),
     /// Rotation about an axis by an angle × curve, each node on its circle; see [`Motion::rotation`].
     Rotation {
-        /// k × r and k × (k × r) [m] of each node of the constraint, in their order: k is the axis, r the arm from it.
+        /// k × r and k × (k × r) [m] of each node of the constraint, in their order: k is the axis, r the arm
+        /// from it.
         arms: Vec<Amplitudes>,
         /// The angle [rad].
         angle: f64,
         /// Its curve over time.
         curve: Curve,
     },
-    /// The mean of their displacements goes by so much [m] × curve, with weights that sum to 1; each by itself is free, as under a plate
-    /// that tilts.
+    /// The mean of their displacements goes by so much [m] × curve, with weights that sum to 1; each by
+    /// itself is free, as under a plate that tilts.
     Mean {
         /// One for each node of the constraint.
         weights: Vec<f64>,
@@ -119,7 +122,8 @@ pub enum Motion {
     },
     /// Together they move as a rigid body, free in space.
     Rigid,
-    /// The volume that faces enclose grows by so much [m³] × curve from what it is at rest; a uniform pressure on them does it.
+    /// The volume that faces enclose grows by so much [m³] × curve from what it is at rest; a uniform
+    /// pressure on them does it.
     Volume {
         /// What encloses it.
         enclosure: Enclosure,
@@ -140,8 +144,8 @@ pub struct Enclosure {
 }
 
 impl Enclosure {
-    /// The volume [m³] within the faces and its gradient [m²], which is added to one entry a node; `place` gives the places [m] of nodes. Facets of
-    /// shells do not count here.
+    /// The volume [m³] within the faces and its gradient [m²], which is added to one entry a node; `place`
+    /// gives the places [m] of nodes. Facets of shells do not count here.
     pub fn add_gradient(&self, place: impl Fn(u32) -> Vector<f64>, gradient: &mut [Vector<f64>]) -> f64 {
         let mut sum = 0.0;
         for (node, area) in self.faces.iter().flat_map(|face| face_areas(face, &place)) {
@@ -158,8 +162,9 @@ pub(super) const CORRECTIONS: usize = 50;
 /// A volume that is off by no more, over itself, is where it should be.
 pub(super) const FILLED: f64 = 1e-12;
 
-/// Moves the components of a state along the gradient of an enclosed volume until that is `wanted` [m³] (Newton's method). `volume` finds
-/// the volume [m³] and its gradient; `advance` moves the state by a multiple of the gradient.
+/// Moves the components of a state along the gradient of an enclosed volume until that is `wanted` [m³]
+/// (Newton's method). `volume` finds the volume [m³] and its gradient; `advance` moves the state by a
+/// multiple of the gradient.
 pub fn fill<S: ?Sized>(
     state: &mut S,
     wanted: f64,
@@ -219,7 +224,8 @@ impl Motion {
         Self::Turn { by: vec![by; nodes], turn, curve }
     }
 
-    /// What the factors multiply: the displacement [m], the velocity [m/s] or the arms [m] of the constraint's node at `index`.
+    /// What the factors multiply: the displacement [m], the velocity [m/s] or the arms [m] of the
+    /// constraint's node at `index`.
     pub fn amplitudes(&self, index: usize) -> Amplitudes {
         let one = |amplitude| [amplitude, [0.0; 3]];
         match self {
@@ -236,7 +242,8 @@ impl Motion {
         self.factors_of_part(time, 1.0)
     }
 
-    /// Displacement over amplitudes where a part, from 0 to 1, of the way to where it is at a time [s] is gone.
+    /// Displacement over amplitudes where a part, from 0 to 1, of the way to where it is at a time [s] is
+    /// gone.
     pub(super) fn factors_of_part(&self, time: f64, part: f64) -> [f64; 2] {
         match self {
             Self::Fixed | Self::Rigid => [0.0; 2],
@@ -254,7 +261,8 @@ impl Motion {
         }
     }
 
-    /// Displacement [m] of the constraint's node at `index`, a part, from 0 to 1, of the way to where it is at a time [s].
+    /// Displacement [m] of the constraint's node at `index`, a part, from 0 to 1, of the way to where it is
+    /// at a time [s].
     pub fn displacement(&self, index: usize, time: f64, part: f64) -> Vector<f64> {
         let (amplitudes, factors) = (self.amplitudes(index), self.factors_of_part(time, part));
         [0, 1, 2].map(|c| placed(component(&amplitudes, c), factors))
@@ -270,7 +278,8 @@ impl Motion {
         [x, y, z, turn[0], turn[1], turn[2]]
     }
 
-    /// How far the constraint's node at `index` goes between two times [s]: its displacement [m] and its rotation vector [rad].
+    /// How far the constraint's node at `index` goes between two times [s]: its displacement [m] and its
+    /// rotation vector [rad].
     pub fn increment(&self, index: usize, from: f64, to: f64) -> [f64; 6] {
         let shift = match self {
             Self::Fixed | Self::Rigid | Self::Volume { .. } => [0.0; 3],

@@ -1,5 +1,6 @@
-//! Input of an organ mesher: the field of the whole body, and fields of its materials if there are several. A point
-//! belongs to the material with the largest field. Fields come from the regions of an image, or from functions.
+//! Input of an organ mesher: the field of the whole body, and fields of its materials if there are several. A
+//! point belongs to the material with the largest field. Fields come from the regions of an image, or from
+//! functions.
 
 use pliant_geometry::{DataArray, DistanceField, Grid, Mesh, Vector3};
 
@@ -50,8 +51,8 @@ impl<'a> Anatomy<'a> {
         self
     }
 
-    /// Distances of its meshes are measured to the faces of these voxels: the material of each point of `grid`, numbered from 1 in
-    /// the order of their addition, 0 outside.
+    /// Distances of its meshes are measured to the faces of these voxels: the material of each point of
+    /// `grid`, numbered from 1 in the order of their addition, 0 outside.
     ///
     /// # Panics
     /// If the numbers of materials and of points of the grid differ, or a material has no field.
@@ -63,8 +64,8 @@ impl<'a> Anatomy<'a> {
         self
     }
 
-    /// Adds a material: the part of the body inside `field` and not deeper inside another material. The rest belongs to
-    /// the first material. Meshes bear [`MOST_MATERIALS`](crate::MOST_MATERIALS).
+    /// Adds a material: the part of the body inside `field` and not deeper inside another material. The rest
+    /// belongs to the first material. Meshes bear [`MOST_MATERIALS`](crate::MOST_MATERIALS).
     pub fn with_inner(mut self, label: i32, field: impl ImplicitField + 'a) -> Self {
         self.materials.push((label, Some(Box::new(field))));
         self.volumes.push(None);
@@ -81,7 +82,8 @@ impl<'a> Anatomy<'a> {
         self.materials[0].1.as_deref().map(|field| field as &dyn ImplicitField)
     }
 
-    /// Whether each material has a signed distance of its own, as those of voxels have from three materials on.
+    /// Whether each material has a signed distance of its own, as those of voxels have from three materials
+    /// on.
     pub(crate) fn has_own_fields(&self) -> bool {
         matches!(self.given, Some(Given::Voxels { .. }))
             && self.materials.iter().all(|(_, field)| field.is_some())

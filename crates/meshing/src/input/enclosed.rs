@@ -1,7 +1,8 @@
-//! The body inside a closed surface, as a field of signed distances. The surface is repaired like every surface from a file
-//! (`triangles.rs`); narrow holes are closed. Where it intersects itself, or parts with the same orientation lie inside each other,
-//! the body is all that it winds around (`winding.rs`), without the surface inside it. Distances are exact on a grid and linear in
-//! between; they are clipped beyond two edges of the cells. Leaves out: open surfaces, several materials.
+//! The body inside a closed surface, as a field of signed distances. The surface is repaired like every
+//! surface from a file (`triangles.rs`); narrow holes are closed. Where it intersects itself, or parts with
+//! the same orientation lie inside each other, the body is all that it winds around (`winding.rs`), without
+//! the surface inside it. Distances are exact on a grid and linear in between; they are clipped beyond two
+//! edges of the cells. Leaves out: open surfaces, several materials.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -135,7 +136,8 @@ pub struct Enclosed {
 }
 
 impl Enclosed {
-    /// The triangles and quads of a mesh, or the boundary of its volume cells, mended and closed for cells of `edge` [m].
+    /// The triangles and quads of a mesh, or the boundary of its volume cells, mended and closed for cells of
+    /// `edge` [m].
     ///
     /// # Errors
     /// If the surface has no area, stays open, or encloses nothing.
@@ -170,7 +172,8 @@ impl Enclosed {
         self.crossing.is_empty() && self.report.swallowed_shells == 0
     }
 
-    /// The body as an anatomy of one material, for cells of `edge` [m]. `progress` hears fractions from 0 to 1.
+    /// The body as an anatomy of one material, for cells of `edge` [m]. `progress` hears fractions from 0
+    /// to 1.
     ///
     /// # Errors
     /// If the grid would not fit into memory.
@@ -245,8 +248,8 @@ impl Enclosed {
         Ok((field, hull))
     }
 
-    /// The part of the surface that bounds the body: all of it, or the triangles with the body on one side only.
-    /// Intersecting triangles are divided to below a step of the grid [m].
+    /// The part of the surface that bounds the body: all of it, or the triangles with the body on one side
+    /// only. Intersecting triangles are divided to below a step of the grid [m].
     pub(crate) fn hull(&self, winding: &Winding, step: f64) -> TriangleMesh {
         if self.is_simple() {
             return TriangleMesh::new(self.points.clone(), self.triangles.clone());
@@ -337,7 +340,8 @@ impl Enclosed {
     }
 }
 
-/// Points and triangles of a surface with coincident points joined: this closes it where it was split along edges.
+/// Points and triangles of a surface with coincident points joined: this closes it where it was split along
+/// edges.
 fn rejoined(surface: &TriangleMesh) -> (Vec<Vector3>, Vec<[u32; 3]>) {
     let (points, mut triangles) = surface.compact();
     let mut places: BTreeMap<[u64; 3], u32> = BTreeMap::new();
@@ -371,7 +375,8 @@ fn open_loops(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
     let mut loops = Vec::new();
     let starts: Vec<u32> = next.keys().copied().collect();
     for start in starts {
-        // As many edges leave a point as arrive, so every path returns; where it meets itself, a loop is extracted.
+        // As many edges leave a point as arrive, so every path returns; where it meets itself, a loop is
+        // extracted.
         let mut way = vec![start];
         while let Some(to) = way.last().and_then(|at| next.get_mut(at)).and_then(Vec::pop) {
             match way.iter().position(|&n| n == to) {
@@ -416,7 +421,8 @@ fn distances(grid: &Grid, surface: &SurfaceLocator, reach: f64) -> Vec<f32> {
     (0..blocks[2]).into_par_iter().flat_map_iter(of_layer).collect()
 }
 
-/// Makes distances outside negative. Along a row of the grid the side changes only where the surface may lie between two points.
+/// Makes distances outside negative. Along a row of the grid the side changes only where the surface may lie
+/// between two points.
 pub(crate) fn sign(grid: &Grid, winding: &Winding, distances: &mut [f32]) {
     let nx = grid.dims[0];
     let step = grid.spacing()[0];

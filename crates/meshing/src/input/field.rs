@@ -11,8 +11,8 @@ pub trait ImplicitField: Sync {
     /// Smallest and largest corner of a box that encloses the body [m].
     fn bounds(&self) -> (Vector3, Vector3);
 
-    /// Gradient of the value, without unit: by central differences over a ten-thousandth of the box unless the field
-    /// knows better.
+    /// Gradient of the value, without unit: by central differences over a ten-thousandth of the box unless
+    /// the field knows better.
     fn gradient(&self, point: &Vector3) -> Vector3 {
         let (low, high) = self.bounds();
         let step = 1e-4 * (high - low).amax();

@@ -1,5 +1,5 @@
-//! The surfaces that a mesh is to follow as the user gave them: the triangles of a file, or the faces of the voxels of labels; not the
-//! smooth field made of them. Each face knows the labels on its two sides.
+//! The surfaces that a mesh is to follow as the user gave them: the triangles of a file, or the faces of the
+//! voxels of labels; not the smooth field made of them. Each face knows the labels on its two sides.
 
 use std::fmt;
 

@@ -8,16 +8,18 @@ use crate::input::field::ImplicitField;
 use crate::surface::triangles::TriangleMesh;
 use crate::tets::complex::MOST_MATERIALS;
 
-/// Best smoothing of the field of an image if [`SURFACE_PAIRS`] smooth its surface afterwards. Of the settings tested on labels
-/// of the analytic liver and brain, this one stays closest to them. With sigma 1 and no pairs, which suits tetrahedra, the
-/// largest distance is half as large again on the liver and twice on the brain; without sigma the steps of the voxels remain.
+/// Best smoothing of the field of an image if [`SURFACE_PAIRS`] smooth its surface afterwards. Of the
+/// settings tested on labels of the analytic liver and brain, this one stays closest to them. With sigma 1
+/// and no pairs, which suits tetrahedra, the largest distance is half as large again on the liver and twice
+/// on the brain; without sigma the steps of the voxels remain.
 pub const SURFACE_SMOOTHING: Smoothing = Smoothing { sigma: 0.55, clip: 6.0 };
 
 /// Pairs of moves for [`TriangleMesh::smooth`](crate::TriangleMesh::smooth) after that.
 pub const SURFACE_PAIRS: usize = 50;
 
 impl TriangleMesh {
-    /// The smooth surface of a body in an image, on a grid of `step` [m], with [`SURFACE_SMOOTHING`] of its field.
+    /// The smooth surface of a body in an image, on a grid of `step` [m], with [`SURFACE_SMOOTHING`] of its
+    /// field.
     ///
     /// # Errors
     /// If the box of the body is empty or not finite, or the grid is too large.
@@ -29,8 +31,8 @@ impl TriangleMesh {
 }
 
 impl Anatomy<'static> {
-    /// The regions of some labels of an image as one body, each a material: cleaned together (gaps and holes are filled
-    /// with the first label), smoothed one by one. `progress` hears fractions from 0 to 1.
+    /// The regions of some labels of an image as one body, each a material: cleaned together (gaps and holes
+    /// are filled with the first label), smoothed one by one. `progress` hears fractions from 0 to 1.
     pub fn from_image(
         image: &LabelImage,
         labels: &[i32],
@@ -53,8 +55,8 @@ impl Anatomy<'static> {
         }
         volumes[0] = Some(whole.volume() - others);
         if labels.len() > 2 {
-            // The remainder of several others is a poor measure of the first one: where two of them meet, it is as near as they
-            // are.
+            // The remainder of several others is a poor measure of the first one: where two of them meet, it
+            // is as near as they are.
             let first = parts.distance_field(1, smoothing, &part(labels.len()))?;
             materials[0].1 = Some(Box::new(first));
         }

@@ -1,5 +1,5 @@
-//! The surfaces of an anatomy: the sides of points, and projection onto surfaces. Each surface may be shifted slightly
-//! outwards, so that facets between points of a curved surface enclose the right volume.
+//! The surfaces of an anatomy: the sides of points, and projection onto surfaces. Each surface may be shifted
+//! slightly outwards, so that facets between points of a curved surface enclose the right volume.
 
 use pliant_geometry::Vector3;
 
@@ -10,7 +10,8 @@ use crate::tets::near_materials::NearMaterials;
 /// The surfaces of the whole body and of its inner materials.
 pub(crate) struct Surfaces<'a> {
     anatomy: &'a Anatomy<'a>,
-    /// Where the surfaces of the whole (0) and of the inner materials lie: at these values of their fields [m].
+    /// Where the surfaces of the whole (0) and of the inner materials lie: at these values of their fields
+    /// [m].
     levels: Vec<f64>,
     /// Lattice constant of the mesh [m].
     edge: f64,
@@ -39,15 +40,15 @@ impl<'a> Surfaces<'a> {
         self.levels.len()
     }
 
-    /// Moves the surface of the whole (0) or of an inner material (its number less one) outwards [m], by at most `most` in
-    /// all; whether it moves.
+    /// Moves the surface of the whole (0) or of an inner material (its number less one) outwards [m], by at
+    /// most `most` in all; whether it moves.
     pub(crate) fn shift(&mut self, surface: usize, outwards: f64, most: f64) -> bool {
         let level = (self.levels[surface] - outwards).clamp(-most, most);
         std::mem::replace(&mut self.levels[surface], level) != level
     }
 
-    /// How far a point is inside a material (numbered from 1) rather than in any other [m]; of one far from the material only the sign
-    /// counts.
+    /// How far a point is inside a material (numbered from 1) rather than in any other [m]; of one far from
+    /// the material only the sign counts.
     pub(crate) fn inside(&self, material: usize, point: &Vector3) -> f64 {
         if self.near.is_far(material, point) {
             return -self.edge;
@@ -63,8 +64,8 @@ impl<'a> Surfaces<'a> {
         depths.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(1, |(_, material)| material)
     }
 
-    /// Field of a material [m]. The first one has no field of its own; it is the remainder of the others, minus the
-    /// deepest of them.
+    /// Field of a material [m]. The first one has no field of its own; it is the remainder of the others,
+    /// minus the deepest of them.
     fn depth(&self, material: usize, point: &Vector3) -> f64 {
         match (material, self.anatomy.first()) {
             (1, Some(first)) => first.value(point),
@@ -96,8 +97,8 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// What must be zero at a point between sides, with its gradient: the field of the body on its boundary, the
-    /// difference of two materials between them. At most three.
+    /// What must be zero at a point between sides, with its gradient: the field of the body on its boundary,
+    /// the difference of two materials between them. At most three.
     pub(crate) fn constraints(&self, sides: Sides, point: &Vector3) -> Constraints {
         let mut found = Constraints::default();
         if sides & OUTSIDE != 0 {
@@ -130,8 +131,8 @@ impl<'a> Surfaces<'a> {
         here >= 0.0 || depth(&onward) < here - room / 2.0
     }
 
-    /// The closest point between the same sides, by Newton's method with steps of at most `longest` [m] on the least
-    /// move, and the gradient of the first constraint there; `None` if it is not found.
+    /// The closest point between the same sides, by Newton's method with steps of at most `longest` [m] on
+    /// the least move, and the gradient of the first constraint there; `None` if it is not found.
     pub(crate) fn project(&self, sides: Sides, from: &Vector3, longest: f64) -> Option<(Vector3, Vector3)> {
         let mut point = *from;
         for _ in 0..12 {

@@ -1,5 +1,5 @@
-//! Distance between the boundary of a mesh and the surface of its body in both directions. The surface is given, or the zero
-//! surface of a field.
+//! Distance between the boundary of a mesh and the surface of its body in both directions. The surface is
+//! given, or the zero surface of a field.
 
 use std::collections::HashMap;
 
@@ -63,7 +63,8 @@ pub(crate) struct Measured {
 type Samples = (Vec<Sample>, Vec<f64>);
 
 impl Measured {
-    /// Distances of a mesh with a distance bound [m]: to triangles if they define the body, otherwise to its field.
+    /// Distances of a mesh with a distance bound [m]: to triangles if they define the body, otherwise to its
+    /// field.
     pub(crate) fn of(mesh: &Mesh, anatomy: &Anatomy<'_>, distance: f64) -> Result<Self, MeshingError> {
         if let Some(given) = anatomy.given().filter(|given| given.measured_to() == MeasuredTo::Triangles) {
             let (made, patches) = (faces_between_labels(mesh), anatomy.patches());
@@ -148,8 +149,8 @@ impl Measured {
 }
 
 impl Deviation {
-    /// Measures a mesh with cells of `edge` [m] against its input: the triangles of a file, the voxel faces of an image, or the field of
-    /// a function. Samples are at most a quarter of an edge apart.
+    /// Measures a mesh with cells of `edge` [m] against its input: the triangles of a file, the voxel faces
+    /// of an image, or the field of a function. Samples are at most a quarter of an edge apart.
     ///
     /// # Errors
     /// If the box of the field is empty or not finite.
@@ -162,8 +163,8 @@ impl Deviation {
         given.map_or_else(|| Self::new(mesh, anatomy.field(), edge), Ok)
     }
 
-    /// Measures a mesh against a field. The surface is sampled at its intersections with a grid of a quarter of `edge`
-    /// [m], at least a 160th of the box: thinner parts may be missed.
+    /// Measures a mesh against a field. The surface is sampled at its intersections with a grid of a quarter
+    /// of `edge` [m], at least a 160th of the box: thinner parts may be missed.
     ///
     /// # Errors
     /// If the box of the field is empty or not finite.
@@ -171,8 +172,8 @@ impl Deviation {
         Ok(Measured::to_field(mesh, field, edge)?.deviation())
     }
 
-    /// Between the triangles of a mesh and of its input with chosen sides, with samples at most `spacing` [m] apart; `None` if one of
-    /// them has none.
+    /// Between the triangles of a mesh and of its input with chosen sides, with samples at most `spacing` [m]
+    /// apart; `None` if one of them has none.
     pub(crate) fn between(
         mesh: &Patches,
         given: &Patches,
@@ -277,8 +278,8 @@ fn way_to_surface(field: &(impl ImplicitField + ?Sized), from: &Vector3, longest
     if value.abs() < 1e-2 * longest { (point - from).norm() + value.abs() } else { f64::INFINITY }
 }
 
-/// Points of the surface: its intersections with the edges of a grid of a quarter of `edge` [m], at least a 160th of the
-/// box.
+/// Points of the surface: its intersections with the edges of a grid of a quarter of `edge` [m], at least a
+/// 160th of the box.
 pub(crate) fn surface_points(
     field: &(impl ImplicitField + ?Sized),
     edge: f64,

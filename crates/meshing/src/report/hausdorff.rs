@@ -1,6 +1,6 @@
-//! Distance between two surfaces in both directions: from each of many samples of one to the nearest point of the other. The largest of
-//! both directions is the Hausdorff distance. Samples have at most the requested spacing, so narrower peaks may be missed; the
-//! distances of samples are exact.
+//! Distance between two surfaces in both directions: from each of many samples of one to the nearest point of
+//! the other. The largest of both directions is the Hausdorff distance. Samples have at most the requested
+//! spacing, so narrower peaks may be missed; the distances of samples are exact.
 
 use std::fmt;
 
@@ -39,7 +39,8 @@ impl Hausdorff {
         Self::with_places(first, second, spacing).0
     }
 
-    /// The same, and the points of the first and of the second surface [m] that are farthest from the other one.
+    /// The same, and the points of the first and of the second surface [m] that are farthest from the other
+    /// one.
     pub fn with_places(first: &TriangleMesh, second: &TriangleMesh, spacing: f64) -> (Self, [[f64; 3]; 2]) {
         let one_way = |from: &TriangleMesh, to: &TriangleMesh| {
             let locator = locator(to);

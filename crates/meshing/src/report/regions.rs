@@ -1,4 +1,5 @@
-//! The labels of a mesh: cells, volume and distances of each, and distances of each interface between two of them, against the input.
+//! The labels of a mesh: cells, volume and distances of each, and distances of each interface between two of
+//! them, against the input.
 
 use std::collections::BTreeMap;
 
@@ -82,7 +83,8 @@ impl Regions {
         found
     }
 
-    /// Labels that are lost, whose volume is off by more than 5 %, or whose surface is farther off than `allowed` [m].
+    /// Labels that are lost, whose volume is off by more than 5 %, or whose surface is farther off than
+    /// `allowed` [m].
     pub fn missed(&self, allowed: f64) -> Vec<Missed> {
         let mut missed = Vec::new();
         for region in &self.labels {
@@ -112,7 +114,8 @@ fn pairs(all: &[&Patches]) -> Vec<[i32; 2]> {
     pairs
 }
 
-/// Cells and volume of each label of a mesh, filled by the fractions of its cells, beside the volume of the input.
+/// Cells and volume of each label of a mesh, filled by the fractions of its cells, beside the volume of the
+/// input.
 fn volumes(mesh: &Mesh, anatomy: &Anatomy<'_>) -> Vec<LabelReport> {
     let mut found: BTreeMap<i32, (usize, f64)> = BTreeMap::new();
     for block in mesh.volume_blocks() {
@@ -137,7 +140,8 @@ fn volumes(mesh: &Mesh, anatomy: &Anatomy<'_>) -> Vec<LabelReport> {
 mod tests {
     use super::*;
 
-    /// Volume and surface of a label are judged each by itself, at 5 % and at the distance allowed, and said with number and place.
+    /// Volume and surface of a label are judged each by itself, at 5 % and at the distance allowed, and said
+    /// with number and place.
     #[test]
     fn labels_off_by_volume_or_by_place_are_told_apart() {
         let region = |label: i32, part: f64, away: f64| LabelReport {

@@ -1,6 +1,7 @@
-//! An intra-ocular lens as a flat sheet of triangles: the union of a disc, the optic, and two loops, the haptics, half a turn apart. A haptic
-//! is all within half of its width of a line r(φ) = r₀ + (R − r₀) S(φ/φ₁), S(t) = t² (3 − 2 t) up to t = 1 and 1 above, on which it leaves the
-//! optic and goes round it. A fine lattice is cut at the outline and meshed anew with even edges.
+//! An intra-ocular lens as a flat sheet of triangles: the union of a disc, the optic, and two loops, the
+//! haptics, half a turn apart. A haptic is all within half of its width of a line r(φ) = r₀ + (R − r₀)
+//! S(φ/φ₁), S(t) = t² (3 − 2 t) up to t = 1 and 1 above, on which it leaves the optic and goes round it. A
+//! fine lattice is cut at the outline and meshed anew with even edges.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +18,8 @@ const SNAP: f64 = 0.3;
 /// Pieces of a line of a haptic.
 const PIECES: usize = 400;
 
-/// A lens with two haptics in the plane z = 0 about the origin, its haptics leaving the optic at +x and −x. Lengths in metres, angles in radians.
+/// A lens with two haptics in the plane z = 0 about the origin, its haptics leaving the optic at +x and −x.
+/// Lengths in metres, angles in radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lens {
     /// Diameter of the optic.
@@ -36,7 +38,8 @@ impl Lens {
     /// Triangles with edges of about a length [m], facing +z. Point sets: `optic` and `haptics`.
     ///
     /// # Errors
-    /// If a length or an angle is not positive, the haptics are not outside the optic, or there are too many triangles.
+    /// If a length or an angle is not positive, the haptics are not outside the optic, or there are too many
+    /// triangles.
     pub fn mesh(&self, edge: f64, cell_limit: usize) -> Result<Mesh, MeshingError> {
         for (name, length) in [
             ("diameter of the optic", self.optic),
@@ -171,7 +174,8 @@ impl Lens {
         lattice
     }
 
-    /// A point of a lattice of a spacing [m], on the outline if that is near, and how far [m] it is out of the lens.
+    /// A point of a lattice of a spacing [m], on the outline if that is near, and how far [m] it is out of
+    /// the lens.
     fn snapped(&self, line: &[Vector3], x: Vector3, spacing: f64) -> (Vector3, f64) {
         let out = self.outside(line, &x);
         if out.abs() < SNAP * spacing {
@@ -199,7 +203,8 @@ mod tests {
     use super::*;
     use crate::DEFAULT_CELL_LIMIT;
 
-    /// Area [mm²] and second moments xx, yy, xy [mm⁴] of outlines by the rule of the reference (0.3 % and 0.5 % with edges of 0.35 mm at most).
+    /// Area [mm²] and second moments xx, yy, xy [mm⁴] of outlines by the rule of the reference (0.3 % and 0.5
+    /// % with edges of 0.35 mm at most).
     const DESIGNS: [([f64; 5], [f64; 4]); 3] = [
         ([6.0, 12.5, 0.45, 55.0, 140.0], [40.9839063, 184.296847, 347.799553, 19.0851594]),
         ([5.5, 12.0, 0.45, 55.0, 140.0], [35.9970196, 150.626184, 295.246722, 16.5021854]),

@@ -1,6 +1,6 @@
-//! Triangle meshes of thin bodies on a structured grid: plates, cylinders, hemispheres, annuli, twisted strips; and spheres by
-//! subdivision of an icosahedron. Cells can be split in three patterns and inner points moved at random, since an element that
-//! is right on one regular mesh may be wrong on every other.
+//! Triangle meshes of thin bodies on a structured grid: plates, cylinders, hemispheres, annuli, twisted
+//! strips; and spheres by subdivision of an icosahedron. Cells can be split in three patterns and inner
+//! points moved at random, since an element that is right on one regular mesh may be wrong on every other.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -27,8 +27,8 @@ pub enum Pattern {
 /// Inner points moved along the grid at random.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distortion {
-    /// Largest shift along each axis as a part of a cell (of half a cell with [`Pattern::Crossed`]), below 0.5. No triangle
-    /// turns over up to 0.25.
+    /// Largest shift along each axis as a part of a cell (of half a cell with [`Pattern::Crossed`]), below
+    /// 0.5. No triangle turns over up to 0.25.
     pub amount: f64,
     /// Other seeds, other shifts; the same seed, the same shifts.
     pub seed: u64,
@@ -37,14 +37,14 @@ pub struct Distortion {
 /// A thin body of triangles. Lengths in metres, angles in radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sheet {
-    /// A rectangle in the plane z = 0 from the origin on, facing +z. Its edges are the point sets `x-min`, `x-max`, `y-min`,
-    /// `y-max`; grid axes are x and y.
+    /// A rectangle in the plane z = 0 from the origin on, facing +z. Its edges are the point sets `x-min`,
+    /// `x-max`, `y-min`, `y-max`; grid axes are x and y.
     Plate {
         /// Lengths along x and y.
         size: [f64; 2],
     },
-    /// A part of a cylinder around the z axis from z = 0, facing outwards. Edges: `z-min`, `z-max`, and on an open
-    /// cylinder `start` and `end`; the grid axes run around and along.
+    /// A part of a cylinder around the z axis from z = 0, facing outwards. Edges: `z-min`, `z-max`, and on an
+    /// open cylinder `start` and `end`; the grid axes run around and along.
     Cylinder {
         /// Radius.
         radius: f64,
@@ -55,8 +55,8 @@ pub enum Sheet {
         /// Angle that it spans; 2π closes it.
         span: f64,
     },
-    /// A part of a hemisphere z ≥ 0 round the z axis with a hole at the pole, facing outwards. Edges: `equator`, `hole`, and where
-    /// it is open `start` and `end`; grid axes are round and towards the pole.
+    /// A part of a hemisphere z ≥ 0 round the z axis with a hole at the pole, facing outwards. Edges:
+    /// `equator`, `hole`, and where it is open `start` and `end`; grid axes are round and towards the pole.
     Hemisphere {
         /// Radius.
         radius: f64,
@@ -65,8 +65,9 @@ pub enum Sheet {
         /// Angle from the x axis that it spans; 2π closes it.
         span: f64,
     },
-    /// A part of a ring in the plane z = 0, facing +z. Edges: `inner`, `outer`, `start` and `end`; grid axes are outwards and
-    /// round. A span of 2π has a slit: the edges `start` and `end` lie on each other, but are not joined.
+    /// A part of a ring in the plane z = 0, facing +z. Edges: `inner`, `outer`, `start` and `end`; grid axes
+    /// are outwards and round. A span of 2π has a slit: the edges `start` and `end` lie on each other, but
+    /// are not joined.
     Annulus {
         /// Inner radius.
         inner: f64,
@@ -75,8 +76,8 @@ pub enum Sheet {
         /// Angle from the x axis that it spans, at most 2π.
         span: f64,
     },
-    /// A strip along x whose width turns round the x axis, from the y axis at x = 0. Edges: `x-min`, `x-max`, `low`, `high`; grid
-    /// axes are along and across.
+    /// A strip along x whose width turns round the x axis, from the y axis at x = 0. Edges: `x-min`, `x-max`,
+    /// `low`, `high`; grid axes are along and across.
     TwistedStrip {
         /// Length along x.
         length: f64,
@@ -88,11 +89,12 @@ pub enum Sheet {
 }
 
 impl Sheet {
-    /// Triangles on a grid with `counts` cells along its two axes. Point data `normal` are the unit normals of a sheet that is curved, if
-    /// no triangle leans more than 60° from them.
+    /// Triangles on a grid with `counts` cells along its two axes. Point data `normal` are the unit normals
+    /// of a sheet that is curved, if no triangle leans more than 60° from them.
     ///
     /// # Errors
-    /// If a length is not positive, a count is zero, the distortion is half a cell or more, or there are too many triangles.
+    /// If a length is not positive, a count is zero, the distortion is half a cell or more, or there are too
+    /// many triangles.
     pub fn mesh(
         &self,
         counts: [usize; 2],
@@ -221,7 +223,8 @@ impl Sheet {
     }
 }
 
-/// Gives a mesh the normals of the surface that it is of, unless a triangle leans more than 60° from one of them, as folded ones do.
+/// Gives a mesh the normals of the surface that it is of, unless a triangle leans more than 60° from one of
+/// them, as folded ones do.
 fn add_normals(mesh: &mut Mesh, normals: Vec<Vector3>) {
     let stands = |corners: &[u32]| {
         let [a, b, c] = [0, 1, 2].map(|i| mesh.points[corners[i] as usize]);
@@ -234,7 +237,8 @@ fn add_normals(mesh: &mut Mesh, normals: Vec<Vector3>) {
     }
 }
 
-/// Cells along two axes; points are numbered along the first, then the second; middles of crossed cells follow.
+/// Cells along two axes; points are numbered along the first, then the second; middles of crossed cells
+/// follow.
 struct CellSheet {
     counts: [usize; 2],
     wraps: bool,
@@ -324,8 +328,8 @@ impl Shifts {
     }
 }
 
-/// A sphere about the origin, facing outwards: an icosahedron whose triangles are cut into four `levels` times; point data `normal`
-/// are its normals.
+/// A sphere about the origin, facing outwards: an icosahedron whose triangles are cut into four `levels`
+/// times; point data `normal` are its normals.
 ///
 /// # Errors
 /// If the radius is not positive or there are too many triangles.
@@ -365,7 +369,8 @@ pub fn sphere(radius: f64, levels: u32, cell_limit: usize) -> Result<Mesh, Meshi
     Ok(mesh)
 }
 
-/// The faces of an icosahedron: three corners that are all an edge apart, seen counter-clockwise from outside.
+/// The faces of an icosahedron: three corners that are all an edge apart, seen counter-clockwise from
+/// outside.
 fn convex_faces(points: &[Vector3]) -> Vec<[u32; 3]> {
     // Corners of an edge are 63.4° apart, others at least 116.6°.
     let near = |a: usize, b: usize| points[a].dot(&points[b]) > 0.0;

@@ -1,8 +1,10 @@
-//! How much work a fit may take, counted in searches for the nearest point of the target: the same count, and the same shells, on every
-//! machine with any number of threads. It does not grow with the number of triangles of the target: points of the target that are looked
-//! at have a largest number (`target`), so that a round costs what its shells cost.
+//! How much work a fit may take, counted in searches for the nearest point of the target: the same count, and
+//! the same shells, on every machine with any number of threads. It does not grow with the number of
+//! triangles of the target: points of the target that are looked at have a largest number (`target`), so that
+//! a round costs what its shells cost.
 
-/// A search for the nearest place of the shells weighs as much as this many for the nearest point of the target.
+/// A search for the nearest place of the shells weighs as much as this many for the nearest point of the
+/// target.
 pub(super) const LANDING: usize = 4;
 
 /// A row of the least-squares step weighs as much. A check of one piece of a shell for crossings weighs 1.

@@ -1,8 +1,9 @@
-//! Exchange of shells once there are as many as asked for. Where they are farthest off, they are fitted again by themselves, edges flip
-//! or shells are halved; for each that is halved two others collapse, where they stay close. Each change is tried on a part of the shells
-//! (`part`) and stays if the farthest there come nearer, or if those that collapse stay nearer than the farthest of all. It ends
-//! when the farthest come no nearer, nothing collapses or the work is done.
-//! Leaves out: collapses of points of borders, of sharp edges and of creases.
+//! Exchange of shells once there are as many as asked for. Where they are farthest off, they are fitted again
+//! by themselves, edges flip or shells are halved; for each that is halved two others collapse, where they
+//! stay close. Each change is tried on a part of the shells (`part`) and stays if the farthest there come
+//! nearer, or if those that collapse stay nearer than the farthest of all. It ends when the farthest come no
+//! nearer, nothing collapses or the work is done. Leaves out: collapses of points of borders, of sharp edges
+//! and of creases.
 
 use std::collections::BTreeSet;
 
@@ -81,7 +82,8 @@ impl Part {
         Some(next)
     }
 
-    /// Whether its triangles are no poorer than those before a change, no more points have lost their normals and no more shells cross.
+    /// Whether its triangles are no poorer than those before a change, no more points have lost their normals
+    /// and no more shells cross.
     fn holds(&self, before: &Self, effort: &mut Effort) -> bool {
         let crossing = |part: &Self, effort: &mut Effort| {
             part.shells.crossing_with_moving(part.shells.parts_in_the_end(), effort)
@@ -102,7 +104,8 @@ impl Part {
         active.map(|(n, x)| shells.worth_round(n, x)).fold(1.0, f64::min)
     }
 
-    /// The largest distance of shells that move and of the points of the target that were nearest to them [m].
+    /// The largest distance of shells that move and of the points of the target that were nearest to them
+    /// [m].
     fn farthest(&self) -> f64 {
         self.shells.farthest_moving(&self.distances).max(self.distances.largest_back())
     }
@@ -126,7 +129,8 @@ struct Exchange<'t> {
 }
 
 impl Shells {
-    /// Exchanges shells as long as the largest distance falls, if there are as many as asked for. `told` hears that distance [m].
+    /// Exchanges shells as long as the largest distance falls, if there are as many as asked for. `told`
+    /// hears that distance [m].
     pub(super) fn exchange(
         &mut self,
         number: usize,
@@ -164,7 +168,8 @@ impl Exchange<'_> {
         part.put_back(&mut self.shells, &mut self.distances);
     }
 
-    /// Brings the farthest shell nearer, whose distance is given [m]: by what takes no more shells, or with more. Returns whether it did.
+    /// Brings the farthest shell nearer, whose distance is given [m]: by what takes no more shells, or with
+    /// more. Returns whether it did.
     fn come_nearer(&mut self, off: f64) -> bool {
         let far = self.distances.far();
         let alive = self.shells.mesh.alive();
@@ -213,7 +218,8 @@ impl Exchange<'_> {
         None
     }
 
-    /// Collapses an edge where shells are close, measured by the largest distance [m]. Returns whether it did.
+    /// Collapses an edge where shells are close, measured by the largest distance [m]. Returns whether it
+    /// did.
     fn collapse(&mut self, off: f64) -> bool {
         let far = self.distances.far();
         let mesh = &self.shells.mesh;
@@ -272,8 +278,8 @@ mod tests {
         }
     }
 
-    /// Even shells on the ball are too large for the knob. Exchanged for as many others they come four times nearer, the surface stays
-    /// closed, and distances are those that are measured anew.
+    /// Even shells on the ball are too large for the knob. Exchanged for as many others they come four times
+    /// nearer, the surface stays closed, and distances are those that are measured anew.
     #[test]
     fn shells_go_where_the_surface_bends() {
         let surface = TriangleMesh::of_field(&Knob, 0.001, DEFAULT_CELL_LIMIT).unwrap();

@@ -1,6 +1,8 @@
-//! Fit of shells to a surface: Gauss–Newton for the places and normals of the vertices, with respect to the distances at places of the
-//! shells and at points of the target. Distances count with a high power, so that the largest falls; each vertex goes only as far as
-//! the sum of the powers round it falls, its triangles keep their shape and the normals stand on them. Vertices of a border stay in place, only their normals turn.
+//! Fit of shells to a surface: Gauss–Newton for the places and normals of the vertices, with respect to the
+//! distances at places of the shells and at points of the target. Distances count with a high power, so that
+//! the largest falls; each vertex goes only as far as the sum of the powers round it falls, its triangles
+//! keep their shape and the normals stand on them. Vertices of a border stay in place, only their normals
+//! turn.
 
 use nalgebra::Matrix3;
 use pliant_geometry::{ControlWeights, CurvedTriangle, EDGES, Vector3};
@@ -20,7 +22,8 @@ const PARTS: usize = 5;
 /// Points of the target count from this part of the distance asked for.
 const CLOSE: f64 = 0.3;
 
-/// Where more than so many points of the target count at one shell, of each of [`BINS`]² parts of it only the farthest does.
+/// Where more than so many points of the target count at one shell, of each of [`BINS`]² parts of it only the
+/// farthest does.
 const MOST_BACK: usize = 128;
 const BINS: f64 = 11.0;
 
@@ -28,7 +31,8 @@ const BINS: f64 = 11.0;
 const LARGEST_TURN: f64 = 0.3;
 const LARGEST_WAY: f64 = 0.2;
 
-/// What steps of vertices that make things worse are reduced by, try by try, and whether the whole may then be taken if it is better.
+/// What steps of vertices that make things worse are reduced by, try by try, and whether the whole may then
+/// be taken if it is better.
 const TRIES: [(f64, bool); 8] = [
     (0.4, false),
     (0.4, false),
@@ -118,7 +122,8 @@ impl Shells {
         (0..).zip(&self.mesh.points).map(|(v, x)| self.upright_round(v, x)).collect()
     }
 
-    /// Corners that move of shells that cross others and did not before: of flat triangles, and once normals stand of curved ones.
+    /// Corners that move of shells that cross others and did not before: of flat triangles, and once normals
+    /// stand of curved ones.
     fn newly_crossed(&self, before: &Self, crossed: &mut Crossed, effort: &mut Effort) -> Vec<usize> {
         let mut nodes = Vec::new();
         for (parts, old) in [1, COARSE].into_iter().zip(crossed).take(if self.strict { 2 } else { 1 }) {
@@ -153,7 +158,8 @@ impl Shells {
         shells.into_iter().map(of).collect()
     }
 
-    /// The sums of the powers of distances after a step. Those of shells that have not changed since they were summed stay.
+    /// The sums of the powers of distances after a step. Those of shells that have not changed since they
+    /// were summed stay.
     fn sums_again(
         &self,
         moving: &[Moving],
@@ -251,7 +257,8 @@ fn off_along(patch: &CurvedTriangle, landing: &Landing) -> (Vector3, f64) {
     (off.signum() * landing.along, off.abs())
 }
 
-/// Derivatives of the place with some weights along a direction by each corner and by each normal, from those of the edges' control points.
+/// Derivatives of the place with some weights along a direction by each corner and by each normal, from those
+/// of the edges' control points.
 fn slopes(
     edges: &[[Matrix3<f64>; 2]; 6],
     (corner, edge): ControlWeights,

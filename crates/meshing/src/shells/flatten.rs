@@ -1,6 +1,6 @@
-//! Shells that do not cross for certain: where they do, one of each two becomes as flat as its triangle. Flat triangles do not cross, so in
-//! the end no shells do.
-//! Leaves out: triangles that cross; these stay as they are.
+//! Shells that do not cross for certain: where they do, one of each two becomes as flat as its triangle. Flat
+//! triangles do not cross, so in the end no shells do. Leaves out: triangles that cross; these stay as they
+//! are.
 
 use pliant_geometry::Vector3;
 
@@ -11,8 +11,8 @@ use super::target::Target;
 const TIMES: usize = 6;
 
 impl Shells {
-    /// Makes shells flat until none cross but those whose triangles do: of two that cross the one that bulges more. Nothing may change
-    /// triangles or turn normals afterwards.
+    /// Makes shells flat until none cross but those whose triangles do: of two that cross the one that bulges
+    /// more. Nothing may change triangles or turn normals afterwards.
     pub(super) fn flatten(&mut self) {
         self.flat.resize(self.mesh.triangles.len(), false);
         loop {
@@ -29,8 +29,8 @@ impl Shells {
         }
     }
 
-    /// Makes those shells flat that are farther off than a bound [m], told by the distances of all, and nearer as flat triangles, as long as the largest
-    /// distance falls. Returns whether any are.
+    /// Makes those shells flat that are farther off than a bound [m], told by the distances of all, and
+    /// nearer as flat triangles, as long as the largest distance falls. Returns whether any are.
     pub(super) fn flatten_nearer(&mut self, target: &Target, bound: impl Fn(&[f64]) -> f64) -> bool {
         let largest = |far: &[f64]| far.iter().copied().fold(0.0, f64::max);
         let flat = Self { flat: vec![true; self.mesh.triangles.len()], ..self.clone() };
@@ -72,7 +72,8 @@ mod tests {
     use super::*;
     use crate::surface::triangles::TriangleMesh;
 
-    /// Two squares 0.13 apart, of four triangles each, with normals of which the shells of each bulge by 0.08 towards the other.
+    /// Two squares 0.13 apart, of four triangles each, with normals of which the shells of each bulge by 0.08
+    /// towards the other.
     fn bulging() -> Shells {
         let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.5]];
         let of = |z: f64, lean: f64| {

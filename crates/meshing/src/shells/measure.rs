@@ -57,7 +57,8 @@ impl Distances {
         far
     }
 
-    /// Those of some shells, increasing, which are numbered anew, and of points of the target that are nearest to those that move.
+    /// Those of some shells, increasing, which are numbered anew, and of points of the target that are
+    /// nearest to those that move.
     pub(super) fn part(&self, own: &[u32], moves: impl Fn(u32) -> bool) -> Self {
         let there = own.iter().map(|&t| self.there[t as usize]).collect();
         let landings = self.landings.iter().filter(|landing| moves(landing.shell)).filter_map(|landing| {
@@ -68,7 +69,8 @@ impl Distances {
 }
 
 impl Distances {
-    /// Puts those of a part, whose shells have these numbers here, in the place of those of the shells that moved there.
+    /// Puts those of a part, whose shells have these numbers here, in the place of those of the shells that
+    /// moved there.
     pub(super) fn put(&mut self, part: &Self, own: &[u32], moved: impl Fn(u32) -> bool) {
         let count = own.iter().map(|&t| t as usize + 1).fold(self.there.len(), usize::max);
         self.there.resize(count, 0.0);
@@ -107,8 +109,8 @@ impl Shells {
         spots.filter_map(|(sample, normal)| nearest.landing(&sample.point, normal)).collect()
     }
 
-    /// Distances after some shells have moved. Points of the target that were nearest to these are looked for on them and their
-    /// neighbours; others are at most as far off as before.
+    /// Distances after some shells have moved. Points of the target that were nearest to these are looked for
+    /// on them and their neighbours; others are at most as far off as before.
     pub(super) fn distances_after(
         &self,
         before: &Distances,
@@ -332,8 +334,8 @@ impl Nearest {
         Some(self.refined_from(point, self.locator.closest(point)?))
     }
 
-    /// The same, of what looks the same way as the target. What looks the other way counts if nothing else is near, as measured by the
-    /// size of a shell.
+    /// The same, of what looks the same way as the target. What looks the other way counts if nothing else is
+    /// near, as measured by the size of a shell.
     fn landing(&self, point: &Vector3, normal: &Vector3) -> Option<Landing> {
         let (mut shell, mut place, mut off) = self.nearest(point)?;
         let patch = &self.patches[shell];

@@ -1,13 +1,15 @@
-//! A fine surface by few curved shells: cubic Bézier triangles ([`CurvedTriangle`]) whose vertices and normals are fitted to it.
-//! A decimated surface starts; then, round by round, the shells that are too far off, either way, are halved at their longest edges, and
-//! round them triangles are evened out and fitted again, while the others rest. What is reached is looked at more closely before it counts.
-//! Normals stand within 60° of their triangles and shells do not pass through each other: where they would, they are halved, too.
-//! As many shells as asked for come nearer by exchange (`exchange`): some collapse where the surface is flat, and others are halved elsewhere.
-//! What crosses in the end is repaired (`repair`), and of what is left shells become flat (`flatten`). Where a fit fails, it starts again from finer
-//! triangles, and where even flat triangles cross from some that never did (`start`). The work is bounded, by a count that is the same on
-//! every machine; what was closest by then is the result.
-//! Sharp edges of the surface stay (`sharp`). Where flat triangles are nearer than curved ones, they are flat.
-//! Leaves out: edges that bend more than their end normals tell.
+//! A fine surface by few curved shells: cubic Bézier triangles ([`CurvedTriangle`]) whose vertices and
+//! normals are fitted to it. A decimated surface starts; then, round by round, the shells that are too far
+//! off, either way, are halved at their longest edges, and round them triangles are evened out and fitted
+//! again, while the others rest. What is reached is looked at more closely before it counts. Normals stand
+//! within 60° of their triangles and shells do not pass through each other: where they would, they are
+//! halved, too. As many shells as asked for come nearer by exchange (`exchange`): some collapse where the
+//! surface is flat, and others are halved elsewhere. What crosses in the end is repaired (`repair`), and of
+//! what is left shells become flat (`flatten`). Where a fit fails, it starts again from finer triangles, and
+//! where even flat triangles cross from some that never did (`start`). The work is bounded, by a count that
+//! is the same on every machine; what was closest by then is the result. Sharp edges of the surface stay
+//! (`sharp`). Where flat triangles are nearer than curved ones, they are flat. Leaves out: edges that bend
+//! more than their end normals tell.
 
 mod crossing;
 mod effort;
@@ -61,11 +63,12 @@ const UPRIGHT_AFTER: f64 = 0.6;
 /// Rounds more in which shells are mended that cross or have a crease.
 const MENDING_ROUNDS: usize = 4;
 
-/// Shells with creases or crossings are halved down to edges of this part of the diagonal, or of the error asked for.
+/// Shells with creases or crossings are halved down to edges of this part of the diagonal, or of the error
+/// asked for.
 const LEAST_EDGE: f64 = 1e-3;
 
-/// Part of the work allowed after which a fit is given up that is not [`UPRIGHT_FROM`] of the way and has not come this much nearer in so
-/// many rounds, if there are finer triangles to start from.
+/// Part of the work allowed after which a fit is given up that is not [`UPRIGHT_FROM`] of the way and has not
+/// come this much nearer in so many rounds, if there are finer triangles to start from.
 const GIVEN_UP: f64 = 0.5;
 const NEARER: f64 = 1.05;
 const STUCK: usize = 3;
@@ -73,8 +76,9 @@ const STUCK: usize = 3;
 /// Part of the work allowed that a second fit has at least.
 const AGAIN: f64 = 0.5;
 
-/// Least shape of shells that keep sharp edges. If one is slimmer, shells without sharp edges are fitted, too, and are the result unless their
-/// distance is larger by more than the factor below. Rims of images have more corners than few shells can follow.
+/// Least shape of shells that keep sharp edges. If one is slimmer, shells without sharp edges are fitted,
+/// too, and are the result unless their distance is larger by more than the factor below. Rims of images have
+/// more corners than few shells can follow.
 const SLIM: f64 = 0.3;
 const MUCH: f64 = 2.0;
 
@@ -96,10 +100,12 @@ pub enum ShellGoal {
 /// Curved shells fitted to a surface.
 #[derive(Clone, Debug)]
 pub struct FittedShells {
-    /// Triangles with the unit normals of their nodes as point data `normal` and the largest distance of each shell [m], both ways, as
-    /// cell data `distance`. Where some shells are as flat as their triangles, cell data `flat` is 1 there and 0 elsewhere.
+    /// Triangles with the unit normals of their nodes as point data `normal` and the largest distance of each
+    /// shell [m], both ways, as cell data `distance`. Where some shells are as flat as their triangles, cell
+    /// data `flat` is 1 there and 0 elsewhere.
     pub mesh: Mesh,
-    /// The curved surface in small flat triangles, with its distance from the target as point data `distance` [m].
+    /// The curved surface in small flat triangles, with its distance from the target as point data `distance`
+    /// [m].
     pub error_map: Mesh,
     /// What was measured.
     pub report: ShellReport,
@@ -114,8 +120,8 @@ struct Shells {
     on_border: Vec<bool>,
     /// Points that may move: those near what has changed. The others keep what was fitted.
     active: Vec<bool>,
-    /// Whether normals must stand on their triangles. On the way to the goal, while triangles are large, they need not: points that
-    /// are held back then do not find their places.
+    /// Whether normals must stand on their triangles. On the way to the goal, while triangles are large, they
+    /// need not: points that are held back then do not find their places.
     strict: bool,
     /// Points where no normal stands on all triangles, and points of sharp edges.
     creased: Vec<bool>,
@@ -158,7 +164,8 @@ impl FittedShells {
         Ok(Self::within(target, goal, Effort::new(most), UNCROSSED, progress))
     }
 
-    /// The same with so much work for each of two attempts. In the first, collapses may make more than `uncrossed` triangles cross.
+    /// The same with so much work for each of two attempts. In the first, collapses may make more than
+    /// `uncrossed` triangles cross.
     fn within(
         surface: &TriangleMesh,
         goal: ShellGoal,
@@ -239,7 +246,8 @@ struct Job<'t> {
 }
 
 impl Job<'_> {
-    /// Fits from few triangles, if that fails from finer ones, and if shells still cross takes those that it started from.
+    /// Fits from few triangles, if that fails from finer ones, and if shells still cross takes those that it
+    /// started from.
     fn attempt(&self, starts: &Starts, effort: Effort) -> Found {
         let fit = |mesh, effort, is_last| Fit::new(self.target, mesh, self.goal, effort, is_last);
         if starts.is_lost {
@@ -256,7 +264,8 @@ impl Job<'_> {
         found
     }
 
-    /// Makes shells flat where they cross. If the fit fails, or the flat triangles are nearer as a whole, shells become flat where that is nearer, too.
+    /// Makes shells flat where they cross. If the fit fails, or the flat triangles are nearer as a whole,
+    /// shells become flat where that is nearer, too.
     fn flattened(&self, found: Found) -> Found {
         let FittedShells { report, .. } = &found.fitted;
         let is_nearer = !report.reached || report.flat.largest() < report.distances.largest();
@@ -320,8 +329,8 @@ enum End {
     Spent,
 }
 
-/// How good shells are; the least is best. Whether the goal is missed, how many shells cross or have creases, whether triangles are poor,
-/// and what is to be small.
+/// How good shells are; the least is best. Whether the goal is missed, how many shells cross or have creases,
+/// whether triangles are poor, and what is to be small.
 type Rank = (bool, usize, bool, f64);
 
 impl<'t> Fit<'t> {
@@ -406,7 +415,8 @@ impl<'t> Fit<'t> {
         !self.is_last && stays && self.effort.part() > GIVEN_UP
     }
 
-    /// Makes normals stand on their triangles, or looks at distances closely, where it is time for that; the distances then.
+    /// Makes normals stand on their triangles, or looks at distances closely, where it is time for that; the
+    /// distances then.
     fn measured_anew(&mut self, part: f64, bound: f64) -> Option<Distances> {
         let target = self.target;
         let detail = if !self.shells.strict && (part >= UPRIGHT_FROM || self.effort.part() >= UPRIGHT_AFTER) {
@@ -427,11 +437,13 @@ impl<'t> Fit<'t> {
         Some(now)
     }
 
-    /// Keeps the shells if they are the best so far. Those to be halved for what is wrong with them; `None` where no round helps any more.
+    /// Keeps the shells if they are the best so far. Those to be halved for what is wrong with them; `None`
+    /// where no round helps any more.
     fn flawed(&mut self, far: &[f64], part: f64) -> Option<Vec<u32>> {
         let [creased, crossing] = if self.shells.strict { self.flaws() } else { Default::default() };
         let rank = self.rank(far, part, creased.len() + crossing.len());
-        // Halving what has a crease helps where a fold is wide enough for smaller shells, and not where it is sharp.
+        // Halving what has a crease helps where a fold is wide enough for smaller shells, and not where it is
+        // sharp.
         let fewer = self.best.as_ref().is_none_or(|(best, _)| best.0 || rank.1 < best.1);
         let mut flawed = crossing;
         flawed.extend(creased.into_iter().filter(|_| fewer && part >= 1.0));
@@ -526,8 +538,8 @@ fn worst(far: &[f64]) -> f64 {
     far.iter().copied().fold(0.0, f64::max)
 }
 
-/// The distance above which shells are halved on the way to a number of them: six tenths of the worst, or so many that there are a
-/// twentieth more.
+/// The distance above which shells are halved on the way to a number of them: six tenths of the worst, or so
+/// many that there are a twentieth more.
 fn share(far: &[f64]) -> f64 {
     let mut sorted = far.to_vec();
     sorted.sort_unstable_by(|a, b| b.total_cmp(a));

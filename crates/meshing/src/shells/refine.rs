@@ -55,8 +55,8 @@ impl Shells {
         around.iter().map(|&n| (self.mesh.points[n as usize] - here).norm()).fold(f64::INFINITY, f64::min)
     }
 
-    /// Puts the points of borders on those of the target. Decimation leaves them beside it, and neither evening out nor the fit need move
-    /// them.
+    /// Puts the points of borders on those of the target. Decimation leaves them beside it, and neither
+    /// evening out nor the fit need move them.
     pub(super) fn place_border(&mut self, target: &Target) {
         for point in 0..self.mesh.points.len() as u32 {
             if self.on_border[point as usize] {
@@ -106,7 +106,8 @@ impl Shells {
         self.along(nodes, &cross(x).try_normalize(0.0).unwrap_or_default())
     }
 
-    /// The shape of a triangle, less where it does not look along the normals of its corners, down to 0 where it stands across them.
+    /// The shape of a triangle, less where it does not look along the normals of its corners, down to 0 where
+    /// it stands across them.
     fn worth(&self, nodes: [u32; 3], x: [Vector3; 3]) -> f64 {
         shape(x) * (self.stands(nodes, x) / ALONG).clamp(0.0, 1.0)
     }
@@ -134,8 +135,8 @@ impl Shells {
         self.mesh.star[point as usize].iter().map(of).fold(f64::INFINITY, f64::min)
     }
 
-    /// Moves a point towards evener triangles, as long as no triangle there gets worse than the worst, and where they are poor to the
-    /// best of some places around.
+    /// Moves a point towards evener triangles, as long as no triangle there gets worse than the worst, and
+    /// where they are poor to the best of some places around.
     fn move_along(&mut self, point: u32, target: &Target) {
         let here = self.mesh.points[point as usize];
         if let [a, b] = self.mesh.marked(point)[..]
@@ -186,8 +187,9 @@ impl Shells {
         self.mesh.would_cross(&nodes, star)
     }
 
-    /// Halves the shells that are farther off than a bound at their longest edges, the worst first, up to a number. They, their
-    /// neighbours and poor triangles may move from then on. Returns how many edges were halved.
+    /// Halves the shells that are farther off than a bound at their longest edges, the worst first, up to a
+    /// number. They, their neighbours and poor triangles may move from then on. Returns how many edges were
+    /// halved.
     pub(super) fn refine(&mut self, far: &[f64], bound: f64, room: usize, target: &Target) -> usize {
         let mut order: Vec<u32> = self.mesh.alive().filter(|&t| far[t as usize] > bound).collect();
         order.sort_by(|&a, &b| far[b as usize].total_cmp(&far[a as usize]));
@@ -244,7 +246,8 @@ impl Shells {
         let middle = 0.5 * (self.mesh.points[a as usize] + self.mesh.points[b as usize]);
         self.place(fresh, target);
         if self.is_crossed_round(fresh) || self.reach(fresh) <= COINCIDING * target.diagonal {
-            // As it was, which crosses nothing new. Points that fall on each other would have no curve between them.
+            // As it was, which crosses nothing new. Points that fall on each other would have no curve
+            // between them.
             self.mesh.points[fresh as usize] = middle;
             self.stand(fresh);
         }
@@ -256,8 +259,9 @@ impl Shells {
         !self.on_border[gone as usize] && !self.creased[gone as usize] && self.mesh.may_collapse(keep, gone)
     }
 
-    /// Makes the ends of an edge one, in the middle if the first may move. Returns whether it could: triangles keep their sides and some
-    /// shape, and flat ones do not cross. Otherwise the shells are of no more use.
+    /// Makes the ends of an edge one, in the middle if the first may move. Returns whether it could:
+    /// triangles keep their sides and some shape, and flat ones do not cross. Otherwise the shells are of no
+    /// more use.
     pub(super) fn collapse(&mut self, [keep, gone]: [u32; 2], target: &Target) -> bool {
         let stays = self.on_border[keep as usize] || self.creased[keep as usize];
         let [here, there] = [keep, gone].map(|n| self.mesh.points[n as usize]);

@@ -1,7 +1,7 @@
-//! Undoing crossings at the end of a fit: corners of shells that cross are turned or moved, as long as fewer pairs cross.
-//! The target does not cross itself, nor do flat triangles close to it. So one aim is the target with its normals, the other flatter
-//! shells. A fit without crossings stays as it is, bit by bit.
-//! Leaves out: knots that no step of this list loosens. The report counts them.
+//! Undoing crossings at the end of a fit: corners of shells that cross are turned or moved, as long as fewer
+//! pairs cross. The target does not cross itself, nor do flat triangles close to it. So one aim is the target
+//! with its normals, the other flatter shells. A fit without crossings stays as it is, bit by bit. Leaves
+//! out: knots that no step of this list loosens. The report counts them.
 
 use std::cmp::Reverse;
 
@@ -28,7 +28,8 @@ enum Step {
     Facing,
     /// Points go this part of the way to the target, with its normals.
     Nearer(f64),
-    /// Points go this part of the way to the middle of their neighbours, and normals to the mean of the triangles.
+    /// Points go this part of the way to the middle of their neighbours, and normals to the mean of the
+    /// triangles.
     Evener(f64),
     /// Points go this part of the mean edge along their normals, out or in.
     Along(f64),
@@ -52,7 +53,8 @@ const STEPS: [Step; 14] = [
     Step::Evener(1.0),
 ];
 
-/// How good a step is; the least is best. Whether it takes shells farther off, how many pairs it parts, and how far off they are [m].
+/// How good a step is; the least is best. Whether it takes shells farther off, how many pairs it parts, and
+/// how far off they are [m].
 type Rank = (bool, Reverse<usize>, f64);
 
 impl Part {
@@ -115,8 +117,9 @@ impl Shells {
         }
     }
 
-    /// Takes the normals of the corners of shells that still cross: at creases shells are as flat as their triangles, which do not cross.
-    /// The result counts only if fewer shells cross than before. Nothing may turn normals afterwards.
+    /// Takes the normals of the corners of shells that still cross: at creases shells are as flat as their
+    /// triangles, which do not cross. The result counts only if fewer shells cross than before. Nothing may
+    /// turn normals afterwards.
     pub(super) fn crease_crossing(&mut self) {
         let mut now = self.crossing().shells();
         for _ in 0..CREASINGS {
@@ -135,8 +138,9 @@ impl Shells {
         }
     }
 
-    /// Takes the step of one knot's corners, or of one of them, after which fewer pairs cross. Steps that take nothing farther off come
-    /// first, then those that leave the fewest pairs, then the closest. Returns whether there is one.
+    /// Takes the step of one knot's corners, or of one of them, after which fewer pairs cross. Steps that
+    /// take nothing farther off come first, then those that leave the fewest pairs, then the closest. Returns
+    /// whether there is one.
     fn loosen(
         &mut self,
         knot: &[u32],

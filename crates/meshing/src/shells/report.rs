@@ -35,10 +35,11 @@ pub struct ShellReport {
     pub stopped: bool,
     /// Vertices on sharp edges of the target, where faces meet at more than 45°: they have no normal.
     pub sharp: usize,
-    /// Vertices where the surface folds too sharply for a normal within 60° of all triangles, or for curved shells that do not cross: they
-    /// have none, `normal` is zero there.
+    /// Vertices where the surface folds too sharply for a normal within 60° of all triangles, or for curved
+    /// shells that do not cross: they have none, `normal` is zero there.
     pub creases: Flaw,
-    /// Shells that are as flat as their triangles, since curved they would cross others or be farther from the target.
+    /// Shells that are as flat as their triangles, since curved they would cross others or be farther from
+    /// the target.
     pub flattened: Flaw,
     /// Shells that pass through themselves or each other.
     pub crossings: Flaw,
@@ -68,7 +69,8 @@ fn millimetres([x, y, z]: &[f64; 3]) -> String {
 }
 
 impl ShellReport {
-    /// What a user should know before using the shells, in sentences: a goal that was missed, crossings, flat shells, creases.
+    /// What a user should know before using the shells, in sentences: a goal that was missed, crossings, flat
+    /// shells, creases.
     pub fn warnings(&self) -> Vec<String> {
         let missed = (!self.reached).then(|| self.missed());
         let crossings = (self.crossings.count > 0).then(|| {
@@ -104,7 +106,8 @@ impl ShellReport {
         self.crossings.count > 0 || !self.reached
     }
 
-    /// How bad they are; the least is best. How many cross, whether they miss the goal, and how far off they are [m].
+    /// How bad they are; the least is best. How many cross, whether they miss the goal, and how far off they
+    /// are [m].
     pub(super) fn rank(&self) -> (usize, bool, f64) {
         (self.crossings.count, !self.reached, self.distances.largest())
     }

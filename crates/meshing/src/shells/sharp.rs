@@ -6,17 +6,20 @@ use pliant_geometry::DisjointSets;
 use super::ShellGoal;
 use crate::surface::triangles::TriangleMesh;
 
-/// Faces that meet at more than this angle [rad] make a sharp edge: the angle at which shells without given normals have creases.
+/// Faces that meet at more than this angle [rad] make a sharp edge: the angle at which shells without given
+/// normals have creases.
 const SHARP: f64 = std::f64::consts::FRAC_PI_4;
 
 /// Sharp edges that hang together are this long at least, over the diagonal. Shorter ones are noise.
 const LEAST_LENGTH: f64 = 0.05;
 
-/// The faces beside sharp edges meet their other neighbours at angles that are this part of those of the sharp edges at most, in the mean. At thin
-/// edges of organs triangles turn step by step, and such edges are round.
+/// The faces beside sharp edges meet their other neighbours at angles that are this part of those of the
+/// sharp edges at most, in the mean. At thin edges of organs triangles turn step by step, and such edges are
+/// round.
 const BESIDE: f64 = 0.25;
 
-/// Largest part of the surface that is nearer to sharp edges than the error asked for. Steps of voxels take a larger part, and are not sharp edges.
+/// Largest part of the surface that is nearer to sharp edges than the error asked for. Steps of voxels take a
+/// larger part, and are not sharp edges.
 const MOST_NEAR: f64 = 0.1;
 
 /// The error that stands for a number of shells, over their edges.
@@ -54,7 +57,8 @@ pub(super) fn with_sharp_edges(surface: &TriangleMesh, goal: ShellGoal) -> Optio
     Some(marked)
 }
 
-/// The mean angles [rad] at the sharp edges of each chain, and at the other edges of their faces, by the first point of the chain.
+/// The mean angles [rad] at the sharp edges of each chain, and at the other edges of their faces, by the
+/// first point of the chain.
 fn turns_of_chains(marked: &TriangleMesh, edges: &[[u32; 2]], chains: &mut DisjointSets) -> Vec<[f64; 2]> {
     let turn = |[a, b]: [u32; 2]| match marked.sides(a, b) {
         [Some(s), Some(t)] => marked.normal(s).angle(&marked.normal(t)),
@@ -91,7 +95,8 @@ mod tests {
         TriangleMesh::from_mesh(&mesh).unwrap().0
     }
 
-    /// Builds a closed prism, 60 mm high and with corners at a radius of 30 mm. Its sides are divided into layers.
+    /// Builds a closed prism, 60 mm high and with corners at a radius of 30 mm. Its sides are divided into
+    /// layers.
     fn prism(sides: u32, layers: u32) -> TriangleMesh {
         let corner = |k: u32, layer: u32| {
             let angle = f64::from(k) / f64::from(sides) * std::f64::consts::TAU;

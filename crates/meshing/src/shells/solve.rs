@@ -1,4 +1,5 @@
-//! The damped least-squares step of a fit: (Jᵀ W J + D) δ = −Jᵀ W r by conjugate gradients, Jᵀ W J as one block for each shell.
+//! The damped least-squares step of a fit: (Jᵀ W J + D) δ = −Jᵀ W r by conjugate gradients, Jᵀ W J as one
+//! block for each shell.
 
 /// The power of distances whose sum is made small.
 pub(super) const POWER: i32 = 6;

@@ -1,6 +1,7 @@
-//! Flat triangles that a fit starts from. Few are best, as long as they have all parts of the surface: what they have lost, such as a
-//! vessel, the fit has to pull out of them again, and shells come to cross on the way. What fails is tried again from finer ones.
-//! Leaves out: whether a part is lost where it is not farther off than half an edge.
+//! Flat triangles that a fit starts from. Few are best, as long as they have all parts of the surface: what
+//! they have lost, such as a vessel, the fit has to pull out of them again, and shells come to cross on the
+//! way. What fails is tried again from finer ones. Leaves out: whether a part is lost where it is not farther
+//! off than half an edge.
 
 use rayon::prelude::*;
 
@@ -15,16 +16,18 @@ const START: usize = 100;
 /// Doublings of their number at most.
 const DOUBLINGS: u32 = 7;
 
-/// Parts are lost where a point of the target is farther from the flat triangles than this part of their mean edge.
+/// Parts are lost where a point of the target is farther from the flat triangles than this part of their mean
+/// edge.
 const LOST: f64 = 0.5;
 
-/// Triangles after a fit that has failed are not farther from the target than this times the error asked for, and those in place of
-/// triangles that have lost parts nearer: parts that are narrow for their shells hardly come nearer by the fit.
+/// Triangles after a fit that has failed are not farther from the target than this times the error asked for,
+/// and those in place of triangles that have lost parts nearer: parts that are narrow for their shells hardly
+/// come nearer by the fit.
 const FINER: f64 = 1.5;
 const WHOLE: f64 = 1.2;
 
-/// From so many triangles down, collapses that make triangles cross are refused at first. Among more, looking takes longer than all else:
-/// that is for surfaces whose shells cross otherwise.
+/// From so many triangles down, collapses that make triangles cross are refused at first. Among more, looking
+/// takes longer than all else: that is for surfaces whose shells cross otherwise.
 pub(super) const UNCROSSED: usize = 20_000;
 
 /// What a fit starts from.
@@ -110,7 +113,8 @@ mod tests {
         }
     }
 
-    /// A hundred triangles hold a ball, and not twenty rods: there, the fit starts from triangles that have them all.
+    /// A hundred triangles hold a ball, and not twenty rods: there, the fit starts from triangles that have
+    /// them all.
     #[test]
     fn few_triangles_start_where_no_part_is_lost() {
         let starts = |field: &dyn ImplicitField, error: f64| {

@@ -1,5 +1,6 @@
-//! The surface to be fitted, and the points of it that are looked at. Where a surface folds, its other side may be nearer than the side
-//! that a shell stands for: what looks the other way is passed over, as far as the shell is large.
+//! The surface to be fitted, and the points of it that are looked at. Where a surface folds, its other side
+//! may be nearer than the side that a shell stands for: what looks the other way is passed over, as far as
+//! the shell is large.
 
 use std::collections::BTreeMap;
 
@@ -54,8 +55,8 @@ impl Target {
         Self { coarse, fine, diagonal, reference }
     }
 
-    /// The nearest point that looks the same way as `facing`, and the normal there. One that looks the other way counts if there is none
-    /// that is farther off by less than `reach` [m].
+    /// The nearest point that looks the same way as `facing`, and the normal there. One that looks the other
+    /// way counts if there is none that is farther off by less than `reach` [m].
     pub(super) fn foot(&self, x: &Vector3, facing: &Vector3, reach: f64) -> (Vector3, Vector3) {
         let nearest = self.reference.closest(x);
         if nearest.1.dot(facing) < FACING {
@@ -78,8 +79,8 @@ fn distinct(mut samples: Vec<Sample>) -> Vec<Sample> {
     samples
 }
 
-/// So few samples that no cube of a grid holds two, of cubes that grow until there are no more than `most`. One stands for the area of all
-/// in its cube.
+/// So few samples that no cube of a grid holds two, of cubes that grow until there are no more than `most`.
+/// One stands for the area of all in its cube.
 fn thinned(mut samples: Vec<Sample>, spacing: f64, most: usize) -> Vec<Sample> {
     let mut size = 0.5 * spacing;
     while samples.len() > most {

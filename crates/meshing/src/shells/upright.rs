@@ -1,13 +1,15 @@
-//! Normals that stand on their triangles. A shell takes the normal of a vertex as that of its surface, so it may lean by no more than
-//! 60° from the normal of any triangle round the vertex. Where the surface folds too sharply for any such normal, the vertex is a crease:
-//! like a shell without given normals, each fan of triangles that meet at less than 45° has a normal of its own there, and edges between
-//! fans leave the vertex straight.
+//! Normals that stand on their triangles. A shell takes the normal of a vertex as that of its surface, so it
+//! may lean by no more than 60° from the normal of any triangle round the vertex. Where the surface folds too
+//! sharply for any such normal, the vertex is a crease: like a shell without given normals, each fan of
+//! triangles that meet at less than 45° has a normal of its own there, and edges between fans leave the
+//! vertex straight.
 
 use pliant_geometry::Vector3;
 
 use super::Shells;
 
-/// Least cosine between the normal of a vertex and those of its triangles: 60°, and what a file in single precision may add.
+/// Least cosine between the normal of a vertex and those of its triangles: 60°, and what a file in single
+/// precision may add.
 const UPRIGHT: f64 = 0.501;
 
 /// Least cosine between triangles of one fan: 45°, as shells without given normals have it.
@@ -38,7 +40,8 @@ fn least_cosine(faces: &[Vector3], normal: &Vector3) -> f64 {
     faces.iter().map(|face| face.dot(normal)).fold(1.0, f64::min)
 }
 
-/// The unit vector whose largest angle to any face is least: the axis of the narrowest cone round all, which touches two of them or three.
+/// The unit vector whose largest angle to any face is least: the axis of the narrowest cone round all, which
+/// touches two of them or three.
 fn middle(faces: &[Vector3]) -> Vector3 {
     let mut best = (f64::NEG_INFINITY, faces.first().copied().unwrap_or_default());
     let mut consider = |axis: Vector3| {
@@ -68,14 +71,15 @@ impl Shells {
         (0..self.mesh.points.len() as u32).for_each(|point| self.stand(point));
     }
 
-    /// Whether a change of the least cosine round a vertex is one that must not be: from upright to not, on the way to the goal from
-    /// along the surface to against it.
+    /// Whether a change of the least cosine round a vertex is one that must not be: from upright to not, on
+    /// the way to the goal from along the surface to against it.
     pub(super) fn tilts(&self, before: f64, after: f64) -> bool {
         let least = if self.strict { UPRIGHT } else { 0.0 };
         before >= least && after < least
     }
 
-    /// Turns the normal of a vertex as far as it must to stand on all triangles round it; a crease where none does.
+    /// Turns the normal of a vertex as far as it must to stand on all triangles round it; a crease where none
+    /// does.
     pub(super) fn stand(&mut self, point: u32) {
         if !self.strict || self.sharp[point as usize] {
             return;
@@ -105,7 +109,8 @@ impl Shells {
         smooth.map(|&n| self.normals[n as usize].dot(normal)).fold(1.0, f64::min)
     }
 
-    /// The normal of a corner of a shell, and whether the edges to the next corner and to the last leave it straight.
+    /// The normal of a corner of a shell, and whether the edges to the next corner and to the last leave it
+    /// straight.
     pub(super) fn corner(&self, triangle: u32, corner: usize) -> (Vector3, [bool; 2]) {
         let nodes = self.mesh.triangles[triangle as usize];
         let point = nodes[corner];
@@ -150,7 +155,8 @@ impl Shells {
 mod tests {
     use super::*;
 
-    /// Two faces at an angle: the wish where it stands, else leaned to 60° from the farther one; none beyond 120°.
+    /// Two faces at an angle: the wish where it stands, else leaned to 60° from the farther one; none beyond
+    /// 120°.
     #[test]
     fn a_normal_leans_no_more_than_it_must() {
         let tilted = |degrees: f64| Vector3::new(degrees.to_radians().sin(), 0.0, degrees.to_radians().cos());
@@ -159,7 +165,8 @@ mod tests {
         let leaned = upright(&faces, &tilted(40.0)).unwrap();
         assert!((leaned.angle(&faces[0]).to_degrees() - 60.0).abs() < 0.1, "{leaned}");
         assert_eq!(upright(&[tilted(-61.0), tilted(61.0)], &tilted(0.0)), None);
-        // Round a spike whose faces lean by 59° from its axis there is one, whatever the wish; by 61° there is none.
+        // Round a spike whose faces lean by 59° from its axis there is one, whatever the wish; by 61° there
+        // is none.
         let spike = |degrees: f64| {
             (0..7).map(|k| f64::from(k) * 0.9).map(move |turn| {
                 let (s, c) = degrees.to_radians().sin_cos();

@@ -1,5 +1,6 @@
-//! Boxes by their places, for surfaces that change: a box is in the cubes of a grid as coarse as it is large, so that a search looks at few
-//! cubes whatever the sizes are. Boxes that have changed are put in anew; those of before stay until all are put in again.
+//! Boxes by their places, for surfaces that change: a box is in the cubes of a grid as coarse as it is large,
+//! so that a search looks at few cubes whatever the sizes are. Boxes that have changed are put in anew; those
+//! of before stay until all are put in again.
 
 use std::collections::{BTreeMap, HashMap};
 

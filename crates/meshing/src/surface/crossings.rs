@@ -27,8 +27,8 @@ pub(crate) fn crossings(points: &[Vector3], triangles: &[[u32; 3]]) -> (Vec<[u32
     crossing_groups(points, triangles, 1, |_| true)
 }
 
-/// The same of groups of so many triangles each, one after the other. A group may cross itself: it is a pair with itself then. Of each
-/// pair that counts at least one is looked at.
+/// The same of groups of so many triangles each, one after the other. A group may cross itself: it is a pair
+/// with itself then. Of each pair that counts at least one is looked at.
 pub(crate) fn crossing_groups(
     points: &[Vector3],
     triangles: &[[u32; 3]],
@@ -133,7 +133,8 @@ pub(crate) fn meet(at: &(impl Fn(u32) -> Vector3 + ?Sized), s: [u32; 3], t: [u32
     })
 }
 
-/// Whether a triangle lies on one side of the plane of another, or touches it. No edge of it pierces the other then.
+/// Whether a triangle lies on one side of the plane of another, or touches it. No edge of it pierces the
+/// other then.
 fn is_beside(at: &(impl Fn(u32) -> Vector3 + ?Sized), plane: [u32; 3], triangle: [u32; 3]) -> bool {
     let [a, b, c] = plane.map(at);
     let normal = (b - a).cross(&(c - a));
@@ -141,7 +142,8 @@ fn is_beside(at: &(impl Fn(u32) -> Vector3 + ?Sized), plane: [u32; 3], triangle:
     heights.iter().all(|&h| h >= 0.0) || heights.iter().all(|&h| h <= 0.0)
 }
 
-/// Where a segment pierces a triangle, edges included: where a body meets its mirror image, edges cross edges.
+/// Where a segment pierces a triangle, edges included: where a body meets its mirror image, edges cross
+/// edges.
 fn pierced([p, q]: [Vector3; 2], [a, b, c]: [Vector3; 3]) -> Option<Vector3> {
     // Six times signed volumes; values below round-off count as touching.
     let volume = |u: &Vector3, v: &Vector3, w: &Vector3, x: &Vector3| (v - u).cross(&(w - u)).dot(&(x - u));

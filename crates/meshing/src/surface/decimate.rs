@@ -1,6 +1,7 @@
-//! Fewer triangles for the same surface: edges collapse in the order of their cost. The cost is the sum of squared distances from
-//! the surrounding planes (Garland and Heckbert 1997), each weighted by its area, with planes through borders and creases to
-//! preserve these. A collapse must keep the topology, the orientation of faces and some of their shape.
+//! Fewer triangles for the same surface: edges collapse in the order of their cost. The cost is the sum of
+//! squared distances from the surrounding planes (Garland and Heckbert 1997), each weighted by its area, with
+//! planes through borders and creases to preserve these. A collapse must keep the topology, the orientation
+//! of faces and some of their shape.
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
@@ -15,7 +16,8 @@ use crate::surface::triangles::{TriangleMesh, cross};
 /// Planes through borders and creases weigh this many times as much as faces of the same size.
 const LINE_WEIGHT: f64 = 10.0;
 
-/// Weight of a point's own place beside its planes: makes places on flat parts unique and triangles there even.
+/// Weight of a point's own place beside its planes: makes places on flat parts unique and triangles there
+/// even.
 const PLACE_WEIGHT: f64 = 1e-3;
 
 /// Collapses leave no triangle of a worse shape, unless it was worse before.
@@ -115,7 +117,8 @@ struct Decimation<'m> {
 }
 
 impl TriangleMesh {
-    /// Reduces the number of triangles and returns it. It exceeds the requested number if nothing more can collapse.
+    /// Reduces the number of triangles and returns it. It exceeds the requested number if nothing more can
+    /// collapse.
     pub fn decimate(&mut self, until: Fewer) -> Result<usize, MeshingError> {
         let (least, limit) = match until {
             Fewer::Triangles(number) => {
@@ -130,8 +133,8 @@ impl TriangleMesh {
         Ok(Decimation::new(self).run(least, limit))
     }
 
-    /// The surface in each of some numbers of triangles, decreasing, or in a few more where nothing more can collapse. From `uncrossed`
-    /// triangles down collapses do not make triangles cross each other.
+    /// The surface in each of some numbers of triangles, decreasing, or in a few more where nothing more can
+    /// collapse. From `uncrossed` triangles down collapses do not make triangles cross each other.
     pub(crate) fn decimated_to_each(mut self, numbers: &[usize], uncrossed: usize) -> Vec<Self> {
         let mut work = Decimation::new(&mut self);
         work.run(uncrossed.max(numbers.first().copied().unwrap_or(0)), f64::INFINITY);
@@ -260,7 +263,8 @@ impl<'m> Decimation<'m> {
         [a.inf(&b).inf(&c), a.sup(&b).sup(&c)]
     }
 
-    /// Puts in the triangles round a point, which have changed, or all if too many that have changed since are there.
+    /// Puts in the triangles round a point, which have changed, or all if too many that have changed since
+    /// are there.
     fn place_round(&mut self, point: u32, count: usize) {
         let Some(mut placed) = self.placed.take() else { return };
         if placed.len() > PUT_IN * count {
@@ -301,8 +305,8 @@ mod tests {
     use crate::surface::crossings::crossings;
     use crate::{DEFAULT_CELL_LIMIT, Pattern, Sheet, sphere};
 
-    /// On a sphere, flat triangles of edge h are up to h²/6R off at their centres; 500 triangles have a mean edge of 0.24: 0.010, and
-    /// half as much again for the longest.
+    /// On a sphere, flat triangles of edge h are up to h²/6R off at their centres; 500 triangles have a mean
+    /// edge of 0.24: 0.010, and half as much again for the longest.
     #[test]
     fn a_sphere_keeps_its_shape_and_stays_closed() {
         let (fine, _) = TriangleMesh::from_mesh(&sphere(1.0, 4, DEFAULT_CELL_LIMIT).unwrap()).unwrap();
@@ -314,7 +318,8 @@ mod tests {
         assert!(apart.largest_forward < 0.015 && apart.largest_backward < 0.015, "{apart:?}");
     }
 
-    /// A ball with a cavity, whose wall is thinner than flat triangles of the last size are off it: the faces of the wall do not cross.
+    /// A ball with a cavity, whose wall is thinner than flat triangles of the last size are off it: the faces
+    /// of the wall do not cross.
     #[test]
     fn the_faces_of_a_thin_wall_do_not_cross() {
         let mut ball = sphere(1.0, 4, DEFAULT_CELL_LIMIT).unwrap();

@@ -1,5 +1,6 @@
-//! The surface of a field in triangles: the cubes of a grid are cut into six tetrahedra each, all along the same diagonals (Freudenthal
-//! 1942), and in each the surface is one triangle or two. It is closed and manifold for any values, as it has no ambiguous cells.
+//! The surface of a field in triangles: the cubes of a grid are cut into six tetrahedra each, all along the
+//! same diagonals (Freudenthal 1942), and in each the surface is one triangle or two. It is closed and
+//! manifold for any values, as it has no ambiguous cells.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +12,8 @@ use crate::input::extent::checked_box;
 use crate::input::field::ImplicitField;
 use crate::surface::triangles::TriangleMesh;
 
-/// The six tetrahedra of a cube: ways from its first corner to the last along one axis after the other. Odd ones are left-handed.
+/// The six tetrahedra of a cube: ways from its first corner to the last along one axis after the other. Odd
+/// ones are left-handed.
 const WAYS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
 
 /// Cubes of the grid allowed per allowed triangle, and always.
@@ -49,7 +51,8 @@ impl TriangleMesh {
     }
 }
 
-/// Euler number of the zero surface of a field on a grid of `step` [m]. The surface is closed: its edges are three halves of its triangles.
+/// Euler number of the zero surface of a field on a grid of `step` [m]. The surface is closed: its edges are
+/// three halves of its triangles.
 pub(crate) fn euler_number_of_field(
     field: &(impl ImplicitField + ?Sized),
     step: f64,

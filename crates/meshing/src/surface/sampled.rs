@@ -1,6 +1,7 @@
-//! Signed distances of a closed surface at the points of a regular grid, as contact needs them. They are exact wherever the surface, moved
-//! outward by an offset, may be near. Far from it they are exact at every fourth point along each axis and linear in between. Leaves out:
-//! sharp edges of the moved surface, which is rounded where it goes outward round an edge.
+//! Signed distances of a closed surface at the points of a regular grid, as contact needs them. They are
+//! exact wherever the surface, moved outward by an offset, may be near. Far from it they are exact at every
+//! fourth point along each axis and linear in between. Leaves out: sharp edges of the moved surface, which is
+//! rounded where it goes outward round an edge.
 
 use pliant_geometry::{DistanceField, Grid, SurfaceLocator, Vector3};
 use rayon::prelude::*;
@@ -61,8 +62,8 @@ impl Enclosed {
         [0, 1, 2].map(|axis| cells[axis] * COARSE as f64 + 1.0)
     }
 
-    /// Signed distances of the surface moved outward by an offset [m], inward if it is negative, at points `spacing` [m] apart. `progress`
-    /// hears fractions from 0 to 1.
+    /// Signed distances of the surface moved outward by an offset [m], inward if it is negative, at points
+    /// `spacing` [m] apart. `progress` hears fractions from 0 to 1.
     ///
     /// # Errors
     /// If the spacing is not positive, the grid has more than 2²⁶ points, or nothing is left inside.
@@ -120,7 +121,8 @@ fn distances(grid: &Grid, surface: &SurfaceLocator, reach: f64, progress: &dyn F
     };
     let coarse: Vec<f64> = (0..corners.iter().product()).into_par_iter().map(corner_at).collect();
     progress(0.3);
-    // A distance changes by no more than the way: no point of a block is farther than this from its nearest corner.
+    // A distance changes by no more than the way: no point of a block is farther than this from its nearest
+    // corner.
     let half = 0.5 * COARSE as f64 * Vector3::from(grid.spacing()).norm();
     let layer = |k: usize| {
         let (block, part) = (k / COARSE, (k % COARSE) as f64 / COARSE as f64);
@@ -178,7 +180,8 @@ mod tests {
         beyond.map(|x| x.max(0.0)).norm() + beyond.max().min(0.0)
     }
 
-    /// Of a box: exact where they are small, with the right sign everywhere, elsewhere off by less than the coarse points are apart.
+    /// Of a box: exact where they are small, with the right sign everywhere, elsewhere off by less than the
+    /// coarse points are apart.
     #[test]
     fn distances_to_a_box_are_those_of_geometry() {
         let size = [0.05, 0.03, 0.02];

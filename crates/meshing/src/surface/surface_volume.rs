@@ -1,6 +1,7 @@
-//! Surfaces of segmented bodies that keep their volume. Facets between points of a curved surface cut it off, and smoothing takes thin
-//! parts away: a ball of few triangles has lost a fifth. All points move along their normals until the surface encloses the volume of the
-//! input, less the parts that it lacks altogether. What is left is reported.
+//! Surfaces of segmented bodies that keep their volume. Facets between points of a curved surface cut it off,
+//! and smoothing takes thin parts away: a ball of few triangles has lost a fifth. All points move along their
+//! normals until the surface encloses the volume of the input, less the parts that it lacks altogether. What
+//! is left is reported.
 
 use pliant_geometry::Vector3;
 use serde::Serialize;
@@ -34,7 +35,8 @@ pub struct LabelVolume {
 /// Volumes of a surface against its input.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SurfaceVolume {
-    /// The labels. With several, each has its own voxels within the surface, and the background there that is next to it.
+    /// The labels. With several, each has its own voxels within the surface, and the background there that is
+    /// next to it.
     pub labels: Vec<LabelVolume>,
     /// Parts of the labels that the surface lacks, the largest first.
     pub lost: Vec<LostReport>,
@@ -97,7 +99,8 @@ impl SurfaceVolume {
 }
 
 impl TriangleMesh {
-    /// Moves the surface of the voxels of an anatomy along its normals until it has their volume; `None` if the anatomy has no voxels.
+    /// Moves the surface of the voxels of an anatomy along its normals until it has their volume; `None` if
+    /// the anatomy has no voxels.
     pub fn keep_volume(&mut self, anatomy: &Anatomy<'_>) -> Option<SurfaceVolume> {
         let faces = self.len();
         let area: f64 = self.alive().map(|t| self.area(t)).sum();
@@ -137,7 +140,8 @@ impl TriangleMesh {
         signed_volume(&points, &triangles)
     }
 
-    /// A sentence on how its volume differs from that of the surface it was made of, if by more than 5 %; `None` for open surfaces.
+    /// A sentence on how its volume differs from that of the surface it was made of, if by more than 5 %;
+    /// `None` for open surfaces.
     pub fn volume_warning(&self, input: &Self) -> Option<String> {
         let error = self.volume() / input.volume() - 1.0;
         (input.is_closed() && self.is_closed() && error.abs() > LARGEST_VOLUME_ERROR).then(|| {
@@ -151,8 +155,8 @@ impl TriangleMesh {
         })
     }
 
-    /// Moves all points along their normals until the surface encloses a volume [m³], by at most `most` [m]; returns how far. A move that
-    /// makes triangles cross is halved.
+    /// Moves all points along their normals until the surface encloses a volume [m³], by at most `most` [m];
+    /// returns how far. A move that makes triangles cross is halved.
     fn inflate(&mut self, wanted: f64, most: f64) -> f64 {
         let crossing = |surface: &Self| {
             let (points, triangles) = surface.compact();

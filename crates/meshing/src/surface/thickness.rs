@@ -1,6 +1,7 @@
-//! Thickness of the body inside a closed surface: from points spread over its faces straight inwards to the opposite side. A slab has
-//! its thickness, a ball and a cylinder their diameters; towards a sharp edge the thickness goes to zero. Leaves out: inscribed balls,
-//! which are thinner where the two sides are not parallel.
+//! Thickness of the body inside a closed surface: from points spread over its faces straight inwards to the
+//! opposite side. A slab has its thickness, a ball and a cylinder their diameters; towards a sharp edge the
+//! thickness goes to zero. Leaves out: inscribed balls, which are thinner where the two sides are not
+//! parallel.
 
 use pliant_geometry::Vector3;
 use rayon::prelude::*;

@@ -1,7 +1,8 @@
-//! A surface of triangles that changes: edges collapse, are halved or flipped. Borders and creases are marked edges; a point where
-//! other than two of them meet is a corner and stays. Surfaces from files are made manifold first: points at one place are one, faces
-//! without area or given twice go, where more than two faces share an edge the surface is cut, faces are turned alike and outwards.
-//! Leaves out: finding and mending surfaces that pass through themselves.
+//! A surface of triangles that changes: edges collapse, are halved or flipped. Borders and creases are marked
+//! edges; a point where other than two of them meet is a corner and stays. Surfaces from files are made
+//! manifold first: points at one place are one, faces without area or given twice go, where more than two
+//! faces share an edge the surface is cut, faces are turned alike and outwards. Leaves out: finding and
+//! mending surfaces that pass through themselves.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt;
@@ -22,7 +23,8 @@ const GONE: [u32; 3] = [u32::MAX; 3];
 /// Points closer than this part of the box's diagonal are one.
 const SAME: f64 = 1e-9;
 
-/// Points at one place are moved apart by this part of the diagonal: more than readers take for one point, in single precision too.
+/// Points at one place are moved apart by this part of the diagonal: more than readers take for one point, in
+/// single precision too.
 const APART: f64 = 1e-5;
 
 /// A triangulated surface, manifold with or without borders.
@@ -91,7 +93,8 @@ impl TriangleMesh {
         mesh
     }
 
-    /// The triangles and quads of a mesh (quads halved), or the boundary of its volume cells, mended where needed.
+    /// The triangles and quads of a mesh (quads halved), or the boundary of its volume cells, mended where
+    /// needed.
     pub fn from_mesh(mesh: &Mesh) -> Result<(Self, SurfaceRepairs), MeshingError> {
         let (surface, mut repairs) = Self::from_surface(&boundary(mesh), &mesh.points)?;
         if mesh.volume_blocks().all(|block| block.is_empty()) {
@@ -142,8 +145,8 @@ impl TriangleMesh {
         mesh
     }
 
-    /// The same for a file or a body: points at one place, where the surface touches itself, are moved a little apart, each towards its
-    /// neighbours. Readers take points at one place for one.
+    /// The same for a file or a body: points at one place, where the surface touches itself, are moved a
+    /// little apart, each towards its neighbours. Readers take points at one place for one.
     pub fn to_parted_mesh(&self) -> Mesh {
         let mut mesh = self.to_mesh();
         let rest = mesh.points.clone();
@@ -222,8 +225,9 @@ impl TriangleMesh {
         compacted
     }
 
-    /// Puts triangles in the place of others, and new ones beside them: those of a part of this surface that has changed, whose triangles
-    /// and points have these numbers here. Creases between its points are those of the part.
+    /// Puts triangles in the place of others, and new ones beside them: those of a part of this surface that
+    /// has changed, whose triangles and points have these numbers here. Creases between its points are those
+    /// of the part.
     pub(crate) fn put(&mut self, part: &Self, own: &[u32], nodes: &[u32]) {
         for &t in own.iter().filter(|&&t| (t as usize) < self.triangles.len()) {
             let [a, b, c] = self.triangles[t as usize];
@@ -342,8 +346,8 @@ impl TriangleMesh {
         found
     }
 
-    /// Whether the edge can collapse into its first end so that the surface keeps its topology and its marked lines: the link
-    /// condition (Dey et al. 1999), with the outside of a border as one more point.
+    /// Whether the edge can collapse into its first end so that the surface keeps its topology and its marked
+    /// lines: the link condition (Dey et al. 1999), with the outside of a border as one more point.
     pub(crate) fn may_collapse(&self, keep: u32, gone: u32) -> bool {
         let lines = self.marked(gone);
         if !(lines.is_empty() || lines.len() == 2 && lines.contains(&keep)) {
@@ -371,7 +375,8 @@ impl TriangleMesh {
         }
     }
 
-    /// Whether all triangles round two points that stay keep their side and some shape if the points become one at `position`.
+    /// Whether all triangles round two points that stay keep their side and some shape if the points become
+    /// one at `position`.
     pub(crate) fn keeps_sides(&self, keep: u32, gone: u32, position: &Vector3, least_shape: f64) -> bool {
         [(keep, gone), (gone, keep)].into_iter().all(|(own, other)| {
             self.star[own as usize].iter().all(|&t| {
@@ -455,7 +460,8 @@ impl TriangleMesh {
         self.star[c as usize].push(t);
     }
 
-    /// Mean normal of the triangles round a point, weighted by their angles there (Thürmer and Wüthrich 1998).
+    /// Mean normal of the triangles round a point, weighted by their angles there (Thürmer and Wüthrich
+    /// 1998).
     pub(crate) fn point_normal(&self, point: u32) -> Vector3 {
         let of = |&t: &u32| {
             let at = self.triangles[t as usize].iter().position(|&n| n == point).unwrap_or(0);
@@ -507,8 +513,8 @@ fn sides_of(triangles: &[[u32; 3]]) -> BTreeMap<[u32; 2], Vec<(u32, bool)>> {
     sides
 }
 
-/// Orients triangles consistently with the majority of each piece; closed pieces outwards together with the pieces inside, where a
-/// cavity is oriented towards itself. Returns the number of turned triangles.
+/// Orients triangles consistently with the majority of each piece; closed pieces outwards together with the
+/// pieces inside, where a cavity is oriented towards itself. Returns the number of turned triangles.
 fn turn_alike(triangles: &mut [[u32; 3]], points: &[Vector3]) -> usize {
     let before = triangles.to_vec();
     let (pieces, closed) = turn_pieces(triangles);
@@ -528,8 +534,8 @@ fn turn_alike(triangles: &mut [[u32; 3]], points: &[Vector3]) -> usize {
     (0..before.len()).filter(|&t| before[t] != triangles[t]).count()
 }
 
-/// Orients the triangles of each piece consistently with their majority. Returns the pieces, and whether each is
-/// closed.
+/// Orients the triangles of each piece consistently with their majority. Returns the pieces, and whether each
+/// is closed.
 fn turn_pieces(triangles: &mut [[u32; 3]]) -> (Vec<Vec<u32>>, Vec<bool>) {
     let sides = sides_of(triangles);
     let mut turn: Vec<Option<bool>> = vec![None; triangles.len()];
@@ -573,8 +579,8 @@ fn turn_pieces(triangles: &mut [[u32; 3]]) -> (Vec<Vec<u32>>, Vec<bool>) {
     (pieces, closed)
 }
 
-/// Triangles of an edge that continue each other on one surface. Of more than two, those that bound the same inside: from each, turning
-/// about the edge into its inside, the next one that runs the other way.
+/// Triangles of an edge that continue each other on one surface. Of more than two, those that bound the same
+/// inside: from each, turning about the edge into its inside, the next one that runs the other way.
 fn joined_at(
     edge: [u32; 2],
     sides: &[(u32, bool)],

@@ -1,6 +1,6 @@
-//! A tetrahedral mesh under modification: points move, edges collapse or are halved, tets are removed. Each point
-//! stores its tets and its *sides*: the materials of its tets, and the outside if it is on the boundary. A point with
-//! two sides lies on a surface, with three on a line, with four it is a corner.
+//! A tetrahedral mesh under modification: points move, edges collapse or are halved, tets are removed. Each
+//! point stores its tets and its *sides*: the materials of its tets, and the outside if it is on the
+//! boundary. A point with two sides lies on a surface, with three on a line, with four it is a corner.
 
 use pliant_geometry::Vector3;
 
@@ -49,7 +49,8 @@ pub(crate) struct Complex {
     pub(crate) size: Vec<f64>,
 }
 
-/// Acoustic length of a tet [m]: 6 V / (Σ (2 A_a)²)^(1/2), negative if inverted (see `pliant_geometry::acoustic_length`).
+/// Acoustic length of a tet [m]: 6 V / (Σ (2 A_a)²)^(1/2), negative if inverted (see
+/// `pliant_geometry::acoustic_length`).
 #[inline]
 pub(crate) fn acoustic_length(x: [Vector3; 4]) -> f64 {
     let [u, v, w] = [x[1] - x[0], x[2] - x[0], x[3] - x[0]];
@@ -134,7 +135,8 @@ impl Complex {
         (self.points[p as usize] - self.points[q as usize]).norm() > self.longest(p, q)
     }
 
-    /// Whether moving a point to `place` makes one of its edges too long (except that to `without`), or lengthens one that already is.
+    /// Whether moving a point to `place` makes one of its edges too long (except that to `without`), or
+    /// lengthens one that already is.
     pub(crate) fn stretches(&self, point: u32, place: &Vector3, without: u32) -> bool {
         let from = &self.points[point as usize];
         let stretched = |&node: &u32| {
@@ -186,9 +188,10 @@ impl Complex {
         self.alive().map(|tet| self.part(tet)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Acoustic length of a single point if it were at `place` [m]: 1 / √(K / m) with its stiffness K = Σ V |∇N|² and its mass m = Σ V / 4
-    /// over its tets, of material with a wave speed of 1. A step above twice that is unstable, since K c² / m is a Rayleigh quotient of M⁻¹
-    /// K. In the ideal lattice it equals the acoustic length; points with few tets can have half of their tets' length.
+    /// Acoustic length of a single point if it were at `place` [m]: 1 / √(K / m) with its stiffness K = Σ
+    /// V |∇N|² and its mass m = Σ V / 4 over its tets, of material with a wave speed of 1. A step above twice
+    /// that is unstable, since K c² / m is a Rayleigh quotient of M⁻¹ K. In the ideal lattice it equals the
+    /// acoustic length; points with few tets can have half of their tets' length.
     pub(crate) fn nodal_length(&self, point: u32, place: &Vector3) -> f64 {
         let (mut stiffness, mut mass) = (0.0, 0.0);
         for &tet in &self.star[point as usize] {
@@ -265,7 +268,8 @@ impl Complex {
         new
     }
 
-    /// Puts a tet on each of some boundary faces, outward, with a new point at `position` as the apex; that gets what `point` has.
+    /// Puts a tet on each of some boundary faces, outward, with a new point at `position` as the apex; that
+    /// gets what `point` has.
     pub(crate) fn cap(&mut self, point: u32, faces: &[[u32; 3]], position: Vector3) {
         let apex = self.points.len() as u32;
         self.points.push(position);
@@ -304,9 +308,9 @@ impl Complex {
         self.points[kept as usize] = position;
     }
 
-    /// Whether joining the ends of an edge leaves the body and each of its materials as they hang together: the link
-    /// condition (Dey, Edelsbrunner, Guha, Nekhayev 1999) in the body and in every material, each closed by a ghost
-    /// point on its boundary.
+    /// Whether joining the ends of an edge leaves the body and each of its materials as they hang together:
+    /// the link condition (Dey, Edelsbrunner, Guha, Nekhayev 1999) in the body and in every material, each
+    /// closed by a ghost point on its boundary.
     pub(crate) fn may_collapse(&self, u: u32, v: u32) -> bool {
         let stars = [u, v].map(|point| self.star[point as usize].as_slice());
         let materials: Sides =

@@ -1,6 +1,7 @@
-//! Cuts a mesh along a surface: separates inner materials from the whole body, and opens gaps bridged by edges with both
-//! ends inside. Points near the surface first move onto it. Then every edge that still crosses it is halved there, the
-//! longest first. The mesh stays conforming in any order, and no edge crosses the surface afterwards.
+//! Cuts a mesh along a surface: separates inner materials from the whole body, and opens gaps bridged by
+//! edges with both ends inside. Points near the surface first move onto it. Then every edge that still
+//! crosses it is halved there, the longest first. The mesh stays conforming in any order, and no edge crosses
+//! the surface afterwards.
 
 use pliant_geometry::Vector3;
 
@@ -24,7 +25,8 @@ const LEAST_AFTER_MOVE: f64 = 0.2;
 /// it.
 const GAP: f64 = 0.1;
 
-/// A tet that no cut gave to a material stays in the first one if that is not farther than this, in lattice constants.
+/// A tet that no cut gave to a material stays in the first one if that is not farther than this, in lattice
+/// constants.
 const FAR: f64 = 0.25;
 
 /// Where a surface crosses an edge.
@@ -126,7 +128,8 @@ struct Surface<'a> {
 }
 
 impl Surface<'_> {
-    /// Cuts the mesh along the surface, given the function at its points; the side of each tet: positive inside.
+    /// Cuts the mesh along the surface, given the function at its points; the side of each tet: positive
+    /// inside.
     fn cut(&self, complex: &mut Complex, mut values: Vec<f64>) -> Vec<(u32, f64)> {
         self.move_points(complex, &mut values);
         let mut crossings = self.crossings(complex, &values);

@@ -1,7 +1,7 @@
-//! Flips of a tetrahedral mesh: the tets around an edge become those over the best triangulation of its ring (Klincsek
-//! 1980; 3-2, 4-4 and longer rings alike, open rings on the boundary), or two tets with a common face become three around a
-//! new edge. A flip is accepted if its worst tet improves, within one material; on the boundary also only if the new edge
-//! follows the surface.
+//! Flips of a tetrahedral mesh: the tets around an edge become those over the best triangulation of its ring
+//! (Klincsek 1980; 3-2, 4-4 and longer rings alike, open rings on the boundary), or two tets with a common
+//! face become three around a new edge. A flip is accepted if its worst tet improves, within one material; on
+//! the boundary also only if the new edge follows the surface.
 
 use crate::tets::complex::{Complex, acoustic_length};
 
@@ -15,8 +15,8 @@ const GAIN: f64 = 1.0 + 1e-3;
 pub(crate) type Follows<'a> = dyn Fn(&Complex, [u32; 2], [u32; 2]) -> bool + 'a;
 
 impl Complex {
-    /// Flips one tet away if that lengthens the worst acoustic length of the tets that change: its edges first, then its
-    /// faces.
+    /// Flips one tet away if that lengthens the worst acoustic length of the tets that change: its edges
+    /// first, then its faces.
     pub(crate) fn flip(&mut self, tet: u32, follows: &Follows<'_>) -> bool {
         let nodes = self.tets[tet as usize];
         (0..4).any(|i| (i + 1..4).any(|j| self.remove_edge([nodes[i], nodes[j]], follows)))
@@ -84,8 +84,8 @@ impl Complex {
         star.copied().filter(|&tet| self.tets[tet as usize].contains(&q)).collect()
     }
 
-    /// The nodes opposite to an edge, right-handed about the direction from p to q; `None` unless the tets are one fan of
-    /// one material that may be flipped.
+    /// The nodes opposite to an edge, right-handed about the direction from p to q; `None` unless the tets
+    /// are one fan of one material that may be flipped.
     fn ring(&self, around: &[u32], p: u32, q: u32) -> Option<Ring> {
         let first = *around.first()?;
         if around.len() > LONGEST_RING

@@ -1,6 +1,6 @@
-//! Tets of several sizes in the body of a field: the required sizes of the lattice cubes (`octree.rs`), and the lattice cut along the
-//! surface. Sizes are the requested edge times powers of two: this edge along the surface, longer ones inside and shorter ones in labels
-//! and places on request.
+//! Tets of several sizes in the body of a field: the required sizes of the lattice cubes (`octree.rs`), and
+//! the lattice cut along the surface. Sizes are the requested edge times powers of two: this edge along the
+//! surface, longer ones inside and shorter ones in labels and places on request.
 
 use std::collections::BTreeSet;
 
@@ -22,8 +22,9 @@ use crate::tets::topology::in_large_components;
 /// Cubes outside the body may be this many doublings larger than the edge.
 const LARGEST_OUTSIDE: usize = 3;
 
-/// Cubes across a thin part that is torn by larger ones. With 1.71 a lattice point is always left inside: points that are nearer to a side
-/// than 0.357 of a cube may move onto it, and no edge of a tet is longer than a cube.
+/// Cubes across a thin part that is torn by larger ones. With 1.71 a lattice point is always left inside:
+/// points that are nearer to a side than 0.357 of a cube may move onto it, and no edge of a tet is longer
+/// than a cube.
 const CELLS_ACROSS: f64 = 1.75;
 
 /// Limit of cubes examined for a size.
@@ -58,7 +59,8 @@ impl Levels {
         Ok(Self { base, inner: base + doublings as usize, protected: protected.collect() })
     }
 
-    /// Wants smaller cubes round tears, at least halved ones and enough of them across the thin part; whether any are.
+    /// Wants smaller cubes round tears, at least halved ones and enough of them across the thin part; whether
+    /// any are.
     pub(crate) fn close(
         &self,
         request: &OrganTets,

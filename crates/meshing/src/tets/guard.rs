@@ -1,5 +1,6 @@
-//! Keeps the boundary of a mesh that changes free of intersections: a change is accepted if its faces neither cross other faces nor come
-//! nearer to them than a clearance. It starts from a boundary without intersections. Crossings are those of `crossings.rs`.
+//! Keeps the boundary of a mesh that changes free of intersections: a change is accepted if its faces neither
+//! cross other faces nor come nearer to them than a clearance. It starts from a boundary without
+//! intersections. Crossings are those of `crossings.rs`.
 
 use std::collections::HashMap;
 
@@ -123,7 +124,8 @@ impl Guard {
         self.lets(complex, &[[a, b, p], [b, a, q]], &at, &|face| face.contains(&p) && face.contains(&q))
     }
 
-    /// Whether faces keep clear of all others and of each other; `at` gives their corners, `is_replaced` the faces that they replace.
+    /// Whether faces keep clear of all others and of each other; `at` gives their corners, `is_replaced` the
+    /// faces that they replace.
     fn lets(
         &self,
         complex: &Complex,

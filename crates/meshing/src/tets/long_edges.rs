@@ -1,6 +1,7 @@
-//! Edges that are longer than [`LONGEST`] times the local lattice constant are halved before the optimiser starts, which makes none itself.
-//! Where cubes of two sizes meet, two corners of a large cube may each have small cubes elsewhere: the edge between is twice as long as
-//! either asks for, and cuts along surfaces shorten what is asked for at its points, too.
+//! Edges that are longer than [`LONGEST`] times the local lattice constant are halved before the optimiser
+//! starts, which makes none itself. Where cubes of two sizes meet, two corners of a large cube may each have
+//! small cubes elsewhere: the edge between is twice as long as either asks for, and cuts along surfaces
+//! shorten what is asked for at its points, too.
 
 use crate::input::surfaces::Surfaces;
 use crate::tets::complex::{Complex, LONGEST};
@@ -15,7 +16,8 @@ const LEAST_AFTER_MOVE: f64 = 0.2;
 /// How far new points may be from their surface, in lattice constants.
 const REACH: f64 = 0.5;
 
-/// Halves edges that are too long, the longest as compared with its limit first. Points between sides go there. How many were halved.
+/// Halves edges that are too long, the longest as compared with its limit first. Points between sides go
+/// there. How many were halved.
 pub(crate) fn halve_long_edges(
     complex: &mut Complex,
     surfaces: &Surfaces<'_>,

@@ -1,6 +1,7 @@
-//! Parts of a body that its mesh lacks. The body as given, voxels or what triangles enclose, is sampled on a grid. Samples in no tet of
-//! the mesh form a thin layer under curved surfaces everywhere, and lumps where a part is lost: thinner than the cells, torn off, or too
-//! small. A lump has samples far from the mesh; the rest of it follows from there up to where it meets the mesh.
+//! Parts of a body that its mesh lacks. The body as given, voxels or what triangles enclose, is sampled on a
+//! grid. Samples in no tet of the mesh form a thin layer under curved surfaces everywhere, and lumps where a
+//! part is lost: thinner than the cells, torn off, or too small. A lump has samples far from the mesh; the
+//! rest of it follows from there up to where it meets the mesh.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -62,8 +63,8 @@ impl Samples {
         }
     }
 
-    /// Inside triangles, on a grid of `step` [m] or more. Rows along x are cut at the triangles, so parts thinner than a step count
-    /// with their volume on average.
+    /// Inside triangles, on a grid of `step` [m] or more. Rows along x are cut at the triangles, so parts
+    /// thinner than a step count with their volume on average.
     fn within(points: &[Vector3], triangles: &[[u32; 3]], step: f64) -> Option<Self> {
         let start = *points.first()?;
         let (low, high) = points.iter().fold((start, start), |(low, high), x| (low.inf(x), high.sup(x)));
@@ -119,8 +120,8 @@ impl Samples {
         volumes
     }
 
-    /// Volume of each material among the samples inside a surface [m³]; the outside there counts to the material that most of the samples
-    /// round it have.
+    /// Volume of each material among the samples inside a surface [m³]; the outside there counts to the
+    /// material that most of the samples round it have.
     pub(crate) fn volumes_with_neighbours(&self, inside: &[bool]) -> Vec<f64> {
         let mut volumes = self.volumes(|at| inside[at]);
         for at in (0..inside.len()).filter(|&at| inside[at] && self.materials[at] == 0) {
@@ -192,7 +193,8 @@ impl Samples {
                 if distances[at] > distances[farthest] {
                     farthest = at;
                 }
-                // Through the lump in every direction, over gaps that rows leave in parts as thin as a step; then only towards the mesh.
+                // Through the lump in every direction, over gaps that rows leave in parts as thin as a step;
+                // then only towards the mesh.
                 let lump = self.around(at, 2).filter(|&(next, _)| distances[next] > near);
                 let rest = self.around(at, 1).filter(|&(next, _)| distances[next] < distances[at]);
                 for (next, _) in lump.chain(rest) {
@@ -208,7 +210,8 @@ impl Samples {
         lost
     }
 
-    /// Distances [m] through the body from the samples that the mesh holds; infinite for loose pieces (Dijkstra 1959).
+    /// Distances [m] through the body from the samples that the mesh holds; infinite for loose pieces
+    /// (Dijkstra 1959).
     fn distances(&self, covered: &[bool]) -> Vec<f32> {
         let mut distances = vec![f32::INFINITY; covered.len()];
         let mut ahead = BinaryHeap::new();
@@ -257,7 +260,8 @@ impl Samples {
     }
 }
 
-/// Where the rows of a grid along i run within triangles [voxels], row by row. `off` shifts a row along j and k [voxels].
+/// Where the rows of a grid along i run within triangles [voxels], row by row. `off` shifts a row along j and
+/// k [voxels].
 fn inner_rows(
     grid: &Grid,
     points: &[Vector3],
@@ -364,7 +368,8 @@ mod tests {
         }
     }
 
-    /// Two boxes with a neck between, of which the mesh is one tet in the first one, and a layer of it is not in the mesh.
+    /// Two boxes with a neck between, of which the mesh is one tet in the first one, and a layer of it is not
+    /// in the mesh.
     #[test]
     fn a_lump_is_lost_and_a_thin_layer_is_not() {
         let (points, triangles) = cuboid([0.0; 3], [0.02, 0.02, 0.02]);

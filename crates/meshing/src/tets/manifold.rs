@@ -1,8 +1,9 @@
-//! Repairs a body that touches itself: where a gap is thinner than the cells, its two sides share points or edges. A point is doubled
-//! for every group of its tets connected through faces. An edge with more than two boundary faces is halved first, which gives each
-//! side its own point. Where two stretches of the boundary meet in a point whose tets are connected (a sheet without thickness), one of
-//! them gets its own point slightly further out, with a tet on each of its faces, or the point is taken off. Points in one place then move apart, each into its own
-//! tets, so that the sides have a gap between them.
+//! Repairs a body that touches itself: where a gap is thinner than the cells, its two sides share points or
+//! edges. A point is doubled for every group of its tets connected through faces. An edge with more than two
+//! boundary faces is halved first, which gives each side its own point. Where two stretches of the boundary
+//! meet in a point whose tets are connected (a sheet without thickness), one of them gets its own point
+//! slightly further out, with a tet on each of its faces, or the point is taken off. Points in one place then
+//! move apart, each into its own tets, so that the sides have a gap between them.
 
 use std::collections::BTreeMap;
 
@@ -77,7 +78,8 @@ fn move_apart(complex: &mut Complex) {
     }
 }
 
-/// Moves a point of the boundary into its tets, in the direction that leads deepest behind all faces round it.
+/// Moves a point of the boundary into its tets, in the direction that leads deepest behind all faces round
+/// it.
 fn move_inwards(complex: &mut Complex, point: u32) {
     let (here, size) = (complex.points[point as usize], complex.size[point as usize]);
     let normal = |face: [u32; 3]| {
@@ -139,8 +141,8 @@ fn fans(complex: &Complex, point: u32) -> Vec<Vec<[u32; 3]>> {
     fans
 }
 
-/// Gives one of the fans round a point a new point further out, and a tet on each of its faces; of all fans and places the one whose
-/// worst new tet is best. False where every one would turn a tet over.
+/// Gives one of the fans round a point a new point further out, and a tet on each of its faces; of all fans
+/// and places the one whose worst new tet is best. False where every one would turn a tet over.
 fn part_pinch(complex: &mut Complex, point: u32) -> bool {
     let (here, size) = (complex.points[point as usize], complex.size[point as usize]);
     let mut best: Option<(f64, Vec<[u32; 3]>, Vector3)> = None;
@@ -218,7 +220,8 @@ fn double_points(complex: &mut Complex, points: std::ops::Range<u32>) -> usize {
     added
 }
 
-/// Tets round a point in groups that hang together through faces with the point; the group of the first tet first.
+/// Tets round a point in groups that hang together through faces with the point; the group of the first tet
+/// first.
 fn groups(complex: &Complex, point: u32) -> Vec<Vec<u32>> {
     let star = &complex.star[point as usize];
     let mut rest: Vec<u32> = star.clone();
@@ -272,7 +275,8 @@ mod tests {
         }
     }
 
-    /// A ring of tets round an edge with two of them taken out opposite each other: its ends hold the halves together.
+    /// A ring of tets round an edge with two of them taken out opposite each other: its ends hold the halves
+    /// together.
     #[test]
     fn an_edge_between_halves_that_hang_together_elsewhere_is_halved() {
         let around = |at: usize| {

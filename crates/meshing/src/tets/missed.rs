@@ -1,7 +1,7 @@
-//! Features of a body that its mesh misses: parts and gaps thinner than the lattice, with their location and thickness, and other
-//! surface points far from the mesh.
-//! A part is thin if the straight line through it, from one point of the surface to the opposite wall, is shorter than the lattice
-//! constant. It is missed if the middle of this line is not in the mesh. Gaps are treated in the same way in the background.
+//! Features of a body that its mesh misses: parts and gaps thinner than the lattice, with their location and
+//! thickness, and other surface points far from the mesh. A part is thin if the straight line through it,
+//! from one point of the surface to the opposite wall, is shorter than the lattice constant. It is missed if
+//! the middle of this line is not in the mesh. Gaps are treated in the same way in the background.
 
 use std::fmt;
 
@@ -17,14 +17,16 @@ use crate::tets::voxels::Voxels;
 /// Steps along the way through a thin part, per lattice constant.
 const STEPS: usize = 20;
 
-/// Walls face each other if the cosine between their normals is below this: within 45°. Rims and notches do not count.
+/// Walls face each other if the cosine between their normals is below this: within 45°. Rims and notches do
+/// not count.
 const OPPOSITE: f64 = -0.7;
 
-/// The middle of a thin part is missed if it is this far from the mesh, in lattice constants; if nearer, the mesh only cuts a
-/// crest.
+/// The middle of a thin part is missed if it is this far from the mesh, in lattice constants; if nearer, the
+/// mesh only cuts a crest.
 const MARGIN: f64 = 0.25;
 
-/// A feature of a body that its mesh misses or misplaces. Locations in metres, RAS if the body comes from an image.
+/// A feature of a body that its mesh misses or misplaces. Locations in metres, RAS if the body comes from an
+/// image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Missed {
@@ -84,8 +86,9 @@ pub enum Missed {
 }
 
 impl Missed {
-    /// How far [m] the surface of a body may be from a mesh with cells of `edge` [m] before it is reported: half an edge of tets; steps of
-    /// cubes stay behind the body by up to half of their diagonal, and immersed ones hold all of it.
+    /// How far [m] the surface of a body may be from a mesh with cells of `edge` [m] before it is reported:
+    /// half an edge of tets; steps of cubes stay behind the body by up to half of their diagonal, and
+    /// immersed ones hold all of it.
     pub(crate) fn allowed(mesh: &Mesh, edge: f64) -> f64 {
         match mesh.block(CellKind::Hex) {
             None => edge / 2.0,
@@ -94,9 +97,9 @@ impl Missed {
         }
     }
 
-    /// Features of the body of a field that a mesh with cells of `edge` [m] misses: the worst thin part, the worst thin gap, and the
-    /// farthest point of the surface if it is farther than `allowed` [m] and no thin part explains it, otherwise that of the mesh
-    /// boundary.
+    /// Features of the body of a field that a mesh with cells of `edge` [m] misses: the worst thin part, the
+    /// worst thin gap, and the farthest point of the surface if it is farther than `allowed` [m] and no thin
+    /// part explains it, otherwise that of the mesh boundary.
     ///
     /// # Errors
     /// If the box of the field is empty or not finite.
@@ -252,7 +255,8 @@ mod tests {
     use super::*;
     use crate::{Anatomy, OrganTets, Stuffing};
 
-    /// Two slabs: 30 mm of body with a plate `thickness` thick on it, sticking out to x = 60 mm; a gap of `gap` between two blocks.
+    /// Two slabs: 30 mm of body with a plate `thickness` thick on it, sticking out to x = 60 mm; a gap of
+    /// `gap` between two blocks.
     struct Plates {
         plate: f64,
         gap: f64,

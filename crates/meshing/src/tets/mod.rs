@@ -1,4 +1,5 @@
-//! Tetrahedra and cubes in a body: lattice, stuffing, cuts between materials, improvement, and what a mesh misses.
+//! Tetrahedra and cubes in a body: lattice, stuffing, cuts between materials, improvement, and what a mesh
+//! misses.
 
 pub(crate) mod complex;
 pub(crate) mod cut;

@@ -1,5 +1,6 @@
-//! The materials near a point of a body made of voxels. Each field of theirs is a signed distance that is positive in a box; where the box
-//! is far, the point is in another material. Without it, cutting out n materials takes n² fields at each point.
+//! The materials near a point of a body made of voxels. Each field of theirs is a signed distance that is
+//! positive in a box; where the box is far, the point is in another material. Without it, cutting out n
+//! materials takes n² fields at each point.
 
 use pliant_geometry::Vector3;
 
@@ -22,7 +23,8 @@ pub(crate) struct NearMaterials {
 }
 
 impl NearMaterials {
-    /// Of a body for cells of `edge` [m]; a material counts in its box and an edge round it. In bodies of functions each counts everywhere.
+    /// Of a body for cells of `edge` [m]; a material counts in its box and an edge round it. In bodies of
+    /// functions each counts everywhere.
     pub(crate) fn new(anatomy: &Anatomy<'_>, edge: f64) -> Self {
         let materials = anatomy.labels().len();
         let everywhere = Self {

@@ -1,8 +1,9 @@
-//! A body-centred cubic lattice of cubes of several sizes, after Labelle and Shewchuk (2007). Cubes are halved where cells must be smaller;
-//! neighbours, also across edges and corners, differ by at most one halving. Equal cubes have the tets of the uniform lattice between them,
-//! halved where one of their edges is. A cube and four smaller ones have pyramids from the centres over the four squares between them, each
-//! halved along the diagonal that starts in the middle of the larger square. Cubes of level 0 are the smallest; those of level n are 2ⁿ as
-//! long.
+//! A body-centred cubic lattice of cubes of several sizes, after Labelle and Shewchuk (2007). Cubes are
+//! halved where cells must be smaller; neighbours, also across edges and corners, differ by at most one
+//! halving. Equal cubes have the tets of the uniform lattice between them, halved where one of their edges
+//! is. A cube and four smaller ones have pyramids from the centres over the four squares between them, each
+//! halved along the diagonal that starts in the middle of the larger square. Cubes of level 0 are the
+//! smallest; those of level n are 2ⁿ as long.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -32,8 +33,8 @@ pub(crate) struct GradedLattice {
 }
 
 impl Octree {
-    /// Cubes of level `top` over a box and at least one more on every side; level 0 has the edge `finest` [m]. Some corner of the regular
-    /// lattice lies at `through`.
+    /// Cubes of level `top` over a box and at least one more on every side; level 0 has the edge `finest`
+    /// [m]. Some corner of the regular lattice lies at `through`.
     pub(crate) fn over(low: &Vector3, high: &Vector3, finest: f64, top: usize, through: &Vector3) -> Self {
         let largest = finest * f64::from(1 << top);
         let centre = (low + high) / 2.0;
@@ -177,7 +178,8 @@ impl Octree {
         GradedLattice { points, sizes: nodes.sizes, tets }
     }
 
-    /// Four tets round the way between the centres of two equal cubes, or up to eight where edges of the square between are halved.
+    /// Four tets round the way between the centres of two equal cubes, or up to eight where edges of the
+    /// square between are halved.
     fn towards_equal(&self, level: usize, cube: Cube, axis: usize, nodes: &Nodes, tets: &mut Vec<[u32; 4]>) {
         let mut other = cube;
         other[axis] += 1;
@@ -290,8 +292,8 @@ mod tests {
     use super::*;
     use crate::tets::complex::acoustic_length;
 
-    /// Cubes of three sizes: every face that is not on the rim of the box has two tets, volumes add up, and no tet is below 0.89 of the
-    /// ideal one of the smallest cube at its corners.
+    /// Cubes of three sizes: every face that is not on the rim of the box has two tets, volumes add up, and
+    /// no tet is below 0.89 of the ideal one of the smallest cube at its corners.
     #[test]
     fn cubes_of_several_sizes_make_a_lattice_that_fits() {
         let mut tree = Octree::over(&Vector3::zeros(), &Vector3::repeat(3.0), 0.25, 2, &Vector3::zeros());
@@ -314,7 +316,8 @@ mod tests {
             }
         }
         assert!(least > 0.89, "{least}");
-        // Faces on the rim: two corners of the box's square and a centre. They bound what is missing of the outermost cubes.
+        // Faces on the rim: two corners of the box's square and a centre. They bound what is missing of the
+        // outermost cubes.
         let [low, high] = [0, 1].map(|end| {
             let counts = tree.counts(2).map(|n| end * n);
             tree.place(2, counts, [0.0; 3])

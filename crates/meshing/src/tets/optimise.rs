@@ -1,7 +1,8 @@
-//! Improves a tetrahedral mesh for explicit dynamics, where the smallest acoustic length sets the time step. Tets below a rising threshold
-//! lose an edge, are flipped or change their material. Then points move to improve their worst tet. Points between sides stay between
-//! them. No edge exceeds 1.6 lattice constants. Lengths are measured in the local lattice constant, which may be graded. Deterministic:
-//! work follows the order of numbers, and a fixed sequence rotates the directions of trial moves.
+//! Improves a tetrahedral mesh for explicit dynamics, where the smallest acoustic length sets the time step.
+//! Tets below a rising threshold lose an edge, are flipped or change their material. Then points move to
+//! improve their worst tet. Points between sides stay between them. No edge exceeds 1.6 lattice constants.
+//! Lengths are measured in the local lattice constant, which may be graded. Deterministic: work follows the
+//! order of numbers, and a fixed sequence rotates the directions of trial moves.
 
 use std::cell::OnceCell;
 
@@ -16,8 +17,8 @@ use crate::tets::guard::Guard;
 /// Threshold of the first round, in ideal acoustic lengths.
 const FIRST_THRESHOLD: f64 = 0.3;
 
-/// Rounds aim this much higher than the target, because the critical time step depends on the number of tets near the
-/// smallest length. With 1 it was 3 % lower for the brain phantom at 10 mm.
+/// Rounds aim this much higher than the target, because the critical time step depends on the number of tets
+/// near the smallest length. With 1 it was 3 % lower for the brain phantom at 10 mm.
 const AIM: f64 = 1.07;
 
 /// The threshold reaches its goal in this part of the rounds.
@@ -40,15 +41,15 @@ const FIT_REACH: f64 = 0.25;
 /// Faces that follow their surface this well (root mean square, in lattice constants) stay.
 const FIT_ENOUGH: f64 = 0.01;
 
-/// If the target is not reached, points around bad tets may leave their surfaces by this, in lattice constants; the last
-/// value applies only if the target itself is not reached.
+/// If the target is not reached, points around bad tets may leave their surfaces by this, in lattice
+/// constants; the last value applies only if the target itself is not reached.
 const SLACKS: [f64; 3] = [0.03, 0.06, 0.12];
 
 /// Boundary edges may flip if the new one is at most this far from the surface, in lattice constants.
 const FLIP_OFF: f64 = 0.03;
 
-/// Inner points are moved at last where their worst tet is below this, in ideal acoustic lengths: it raised τ of the liver phantom
-/// at 10 mm from 0.63 to 0.66 on average.
+/// Inner points are moved at last where their worst tet is below this, in ideal acoustic lengths: it raised τ
+/// of the liver phantom at 10 mm from 0.63 to 0.66 on average.
 const POLISH: f64 = 0.9;
 
 /// Volumes within this fraction of their target are not adjusted.
@@ -108,8 +109,9 @@ impl<'a> Optimiser<'a> {
         }
     }
 
-    /// Up to `rounds` rounds towards a least acoustic length of `target` × ideal, then surfaces shifted until the mesh encloses the volumes
-    /// [m³] of the whole and of the inner materials, as far as these are known; `volumes` gives them for the mesh before.
+    /// Up to `rounds` rounds towards a least acoustic length of `target` × ideal, then surfaces shifted until
+    /// the mesh encloses the volumes [m³] of the whole and of the inner materials, as far as these are known;
+    /// `volumes` gives them for the mesh before.
     pub(crate) fn run(
         &mut self,
         target: f64,
@@ -235,8 +237,8 @@ impl<'a> Optimiser<'a> {
         bad.into_iter().map(|(_, tet)| tet).collect()
     }
 
-    /// Removes tets of the boundary that the body does not need to hang together: those below half the threshold, and tips that
-    /// are light for their stiffness.
+    /// Removes tets of the boundary that the body does not need to hang together: those below half the
+    /// threshold, and tips that are light for their stiffness.
     fn peel(&mut self, threshold: f64) {
         let mut peeled = 0;
         let short = |node: &u32| self.nodal_part(*node, &self.complex.points[*node as usize]) < threshold;
@@ -257,7 +259,8 @@ impl<'a> Optimiser<'a> {
         self.done.peeled += peeled;
     }
 
-    /// Three boundary faces: a tip. Two: a wedge, if the edge that its removal lays open is not on the boundary yet.
+    /// Three boundary faces: a tip. Two: a wedge, if the edge that its removal lays open is not on the
+    /// boundary yet.
     fn may_peel(&self, tet: u32) -> bool {
         let nodes = self.complex.tets[tet as usize];
         let is_open = |corner: usize| {
@@ -284,7 +287,8 @@ impl<'a> Optimiser<'a> {
         }
     }
 
-    /// Moves tets below half the threshold, flat ones between materials, to the material with more of their surface.
+    /// Moves tets below half the threshold, flat ones between materials, to the material with more of their
+    /// surface.
     fn hand_over(&mut self, threshold: f64) {
         let mut given = 0;
         for tet in self.below(threshold / 2.0) {
@@ -413,7 +417,8 @@ impl<'a> Optimiser<'a> {
         best.map(|(_, place)| place)
     }
 
-    /// Parts of the ideal length that a node at `place` is responsible for: the least of its tets, and its own.
+    /// Parts of the ideal length that a node at `place` is responsible for: the least of its tets, and its
+    /// own.
     fn parts_round(&self, node: u32, place: &Vector3) -> [f64; 2] {
         [self.star_min(node, place, u32::MAX, 0.0), self.nodal_part(node, place)]
     }
@@ -423,8 +428,8 @@ impl<'a> Optimiser<'a> {
         self.complex.nodal_length(node, place) / self.complex.ideal([node; 4])
     }
 
-    /// Least acoustic length of the tets round a node if it were at `place` as a part of the ideal, leaving out those with another node;
-    /// stops once it is not above `floor`.
+    /// Least acoustic length of the tets round a node if it were at `place` as a part of the ideal, leaving
+    /// out those with another node; stops once it is not above `floor`.
     fn star_min(&self, node: u32, place: &Vector3, without: u32, floor: f64) -> f64 {
         let mut least = f64::INFINITY;
         for &tet in &self.complex.star[node as usize] {
@@ -441,8 +446,8 @@ impl<'a> Optimiser<'a> {
         least
     }
 
-    /// The position nearest to `place` between the sides of a node, if it is on the same side of the body: the normals
-    /// differ by less than 90°. The other side of a gap or of a thin lobe may be nearer.
+    /// The position nearest to `place` between the sides of a node, if it is on the same side of the body:
+    /// the normals differ by less than 90°. The other side of a gap or of a thin lobe may be nearer.
     fn project(&self, node: u32, place: Vector3) -> Option<Vector3> {
         self.project_from(node, place, &OnceCell::new())
     }
@@ -471,8 +476,8 @@ impl<'a> Optimiser<'a> {
         (own_look.dot(&its_look) > 0.0).then_some(there)
     }
 
-    /// Slides points along their surface to where its facets follow the field best, as long as no tet falls below the
-    /// target; `reach` in lattice constants. What falls short of a crest moves onto it.
+    /// Slides points along their surface to where its facets follow the field best, as long as no tet falls
+    /// below the target; `reach` in lattice constants. What falls short of a crest moves onto it.
     fn fit(&mut self, target: f64, reach: f64) {
         for node in 0..self.complex.points.len() as u32 {
             if self.complex.sides[node as usize].count_ones() == 2 {
@@ -517,8 +522,8 @@ impl<'a> Optimiser<'a> {
         }
     }
 
-    /// Sum of area × mean squared distance from the surface over the faces round a node if it were at `place` [m⁴], taken at
-    /// the middle of each face and of its edges at the node; and the area [m²].
+    /// Sum of area × mean squared distance from the surface over the faces round a node if it were at `place`
+    /// [m⁴], taken at the middle of each face and of its edges at the node; and the area [m²].
     fn misfit(&self, node: u32, place: &Vector3, faces: &[[u32; 3]]) -> [f64; 2] {
         let sides = self.complex.sides[node as usize];
         let of_face = |face: &[u32; 3]| {
@@ -537,7 +542,8 @@ impl<'a> Optimiser<'a> {
         faces.iter().map(of_face).fold([0.0; 2], |[misfit, all], [own, area]| [misfit + own, all + area])
     }
 
-    /// Moves the chosen points whose worst tet is below the threshold to the best of some places round them; `reach` in lattice constants.
+    /// Moves the chosen points whose worst tet is below the threshold to the best of some places round them;
+    /// `reach` in lattice constants.
     fn relocate(&mut self, threshold: f64, reach: f64, chosen: &dyn Fn(Sides) -> bool) {
         let mut parts = self.parts();
         for node in 0..self.complex.points.len() as u32 {
@@ -596,8 +602,8 @@ pub(crate) fn directions() -> impl Iterator<Item = Vector3> {
     grid.filter(|direction| *direction != Vector3::zeros()).map(|direction| direction.normalize())
 }
 
-/// Volume [m³] and area [m²] of the whole and of each inner material; the area of a material excludes the boundary of
-/// the whole.
+/// Volume [m³] and area [m²] of the whole and of each inner material; the area of a material excludes the
+/// boundary of the whole.
 fn measure(complex: &Complex, materials: usize) -> Vec<[f64; 2]> {
     let mut measured = vec![[0.0; 2]; materials];
     let mut faces: Vec<([u32; 3], u8)> = Vec::new();

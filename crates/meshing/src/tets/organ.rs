@@ -1,6 +1,7 @@
-//! From an anatomy to tetrahedra that an explicit solver can take large steps with: isosurface stuffing of the whole body,
-//! its materials cut out, banks that touch parted, then the optimiser. Rules and thresholds: the project's meshing
-//! specification 1.3. Cells of several sizes, and cells made smaller until a distance is held: `grading.rs`.
+//! From an anatomy to tetrahedra that an explicit solver can take large steps with: isosurface stuffing of
+//! the whole body, its materials cut out, banks that touch parted, then the optimiser. Rules and thresholds:
+//! the project's meshing specification 1.3. Cells of several sizes, and cells made smaller until a distance
+//! is held: `grading.rs`.
 
 use std::fmt;
 
@@ -50,7 +51,8 @@ const REACH: f64 = 3.0;
 const RAW_BEYOND: f64 = 1.2;
 
 impl OrganTets {
-    /// Fills an anatomy with tetrahedra; the label of each is its cell data `label`. `progress` hears fractions from 0 to
+    /// Fills an anatomy with tetrahedra; the label of each is its cell data `label`. `progress` hears
+    /// fractions from 0 to
     /// 1. The result does not depend on the number of threads.
     pub fn mesh(&self, anatomy: &Anatomy<'_>, progress: &dyn Fn(f64)) -> Result<OrganMesh, MeshingError> {
         if !(0.0..1.0).contains(&self.target) {
@@ -140,7 +142,8 @@ impl OrganTets {
         }
     }
 
-    /// A body filled with tets of several sizes, smaller ones than `wanted` where thin parts would be torn; and the lattice.
+    /// A body filled with tets of several sizes, smaller ones than `wanted` where thin parts would be torn;
+    /// and the lattice.
     fn whole(
         &self,
         anatomy: &Anatomy<'_>,
@@ -191,7 +194,8 @@ impl OrganTets {
         let mended = mend(&mut complex);
         progress(0.1);
         let samples = Samples::of(anatomy, self.edge);
-        // A mesh has the surface of its body within half an edge, a smooth one of voxels within their diagonal.
+        // A mesh has the surface of its body within half an edge, a smooth one of voxels within their
+        // diagonal.
         let far = (self.edge / 2.0).max(anatomy.resolution());
         let lost = |complex: &Complex| {
             samples.as_ref().map_or_else(Vec::new, |own| own.lost(&own.within_tets(complex), far))
@@ -227,8 +231,9 @@ impl OrganTets {
         Ok(OrganMesh { mesh, report })
     }
 
-    /// Halves long edges and optimises; how many were halved, and the steps. Few bodies have banks that could meet, and guarding all moves
-    /// takes long: it is done where the body touched itself (`is_tight`), or where the result intersects itself without.
+    /// Halves long edges and optimises; how many were halved, and the steps. Few bodies have banks that could
+    /// meet, and guarding all moves takes long: it is done where the body touched itself (`is_tight`), or
+    /// where the result intersects itself without.
     fn improved(
         &self,
         mut complex: Complex,
@@ -277,7 +282,8 @@ fn finer(wanted: &mut Wanted, tree: &Octree, measured: &Measured, distance: f64)
     wanted.len() > before
 }
 
-/// Volume of the whole and of each inner material [m³], where known, without what a mesh lacks: the rest must not grow for it.
+/// Volume of the whole and of each inner material [m³], where known, without what a mesh lacks: the rest must
+/// not grow for it.
 fn wanted_volumes(anatomy: &Anatomy<'_>, lost: &[LostPart]) -> Vec<Option<f64>> {
     let mut volumes = anatomy.volumes().to_vec();
     for part in lost {
@@ -741,7 +747,8 @@ impl fmt::Display for TetReport {
 mod tests {
     use super::*;
 
-    /// A small cell among even ones costs as much as it is smaller; where small cells are everywhere, no place does.
+    /// A small cell among even ones costs as much as it is smaller; where small cells are everywhere, no
+    /// place does.
     #[test]
     fn a_place_costs_what_its_cells_shorten_the_step_by() {
         let row = |least: f64| -> Vec<(Vector3, f64)> {

@@ -12,17 +12,19 @@ pub(crate) const SMALLEST_PART: f64 = 1.0 / 64.0;
 pub struct OrganTets {
     /// Lattice constant [m]: the long edges of the inner tetrahedra; the short ones are √3/2 of it.
     pub edge: f64,
-    /// Lattice constant inside, away from the surface [m], if larger: the largest `edge` × 2ⁿ up to this value.
+    /// Lattice constant inside, away from the surface [m], if larger: the largest `edge` × 2ⁿ up to this
+    /// value.
     pub inner_edge: Option<f64>,
-    /// Labels with smaller cells, and their lattice constant [m]: the largest `edge` / 2ⁿ that is not above it.
+    /// Labels with smaller cells, and their lattice constant [m]: the largest `edge` / 2ⁿ that is not above
+    /// it.
     pub protect: Vec<(i32, f64)>,
-    /// Largest distance between mesh boundary and body surface [m] in both directions: cells are halved where it is exceeded. The
-    /// reference is the smooth surface of an image, or the triangles of a file.
+    /// Largest distance between mesh boundary and body surface [m] in both directions: cells are halved where
+    /// it is exceeded. The reference is the smooth surface of an image, or the triangles of a file.
     pub distance: Option<f64>,
     /// A lattice point [m]; the centre of the box of the body if `None`.
     pub origin: Option<Vector3>,
-    /// Target for the smallest acoustic length, as a fraction of the ideal tet: 0.75 is usual, 0.9 the best, 0 skips
-    /// optimisation.
+    /// Target for the smallest acoustic length, as a fraction of the ideal tet: 0.75 is usual, 0.9 the best,
+    /// 0 skips optimisation.
     pub target: f64,
     /// Most rounds of the optimiser.
     pub rounds: usize,
@@ -33,7 +35,8 @@ pub struct OrganTets {
 }
 
 impl OrganTets {
-    /// Lattice constant `edge` [m] everywhere, target 0.75 in at most 10 rounds, pieces of a twentieth of the largest one and more.
+    /// Lattice constant `edge` [m] everywhere, target 0.75 in at most 10 rounds, pieces of a twentieth of the
+    /// largest one and more.
     pub fn new(edge: f64) -> Self {
         Self {
             edge,
@@ -48,13 +51,14 @@ impl OrganTets {
         }
     }
 
-    /// The initial edge [m] if only a distance [m] is given, from the box of the body [m]: the chord √(8 R d) that is a distance d off an arc,
-    /// whose radius R is a quarter of the shortest side of the box.
+    /// The initial edge [m] if only a distance [m] is given, from the box of the body [m]: the chord √(8 R d)
+    /// that is a distance d off an arc, whose radius R is a quarter of the shortest side of the box.
     pub fn edge_for(distance: f64, [low, high]: [Vector3; 2]) -> f64 {
         (2.0 * (high - low).min() * distance).sqrt().min((high - low).norm() / 15.0)
     }
 
-    /// The same with labels that have smaller cells: of the edge given [m], or else of half the edge of the others.
+    /// The same with labels that have smaller cells: of the edge given [m], or else of half the edge of the
+    /// others.
     pub fn protecting(self, labels: &[(i32, Option<f64>)]) -> Self {
         let own = |&(label, edge): &(i32, Option<f64>)| (label, edge.unwrap_or(self.edge / 2.0));
         Self { protect: labels.iter().map(own).collect(), ..self }

@@ -1,10 +1,10 @@
-//! Tetrahedra in the body of a field by isosurface stuffing, after Labelle and Shewchuk (2007): a body-centred
-//! cubic lattice, warped so that no cut is too near a lattice point, then cut along the surface. Five steps:
-//! lattice, cut points, warp, stencils (`stencil.rs`), largest component (`topology.rs`). Two things differ from
-//! the paper. All points are warped at once, so their order does not matter. The diagonals of `stencil.rs`
-//! favour the time step, so the paper's bound of 10.8° on dihedral angles does not hold: the smallest observed
-//! is 8.2° (brain at 5 mm; example `measure`). Leaves out: grading; the later steps of `organ.rs` (optimisation,
-//! materials, repair of non-manifold edges).
+//! Tetrahedra in the body of a field by isosurface stuffing, after Labelle and Shewchuk (2007): a
+//! body-centred cubic lattice, warped so that no cut is too near a lattice point, then cut along the surface.
+//! Five steps: lattice, cut points, warp, stencils (`stencil.rs`), largest component (`topology.rs`). Two
+//! things differ from the paper. All points are warped at once, so their order does not matter. The diagonals
+//! of `stencil.rs` favour the time step, so the paper's bound of 10.8° on dihedral angles does not hold: the
+//! smallest observed is 8.2° (brain at 5 mm; example `measure`). Leaves out: grading; the later steps of
+//! `organ.rs` (optimisation, materials, repair of non-manifold edges).
 
 use pliant_geometry::{CellKind, Vector3};
 use rayon::prelude::*;
@@ -52,8 +52,8 @@ impl Stuffing {
         Ok(largest_component(CellKind::Tet, &tets, |node| warped.position(node)))
     }
 
-    /// The same with all components of at least this part of the largest one's cells, and how many cells and components
-    /// less that leaves out.
+    /// The same with all components of at least this part of the largest one's cells, and how many cells and
+    /// components less that leaves out.
     pub(crate) fn parts(
         &self,
         field: &(impl ImplicitField + ?Sized),

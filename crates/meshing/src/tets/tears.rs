@@ -1,8 +1,9 @@
-//! Places where a mesh tears thin parts of a body. Where a part is little thicker than the cells, all points of some cells lie on its
-//! sides, and the cells are dropped. The boundary of the mesh then has bands of faces that cut through the body, deep inside. A band
-//! round a hole looks inwards, towards the hole; the rim of a crest that falls short looks outwards. A hole may end in an edge on the
-//! other side of the part, which comes apart when its points are doubled. Two bands that look at each other
-//! through the body are the ends of a broken neck.
+//! Places where a mesh tears thin parts of a body. Where a part is little thicker than the cells, all points
+//! of some cells lie on its sides, and the cells are dropped. The boundary of the mesh then has bands of
+//! faces that cut through the body, deep inside. A band round a hole looks inwards, towards the hole; the rim
+//! of a crest that falls short looks outwards. A hole may end in an edge on the other side of the part, which
+//! comes apart when its points are doubled. Two bands that look at each other through the body are the ends
+//! of a broken neck.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -41,7 +42,8 @@ struct Band {
     middle: Vector3,
     /// Sum of their outward normals by area [m²].
     towards: Vector3,
-    /// Whether it looks into a hole that it goes round, or into a void that touches a side of the part in an edge.
+    /// Whether it looks into a hole that it goes round, or into a void that touches a side of the part in an
+    /// edge.
     is_round: bool,
     thickness: f64,
     /// Lattice constant [m].

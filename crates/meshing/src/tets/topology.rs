@@ -25,7 +25,8 @@ pub(crate) fn largest_component(
     large_components(kind, cells, f64::INFINITY, position)
 }
 
-/// Keeps the largest face-connected component of `cells` and all that have at least the part `smallest` of its cells.
+/// Keeps the largest face-connected component of `cells` and all that have at least the part `smallest` of
+/// its cells.
 pub(crate) fn large_components(
     kind: CellKind,
     cells: &[u32],
@@ -53,7 +54,8 @@ pub(crate) fn large_components(
     }
 }
 
-/// The faces of the volume cells of a mesh between different labels (cell data `label`) and to the outside, quads as two triangles.
+/// The faces of the volume cells of a mesh between different labels (cell data `label`) and to the outside,
+/// quads as two triangles.
 pub(crate) fn faces_between_labels(mesh: &Mesh) -> Patches {
     let mut all: Vec<([u32; 4], Vec<u32>, i32)> = Vec::new();
     for block in mesh.volume_blocks() {
@@ -85,8 +87,8 @@ pub(crate) fn faces_between_labels(mesh: &Mesh) -> Patches {
     found
 }
 
-/// Whether each cell is in a component with at least the part `smallest` of the cells of the largest one, and how many components are
-/// smaller.
+/// Whether each cell is in a component with at least the part `smallest` of the cells of the largest one, and
+/// how many components are smaller.
 pub(crate) fn in_large_components(kind: CellKind, cells: &[u32], smallest: f64) -> (Vec<bool>, usize) {
     let components = Components::new(kind, cells, &sorted_faces(kind, cells));
     let kept = components.large(smallest);
@@ -171,8 +173,8 @@ impl Components {
         Self { root, count }
     }
 
-    /// Whether each root is that of the component with the most cells (the lowest of equals), or of one with at least
-    /// the part `smallest` of them.
+    /// Whether each root is that of the component with the most cells (the lowest of equals), or of one with
+    /// at least the part `smallest` of them.
     fn large(&self, smallest: f64) -> Vec<bool> {
         let mut size = vec![0_u32; self.root.len()];
         for &root in &self.root {

@@ -1,6 +1,7 @@
-//! Cubes in the body of a field, on a regular grid, the largest face-connected part: every cube with its centre inside, or every
-//! cube that the body fills by more than a small fraction, with this fraction. Immersed cubes are weighted by their fractions
-//! and carry the surface of the body (de Visser and Comas 2008).
+//! Cubes in the body of a field, on a regular grid, the largest face-connected part: every cube with its
+//! centre inside, or every cube that the body fills by more than a small fraction, with this fraction.
+//! Immersed cubes are weighted by their fractions and carry the surface of the body (de Visser and Comas
+//! 2008).
 
 use pliant_geometry::{CellKind, DataArray, Vector3};
 use rayon::prelude::*;
@@ -91,8 +92,8 @@ impl Voxels {
 
     /// The part of a cube that the body fills, by samples at the centres of smaller cubes.
     fn fraction(&self, field: &(impl ImplicitField + ?Sized), centre: &Vector3) -> Result<f64, MeshingError> {
-        // A value approximates the distance to the surface: beyond twice the half diagonal, the cube contains no
-        // surface.
+        // A value approximates the distance to the surface: beyond twice the half diagonal, the cube contains
+        // no surface.
         let value = finite(field, centre)?;
         if value.abs() > 3.0_f64.sqrt() * self.edge {
             return Ok(if value > 0.0 { 1.0 } else { 0.0 });

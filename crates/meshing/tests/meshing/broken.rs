@@ -1,4 +1,5 @@
-//! Surfaces of the test files of the readers, malformed and changed at random: each gives a body or an error, never a panic.
+//! Surfaces of the test files of the readers, malformed and changed at random: each gives a body or an error,
+//! never a panic.
 
 use std::fs;
 use std::path::Path;
@@ -53,7 +54,8 @@ fn surfaces_of_broken_files_never_panic() {
     assert!(tried > 100 && bodies > 20, "{tried} {bodies}");
 }
 
-/// Triangles between few points at random: every kind of edge, folds, crossings, on a lattice also exact contact.
+/// Triangles between few points at random: every kind of edge, folds, crossings, on a lattice also exact
+/// contact.
 #[test]
 fn surfaces_at_random_never_panic() {
     let mut random = Random::new(7);

@@ -34,8 +34,8 @@ fn ball_volume(radius: f64) -> f64 {
     4.0 / 3.0 * std::f64::consts::PI * radius.powi(3)
 }
 
-/// Distances of a ball are R − r, up to the sagitta of its triangles and the curvature between points of the grid
-/// (h²/4R = 0.01 mm for h = 1 mm).
+/// Distances of a ball are R − r, up to the sagitta of its triangles and the curvature between points of the
+/// grid (h²/4R = 0.01 mm for h = 1 mm).
 #[test]
 fn the_field_of_a_ball_is_the_distance_to_it() {
     let body = enclosed(&ball(0.03, 0.01));
@@ -78,8 +78,8 @@ fn an_inverted_ball_is_turned_and_a_cavity_is_kept() {
     assert_eq!((filled.report.filled_cavities, filled.report.shells), (1, 1));
 }
 
-/// Balls that overlap: the body is their union, without the walls within. Lens of two balls of radius R at distance d:
-/// π (2R − d)² (d² + 4dR) / 12d.
+/// Balls that overlap: the body is their union, without the walls within. Lens of two balls of radius R at
+/// distance d: π (2R − d)² (d² + 4dR) / 12d.
 #[test]
 fn overlapping_balls_are_joined() {
     let (radius, apart) = (0.03_f64, 0.03_f64);

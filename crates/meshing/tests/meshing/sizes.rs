@@ -28,8 +28,8 @@ fn skin(mesh: &Mesh) -> TriangleMesh {
     TriangleMesh::from_mesh(&skin).expect("a surface").0
 }
 
-/// The field of cells of 8 mm loses most of the spike, and the mesh follows the field. The report used to give its
-/// distance from the field.
+/// The field of cells of 8 mm loses most of the spike, and the mesh follows the field. The report used to
+/// give its distance from the field.
 #[test]
 fn tets_of_a_surface_are_measured_to_its_triangles() {
     let edge = 0.008;

@@ -1,4 +1,5 @@
-//! Surfaces of label images: how close they are to the organ whose labels they are (the meshing specification's 2.1).
+//! Surfaces of label images: how close they are to the organ whose labels they are (the meshing
+//! specification's 2.1).
 
 use pliant_geometry::CellKind;
 use pliant_imaging::{Cleaning, LabelImage, Smoothing};
@@ -36,8 +37,8 @@ fn truth(organ: Organ) -> TriangleMesh {
     TriangleMesh::of_field(&Phantom::new(organ, 1.0).unwrap(), 0.002, 1_000_000).unwrap()
 }
 
-/// Voxels of 1.6 mm: half of one at most, a tenth on average, and the volume within a part in a thousand. The specification's prototype
-/// has 0.74 and 0.70 mm, 0.158 mm, +0.02 %.
+/// Voxels of 1.6 mm: half of one at most, a tenth on average, and the volume within a part in a thousand. The
+/// specification's prototype has 0.74 and 0.70 mm, 0.158 mm, +0.02 %.
 #[test]
 fn the_surface_of_the_livers_labels_is_close_to_the_liver() {
     let made = surface(&organs::liver(), &SURFACE_SMOOTHING, SURFACE_PAIRS);

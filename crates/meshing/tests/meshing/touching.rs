@@ -3,8 +3,8 @@
 use pliant_geometry::{CellKind, Mesh, Vector3, diagnose};
 use pliant_meshing::TriangleMesh;
 
-/// Two cubes that share an edge are two closed surfaces that touch there. As a mesh they are two pieces without open edges, whose points
-/// no reader takes for one, not in single precision either.
+/// Two cubes that share an edge are two closed surfaces that touch there. As a mesh they are two pieces
+/// without open edges, whose points no reader takes for one, not in single precision either.
 #[test]
 fn cubes_that_share_an_edge_stay_closed() {
     let cube = |at: f64| {

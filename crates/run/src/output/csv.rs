@@ -45,7 +45,8 @@ pub fn sampled_columns(world: &World) -> Vec<Column> {
     Samples::new(world, &world.scene.sampled()).columns
 }
 
-/// The samples of a table at an instant: energies of several participants together, then those of each participant.
+/// The samples of a table at an instant: energies of several participants together, then those of each
+/// participant.
 pub(crate) struct Samples {
     columns: Vec<Column>,
     /// Whether energies of all participants together come first.
@@ -353,8 +354,8 @@ impl Rows {
         OutputError::new(&self.path, error)
     }
 
-    /// Writes a row in one go; of one that does not fit on the disk nothing stays. A row that stands there already is
-    /// passed over; any other is cut off with all after it.
+    /// Writes a row in one go; of one that does not fit on the disk nothing stays. A row that stands there
+    /// already is passed over; any other is cut off with all after it.
     fn write(&mut self, mut row: String) -> Result<(), OutputError> {
         row.push('\n');
         if self.beyond.starts_with(row.as_bytes()) {

@@ -75,7 +75,8 @@ impl Curved {
         (curved, mesh)
     }
 
-    /// The nodes of the facet of a point, with its weights: where the point is, but for the bulge of the curved surface.
+    /// The nodes of the facet of a point, with its weights: where the point is, but for the bulge of the
+    /// curved surface.
     pub(super) fn nodes_of(&self, part: &ImplicitBodies, point: u32) -> Vec<(u32, f64)> {
         let place = &self.picture.places[self.points[point as usize] as usize];
         part.model.facets[place.facet as usize].nodes.into_iter().zip(place.weights).collect()

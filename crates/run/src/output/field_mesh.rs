@@ -73,7 +73,8 @@ impl FieldMesh {
         None
     }
 
-    /// A point of the mesh as a combination of nodes of a participant; of a curved surface, the combination under its bulge.
+    /// A point of the mesh as a combination of nodes of a participant; of a curved surface, the combination
+    /// under its bulge.
     pub fn nodes_of(&self, world: &World, point: u32) -> (usize, Vec<(u32, f64)>) {
         let Some((index, own, point)) = self.part_of(point) else { return (0, Vec::new()) };
         (index, own.nodes_of(&world.participants[index].built, point as u32))
@@ -134,7 +135,8 @@ enum Content {
 }
 
 impl ParticipantMesh {
-    /// Of a body or surface by name, or of all bodies, solids before shells; with `curved`, of the curved surface of shells.
+    /// Of a body or surface by name, or of all bodies, solids before shells; with `curved`, of the curved
+    /// surface of shells.
     fn all(built: &Built, on: Option<&str>, fields: &[FieldName], at: At, curved: Option<u32>) -> Vec<Self> {
         let own = |(mesh, content), fields| Self::new(built, on, mesh, content, fields, at);
         let surface = built.model.surfaces.iter().position(|surface| Some(surface.name.as_str()) == on);
@@ -212,7 +214,8 @@ impl ParticipantMesh {
         Self { mesh, first_body: 0, fields, at, content }
     }
 
-    /// A point of the mesh as a combination of nodes of the model; of a curved surface, the combination under its bulge.
+    /// A point of the mesh as a combination of nodes of the model; of a curved surface, the combination under
+    /// its bulge.
     fn nodes_of(&self, built: &Built, point: u32) -> Vec<(u32, f64)> {
         match &self.content {
             Content::Surface(index) => built.model.surfaces[*index].mapping.row(point as usize).collect(),
@@ -277,7 +280,8 @@ fn moved_things(frame: &Frame<'_>, points: &[Vector3], owners: &[u32], outward: 
     points.iter().zip(owners).zip(outward).flat_map(moved).collect()
 }
 
-/// Fields on a carried surface; those of cells as means at the nodes, which points outside of all cells do not extrapolate.
+/// Fields on a carried surface; those of cells as means at the nodes, which points outside of all cells do
+/// not extrapolate.
 fn fill_surface(mesh: &mut Mesh, frame: &Frame<'_>, wanted: &[FieldName], surface: usize) {
     let model = &frame.built().model;
     let mapping = &model.surfaces[surface].mapping;
@@ -351,7 +355,8 @@ fn models(built: &Built, on: Option<&str>) -> Vec<BodyModel> {
     chosen(built, on, false).flat_map(of_body).map(model).collect()
 }
 
-/// The cells of solids, membranes and bars of one body or of all, with `label` and, for several bodies, the number of the `body`.
+/// The cells of solids, membranes and bars of one body or of all, with `label` and, for several bodies, the
+/// number of the `body`.
 fn merged_bodies(built: &Built, on: Option<&str>) -> (Mesh, Content) {
     let mut mesh = Mesh::default();
     let mut nodes = Vec::new();
@@ -526,7 +531,8 @@ fn joined<T, V: AsRef<[f64]>>(items: &[T], components: usize, value: impl Fn(&T)
 
 /// Volume-weighted means of cell values at the points.
 struct Averages {
-    /// For each field: sums of value × volume, and of volume, at each point. Cells without a value don't count.
+    /// For each field: sums of value × volume, and of volume, at each point. Cells without a value don't
+    /// count.
     sums: Vec<(Vec<f64>, Vec<f64>)>,
 }
 

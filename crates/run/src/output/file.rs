@@ -71,7 +71,8 @@ pub(crate) fn temporary(path: &Path) -> PathBuf {
     name.into()
 }
 
-/// Writes a whole file under its temporary name, then gives it its own; a failure leaves the old file and nothing else.
+/// Writes a whole file under its temporary name, then gives it its own; a failure leaves the old file and
+/// nothing else.
 pub(crate) fn replace(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
     check_own(path)?;
     let temporary = temporary(path);

@@ -43,12 +43,12 @@ impl OutputFolder {
         Path::new("out").join(name)
     }
 
-    /// Makes the folder. A non-empty folder is rejected unless `force` is given; then the files of an earlier run of the
-    /// same outputs are removed, and nothing else.
+    /// Makes the folder. A non-empty folder is rejected unless `force` is given; then the files of an earlier
+    /// run of the same outputs are removed, and nothing else.
     ///
     /// # Errors
-    /// If the folder holds something, holds a link where this run would write, is held by another run, or can't be
-    /// written to.
+    /// If the folder holds something, holds a link where this run would write, is held by another run, or
+    /// can't be written to.
     pub fn prepare(path: PathBuf, scene: &Scene, force: bool) -> Result<Self, OutputError> {
         let folder = Self::claim(path, force, |_| false)?;
         remove_earlier(folder.path(), scene)?;
@@ -84,8 +84,8 @@ impl OutputFolder {
     /// Opens the folder of an interrupted run to go on with it. Nothing of the run changes yet.
     ///
     /// # Errors
-    /// If it does not hold the outputs as they were at the checkpoint, if nothing is left to run, or if the folder is
-    /// held by another run or can't be written to.
+    /// If it does not hold the outputs as they were at the checkpoint, if nothing is left to run, or if the
+    /// folder is held by another run or can't be written to.
     pub fn reopen(path: PathBuf, scene: &Scene, checkpoint: &Checkpoint) -> Result<Self, ResumeError> {
         let refused = |path: &Path, reason| ResumeError::OtherOutputs { path: path.to_owned(), reason };
         if !path.is_dir() {
@@ -111,8 +111,8 @@ impl OutputFolder {
         Ok(Self { path, _lock: Arc::new(lock) })
     }
 
-    /// Before a resumed run continues, removes the files of a finished run and the unfinished files of a killed one: pages
-    /// are there only of a run that has ended.
+    /// Before a resumed run continues, removes the files of a finished run and the unfinished files of a
+    /// killed one: pages are there only of a run that has ended.
     pub(crate) fn go_on(&self, scene: &Scene) -> Result<(), OutputError> {
         let removed = || -> io::Result<()> {
             remove_pages(&self.path)?;
@@ -173,7 +173,8 @@ impl Lock {
             if let Err(TryLockError::WouldBlock) = file.try_lock() {
                 return Err(held(folder, &mut file));
             }
-            // Otherwise locked, or on a file system without locks. The last holder may have removed the file meanwhile.
+            // Otherwise locked, or on a file system without locks. The last holder may have removed the file
+            // meanwhile.
             if is_at(&file, &path).map_err(failed)? {
                 let lock = Self { path, file };
                 lock.sign();

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use pliant_geometry::{CellBlock, CellKind, DataArray, Mesh};
 
-/// Meshes with their data as one mesh, each with the number of its first `body`, from which its cells count. Data that a mesh lacks are
-/// not a number there; labels and marks of things are 0.
+/// Meshes with their data as one mesh, each with the number of its first `body`, from which its cells count.
+/// Data that a mesh lacks are not a number there; labels and marks of things are 0.
 pub(super) fn merged(numbered: &[(&Mesh, usize)]) -> Mesh {
     let meshes: Vec<&Mesh> = numbered.iter().map(|(mesh, _)| *mesh).collect();
     let mut all = Mesh::default();

@@ -1,5 +1,6 @@
-//! The outputs of a run with their schedules. Those of whole meshes, which take longer than steps, work on a thread of their own: it gets snapshots
-//! in their order, a few at a time, and finds the forces of each again in a simulation of its own, with the same bits.
+//! The outputs of a run with their schedules. Those of whole meshes, which take longer than steps, work on a
+//! thread of their own: it gets snapshots in their order, a few at a time, and finds the forces of each again
+//! in a simulation of its own, with the same bits.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -45,8 +46,8 @@ enum Task {
 }
 
 impl<'scope> Outputs<'scope> {
-    /// The outputs of a world. Their files are opened here; all paths go to `files`. Those of a run that goes on take up what is `written`. With a thread
-    /// to spare, some work on it.
+    /// The outputs of a world. Their files are opened here; all paths go to `files`. Those of a run that goes
+    /// on take up what is `written`. With a thread to spare, some work on it.
     pub fn new(
         world: &'scope World,
         folder: &Path,
@@ -113,7 +114,8 @@ impl<'scope> Outputs<'scope> {
         self.end()
     }
 
-    /// Shows a state that was found in a step that failed to those that have not seen its time. That failure is reported, none of theirs.
+    /// Shows a state that was found in a step that failed to those that have not seen its time. That failure
+    /// is reported, none of theirs.
     pub(crate) fn see_found(&mut self, simulation: &Simulation, seen: f64) {
         let (time, step) = (simulation.time(), simulation.step_length());
         let due = |schedule: &mut Schedule| {

@@ -1,4 +1,5 @@
-//! Largest changes of volume of nearly incompressible bodies, and membranes that a solid lets wrinkle, with their warnings.
+//! Largest changes of volume of nearly incompressible bodies, and membranes that a solid lets wrinkle, with
+//! their warnings.
 
 use std::f64::consts::TAU;
 
@@ -10,13 +11,15 @@ use pliant_mechanics::model::{Cells, Solid};
 use pliant_sim::Instant;
 use serde::{Deserialize, Serialize};
 
-/// Poisson's ratio at rest from which on a body counts as nearly incompressible. Bodies with fibres do with any ratio.
+/// Poisson's ratio at rest from which on a body counts as nearly incompressible. Bodies with fibres do with
+/// any ratio.
 const NEARLY_INCOMPRESSIBLE: f64 = 0.45;
 
 /// Change of volume beyond which a run warns.
 const MUCH: f64 = 0.05;
 
-/// Compressive membrane force beyond which a run warns, over the one at which wrinkles as short as an edge appear.
+/// Compressive membrane force beyond which a run warns, over the one at which wrinkles as short as an edge
+/// appear.
 const NEAR_WRINKLES: f64 = 0.5;
 
 /// The largest change of volume of a nearly incompressible body during a run.
@@ -141,9 +144,9 @@ fn compressive_force(fields: &CellFields) -> f64 {
     (-least).max(0.0)
 }
 
-/// The compressive force [N/m] at which each element of a membrane on a solid wrinkles as short as its mean edge h: E* h/2π, the least of
-/// E t³ k²/12 + E* / (2 k) that a wavelength 2π/k of two edges allows without bending (Biot 1957). `None` of other cells, and of membranes
-/// on no solid.
+/// The compressive force [N/m] at which each element of a membrane on a solid wrinkles as short as its mean
+/// edge h: E* h/2π, the least of E t³ k²/12 + E* / (2 k) that a wavelength 2π/k of two edges allows without
+/// bending (Biot 1957). `None` of other cells, and of membranes on no solid.
 fn wrinkling_forces(model: &Model, membrane: &Solid) -> Option<Vec<f64>> {
     if !matches!(membrane.cells, Cells::Membrane(..)) {
         return None;

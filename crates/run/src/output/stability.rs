@@ -154,7 +154,8 @@ pub(crate) fn doubts(
         .collect()
 }
 
-/// The failure of a run that ended with a larger part of its internal energy in hourglass modes than its scene allows.
+/// The failure of a run that ended with a larger part of its internal energy in hourglass modes than its
+/// scene allows.
 pub(crate) fn hourglass_failure(world: &World, outcome: &Outcome) -> Option<Failure> {
     let allowed = world.scene.run.allow_hourglass;
     let (part, share) = (world.participants.iter().zip(&outcome.parts))
@@ -185,7 +186,8 @@ fn held_by_hourglass(built: &Built, share: f64, time: f64, most: &str, remedy: &
     )
 }
 
-/// Warning of unstable static equilibria. A run with a control has none, since it passes limit points on purpose.
+/// Warning of unstable static equilibria. A run with a control has none, since it passes limit points on
+/// purpose.
 fn unstable_equilibria(built: &Built, outcome: &PartOutcome) -> Option<String> {
     let controlled = built.implicit.as_ref().is_some_and(|part| part.control.is_some());
     let from = outcome.effort.as_ref().filter(|_| !controlled)?.unstable_from?;

@@ -1,5 +1,5 @@
-//! A ParaView series: `X/000000.vtu`, … and `X.pvd`, whole after each frame, so that a killed run leaves a series
-//! that can be read. Points are at rest; `displacement` warps them.
+//! A ParaView series: `X/000000.vtu`, … and `X.pvd`, whole after each frame, so that a killed run leaves a
+//! series that can be read. Points are at rest; `displacement` warps them.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
@@ -22,7 +22,8 @@ pub(super) struct Series {
     open: Option<(File, u64)>,
     name: String,
     times: Vec<f64>,
-    /// Times of the frames that an interrupted run had written beyond these; their files stay until they are replaced.
+    /// Times of the frames that an interrupted run had written beyond these; their files stay until they are
+    /// replaced.
     beyond: Vec<f64>,
     shown: FieldMesh,
     frames: VtuSeries,
@@ -78,7 +79,8 @@ impl Series {
         Ok(())
     }
 
-    /// Writes an entry and the end of the list over its old end, at once: who reads finds it whole before and after.
+    /// Writes an entry and the end of the list over its old end, at once: who reads finds it whole before and
+    /// after.
     fn append(&self, mut file: File, end: u64, time: f64) -> io::Result<Option<(File, u64)>> {
         // Somebody may have put another one in its place, or written in it.
         if !is_at(&file, &self.index)? || file.metadata()?.len() != end + PVD_TAIL.len() as u64 {
@@ -98,7 +100,8 @@ impl Series {
         written.map(|()| Some((file, end + entry.len() as u64)))
     }
 
-    /// Writes the list of all frames in place of the old one; returns it and where its entries end, if it can be written on.
+    /// Writes the list of all frames in place of the old one; returns it and where its entries end, if it can
+    /// be written on.
     fn list_all(&self) -> io::Result<Option<(File, u64)>> {
         let all = self.times.iter().chain(&self.beyond).enumerate();
         let list =

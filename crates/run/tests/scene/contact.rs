@@ -19,7 +19,8 @@ pub(super) fn pressed(run: &str, more: &str) -> String {
     )
 }
 
-/// The ball's force goes through the block to the floor; the node under it is not in the ball; energies balance.
+/// The ball's force goes through the block to the floor; the node under it is not in the ball; energies
+/// balance.
 #[test]
 fn a_tool_presses_a_body_onto_an_obstacle() {
     for precision in ["", "precision = 'single'"] {
@@ -40,7 +41,8 @@ fn a_tool_presses_a_body_onto_an_obstacle() {
     }
 }
 
-/// A ball that grows presses like one that moves: it is drawn as large as it is, and an explicit run and an implicit one feel the same force.
+/// A ball that grows presses like one that moves: it is drawn as large as it is, and an explicit run and an
+/// implicit one feel the same force.
 #[test]
 fn a_ball_that_grows_presses_a_body() {
     let small =
@@ -69,8 +71,9 @@ fn a_ball_that_grows_presses_a_body() {
     assert!((forces[0] / forces[1] - 1.0).abs() < 0.05, "{forces:?}");
 }
 
-/// The same on a GPU, as on the CPU in double precision. Both find impulses to a thousandth of the deepest gap predicted, with faces in another order. A
-/// stable step predicts at most four times the depth that forces hold, (ω Δt)² ≤ 4.
+/// The same on a GPU, as on the CPU in double precision. Both find impulses to a thousandth of the deepest
+/// gap predicted, with faces in another order. A stable step predicts at most four times the depth that
+/// forces hold, (ω Δt)² ≤ 4.
 #[cfg(feature = "gpu")]
 #[test]
 fn a_tool_presses_a_body_on_a_device() {
@@ -104,7 +107,8 @@ pub(super) fn stacked(run: &str, more: &str) -> String {
     )
 }
 
-/// A lid of tets lies on a block of hexes: the forces between them and on the floor are the weights, single precision like double.
+/// A lid of tets lies on a block of hexes: the forces between them and on the floor are the weights, single
+/// precision like double.
 #[test]
 fn a_body_lies_on_another_one() {
     for precision in ["", "precision = 'single'"] {
@@ -124,7 +128,8 @@ fn a_body_lies_on_another_one() {
     }
 }
 
-/// The same on a GPU: a lid that falls, slides and comes to rest, and a block on its floor, as on the CPU in double precision.
+/// The same on a GPU: a lid that falls, slides and comes to rest, and a block on its floor, as on the CPU in
+/// double precision.
 #[cfg(feature = "gpu")]
 #[test]
 fn a_body_lies_on_another_one_on_a_device() {
@@ -139,7 +144,8 @@ fn a_body_lies_on_another_one_on_a_device() {
     }
 }
 
-/// `"all"` is all pairs, each with its force; the result does not depend on the order in which bodies are named.
+/// `"all"` is all pairs, each with its force; the result does not depend on the order in which bodies are
+/// named.
 #[test]
 fn all_touch_all() {
     let named = last_row(&stacked("", ""));

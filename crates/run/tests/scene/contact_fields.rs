@@ -176,8 +176,8 @@ fn pushed(world: &World, body: usize, at: [f64; 3]) -> [f64; 3] {
     built.pushed.as_ref().unwrap()[nearest.unwrap() as usize]
 }
 
-/// A lid that begins within a block: both give way, together by the overlap. The run starts deformed: its energies balance with what is stored at
-/// the start, and it ends where one ends that began apart.
+/// A lid that begins within a block: both give way, together by the overlap. The run starts deformed: its
+/// energies balance with what is stored at the start, and it ends where one ends that began apart.
 #[test]
 fn bodies_that_overlap_are_pushed_apart() {
     let text = overlapping(0.0015, "");
@@ -236,7 +236,8 @@ fn nodes_in_a_tool_are_pushed_onto_its_surface() {
     assert!(balance < 0.02, "{balance}");
 }
 
-/// A thin plate that begins a little within the upper side of the block, between and on nodes, is left on the side where it comes from.
+/// A thin plate that begins a little within the upper side of the block, between and on nodes, is left on the
+/// side where it comes from.
 #[test]
 fn faces_are_pushed_to_the_side_of_their_nodes() {
     for (y, width) in [(0.02, 0.004), (0.0213, 0.003), (0.017, 0.012)] {

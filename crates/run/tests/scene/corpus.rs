@@ -1,6 +1,7 @@
-//! Scene files, NiftySim models and checkpoints of `corpus/`, the project's own scenes and a checkpoint made here, cut off and changed
-//! at random, the same every time: what they say or an error, never a panic, and no memory beyond what the file justifies. In
-//! a process of its own, whose largest memory is measured. The fuzz targets `scene`, `niftysim` and `checkpoint` go on from here.
+//! Scene files, NiftySim models and checkpoints of `corpus/`, the project's own scenes and a checkpoint made
+//! here, cut off and changed at random, the same every time: what they say or an error, never a panic, and no
+//! memory beyond what the file justifies. In a process of its own, whose largest memory is measured. The fuzz
+//! targets `scene`, `niftysim` and `checkpoint` go on from here.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,10 +1,12 @@
-//! Graspers: jaws that hold by friction or as if tied, by the text of a scene and by code; tools that are driven.
+//! Graspers: jaws that hold by friction or as if tied, by the text of a scene and by code; tools that are
+//! driven.
 
 use pliant_sim::Simulation;
 use pliant_sim::contact::pose::Pose;
 use pliant_testing::scenes::{last_row, resumes, run, scene, world};
 
-/// A flap of 30 × 6 × 20 mm on a floor, and jaws around it that close in 0.3 s and go up by 30 mm until 0.8 s.
+/// A flap of 30 × 6 × 20 mm on a floor, and jaws around it that close in 0.3 s and go up by 30 mm until 0.8
+/// s.
 fn flap(run: &str, tool: &str, friction: f64, until: f64) -> String {
     format!(
         "[scene]\nuntil = {until}\ngravity = [0, 0, -9.81]\n[run]\n{run}\n\
@@ -25,7 +27,8 @@ const CLOSES: &str = "opening = { angle = 0.4, curve = { table = [[0, 1], [0.3, 
                       by = [0, 0, 0.03]\nfrom = 0.4\nto = 0.8\n";
 const WEIGHT: f64 = 0.03 * 0.006 * 0.02 * 1000.0 * 9.81;
 
-/// Friction holds what jaws squeeze: it goes up with them, and both carry its weight. Without friction it slips out.
+/// Friction holds what jaws squeeze: it goes up with them, and both carry its weight. Without friction it
+/// slips out.
 #[test]
 fn jaws_lift_a_flap_by_friction() {
     for precision in ["", "precision = 'single'"] {
@@ -74,7 +77,8 @@ fn a_run_with_closed_jaws_goes_on_in_the_same_bits() {
     ));
 }
 
-/// The same work by a program: it closes the jaws and drives them up; a snapshot on the way leads to the same bits.
+/// The same work by a program: it closes the jaws and drives them up; a snapshot on the way leads to the same
+/// bits.
 #[test]
 fn a_program_closes_jaws_and_drives_them() {
     let text = flap("", "opening = { angle = 0.4, curve = 'hold' }\nideal-grip = 0.2", 0.0, 2.0);
@@ -109,7 +113,8 @@ fn a_program_closes_jaws_and_drives_them() {
     assert_eq!([work(simulation); 2], prints);
 }
 
-/// Pose and opening have a goal each, in whatever order they are given; a snapshot on the way leads to the same bits.
+/// Pose and opening have a goal each, in whatever order they are given; a snapshot on the way leads to the
+/// same bits.
 #[test]
 fn a_grasper_moves_while_it_closes() {
     let text = flap("", "opening = { angle = 0.4, curve = 'hold' }", 0.0, 2.0);
@@ -147,7 +152,8 @@ fn a_grasper_moves_while_it_closes() {
     assert!(prints.iter().all(|print| *print == prints[0]), "{prints:?}");
 }
 
-/// A tool that cannot be there in time without passing over nodes arrives later; a tool that is not there, and numbers that are none.
+/// A tool that cannot be there in time without passing over nodes arrives later; a tool that is not there,
+/// and numbers that are none.
 #[test]
 fn impossible_goals_are_told() {
     let world = world(&flap("", "opening = { angle = 0.4, curve = 'hold' }", 0.0, 2.0)).unwrap();
@@ -184,7 +190,8 @@ fn jaws_that_cannot_be_are_refused_with_their_line() {
     assert!(error.contains("`opening` is for a tool with jaws"), "{error}");
 }
 
-/// Cells of reduced integration, squeezed to half: forces carry predictions deep into the jaws, past their edges, and no node is thrown.
+/// Cells of reduced integration, squeezed to half: forces carry predictions deep into the jaws, past their
+/// edges, and no node is thrown.
 #[test]
 fn jaws_that_squeeze_hard_keep_the_energies() {
     let text = flap("", &CLOSES.replace("0.45", "0.35"), 0.8, 1.0).replace("element = 'hex8-full'\n", "");

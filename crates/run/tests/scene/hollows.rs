@@ -33,7 +33,8 @@ fn box_file(folder: &Path, edge: f64) -> String {
 /// Its weight and what draws it aside [N].
 const PULL: [f64; 2] = [0.06 * 0.06 * 0.06 * 1000.0 * 6.0, 0.06 * 0.06 * 0.06 * 1000.0 * 9.81];
 
-/// Where the lower edge lies on floor and wall, both push: together they hold the block against both components of gravity.
+/// Where the lower edge lies on floor and wall, both push: together they hold the block against both
+/// components of gravity.
 #[test]
 fn a_block_slides_into_the_corner_of_a_hollow() {
     let folder = tempfile::tempdir().unwrap();

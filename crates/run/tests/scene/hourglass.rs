@@ -40,7 +40,8 @@ fn exact() -> f64 {
     stress(low)[2] * 1e-4
 }
 
-/// With a constant stiffness the cube collapses into hourglass modes (a tenth of the force); with one that follows the law it keeps its shape.
+/// With a constant stiffness the cube collapses into hourglass modes (a tenth of the force); with one that
+/// follows the law it keeps its shape.
 #[test]
 fn evenly_squeezed_tissue_keeps_its_shape() {
     let exact = exact();
@@ -71,8 +72,8 @@ fn a_resumed_run_of_a_growing_stiffness_ends_in_the_same_bits() {
     }
 }
 
-/// A constant `hourglass` is kept as it is given: the run ends with most of its energy in hourglass modes, writes all that it should, and fails
-/// unless the scene allows so much.
+/// A constant `hourglass` is kept as it is given: the run ends with most of its energy in hourglass modes,
+/// writes all that it should, and fails unless the scene allows so much.
 #[test]
 fn a_run_that_ends_in_hourglass_modes_fails_after_its_outputs() {
     for solver in ["solver = 'quasi-static'", "solver = 'explicit'"] {

@@ -41,7 +41,8 @@ fn height(simulation: &mut Simulation) -> f64 {
     simulation.frame().unwrap().tool("ball").unwrap().pose.translation.z
 }
 
-/// The same goal again at each step: the tool stands where it stood, goes on at the same pace, and meets the same force.
+/// The same goal again at each step: the tool stands where it stood, goes on at the same pace, and meets the
+/// same force.
 #[test]
 fn a_tool_that_is_led_again_goes_on() {
     let goal = Pose::translation(0.03, 0.03, 0.072);

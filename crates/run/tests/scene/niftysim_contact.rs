@@ -1,4 +1,5 @@
-//! NiftySim models with contact and membranes: each is imported and run; nothing penetrates, forces balance, and closed forms are met.
+//! NiftySim models with contact and membranes: each is imported and run; nothing penetrates, forces balance,
+//! and closed forms are met.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,8 +16,8 @@ use pliant_sim::contact::touch::With;
 const MU: f64 = 1000.0;
 const KAPPA: f64 = 5000.0;
 
-/// How deep a node of a body may lie in another one [m]. Normals are those before a step: what slides across an edge in it, or turns, ends
-/// within by the square of its way.
+/// How deep a node of a body may lie in another one [m]. Normals are those before a step: what slides across
+/// an edge in it, or turns, ends within by the square of its way.
 const ACROSS_EDGES: f64 = 1e-6;
 
 /// A grid of hexahedra or tetrahedra as NiftySim lists it.
@@ -259,9 +260,11 @@ fn off(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
     apart.fold(0.0, f64::max) / largest
 }
 
-/// Force [N] by which a block of this law and area [m²] withstands a stretch, free to slide at its ends and sides.
+/// Force [N] by which a block of this law and area [m²] withstands a stretch, free to slide at its ends and
+/// sides.
 fn uniaxial(stretch: f64, area: f64) -> f64 {
-    // J − 1 from the stress across, which vanishes: μ J^(−5/3) (t² − I₁/3) + κ (J − 1) = 0 with t² = J / stretch.
+    // J − 1 from the stress across, which vanishes: μ J^(−5/3) (t² − I₁/3) + κ (J − 1) = 0 with t² = J /
+    // stretch.
     let across = |j: f64| {
         let t2 = j / stretch;
         MU * j.powf(-5.0 / 3.0) * (t2 - stretch * stretch) / 3.0 + KAPPA * (j - 1.0)
@@ -297,7 +300,8 @@ fn plate(by: f64, nodes: &[usize]) -> String {
     )
 }
 
-/// A plate that slides freely on a cube displaces its top as a constraint does; its force is that of the closed form and of the floor.
+/// A plate that slides freely on a cube displaces its top as a constraint does; its force is that of the
+/// closed form and of the floor.
 #[test]
 fn a_plate_presses_a_cube_as_a_prescribed_displacement_does() {
     for tets in [false, true] {
@@ -323,7 +327,8 @@ fn a_plate_presses_a_cube_as_a_prescribed_displacement_does() {
     }
 }
 
-/// A cylinder and a probe are pressed into a block on its side, or grow into it: no node goes in, and the base carries their force.
+/// A cylinder and a probe are pressed into a block on its side, or grow into it: no node goes in, and the
+/// base carries their force.
 #[test]
 fn round_things_are_pressed_into_a_block() {
     let grid = Grid::hexes([8, 4, 4], [0.08, 0.04, 0.04], [0.0; 3], |_| true);
@@ -388,7 +393,8 @@ fn a_moving_rigid_sheet_presses_a_cube() {
         trajectory.in_things
     );
     assert!(trajectory.in_things < 1e-8, "{:e}", trajectory.in_things);
-    // It still moves at the end, at 5 mm/s: damping of 60/s takes its part of the force, of a mass of 1 kg at half of this speed.
+    // It still moves at the end, at 5 mm/s: damping of 60/s takes its part of the force, of a mass of 1 kg at
+    // half of this speed.
     let damped = 0.5 * 60.0 * 0.005;
     assert!((sheet / (exact - damped) - 1.0).abs() < 5e-3, "{sheet} N of {exact} N");
     assert!((ceiling - sheet - damped).abs() < 1e-3 * sheet.abs(), "{sheet} N and {ceiling} N");
@@ -408,7 +414,8 @@ fn a_moving_rigid_sheet_presses_a_cube() {
     );
 }
 
-/// A cube lies on a larger one of other cells; both are pressed. The force goes through, and neither is in the other.
+/// A cube lies on a larger one of other cells; both are pressed. The force goes through, and neither is in
+/// the other.
 #[test]
 fn two_cubes_touch() {
     let lower = Grid::block(3, 0.1, [0.0; 3]).tets();
@@ -443,7 +450,8 @@ fn two_cubes_touch() {
     assert!((top / between + 1.0).abs() < 2e-3, "{between} N, {top} N");
 }
 
-/// Two cubes of one mesh: the upper one falls on the lower one, in a box that is turned inward. The floor carries both, the box nothing.
+/// Two cubes of one mesh: the upper one falls on the lower one, in a box that is turned inward. The floor
+/// carries both, the box nothing.
 #[test]
 fn pieces_of_one_mesh_touch() {
     let lower = Grid::block(3, 0.1, [0.0; 3]).tets();
@@ -480,7 +488,8 @@ fn pieces_of_one_mesh_touch() {
     assert!((-0.02..-0.001).contains(&fallen), "{fallen}");
 }
 
-/// Two free cubes are pushed against each other by opposite forces: they have no momentum together, with friction or without.
+/// Two free cubes are pushed against each other by opposite forces: they have no momentum together, with
+/// friction or without.
 #[test]
 fn free_cubes_keep_their_momentum() {
     let left = Grid::block(3, 0.1, [0.0; 3]).tets();
@@ -512,7 +521,8 @@ fn free_cubes_keep_their_momentum() {
     }
 }
 
-/// The two arms of a fork are pressed together: they touch and stay apart, and the base, which holds the fork, carries nothing.
+/// The two arms of a fork are pressed together: they touch and stay apart, and the base, which holds the
+/// fork, carries nothing.
 #[test]
 fn a_fork_touches_itself() {
     let grid = Grid::hexes([6, 2, 5], [0.12, 0.02, 0.05], [0.0; 3], |[i, _, k]| i == 0 || k != 2);
@@ -533,7 +543,8 @@ fn a_fork_touches_itself() {
             system(5e-4, 1.5, 20.0, switch)
         )
     };
-    // The arms are straight and thin, and lower nodes have upper ones at their side: their heights tell who is above.
+    // The arms are straight and thin, and lower nodes have upper ones at their side: their heights tell who
+    // is above.
     let gap = |trajectory: &Trajectory| {
         let height = |node: usize| grid.nodes[node][2] + trajectory.displacements["model"][node][2];
         arm(0.02)
@@ -557,7 +568,8 @@ fn a_fork_touches_itself() {
     assert!(base.norm() < 1e-3 * 0.024, "{base:?}");
 }
 
-/// Membranes on two sides of a block that is stretched carry their part: F = w ε (E h + 2 E_m t) for small strain and equal ν.
+/// Membranes on two sides of a block that is stretched carry their part: F = w ε (E h + 2 E_m t) for small
+/// strain and equal ν.
 #[test]
 fn membranes_carry_their_part_of_a_force() {
     let grid = Grid::block(3, 0.1, [0.0; 3]).tets();

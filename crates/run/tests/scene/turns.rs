@@ -2,7 +2,8 @@
 
 use pliant_testing::scenes::{last_row, resumes, world};
 
-/// A strip of 60 × 20 × 0.5 mm, tied by one edge to the side of a block of stone that `more` holds; its bending stiffness is 2.08e-7 N m².
+/// A strip of 60 × 20 × 0.5 mm, tied by one edge to the side of a block of stone that `more` holds; its
+/// bending stiffness is 2.08e-7 N m².
 fn strip(solver: &str, rotations: &str, more: &str) -> String {
     format!(
         "[scene]\nuntil = 1\n[run]\n{solver}\n\
@@ -28,7 +29,8 @@ fn lifted(force: f64) -> String {
     )
 }
 
-/// The strip is a cantilever, F L³/(3 E I), where its edge turns with the stone: free it would swing about a hinge.
+/// The strip is a cantilever, F L³/(3 E I), where its edge turns with the stone: free it would swing about a
+/// hinge.
 #[test]
 fn a_strip_tied_by_its_edge_bends_as_a_cantilever() {
     let force = 1.74e-6;
@@ -74,8 +76,9 @@ fn a_resumed_run_of_turns_that_follow_ends_in_the_same_bits() {
     }
 }
 
-/// A beam of two materials: a block of 80 × 10 × 10 mm with a wall of 2 mm on top, ten times as stiff, bent by its weight. Rotations that follow leave
-/// out that the tissue shears right under the wall: it bends a little less, on every mesh.
+/// A beam of two materials: a block of 80 × 10 × 10 mm with a wall of 2 mm on top, ten times as stiff, bent
+/// by its weight. Rotations that follow leave out that the tissue shears right under the wall: it bends a
+/// little less, on every mesh.
 #[test]
 fn a_wall_whose_rotations_follow_bends_a_little_less_than_a_free_one() {
     let beam = |finer: u32, rotations: &str| {

@@ -1,4 +1,5 @@
-//! Thin walls on solids: membranes with every solver of solids, shells with those that solve equations, and what is refused.
+//! Thin walls on solids: membranes with every solver of solids, shells with those that solve equations, and
+//! what is refused.
 
 use std::fs;
 
@@ -53,7 +54,8 @@ fn a_resumed_run_of_a_coated_solid_ends_in_the_same_bits() {
     }
 }
 
-/// A wall of the same thickness and linear elasticity, as membrane and as shell without and with bending, which is next to nothing here.
+/// A wall of the same thickness and linear elasticity, as membrane and as shell without and with bending,
+/// which is next to nothing here.
 #[test]
 fn a_shell_on_a_solid_is_a_membrane_with_bending() {
     let solver = "solver = 'static'\nload-steps = 4\ntolerance = 1e-10";
@@ -127,7 +129,8 @@ fn a_wall_is_written_with_its_own_fields_and_the_whole_mass_is_that_of_both() {
     }
 }
 
-/// A body of its own: a sheet of rubber pulled by an eighth stands as in closed form, with a probe and a carried surface on it.
+/// A body of its own: a sheet of rubber pulled by an eighth stands as in closed form, with a probe and a
+/// carried surface on it.
 #[test]
 fn a_sheet_by_itself_is_pulled_as_in_closed_form() {
     let sheet = |solver: &str| {

@@ -1,7 +1,8 @@
-//! Bodies that overlap at the start are pushed apart: with the gap g < 0 of points Σ cᵢ xᵢ along a normal n, xᵢ += cᵢ n λ, λ = −g / Σ cᵢ².
-//! Passes over all contacts go on until nothing overlaps, and no edge of one body goes through another; nodes inside of bodies follow
-//! harmonically. With `separate` the shape at rest stays, so that the run starts deformed; with `gap` the shape at rest moves. Leaves out:
-//! whether bodies could have been moved as a whole.
+//! Bodies that overlap at the start are pushed apart: with the gap g < 0 of points Σ cᵢ xᵢ along a normal n,
+//! xᵢ += cᵢ n λ, λ = −g / Σ cᵢ². Passes over all contacts go on until nothing overlaps, and no edge of one
+//! body goes through another; nodes inside of bodies follow harmonically. With `separate` the shape at rest
+//! stays, so that the run starts deformed; with `gap` the shape at rest moves. Leaves out: whether bodies
+//! could have been moved as a whole.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -23,7 +24,8 @@ use super::{Builder, BuiltBody, in_metres};
 const LEAST_GAP: f64 = 0.5;
 /// Passes at most.
 const PASSES: usize = 400;
-/// Cosine of the angle between the shortest way out of a thing and that into the own body, below which the latter is taken.
+/// Cosine of the angle between the shortest way out of a thing and that into the own body, below which the
+/// latter is taken.
 const FACING: f64 = 0.3;
 /// Sweeps in which inner nodes follow.
 const SWEEPS: usize = 200;
@@ -39,7 +41,8 @@ struct Pushed {
     places: Vec<Vector3>,
     /// 1 along components that are free, else 0.
     free: Vec<Vector3>,
-    /// Gap [m] below which points are pushed, and the gap that is left between them: that of barriers, without them none.
+    /// Gap [m] below which points are pushed, and the gap that is left between them: that of barriers,
+    /// without them none.
     least: f64,
     left: f64,
     /// Ways [m] up to this have no direction.
@@ -77,8 +80,9 @@ impl Pushed {
 }
 
 impl Builder<'_> {
-    /// The displacements [m] that push bodies apart which overlap, of all nodes; `None` if nothing has to, or cannot be. Barriers have `distances`
-    /// [m], one a contact: bodies are pushed apart by as much, so that the run starts without forces between them.
+    /// The displacements [m] that push bodies apart which overlap, of all nodes; `None` if nothing has to, or
+    /// cannot be. Barriers have `distances` [m], one a contact: bodies are pushed apart by as much, so that
+    /// the run starts without forces between them.
     pub(super) fn separate(
         &mut self,
         contacts: Option<&Contacts>,
@@ -117,7 +121,8 @@ impl Builder<'_> {
         Some(Arc::new(displacement))
     }
 
-    /// The bodies with shapes at rest that have the gaps of contacts between them; `None` if nothing has to move, or can't.
+    /// The bodies with shapes at rest that have the gaps of contacts between them; `None` if nothing has to
+    /// move, or can't.
     pub(super) fn part_at_rest(&mut self, contacts: &Contacts) -> Option<Vec<BuiltBody>> {
         let scene = self.scene;
         let (name, _) = scene.contacts.iter().find(|(_, table)| table.gap.is_some())?;
@@ -147,8 +152,8 @@ impl Builder<'_> {
         Some(bodies)
     }
 
-    /// Where nodes are [m] once nothing overlaps; `None` if something still does. Of each contact that counts `kept` says below which gap [m] points are
-    /// pushed, and which is left.
+    /// Where nodes are [m] once nothing overlaps; `None` if something still does. Of each contact that counts
+    /// `kept` says below which gap [m] points are pushed, and which is left.
     fn push_all_apart(
         &mut self,
         asked: [&str; 2],
@@ -333,7 +338,8 @@ fn size_of(places: &[Vector3]) -> f64 {
     places.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()))
 }
 
-/// Pushes nodes and points of faces out of a rigid thing: the shortest way, unless this leads out of the body. A solid then draws back into itself.
+/// Pushes nodes and points of faces out of a rigid thing: the shortest way, unless this leads out of the
+/// body. A solid then draws back into itself.
 fn push_out(rigid: &Rigid, offset: f64, surface: &Surface, is_solid: bool, pushed: &mut Pushed) {
     let stance = rigid.stance(0.0, None);
     let thinnest = rigid.shape.thinnest();
@@ -374,8 +380,8 @@ fn push_out(rigid: &Rigid, offset: f64, surface: &Surface, is_solid: bool, pushe
     }
 }
 
-/// How far [m] a point has to go along a direction to leave a thing whose thinnest part is known [m]; `None` if it is not that thin there, or without
-/// a direction.
+/// How far [m] a point has to go along a direction to leave a thing whose thinnest part is known [m]; `None`
+/// if it is not that thin there, or without a direction.
 fn way_out(from: &Vector3, along: &Vector3, thinnest: f64, gap: impl Fn(&Vector3) -> f64) -> Option<f64> {
     let mut way = 0.0;
     while way <= 4.0 * thinnest && *along != Vector3::zeros() {

@@ -54,7 +54,8 @@ impl Builder<'_> {
         true
     }
 
-    /// Refuses constraints of rotations that follow a solid, and volumes that shells with such rotations enclose.
+    /// Refuses constraints of rotations that follow a solid, and volumes that shells with such rotations
+    /// enclose.
     pub(super) fn check_turns(&mut self) {
         let mut turning: Vec<u32> = self.assembly.turns.iter().map(|turn| turn.node).collect();
         turning.sort_unstable();

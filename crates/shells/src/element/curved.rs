@@ -1,8 +1,9 @@
-//! Membrane strain of a curved triangle: the mean over its cubic Bézier patch, linear in the nodes' displacements and rotations about
-//! rest. The edges of the patch turn in their surface by (1 − α) of the turn of their chord and by α of that of their node about its own
-//! normal, which both neighbours share: α = 3/2, as in the ANDES triangle, which this is on a flat facet. Strain and pressure from one
-//! surface that is continuous over edges leave no nodal forces that bend a thin wall.
-//! Leaves out: how the strain changes as the wall bends far from its rest shape, by the square of an edge's angle.
+//! Membrane strain of a curved triangle: the mean over its cubic Bézier patch, linear in the nodes'
+//! displacements and rotations about rest. The edges of the patch turn in their surface by (1 − α) of the
+//! turn of their chord and by α of that of their node about its own normal, which both neighbours share: α =
+//! 3/2, as in the ANDES triangle, which this is on a flat facet. Strain and pressure from one surface that is
+//! continuous over edges leave no nodal forces that bend a thin wall. Leaves out: how the strain changes as
+//! the wall bends far from its rest shape, by the square of an edge's angle.
 
 use nalgebra::{Matrix2, Matrix3, RowVector3, SMatrix, Vector2, Vector3};
 

@@ -1,7 +1,7 @@
-//! Walls of layers: classical laminate theory (Reissner and Stavsky 1961, J. Appl. Mech. 28:402; Jones 1999). With the plane stress Q of
-//! each layer, turned to the axes of the wall, membrane forces and moments of strains ε and curvatures κ are
-//! n = A ε + B κ, m = B ε + D κ, (A, B, D) = ∫ Q (1, z, z²) dz.
-//! Leaves out: shear across the thickness, slip between layers.
+//! Walls of layers: classical laminate theory (Reissner and Stavsky 1961, J. Appl. Mech. 28:402; Jones 1999).
+//! With the plane stress Q of each layer, turned to the axes of the wall, membrane forces and moments of
+//! strains ε and curvatures κ are n = A ε + B κ, m = B ε + D κ, (A, B, D) = ∫ Q (1, z, z²) dz. Leaves out:
+//! shear across the thickness, slip between layers.
 
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
@@ -76,8 +76,8 @@ pub(crate) fn density(layers: &[Layer]) -> f64 {
     layers.iter().map(|layer| layer.density * layer.thickness).sum::<f64>() / thickness(layers)
 }
 
-/// The isotropic elasticity that layers have on the mean over all angles (Tsai and Pagano 1968): what stands for them where an element
-/// wants one number.
+/// The isotropic elasticity that layers have on the mean over all angles (Tsai and Pagano 1968): what stands
+/// for them where an element wants one number.
 pub(crate) fn mean(layers: &[Layer]) -> Elasticity {
     let whole = thickness(layers);
     let q = layers
@@ -116,7 +116,8 @@ pub struct Section {
 }
 
 impl Section {
-    /// Of layers from the bottom (against the normal) to the top, whose direction is turned by an angle [rad] from the first axis.
+    /// Of layers from the bottom (against the normal) to the top, whose direction is turned by an angle [rad]
+    /// from the first axis.
     pub fn new(layers: &[Layer], direction: f64) -> Self {
         let whole = thickness(layers);
         let mut bottom = -0.5 * whole;
@@ -151,8 +152,8 @@ impl Section {
         PlaneStress { matrix, ..PlaneStress::from(self.mean) }
     }
 
-    /// Stress [Pa] under membrane forces [N/m] and moments [N] at the top, in the middle (of two layers there the upper one), at the
-    /// bottom, and at both faces of each layer.
+    /// Stress [Pa] under membrane forces [N/m] and moments [N] at the top, in the middle (of two layers there
+    /// the upper one), at the bottom, and at both faces of each layer.
     pub(crate) fn stresses(
         &self,
         forces: &Vector3<f64>,
@@ -200,14 +201,16 @@ mod tests {
         let (q, turned) = (SOFT.matrix(), SOFT.turned(90_f64.to_radians()));
         assert!((turned[(0, 0)] - q[(1, 1)]).abs() < 1e-9 && (turned[(1, 1)] - q[(0, 0)]).abs() < 1e-9);
         assert!((SOFT.turned(std::f64::consts::PI) - q).norm() < 1e-9 * q.norm());
-        // Pulled along its stiff axis at 30°, it does not shear in its own axes: E₁ ν₁₂ there (Jones 1999, 2.97).
+        // Pulled along its stiff axis at 30°, it does not shear in its own axes: E₁ ν₁₂ there (Jones 1999,
+        // 2.97).
         let inverse = SOFT.turned(30_f64.to_radians()).try_inverse().unwrap();
         let (s, c) = 30_f64.to_radians().sin_cos();
         let young = 1.0 / (c.powi(4) / 2e6 + s.powi(4) / 0.5e6 + (1.0 / 0.2e6 - 0.6 / 2e6) * s * s * c * c);
         assert!((1.0 / inverse[(0, 0)] / young - 1.0).abs() < 1e-12);
     }
 
-    /// ±θ: no coupling of stretch and shear; and only stretch with twist, as they are not symmetric. Four of them are.
+    /// ±θ: no coupling of stretch and shear; and only stretch with twist, as they are not symmetric. Four of
+    /// them are.
     #[test]
     fn balanced_layers_do_not_shear() {
         let pair = Section::new(&[layer(35.0), layer(-35.0)], 0.0);

@@ -1,5 +1,5 @@
-//! Membrane of a flat triangle with rotations about its normal: Felippa's optimal ANDES element (2003), CMAME 192:2125,
-//! and the constant-strain triangle.
+//! Membrane of a flat triangle with rotations about its normal: Felippa's optimal ANDES element (2003), CMAME
+//! 192:2125, and the constant-strain triangle.
 
 use nalgebra::{Matrix3, SMatrix};
 
@@ -8,7 +8,8 @@ use super::{Corners, Differences, Matrix9, PlaneStress, area, gradients};
 /// α_b: how much of the edges' normal displacement comes from drilling.
 pub(super) const DRILLING_TO_EDGE: f64 = 1.5;
 
-/// Mean strain (εxx, εyy, γxy) of the ANDES triangle over (u, v, θz), Lᵀ/(t A) with its lumping L of constant stress.
+/// Mean strain (εxx, εyy, γxy) of the ANDES triangle over (u, v, θz), Lᵀ/(t A) with its lumping L of constant
+/// stress.
 pub(crate) fn andes_strain(corners: &Corners) -> SMatrix<f64, 3, 9> {
     let d = Differences::new(corners);
     let (x13, x21, x32) = (-d.x31, -d.x12, -d.x23);
@@ -61,7 +62,8 @@ pub(crate) fn andes_higher(
         (y23 * x31 + x32 * y13) * l21, (y31 * x12 + x13 * y21) * l32, (y12 * x23 + x21 * y32) * l13,
     ) / (4.0 * area * area);
     let elastic_natural = natural.transpose() * elastic.matrix * natural;
-    // Strains along the edges at the corners, from the hierarchical rotations; βs 1, 2, 1, 0, 1, −1, −1, −1, −2.
+    // Strains along the edges at the corners, from the hierarchical rotations; βs 1, 2, 1, 0, 1, −1, −1, −1,
+    // −2.
     let lengths = Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0 / l21, 1.0 / l32, 1.0 / l13));
     let scale = lengths * (2.0 * area / 3.0);
     let q1 = scale * Matrix3::new(1.0, 2.0, 1.0, 0.0, 1.0, -1.0, -1.0, -1.0, -2.0);

@@ -1,5 +1,6 @@
-//! Stiffness of triangles in their rest shape: of flat ones in their own plane, and the membrane of curved ones. Degrees of freedom of the membrane are
-//! (u, v, θz) node by node, those of bending (w, θx, θy), with θx = ∂w/∂y and θy = −∂w/∂x.
+//! Stiffness of triangles in their rest shape: of flat ones in their own plane, and the membrane of curved
+//! ones. Degrees of freedom of the membrane are (u, v, θz) node by node, those of bending (w, θx, θy), with
+//! θx = ∂w/∂y and θy = −∂w/∂x.
 
 mod bending;
 mod comas;
@@ -39,26 +40,28 @@ pub use membrane::{andes_opt, constant_strain};
 /// How a shell resists in its plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Membrane {
-    /// The mean strain of the curved triangle (`Opt` on flat facets), which goes with `Spread::Curved`: pressure
-    /// on a curved wall then stretches it and bends it no more than the true load. Not with `Spread::Lumped`: either without the other
-    /// scatters displacements from node to node, the more the thinner the wall. Normals of the true surface count: estimated from the
-    /// triangles they describe another wall.
+    /// The mean strain of the curved triangle (`Opt` on flat facets), which goes with `Spread::Curved`:
+    /// pressure on a curved wall then stretches it and bends it no more than the true load. Not with
+    /// `Spread::Lumped`: either without the other scatters displacements from node to node, the more the
+    /// thinner the wall. Normals of the true surface count: estimated from the triangles they describe
+    /// another wall.
     Curved {
         /// κ, as in `Opt`; 10 by default.
         adaptation: f64,
     },
-    /// Felippa's optimal ANDES triangle with its higher-order part scaled by min(1, κ t²/A), so that drilling does
-    /// not lock thin curved shells. κ = ∞ is Felippa's OPT. In thin curved shells under large tension, as balloons, drilling moments of
-    /// unequal facets tilt the nodes, by about ε h³/(R t²) for a strain ε, edges h and a radius R: blown up to twice its volume
-    /// (R/t = 50) a sphere of 128 facets folds, one of 512 tilts by 1.2 rad at a pressure 1.6 % off, one of 2048 by 0.24 rad at 0.02 %
-    /// (`validation`, `shell_balloon`). There take `Curved`, `Cst`, or a mesh with h³ well below R t²/ε.
+    /// Felippa's optimal ANDES triangle with its higher-order part scaled by min(1, κ t²/A), so that drilling
+    /// does not lock thin curved shells. κ = ∞ is Felippa's OPT. In thin curved shells under large tension,
+    /// as balloons, drilling moments of unequal facets tilt the nodes, by about ε h³/(R t²) for a strain ε,
+    /// edges h and a radius R: blown up to twice its volume (R/t = 50) a sphere of 128 facets folds, one of
+    /// 512 tilts by 1.2 rad at a pressure 1.6 % off, one of 2048 by 0.24 rad at 0.02 % (`validation`,
+    /// `shell_balloon`). There take `Curved`, `Cst`, or a mesh with h³ well below R t²/ε.
     Opt {
         /// κ; 10 by default.
         adaptation: f64,
     },
-    /// The constant-strain triangle: for membranes under pressure, where it tilts no node (0.3 % off the pressure of the balloon of 512
-    /// facets, 0.07 % of 2048), whatever its drilling. Much too stiff for bending in its plane: 0.72 of Cook's membrane at N = 8, where
-    /// `Opt` has 0.95.
+    /// The constant-strain triangle: for membranes under pressure, where it tilts no node (0.3 % off the
+    /// pressure of the balloon of 512 facets, 0.07 % of 2048), whatever its drilling. Much too stiff for
+    /// bending in its plane: 0.72 of Cook's membrane at N = 8, where `Opt` has 0.95.
     Cst {
         /// Stiffness against drilling as a part of G t A/3 per node.
         drilling: f64,
@@ -79,8 +82,8 @@ pub enum Bending {
     /// The discrete Kirchhoff triangle.
     #[default]
     Dkt,
-    /// The element of Comas (2010), corrected for its typing errors. Only for comparison: it depends on the numbering
-    /// of the corners, fails the patch test and converges to plates 6 to 26 % too soft.
+    /// The element of Comas (2010), corrected for its typing errors. Only for comparison: it depends on the
+    /// numbering of the corners, fails the patch test and converges to plates 6 to 26 % too soft.
     Comas2010,
     /// No resistance: for studies of membranes.
     None,
@@ -163,7 +166,8 @@ impl Elasticity {
     }
 }
 
-/// Elasticity of a wall in its plane, and two numbers of it by which elements scale what every value of keeps their convergence.
+/// Elasticity of a wall in its plane, and two numbers of it by which elements scale what every value of keeps
+/// their convergence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlaneStress {
     /// (σxx, σyy, σxy) over (εxx, εyy, γxy) [Pa].

@@ -100,7 +100,8 @@ fn constant_strain_and_curvature_have_their_energy() {
     }
 }
 
-/// The largest change of the stiffness, of its largest entry, when the corners are numbered from the second on.
+/// The largest change of the stiffness, of its largest entry, when the corners are numbered from the second
+/// on.
 fn asymmetry(stiffness: Stiffness, corners: &Corners) -> f64 {
     let k = stiffness(corners, &ELASTIC.into(), THICKNESS);
     let turned = stiffness(&[corners[1], corners[2], corners[0]], &ELASTIC.into(), THICKNESS);
@@ -136,8 +137,8 @@ fn patch() -> (Vec<Vector2<f64>>, Vec<[usize; 3]>) {
     (points, quadrilaterals.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
 }
 
-/// The largest deviation of the inner nodes from a displacement given at the outer four, over its largest value, when each
-/// triangle's first corner is `start` places on.
+/// The largest deviation of the inner nodes from a displacement given at the outer four, over its largest
+/// value, when each triangle's first corner is `start` places on.
 fn patch_error(
     stiffness: Stiffness,
     field: impl Fn(&Corners) -> SVector<f64, 9>,

@@ -1,8 +1,9 @@
-//! A flat triangular shell in large rotation: the linear element in a frame that turns with it. The frame is the facet's
-//! normal and the two-dimensional polar rotation in its plane, so it does not depend on the order of the corners;
-//! nodal forces are the exact gradient of the energy ½ dᵀ K d in that frame. Element-independent co-rotation after
-//! Felippa and Haugen (2005), CMAME 194:2285; polar frame after Caselli and Bisegna (2013), IJNME 95:499.
-//! Leaves out: large strains (the energy is that of linear elasticity) and shear of the thickness.
+//! A flat triangular shell in large rotation: the linear element in a frame that turns with it. The frame is
+//! the facet's normal and the two-dimensional polar rotation in its plane, so it does not depend on the order
+//! of the corners; nodal forces are the exact gradient of the energy ½ dᵀ K d in that frame.
+//! Element-independent co-rotation after Felippa and Haugen (2005), CMAME 194:2285; polar frame after Caselli
+//! and Bisegna (2013), IJNME 95:499. Leaves out: large strains (the energy is that of linear elasticity) and
+//! shear of the thickness.
 
 #[cfg(test)]
 mod single;
@@ -34,7 +35,8 @@ const BENDING: [usize; 9] = [2, 3, 4, 8, 9, 10, 14, 15, 16];
 /// Above this rotation [rad] of a node out of the plane of its facet the facet is folded over, not deformed.
 const FOLDED: f64 = 2.0;
 
-/// Above this rotation [rad], about any axis, the rotation vector is not safely one of its kind: at π it changes sign.
+/// Above this rotation [rad], about any axis, the rotation vector is not safely one of its kind: at π it
+/// changes sign.
 const FULL: f64 = 3.0;
 
 /// A shell element: what its rest shape gives.
@@ -48,8 +50,8 @@ pub struct Facet {
     pub area: f64,
     /// Mass that it gives to each node [kg].
     pub mass: f64,
-    /// Rotary inertia that it gives to each node [kg m²]: at least that of a square of its area, so that rotations do not shorten the
-    /// steps of an explicit solver.
+    /// Rotary inertia that it gives to each node [kg m²]: at least that of a square of its area, so that
+    /// rotations do not shorten the steps of an explicit solver.
     pub inertia: f64,
     elastic: PlaneStress,
     /// Of a wall of layers.
@@ -61,7 +63,8 @@ pub struct Facet {
     /// Axes at rest.
     axes: UnitQuaternion<f64>,
     formulation: Formulation,
-    /// Which edges of a curved membrane are straight, and its normals, in the facet's axes; `None` while it is flat.
+    /// Which edges of a curved membrane are straight, and its normals, in the facet's axes; `None` while it
+    /// is flat.
     curved: Option<([Vector3<f64>; 3], [bool; 6])>,
     /// Stiffness of all, in the facet's axes.
     stiffness: Matrix18,
@@ -142,7 +145,8 @@ pub enum Broken {
     Area(f64),
     /// A node has turned by this angle [rad] against it.
     Folded(f64),
-    /// Of a cell of a solid: the determinant of its deformation gradient is not positive, there or at a corner.
+    /// Of a cell of a solid: the determinant of its deformation gradient is not positive, there or at a
+    /// corner.
     Inverted(f64),
 }
 
@@ -158,8 +162,8 @@ impl Facet {
         Self::of_wall(nodes, rest, thickness, material, None, formulation)
     }
 
-    /// A facet of layers from the bottom (against its normal) to the top; their angles count from a direction, which is projected on the
-    /// facet.
+    /// A facet of layers from the bottom (against its normal) to the top; their angles count from a
+    /// direction, which is projected on the facet.
     pub fn layered(
         nodes: [u32; 3],
         rest: [Vector3<f64>; 3],
@@ -227,7 +231,8 @@ impl Facet {
         Some(facet)
     }
 
-    /// Takes up a membrane with its mean strain and the area of that [m²]: whole stiffness and forces at rest.
+    /// Takes up a membrane with its mean strain and the area of that [m²]: whole stiffness and forces at
+    /// rest.
     fn put_together(&mut self, membrane: Matrix18, strain: Matrix3x18, area: f64) {
         self.stiffness = membrane;
         add_block(&mut self.stiffness, BENDING, &self.bending);
@@ -254,7 +259,8 @@ impl Facet {
         Self { tension: (forces, tension), ..self }
     }
 
-    /// Gives a curved membrane the normals of its corners at rest, and says which of its edges are straight; others stay as they are.
+    /// Gives a curved membrane the normals of its corners at rest, and says which of its edges are straight;
+    /// others stay as they are.
     pub fn curve(&mut self, normals: [Vector3<f64>; 3], straight: [bool; 6]) {
         let Membrane::Curved { adaptation } = self.formulation.membrane else { return };
         let back = self.axes.inverse();
@@ -360,8 +366,9 @@ impl Facet {
         ShellEnergy { membrane: membrane + self.tension_energy(d), bending, drilling }
     }
 
-    /// Mean forces and moments per length: t D times the mean strain, and those moments whose work with a uniform curvature is that of
-    /// the element's nodal forces (for the discrete Kirchhoff triangle D times the mean curvature).
+    /// Mean forces and moments per length: t D times the mean strain, and those moments whose work with a
+    /// uniform curvature is that of the element's nodal forces (for the discrete Kirchhoff triangle D times
+    /// the mean curvature).
     pub fn resultants(&self, placed: &Placed) -> Resultants {
         let d = &placed.deformation;
         let strain = self.strain.0 * d;
@@ -384,7 +391,8 @@ impl Facet {
         Resultants { membrane, moment, axes: placed.axes }
     }
 
-    /// The largest ω² [1/s²] of the element by itself about its rest shape, with its lumped masses: none of the model's is higher.
+    /// The largest ω² [1/s²] of the element by itself about its rest shape, with its lumped masses: none of
+    /// the model's is higher.
     pub fn highest_frequency_squared(&self) -> f64 {
         let scale = |i: usize| if i % 6 < 3 { self.mass } else { self.inertia }.sqrt();
         let scaled = Matrix18::from_fn(|i, j| self.stiffness[(i, j)] / (scale(i) * scale(j)));
@@ -406,8 +414,8 @@ impl Facet {
         (0..18).filter(|i| i % 6 < 3).map(|i| self.stiffness[(i, i)]).fold(0.0, f64::max)
     }
 
-    /// Stress (σxx, σyy, σxy) [Pa] at the top, in the middle and at the bottom, and the largest von Mises stress there and, of a wall of
-    /// layers, at the faces of each.
+    /// Stress (σxx, σyy, σxy) [Pa] at the top, in the middle and at the bottom, and the largest von Mises
+    /// stress there and, of a wall of layers, at the faces of each.
     pub fn stresses(&self, resultants: &Resultants) -> ([Vector3<f64>; 3], f64) {
         let mises = |s: &Vector3<f64>| (s.x * s.x - s.x * s.y + s.y * s.y + 3.0 * s.z * s.z).sqrt();
         let Some(section) = &self.section else {
@@ -432,8 +440,9 @@ impl Facet {
         ShellStrain::new(&strain, &(self.mean_curvature * own), self.thickness)
     }
 
-    /// Thickness [m] with the strain across that plane stress asks for, t (A/A₀)^(−ν/(1 − ν)): −ν/(1 − ν) (ε₁ + ε₂) where strains are
-    /// small, and the same volume for ν = ½ however large they are. Forces do not feel it.
+    /// Thickness [m] with the strain across that plane stress asks for, t (A/A₀)^(−ν/(1 − ν)): −ν/(1 − ν)
+    /// (ε₁ + ε₂) where strains are small, and the same volume for ν = ½ however large they are. Forces do not
+    /// feel it.
     pub fn thickness_now(&self, placed: &Placed) -> f64 {
         let nu = self.elastic.poisson;
         let ratio = area(&placed.local) / self.area;

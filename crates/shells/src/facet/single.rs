@@ -34,8 +34,8 @@ impl Facet {
         k
     }
 
-    /// The symmetric part of the change of the force: the Hessian of the energy on the group of rotations (Simo 1992, CMAME 96:189);
-    /// the rest vanishes at equilibrium without moments.
+    /// The symmetric part of the change of the force: the Hessian of the energy on the group of rotations
+    /// (Simo 1992, CMAME 96:189); the rest vanishes at equilibrium without moments.
     pub(super) fn hessian(&self, placed: &Placed) -> Matrix18 {
         let mut k = self.tangent(placed);
         symmetrise(&mut k);

@@ -46,7 +46,8 @@ fn facet(order: [usize; 3]) -> Facet {
     facet
 }
 
-/// Mean strain and stiffness are those of ANDES-OPT where the normals are the facet's, and where all edges are straight: 1e-13.
+/// Mean strain and stiffness are those of ANDES-OPT where the normals are the facet's, and where all edges
+/// are straight: 1e-13.
 #[test]
 fn a_curved_membrane_without_curvature_is_andes() {
     let [a, b, c] = rest();
@@ -131,8 +132,8 @@ fn force_is_the_gradient_of_the_energy() {
     }
 }
 
-/// Eight at a time, the last pack not full: energies, forces and stiffness of single facets to round-off, curved and under tension,
-/// also where they are bent by half a radian.
+/// Eight at a time, the last pack not full: energies, forces and stiffness of single facets to round-off,
+/// curved and under tension, also where they are bent by half a radian.
 #[test]
 fn packs_have_forces_and_stiffness_of_single_facets() {
     let mut random = Random::new(21);

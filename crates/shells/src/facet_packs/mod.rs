@@ -1,12 +1,14 @@
-//! Forces and stiffness of eight facets at a time: what `facet/single.rs` finds one by one, in blocks of 3 × 3. Of the
-//! change of the force only the symmetric part is made. With G the spin of the frame over translations, S the lever arms, K the
-//! stiffness over spins and R = K Ψ what rigid turns make of it, its blocks of translations (T) and turns (R) are
+//! Forces and stiffness of eight facets at a time: what `facet/single.rs` finds one by one, in blocks of 3
+//! × 3. Of the change of the force only the symmetric part is made. With G the spin of the frame over
+//! translations, S the lever arms, K the stiffness over spins and R = K Ψ what rigid turns make of it, its
+//! blocks of translations (T) and turns (R) are
 //!
 //! * T T: K − Qᵢ Gⱼ − (Qⱼ Gᵢ)ᵀ + ½ (Bᵢⱼ + Bⱼᵢᵀ), Qᵢ = Rᵢ + ½ (S(pᵢ) + S(fᵢ) + tᵢ) − ½ Gᵢᵀ W,
 //! * R T: K − (Rᵢ + ½ S(mᵢ) + cᵢ) Gⱼ, and R R: K + cᵢ on the diagonal,
 //!
-//! with forces f, those left without their resultant p and m, the symmetric parts c of the change of moments that are conjugate to spins, and B with
-//! t of the change of G. A facet takes about 2,500 fused multiplications and reads 1.6 kB.
+//! with forces f, those left without their resultant p and m, the symmetric parts c of the change of moments
+//! that are conjugate to spins, and B with t of the change of G. A facet takes about 2,500 fused
+//! multiplications and reads 1.6 kB.
 
 mod placing;
 
@@ -36,7 +38,8 @@ pub struct FacetPack {
     stiffness: [Pack; HALF],
     tension: [Pack; 18],
     gradient: [Pack; 6],
-    /// Corners and the rotation to the axes, (w, x, y, z), as [`Placing`] finds them there: a facet at rest then has exactly no deformation.
+    /// Corners and the rotation to the axes, (w, x, y, z), as [`Placing`] finds them there: a facet at rest
+    /// then has exactly no deformation.
     corners: [Pack; 6],
     turn: [Pack; 4],
 }
@@ -91,7 +94,8 @@ pub struct Work {
     position: [Pack; 9],
     rotation: [Pack; 12],
     double_area: Pack,
-    /// Rotations of the nodes relative to the facet, and the share of the vector in their squares: the sine squared of half the angle.
+    /// Rotations of the nodes relative to the facet, and the share of the vector in their squares: the sine
+    /// squared of half the angle.
     relative: [Pack; 12],
     share: [Pack; 3],
     broken: [Option<Broken>; PACK],
@@ -427,8 +431,8 @@ impl<S: Simd> Now<S> {
         self.write_turns(&over, work, register);
     }
 
-    /// Finds Hᵀ K H but for translations alone, and the corrections. In loops: closures of `map` are left as calls, without the instructions of
-    /// this kernel, and take most of its time.
+    /// Finds Hᵀ K H but for translations alone, and the corrections. In loops: closures of `map` are left as
+    /// calls, without the instructions of this kernel, and take most of its time.
     #[inline(always)]
     fn spin(&self, over: &mut OverSpins<S>, pack: &FacetPack, work: &Work, register: usize) {
         for i in 0..3 {

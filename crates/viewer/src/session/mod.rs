@@ -1,5 +1,6 @@
-//! A scene on a thread of its own: it is played there in real time, and handed over frame by frame. Neither side ever waits for the
-//! other: orders go through a channel, the newest frame lies in one of three places of which each side holds one.
+//! A scene on a thread of its own: it is played there in real time, and handed over frame by frame. Neither
+//! side ever waits for the other: orders go through a channel, the newest frame lies in one of three places
+//! of which each side holds one.
 
 mod playback;
 mod player;
@@ -52,7 +53,8 @@ pub enum Order {
     Hand(Hand),
     /// Changes what the second hand or a pin holds.
     Second(Hand),
-    /// Goes on as another world from the next step on, from where the run stands: that of numbers which are others than in the file.
+    /// Goes on as another world from the next step on, from where the run stands: that of numbers which are
+    /// others than in the file.
     Change(Box<World>, Vec<Number>),
     /// Finds where bodies are held, moved and loaded in each frame, or not any more.
     Marks(bool),
@@ -68,7 +70,8 @@ pub enum Order {
     Halve,
     /// Shows another field, or another surface.
     Show(Box<ViewTable>),
-    /// Brings every frame to ordinary memory where the state lies on a device, as a section needs it; or only some.
+    /// Brings every frame to ordinary memory where the state lies on a device, as a section needs it; or only
+    /// some.
     Memory(bool),
     /// Ends.
     Quit,
@@ -89,10 +92,12 @@ pub struct Frame {
     pub steps: u64,
     /// Whether it goes on.
     pub playing: bool,
-    /// Points on the device where the state lies, at this instant, to be drawn from there; `None` of a state in ordinary memory.
+    /// Points on the device where the state lies, at this instant, to be drawn from there; `None` of a state
+    /// in ordinary memory.
     pub on_device: Option<DevicePoints>,
-    /// How many inspections there were. Points, values, energies, and what is held are of the last one: of this instant unless
-    /// the state lies on a device, where inspections are rare ([`INSPECTION`](crate::INSPECTION)).
+    /// How many inspections there were. Points, values, energies, and what is held are of the last one: of
+    /// this instant unless the state lies on a device, where inspections are rare
+    /// ([`INSPECTION`](crate::INSPECTION)).
     pub inspections: u64,
     /// What was read back from the device so far.
     pub read_backs: u64,
@@ -108,7 +113,8 @@ pub struct Frame {
     pub least_gap: Option<f64>,
     /// Steps that were taken though they had not converged.
     pub unconverged: u64,
-    /// What is held: the point [m] and the force on the body [N] of each hand that holds something, then of each pin.
+    /// What is held: the point [m] and the force on the body [N] of each hand that holds something, then of
+    /// each pin.
     pub held: Vec<[[f64; 3]; 2]>,
     /// Where each hand is among what is held; `None` of one that holds nothing.
     pub hands: [Option<usize>; 2],
@@ -120,7 +126,8 @@ pub struct Frame {
     pub followed: Vec<FollowedPoint>,
     /// The tool that each hand holds.
     pub tools: [Option<String>; 2],
-    /// Whether each triangle of the subject can be taken hold of: those of bodies and tools, not those of obstacles.
+    /// Whether each triangle of the subject can be taken hold of: those of bodies and tools, not those of
+    /// obstacles.
     pub movable: Arc<[bool]>,
     /// A triangle of each tool.
     pub tool_triangles: Arc<[u32]>,
@@ -172,7 +179,8 @@ pub struct Session {
     thread: Option<JoinHandle<Recording>>,
 }
 
-/// Begins to play a world, from where a run of another one stands if it can be; whether it goes on from there.
+/// Begins to play a world, from where a run of another one stands if it can be; whether it goes on from
+/// there.
 ///
 /// # Errors
 /// If a stepper can't be made.
@@ -225,7 +233,8 @@ impl Session {
 }
 
 impl Session {
-    /// Ends it; what was done since it was told to record or was last reset. `None` after a panic, which was told there.
+    /// Ends it; what was done since it was told to record or was last reset. `None` after a panic, which was
+    /// told there.
     pub fn end(&mut self) -> Option<Recording> {
         self.order(Order::Quit);
         self.stop.ask();

@@ -71,7 +71,8 @@ pub(super) struct Playback {
     pub(super) playing: bool,
     /// Steps that were asked for one by one.
     pub(super) owed: u64,
-    /// What was asked for that no step has felt yet: when, after how many steps it acts, and its number in the recording.
+    /// What was asked for that no step has felt yet: when, after how many steps it acts, and its number in
+    /// the recording.
     pub(super) waiting: Vec<(Instant, u64, usize)>,
     pub(super) input_lag: Option<f64>,
     /// Since the last frame.

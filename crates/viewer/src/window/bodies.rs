@@ -93,7 +93,8 @@ fn regions_named(names: &RegionNames, name: &str) -> Vec<Region> {
     names.find(&CellLabel::Name(name.to_owned())).unwrap_or_default()
 }
 
-/// Gives a region a look, by the name that has given it one so far. A name of several labels is replaced by the numbers of the others.
+/// Gives a region a look, by the name that has given it one so far. A name of several labels is replaced by
+/// the numbers of the others.
 fn set_look(names: &RegionNames, looks: &mut Looks, region: Region, own: &CellLabel, look: LookTable) {
     let mut key = own.to_string();
     while let Some((name, shared)) = look_of(names, looks, region) {

@@ -1,4 +1,5 @@
-//! A film of the picture as it is played: ten pictures a second, half as wide and high, as an animated PNG beside the scene.
+//! A film of the picture as it is played: ten pictures a second, half as wide and high, as an animated PNG
+//! beside the scene.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};

@@ -1,5 +1,5 @@
-//! The window of a finished run: its frames over a timeline. They are read on a thread of their own, the newest that is asked for; frames
-//! that cannot be read in time are left out.
+//! The window of a finished run: its frames over a timeline. They are read on a thread of their own, the
+//! newest that is asked for; frames that cannot be read in time are left out.
 
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};

@@ -1,4 +1,5 @@
-//! Picked points over the picture: where they are, their place, value, body, element and label, and the distance of the last two.
+//! Picked points over the picture: where they are, their place, value, body, element and label, and the
+//! distance of the last two.
 
 use eframe::egui::{Align2, Color32, FontId, Painter, Stroke, vec2};
 use pliant_picture::readable;
@@ -16,8 +17,8 @@ fn length(metres: f64) -> String {
 }
 
 impl App {
-    /// Followed points with their numbers, and what is known of them beside the bar: place, value, body, element and label, and the
-    /// distance of the last two.
+    /// Followed points with their numbers, and what is known of them beside the bar: place, value, body,
+    /// element and label, and the distance of the last two.
     pub(super) fn draw_followed(&self, painter: &Painter) {
         let followed = &self.frame.followed;
         if let [.., one, two] = &followed[..]

@@ -1,4 +1,5 @@
-//! What a user takes away: a picture, the view as the table `[view]` of a scene, and the scene with the numbers that were changed.
+//! What a user takes away: a picture, the view as the table `[view]` of a scene, and the scene with the
+//! numbers that were changed.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -84,7 +85,8 @@ fn part(image: &ColorImage, rect: Rect, pixels_per_point: f32) -> Option<Picture
     (!rgba.is_empty()).then_some(Picture { width, height, rgba })
 }
 
-/// What a camera has to look at to see what it sees, where it does not see all: target [m] and magnification of what fits.
+/// What a camera has to look at to see what it sees, where it does not see all: target [m] and magnification
+/// of what fits.
 type Closer = Option<([f64; 3], f64)>;
 
 /// A view as the table `[view]` of a scene.

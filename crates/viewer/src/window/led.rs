@@ -9,8 +9,8 @@ use super::App;
 use super::picture::{OPEN, TURN};
 use crate::hand::{Hand, Point};
 
-/// How far a tool goes in a second while a key is held, over the height of the picture; by how many points of the mouse it turns, and of
-/// the wheel its jaws open.
+/// How far a tool goes in a second while a key is held, over the height of the picture; by how many points of
+/// the mouse it turns, and of the wheel its jaws open.
 const SPEED: f64 = 0.15;
 const TURNS: f64 = 60.0;
 const OPENS: f64 = 300.0;
@@ -34,8 +34,8 @@ impl App {
         self.take_with(which, Point { triangle, weights: [1.0 / 3.0; 3] }, middle);
     }
 
-    /// Moves the tool that keys lead: arrows across the view, Page Up and Page Down along it; with Shift arrows turn it; Home and End open
-    /// and close its jaws.
+    /// Moves the tool that keys lead: arrows across the view, Page Up and Page Down along it; with Shift
+    /// arrows turn it; Home and End open and close its jaws.
     pub(super) fn lead_tool(&mut self, context: &egui::Context) {
         let Some((_, which)) = self.led else { return };
         let Some(at) = self.hands[which as usize] else { return };

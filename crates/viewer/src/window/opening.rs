@@ -86,7 +86,8 @@ impl Browser {
     }
 }
 
-/// What can be opened in a folder: folders, then scenes and meshes, each by name. What cannot be read has nothing.
+/// What can be opened in a folder: folders, then scenes and meshes, each by name. What cannot be read has
+/// nothing.
 fn entries(folder: &Path) -> Vec<Entry> {
     let read = fs::read_dir(folder).into_iter().flatten().flatten();
     let entry = |path: PathBuf| {

@@ -1,4 +1,5 @@
-//! The numbers of laws, loads and bodies, changed while it is played. The scene with them is made on a thread of its own.
+//! The numbers of laws, loads and bodies, changed while it is played. The scene with them is made on a thread
+//! of its own.
 
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 

@@ -223,7 +223,8 @@ mod tests {
         shapes(line).iter().filter_map(text).collect()
     }
 
-    /// Many values in a pixel, then a drop and a pause: a band would be filled from the drop to the end of the pause.
+    /// Many values in a pixel, then a drop and a pause: a band would be filled from the drop to the end of
+    /// the pause.
     #[test]
     fn a_curve_that_drops_is_a_line_and_fills_nothing() {
         let rise = (0..2000).map(|i| [f64::from(i) * 1e-3, f64::from(i)]);

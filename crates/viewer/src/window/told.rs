@@ -1,4 +1,5 @@
-//! The line below the picture: a failure, a warning, a hint, or a thing that was done. It lies beside the picture, so it hides nothing.
+//! The line below the picture: a failure, a warning, a hint, or a thing that was done. It lies beside the
+//! picture, so it hides nothing.
 
 use eframe::egui::{self, Color32, Frame, Margin, RichText, Ui};
 
@@ -39,7 +40,8 @@ impl Told {
 }
 
 impl Kind {
-    /// The word before the text, and the colours of paper and word; the word makes it readable without colours.
+    /// The word before the text, and the colours of paper and word; the word makes it readable without
+    /// colours.
     fn look(self, dark: bool) -> (&'static str, Color32, Color32) {
         let (word, [paper, ink]) = match self {
             Self::Failure => ("error", [[252, 224, 219], [160, 28, 20]]),
@@ -57,8 +59,9 @@ impl Kind {
 }
 
 impl App {
-    /// What a user should know now: why the run cannot go on, then what was done last, else what the run notes or the scene warns of. A
-    /// failure, a note and a warning that were closed do not come back; a message does where it comes anew.
+    /// What a user should know now: why the run cannot go on, then what was done last, else what the run
+    /// notes or the scene warns of. A failure, a note and a warning that were closed do not come back; a
+    /// message does where it comes anew.
     pub(super) fn banner(&self) -> Vec<Told> {
         let warned = |text: String| Told { kind: Kind::Warning, text };
         let open = |told: &Told| !self.closed.contains(&told.text);

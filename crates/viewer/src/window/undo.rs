@@ -41,7 +41,8 @@ impl App {
         });
     }
 
-    /// Takes back what was done last: numbers and pins as they were, a pull by going back to a state before it.
+    /// Takes back what was done last: numbers and pins as they were, a pull by going back to a state before
+    /// it.
     pub(super) fn undo(&mut self) {
         match self.acts.pop() {
             Some(Act::Numbers(before)) => self.set_numbers(&before),

@@ -1,5 +1,5 @@
-//! What is looked at, and from where: the body that is drawn, the camera, the style, and what is written around it. A scene that is played
-//! and a finished run are both seen through one.
+//! What is looked at, and from where: the body that is drawn, the camera, the style, and what is written
+//! around it. A scene that is played and a finished run are both seen through one.
 
 use std::sync::Arc;
 
@@ -34,11 +34,12 @@ pub(super) const BESIDE_BAR: f32 = 2.0 * CORNER + 24.0 + BAR as f32;
 /// Colours of x, y and z.
 const COLOURS: [Color32; 3] =
     [Color32::from_rgb(196, 54, 46), Color32::from_rgb(46, 138, 60), Color32::from_rgb(50, 92, 196)];
-/// Letters of the sides of a patient to which x, y and z point, and of the other sides: right and left, front (anterior) and back, head (superior)
-/// and feet.
+/// Letters of the sides of a patient to which x, y and z point, and of the other sides: right and left, front
+/// (anterior) and back, head (superior) and feet.
 const SIDES_OF_PATIENT: [[&str; 2]; 3] = [["R", "L"], ["A", "P"], ["S", "I"]];
 
-/// Azimuth and elevation [°] of the sides: front, back, left, right, top, bottom. Those of a patient, whose front is along y, or of x.
+/// Azimuth and elevation [°] of the sides: front, back, left, right, top, bottom. Those of a patient, whose
+/// front is along y, or of x.
 fn sides(patient: bool) -> [(Key, [f64; 2]); 6] {
     let front = if patient { 90.0 } else { 0.0 };
     [
@@ -51,7 +52,8 @@ fn sides(patient: bool) -> [(Key, [f64; 2]); 6] {
     ]
 }
 
-/// A section: whether it is on, its normal, and how far along it the plane lies, as a part of the body's extent at rest.
+/// A section: whether it is on, its normal, and how far along it the plane lies, as a part of the body's
+/// extent at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Cut {
     pub on: bool,
@@ -261,8 +263,8 @@ impl Viewport {
         }
     }
 
-    /// Takes what is left of the window, and lets the section follow the body; what the mouse does there. A name of its own keeps a drag
-    /// alive where a panel beside it comes or goes.
+    /// Takes what is left of the window, and lets the section follow the body; what the mouse does there. A
+    /// name of its own keeps a drag alive where a panel beside it comes or goes.
     pub(crate) fn lay_out(&mut self, ui: &mut egui::Ui) -> egui::Response {
         let rect = ui.available_rect_before_wrap();
         let response = ui.interact(rect, egui::Id::unique("picture"), Sense::click_and_drag());
@@ -325,8 +327,8 @@ impl Viewport {
         camera
     }
 
-    /// How far the middle of what is seen lies beside that of the picture, in heights to the right and up: beside the scale of colours and
-    /// below the figures.
+    /// How far the middle of what is seen lies beside that of the picture, in heights to the right and up:
+    /// beside the scale of colours and below the figures.
     fn beside(&self) -> [f64; 2] {
         let height = self.rect.height().max(SCALE);
         [-0.5 * f64::from(SCALE / height), -0.5 * f64::from(FIGURES / height).min(0.4)]
@@ -343,7 +345,8 @@ impl Viewport {
         camera
     }
 
-    /// What the camera looks at and how near it is where it does not see all: target [m] and magnification of what fits.
+    /// What the camera looks at and how near it is where it does not see all: target [m] and magnification of
+    /// what fits.
     pub fn closer(&self) -> Option<(Vector3, f64)> {
         let fitted = self.fitted();
         let moved = (self.camera.target - fitted.target).norm() > 0.01 * fitted.height
@@ -450,7 +453,8 @@ impl Viewport {
         painter.rect_filled(place.expand(6.0), 5.0, pale);
     }
 
-    /// Lines of text on a card, from a corner at the left on. Where the picture is narrow they are broken before the scale of colours.
+    /// Lines of text on a card, from a corner at the left on. Where the picture is narrow they are broken
+    /// before the scale of colours.
     pub fn write(&self, painter: &Painter, corner: Align2, at: Pos2, lines: &[String], size: f32) {
         let scale = if self.style.range.is_some() && !self.values.is_empty() { SCALE + 20.0 } else { 12.0 };
         let room = (self.rect.right() - scale - at.x).max(100.0);
@@ -507,7 +511,8 @@ impl Viewport {
         }
     }
 
-    /// A ring around the place of the largest value that is seen, dashed where something hides it, and the number.
+    /// A ring around the place of the largest value that is seen, dashed where something hides it, and the
+    /// number.
     pub(crate) fn draw_maximum(&self, painter: &Painter, unit: &str) {
         let Some([low, high]) = self.style.range.filter(|_| self.style.maximum && !self.values.is_empty())
         else {
@@ -551,7 +556,8 @@ impl Viewport {
         painter.galley(text.min, galley, ink);
     }
 
-    /// The range of colours, typed in the unit of the scale: a typed one is locked. What is wrong with one that is not taken.
+    /// The range of colours, typed in the unit of the scale: a typed one is locked. What is wrong with one
+    /// that is not taken.
     pub(crate) fn edit_range(&mut self, ui: &mut egui::Ui, unit: &str) -> Option<String> {
         let mut refused = None;
         if let Some(range) = self.style.range {
@@ -615,8 +621,9 @@ impl Viewport {
     }
 }
 
-/// The letters at the end of an axis that points somewhere on the screen, and at the other side of the origin: sides of a patient, of which
-/// the other one has no room where the axis is short; or the name of the axis alone.
+/// The letters at the end of an axis that points somewhere on the screen, and at the other side of the
+/// origin: sides of a patient, of which the other one has no room where the axis is short; or the name of the
+/// axis alone.
 fn letters(axis: usize, patient: bool, along: Vec2) -> [&'static str; 2] {
     let [far, near] = SIDES_OF_PATIENT[axis];
     match patient {

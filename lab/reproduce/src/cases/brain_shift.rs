@@ -1,5 +1,5 @@
-//! Brain shift on an ellipsoid: half axes 80, 65 and 60 mm about the origin, held by the skull below z = −12 mm, pressed
-//! inwards at an opening around the axis n, free elsewhere. E = 3000 Pa, ν = 0.49.
+//! Brain shift on an ellipsoid: half axes 80, 65 and 60 mm about the origin, held by the skull below z = −12
+//! mm, pressed inwards at an opening around the axis n, free elsewhere. E = 3000 Pa, ν = 0.49.
 
 use pliant_geometry::{CellKind, DataArray, Locator, Mesh, Vector3, boundary, relative_acoustic_length};
 use pliant_mechanics::curve::{Curve as LoadCurve, Shape};
@@ -39,7 +39,8 @@ const DEPTH: f64 = 0.01;
 const OPENING: f64 = 0.88;
 /// The skull holds all nodes below this z [m].
 const SKULL: f64 = -0.012;
-/// Slack of the borders of both regions, as a part of the height: the mesh of the reference has its nodes on them.
+/// Slack of the borders of both regions, as a part of the height: the mesh of the reference has its nodes on
+/// them.
 const SLACK: f64 = 1e-9;
 
 /// Edge [m] of the tets of [`mesh`].
@@ -48,8 +49,8 @@ const EDGE: f64 = 0.0122;
 /// Least [`quality`] of a tet to which a border may press it.
 const WORST: f64 = 0.4;
 
-/// The mesh of `scenes/brain-shift`: about 2,000 nodes, with its regions (see [`with_regions`]) and nodes along their
-/// borders.
+/// The mesh of `scenes/brain-shift`: about 2,000 nodes, with its regions (see [`with_regions`]) and nodes
+/// along their borders.
 pub fn mesh() -> Mesh {
     stuffed(EDGE)
 }
@@ -67,8 +68,9 @@ pub fn stuffed(edge: f64) -> Mesh {
     with_regions(mesh)
 }
 
-/// Moves surface nodes along the surface onto the border n·X = height [m]: of each edge of the surface that it cuts, the
-/// nearer end that spoils no tet around it (see [`WORST`]). On the unit sphere x/a, y/b, z/c the border is a circle.
+/// Moves surface nodes along the surface onto the border n·X = height [m]: of each edge of the surface that
+/// it cuts, the nearer end that spoils no tet around it (see [`WORST`]). On the unit sphere x/a, y/b, z/c the
+/// border is a circle.
 fn draw_border(mesh: &mut Mesh, normal: &Vector3, height: f64) {
     let radii = Vector3::from(RADII);
     let axis = normal.component_mul(&radii);
@@ -109,8 +111,8 @@ fn quality(mesh: &Mesh, tet: &[u32; 4]) -> f64 {
     relative_acoustic_length(CellKind::Tet, &tet.map(|node| mesh.points[node as usize]))
 }
 
-/// Adds the sets `skull` and `opening` of surface nodes and the point data `shift`, the displacement of the opening [m]:
-/// −10 mm s² (3 − 2s) n with s = (n·X/H − 0.88)/(1 − 0.88), where s ≥ 0.
+/// Adds the sets `skull` and `opening` of surface nodes and the point data `shift`, the displacement of the
+/// opening [m]: −10 mm s² (3 − 2s) n with s = (n·X/H − 0.88)/(1 − 0.88), where s ≥ 0.
 pub(crate) fn with_regions(mut mesh: Mesh) -> Mesh {
     let surface = boundary(&mesh).nodes();
     let s = |point: &Vector3| (point.dot(&Vector3::from(AXIS)) / HEIGHT - OPENING) / (1.0 - OPENING);
@@ -166,8 +168,8 @@ pub fn reference_mesh() -> Mesh {
     with_regions(read_mesh(include_bytes!("../../../validation/data/ellipsoid_tet4_h14mm.msh")))
 }
 
-/// The largest deviation of nodal displacements on the reference's mesh from its solution `T4` or `ANP`, over the largest
-/// displacement.
+/// The largest deviation of nodal displacements on the reference's mesh from its solution `T4` or `ANP`, over
+/// the largest displacement.
 ///
 /// # Errors
 /// If no equilibrium is found.

@@ -1,6 +1,6 @@
-//! Figure 6.7: the cost of fibres and relaxation on this machine: wall time of an explicit step of the thesis's cube
-//! of hexahedra, single precision, all cores. Repeats of all models are interleaved, so other load affects them
-//! equally; the median counts.
+//! Figure 6.7: the cost of fibres and relaxation on this machine: wall time of an explicit step of the
+//! thesis's cube of hexahedra, single precision, all cores. Repeats of all models are interleaved, so other
+//! load affects them equally; the median counts.
 
 use pliant_bench::{Clocked, ClockedOnDevice, Spread, Timed};
 use pliant_explicit::State;
@@ -24,8 +24,8 @@ const REPEATS: usize = 21;
 const REPEATS_ON_DEVICE: usize = 5;
 /// Elements stepped in a repeat.
 const ELEMENT_STEPS: usize = 110_000;
-/// Names of the models, as in the thesis: neo-Hookean elastic, transversely isotropic elastic and viscoelastic; and
-/// neo-Hookean viscoelastic, which it has not.
+/// Names of the models, as in the thesis: neo-Hookean elastic, transversely isotropic elastic and
+/// viscoelastic; and neo-Hookean viscoelastic, which it has not.
 const MODELS: [&str; 4] = ["NHE", "TIE", "NHV", "TIV"];
 
 /// Figure 6.7.

@@ -1,4 +1,5 @@
-//! The thesis's cube [0, 0.1 m]³ between glued platens, compressed along x: figure 6.5 and the converged answer at 20 %.
+//! The thesis's cube [0, 0.1 m]³ between glued platens, compressed along x: figure 6.5 and the converged
+//! answer at 20 %.
 
 use pliant_mechanics::curve::Curve;
 use pliant_mechanics::law::AnyLaw;
@@ -41,8 +42,8 @@ pub(crate) const DEFORMED: Case = Case {
     compute,
 };
 
-/// An eighth [0, 0.05 m]³ of the cube with its glued platen at x = 0 moving inwards by a part of its edge, and its
-/// symmetry planes at x = 0.05, y = 0 and z = 0.
+/// An eighth [0, 0.05 m]³ of the cube with its glued platen at x = 0 moving inwards by a part of its edge,
+/// and its symmetry planes at x = 0.05, y = 0 and z = 0.
 pub(crate) fn held_as_an_eighth(specimen: Specimen, part: f64, curve: Curve) -> Specimen {
     specimen
         .shift("x-min", part * 0.05, curve)
@@ -52,7 +53,8 @@ pub(crate) fn held_as_an_eighth(specimen: Specimen, part: f64, curve: Curve) -> 
         .fix("z-min", [false, false, true])
 }
 
-/// Force F [N] and bulge [mm] of the cube of soft tissue at 20 %, from hexahedra with `n` cells along the full edge.
+/// Force F [N] and bulge [mm] of the cube of soft tissue at 20 %, from hexahedra with `n` cells along the
+/// full edge.
 ///
 /// # Errors
 /// If it does not come to rest.

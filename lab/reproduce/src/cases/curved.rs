@@ -1,6 +1,7 @@
-//! Figures 8.2 to 8.4: the curved surface of shells, its carried surfaces, and its rendering. The surface here is a cubic Bézier
-//! triangle from positions and nodal normals (PN triangles of Vlachos et al. 2001 with arcs for edges), not the thesis's deflection
-//! (8.3) along the normal of each facet, which leaves gaps between facets that are not coplanar.
+//! Figures 8.2 to 8.4: the curved surface of shells, its carried surfaces, and its rendering. The surface
+//! here is a cubic Bézier triangle from positions and nodal normals (PN triangles of Vlachos et al. 2001 with
+//! arcs for edges), not the thesis's deflection (8.3) along the normal of each facet, which leaves gaps
+//! between facets that are not coplanar.
 
 use nalgebra::{SMatrix, SVector, UnitQuaternion};
 use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3};
@@ -82,7 +83,8 @@ fn flat(model: &Assembly, state: &State, place: &Place) -> Vector3 {
     nodes.iter().zip(place.weights).map(|(&node, w)| state.position[node as usize] * w).sum()
 }
 
-/// Nine functions (1, x, y, x², xy, y², x³, xy², y³) of (8.3) with their derivatives by y and, negative, by x.
+/// Nine functions (1, x, y, x², xy, y², x³, xy², y³) of (8.3) with their derivatives by y and, negative, by
+/// x.
 fn polynomial([x, y]: [f64; 2]) -> [[f64; 9]; 3] {
     [
         [1.0, x, y, x * x, x * y, y * y, x * x * x, x * y * y, y * y * y],
@@ -143,7 +145,8 @@ impl Deflected {
     }
 }
 
-/// Errors of force and moment of the nodal loads against those of a force at a point, over the force and over force × mean edge.
+/// Errors of force and moment of the nodal loads against those of a force at a point, over the force and over
+/// force × mean edge.
 fn resultants_off(
     corners: [Vector3; 3],
     nodal: [[Vector3; 2]; 3],
@@ -400,8 +403,8 @@ impl Ellipsoid {
     }
 }
 
-/// How far the surfaces of a sphere of so many shells are off: the one here, and the thesis's at its gaps, with the largest distance, the mean
-/// one and the gap of a prototype.
+/// How far the surfaces of a sphere of so many shells are off: the one here, and the thesis's at its gaps,
+/// with the largest distance, the mean one and the gap of a prototype.
 fn distances(levels: u32, count: u32, ours: [f64; 2], theirs: f64) -> Result<[Row; 3], CaseError> {
     let source = "prototype of the formulas; tolerance 10 %";
     let ball = Ellipsoid::new(levels, [1.0; 3])?;
@@ -446,7 +449,8 @@ fn with_gaps(ball: &Ellipsoid, Picture { places, triangles, .. }: &Picture) -> M
     triangle_mesh(points, cut)
 }
 
-/// A sphere of 1,280 triangles that shells carry from rest to where they are now, rotated so that no part of it lies on their edges.
+/// A sphere of 1,280 triangles that shells carry from rest to where they are now, rotated so that no part of
+/// it lies on their edges.
 fn irregular(rest: &Ellipsoid, ball: &Ellipsoid, surface: &CurvedSurface) -> Result<Mesh, CaseError> {
     let mut irregular = sphere(1.0, 3, DEFAULT_CELL_LIMIT)?;
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, 0.5, -0.2));

@@ -1,8 +1,9 @@
-//! Accuracy of elements for nearly incompressible tissue, ν = 0.49: the cantilever under its own weight and the glued
-//! cube at 20 %.
+//! Accuracy of elements for nearly incompressible tissue, ν = 0.49: the cantilever under its own weight and
+//! the glued cube at 20 %.
 //!
 //! Cantilever 0.08 × 0.03 × 0.03 m, half of it modelled, E = 20 kPa, ρ = 1000: tip (0.08, 0, 0.03) sinks by
-//! 34.85 ± 0.15 mm. Cube of 0.1 m, an eighth of it modelled, E = 3 kPa: F = 9.15 ± 0.15 N, bulge 7.57 ± 0.08 mm.
+//! 34.85 ± 0.15 mm. Cube of 0.1 m, an eighth of it modelled, E = 3 kPa: F = 9.15 ± 0.15 N, bulge 7.57 ± 0.08
+//! mm.
 
 use pliant_geometry::Mesh;
 use pliant_mechanics::law::AnyLaw;
@@ -47,8 +48,8 @@ pub const ELEMENTS: [Element; 5] = [
     Element { name: "hex8-full", tets: Tets::Plain, hexes: Some([Hexes::Full; 2]) },
 ];
 
-/// Results of the prototype of the formulas on the same meshes, in the order of [`ELEMENTS`]: tip [mm] and F [N] as
-/// printed.
+/// Results of the prototype of the formulas on the same meshes, in the order of [`ELEMENTS`]: tip [mm] and F
+/// [N] as printed.
 const PROTOTYPE: [[f64; 2]; 5] =
     [[-26.6, 10.19], [-32.5, 9.57], [-33.0, 9.47], [-34.83, 9.10], [-34.5, 9.25]];
 

@@ -1,6 +1,7 @@
-//! Figure 6.9: the cost of the framework. The bare step of a cube of hexahedra under gravity is compared with the whole
-//! program on this machine, without and with a series of meshes, in single precision on all cores; so is `scenes/liver`, without and with all
-//! its outputs. All start at rest and take the same steps of the same model; repeats are interleaved, so other load affects all equally.
+//! Figure 6.9: the cost of the framework. The bare step of a cube of hexahedra under gravity is compared with
+//! the whole program on this machine, without and with a series of meshes, in single precision on all cores;
+//! so is `scenes/liver`, without and with all its outputs. All start at rest and take the same steps of the
+//! same model; repeats are interleaved, so other load affects all equally.
 
 use pliant_bench::{Clocked, Spread, Timed};
 use pliant_explicit::State;
@@ -88,7 +89,8 @@ impl Program {
         Ok([self.bare()?, whole(&self.0[0])?, whole(&self.0[1])?])
     }
 
-    /// Medians of the repeats' three times [s], and of their costs over the first [%]. A turn before warms up.
+    /// Medians of the repeats' three times [s], and of their costs over the first [%]. A turn before warms
+    /// up.
     fn medians(&self) -> Result<([f64; 3], [f64; 2]), CaseError> {
         self.times()?;
         let times = (0..REPEATS).map(|_| self.times()).collect::<Result<Vec<_>, _>>()?;

@@ -1,5 +1,5 @@
-//! Table 8.2 and figures 8.6 to 8.8: an intra-ocular lens is folded, pushed through an injector and unfolds in a bag. The run is that of
-//! `scenes/lens`: the thesis gives neither its meshes nor its injector.
+//! Table 8.2 and figures 8.6 to 8.8: an intra-ocular lens is folded, pushed through an injector and unfolds
+//! in a bag. The run is that of `scenes/lens`: the thesis gives neither its meshes nor its injector.
 
 use std::fs;
 use std::time::Instant;
@@ -119,7 +119,8 @@ struct Way {
     rest: Vec<f64>,
     /// When [s] all of it was beyond the tube.
     left: Option<f64>,
-    /// The largest change of its whole area, and of that of a triangle; the largest part of it in triangles that changed by more than 5 %.
+    /// The largest change of its whole area, and of that of a triangle; the largest part of it in triangles
+    /// that changed by more than 5 %.
     whole: f64,
     triangle: f64,
     beyond: f64,

@@ -1,8 +1,9 @@
-//! Figure 6.10: von Mises stress in a stretched liver, transversely isotropic, without relaxation and with it some seconds
-//! after the stretch. The organ is the one of `scenes/liver`, since the thesis's mesh was never published.
+//! Figure 6.10: von Mises stress in a stretched liver, transversely isotropic, without relaxation and with it
+//! some seconds after the stretch. The organ is the one of `scenes/liver`, since the thesis's mesh was never
+//! published.
 //!
-//! The source has no numbers. Instead: after relaxation, the tissue must equal an elastic one of modulus (1 − α) μ,
-//! (1 − α) η and the same κ in equilibrium, which another solver computes.
+//! The source has no numbers. Instead: after relaxation, the tissue must equal an elastic one of modulus (1 −
+//! α) μ, (1 − α) η and the same κ in equilibrium, which another solver computes.
 
 use pliant_format::Scene;
 use pliant_format::source::Source;

@@ -1,5 +1,5 @@
-//! Figure 6.8: tissue in real time. A cube of 55,566 tetrahedra is stretched to and fro, and a liver is pulled on one thread, as
-//! `pliant view` plays them: steps, and sixty frames per second of simulated time.
+//! Figure 6.8: tissue in real time. A cube of 55,566 tetrahedra is stretched to and fro, and a liver is
+//! pulled on one thread, as `pliant view` plays them: steps, and sixty frames per second of simulated time.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};

@@ -1,6 +1,7 @@
-//! Figures 9.1 to 9.3: fine surfaces as few curved shells. The thesis prints no numbers beside its maps of the distance from shells to
-//! surface; here both directions are measured, densely. The capsule and the aneurysm are analytic, since the thesis's are not
-//! published. If `PLIANT_DATA` names a folder of organs, those of patients are shown as well.
+//! Figures 9.1 to 9.3: fine surfaces as few curved shells. The thesis prints no numbers beside its maps of
+//! the distance from shells to surface; here both directions are measured, densely. The capsule and the
+//! aneurysm are analytic, since the thesis's are not published. If `PLIANT_DATA` names a folder of organs,
+//! those of patients are shown as well.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -179,7 +180,8 @@ fn capsule() -> Result<Findings, CaseError> {
     Ok(findings)
 }
 
-/// A bent vessel with a sac: a torus's arc of 4 mm and a ball of 9 mm, joined smoothly; the vessel's ends are closed.
+/// A bent vessel with a sac: a torus's arc of 4 mm and a ball of 9 mm, joined smoothly; the vessel's ends are
+/// closed.
 struct Sac;
 
 impl ImplicitField for Sac {

@@ -1,6 +1,6 @@
-//! Figure 6.6: the liver-like cube compressed by 30 % in 0.5 s, linearly, then held to 5 s. Half of the isochoric stress
-//! relaxes with τ = 0.58 s. The reference is quasi-static, of quadratic hexahedra without inertia, so the comparison
-//! uses the shape of the decay, F(t)/F(5 s), after the waves of the ramp.
+//! Figure 6.6: the liver-like cube compressed by 30 % in 0.5 s, linearly, then held to 5 s. Half of the
+//! isochoric stress relaxes with τ = 0.58 s. The reference is quasi-static, of quadratic hexahedra without
+//! inertia, so the comparison uses the shape of the decay, F(t)/F(5 s), after the waves of the ramp.
 
 use pliant_mechanics::curve::{Curve as LoadCurve, Shape};
 use pliant_mechanics::law::AnyLaw;
@@ -126,8 +126,8 @@ fn from_rest(times: &[f64], forces: &[f64]) -> Vec<(f64, f64)> {
     std::iter::once((0.0, 0.0)).chain(times.iter().copied().zip(forces.iter().copied())).collect()
 }
 
-/// The limit of fine meshes and its uncertainty, from a force of the reference: at 30 % its coarse meshes of quadratic
-/// hexahedra are 4 to 8 % too stiff.
+/// The limit of fine meshes and its uncertainty, from a force of the reference: at 30 % its coarse meshes of
+/// quadratic hexahedra are 4 to 8 % too stiff.
 pub fn of_fine_meshes(force: f64) -> [f64; 2] {
     let [low, high] = [force / 1.08, force / 1.04];
     [0.5 * (low + high), 0.5 * (high - low)]
@@ -149,7 +149,8 @@ fn compute() -> Result<Findings, CaseError> {
         let late = || relaxed.ratios().filter(|(time, ..)| *time >= 0.5);
         ratios.push(Curve::new(name, colour, Pen::Line, late().map(|(t, _, e)| (t, e)).collect()));
         ratios.push(Curve::new("", colour, Pen::Markers, late().map(|(t, f, _)| (t, f)).collect()));
-        // 1 %: the reference's ratios differ by less than 0.5 % between its meshes; the rest for the waves of the ramp.
+        // 1 %: the reference's ratios differ by less than 0.5 % between its meshes; the rest for the waves of
+        // the ramp.
         let quantity = format!("{name}: F(t)/F(5 s) from {FROM} s on, largest deviation");
         findings.rows.push(Row::deviation(quantity, 0.01, relaxed.off(), SOURCE));
         let [found, expected] = relaxed.last();

@@ -1,5 +1,5 @@
-//! Figures 6.3 and 6.4: a unit cube of liver-like tissue, one element, sheared at a constant rate with fibres along e₁.
-//! *A*: F = I + γ e₂⊗e₁, which stretches the fibres; *B*: F = I + γ e₁⊗e₂, which does not.
+//! Figures 6.3 and 6.4: a unit cube of liver-like tissue, one element, sheared at a constant rate with fibres
+//! along e₁. *A*: F = I + γ e₂⊗e₁, which stretches the fibres; *B*: F = I + γ e₁⊗e₂, which does not.
 //! References: closed forms with fifty digits (Taylor et al. 2009 with the factor 2 put right).
 
 use pliant_mechanics::curve::{Curve as LoadCurve, Shape};

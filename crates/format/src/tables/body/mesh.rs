@@ -13,51 +13,57 @@ use super::{
     SphereShape, TubeShape, TwistedStripShape,
 };
 
-/// A mesh: exactly one of `file`, `image`, `block`, `ellipsoid`, `tube`, `organ`, for shells `plate`, `cylinder`, `sphere`,
-/// `hemisphere`, `annulus`, `twisted-strip`, `lens`, or for bars `lines`.
+/// A mesh: exactly one of `file`, `image`, `block`, `ellipsoid`, `tube`, `organ`, for shells `plate`,
+/// `cylinder`, `sphere`, `hemisphere`, `annulus`, `twisted-strip`, `lens`, or for bars `lines`.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct MeshTable {
-    /// A mesh file, relative to the scene: Gmsh (.msh), VTK (.vtk, .vtu), OBJ, OFF, STL, PLY, GIfTI, FreeSurfer. Its own cells are taken, unless `as`
-    /// asks for others made of its surface.
+    /// A mesh file, relative to the scene: Gmsh (.msh), VTK (.vtk, .vtu), OBJ, OFF, STL, PLY, GIfTI,
+    /// FreeSurfer. Its own cells are taken, unless `as` asks for others made of its surface.
     #[serde(default)]
     pub file: Option<PathBuf>,
-    /// The name of a mesh that the program which reads the scene gives from its memory, instead of a `file`; scenes that the command line
-    /// reads have none.
+    /// The name of a mesh that the program which reads the scene gives from its memory, instead of a `file`;
+    /// scenes that the command line reads have none.
     #[serde(default)]
     pub given: Option<String>,
-    /// A segmented image, relative to the scene: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, a DICOM segmentation, or the
-    /// folder of a DICOM series. Coordinates are those of the patient: x to the right, y to the front, z to the head [m].
+    /// A segmented image, relative to the scene: NIfTI (.nii, .nii.gz), NRRD, MetaImage (.mha, .mhd), GIPL, a
+    /// DICOM segmentation, or the folder of a DICOM series. Coordinates are those of the patient: x to the
+    /// right, y to the front, z to the head [m].
     #[serde(default)]
     pub image: Option<PathBuf>,
-    /// Another image of the same voxels whose values are added before the `threshold`, as grey matter to white matter.
+    /// Another image of the same voxels whose values are added before the `threshold`, as grey matter to
+    /// white matter.
     #[serde(default)]
     pub add: Option<PathBuf>,
-    /// Several masks of the same voxels, each an image with 0 outside, as one image: the first has label 1, the second 2, and so on, each
-    /// with the name of its file. Where they overlap, the last one counts.
+    /// Several masks of the same voxels, each an image with 0 outside, as one image: the first has label 1,
+    /// the second 2, and so on, each with the name of its file. Where they overlap, the last one counts.
     #[serde(default)]
     pub masks: Option<Vec<PathBuf>>,
-    /// Names for the labels: a table of ITK-SNAP, FreeSurfer or 3D Slicer, lines like `5 liver`, JSON, or the word `totalsegmentator`.
+    /// Names for the labels: a table of ITK-SNAP, FreeSurfer or 3D Slicer, lines like `5 liver`, JSON, or the
+    /// word `totalsegmentator`.
     #[serde(default)]
     pub names: Option<PathBuf>,
     /// Label of the image to mesh, by number or name; or groups of labels, each one material of that name:
-    /// `{ tissue = [1, 5, "liver"], bone = "26-50" }`. Cells of a group carry the number of its first label. The first group by name takes
-    /// what cleaning adds.
+    /// `{ tissue = [1, 5, "liver"], bone = "26-50" }`. Cells of a group carry the number of its first label.
+    /// The first group by name takes what cleaning adds.
     #[serde(default)]
     pub label: Option<LabelOrGroups>,
-    /// Several labels of the image as one body, by number, name or range as `"5-8"`; of `masks` all if not given. Each cell has its own as cell data `label`, for `law`, `density` and
-    /// `hourglass` by label. The first label takes what cleaning adds.
+    /// Several labels of the image as one body, by number, name or range as `"5-8"`; of `masks` all if not
+    /// given. Each cell has its own as cell data `label`, for `law`, `density` and `hourglass` by label. The
+    /// first label takes what cleaning adds.
     #[serde(default)]
     pub labels: Option<Vec<Label>>,
-    /// Labels of vessels in the organ of `label` or `labels`, by number, name or range. Where they run inside of the organ, their voxels belong
-    /// to it, with the label of the tissue round them; outside of it they do not. A voxel is inside if more than half of the 26 ways from it
-    /// lead through vessels into the organ.
+    /// Labels of vessels in the organ of `label` or `labels`, by number, name or range. Where they run inside
+    /// of the organ, their voxels belong to it, with the label of the tissue round them; outside of it they
+    /// do not. A voxel is inside if more than half of the 26 ways from it lead through vessels into the
+    /// organ.
     #[serde(default)]
     pub vessels: Option<Vec<Label>>,
     /// Instead of labels: all voxels of at least this value, as of a map of probabilities. Their label is 1.
     #[serde(default)]
     pub threshold: Option<f64>,
-    /// Cleaning of the labels of an image, or of what the surface of a file encloses, before new cells are made.
+    /// Cleaning of the labels of an image, or of what the surface of a file encloses, before new cells are
+    /// made.
     #[serde(default)]
     pub clean: Option<CleanTable>,
     /// A box from the origin.
@@ -72,53 +78,58 @@ pub struct MeshTable {
     /// A built-in organ, centred on the origin.
     #[serde(default)]
     pub organ: Option<Organ>,
-    /// A rectangle of triangles in the plane z = 0 from the origin, facing +z. Point sets: `x-min`, `x-max`, `y-min`, `y-max`.
+    /// A rectangle of triangles in the plane z = 0 from the origin, facing +z. Point sets: `x-min`, `x-max`,
+    /// `y-min`, `y-max`.
     #[serde(default)]
     pub plate: Option<PlateShape>,
-    /// A cylinder of triangles about the z axis from z = 0, open at its ends, facing outwards. Point sets: `z-min`, `z-max`, and of
-    /// a part `start`, `end`.
+    /// A cylinder of triangles about the z axis from z = 0, open at its ends, facing outwards. Point sets:
+    /// `z-min`, `z-max`, and of a part `start`, `end`.
     #[serde(default)]
     pub cylinder: Option<CylinderShape>,
     /// A sphere of triangles about the origin, facing outwards.
     #[serde(default)]
     pub sphere: Option<SphereShape>,
-    /// A hemisphere of triangles z ≥ 0 about the z axis with a hole at the pole, facing outwards. Point sets: `equator`, `hole`,
-    /// and of a part `start`, `end`.
+    /// A hemisphere of triangles z ≥ 0 about the z axis with a hole at the pole, facing outwards. Point sets:
+    /// `equator`, `hole`, and of a part `start`, `end`.
     #[serde(default)]
     pub hemisphere: Option<HemisphereShape>,
-    /// A ring of triangles in the plane z = 0 about the origin, facing +z, slit along +x. Point sets: `inner`, `outer`, `start`, `end`.
+    /// A ring of triangles in the plane z = 0 about the origin, facing +z, slit along +x. Point sets:
+    /// `inner`, `outer`, `start`, `end`.
     #[serde(default)]
     pub annulus: Option<AnnulusShape>,
     /// A strip of triangles along x that turns about the x axis. Point sets: `x-min`, `x-max`, `low`, `high`.
     #[serde(default)]
     pub twisted_strip: Option<TwistedStripShape>,
-    /// A flat intra-ocular lens of triangles in the plane z = 0 about the origin, facing +z, with edges of about `edge`. Point sets: `optic`,
-    /// `haptics`.
+    /// A flat intra-ocular lens of triangles in the plane z = 0 about the origin, facing +z, with edges of
+    /// about `edge`. Point sets: `optic`, `haptics`.
     #[serde(default)]
     pub lens: Option<LensShape>,
-    /// Paths of bars from point to point [m]: `lines = [[[0, 0, 0], [0, 0, 0.02]]]`. They meet where they have a point in common; with
-    /// `edge` each piece is cut into bars of about that length.
+    /// Paths of bars from point to point [m]: `lines = [[[0, 0, 0], [0, 0, 0.02]]]`. They meet where they
+    /// have a point in common; with `edge` each piece is cut into bars of about that length.
     #[serde(default)]
     pub lines: Option<Vec<Vec<[f64; 3]>>>,
-    /// Target edge length of the cells of a built-in shape, an image or what the surface of a file encloses [m].
+    /// Target edge length of the cells of a built-in shape, an image or what the surface of a file encloses
+    /// [m].
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub edge: Option<f64>,
-    /// Tets of an image or of what the surface of a file encloses: longer edge inside, away from the surface [m], rounded down to 2, 4, 8,
-    /// ... times `edge`.
+    /// Tets of an image or of what the surface of a file encloses: longer edge inside, away from the surface
+    /// [m], rounded down to 2, 4, 8, ... times `edge`.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub inner_edge: Option<f64>,
-    /// Labels with smaller tets: numbers or names, for half of `edge`, or tables with their edge, as `["tumour", { label = 5, edge = 0.002 }]`. Edges are
-    /// rounded down to a half, a quarter, ... of `edge`.
+    /// Labels with smaller tets: numbers or names, for half of `edge`, or tables with their edge, as
+    /// `["tumour", { label = 5, edge = 0.002 }]`. Edges are rounded down to a half, a quarter, ... of `edge`.
     #[serde(default)]
     pub protect: Option<Vec<Protected>>,
-    /// Largest distance between the boundary of tets and the body [m], both ways: they are made smaller where it is not held. It is
-    /// measured to the triangles of a file, or to the smooth surface of an image. Without `edge` the first edge is chosen.
+    /// Largest distance between the boundary of tets and the body [m], both ways: they are made smaller where
+    /// it is not held. It is measured to the triangles of a file, or to the smooth surface of an image.
+    /// Without `edge` the first edge is chosen.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub distance: Option<f64>,
-    /// Number of triangles of a `surface` of an image or a file, instead of `edge`: as few, placed where the shape needs them.
+    /// Number of triangles of a `surface` of an image or a file, instead of `edge`: as few, placed where the
+    /// shape needs them.
     #[serde(default)]
     #[schemars(range(min = 4))]
     pub triangles: Option<u32>,
@@ -126,20 +137,22 @@ pub struct MeshTable {
     #[serde(default)]
     #[schemars(range(min = 4))]
     pub shells: Option<u32>,
-    /// Largest distance of `shells` from the surface of an image, both ways, as a part of the diagonal of its box.
+    /// Largest distance of `shells` from the surface of an image, both ways, as a part of the diagonal of its
+    /// box.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub error: Option<f64>,
     /// Cells of a built-in shape or an image (tets if not given), or of the closed surface of a `file`.
     #[serde(default, rename = "as")]
     pub cells: Option<Cells>,
-    /// Factor on all lengths: the size of one unit of the mesh in metres (0.001 for millimetres); 1 if not given. A file that would be
-    /// larger than 10 m needs it.
+    /// Factor on all lengths: the size of one unit of the mesh in metres (0.001 for millimetres); 1 if not
+    /// given. A file that would be larger than 10 m needs it.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub scale: Option<f64>,
-    /// Turn about the origin, after scaling: about the axis of this vector by its length [rad]. `[0, 0, 3.14159265]` takes the axes left,
-    /// back, head (LPS) to right, front, head (RAS). Data of three components turn as vectors.
+    /// Turn about the origin, after scaling: about the axis of this vector by its length [rad].
+    /// `[0, 0, 3.14159265]` takes the axes left, back, head (LPS) to right, front, head (RAS). Data of three
+    /// components turn as vectors.
     #[serde(default)]
     pub turn: [f64; 3],
     /// Shift after scaling and turning [m].
@@ -317,13 +330,14 @@ pub enum Cells {
     /// Tetrahedra.
     #[default]
     Tets,
-    /// Hexahedra: structured for blocks and tubes, cubes with a stepped surface for ellipsoids, organs and images.
+    /// Hexahedra: structured for blocks and tubes, cubes with a stepped surface for ellipsoids, organs and
+    /// images.
     Hexes,
-    /// All cubes that an ellipsoid, an organ or an image fills by more than 2 %, with their stiffness and mass by the part that it
-    /// fills. A carried surface shows it smooth.
+    /// All cubes that an ellipsoid, an organ or an image fills by more than 2 %, with their stiffness and
+    /// mass by the part that it fills. A carried surface shows it smooth.
     ImmersedHexes,
-    /// The smooth surface of an image in triangles: even ones of `edge`, as few as `triangles`, or for a carried surface as fine as
-    /// the voxels.
+    /// The smooth surface of an image in triangles: even ones of `edge`, as few as `triangles`, or for a
+    /// carried surface as fine as the voxels.
     Surface,
     /// Curved shells fitted to the smooth surface of an image: as many as `shells`, or as close as `error`.
     Shells,

@@ -20,15 +20,16 @@ use super::{NodeVectors, Rotations};
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct BodyTable {
-    /// How it is modelled; if not given, `solid`, or `membrane` with `on`. With the solvers `explicit` and `quasi-static` shells are a
-    /// participant of their own (`[participant.NAME]`).
+    /// How it is modelled; if not given, `solid`, or `membrane` with `on`. With the solvers `explicit` and
+    /// `quasi-static` shells are a participant of their own (`[participant.NAME]`).
     #[serde(default)]
     pub model: BodyModel,
-    /// Its mesh, from a file, a built-in shape, or a segmented image. The mesh of a shell or a membrane is of triangles (quads are cut
-    /// into two); a volume mesh gives it its boundary. That of bars is of lines.
+    /// Its mesh, from a file, a built-in shape, or a segmented image. The mesh of a shell or a membrane is of
+    /// triangles (quads are cut into two); a volume mesh gives it its boundary. That of bars is of lines.
     #[serde(default)]
     pub mesh: MeshTable,
-    /// Instead of a mesh: the body on whose boundary this one is a wall, with the same nodes, as the capsule of an organ.
+    /// Instead of a mesh: the body on whose boundary this one is a wall, with the same nodes, as the capsule
+    /// of an organ.
     #[serde(default)]
     pub on: Option<String>,
     /// The faces of that boundary that are the wall; if not given, all of it.
@@ -37,51 +38,53 @@ pub struct BodyTable {
     /// What the rotations of a shell do that is a wall with `on`.
     #[serde(default)]
     pub rotations: Rotations,
-    /// The element; if not given, `tet4` for tets, `hex8` for hexes and `dkt-curved` for shells; `model = "membrane"` has one only. For
-    /// soft tissue prefer `tet4-anp` to `tet4`.
+    /// The element; if not given, `tet4` for tets, `hex8` for hexes and `dkt-curved` for shells;
+    /// `model = "membrane"` has one only. For soft tissue prefer `tet4-anp` to `tet4`.
     #[serde(default)]
     pub element: Option<Element>,
-    /// The name of its law, or a law for each cell label, by number or by the name of the label: `{ 1 = "soft", tumour = "stiff" }`. Shells
-    /// and bars take the moduli of an isotropic law at small strain; a shell whose `layers` all have their own elasticity
-    /// needs none.
+    /// The name of its law, or a law for each cell label, by number or by the name of the label:
+    /// `{ 1 = "soft", tumour = "stiff" }`. Shells and bars take the moduli of an isotropic law at small
+    /// strain; a shell whose `layers` all have their own elasticity needs none.
     #[serde(default = "no_law")]
     pub law: ByLabel<String>,
-    /// Mass per volume [kg/m³], or one for each cell label, as of `law`. Elements with averaged pressure average it apart on parts of
-    /// different density.
+    /// Mass per volume [kg/m³], or one for each cell label, as of `law`. Elements with averaged pressure
+    /// average it apart on parts of different density.
     pub density: ByLabel<Density>,
     /// Thickness of a shell or a membrane [m]: one, or one for each triangle.
     #[serde(default)]
     pub thickness: Option<Thickness>,
-    /// Layers of a shell from the side that its triangles face away from to the side that they face, instead of a `thickness`. Their
-    /// angles count from `fibre`, projected on each triangle.
+    /// Layers of a shell from the side that its triangles face away from to the side that they face, instead
+    /// of a `thickness`. Their angles count from `fibre`, projected on each triangle.
     #[serde(default)]
     pub layers: Vec<LayerTable>,
-    /// Tension [N/m] of a shell in the shape of its mesh, equal in all directions: what holds a flat `membrane` across. Not for the
-    /// element `plate`.
+    /// Tension [N/m] of a shell in the shape of its mesh, equal in all directions: what holds a flat
+    /// `membrane` across. Not for the element `plate`.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub pre_tension: f64,
-    /// Where the normals at rest of a shell come from, which make its surface curved; if not given, from the mesh where it has
-    /// some, as built-in shapes have, and there is no `crease`, else from the triangles.
+    /// Where the normals at rest of a shell come from, which make its surface curved; if not given, from the
+    /// mesh where it has some, as built-in shapes have, and there is no `crease`, else from the triangles.
     #[serde(default)]
     pub normals: Option<Normals>,
-    /// Angle [degrees] between triangles of a shell above which their edge is a crease, where the curved surface has a kink; 45
-    /// if not given. Not with the normals of a mesh.
+    /// Angle [degrees] between triangles of a shell above which their edge is a crease, where the curved
+    /// surface has a kink; 45 if not given. Not with the normals of a mesh.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 180.0))]
     pub crease: Option<f64>,
     /// Whether more than two triangles of a shell may meet in an edge.
     #[serde(default)]
     pub branches: bool,
-    /// The name of a cell-data array of the mesh with the part of each cell that the body fills, above 0 and at most 1: its
-    /// stiffness and mass are so much smaller, but never less than a tenth. If not given, `fraction` of `immersed-hexes`.
+    /// The name of a cell-data array of the mesh with the part of each cell that the body fills, above 0 and
+    /// at most 1: its stiffness and mass are so much smaller, but never less than a tenth. If not given,
+    /// `fraction` of `immersed-hexes`.
     #[serde(default)]
     pub fraction: Option<String>,
     /// Cross section of bars [m²].
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub area: Option<f64>,
-    /// Length of bars without force over that in the mesh: above 1 they hang through at the start, below 1 they pull.
+    /// Length of bars without force over that in the mesh: above 1 they hang through at the start, below 1
+    /// they pull.
     #[serde(default = "one")]
     #[schemars(range(min = 0.1, max = 10.0))]
     pub slack: f64,
@@ -92,25 +95,28 @@ pub struct BodyTable {
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub damping: f64,
-    /// Stiffness-proportional damping β [s] with the solver `implicit`, and with `explicit` of all bodies but shells; the same for all bodies of
-    /// a participant. It damps a vibration of angular frequency ω with the ratio βω/2. An explicit step shrinks with it, from the critical time step
-    /// Δt to √(β² + Δt²) − β.
+    /// Stiffness-proportional damping β [s] with the solver `implicit`, and with `explicit` of all bodies but
+    /// shells; the same for all bodies of a participant. It damps a vibration of angular frequency ω with the
+    /// ratio βω/2. An explicit step shrinks with it, from the critical time step Δt to √(β² + Δt²) − β.
     #[serde(default)]
     #[schemars(range(min = 0.0))]
     pub stiffness_damping: f64,
-    /// Stiffness against hourglass patterns of `hex8`, as a multiple of the shear modulus at rest; above about 0.5 it stiffens
-    /// bending. One for the whole body or for each cell label. If not given, 0.2 of the current shear modulus of each element, which is at
-    /// least the one at rest.
+    /// Stiffness against hourglass patterns of `hex8`, as a multiple of the shear modulus at rest; above
+    /// about 0.5 it stiffens bending. One for the whole body or for each cell label. If not given, 0.2 of the
+    /// current shear modulus of each element, which is at least the one at rest.
     #[serde(default)]
     pub hourglass: Option<ByLabel<Hourglass>>,
-    /// Velocity [m/s] at the start, of all nodes that no constraint holds or moves; not for quasi-static runs.
+    /// Velocity [m/s] at the start, of all nodes that no constraint holds or moves; not for quasi-static
+    /// runs.
     #[serde(default)]
     pub velocity: Option<[f64; 3]>,
-    /// Displacement [m] of each node from rest at the start, of shells, and of solids with the solvers `implicit` and `static`; the
-    /// nodes of shells turn with the triangles round them. The mesh is the shape at rest.
+    /// Displacement [m] of each node from rest at the start, of shells, and of solids with the solvers
+    /// `implicit` and `static`; the nodes of shells turn with the triangles round them. The mesh is the shape
+    /// at rest.
     #[serde(default)]
     pub initial_displacement: Option<NodeVectors>,
-    /// Fibre direction at rest; overrides that of the law. Of a shell, the direction that the angles of its `layers` count from.
+    /// Fibre direction at rest; overrides that of the law. Of a shell, the direction that the angles of its
+    /// `layers` count from.
     #[serde(default)]
     pub fibre: Option<Fibre>,
     /// Direction of the second family of fibres at rest; overrides that of the law.
@@ -133,22 +139,24 @@ fn no_law() -> ByLabel<String> {
     ByLabel::Each(BTreeMap::new())
 }
 
-/// A layer of a shell: linearly elastic in plane stress, by a `law` (that of the body if not given) or by moduli of its own along and
-/// across its direction.
+/// A layer of a shell: linearly elastic in plane stress, by a `law` (that of the body if not given) or by
+/// moduli of its own along and across its direction.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct LayerTable {
     /// Thickness [m].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub thickness: f64,
-    /// Angle [degrees] of its direction from the `fibre` of the body, counter-clockwise seen from the side that the triangles face.
+    /// Angle [degrees] of its direction from the `fibre` of the body, counter-clockwise seen from the side
+    /// that the triangles face.
     #[serde(default)]
     #[schemars(range(min = -180.0, max = 180.0))]
     pub angle: f64,
     /// The name of an isotropic law, whose Young's modulus and Poisson's ratio at small strain are taken.
     #[serde(default)]
     pub law: Option<String>,
-    /// Young's moduli along and across its direction [Pa]; with `poisson-ratio` and `shear-modulus`, instead of a law.
+    /// Young's moduli along and across its direction [Pa]; with `poisson-ratio` and `shear-modulus`, instead
+    /// of a law.
     #[serde(default)]
     pub young_modulus: Option<[f64; 2]>,
     /// Poisson's ratio: how much it narrows across its direction when it is pulled along it.
@@ -173,9 +181,11 @@ pub enum BodyModel {
     Solid,
     /// A thin wall of triangles with membrane, bending and twist in large rotation and small strain.
     Shell,
-    /// A thin wall of triangles without bending, in large strain, by any law, in plane stress: a capsule or a balloon.
+    /// A thin wall of triangles without bending, in large strain, by any law, in plane stress: a capsule or a
+    /// balloon.
     Membrane,
-    /// Lines that carry force along their length only, linear in their stretch: ligaments, chords of a valve, sutures.
+    /// Lines that carry force along their length only, linear in their stretch: ligaments, chords of a valve,
+    /// sutures.
     Bar,
 }
 
@@ -266,8 +276,9 @@ impl Hourglass {
     pub const DEFAULT: Self = Self(0.2);
 }
 
-/// Fibre direction at rest: `fibre = [0, 0, 1]` for one direction everywhere, whose length does not matter, or a table with exactly
-/// one of the keys below for a direction in each element, such as `fibre = { cell-data = "fibre" }`.
+/// Fibre direction at rest: `fibre = [0, 0, 1]` for one direction everywhere, whose length does not matter,
+/// or a table with exactly one of the keys below for a direction in each element, such as
+/// `fibre = { cell-data = "fibre" }`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Fibre {
@@ -287,7 +298,8 @@ pub enum FibreRule {
     Along([f64; 3]),
     /// Towards a point [m]: `{ toward = [0, 0, 0] }`.
     Toward([f64; 3]),
-    /// Around an axis, as the fibres of a vessel: `{ around = { point = [0, 0, 0], axis = [0, 0, 1], angle = 30 } }`.
+    /// Around an axis, as the fibres of a vessel:
+    /// `{ around = { point = [0, 0, 0], axis = [0, 0, 1], angle = 30 } }`.
     Around {
         /// A point of the axis [m].
         point: [f64; 3],
@@ -298,8 +310,8 @@ pub enum FibreRule {
         #[schemars(range(min = -90.0, max = 90.0))]
         angle: f64,
     },
-    /// In the surface, as close as possible to a direction: `{ tangential = { closest-to = [0, 0, 1] } }`. The surface is
-    /// taken at its point nearest to the cell.
+    /// In the surface, as close as possible to a direction: `{ tangential = { closest-to = [0, 0, 1] } }`.
+    /// The surface is taken at its point nearest to the cell.
     Tangential {
         /// The faces of the body's boundary that are the surface.
         #[serde(default = "boundary")]
@@ -308,8 +320,9 @@ pub enum FibreRule {
         #[serde(rename = "closest-to")]
         closest_to: [f64; 3],
     },
-    /// From one part of the surface to another, along the gradient of the harmonic function (Laplace's equation) that is 0
-    /// on the one and 1 on the other: `{ laplace = { from = { set = "inner" }, to = { set = "outer" } } }`.
+    /// From one part of the surface to another, along the gradient of the harmonic function (Laplace's
+    /// equation) that is 0 on the one and 1 on the other:
+    /// `{ laplace = { from = { set = "inner" }, to = { set = "outer" } } }`.
     Laplace {
         /// The nodes where it is 0.
         from: Selection,
@@ -330,30 +343,35 @@ pub enum Element {
     Tet4,
     /// Linear tetrahedron with average nodal pressure (Bonet and Burton 1998): the recommended tetrahedron.
     Tet4Anp,
-    /// Linear tetrahedron with improved average nodal pressure, variational: softer still; watch for pressure modes.
+    /// Linear tetrahedron with improved average nodal pressure, variational: softer still; watch for pressure
+    /// modes.
     Tet4Ianp,
     /// Linear tetrahedron with improved average nodal pressure as in NiftySim; not the gradient of an energy.
     Tet4IanpNiftysim,
     /// Uniform-strain hexahedron with hourglass control: the default of hexahedra.
     Hex8,
-    /// Hexahedron with eight points and one mean dilatation: no hourglass patterns, eight stresses a cell. The default of elements that the
-    /// body fills in part, unless `hourglass` is given or the law has no energy of the volume alone.
+    /// Hexahedron with eight points and one mean dilatation: no hourglass patterns, eight stresses a cell.
+    /// The default of elements that the body fills in part, unless `hourglass` is given or the law has no
+    /// energy of the volume alone.
     Hex8Full,
-    /// Shell: discrete Kirchhoff triangle and the mean membrane strain of the curved triangle: the recommended one.
+    /// Shell: discrete Kirchhoff triangle and the mean membrane strain of the curved triangle: the
+    /// recommended one.
     DktCurved,
-    /// Shell: discrete Kirchhoff triangle and optimal flat ANDES membrane, whose drilling adapts to the thickness. `dkt-curved` is this
-    /// on flat walls; on curved walls under pressure this one scatters displacements from node to node.
+    /// Shell: discrete Kirchhoff triangle and optimal flat ANDES membrane, whose drilling adapts to the
+    /// thickness. `dkt-curved` is this on flat walls; on curved walls under pressure this one scatters
+    /// displacements from node to node.
     DktOpt,
-    /// Shell: discrete Kirchhoff triangle and constant-strain membrane, too stiff for bending in its plane, and calm under pressures
-    /// that stretch thin curved walls much.
+    /// Shell: discrete Kirchhoff triangle and constant-strain membrane, too stiff for bending in its plane,
+    /// and calm under pressures that stretch thin curved walls much.
     DktCst,
-    /// Shell without bending, in small strain: a constant-strain membrane whose nodes do not turn. In large strain take
-    /// `model = "membrane"`.
+    /// Shell without bending, in small strain: a constant-strain membrane whose nodes do not turn. In large
+    /// strain take `model = "membrane"`.
     Membrane,
-    /// Shell without membrane: bending and twist of plates, for studies; something else must hold it in its plane.
+    /// Shell without membrane: bending and twist of plates, for studies; something else must hold it in its
+    /// plane.
     Plate,
-    /// Shell: the element of Comas (2010), corrected for its typing errors. Only for comparison: it depends on the numbering of
-    /// the corners and converges to plates 6 to 26 % too soft.
+    /// Shell: the element of Comas (2010), corrected for its typing errors. Only for comparison: it depends
+    /// on the numbering of the corners and converges to plates 6 to 26 % too soft.
     #[serde(rename = "comas-2010")]
     Comas2010,
 }
@@ -384,7 +402,7 @@ impl Element {
 pub struct SurfaceTable {
     /// The body that carries it.
     pub on: String,
-    /// The surface: triangles or quads of a file, the boundary of a built-in shape, or of an image its boundary or, with
-    /// `as = "surface"`, its smooth surface.
+    /// The surface: triangles or quads of a file, the boundary of a built-in shape, or of an image its
+    /// boundary or, with `as = "surface"`, its smooth surface.
     pub mesh: MeshTable,
 }

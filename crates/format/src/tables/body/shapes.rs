@@ -135,7 +135,8 @@ pub struct HemisphereShape {
     pub grid: SheetGrid,
 }
 
-/// A ring; grid axes are outwards and round. A whole turn has a slit: its sides lie on each other, but are not joined.
+/// A ring; grid axes are outwards and round. A whole turn has a slit: its sides lie on each other, but are
+/// not joined.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct AnnulusShape {
@@ -171,8 +172,8 @@ pub struct TwistedStripShape {
     pub grid: SheetGrid,
 }
 
-/// An intra-ocular lens: a disc, the optic, and two loops half a turn apart, the haptics. From the x axis on a haptic leaves the optic, and goes on at
-/// the overall diameter.
+/// An intra-ocular lens: a disc, the optic, and two loops half a turn apart, the haptics. From the x axis on
+/// a haptic leaves the optic, and goes on at the overall diameter.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct LensShape {

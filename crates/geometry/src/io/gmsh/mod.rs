@@ -13,7 +13,8 @@ pub(super) use write::write;
 use super::cells::FileKind::{self, Kept, Split};
 use crate::{CellKind, SplitKind};
 
-/// Element types of Gmsh by number: the kind, or the dimension if the kind is not supported; the name, and the number of nodes.
+/// Element types of Gmsh by number: the kind, or the dimension if the kind is not supported; the name, and
+/// the number of nodes.
 fn element_type(number: i64) -> Option<(Result<FileKind, usize>, &'static str, usize)> {
     Some(match number {
         1 => (Ok(Kept(CellKind::Line)), "line", 2),

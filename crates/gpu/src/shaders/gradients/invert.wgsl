@@ -1,4 +1,5 @@
-// One pivot of the inversion of the coarse matrix in place, block by block (Gauss and Jordan), without exchanges: it is positive definite.
+// One pivot of the inversion of the coarse matrix in place, block by block (Gauss and Jordan), without
+// exchanges: it is positive definite.
 @group(1) @binding(0) var<storage, read> now: array<f32>;
 @group(1) @binding(1) var<storage, read_write> next: array<f32>;
 

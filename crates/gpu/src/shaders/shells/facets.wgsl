@@ -1,6 +1,6 @@
-// Forces and moments of a facet on its corners: `facet_packs` of pliant-shells, from displacements instead of positions, so that small
-// strains keep their digits. With H = Σ u ⊗ ∇N in the axes at rest, C − I = H + Hᵀ + HᵀH gives U − I; the frame is the least rotation to the
-// normal and the polar rotation in the plane.
+// Forces and moments of a facet on its corners: `facet_packs` of pliant-shells, from displacements instead of
+// positions, so that small strains keep their digits. With H = Σ u ⊗ ∇N in the axes at rest, C − I = H + Hᵀ +
+// HᵀH gives U − I; the frame is the least rotation to the normal and the polar rotation in the plane.
 
 // Of each node its displacement [m] and its rotation from rest.
 @group(1) @binding(0) var<storage, read> places: array<vec4f>;
@@ -107,7 +107,8 @@ fn main(
     var f2 = vec3f(h2.x, 1.0 + h2.y, h2.z);
     var normal = vec3f(f1.y * f2.z - f1.z * f2.y, f1.z * f2.x - f1.x * f2.z, f1.x * f2.y - f1.y * f2.x);
     normal *= inverseSqrt(max(dot(normal, normal), 1e-30));
-    // Beyond a right angle the least rotation is that from the opposite normal, after half a turn about the first axis.
+    // Beyond a right angle the least rotation is that from the opposite normal, after half a turn about the
+    // first axis.
     let over = normal.z < 0.0;
     if over {
         f1 = vec3f(f1.x, -f1.yz);

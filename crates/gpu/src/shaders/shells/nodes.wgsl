@@ -1,11 +1,13 @@
-// The step of a node: (1 + αh/2) v⁺ = (1 − αh/2) v + h f/m, and the same of spins. Held components keep still or take the velocities of their
-// motion.
+// The step of a node: (1 + αh/2) v⁺ = (1 − αh/2) v + h f/m, and the same of spins. Held components keep still
+// or take the velocities of their motion.
 
 // Of each node its displacement [m], and its rotation from rest.
 @group(1) @binding(0) var<storage, read_write> places: array<vec4f>;
-// Velocity [m/s] and spin [rad/s] half a step before; with the spin the work [J] of forces from outside since the last read-back.
+// Velocity [m/s] and spin [rad/s] half a step before; with the spin the work [J] of forces from outside since
+// the last read-back.
 @group(1) @binding(1) var<storage, read_write> rates: array<vec4f>;
-// (1 − αh/2)/(1 + αh/2), h/m/(1 + αh/2), h/I/(1 + αh/2), and bits: the six held components; then that it has no mass.
+// (1 − αh/2)/(1 + αh/2), h/m/(1 + αh/2), h/I/(1 + αh/2), and bits: the six held components; then that it has
+// no mass.
 @group(1) @binding(2) var<storage, read> kinds: array<vec4f>;
 // Where in a row of the table the motion of each node is; all bits: nowhere.
 @group(1) @binding(3) var<storage, read> motions: array<u32>;

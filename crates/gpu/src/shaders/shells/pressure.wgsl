@@ -1,9 +1,11 @@
 // Pressure on a facet: a third of p A n to each corner, and `Patch::pressure_forces` on the curved triangle.
 
-// Where the pressures of each facet begin; of each its load, and the pressure [Pa] on the flat and on the curved triangle.
+// Where the pressures of each facet begin; of each its load, and the pressure [Pa] on the flat and on the
+// curved triangle.
 @group(2) @binding(0) var<storage, read> starts: array<u32>;
 @group(2) @binding(1) var<storage, read> pressures: array<vec4f>;
-// Of each corner its normal at rest in the axes of the facet, and which of its two control points are on straight edges.
+// Of each corner its normal at rest in the axes of the facet, and which of its two control points are on
+// straight edges.
 @group(2) @binding(2) var<storage, read> normals: array<vec4f>;
 // Weights of the products of control points.
 @group(2) @binding(3) var<storage, read> weights: array<f32>;

@@ -1,4 +1,5 @@
-//! A cube of distorted cells, held at its base and moved at its top; and one without any order, deformed at random.
+//! A cube of distorted cells, held at its base and moved at its top; and one without any order, deformed at
+//! random.
 
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::element::Cord;
@@ -178,7 +179,8 @@ pub struct Jumble {
     pub node: Vec<u32>,
 }
 
-/// A cube whose inner nodes lie at random, whose nodes and cells are numbered at random, and cells from any of their nodes.
+/// A cube whose inner nodes lie at random, whose nodes and cells are numbered at random, and cells from any
+/// of their nodes.
 pub fn jumbled_cube(element: &str, material: Material) -> Jumble {
     let mut random = Random::new(11);
     let (ordered, mut hexes) = grid(0.5, &mut random);
@@ -211,7 +213,8 @@ pub fn jumbled_cube(element: &str, material: Material) -> Jumble {
     Jumble { model, start, node }
 }
 
-/// (z/L) Σ a sin(k·X + φ) over some waves with lengths of the cube's size, such that the largest ‖sym ∇u‖ is 0.2.
+/// (z/L) Σ a sin(k·X + φ) over some waves with lengths of the cube's size, such that the largest ‖sym ∇u‖ is
+/// 0.2.
 fn deformation(places: &[Vector<f64>], random: &mut Random) -> Vec<Vector<f64>> {
     let wave =
         |_| (vector(random), vector(random).map(|k| 2.0 * k * std::f64::consts::TAU / EDGE), random.half());

@@ -1,5 +1,5 @@
-//! Every law, element and load on meshes without any order, deformed at random, in the designs that run blocks and in the plain
-//! one.
+//! Every law, element and load on meshes without any order, deformed at random, in the designs that run
+//! blocks and in the plain one.
 
 use pliant_gpu::Design;
 use pliant_mechanics::curve::{Curve, Shape};
@@ -31,7 +31,8 @@ fn every_law_on_every_kind_of_element() {
         for element in ["tet4", "tet4-anp", "hex8"] {
             if element != "tet4-anp" || law.has_volumetric_energy() {
                 let what = format!("{} on {element}", law.name());
-                // A law meets an element in the same lines whatever the design, so that one element will do for the others.
+                // A law meets an element in the same lines whatever the design, so that one element will do
+                // for the others.
                 let designs = if element == "tet4" { EACH } else { PLAIN };
                 compare(&device, &what, &jumbled_cube(element, elastic(law)), designs);
             }

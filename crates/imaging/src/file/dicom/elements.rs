@@ -1,5 +1,6 @@
-//! The elements of a DICOM file that are read, with the sequences that hold them. Encoding: DICOM PS3.5 sections 7.1, 7.5 and annex A.
-//! Leaves out: compressed pixels, elements and sequences that nobody asks for (they are passed over).
+//! The elements of a DICOM file that are read, with the sequences that hold them. Encoding: DICOM PS3.5
+//! sections 7.1, 7.5 and annex A. Leaves out: compressed pixels, elements and sequences that nobody asks for
+//! (they are passed over).
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;

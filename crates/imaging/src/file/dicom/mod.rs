@@ -1,7 +1,8 @@
-//! DICOM: series in a folder of slices, one file each; files of several frames; segmentations (`segmentation.rs`). All uncompressed (implicit or
-//! explicit, little- or big-endian, or deflated; `elements.rs`). Place of a pixel: PS3.3 C.7.6.2.1.1 (equation C.7.6.2.1-1), in
-//! LPS. Slices are sorted along their common normal; a tilted gantry shears the grid.
-//! Leaves out: compressed pixels, colours, contours (RT structure sets, which are named).
+//! DICOM: series in a folder of slices, one file each; files of several frames; segmentations
+//! (`segmentation.rs`). All uncompressed (implicit or explicit, little- or big-endian, or deflated;
+//! `elements.rs`). Place of a pixel: PS3.3 C.7.6.2.1.1 (equation C.7.6.2.1-1), in LPS. Slices are sorted
+//! along their common normal; a tilted gantry shears the grid. Leaves out: compressed pixels, colours,
+//! contours (RT structure sets, which are named).
 
 mod elements;
 mod segmentation;
@@ -61,7 +62,8 @@ fn contours() -> ImageProblem {
     }
 }
 
-/// Reads a file by itself: a segmentation, an image of several frames or, where `slice` says so, the volume of a single slice.
+/// Reads a file by itself: a segmentation, an image of several frames or, where `slice` says so, the volume
+/// of a single slice.
 pub(super) fn read_file(bytes: &[u8], slice: bool, options: &ReadOptions) -> Result<Image, Fault> {
     let set = DataSet::of(bytes)?.ok_or(ImageProblem::NoSlices { files: 1 })?;
     let elements = set.elements()?;
@@ -260,7 +262,8 @@ impl Slice {
     }
 }
 
-/// Where the frames of a file are: what their functional groups say, shared or their own, and else the file as a whole.
+/// Where the frames of a file are: what their functional groups say, shared or their own, and else the file
+/// as a whole.
 struct Frames<'a> {
     elements: &'a Elements<'a>,
     shared: Option<&'a Elements<'a>>,

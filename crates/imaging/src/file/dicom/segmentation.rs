@@ -1,6 +1,7 @@
-//! DICOM segmentations (PS3.3 C.8.20): frames of one segment each, with a bit or a fraction per pixel, or frames of labels. They become a
-//! label image whose labels are the segment numbers. Frames without voxels may be missing: slices beyond the first and the last frame are
-//! assumed empty. Leaves out: compressed frames, segmentations of several orientations.
+//! DICOM segmentations (PS3.3 C.8.20): frames of one segment each, with a bit or a fraction per pixel, or
+//! frames of labels. They become a label image whose labels are the segment numbers. Frames without voxels
+//! may be missing: slices beyond the first and the last frame are assumed empty. Leaves out: compressed
+//! frames, segmentations of several orientations.
 
 use pliant_geometry::Vector3;
 

@@ -11,11 +11,12 @@ use crate::model::error::SolveError;
 use crate::model::state::State;
 
 impl Statics {
-    /// The next equilibrium under a control, which finds the factor of the controlled loads, at a time [s] that other loads and prescribed
-    /// motions reach evenly. A step that fails is halved.
+    /// The next equilibrium under a control, which finds the factor of the controlled loads, at a time [s]
+    /// that other loads and prescribed motions reach evenly. A step that fails is halved.
     ///
     /// # Errors
-    /// If no load is controlled, the controlled component is held, a balloon is open, or no equilibrium is found (the state then is as it was).
+    /// If no load is controlled, the controlled component is held, a balloon is open, or no equilibrium is
+    /// found (the state then is as it was).
     pub fn control(&mut self, state: &mut State, control: Control, until: f64) -> Result<Step, SolveError> {
         self.attempts.clear();
         if !self.system.model.loads.iter().any(|load| load.controlled) {

@@ -8,7 +8,8 @@ use pliant_mechanics::tie::Tie;
 use crate::model::assembly::Assembly;
 use crate::model::error::SolveError;
 
-/// Whether every part of a model is held: of its six rigid motions none may leave constraints and springs unmoved.
+/// Whether every part of a model is held: of its six rigid motions none may leave constraints and springs
+/// unmoved.
 ///
 /// # Errors
 /// If not: a node of a part, and how many motions it is free in.
@@ -61,7 +62,8 @@ fn parts(model: &Assembly) -> (DisjointSets, Vec<bool>) {
     (part, used)
 }
 
-/// Per part, at its root: Σ of the squares of what its rigid motions (about the root, in mean edges) do to what holds it.
+/// Per part, at its root: Σ of the squares of what its rigid motions (about the root, in mean edges) do to
+/// what holds it.
 struct Holding<'a> {
     model: &'a Assembly,
     part: &'a mut DisjointSets,

@@ -44,7 +44,8 @@ fn model() -> Assembly {
     model
 }
 
-/// The bar with a strip of shell. Two edges of the strip lie in the bar and turn with it, the second one in a hex at the rigid end.
+/// The bar with a strip of shell. Two edges of the strip lie in the bar and turn with it, the second one in a
+/// hex at the rigid end.
 fn with_strip() -> Assembly {
     let mut model = model();
     let across = [0.002, 0.008];
@@ -85,7 +86,8 @@ fn the_stiffness_of_turns_that_follow_a_solid_is_the_change_of_their_forces() {
     stiffness_is_the_change_of_forces(with_strip(), 3 * 12 + 6 + 2 * 6);
 }
 
-/// The stiffness along any direction is what the forces change by, far from equilibrium; and these are the change of the energy.
+/// The stiffness along any direction is what the forces change by, far from equilibrium; and these are the
+/// change of the energy.
 fn stiffness_is_the_change_of_forces(model: Assembly, unknowns: usize) {
     let model = Arc::new(model);
     let mut system = System::new(Arc::clone(&model), LinearSolver::Direct).unwrap();
@@ -128,7 +130,8 @@ fn stiffness_is_the_change_of_forces(model: Assembly, unknowns: usize) {
     assert!((own - wanted).abs() < 1e-6 * wanted.abs(), "{own} {wanted}");
 }
 
-/// A bar whose free end is turned by 2.5 rad follows as one body without stress; a free one keeps its shape and its velocity.
+/// A bar whose free end is turned by 2.5 rad follows as one body without stress; a free one keeps its shape
+/// and its velocity.
 #[test]
 fn a_rigid_motion_costs_nothing() {
     [model(), with_strip()].into_iter().for_each(moves_rigidly);
@@ -172,7 +175,8 @@ fn moves_rigidly(mut model: Assembly) {
     assert!(off < 1e-12 && slower < 1e-12, "{off:e} {slower:e}");
 }
 
-/// Three nodes on a line keep their distances: a turn about the line, which moves none of them, does not make the stiffness singular.
+/// Three nodes on a line keep their distances: a turn about the line, which moves none of them, does not make
+/// the stiffness singular.
 #[test]
 fn nodes_on_a_line_are_bound() {
     let mut model = model();

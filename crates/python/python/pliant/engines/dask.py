@@ -34,7 +34,8 @@ class Dask:
         lacking = [name for name, found in client.run(importlib.util.find_spec, "pliant").items() if found is None]
         if lacking:
             raise ClusterError(f"pliant is not installed on {', '.join(lacking)}; install the version of this process there", hosts=lacking)
-        # The bundle is the result of a task, not scattered: a worker that has it and is lost does not take it away.
+        # The bundle is the result of a task, not scattered: a worker that has it and is lost does not take it
+        # away.
         shared = client.submit(_same, bundle, pure=False)
         options = {"pure": False, "retries": self._retries, "resources": self._resources}
         left = iter(numbers)

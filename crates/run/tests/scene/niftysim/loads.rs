@@ -100,7 +100,8 @@ pub(super) fn pressure_pushes_as_the_listed_faces_are_turned() {
     assert_eq!(imported.meshes[0].1.block(CellKind::Triangle).unwrap().len(), 2);
 }
 
-/// NiftySim subtracts tractions from the forces on the nodes (`tledTractionConstraint`; its own test asks for that).
+/// NiftySim subtracts tractions from the forces on the nodes (`tledTractionConstraint`; its own test asks for
+/// that).
 #[test]
 pub(super) fn traction_pulls_as_niftysim_pulls() {
     let more = "<Constraint Type=\"Traction\" SpecType=\"NORMAL\" LoadShape=\"STEP\">\

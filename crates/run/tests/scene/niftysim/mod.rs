@@ -261,8 +261,9 @@ fn a_mesh_file_is_placed_in_the_order_of_niftysim() {
     io::write(&folder.0.join("tets.msh"), mesh).unwrap();
     io::write(&folder.0.join("tets.vtu"), mesh).unwrap();
     for (tag, file) in [("MSHMesh", "tets.msh"), ("VTKMesh", "tets.vtu")] {
-        // From the centre (1, 1, 0): node 0 at (−1, −1, 0), around z to (1, −1, 0), around x to (1, 0, −1); then twice
-        // (2, 1, −1), then shifted. The other way round, first x and then z, it would come to (0, −1, −1).
+        // From the centre (1, 1, 0): node 0 at (−1, −1, 0), around z to (1, −1, 0), around x to (1, 0, −1);
+        // then twice (2, 1, −1), then shifted. The other way round, first x and then z, it would come to (0,
+        // −1, −1).
         let placed = format!(
             "<{tag} Type=\"T4\">\n  {file}\n  <Translation>0 0 10</Translation><ScaleFactor>2</ScaleFactor>\
              <Rotation>1 1 0 90 0 90</Rotation></{tag}>"

@@ -13,8 +13,8 @@ impl Builder<'_> {
         self.shell_cells(body).is_some()
     }
 
-    /// The components of a constraint: translations and rotations. By default all translations, and rotations if the body has
-    /// some and `turns`.
+    /// The components of a constraint: translations and rotations. By default all translations, and rotations
+    /// if the body has some and `turns`.
     pub(in crate::assemble) fn components(
         &mut self,
         axes: Option<&[Axis]>,

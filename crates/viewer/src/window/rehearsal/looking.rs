@@ -163,7 +163,8 @@ fn beside(app: &App) -> Pos2 {
     app.port.rect.min + vec2(20.0, 150.0)
 }
 
-/// The middle of a half-transparent body shows the background, and the copied view says so; an opaque one looks as before.
+/// The middle of a half-transparent body shows the background, and the copied view says so; an opaque one
+/// looks as before.
 #[test]
 fn one_sees_through_a_body() {
     let Some(mut window) = Rehearsal::painted(BALL) else { return };

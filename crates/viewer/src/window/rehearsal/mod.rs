@@ -1,6 +1,7 @@
-//! The window rehearsed without a screen: tests give it what a user does with mouse and keys, as events of egui, and look at what comes of
-//! it. Its own code runs, and the solver on its thread; by egui's clock a frame takes a sixtieth of a second, however long it really does. Pictures
-//! are drawn only where a test looks at them. Without a GPU the tests are skipped with a notice; with `PLIANT_REQUIRE_GPU=1` they fail.
+//! The window rehearsed without a screen: tests give it what a user does with mouse and keys, as events of
+//! egui, and look at what comes of it. Its own code runs, and the solver on its thread; by egui's clock a
+//! frame takes a sixtieth of a second, however long it really does. Pictures are drawn only where a test
+//! looks at them. Without a GPU the tests are skipped with a notice; with `PLIANT_REQUIRE_GPU=1` they fail.
 
 mod following;
 mod looking;
@@ -34,7 +35,8 @@ use crate::recording::Recording;
 const BALL: &str = include_str!("../../../tests/support/ball.toml");
 /// Width and height of the window.
 const SIZE: [u32; 2] = [800, 600];
-/// Wall time from frame to frame while something has to come, and in which it does on a machine that does much else.
+/// Wall time from frame to frame while something has to come, and in which it does on a machine that does
+/// much else.
 const FRAME: Duration = Duration::from_millis(16);
 const PATIENCE: Duration = Duration::from_secs(180);
 /// The buttons of the mouse.

@@ -13,7 +13,8 @@ use crate::window::undo::Act;
 
 /// Simulated time [s] in which what is pulled comes to rest.
 const SETTLING: f64 = 1.0;
-/// Simulated time [s] from one movement of the mouse to the next: in less than one step they would tear the body.
+/// Simulated time [s] from one movement of the mouse to the next: in less than one step they would tear the
+/// body.
 const PACE: f64 = 0.03;
 
 #[test]
@@ -46,7 +47,8 @@ fn a_pull_is_taken_back() {
     window.hold(Modifiers::NONE);
 }
 
-/// What the first hand holds is kept with B, the second hand pulls beside it, and what is kept is taken again and let go.
+/// What the first hand holds is kept with B, the second hand pulls beside it, and what is kept is taken again
+/// and let go.
 #[test]
 fn two_hands_pull_and_keep() {
     let Some(mut window) = Rehearsal::paused(BALL) else { return };
@@ -76,8 +78,8 @@ fn kept(app: &App) -> Pos2 {
     app.port.to_screen(&Vector3::from(point)).unwrap()
 }
 
-/// Plays, takes hold and pulls upwards, until all is at rest: the hand's force is that of its spring. It still holds when the window closes.
-/// A replay of what was recorded.
+/// Plays, takes hold and pulls upwards, until all is at rest: the hand's force is that of its spring. It
+/// still holds when the window closes. A replay of what was recorded.
 fn pulled(scene: &str) -> Option<Replayed> {
     let mut window = Rehearsal::paused(scene)?;
     window.key("Space plays", Key::Space, |app| app.frame.playing);

@@ -1,4 +1,5 @@
-//! What a window without a screen is drawn on, as eframe draws: with the samples and the depth that the bodies need.
+//! What a window without a screen is drawn on, as eframe draws: with the samples and the depth that the
+//! bodies need.
 
 use eframe::egui::{self, FullOutput, ScreenshotCallback, TexturesDelta, ViewportCommand};
 use eframe::egui_wgpu::capture::CaptureState;

@@ -62,7 +62,8 @@ fn covering(app: &App, [x, y]: [f64; 2], aspect: f64) -> Option<u32> {
     nearest.filter(|(.., least)| *least > 0.02).map(|(_, number, _)| number)
 }
 
-/// Distance [m] along the view of a point with these weights in the projection: 1/z is linear there in perspective, z otherwise.
+/// Distance [m] along the view of a point with these weights in the projection: 1/z is linear there in
+/// perspective, z otherwise.
 fn depth(camera: &Camera, corners: &[Vector3; 3], weights: &[f64; 3]) -> f64 {
     let (eye, towards) = (camera.eye(), camera.axes()[2]);
     let depths = corners.iter().map(|corner| (eye - corner).dot(&towards)).zip(weights);

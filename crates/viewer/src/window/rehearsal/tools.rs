@@ -47,7 +47,8 @@ fn lead(
     window.frame([released]);
 }
 
-/// K takes a tool beside the hand of the mouse; keys move it, turn it and close its jaws; K lets go after the last one.
+/// K takes a tool beside the hand of the mouse; keys move it, turn it and close its jaws; K lets go after the
+/// last one.
 #[test]
 fn keys_lead_a_tool() {
     let Some(mut window) = Rehearsal::open(GRASPED) else { return };
