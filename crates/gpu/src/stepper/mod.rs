@@ -248,8 +248,8 @@ impl GpuStepper {
         };
         let increment = fours((0..self.nodes.count).flat_map(of_node));
         let displacement = fours(state.displacement.iter().copied());
-        self.stage = Stage::Uploaded;
         let side = self.stage.side();
+        self.stage = Stage::Uploaded { side };
         queue.write_buffer(&self.nodes.displacement[side], 0, bytemuck::cast_slice(&displacement));
         queue.write_buffer(&self.nodes.increment[side], 0, bytemuck::cast_slice(&increment));
         for (solid, history) in self.forces.solids.iter().zip(&state.history) {
@@ -290,9 +290,9 @@ impl GpuStepper {
         self.lengths = self.control.lengths(state);
         self.relax(self.control.relaxing(state));
         self.instants.forget_deformation(&self.device);
-        if let Stage::Uploaded = self.stage {
-            self.list(self.stage.side())?;
-            self.stage = Stage::Listed;
+        if let Stage::Uploaded { side } = self.stage {
+            self.list(side)?;
+            self.stage = Stage::Listed { side };
         }
         let starts = if state.is_at_start() { flags::STARTS } else { 0 };
         let mut results = self.evaluate_listed(state, flags::MEASURES | starts, true)?;

@@ -14,10 +14,10 @@ const CALM: f64 = 1.02;
 pub(super) enum Stage {
     /// No state was uploaded.
     Empty,
-    /// A state was uploaded.
-    Uploaded,
+    /// A state was uploaded to a side of the arrays.
+    Uploaded { side: usize },
     /// Candidates for contact are listed for the uploaded state.
-    Listed,
+    Listed { side: usize },
     /// An instant was evaluated; others may have followed.
     Evaluated(Progress),
 }
@@ -42,7 +42,11 @@ impl Stage {
 
     /// Side of the arrays that holds the present instant.
     pub(super) fn side(&self) -> usize {
-        self.progress().map_or(0, Progress::side)
+        match self {
+            Self::Empty => 0,
+            Self::Uploaded { side } | Self::Listed { side } => *side,
+            Self::Evaluated(progress) => progress.side(),
+        }
     }
 }
 
