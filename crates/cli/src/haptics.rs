@@ -125,7 +125,7 @@ fn run(
         thread,
         pace,
         estimate: Estimate::new(settings.coupling.stiffness, STIFFNESS),
-        kept: Kept::new(&mut simulation).map_err(failed)?,
+        snapshots: Snapshots::new(&mut simulation).map_err(failed)?,
         pressed: None,
         simulation,
     };
@@ -176,7 +176,7 @@ struct Session<'a> {
     thread: Thread,
     pace: Pace,
     estimate: Estimate,
-    kept: Kept,
+    snapshots: Snapshots,
     /// The model of the largest force so far.
     pressed: Option<LocalModel>,
 }
@@ -190,7 +190,7 @@ impl Session<'_> {
             match step(&mut self.simulation, &self.around, goal, self.pace.until()) {
                 Ok(period) => self.publish(&period)?,
                 Err(failure) => {
-                    if !self.kept.go_back(&mut self.simulation) {
+                    if !self.snapshots.go_back(&mut self.simulation) {
                         return Ok(Some(failure));
                     }
                     self.pace.go_back(&self.simulation);
@@ -214,19 +214,19 @@ impl Session<'_> {
             self.pressed = Some(model.clone());
         }
         self.thread.publish(model);
-        self.kept.keep(&mut self.simulation).map_err(failed)?;
+        self.snapshots.keep(&mut self.simulation).map_err(failed)?;
         self.pace.wait();
         Ok(())
     }
 
     /// Ends the thread and tells how it went.
     fn finish(self, settings: Settings) -> Result<(), Failure> {
-        let Self { mut simulation, around, mut thread, pace, estimate, kept, pressed } = self;
+        let Self { mut simulation, around, mut thread, pace, estimate, snapshots, pressed } = self;
         let device: [f64; 3] = thread.state().force.into();
         let report = thread.finish().map_err(refused)?;
         say(words(&report, &pace, &estimate))?;
-        if kept.failures > 0 {
-            say(format_args!("went back        {} times", kept.failures))?;
+        if snapshots.failures > 0 {
+            say(format_args!("went back        {} times", snapshots.failures))?;
         }
         if let Some(now) = simulation.frame().ok().and_then(|frame| frame.tool(around.tool)) {
             let (device, simulation) = (vector(device), vector(now.force));
@@ -290,7 +290,7 @@ fn on_the_way(now: &Isometry3<f64>, goal: &Isometry3<f64>, time: f64) -> Isometr
 }
 
 /// States to go back to.
-struct Kept {
+struct Snapshots {
     start: State,
     /// Times [s] and states, the newest last.
     states: VecDeque<(f64, State)>,
@@ -299,7 +299,7 @@ struct Kept {
     in_a_row: usize,
 }
 
-impl Kept {
+impl Snapshots {
     fn new(simulation: &mut Simulation) -> Result<Self, pliant_sim::Failure> {
         Ok(Self { start: simulation.state()?, states: VecDeque::new(), failures: 0, in_a_row: 0 })
     }

@@ -13,14 +13,14 @@ use crate::running::Running;
 #[derive(Clone)]
 #[pyclass(frozen, module = "pliant._native")]
 pub struct State {
-    kept: Kept,
+    snapshot: Snapshot,
     time: f64,
     steps: u64,
     displacement: Arc<Vec<f64>>,
 }
 
 #[derive(Clone)]
-enum Kept {
+enum Snapshot {
     Whole(Arc<pliant_sim::State>),
     /// As it came from a file or another process, of no world yet.
     Bytes(Arc<Vec<Vec<u8>>>),
@@ -28,10 +28,10 @@ enum Kept {
 
 impl State {
     pub fn of(running: &mut Running) -> Result<Self, Trouble> {
-        let kept = Kept::Whole(Arc::new(running.live.simulation.state()?));
+        let snapshot = Snapshot::Whole(Arc::new(running.live.simulation.state()?));
         let displacement = Arc::new(running.nodal(|now, _, node| now.displacement(node)));
         let simulation = running.simulation();
-        Ok(Self { kept, time: simulation.time(), steps: simulation.steps(), displacement })
+        Ok(Self { snapshot, time: simulation.time(), steps: simulation.steps(), displacement })
     }
 
     /// As a state of the world of a run.
@@ -39,10 +39,10 @@ impl State {
         let world = running.simulation().world();
         let other =
             || Trouble::Value("the state is of a model with other meshes, solvers or precision".into());
-        match &self.kept {
+        match &self.snapshot {
             // Another world refuses it when it is taken up.
-            Kept::Whole(state) => Ok((**state).clone()),
-            Kept::Bytes(bytes) => pliant_sim::State::decode(world, bytes).ok_or_else(other),
+            Snapshot::Whole(state) => Ok((**state).clone()),
+            Snapshot::Bytes(bytes) => pliant_sim::State::decode(world, bytes).ok_or_else(other),
         }
     }
 }
@@ -52,18 +52,18 @@ impl State {
     /// From its bytes.
     #[staticmethod]
     fn decoded(bytes: Vec<Vec<u8>>, time: f64, steps: u64, displacement: Vec<f64>) -> Self {
-        Self { kept: Kept::Bytes(Arc::new(bytes)), time, steps, displacement: Arc::new(displacement) }
+        Self { snapshot: Snapshot::Bytes(Arc::new(bytes)), time, steps, displacement: Arc::new(displacement) }
     }
 
     /// Its bytes, time [s], steps and displacements [m].
     #[allow(clippy::type_complexity, reason = "the arguments of `decoded`")]
     fn encoded(&self) -> Result<(Vec<std::borrow::Cow<'_, [u8]>>, f64, u64, Vec<f64>), Trouble> {
-        let bytes = match &self.kept {
-            Kept::Whole(state) => {
+        let bytes = match &self.snapshot {
+            Snapshot::Whole(state) => {
                 let bytes = state.encode().map_err(|error| Trouble::Internal(error.to_string()))?;
                 bytes.into_iter().map(Into::into).collect()
             }
-            Kept::Bytes(bytes) => bytes.iter().map(|own| own.as_slice().into()).collect(),
+            Snapshot::Bytes(bytes) => bytes.iter().map(|own| own.as_slice().into()).collect(),
         };
         Ok((bytes, self.time, self.steps, self.displacement.to_vec()))
     }

@@ -12,8 +12,8 @@ use pliant_mechanics::tensor::Vector;
 
 use crate::failure::Failure;
 use crate::instant::Instant;
-use crate::kept::Kept;
 use crate::reals::RealsMut;
+use crate::snapshot::Snapshot;
 use crate::solver::LoadStepProgress;
 
 /// Bodies that one stepper advances together.
@@ -73,13 +73,13 @@ pub(crate) trait Participant: Instant + Send {
     }
 
     /// Whether it can go back to a state of its part; else it is made anew for that.
-    fn goes_back_to(&self, kept: &Kept) -> bool;
+    fn goes_back_to(&self, snapshot: &Snapshot) -> bool;
 
     /// Goes back to a state that it [can](Self::goes_back_to), with the clock of explicit steps and their length [s].
     ///
     /// # Errors
     /// If equations are too many.
-    fn go_back(&mut self, kept: &Kept, steps: Option<(Clock, f64)>) -> Result<(), Failure>;
+    fn go_back(&mut self, snapshot: &Snapshot, steps: Option<(Clock, f64)>) -> Result<(), Failure>;
 
     /// Looks at a flag within steps that take long; such a step fails as [interrupted](crate::INTERRUPTED).
     fn stop_on(&mut self, _flag: &StopFlag) {}
@@ -93,10 +93,10 @@ pub(crate) trait Participant: Instant + Send {
     }
 
     /// The state and what a restart needs beside it, after [`advance`](Self::advance).
-    fn kept(&self) -> Kept;
+    fn snapshot(&self) -> Snapshot;
 
     /// Adds what a checkpoint has beside that: the residuals of iterations so far.
-    fn add_log(&self, _kept: &mut Kept) {}
+    fn add_log(&self, _snapshot: &mut Snapshot) {}
 
     /// Forgets what it notes of iterations after the present state.
     fn cut_log(&mut self) {}

@@ -18,19 +18,19 @@ use pliant_mechanics::{Energies, Model, fingerprint};
 
 use crate::failure::Failure;
 use crate::instant::{CellsNow, Instant};
-use crate::kept::Kept;
 use crate::part::Part;
 use crate::participant::Participant;
 use crate::reals::{Reals, RealsMut};
+use crate::snapshot::Snapshot;
 use crate::solver::{Equilibria, LoadStepProgress, Memory, Solver, on_cpu};
 
 /// The number types that solids in large strain are computed in.
 pub(crate) trait Numeric: Scalar {
     /// A state with its memory, kept.
-    fn keep(state: State<Self>, memory: Memory<Self>) -> Kept;
+    fn into_snapshot(state: State<Self>, memory: Memory<Self>) -> Snapshot;
 
     /// The same, from what is kept; `None` of another number type.
-    fn kept(kept: &Kept) -> Option<(&State<Self>, &Memory<Self>)>;
+    fn of_snapshot(snapshot: &Snapshot) -> Option<(&State<Self>, &Memory<Self>)>;
 
     /// Vectors of nodes as they are shown.
     fn reals(values: &[Vector<Self>]) -> Reals<'_>;
@@ -52,8 +52,8 @@ pub(crate) trait Numeric: Scalar {
 }
 
 impl Numeric for f32 {
-    fn keep(state: State<f32>, memory: Memory<f32>) -> Kept {
-        Kept::Single(state, memory)
+    fn into_snapshot(state: State<f32>, memory: Memory<f32>) -> Snapshot {
+        Snapshot::Single(state, memory)
     }
 
     fn reals(values: &[Vector<f32>]) -> Reals<'_> {
@@ -64,8 +64,8 @@ impl Numeric for f32 {
         RealsMut::Single(values)
     }
 
-    fn kept(kept: &Kept) -> Option<(&State<f32>, &Memory<f32>)> {
-        if let Kept::Single(state, memory) = kept { Some((state, memory)) } else { None }
+    fn of_snapshot(snapshot: &Snapshot) -> Option<(&State<f32>, &Memory<f32>)> {
+        if let Snapshot::Single(state, memory) = snapshot { Some((state, memory)) } else { None }
     }
 
     #[cfg_attr(
@@ -87,8 +87,8 @@ impl Numeric for f32 {
 }
 
 impl Numeric for f64 {
-    fn keep(state: State<f64>, memory: Memory<f64>) -> Kept {
-        Kept::Double(state, memory)
+    fn into_snapshot(state: State<f64>, memory: Memory<f64>) -> Snapshot {
+        Snapshot::Double(state, memory)
     }
 
     fn reals(values: &[Vector<f64>]) -> Reals<'_> {
@@ -99,8 +99,8 @@ impl Numeric for f64 {
         RealsMut::Double(values)
     }
 
-    fn kept(kept: &Kept) -> Option<(&State<f64>, &Memory<f64>)> {
-        if let Kept::Double(state, memory) = kept { Some((state, memory)) } else { None }
+    fn of_snapshot(snapshot: &Snapshot) -> Option<(&State<f64>, &Memory<f64>)> {
+        if let Snapshot::Double(state, memory) = snapshot { Some((state, memory)) } else { None }
     }
 
     fn solver(part: &Part, _state: &State<f64>) -> Result<Box<dyn Solver<f64>>, Failure> {
@@ -325,12 +325,12 @@ impl<R: Numeric> Participant for Solids<R> {
         Some(R::reals_mut(&mut self.state.displacement))
     }
 
-    fn goes_back_to(&self, kept: &Kept) -> bool {
-        R::kept(kept).is_some() && self.solver.goes_back()
+    fn goes_back_to(&self, snapshot: &Snapshot) -> bool {
+        R::of_snapshot(snapshot).is_some() && self.solver.goes_back()
     }
 
-    fn go_back(&mut self, kept: &Kept, steps: Option<(Clock, f64)>) -> Result<(), Failure> {
-        let Some((state, memory)) = R::kept(kept) else { return Ok(()) };
+    fn go_back(&mut self, snapshot: &Snapshot, steps: Option<(Clock, f64)>) -> Result<(), Failure> {
+        let Some((state, memory)) = R::of_snapshot(snapshot) else { return Ok(()) };
         // The vector keeps its address.
         let mut displacement = std::mem::take(&mut self.state.displacement);
         displacement.copy_from_slice(&state.displacement);
@@ -347,8 +347,8 @@ impl<R: Numeric> Participant for Solids<R> {
         self.solver.bring_back(&mut self.state)
     }
 
-    fn kept(&self) -> Kept {
-        R::keep(self.state.clone(), self.solver.memory())
+    fn snapshot(&self) -> Snapshot {
+        R::into_snapshot(self.state.clone(), self.solver.memory())
     }
 
     fn clock(&self) -> Option<Clock> {

@@ -5,9 +5,9 @@ use pliant_mechanics::Model;
 
 use crate::assembled::Assembled;
 use crate::failure::Failure;
-use crate::kept::Kept;
 use crate::part::{Explicit, Method, Part, Precision};
 use crate::participant::Participant;
+use crate::snapshot::Snapshot;
 use crate::solids::{Numeric, Solids};
 use crate::solver::Memory;
 
@@ -56,21 +56,25 @@ pub(crate) struct Before<'a> {
 /// If its stepper can't be made.
 pub(crate) fn go_on(
     part: &Part,
-    kept: Kept,
+    snapshot: Snapshot,
     before: Option<Before<'_>>,
 ) -> Result<Option<Box<dyn Participant>>, Failure> {
-    if !kept.fits(part) {
+    if !snapshot.fits(part) {
         return Ok(None);
     }
     part.has_room()?;
-    Ok(match (kept, part.method.bodies(), part.method.precision()) {
-        (Kept::Implicit(state), Some(bodies), _) => {
+    Ok(match (snapshot, part.method.bodies(), part.method.precision()) {
+        (Snapshot::Implicit(state), Some(bodies), _) => {
             let mut participant = Assembled::new(part, bodies)?;
             participant.resume(*state)?;
             Some(Box::new(participant))
         }
-        (Kept::Single(state, memory), None, Precision::Single) => Some(resumed(part, state, memory, before)?),
-        (Kept::Double(state, memory), None, Precision::Double) => Some(resumed(part, state, memory, before)?),
+        (Snapshot::Single(state, memory), None, Precision::Single) => {
+            Some(resumed(part, state, memory, before)?)
+        }
+        (Snapshot::Double(state, memory), None, Precision::Double) => {
+            Some(resumed(part, state, memory, before)?)
+        }
         _ => None,
     })
 }

@@ -13,7 +13,7 @@ use pliant_mechanics::model::Enclosed;
 
 use super::*;
 use crate::instant::{CellsNow, Effort, Instant};
-use crate::kept::Iterated;
+use crate::snapshot::Iterated;
 use crate::solids::SolidCells;
 
 impl Instant for Assembled {

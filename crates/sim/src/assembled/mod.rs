@@ -33,9 +33,9 @@ use self::method::SolverMethod;
 use crate::bodies::{ImplicitBodies, RunControl};
 use crate::failure::{FailedLoadStep, Failure, FailureKind};
 use crate::instant::Effort;
-use crate::kept::{ContactState, ImplicitState, Iterated, PlainState};
 use crate::part::{self, Part};
 use crate::path::{Path, part_of};
+use crate::snapshot::{ContactState, ImplicitState, Iterated, PlainState};
 use crate::steps::Steps;
 
 /// Stiffness of the firmest grip over that of the stiffest cell.
@@ -448,7 +448,7 @@ impl Assembled {
         Ok(())
     }
 
-    fn snapshot(&self) -> ImplicitState {
+    fn implicit_state(&self) -> ImplicitState {
         let previous = match &self.method {
             SolverMethod::Implicit(solver, _) => solver.previous().map(PlainState::of),
             _ => None,

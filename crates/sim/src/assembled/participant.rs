@@ -9,8 +9,8 @@ use pliant_mechanics::{StopFlag, fingerprint};
 
 use super::*;
 use crate::failure::Failure;
-use crate::kept::Kept;
 use crate::participant::Participant;
+use crate::snapshot::Snapshot;
 use crate::solver::LoadStepProgress;
 
 impl Participant for Assembled {
@@ -111,13 +111,13 @@ impl Participant for Assembled {
     }
 
     /// What was spent since then counts.
-    fn goes_back_to(&self, kept: &Kept) -> bool {
+    fn goes_back_to(&self, snapshot: &Snapshot) -> bool {
         // What is touched at the start is not known before contacts are looked at.
-        matches!(kept, Kept::Implicit(state) if state.contact.is_some() || self.method.contact().is_none())
+        matches!(snapshot, Snapshot::Implicit(state) if state.contact.is_some() || self.method.contact().is_none())
     }
 
-    fn go_back(&mut self, kept: &Kept, _steps: Option<(Clock, f64)>) -> Result<(), Failure> {
-        let Kept::Implicit(state) = kept else { return Ok(()) };
+    fn go_back(&mut self, snapshot: &Snapshot, _steps: Option<(Clock, f64)>) -> Result<(), Failure> {
+        let Snapshot::Implicit(state) = snapshot else { return Ok(()) };
         let spent = (self.effort.clone(), self.effort_before.clone());
         let convergence = std::mem::take(&mut self.convergence);
         self.resume((**state).clone())?;
@@ -132,12 +132,12 @@ impl Participant for Assembled {
         }
     }
 
-    fn kept(&self) -> Kept {
-        Kept::Implicit(Box::new(self.snapshot()))
+    fn snapshot(&self) -> Snapshot {
+        Snapshot::Implicit(Box::new(self.implicit_state()))
     }
 
-    fn add_log(&self, kept: &mut Kept) {
-        if let Kept::Implicit(state) = kept {
+    fn add_log(&self, snapshot: &mut Snapshot) {
+        if let Snapshot::Implicit(state) = snapshot {
             state.convergence.clone_from(&self.convergence);
         }
     }

@@ -132,7 +132,7 @@ impl Simulation {
             }
             let model = Some(&*before.model);
             let steps = own.steps().map(|(clock, step)| Before { clock, step, model });
-            match go_on(part, own.kept, steps)? {
+            match go_on(part, own.snapshot, steps)? {
                 Some(participant) => participants.push(participant),
                 None => return Ok(None),
             }
@@ -282,7 +282,7 @@ impl Simulation {
                 self.before.clear();
                 let parts = self.participants.iter().zip(&self.world.parts);
                 self.before.extend(parts.map(|(now, part)| OwnState {
-                    kept: now.kept(),
+                    snapshot: now.snapshot(),
                     clock: None,
                     step: part.steps.step,
                 }));
@@ -463,7 +463,7 @@ impl Simulation {
         if self.evaluated
             && let Some(before) = self.before.get_mut(part)
         {
-            before.kept.drive(rigid, leg);
+            before.snapshot.drive(rigid, leg);
         }
     }
 
@@ -490,7 +490,7 @@ impl Simulation {
     /// If a device fails.
     pub fn state(&mut self) -> Result<State, Failure> {
         let mut state = self.motion()?;
-        state.0.iter_mut().zip(&self.participants).for_each(|(own, now)| now.add_log(&mut own.kept));
+        state.0.iter_mut().zip(&self.participants).for_each(|(own, now)| now.add_log(&mut own.snapshot));
         Ok(state)
     }
 
@@ -504,8 +504,8 @@ impl Simulation {
     pub fn snapshot(&self) -> State {
         let parts = self.world.parts.iter().zip(&self.participants).enumerate();
         let own = parts.map(|(index, (part, now))| {
-            let kept = self.met().map_or_else(|| now.kept(), |met| met[index].kept.clone());
-            OwnState { clock: now.clock(), kept, step: part.steps.step }
+            let snapshot = self.met().map_or_else(|| now.snapshot(), |met| met[index].snapshot.clone());
+            OwnState { clock: now.clock(), snapshot, step: part.steps.step }
         });
         State(own.collect(), self.between())
     }
@@ -549,13 +549,13 @@ impl Simulation {
     ) -> Result<(), Failure> {
         let mut made = Vec::new();
         for (part, state) in states.iter().enumerate() {
-            if chosen(self, part) && !self.participants[part].goes_back_to(&state.kept) {
+            if chosen(self, part) && !self.participants[part].goes_back_to(&state.snapshot) {
                 made.push((part, resume(&self.world.parts[part], state.clone())?));
             }
         }
         for (part, state) in states.iter().enumerate() {
-            if chosen(self, part) && self.participants[part].goes_back_to(&state.kept) {
-                self.participants[part].go_back(&state.kept, state.steps())?;
+            if chosen(self, part) && self.participants[part].goes_back_to(&state.snapshot) {
+                self.participants[part].go_back(&state.snapshot, state.steps())?;
             }
         }
         for (part, anew) in made {
@@ -754,7 +754,7 @@ impl Simulation {
 /// A participant that goes on from a state of its part.
 fn resume(part: &Part, own: OwnState) -> Result<Box<dyn Participant>, Failure> {
     let steps = own.steps().map(|(clock, step)| Before { clock, step, model: None });
-    go_on(part, own.kept, steps)?.ok_or_else(|| Failure::input(&"the state is of another model"))
+    go_on(part, own.snapshot, steps)?.ok_or_else(|| Failure::input(&"the state is of another model"))
 }
 
 /// Keeps displacements of a participant at the addresses where those of another one of the same meshes were.

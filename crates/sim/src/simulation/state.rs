@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 use super::World;
 use crate::coupled_surfaces::CouplingMemory;
 use crate::failure::Failure;
-use crate::kept::Kept;
 use crate::part::Part;
 use crate::penalty::TieMemory;
+use crate::snapshot::Snapshot;
 
 /// The state of a simulation between two steps: a snapshot of all that another one needs to go on from there.
 #[derive(Clone, Debug)]
@@ -36,7 +36,7 @@ impl Between {
 /// That of a participant.
 #[derive(Clone, Debug)]
 pub(super) struct OwnState {
-    pub(super) kept: Kept,
+    pub(super) snapshot: Snapshot,
     pub(super) clock: Option<Clock>,
     /// Length of its steps [s].
     pub(super) step: f64,
@@ -60,21 +60,21 @@ impl State {
         let between = (!alone).then(|| postcard::to_stdvec(between));
         let of = |own: &OwnState| {
             let steps = postcard::to_stdvec(&own.steps())?;
-            Ok([steps, own.kept.encode()?].concat())
+            Ok([steps, own.snapshot.encode()?].concat())
         };
         parts.iter().map(of).chain(between).collect()
     }
 
     /// Its time [s].
     pub fn time(&self) -> f64 {
-        self.0.first().map_or(0.0, |own| own.kept.at().0)
+        self.0.first().map_or(0.0, |own| own.snapshot.at().0)
     }
 
     /// Halves the steps of all participants of its world that [cut theirs](World::cuts_steps) from here on. False where there are none, or
     /// where that was done [three times](pliant_explicit::stability::MOST_HALVINGS).
     pub fn halve_steps(&mut self, world: &World) -> bool {
         let mut cut = self.0.iter_mut().zip(&world.parts).filter(|(_, part)| part.cuts_steps()).peekable();
-        cut.peek().is_some() && cut.all(|(own, _)| own.kept.halve_steps())
+        cut.peek().is_some() && cut.all(|(own, _)| own.snapshot.halve_steps())
     }
 
     /// Whether it is one of a world.
@@ -85,7 +85,7 @@ impl State {
         let Self(parts, between) = self;
         let is_own = parts.len() == world.parts.len()
             && between.fits(world)
-            && parts.iter().zip(&world.parts).all(|(own, part)| own.kept.fits(part));
+            && parts.iter().zip(&world.parts).all(|(own, part)| own.snapshot.fits(part));
         if is_own { Ok(()) } else { Err(Failure::input(&"the state is of another model")) }
     }
 
@@ -99,8 +99,8 @@ impl State {
         };
         let of = |(part, bytes): (&Part, &B)| {
             let (steps, bytes) = postcard::take_from_bytes::<Option<(Clock, f64)>>(bytes.as_ref()).ok()?;
-            let kept = Kept::decode(part, bytes)?;
-            let done = kept.at().1;
+            let snapshot = Snapshot::decode(part, bytes)?;
+            let done = snapshot.at().1;
             let fits = |&(clock, step): &(Clock, f64)| {
                 clock.steps <= done
                     && is_time(clock.since, step)
@@ -111,7 +111,7 @@ impl State {
                 return None;
             }
             Some(OwnState {
-                kept,
+                snapshot,
                 clock: steps.map(|of| of.0),
                 step: steps.map_or(part.steps.step, |of| of.1),
             })

@@ -22,7 +22,7 @@ use crate::solver::Memory;
 
 /// The state of a participant with all that a restart needs beside it.
 #[derive(Clone, Debug)]
-pub(crate) enum Kept {
+pub(crate) enum Snapshot {
     /// In single precision.
     Single(State<f32>, Memory<f32>),
     /// In double precision.
@@ -31,18 +31,18 @@ pub(crate) enum Kept {
     Implicit(Box<ImplicitState>),
 }
 
-impl Kept {
+impl Snapshot {
     /// That of a participant from its bytes; `None` where these are none, or of another size.
     pub fn decode(part: &Part, bytes: &[u8]) -> Option<Self> {
         fn read<T: DeserializeOwned>(bytes: &[u8]) -> Option<T> {
             postcard::from_bytes(bytes).ok()
         }
-        let kept = match (part.method.bodies(), part.method.precision()) {
+        let snapshot = match (part.method.bodies(), part.method.precision()) {
             (Some(_), _) => Self::Implicit(read(bytes)?),
             (None, Precision::Single) => read(bytes).map(|(state, memory)| Self::Single(state, memory))?,
             (None, Precision::Double) => read(bytes).map(|(state, memory)| Self::Double(state, memory))?,
         };
-        kept.fits(part).then_some(kept)
+        snapshot.fits(part).then_some(snapshot)
     }
 
     /// As bytes of a checkpoint.
