@@ -271,9 +271,9 @@ mod tests {
     #[test]
     fn an_unknown_label_comes_with_those_there_are() {
         let labels = named(&[(5, "liver"), (7, "vein"), (8, "vein")]);
-        let told = find(&labels, "livr").unwrap_err();
+        let message = find(&labels, "livr").unwrap_err();
         let all = "the mesh has -2, 5 (liver), 7 (vein), 8 (vein)";
-        assert_eq!(told, format!("no label is named `livr`; did you mean `liver`? ({all})"));
+        assert_eq!(message, format!("no label is named `livr`; did you mean `liver`? ({all})"));
         assert_eq!(find(&labels, "6").unwrap_err(), format!("no cell has label 6: {all}"));
         assert_eq!(find(&labels, "20-30").unwrap_err(), format!("no cell has label 20-30: {all}"));
         assert!(find(&labels, "vein").unwrap_err().contains("the labels 7, 8; choose by number"));

@@ -108,10 +108,10 @@ mod tests {
         assert_eq!(find("liver").unwrap(), [Region::Label(1)]);
         assert_eq!(find("grasper").unwrap(), [Region::Body(1)]);
         assert_eq!(find("1-2").unwrap(), [Region::Label(1), Region::Label(2)]);
-        let told = find("graper").unwrap_err().to_string();
-        assert!(told.contains("did you mean `grasper`?") && told.contains("2 (tumour)"), "{told}");
-        let told = find("tumor").unwrap_err().to_string();
-        assert!(told.contains("did you mean `tumour`?"), "{told}");
+        let message = find("graper").unwrap_err().to_string();
+        assert!(message.contains("did you mean `grasper`?") && message.contains("2 (tumour)"), "{message}");
+        let message = find("tumor").unwrap_err().to_string();
+        assert!(message.contains("did you mean `tumour`?"), "{message}");
     }
 
     #[test]

@@ -324,13 +324,13 @@ mod tests {
         assert_eq!(choose(&["tumour"], &[5, 8]), Ok(vec![8]));
         assert!(matches!(choose(&["tumour"], &all), Err(LabelError::AmbiguousName { .. })));
         assert!(matches!(choose(&["20-30"], &all), Err(LabelError::EmptyRange { .. })));
-        let told = choose(&["livr"], &all).unwrap_err().to_string();
+        let message = choose(&["livr"], &all).unwrap_err().to_string();
         assert!(
-            told.starts_with("no label is named `livr`; did you mean `Liver`? (the image has Liver (5)"),
-            "{told}"
+            message.starts_with("no label is named `livr`; did you mean `Liver`? (the image has Liver (5)"),
+            "{message}"
         );
-        let told = choose(&["spleen"], &all).unwrap_err().to_string();
-        assert!(told.contains("no label is named `spleen`") && told.contains("Liver (5)"), "{told}");
+        let message = choose(&["spleen"], &all).unwrap_err().to_string();
+        assert!(message.contains("no label is named `spleen`") && message.contains("Liver (5)"), "{message}");
     }
 
     #[test]

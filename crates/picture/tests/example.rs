@@ -9,12 +9,12 @@ fn a_picture_is_drawn_without_a_window() {
     let place = tempfile::tempdir().unwrap();
     let file = place.path().join("block.png");
     let output = Command::new(example).arg(&file).output().unwrap();
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
     if !output.status.success() && std::env::var_os("PLIANT_REQUIRE_GPU").is_none() {
-        println!("skipped: {told}");
+        println!("skipped: {message}");
         return;
     }
-    assert!(output.status.success(), "{told}");
+    assert!(output.status.success(), "{message}");
     let picture = std::fs::read(file).unwrap();
     assert!(picture.starts_with(b"\x89PNG") && picture.len() > 5000, "{} bytes", picture.len());
 }

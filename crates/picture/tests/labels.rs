@@ -98,8 +98,8 @@ fn hidden_labels_show_what_lies_inside_and_leave_the_legend() {
     let half = hiding(vec![2]).unwrap();
     let [left, right, core, _] = counts(&half);
     assert!(right == 0 && left > 3000 && core > 200, "{left} {right} {core}");
-    let told = hiding(vec![1, 2, 3]).unwrap_err().to_string();
-    assert!(told.contains("nothing is visible"), "{told}");
+    let message = hiding(vec![1, 2, 3]).unwrap_err().to_string();
+    assert!(message.contains("nothing is visible"), "{message}");
 }
 
 #[test]
@@ -191,6 +191,6 @@ fn a_mesh_without_labels_is_refused() {
     let Some(graphics) = graphics() else { return };
     let mut mesh = cube();
     mesh.blocks[0].data.clear();
-    let told = look().picture(&graphics, &mesh, None, 0.0).unwrap_err();
-    assert!(told.to_string().contains("have no labels") && !told.remedy().is_empty(), "{told}");
+    let message = look().picture(&graphics, &mesh, None, 0.0).unwrap_err();
+    assert!(message.to_string().contains("have no labels") && !message.remedy().is_empty(), "{message}");
 }

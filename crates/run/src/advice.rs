@@ -22,8 +22,8 @@ pub(crate) fn remedy(failure: &Failure, part: &Part, now: &dyn Instant) -> Optio
     let on_unstable = scene.run.on_unstable.unwrap_or_default();
     let stability = now.stability();
     let step = plan.steps.step / f64::from(1 << stability.halvings);
-    if let Some(told) = too_much_damping(failure, built, step) {
-        return Some(told);
+    if let Some(message) = too_much_damping(failure, built, step) {
+        return Some(message);
     }
     let seen = stability.smallest.as_ref().map(|look| look.limit / plan.steps.step);
     let cuts = match stability.halvings {
@@ -31,7 +31,7 @@ pub(crate) fn remedy(failure: &Failure, part: &Part, now: &dyn Instant) -> Optio
         n => format!("the run cuts its steps, went back {} and halved them", counted(n as usize, "time")),
     };
     let shorter = format!("a `step` of {} s or less", number(0.5 * step));
-    let told = match (failure.kind, on_unstable) {
+    let message = match (failure.kind, on_unstable) {
         (FailureKind::Unstable, OnUnstableName::Substep) => format!(
             "{cuts}, into 100 parts at the most, and that is not enough: try a slower or smaller motion, a coarser mesh there, or {shorter}"
         ),
@@ -58,7 +58,7 @@ pub(crate) fn remedy(failure: &Failure, part: &Part, now: &dyn Instant) -> Optio
         }
         _ => return None,
     };
-    Some(told + &pushing(part, now))
+    Some(message + &pushing(part, now))
 }
 
 /// That moving tools which touch bodies here have no limit of their force.

@@ -96,10 +96,10 @@ pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
     {
         let [asked, until, step] = [asked, scene.scene.until, plan.steps.step].map(number);
         let steps = counted(plan.steps.number as usize, "step");
-        let told = format!(
+        let message = format!(
             "a step of {asked} s does not divide the {until} s of the scene: it takes {steps} of {step} s"
         );
-        plan.note = Some(plan.note.map_or(told.clone(), |note| format!("{note}; {told}")));
+        plan.note = Some(plan.note.map_or(message.clone(), |note| format!("{note}; {message}")));
     }
     Ok(plan)
 }
@@ -252,9 +252,9 @@ mod tests {
     #[test]
     fn a_step_that_does_not_divide_the_duration_is_told() {
         let with = |step: &str| planned(&format!("[run]\nsolver = 'quasi-static'\nstep = {step}\n")).unwrap();
-        let told = with("0.03");
-        assert_eq!((told.steps.number, told.steps.step), (4, 0.025));
-        let note = told.note.unwrap();
+        let plan = with("0.03");
+        assert_eq!((plan.steps.number, plan.steps.step), (4, 0.025));
+        let note = plan.note.unwrap();
         for piece in ["0.03", "does not divide", "4 steps of 0.025"] {
             assert!(note.contains(piece), "no `{piece}` in {note}");
         }

@@ -236,16 +236,16 @@ mod tests {
             ("hide = ['bar']", "all bodies are hidden"),
             ("look.bat = { opacity = 0.5 }", "nothing that is shown is named `bat`; did you mean `bar`?"),
         ] {
-            let told = World::new(&bar(view)).unwrap_err().plain().to_string();
-            assert!(told.contains(piece) && told.contains("bar.toml:"), "{view}: {told}");
+            let message = World::new(&bar(view)).unwrap_err().plain().to_string();
+            assert!(message.contains(piece) && message.contains("bar.toml:"), "{view}: {message}");
         }
-        let told = mistakes("[view]\ncolour = 'label'\n").plain().to_string();
-        assert!(told.contains("have no labels") && told.contains("cell data `label`"), "{told}");
-        let told =
+        let message = mistakes("[view]\ncolour = 'label'\n").plain().to_string();
+        assert!(message.contains("have no labels") && message.contains("cell data `label`"), "{message}");
+        let message =
             World::new(&crate::testing::scene("[view]\nhide = [1]\n")).unwrap_err().plain().to_string();
         assert!(
-            told.contains("no cell has label 1") && told.contains("obstacles and tools by name"),
-            "{told}"
+            message.contains("no cell has label 1") && message.contains("obstacles and tools by name"),
+            "{message}"
         );
     }
 
@@ -260,8 +260,8 @@ mod tests {
             ("clip = { point = [0, 0, 0], normal = [0, 0, 0] }", "a plane needs a normal"),
             ("range = [2, 1]", "the range must grow"),
         ] {
-            let told = mistakes(&format!("[view]\n{view}\n")).plain().to_string();
-            assert!(told.contains(piece), "{view}: {told}");
+            let message = mistakes(&format!("[view]\n{view}\n")).plain().to_string();
+            assert!(message.contains(piece), "{view}: {message}");
         }
     }
 }

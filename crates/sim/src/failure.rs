@@ -173,8 +173,8 @@ impl Failure {
     /// The same failure with another remedy.
     #[must_use]
     pub fn advised(mut self, remedy: &str) -> Self {
-        if let Some(told) = self.message.strip_suffix(self.remedy).filter(|_| !self.remedy.is_empty()) {
-            self.message = format!("{told}{remedy}");
+        if let Some(cause) = self.message.strip_suffix(self.remedy).filter(|_| !self.remedy.is_empty()) {
+            self.message = format!("{cause}{remedy}");
             self.remedy = "";
         }
         self

@@ -227,13 +227,13 @@ fn a_grip_pulls_at_nodes_of_any_participant() {
 fn a_load_step_tells_how_far_it_is() {
     let mut simulation = Simulation::new(Part::quasi_static("cube", cube(1e5), DURATION, 2)).unwrap();
     for number in [1, 2] {
-        let mut told = Vec::new();
+        let mut progresses = Vec::new();
         simulation.evaluate(Wanted::Energies).unwrap();
-        simulation.advance(1, &mut |progress| told.push(progress)).unwrap();
-        assert!(told.len() > 3 && told.iter().all(|p| (p.number, p.of) == (number, 2)));
-        let fractions: Vec<f64> = told.iter().map(|p| p.iteration.fraction).collect();
+        simulation.advance(1, &mut |progress| progresses.push(progress)).unwrap();
+        assert!(progresses.len() > 3 && progresses.iter().all(|p| (p.number, p.of) == (number, 2)));
+        let fractions: Vec<f64> = progresses.iter().map(|p| p.iteration.fraction).collect();
         assert!(fractions.is_sorted() && fractions[0] == 0.0, "{fractions:?}");
-        let last = told.last().unwrap();
+        let last = progresses.last().unwrap();
         assert!((last.iteration.span[1] - simulation.time()).abs() < 1e-15, "{last:?}");
         assert!(last.iteration.residual > last.tolerance);
     }
@@ -252,8 +252,8 @@ fn solids_refuse_loads_of_shells() {
             Part::explicit("cube", model.clone(), DURATION).unwrap(),
             Part::quasi_static("cube", model, DURATION, 1),
         ] {
-            let told = Simulation::new(part).err().unwrap().to_string();
-            assert!(told.contains("`twist` is a load of shells"), "{told}");
+            let message = Simulation::new(part).err().unwrap().to_string();
+            assert!(message.contains("`twist` is a load of shells"), "{message}");
         }
     }
 }

@@ -181,8 +181,8 @@ fn solvers_without_common_steps_are_refused() {
     };
     let explicit = Part::explicit("a", column("a", 0, SOFT, 0.0), 0.1).unwrap();
     let still = Part::quasi_static("b", column("b", 1, SOFT, 0.0), 0.1, 4);
-    let told = tie(vec![explicit.clone(), still]);
-    assert!(told.contains("tie `glue`: participant `b` finds equilibria"), "{told}");
-    let told = tie(vec![explicit]);
-    assert!(told.contains("as many points of one participant as of another"), "{told}");
+    let message = tie(vec![explicit.clone(), still]);
+    assert!(message.contains("tie `glue`: participant `b` finds equilibria"), "{message}");
+    let message = tie(vec![explicit]);
+    assert!(message.contains("as many points of one participant as of another"), "{message}");
 }

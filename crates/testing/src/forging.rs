@@ -104,8 +104,8 @@ impl Attempts {
             Ok(false) => self.refused += 1,
             Err(_) => {
                 let last = LAST.lock().ok().and_then(|mut last| last.take());
-                let (told, from) = last.unwrap_or_default();
-                self.panics.entry(told).or_insert((0, seed, from)).0 += 1;
+                let (message, from) = last.unwrap_or_default();
+                self.panics.entry(message).or_insert((0, seed, from)).0 += 1;
             }
         }
     }
@@ -113,17 +113,17 @@ impl Attempts {
     /// Calls a function while panics are noted in place of being printed.
     pub fn quietly<T>(go: impl FnOnce() -> T) -> T {
         let before = panic::take_hook();
-        panic::set_hook(Box::new(|told| {
+        panic::set_hook(Box::new(|message| {
             if let Ok(mut last) = LAST.lock() {
-                *last = Some((told.to_string(), Backtrace::force_capture().to_string()));
+                *last = Some((message.to_string(), Backtrace::force_capture().to_string()));
             }
         }));
         let done = panic::catch_unwind(AssertUnwindSafe(go));
         panic::set_hook(before);
         done.unwrap_or_else(|other| {
             // One that no attempt has caught is a fault of the test.
-            if let Some((told, from)) = LAST.lock().ok().and_then(|mut last| last.take()) {
-                eprintln!("{told}\n{from}");
+            if let Some((message, from)) = LAST.lock().ok().and_then(|mut last| last.take()) {
+                eprintln!("{message}\n{from}");
             }
             panic::resume_unwind(other)
         })
@@ -134,8 +134,8 @@ impl fmt::Display for Attempts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { taken, refused, longest: (longest, of), panics } = self;
         write!(f, "{taken} went on, {refused} refused, longest {longest:.1?} (seed {of})")?;
-        for (told, (count, seed, from)) in panics {
-            write!(f, "\n{count} × {told} (seed {seed})\n{from}")?;
+        for (message, (count, seed, from)) in panics {
+            write!(f, "\n{count} × {message} (seed {seed})\n{from}")?;
         }
         Ok(())
     }

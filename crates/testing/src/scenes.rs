@@ -300,12 +300,12 @@ impl Workshop {
 
     /// Builds the scene with the values of some keys set, as `pliant check` does, and describes it.
     pub fn check(&self, set: &[&str]) -> Told {
-        let mut told = Told::default();
-        match self.world(set, &mut told) {
-            Ok(world) => told.out = overview(&world),
-            Err(message) => told.result = failed_input(&message),
+        let mut output = Told::default();
+        match self.world(set, &mut output) {
+            Ok(world) => output.out = overview(&world),
+            Err(message) => output.result = failed_input(&message),
         }
-        self.relative(told)
+        self.relative(output)
     }
 
     /// Runs the scene with the values of some keys set, as `pliant run` does. The outputs are in `out/case`; those of an earlier run
@@ -355,12 +355,12 @@ impl Workshop {
     }
 
     fn go(&self, checkpoint: Option<&str>, out: &str, set: &[&str]) -> Told {
-        let mut told = Told::default();
-        told.result = match self.attempt(checkpoint, out, set, &mut told) {
+        let mut output = Told::default();
+        output.result = match self.attempt(checkpoint, out, set, &mut output) {
             Ok(result) => result,
             Err(message) => failed_input(&message),
         };
-        self.relative(told)
+        self.relative(output)
     }
 
     /// The result of a run as an object, or the message of why there is no run.
@@ -369,37 +369,37 @@ impl Workshop {
         checkpoint: Option<&str>,
         out: &str,
         set: &[&str],
-        told: &mut Told,
+        output: &mut Told,
     ) -> Result<Value, String> {
         let checkpoint = checkpoint.map(|name| Checkpoint::read(&self.path(name))).transpose();
-        let checkpoint = checkpoint.map_err(|error| told.refuse(&error, &error.remedy()))?;
-        let mut world = self.world(set, told)?;
+        let checkpoint = checkpoint.map_err(|error| output.refuse(&error, &error.remedy()))?;
+        let mut world = self.world(set, output)?;
         if let Some(checkpoint) = &checkpoint {
-            world = checkpoint.continues(&world).map_err(|error| told.refuse(&error, &error.remedy()))?;
+            world = checkpoint.continues(&world).map_err(|error| output.refuse(&error, &error.remedy()))?;
         }
         let folder = match &checkpoint {
             Some(checkpoint) => OutputFolder::reopen(self.path(out), &world.scene, checkpoint)
-                .map_err(|error| told.refuse(&error, &error.remedy())),
+                .map_err(|error| output.refuse(&error, &error.remedy())),
             None => OutputFolder::prepare(self.path(out), &world.scene, true)
-                .map_err(|error| told.refuse(&error, error.remedy)),
+                .map_err(|error| output.refuse(&error, error.remedy)),
         }?;
-        told.err.extend(world.notes().map(|note| format!("note: {note}\n")));
+        output.err.extend(world.notes().map(|note| format!("note: {note}\n")));
         let options = Options { resume: checkpoint.as_ref(), ..Options::default() };
         Ok(match pliant_run::run_with(&world, &folder, options, &mut |_| ()) {
             Ok(summary) => {
-                told.err.extend(summary.warnings.iter().map(|warning| format!("warning: {warning}\n")));
-                told.err.extend(summary.error.iter().map(|error| format!("error: {}\n", error.message)));
+                output.err.extend(summary.warnings.iter().map(|warning| format!("warning: {warning}\n")));
+                output.err.extend(summary.error.iter().map(|error| format!("error: {}\n", error.message)));
                 json!(summary)
             }
             Err(error) => {
-                told.err += &format!("error: {error}; {}\n", error.remedy);
+                output.err += &format!("error: {error}; {}\n", error.remedy);
                 failed_output(&error)
             }
         })
     }
 
     /// The world of the scene with the values of some keys set, or its mistakes.
-    fn world(&self, set: &[&str], told: &mut Told) -> Result<World, String> {
+    fn world(&self, set: &[&str], output: &mut Told) -> Result<World, String> {
         let world = (|| {
             let mut source = self.source()?;
             let mistakes: Vec<Diagnostic> =
@@ -412,20 +412,21 @@ impl Workshop {
         })();
         match &world {
             Ok(world) => {
-                told.show(&world.scene.source.errors(world.warnings().cloned().collect()));
+                output.show(&world.scene.source.errors(world.warnings().cloned().collect()));
             }
-            Err(errors) => told.show(errors),
+            Err(errors) => output.show(errors),
         }
         world.map_err(|errors| errors.plain().to_string())
     }
 
     /// The messages, with paths relative to the folder.
-    fn relative(&self, mut told: Told) -> Told {
+    fn relative(&self, mut output: Told) -> Told {
         let folder = format!("{}/", self.folder.path().display());
-        told.out = told.out.replace(&folder, "");
-        told.err = told.err.replace(&folder, "");
-        told.result = serde_json::from_str(&told.result.to_string().replace(&folder, "")).expect("an object");
-        told
+        output.out = output.out.replace(&folder, "");
+        output.err = output.err.replace(&folder, "");
+        output.result =
+            serde_json::from_str(&output.result.to_string().replace(&folder, "")).expect("an object");
+        output
     }
 }
 

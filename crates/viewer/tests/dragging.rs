@@ -156,16 +156,16 @@ impl Dragged {
     fn go_back(&mut self) {
         self.session.order(Order::Back(u64::MAX));
         wait(&mut self.session, |frame| {
-            frame.note.as_deref().is_some_and(|told| told.contains("went back to"))
+            frame.note.as_deref().is_some_and(|message| message.contains("went back to"))
         });
     }
 }
 
 /// What broke a drag is told: the body is turned inside out, squeezed until it is too stiff for the step, or gains energy.
-fn assert_is_told(told: &str, drag: u64) {
+fn assert_is_told(message: &str, drag: u64) {
     let reasons = ["is inverted", "the largest stable step has fallen", "the energies are off balance"];
-    let is_told = reasons.iter().any(|why| told.contains(why));
-    assert!(is_told && told.contains("went back to"), "in drag {drag}: {told}");
+    let is_told = reasons.iter().any(|why| message.contains(why));
+    assert!(is_told && message.contains("went back to"), "in drag {drag}: {message}");
 }
 
 /// Drags of a second each at a body, each at a place of its own, with a stiffness between 20 and 500 N/m. The run never ends: after a pull

@@ -195,11 +195,11 @@ fn a_run_that_breaks_tells_body_and_element_and_keeps_the_last_good_picture() {
     let mut session = Session::start(world(&text), || ()).unwrap();
     session.order(Order::Play(true));
     let broken = wait(&mut session, |frame| frame.failure.is_some());
-    let told = broken.failure.clone().unwrap();
-    let element = told.split("element ").nth(1).and_then(|rest| rest.split(' ').next());
-    assert!(told.contains("`ball`") && element.is_some_and(|e| e.parse::<u32>().is_ok()), "{told}");
-    let (_, remedy) = told.split_once("; ").expect("a remedy");
-    assert!(remedy.contains("step") || remedy.contains("mesh"), "{told}");
+    let message = broken.failure.clone().unwrap();
+    let element = message.split("element ").nth(1).and_then(|rest| rest.split(' ').next());
+    assert!(message.contains("`ball`") && element.is_some_and(|e| e.parse::<u32>().is_ok()), "{message}");
+    let (_, remedy) = message.split_once("; ").expect("a remedy");
+    assert!(remedy.contains("step") || remedy.contains("mesh"), "{message}");
     assert!(!broken.playing && !broken.points.is_empty());
     assert!(broken.points.iter().all(|point| point.iter().all(|x| x.is_finite())));
     session.order(Order::Reset);
@@ -753,8 +753,8 @@ fn two_hands_pull_each_on_its_own_and_are_repeated() {
     assert_eq!(once, replay(&world, &recording).unwrap());
     let end = one.hand(Which::Second).unwrap();
     assert!(once.held == Some(end) && once.largest_force >= up.max(-down));
-    let told = Recording::from_bytes(&recording.to_bytes().unwrap()).unwrap();
-    assert_eq!(told, recording);
+    let read = Recording::from_bytes(&recording.to_bytes().unwrap()).unwrap();
+    assert_eq!(read, recording);
 }
 
 /// A hand keeps the tissue while the other one leads the tool, and takes the tool over.

@@ -26,18 +26,18 @@ const KEYS: [&str; 17] = [
 
 #[test]
 fn the_list_names_every_row_in_a_line() {
-    let told = Workshop::new("").lab(&["bench", "--list"]);
-    assert_eq!(told.code, 0, "{}", told.err);
+    let output = Workshop::new("").lab(&["bench", "--list"]);
+    assert_eq!(output.code, 0, "{}", output.err);
     for id in ["tet4-nh-55566", "hex8-ti-prony-27000-double-all", "hex8-nh-1000", "tet4-anp-ti-55566-all"] {
-        assert_eq!(told.out.lines().filter(|line| line.split(' ').next() == Some(id)).count(), 1, "{id}");
+        assert_eq!(output.out.lines().filter(|line| line.split(' ').next() == Some(id)).count(), 1, "{id}");
     }
 }
 
 #[test]
 fn a_row_has_the_promised_keys_with_numbers_that_agree() {
-    let told = Workshop::new("").lab(&["bench", "--only", "hex8-nh-1000", "--repeats", "3", "--json"]);
-    assert_eq!(told.code, 0, "{}", told.err);
-    let report = told.json();
+    let output = Workshop::new("").lab(&["bench", "--only", "hex8-nh-1000", "--repeats", "3", "--json"]);
+    assert_eq!(output.code, 0, "{}", output.err);
+    let report = output.json();
     let rows = report["rows"].as_array().unwrap();
     assert_eq!(rows.len(), 1);
     let row = rows[0].as_object().unwrap();
@@ -69,10 +69,10 @@ fn a_design_is_measured_on_the_device_and_named_with_it() {
         return;
     }
     let best = pliant_gpu::adapters().remove(0);
-    let told =
+    let output =
         Workshop::new("").lab(&["bench", "--only", "hex8-nh-27000-gather", "--repeats", "1", "--json"]);
-    assert_eq!(told.code, 0, "{}", told.err);
-    let report = told.json();
+    assert_eq!(output.code, 0, "{}", output.err);
+    let report = output.json();
     let row = report["rows"][0].as_object().unwrap();
     assert!(KEYS.iter().all(|key| row.contains_key(*key)), "{row:?}");
     assert_eq!((&row["adapter"], &row["design"]), (&best.name.into(), &"gather".into()));
@@ -87,9 +87,9 @@ fn designs_without_a_device_are_answered_with_the_packages() {
     // None answers to Direct3D there.
     let workshop = Workshop::new("");
     let mut command = workshop.command(&["bench", "--designs", "--repeats", "1"]);
-    let told: Said = command.env("WGPU_BACKEND", "dx12").output().expect("the binary starts").into();
-    assert_eq!(told.code, 1, "{}", told.out);
-    assert!(told.words().contains("mesa-vulkan-drivers"), "{}", told.err);
+    let output: Said = command.env("WGPU_BACKEND", "dx12").output().expect("the binary starts").into();
+    assert_eq!(output.code, 1, "{}", output.out);
+    assert!(output.words().contains("mesa-vulkan-drivers"), "{}", output.err);
 }
 
 #[test]
@@ -110,21 +110,21 @@ fn lanes_are_chosen_by_word_and_missing_ones_are_refused() {
         ];
         workshop.lab(&row)
     };
-    let told = run("plain");
-    assert_eq!(told.code, 0, "{}", told.err);
-    assert_eq!(told.json()["rows"][0]["lanes"], "plain");
+    let output = run("plain");
+    assert_eq!(output.code, 0, "{}", output.err);
+    assert_eq!(output.json()["rows"][0]["lanes"], "plain");
     let foreign = if cfg!(target_arch = "x86_64") { "neon" } else { "avx512" };
-    let told = run(foreign);
-    assert_eq!(told.code, 2);
+    let output = run(foreign);
+    assert_eq!(output.code, 2);
     assert!(
-        told.words().contains(&format!("this processor has no `{foreign}` instructions")),
+        output.words().contains(&format!("this processor has no `{foreign}` instructions")),
         "{}",
-        told.err
+        output.err
     );
-    assert!(told.words().contains("omit `--lanes`"), "{}", told.err);
-    let told = run("mmx");
-    assert_eq!(told.code, 2);
-    assert!(told.err.contains("avx2"), "{}", told.err);
+    assert!(output.words().contains("omit `--lanes`"), "{}", output.err);
+    let output = run("mmx");
+    assert_eq!(output.code, 2);
+    assert!(output.err.contains("avx2"), "{}", output.err);
 }
 
 #[test]
@@ -135,18 +135,18 @@ fn several_rows_make_a_table_and_three_meshes_a_line() {
         "page.md",
         "# Page\n<!-- pliant-lab bench: start -->\nold\n<!-- pliant-lab bench: end -->\nmore\n",
     );
-    let told = workshop.lab(&[&["bench", "--repeats", "1", "--table", "page.md"], ids.as_slice()].concat());
-    assert_eq!(told.code, 0, "{}", told.err);
+    let output = workshop.lab(&[&["bench", "--repeats", "1", "--table", "page.md"], ids.as_slice()].concat());
+    assert_eq!(output.code, 0, "{}", output.err);
     for mesh in ["cube-10", "cube-16", "cube-25"] {
         assert_eq!(
-            told.out.lines().filter(|line| line.starts_with(&format!("| {mesh} "))).count(),
+            output.out.lines().filter(|line| line.starts_with(&format!("| {mesh} "))).count(),
             1,
             "{mesh}"
         );
     }
-    assert!(told.out.contains("3 of 1000 to 15625 elements"), "{}", told.out);
+    assert!(output.out.contains("3 of 1000 to 15625 elements"), "{}", output.out);
     let page = workshop.read("page.md");
-    let (before, after) = page.split_once(told.out.trim_end()).expect("the same tables");
+    let (before, after) = page.split_once(output.out.trim_end()).expect("the same tables");
     assert_eq!(before, "# Page\n<!-- pliant-lab bench: start -->\n\n");
     assert_eq!(after, "\n\n<!-- pliant-lab bench: end -->\nmore\n");
 }
@@ -154,9 +154,9 @@ fn several_rows_make_a_table_and_three_meshes_a_line() {
 #[test]
 fn a_series_of_tissues_on_all_threads_leads_to_a_cube_in_real_time() {
     let ids = ["hex8-nh-1000-all", "hex8-nh-4096-all", "hex8-nh-15625-all"].map(|id| ["--only", id]).concat();
-    let told = Workshop::new("").lab(&[&["bench", "--repeats", "1", "--json"], ids.as_slice()].concat());
-    assert_eq!(told.code, 0, "{}", told.err);
-    let report = told.json();
+    let output = Workshop::new("").lab(&[&["bench", "--repeats", "1", "--json"], ids.as_slice()].concat());
+    assert_eq!(output.code, 0, "{}", output.err);
+    let report = output.json();
     let fit = &report["linear_cost"][0];
     let cost = fit["ns_per_element_step"].as_f64().unwrap();
     assert!(cost > 0.0 && fit["largest_deviation"].as_f64().unwrap() >= 0.0);
@@ -172,16 +172,16 @@ fn a_series_of_tissues_on_all_threads_leads_to_a_cube_in_real_time() {
 #[test]
 fn an_unknown_row_is_answered_with_the_nearest() {
     let workshop = Workshop::new("");
-    let told = workshop.lab(&["bench", "--only", "tet4-nh-5556", "--json"]);
-    assert_eq!(told.code, 2);
-    assert!(told.err.contains("did you mean `tet4-nh-55566`?"), "{}", told.err);
-    assert!(told.out.contains("tet4-nh-5556"), "{}", told.out);
+    let output = workshop.lab(&["bench", "--only", "tet4-nh-5556", "--json"]);
+    assert_eq!(output.code, 2);
+    assert!(output.err.contains("did you mean `tet4-nh-55566`?"), "{}", output.err);
+    assert!(output.out.contains("tet4-nh-5556"), "{}", output.out);
     let mistyped = workshop.lab(&["bench", "--json", "--ful"]);
     assert_eq!((mistyped.code, mistyped.json()["status"].as_str()), (2, Some("invalid")), "{}", mistyped.out);
     assert_eq!(workshop.lab(&["bench", "--repeats", "0"]).code, 2);
     assert_eq!(workshop.lab(&["bench", "--seconds", "0"]).code, 2);
     workshop.write("page.md", "# Page\n");
-    let told = workshop.lab(&["bench", "--table", "page.md"]);
-    assert_eq!(told.code, 2);
-    assert!(told.words().contains("`page.md` has no place for the table"), "{}", told.err);
+    let output = workshop.lab(&["bench", "--table", "page.md"]);
+    assert_eq!(output.code, 2);
+    assert!(output.words().contains("`page.md` has no place for the table"), "{}", output.err);
 }

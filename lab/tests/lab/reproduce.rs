@@ -6,8 +6,8 @@ use crate::Workshop;
 
 #[test]
 fn the_list_names_every_case_in_a_line() {
-    let told = Workshop::new("").lab(&["reproduce", "--list"]);
-    assert_eq!(told.code, 0, "{}", told.err);
+    let output = Workshop::new("").lab(&["reproduce", "--list"]);
+    assert_eq!(output.code, 0, "{}", output.err);
     for id in [
         "fig-6.3",
         "fig-6.4",
@@ -30,15 +30,15 @@ fn the_list_names_every_case_in_a_line() {
         "fig-9.4",
         "fig-9.5",
     ] {
-        assert_eq!(told.out.lines().filter(|line| line.split(' ').next() == Some(id)).count(), 1, "{id}");
+        assert_eq!(output.out.lines().filter(|line| line.split(' ').next() == Some(id)).count(), 1, "{id}");
     }
 }
 
 #[test]
 fn a_case_leaves_a_page_and_its_numbers() {
     let workshop = Workshop::new("");
-    let told = workshop.lab(&["reproduce", "--only", "fig-6.3", "--only", "fig-6.4", "--out", "shear"]);
-    assert_eq!(told.code, 0, "{}{}", told.out, told.err);
+    let output = workshop.lab(&["reproduce", "--only", "fig-6.3", "--only", "fig-6.4", "--out", "shear"]);
+    assert_eq!(output.code, 0, "{}{}", output.out, output.err);
     let results: Value = serde_json::from_str(&workshop.read("shear/results.json")).unwrap();
     let rows = results["rows"].as_array().unwrap();
     assert_eq!((rows.len(), results["failed"].as_u64()), (16, Some(0)));
@@ -63,9 +63,9 @@ fn a_case_leaves_a_page_and_its_numbers() {
 #[test]
 fn a_folder_with_something_else_in_it_is_refused() {
     let workshop = Workshop::new("");
-    let told = workshop.lab(&["reproduce", "--only", "fig-6.3", "--out", "case"]);
-    assert_eq!(told.code, 2);
-    assert!(told.words().contains("`case` cannot be written: it is not empty"), "{}", told.err);
+    let output = workshop.lab(&["reproduce", "--only", "fig-6.3", "--out", "case"]);
+    assert_eq!(output.code, 2);
+    assert!(output.words().contains("`case` cannot be written: it is not empty"), "{}", output.err);
     let forced = workshop.lab(&["reproduce", "--only", "fig-6.3", "--out", "case", "--force"]);
     assert_eq!(forced.code, 0, "{}", forced.err);
     assert!(workshop.path("case/scene.toml").exists() && workshop.path("case/index.html").exists());
@@ -74,10 +74,10 @@ fn a_folder_with_something_else_in_it_is_refused() {
 #[test]
 fn an_unknown_case_is_answered_with_the_nearest() {
     let workshop = Workshop::new("");
-    let told = workshop.lab(&["reproduce", "--only", "fig-6.1O"]);
-    assert_eq!(told.code, 2);
-    assert!(told.words().contains("there is no case `fig-6.1O`"), "{}", told.err);
-    assert!(told.words().contains("did you mean `fig-6.10`?"), "{}", told.err);
+    let output = workshop.lab(&["reproduce", "--only", "fig-6.1O"]);
+    assert_eq!(output.code, 2);
+    assert!(output.words().contains("there is no case `fig-6.1O`"), "{}", output.err);
+    assert!(output.words().contains("did you mean `fig-6.10`?"), "{}", output.err);
     assert!(!workshop.path("reproduce").exists(), "nothing is made");
 }
 
@@ -85,7 +85,7 @@ fn an_unknown_case_is_answered_with_the_nearest() {
 fn a_table_needs_its_marks() {
     let workshop = Workshop::new("");
     workshop.write("page.md", "# Validation\n");
-    let told = workshop.lab(&["reproduce", "--table", "page.md"]);
-    assert_eq!(told.code, 2);
-    assert!(told.words().contains("`page.md` has no place for the table"), "{}", told.err);
+    let output = workshop.lab(&["reproduce", "--table", "page.md"]);
+    assert_eq!(output.code, 2);
+    assert!(output.words().contains("`page.md` has no place for the table"), "{}", output.err);
 }

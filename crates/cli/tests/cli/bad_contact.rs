@@ -50,20 +50,20 @@ fn run(scene: &str, mesh: &str) -> (Said, Workshop) {
 /// Asserts exit code 2 and these words, and that nothing was written.
 #[track_caller]
 fn refused(scene: &str, mesh: &str, says: &[&str]) {
-    let (told, workshop) = run(scene, mesh);
-    assert_eq!(told.code, 2, "{}\n{}", told.err, told.out);
-    let words = told.words();
+    let (output, workshop) = run(scene, mesh);
+    assert_eq!(output.code, 2, "{}\n{}", output.err, output.out);
+    let words = output.words();
     says.iter().for_each(|piece| assert!(words.contains(piece), "no `{piece}` in:\n{words}"));
-    assert_eq!(told.json()["error"]["kind"], "input");
+    assert_eq!(output.json()["error"]["kind"], "input");
     assert!(!workshop.path("out").exists(), "something was written");
 }
 
 /// Asserts exit code 0 and these words.
 #[track_caller]
 fn accepted(scene: &str, mesh: &str, says: &[&str]) {
-    let (told, _) = run(scene, mesh);
-    assert_eq!(told.code, 0, "{}\n{}", told.err, told.out);
-    let words = told.words();
+    let (output, _) = run(scene, mesh);
+    assert_eq!(output.code, 0, "{}\n{}", output.err, output.out);
+    let words = output.words();
     says.iter().for_each(|piece| assert!(words.contains(piece), "no `{piece}` in:\n{words}"));
 }
 
@@ -168,8 +168,8 @@ fn numbers_that_cannot_be_are_refused_with_their_ranges() {
         let workshop = Workshop::new(&changed(SOLID, "[contact.below]", tool));
         workshop.write("case/organ.vtk", cube());
         workshop.write("case/p.csv", row);
-        let told = workshop.run(&[]);
-        assert!(told.code == 2 && told.words().contains(says), "{}", told.err);
+        let output = workshop.run(&[]);
+        assert!(output.code == 2 && output.words().contains(says), "{}", output.err);
     }
 }
 

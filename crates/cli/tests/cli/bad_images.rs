@@ -10,13 +10,13 @@ use crate::support::{BLOCK, Said, Workshop};
 
 fn assert_refused(workshop: &Workshop, image: &str, says: &[&str]) {
     let mesh = ["mesh", image, "--label", "1", "--edge", "5mm", "-o", "out.vtu", "--json"];
-    let told: [Said; 2] = [workshop.pliant(&mesh), workshop.pliant(&["labels", image, "--json"])];
-    for told in told {
-        assert_eq!(told.code, 2, "{image}: {}{}", told.err, told.out);
-        assert_eq!(told.json()["error"]["kind"], "input");
-        assert_eq!(told.err.matches("error:").count(), 1, "{image}: {}", told.err);
+    let output: [Said; 2] = [workshop.pliant(&mesh), workshop.pliant(&["labels", image, "--json"])];
+    for output in output {
+        assert_eq!(output.code, 2, "{image}: {}{}", output.err, output.out);
+        assert_eq!(output.json()["error"]["kind"], "input");
+        assert_eq!(output.err.matches("error:").count(), 1, "{image}: {}", output.err);
         for piece in says {
-            assert!(told.words().contains(piece), "{image}: no `{piece}` in: {}", told.err);
+            assert!(output.words().contains(piece), "{image}: no `{piece}` in: {}", output.err);
         }
     }
     assert!(!workshop.path("out.vtu").exists());
@@ -68,10 +68,10 @@ fn either_byte_order_and_both_versions_of_nifti_give_the_same_mesh() {
         ("two.nii", nifti2(&volume, false)),
     ] {
         workshop.write(name, bytes);
-        let told =
+        let output =
             workshop.pliant(&["mesh", name, "--label", "1", "--edge", "5mm", "-o", "out.vtu", "--json"]);
-        assert_eq!(told.code, 0, "{}", told.err);
-        cells.push(told.json()["cells"].clone());
+        assert_eq!(output.code, 0, "{}", output.err);
+        cells.push(output.json()["cells"].clone());
     }
     assert!(cells[0].as_u64() > Some(50) && cells.iter().all(|one| *one == cells[0]), "{cells:?}");
 }
@@ -104,9 +104,9 @@ fn images_of_more_than_two_gigabytes_ask_for_force() {
     bytes[70..74].copy_from_slice(&[64, 0, 64, 0]);
     workshop.write("large.nii", bytes);
     let mesh = ["mesh", "large.nii", "--label", "1", "--edge", "5mm", "-o", "out.vtu"];
-    let told = workshop.pliant(&mesh);
-    assert!(told.code == 2 && told.words().contains("`--force` reads it anyway"), "{}", told.err);
-    let told = workshop.pliant(&[&mesh[..], &["--force"]].concat());
-    let words = told.words();
-    assert!(told.code == 2 && !words.contains("--force") && words.contains("large.nii"), "{}", told.err);
+    let output = workshop.pliant(&mesh);
+    assert!(output.code == 2 && output.words().contains("`--force` reads it anyway"), "{}", output.err);
+    let output = workshop.pliant(&[&mesh[..], &["--force"]].concat());
+    let words = output.words();
+    assert!(output.code == 2 && !words.contains("--force") && words.contains("large.nii"), "{}", output.err);
 }

@@ -10,21 +10,25 @@ use crate::support::{BLOCK, FROM_FILE, Said, Workshop, changed, series};
 /// not change.
 #[track_caller]
 fn assert_refused(workshop: &Workshop, lines: &[&str], says: &[&str]) {
-    let told = workshop.run(&[]);
-    assert_invalid(&told, says);
-    assert!(lines.iter().any(|line| told.underlines(line)), "none of {lines:?} is underlined:\n{}", told.err);
+    let output = workshop.run(&[]);
+    assert_invalid(&output, says);
+    assert!(
+        lines.iter().any(|line| output.underlines(line)),
+        "none of {lines:?} is underlined:\n{}",
+        output.err
+    );
     assert!(!workshop.path("out").exists(), "something was written");
 }
 
 /// Asserts exit code 2, these words on standard error, and one JSON object that says so.
 #[track_caller]
-fn assert_invalid(told: &Said, says: &[&str]) {
-    assert_eq!(told.code, 2, "{}\n{}", told.err, told.out);
-    let words = told.words();
+fn assert_invalid(output: &Said, says: &[&str]) {
+    assert_eq!(output.code, 2, "{}\n{}", output.err, output.out);
+    let words = output.words();
     for piece in says {
-        assert!(words.contains(piece), "no `{piece}` in:\n{}", told.err);
+        assert!(words.contains(piece), "no `{piece}` in:\n{}", output.err);
     }
-    let json = told.json();
+    let json = output.json();
     assert_eq!(json["status"], "invalid", "{json}");
     assert_eq!(json["error"]["kind"], "input", "{json}");
     assert!(json["error"]["message"].as_str().is_some_and(|message| message.len() > 10), "{json}");
@@ -48,9 +52,9 @@ fn every_mistake_is_underlined_on_standard_error() {
     assert_refused(&workshop, &["densty = 1000"], &says);
     assert_refused(&workshop, &["until = -1"], &says);
     // What is doubted is said, and no reason to stop.
-    let told = Workshop::block("density = 1000", "density = 1e-6").pliant(&["check", "case"]);
-    assert_eq!(told.code, 0, "{}", told.err);
-    assert!(told.words().contains("is that so?") && told.underlines("density = 1e-6"), "{}", told.err);
+    let output = Workshop::block("density = 1000", "density = 1e-6").pliant(&["check", "case"]);
+    assert_eq!(output.code, 0, "{}", output.err);
+    assert!(output.words().contains("is that so?") && output.underlines("density = 1e-6"), "{}", output.err);
 }
 
 #[test]
@@ -112,8 +116,8 @@ fn a_filled_folder_needs_force_and_keeps_what_is_not_ours() {
     }
     workshop.write("out/case/fields/000099.vtu", "of an earlier run");
     workshop.write("out/case/fields/000099.vtu.tmp", "of a killed run");
-    let told = workshop.run(&[]);
-    assert_invalid(&told, &["`out/case` cannot be written: it is not empty", "add `--force`"]);
+    let output = workshop.run(&[]);
+    assert_invalid(&output, &["`out/case` cannot be written: it is not empty", "add `--force`"]);
     assert!(workshop.path("out/case/fields/000099.vtu").exists());
     workshop.run(&["--force"]).done();
     for foreign in ["out/case/notes.txt", "out/case/fields/mine.vtu", "out/case/fields/000000.txt"] {
@@ -126,14 +130,14 @@ fn a_filled_folder_needs_force_and_keeps_what_is_not_ours() {
 
 /// Asserts that a run ended with exit code 1 because a file could not be written.
 #[track_caller]
-fn assert_disk_full(told: &Said, file: &str, reason: &str) {
-    assert_eq!(told.code, 1, "{}", told.err);
-    let json = told.json();
+fn assert_disk_full(output: &Said, file: &str, reason: &str) {
+    assert_eq!(output.code, 1, "{}", output.err);
+    let json = output.json();
     assert_eq!(json["status"], "failed");
     assert_eq!(json["error"]["kind"], "output");
     let message = json["error"]["message"].as_str().unwrap();
     for piece in [file, reason, "free space"] {
-        assert!(message.contains(piece) && told.err.contains(piece), "no `{piece}` in {message}");
+        assert!(message.contains(piece) && output.err.contains(piece), "no `{piece}` in {message}");
     }
 }
 
@@ -197,25 +201,25 @@ fn a_full_disk_in_the_middle_of_the_history_leaves_whole_rows() {
 #[test]
 fn check_and_info_refuse_like_run() {
     let workshop = Workshop::block("density = 1000", "density = 0");
-    let told = workshop.pliant(&["check", "case"]);
-    assert_eq!(told.code, 2);
-    assert!(told.underlines("density = 0") && told.out.is_empty(), "{}", told.err);
+    let output = workshop.pliant(&["check", "case"]);
+    assert_eq!(output.code, 2);
+    assert!(output.underlines("density = 0") && output.out.is_empty(), "{}", output.err);
     workshop.write("broken.off", "OFF\n3 1 0\n0 0 0\n");
-    let told = workshop.pliant(&["info", "broken.off"]);
-    assert_eq!(told.code, 2);
-    assert!(told.err.contains("truncated"), "{}", told.err);
+    let output = workshop.pliant(&["info", "broken.off"]);
+    assert_eq!(output.code, 2);
+    assert!(output.err.contains("truncated"), "{}", output.err);
 }
 
 #[test]
 fn new_does_not_overwrite() {
     let workshop = Workshop::new(BLOCK);
-    let told = workshop.pliant(&["new", "case"]);
-    assert_eq!(told.code, 2);
-    assert!(told.err.contains("`case/scene.toml` exists already"), "{}", told.err);
+    let output = workshop.pliant(&["new", "case"]);
+    assert_eq!(output.code, 2);
+    assert!(output.err.contains("`case/scene.toml` exists already"), "{}", output.err);
     assert_eq!(workshop.read("case/scene.toml"), BLOCK);
-    let told = workshop.pliant(&["new", "case/scene.toml/below"]);
-    assert_eq!(told.code, 2);
-    assert!(told.err.contains("cannot be written"), "{}", told.err);
+    let output = workshop.pliant(&["new", "case/scene.toml/below"]);
+    assert_eq!(output.code, 2);
+    assert!(output.err.contains("cannot be written"), "{}", output.err);
 }
 
 /// 5,000 terms, each wrong: 152 MB were printed.
@@ -223,9 +227,9 @@ fn new_does_not_overwrite() {
 fn a_flood_of_mistakes_is_shown_in_a_few_kilobytes() {
     let terms = format!("prony = [{}]", "1, ".repeat(5000));
     let scene = changed(BLOCK, r#"prony = [{ part = "isochoric", weight = 0.3, time = 0.5 }]"#, &terms);
-    let told = Workshop::new(&scene).run(&[]);
-    assert_invalid(&told, &["prony"]);
-    assert!(told.err.len() + told.out.len() < 100_000, "{} bytes", told.err.len() + told.out.len());
+    let output = Workshop::new(&scene).run(&[]);
+    assert_invalid(&output, &["prony"]);
+    assert!(output.err.len() + output.out.len() < 100_000, "{} bytes", output.err.len() + output.out.len());
 }
 
 /// Names and titles of a scene from somewhere else neither reach the terminal as codes nor a page as HTML.
@@ -235,23 +239,23 @@ fn codes_for_terminals_and_html_are_shown_not_obeyed() {
 title = "\u001b]0;mine\u0007<script>alert(1)</script>""#;
     let codes = |text: &str| text.contains(['\u{1b}', '\u{7}', '\u{9b}']);
     let workshop = Workshop::new(&changed(BLOCK, "[scene]", TITLE));
-    let told = workshop.run(&[]);
-    assert!(told.code == 0 && !codes(&told.err) && !codes(&told.out), "{}", told.err);
+    let output = workshop.run(&[]);
+    assert!(output.code == 0 && !codes(&output.err) && !codes(&output.out), "{}", output.err);
     let page = workshop.read("out/case/summary.md");
     assert!(!codes(&page) && !page.contains("<script") && page.contains("&lt;script>"), "{page}");
     for bad in ["\"\\u001b[2J\" = 1", "# \u{9b}2J\nuntill = 1", "\u{202e} = 1"] {
-        let told = Workshop::new(&changed(BLOCK, "[scene]", &format!("[scene]\n{bad}"))).run(&[]);
-        assert!(told.code == 2 && !codes(&told.err) && !codes(&told.out), "{}", told.err);
-        assert!(!told.err.contains('\u{202e}'), "{}", told.err);
+        let output = Workshop::new(&changed(BLOCK, "[scene]", &format!("[scene]\n{bad}"))).run(&[]);
+        assert!(output.code == 2 && !codes(&output.err) && !codes(&output.out), "{}", output.err);
+        assert!(!output.err.contains('\u{202e}'), "{}", output.err);
     }
 }
 
 #[test]
 fn a_run_of_more_than_a_day_asks_for_consent() {
     let workshop = Workshop::block("until = 0.02", "until = 1e9");
-    let told = workshop.run(&[]);
-    assert_invalid(&told, &["the run takes ", " steps of ", "days on this machine", "add `--long`"]);
-    assert!(told.underlines("until = 1e9"), "{}", told.err);
+    let output = workshop.run(&[]);
+    assert_invalid(&output, &["the run takes ", " steps of ", "days on this machine", "add `--long`"]);
+    assert!(output.underlines("until = 1e9"), "{}", output.err);
     assert!(!workshop.path("out").exists());
     // Whoever wants it gets it.
     let mut child = workshop

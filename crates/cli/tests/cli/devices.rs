@@ -20,10 +20,10 @@ fn devices_are_listed_with_what_matters() {
     }
     let workshop = Workshop::new(BLOCK);
     let best = pliant_gpu::adapters().remove(0);
-    let told = workshop.pliant(&["devices"]);
-    assert_eq!(told.code, 0, "{}", told.err);
+    let output = workshop.pliant(&["devices"]);
+    assert_eq!(output.code, 0, "{}", output.err);
     for piece in [best.name.as_str(), best.backend.as_str(), "MiB", "KiB"] {
-        assert!(told.out.contains(piece), "no `{piece}` in:\n{}", told.out);
+        assert!(output.out.contains(piece), "no `{piece}` in:\n{}", output.out);
     }
     let json: serde_json::Value =
         serde_json::from_str(&workshop.pliant(&["devices", "--json"]).out).expect("JSON");
@@ -34,10 +34,10 @@ fn devices_are_listed_with_what_matters() {
 #[test]
 #[cfg(target_os = "linux")]
 fn without_an_adapter_the_packages_are_named_and_auto_runs_on_the_processor() {
-    let told = without_adapters(&on("device = \"cpu\""), &["devices"]);
-    assert_eq!(told.code, 0);
-    assert!(told.out.contains("no GPU was found"), "{}", told.out);
-    assert!(told.out.contains("mesa-vulkan-drivers"), "{}", told.out);
+    let output = without_adapters(&on("device = \"cpu\""), &["devices"]);
+    assert_eq!(output.code, 0);
+    assert!(output.out.contains("no GPU was found"), "{}", output.out);
+    assert!(output.out.contains("mesa-vulkan-drivers"), "{}", output.out);
 
     let refused = without_adapters(&on("device = \"gpu\""), &["run", "case", "--json"]);
     assert_eq!(refused.code, 2, "{}", refused.err);

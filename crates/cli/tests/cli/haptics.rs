@@ -13,12 +13,12 @@ fn a_trace_presses_a_liver() {
         "t,x,y,z,qw,qx,qy,qz\n0,-0.03,0,0.09,1,0,0,0\n0.5,-0.03,0,0.074,1,0,0,0\n1.5,-0.03,0,0.074,1,0,0,0\n",
     );
     let trace = workshop.path("press.csv");
-    let told = workshop.pliant(&["haptics", SCENE, "--replay", trace.to_str().unwrap()]);
-    assert_eq!(told.code, 0, "{}", told.err);
+    let output = workshop.pliant(&["haptics", SCENE, "--replay", trace.to_str().unwrap()]);
+    assert_eq!(output.code, 0, "{}", output.err);
     for word in ["force period", "device to force", "largest jump", "energy observed", "stiffest coupling"] {
-        assert!(told.out.contains(word), "{}", told.out);
+        assert!(output.out.contains(word), "{}", output.out);
     }
-    let last = told.out.lines().find(|line| line.starts_with("last force")).unwrap();
+    let last = output.out.lines().find(|line| line.starts_with("last force")).unwrap();
     let triples = last.split('(').skip(1).map(|text| text.split(')').next().unwrap());
     let triples: Vec<Vec<f64>> =
         triples.map(|text| text.split(", ").map(|x| x.parse().unwrap()).collect()).collect();
@@ -48,10 +48,10 @@ fn thrusts_end_no_session() {
         }
         workshop.write("thrust.csv", trace);
         let path = workshop.path("thrust.csv");
-        let told = workshop.pliant(&["haptics", "case", "--replay", path.to_str().unwrap()]);
-        assert_eq!(told.code, 0, "{solver}: {}\n{}", told.out, told.err);
-        let jump = told.out.split("largest jump ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
-        assert!(jump.parse::<f64>().unwrap() <= 0.3 + 1e-9, "{solver}: {}", told.out);
+        let output = workshop.pliant(&["haptics", "case", "--replay", path.to_str().unwrap()]);
+        assert_eq!(output.code, 0, "{solver}: {}\n{}", output.out, output.err);
+        let jump = output.out.split("largest jump ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
+        assert!(jump.parse::<f64>().unwrap() <= 0.3 + 1e-9, "{solver}: {}", output.out);
     }
 }
 
@@ -69,8 +69,8 @@ fn mistakes_are_told_with_a_remedy() {
         (vec!["--replay", good, "--stiffness", "0"], "stiffness of the coupling"),
         (vec!["--replay", good, "--rate", "5"], "give 10 to 1000"),
     ] {
-        let told = workshop.pliant(&[&["haptics", SCENE], &arguments[..]].concat());
-        assert_eq!(told.code, 2, "{arguments:?}: {}", told.err);
-        assert!(told.err.contains(word), "{arguments:?}: {}", told.err);
+        let output = workshop.pliant(&[&["haptics", SCENE], &arguments[..]].concat());
+        assert_eq!(output.code, 2, "{arguments:?}: {}", output.err);
+        assert!(output.err.contains(word), "{arguments:?}: {}", output.err);
     }
 }

@@ -13,9 +13,9 @@ fn workshop(changes: &[[&str; 2]]) -> Workshop {
 }
 
 #[track_caller]
-fn done(told: Said) -> Said {
-    assert_eq!(told.code, 0, "{}", told.err);
-    told
+fn done(output: Said) -> Said {
+    assert_eq!(output.code, 0, "{}", output.err);
+    output
 }
 
 #[test]
@@ -31,8 +31,8 @@ fn a_mesh_of_an_image_keeps_the_names_and_protects_by_name() {
     done(mesh(&["--protect", "Tumour=2mm"]));
     let fine = io::read(&workshop.path("organs.vtu")).unwrap().mesh;
     assert!(fine.points.len() > 2 * coarse.points.len());
-    let told = mesh(&["--protect", "tumor=2mm"]);
-    assert!(told.code == 2 && told.words().contains("did you mean `tumour`?"), "{}", told.err);
+    let output = mesh(&["--protect", "tumor=2mm"]);
+    assert!(output.code == 2 && output.words().contains("did you mean `tumour`?"), "{}", output.err);
     assert_eq!(mesh(&["--protect", "=1mm"]).code, 2);
 }
 
@@ -103,8 +103,8 @@ mod with_pictures {
             ("out/case", "7", "no cell has label 7: the mesh has 1 (liver)"),
             ("out/case", "1-3", "nothing is visible"),
         ] {
-            let told = workshop.pliant(&["render", what, "--force", "--colour", "label", "--hide", hide]);
-            assert!(told.code == 2 && told.words().contains(piece), "{what} {hide}: {}", told.err);
+            let output = workshop.pliant(&["render", what, "--force", "--colour", "label", "--hide", hide]);
+            assert!(output.code == 2 && output.words().contains(piece), "{what} {hide}: {}", output.err);
         }
     }
 }

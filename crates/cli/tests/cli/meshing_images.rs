@@ -30,11 +30,11 @@ fn an_image_becomes_a_scene_with_walls_and_ties() {
     let workshop = with_image();
     let more =
         ["--label", "5", "--vessels", "8=0.5mm", "--capsule", "0.1mm", "--edge", "4mm", "--keep-largest"];
-    let told = mesh(&workshop, &[&more[..], &["-o", "organ/scene.toml"]].concat());
-    assert_eq!(told.code, 0, "{}", told.err);
-    assert!(told.out.contains("wrote organ/scene.toml"), "{}", told.out);
+    let output = mesh(&workshop, &[&more[..], &["-o", "organ/scene.toml"]].concat());
+    assert_eq!(output.code, 0, "{}", output.err);
+    assert!(output.out.contains("wrote organ/scene.toml"), "{}", output.out);
     // The core is inside of the ball, all of it.
-    assert!(told.out.contains("1.47 ml of the vessels; 0.00 ml of these run outside"), "{}", told.out);
+    assert!(output.out.contains("1.47 ml of the vessels; 0.00 ml of these run outside"), "{}", output.out);
     let text = workshop.read("organ/scene.toml");
     for piece in [
         "labels = [5], vessels = [8]",
@@ -45,11 +45,11 @@ fn an_image_becomes_a_scene_with_walls_and_ties() {
     ] {
         assert!(text.contains(piece), "no `{piece}` in:\n{text}");
     }
-    let told = workshop.pliant(&["run", "organ", "--until", "0.005"]);
-    assert_eq!(told.code, 0, "{}", told.err);
-    let told = workshop.pliant(&["check", "organ"]);
-    assert!(told.out.contains("body `capsule`: the boundary of `organ`"), "{}", told.out);
-    assert!(told.out.contains("follow `organ`"), "{}", told.out);
+    let output = workshop.pliant(&["run", "organ", "--until", "0.005"]);
+    assert_eq!(output.code, 0, "{}", output.err);
+    let output = workshop.pliant(&["check", "organ"]);
+    assert!(output.out.contains("body `capsule`: the boundary of `organ`"), "{}", output.out);
+    assert!(output.out.contains("follow `organ`"), "{}", output.out);
     // Masks stand for themselves, and are named after their files.
     let ball =
         |radius: f64| Volume::of_labels(move |[x, y, z]| i16::from(x * x + y * y + z * z < radius * radius));
@@ -57,8 +57,8 @@ fn an_image_becomes_a_scene_with_walls_and_ties() {
     workshop.write("core.nii", ball(7.0).nifti());
     let masks =
         ["mesh", "shell.nii", "core.nii", "--vessels", "core=1mm", "--edge", "4mm", "-o", "masks.toml"];
-    let told = workshop.pliant(&masks);
-    assert_eq!(told.code, 0, "{}", told.err);
+    let output = workshop.pliant(&masks);
+    assert_eq!(output.code, 0, "{}", output.err);
     let text = workshop.read("masks.toml");
     assert!(text.contains("masks = [\"shell.nii\"], labels = [1]"), "{text}");
     assert!(text.contains("masks = [\"core.nii\"], label = 1") && !text.contains("capsule"), "{text}");
@@ -73,9 +73,9 @@ fn an_image_becomes_a_scene_with_walls_and_ties() {
         (&["--as", "hexes"], "a.toml", ["of tets", "leave it out"]),
         (&[], "masks.toml", ["exists already", "--force"]),
     ] {
-        let told = mesh(&workshop, &[&["--label", "5", "--edge", "4mm", "-o", out], given].concat());
-        assert_eq!(told.code, 2, "{given:?}: {}", told.err);
-        assert!(pieces.iter().all(|piece| told.err.contains(piece)), "{given:?}: {}", told.err);
+        let output = mesh(&workshop, &[&["--label", "5", "--edge", "4mm", "-o", out], given].concat());
+        assert_eq!(output.code, 2, "{given:?}: {}", output.err);
+        assert!(pieces.iter().all(|piece| output.err.contains(piece)), "{given:?}: {}", output.err);
     }
     let none = workshop.pliant(&[
         "mesh",
@@ -98,8 +98,8 @@ fn an_image_becomes_a_scene_with_walls_and_ties() {
 #[test]
 fn labels_are_listed_with_volume_place_and_pieces() {
     let workshop = with_image();
-    let told = workshop.pliant(&["labels", "case/seg.nii.gz"]);
-    assert_eq!(told.code, 0, "{}", told.err);
+    let output = workshop.pliant(&["labels", "case/seg.nii.gz"]);
+    assert_eq!(output.code, 0, "{}", output.err);
     for piece in [
         "NIfTI-1",
         "40 × 40 × 40 voxels of 1.000 × 1.000 × 1.000 mm",
@@ -108,7 +108,7 @@ fn labels_are_listed_with_volume_place_and_pieces() {
         "label 8:",
         "label 9: 1 voxels",
     ] {
-        assert!(told.out.contains(piece), "no `{piece}` in:\n{}", told.out);
+        assert!(output.out.contains(piece), "no `{piece}` in:\n{}", output.out);
     }
     let json = workshop.pliant(&["labels", "case/seg.nii.gz", "--json"]).json();
     assert_eq!(json["size"], serde_json::json!([40, 40, 40]));
@@ -124,9 +124,9 @@ fn labels_are_listed_with_volume_place_and_pieces() {
 fn groups_of_labels_are_one_material_each() {
     let workshop = with_image();
     let groups = ["--label", "tissue=5,9", "--label", "core=6-8"];
-    let told = mesh(&workshop, &[&groups[..], &["--edge", "4mm", "-o", "two.vtu"]].concat());
-    assert_eq!(told.code, 0, "{}", told.err);
-    assert!(told.out.contains("labels           5 (tissue), 8 (core)"), "{}", told.out);
+    let output = mesh(&workshop, &[&groups[..], &["--edge", "4mm", "-o", "two.vtu"]].concat());
+    assert_eq!(output.code, 0, "{}", output.err);
+    assert!(output.out.contains("labels           5 (tissue), 8 (core)"), "{}", output.out);
     let made = io::read(&workshop.path("two.vtu")).unwrap().mesh;
     assert_eq!(made.label_names, [(5, "tissue".into()), (8, "core".into())].into());
     let twice = mesh(&workshop, &["--label", "a=5,8", "--label", "8", "--edge", "4mm", "-o", "two.vtu"]);
@@ -136,11 +136,16 @@ fn groups_of_labels_are_one_material_each() {
     let scene = changed(FROM_IMAGE, "label = 5", grouped);
     let scene = changed(&scene, "law = \"tissue\"", "law = { tissue = \"tissue\", core = \"core\" }");
     workshop.write("case/scene.toml", &scene);
-    let told = workshop.pliant(&["check", "case"]);
-    assert!(told.code == 0 && told.out.contains("label 8 (core), 5 (tissue)"), "{} {}", told.out, told.err);
+    let output = workshop.pliant(&["check", "case"]);
+    assert!(
+        output.code == 0 && output.out.contains("label 8 (core), 5 (tissue)"),
+        "{} {}",
+        output.out,
+        output.err
+    );
     // As `pliant mesh` writes it, and labels and groups do not mix there.
-    let told = mesh(&workshop, &[&groups[..], &["--edge", "4mm", "-o", "organ/scene.toml"]].concat());
-    assert_eq!(told.code, 0, "{}", told.err);
+    let output = mesh(&workshop, &[&groups[..], &["--edge", "4mm", "-o", "organ/scene.toml"]].concat());
+    assert_eq!(output.code, 0, "{}", output.err);
     let text = workshop.read("organ/scene.toml");
     assert!(text.contains("label = { \"tissue\" = [5, 9], \"core\" = [\"6-8\"] }"), "{text}");
     assert_eq!(workshop.pliant(&["check", "organ"]).code, 0);
@@ -163,9 +168,9 @@ fn two_labels_become_one_mesh_of_two_materials() {
         "-o",
         "two.vtu",
     ];
-    let told = mesh(&workshop, &[&arguments[..], &["--json"]].concat());
-    assert_eq!(told.code, 0, "{}", told.err);
-    let json = told.json();
+    let output = mesh(&workshop, &[&arguments[..], &["--json"]].concat());
+    assert_eq!(output.code, 0, "{}", output.err);
+    let json = output.json();
     assert_eq!(json["cleaned"]["holes"], 1);
     assert_eq!(json["cleaned"]["pieces_removed"], 1);
     assert_eq!(json["components"], 1);
@@ -215,7 +220,7 @@ fn tets_come_in_several_sizes_and_within_a_distance() {
     let fine = [&two[..], &["--edge", "8mm", "--protect", "8=2mm", "-o", "fine.vtu"]].concat();
     let fine = mesh(&workshop, &fine);
     assert_eq!(fine.code, 0, "{}", fine.err);
-    let [coarse, fine] = [coarse, fine].map(|told| told.json());
+    let [coarse, fine] = [coarse, fine].map(|output| output.json());
     assert_eq!(fine["distances"]["to"], "voxels");
     let off = |json: &Value| json["materials"][1]["distances"]["p95_from_mesh"].as_f64().expect("a distance");
     assert!(off(&fine) < off(&coarse), "{} {}", off(&fine), off(&coarse));
@@ -228,9 +233,10 @@ fn tets_come_in_several_sizes_and_within_a_distance() {
     assert!(held["distance"]["reached"].as_f64().unwrap() <= 1e-3, "{held}");
     // A tenth of the ball's radius at its surface and up to four times that inside.
     let cells = |more: &[&str]| {
-        let told = mesh(&workshop, &[&["--threshold", "5", "--edge", "1.5mm", "--json"][..], more].concat());
-        assert_eq!(told.code, 0, "{}", told.err);
-        told.json()
+        let output =
+            mesh(&workshop, &[&["--threshold", "5", "--edge", "1.5mm", "--json"][..], more].concat());
+        assert_eq!(output.code, 0, "{}", output.err);
+        output.json()
     };
     let even = cells(&["-o", "even.vtu"]);
     let graded = cells(&["--inner-edge", "6mm", "-o", "graded.vtu"]);
@@ -245,23 +251,23 @@ fn tets_come_in_several_sizes_and_within_a_distance() {
         (["--inner-edge", "8mm"], "`--inner-edge` is for tets"),
         (["--protect", "5"], "`--protect` is for tets"),
     ] {
-        let told = mesh(
+        let output = mesh(
             &workshop,
             &[&["--label", "5", "--edge", "4mm", "--as", "hexes", "-o", "x.vtu"][..], &option].concat(),
         );
-        assert!(told.code != 0 && told.err.contains(message), "{}", told.err);
+        assert!(output.code != 0 && output.err.contains(message), "{}", output.err);
     }
-    let told = mesh(&workshop, &["--label", "5", "--edge", "4mm", "--protect", "8", "-o", "x.vtu"]);
-    assert!(told.code != 0 && told.err.contains("label 8 can't be protected"), "{}", told.err);
+    let output = mesh(&workshop, &["--label", "5", "--edge", "4mm", "--protect", "8", "-o", "x.vtu"]);
+    assert!(output.code != 0 && output.err.contains("label 8 can't be protected"), "{}", output.err);
 }
 
 #[test]
 fn hexes_and_thresholds_work_and_go_to_gmsh() {
     let workshop = with_image();
-    let told =
+    let output =
         mesh(&workshop, &["--threshold", "5", "--edge", "0.004", "--as", "hexes", "-o", "all.msh", "--json"]);
-    assert_eq!(told.code, 0, "{}", told.err);
-    let json = told.json();
+    assert_eq!(output.code, 0, "{}", output.err);
+    let json = output.json();
     assert!(close(&json["materials"][0]["volume"], 1.4137e-5, 0.06), "{json}");
     assert_eq!((&json["as"], &json["materials"][0]["label"]), (&"hexes".into(), &1.into()));
     let read = io::read(&workshop.path("all.msh")).expect("a mesh");
@@ -307,42 +313,42 @@ fn what_is_wrong_is_refused_with_a_remedy_and_nothing_is_written() {
         (seg, &["--label", "5", "--edge", "0.006", "--close-gaps", "30"], &["voxels", "3 mm"]),
     ];
     for (image, more, says) in cases {
-        let told = workshop.pliant(&[&["mesh", image], more, &["-o", "out.vtu", "--json"]].concat());
-        assert_eq!(told.code, 2, "{image} {more:?}: {}{}", told.err, told.out);
-        assert_eq!(told.json()["error"]["kind"], "input");
+        let output = workshop.pliant(&[&["mesh", image], more, &["-o", "out.vtu", "--json"]].concat());
+        assert_eq!(output.code, 2, "{image} {more:?}: {}{}", output.err, output.out);
+        assert_eq!(output.json()["error"]["kind"], "input");
         for piece in says {
-            assert!(told.words().contains(piece), "{image} {more:?}: no `{piece}` in: {}", told.err);
+            assert!(output.words().contains(piece), "{image} {more:?}: no `{piece}` in: {}", output.err);
         }
-        assert_eq!(told.err.matches("error:").count(), 1, "{}", told.err);
+        assert_eq!(output.err.matches("error:").count(), 1, "{}", output.err);
         assert!(!workshop.path("out.vtu").exists());
     }
     for name in ["out.stl", "out.vtk", "out"] {
-        let told = mesh(&workshop, &[&chosen[..], &["-o", name]].concat());
-        assert_eq!(told.code, 2, "{}", told.err);
-        assert!(told.err.contains("ends in .vtu or .msh"), "{}", told.err);
+        let output = mesh(&workshop, &[&chosen[..], &["-o", name]].concat());
+        assert_eq!(output.code, 2, "{}", output.err);
+        assert!(output.err.contains("ends in .vtu or .msh"), "{}", output.err);
         assert!(!workshop.path(name).exists());
     }
-    let told = workshop.pliant(&["labels", "text.txt", "--json"]);
-    assert_eq!(told.code, 2);
-    assert!(told.words().contains("not a supported image"), "{}", told.err);
+    let output = workshop.pliant(&["labels", "text.txt", "--json"]);
+    assert_eq!(output.code, 2);
+    assert!(output.words().contains("not a supported image"), "{}", output.err);
 }
 
 #[test]
 fn a_part_thinner_than_the_cells_is_told_with_its_place() {
     let workshop = with_image();
     workshop.write("rod.nii", Volume::ball_with_a_rod(1).nifti());
-    let told =
+    let output =
         workshop.pliant(&["mesh", "rod.nii", "--label", "1", "--edge", "0.008", "-o", "rod.vtu", "--json"]);
-    assert_eq!(told.code, 0, "{}", told.err);
-    let json = told.json();
+    assert_eq!(output.code, 0, "{}", output.err);
+    let json = output.json();
     assert!(
-        told.words().contains("warning: the mesh misses a part of the body")
-            && told.err.contains("shorter edge"),
+        output.words().contains("warning: the mesh misses a part of the body")
+            && output.err.contains("shorter edge"),
         "{}",
-        told.err
+        output.err
     );
     assert!(close(&json["distances"]["farthest"][0], 0.0175, 0.06), "{json}");
-    assert!(told.words().contains("the mesh lacks parts of the body: "), "{}", told.err);
+    assert!(output.words().contains("the mesh lacks parts of the body: "), "{}", output.err);
     assert_eq!(json["warnings"].as_array().map(Vec::len), Some(2));
 }
 
@@ -352,15 +358,15 @@ fn a_full_disk_is_a_failure_of_the_output() {
     let workshop = with_image();
     // A file may have 8 blocks of 512 or 1024 bytes: then writing fails, as on a full disk.
     let limited = "trap '' XFSZ; ulimit -f 8; exec \"$0\" mesh case/seg.nii.gz --label 5 --edge 0.006 -o out.vtu --json";
-    let told: Said = std::process::Command::new("sh")
+    let output: Said = std::process::Command::new("sh")
         .args(["-c", limited, env!("CARGO_BIN_EXE_pliant")])
         .current_dir(workshop.path(""))
         .output()
         .expect("a shell")
         .into();
-    assert_eq!(told.code, 1, "{}", told.err);
-    assert!(told.words().contains("free space"), "{}", told.err);
-    assert_eq!(told.json()["error"]["kind"], "output");
+    assert_eq!(output.code, 1, "{}", output.err);
+    assert!(output.words().contains("free space"), "{}", output.err);
+    assert_eq!(output.json()["error"]["kind"], "output");
     assert!(!workshop.path("out.vtu").exists());
     let left: Vec<_> = std::fs::read_dir(workshop.path("")).expect("a folder").collect();
     assert_eq!(left.len(), 1, "{left:?}");
@@ -383,17 +389,17 @@ fn immersed_hexes_weigh_what_the_organ_weighs() {
 #[test]
 fn the_cache_of_meshes_is_used_unless_it_is_off() {
     let workshop = with_image();
-    let told = |more: &[&str]| {
-        let told = workshop.run(&[&["--force", "--until", "1e-3"], more].concat());
-        told.done();
-        told.err
+    let output = |more: &[&str]| {
+        let output = workshop.run(&[&["--force", "--until", "1e-3"], more].concat());
+        output.done();
+        output.err
     };
-    assert!(told(&[]).contains("stored in the cache"));
-    assert!(told(&[]).contains("seg.nii.gz: from the cache"));
-    assert!(!told(&["--no-cache"]).contains("cache"));
-    let told =
+    assert!(output(&[]).contains("stored in the cache"));
+    assert!(output(&[]).contains("seg.nii.gz: from the cache"));
+    assert!(!output(&["--no-cache"]).contains("cache"));
+    let output =
         workshop.command(&["run", "case", "--force"]).env("PLIANT_CACHE", "off").output().expect("it starts");
-    assert!(told.status.success() && !String::from_utf8_lossy(&told.stderr).contains("cache"));
+    assert!(output.status.success() && !String::from_utf8_lossy(&output.stderr).contains("cache"));
 }
 
 /// The liver of a patient, where `PLIANT_DATA` has it: meshed by one command.
@@ -409,7 +415,7 @@ fn a_liver_of_a_patient_is_meshed() {
     };
     let image = image.to_str().expect("a path of text");
     let workshop = with_image();
-    let told = workshop.pliant(&[
+    let output = workshop.pliant(&[
         "mesh",
         image,
         "--label",
@@ -421,8 +427,8 @@ fn a_liver_of_a_patient_is_meshed() {
         "liver.vtu",
         "--json",
     ]);
-    assert_eq!(told.code, 0, "{}", told.err);
-    let json = told.json();
+    assert_eq!(output.code, 0, "{}", output.err);
+    let json = output.json();
     assert!(json["acoustic_part"].as_f64().unwrap() > 0.5, "{json}");
     assert!(json["materials"][0]["volume_error"].as_f64().unwrap().abs() < 0.03, "{json}");
 }
@@ -477,12 +483,12 @@ fn a_surface_of_an_image_becomes_fewer_triangles_and_shells() {
 #[test]
 fn what_a_surface_or_shells_need_is_told() {
     let workshop = with_image();
-    let told = mesh(&workshop, &["--label", "5", "--as", "shells", "-o", "a.vtu"]);
-    assert!(told.code == 2 && told.err.contains("--error 0.5%"), "{}", told.err);
-    let told = mesh(&workshop, &["--label", "5", "--as", "surface", "-o", "a.vtu"]);
-    assert!(told.code == 2 && told.err.contains("--cells 8000"), "{}", told.err);
-    let told = mesh(&workshop, &["--label", "5", "-o", "a.vtu"]);
-    assert!(told.code == 2 && told.err.contains("--edge 8mm"), "{}", told.err);
-    let told = mesh(&workshop, &["--label", "5", "--as", "shells", "--error", "3", "-o", "a.vtu"]);
-    assert!(told.code == 2 && told.err.contains("0.5%"), "{}", told.err);
+    let output = mesh(&workshop, &["--label", "5", "--as", "shells", "-o", "a.vtu"]);
+    assert!(output.code == 2 && output.err.contains("--error 0.5%"), "{}", output.err);
+    let output = mesh(&workshop, &["--label", "5", "--as", "surface", "-o", "a.vtu"]);
+    assert!(output.code == 2 && output.err.contains("--cells 8000"), "{}", output.err);
+    let output = mesh(&workshop, &["--label", "5", "-o", "a.vtu"]);
+    assert!(output.code == 2 && output.err.contains("--edge 8mm"), "{}", output.err);
+    let output = mesh(&workshop, &["--label", "5", "--as", "shells", "--error", "3", "-o", "a.vtu"]);
+    assert!(output.code == 2 && output.err.contains("0.5%"), "{}", output.err);
 }

@@ -88,9 +88,9 @@ fn mesh(workshop: &Workshop, name: &str, more: &[&str]) -> Said {
     workshop.pliant(&[&arguments[..], more].concat())
 }
 
-fn done(told: &Said) -> Value {
-    assert_eq!(told.code, 0, "{}{}", told.err, told.out);
-    told.json()
+fn done(output: &Said) -> Value {
+    assert_eq!(output.code, 0, "{}{}", output.err, output.out);
+    output.json()
 }
 
 fn close(value: &Value, expected: f64, within: f64) -> bool {
@@ -163,12 +163,12 @@ fn what_was_mended_is_told() {
     ];
     for (surface, more, says) in cases {
         let workshop = with("surface.ply", &surface);
-        let told = workshop.pliant(
+        let output = workshop.pliant(
             &[&["mesh", "surface.ply", "--scale", "0.001", "--edge", "5mm", "-o", "out.vtu"], more].concat(),
         );
-        assert_eq!(told.code, 0, "{}", told.err);
-        let page = told.out.split_whitespace().collect::<Vec<_>>().join(" ");
-        says.iter().for_each(|piece| assert!(page.contains(piece), "no `{piece}` in:\n{}", told.out));
+        assert_eq!(output.code, 0, "{}", output.err);
+        let page = output.out.split_whitespace().collect::<Vec<_>>().join(" ");
+        says.iter().for_each(|piece| assert!(page.contains(piece), "no `{piece}` in:\n{}", output.out));
     }
     // Triangles of an STL file share no points.
     let workshop = with("ball.stl", &ball(RADIUS, 0.0));
@@ -229,11 +229,11 @@ fn what_cannot_be_filled_is_refused_with_a_remedy() {
         ("ball.ply", &["--close-gaps", "-1mm"], &["gaps to close is -0.001"]),
     ];
     for (name, more, says) in cases {
-        let told = mesh(&workshop, name, more);
-        assert_eq!(told.code, 2, "{name} {more:?}: {}{}", told.err, told.out);
-        assert_eq!(told.json()["error"]["kind"], "input");
+        let output = mesh(&workshop, name, more);
+        assert_eq!(output.code, 2, "{name} {more:?}: {}{}", output.err, output.out);
+        assert_eq!(output.json()["error"]["kind"], "input");
         for piece in says {
-            assert!(told.words().contains(piece), "{name} {more:?}: no `{piece}` in: {}", told.err);
+            assert!(output.words().contains(piece), "{name} {more:?}: no `{piece}` in: {}", output.err);
         }
         assert!(!workshop.path("out.vtu").exists());
     }
@@ -259,8 +259,8 @@ fn lengths_take_units_and_a_tissue_its_step() {
         })
         .collect();
     assert!(bytes.iter().all(|one| *one == bytes[0]));
-    let told = mesh(&workshop, "ball.ply", &["--edge", "6km"]);
-    assert!(told.code == 2 && told.err.contains("as 8mm"), "{}", told.err);
+    let output = mesh(&workshop, "ball.ply", &["--edge", "6km"]);
+    assert!(output.code == 2 && output.err.contains("as 8mm"), "{}", output.err);
 
     let bounds = |more: &[&str]| done(&mesh(&workshop, "ball.ply", more))["element_bound"].clone();
     let usual = bounds(&[]);
@@ -298,24 +298,24 @@ fn a_full_disk_leaves_the_old_mesh() {
     let before = std::fs::read(workshop.path("out.vtu")).expect("a mesh");
     let limited =
         "trap '' XFSZ; ulimit -f 8; exec \"$0\" mesh ball.ply --scale 0.001 --edge 3mm -o out.vtu --json";
-    let told: Said = std::process::Command::new("sh")
+    let output: Said = std::process::Command::new("sh")
         .args(["-c", limited, env!("CARGO_BIN_EXE_pliant")])
         .current_dir(workshop.path(""))
         .output()
         .expect("a shell")
         .into();
-    assert_eq!(told.code, 1, "{}", told.err);
-    assert_eq!(told.json()["error"]["kind"], "output");
-    assert!(told.words().contains("free space"), "{}", told.err);
+    assert_eq!(output.code, 1, "{}", output.err);
+    assert_eq!(output.json()["error"]["kind"], "output");
+    assert!(output.words().contains("free space"), "{}", output.err);
     assert_eq!(std::fs::read(workshop.path("out.vtu")).expect("a mesh"), before);
     let beside: Vec<_> = std::fs::read_dir(workshop.path("")).expect("a folder").collect();
     assert_eq!(beside.len(), 3, "{beside:?}");
     // A folder that is not there, and one that is a file.
     for out in ["missing/out.vtu", "ball.ply/out.vtu"] {
-        let told =
+        let output =
             workshop.pliant(&["mesh", "ball.ply", "--scale", "0.001", "--edge", "5mm", "-o", out, "--json"]);
-        assert_eq!((told.code, &told.json()["error"]["kind"]), (1, &"output".into()), "{}", told.err);
-        assert!(told.err.contains(out), "{}", told.err);
+        assert_eq!((output.code, &output.json()["error"]["kind"]), (1, &"output".into()), "{}", output.err);
+        assert!(output.err.contains(out), "{}", output.err);
     }
 }
 
@@ -361,8 +361,8 @@ fn info_measures_a_mesh_against_another() {
         ("other.stl", "0", "--against-scale"),
         ("other.stl", "nan", "--against-scale"),
     ] {
-        let told = workshop.pliant(&["info", "ball.ply", "--against", other, "--against-scale", scale]);
-        assert!(told.code == 2 && told.words().contains(says), "{}", told.err);
+        let output = workshop.pliant(&["info", "ball.ply", "--against", other, "--against-scale", scale]);
+        assert!(output.code == 2 && output.words().contains(says), "{}", output.err);
     }
 }
 

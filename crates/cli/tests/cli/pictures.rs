@@ -9,9 +9,9 @@ use crate::support::{BLOCK, Workshop};
 fn a_build_without_pictures_tells_how_to_make_one_with_them() {
     let workshop = Workshop::new(BLOCK);
     for arguments in [&["render", "case"][..], &["view", "case"], &["run", "case", "--picture"]] {
-        let told = workshop.pliant(arguments);
-        assert_eq!(told.code, 2, "{}", told.err);
-        assert!(told.err.contains("cargo build --release --features viewer"), "{}", told.err);
+        let output = workshop.pliant(arguments);
+        assert_eq!(output.code, 2, "{}", output.err);
+        assert!(output.err.contains("cargo build --release --features viewer"), "{}", output.err);
         assert!(!workshop.path("out").join("case/history.csv").exists(), "nothing is run");
     }
 }
@@ -40,9 +40,9 @@ mod with_pictures {
     }
 
     #[track_caller]
-    fn done(told: &Said) -> &Said {
-        assert_eq!(told.code, 0, "{}", told.err);
-        told
+    fn done(output: &Said) -> &Said {
+        assert_eq!(output.code, 0, "{}", output.err);
+        output
     }
 
     fn short(more: &str) -> Workshop {
@@ -55,10 +55,10 @@ mod with_pictures {
             return;
         }
         let workshop = short("");
-        let told = workshop.run(&["--picture", "--step", "1e-3"]);
+        let output = workshop.run(&["--picture", "--step", "1e-3"]);
         assert_eq!(png(&workshop, "out/case/picture.png"), ([96, 64], None));
         assert!(workshop.read("out/case/summary.md").contains("![the last instant](picture.png)"));
-        let files = &told.done()["files"];
+        let files = &output.done()["files"];
         assert!(files.as_array().unwrap().iter().any(|file| file.as_str().unwrap().ends_with("picture.png")));
         // Without the option the picture of the last run is removed.
         workshop.run(&["--force", "--step", "1e-3"]).done();
@@ -103,15 +103,15 @@ mod with_pictures {
         }
         let workshop = short("");
         let arguments = ["render", "case", "--film", "film.mp4", "--step", "1e-3", "--size", "81x61"];
-        let told = workshop.pliant(&arguments);
-        done(&told);
+        let output = workshop.pliant(&arguments);
+        done(&output);
         if pliant_picture::ffmpeg() {
             let bytes = fs::read(workshop.path("film.mp4")).unwrap();
             assert_eq!(&bytes[4..8], b"ftyp");
         }
         let mut without = workshop.command(&[&arguments[..], &["--force"]].concat());
-        let told: Said = without.env("PATH", "").output().unwrap().into();
-        assert!(done(&told).err.contains("ffmpeg was not found"), "{}", told.err);
+        let output: Said = without.env("PATH", "").output().unwrap().into();
+        assert!(done(&output).err.contains("ffmpeg was not found"), "{}", output.err);
         assert_eq!(png(&workshop, "film.png"), ([81, 61], Some(6)));
     }
 
@@ -212,9 +212,9 @@ mod with_pictures {
             assert!(page.contains(piece), "{piece}: {page}");
         }
         done(&workshop.pliant(&arguments));
-        let told = workshop.pliant(&[&arguments[..], &["--film", "film.png"]].concat());
-        assert_eq!(told.code, 2);
-        assert!(told.err.contains("the last picture of each scene"), "{}", told.err);
+        let output = workshop.pliant(&[&arguments[..], &["--film", "film.png"]].concat());
+        assert_eq!(output.code, 2);
+        assert!(output.err.contains("the last picture of each scene"), "{}", output.err);
     }
 
     /// A bar that is held at one end, moved at the other one, and pressed from above: in its files, and in pictures of the scene, of a surface that it
@@ -293,9 +293,9 @@ mod with_pictures {
             (&["render", "case", "--colour", "bending-moment:xx"], "have no `bending-moment`"),
         ];
         for (arguments, piece) in cases {
-            let told = workshop.pliant(arguments);
-            assert_eq!(told.code, 2, "{arguments:?}: {}", told.err);
-            assert!(told.words().contains(piece), "{arguments:?}: {}", told.err);
+            let output = workshop.pliant(arguments);
+            assert_eq!(output.code, 2, "{arguments:?}: {}", output.err);
+            assert!(output.words().contains(piece), "{arguments:?}: {}", output.err);
         }
         for typed in [
             ["--range", "2,1"],
@@ -316,9 +316,10 @@ mod with_pictures {
         let workshop = short("");
         for arguments in [&["render", "case"][..], &["run", "case", "--picture"]] {
             // On Linux nothing answers to Direct3D.
-            let told: Said = workshop.command(arguments).env("WGPU_BACKEND", "dx12").output().unwrap().into();
-            assert_eq!(told.code, 2, "{}", told.err);
-            assert!(told.err.contains("mesa-vulkan-drivers libvulkan1"), "{}", told.err);
+            let output: Said =
+                workshop.command(arguments).env("WGPU_BACKEND", "dx12").output().unwrap().into();
+            assert_eq!(output.code, 2, "{}", output.err);
+            assert!(output.err.contains("mesa-vulkan-drivers libvulkan1"), "{}", output.err);
         }
         let scene = changed(BLOCK, "until = 0.02", "until = 0.002");
         assert_eq!(Workshop::new(&scene).pliant(&["run", "case"]).code, 0, "everything else works");

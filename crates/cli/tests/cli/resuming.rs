@@ -39,17 +39,17 @@ fn a_killed_run_goes_on_to_the_files_of_one_that_was_not() {
 fn a_run_that_cannot_be_resumed_is_refused_and_one_that_can_goes_on_longer() {
     let workshop = Workshop::new(&resumable("hex8", "step = 5e-4", true));
     workshop.run(&[]).done();
-    let refused = |told: &Said, pieces: &[&str]| {
-        assert_eq!(told.code, 2, "{}", told.err);
-        assert_eq!(told.json()["status"], "invalid");
-        assert!(pieces.iter().all(|piece| told.words().contains(piece)), "{}", told.err);
+    let refused = |output: &Said, pieces: &[&str]| {
+        assert_eq!(output.code, 2, "{}", output.err);
+        assert_eq!(output.json()["status"], "invalid");
+        assert!(pieces.iter().all(|piece| output.words().contains(piece)), "{}", output.err);
     };
-    let told = workshop.run(&["--resume", "out/case"]);
-    refused(&told, &["the checkpoint is at t = 0.1000 s, and the scene ends at 0.1000 s", "`--until`"]);
+    let output = workshop.run(&["--resume", "out/case"]);
+    refused(&output, &["the checkpoint is at t = 0.1000 s, and the scene ends at 0.1000 s", "`--until`"]);
     refused(&workshop.run(&["--resume", "case"]), &["there is no checkpoint in `case`", "every = 1.0"]);
-    let told = workshop.run(&["--resume", "out/case", "--out", "elsewhere"]);
+    let output = workshop.run(&["--resume", "out/case", "--out", "elsewhere"]);
     refused(
-        &told,
+        &output,
         &["does not hold what the checkpoint continues", "there is no such folder", "`--out DIR`"],
     );
     assert_eq!(workshop.run(&["--force", "--resume", "out/case"]).code, 2, "one or the other");
@@ -79,16 +79,16 @@ fn ctrl_c_leaves_a_checkpoint_and_says_how_to_go_on() {
         assert!(killed.unwrap().success());
         (workshop, Said::from(child.wait_with_output().unwrap()))
     };
-    let (workshop, told) = interrupt(&long, "out/parts");
-    assert_eq!((told.code, &told.json()["status"]), (130, &"interrupted".into()), "{}", told.err);
-    assert!(told.words().contains("go on with `--resume out/parts/checkpoint-"), "{}", told.err);
+    let (workshop, output) = interrupt(&long, "out/parts");
+    assert_eq!((output.code, &output.json()["status"]), (130, &"interrupted".into()), "{}", output.err);
+    assert!(output.words().contains("go on with `--resume out/parts/checkpoint-"), "{}", output.err);
     assert!(workshop.read("out/parts/summary.md").contains("**Interrupted**"));
     workshop.run(&["--resume", "out/parts"]).done();
     workshop.run(&["--out", "out/whole"]).done();
     workshop.assert_same_files("out/whole", "out/parts", "interrupted");
 
-    let (workshop, told) = interrupt(&changed(BLOCK, "until = 0.02", "until = 50"), "out/case");
-    assert_eq!(told.code, 130, "{}", told.err);
-    assert!(told.words().contains("with `checkpoint = { every = 1.0 }` in `[run]`"), "{}", told.err);
+    let (workshop, output) = interrupt(&changed(BLOCK, "until = 0.02", "until = 50"), "out/case");
+    assert_eq!(output.code, 130, "{}", output.err);
+    assert!(output.words().contains("with `checkpoint = { every = 1.0 }` in `[run]`"), "{}", output.err);
     assert!(workshop.checkpoints("out/case").is_empty());
 }

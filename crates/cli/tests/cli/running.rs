@@ -109,23 +109,23 @@ fn a_folder_means_its_scene_and_names_the_outputs() {
     let workshop = Workshop::new(BLOCK);
     workshop.write("case/other.toml", BLOCK);
     for (scene, out) in [("case", "out/case"), ("case/other.toml", "out/other")] {
-        let told = workshop.pliant(&["run", scene, "--json", "--until", "0.002"]);
-        told.done();
+        let output = workshop.pliant(&["run", scene, "--json", "--until", "0.002"]);
+        output.done();
         assert!(workshop.path(out).join("summary.md").exists(), "{out}");
     }
-    let told = workshop.pliant(&["run", "case/scene.toml", "--until", "0.002"]);
-    assert_eq!(told.code, 2, "the folder of the scene holds a run already: {}", told.out);
+    let output = workshop.pliant(&["run", "case/scene.toml", "--until", "0.002"]);
+    assert_eq!(output.code, 2, "the folder of the scene holds a run already: {}", output.out);
     let mut inside = workshop.command(&["run", ".", "--until", "0.002"]);
-    let told = Said::from(inside.current_dir(workshop.path("case")).output().unwrap());
-    assert_eq!(told.code, 0, "{}", told.err);
+    let output = Said::from(inside.current_dir(workshop.path("case")).output().unwrap());
+    assert_eq!(output.code, 0, "{}", output.err);
     assert!(workshop.path("case/out/case/summary.md").exists());
 }
 
 #[test]
 fn a_run_tells_its_result_in_words() {
     let workshop = Workshop::new(BLOCK);
-    let told = workshop.pliant(&["run", "case"]);
-    assert_eq!(told.code, 0);
+    let output = workshop.pliant(&["run", "case"]);
+    assert_eq!(output.code, 0);
     for piece in [
         "27 nodes, 48 elements; step ",
         "real time; energies balance to",
@@ -133,7 +133,7 @@ fn a_run_tells_its_result_in_words() {
         "reaction of `hand`: (",
         "wrote out/case/summary.md",
     ] {
-        assert!(told.out.contains(piece), "no `{piece}` in {}", told.out);
+        assert!(output.out.contains(piece), "no `{piece}` in {}", output.out);
     }
     let page = workshop.read("out/case/summary.md");
     for piece in [
@@ -160,9 +160,9 @@ fn a_failed_run_says_where_and_leaves_what_it_wrote() {
     let scene =
         changed(BLOCK, "by = [0, 0, 0.001]", "by = [0, 0, -0.2]").replace("until = 0.02", "until = 0.1");
     let workshop = Workshop::new(&scene);
-    let told = workshop.run(&[]);
-    assert_eq!(told.code, 1);
-    let json = told.json();
+    let output = workshop.run(&[]);
+    assert_eq!(output.code, 1);
+    let json = output.json();
     assert_eq!((&json["status"], &json["error"]["kind"]), (&"failed".into(), &"inverted".into()));
     assert_eq!(json["error"]["body"], "block");
     let element = json["error"]["element"].as_u64().unwrap();
@@ -171,7 +171,7 @@ fn a_failed_run_says_where_and_leaves_what_it_wrote() {
     assert!(time > 0.0 && time < 0.1, "{json}");
     let message = json["error"]["message"].as_str().unwrap();
     for piece in [&format!("element {element} of `block` is inverted"), "det F", "t = ", "finer mesh"] {
-        assert!(message.contains(piece) && told.err.contains(piece), "no `{piece}` in {message}");
+        assert!(message.contains(piece) && output.err.contains(piece), "no `{piece}` in {message}");
     }
     let frames = workshop.series("out/case/fields.pvd");
     assert!(frames.len() > 1 && frames.iter().all(|(written, _)| *written < time));
@@ -218,11 +218,11 @@ fn info_asks_whether_a_large_mesh_is_in_millimetres() {
 fn a_new_scene_runs_as_it_is() {
     let workshop = Workshop::new(BLOCK);
     for name in ["my-organ", "deep/er \"organ\""] {
-        let told = workshop.pliant(&["new", name]);
-        assert_eq!(told.code, 0, "{}", told.err);
-        assert!(told.out.contains("try: pliant run"), "{}", told.out);
-        let told = workshop.pliant(&["run", name, "--json", "--until", "0.01"]);
-        told.done();
+        let output = workshop.pliant(&["new", name]);
+        assert_eq!(output.code, 0, "{}", output.err);
+        assert!(output.out.contains("try: pliant run"), "{}", output.out);
+        let output = workshop.pliant(&["run", name, "--json", "--until", "0.01"]);
+        output.done();
     }
     let check = workshop.pliant(&["check", "my-organ"]);
     assert!(check.out.starts_with("my-organ\n"), "{}", check.out);
@@ -232,8 +232,8 @@ fn a_new_scene_runs_as_it_is() {
 #[test]
 fn check_prints_the_model_and_writes_nothing() {
     let workshop = Workshop::new(BLOCK);
-    let told = workshop.pliant(&["check", "case"]);
-    assert_eq!((told.code, told.err.as_str()), (0, ""));
+    let output = workshop.pliant(&["check", "case"]);
+    assert_eq!((output.code, output.err.as_str()), (0, ""));
     for piece in [
         "body `block`",
         "27 nodes, 48 elements",
@@ -257,7 +257,7 @@ fn check_prints_the_model_and_writes_nothing() {
         "expected cost",
         "real-time factor",
     ] {
-        assert!(told.out.contains(piece), "no `{piece}` in {}", told.out);
+        assert!(output.out.contains(piece), "no `{piece}` in {}", output.out);
     }
     let left: Vec<_> =
         fs::read_dir(workshop.path("")).unwrap().map(|entry| entry.unwrap().file_name()).collect();
@@ -269,8 +269,8 @@ fn check_prints_the_model_and_writes_nothing() {
 fn info_tells_what_a_mesh_holds_and_what_is_wrong() {
     let workshop = Workshop::new(BLOCK);
     workshop.write("good.vtk", vtk(&CORNERS, &TETS, &labels(&[1; 6])));
-    let told = workshop.pliant(&["info", "good.vtk", "--scale", "0.5"]);
-    assert_eq!(told.code, 0, "{}", told.err);
+    let output = workshop.pliant(&["info", "good.vtk", "--scale", "0.5"]);
+    assert_eq!(output.code, 0, "{}", output.err);
     for piece in [
         "legacy VTK 3.0 ASCII",
         "from (0, 0, 0) to (0.05000",
@@ -279,17 +279,17 @@ fn info_tells_what_a_mesh_holds_and_what_is_wrong() {
         "cell data `label`",
         "no faults found",
     ] {
-        assert!(told.out.contains(piece), "no `{piece}` in {}", told.out);
+        assert!(output.out.contains(piece), "no `{piece}` in {}", output.out);
     }
-    let told = workshop.pliant(&["info", "good.vtk", "--convert", "good.msh"]);
-    assert_eq!(told.code, 0, "{}", told.err);
+    let output = workshop.pliant(&["info", "good.vtk", "--convert", "good.msh"]);
+    assert_eq!(output.code, 0, "{}", output.err);
     assert!(workshop.pliant(&["info", "good.msh"]).out.contains("tet cells        6"));
     let mut tets = TETS;
     tets[2] = &[0, 6, 2, 7];
     workshop.write("bad.vtk", vtk(&CORNERS, &tets, ""));
-    let told = workshop.pliant(&["info", "bad.vtk"]);
-    assert_eq!(told.code, 0);
-    assert!(told.out.contains("inverted cells: 1 (tet 2)"), "{}", told.out);
+    let output = workshop.pliant(&["info", "bad.vtk"]);
+    assert_eq!(output.code, 0);
+    assert!(output.out.contains("inverted cells: 1 (tet 2)"), "{}", output.out);
     let object = workshop.pliant(&["info", "bad.vtk", "--json"]).json();
     assert_eq!((&object["usable"], &object["cells"]["tet"]), (&false.into(), &6.into()), "{object}");
     let open = "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n";
@@ -301,10 +301,10 @@ fn info_tells_what_a_mesh_holds_and_what_is_wrong() {
 fn every_subcommand_helps_with_an_example() {
     let workshop = Workshop::new(BLOCK);
     for subcommand in [&[][..], &["run"], &["check"], &["sweep"], &["new"], &["schema"], &["info"]] {
-        let told = workshop.pliant(&[subcommand, &["--help"]].concat());
-        assert_eq!(told.code, 0);
+        let output = workshop.pliant(&[subcommand, &["--help"]].concat());
+        assert_eq!(output.code, 0);
         let example =
-            told.out.split_once("Example").unwrap_or_else(|| panic!("{subcommand:?}: {}", told.out)).1;
+            output.out.split_once("Example").unwrap_or_else(|| panic!("{subcommand:?}: {}", output.out)).1;
         assert!(example.contains(&format!("pliant {}", subcommand.first().unwrap_or(&"run"))), "{example}");
     }
     assert_eq!(workshop.pliant(&[]).code, 2);
@@ -312,9 +312,9 @@ fn every_subcommand_helps_with_an_example() {
 
 /// The schema of `pliant schema`.
 fn schema() -> Value {
-    let told = Workshop::new(BLOCK).pliant(&["schema"]);
-    assert_eq!(told.code, 0);
-    told.json()
+    let output = Workshop::new(BLOCK).pliant(&["schema"]);
+    assert_eq!(output.code, 0);
+    output.json()
 }
 
 /// The target of a schema reference, and its alternatives.
@@ -387,10 +387,10 @@ fn the_reference_page_lists_every_kind_of_table() {
 fn a_shipped_scene_runs_from_anywhere() {
     let workshop = Workshop::new(BLOCK);
     let liver = Path::new(ROOT).join("scenes/liver");
-    let told = workshop.pliant(&["check", liver.to_str().unwrap()]);
-    assert_eq!((told.code, told.err.as_str()), (0, ""));
-    let told = workshop.pliant(&["run", liver.to_str().unwrap(), "--json", "--until", "0.01"]);
-    assert!(told.done()["elements"].as_u64().unwrap() >= 2400);
+    let output = workshop.pliant(&["check", liver.to_str().unwrap()]);
+    assert_eq!((output.code, output.err.as_str()), (0, ""));
+    let output = workshop.pliant(&["run", liver.to_str().unwrap(), "--json", "--until", "0.01"]);
+    assert!(output.done()["elements"].as_u64().unwrap() >= 2400);
     assert!(workshop.path("out/liver/summary.md").exists());
 }
 
@@ -400,8 +400,8 @@ fn a_reader_that_leaves_early_is_no_mistake() {
     let mut child =
         workshop.command(&["schema"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     drop(child.stdout.take());
-    let told = Said::from(child.wait_with_output().unwrap());
-    assert_eq!((told.code, told.err.as_str()), (0, ""));
+    let output = Said::from(child.wait_with_output().unwrap());
+    assert_eq!((output.code, output.err.as_str()), (0, ""));
 }
 
 #[test]
@@ -418,9 +418,9 @@ fn a_niftysim_model_runs_as_it_is_or_as_the_scene_it_becomes() {
             <Density>1000</Density></SystemParams></Model>"#;
     let workshop = Workshop::new("");
     workshop.write("model.xml", model);
-    let told = workshop.pliant(&["run", "model.xml", "--json"]);
-    let direct = told.done();
-    assert!(told.err.contains("note: "), "{}", told.err);
+    let output = workshop.pliant(&["run", "model.xml", "--json"]);
+    let direct = output.done();
+    assert!(output.err.contains("note: "), "{}", output.err);
     assert!(workshop.path("out/model/fields.pvd").is_file());
     workshop.pliant(&["import", "model.xml", "-o", "translated.toml"]).words();
     let scene = workshop.pliant(&["run", "translated.toml", "--json"]).done();
@@ -433,16 +433,16 @@ fn a_niftysim_model_runs_as_it_is_or_as_the_scene_it_becomes() {
     for arguments in
         [&["run", "partial.xml"][..], &["import", "partial.xml", "-o", "partial"], &["check", "partial.xml"]]
     {
-        let told = workshop.pliant(arguments);
-        assert_eq!(told.code, 2, "{arguments:?}: {}", told.err);
+        let output = workshop.pliant(arguments);
+        assert_eq!(output.code, 2, "{arguments:?}: {}", output.err);
         for part in ["partial.xml", "LinearShell bends", "contact (KinematicContact", "--allow-partial"] {
-            assert!(told.err.contains(part), "{arguments:?}: no `{part}` in {}", told.err);
+            assert!(output.err.contains(part), "{arguments:?}: no `{part}` in {}", output.err);
         }
         assert!(!workshop.path("out/partial").exists() && !workshop.path("partial").exists());
     }
-    let told = workshop.pliant(&["run", "partial.xml", "--allow-partial", "--json"]);
-    assert!(told.err.contains("left out"), "{}", told.err);
-    assert_eq!(told.done()["reactions"], direct["reactions"]);
+    let output = workshop.pliant(&["run", "partial.xml", "--allow-partial", "--json"]);
+    assert!(output.err.contains("left out"), "{}", output.err);
+    assert_eq!(output.done()["reactions"], direct["reactions"]);
     workshop.pliant(&["import", "partial.xml", "-o", "partial", "--allow-partial"]).words();
     assert!(workshop.path("partial/scene.toml").is_file());
     // A plate that turns away from the tip, which moves off it, and a rigid surface that follows a table of poses.
@@ -459,6 +459,6 @@ fn a_niftysim_model_runs_as_it_is_or_as_the_scene_it_becomes() {
     let scene = workshop.pliant(&["run", "carried", "--json"]).done();
     assert_eq!(direct["reactions"], scene["reactions"]);
     workshop.write("broken.xml", &model[..200]);
-    let told = workshop.pliant(&["run", "broken.xml"]);
-    assert!(told.code == 2 && told.err.contains("broken.xml"), "{}", told.err);
+    let output = workshop.pliant(&["run", "broken.xml"]);
+    assert!(output.code == 2 && output.err.contains("broken.xml"), "{}", output.err);
 }

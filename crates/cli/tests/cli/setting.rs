@@ -37,7 +37,7 @@ fn a_value_set_is_as_if_it_stood_in_the_file() {
 fn words_need_no_quotes_and_missing_tables_are_made() {
     let workshop =
         Workshop::new(&changed(BLOCK, "[run]\nprecision = \"double\"\nstep = \"auto\"\nthreads = 1\n", ""));
-    let told = check(
+    let output = check(
         &workshop,
         &[
             "body.block.element=tet4-anp",
@@ -48,10 +48,10 @@ fn words_need_no_quotes_and_missing_tables_are_made() {
             "surface.skin.mesh.edge=0.05",
         ],
     );
-    assert_eq!((told.code, told.err.as_str()), (0, ""));
+    assert_eq!((output.code, output.err.as_str()), (0, ""));
     for piece in ["a block, pulled", "tet4-anp", "output `more`", "set on the command line: run.load-steps=3"]
     {
-        assert!(told.out.contains(piece), "no `{piece}` in {}", told.out);
+        assert!(output.out.contains(piece), "no `{piece}` in {}", output.out);
     }
 }
 
@@ -77,12 +77,12 @@ fn a_mistake_shows_what_was_typed_underlined() {
         ("scene.until=99999999999999999999", &["64 bits"]),
         ("constraint.base.nodes.set=z-mni", &["z-mni", "did you mean"]),
     ] {
-        let told = check(&workshop, &[set]);
-        assert_eq!(told.code, 2, "{set}: {}", told.out);
+        let output = check(&workshop, &[set]);
+        assert_eq!(output.code, 2, "{set}: {}", output.out);
         for piece in pieces {
-            assert!(told.words().contains(piece), "{set}: no `{piece}` in {}", told.err);
+            assert!(output.words().contains(piece), "{set}: no `{piece}` in {}", output.err);
         }
-        assert!(told.underlines(&format!("--set {set}")), "{set}: {}", told.err);
+        assert!(output.underlines(&format!("--set {set}")), "{set}: {}", output.err);
         let json = workshop.run(&["--set", set]).json();
         let message = json["error"]["message"].as_str().unwrap();
         assert!(message.starts_with(&format!("--set {set}: error: ")), "{message}");
@@ -93,13 +93,13 @@ fn a_mistake_shows_what_was_typed_underlined() {
 #[test]
 fn mistakes_of_the_file_and_of_several_options_are_told_together() {
     let workshop = Workshop::block("density = 1000", "density = 0");
-    let told = check(&workshop, &["law.tissue.young-modulus=-1", "law.tissue.fibre-modulus=-2"]);
-    assert_eq!(told.code, 2);
-    assert!(told.words().contains("3 mistakes in case/scene.toml"), "{}", told.err);
+    let output = check(&workshop, &["law.tissue.young-modulus=-1", "law.tissue.fibre-modulus=-2"]);
+    assert_eq!(output.code, 2);
+    assert!(output.words().contains("3 mistakes in case/scene.toml"), "{}", output.err);
     for line in ["density = 0", "--set law.tissue.young-modulus=-1", "--set law.tissue.fibre-modulus=-2"] {
-        assert!(told.underlines(line), "{line}: {}", told.err);
+        assert!(output.underlines(line), "{line}: {}", output.err);
     }
-    let told = check(&Workshop::new(BLOCK), &["scene.until=0.1", "scene.until=0.2"]);
-    assert!(told.words().contains("`scene.until` is set twice"), "{}", told.err);
-    assert!(told.words().contains("it is set by `--set scene.until=0.1`, too"), "{}", told.err);
+    let output = check(&Workshop::new(BLOCK), &["scene.until=0.1", "scene.until=0.2"]);
+    assert!(output.words().contains("`scene.until` is set twice"), "{}", output.err);
+    assert!(output.words().contains("it is set by `--set scene.until=0.1`, too"), "{}", output.err);
 }

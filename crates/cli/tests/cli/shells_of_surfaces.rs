@@ -100,8 +100,8 @@ fn pressed(body: Body, goal: [&str; 2]) -> (serde_json::Value, Mesh, Said) {
 
 fn pressed_file(workshop: &Workshop, file: &str, more: &[&str]) -> (serde_json::Value, Mesh, Said) {
     let words = ["mesh", file, "--as", "shells", "-o", "shells.vtu", "--json"];
-    let told = workshop.pliant(&[&words, more].concat());
-    let done = told.done();
+    let output = workshop.pliant(&[&words, more].concat());
+    let done = output.done();
     let report = done["report"].clone();
     let warned =
         |words| done["warnings"].as_array().unwrap().iter().any(|w| w.as_str().unwrap().contains(words));

@@ -49,9 +49,9 @@ fn sigterm_and_sighup_end_a_run_as_ctrl_c_does() {
         };
         let child = started(&workshop, &mut command);
         send(signal, &child);
-        let told = Said::from(child.wait_with_output().unwrap());
-        assert_eq!((told.code, &told.json()["status"]), (code, &"interrupted".into()), "{}", told.err);
-        assert!(told.words().contains("go on with `--resume out/case/checkpoint-"), "{}", told.err);
+        let output = Said::from(child.wait_with_output().unwrap());
+        assert_eq!((output.code, &output.json()["status"]), (code, &"interrupted".into()), "{}", output.err);
+        assert!(output.words().contains("go on with `--resume out/case/checkpoint-"), "{}", output.err);
         assert!(workshop.read("out/case/summary.md").contains("**Interrupted**"));
         assert!(workshop.path("out/case/plot.svg").exists());
         assert!(!workshop.path("out/case/.pliant-lock").exists());
@@ -75,9 +75,9 @@ fn a_second_run_in_the_same_folder_is_refused() {
     let child = started(&workshop, &mut workshop.command(&["run", "case"]));
     let says = format!("`out/case` cannot be written: another run (process {}) is writing to it", child.id());
     for arguments in [&["--force"][..], &[]] {
-        let told = workshop.run(arguments);
-        assert_eq!(told.code, 2, "{}", told.err);
-        assert!(told.words().contains(&says) && told.words().contains("`--out DIR`"), "{}", told.err);
+        let output = workshop.run(arguments);
+        assert_eq!(output.code, 2, "{}", output.err);
+        assert!(output.words().contains(&says) && output.words().contains("`--out DIR`"), "{}", output.err);
     }
     send("-KILL", &child);
     child.wait_with_output().unwrap();
@@ -104,16 +104,16 @@ fn a_run_is_not_resumed_while_it_runs() {
         std::thread::sleep(Duration::from_millis(2));
     }
     // A checkpoint of the run may go while it is read: then another one is there.
-    let mut told = workshop.run(&["--resume", "out/case"]);
+    let mut output = workshop.run(&["--resume", "out/case"]);
     for _ in 0..20 {
-        if told.err.contains("cannot be read") {
-            told = workshop.run(&["--resume", "out/case"]);
+        if output.err.contains("cannot be read") {
+            output = workshop.run(&["--resume", "out/case"]);
         }
     }
     send("-KILL", &child);
     child.wait_with_output().unwrap();
-    assert_eq!(told.code, 2, "{}", told.err);
-    assert!(told.words().contains("another run (process "), "{}", told.err);
+    assert_eq!(output.code, 2, "{}", output.err);
+    assert!(output.words().contains("another run (process "), "{}", output.err);
 }
 
 /// A file that a link may lead to.
@@ -138,10 +138,10 @@ fn links_in_an_output_folder_are_not_followed() {
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         let goal = if is_folder { workshop.path("elsewhere") } else { workshop.path(ELSEWHERE) };
         symlink(&goal, &path).unwrap();
-        let told = workshop.run(&["--force"]);
-        assert_ne!(told.code, 0, "{link}");
+        let output = workshop.run(&["--force"]);
+        assert_ne!(output.code, 0, "{link}");
         let says = format!("is a link to `{}`", goal.display());
-        assert!(told.words().contains(link) && told.words().contains(&says), "{link}: {}", told.err);
+        assert!(output.words().contains(link) && output.words().contains(&says), "{link}: {}", output.err);
         assert!(path.is_symlink(), "{link} was removed");
         assert_eq!(workshop.read(ELSEWHERE), "precious", "{link}");
         assert_eq!(workshop.read("elsewhere/000099.vtu"), "precious, too", "{link}");
@@ -158,17 +158,17 @@ fn a_resumed_run_and_a_sweep_follow_no_links_either() {
     workshop.write(ELSEWHERE, workshop.read("out/case/history.csv"));
     fs::remove_file(&history).unwrap();
     symlink(workshop.path(ELSEWHERE), &history).unwrap();
-    let told = workshop.run(&["--resume", "out/case"]);
-    assert_eq!(told.code, 2, "{}", told.err);
-    assert!(told.words().contains("out/case/history.csv` is a link to"), "{}", told.err);
+    let output = workshop.run(&["--resume", "out/case"]);
+    assert_eq!(output.code, 2, "{}", output.err);
+    assert!(output.words().contains("out/case/history.csv` is a link to"), "{}", output.err);
 
     workshop.write("elsewhere/summary.md", "precious");
     fs::create_dir_all(workshop.path("out/sweep")).unwrap();
     symlink(workshop.path("elsewhere"), workshop.path("out/sweep/run-0000")).unwrap();
     let sweep = ["sweep", "case", "--set", "body.block.damping=5,6", "--out", "out/sweep", "--force"];
-    let told = workshop.pliant(&sweep);
-    assert_eq!(told.code, 2, "{}", told.err);
-    assert!(told.words().contains("out/sweep/run-0000` is a link to"), "{}", told.err);
+    let output = workshop.pliant(&sweep);
+    assert_eq!(output.code, 2, "{}", output.err);
+    assert!(output.words().contains("out/sweep/run-0000` is a link to"), "{}", output.err);
     assert_eq!(workshop.read("elsewhere/summary.md"), "precious");
 }
 
@@ -276,9 +276,13 @@ fn pipes_and_devices_are_no_files() {
         &["check", "/dev/zero"],
         &["run", "case", "--resume", "checkpoint-0000000001.pliant"],
     ] {
-        let told = within_seconds(&workshop, arguments);
-        assert_eq!(told.code, 2, "{arguments:?}: {}", told.err);
-        assert!(told.words().contains("it is not a regular file but a pipe"), "{arguments:?}: {}", told.err);
+        let output = within_seconds(&workshop, arguments);
+        assert_eq!(output.code, 2, "{arguments:?}: {}", output.err);
+        assert!(
+            output.words().contains("it is not a regular file but a pipe"),
+            "{arguments:?}: {}",
+            output.err
+        );
     }
 }
 
@@ -315,16 +319,16 @@ fn a_sandbox_keeps_a_scene_in_its_folder() {
     ] {
         workshop.write("case/scene.toml", naming(mesh, table));
         assert_eq!(workshop.pliant(&["check", "case"]).code, 0, "{mesh}, {table}");
-        let told = workshop.pliant(&["check", "case", "--sandbox"]);
-        assert_eq!(told.code, if allowed { 0 } else { 2 }, "{mesh}, {table}: {}", told.err);
-        let says = told.words().contains("it is outside the scene's folder");
-        assert_eq!(says, !allowed, "{mesh}, {table}: {}", told.err);
+        let output = workshop.pliant(&["check", "case", "--sandbox"]);
+        assert_eq!(output.code, if allowed { 0 } else { 2 }, "{mesh}, {table}: {}", output.err);
+        let says = output.words().contains("it is outside the scene's folder");
+        assert_eq!(says, !allowed, "{mesh}, {table}: {}", output.err);
         // A run reads the same files, and leaves nothing where it may not.
-        let told =
+        let output =
             workshop.pliant(&["run", "case", "--sandbox", "--until", "1e-4", "--out", "out", "--force"]);
-        assert_eq!(told.code, if allowed { 0 } else { 2 }, "{mesh}, {table}: {}", told.err);
-        let says = told.words().contains("it is outside the scene's folder");
-        assert_eq!(says, !allowed, "{mesh}, {table}: {}", told.err);
+        assert_eq!(output.code, if allowed { 0 } else { 2 }, "{mesh}, {table}: {}", output.err);
+        let says = output.words().contains("it is outside the scene's folder");
+        assert_eq!(says, !allowed, "{mesh}, {table}: {}", output.err);
         assert_eq!(workshop.path("out").exists(), allowed, "{mesh}, {table}");
         if allowed {
             std::fs::remove_dir_all(workshop.path("out")).unwrap();
@@ -333,8 +337,8 @@ fn a_sandbox_keeps_a_scene_in_its_folder() {
     // The scene file itself.
     workshop.write("elsewhere/other.toml", naming("organ.vtk", "table.csv"));
     symlink(workshop.path("elsewhere/other.toml"), workshop.path("case/other.toml")).unwrap();
-    let told = workshop.pliant(&["check", "case/other.toml", "--sandbox"]);
-    assert!(told.code == 2 && told.words().contains("outside the scene's folder"), "{}", told.err);
+    let output = workshop.pliant(&["check", "case/other.toml", "--sandbox"]);
+    assert!(output.code == 2 && output.words().contains("outside the scene's folder"), "{}", output.err);
 }
 
 #[test]
@@ -358,11 +362,11 @@ fn a_sandbox_keeps_images_and_models_in_their_folder() {
     workshop.write("elsewhere/scan.raw", &voxels);
     for (data, allowed) in [("scan.raw", true), ("../elsewhere/scan.raw", false)] {
         workshop.write("case/scan.nhdr", header(data));
-        let told = workshop.pliant(&["check", "case"]);
-        assert_eq!(told.code, 0, "{}", told.err);
-        let told = workshop.pliant(&["check", "case", "--sandbox", "--no-cache"]);
-        assert_eq!(told.code, if allowed { 0 } else { 2 }, "{data}: {}", told.err);
-        assert_eq!(told.words().contains("it is outside the folder"), !allowed, "{data}: {}", told.err);
+        let output = workshop.pliant(&["check", "case"]);
+        assert_eq!(output.code, 0, "{}", output.err);
+        let output = workshop.pliant(&["check", "case", "--sandbox", "--no-cache"]);
+        assert_eq!(output.code, if allowed { 0 } else { 2 }, "{data}: {}", output.err);
+        assert_eq!(output.words().contains("it is outside the folder"), !allowed, "{data}: {}", output.err);
     }
     let model = "<Model><SystemParams><TimeStep>0.001</TimeStep><TotalTime>0.1</TotalTime><DampingCoeff>5</DampingCoeff>\
                  <Density>1000</Density></SystemParams><VTKMesh Type=\"T4\">../elsewhere/organ.vtk</VTKMesh></Model>";
@@ -385,7 +389,7 @@ fn names_from_files_reach_the_terminal_without_codes() {
         "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n3 1 \"\u{1b}[2Jliver\"\n$EndPhysicalNames\n$Nodes\n4\n1 0 0 0\n\
          2 0.1 0 0\n3 0 0.1 0\n4 0 0 0.1\n$EndNodes\n$Elements\n1\n1 4 2 1 1 1 2 3 4\n$EndElements\n",
     );
-    let told = workshop.pliant(&["info", "named.msh"]);
-    assert!(told.code == 0 && told.out.contains("?[2Jliver"), "{}{}", told.out, told.err);
-    assert!(!told.out.contains('\u{1b}') && !told.err.contains('\u{1b}'));
+    let output = workshop.pliant(&["info", "named.msh"]);
+    assert!(output.code == 0 && output.out.contains("?[2Jliver"), "{}{}", output.out, output.err);
+    assert!(!output.out.contains('\u{1b}') && !output.err.contains('\u{1b}'));
 }

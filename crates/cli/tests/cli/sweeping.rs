@@ -14,10 +14,10 @@ fn sweep(workshop: &Workshop, arguments: &[&str]) -> Said {
 fn a_sweep_tells_what_it_came_to() {
     let workshop = Workshop::new(BLOCK);
     let set = ["--set", "law.tissue.young-modulus=5e3..20e3/3", "--set", "scene.until=0.008"];
-    let told = sweep(&workshop, &set);
-    assert_eq!(told.code, 0, "{}", told.err);
+    let output = sweep(&workshop, &set);
+    assert_eq!(output.code, 0, "{}", output.err);
     for piece in ["3 runs, 0 failed\nwrote out/case-sweep/sweep.csv", "wrote out/case-sweep/sweep.svg"] {
-        assert!(told.out.contains(piece), "no `{piece}` in {}", told.out);
+        assert!(output.out.contains(piece), "no `{piece}` in {}", output.out);
     }
     assert!(!workshop.path("out/case-sweep/run-0002/fields.pvd").exists());
     let more = ["--threads", "3", "--out", "out/again", "--keep-fields"];
@@ -30,12 +30,12 @@ fn a_sweep_tells_what_it_came_to() {
 fn a_run_that_fails_stops_no_other() {
     let workshop = Workshop::new(BLOCK);
     let set = ["--set", "constraint.hand.by.2=0.001,-0.2,0.002", "--set", "scene.until=0.1"];
-    let told = sweep(&workshop, &set);
-    assert_eq!(told.code, 1, "{}", told.err);
-    assert!(told.out.contains("3 runs, 1 failed"), "{}", told.out);
+    let output = sweep(&workshop, &set);
+    assert_eq!(output.code, 1, "{}", output.err);
+    assert!(output.out.contains("3 runs, 1 failed"), "{}", output.out);
     for piece in ["1 of 3 runs failed", "run-0001 (constraint.hand.by.2=-0.2 scene.until=0.1)", "is inverted"]
     {
-        assert!(told.words().contains(piece), "no `{piece}` in {}", told.err);
+        assert!(output.words().contains(piece), "no `{piece}` in {}", output.err);
     }
     let rows = workshop.cells("out/case-sweep/sweep.csv");
     let status = rows[0].iter().position(|name| name == "status").unwrap();
@@ -51,11 +51,11 @@ fn a_run_that_fails_stops_no_other() {
 fn all_combinations_are_checked_before_the_first_is_run() {
     let workshop = Workshop::new(BLOCK);
     let set = ["--set", "law.tissue.young-modulus=1e3,2e3", "--set", "law.tissue.poisson-ratio=0.3,0.7"];
-    let told = sweep(&workshop, &set);
-    assert_eq!(told.code, 2, "{}", told.err);
-    assert!(told.underlines("--set law.tissue.poisson-ratio=0.7"), "{}", told.err);
-    assert!(told.words().contains("2 of 4 combinations are invalid; nothing was run"), "{}", told.err);
-    assert_eq!(told.err.matches("found 0.7").count(), 1, "told once: {}", told.err);
+    let output = sweep(&workshop, &set);
+    assert_eq!(output.code, 2, "{}", output.err);
+    assert!(output.underlines("--set law.tissue.poisson-ratio=0.7"), "{}", output.err);
+    assert!(output.words().contains("2 of 4 combinations are invalid; nothing was run"), "{}", output.err);
+    assert_eq!(output.err.matches("found 0.7").count(), 1, "told once: {}", output.err);
     assert!(!workshop.path("out").exists());
     for (set, says) in [
         ("law.tissue.young-modulus=1e3,,2e3", "a value of `law.tissue.young-modulus` is missing"),
@@ -63,10 +63,10 @@ fn all_combinations_are_checked_before_the_first_is_run() {
         ("law.tisue.young-modulus=1e3,2e3", "did you mean `tissue`?"),
         ("law.tissue.young-modulus", "is not an assignment"),
     ] {
-        let told = sweep(&workshop, &["--set", set]);
-        assert_eq!(told.code, 2);
-        assert!(told.words().contains(says), "no `{says}` in {}", told.err);
-        assert!(told.err.contains(&format!("--set {}", set.split(',').next().unwrap())), "{}", told.err);
+        let output = sweep(&workshop, &["--set", set]);
+        assert_eq!(output.code, 2);
+        assert!(output.words().contains(says), "no `{says}` in {}", output.err);
+        assert!(output.err.contains(&format!("--set {}", set.split(',').next().unwrap())), "{}", output.err);
     }
     assert_eq!(sweep(&workshop, &[]).code, 2, "something is to be swept");
 }
@@ -74,12 +74,12 @@ fn all_combinations_are_checked_before_the_first_is_run() {
 #[test]
 fn a_dry_run_lists_the_product_and_writes_nothing() {
     let workshop = Workshop::new(BLOCK);
-    let told = sweep(
+    let output = sweep(
         &workshop,
         &["--set", "body.block.element=tet4,tet4-anp", "--set", "scene.until=1..2/2", "--dry-run"],
     );
-    assert_eq!((told.code, told.err.as_str()), (0, ""));
-    let lines: Vec<&str> = told.out.lines().collect();
+    assert_eq!((output.code, output.err.as_str()), (0, ""));
+    let lines: Vec<&str> = output.out.lines().collect();
     assert_eq!(
         lines,
         [
@@ -99,9 +99,9 @@ fn a_filled_folder_needs_force_and_loses_the_runs_of_an_earlier_sweep() {
     assert_eq!(sweep(&workshop, &three).code, 0);
     workshop.write("out/case-sweep/run-0001/notes.txt", "mine");
     let two = ["--set", "scene.until=0.001", "--set", "scene.gravity=[0,0,0]"];
-    let told = sweep(&workshop, &two);
-    assert_eq!(told.code, 2);
-    assert!(told.err.contains("it is not empty") && told.err.contains("--force"), "{}", told.err);
+    let output = sweep(&workshop, &two);
+    assert_eq!(output.code, 2);
+    assert!(output.err.contains("it is not empty") && output.err.contains("--force"), "{}", output.err);
     assert_eq!(sweep(&workshop, &[&two[..], &["--force"]].concat()).code, 0);
     assert!(!workshop.path("out/case-sweep/run-0002").exists());
     let left: Vec<_> = fs::read_dir(workshop.path("out/case-sweep/run-0001"))
@@ -129,9 +129,9 @@ fn ctrl_c_ends_a_sweep_with_what_it_has() {
     }
     let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
     assert!(killed.unwrap().success());
-    let told = Said::from(child.wait_with_output().unwrap());
-    assert_eq!(told.code, 130, "{}", told.err);
-    assert!(told.words().contains("the table contains the finished runs"), "{}", told.err);
+    let output = Said::from(child.wait_with_output().unwrap());
+    assert_eq!(output.code, 130, "{}", output.err);
+    assert!(output.words().contains("the table contains the finished runs"), "{}", output.err);
     let rows = workshop.cells("out/case-sweep/sweep.csv");
     let states: Vec<&str> = rows[1..].iter().map(|row| row[2].as_str()).collect();
     assert_eq!(states, ["done", "interrupted"]);

@@ -222,12 +222,12 @@ fn mouse_and_keys_of_a_screen_lead_the_window() {
 fn recordings_outlive_signals() {
     let workshop = Workshop::new(BALL);
     for (path, why) in [("nowhere/drag", "No such file"), ("case", "it is a folder")] {
-        let told = workshop.pliant(&["view", "case", "--record", path]);
-        assert_eq!(told.code, 2, "{}", told.err);
+        let output = workshop.pliant(&["view", "case", "--record", path]);
+        assert_eq!(output.code, 2, "{}", output.err);
         assert!(
-            told.err.contains(path) && told.err.contains("cannot be written") && told.err.contains(why),
+            output.err.contains(path) && output.err.contains("cannot be written") && output.err.contains(why),
             "{}",
-            told.err
+            output.err
         );
     }
     if !has_gpu() {
@@ -264,9 +264,10 @@ fn the_window_is_on_the_device_of_a_scene_that_runs_on_one() {
     }
     let Some(screen) = Screen::start() else { return };
     let workshop = Workshop::new(&changed(BALL, "threads = 1", "threads = 1\ndevice = 'gpu'"));
-    let told = view(&workshop, &screen, &[SMALL, &["--screenshot", "window.png", "--after", "0.1"]].concat());
-    assert_eq!(told.code, 0, "{}", told.err);
-    assert!(told.out.starts_with("A ball at t = "), "{}", told.out);
+    let output =
+        view(&workshop, &screen, &[SMALL, &["--screenshot", "window.png", "--after", "0.1"]].concat());
+    assert_eq!(output.code, 0, "{}", output.err);
+    assert!(output.out.starts_with("A ball at t = "), "{}", output.out);
     let picture = std::fs::read(workshop.path("window.png")).unwrap();
     assert!(picture.starts_with(b"\x89PNG") && picture.len() > 20_000, "{} bytes", picture.len());
 }
@@ -284,23 +285,23 @@ fn the_window_takes_a_picture_of_itself_and_reads_a_scene_that_changed_while_it_
         command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the binary starts")
     };
     let window = start("0.1");
-    let told: Said = window.wait_with_output().unwrap().into();
-    assert_eq!(told.code, 0, "{}", told.err);
-    assert!(told.out.starts_with("A ball at t = "), "{}", told.out);
+    let output: Said = window.wait_with_output().unwrap().into();
+    assert_eq!(output.code, 0, "{}", output.err);
+    assert!(output.out.starts_with("A ball at t = "), "{}", output.out);
     assert!(std::fs::read(workshop.path("window.png")).unwrap().starts_with(b"\x89PNG"));
 
     // Simulated time restarts with the reloaded scene.
     let window = start("8");
     std::thread::sleep(Duration::from_secs(5));
     workshop.write("case/scene.toml", changed(BALL, "A ball", "Another ball"));
-    let told: Said = window.wait_with_output().unwrap().into();
-    assert_eq!(told.code, 0, "{}", told.err);
-    assert!(told.out.starts_with("Another ball at t = "), "{}", told.out);
-    assert!(told.out.contains("the scene was read anew"), "{}", told.out);
+    let output: Said = window.wait_with_output().unwrap().into();
+    assert_eq!(output.code, 0, "{}", output.err);
+    assert!(output.out.starts_with("Another ball at t = "), "{}", output.out);
+    assert!(output.out.contains("the scene was read anew"), "{}", output.out);
 
-    let told = view(&workshop, &screen, &["--screenshot", "nowhere/window.png", "--after", "0"]);
-    assert_eq!(told.code, 2, "{}", told.err);
-    assert!(told.err.contains("nowhere/window.png"), "{}", told.err);
+    let output = view(&workshop, &screen, &["--screenshot", "nowhere/window.png", "--after", "0"]);
+    assert_eq!(output.code, 2, "{}", output.err);
+    assert!(output.err.contains("nowhere/window.png"), "{}", output.err);
 }
 
 #[test]
@@ -311,8 +312,8 @@ fn a_finished_run_is_looked_at_over_its_timeline() {
     let Some(screen) = Screen::start() else { return };
     let fields = "[output.fields]\ntype = 'vtu'\nevery = 0.05\ndata = ['displacement', 'von-mises']\n";
     let workshop = Workshop::new(&format!("{BALL}{fields}"));
-    let told = workshop.pliant(&["run", "case", "--until", "0.2", "--out", "out"]);
-    assert_eq!(told.code, 0, "{}", told.err);
+    let output = workshop.pliant(&["run", "case", "--until", "0.2", "--out", "out"]);
+    assert_eq!(output.code, 0, "{}", output.err);
     let open = |what: &str, more: &[&str]| -> Said {
         let mut command = workshop.command(&[&["view", what], more].concat());
         command.env("DISPLAY", &screen.display).env_remove("WAYLAND_DISPLAY");
@@ -320,35 +321,35 @@ fn a_finished_run_is_looked_at_over_its_timeline() {
     };
     let mut pictures = Vec::new();
     for (what, after) in [("out", "0"), ("out/fields.pvd", "0.16")] {
-        let told = open(what, &["--screenshot", "run.png", "--after", after]);
-        assert_eq!(told.code, 0, "{}", told.err);
-        assert!(told.out.starts_with("out at t = 0."), "{}", told.out);
+        let output = open(what, &["--screenshot", "run.png", "--after", after]);
+        assert_eq!(output.code, 0, "{}", output.err);
+        assert!(output.out.starts_with("out at t = 0."), "{}", output.out);
         pictures.push(std::fs::read(workshop.path("run.png")).unwrap());
     }
     assert!(pictures.iter().all(|picture| picture.starts_with(b"\x89PNG")) && pictures[0] != pictures[1]);
-    let told = open("out", &["--record", "drag"]);
-    assert_eq!(told.code, 2, "{}", told.err);
-    assert!(told.err.contains("`out` is a finished run, and `--record` is for scenes"), "{}", told.err);
-    let told = open("out/none.pvd", &[]);
-    assert_eq!(told.code, 2, "{}", told.err);
-    assert!(told.err.contains("has no series `none`; it has `fields`"), "{}", told.err);
+    let output = open("out", &["--record", "drag"]);
+    assert_eq!(output.code, 2, "{}", output.err);
+    assert!(output.err.contains("`out` is a finished run, and `--record` is for scenes"), "{}", output.err);
+    let output = open("out/none.pvd", &[]);
+    assert_eq!(output.code, 2, "{}", output.err);
+    assert!(output.err.contains("has no series `none`; it has `fields`"), "{}", output.err);
 }
 
 #[test]
 fn without_a_screen_it_says_what_it_needs() {
     let workshop = Workshop::new(BLOCK);
     let mut command = workshop.command(&["view", "case"]);
-    let told: Said = command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").output().unwrap().into();
-    assert_eq!(told.code, 2, "{}", told.err);
+    let output: Said = command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").output().unwrap().into();
+    assert_eq!(output.code, 2, "{}", output.err);
     assert!(
-        told.err.contains("no window can be opened") && told.err.contains("pliant render"),
+        output.err.contains("no window can be opened") && output.err.contains("pliant render"),
         "{}",
-        told.err
+        output.err
     );
     workshop.write("drag", "no recording");
-    let told = workshop.pliant(&["view", "case", "--replay", "drag"]);
-    assert_eq!(told.code, 2);
-    assert!(told.err.contains("is not a recording"), "{}", told.err);
+    let output = workshop.pliant(&["view", "case", "--replay", "drag"]);
+    assert_eq!(output.code, 2);
+    assert!(output.err.contains("is not a recording"), "{}", output.err);
 }
 
 /// The bodies of a scene, as its recordings name them.
@@ -363,9 +364,9 @@ fn a_recording_of_another_scene_is_refused() {
         Workshop::new(&BLOCK.replace("[body.block]", "[body.brick]").replace("\"block\"", "\"brick\""));
     let recording = Recording { steps: 3, of: of(BLOCK), ..Recording::default() };
     std::fs::write(workshop.path("drag"), recording.to_bytes().unwrap()).unwrap();
-    let told = workshop.pliant(&["view", "case", "--replay", "drag"]);
-    assert_eq!(told.code, 1);
-    assert!(told.err.contains("the recording is of another scene"), "{}", told.err);
+    let output = workshop.pliant(&["view", "case", "--replay", "drag"]);
+    assert_eq!(output.code, 1);
+    assert!(output.err.contains("the recording is of another scene"), "{}", output.err);
 }
 
 /// Ctrl-C ends a replay, which may be as long as its file says.
@@ -390,9 +391,9 @@ fn a_replay_tells_breaks() {
     let broken = Break { times: [0.5, 0.25], message: "element 3 of `block` is inverted".into() };
     let recording = Recording { steps: 3, breaks: vec![broken], of: of(BLOCK), ..Recording::default() };
     std::fs::write(workshop.path("drag"), recording.to_bytes().unwrap()).unwrap();
-    let told = workshop.pliant(&["view", "case", "--replay", "drag"]);
-    assert_eq!(told.code, 1);
+    let output = workshop.pliant(&["view", "case", "--replay", "drag"]);
+    assert_eq!(output.code, 1);
     let expected = "error: at t = 0.5000 s a pull broke the run, which then went back to t = 0.2500 s: element 3 of `block` is inverted";
-    assert!(told.err.contains(expected), "{}", told.err);
-    assert_eq!(told.json()["breaks"][0]["times"][1], 0.25);
+    assert!(output.err.contains(expected), "{}", output.err);
+    assert_eq!(output.json()["breaks"][0]["times"][1], 0.25);
 }

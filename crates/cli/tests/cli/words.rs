@@ -45,36 +45,36 @@ fn mesh(workshop: &Workshop, more: &[&str]) -> Said {
 }
 
 #[track_caller]
-fn refused(told: &Said, says: &[&str]) {
-    assert_eq!(told.code, 2, "{}{}", told.err, told.out);
+fn refused(output: &Said, says: &[&str]) {
+    assert_eq!(output.code, 2, "{}{}", output.err, output.out);
     for part in says {
-        assert!(told.words().contains(part), "no `{part}` in: {}", told.err);
+        assert!(output.words().contains(part), "no `{part}` in: {}", output.err);
     }
 }
 
 /// Labels of the materials of a mesh that was made.
 #[track_caller]
-fn materials(told: &Said) -> Vec<i64> {
-    assert_eq!(told.code, 0, "{}", told.err);
-    told.json()["materials"].as_array().unwrap().iter().map(|one| one["label"].as_i64().unwrap()).collect()
+fn materials(output: &Said) -> Vec<i64> {
+    assert_eq!(output.code, 0, "{}", output.err);
+    output.json()["materials"].as_array().unwrap().iter().map(|one| one["label"].as_i64().unwrap()).collect()
 }
 
 #[test]
 fn labels_are_listed_with_names_and_where_the_image_cuts_them_off() {
     let workshop = workshop();
-    let told = workshop.pliant(&["labels", "seg.dcm"]);
-    assert_eq!(told.code, 0, "{}", told.err);
+    let output = workshop.pliant(&["labels", "seg.dcm"]);
+    assert_eq!(output.code, 0, "{}", output.err);
     for part in [
         "DICOM segmentation",
         "label 1 (Liver): 936 voxels",
         "label 2 (tumour): 64 voxels",
         "label 3 (heart)",
     ] {
-        assert!(told.out.contains(part), "no `{part}` in: {}", told.out);
+        assert!(output.out.contains(part), "no `{part}` in: {}", output.out);
     }
-    let told = workshop.pliant(&["labels", "seg.nii"]);
-    assert!(told.out.contains("at the border of the image: 40 voxels on the head side"), "{}", told.out);
-    assert_eq!(told.out.matches("border").count(), 1, "{}", told.out);
+    let output = workshop.pliant(&["labels", "seg.nii"]);
+    assert!(output.out.contains("at the border of the image: 40 voxels on the head side"), "{}", output.out);
+    assert_eq!(output.out.matches("border").count(), 1, "{}", output.out);
     let json = workshop.pliant(&["labels", "seg.dcm", "--json"]).json();
     assert_eq!(
         (&json["labels"][1]["name"], &json["labels"][1]["border"]),
@@ -82,19 +82,19 @@ fn labels_are_listed_with_names_and_where_the_image_cuts_them_off() {
     );
     workshop
         .write("names.txt", "# IDX   -R-  -G-  -B-  -A--  VIS MSH  LABEL\n 1 255 0 0 1 1 1 \"right lobe\"\n");
-    let told = workshop.pliant(&["labels", "seg.nii", "--names", "names.txt"]);
-    assert!(told.out.contains("label 1 (right lobe)"), "{}", told.out);
-    let told = workshop.pliant(&["labels", "seg.nii", "--names", "totalsegmentator"]);
-    assert!(told.out.contains("label 3 (kidney_left)"), "{}", told.out);
+    let output = workshop.pliant(&["labels", "seg.nii", "--names", "names.txt"]);
+    assert!(output.out.contains("label 1 (right lobe)"), "{}", output.out);
+    let output = workshop.pliant(&["labels", "seg.nii", "--names", "totalsegmentator"]);
+    assert!(output.out.contains("label 3 (kidney_left)"), "{}", output.out);
     refused(&workshop.pliant(&["labels", "seg.nii", "--names", "seg.nii"]), &["not a table of names"]);
 }
 
 #[test]
 fn a_label_is_chosen_by_name_and_range() {
     let workshop = workshop();
-    let told = mesh(&workshop, &["seg.dcm", "--label", "liver", "--label", "Tumour"]);
-    assert_eq!(materials(&told), [1, 2]);
-    assert_eq!(told.json()["image"]["names"], serde_json::json!({ "1": "Liver", "2": "tumour" }));
+    let output = mesh(&workshop, &["seg.dcm", "--label", "liver", "--label", "Tumour"]);
+    assert_eq!(materials(&output), [1, 2]);
+    assert_eq!(output.json()["image"]["names"], serde_json::json!({ "1": "Liver", "2": "tumour" }));
     assert_eq!(materials(&mesh(&workshop, &["seg.nii", "--label", "1-2"])), [1, 2]);
     assert_eq!(
         materials(&mesh(&workshop, &["seg.nii", "--names", "totalsegmentator", "--label", "kidney_right"])),
@@ -111,15 +111,15 @@ fn a_label_is_chosen_by_name_and_range() {
 #[test]
 fn an_organ_that_the_image_cuts_off_is_warned_of() {
     let workshop = workshop();
-    let told = mesh(&workshop, &["seg.nii", "--label", "3"]);
-    assert_eq!(materials(&told), [3]);
+    let output = mesh(&workshop, &["seg.nii", "--label", "3"]);
+    assert_eq!(materials(&output), [3]);
     assert!(
-        told.err.contains("warning: label 3 lies at the border of the image (40 voxels on the head side)"),
+        output.err.contains("warning: label 3 lies at the border of the image (40 voxels on the head side)"),
         "{}",
-        told.err
+        output.err
     );
-    let told = mesh(&workshop, &["seg.nii", "--label", "1"]);
-    assert!(!told.err.contains("border"), "{}", told.err);
+    let output = mesh(&workshop, &["seg.nii", "--label", "1"]);
+    assert!(!output.err.contains("border"), "{}", output.err);
 }
 
 #[test]
@@ -130,13 +130,13 @@ fn masks_are_one_image_of_labels() {
             Volume { values: organ().values.iter().map(|&own| i16::from(own == label)).collect(), ..organ() };
         workshop.write(name, nifti1(&mask, Form::Sform, false));
     }
-    let told = mesh(&workshop, &["liver.nii", "tumour.nii"]);
-    assert_eq!(materials(&told), [1, 2]);
+    let output = mesh(&workshop, &["liver.nii", "tumour.nii"]);
+    assert_eq!(materials(&output), [1, 2]);
     let expected = materials(&mesh(&workshop, &["seg.nii", "--label", "1-2"]));
-    assert_eq!(materials(&told), expected);
+    assert_eq!(materials(&output), expected);
     assert_eq!(materials(&mesh(&workshop, &["liver.nii", "tumour.nii", "--label", "tumour"])), [2]);
-    let told = workshop.pliant(&["labels", "liver.nii", "tumour.nii"]);
-    assert!(told.out.contains("label 2 (tumour): 64 voxels"), "{}", told.out);
+    let output = workshop.pliant(&["labels", "liver.nii", "tumour.nii"]);
+    assert!(output.out.contains("label 2 (tumour): 64 voxels"), "{}", output.out);
     refused(
         &mesh(&workshop, &["liver.nii", "seg.nii"]),
         &["`seg.nii` is not a mask: it has the labels 1, 2, 3"],
@@ -155,8 +155,8 @@ fn what_would_be_ignored_or_is_no_label_image_is_refused() {
         |[i, j, k]| if i < 5 { -1024 } else { ((i * 7919 + j * 104_729 + k * 1_299_709) % 901) as i16 },
     );
     workshop.write("ct.mha", metaimage(&scan, false, false, "LOCAL"));
-    for told in [workshop.pliant(&["labels", "ct.mha"]), mesh(&workshop, &["ct.mha", "--label", "7"])] {
-        refused(&told, &["this is not a label image", "values from -1024 to 900", "--threshold VALUE"]);
+    for output in [workshop.pliant(&["labels", "ct.mha"]), mesh(&workshop, &["ct.mha", "--label", "7"])] {
+        refused(&output, &["this is not a label image", "values from -1024 to 900", "--threshold VALUE"]);
     }
     workshop.write("rtss.dcm", structure_set());
     refused(&workshop.pliant(&["labels", "rtss.dcm"]), &["RTSTRUCT", "contours", "SlicerRT"]);
@@ -168,16 +168,16 @@ fn a_surface_in_millimetres_is_not_taken_for_one_in_metres() {
     let ball = sphere(60.0, 4, 100_000).expect("a sphere");
     io::write(&workshop.path("ball.stl"), &ball).expect("the mesh is written");
     let plain = ["ball.stl", "--edge", "8"];
-    let told = workshop.pliant(&[&["mesh"], &plain[..], &["-o", "out.vtu"]].concat());
+    let output = workshop.pliant(&[&["mesh"], &plain[..], &["-o", "out.vtu"]].concat());
     refused(
-        &told,
+        &output,
         &["measures 207.8", "probably millimetres", "--scale 0.001", "`--scale 1` if it is in metres"],
     );
     assert!(!workshop.path("out.vtu").exists());
-    let told = mesh(&workshop, &["ball.stl", "--scale", "0.001"]);
-    assert!(told.code == 0 && !told.err.contains("larger than"), "{}", told.err);
-    let told = workshop.pliant(&[&["mesh"], &plain[..], &["--scale", "1", "-o", "out.vtu"]].concat());
-    assert!(told.code == 0 && told.err.contains("larger than any organ"), "{}", told.err);
+    let output = mesh(&workshop, &["ball.stl", "--scale", "0.001"]);
+    assert!(output.code == 0 && !output.err.contains("larger than"), "{}", output.err);
+    let output = workshop.pliant(&[&["mesh"], &plain[..], &["--scale", "1", "-o", "out.vtu"]].concat());
+    assert!(output.code == 0 && output.err.contains("larger than any organ"), "{}", output.err);
 }
 
 /// A tumour of 4 mm in millimetres measures as much as a machine in metres: both are possible, and the user is asked.
@@ -187,12 +187,12 @@ fn a_small_organ_in_millimetres_is_noted() {
     io::write(&workshop.path("tumour.stl"), &sphere(2.0, 3, 100_000).expect("a sphere")).expect("written");
     let asked = ["measures 6.928 m across, larger than a person", "may be millimetres", "`--scale 0.001`"];
     let made = ["mesh", "tumour.stl", "--edge", "0.8", "-o", "out.vtu"];
-    let told = workshop.pliant(&made);
-    assert!(told.code == 0 && asked.iter().all(|piece| told.words().contains(piece)), "{}", told.err);
-    let told = workshop.pliant(&[&made[..], &["--scale", "1"]].concat());
-    assert!(told.code == 0 && !told.err.contains("larger than"), "{}", told.err);
-    let told = workshop.pliant(&["info", "tumour.stl"]);
-    assert!(told.out.contains("may be millimetres or centimetres"), "{}", told.out);
+    let output = workshop.pliant(&made);
+    assert!(output.code == 0 && asked.iter().all(|piece| output.words().contains(piece)), "{}", output.err);
+    let output = workshop.pliant(&[&made[..], &["--scale", "1"]].concat());
+    assert!(output.code == 0 && !output.err.contains("larger than"), "{}", output.err);
+    let output = workshop.pliant(&["info", "tumour.stl"]);
+    assert!(output.out.contains("may be millimetres or centimetres"), "{}", output.out);
 }
 
 /// What other programs read is named, with what helps; a scene in XML is one mistake, not five of TOML.
@@ -205,8 +205,8 @@ fn files_of_other_programs_are_named() {
         ("model.scn", "<Node name=\"root\">\n", ["a scene of SOFA", "`filename`"]),
     ] {
         workshop.write(name, text);
-        for told in [workshop.pliant(&["info", name]), mesh(&workshop, &[name, "--label", "1"])] {
-            refused(&told, &says);
+        for output in [workshop.pliant(&["info", name]), mesh(&workshop, &[name, "--label", "1"])] {
+            refused(&output, &says);
         }
     }
     let scenes = [
@@ -219,9 +219,9 @@ fn files_of_other_programs_are_named() {
     ];
     for (name, text, says) in scenes {
         workshop.write(name, text);
-        let told = workshop.pliant(&["check", name]);
-        refused(&told, &[says, "not a scene in TOML"]);
-        assert!(!told.err.contains("mistakes"), "{}", told.err);
+        let output = workshop.pliant(&["check", name]);
+        refused(&output, &[says, "not a scene in TOML"]);
+        assert!(!output.err.contains("mistakes"), "{}", output.err);
     }
 }
 
@@ -289,9 +289,9 @@ fn a_scene_says_labels_by_name_and_masks_and_is_asked_about_units() {
         ("{ file = \"ball.stl\", as = \"tets\", edge = 8.0 }", 2, "probably millimetres"),
         ("{ file = \"ball.stl\", as = \"tets\", edge = 0.008, scale = 0.001 }", 0, "what it encloses"),
     ] {
-        let told = scene(mesh).pliant(&["check", "case"]);
-        assert_eq!(told.code, code, "{mesh}: {}", told.err);
-        let all = format!("{} {}", told.words(), told.out);
+        let output = scene(mesh).pliant(&["check", "case"]);
+        assert_eq!(output.code, code, "{mesh}: {}", output.err);
+        let all = format!("{} {}", output.words(), output.out);
         assert!(all.contains(says), "{mesh}: no `{says}` in: {all}");
     }
 }

@@ -64,8 +64,8 @@ mod tests {
         let list = "<VTKFile>\n<Collection>\n<DataSet timestep=\"0.1\" file=\"a/1 &amp; 2.vtu\"/>\n</Collection></VTKFile>";
         assert_eq!(parse(path, list).unwrap(), [(0.1, PathBuf::from("out/a/1 & 2.vtu"))]);
         for broken in [list.replace("0.1", "x"), list.replace("0.1", "inf"), list.replace("file", "name")] {
-            let told = parse(path, &broken).unwrap_err().to_string();
-            assert!(told.contains("line 3: a frame without a time or a file"), "{told}");
+            let message = parse(path, &broken).unwrap_err().to_string();
+            assert!(message.contains("line 3: a frame without a time or a file"), "{message}");
         }
         assert!(parse(path, "no XML").is_err() && read_pvd(Path::new("none.pvd")).is_err());
     }

@@ -57,8 +57,8 @@ mod tests {
             read_limited(&path, 6).unwrap_err().to_string().contains("7 bytes, more than the limit of 6")
         );
         fs::File::create(&path).unwrap().set_len(1 << 40).unwrap();
-        let told = read_limited(&path, 1 << 30).unwrap_err().to_string();
-        assert_eq!(told, "it has 1048576 MB, more than the limit of 1024 MB");
+        let message = read_limited(&path, 1 << 30).unwrap_err().to_string();
+        assert_eq!(message, "it has 1048576 MB, more than the limit of 1024 MB");
         assert!(read_limited(folder.path(), 6).unwrap_err().to_string().contains("folder"));
         assert_eq!(read_limited(&folder.path().join("none"), 6).unwrap_err().kind(), io::ErrorKind::NotFound);
     }

@@ -309,8 +309,8 @@ fn gifti_says_what_it_leaves_out() {
         ("<GIFTI", "<GOFTI", "XML is broken"),
         ("NIFTI_INTENT_TRIANGLE", "NIFTI_INTENT_SHAPE", "no cells"),
     ] {
-        let told = changed(from, to).unwrap_err().to_string();
-        assert!(told.contains(says), "{told}");
+        let message = changed(from, to).unwrap_err().to_string();
+        assert!(message.contains(says), "{message}");
     }
 }
 
@@ -323,14 +323,14 @@ fn pipes_and_devices_are_refused_and_not_waited_for() {
     let zero = folder.path().join("zero.vtu");
     std::os::unix::fs::symlink("/dev/zero", &zero).unwrap();
     for path in [&pipe, &zero] {
-        let told = read(path).unwrap_err().to_string();
-        assert!(told.contains("cannot open") && told.contains("not a regular file"), "{told}");
+        let message = read(path).unwrap_err().to_string();
+        assert!(message.contains("cannot open") && message.contains("not a regular file"), "{message}");
     }
     let huge = folder.path().join("huge.stl");
     // Without any block on the disk.
     fs::File::create(&huge).unwrap().set_len(1 << 40).unwrap();
-    let told = read(&huge).unwrap_err().to_string();
-    assert!(told.contains("1048576 MB, more than"), "{told}");
+    let message = read(&huge).unwrap_err().to_string();
+    assert!(message.contains("1048576 MB, more than"), "{message}");
 }
 
 #[test]

@@ -74,8 +74,8 @@ fn a_segmentation_is_found_as_a_file_and_beside_the_series_it_was_made_of() {
     assert_same(&read(&file, &ReadOptions::default()).unwrap(), &volume);
     assert_same(&read(folder.path(), &ReadOptions::default()).unwrap(), &volume);
     dicom_folder(folder.path(), &volume, Syntax::Explicit);
-    let told = read(folder.path(), &ReadOptions::default()).unwrap_err().to_string();
-    assert!(told.contains("1.9 (segmentation, seg.dcm)") && told.contains("1.2.3.4"), "{told}");
+    let message = read(folder.path(), &ReadOptions::default()).unwrap_err().to_string();
+    assert!(message.contains("1.9 (segmentation, seg.dcm)") && message.contains("1.2.3.4"), "{message}");
     for (series, format) in [("1.9", "DICOM segmentation"), ("1.2.3.4", "DICOM")] {
         let options = ReadOptions { series: Some(series.into()), ..ReadOptions::default() };
         assert_eq!(read(folder.path(), &options).unwrap().format, format);
@@ -88,9 +88,9 @@ fn contours_are_named_with_what_turns_them_into_labels() {
     let file = folder.path().join("rtss.dcm");
     fs::write(&file, structure_set()).unwrap();
     for path in [&file, &folder.path().to_owned()] {
-        let told = read(path, &ReadOptions::default()).unwrap_err().to_string();
+        let message = read(path, &ReadOptions::default()).unwrap_err().to_string();
         for part in ["RTSTRUCT", "contours", "SlicerRT", "plastimatch"] {
-            assert!(told.contains(part), "{told}");
+            assert!(message.contains(part), "{message}");
         }
     }
     // Beside a series they are passed over, and noted.
@@ -219,11 +219,11 @@ fn groups_of_labels_become_one() {
     let expected: Vec<i32> = before.iter().map(|&label| if label == 1 { 3 } else { label }).collect();
     assert_eq!(image.labels().unwrap().labels, expected);
     assert_eq!(image.names.get(3), Some("rest"));
-    let told = |typed: &[&str]| read().choose(&choices(typed)).unwrap_err();
-    assert_eq!(told(&["a=1-2", "b=2,3"]), LabelError::Repeated { label: 2 });
-    assert!(matches!(told(&["a=1,9"]), LabelError::Absent { label: 9, .. }));
-    assert!(matches!(told(&["a=0,1"]), LabelError::Background { .. }));
-    assert!(matches!(told(&["a=7-9"]), LabelError::EmptyRange { .. }));
+    let error = |typed: &[&str]| read().choose(&choices(typed)).unwrap_err();
+    assert_eq!(error(&["a=1-2", "b=2,3"]), LabelError::Repeated { label: 2 });
+    assert!(matches!(error(&["a=1,9"]), LabelError::Absent { label: 9, .. }));
+    assert!(matches!(error(&["a=0,1"]), LabelError::Background { .. }));
+    assert!(matches!(error(&["a=7-9"]), LabelError::EmptyRange { .. }));
 }
 
 /// Layers of segments as 3D Slicer writes them: two numbers for each of the 2 × 2 × 1 voxels.
@@ -265,12 +265,12 @@ fn layers_of_segments_become_one_image() {
 
 #[test]
 fn layers_without_segments_or_with_too_few_numbers_are_refused() {
-    let told = layered("5 0 5 7 0 7 0 0", "").unwrap_err();
-    assert!(told.contains("several values per voxel"), "{told}");
+    let message = layered("5 0 5 7 0 7 0 0", "").unwrap_err();
+    assert!(message.contains("several values per voxel"), "{message}");
     let odd = "Segment0_LabelValue:=5\nSegment0_Layer:=-1\nSegmentx_Layer:=1\nSegment1_LabelValue:=many\n";
     assert_eq!(layered("5 0 5 0 0 0 0 0", odd).unwrap().labels().unwrap().labels, [0; 4]);
-    let told = layered("5 0 5", "Segment0_LabelValue:=5\n").unwrap_err();
-    assert!(told.contains("the voxels"), "{told}");
+    let message = layered("5 0 5", "Segment0_LabelValue:=5\n").unwrap_err();
+    assert!(message.contains("the voxels"), "{message}");
 }
 
 fn image(value: impl Fn(usize) -> i16, dims: [usize; 3]) -> Image {
@@ -286,11 +286,11 @@ fn a_scan_is_no_label_image() {
         |at| if at % 30 < 8 { -1024 } else { (at.wrapping_mul(2_654_435_761) >> 7) as i16 % 700 },
         [30, 30, 12],
     );
-    let told = scan.labels().unwrap_err();
-    assert!(matches!(told, LabelError::Grey { values: 500.., more: false, range: [-1024, _] }), "{told}");
+    let error = scan.labels().unwrap_err();
+    assert!(matches!(error, LabelError::Grey { values: 500.., more: false, range: [-1024, _] }), "{error}");
     assert!(
-        told.to_string().contains("not a label image") && told.to_string().contains("from -1024 to 69"),
-        "{told}"
+        error.to_string().contains("not a label image") && error.to_string().contains("from -1024 to 69"),
+        "{error}"
     );
     // Many labels of a few voxels each are labels.
     let atlas = image(|at| (at / 5) as i16, [30, 30, 12]);
@@ -304,15 +304,15 @@ fn masks_become_one_image_in_which_the_last_counts() {
     let masks = [(PathBuf::from("a/liver.nii.gz"), first), (PathBuf::from("tumour.nrrd"), second)];
     let both = Image::of_masks(&masks, None).unwrap();
     let regions = both.regions(&|_| {}).unwrap();
-    let told: Vec<_> =
+    let found: Vec<_> =
         regions.iter().map(|region| (region.label, region.voxels, region.name.as_deref().unwrap())).collect();
-    assert_eq!(told, [(1, 24, "liver"), (2, 48, "tumour")]);
+    assert_eq!(found, [(1, 24, "liver"), (2, 48, "tumour")]);
     assert!(both.notes[0].contains("overlap in 24 voxels"), "{:?}", both.notes);
     let labels = (PathBuf::from("seg.nii"), image(|at| (at % 4) as i16, [10, 4, 3]));
     let [mask, _] = masks;
     let masks = [mask, labels];
-    let told = Image::of_masks(&masks, None).unwrap_err().to_string();
-    assert!(told.contains("`seg.nii` is not a mask: it has the labels 1, 2, 3"), "{told}");
+    let message = Image::of_masks(&masks, None).unwrap_err().to_string();
+    assert!(message.contains("`seg.nii` is not a mask: it has the labels 1, 2, 3"), "{message}");
     assert_eq!(Image::of_masks(&masks, Some(3.0)).unwrap().regions(&|_| {}).unwrap()[0].label, 2);
     let other = image(|_| 1, [4, 10, 3]);
     let masks = [masks.into_iter().next().unwrap(), (PathBuf::from("other.nii"), other)];
@@ -329,8 +329,8 @@ fn images_of_too_many_bytes_are_refused_before_they_are_read() {
         (metaimage(&labelled(), true, false, "LOCAL"), ImageFormat::MetaImage),
         (gipl(&labelled()), ImageFormat::Gipl),
     ] {
-        let told = read_bytes(&bytes, format, &options).unwrap_err().to_string();
-        assert!(told.contains("uncompressed, more than") && told.contains("crop"), "{told}");
+        let message = read_bytes(&bytes, format, &options).unwrap_err().to_string();
+        assert!(message.contains("uncompressed, more than") && message.contains("crop"), "{message}");
         assert!(read_bytes(&bytes, format, &ReadOptions { byte_limit: 240, ..options.clone() }).is_ok());
     }
 }
@@ -356,8 +356,8 @@ fn pipes_and_devices_are_refused_and_not_waited_for() {
     ] {
         let path = folder.path().join(name);
         fs::write(&path, bytes).unwrap();
-        let told = read(&path, &ReadOptions::default()).unwrap_err().to_string();
-        assert!(told.contains("ElementDataFile") && told.contains("not a regular file"), "{told}");
+        let message = read(&path, &ReadOptions::default()).unwrap_err().to_string();
+        assert!(message.contains("ElementDataFile") && message.contains("not a regular file"), "{message}");
     }
 }
 

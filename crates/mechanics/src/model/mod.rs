@@ -498,10 +498,10 @@ mod tests {
             (turn(0.3, 1.0), turn(0.2, 1.0)),
             (turn(0.3, 1.0), turn(0.3, 2.0)),
         ] {
-            let told = with(first, second).unwrap_err().to_string();
+            let message = with(first, second).unwrap_err().to_string();
             let wanted =
                 "`clamp` and `hand` both prescribe the rotation about x of node 1 of `wall`, and differently";
-            assert_eq!(told, wanted);
+            assert_eq!(message, wanted);
         }
     }
 }

@@ -20,16 +20,16 @@ fn what_only_the_processor_can_do_is_refused_by_name_before_the_run() {
         ),
         ("device = \"gpu\"\nprecision = \"double\"", "precision = \"double\"", "double precision"),
     ] {
-        let told = on(run).check(&[]);
-        assert_eq!(told.status(), "invalid", "{}", told.err);
-        assert!(told.underlines(line) || told.underlines("device = \"gpu\""), "{}", told.err);
-        assert!(told.words().contains(&format!("{says} runs on the CPU only")), "{}", told.err);
-        assert!(told.words().contains("device = \"cpu\""), "{}", told.err);
+        let output = on(run).check(&[]);
+        assert_eq!(output.status(), "invalid", "{}", output.err);
+        assert!(output.underlines(line) || output.underlines("device = \"gpu\""), "{}", output.err);
+        assert!(output.words().contains(&format!("{says} runs on the CPU only")), "{}", output.err);
+        assert!(output.words().contains("device = \"cpu\""), "{}", output.err);
     }
     let auto = on("device = \"auto\"\nsolver = \"quasi-static\"\nload-steps = 2");
-    let told = auto.run(&[]);
-    assert_eq!(told.done()["device"], "cpu");
-    assert!(told.words().contains("the solver `quasi-static` runs on the CPU only"), "{}", told.err);
+    let output = auto.run(&[]);
+    assert_eq!(output.done()["device"], "cpu");
+    assert!(output.words().contains("the solver `quasi-static` runs on the CPU only"), "{}", output.err);
 }
 
 #[test]
@@ -87,8 +87,8 @@ fn a_scene_of_every_kind_of_part_runs_on_a_device_as_on_the_processor() {
     }
     let [cpu, gpu] = ["device = \"cpu\"", "device = \"gpu\""].map(on);
     let reference = cpu.run(&[STEP]).done();
-    let told = gpu.run(&[STEP]);
-    let json = told.done();
+    let output = gpu.run(&[STEP]);
+    let json = output.done();
     assert_eq!(json["device"], adapters()[0].name);
     assert_eq!((&json["precision"], &reference["precision"]), (&"single".into(), &"double".into()));
     let apart = apart(&cpu, &gpu);
@@ -121,9 +121,9 @@ fn organs_and_a_grasper_touch_on_a_device_as_on_the_processor() {
     for device in ["cpu", "gpu"] {
         let out = format!("out/{device}");
         let device_is = format!("run.device={device}");
-        let told = workshop.run_into(&out, &["scene.until=0.1", "output.history.every=0.02", &device_is]);
-        let json = told.done();
-        assert_eq!(json["device"] == "cpu", device == "cpu", "{}", told.err);
+        let output = workshop.run_into(&out, &["scene.until=0.1", "output.history.every=0.02", &device_is]);
+        let json = output.done();
+        assert_eq!(json["device"] == "cpu", device == "cpu", "{}", output.err);
     }
     let [(names, cpu), (_, gpu)] =
         ["cpu", "gpu"].map(|device| workshop.table(&format!("out/{device}/history.csv")));
@@ -213,8 +213,8 @@ fn solutions_that_a_device_leaves_to_the_processor_are_counted() {
     let json = gpu.run(&[linear]).done();
     let [left, all] = ["left_to_cpu", "solutions"].map(|key| json["solver"][key].as_u64().unwrap());
     assert!(left > 0 && left <= all, "{json}");
-    let told = format!("| solutions that the GPU left to the CPU | {left} of {all} |");
-    assert!(gpu.read("out/case/summary.md").contains(&told), "{told}");
+    let row = format!("| solutions that the GPU left to the CPU | {left} of {all} |");
+    assert!(gpu.read("out/case/summary.md").contains(&row), "{row}");
 }
 
 #[test]
@@ -234,22 +234,22 @@ fn equations_that_a_device_does_not_solve_are_refused_by_name() {
             "`aggregates` or `block-jacobi`",
         ),
     ] {
-        let told = tube("device = \"gpu\"").check(&[&given]);
-        assert_eq!(told.status(), "invalid", "{}", told.err);
-        assert!(told.words().contains(says) && told.words().contains(help), "{given}: {}", told.err);
+        let output = tube("device = \"gpu\"").check(&[&given]);
+        assert_eq!(output.status(), "invalid", "{}", output.err);
+        assert!(output.words().contains(says) && output.words().contains(help), "{given}: {}", output.err);
     }
-    let told = tube("device = \"auto\"").run(&["run.linear=direct"]);
-    assert_eq!(told.done()["device"], "cpu");
-    assert!(told.words().contains("the linear solver `direct` runs on the CPU only"), "{}", told.err);
+    let output = tube("device = \"auto\"").run(&["run.linear=direct"]);
+    assert_eq!(output.done()["device"], "cpu");
+    assert!(output.words().contains("the linear solver `direct` runs on the CPU only"), "{}", output.err);
     if !pliant_testing::has_gpu(adapters().len()) {
         return;
     }
-    let told = tube("device = \"gpu\"\ndesign = \"gather\"").check(&[]);
-    assert_eq!(told.status(), "invalid", "{}", told.err);
+    let output = tube("device = \"gpu\"\ndesign = \"gather\"").check(&[]);
+    assert_eq!(output.status(), "invalid", "{}", output.err);
     assert!(
-        told.underlines("design = \"gather\"") && told.words().contains("about explicit solids"),
+        output.underlines("design = \"gather\"") && output.words().contains("about explicit solids"),
         "{}",
-        told.err
+        output.err
     );
 }
 
@@ -294,18 +294,22 @@ fn explicit_shells_run_on_a_device_as_on_the_processor() {
 
 #[test]
 fn explicit_shells_that_only_the_processor_has_are_refused_by_name() {
-    let told = Workshop::new(&explicit_tube("device = \"gpu\"\nprecision = \"double\"")).check(&[]);
-    assert!(told.underlines("precision = \"double\"") || told.underlines("device = \"gpu\""), "{}", told.err);
-    assert!(told.words().contains("double precision runs on the CPU only"), "{}", told.err);
+    let output = Workshop::new(&explicit_tube("device = \"gpu\"\nprecision = \"double\"")).check(&[]);
+    assert!(
+        output.underlines("precision = \"double\"") || output.underlines("device = \"gpu\""),
+        "{}",
+        output.err
+    );
+    assert!(output.words().contains("double precision runs on the CPU only"), "{}", output.err);
     let spring = "\n[constraint.bed]\ntype = \"spring\"\nbody = \"tube\"\nnodes = \"all\"\nstiffness = 1\n";
     let sprung = |device: &str| Workshop::new(&(explicit_tube(device) + spring));
-    let told = sprung("device = \"gpu\"").check(&[]);
-    assert_eq!(told.status(), "invalid", "{}", told.err);
-    assert!(told.underlines("device = \"gpu\""), "{}", told.err);
-    assert!(told.words().contains("a spring on explicit shells runs on the CPU only"), "{}", told.err);
-    let told = sprung("device = \"auto\"").run(&["scene.until=1e-4"]);
-    assert_eq!(told.done()["device"], "cpu");
-    assert!(told.words().contains("a spring on explicit shells runs on the CPU only"), "{}", told.err);
+    let output = sprung("device = \"gpu\"").check(&[]);
+    assert_eq!(output.status(), "invalid", "{}", output.err);
+    assert!(output.underlines("device = \"gpu\""), "{}", output.err);
+    assert!(output.words().contains("a spring on explicit shells runs on the CPU only"), "{}", output.err);
+    let output = sprung("device = \"auto\"").run(&["scene.until=1e-4"]);
+    assert_eq!(output.done()["device"], "cpu");
+    assert!(output.words().contains("a spring on explicit shells runs on the CPU only"), "{}", output.err);
 }
 
 /// A hand and a force from outside move them as on the processor, and again from a snapshot: 1e-5 of the largest displacement and of the work.
@@ -413,9 +417,9 @@ fn a_failed_run_on_a_device_names_element_and_time() {
         return;
     }
     let crushed = changed(BLOCK, "by = [0, 0, 0.001]", "by = [0, 0, -0.12]");
-    let told = Workshop::new(&changed(&crushed, "precision = \"double\"", "device = \"gpu\"")).run(&[STEP]);
-    assert_eq!(told.status(), "failed", "{}", told.err);
-    let error = &told.json()["error"];
+    let output = Workshop::new(&changed(&crushed, "precision = \"double\"", "device = \"gpu\"")).run(&[STEP]);
+    assert_eq!(output.status(), "failed", "{}", output.err);
+    let error = &output.json()["error"];
     assert!(["inverted", "not-finite", "unstable"].contains(&error["kind"].as_str().unwrap()), "{error}");
     assert_eq!(error["body"], "block");
     assert!(error["node"].is_u64() && error["time"].as_f64().is_some_and(|time| time > 0.0), "{error}");

@@ -19,9 +19,9 @@ fn workshop(mesh: &str, law: &str) -> Workshop {
 fn a_scene_names_an_image_and_laws_by_label() {
     let mesh = "{ image = \"seg.nii.gz\", labels = [5, 8], edge = 0.006, as = \"tets\", clean = { keep-largest = true } }";
     let workshop = workshop(mesh, "{ 5 = \"tissue\", 8 = \"core\" }");
-    let told = workshop.check(&[]);
-    assert_eq!(told.status(), "checked", "{}", told.err);
-    assert!(told.out.contains("seg.nii.gz (NIfTI-1), label 5, 8, tets of 0.006 m"), "{}", told.out);
+    let output = workshop.check(&[]);
+    assert_eq!(output.status(), "checked", "{}", output.err);
+    assert!(output.out.contains("seg.nii.gz (NIfTI-1), label 5, 8, tets of 0.006 m"), "{}", output.out);
     let ran = workshop.run(&[]);
     let json = ran.done();
     assert!(ran.words().contains("1 voxels removed in 1 smaller pieces"), "{}", ran.err);
@@ -36,8 +36,8 @@ fn vessels_belong_to_the_organ_where_they_run_inside_of_it() {
         let mesh = format!(
             "{{ image = \"seg.nii.gz\", label = 5, edge = 0.006, clean = {{ keep-largest = true }}{vessels} }}"
         );
-        let told = workshop(&mesh, "\"tissue\"").run(&["scene.until=1e-5"]);
-        (told.done()["mass"].as_f64().unwrap(), told.words())
+        let output = workshop(&mesh, "\"tissue\"").run(&["scene.until=1e-5"]);
+        (output.done()["mass"].as_f64().unwrap(), output.words())
     };
     // A ball of 15 mm, hollow for the core of 7 mm, which 6 mm hardly resolve; of water's density.
     let (hollow, _) = mass("");
@@ -55,8 +55,8 @@ fn vessels_belong_to_the_organ_where_they_run_inside_of_it() {
 fn a_scene_asks_for_larger_cells_inside_and_for_a_distance() {
     let elements = |edge: &str, more: &str| {
         let mesh = format!("{{ image = \"seg.nii.gz\", threshold = 5, edge = {edge}{more} }}");
-        let told = workshop(&mesh, "\"tissue\"").run(&["scene.until=1e-5"]);
-        (told.done()["elements"].as_u64().unwrap(), told.words())
+        let output = workshop(&mesh, "\"tissue\"").run(&["scene.until=1e-5"]);
+        (output.done()["elements"].as_u64().unwrap(), output.words())
     };
     let (even, _) = elements("0.0015", "");
     let (graded, _) = elements("0.0015", ", inner-edge = 0.006");
@@ -105,16 +105,16 @@ fn shells_of_an_image_become_a_wall() {
         .read("case/scene.toml")
         .replace("[law.tissue]", "[run]\nsolver = \"static\"\n\n[law.tissue]");
     workshop.write("case/scene.toml", text);
-    let told = workshop.check(&[]);
-    assert_eq!(told.status(), "checked", "{}", told.err);
-    assert!(told.out.contains("label 5, 8, 80 shells"), "{}", told.out);
+    let output = workshop.check(&[]);
+    assert_eq!(output.status(), "checked", "{}", output.err);
+    assert!(output.out.contains("label 5, 8, 80 shells"), "{}", output.out);
 }
 
 /// Whether the mesh of a run came from the cache.
 fn cached(workshop: &Workshop, set: &[&str]) -> Option<bool> {
-    let told = workshop.run(set);
-    told.done();
-    match (told.err.contains("seg.nii.gz: from the cache"), told.err.contains("stored in the cache")) {
+    let output = workshop.run(set);
+    output.done();
+    match (output.err.contains("seg.nii.gz: from the cache"), output.err.contains("stored in the cache")) {
         (false, false) => None,
         (hit, _) => Some(hit),
     }
@@ -150,11 +150,11 @@ fn a_kept_mesh_still_warns() {
     let workshop = workshop("{ image = \"seg.nii.gz\", label = 5, edge = 0.008 }", "\"tissue\"");
     workshop.write("case/seg.nii.gz", Volume::ball_with_a_rod(5).packed());
     for kept in ["stored in the cache", "from the cache"] {
-        let told = workshop.run(&[]);
+        let output = workshop.run(&[]);
         assert!(
-            told.words().contains(kept) && told.words().contains("the mesh misses a part of the body"),
+            output.words().contains(kept) && output.words().contains("the mesh misses a part of the body"),
             "{}",
-            told.err
+            output.err
         );
     }
 }
@@ -177,10 +177,10 @@ fn mistakes_about_images_are_underlined_in_the_scene() {
         ("{ image = \"seg.nii.gz\", label = 5, vesels = [8], edge = 0.006 }", "`vessels`"),
         ("{ image = \"seg.nii.gz\", threshold = 5, vessels = [8], edge = 0.006 }", "chosen by `threshold`"),
     ] {
-        let told = workshop(mesh, "\"tissue\"").check(&[]);
-        assert_eq!(told.status(), "invalid", "{mesh}: {}", told.err);
-        assert!(told.underlines(&format!("mesh = {mesh}")), "{mesh}: {}", told.err);
-        assert!(told.words().contains(says), "{mesh}: no `{says}` in {}", told.err);
+        let output = workshop(mesh, "\"tissue\"").check(&[]);
+        assert_eq!(output.status(), "invalid", "{mesh}: {}", output.err);
+        assert!(output.underlines(&format!("mesh = {mesh}")), "{mesh}: {}", output.err);
+        assert!(output.words().contains(says), "{mesh}: no `{says}` in {}", output.err);
     }
 }
 
@@ -223,9 +223,9 @@ fn unknown_names_are_refused_where_they_stand_with_those_there_are() {
             "`liver` is label 1, which has a value",
         ),
     ] {
-        let told = by_names(&[[from, to]]).check(&[]);
-        let words = told.words();
-        assert_eq!(told.status(), "invalid", "{to}: {}", told.err);
+        let output = by_names(&[[from, to]]).check(&[]);
+        let words = output.words();
+        assert_eq!(output.status(), "invalid", "{to}: {}", output.err);
         assert!(words.contains(piece), "{to}: {words}");
         let lists = words.contains("1 (liver), 2 (spleen), 3 (tumour)") || to.contains("density");
         assert!(lists, "{to}: {words}");

@@ -46,9 +46,9 @@ fn laws_go_by_label_over_tets_and_hexes_of_one_body() {
         changed(FROM_FILE, "law = \"tissue\"", "law = { 1 = \"tissue\", 2 = \"tissue\", 3 = \"tissue\" }");
     let workshop = Workshop::new(&scene);
     workshop.write("case/organ.vtk", vtk(&points, &cells, &labels(&[1, 1, 1, 2, 2, 2, 3])));
-    let told = workshop.run(&[]);
-    assert_eq!(told.done()["elements"], 7);
-    assert!(told.err.contains("`organ` is made of 2 separate parts"), "{}", told.err);
+    let output = workshop.run(&[]);
+    assert_eq!(output.done()["elements"], 7);
+    assert!(output.err.contains("`organ` is made of 2 separate parts"), "{}", output.err);
 }
 
 #[test]
@@ -120,9 +120,9 @@ fn every_selection_finds_its_nodes_in_a_scene() {
     ];
     let count = |workshop: &Workshop, base: &str, from: &str, to: &str| {
         workshop.write("case/scene.toml", changed(base, from, &format!("nodes = {to}")));
-        let told = workshop.check(&[]);
-        assert_eq!(told.status(), "checked", "{to}: {}", told.err);
-        let line = told.out.lines().find(|line| line.starts_with("constraint `base`")).unwrap().to_owned();
+        let output = workshop.check(&[]);
+        assert_eq!(output.status(), "checked", "{to}: {}", output.err);
+        let line = output.out.lines().find(|line| line.starts_with("constraint `base`")).unwrap().to_owned();
         line.split_whitespace().rev().nth(1).unwrap().parse::<usize>().unwrap()
     };
     // The other constraint would contradict most of them.
@@ -219,9 +219,9 @@ fn scale_and_at_bring_a_mesh_to_metres_and_in_place() {
     let scene = changed(FROM_FILE, "\"organ.vtk\"", "\"organ.vtk\", scale = 0.001, at = [0.5, 0, 0]");
     let workshop = Workshop::new(&scene);
     workshop.write("case/organ.vtk", vtk(&millimetres, &TETS, ""));
-    let told = workshop.run(&[]);
-    assert_close(told.done()["mass"].as_f64().unwrap(), 1.0, 1e-12, "mass [kg]");
-    assert_eq!(told.err, "", "nothing to doubt");
+    let output = workshop.run(&[]);
+    assert_close(output.done()["mass"].as_f64().unwrap(), 1.0, 1e-12, "mass [kg]");
+    assert_eq!(output.err, "", "nothing to doubt");
     let mesh = workshop.series("out/case/fields.pvd").remove(0).1.mesh;
     let (low, high) = mesh.bounds().unwrap();
     assert_close(low.x, 0.5, 1e-12, "left end [m]");

@@ -422,18 +422,22 @@ fn the_shipped_scenes_leave_no_doubts() {
     let entries = fs::read_dir(Path::new(ROOT).join("scenes")).unwrap().map(|entry| entry.unwrap());
     for folder in entries.filter(|entry| entry.path().is_dir()) {
         let name = folder.file_name().into_string().unwrap();
-        let told = Workshop::shipped(&name).check(&[]);
+        let output = Workshop::shipped(&name).check(&[]);
         // An intra-ocular lens of 0.3 mm with so few nodes is at the limit of a thin wall, and the scene says so.
         if name == "lens" {
-            assert!(told.err.contains("of `lens` are thicker than their smallest altitude"), "{}", told.err);
+            assert!(
+                output.err.contains("of `lens` are thicker than their smallest altitude"),
+                "{}",
+                output.err
+            );
             assert_eq!(
-                (told.status(), told.err.matches("triangles of").count()),
+                (output.status(), output.err.matches("triangles of").count()),
                 ("checked", 1),
                 "{}",
-                told.err
+                output.err
             );
             continue;
         }
-        assert_eq!((told.status(), told.err.as_str()), ("checked", ""), "{name}");
+        assert_eq!((output.status(), output.err.as_str()), ("checked", ""), "{name}");
     }
 }

@@ -24,10 +24,10 @@ fn assert_resumes(scene: &str, threads: [&str; 3], what: &str) {
     fs::remove_file(&written[1]).unwrap();
     let history = workshop.read("out/parts/history.csv");
     workshop.write("out/parts/history.csv", &history[..history.len() - 150]);
-    let told = workshop.resume("out/parts", &[&on_threads(threads[2])]);
+    let output = workshop.resume("out/parts", &[&on_threads(threads[2])]);
     // Solvers with equations write their residuals, too.
     let residuals = ["\"implicit\"", "\"static\""].iter().any(|solver| scene.contains(solver));
-    assert_eq!(told.done()["files"].as_array().unwrap().len(), 5 + usize::from(residuals), "{what}");
+    assert_eq!(output.done()["files"].as_array().unwrap().len(), 5 + usize::from(residuals), "{what}");
     workshop.assert_same_files("out/whole", "out/parts", what);
     assert!(workshop.read("out/parts/summary.md").contains("Resumed at t = 0.0"), "{what}");
     let again = workshop.checkpoints("out/parts");
@@ -114,8 +114,8 @@ fn a_resumed_run_with_mass_scaling_ends_in_the_same_bits_and_refuses_another_one
     assert_resumes(&scene, ["1", "2", "1"], "mass scaling");
     let workshop = Workshop::new(&scene);
     workshop.run(&[]).done();
-    let told = workshop.resume("out/case", &["run.mass-scaling.share=0.03", "scene.until=0.2"]);
-    refused(&told, &["`run.mass-scaling` differs"]);
+    let output = workshop.resume("out/case", &["run.mass-scaling.share=0.03", "scene.until=0.2"]);
+    refused(&output, &["`run.mass-scaling` differs"]);
 }
 
 #[test]
@@ -244,10 +244,13 @@ fn a_run_killed_after_its_last_checkpoint_gets_its_end() {
 fn a_longer_until_goes_on_from_the_end() {
     let workshop = Workshop::new(&resumable("hex8", "step = 5e-4", true));
     workshop.run_into("out/parts", &[]).done();
-    let told = workshop.resume("out/parts", &[]);
-    refused(&told, &["the checkpoint is at t = 0.1000 s, and the scene ends at 0.1000 s", "`--until`"]);
-    let told = workshop.resume("out/parts", &["scene.until=0.05"]);
-    refused(&told, &["the checkpoint is at t = 0.1000 s, after the end of the scene at 0.0500", "`--until`"]);
+    let output = workshop.resume("out/parts", &[]);
+    refused(&output, &["the checkpoint is at t = 0.1000 s, and the scene ends at 0.1000 s", "`--until`"]);
+    let output = workshop.resume("out/parts", &["scene.until=0.05"]);
+    refused(
+        &output,
+        &["the checkpoint is at t = 0.1000 s, after the end of the scene at 0.0500", "`--until`"],
+    );
     workshop.resume("out/parts", &["scene.until=0.2"]).done();
     workshop.run_into("out/whole", &["scene.until=0.2"]).done();
     // The final time of the first part has its own row and frame.
@@ -287,8 +290,13 @@ fn a_failing_resumed_run_loses_nothing() {
     // A frame that cannot be written ends the run at the first one after the checkpoint.
     let next = workshop.path("out/parts/fields/000007.vtu.tmp");
     fs::create_dir(&next).unwrap();
-    let told = workshop.resume("out/parts", &[]);
-    assert_eq!((told.status(), &told.json()["error"]["kind"]), ("failed", &"output".into()), "{}", told.err);
+    let output = workshop.resume("out/parts", &[]);
+    assert_eq!(
+        (output.status(), &output.json()["error"]["kind"]),
+        ("failed", &"output".into()),
+        "{}",
+        output.err
+    );
     fs::remove_dir(&next).unwrap();
     let after = workshop.files("out/parts");
     for (before, after) in before.iter().zip(&after).filter(|(file, _)| !file.0.ends_with("plot.svg")) {
@@ -335,8 +343,8 @@ fn a_list_of_frames_that_is_torn_is_made_whole() {
         workshop.assert_same_files("out/whole", &folder, torn);
     }
     let checkpoint = stopped_run("out/refused", &list[..entries[5] + 40]);
-    let told = workshop.resume(&checkpoint, &[]);
-    refused(&told, &["it does not list the frames of the interrupted run"]);
+    let output = workshop.resume(&checkpoint, &[]);
+    refused(&output, &["it does not list the frames of the interrupted run"]);
     workshop.write("out/refused/fields.pvd", list.replacen("timestep=\"0.0", "timestep=0.0", 1));
     refused(&workshop.resume(&checkpoint, &[]), &["not XML"]);
 }
@@ -357,10 +365,10 @@ fn a_list_that_is_torn_at_the_end_of_a_run_is_made_whole() {
 
 /// Asserts that a run was rejected in these words.
 #[track_caller]
-fn refused(told: &Told, pieces: &[&str]) {
-    assert_eq!(told.status(), "invalid", "{}", told.err);
+fn refused(output: &Told, pieces: &[&str]) {
+    assert_eq!(output.status(), "invalid", "{}", output.err);
     for piece in pieces {
-        assert!(told.words().contains(piece), "no `{piece}` in {}", told.err);
+        assert!(output.words().contains(piece), "no `{piece}` in {}", output.err);
     }
 }
 
@@ -407,13 +415,13 @@ fn a_checkpoint_of_another_scene_is_refused_with_what_differs() {
     // A curve that ends with the scene is another one in a longer scene.
     workshop.write("case/scene.toml", changed(&scene, "to = 0.08\n", ""));
     workshop.run_into("out/open", &[]).done();
-    let told = workshop.resume("out/open", &["scene.until=0.2"]);
-    refused(&told, &["constraint `hand` differs", "write `to = 0.1`"]);
+    let output = workshop.resume("out/open", &["scene.until=0.2"]);
+    refused(&output, &["constraint `hand` differs", "write `to = 0.1`"]);
     // Damping by stiffness, which also shortens automatic steps.
     workshop.write("case/scene.toml", changed(&scene, "[run]", "[run]\nstep = 1e-4"));
     workshop.run_into("out/stepped", &[]).done();
-    let told = workshop.resume("out/stepped", &["body.block.stiffness-damping=1e-5"]);
-    refused(&told, &["damping by stiffness of solids differs", "run from the start"]);
+    let output = workshop.resume("out/stepped", &["body.block.stiffness-damping=1e-5"]);
+    refused(&output, &["damping by stiffness of solids differs", "run from the start"]);
     assert!(workshop.files("out/case") == before);
 }
 
@@ -446,8 +454,8 @@ fn a_folder_that_does_not_hold_what_a_checkpoint_continues_is_refused() {
     let workshop = interrupted(&resumable("hex8", "", true));
     let before = workshop.files("out/case");
     let outputs = "does not hold what the checkpoint continues";
-    let told = workshop.resume_in("out/case", "elsewhere");
-    refused(&told, &[outputs, "there is no such folder", "`--out DIR`"]);
+    let output = workshop.resume_in("out/case", "elsewhere");
+    refused(&output, &[outputs, "there is no such folder", "`--out DIR`"]);
     assert!(!workshop.path("elsewhere").exists());
     let history = workshop.read("out/case/history.csv");
     workshop.write("out/case/history.csv", &history[..history.len() / 2]);

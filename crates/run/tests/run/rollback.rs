@@ -34,8 +34,8 @@ nodes = { set = "x-min" }
 #[test]
 fn a_run_whose_step_fails_goes_back_and_halves_its_steps() {
     let workshop = Workshop::new(&pressed(SOON));
-    let told = workshop.run(&[]).done();
-    assert_eq!(told["stability"]["halvings"], 1, "{told}");
+    let output = workshop.run(&[]).done();
+    assert_eq!(output["stability"]["halvings"], 1, "{output}");
     assert!(workshop.read("out/case/summary.md").contains("went back 1 time"));
     // Each instant once, and the rows before the state that it went back to are those of a run until then.
     let (names, rows) = workshop.table("out/case/history.csv");
@@ -59,8 +59,8 @@ fn a_run_that_is_resumed_before_or_after_it_went_back_ends_in_the_same_bits() {
     for until in ["2.5", "3.5"] {
         let parts = format!("out/until-{until}");
         workshop.run_into(&parts, &[&format!("scene.until={until}")]).done();
-        let told = workshop.resume(&parts, &[]).done();
-        assert_eq!(told["stability"]["halvings"], 1, "{until}");
+        let output = workshop.resume(&parts, &[]).done();
+        assert_eq!(output["stability"]["halvings"], 1, "{until}");
         // Samples of the plot follow the time at which a run was to end.
         let files = |folder: &str| {
             let mut files = workshop.files(folder);
@@ -73,9 +73,9 @@ fn a_run_that_is_resumed_before_or_after_it_went_back_ends_in_the_same_bits() {
 
 #[test]
 fn steps_are_halved_three_times_at_most() {
-    let told = Workshop::new(&pressed(AT_ONCE)).run(&[]);
-    let json = told.json();
-    assert_eq!((told.status(), &json["stability"]["halvings"]), ("failed", &3.into()), "{json}");
+    let output = Workshop::new(&pressed(AT_ONCE)).run(&[]);
+    let json = output.json();
+    assert_eq!((output.status(), &json["stability"]["halvings"]), ("failed", &3.into()), "{json}");
     assert!(json["error"]["message"].as_str().unwrap().contains("`step`"), "{json}");
 }
 
@@ -83,8 +83,8 @@ fn steps_are_halved_three_times_at_most() {
 fn all_participants_go_back_together() {
     let scene = pressed(SOON).replacen("until = 4.0", "until = 4.0\ngravity = [0, 0, -1]", 1);
     let workshop = Workshop::new(&(scene + SHELL));
-    let told = workshop.run(&[]).done();
-    assert!(told.to_string().contains("\"halvings\":1"), "{told}");
+    let output = workshop.run(&[]).done();
+    assert!(output.to_string().contains("\"halvings\":1"), "{output}");
     // The shell swings as it does beside a cube that never fails.
     workshop.run_into("out/calm", &["constraint.top.by=[0,0,0]"]).done();
     let [both, calm] = ["out/case/history.csv", "out/calm/history.csv"].map(|name| workshop.table(name));
@@ -106,8 +106,8 @@ fn a_run_on_a_gpu_goes_back_too() {
     let on = |device: &str| Workshop::new(&pressed(SOON).replace("precision = \"double\"", device));
     let [gpu, cpu] = [on("device = \"gpu\""), on("precision = \"single\"")]
         .map(|own| (own.run(&[]).done(), own.table("out/case/history.csv")));
-    for (told, (_, rows)) in [&gpu, &cpu] {
-        assert_eq!((told["stability"]["halvings"].as_u64(), rows.len()), (Some(1), 401), "{told}");
+    for (output, (_, rows)) in [&gpu, &cpu] {
+        assert_eq!((output["stability"]["halvings"].as_u64(), rows.len()), (Some(1), 401), "{output}");
     }
     let column = cpu.1.0.iter().position(|name| name == "reaction.top.z").unwrap();
     let [last, other] = [&gpu, &cpu].map(|(_, (_, rows))| rows.last().unwrap()[column]);

@@ -9,9 +9,9 @@ use crate::support::{assert_close, keys, squeezed};
 
 #[test]
 fn a_state_that_is_no_longer_finite_ends_the_run() {
-    let told = Workshop::block("acceleration = [1, 0, 0]", "acceleration = [1e308, 0, 0]").run(&[]);
-    assert_eq!(told.status(), "failed", "{}", told.err);
-    let error = &told.json()["error"];
+    let output = Workshop::block("acceleration = [1, 0, 0]", "acceleration = [1e308, 0, 0]").run(&[]);
+    assert_eq!(output.status(), "failed", "{}", output.err);
+    let error = &output.json()["error"];
     assert_eq!(error["kind"], "not-finite");
     assert_eq!(error["body"], "block");
     assert!(error["node"].is_u64() && error["time"].is_f64() && error["element"].is_null(), "{error}");
@@ -49,8 +49,8 @@ fn every_law_runs_by_its_name() {
         let mut scene = changed(BLOCK, "\"transversely-isotropic\"", &format!("\"{name}\""));
         scene = scene.replace(elastic, matrix).replace("fibre-modulus = 5e3", own);
         let workshop = Workshop::new(&scene);
-        let told = workshop.run(&[]);
-        assert_eq!(told.status(), "done", "{name}: {}", told.err);
+        let output = workshop.run(&[]);
+        assert_eq!(output.status(), "done", "{name}: {}", output.err);
     }
 }
 
@@ -59,10 +59,10 @@ fn a_law_beyond_its_locking_strain_ends_the_run_with_an_error() {
     let scene = changed(BLOCK, "\"transversely-isotropic\"", "\"gent\"")
         .replace("fibre-modulus = 5e3", "limit = 0.05")
         .replace("by = [0, 0, 0.001]", "by = [0, 0, 0.1]");
-    let told = Workshop::new(&scene).run(&[]);
-    assert_eq!(told.status(), "failed", "{}", told.err);
-    assert_eq!(told.json()["status"], "failed");
-    assert!(told.err.contains("of `block`") && told.err.contains("t = "), "{}", told.err);
+    let output = Workshop::new(&scene).run(&[]);
+    assert_eq!(output.status(), "failed", "{}", output.err);
+    assert_eq!(output.json()["status"], "failed");
+    assert!(output.err.contains("of `block`") && output.err.contains("t = "), "{}", output.err);
 }
 
 /// A block of soft tissue that gravity, set in at once, stretches by 38 %.
@@ -126,21 +126,21 @@ fn steps_are_cut_where_the_stable_one_falls_below_them_and_it_is_told() {
 
 #[test]
 fn below_the_stable_step_a_run_can_stop_or_only_report() {
-    let told = Workshop::new(&changed(SOFT, "\"substep\"", "\"stop\"")).run(&[]);
-    assert_eq!(told.status(), "failed");
-    let error = &told.json()["error"];
+    let output = Workshop::new(&changed(SOFT, "\"substep\"", "\"stop\"")).run(&[]);
+    assert_eq!(output.status(), "failed");
+    let error = &output.json()["error"];
     assert_eq!((&error["kind"], &error["body"]), (&"unstable".into(), &"block".into()));
     assert!(error["element"].is_u64() && error["node"].is_u64() && error["time"].is_f64(), "{error}");
     for piece in ["the largest stable step has fallen to", "smaller `step`", "on-unstable"] {
-        assert!(told.err.contains(piece), "no `{piece}` in {}", told.err);
+        assert!(output.err.contains(piece), "no `{piece}` in {}", output.err);
     }
-    let told = Workshop::new(&changed(SOFT, "\"substep\"", "\"report\"")).run(&["scene.until=0.11"]);
-    let seen = &told.json()["stability"];
+    let output = Workshop::new(&changed(SOFT, "\"substep\"", "\"report\"")).run(&["scene.until=0.11"]);
+    let seen = &output.json()["stability"];
     assert!(seen["steps_below"].as_u64() > Some(0) && seen["extra_steps"] == 0, "{seen}");
     assert!(
-        told.err.contains("warning: smallest stable step seen") && told.err.contains("below the step"),
+        output.err.contains("warning: smallest stable step seen") && output.err.contains("below the step"),
         "{}",
-        told.err
+        output.err
     );
 }
 
@@ -159,8 +159,8 @@ fn mass_scaling_enlarges_the_step_tells_the_added_mass_and_leaves_forces_at_rest
     };
     let to = |factor: f64| scaled(&format!("target-step = {:e}", factor * before));
     let workshop = to(1.02);
-    let told = workshop.run(&[]);
-    let done = told.done();
+    let output = workshop.run(&[]);
+    let done = output.done();
     let added = &done["added_mass"];
     let reached = done["critical_step"].as_f64().unwrap() / before;
     assert!((1.02..1.04).contains(&reached), "{reached} × the critical time step");
@@ -183,10 +183,10 @@ fn mass_scaling_enlarges_the_step_tells_the_added_mass_and_leaves_forces_at_rest
     }
     let told_share = format!("{percent:.2} %");
     assert!(
-        told.err.contains("note: mass scaling adds")
-            && told.err.contains(&format!("{told_share} of the mass")),
+        output.err.contains("note: mass scaling adds")
+            && output.err.contains(&format!("{told_share} of the mass")),
         "{}",
-        told.err
+        output.err
     );
     let page = workshop.read("out/case/summary.md");
     assert!(page.contains("| mass added by scaling |") && page.contains("| critical time step without it |"));
@@ -227,8 +227,8 @@ fn hourglass_energy_above_5_percent_is_warned_about() {
     let coarse = changed(SOFT, "cells = [8, 4, 4]", "cells = [2, 1, 1]");
     let coarse = changed(&changed(&coarse, "[output.history]", pulled), "gravity = [9.81, 0, 0]", "");
     let workshop = Workshop::new(&coarse);
-    let told = workshop.run(&[]);
-    let done = told.done();
+    let output = workshop.run(&[]);
+    let done = output.done();
     let warning = done["warnings"][0].as_str().unwrap();
     for piece in [
         "hourglass control holds",
@@ -240,7 +240,7 @@ fn hourglass_energy_above_5_percent_is_warned_about() {
     ] {
         assert!(warning.contains(piece), "no `{piece}` in {warning}");
     }
-    assert!(told.err.contains(&format!("warning: {warning}")), "{}", told.err);
+    assert!(output.err.contains(&format!("warning: {warning}")), "{}", output.err);
     assert!(workshop.read("out/case/summary.md").contains(&format!("**Warning:** {warning}")));
     let full = changed(&coarse, "density = 1000", "density = 1000\nelement = \"hex8-full\"");
     assert_eq!(Workshop::new(&full).run(&[]).done()["warnings"], serde_json::json!([]));
@@ -308,9 +308,9 @@ fn a_quasi_static_body_that_nothing_holds_is_refused_while_it_runs() {
         .replace("until = 1.0", "until = 1.0\ngravity = [0, 0, -9.81]")
         .replace("nodes = { set = \"x-min\" }", "nodes = { set = \"x-min\" }\ncomponents = [\"y\"]")
         .replace("by = [0, 0, 0.01]", "by = [0, 0, 0.01]\ncomponents = [\"y\"]");
-    let told = Workshop::new(&free).run(&[]);
-    assert_eq!(told.status(), "failed", "{}", told.err);
-    let error = &told.json()["error"];
+    let output = Workshop::new(&free).run(&[]);
+    assert_eq!(output.status(), "failed", "{}", output.err);
+    let error = &output.json()["error"];
     assert_eq!(error["kind"], "not-converged");
     assert_eq!(keys(&error["load_step"]), ["number", "of", "iterations", "residual"]);
     assert_eq!(
@@ -320,7 +320,7 @@ fn a_quasi_static_body_that_nothing_holds_is_refused_while_it_runs() {
     assert!(error["load_step"]["residual"].as_f64().unwrap() > 1e-9 && error["node"].is_number(), "{error}");
     // Gravity acts from the start: its equilibrium comes before the first load step.
     for piece in ["the loads at t = 0: no equilibrium", "largest at node", "iterations", "nothing holds"] {
-        assert!(told.err.contains(piece), "{}", told.err);
+        assert!(output.err.contains(piece), "{}", output.err);
     }
 }
 
@@ -328,8 +328,8 @@ fn a_quasi_static_body_that_nothing_holds_is_refused_while_it_runs() {
 fn load_steps_that_are_not_as_asked_or_not_equal_are_told() {
     let run = |lines: &str| {
         let workshop = Workshop::new(&bent("hex8", &format!("solver = \"quasi-static\"\n{lines}")));
-        let told = workshop.run(&[]);
-        (told.err.clone(), workshop.read("out/case/summary.md"), told.done())
+        let output = workshop.run(&[]);
+        (output.err.clone(), workshop.read("out/case/summary.md"), output.done())
     };
     let (said, page, json) = run("step = 0.3");
     let note = "a step of 0.3000 s does not divide the 1.000 s of the scene: it takes 4 steps of 0.2500 s";
@@ -368,54 +368,54 @@ fn load_steps_that_are_not_as_asked_or_not_equal_are_told() {
         ("step = 0.5\nload-steps = { times = [0.4] }", ["in two ways", "leave one of them out"]),
     ] {
         let scene = bent("hex8", &format!("solver = \"quasi-static\"\n{lines}"));
-        let told = Workshop::new(&scene).run(&[]);
+        let output = Workshop::new(&scene).run(&[]);
         assert!(
-            told.status() == "invalid" && pieces.iter().all(|piece| told.err.contains(piece)),
+            output.status() == "invalid" && pieces.iter().all(|piece| output.err.contains(piece)),
             "{}",
-            told.err
+            output.err
         );
     }
     let controlled = "solver = \"static\"\nload-steps = { times = [0.4] }\ncontrol = { load = \"pull\", arc-length = 0.1 }";
-    let told = Workshop::new(&bent("hex8", controlled)).run(&[]);
-    assert!(told.status() == "invalid" && told.err.contains("equal parts"), "{}", told.err);
+    let output = Workshop::new(&bent("hex8", controlled)).run(&[]);
+    assert!(output.status() == "invalid" && output.err.contains("equal parts"), "{}", output.err);
 }
 
 #[test]
 fn a_flattened_cube_ends_with_the_corner_that_turns_inside_out() {
     for by in ["-0.095", "-0.099", "-0.1"] {
-        let told = Workshop::new(&squeezed("hex8-full", "", &format!("by = [0, 0, {by}]"))).run(&[]);
-        assert_eq!(told.status(), "failed", "{by}: {}", told.err);
-        let error = &told.json()["error"];
+        let output = Workshop::new(&squeezed("hex8-full", "", &format!("by = [0, 0, {by}]"))).run(&[]);
+        assert_eq!(output.status(), "failed", "{by}: {}", output.err);
+        let error = &output.json()["error"];
         assert_eq!(error["kind"], "inverted", "{by}: {error}");
         for piece in ["at its corner at node", "(det F = ", "slower or smaller motion"] {
-            assert!(told.err.contains(piece), "{by}: no `{piece}` in {}", told.err);
+            assert!(output.err.contains(piece), "{by}: no `{piece}` in {}", output.err);
         }
         assert!(error["element"].is_number() && error["node"].is_number() && error["time"].is_number());
     }
     // One point a cell: hourglass control holds the corners apart for longer.
     for by in ["-0.095", "-0.099", "-0.1"] {
-        let told = Workshop::new(&squeezed("hex8", "", &format!("by = [0, 0, {by}]"))).run(&[]);
+        let output = Workshop::new(&squeezed("hex8", "", &format!("by = [0, 0, {by}]"))).run(&[]);
         assert_eq!(
-            (told.status(), &told.json()["error"]["kind"]),
+            (output.status(), &output.json()["error"]["kind"]),
             ("failed", &"inverted".into()),
             "{by}: {}",
-            told.err
+            output.err
         );
-        assert!(told.err.contains("at its corner at node"), "{by}: {}", told.err);
+        assert!(output.err.contains("at its corner at node"), "{by}: {}", output.err);
     }
     // Grown in load steps to the whole height.
     for element in ["hex8", "hex8-full"] {
         let ramp = "solver = \"quasi-static\"\nload-steps = 10";
-        let told = Workshop::new(&squeezed(element, ramp, "by = [0, 0, -0.1]\ncurve = \"ramp\"")).run(&[]);
-        assert_eq!(told.status(), "failed", "{element}: {}", told.err);
+        let output = Workshop::new(&squeezed(element, ramp, "by = [0, 0, -0.1]\ncurve = \"ramp\"")).run(&[]);
+        assert_eq!(output.status(), "failed", "{element}: {}", output.err);
     }
     let run = "solver = \"quasi-static\"\nload-steps = 2";
     for element in ["hex8", "hex8-full"] {
         let scene = squeezed(element, run, "by = [0, 0, -0.099]\ncurve = \"hold\"");
-        let told = Workshop::new(&scene).run(&[]);
-        assert_eq!(told.status(), "failed", "{element}: {}", told.err);
-        let advice = told.err.contains("inverted") && told.err.contains("let it grow over time");
-        assert!(advice && !told.err.contains("more load steps"), "{element}: {}", told.err);
+        let output = Workshop::new(&scene).run(&[]);
+        assert_eq!(output.status(), "failed", "{element}: {}", output.err);
+        let advice = output.err.contains("inverted") && output.err.contains("let it grow over time");
+        assert!(advice && !output.err.contains("more load steps"), "{element}: {}", output.err);
     }
 }
 

@@ -221,8 +221,8 @@ fn bodies_that_fall_onto_each_other_with_friction_keep_their_energy() {
     let failed: Vec<String> = (0..24)
         .filter_map(|seed| {
             let folder = tempfile::tempdir().expect("a folder");
-            let told = Workshop::new(&meeting(seed, folder.path())).run(&[]).json();
-            (told["status"] != "done").then(|| format!("{seed}: {}", told["error"]["message"]))
+            let output = Workshop::new(&meeting(seed, folder.path())).run(&[]).json();
+            (output["status"] != "done").then(|| format!("{seed}: {}", output["error"]["message"]))
         })
         .collect();
     assert!(failed.is_empty(), "{failed:#?}");

@@ -59,12 +59,12 @@ fn a_scene_fills_or_covers_the_surface_of_a_file() {
     let workshop = with_surface(&turned);
     let wall = "model = \"shell\"\nthickness = 1e-3\n";
     workshop.write("case/scene.toml", scene("shells = 80, as = \"shells\"", wall, "implicit"));
-    let told = workshop.check(&[]);
+    let output = workshop.check(&[]);
     assert!(
-        told.status() == "checked" && told.out.contains("what it encloses, 80 shells"),
+        output.status() == "checked" && output.out.contains("what it encloses, 80 shells"),
         "{}{}",
-        told.out,
-        told.err
+        output.out,
+        output.err
     );
     let ran = workshop.run(&[]);
     ran.done();
@@ -77,13 +77,13 @@ fn a_scene_fills_or_covers_the_surface_of_a_file() {
         ("as = \"tets\", edge = 0.1e-3", "cells"),
     ] {
         workshop.write("case/scene.toml", scene(mesh, "", "explicit"));
-        let told = workshop.check(&[]);
-        assert!(told.status() == "invalid" && told.words().contains(says), "{mesh}: {}", told.err);
+        let output = workshop.check(&[]);
+        assert!(output.status() == "invalid" && output.words().contains(says), "{mesh}: {}", output.err);
     }
     let mut open = ball();
     nodes(&mut open).drain(..1200);
     io::write(&workshop.path("case/ball.stl"), &open).unwrap();
     workshop.write("case/scene.toml", scene("as = \"tets\", edge = 0.002", "", "explicit"));
-    let told = workshop.check(&[]);
-    assert!(told.status() == "invalid" && told.words().contains("hole"), "{}", told.err);
+    let output = workshop.check(&[]);
+    assert!(output.status() == "invalid" && output.words().contains("hole"), "{}", output.err);
 }

@@ -68,6 +68,6 @@ fn a_curved_surface_that_is_none_is_refused() {
          law = 'coat'\ndensity = 1000\nthickness = 5e-4\n[tie.glue]\nbetween = ['coat', 'block']\n",
     )
     .replace("['block', 'ball']\n", "['coat', 'ball']\nthickness = 0\nsubdivision = 1\n");
-    let told = world(&coated).err().unwrap();
-    assert!(told.contains("of `coat` follows others by a tie"), "{told}");
+    let message = world(&coated).err().unwrap();
+    assert!(message.contains("of `coat` follows others by a tie"), "{message}");
 }

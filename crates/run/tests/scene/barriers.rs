@@ -123,8 +123,8 @@ fn a_gap_parts_the_shapes_at_rest() {
     let text = crossed("gap = 2e-4");
     let world = world(&text).unwrap();
     let notes: Vec<&str> = world.notes().map(AsRef::as_ref).collect();
-    let told = |word: &str| notes.iter().filter(|note| note.contains(word)).count();
-    assert!(told("too near each other were pushed apart before the run") == 1, "{notes:?}");
+    let notes_with = |word: &str| notes.iter().filter(|note| note.contains(word)).count();
+    assert!(notes_with("too near each other were pushed apart before the run") == 1, "{notes:?}");
     let built = &world.only().unwrap().built;
     assert!(built.pushed.is_none());
     // Of the nodes at the ends of the edges that went through each other.
@@ -137,7 +137,7 @@ fn a_gap_parts_the_shapes_at_rest() {
 
 #[test]
 fn bad_gaps_are_refused() {
-    for (given, told) in [
+    for (given, message) in [
         ("gap = 0", "greater than 0"),
         ("gap = -1e-4", "greater than 0"),
         ("gap = true", "`gap`"),
@@ -145,7 +145,7 @@ fn bad_gaps_are_refused() {
         ("gap = 0.2", "would invert element"),
     ] {
         let refused = world(&crossed(given)).err().unwrap_or_else(|| panic!("accepted: {given}"));
-        assert!(refused.contains(told), "{given}: {refused}");
+        assert!(refused.contains(message), "{given}: {refused}");
     }
 }
 
@@ -208,8 +208,8 @@ fn steps_that_do_not_converge_have_no_intersection_either() {
     assert!(effort.unconverged > 5 && effort.newton_iterations <= 20 * 3 * 4, "{effort:?}");
     let page = std::fs::read_to_string(out.path().join("out/summary.md")).unwrap();
     assert!(page.contains("steps that did not converge"), "{page}");
-    let told = world(&pressed("solver = 'static'\naccept-unconverged = true", "")).unwrap_err();
-    assert!(told.contains("`accept-unconverged` is for `solver = \"implicit\"`"), "{told}");
+    let message = world(&pressed("solver = 'static'\naccept-unconverged = true", "")).unwrap_err();
+    assert!(message.contains("`accept-unconverged` is for `solver = \"implicit\"`"), "{message}");
 }
 
 /// The block with a coat of a model on its top, on the nodes of the block or on a mesh of its own that is tied, which the ball presses.
@@ -255,8 +255,8 @@ fn a_tied_coat_is_pressed_as_one_on_the_nodes_of_its_block() {
     let run = "solver = 'implicit'\nstep = 0.05\ncheckpoint = { every = 0.4 }";
     resumes(&coated(run, "shell", "[7, 9]", "rotations = 'follow'\n"));
     let rigid = "[constraint.bone]\ntype = 'rigid'\nbody = 'block'\nnodes = { set = 'z-max' }\n";
-    let told = world(&coated(run, "shell", "[7, 9]", rigid)).err().unwrap();
-    assert!(told.contains("follows others by a rigid part or a mean"), "{told}");
+    let message = world(&coated(run, "shell", "[7, 9]", rigid)).err().unwrap();
+    assert!(message.contains("follows others by a rigid part or a mean"), "{message}");
 }
 
 /// Each mistake is refused with its place and a remedy.

@@ -158,14 +158,14 @@ fn what_bars_cannot_be_is_refused_by_name() {
         ),
     ] {
         assert!(text.contains(from), "{from}");
-        let told = world(&text.replacen(from, to, 1)).err().unwrap_or_else(|| panic!("accepted: {to}"));
-        assert!(pieces.iter().all(|piece| told.contains(piece)), "{told}");
+        let message = world(&text.replacen(from, to, 1)).err().unwrap_or_else(|| panic!("accepted: {to}"));
+        assert!(pieces.iter().all(|piece| message.contains(piece)), "{message}");
     }
     let fibres = text.replacen(
         "type = 'neo-hookean'\nyoung-modulus = 1e6",
         "type = 'transversely-isotropic'\nfibre = [0, 0, 1]\nfibre-modulus = 1e3\nyoung-modulus = 1e6",
         1,
     );
-    let told = world(&fibres).err().unwrap();
-    assert!(told.contains("has directions of its own") && told.contains("is a bar"), "{told}");
+    let message = world(&fibres).err().unwrap();
+    assert!(message.contains("has directions of its own") && message.contains("is a bar"), "{message}");
 }

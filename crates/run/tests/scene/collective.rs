@@ -271,7 +271,7 @@ fn what_cannot_be_bound_is_refused_by_name() {
         ),
     ] {
         let text = block(solver, constraint, more).replace("damping = 40\n", "\n");
-        let told = world(&text).err().unwrap_or_else(|| panic!("accepted: {constraint}"));
-        assert!(pieces.iter().all(|piece| told.contains(piece)), "{told}");
+        let message = world(&text).err().unwrap_or_else(|| panic!("accepted: {constraint}"));
+        assert!(pieces.iter().all(|piece| message.contains(piece)), "{message}");
     }
 }

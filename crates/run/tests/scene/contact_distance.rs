@@ -23,13 +23,13 @@ fn bodies_keep_a_distance_if_none_is_given() {
     let [floor, between, itself] = offsets(&usual);
     assert_eq!(floor, 0.0);
     assert!((2e-5..8e-5).contains(&between) && (2e-5..8e-5).contains(&itself), "{between} {itself}");
-    let told = world(&usual).unwrap();
+    let known = world(&usual).unwrap();
     for name in ["above", "itself"] {
         let note = format!("contact `{name}`: surfaces keep ");
-        let note = told.notes().find(|own| own.starts_with(&note)).unwrap();
+        let note = known.notes().find(|own| own.starts_with(&note)).unwrap();
         assert!(note.contains("0.5 % of their mean edge, since `thickness` is not given"), "{note}");
     }
-    assert!(!told.notes().any(|note| note.contains("contact `below`")));
+    assert!(!known.notes().any(|note| note.contains("contact `below`")));
     assert_eq!(offsets(&usual.replace("friction = 0.3\n", "friction = 0.3\nthickness = 0\n"))[1], 0.0);
     let [row, touching] = [&usual, &stacked("", "")].map(|text| last_row(text));
     let lies = |row: &std::collections::BTreeMap<String, f64>| row["probe.top.displacement.z"];

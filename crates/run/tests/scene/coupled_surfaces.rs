@@ -143,13 +143,13 @@ fn solids_of_two_participants_that_overlap_are_refused() {
         )
         .replace("thickness = 0.002\n", "");
     assert!(text.contains("'tets'"));
-    let told = world(&text).err().unwrap();
-    assert!(told.contains("overlap at the start") && told.contains("m deep"), "{told}");
+    let message = world(&text).err().unwrap();
+    assert!(message.contains("overlap at the start") && message.contains("m deep"), "{message}");
 }
 
 #[test]
 fn contacts_of_participants_that_cannot_be_are_refused_with_the_line() {
-    let told = |text: &str| world(text).err().unwrap_or_else(|| panic!("accepted:\n{text}"));
+    let message = |text: &str| world(text).err().unwrap_or_else(|| panic!("accepted:\n{text}"));
     let plain = pressed(0.01, 1.0, "");
     for (from, to, pieces) in [
         ("0.0212]", "0.015]", ["overlap at the start", "move one of them"]),
@@ -174,7 +174,7 @@ fn contacts_of_participants_that_cannot_be_are_refused_with_the_line() {
     ] {
         let text = plain.replace(from, to);
         assert_ne!(text, plain, "{from}");
-        let told = told(&text);
-        assert!(pieces.iter().all(|piece| told.contains(piece)), "{told}");
+        let message = message(&text);
+        assert!(pieces.iter().all(|piece| message.contains(piece)), "{message}");
     }
 }

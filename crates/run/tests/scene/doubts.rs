@@ -22,11 +22,11 @@ fn a_sheet_that_should_buckle_is_doubted() {
              [constraint.m]\ntype = 'move'\nbody = 'b'\nnodes = {{ set = 'x-max' }}\nby = [{by}, 0, 0]\n"
         )
     };
-    let told = |by| {
+    let buckles = |by| {
         warnings(&sheet(by)).0.iter().any(|text| text.contains("s on are unstable: the body would buckle"))
     };
-    assert!(told(-0.005));
-    assert!(!told(0.005));
+    assert!(buckles(-0.005));
+    assert!(!buckles(0.005));
 }
 
 /// A flat membrane in its plane: nothing holds it across but tension, which it does not have yet.
@@ -70,8 +70,8 @@ fn a_wall_that_swells_is_doubted() {
         )
     };
     let swells = |bulk| {
-        let (told, changes) = warnings(&wall(bulk));
-        (told.iter().any(|text| text.contains("`b` changes its volume by +")), changes[0])
+        let (message, changes) = warnings(&wall(bulk));
+        (message.iter().any(|text| text.contains("`b` changes its volume by +")), changes[0])
     };
     let ((soft, much), (stiff, little)) = (swells(3e4), swells(3e6));
     println!("J − 1: {much} and {little}");
@@ -93,7 +93,7 @@ fn a_membrane_that_wrinkles_is_doubted() {
         )
     };
     // E t ε/(1 − ν²) = 110 ε N/m against half of E* h/2π = 1.4 N/m: from 1.3 % on.
-    let told =
+    let message =
         |by| warnings(&coated(by)).0.iter().any(|text| text.contains("the membrane `skin` is compressed by"));
-    assert!(told(-0.0006) && !told(-0.0001) && !told(0.0006));
+    assert!(message(-0.0006) && !message(-0.0001) && !message(0.0006));
 }

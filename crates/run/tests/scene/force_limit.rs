@@ -30,8 +30,8 @@ fn a_tool_driven_through_a_body_stops_at_its_limit() {
         assert!((force / 2.0 - 1.0).abs() < 0.01, "{force} N");
         let out = tempfile::tempdir().unwrap();
         let summary = run(&text, out.path());
-        let told = |text: &String| text.contains("`finger` was held back by its `force-limit`");
-        assert!(summary.warnings.iter().any(told), "{:?}", summary.warnings);
+        let message = |text: &String| text.contains("`finger` was held back by its `force-limit`");
+        assert!(summary.warnings.iter().any(message), "{:?}", summary.warnings);
         assert!(summary.energy_balance.unwrap() < 0.01);
     }
 }
@@ -75,7 +75,7 @@ fn most_and_last(text: &str, column: &str) -> (pliant_run::Summary, f64, f64) {
 }
 
 /// What tells that something was held back.
-fn told(summary: &pliant_run::Summary) -> Vec<&String> {
+fn warnings(summary: &pliant_run::Summary) -> Vec<&String> {
     summary.warnings.iter().filter(|text| text.contains("was held back by its `force-limit`")).collect()
 }
 
@@ -88,9 +88,9 @@ fn a_tool_stops_at_its_limit_under_a_barrier() {
             .replace("['block', 'finger']\n", "['block', 'finger']\ncheck-intersections = true\n")
             .replace("every = 1.2", "every = 0.02");
         let (summary, most, last) = most_and_last(&text, "contact.feels.z");
-        let told = told(&summary);
-        assert!(told.len() == 1 && told[0].contains("`finger`"), "{:?}", summary.warnings);
-        println!("{run_table}: {last} N in the end, {most} N at most; {}", told[0]);
+        let warnings = warnings(&summary);
+        assert!(warnings.len() == 1 && warnings[0].contains("`finger`"), "{:?}", summary.warnings);
+        println!("{run_table}: {last} N in the end, {most} N at most; {}", warnings[0]);
         assert!((last / 2.0 - 1.0).abs() < 0.015 && most < 2.04, "{last} {most}");
     }
 }
@@ -144,9 +144,9 @@ fn moved_nodes_stop_at_their_limit_under_a_barrier() {
     for run_table in ["solver = 'implicit'\nstep = 0.02", "solver = 'static'\nload-steps = 50"] {
         let text = driven(run_table, "to = 0.5\nforce-limit = 0.5", 1.0);
         let (summary, most, last) = most_and_last(&text, "reaction.push.z");
-        let told = told(&summary);
-        assert!(told.len() == 1 && told[0].contains("`push`"), "{:?}", summary.warnings);
-        println!("{run_table}: {last} N in the end, {most} N at most; {}", told[0]);
+        let warnings = warnings(&summary);
+        assert!(warnings.len() == 1 && warnings[0].contains("`push`"), "{:?}", summary.warnings);
+        println!("{run_table}: {last} N in the end, {most} N at most; {}", warnings[0]);
         assert!((last / 0.5 - 1.0).abs() < 0.015 && most < 0.51, "{last} {most}");
     }
 }

@@ -40,8 +40,8 @@ mod walls;
 /// Panics unless a scene is refused, in words that contain all pieces.
 #[track_caller]
 fn assert_refused(text: &str, pieces: &[&str]) {
-    let told = pliant_testing::scenes::world(text).err().unwrap_or_else(|| panic!("accepted:\n{text}"));
-    assert!(pieces.iter().all(|piece| told.contains(piece)), "{told}");
+    let message = pliant_testing::scenes::world(text).err().unwrap_or_else(|| panic!("accepted:\n{text}"));
+    assert!(pieces.iter().all(|piece| message.contains(piece)), "{message}");
 }
 
 #[cfg(feature = "gpu")]

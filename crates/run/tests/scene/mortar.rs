@@ -171,8 +171,9 @@ fn points_do_not_pass_it_and_say_so() {
         assert!(stress > 0.02, "{order:?}: {stress}");
         let warned: Vec<String> = world(&text).unwrap().warnings().map(ToString::to_string).collect();
         let coarse_first = order == ["a", "b"];
-        let says =
-            warned.iter().any(|told| told.contains("`a` is coarser than `b`") && told.contains("stay free"));
+        let says = warned
+            .iter()
+            .any(|message| message.contains("`a` is coarser than `b`") && message.contains("stay free"));
         assert_eq!(says, coarse_first, "{warned:?}");
     }
 }
@@ -220,9 +221,9 @@ fn joined_faces_move_on_a_device_as_on_the_processor() {
 fn constraints_of_the_following_body_alone_are_refused() {
     let place = tempfile::tempdir().unwrap();
     let text = stacked(place.path(), "solver = 'static'", PAIRS[0], ["a", "b"], "");
-    let told = world(&text.replace(&symmetric("b"), "")).err().unwrap();
+    let message = world(&text.replace(&symmetric("b"), "")).err().unwrap();
     for piece in ["`ax` and `t` both prescribe x", "constrain `b`"] {
-        assert!(told.contains(piece), "no {piece} in {told}");
+        assert!(message.contains(piece), "no {piece} in {message}");
     }
     assert!(world(&text.replace(&symmetric("a"), "")).is_ok());
 }
@@ -334,8 +335,8 @@ fn a_curved_joint_converges_with_the_square_of_the_edges_and_keeps_the_force() {
                  [load.p]\ntype = 'pressure'\non = 'inner'\nfaces = {{ set = 'inside' }}\npressure = {pressure}\nto = 1\n\
                  [output.all]\ntype = 'vtu'\nevery = 1\ndata = ['displacement', 'cauchy-stress']\n[output.history]\ntype = 'csv'\nevery = 1\n"
             );
-            let told = world(&text).unwrap().participants[0].built.notes.clone();
-            assert!(told.iter().any(|note| note.contains("(mortar)")), "{told:?}");
+            let notes = world(&text).unwrap().participants[0].built.notes.clone();
+            assert!(notes.iter().any(|note| note.contains("(mortar)")), "{notes:?}");
             let Ended { moved, row, .. } = ended(&text);
             let off = moved.iter().map(|[x, u]| {
                 let r = x[0].hypot(x[1]);

@@ -206,8 +206,8 @@ fn shapes_that_cannot_be_are_refused_with_their_line() {
         ("{ image = { file = 'none.nii', label = 1 } }".into(), ["none.nii", "relative to the scene file"]),
     ] {
         let text = bowl(&shape, "");
-        let told = world(&text).err().unwrap_or_else(|| panic!("accepted: {shape}"));
-        assert!(pieces.iter().all(|piece| told.contains(piece)), "{shape}: {told}");
+        let message = world(&text).err().unwrap_or_else(|| panic!("accepted: {shape}"));
+        assert!(pieces.iter().all(|piece| message.contains(piece)), "{shape}: {message}");
     }
 }
 
@@ -219,7 +219,7 @@ fn a_shape_much_larger_than_the_bodies_is_doubted() {
     let text = bowl(&format!("{{ mesh = {{ file = '{file}', scale = 1 }} }}"), "");
     let world = world(&text).unwrap();
     let doubts = &world.participants[0].built.warnings;
-    let told = doubts.iter().find(|doubt| doubt.message.contains("`bowl`")).unwrap();
-    assert!(told.message.contains("times the bodies"), "{}", told.message);
-    assert!(told.help.iter().any(|help| help.contains("0.001")), "{:?}", told.help);
+    let doubt = doubts.iter().find(|doubt| doubt.message.contains("`bowl`")).unwrap();
+    assert!(doubt.message.contains("times the bodies"), "{}", doubt.message);
+    assert!(doubt.help.iter().any(|help| help.contains("0.001")), "{:?}", doubt.help);
 }

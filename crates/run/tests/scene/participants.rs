@@ -163,7 +163,7 @@ fn without_tables_solids_and_shells_are_participants_of_the_run() {
 
 #[test]
 fn mistakes_of_participants_are_underlined() {
-    let told = |text: &str| scenes::world(text).err().unwrap_or_else(|| "no mistake".into());
+    let message = |text: &str| scenes::world(text).err().unwrap_or_else(|| "no mistake".into());
     let table = |bodies: &str, more: &str| {
         format!("{HEAD}[participant.walls]\nbodies = {bodies}\n{more}{LAWS}{SOLID}{SHELL}{OUTPUTS}")
     };
@@ -186,8 +186,8 @@ fn mistakes_of_participants_are_underlined() {
             "there is no constraint `bose`",
         ),
     ] {
-        let told = told(&text);
-        assert!(told.contains(says), "{told}\n{text}");
+        let message = message(&text);
+        assert!(message.contains(says), "{message}\n{text}");
     }
 }
 

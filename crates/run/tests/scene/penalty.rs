@@ -43,7 +43,7 @@ fn a_resumed_run_of_participants_that_are_tied_ends_in_the_same_bits() {
 
 #[test]
 fn solvers_that_no_spring_ties_are_refused_with_the_line() {
-    let told = |text: &str| world(text).err().unwrap_or_else(|| panic!("accepted:\n{text}"));
+    let message = |text: &str| world(text).err().unwrap_or_else(|| panic!("accepted:\n{text}"));
     let quasi_static =
         coated("solver = 'quasi-static'", "cells = [7, 5]", "[participant.coat]\nbodies = ['coat']\n");
     for (text, pieces) in [
@@ -68,7 +68,7 @@ fn solvers_that_no_spring_ties_are_refused_with_the_line() {
             ["no set is named `nose`", ""],
         ),
     ] {
-        let told = told(&text);
-        assert!(pieces.iter().all(|piece| told.contains(piece)), "{told}");
+        let message = message(&text);
+        assert!(pieces.iter().all(|piece| message.contains(piece)), "{message}");
     }
 }

@@ -18,9 +18,9 @@ fn run(text: &str) -> (String, f64, BTreeMap<String, f64>) {
     let mut rows = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
     let column = rows.next().unwrap().iter().position(|name| *name == "pressure.air").unwrap();
     let most = rows.map(|row| row[column].parse::<f64>().unwrap().abs()).fold(0.0, f64::max);
-    let mut told = summary.warnings.into_iter();
-    let told = told.find(|text| text.contains("`air` was held back by its `pressure-limit`"));
-    (told.unwrap_or_default(), most, last_row_in(&folder))
+    let mut warnings = summary.warnings.into_iter();
+    let message = warnings.find(|text| text.contains("`air` was held back by its `pressure-limit`"));
+    (message.unwrap_or_default(), most, last_row_in(&folder))
 }
 
 /// The volume [m³] of a balloon at rest.
@@ -38,15 +38,15 @@ fn a_balloon_is_filled_up_to_its_limit() {
             let whole = balloon(model, solver, volume, "");
             let text = whole.replace(volume, &format!("{volume}\npressure-limit = {limit}"));
             let rest = at_rest(model);
-            let (told, most, row) = run(&text);
+            let (message, most, row) = run(&text);
             let (_, without, asked) = run(&whole);
             let [last, end, asked] =
                 [row["pressure.air"].abs(), row["volume.air"] - rest, asked["volume.air"] - rest];
             let name = if solver == STATIC { "static" } else { "implicit" };
             println!(
-                "{model}, {name}: {most} and {last} Pa of {limit}, {without} without; {end} of {asked} m³; {told}"
+                "{model}, {name}: {most} and {last} Pa of {limit}, {without} without; {end} of {asked} m³; {message}"
             );
-            assert!(without > 1.2 * limit && !told.is_empty(), "{model}, {name}: {without} {told}");
+            assert!(without > 1.2 * limit && !message.is_empty(), "{model}, {name}: {without} {message}");
             assert!(
                 (last / limit - 1.0).abs() < 1e-3 && most < 1.02 * limit,
                 "{model}, {name}: {most} {last}"
@@ -115,12 +115,12 @@ fn a_balloon_that_is_pressed_lets_out_what_its_limit_does_not_hold() {
         let (_, without, _) = run(&text("by = 0", "to = 0.2"));
         let limit = 0.5 * without;
         let limited = format!("by = 0\npressure-limit = {limit}");
-        let (told, most, row) = run(&text(&limited, "to = 0.2"));
+        let (message, most, row) = run(&text(&limited, "to = 0.2"));
         let [up, down, last, end] =
             ["contact.above.z", "contact.below.z", "pressure.air", "volume.air"].map(|name| row[name]);
-        println!("{model}: {most} and {last} Pa of {limit}; {end} m³; {up} N, {down} N; {told}");
+        println!("{model}: {most} and {last} Pa of {limit}; {end} m³; {up} N, {down} N; {message}");
         assert!(
-            !told.is_empty() && most < 1.03 * limit && (last / limit - 1.0).abs() < 0.01,
+            !message.is_empty() && most < 1.03 * limit && (last / limit - 1.0).abs() < 0.01,
             "{model}: {most} {last}"
         );
         assert!(up > 0.1 && (up / down.abs() - 1.0).abs() < 0.01, "{model}: {up} {down}");
@@ -138,9 +138,9 @@ fn a_balloon_that_snaps_at_its_limit_ends_the_run_with_pressure_and_volume() {
     let volume = "by = 3e-4\ncurve = { table = [[0, 0], [0.5, 1]] }\npressure-limit = 11000";
     let load = "[load.help]\ntype = 'pressure'\non = 'balloon'\nfaces = 'all'\npressure = -6000\ncurve = { table = [[0, 0], [0.5, 1], [1, 0]] }\n";
     let text = |solver: &str| balloon("membrane", solver, volume, load);
-    let told = Workshop::new(&text("solver = 'static'\nload-steps = 10\ntolerance = 1e-8")).run(&[]);
-    assert_eq!(told.status(), "failed", "{}", told.err);
-    let error = &told.json()["error"];
+    let output = Workshop::new(&text("solver = 'static'\nload-steps = 10\ntolerance = 1e-8")).run(&[]);
+    assert_eq!(output.status(), "failed", "{}", output.err);
+    let error = &output.json()["error"];
     assert_eq!((&error["kind"], &error["body"]), (&"not-converged".into(), &"balloon".into()), "{error}");
     assert!(error["node"].is_null(), "{error}");
     // Without a limit the pressure is 11 kPa at 0.89 s.
@@ -153,11 +153,11 @@ fn a_balloon_that_snaps_at_its_limit_ends_the_run_with_pressure_and_volume() {
         "try the solver `implicit`",
     ];
     for word in words {
-        assert!(told.words().contains(word), "{}", told.err);
+        assert!(output.words().contains(word), "{}", output.err);
     }
-    assert!(!told.words().contains("a membrane resists bending"), "{}", told.err);
-    let (told, most, row) = run(&text(IMPLICIT));
-    assert!(!told.is_empty() && most < 1.02 * 11000.0, "{most} {told}");
+    assert!(!output.words().contains("a membrane resists bending"), "{}", output.err);
+    let (message, most, row) = run(&text(IMPLICIT));
+    assert!(!message.is_empty() && most < 1.02 * 11000.0, "{most} {message}");
     assert!(row["volume.air"] < at_rest("membrane") + 1e-4, "{}", row["volume.air"]);
 }
 
@@ -167,15 +167,15 @@ fn limits_of_pressure_that_cannot_be_kept_are_refused() {
     for solver in ["explicit", "quasi-static"] {
         let run = format!("solver = '{solver}'");
         let text = balloon("membrane", &run, &format!("{FILLED}\npressure-limit = 5000"), "");
-        let told = world(&text).err().unwrap();
+        let message = world(&text).err().unwrap();
         assert!(
-            told.contains(&format!("the solver `{solver}` keeps no limit of the pressure of `air`")),
-            "{told}"
+            message.contains(&format!("the solver `{solver}` keeps no limit of the pressure of `air`")),
+            "{message}"
         );
     }
     for limit in ["-1", "0", "inf", "'much'"] {
         let text = balloon("membrane", STATIC, &format!("{FILLED}\npressure-limit = {limit}"), "");
-        let told = world(&text).err().unwrap();
-        assert!(told.contains("pressure-limit"), "{told}");
+        let message = world(&text).err().unwrap();
+        assert!(message.contains("pressure-limit"), "{message}");
     }
 }

@@ -151,8 +151,8 @@ fn stopped_anywhere(seeds: std::ops::Range<u64>) {
         let text = ingredients(&mut Random::new(seed));
         let world = match world(&text) {
             Ok(world) => world,
-            Err(told) => {
-                println!("seed {seed}: refused: {}", told.lines().next().unwrap_or_default());
+            Err(message) => {
+                println!("seed {seed}: refused: {}", message.lines().next().unwrap_or_default());
                 refused += 1;
                 continue;
             }

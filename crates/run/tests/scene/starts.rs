@@ -301,9 +301,9 @@ fn impossible_starts_are_refused() {
                 element = 'hex8-full'\nlaw = 'a'\ndensity = 1000\n\
                 [constraint.hand]\ntype = 'move'\nbody = 'lid'\nnodes = 'all'\nby = [0, 0, -0.001]\ncurve = 'hold'\n\
                 [contact.lid]\nbetween = ['b', 'lid']\n";
-    let told = world(&cube("solver = 'implicit'\nstep = 5e-4", over)).unwrap_err();
-    assert!(told.contains("contact `lid` has no gap at the start in 50 places"), "{told}");
-    assert!(told.contains("scene.toml:37:11"), "{told}");
+    let message = world(&cube("solver = 'implicit'\nstep = 5e-4", over)).unwrap_err();
+    assert!(message.contains("contact `lid` has no gap at the start in 50 places"), "{message}");
+    assert!(message.contains("scene.toml:37:11"), "{message}");
 }
 
 /// A scene whose motion is changed on the way goes to where the new one says within its next step.

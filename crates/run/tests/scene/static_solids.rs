@@ -30,7 +30,7 @@ pub(super) fn block(solver: &str, element: &str, law: &str, more: &str) -> Strin
 #[test]
 fn a_check_tells_what_factors_take() {
     let law = format!("type = 'neo-hookean'\n{MATRIX}");
-    let told = |solver: &str| {
+    let factors = |solver: &str| {
         let page = overview(&world(&block(solver, "tet4", &law, "")).unwrap());
         page.lines().find_map(|line| line.strip_prefix("factors of the equations: ").map(str::to_owned))
     };
@@ -39,13 +39,13 @@ fn a_check_tells_what_factors_take() {
         "solver = 'implicit'\nstep = 0.1",
         "solver = 'static'\nlinear = { by = 'conjugate-gradients', preconditioner = 'lagged-factors' }",
     ] {
-        let told = told(solver).unwrap_or_else(|| panic!("{solver}"));
+        let factors = factors(solver).unwrap_or_else(|| panic!("{solver}"));
         // 45 nodes of which 9 are held: 27 equations a column at the most.
-        let bytes: f64 = told.split_once(" kB").unwrap().0.parse().unwrap();
-        assert!((20.0..200.0).contains(&bytes), "{solver}: {told}");
+        let bytes: f64 = factors.split_once(" kB").unwrap().0.parse().unwrap();
+        assert!((20.0..200.0).contains(&bytes), "{solver}: {factors}");
     }
     for solver in ["solver = 'quasi-static'", "solver = 'static'\nlinear = 'conjugate-gradients'"] {
-        assert_eq!(told(solver), None, "{solver}");
+        assert_eq!(factors(solver), None, "{solver}");
     }
 }
 
@@ -228,12 +228,12 @@ fn bodies_that_the_solver_cannot_take_are_refused_by_name() {
         ),
     ] {
         match world(&text) {
-            Err(told) => assert!(pieces.iter().all(|piece| told.contains(piece)), "{told}"),
+            Err(message) => assert!(pieces.iter().all(|piece| message.contains(piece)), "{message}"),
             Ok(_) => assert_eq!(pieces, ["", ""], "{text}"),
         }
     }
     let loose = block(newton, "tet4", &plain, "");
     let loose = &loose[..loose.find("[constraint.base]").unwrap()];
-    let told = world(loose).unwrap_err();
-    assert!(told.contains("`block` is free in 6 rigid motions of 6"), "{told}");
+    let message = world(loose).unwrap_err();
+    assert!(message.contains("`block` is free in 6 rigid motions of 6"), "{message}");
 }

@@ -109,7 +109,7 @@ fn energies_of_tied_bodies_balance_and_the_critical_step_is_that_of_the_whole() 
     );
     let world = world(&broken);
     let failed = match world {
-        Err(told) => told.contains("stable"),
+        Err(message) => message.contains("stable"),
         Ok(world) => {
             let folder =
                 pliant_run::OutputFolder::prepare(out.path().join("again"), &world.scene, false).unwrap();
@@ -197,10 +197,12 @@ fn ties_that_cannot_be_are_refused_by_name_and_gaps_are_told() {
     }
     // A coat that hangs over: the nodes that are not tied are reported with their largest gap.
     let over = world(&with("at = [0, 0, 0.01]", "at = [0.01, 0, 0.01]")).unwrap();
-    let told: Vec<String> = over.warnings().map(ToString::to_string).collect();
+    let warnings: Vec<String> = over.warnings().map(ToString::to_string).collect();
     assert!(
-        told.iter().any(|told| told.contains("up to 0.01") && told.contains("of `coat` lie farther than")),
-        "{told:?}"
+        warnings
+            .iter()
+            .any(|message| message.contains("up to 0.01") && message.contains("of `coat` lie farther than")),
+        "{warnings:?}"
     );
     let notes = &over.participants[0].built.notes;
     assert!(

@@ -252,7 +252,7 @@ fn what_encloses_nothing_is_refused_by_name() {
         ),
     ] {
         let text = balloon(model, solver, volume, more);
-        let told = world(&text).err().unwrap_or_else(|| panic!("accepted: {model} {volume}"));
-        assert!(pieces.iter().all(|piece| told.contains(piece)), "{told}");
+        let message = world(&text).err().unwrap_or_else(|| panic!("accepted: {model} {volume}"));
+        assert!(pieces.iter().all(|piece| message.contains(piece)), "{message}");
     }
 }

@@ -513,22 +513,22 @@ mod tests {
                 .map(|part| (part.law, part.density.0, part.hourglass.map(|own| own.0), part.cells))
                 .collect::<Vec<_>>()
         };
-        let told = |law: &str, density, hourglass, cells: &[u32]| {
+        let message = |law: &str, density, hourglass, cells: &[u32]| {
             (law.to_owned(), density, hourglass, cells.to_vec())
         };
         let hex = CellKind::Hex;
-        assert_eq!(of("law = 'soft'\ndensity = 9", hex), [told("soft", 9.0, None, &[0, 1, 2])]);
+        assert_eq!(of("law = 'soft'\ndensity = 9", hex), [message("soft", 9.0, None, &[0, 1, 2])]);
         assert_eq!(
             of("law = { 1 = 'soft', 2 = 'hard' }\ndensity = { 1 = 8, 2 = 9 }", hex),
-            [told("hard", 9.0, None, &[0, 2]), told("soft", 8.0, None, &[1])]
+            [message("hard", 9.0, None, &[0, 2]), message("soft", 8.0, None, &[1])]
         );
         let by_hourglass = "law = 'soft'\ndensity = 9\nhourglass = { 1 = 0.1, 2 = 0.3 }";
         assert_eq!(
             of(by_hourglass, hex),
-            [told("soft", 9.0, Some(0.1), &[1]), told("soft", 9.0, Some(0.3), &[0, 2])]
+            [message("soft", 9.0, Some(0.1), &[1]), message("soft", 9.0, Some(0.3), &[0, 2])]
         );
         // Tets have no hourglass patterns: they stay together.
-        assert_eq!(of(by_hourglass, CellKind::Tet), [told("soft", 9.0, None, &[0, 1, 2])]);
+        assert_eq!(of(by_hourglass, CellKind::Tet), [message("soft", 9.0, None, &[0, 1, 2])]);
     }
 
     #[test]
@@ -540,8 +540,8 @@ mod tests {
                 build(&read(&format!("{text}{two}"))).unwrap_or_else(|errors| panic!("{}", errors.plain()));
             built.warnings.iter().map(|warning| warning.message.clone()).collect::<Vec<_>>()
         };
-        let told = warned("shear-modulus = 3e3\nbulk-modulus = 1e3");
-        assert!(told.len() == 1 && told[0].contains("a Poisson's ratio of -0.25"), "{told:?}");
+        let warnings = warned("shear-modulus = 3e3\nbulk-modulus = 1e3");
+        assert!(warnings.len() == 1 && warnings[0].contains("a Poisson's ratio of -0.25"), "{warnings:?}");
         assert_eq!(warned("shear-modulus = 3e3\nbulk-modulus = 2e3"), [""; 0]);
     }
 
@@ -585,8 +585,8 @@ mod tests {
             ("{ liver = 'tissue', 2 = 'stiff', 5 = 'hard' }", &["there is no law `stiff`"]),
             ("{ 1 = 'tissue', 2 = 'hard', 4 = 'hard', 5 = 'hard' }", &["no cell of `bar` has label `4`"]),
         ] {
-            let told = model(&format!("law = {law}\ndensity = 1000")).unwrap_err();
-            assert!(pieces.iter().all(|piece| told.contains(piece)), "{law}: {told}");
+            let message = model(&format!("law = {law}\ndensity = 1000")).unwrap_err();
+            assert!(pieces.iter().all(|piece| message.contains(piece)), "{law}: {message}");
         }
     }
 

@@ -488,8 +488,8 @@ mod tests {
             ("type = 'move'\nby = [0, 0, 1]\nvelocity = [0, 0, 1]", "found both"),
             ("type = 'fix'\ncomponents = []", "`components` is empty"),
         ] {
-            let told = mistakes(&top(what)).plain().to_string();
-            assert!(told.contains(says), "{told}");
+            let message = mistakes(&top(what)).plain().to_string();
+            assert!(message.contains(says), "{message}");
         }
     }
 
@@ -512,8 +512,8 @@ mod tests {
         assert!(!turned("angle = 6.2831853").1.contains("turns"));
         for (angle, found) in [("", "neither"), (", angle = 1, degrees = 60", "both")] {
             let rotate = format!("rotate = {{ axis = [0, 0, 1], centre = [0, 0, 0]{angle} }}");
-            let told = mistakes(&top(&format!("type = 'move'\n{rotate}"))).plain().to_string();
-            assert!(told.contains(&format!("by `angle` or by `degrees`, found {found}")), "{told}");
+            let message = mistakes(&top(&format!("type = 'move'\n{rotate}"))).plain().to_string();
+            assert!(message.contains(&format!("by `angle` or by `degrees`, found {found}")), "{message}");
         }
     }
 
@@ -521,7 +521,7 @@ mod tests {
     fn two_constraints_may_hold_the_same_node_but_not_move_it_apart() {
         let edge = "[constraint.edge]\nbody = 'cube'\nnodes = { set = 'x-min' }\n";
         built(&format!("{edge}type = 'fix'\n"));
-        let told = mistakes(&format!("{edge}type = 'move'\nby = [0, 0, 1]\n")).plain().to_string();
-        assert!(told.contains("`base` and `edge` both prescribe z of node 0 of `cube`"), "{told}");
+        let message = mistakes(&format!("{edge}type = 'move'\nby = [0, 0, 1]\n")).plain().to_string();
+        assert!(message.contains("`base` and `edge` both prescribe z of node 0 of `cube`"), "{message}");
     }
 }

@@ -468,8 +468,8 @@ mod tests {
                 "is in `from` and in `to`",
             ),
         ] {
-            let told = refused(BLOCK, rule);
-            assert!(told.contains(says), "{told}");
+            let message = refused(BLOCK, rule);
+            assert!(message.contains(says), "{message}");
         }
     }
 }

@@ -124,10 +124,10 @@ mod tests {
         write(&mut mesh, vec![1.0, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.01]);
         assert!((volume(&of("").unwrap()) - 0.002).abs() < 1e-15);
         assert!((volume(&of("fraction = 'fill'").unwrap()) - 0.002 * (1.0 + 3.0 + 0.1) / 8.0).abs() < 1e-15);
-        let told = of("fraction = 'fil'").unwrap_err();
-        assert!(told.contains("no data `fil`") && told.contains("did you mean `fill`?"), "{told}");
+        let message = of("fraction = 'fil'").unwrap_err();
+        assert!(message.contains("no data `fil`") && message.contains("did you mean `fill`?"), "{message}");
         write(&mut mesh, vec![1.0, 0.5, 0.0, 0.5, 1.5, 0.5, 0.5, 0.5]);
-        let told = of("fraction = 'fill'").unwrap_err();
-        assert!(told.contains("hex 2, hex 4 (counted from 0)"), "{told}");
+        let message = of("fraction = 'fill'").unwrap_err();
+        assert!(message.contains("hex 2, hex 4 (counted from 0)"), "{message}");
     }
 }

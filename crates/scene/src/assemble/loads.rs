@@ -497,8 +497,8 @@ mod tests {
         assert!(x == 0.0 && y == 0.0 && (z + 10.0 * mass).abs() < 1e-12 * mass && nodes == 9, "{z} {mass}");
         let other =
             "[body.other]\nmesh = { block = { size = [1, 1, 1] }, edge = 1 }\nlaw = 'tissue'\ndensity = 1\n";
-        let told = mistakes(&format!("{other}{load}")).plain().to_string();
-        assert!(told.contains("`nodes` are nodes of one body"), "{told}");
+        let message = mistakes(&format!("{other}{load}")).plain().to_string();
+        assert!(message.contains("`nodes` are nodes of one body"), "{message}");
     }
 
     #[test]

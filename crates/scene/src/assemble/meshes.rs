@@ -531,8 +531,8 @@ mod tests {
         ] {
             let own = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();
             let scene = read(&CUBE.replace(own, &format!("mesh = {mesh}")));
-            let told = crate::build(&scene).unwrap_err().plain().to_string();
-            assert!(told.contains(says), "{told}");
+            let message = crate::build(&scene).unwrap_err().plain().to_string();
+            assert!(message.contains(says), "{message}");
         }
     }
 }

@@ -177,17 +177,17 @@ mod tests {
             ("4,0,0,0\n", "motion.csv:1: there is no node 4: the mesh has 4 nodes"),
             ("1,0,0,0\n1,0,0,0\n", "motion.csv:2: node 1 has a row already"),
         ] {
-            let told = read(text).unwrap_err();
-            assert!(told.starts_with(says), "{told}");
+            let message = read(text).unwrap_err();
+            assert!(message.starts_with(says), "{message}");
         }
     }
 
     #[test]
     fn nodes_without_a_row_are_counted() {
         let rows = [(1, [0.0; 3])].into();
-        let told = of_rows(Path::new("m.csv"), &rows, [1, 2, 3].into_iter()).unwrap_err().message;
+        let message = of_rows(Path::new("m.csv"), &rows, [1, 2, 3].into_iter()).unwrap_err().message;
         assert_eq!(
-            told,
+            message,
             "`m.csv` has no row for node 2 (counted from 0) and for 1 node more of the selection"
         );
     }

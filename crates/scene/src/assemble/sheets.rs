@@ -189,8 +189,8 @@ mod tests {
             ("{ sphere = { radius = 1, levels = 40 } }", "exceed the limit"),
             ("{ cylinder = { radius = 1, length = 1, span = 400 }, edge = 1 }", "span"),
         ] {
-            let told = mistakes_alone(&shell(mesh)).plain().to_string();
-            assert!(told.contains(says), "{mesh}: {told}");
+            let message = mistakes_alone(&shell(mesh)).plain().to_string();
+            assert!(message.contains(says), "{mesh}: {message}");
         }
     }
 }

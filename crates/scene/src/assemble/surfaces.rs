@@ -162,9 +162,9 @@ mod tests {
     #[test]
     fn a_surface_needs_a_body_and_a_name_of_its_own() {
         let mesh = "mesh = { block = { size = [0.2, 0.1, 0.1] }, edge = 0.1 }\n";
-        let told = mistakes(&format!("[surface.skin]\non = 'cubes'\n{mesh}")).plain().to_string();
-        assert!(told.contains("there is no body `cubes` (help: did you mean `cube`?)"), "{told}");
-        let told = mistakes(&format!("[surface.cube]\non = 'cube'\n{mesh}")).plain().to_string();
-        assert!(told.contains("`cube` is the name of a body and of a surface"), "{told}");
+        let message = mistakes(&format!("[surface.skin]\non = 'cubes'\n{mesh}")).plain().to_string();
+        assert!(message.contains("there is no body `cubes` (help: did you mean `cube`?)"), "{message}");
+        let message = mistakes(&format!("[surface.cube]\non = 'cube'\n{mesh}")).plain().to_string();
+        assert!(message.contains("`cube` is the name of a body and of a surface"), "{message}");
     }
 }

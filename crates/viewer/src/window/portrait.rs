@@ -50,18 +50,18 @@ impl App {
             _ => {}
         }
         let Some(written) = portrait.taking.write(&portrait.file) else { return };
-        let told = written.map(|()| self.shown());
-        *self.outcome.lock().unwrap_or_else(PoisonError::into_inner) = Some(told);
+        let outcome = written.map(|()| self.shown());
+        *self.outcome.lock().unwrap_or_else(PoisonError::into_inner) = Some(outcome);
         self.context.send_viewport_cmd(egui::ViewportCommand::Close);
     }
 
     /// What a picture of the window shows.
     fn shown(&self) -> String {
-        let told: String = self.banner().iter().map(|told| format!(": {}", told.text)).collect();
+        let message: String = self.banner().iter().map(|message| format!(": {}", message.text)).collect();
         let first = self.first_picture.unwrap_or_default();
         let frame = 1e3 * self.frame_seconds;
         format!(
-            "{} at t = {:.3} s{told}; first picture after {first:.2} s, frames of {frame:.1} ms ({})",
+            "{} at t = {:.3} s{message}; first picture after {first:.2} s, frames of {frame:.1} ms ({})",
             self.title(),
             self.frame.time,
             self.adapter

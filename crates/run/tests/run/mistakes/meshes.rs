@@ -25,9 +25,9 @@ pub(super) fn an_organ_a_thousand_times_too_large_is_refused_and_one_too_small_d
     let says = ["the mesh measures 173.2 m across", "`scale = 0.001` brings millimetres to metres"];
     assert_refused(&with_mesh(vtk(&large, &TETS, ""), FROM_FILE), &[MESH_LINE], &says);
     let scene = changed(FROM_FILE, "\"organ.vtk\"", "\"organ.vtk\", scale = 0.001");
-    let told = with_mesh(vtk(&CORNERS, &TETS, ""), &scene).check(&[]);
-    assert_eq!(told.status(), "checked");
-    assert!(told.words().contains("`organ` measures 1.732e-4 m across"), "{}", told.err);
+    let output = with_mesh(vtk(&CORNERS, &TETS, ""), &scene).check(&[]);
+    assert_eq!(output.status(), "checked");
+    assert!(output.words().contains("`organ` measures 1.732e-4 m across"), "{}", output.err);
 }
 
 #[test]
@@ -43,8 +43,8 @@ pub(super) fn inverted_elements_are_listed_and_reordered_on_request() {
     // A bow tie stays one in any order of its layers.
     let twisted: &[u32] = &[0, 1, 2, 3, 4, 5, 7, 6];
     let scene = changed(FROM_FILE, "\"organ.vtk\"", "\"organ.vtk\", fix = \"reorder\"");
-    let told = with_mesh(vtk(&CORNERS, &[twisted], ""), &scene).run(&[]);
-    assert_invalid(&told, &["inverted elements at rest: hex 0", "does not help: remesh"]);
+    let output = with_mesh(vtk(&CORNERS, &[twisted], ""), &scene).run(&[]);
+    assert_invalid(&output, &["inverted elements at rest: hex 0", "does not help: remesh"]);
 }
 
 #[test]
@@ -92,8 +92,8 @@ pub(super) fn several_repairs_go_in_order() {
     let mut tets = TETS;
     (tets[0], tets[5]) = (&[0, 3, 1, 7], &[0, 5, 1, 8]);
     let fixes = "\"organ.vtk\", fix = [\"merge\", \"reorder\", \"drop-unused\"]";
-    let told = with_mesh(vtk(&points, &tets, ""), &changed(FROM_FILE, "\"organ.vtk\"", fixes)).run(&[]);
-    assert_eq!(told.done()["nodes"], 8);
+    let output = with_mesh(vtk(&points, &tets, ""), &changed(FROM_FILE, "\"organ.vtk\"", fixes)).run(&[]);
+    assert_eq!(output.done()["nodes"], 8);
 }
 
 #[test]

@@ -8,21 +8,25 @@ use pliant_testing::scenes::{BLOCK, CORNERS, FROM_FILE, TETS, Told, Workshop, ch
 /// not change.
 #[track_caller]
 fn assert_refused(workshop: &Workshop, lines: &[&str], says: &[&str]) {
-    let told = workshop.run(&[]);
-    assert_invalid(&told, says);
-    assert!(lines.iter().any(|line| told.underlines(line)), "none of {lines:?} is underlined:\n{}", told.err);
+    let output = workshop.run(&[]);
+    assert_invalid(&output, says);
+    assert!(
+        lines.iter().any(|line| output.underlines(line)),
+        "none of {lines:?} is underlined:\n{}",
+        output.err
+    );
     assert!(!workshop.path("out").exists(), "something was written");
 }
 
 /// Asserts that a scene was rejected in these words, and that the object of the run says so.
 #[track_caller]
-fn assert_invalid(told: &Told, says: &[&str]) {
-    assert_eq!(told.status(), "invalid", "{}", told.err);
-    let words = told.words();
+fn assert_invalid(output: &Told, says: &[&str]) {
+    assert_eq!(output.status(), "invalid", "{}", output.err);
+    let words = output.words();
     for piece in says {
-        assert!(words.contains(piece), "no `{piece}` in:\n{}", told.err);
+        assert!(words.contains(piece), "no `{piece}` in:\n{}", output.err);
     }
-    let json = told.json();
+    let json = output.json();
     assert_eq!(json["error"]["kind"], "input", "{json}");
     assert!(json["error"]["message"].as_str().is_some_and(|message| message.len() > 10), "{json}");
     for key in ["body", "element", "node", "time"] {
@@ -62,9 +66,9 @@ fn bad_mesh(mesh: impl AsRef<[u8]>, says: &[&str]) {
 #[track_caller]
 fn repaired(mesh: &str, fix: &str, note: &str) {
     let scene = changed(FROM_FILE, MESH_LINE, &format!("mesh = {{ file = \"organ.vtk\", fix = \"{fix}\" }}"));
-    let told = with_mesh(mesh, &scene).run(&[]);
-    told.done();
-    assert!(told.err.contains(note), "{}", told.err);
+    let output = with_mesh(mesh, &scene).run(&[]);
+    output.done();
+    assert!(output.err.contains(note), "{}", output.err);
 }
 
 #[test]
@@ -134,9 +138,9 @@ fn unknown_types_and_words_get_the_nearest_name() {
         let word = bad.rsplit('"').nth(1).unwrap();
         spoilt(good, bad, &[word, says]);
     }
-    let told = Workshop::block("type = \"fix\"\n", "").run(&[]);
-    assert_invalid(&told, &["`constraint.base` has no `type`", "`fix`, `move`"]);
-    assert!(told.underlines("[constraint.base]"), "{}", told.err);
+    let output = Workshop::block("type = \"fix\"\n", "").run(&[]);
+    assert_invalid(&output, &["`constraint.base` has no `type`", "`fix`, `move`"]);
+    assert!(output.underlines("[constraint.base]"), "{}", output.err);
 }
 
 #[test]
@@ -176,8 +180,8 @@ fn missing_keys_and_tables_are_named() {
     ] {
         assert_refused(&Workshop::block(line, ""), &[header], &[says]);
     }
-    let told = Workshop::new("").run(&[]);
-    assert_invalid(&told, &["the scene has no table `[scene]`", "until = 1.0", "the scene has no body"]);
+    let output = Workshop::new("").run(&[]);
+    assert_invalid(&output, &["the scene has no table `[scene]`", "until = 1.0", "the scene has no body"]);
 }
 
 #[test]
@@ -260,9 +264,9 @@ fn a_fibre_needs_a_direction() {
         "fibre = [0, 0, 0]",
         &["the fibre direction is zero", "for example [0, 1, 0]"],
     );
-    let told = Workshop::block("fibre = [0, 1, 0]\n", "").run(&[]);
-    assert_invalid(&told, &["`block` has a law with fibres, but no fibre direction", "cell-data"]);
-    assert!(told.underlines("law = \"tissue\""), "{}", told.err);
+    let output = Workshop::block("fibre = [0, 1, 0]\n", "").run(&[]);
+    assert_invalid(&output, &["`block` has a law with fibres, but no fibre direction", "cell-data"]);
+    assert!(output.underlines("law = \"tissue\""), "{}", output.err);
 }
 
 /// [`FROM_FILE`] with a fibre for each cell.
@@ -297,8 +301,8 @@ fn a_zero_or_not_finite_fibre_of_a_cell_is_told_by_its_number() {
 fn an_averaged_pressure_needs_an_energy_of_the_volume() {
     let scene = changed(FROM_FILE, "density", "element = \"tet4-anp\"\ndensity");
     let scene = changed(&scene, "\"neo-hookean\"", "\"st-venant-kirchhoff\"");
-    let told = ["`st-venant-kirchhoff` has no energy of the volume alone", "take `tet4` or `hex8`"];
-    assert_refused(&with_mesh(vtk(&CORNERS, &TETS, ""), &scene), &["element = \"tet4-anp\""], &told);
+    let says = ["`st-venant-kirchhoff` has no energy of the volume alone", "take `tet4` or `hex8`"];
+    assert_refused(&with_mesh(vtk(&CORNERS, &TETS, ""), &scene), &["element = \"tet4-anp\""], &says);
     let plain = changed(&scene, "tet4-anp", "tet4");
     with_mesh(vtk(&CORNERS, &TETS, ""), &plain).run(&[]).done();
 }
@@ -464,20 +468,24 @@ fn a_probe_or_a_surface_far_from_its_body_is_doubted() {
             "mesh = { block = { size = [0.1, 0.1, 0.1] }, edge = 0.04, at = [1, 0, 0]",
         ),
     ] {
-        let told = Workshop::block(good, far).check(&[]);
-        assert_eq!(told.status(), "checked", "{}", told.err);
-        assert!(told.words().contains("m outside `block`, which measures 0.1732 m across"), "{}", told.err);
+        let output = Workshop::block(good, far).check(&[]);
+        assert_eq!(output.status(), "checked", "{}", output.err);
+        assert!(
+            output.words().contains("m outside `block`, which measures 0.1732 m across"),
+            "{}",
+            output.err
+        );
     }
 }
 
 #[test]
 fn a_motion_after_the_end_is_doubted() {
-    let told = Workshop::block("curve = \"smooth-step\"", "from = 1\nto = 2").run(&[]);
-    told.done();
+    let output = Workshop::block("curve = \"smooth-step\"", "from = 1\nto = 2").run(&[]);
+    output.done();
     assert!(
-        told.words().contains("`constraint.hand` begins at 1 s, but the scene ends at 0.02 s"),
+        output.words().contains("`constraint.hand` begins at 1 s, but the scene ends at 0.02 s"),
         "{}",
-        told.err
+        output.err
     );
 }
 
@@ -494,9 +502,9 @@ fn a_step_above_the_critical_step_is_refused_and_one_below_it_runs() {
         "m",
     ];
     spoilt("step = \"auto\"", &format!("step = {:e}", 1.01 * limit), &says);
-    let told = Workshop::block("step = \"auto\"", &format!("step = {:e}", 0.95 * limit)).run(&[]);
-    told.done();
-    assert!(told.err.contains("is close to the critical time step"), "{}", told.err);
+    let output = Workshop::block("step = \"auto\"", &format!("step = {:e}", 0.95 * limit)).run(&[]);
+    output.done();
+    assert!(output.err.contains("is close to the critical time step"), "{}", output.err);
 }
 
 #[test]
@@ -567,8 +575,8 @@ fn a_motion_from_point_data_needs_an_array_of_finite_vectors() {
         &["point data `shift` is [0.0, NaN, 0.0] at node 1 (counted from 0)", "or select fewer nodes"],
     );
     // A built-in shape carries none.
-    let told = Workshop::block("by = [0, 0, 0.001]", line).run(&[]);
-    assert_invalid(&told, &["the mesh of `block` has no point data `shift`"]);
+    let output = Workshop::block("by = [0, 0, 0.001]", line).run(&[]);
+    assert_invalid(&output, &["the mesh of `block` has no point data `shift`"]);
 }
 
 #[test]
@@ -657,32 +665,32 @@ fn values_beyond_all_sense_are_refused_and_unusual_ones_doubted() {
         ("pressure = 20", "pressure = -1e15", "and usual is less than 1e13 Pa"),
         ("total = [0.1, 0, 0]", "total = [1e40, 0, 0]", "is 1e40 N, and usual is less than 1e9 N"),
     ] {
-        let told = Workshop::block(good, odd).check(&[]);
-        assert_eq!(told.status(), "checked", "{}", told.err);
-        assert!(told.words().contains(says) && told.underlines(odd), "{}", told.err);
+        let output = Workshop::block(good, odd).check(&[]);
+        assert_eq!(output.status(), "checked", "{}", output.err);
+        assert!(output.words().contains(says) && output.underlines(odd), "{}", output.err);
     }
     // Loads may be as small, and boxes as large, as they like.
     let boxed = "nodes = { box = [[-1e9, -1e9, 0.09], [1e9, 1e9, 1e9]] }";
     for (good, usual) in [("pressure = 20", "pressure = 1e-15"), ("nodes = { set = \"z-max\" }", boxed)] {
-        let told = Workshop::block(good, usual).check(&[]);
-        assert_eq!((told.status(), told.err.as_str()), ("checked", ""));
+        let output = Workshop::block(good, usual).check(&[]);
+        assert_eq!((output.status(), output.err.as_str()), ("checked", ""));
     }
 }
 
 #[test]
 fn a_nearest_node_far_from_its_point_is_doubted() {
     let line = "nodes = { nearest = { point = [1000, 0.05, 0.05] } }";
-    let told = Workshop::block("nodes = { nearest = { point = [0.1, 0.05, 0.05] } }", line).check(&[]);
-    assert_eq!(told.status(), "checked", "{}", told.err);
+    let output = Workshop::block("nodes = { nearest = { point = [0.1, 0.05, 0.05] } }", line).check(&[]);
+    assert_eq!(output.status(), "checked", "{}", output.err);
     let says = "nearest to [1000.0, 0.05, 0.05] is 999.9 m away, and `block` measures 0.1732 m across";
-    assert!(told.words().contains(says) && told.underlines(line), "{}", told.err);
+    assert!(output.words().contains(says) && output.underlines(line), "{}", output.err);
 }
 
 /// The output of a failed run.
 fn failure_of(changes: &[&str]) -> String {
-    let told = Workshop::new(BLOCK).run(changes);
-    assert_eq!(told.status(), "failed", "{}", told.err);
-    told.json()["error"]["message"].as_str().unwrap().to_owned()
+    let output = Workshop::new(BLOCK).run(changes);
+    assert_eq!(output.status(), "failed", "{}", output.err);
+    output.json()["error"]["message"].as_str().unwrap().to_owned()
 }
 
 #[test]

@@ -10,24 +10,24 @@ pub(super) fn pressures_and_membranes_go_in_pairs() {
             (THICK, &format!("{THICK}\n{element}")),
             ("pressure = 1", &format!("pressure = 1\n{spread}")),
         ]);
-        let told = scene.check(&[]);
-        assert_eq!(told.status(), "checked", "{}", told.err);
-        told
+        let output = scene.check(&[]);
+        assert_eq!(output.status(), "checked", "{}", output.err);
+        output
     };
     let (flat, lumped, curved) = ("element = \"dkt-opt\"", "spread = \"lumped\"", "spread = \"curved\"");
     for (element, spread) in
         [("", ""), ("", curved), (flat, ""), (flat, lumped), ("element = \"plate\"", curved)]
     {
-        let told = check(element, spread);
-        assert!(!told.words().contains("does not go with"), "{element} {spread}: {}", told.err);
+        let output = check(element, spread);
+        assert!(!output.words().contains("does not go with"), "{element} {spread}: {}", output.err);
     }
-    let told = check("", lumped);
+    let output = check("", lumped);
     says(
-        &told,
+        &output,
         &["a lumped pressure does not go with `dkt-curved`, the element of `wall`", "leave `spread` out"],
     );
-    let told = check(flat, curved);
-    says(&told, &["does not go with the flat membrane of `wall`", "take `element = \"dkt-curved\"`"]);
+    let output = check(flat, curved);
+    says(&output, &["does not go with the flat membrane of `wall`", "take `element = \"dkt-curved\"`"]);
 }
 
 /// R t = 5e-5 m²: edges up to 14 mm on irregular meshes. Normals of a file without any are estimated, and that is said where the wall is
@@ -36,18 +36,18 @@ pub(super) fn pressures_and_membranes_go_in_pairs() {
 pub(super) fn coarse_meshes_of_curved_walls_under_pressure_are_warned_about() {
     let cylinder = |more: &str| {
         let mesh = format!("mesh = {{ cylinder = {{ radius = 0.1, length = 0.2, cells = [12, 6]{more} }} }}");
-        let told = wall(&[
+        let output = wall(&[
             (PLATE, &mesh),
             ("{ set = \"x-min\" }", "{ set = \"z-min\" }"),
             (THICK, "thickness = 5e-4"),
         ])
         .check(&[]);
-        assert_eq!(told.status(), "checked", "{}", told.err);
-        told
+        assert_eq!(output.status(), "checked", "{}", output.err);
+        output
     };
-    let told = cylinder(", distortion = 0.2");
+    let output = cylinder(", distortion = 0.2");
     says(
-        &told,
+        &output,
         &[
             "of `wall` under pressure have edges above 2 √(R t)",
             "m is the limit",
@@ -55,8 +55,8 @@ pub(super) fn coarse_meshes_of_curved_walls_under_pressure_are_warned_about() {
         ],
     );
     let regular = cylinder("");
-    for told in [&regular, &told] {
-        assert!(!told.words().contains("are estimated"), "{}", told.err);
+    for output in [&regular, &output] {
+        assert!(!output.words().contains("are estimated"), "{}", output.err);
     }
     assert!(!regular.words().contains("2 √(R t)"), "{}", regular.err);
     let points = [
@@ -67,8 +67,11 @@ pub(super) fn coarse_meshes_of_curved_walls_under_pressure_are_warned_about() {
         [0.1, 0.1, 0.02],
         [0.2, 0.1, 0.0],
     ];
-    let told = from_file(&points, &[&[0, 1, 4], &[0, 4, 3], &[1, 2, 5], &[1, 5, 4]], &[]);
-    says(&told, &["the normals of 4 of 4 curved triangles under pressure are estimated from the triangles"]);
+    let output = from_file(&points, &[&[0, 1, 4], &[0, 4, 3], &[1, 2, 5], &[1, 5, 4]], &[]);
+    says(
+        &output,
+        &["the normals of 4 of 4 curved triangles under pressure are estimated from the triangles"],
+    );
 }
 
 /// A flat membrane held along its border bulges, with factors and with conjugate gradients, without tension and with some, which flattens
@@ -84,27 +87,27 @@ pub(super) fn a_slack_membrane_is_told_and_starts() {
             ("at = [0.2, 0.05, 0]", "at = [0.1, 0.05, 0]"),
             (STEPS, &format!("load-steps = 2\n{run}")),
         ]);
-        let told = workshop.run(&[]);
-        told.done();
+        let output = workshop.run(&[]);
+        output.done();
         let (_, rows) = workshop.table("out/case/history.csv");
-        (told, *rows.last().unwrap().last().unwrap(), workshop.read("out/case/convergence.csv"))
+        (output, *rows.last().unwrap().last().unwrap(), workshop.read("out/case/convergence.csv"))
     };
-    let (told, slack, table) = held("", "");
+    let (output, slack, table) = held("", "");
     says(
-        &told,
+        &output,
         &["15 nodes of the membrane lie in one plane", "artificial stiffness", "`pre-tension` [N/m]"],
     );
     assert!(table.starts_with("step,attempt,time,iteration,residual,allowed,found\n1,1,0.5,0,"), "{table}");
     let gradients = "linear = { by = \"conjugate-gradients\", tolerance = 1e-6 }";
     assert!((held("", gradients).1 / slack - 1.0).abs() < 1e-4);
-    let (told, taut, _) = held("pre-tension = 100", "");
-    assert!(!told.words().contains("artificial"), "{}", told.err);
+    let (output, taut, _) = held("pre-tension = 100", "");
+    assert!(!output.words().contains("artificial"), "{}", output.err);
     assert!(slack > 2e-5 && taut > 0.0 && taut < 0.1 * slack, "{slack} {taut}");
 
-    let told = wall(&[(THICK, "thickness = 0.002\nelement = \"membrane\"")]).run(&[]);
-    assert_eq!(told.status(), "failed", "{}", told.err);
-    says(&told, &["in `wall`", "a membrane resists bending and compression across by nothing"]);
-    assert!(!told.words().contains("inf"), "{}", told.err);
+    let output = wall(&[(THICK, "thickness = 0.002\nelement = \"membrane\"")]).run(&[]);
+    assert_eq!(output.status(), "failed", "{}", output.err);
+    says(&output, &["in `wall`", "a membrane resists bending and compression across by nothing"]);
+    assert!(!output.words().contains("inf"), "{}", output.err);
     let plate = "thickness = 0.002\nelement = \"plate\"\npre-tension = 1";
     refused(&[(THICK, plate)], &["`pre-tension` is for a shell that resists in its plane"]);
 }
@@ -124,10 +127,10 @@ pub(super) fn large_strains_are_told() {
             (STEPS, "load-steps = 10"),
             ("pressure = 1", "pressure = 0"),
         ]);
-        let told = workshop.run(&[]);
-        (told.done(), told, workshop.read("out/case/summary.md"))
+        let output = workshop.run(&[]);
+        (output.done(), output, workshop.read("out/case/summary.md"))
     };
-    let (json, told, page) = pulled(0.1);
+    let (json, output, page) = pulled(0.1);
     let strain = &json["shell_strains"][0];
     assert_eq!((&strain["body"], &strain["time"]), (&"wall".into(), &1.0.into()), "{strain}");
     let largest = strain["largest"].as_f64().unwrap();
@@ -142,7 +145,7 @@ pub(super) fn large_strains_are_told() {
         assert!(page.contains(piece), "no `{piece}` in {page}");
     }
     says(
-        &told,
+        &output,
         &[
             "`wall` is strained by",
             "for small strain",
@@ -150,10 +153,10 @@ pub(super) fn large_strains_are_told() {
             "a solid, both with a hyper",
         ],
     );
-    let (json, told, page) = pulled(0.002);
+    let (json, output, page) = pulled(0.002);
     // A thin wall that is clamped and pulled has unstable equilibria by its triangles; it has no other warning.
     let warnings = json["warnings"].as_array().unwrap();
-    assert!(warnings.iter().all(|own| own.as_str().unwrap().contains("are unstable")), "{}", told.err);
+    assert!(warnings.iter().all(|own| own.as_str().unwrap().contains("are unstable")), "{}", output.err);
     assert!(json["shell_strains"][0]["above_from"].is_null(), "{json}");
     assert!(page.contains("| wall | 1."), "{page}");
 }

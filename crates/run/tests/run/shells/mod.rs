@@ -61,9 +61,9 @@ fn wall(changes: &[(&str, &str)]) -> Workshop {
 }
 
 #[track_caller]
-fn says(told: &Told, pieces: &[&str]) {
+fn says(output: &Told, pieces: &[&str]) {
     for piece in pieces {
-        assert!(told.words().contains(piece), "no `{piece}` in:\n{}", told.err);
+        assert!(output.words().contains(piece), "no `{piece}` in:\n{}", output.err);
     }
 }
 
@@ -71,10 +71,10 @@ fn says(told: &Told, pieces: &[&str]) {
 #[track_caller]
 fn refused(changes: &[(&str, &str)], pieces: &[&str]) {
     let workshop = wall(changes);
-    let told = workshop.run(&[]);
-    assert_eq!(told.status(), "invalid", "{}", told.err);
-    says(&told, pieces);
-    assert_eq!(told.json()["error"]["kind"], "input");
+    let output = workshop.run(&[]);
+    assert_eq!(output.status(), "invalid", "{}", output.err);
+    says(&output, pieces);
+    assert_eq!(output.json()["error"]["kind"], "input");
     assert!(!workshop.path("out").exists(), "something was written");
 }
 
@@ -131,29 +131,29 @@ fn meshes_that_are_no_shells_are_refused_or_repaired() {
     const SQUARE: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.1, 0.0], [0.0, 0.1, 0.0]];
     let with = |more: [f64; 3]| [&SQUARE[..], &[more]].concat();
     from_file(&SQUARE, &[&[0, 1, 2], &[0, 2, 3]], &[]).done();
-    let told = from_file(&SQUARE, &[&[0, 1, 2, 3]], &[]);
-    told.done();
-    says(&told, &["`wall`: 1 quad cut into triangles"]);
-    let told = from_file(&SQUARE, &[&[0, 1, 2], &[0, 3, 2]], &[]);
-    told.done();
-    says(&told, &["`wall`: 1 triangle turned over, so that all face one side"]);
+    let output = from_file(&SQUARE, &[&[0, 1, 2, 3]], &[]);
+    output.done();
+    says(&output, &["`wall`: 1 quad cut into triangles"]);
+    let output = from_file(&SQUARE, &[&[0, 1, 2], &[0, 3, 2]], &[]);
+    output.done();
+    says(&output, &["`wall`: 1 triangle turned over, so that all face one side"]);
 
-    let told = from_file(&with([0.05, 0.05, 0.0]), &[&[0, 1, 2], &[0, 2, 3], &[0, 4, 2]], &[]);
-    assert_eq!(told.status(), "invalid");
-    says(&told, &["`wall` has triangles without area at rest: triangle 2", "remesh there"]);
+    let output = from_file(&with([0.05, 0.05, 0.0]), &[&[0, 1, 2], &[0, 2, 3], &[0, 4, 2]], &[]);
+    assert_eq!(output.status(), "invalid");
+    says(&output, &["`wall` has triangles without area at rest: triangle 2", "remesh there"]);
 
     let fin: [&[u32]; 3] = [&[0, 1, 2], &[0, 2, 3], &[0, 2, 4]];
-    let told = from_file(&with([0.05, 0.05, 0.1]), &fin, &[]);
-    assert_eq!(told.status(), "invalid");
-    says(&told, &["3 triangles of `wall` meet in the edge of nodes 0 and 2", "set `branches = true`"]);
+    let output = from_file(&with([0.05, 0.05, 0.1]), &fin, &[]);
+    assert_eq!(output.status(), "invalid");
+    says(&output, &["3 triangles of `wall` meet in the edge of nodes 0 and 2", "set `branches = true`"]);
     from_file(&with([0.05, 0.05, 0.1]), &fin, &[(THICK, "thickness = 0.002\nbranches = true")]).done();
 
     let strip = [[0.1, 0.0], [-0.05, 0.087], [-0.05, -0.087]];
     let points: Vec<[f64; 3]> = strip.iter().flat_map(|&[x, y]| [[x, y, -0.02], [x, y, 0.02]]).collect();
     let moebius: [&[u32]; 6] = [&[0, 2, 1], &[1, 2, 3], &[2, 4, 3], &[3, 4, 5], &[4, 1, 5], &[5, 1, 0]];
-    let told = from_file(&points, &moebius, &[]);
-    assert_eq!(told.status(), "invalid");
-    says(&told, &["shell `wall` has no two sides", "nodes 3 and 4; cut it there"]);
+    let output = from_file(&points, &moebius, &[]);
+    assert_eq!(output.status(), "invalid");
+    says(&output, &["shell `wall` has no two sides", "nodes 3 and 4; cut it there"]);
 }
 
 #[test]
@@ -182,34 +182,34 @@ fn an_open_balloon_is_refused_with_its_borders() {
 
 #[test]
 fn doubtful_shells_are_warned_about() {
-    let told = wall(&[(THICK, "thickness = 0.06")]).run(&[]);
-    told.done();
+    let output = wall(&[(THICK, "thickness = 0.06")]).run(&[]);
+    output.done();
     says(
-        &told,
+        &output,
         &[
             "16 triangles of 16 of `wall` are thicker than their smallest altitude",
             "model the wall with tets",
         ],
     );
     let distorted = PLATE.replace("[4, 2]", "[32, 32], distortion = 0.3, seed = 3");
-    let told = wall(&[(PLATE, &distorted)]).check(&[]);
-    assert_eq!(told.status(), "checked", "{}", told.err);
-    says(&told, &["of `wall` folded back onto all neighbours, as inverted ones are", "smooth or remesh"]);
-    let told = wall(&[(THICK, "thickness = 0.002\nelement = \"comas-2010\"")]).check(&[]);
-    assert_eq!(told.status(), "checked", "{}", told.err);
-    says(&told, &["`wall` has the element of Comas (2010)", "6 to 26 % too soft", "take `dkt-curved`"]);
+    let output = wall(&[(PLATE, &distorted)]).check(&[]);
+    assert_eq!(output.status(), "checked", "{}", output.err);
+    says(&output, &["of `wall` folded back onto all neighbours, as inverted ones are", "smooth or remesh"]);
+    let output = wall(&[(THICK, "thickness = 0.002\nelement = \"comas-2010\"")]).check(&[]);
+    assert_eq!(output.status(), "checked", "{}", output.err);
+    says(&output, &["`wall` has the element of Comas (2010)", "6 to 26 % too soft", "take `dkt-curved`"]);
 }
 
 #[test]
 fn singular_stiffness_names_the_node_and_what_to_try() {
     let workshop = wall(&[(THICK, "thickness = 0.002\nelement = \"plate\"")]);
-    let told = workshop.run(&[]);
-    assert_eq!(told.status(), "failed", "{}", told.err);
-    let json = told.json();
+    let output = workshop.run(&[]);
+    assert_eq!(output.status(), "failed", "{}", output.err);
+    let json = output.json();
     assert_eq!((&json["error"]["kind"], &json["error"]["body"]), (&"singular".into(), &"wall".into()));
     let node = json["error"]["node"].as_u64().expect("a node");
     says(
-        &told,
+        &output,
         &[
             &format!("in `wall`: the stiffness is singular: node {node} can move in x without resistance"),
             "hold it, or give its elements stiffness in that direction",
@@ -256,14 +256,15 @@ fn a_clamp_resists_the_moment_of_a_force_at_the_end() {
 /// Twice the area over the border of 0.2 × 0.1 m is 67 mm: 10 mm are 0.15 of it and 9 % too stiff in torsion, 2 mm are not spoken of.
 #[test]
 fn a_stout_strip_is_noted() {
-    let told = |thickness: &str| {
-        let told = wall(&[(THICK, &format!("thickness = {thickness}")), ("pressure = 1", "pressure = 1e-3")])
-            .run(&[]);
-        told.done();
-        told
+    let output = |thickness: &str| {
+        let output =
+            wall(&[(THICK, &format!("thickness = {thickness}")), ("pressure = 1", "pressure = 1e-3")])
+                .run(&[]);
+        output.done();
+        output
     };
     says(
-        &told("0.01"),
+        &output("0.01"),
         &[
             "`wall` is 0.15 times as thick as wide",
             "transverse shear is neglected",
@@ -271,8 +272,8 @@ fn a_stout_strip_is_noted() {
         ],
     );
     for thin in ["0.002", "0.0033"] {
-        let told = told(thin);
-        assert!(!told.words().contains("as thick as wide"), "{}", told.err);
+        let output = output(thin);
+        assert!(!output.words().contains("as thick as wide"), "{}", output.err);
     }
 }
 
@@ -346,9 +347,9 @@ const CRUSHING: &str = "pressure = 1e6\ncurve = { table = [[0, 0], [0.5, 1e-6], 
 #[test]
 fn a_run_without_equilibrium_keeps_what_it_found() {
     let workshop = wall(&[("pressure = 1", CRUSHING)]);
-    let told = workshop.run(&[]);
-    assert_eq!(told.status(), "failed", "{}", told.err);
-    says(&told, &["after t = 0.5000 s", "in `wall`", "what was written before stays readable"]);
+    let output = workshop.run(&[]);
+    assert_eq!(output.status(), "failed", "{}", output.err);
+    says(&output, &["after t = 0.5000 s", "in `wall`", "what was written before stays readable"]);
     let kept = |workshop: &Workshop| {
         let (_, rows) = workshop.table("out/case/history.csv");
         assert_eq!(rows.iter().map(|row| row[0]).collect::<Vec<_>>(), [0.0, 0.5]);
@@ -361,16 +362,16 @@ fn a_run_without_equilibrium_keeps_what_it_found() {
     // Halving as often as allowed does not help if there is no time to iterate.
     let strong = CRUSHING.replace("1e6", "1e3").replace("1e-6", "1e-9");
     let workshop = wall(&[("pressure = 1", &strong), (STEPS, "load-steps = 2\niterations = 2")]);
-    let told = workshop.run(&[]);
-    assert_eq!(told.status(), "failed", "{}", told.err);
-    let json = told.json();
+    let output = workshop.run(&[]);
+    assert_eq!(output.status(), "failed", "{}", output.err);
+    let json = output.json();
     assert_eq!(
         (&json["error"]["kind"], &json["error"]["time"]),
         (&"not-converged".into(), &0.5.into()),
         "{json}"
     );
     says(
-        &told,
+        &output,
         &[
             "no equilibrium at t =",
             "the residuals of all iterations are in `convergence.csv`",
@@ -391,10 +392,10 @@ fn a_run_without_equilibrium_keeps_what_it_found() {
     kept(&workshop);
 
     let stalled = "load-steps = 2\nlinear = { by = \"conjugate-gradients\", iterations = 2, preconditioner = \"block-jacobi\" }";
-    let told = wall(&[(STEPS, stalled)]).run(&[]);
-    assert_eq!(told.status(), "failed");
+    let output = wall(&[(STEPS, stalled)]).run(&[]);
+    assert_eq!(output.status(), "failed");
     says(
-        &told,
+        &output,
         &["conjugate gradients stand at a residual of", "after 2 iterations", "use the direct solver"],
     );
 }
@@ -468,9 +469,9 @@ fn wrong_combinations_of_models_solvers_and_keys_are_refused() {
         &[("every = 0.5", "every = 0.5\ndata = [\"cauchy-stress\"]")],
         &["bodies of model `shell` have no `cauchy-stress`"],
     );
-    let told = wall(&[(STEPS, &run("device = \"auto\""))]).run(&[]);
-    assert_eq!(told.done()["device"], "cpu");
-    says(&told, &["runs on the CPU only"]);
+    let output = wall(&[(STEPS, &run("device = \"auto\""))]).run(&[]);
+    assert_eq!(output.done()["device"], "cpu");
+    says(&output, &["runs on the CPU only"]);
 }
 
 #[test]
@@ -489,8 +490,8 @@ fn the_number_of_threads_changes_no_bit() {
             ("cells = [4, 2]", "cells = [16, 8]"),
         ]);
         for threads in ["1", "2"] {
-            let told = workshop.run_into(&format!("out/{threads}"), &[&format!("run.threads={threads}")]);
-            told.done();
+            let output = workshop.run_into(&format!("out/{threads}"), &[&format!("run.threads={threads}")]);
+            output.done();
         }
         for file in ["history.csv", "fields/000000.vtu", "fields/000002.vtu"] {
             let [one, two] =

@@ -321,8 +321,8 @@ mod tests {
             ("plain.vtu", "normals = 'mesh'", "has no point data `normal`"),
             ("ball.vtu", "normals = 'mesh'\ncrease = 30", "takes its normals from the mesh"),
         ] {
-            let told = built(file, more).unwrap_err().plain().to_string();
-            assert!(told.contains(says), "{told}");
+            let message = built(file, more).unwrap_err().plain().to_string();
+            assert!(message.contains(says), "{message}");
         }
     }
 
