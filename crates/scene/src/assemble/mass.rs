@@ -1,8 +1,8 @@
-//! Mass scaling, and the keys of `[run]` that are for dynamics only.
+//! Mass scaling.
 
 use pliant_explicit::mass_scaling::{self, Goal};
 use pliant_format::diagnostic::Diagnostic;
-use pliant_format::tables::{LoadSteps, LoadTimes, MassScalingTable, SolverName, StepChoice};
+use pliant_format::tables::MassScalingTable;
 use pliant_geometry::words::{counted, number};
 
 use super::Builder;
@@ -11,53 +11,6 @@ use super::Builder;
 const MUCH: f64 = 0.05;
 
 impl Builder<'_> {
-    /// Refuses what means nothing to a solver without inertia.
-    pub(super) fn check_explicit_only(&mut self) {
-        self.check_load_times();
-        let scene = self.scene;
-        let run = &scene.run;
-        if run.solver != SolverName::QuasiStatic {
-            return;
-        }
-        let given =
-            [("on-unstable", run.on_unstable.is_some()), ("mass-scaling", run.mass_scaling.is_some())];
-        for (key, _) in given.into_iter().filter(|(_, given)| *given) {
-            let message = format!(
-                "`{key}` is for `solver = \"explicit\"`: quasi-static equilibria have no critical time step"
-            );
-            self.error(
-                &scene.run_at(key),
-                message,
-                "has no effect here",
-                "remove it, or take `solver = \"explicit\"`",
-            );
-        }
-    }
-
-    /// Refuses times of load steps that can't be.
-    fn check_load_times(&mut self) {
-        let scene = self.scene;
-        let run = &scene.run;
-        let LoadSteps::Times(LoadTimes { times }) = &run.load_steps else { return };
-        let path = scene.run_at("load-steps");
-        let increasing = [&[0.0], times.as_slice()].concat().windows(2).all(|pair| pair[0] < pair[1]);
-        if !increasing {
-            let help =
-                "such as `load-steps = { times = [0.1, 0.2, 0.5] }`; the last load step ends with the scene";
-            self.error(&path, "times of load steps lie above 0 s and increase", "out of order", help);
-        }
-        if matches!(run.step, StepChoice::Seconds(_)) {
-            let message = "the load steps are given in two ways, by `step` and by their times";
-            self.error(&path, message, "and by `step`", "leave one of them out");
-        }
-        if run.control.is_some() {
-            let message =
-                "`control` goes on by equal parts in each load step, and these end at times of their own";
-            let help = "give their number, such as `load-steps = 10`";
-            self.error(&path, message, "not with `control`", help);
-        }
-    }
-
     /// Makes the nodes that limit the step heavier, and notes how much mass that adds.
     pub(super) fn scale_mass(&mut self) {
         let Some(table) = self.scene.run.mass_scaling else { return };

@@ -1,9 +1,7 @@
-//! Angles in radians or degrees, and rotations of shells that follow the solid that they are tied to or on.
+//! Rotations of shells that follow the solid that they are tied to or on.
 
 use std::collections::HashSet;
-use std::f64::consts::TAU;
 
-use pliant_geometry::words::number;
 use pliant_geometry::{CellId, Face, Vector3, gradient_integrals};
 use pliant_implicit::CarriedTurn;
 use pliant_mechanics::model::Constraint;
@@ -11,32 +9,6 @@ use pliant_mechanics::model::Constraint;
 use super::Builder;
 
 impl Builder<'_> {
-    /// An angle [rad] that a table gives as `angle` or in `degrees`.
-    pub(super) fn angle(&mut self, path: &[&str], angle: Option<f64>, degrees: Option<f64>) -> Option<f64> {
-        match (angle, degrees) {
-            (Some(angle), None) => {
-                self.note_turns(&format!("`{}.angle`", path.join(".")), angle);
-                Some(angle)
-            }
-            (None, Some(degrees)) => Some(degrees.to_radians()),
-            (angle, _) => {
-                let found = if angle.is_some() { "both" } else { "neither" };
-                let message = format!("an angle is given by `angle` or by `degrees`, found {found}");
-                let help = "`angle` in radians, `degrees` in degrees";
-                self.error(path, message, "this angle", help);
-                None
-            }
-        }
-    }
-
-    /// Notes an angle [rad] of more than a whole turn: it may have been meant in degrees.
-    pub(super) fn note_turns(&mut self, what: &str, angle: f64) {
-        let turns = angle.abs() / TAU;
-        if turns > 1.0 + 1e-9 {
-            self.notes.push(format!("{what}: {} rad are {turns:.1} turns: degrees?", number(angle)));
-        }
-    }
-
     /// Whether tied nodes of one body can turn with another.
     pub(super) fn can_turn(&mut self, name: &str, [guest, host]: [usize; 2], names: &[String; 2]) -> bool {
         let path = ["tie", name, "rotations"];
