@@ -333,7 +333,7 @@ impl Hold {
     }
 
     /// Holds the same in another run.
-    pub fn grip_again(&mut self, live: &mut Live) -> bool {
+    pub(crate) fn grip_again(&mut self, live: &mut Live) -> bool {
         for hand in &mut self.hands {
             if matches!(hand, Holds::Tool(tool) if live.simulation.tool(&tool.name).is_none()) {
                 *hand = Holds::Nothing;

@@ -7,9 +7,9 @@ use pliant_format::tables::{CurveShape, SolverName, StepChoice, Timing};
 use pliant_geometry::words::number;
 use pliant_mechanics::curve::{Curve, Shape};
 
-use super::Builder;
+use super::Context;
 
-impl Builder<'_> {
+impl Context<'_> {
     /// The curve of a motion or a load. What it has at t = 0 comes in within the first load step of a static run, so that the step can be
     /// halved.
     pub(super) fn course(&mut self, timing: &Timing, path: &[&str]) -> Option<Curve> {

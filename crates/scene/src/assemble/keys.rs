@@ -5,9 +5,9 @@ use pliant_format::tables::{
     BodyModel, DeviceName, Element, LoadSteps, LoadTimes, PrecisionName, SolverName, StepChoice,
 };
 
-use super::Builder;
+use super::Context;
 
-impl Builder<'_> {
+impl Context<'_> {
     /// Rejects scenes of both kinds of bodies without a common solver, and keys that do not go with the model of the implicit solvers.
     pub(super) fn check_models(&mut self) {
         let scene = self.scene;

@@ -1,6 +1,9 @@
-//! Obstacles and tools, and who touches whom.
+//! The phase [`InContact`]: obstacles and tools, and who touches whom.
 
+mod barriers;
+mod obstacles;
 mod rigids;
+mod separate;
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -17,8 +20,11 @@ use pliant_sim::contact::pairs::{Pairs, Surface};
 use pliant_sim::contact::shape::Shape;
 use pliant_sim::contact::touch::{Contact, Contacts, Rigid, Touch, With, lattice, parts_of};
 
-use super::barriers::BarrierTables;
-use super::{Builder, BuiltBody, Subject, in_metres};
+use super::context::follows;
+use super::loads::Loaded;
+use super::ties::Subject;
+use super::{BuiltBody, in_metres};
+use barriers::BarrierTables;
 
 /// Overlap, over the size of all, above which bodies are in each other.
 pub(super) const OVERLAP: f64 = 1e-9;
@@ -128,9 +134,40 @@ impl Partner {
     }
 }
 
-impl Builder<'_> {
-    /// The contacts of the scene, and how their barriers act; `None` without any.
-    pub(super) fn contacts(&mut self) -> Option<(Arc<Contacts>, BarrierTables)> {
+/// The fourth phase: bodies that touch.
+pub(super) struct InContact<'s> {
+    pub loaded: Loaded<'s>,
+    /// The contacts with obstacles, tools and each other; `None` without any.
+    pub contacts: Option<Arc<Contacts>>,
+    terms: Terms,
+}
+
+follows!(InContact, loaded: Loaded);
+
+/// What the tables of contacts say beside the contacts themselves.
+#[derive(Default)]
+struct Terms {
+    /// How barriers act.
+    barriers: BarrierTables,
+    /// The gap [m] that each contact gets between shapes at rest.
+    gaps: Vec<Option<f64>>,
+    /// A contact without a barrier whose bodies overlap at the start, and are to be pushed apart.
+    overlapping: Option<String>,
+}
+
+impl<'s> Loaded<'s> {
+    /// Finds the contacts of the scene.
+    pub(crate) fn in_contact(mut self) -> InContact<'s> {
+        let mut terms = Terms::default();
+        let contacts = self.contacts(&mut terms);
+        let contacts = (!contacts.contacts.is_empty()).then(|| Arc::new(contacts));
+        InContact { loaded: self, contacts, terms }
+    }
+}
+
+impl Loaded<'_> {
+    /// The contacts of the scene.
+    fn contacts(&mut self, terms: &mut Terms) -> Contacts {
         let scene = self.scene;
         let mut all = Contacts::default();
         // Things that nothing touches are checked, too.
@@ -143,9 +180,8 @@ impl Builder<'_> {
                 all.rigids.extend(self.rigids(kind, name, table).into_iter().flatten());
             }
         }
-        let mut barriers = BarrierTables::default();
         for (name, table) in &scene.contacts {
-            let contacts = self.contact(name, table, &all.rigids, &mut barriers).unwrap_or_default();
+            let contacts = self.contact(name, table, &all.rigids, terms).unwrap_or_default();
             if !scene.run.solver.solves_equations() {
                 self.keep_apart(name, table, &contacts, &mut all);
             }
@@ -154,7 +190,7 @@ impl Builder<'_> {
                 self.check_goes_with_barriers(name, &all);
             }
         }
-        (!all.contacts.is_empty()).then(|| (Arc::new(all), barriers))
+        all
     }
 
     /// Notes the contacts of a table whose bodies keep less where they are nearer at the start, and the distances that they keep if none is given. They come
@@ -181,86 +217,20 @@ impl Builder<'_> {
         self.notes.extend(usual.map(|range| told_distance(name, range)));
     }
 
-    /// Finds the nodes of bodies that are nearer at the start than the distance to keep; `pushed` are displacements [m] there, if bodies were pushed apart.
-    pub(super) fn find_near(&mut self, contacts: &mut Contacts, pushed: Option<&[[f64; 3]]>) {
-        if contacts.near.is_empty() {
-            return;
-        }
-        let start = State::<f64>::at_rest(&self.assembly.model).displacement;
-        let moved = pushed.unwrap_or(&start);
-        let rest = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
-        let place = |node: u32| rest(node) + Vector3::from(moved[node as usize]);
-        let mut near = std::mem::take(&mut contacts.near);
-        for (&index, near) in &mut near {
-            let contact = &contacts.contacts[index];
-            let pairs = contact.pairs(|node| node, rest).map(|(pairs, _)| pairs.keeping([], rest));
-            *near = pairs.map_or_else(Vec::new, |mut pairs| pairs.nearer(place));
-            if !near.is_empty() {
-                self.notes.push(format!(
-                    "contact `{}`: {} nearer at the start than {} m and {} that distance",
-                    contact.name,
-                    match near.len() {
-                        1 => "1 node is".to_owned(),
-                        count => format!("{} are", counted(count, "node")),
-                    },
-                    number(contact.touch.offset),
-                    if near.len() == 1 { "keeps" } else { "keep" }
-                ));
-            }
-        }
-        contacts.near = near;
-    }
-
-    /// Takes note of the bodies that touch something, unless a mistake leaves that open.
-    pub(super) fn note_touching(&mut self, contacts: Option<&Contacts>, meets: &[Meet]) {
-        if self.failed() {
-            return;
-        }
-        let is_host = self.scene.run.solver == SolverName::Explicit;
-        let bodies = self.assembly.bodies.iter().enumerate();
-        let touching = bodies.map(|(index, body)| {
-            contacts.is_some_and(|all| touches(all, body))
-                || is_host && meets.iter().any(|meet| meet.body == index)
-        });
-        self.touching = Some(touching.collect());
-    }
-
-    /// The surfaces of bodies that those of other participants touch.
-    pub(super) fn meets(&mut self) -> Vec<Meet> {
-        let scene = self.scene;
-        let meet = |own: &mut Self, (name, table): &(String, ContactTable)| {
-            let side =
-                table.between.iter().position(|body| scene.bodies.iter().any(|(known, _)| known == body))?;
-            let parts = [("separate", table.separate), ("gap", table.gap.is_some())];
-            if let Some((key, _)) = parts.into_iter().find(|(_, given)| *given) {
-                let message = format!("`{key}` is for bodies of one participant");
-                own.error(&["contact", name, key], message, "of two participants", "move one of them");
-                return None;
-            }
-            if !own.check_keys_of_contact(name, table, false) {
-                return None;
-            }
-            let body = own.bodies.iter().position(|own| own.name == table.between[side])?;
-            let surface = own.surface_of(name, table, body, side)?;
-            Some(Meet { contact: name.clone(), side, body, surface, offset: 0.5 * own.thickest(body) })
-        };
-        scene.meets.iter().filter_map(|table| meet(self, table)).collect()
-    }
-
     /// The contacts of a table: one, or with `"all"` one for each pair.
     fn contact(
         &mut self,
         name: &str,
         table: &ContactTable,
         rigids: &[Rigid],
-        barriers: &mut BarrierTables,
+        terms: &mut Terms,
     ) -> Option<Vec<Contact>> {
         let is_barrier = self.scene.run.solver.solves_equations();
         if !self.check_contact(name, table, is_barrier) {
             return None;
         }
         let pairs = self.pairs(name, table, rigids)?;
-        barriers.check |= table.check_intersections;
+        terms.barriers.check |= table.check_intersections;
         let with_bodies = pairs.iter().any(|(_, with)| with.body().is_some());
         if table.check_intersections && !is_barrier && !with_bodies {
             let message = "`check-intersections` is for bodies that touch each other or themselves with the solver `explicit`";
@@ -284,20 +254,22 @@ impl Builder<'_> {
                 Partner::Body(other) => With::Body(self.surface_of(name, table, other, 1)?),
             };
             let offset = match is_barrier {
-                true => self.barrier(name, table, [Partner::Body(body), partner], barriers)?,
+                true => self.barrier(name, table, [Partner::Body(body), partner], &mut terms.barriers)?,
                 false => self.distance_to_keep(table, &surface, &with),
             };
             match (&with, partner) {
                 _ if is_barrier => {}
-                (With::Rigid(rigid), _) => self.check_apart(name, table, body, &rigids[*rigid], &surface),
+                (With::Rigid(rigid), _) => {
+                    self.check_apart((name, table), body, &rigids[*rigid], &surface, terms);
+                }
                 (With::Body(second), Partner::Body(other)) => {
-                    self.check_bodies_apart(name, table, [body, other], [&surface, second]);
+                    self.check_bodies_apart((name, table), [body, other], [&surface, second], terms);
                 }
                 _ => self.note_apart(&full, &surface, table.thickness),
             }
             let touch = Touch { friction: table.friction, offset };
             all.push(Contact { name: full, surface, with, touch });
-            self.gaps.push(table.gap);
+            terms.gaps.push(table.gap);
         }
         Some(all)
     }
@@ -500,10 +472,10 @@ impl Builder<'_> {
     /// Refuses bodies that overlap at the start, or have no inside.
     fn check_bodies_apart(
         &mut self,
-        name: &str,
-        table: &ContactTable,
+        (name, table): (&str, &ContactTable),
         bodies: [usize; 2],
         surfaces: [&Surface; 2],
+        terms: &mut Terms,
     ) {
         let path = ["contact", name, "between"];
         let names = bodies.map(|body| self.bodies[body].name.clone());
@@ -522,7 +494,7 @@ impl Builder<'_> {
         let place = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
         let sides = [0, 1].map(|side| (&self.bodies[bodies[side]], surfaces[side]));
         let inside = overlaps(sides, size, place);
-        if !inside.is_empty() && self.moves_apart(name, table) {
+        if !inside.is_empty() && self.moves_apart(name, table, terms) {
             return;
         }
         let Some(message) = told_overlap([&names[0], &names[1]], &inside) else { return };
@@ -531,9 +503,9 @@ impl Builder<'_> {
     }
 
     /// Whether bodies that overlap are moved apart before the run.
-    fn moves_apart(&mut self, name: &str, table: &ContactTable) -> bool {
+    fn moves_apart(&self, name: &str, table: &ContactTable, terms: &mut Terms) -> bool {
         if table.separate {
-            self.overlapping.get_or_insert_with(|| name.into());
+            terms.overlapping.get_or_insert_with(|| name.into());
         }
         table.separate || table.gap.is_some() && !self.is_parted
     }
@@ -541,11 +513,11 @@ impl Builder<'_> {
     /// Refuses bodies that are in an obstacle or a tool at the start: a step would throw them out.
     fn check_apart(
         &mut self,
-        name: &str,
-        table: &ContactTable,
+        (name, table): (&str, &ContactTable),
         body: usize,
         rigid: &Rigid,
         surface: &Surface,
+        terms: &mut Terms,
     ) {
         let stance = rigid.stance(0.0, None);
         let rest = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
@@ -569,7 +541,7 @@ impl Builder<'_> {
             let hangs = hang(rigid, longest);
             found.retain(|(gap, _)| hangs == 0.0 || -gap > hangs);
         }
-        if !found.is_empty() && self.moves_apart(name, table) {
+        if !found.is_empty() && self.moves_apart(name, table, terms) {
             return;
         }
         let Some((gap, place)) = found.iter().min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
@@ -585,6 +557,78 @@ impl Builder<'_> {
         let help = "move one of them (`at`), make `thickness` smaller, or let `gap` or `separate = true` part them; \
                     `inside = true` is for bodies within an obstacle";
         self.error(&["contact", name, "between"], message, "overlapping", help);
+    }
+}
+
+impl InContact<'_> {
+    /// The surfaces of bodies that those of other participants touch.
+    pub fn meets(&mut self) -> Vec<Meet> {
+        let scene = self.scene;
+        let meet = |own: &mut Self, (name, table): &(String, ContactTable)| {
+            let side =
+                table.between.iter().position(|body| scene.bodies.iter().any(|(known, _)| known == body))?;
+            let parts = [("separate", table.separate), ("gap", table.gap.is_some())];
+            if let Some((key, _)) = parts.into_iter().find(|(_, given)| *given) {
+                let message = format!("`{key}` is for bodies of one participant");
+                own.error(&["contact", name, key], message, "of two participants", "move one of them");
+                return None;
+            }
+            if !own.check_keys_of_contact(name, table, false) {
+                return None;
+            }
+            let body = own.bodies.iter().position(|own| own.name == table.between[side])?;
+            let surface = own.surface_of(name, table, body, side)?;
+            Some(Meet { contact: name.clone(), side, body, surface, offset: 0.5 * own.thickest(body) })
+        };
+        scene.meets.iter().filter_map(|table| meet(self, table)).collect()
+    }
+
+    /// Whether each body touches something; `None` where a mistake leaves that open.
+    pub fn touching(&self, meets: &[Meet]) -> Option<Vec<bool>> {
+        if self.failed() {
+            return None;
+        }
+        let is_host = self.scene.run.solver == SolverName::Explicit;
+        let bodies = self.assembly.bodies.iter().enumerate();
+        let touching = bodies.map(|(index, body)| {
+            self.contacts.as_ref().is_some_and(|all| touches(all, body))
+                || is_host && meets.iter().any(|meet| meet.body == index)
+        });
+        Some(touching.collect())
+    }
+
+    /// Finds the nodes of bodies that are nearer at the start than the distance to keep; `pushed` are displacements [m] there, if bodies were pushed apart.
+    pub(crate) fn find_near(&mut self, pushed: Option<&[[f64; 3]]>) {
+        let Some(contacts) = &mut self.contacts else { return };
+        if contacts.near.is_empty() {
+            return;
+        }
+        let (contacts, assembly) = (Arc::make_mut(contacts), &self.loaded.assembly);
+        let start = State::<f64>::at_rest(&assembly.model).displacement;
+        let moved = pushed.unwrap_or(&start);
+        let rest = |node: u32| Vector3::from(assembly.rest[node as usize]);
+        let place = |node: u32| rest(node) + Vector3::from(moved[node as usize]);
+        let mut notes = Vec::new();
+        let mut near = std::mem::take(&mut contacts.near);
+        for (&index, near) in &mut near {
+            let contact = &contacts.contacts[index];
+            let pairs = contact.pairs(|node| node, rest).map(|(pairs, _)| pairs.keeping([], rest));
+            *near = pairs.map_or_else(Vec::new, |mut pairs| pairs.nearer(place));
+            if !near.is_empty() {
+                notes.push(format!(
+                    "contact `{}`: {} nearer at the start than {} m and {} that distance",
+                    contact.name,
+                    match near.len() {
+                        1 => "1 node is".to_owned(),
+                        count => format!("{} are", counted(count, "node")),
+                    },
+                    number(contact.touch.offset),
+                    if near.len() == 1 { "keeps" } else { "keep" }
+                ));
+            }
+        }
+        contacts.near = near;
+        self.loaded.notes.extend(notes);
     }
 }
 

@@ -14,7 +14,7 @@ use pliant_sim::contact::profile::{Corner, Profile};
 use pliant_sim::contact::shape::Shape;
 use pliant_sim::contact::touch::{Jaw, Rigid};
 
-use super::super::Builder;
+use super::Loaded;
 
 /// An obstacle or a tool of a scene.
 #[derive(Clone, Copy)]
@@ -41,7 +41,7 @@ impl<'t> Thing<'t> {
     }
 }
 
-impl Builder<'_> {
+impl Loaded<'_> {
     /// The rigid thing of a table, or its two jaws.
     pub(super) fn rigids(&mut self, kind: &str, name: &str, table: &ToolTable) -> Option<Vec<Rigid>> {
         let thing = Thing { kind, name, table };

@@ -1,5 +1,4 @@
-//! Meshes of segmented images and of surface files: read, cut out, cleaned and meshed with the requested
-//! cells, or read from the cache.
+//! Meshes of segmented images and of surface files: read, cut out, cleaned and meshed with the requested cells, or read from the cache.
 
 use std::cell::Cell;
 use std::f64::consts::FRAC_PI_3;
@@ -18,8 +17,9 @@ use pliant_meshing::{
     TriangleMesh, Voxels, require_room_for,
 };
 
-use super::mesh_files::{MeshFault, words};
-use super::{Builder, MeshOrigin, Meshing};
+use super::MeshOrigin;
+use super::files::{MeshFault, words};
+use crate::assemble::{Context, Meshing};
 use crate::cache::{Kept, Key};
 
 /// Faces that meet at more than this angle meet at a crease, which even triangles keep [rad].
@@ -77,9 +77,9 @@ enum Goal {
     Shells(ShellGoal),
 }
 
-impl Builder<'_> {
+impl Context<'_> {
     /// The mesh of what is segmented in an image, or of what the surface of a file encloses.
-    pub(super) fn scanned(&mut self, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
+    pub(in crate::assemble) fn scanned(&mut self, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
         let body = path.get(1).copied().unwrap_or_default();
         let heard = self.watch;
         let watch: Watch<'_> = &|part, now| heard(Meshing { body, part, now });
@@ -198,8 +198,7 @@ impl Builder<'_> {
     }
 }
 
-/// The labels that a table requests, as far as the image has them, or the threshold above which voxels are
-/// inside.
+/// The labels that a table requests, as far as the image has them, or the threshold above which voxels are inside.
 fn choice(image: &mut Image, table: &MeshTable) -> Result<Choice, MeshFault> {
     if let (Some(threshold), None) = (table.threshold, &table.masks) {
         return Ok(Choice::From(threshold));
@@ -273,14 +272,14 @@ impl Scan {
     /// What of the body the image may cut off.
     fn cut_off(&self) -> Vec<String> {
         let Self::Image(image, choice) = self else { return Vec::new() };
-        let told = |(label, border): (i32, Border)| {
+        let message = |(label, border): (i32, Border)| {
             let what = match choice {
                 Choice::Labels(_) => format!("label {}", image.names.shown(label)),
                 Choice::From(_) => "the body".into(),
             };
             format!("{what} lies at the border of the image ({border}): it may be cut off there")
         };
-        image.border(choice).into_iter().map(told).collect()
+        image.border(choice).into_iter().map(message).collect()
     }
 
     /// Gives all bytes that a mesh can depend on, in pieces.
@@ -298,7 +297,7 @@ impl Scan {
 }
 
 /// Gives all bytes of a mesh that its shape depends on, in pieces.
-pub(super) fn content_of(mesh: &Mesh, sink: &mut dyn FnMut(&[u8])) {
+pub(in crate::assemble) fn content_of(mesh: &Mesh, sink: &mut dyn FnMut(&[u8])) {
     let points = mesh.points.iter().flat_map(|x| [x.x, x.y, x.z]);
     sink(&points.flat_map(f64::to_le_bytes).collect::<Vec<u8>>());
     for block in &mesh.blocks {
@@ -442,8 +441,7 @@ fn goal(table: &MeshTable) -> Result<Goal, MeshFault> {
 }
 
 impl Fineness {
-    /// The edge of the cells [m], or of the first ones where a distance is requested, given the box of the
-    /// body [m].
+    /// The edge of the cells [m], or of the first ones where a distance is requested, given the box of the body [m].
     fn edge_in(&self, bounds: [Vector3; 2]) -> f64 {
         let chosen = self.distance.map_or(0.0, |distance| OrganTets::edge_for(distance, bounds));
         self.edge.unwrap_or(chosen)

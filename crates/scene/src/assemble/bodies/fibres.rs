@@ -10,9 +10,9 @@ use pliant_geometry::words::counted;
 use pliant_geometry::{CellBlock, CellId, CellKind, Selection, SurfaceLocator, Vector3};
 use pliant_mechanics::harmonic::Laplacian;
 
-use super::Builder;
-use super::bodies::{Draft, nodes};
-use super::meshes::list_cells;
+use super::{Draft, nodes};
+use crate::assemble::Context;
+use crate::assemble::meshes::list_cells;
 
 /// Directions shorter than this are zero.
 const ZERO: f64 = 1e-12;
@@ -39,7 +39,7 @@ struct Lost {
 /// A direction for each requested cell, `None` where it is undefined.
 type Directions = (Vec<Option<[f64; 3]>>, Lost);
 
-impl Builder<'_> {
+impl Context<'_> {
     /// The unit fibres of some cells of a body, cell by cell as many as the law has families.
     pub(super) fn fibres(
         &mut self,

@@ -7,8 +7,8 @@ use pliant_geometry::Mesh;
 use pliant_geometry::words::number;
 use pliant_meshing::{DEFAULT_CELL_LIMIT, Distortion, Lens, Pattern, Sheet, sphere};
 
-use super::Builder;
-use super::meshes::MeshOrigin;
+use super::MeshOrigin;
+use crate::assemble::Context;
 
 /// A shape on a grid, with the lengths [m] of its grid axes.
 struct OnGrid<'t> {
@@ -50,7 +50,7 @@ fn on_grid(table: &MeshTable) -> Option<OnGrid<'_>> {
     made(sheet, [shape.length, shape.width], &shape.grid)
 }
 
-impl Builder<'_> {
+impl Context<'_> {
     /// The triangles of a shape (`source` is its key).
     pub(super) fn sheet(&mut self, source: &str, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
         let at = |key| [path, &[key]].concat();

@@ -8,10 +8,9 @@ use pliant_geometry::Mesh;
 use pliant_geometry::io::{self, MeshFile, MeshFileError};
 use pliant_geometry::words::number;
 
-use super::Builder;
+use crate::assemble::Context;
 
-/// An organ smaller than the first or larger than the last [m] is probably in other units; from the second on
-/// it may be.
+/// An organ smaller than the first or larger than the last [m] is probably in other units; from the second on it may be.
 const PLAUSIBLE_SIZE: [f64; 3] = [1e-3, 2.0, 10.0];
 
 /// A size that no organ has: the mesh is probably not in metres.
@@ -34,8 +33,7 @@ impl SizeDoubt {
         self.size > PLAUSIBLE_SIZE[2]
     }
 
-    /// Whether it is larger than a person, and not too large for a part of a machine: a small organ in
-    /// millimetres has this size.
+    /// Whether it is larger than a person, and not too large for a part of a machine: a small organ in millimetres has this size.
     pub fn is_possible(&self) -> bool {
         (PLAUSIBLE_SIZE[1]..=PLAUSIBLE_SIZE[2]).contains(&self.size)
     }
@@ -92,7 +90,7 @@ pub(super) struct MeshFault {
     pub help: String,
 }
 
-impl Builder<'_> {
+impl Context<'_> {
     /// The mesh of a file or of the program in metres, with its name.
     pub(super) fn mesh_file(&self, table: &MeshTable) -> Result<(String, MeshFile), MeshFault> {
         let key = table.own_cells().unwrap_or("file");

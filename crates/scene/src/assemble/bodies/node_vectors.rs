@@ -10,7 +10,7 @@ use pliant_format::{rows_of, table};
 use pliant_geometry::words::counted;
 use pliant_geometry::{DataArray, Mesh};
 
-use super::Builder;
+use super::Meshed;
 
 /// What is wrong with a table of vectors, and what to do about it.
 #[derive(Debug)]
@@ -23,9 +23,9 @@ fn fault(message: String, help: impl Into<String>) -> VectorFault {
     VectorFault { message, help: help.into() }
 }
 
-impl Builder<'_> {
+impl Meshed<'_> {
     /// The vector of each of some nodes (numbered in the model) of a body [m or N].
-    pub(super) fn node_vectors(
+    pub(in crate::assemble) fn node_vectors(
         &mut self,
         table: &NodeVectors,
         body: usize,

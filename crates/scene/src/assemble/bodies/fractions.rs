@@ -5,11 +5,11 @@ use pliant_format::tables::Cells;
 use pliant_geometry::{CellBlock, CellId};
 use pliant_meshing::Voxels;
 
-use super::Builder;
-use super::bodies::Draft;
-use super::meshes::list_cells;
+use super::Draft;
+use crate::assemble::Context;
+use crate::assemble::meshes::list_cells;
 
-impl Builder<'_> {
+impl Context<'_> {
     /// How much of each of some cells of a body is filled; diagnostics where the data are missing or wrong.
     pub(super) fn fractions(
         &mut self,

@@ -4,16 +4,15 @@ use pliant_format::diagnostic::Diagnostic;
 use pliant_geometry::words::number;
 use pliant_geometry::{CellId, CellKind, Mesh};
 
-use super::Builder;
-use super::meshes::list_cells;
+use super::list_cells;
+use crate::assemble::Context;
 
 /// The longest edge over the least altitude of a triangle from which on it is doubted, and refused.
 const DOUBTED: f64 = 1e4;
 const REFUSED: f64 = 1e6;
 
-impl Builder<'_> {
-    /// Refuses a mesh with triangles that are far too thin, and warns of thin ones; whether it can be taken.
-    /// Those without area have been refused.
+impl Context<'_> {
+    /// Refuses a mesh with triangles that are far too thin, and warns of thin ones; whether it can be taken. Those without area have been refused.
     pub(super) fn check_slivers(&mut self, mesh: &Mesh, path: &[&str], place: &[&str]) -> bool {
         let Some(block) = mesh.block(CellKind::Triangle) else { return true };
         let aspect = |corners: &[u32]| {

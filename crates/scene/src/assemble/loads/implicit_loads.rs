@@ -14,15 +14,15 @@ use pliant_implicit::Resolution;
 use pliant_mechanics::curve::{Curve, Shape};
 use pliant_mechanics::load::{Load, LoadKind, Spread};
 use pliant_shells::element::Membrane;
-use pliant_sim::{BodyCells, RunControl, Stop};
+use pliant_sim::{RunControl, Stop};
 
-use crate::assemble::{Builder, Subject};
+use crate::assemble::ties::{Subject, Tied};
 
 /// What acts, and the carried surface whose points it numbers.
 type Acting = (LoadKind, Option<usize>);
 
-impl Builder<'_> {
-    pub(in crate::assemble) fn add_implicit_loads(&mut self) {
+impl Tied<'_> {
+    pub(in crate::assemble) fn add_implicit_loads(&mut self) -> Option<RunControl> {
         let scene = self.scene;
         if let Some(acceleration) = scene.scene.gravity {
             let kinds = self.weight_of_all(acceleration);
@@ -40,9 +40,7 @@ impl Builder<'_> {
                 self.push_loads(name, kinds, curve, controlled);
             }
         }
-        if let Some(table) = &scene.run.control {
-            self.add_control(table);
-        }
+        self.control(scene.run.control.as_ref()?)
     }
 
     /// Adds loads.
@@ -252,35 +250,6 @@ impl Builder<'_> {
         self.shell_cells(body).and_then(|cells| cells.first().copied()).map_or(cell, |first| cell - first)
     }
 
-    /// The facets of a shell, numbered in the model; `None` for another body.
-    pub(in crate::assemble) fn shell_cells(&self, body: usize) -> Option<Vec<u32>> {
-        match self.cells.get(body)? {
-            BodyCells::Facets(range) => Some(range.clone().collect()),
-            BodyCells::Solids => None,
-        }
-    }
-
-    /// The selected facets of a shell, numbered in the model.
-    pub(in crate::assemble) fn facets(
-        &mut self,
-        body: usize,
-        selection: &pliant_geometry::Selection,
-        path: &[&str],
-    ) -> Option<Vec<u32>> {
-        let cells = self.shell_cells(body)?;
-        let built = &self.bodies[body];
-        match selection.faces(&built.mesh, &built.boundary) {
-            Ok(faces) => {
-                let cell = |face: u32| cells[built.boundary.faces[face as usize].parent.index as usize];
-                Some(faces.into_iter().map(cell).collect())
-            }
-            Err(error) => {
-                self.error(path, error.to_string(), "this selection", "");
-                None
-            }
-        }
-    }
-
     /// The edges of one triangle only both of whose ends are among some nodes of the model (increasing).
     fn border_edges(&self, body: usize, nodes: &[u32]) -> Vec<[u32; 2]> {
         let Some(cells) = self.shell_cells(body) else { return Vec::new() };
@@ -295,7 +264,7 @@ impl Builder<'_> {
         count.into_iter().filter(|(edge, n)| *n == 1 && chosen(edge)).map(|(edge, _)| edge).collect()
     }
 
-    fn add_control(&mut self, table: &ControlTable) {
+    fn control(&mut self, table: &ControlTable) -> Option<RunControl> {
         let scene = self.scene;
         let path = scene.run_at("control");
         let scene = self.scene;
@@ -304,13 +273,13 @@ impl Builder<'_> {
             let help = suggestion(&table.load, &known, SCENE, "loads");
             let message = format!("there is no load `{}`", table.load);
             self.error(&[&path[..], &["load"]].concat(), message, "no such load", help);
-            return;
+            return None;
         }
         let given = [table.displacement.is_some(), table.arc_length.is_some(), table.volume.is_some()];
         if given.iter().filter(|&&given| given).count() != 1 {
             let message = "a control has exactly one of `displacement`, `arc-length` and `volume`";
             self.error(&path, message, "this control", "leave the others out");
-            return;
+            return None;
         }
         let control = match (&table.displacement, table.arc_length, table.volume) {
             (Some(wanted), _, _) => (self.controlled_node(wanted, &[&path[..], &["displacement"]].concat()))
@@ -325,7 +294,7 @@ impl Builder<'_> {
             let message = "`stop` is for `arc-length`: other controls end where they are set to end";
             self.error(&[&path[..], &["stop"]].concat(), message, "has no effect here", "remove it");
         }
-        self.control = control;
+        control
     }
 
     /// Where a path by arc length ends: at the load as written, unless `stop` says otherwise.

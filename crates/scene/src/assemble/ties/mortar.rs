@@ -10,8 +10,9 @@ use pliant_geometry::{
 };
 use pliant_mechanics::mapping::Weights;
 
+use super::Meshed;
 use super::attach::{Attached, GAP, doubt_points, median_edge};
-use super::{Builder, BuiltBody, in_metres};
+use crate::assemble::{BuiltBody, in_metres};
 
 /// A place that is off by less than this part of the median edge is right.
 const ROUNDING: f64 = 1e-13;
@@ -34,9 +35,9 @@ struct Refusal {
     help: &'static str,
 }
 
-impl Builder<'_> {
-    /// How nodes follow by the method of a tie, which have been found as points. `selected` are all nodes
-    /// that the tie names, numbered in the model.
+impl Meshed<'_> {
+    /// How nodes follow by the method of a tie, which have been found as points. `selected` are all nodes that the tie names, numbered in the
+    /// model.
     pub(super) fn by_method(
         &mut self,
         joint: Joint<'_>,
@@ -57,7 +58,8 @@ impl Builder<'_> {
             }
         }
         let bodies = [joint.guest, joint.host].map(|body| &self.bodies[body]);
-        self.out.extend(doubt_points(&self.scene.source, joint.name, joint.table, bodies));
+        let doubt = doubt_points(self.source(), joint.name, joint.table, bodies);
+        self.out.extend(doubt);
         Some(points)
     }
 
@@ -112,8 +114,8 @@ impl Builder<'_> {
         Ok(found)
     }
 
-    /// Whether a tie without a method takes its mortar rows: all selected nodes are on them, and none lies
-    /// deep in the other body or across a wide gap.
+    /// Whether a tie without a method takes its mortar rows: all selected nodes are on them, and none lies deep in the other body or across a
+    /// wide gap.
     fn is_glued(&self, joint: Joint<'_>, points: &Attached, found: &MortarRows) -> bool {
         let BuiltBody { boundary, mesh, .. } = &self.bodies[joint.host];
         let most = GAP * median_edge(mesh);

@@ -5,16 +5,16 @@ use pliant_geometry::{CellBlock, CellKind, Mesh, Vector3};
 use pliant_mechanics::element::Cord;
 use pliant_mechanics::model::Cells;
 
-use super::Builder;
-use super::bodies::{Draft, nodes};
-use super::meshes::MeshOrigin;
+use super::{Draft, Meshed, nodes};
+use crate::assemble::Context;
+use crate::assemble::meshes::MeshOrigin;
 
 /// Most bars of a path.
 const MOST: f64 = 1e6;
 
-impl Builder<'_> {
+impl Context<'_> {
     /// The bars along paths from point to point. Paths meet where they have a point in common.
-    pub(super) fn lines(&mut self, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
+    pub(in crate::assemble) fn lines(&mut self, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
         let at = |key| [path, &[key]].concat();
         for (key, given) in [("fix", table.fix.is_some()), ("as", table.cells.is_some())] {
             if given {
@@ -55,7 +55,9 @@ impl Builder<'_> {
         let mesh = Mesh { points, blocks: vec![CellBlock::new(CellKind::Line, lines)], ..Mesh::default() };
         Some(MeshOrigin { mesh, origin: format!("lines, {}", pliant_geometry::words::counted(count, "bar")) })
     }
+}
 
+impl Meshed<'_> {
     /// Some lines of a block as bars.
     pub(super) fn bars(
         &mut self,

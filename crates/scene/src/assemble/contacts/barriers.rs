@@ -9,7 +9,9 @@ use pliant_implicit::{ContactModel, State, apart_counts, meetings};
 use pliant_sim::contact::barrier::{BarrierSettings, Meeting};
 use pliant_sim::contact::touch::{Contacts, With};
 
-use super::{Builder, Partner, in_metres};
+use super::{InContact, Loaded, Partner};
+use crate::assemble::in_metres;
+use crate::assemble::start::Started;
 
 /// The distance of a barrier over the diagonal of all bodies, if none is given.
 const DISTANCE: f64 = 1e-3;
@@ -47,7 +49,7 @@ impl BarrierTables {
     }
 }
 
-impl Builder<'_> {
+impl Loaded<'_> {
     /// Refuses keys that only barriers have, or only contacts without them.
     pub(super) fn check_keys_of_contact(
         &mut self,
@@ -115,45 +117,6 @@ impl Builder<'_> {
         Some(offset)
     }
 
-    /// Takes note of bodies without a gap at the start that are to be pushed apart.
-    pub(super) fn find_meetings(
-        &mut self,
-        contacts: &Arc<Contacts>,
-        barriers: &BarrierTables,
-        start: &State,
-    ) {
-        let is_asked =
-            |name: &String| self.scene.contacts.iter().any(|(known, table)| known == name && table.separate);
-        if !barriers.tables.iter().any(is_asked) {
-            return;
-        }
-        let met = meetings(&barriers.contact_model(contacts), &self.assembly, start);
-        let names = met.iter().map(|one| &barriers.tables[one.contact as usize]);
-        self.overlapping = names.into_iter().find(|name| is_asked(name)).cloned();
-    }
-
-    /// Gives the contacts to the model, unless bodies have no gap at the start.
-    pub(super) fn touch(&mut self, contacts: &Arc<Contacts>, barriers: BarrierTables, start: &State) {
-        let model = barriers.contact_model(contacts);
-        let tables = barriers.tables;
-        let met = meetings(&model, &self.assembly, start);
-        let mut of_contacts = BTreeMap::<u32, Vec<Meeting>>::new();
-        met.into_iter().for_each(|one| of_contacts.entry(one.contact).or_default().push(one));
-        for (contact, met) in &of_contacts {
-            self.refuse_meetings(&contacts.contacts[*contact as usize].name, &tables[*contact as usize], met);
-        }
-        for (contact, count) in contacts.contacts.iter().zip(apart_counts(&model, &self.assembly)) {
-            if count > 0 {
-                self.notes.push(format!(
-                    "contact `{}`: {} of nodes with triangles or of edges never touch, since they are in one place at rest",
-                    contact.name,
-                    counted(count, "pair")
-                ));
-            }
-        }
-        self.assembly.contact = Some(model);
-    }
-
     /// How often the triangles of shells among these bodies are divided.
     fn level(&mut self, name: &str, table: &ContactTable, bodies: &[usize]) -> Option<u8> {
         let level = table.subdivision.unwrap_or(0);
@@ -183,39 +146,6 @@ impl Builder<'_> {
             return None;
         }
         Some(level)
-    }
-
-    fn refuse_meetings(&mut self, contact: &str, table: &str, met: &[Meeting]) {
-        let told = |one: &Meeting| {
-            let (body, node) = self.assembly.locate_node(one.node);
-            let how = match one.gap {
-                Some(gap) => format!("a gap of {} m", number(gap)),
-                None => "an edge through a triangle".into(),
-            };
-            format!("node {node} of `{}` at {}: {how}", self.bodies[body].name, in_metres(one.place))
-        };
-        let mut sorted = met.to_vec();
-        sorted.sort_by(|a, b| {
-            a.gap.unwrap_or(f64::NEG_INFINITY).total_cmp(&b.gap.unwrap_or(f64::NEG_INFINITY))
-        });
-        let first: Vec<String> = sorted.iter().take(LISTED).map(told).collect();
-        let message = format!(
-            "contact `{contact}` has no gap at the start in {}: {}{}",
-            counted(met.len(), "place"),
-            first.join("; "),
-            if met.len() > LISTED { "; …" } else { "" }
-        );
-        let asked = self.scene.contacts.iter().find(|(known, _)| known == table).map(|(_, table)| table);
-        let help = match asked {
-            Some(table) if table.separate || table.gap.is_some() => {
-                "move one of them (`at`), make `thickness` smaller, or take finer cells there: what overlaps must be smaller than them"
-            }
-            _ => {
-                "let `gap = 2e-4` or `separate = true` part them, move one of them (`at`), or make `thickness` smaller: a barrier can't \
-                 begin within another body"
-            }
-        };
-        self.error(&["contact", table, "between"], message, "no gap", help);
     }
 
     /// The diagonal [m] of all bodies.
@@ -259,5 +189,86 @@ impl Builder<'_> {
             let help = "leave it out, so that the jaws hold by friction, or take `solver = \"explicit\"`";
             self.error(&["contact", name, "between"], message, "an ideal grip", help);
         }
+    }
+}
+
+impl InContact<'_> {
+    /// Whether states that are written are searched for intersections, since no barrier keeps them away.
+    pub(in crate::assemble) fn checks_intersections(&self) -> bool {
+        !self.scene.run.solver.solves_equations() && self.contacts.is_some() && self.terms.barriers.check
+    }
+
+    /// A contact with a barrier whose bodies have no gap at the start, and are to be pushed apart.
+    pub(super) fn without_gap(&self, start: &State) -> Option<String> {
+        let (contacts, barriers) = (self.contacts.as_ref()?, &self.terms.barriers);
+        let is_asked =
+            |name: &String| self.scene.contacts.iter().any(|(known, table)| known == name && table.separate);
+        if !barriers.tables.iter().any(is_asked) {
+            return None;
+        }
+        let met = meetings(&barriers.contact_model(contacts), &self.assembly, start);
+        let names = met.iter().map(|one| &barriers.tables[one.contact as usize]);
+        names.into_iter().find(|name| is_asked(name)).cloned()
+    }
+}
+
+impl Started<'_> {
+    /// Gives the contacts to the model of a solver with barriers, unless bodies have no gap at the start.
+    pub(in crate::assemble) fn touch(&mut self) {
+        let (Some(contacts), Some(start)) = (self.contacts.clone(), &self.start) else { return };
+        if !self.scene.run.solver.solves_equations() {
+            return;
+        }
+        let model = self.terms.barriers.contact_model(&contacts);
+        let tables = self.terms.barriers.tables.clone();
+        let met = meetings(&model, &self.assembly, start);
+        let mut of_contacts = BTreeMap::<u32, Vec<Meeting>>::new();
+        met.into_iter().for_each(|one| of_contacts.entry(one.contact).or_default().push(one));
+        for (contact, met) in &of_contacts {
+            self.refuse_meetings(&contacts.contacts[*contact as usize].name, &tables[*contact as usize], met);
+        }
+        for (contact, count) in contacts.contacts.iter().zip(apart_counts(&model, &self.assembly)) {
+            if count > 0 {
+                self.notes.push(format!(
+                    "contact `{}`: {} of nodes with triangles or of edges never touch, since they are in one place at rest",
+                    contact.name,
+                    counted(count, "pair")
+                ));
+            }
+        }
+        self.assembly.contact = Some(model);
+    }
+
+    fn refuse_meetings(&mut self, contact: &str, table: &str, met: &[Meeting]) {
+        let message = |one: &Meeting| {
+            let (body, node) = self.assembly.locate_node(one.node);
+            let how = match one.gap {
+                Some(gap) => format!("a gap of {} m", number(gap)),
+                None => "an edge through a triangle".into(),
+            };
+            format!("node {node} of `{}` at {}: {how}", self.bodies[body].name, in_metres(one.place))
+        };
+        let mut sorted = met.to_vec();
+        sorted.sort_by(|a, b| {
+            a.gap.unwrap_or(f64::NEG_INFINITY).total_cmp(&b.gap.unwrap_or(f64::NEG_INFINITY))
+        });
+        let first: Vec<String> = sorted.iter().take(LISTED).map(message).collect();
+        let message = format!(
+            "contact `{contact}` has no gap at the start in {}: {}{}",
+            counted(met.len(), "place"),
+            first.join("; "),
+            if met.len() > LISTED { "; …" } else { "" }
+        );
+        let asked = self.scene.contacts.iter().find(|(known, _)| known == table).map(|(_, table)| table);
+        let help = match asked {
+            Some(table) if table.separate || table.gap.is_some() => {
+                "move one of them (`at`), make `thickness` smaller, or take finer cells there: what overlaps must be smaller than them"
+            }
+            _ => {
+                "let `gap = 2e-4` or `separate = true` part them, move one of them (`at`), or make `thickness` smaller: a barrier can't \
+                 begin within another body"
+            }
+        };
+        self.error(&["contact", table, "between"], message, "no gap", help);
     }
 }

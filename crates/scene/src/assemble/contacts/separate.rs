@@ -1,8 +1,7 @@
-//! Bodies that overlap at the start are pushed apart: with the gap g < 0 of points Σ cᵢ xᵢ along a normal n,
-//! xᵢ += cᵢ n λ, λ = −g / Σ cᵢ². Passes over all contacts go on until nothing overlaps, and no edge of one
-//! body goes through another; nodes inside of bodies follow harmonically. With `separate` the shape at rest
-//! stays, so that the run starts deformed; with `gap` the shape at rest moves. Leaves out: whether bodies
-//! could have been moved as a whole.
+//! Bodies that overlap at the start are pushed apart: with the gap g < 0 of points Σ cᵢ xᵢ along a normal n, xᵢ += cᵢ n λ, λ = −g / Σ cᵢ².
+//! Passes over all contacts go on until nothing overlaps, and no edge of one body goes through another; nodes inside of bodies follow
+//! harmonically. With `separate` the shape at rest stays, so that the run starts deformed; with `gap` the shape at rest moves. Leaves out:
+//! whether bodies could have been moved as a whole.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -17,15 +16,16 @@ use pliant_sim::contact::barrier::IntersectionCheck;
 use pliant_sim::contact::pairs::{Pairs, Surface};
 use pliant_sim::contact::touch::{Contact, Contacts, Rigid, With, lattice, parts_of};
 
-use super::contacts::{OVERLAP, hang};
-use super::{Builder, BuiltBody, in_metres};
+use super::{InContact, OVERLAP, hang};
+use crate::assemble::bodies::Meshed;
+use crate::assemble::ties::Tied;
+use crate::assemble::{BuiltBody, Context, in_metres};
 
 /// The gap between bodies that were pushed apart, over the distance of their barrier, is this at least.
 const LEAST_GAP: f64 = 0.5;
 /// Passes at most.
 const PASSES: usize = 400;
-/// Cosine of the angle between the shortest way out of a thing and that into the own body, below which the
-/// latter is taken.
+/// Cosine of the angle between the shortest way out of a thing and that into the own body, below which the latter is taken.
 const FACING: f64 = 0.3;
 /// Sweeps in which inner nodes follow.
 const SWEEPS: usize = 200;
@@ -41,8 +41,7 @@ struct Pushed {
     places: Vec<Vector3>,
     /// 1 along components that are free, else 0.
     free: Vec<Vector3>,
-    /// Gap [m] below which points are pushed, and the gap that is left between them: that of barriers,
-    /// without them none.
+    /// Gap [m] below which points are pushed, and the gap that is left between them: that of barriers, without them none.
     least: f64,
     left: f64,
     /// Ways [m] up to this have no direction.
@@ -79,81 +78,50 @@ impl Pushed {
     }
 }
 
-impl Builder<'_> {
-    /// The displacements [m] that push bodies apart which overlap, of all nodes; `None` if nothing has to, or
-    /// cannot be. Barriers have `distances` [m], one a contact: bodies are pushed apart by as much, so that
-    /// the run starts without forces between them.
-    pub(super) fn separate(
-        &mut self,
-        contacts: Option<&Contacts>,
-        distances: &[f64],
-        start: Option<&pliant_implicit::State>,
-    ) -> Option<Arc<Vec<[f64; 3]>>> {
-        let (contacts, name) = (contacts?, self.overlapping.clone()?);
-        let owners = self.assembly.constrained_components().ok()?;
-        let mut at_first = State::<f64>::at_rest(&self.assembly.model);
-        if let Some(start) = start {
-            let moved = start.position.iter().zip(&self.assembly.rest);
-            at_first.displacement = moved.map(|(now, rest)| (now - Vector::from(*rest)).into()).collect();
+impl<'s> InContact<'s> {
+    /// The ways [m] of all nodes to shapes at rest that have the gaps of contacts between them; `None` if nothing has to move, or can't, or did
+    /// already.
+    pub(in crate::assemble) fn ways_to_gaps(&mut self) -> Option<Vec<Vector3>> {
+        let contacts = self.contacts.clone()?;
+        if self.is_parted || self.failed() {
+            return None;
         }
-        let start = at_first;
-        let at_rest = |(rest, u): (&[f64; 3], &[f64; 3])| Vector::from(*rest) + Vector::from(*u);
-        let before: Vec<Vector3> = self.assembly.rest.iter().zip(&start.displacement).map(at_rest).collect();
-        let kept = |index: usize| {
-            let contact = &contacts.contacts[index];
-            let Some(distance) = distances.get(index) else { return Some([0.0, OVERLAP * size_of(&before)]) };
-            let kept = match contact.with {
-                With::Rigid(_) => 0.0,
-                _ => contact.touch.offset,
-            };
-            Some([kept + LEAST_GAP * distance, kept + distance])
-        };
-        let is_free = |owner: &[u32; 3]| Vector3::from_fn(|c, _| if owner[c] == FREE { 1.0 } else { 0.0 });
-        let free = owners.iter().map(is_free).collect();
-        let places = self.push_all_apart([&name, "separate"], contacts, &before, free, kept)?;
-        let stays: Vec<bool> = owners.iter().map(|owner| *owner != [FREE; 3]).collect();
-        let ways = self.follow_inside(contacts, stays, &before, &places);
-        let moved = ways.iter().zip(&start.displacement).map(|(way, u)| (Vector::from(*u) + way).into());
-        let mut displacement: Vec<[f64; 3]> = moved.collect();
-        self.assembly.model.follow(&mut displacement);
-        self.check_cells_apart([&name, "separate"], &displacement, start)?;
-        self.note_pushed(&before, &places, OVERLAP * size_of(&before), "that overlapped");
-        Some(Arc::new(displacement))
-    }
-
-    /// The bodies with shapes at rest that have the gaps of contacts between them; `None` if nothing has to
-    /// move, or can't.
-    pub(super) fn part_at_rest(&mut self, contacts: &Contacts) -> Option<Vec<BuiltBody>> {
         let scene = self.scene;
         let (name, _) = scene.contacts.iter().find(|(_, table)| table.gap.is_some())?;
         let before: Vec<Vector3> = self.assembly.rest.iter().map(|&rest| rest.into()).collect();
-        let gaps = std::mem::take(&mut self.gaps);
+        let gaps = self.terms.gaps.clone();
         let kept = |index: usize| match (gaps[index], &contacts.contacts[index].with) {
             (None, _) => None,
             (Some(gap), With::Rigid(_)) => Some([gap; 2]),
             (Some(gap), _) => Some([gap + contacts.contacts[index].touch.offset; 2]),
         };
         let free = vec![Vector3::repeat(1.0); before.len()];
-        let places = self.push_all_apart([name, "gap"], contacts, &before, free, kept)?;
-        let ways = self.follow_inside(contacts, vec![false; before.len()], &before, &places);
+        let places = self.push_all_apart([name, "gap"], &contacts, &before, free, kept)?;
+        let ways = self.follow_inside(&contacts, vec![false; before.len()], &before, &places);
         let displacement: Vec<[f64; 3]> = ways.iter().map(|way| (*way).into()).collect();
         let start = State::<f64>::at_rest(&self.assembly.model);
         self.check_cells_apart([name, "gap"], &displacement, start)?;
         self.note_pushed(&before, &places, OVERLAP * size_of(&before), "too near each other");
-        if ways.iter().all(|way| *way == Vector3::zeros()) {
-            return None;
-        }
-        let mut bodies = std::mem::take(&mut self.bodies);
-        for (body, own) in bodies.iter_mut().zip(&self.assembly.bodies) {
+        ways.iter().any(|way| *way != Vector3::zeros()).then_some(ways)
+    }
+
+    /// The bodies with shapes at rest that have gone these ways [m], and a context to begin anew with. It has the remarks on how the bodies
+    /// were made, and how they were parted: the last one.
+    pub(in crate::assemble) fn parted(self, ways: &[Vector3]) -> (Context<'s>, Vec<BuiltBody>) {
+        let Tied { meshed, noted, .. } = self.loaded.tied;
+        let Meshed { context, assembly, mut bodies, .. } = meshed;
+        for (body, own) in bodies.iter_mut().zip(&assembly.bodies) {
             for (point, node) in body.mesh.points.iter_mut().zip(own.all_nodes()) {
                 *point += ways[node as usize];
             }
         }
-        Some(bodies)
+        let Context { scene, cache, watch, mut notes, .. } = context;
+        notes.drain(noted..notes.len() - 1);
+        (Context { notes, ..Context::new(scene, cache, watch) }, bodies)
     }
 
-    /// Where nodes are [m] once nothing overlaps; `None` if something still does. Of each contact that counts
-    /// `kept` says below which gap [m] points are pushed, and which is left.
+    /// Where nodes are [m] once nothing overlaps; `None` if something still does. Of each contact that counts `kept` says below which gap [m] points are
+    /// pushed, and which is left.
     fn push_all_apart(
         &mut self,
         asked: [&str; 2],
@@ -322,14 +290,61 @@ impl Builder<'_> {
         let moved: Vec<(usize, f64)> = ways.filter(|(_, way)| *way > least).collect();
         let Some(&(node, way)) = moved.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else { return };
         let (body, _) = self.assembly.locate_node(node as u32);
-        self.notes.push(format!(
+        let note = format!(
             "{} {which} {} pushed apart before the run, by up to {} m at {} of `{}`",
             counted(moved.len(), "node"),
             if moved.len() == 1 { "was" } else { "were" },
             number(way),
             in_metres(before[node]),
             self.assembly.bodies[body].name
-        ));
+        );
+        self.notes.push(note);
+    }
+}
+
+impl InContact<'_> {
+    /// The displacements [m] that push bodies apart which overlap, of all nodes; `None` if nothing has to, or cannot be. Bodies with a barrier
+    /// are pushed apart by its distance, so that the run starts without forces between them.
+    pub(in crate::assemble) fn separate(
+        &mut self,
+        start: Option<&pliant_implicit::State>,
+    ) -> Option<Arc<Vec<[f64; 3]>>> {
+        let without_gap = start.and_then(|start| self.without_gap(start));
+        let (contacts, name) =
+            (self.contacts.clone()?, without_gap.or_else(|| self.terms.overlapping.clone())?);
+        if self.failed() {
+            return None;
+        }
+        let distances = self.terms.barriers.distances();
+        let owners = self.assembly.constrained_components().ok()?;
+        let mut at_first = State::<f64>::at_rest(&self.assembly.model);
+        if let Some(start) = start {
+            let moved = start.position.iter().zip(&self.assembly.rest);
+            at_first.displacement = moved.map(|(now, rest)| (now - Vector::from(*rest)).into()).collect();
+        }
+        let start = at_first;
+        let at_rest = |(rest, u): (&[f64; 3], &[f64; 3])| Vector::from(*rest) + Vector::from(*u);
+        let before: Vec<Vector3> = self.assembly.rest.iter().zip(&start.displacement).map(at_rest).collect();
+        let kept = |index: usize| {
+            let contact = &contacts.contacts[index];
+            let Some(distance) = distances.get(index) else { return Some([0.0, OVERLAP * size_of(&before)]) };
+            let kept = match contact.with {
+                With::Rigid(_) => 0.0,
+                _ => contact.touch.offset,
+            };
+            Some([kept + LEAST_GAP * distance, kept + distance])
+        };
+        let is_free = |owner: &[u32; 3]| Vector3::from_fn(|c, _| if owner[c] == FREE { 1.0 } else { 0.0 });
+        let free = owners.iter().map(is_free).collect();
+        let places = self.push_all_apart([&name, "separate"], &contacts, &before, free, kept)?;
+        let stays: Vec<bool> = owners.iter().map(|owner| *owner != [FREE; 3]).collect();
+        let ways = self.follow_inside(&contacts, stays, &before, &places);
+        let moved = ways.iter().zip(&start.displacement).map(|(way, u)| (Vector::from(*u) + way).into());
+        let mut displacement: Vec<[f64; 3]> = moved.collect();
+        self.assembly.model.follow(&mut displacement);
+        self.check_cells_apart([&name, "separate"], &displacement, start)?;
+        self.note_pushed(&before, &places, OVERLAP * size_of(&before), "that overlapped");
+        Some(Arc::new(displacement))
     }
 }
 
@@ -338,8 +353,7 @@ fn size_of(places: &[Vector3]) -> f64 {
     places.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()))
 }
 
-/// Pushes nodes and points of faces out of a rigid thing: the shortest way, unless this leads out of the
-/// body. A solid then draws back into itself.
+/// Pushes nodes and points of faces out of a rigid thing: the shortest way, unless this leads out of the body. A solid then draws back into itself.
 fn push_out(rigid: &Rigid, offset: f64, surface: &Surface, is_solid: bool, pushed: &mut Pushed) {
     let stance = rigid.stance(0.0, None);
     let thinnest = rigid.shape.thinnest();
@@ -380,8 +394,8 @@ fn push_out(rigid: &Rigid, offset: f64, surface: &Surface, is_solid: bool, pushe
     }
 }
 
-/// How far [m] a point has to go along a direction to leave a thing whose thinnest part is known [m]; `None`
-/// if it is not that thin there, or without a direction.
+/// How far [m] a point has to go along a direction to leave a thing whose thinnest part is known [m]; `None` if it is not that thin there, or without
+/// a direction.
 fn way_out(from: &Vector3, along: &Vector3, thinnest: f64, gap: impl Fn(&Vector3) -> f64) -> Option<f64> {
     let mut way = 0.0;
     while way <= 4.0 * thinnest && *along != Vector3::zeros() {

@@ -1,5 +1,10 @@
 //! The mesh of a body or a surface: read from a file or made from a shape, brought to metres, checked and repaired.
 
+mod files;
+mod images;
+mod sheets;
+mod slivers;
+
 use nalgebra::Rotation3;
 use pliant_format::diagnostic::Diagnostic;
 use pliant_format::tables::{BodyModel, BodyTable, Cells, Fix, MeshTable, Organ};
@@ -14,8 +19,11 @@ use pliant_meshing::{
     Stuffing, Tube, VolumeCell, Voxels, brain_label,
 };
 
-use super::Builder;
-use super::mesh_files::{MeshFault, SizeDoubt, words};
+use super::Context;
+pub use files::SizeDoubt;
+use files::{MeshFault, words};
+pub(super) use images::content_of;
+pub(super) use sheets::is_sheet;
 
 /// A mesh and where it comes from.
 pub(crate) struct MeshOrigin {
@@ -29,7 +37,7 @@ const SOLID_SHAPES: [&str; 4] = ["block", "ellipsoid", "tube", "organ"];
 /// Carries the nodes' numbers in the file through the repairs.
 const FILE_NUMBER: &str = "number of the node in the mesh file";
 
-impl Builder<'_> {
+impl Context<'_> {
     /// The mesh of the table at `path` (`body.NAME.mesh`), in metres; diagnostics if it can't be had.
     pub(super) fn mesh(&mut self, table: &MeshTable, path: &[&str]) -> Option<MeshOrigin> {
         let given = [

@@ -8,13 +8,38 @@ use pliant_mechanics::mapping::Weights;
 use pliant_mechanics::model::Surface;
 use pliant_shells::{Carried, EdgeRule};
 
-use super::meshes::surface_of;
-use super::{Builder, MeshOrigin};
+use super::{Meshed, Tied};
+use crate::assemble::meshes::{MeshOrigin, surface_of};
 
 /// A point farther from its body than this fraction of the body's size gives a warning.
 const FAR: f64 = 0.05;
 
-impl Builder<'_> {
+impl Meshed<'_> {
+    /// Warns of what a body carries far outside of itself.
+    pub(in crate::assemble) fn doubt_place(
+        &mut self,
+        what: &str,
+        distance: f64,
+        body: usize,
+        path: &[&str],
+        help: &str,
+    ) {
+        let built = &self.bodies[body];
+        let size = built.mesh.bounds().map_or(0.0, |(low, high)| (high - low).norm());
+        if distance > FAR * size {
+            let message = format!(
+                "{what} reaches {} m outside `{}`, which measures {} m across",
+                number(distance),
+                built.name,
+                number(size)
+            );
+            let place = self.source().span(path);
+            self.out.push(Diagnostic::warning(message).at(place, "far outside").help(help));
+        }
+    }
+}
+
+impl Tied<'_> {
     /// Adds all carried surfaces to the model.
     pub(super) fn add_surfaces(&mut self) {
         let scene = self.scene;
@@ -51,13 +76,14 @@ impl Builder<'_> {
 
     /// The points of a surface carried by the curved surface of a shell, kept there; no linear mapping.
     fn carry_on_shell(&mut self, body: usize, cells: &[u32], name: &str, surface: &Mesh) -> Weights {
-        let assembly = &self.assembly;
+        let assembly = &self.meshed.assembly;
         let curved = self.curved.get_or_insert_with(|| CurvedSurface::new(assembly, EdgeRule::Arc));
         let rest = State::at_rest(assembly);
         let points = curved.carry_all(assembly, &rest, cells, &surface.points).unwrap_or_default();
         let away = |point: &Carried| point.height.hypot(point.aside[0]).hypot(point.aside[1]);
         let farthest = points.iter().map(away).fold(0.0, f64::max);
-        self.assembly.carried.insert(self.assembly.surfaces.len(), points);
+        let number = self.assembly.surfaces.len();
+        self.assembly.carried.insert(number, points);
         let help = "is it in the same units and place as the body? `scale` and `at` move it";
         self.doubt_place(&format!("surface `{name}`"), farthest, body, &["surface", name, "mesh"], help);
         Weights::from_rows(surface.points.iter().map(|_| &[][..]))
@@ -80,22 +106,6 @@ impl Builder<'_> {
         let help = "is it in the same units and place as the body? `scale` and `at` move it";
         self.doubt_place(&format!("surface `{name}`"), farthest, body, &["surface", name, "mesh"], help);
         Weights::from_rows(rows.iter().map(Vec::as_slice))
-    }
-
-    /// Warns of what a body carries far outside of itself.
-    pub(super) fn doubt_place(&mut self, what: &str, distance: f64, body: usize, path: &[&str], help: &str) {
-        let built = &self.bodies[body];
-        let size = built.mesh.bounds().map_or(0.0, |(low, high)| (high - low).norm());
-        if distance > FAR * size {
-            let message = format!(
-                "{what} reaches {} m outside `{}`, which measures {} m across",
-                number(distance),
-                built.name,
-                number(size)
-            );
-            let place = self.source().span(path);
-            self.out.push(Diagnostic::warning(message).at(place, "far outside").help(help));
-        }
     }
 }
 

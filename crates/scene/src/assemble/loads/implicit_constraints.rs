@@ -5,16 +5,11 @@ use pliant_geometry::Vector3;
 use pliant_implicit::Spring;
 use pliant_mechanics::model::Motion;
 
-use crate::assemble::Builder;
+use crate::assemble::ties::Tied;
 
-impl Builder<'_> {
-    /// Whether the nodes of a body turn.
-    pub(super) fn has_rotations(&self, body: usize) -> bool {
-        self.shell_cells(body).is_some()
-    }
-
-    /// The components of a constraint: translations and rotations. By default all translations, and rotations
-    /// if the body has some and `turns`.
+impl Tied<'_> {
+    /// The components of a constraint: translations and rotations. By default all translations, and rotations if the body has
+    /// some and `turns`.
     pub(in crate::assemble) fn components(
         &mut self,
         axes: Option<&[Axis]>,

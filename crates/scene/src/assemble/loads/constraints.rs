@@ -3,18 +3,19 @@
 use std::collections::{BTreeMap, HashMap};
 
 use pliant_format::diagnostic::Diagnostic;
-use pliant_format::registry::{ConstraintTable, LoadTable};
-use pliant_format::tables::{MoveTable, RotateTable, SolverName, Vectors, VolumeTable};
+use pliant_format::registry::ConstraintTable;
+use pliant_format::tables::{MoveTable, RotateTable, Vectors, VolumeTable};
+use pliant_geometry::Selection;
 use pliant_geometry::words::number;
-use pliant_geometry::{Mesh, Selection, Vector3};
 use pliant_mechanics::curve::Curve;
 use pliant_mechanics::load::{Face, NO_NODE};
 use pliant_mechanics::model::{Constraint, Enclosure, Motion};
 use pliant_shells::element::Membrane;
 
-use super::{Builder, Subject, in_metres};
+use crate::assemble::in_metres;
+use crate::assemble::ties::{Subject, Tied};
 
-impl Builder<'_> {
+impl Tied<'_> {
     pub(super) fn add_constraints(&mut self) {
         let scene = self.scene;
         for (name, table) in &scene.constraints {
@@ -87,6 +88,7 @@ impl Builder<'_> {
             self.out.push(diagnostic);
         }
         self.check_limited();
+        self.check_turns();
     }
 
     /// Limits the force [N] or the pressure [Pa] of the constraint that is added next, by this key.
@@ -110,6 +112,7 @@ impl Builder<'_> {
 
     /// Refuses constraints on components of nodes that another one moves with a limited force: these lag.
     fn check_limited(&mut self) {
+        let mut found = Vec::new();
         for &limited in self.assembly.force_limits.keys() {
             let own = &self.assembly.constraints[limited];
             let shares = |other: &Constraint| {
@@ -130,7 +133,35 @@ impl Builder<'_> {
             let help = "take the shared nodes out of one of them with `{ difference = [ …, … ] }`, or limit `components`";
             let diagnostic =
                 diagnostic.at(place, "has nodes of the other").also(limit, "this limit").help(help);
-            self.out.push(diagnostic);
+            found.push(diagnostic);
+        }
+        self.out.extend(found);
+    }
+
+    /// Refuses constraints of rotations that follow a solid, and volumes that shells with such rotations enclose.
+    fn check_turns(&mut self) {
+        let mut turning: Vec<u32> = self.assembly.turns.iter().map(|turn| turn.node).collect();
+        turning.sort_unstable();
+        let turns = |node: &&u32| turning.binary_search(node).is_ok();
+        let holds = |own: &&Constraint| {
+            let encloses = own.motion.encloses() && !self.assembly.facets.is_empty();
+            encloses || (!own.motion.is_collective() && own.components[3..].contains(&true))
+        };
+        let held = self.assembly.constraints.iter().filter(holds);
+        let met: Vec<(String, u32, bool)> = held
+            .filter_map(|own| Some((own.name.clone(), *own.nodes.iter().find(turns)?, own.motion.encloses())))
+            .collect();
+        for (name, node, encloses) in met {
+            let (body, node) = self.assembly.locate_node(node);
+            let body = &self.bodies[body].name;
+            let message = format!(
+                "the rotation of node {node} of `{body}` follows a solid, and `{name}` acts on it, too"
+            );
+            let help = match encloses {
+                true => "leave `rotations` free, or fill a body of model `membrane`",
+                false => "limit it to translations: `components = [\"x\", \"y\", \"z\"]`",
+            };
+            self.error(&["constraint", &name], message, "holds what follows", help);
         }
     }
 
@@ -329,86 +360,6 @@ impl Builder<'_> {
         let rest = nodes.iter().map(|&node| self.assembly.rest[node as usize]);
         Some(Motion::rotation(rotate.axis, rotate.centre, angle, curve, rest))
     }
-
-    /// The nodes of a body that a selection holds, numbered in the model.
-    pub(super) fn body_nodes(
-        &mut self,
-        body: usize,
-        selection: &Selection,
-        path: &[&str],
-    ) -> Option<Vec<u32>> {
-        let built = &self.bodies[body];
-        let own = &self.assembly.bodies[body];
-        match selection.nodes(&built.mesh, &built.boundary) {
-            Ok(nodes) => {
-                let (mesh, name) = (&built.mesh, &built.name);
-                let size = mesh.bounds().map_or(0.0, |(low, high)| (high - low).norm());
-                for (point, distance) in nearest_points(selection, mesh) {
-                    if distance > FAR * size {
-                        let message = format!(
-                            "the node nearest to {point:?} is {} m away, and `{name}` measures {} m across",
-                            number(distance),
-                            number(size)
-                        );
-                        let help =
-                            "points are in metres, where the body is after its mesh's `scale` and `at`";
-                        let place = self.source().span(path);
-                        self.out.push(Diagnostic::warning(message).at(place, "far outside").help(help));
-                    }
-                }
-                Some(nodes.into_iter().map(|node| own.node(node)).collect())
-            }
-            Err(error) => {
-                self.error(path, error.to_string(), "this selection", "");
-                None
-            }
-        }
-    }
-
-    /// Says which bodies nothing holds.
-    pub(super) fn check_free_bodies(&mut self) {
-        let scene = self.scene;
-        let flies =
-            |name: &str| scene.bodies.iter().any(|(own, body)| own == name && body.velocity.is_some());
-        // A wall is held with the body that it is on.
-        let with_nodes = self.assembly.bodies.iter().enumerate().filter(|(_, body)| !body.nodes.is_empty());
-        for (index, body) in with_nodes {
-            let springs = &self.assembly.springs;
-            let held = self
-                .assembly
-                .constraints
-                .iter()
-                .any(|c| c.nodes.iter().any(|node| body.nodes.contains(node)))
-                || springs.iter().any(|spring| body.nodes.contains(&spring.node))
-                || scene.tied_outside.contains(&body.name)
-                || scene
-                    .contacts
-                    .iter()
-                    .flat_map(|(_, contact)| &contact.between)
-                    .any(|name| *name == body.name || name == "all")
-                || self.assembly.ties.iter().flat_map(|tie| &tie.nodes).any(|node| body.nodes.contains(node));
-            if held || scene.run.solver == SolverName::Static {
-                continue;
-            }
-            let name = &body.name;
-            let surfaces = self.assembly.surfaces.iter().filter(|s| s.body == index).map(|s| s.name.as_str());
-            let own: Vec<&str> = surfaces.chain([name.as_str()]).collect();
-            let loaded = scene.loads.iter().any(|(_, load)| match load {
-                LoadTable::Gravity(_) => false,
-                load => load.on().is_some_and(|on| own.contains(&on)),
-            });
-            let falls = scene.scene.gravity.is_some()
-                || scene.loads.iter().any(|(_, load)| matches!(load, LoadTable::Gravity(g) if g.on.as_ref().is_none_or(|on| on == name)));
-            let fate = match (falls, loaded) {
-                (true, false) => "gravity makes it fall",
-                (false, true) => "its loads push it away",
-                (true, true) => "gravity and its loads carry it away",
-                (false, false) if flies(name) => "it flies on as it started",
-                (false, false) => "and nothing moves it",
-            };
-            self.notes.push(format!("`{name}` is held by no constraint: {fate}"));
-        }
-    }
 }
 
 /// An edge of faces without a face across it; `None` if they close.
@@ -429,24 +380,6 @@ fn turn_round(face: &mut Face) {
         face.swap(1, 2);
     } else {
         face.swap(1, 3);
-    }
-}
-
-/// A nearest node farther from its point than this many body sizes gives a warning.
-const FAR: f64 = 10.0;
-
-/// The points by which a selection takes nearest nodes, each with its distance [m] from the first of these.
-fn nearest_points(selection: &Selection, mesh: &Mesh) -> Vec<([f64; 3], f64)> {
-    match selection {
-        Selection::Nearest { point, .. } => {
-            let place = Vector3::from(*point);
-            let distance = mesh.points.iter().map(|p| (p - place).norm()).fold(f64::INFINITY, f64::min);
-            vec![(*point, distance)]
-        }
-        Selection::Union(parts) | Selection::Intersection(parts) | Selection::Difference(parts) => {
-            parts.iter().flat_map(|part| nearest_points(part, mesh)).collect()
-        }
-        _ => Vec::new(),
     }
 }
 

@@ -1,16 +1,25 @@
-//! Ties: nodes of one body that follow the cells of another.
+//! The phase [`Tied`]: nodes of one body follow the cells of another, and bodies carry surfaces.
 
-use pliant_format::diagnostic::Diagnostic;
+mod attach;
+mod mortar;
+mod surfaces;
+mod targets;
+mod turns;
+
+use pliant_format::diagnostic::{Diagnostic, SceneErrors};
 use pliant_format::source::Source;
 use pliant_format::tables::{Rotations, TieTable};
+use pliant_geometry::Mesh;
 use pliant_geometry::words::number;
-use pliant_implicit::CarriedTurn;
+use pliant_implicit::{CarriedTurn, CurvedSurface};
 use pliant_mechanics::model::Cells;
 use pliant_mechanics::tie::TieError;
 
-use super::Builder;
-use super::attach::{Placed, attach};
-use super::mortar::Joint;
+use super::bodies::Meshed;
+use super::context::follows;
+pub(crate) use attach::{Placed, attach, doubt_points};
+use mortar::Joint;
+pub(super) use targets::Subject;
 
 /// A body inside another that takes more of its volume is reported: both are stiff there.
 const CROWDED: f64 = 1e-3;
@@ -22,9 +31,39 @@ pub(crate) fn holds_nothing(source: &Source, path: &[&str], host: &str) -> Diagn
         .help("name it first: its nodes follow the other body")
 }
 
-impl Builder<'_> {
-    /// Adds all ties, once the bodies are there.
-    pub(super) fn add_ties(&mut self) {
+/// The second phase: bodies that are tied to each other, with the surfaces that they carry.
+pub(super) struct Tied<'s> {
+    pub meshed: Meshed<'s>,
+    /// The meshes of the carried surfaces.
+    pub surfaces: Vec<Mesh>,
+    /// The curved surface of the shells, if something is carried by it.
+    pub curved: Option<CurvedSurface>,
+    /// How many notes say how the bodies were made.
+    pub noted: usize,
+}
+
+follows!(Tied, meshed: Meshed);
+
+impl<'s> Meshed<'s> {
+    /// Ties the bodies to each other, and adds the surfaces that they carry.
+    ///
+    /// # Errors
+    /// All mistakes that were found, but those in surfaces.
+    pub fn tied(mut self) -> Result<Tied<'s>, SceneErrors> {
+        let noted = self.notes.len();
+        if !self.failed() {
+            self.add_ties();
+        }
+        self.check_explicit_only();
+        self.stop_at_mistakes()?;
+        let mut tied = Tied { meshed: self, surfaces: Vec::new(), curved: None, noted };
+        tied.add_surfaces();
+        Ok(tied)
+    }
+}
+
+impl Meshed<'_> {
+    fn add_ties(&mut self) {
         let scene = self.scene;
         for (name, table) in &scene.ties {
             self.add_tie(name, table);
@@ -67,7 +106,7 @@ impl Builder<'_> {
             return None;
         }
         let placed = |index: usize| Placed { body: &self.bodies[index], model: &self.assembly.model, index };
-        let (source, out) = (&self.scene.source, &mut self.out);
+        let (source, out) = (self.context.source(), &mut self.context.out);
         let found = attach(source, (name, table), (placed(guest), &nodes), placed(host), out)?;
         let found = self.by_method(Joint { name, table, guest, host }, &nodes, found)?;
         self.notes.push(found.note);

@@ -1,4 +1,12 @@
-//! Bodies: nodes, cells grouped by element and material, masses.
+//! The phase [`Meshed`]: bodies with nodes, cells grouped by element and material, masses.
+
+mod bars;
+mod fibres;
+mod fractions;
+mod node_vectors;
+mod selections;
+mod shells;
+mod walls;
 
 use std::collections::BTreeMap;
 
@@ -12,11 +20,14 @@ use pliant_geometry::words::counted;
 use pliant_geometry::{
     CellBlock, CellKind, CellLabel, Labels, Mesh, Surface, UnknownLabel, body_blocks, boundary,
 };
+use pliant_implicit::Assembly;
 use pliant_linear::memory::room_for;
 use pliant_mechanics::model::{Averaging, Cells, Material, Solid};
 use pliant_mechanics::prony::{Prony, PronyError};
+use pliant_sim::BodyCells;
 
-use super::{Builder, BuiltBody};
+use super::BuiltBody;
+use super::context::{Context, follows};
 
 /// A body that is being built.
 pub(super) struct Draft<'a> {
@@ -53,11 +64,43 @@ struct MaterialCells {
 const BYTES_OF_CELL: u64 = 400;
 const BYTES_OF_SHELL: u64 = 9000;
 
-impl Builder<'_> {
-    pub(super) fn add_bodies(&mut self) {
+/// The first phase: bodies with their meshes, cells and masses.
+pub(super) struct Meshed<'s> {
+    pub context: Context<'s>,
+    /// All bodies; shells in scenes with some. Each phase adds to it.
+    pub assembly: Assembly,
+    /// The cells of each body that an implicit solver advances.
+    pub cells: Vec<BodyCells>,
+    /// The meshes of the bodies.
+    pub bodies: Vec<BuiltBody>,
+    /// Whether an earlier attempt has parted the shapes of bodies at rest.
+    pub is_parted: bool,
+}
+
+follows!(Meshed, context: Context);
+
+impl<'s> Meshed<'s> {
+    /// The bodies of a scene. Those that an earlier attempt has parted come with their `shapes`.
+    pub fn new(context: Context<'s>, mut shapes: Vec<BuiltBody>) -> Self {
+        let mut meshed = Self {
+            context,
+            assembly: Assembly::default(),
+            cells: Vec::new(),
+            bodies: Vec::new(),
+            is_parted: !shapes.is_empty(),
+        };
+        meshed.check_models();
+        meshed.add_bodies(&mut shapes);
+        meshed
+    }
+}
+
+impl Meshed<'_> {
+    fn add_bodies(&mut self, shapes: &mut Vec<BuiltBody>) {
         let scene = self.scene;
         for (name, table) in &scene.bodies {
-            let Some(Shape { mesh, origin, file_nodes, file_numbers, shared }) = self.body_shape(name, table)
+            let Some(Shape { mesh, origin, file_nodes, file_numbers, shared }) =
+                self.body_shape(name, table, shapes)
             else {
                 continue;
             };
@@ -85,12 +128,12 @@ impl Builder<'_> {
     }
 
     /// The mesh of a body, and where it comes from.
-    fn body_shape(&mut self, name: &str, table: &BodyTable) -> Option<Shape> {
+    fn body_shape(&mut self, name: &str, table: &BodyTable, shapes: &mut Vec<BuiltBody>) -> Option<Shape> {
         if let Some(host) = &table.on {
             return self.wall(name, table, host);
         }
-        if let Some(known) = self.parted.iter().position(|body| body.name == name) {
-            let BuiltBody { mesh, origin, file_nodes, file_numbers, .. } = self.parted.swap_remove(known);
+        if let Some(known) = shapes.iter().position(|body| body.name == name) {
+            let BuiltBody { mesh, origin, file_nodes, file_numbers, .. } = shapes.swap_remove(known);
             return Some(Shape { mesh, origin, file_nodes, file_numbers, shared: None });
         }
         let path = ["body", name, "mesh"];
@@ -171,7 +214,7 @@ impl Builder<'_> {
         }
         if self.scene.is_implicit() {
             self.check_solids(name, before);
-            self.cells.push(pliant_sim::BodyCells::Solids);
+            self.cells.push(BodyCells::Solids);
         }
     }
 

@@ -1,5 +1,4 @@
-//! The cells of shells: triangles, elements, materials, thickness. And which solids the implicit solvers can
-//! have.
+//! The cells of shells: triangles, elements, materials, thickness. And which solids the implicit solvers can have.
 
 use std::collections::BTreeMap;
 
@@ -13,10 +12,9 @@ use pliant_shells::element::Wall;
 use pliant_shells::element::{Bending, Elasticity, Formulation, Layer, Membrane, Orthotropic};
 use pliant_sim::BodyCells;
 
-use crate::assemble::bodies::{Draft, nodes};
-use crate::assemble::meshes::surface_of;
-use crate::assemble::sheets::is_sheet;
-use crate::assemble::{Builder, bodies};
+use super::{Draft, Meshed, law_path, nodes};
+use crate::assemble::Context;
+use crate::assemble::meshes::{is_sheet, surface_of};
 
 /// Stiffness against drilling of `dkt-cst` and `membrane`, as a part of G t A/3 a node.
 const DRILLING: f64 = 0.01;
@@ -33,7 +31,7 @@ const FLAT: f64 = 1e-6;
 /// Thickness over width above which a wall is reported as stout: a strip is then 3 % too stiff against twist.
 const STOUT: f64 = 0.05;
 
-impl Builder<'_> {
+impl Context<'_> {
     /// The mesh of a shell as triangles only: quads cut in two, volume cells left for their boundary.
     pub(in crate::assemble) fn triangles(&mut self, mesh: Mesh, path: &[&str]) -> Option<Mesh> {
         let surface = surface_of(mesh);
@@ -77,7 +75,9 @@ impl Builder<'_> {
         }
         Some(Mesh { blocks: vec![whole], ..surface })
     }
+}
 
+impl Meshed<'_> {
     /// Reports solids of the model, from a number on, that the implicit solvers can't have.
     pub(in crate::assemble) fn check_solids(&mut self, name: &str, first: usize) {
         let solids = &self.assembly.solids[first..];
@@ -163,7 +163,7 @@ impl Builder<'_> {
                     // A label without a value is already reported.
                     let law = table.law.of(label.as_deref())?;
                     let density = table.density.of(label.as_deref())?.0;
-                    let path = bodies::law_path(name, &given.law, law);
+                    let path = law_path(name, &given.law, law);
                     let material = Wall { elastic: self.elasticity(name, table, law, &path)?, density };
                     *known.entry(label).or_insert(material)
                 }
@@ -213,8 +213,7 @@ impl Builder<'_> {
         None
     }
 
-    /// The layers of a shell, if it has some, and the direction in each triangle that their angles count
-    /// from.
+    /// The layers of a shell, if it has some, and the direction in each triangle that their angles count from.
     fn layers(&mut self, draft: &Draft<'_>, block: &CellBlock) -> Option<(Vec<Layer>, Vec<Vector3>)> {
         let &Draft { name, table, mesh, .. } = draft;
         if table.layers.is_empty() {
@@ -372,8 +371,7 @@ impl Builder<'_> {
                     let given = data.item(node as usize);
                     (own.node(node), Vector3::new(given[0], given[1], given[2]))
                 };
-                // Where a fit finds no normal that stands on all triangles it gives none: there they are
-                // estimated, with creases.
+                // Where a fit finds no normal that stands on all triangles it gives none: there they are estimated, with creases.
                 let given: BTreeMap<u32, Vector3> = (0..mesh.points.len() as u32)
                     .map(of)
                     .filter(|(_, normal)| *normal != Vector3::zeros())
@@ -522,4 +520,59 @@ fn given_normals<'m>(table: &BodyTable, mesh: &'m Mesh) -> Option<&'m DataArray>
         None => table.crease.is_none(),
     };
     mesh.point_data.get(NORMAL).filter(|data| taken && data.components == 3)
+}
+
+#[cfg(test)]
+mod tests {
+    use pliant_format::Scene;
+    use pliant_format::source::Source;
+    use pliant_geometry::{DataArray, Vector3, io};
+
+    use crate::assemble::build;
+
+    /// A sphere of 20 triangles, whose mesh has the normals of an ellipsoid.
+    #[test]
+    fn the_normals_of_a_mesh_are_taken_unless_creases_are_asked_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut mesh = pliant_meshing::sphere(0.1, 0, 100).unwrap();
+        let normal = |p: &Vector3| [-p.x, -p.y, -2.0 * p.z];
+        let values = mesh.points.iter().flat_map(normal).collect();
+        mesh.point_data.insert("normal".into(), DataArray { components: 3, values });
+        io::write(&folder.path().join("ball.vtu"), &mesh).unwrap();
+        mesh.point_data.clear();
+        io::write(&folder.path().join("plain.vtu"), &mesh).unwrap();
+        let built = |file: &str, more: &str| {
+            let text = format!(
+                "[scene]\nuntil = 1\n[run]\nsolver = 'implicit'\n[law.wall]\ntype = 'neo-hookean'\nyoung-modulus = 1e6\n\
+                 poisson-ratio = 0.3\n[body.wall]\nmodel = 'shell'\nlaw = 'wall'\nmesh = {{ file = '{file}' }}\n\
+                 density = 1000\nthickness = 0.001\n{more}"
+            );
+            let source = Source::parse("ball.toml", text).unwrap();
+            build(&Scene::from_source(source, folder.path().into()).unwrap())
+        };
+        let off = |file: &str, more: &str| {
+            let part = built(file, more).unwrap().implicit.unwrap();
+            let model = &part.model;
+            assert_eq!(model.normals.len(), 12);
+            let wanted = model.places().map(|p| Vector3::new(p.x, p.y, 2.0 * p.z).normalize());
+            let off = model.normals.iter().zip(wanted).map(|(n, wanted)| (n.direction - wanted).norm());
+            off.fold(0.0, f64::max)
+        };
+        for (file, more, same) in [
+            ("ball.vtu", "", true),
+            ("ball.vtu", "normals = 'mesh'", true),
+            ("ball.vtu", "normals = 'triangles'", false),
+            ("ball.vtu", "crease = 45", false),
+            ("plain.vtu", "", false),
+        ] {
+            assert_eq!(off(file, more) < 1e-12, same, "{file} {more}: {}", off(file, more));
+        }
+        for (file, more, says) in [
+            ("plain.vtu", "normals = 'mesh'", "has no point data `normal`"),
+            ("ball.vtu", "normals = 'mesh'\ncrease = 30", "takes its normals from the mesh"),
+        ] {
+            let message = built(file, more).unwrap_err().plain().to_string();
+            assert!(message.contains(says), "{message}");
+        }
+    }
 }

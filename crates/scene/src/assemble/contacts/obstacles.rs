@@ -1,5 +1,5 @@
-//! Shapes of obstacles and tools from mesh files and images: signed distances of a closed surface on a grid,
-//! made once or read from the cache.
+//! Shapes of obstacles and tools from mesh files and images: signed distances of a closed surface on a grid, made once or read from the
+//! cache.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -12,13 +12,13 @@ use pliant_meshing::{Closing, Enclosed, MeshingError};
 use pliant_sim::contact::grid::Grid;
 use pliant_sim::contact::shape::Shape;
 
-use super::images::content_of;
-use super::mesh_files::SizeDoubt;
-use super::{Builder, Meshing};
+use super::Loaded;
+use crate::assemble::Meshing;
+use crate::assemble::meshes::{SizeDoubt, content_of};
 use crate::cache::{KeptGrid, Key};
 
-/// Steps of a grid along the diagonal of the box, if no `resolution` is given: the error at a surface as
-/// round as the box is below 1e-5 of its diagonal, and 3.4 million points (13 MiB) are the most.
+/// Steps of a grid along the diagonal of the box, if no `resolution` is given: the error at a surface as round as the box is below 1e-5 of
+/// its diagonal, and 3.4 million points (13 MiB) are the most.
 const STEPS: f64 = 256.0;
 /// Steps along an edge of the surface, if no `resolution` is given and the triangles are small.
 const STEPS_PER_EDGE: f64 = 2.0;
@@ -29,7 +29,7 @@ const TOO_LARGE: f64 = 50.0;
 /// A point of a grid in memory [MiB].
 const MEBIBYTES: f64 = 4.0 / 1_048_576.0;
 
-impl Builder<'_> {
+impl Loaded<'_> {
     /// The shape of a mesh file; `path` is that of its table.
     pub(super) fn shape_of_mesh(&mut self, table: &MeshTool, path: &[&str]) -> Option<Shape> {
         let source = MeshTable { file: Some(table.file.clone()), scale: table.scale, ..MeshTable::default() };

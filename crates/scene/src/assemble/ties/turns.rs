@@ -4,11 +4,10 @@ use std::collections::HashSet;
 
 use pliant_geometry::{CellId, Face, Vector3, gradient_integrals};
 use pliant_implicit::CarriedTurn;
-use pliant_mechanics::model::Constraint;
 
-use super::Builder;
+use super::Meshed;
 
-impl Builder<'_> {
+impl Meshed<'_> {
     /// Whether tied nodes of one body can turn with another.
     pub(super) fn can_turn(&mut self, name: &str, [guest, host]: [usize; 2], names: &[String; 2]) -> bool {
         let path = ["tie", name, "rotations"];
@@ -24,34 +23,6 @@ impl Builder<'_> {
             return false;
         }
         true
-    }
-
-    /// Refuses constraints of rotations that follow a solid, and volumes that shells with such rotations
-    /// enclose.
-    pub(super) fn check_turns(&mut self) {
-        let mut turning: Vec<u32> = self.assembly.turns.iter().map(|turn| turn.node).collect();
-        turning.sort_unstable();
-        let turns = |node: &&u32| turning.binary_search(node).is_ok();
-        let holds = |own: &&Constraint| {
-            let encloses = own.motion.encloses() && !self.assembly.facets.is_empty();
-            encloses || (!own.motion.is_collective() && own.components[3..].contains(&true))
-        };
-        let held = self.assembly.constraints.iter().filter(holds);
-        let met: Vec<(String, u32, bool)> = held
-            .filter_map(|own| Some((own.name.clone(), *own.nodes.iter().find(turns)?, own.motion.encloses())))
-            .collect();
-        for (name, node, encloses) in met {
-            let (body, node) = self.assembly.locate_node(node);
-            let body = &self.bodies[body].name;
-            let message = format!(
-                "the rotation of node {node} of `{body}` follows a solid, and `{name}` acts on it, too"
-            );
-            let help = match encloses {
-                true => "leave `rotations` free, or fill a body of model `membrane`",
-                false => "limit it to translations: `components = [\"x\", \"y\", \"z\"]`",
-            };
-            self.error(&["constraint", &name], message, "holds what follows", help);
-        }
     }
 
     /// How a node turns with cells of a solid: with the mean of their gradients, by volume.
@@ -78,7 +49,7 @@ impl Builder<'_> {
     }
 
     /// Lets the nodes of a wall on faces of a solid turn with the cells behind these.
-    pub(super) fn turn_wall(&mut self, host: usize, faces: &[Face]) {
+    pub(in crate::assemble) fn turn_wall(&mut self, host: usize, faces: &[Face]) {
         let mut behind: Vec<(u32, CellId)> = Vec::new();
         for face in faces {
             behind.extend(face.nodes().iter().map(|&node| (node, face.parent)));

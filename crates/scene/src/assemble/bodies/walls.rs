@@ -7,13 +7,12 @@ use pliant_mechanics::model::Cells;
 use pliant_mechanics::prony::Prony;
 use pliant_mechanics::tensor::{cross, dot, sub};
 
-use super::Builder;
-use super::bodies::{Draft, Shape, nodes};
+use super::{Draft, Meshed, Shape, nodes};
 
 /// A fibre whose part in the plane of its triangle is shorter than this has no direction there.
 const ACROSS: f64 = 1e-3;
 
-impl Builder<'_> {
+impl Meshed<'_> {
     /// The wall on the boundary of another body: its triangles, and the nodes that it shares.
     pub(super) fn wall(&mut self, name: &str, table: &BodyTable, host: &str) -> Option<Shape> {
         let path = ["body", name, "on"];

@@ -8,7 +8,7 @@ use pliant_geometry::{CellId, Mesh, QualityReport};
 use pliant_mechanics::Model;
 use pliant_mechanics::mapping::Weights;
 
-use super::{BuiltBody, in_metres};
+use crate::assemble::{BuiltBody, in_metres};
 
 /// Part of the median edge of the followed body that a gap may have.
 pub(super) const GAP: f64 = 0.1;

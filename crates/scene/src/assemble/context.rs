@@ -1,0 +1,71 @@
+//! What all phases of building a model share: the scene, the cache, and what a user is message.
+
+use pliant_format::Scene;
+use pliant_format::diagnostic::{Diagnostic, SceneErrors};
+use pliant_format::source::Source;
+
+use super::Meshing;
+use crate::cache::MeshCache;
+
+/// A scene, and what was found out about it.
+pub(super) struct Context<'s> {
+    pub scene: &'s Scene,
+    pub cache: &'s MeshCache,
+    /// Hears how far meshes are.
+    pub watch: &'s dyn Fn(Meshing<'_>),
+    /// Mistakes and doubts.
+    pub out: Vec<Diagnostic>,
+    /// What a user may want to know, a sentence each.
+    pub notes: Vec<String>,
+}
+
+impl<'s> Context<'s> {
+    pub fn new(scene: &'s Scene, cache: &'s MeshCache, watch: &'s dyn Fn(Meshing<'_>)) -> Self {
+        Self { scene, cache, watch, out: scene.doubts.clone(), notes: Vec::new() }
+    }
+
+    pub fn failed(&self) -> bool {
+        self.out.iter().any(Diagnostic::is_error)
+    }
+
+    /// Ends the building of a model that has a mistake.
+    ///
+    /// # Errors
+    /// All mistakes and doubts that were found, if there is a mistake.
+    pub(crate) fn stop_at_mistakes(&mut self) -> Result<(), SceneErrors> {
+        match self.failed() {
+            true => Err(self.source().errors(std::mem::take(&mut self.out))),
+            false => Ok(()),
+        }
+    }
+
+    pub fn source(&self) -> &'s Source {
+        &self.scene.source
+    }
+
+    pub fn error(&mut self, path: &[&str], message: impl Into<String>, label: &str, help: impl Into<String>) {
+        let place = self.source().span(path);
+        self.out.push(Diagnostic::error(message).at(place, label).help(help));
+    }
+}
+
+/// Lets a phase do what the one before it can: it has that in a field.
+macro_rules! follows {
+    ($phase:ident, $field:ident: $before:ident) => {
+        impl<'s> std::ops::Deref for $phase<'s> {
+            type Target = $before<'s>;
+
+            fn deref(&self) -> &Self::Target {
+                &self.$field
+            }
+        }
+
+        impl std::ops::DerefMut for $phase<'_> {
+            fn deref_mut(&mut self) -> &mut Self::Target {
+                &mut self.$field
+            }
+        }
+    };
+}
+
+pub(super) use follows;
