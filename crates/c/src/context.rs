@@ -1,5 +1,5 @@
-//! The context: a table of what a program has open. A handle is a place in the table and how often the place was used, so that a closed handle is known
-//! as one, however often its place was used again.
+//! The context: a table of what a program has open. A handle is a place in the table and how often the place
+//! was used, so that a closed handle is known as one, however often its place was used again.
 
 use std::mem::MaybeUninit;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -122,7 +122,8 @@ fn wrong(wanted: &str, given: &Item) -> Fault {
     Fault::new(PliantStatus::BadHandle, format!("the handle is of a {}, not of a {wanted}", given.kind()))
 }
 
-/// The border: what a call does, with its errors and panics reported to the caller. A panic closes the handle that it was about.
+/// The border: what a call does, with its errors and panics reported to the caller. A panic closes the handle
+/// that it was about.
 ///
 /// # Safety
 /// `context` and `error` are null or point to what they say.

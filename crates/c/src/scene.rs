@@ -1,4 +1,5 @@
-//! Scenes: from a file or a text, with other values and meshes of the program, until simulations are made of them.
+//! Scenes: from a file or a text, with other values and meshes of the program, until simulations are made of
+//! them.
 
 use std::ffi::c_char;
 use std::path::Path;
@@ -41,7 +42,8 @@ pub struct PliantCells {
     pub labels: *const i32,
 }
 
-/// Opens a scene: the path of a scene file, or of a folder with a `scene.toml`. A simulation that is made of it reports mistakes in its values.
+/// Opens a scene: the path of a scene file, or of a folder with a `scene.toml`. A simulation that is made of
+/// it reports mistakes in its values.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_scene_load(
     context: *const PliantContext,
@@ -61,8 +63,8 @@ pub unsafe extern "C" fn pliant_scene_load(
     }
 }
 
-/// Opens a scene from its text, of so many bytes. Files that it names are relative to `folder`; null is the folder of the process. `name` is what
-/// errors call it; null is `scene.toml`.
+/// Opens a scene from its text, of so many bytes. Files that it names are relative to `folder`; null is the
+/// folder of the process. `name` is what errors call it; null is `scene.toml`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_scene_parse(
     context: *const PliantContext,
@@ -97,7 +99,8 @@ pub unsafe extern "C" fn pliant_scene_parse(
 /// Bytes of a scene's text at most, as of files.
 const LONGEST_TEXT: usize = 1 << 26;
 
-/// Changes a value of a scene, as `--set` does: `law.tissue.young-modulus=4e3`, `scene.until=2`, `run.precision="single"`.
+/// Changes a value of a scene, as `--set` does: `law.tissue.young-modulus=4e3`, `scene.until=2`,
+/// `run.precision="single"`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_scene_set(
     context: *const PliantContext,
@@ -118,8 +121,9 @@ pub unsafe extern "C" fn pliant_scene_set(
     }
 }
 
-/// Gives a scene a mesh from memory: bodies take it with `mesh = { given = "NAME" }`. `points` has three numbers [m] a point. Nodes without a cell are a mistake
-/// that the simulation reports when it is made. A mesh of the same name takes its place.
+/// Gives a scene a mesh from memory: bodies take it with `mesh = { given = "NAME" }`. `points` has three
+/// numbers [m] a point. Nodes without a cell are a mistake that the simulation reports when it is made. A
+/// mesh of the same name takes its place.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_scene_give_mesh(
     context: *const PliantContext,

@@ -37,8 +37,9 @@ pub(crate) unsafe fn running(
     }
 }
 
-/// Makes a simulation of a scene as it is now, at its start. It computes on so many threads of its own, 1024 at most; 0 takes `threads` of the scene's
-/// `[run]`. Results do not depend on their number. Images are meshed and shapes built here: this can take seconds.
+/// Makes a simulation of a scene as it is now, at its start. It computes on so many threads of its own, 1024
+/// at most; 0 takes `threads` of the scene's `[run]`. Results do not depend on their number. Images are
+/// meshed and shapes built here: this can take seconds.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_simulation_open(
     context: *const PliantContext,
@@ -78,7 +79,8 @@ pub unsafe extern "C" fn pliant_simulation_open(
     }
 }
 
-/// Closes a simulation. One that is stepped by another thread is stopped first; its memory goes when that call returns.
+/// Closes a simulation. One that is stepped by another thread is stopped first; its memory goes when that
+/// call returns.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_simulation_close(
     context: *const PliantContext,
@@ -126,8 +128,9 @@ pub unsafe extern "C" fn pliant_now(
     }
 }
 
-/// Goes so many steps on. `done`, if it is not null, gets how many were taken, also where one fails or another thread asks to stop. After a failure the
-/// simulation stands at the last good instant; restore a snapshot, or close it.
+/// Goes so many steps on. `done`, if it is not null, gets how many were taken, also where one fails or
+/// another thread asks to stop. After a failure the simulation stands at the last good instant; restore a
+/// snapshot, or close it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_step(
     context: *const PliantContext,
@@ -140,7 +143,8 @@ pub unsafe extern "C" fn pliant_step(
     unsafe { go(context, simulation, done, error, |_, taken| Ok(count - taken)) }
 }
 
-/// Goes on until a time [s], to the instant nearest to it; else as `pliant_step`. A time that has passed takes no step.
+/// Goes on until a time [s], to the instant nearest to it; else as `pliant_step`. A time that has passed
+/// takes no step.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_run_until(
     context: *const PliantContext,
@@ -214,8 +218,8 @@ unsafe fn go(
     status
 }
 
-/// Asks the thread that steps a simulation to stop after its step. A step that takes long is given up: it is not taken. Without such a thread, the next call
-/// that steps returns at once. Any thread may ask.
+/// Asks the thread that steps a simulation to stop after its step. A step that takes long is given up: it is
+/// not taken. Without such a thread, the next call that steps returns at once. Any thread may ask.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_stop(
     context: *const PliantContext,
@@ -231,8 +235,8 @@ pub unsafe extern "C" fn pliant_stop(
     }
 }
 
-/// Pushes nodes with forces [N], three numbers a node, in the order of `pliant_body`, until they are replaced; their work is external. `count` is the
-/// number of nodes of all bodies, or 0 to end all.
+/// Pushes nodes with forces [N], three numbers a node, in the order of `pliant_body`, until they are
+/// replaced; their work is external. `count` is the number of nodes of all bodies, or 0 to end all.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_push(
     context: *const PliantContext,
@@ -271,8 +275,9 @@ pub const PLIANT_TOOLS: u32 = 4;
 /// Warnings about the scene, a sentence each.
 pub const PLIANT_WARNINGS: u32 = 5;
 
-/// Gives the name of a thing of a kind (`PLIANT_BODIES`, …) by its number from 0, with a zero at its end; `PLIANT_STATUS_UNKNOWN` after the last. `length`,
-/// if it is not null, gets the bytes without the zero; with a null buffer of 0 bytes nothing else is given.
+/// Gives the name of a thing of a kind (`PLIANT_BODIES`, …) by its number from 0, with a zero at its end;
+/// `PLIANT_STATUS_UNKNOWN` after the last. `length`, if it is not null, gets the bytes without the zero; with
+/// a null buffer of 0 bytes nothing else is given.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pliant_name(
     context: *const PliantContext,

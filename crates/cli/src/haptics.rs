@@ -1,6 +1,7 @@
-//! `pliant haptics`: a tool of a scene in the hand of a haptic device, or of a trace of one. The scene steps in real time; after each period its
-//! contact becomes a local model: the tangent planes of the tool at the nearest points of the surfaces that it can touch, the mean
-//! force of the period at its mean place, and the compliance that the last periods tell.
+//! `pliant haptics`: a tool of a scene in the hand of a haptic device, or of a trace of one. The scene steps
+//! in real time; after each period its contact becomes a local model: the tangent planes of the tool at the
+//! nearest points of the surfaces that it can touch, the mean force of the period at its mean place, and the
+//! compliance that the last periods tell.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -31,11 +32,13 @@ use crate::signals;
 
 /// Bounds of the tissue's stiffness at a tool [N/m].
 const STIFFNESS: [f64; 2] = [50.0, 5000.0];
-/// Distance [m] from the tool up to which points of a surface become planes: farther than a hand goes in some periods.
+/// Distance [m] from the tool up to which points of a surface become planes: farther than a hand goes in some
+/// periods.
 const REACH: f64 = 0.02;
 /// Time [s] in which the tool goes to the first pose of a trace, before this begins.
 const APPROACH: f64 = 0.5;
-/// Speeds [m/s], [rad/s] at which the tool follows the hand at most: a thrust must not carry it through tissue within a step.
+/// Speeds [m/s], [rad/s] at which the tool follows the hand at most: a thrust must not carry it through
+/// tissue within a step.
 const FASTEST: [f64; 2] = [0.5, 20.0];
 /// The longest lag [s] behind real time that is caught up with.
 const CATCHES_UP: f64 = 0.1;
@@ -182,7 +185,8 @@ struct Session<'a> {
 }
 
 impl Session<'_> {
-    /// Steps until the device or the user ends it; the failure that does, where it can't go back to a state before.
+    /// Steps until the device or the user ends it; the failure that does, where it can't go back to a state
+    /// before.
     fn run(&mut self, stop: &StopFlag) -> Result<Option<pliant_sim::Failure>, Failure> {
         while !self.thread.is_over() && !stop.is_asked() {
             let state = self.thread.state();
@@ -318,7 +322,8 @@ impl Snapshots {
         Ok(())
     }
 
-    /// Goes back to the newest state, which is not gone back to again, or else to the start; whether it could.
+    /// Goes back to the newest state, which is not gone back to again, or else to the start; whether it
+    /// could.
     fn go_back(&mut self, simulation: &mut Simulation) -> bool {
         let newest = self.states.pop_back().map(|(_, state)| state);
         self.in_a_row += usize::from(newest.is_none());
@@ -329,7 +334,8 @@ impl Snapshots {
 }
 
 impl Around<'_> {
-    /// The nearest tangent planes of the tool, for a place that is `back` [m] from where it is, and the largest friction.
+    /// The nearest tangent planes of the tool, for a place that is `back` [m] from where it is, and the
+    /// largest friction.
     fn planes(&self, frame: &Frame, back: &Vector3<f64>) -> (Vec<Plane>, f64) {
         let mut planes = Vec::new();
         let mut most = 0.0_f64;
@@ -359,7 +365,8 @@ impl Around<'_> {
                         let near = rigid.near(&stance, &point);
                         let gap = near.distance - contact.touch.offset;
                         if gap < REACH {
-                            // The tool goes away from the point against the direction in which its distance grows.
+                            // The tool goes away from the point against the direction in which its distance
+                            // grows.
                             let normal = -near.normal;
                             planes.push(Plane { normal, gap: gap + normal.dot(back), friction });
                         }
@@ -459,7 +466,8 @@ fn words(report: &Report, pace: &Pace, estimate: &Estimate) -> String {
     )
 }
 
-/// The stiffest coupling on the model that was pressed most: what the theory says and what a simulated device holds.
+/// The stiffest coupling on the model that was pressed most: what the theory says and what a simulated device
+/// holds.
 fn stiffest(model: &LocalModel, settings: Settings) -> Result<String, HapticsError> {
     let hand = Hand::default();
     // The time ahead damps as K times that, so it counts as a delay does.

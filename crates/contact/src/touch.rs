@@ -1,7 +1,8 @@
-//! The least correction of a node that would go into a rigid surface: along the normal to the surface, then against sliding by the cone of
-//! friction. With the predicted place x*, the mobility w = ∂x/∂f of each component and the gap g = d(x*) − offset < 0,
-//! λ = −g / Σ w n², x* += w n λ; the slip d over the step, less that of the surface, is taken back by a force of at most μ λ. The force on the
-//! node is the correction over its mobility: a step with this force is perfectly plastic along the normal, keeps momentum, and leaves the
+//! The least correction of a node that would go into a rigid surface: along the normal to the surface, then
+//! against sliding by the cone of friction. With the predicted place x*, the mobility w = ∂x/∂f of each
+//! component and the gap g = d(x*) − offset < 0, λ = −g / Σ w n², x* += w n λ; the slip d over the step, less
+//! that of the surface, is taken back by a force of at most μ λ. The force on the node is the correction over
+//! its mobility: a step with this force is perfectly plastic along the normal, keeps momentum, and leaves the
 //! critical time step as it is.
 
 use std::collections::BTreeMap;
@@ -19,14 +20,17 @@ use crate::shape::{Near, Shape, Sides};
 pub(crate) const MOST_PARTS: f64 = 512.0;
 /// Gap, over half of the thinnest part of a thing, at which a node has met it.
 pub(crate) const MEETS: f64 = 1e-3;
-/// Cosine of the angle between the directions away from a thing where a point meets it and where it would end, above which both are on one side.
+/// Cosine of the angle between the directions away from a thing where a point meets it and where it would
+/// end, above which both are on one side.
 pub(crate) const ALIKE: f64 = 0.7;
-/// Part of a depth at the beginning of a step that may be left at its end. Sharp edges come between the points of a face, and the way out of a
-/// thing can turn to another side of it: points that come to lie in it so are pushed out over several steps, as one would throw them.
+/// Part of a depth at the beginning of a step that may be left at its end. Sharp edges come between the
+/// points of a face, and the way out of a thing can turn to another side of it: points that come to lie in it
+/// so are pushed out over several steps, as one would throw them.
 pub const LEFT: f64 = 0.8;
 /// Passes over all rows of a step at most.
 pub const PASSES: usize = 30;
-/// The largest motion by an impulse in a pass, over the depth of the deepest point, at which impulses are found.
+/// The largest motion by an impulse in a pass, over the depth of the deepest point, at which impulses are
+/// found.
 pub const FOUND: f64 = 1e-3;
 /// Times at most that impulses are found with sides of things where nodes came to lie.
 pub const ROUNDS: usize = 4;
@@ -34,7 +38,8 @@ pub const ROUNDS: usize = 4;
 pub const LOOKED: usize = 8;
 /// Sides of a thing at most that a node has at a time.
 pub const SIDES: usize = 4;
-/// Distance of a node from the surface of a thing, over its depth as predicted, from which on it lies off or behind it.
+/// Distance of a node from the surface of a thing, over its depth as predicted, from which on it lies off or
+/// behind it.
 pub const OFF: f64 = 1e-3;
 /// Times at most that a node is lifted out of a thing: creases turn it from one side to another.
 pub const LIFTS: usize = 16;
@@ -42,7 +47,8 @@ pub const LIFTS: usize = 16;
 pub const LIFTED: f64 = 1e-4;
 /// Gaps, over the depth of the deepest point, up to which points take part.
 pub const BAND: f64 = 8.0;
-/// Part of the longest edge of a surface that a node may be away from a thing and still count as near, in addition to its way in the step.
+/// Part of the longest edge of a surface that a node may be away from a thing and still count as near, in
+/// addition to its way in the step.
 pub const MARGIN: f64 = 0.1;
 
 /// A rigid thing: an obstacle, a tool or a jaw of one.
@@ -71,7 +77,8 @@ pub struct Jaw {
     pub opening: (f64, Curve),
     /// Where its shape is in a closed tool.
     pub place: Pose,
-    /// The angle [rad] between the jaws from which on down they hold all that touches their inner faces; `None`: they hold by friction.
+    /// The angle [rad] between the jaws from which on down they hold all that touches their inner faces;
+    /// `None`: they hold by friction.
     pub grip: Option<f64>,
 }
 
@@ -92,7 +99,8 @@ impl Rigid {
         self.jaw.as_ref().map_or(&self.name, |jaw| &jaw.tool)
     }
 
-    /// The pose of the tool or obstacle at a time [s], and the angle [rad] between its jaws; driven as far as there is a leg.
+    /// The pose of the tool or obstacle at a time [s], and the angle [rad] between its jaws; driven as far as
+    /// there is a leg.
     pub fn posture(&self, time: f64, leg: Option<&Leg>) -> (Pose, f64) {
         let opening = |jaw: &Jaw| jaw.opening.0 * jaw.opening.1.value(time);
         let pose = leg.and_then(|leg| leg.pose(time)).unwrap_or_else(|| self.trajectory.at(time));
@@ -128,8 +136,8 @@ impl Rigid {
         Near { distance: sign * (distance - growth), normal: normal * sign }
     }
 
-    /// Distance of a point [m] from where it is free of the thing, and its gradient: of a hollow thing for each of [`Shape::sides`], else for the
-    /// nearest part of the surface.
+    /// Distance of a point [m] from where it is free of the thing, and its gradient: of a hollow thing for
+    /// each of [`Shape::sides`], else for the nearest part of the surface.
     pub fn sides(&self, stance: &Stance, point: &Vector3<f64>) -> Sides {
         if !self.inside {
             let mut all = Sides::default();
@@ -162,8 +170,9 @@ impl Rigid {
         self.jaw.as_ref().and_then(|jaw| jaw.grip).is_some_and(|closed| opening <= closed)
     }
 
-    /// The shortest time [s] between two postures in steps of a length [s] in which no node is passed over. Of a tool with jaws, pose and
-    /// opening take half of what a step allows each: they may be driven at the same time.
+    /// The shortest time [s] between two postures in steps of a length [s] in which no node is passed over.
+    /// Of a tool with jaws, pose and opening take half of what a step allows each: they may be driven at the
+    /// same time.
     pub fn shortest(&self, postures: [(Pose, f64); 2], step: f64) -> f64 {
         let [(from, closed), (to, open)] = postures;
         let moved = travel(self, &[from, to].map(Stance::at));
@@ -193,8 +202,8 @@ pub struct Touch {
 }
 
 impl Touch {
-    /// Where a node goes in the step between two times [s] that is predicted to go from `now` to `predicted` [m]; `None` where it is free.
-    /// `mobility` [m/N] is that of each component, zero of those that are held.
+    /// Where a node goes in the step between two times [s] that is predicted to go from `now` to `predicted`
+    /// [m]; `None` where it is free. `mobility` [m/N] is that of each component, zero of those that are held.
     pub fn correct(
         &self,
         rigid: &Rigid,
@@ -211,7 +220,8 @@ impl Touch {
         lifted.flatten().map(Vector::from)
     }
 
-    /// Lifts a predicted place out of a gap < 0 along a normal, and takes back its slip; `None` if it cannot move.
+    /// Lifts a predicted place out of a gap < 0 along a normal, and takes back its slip; `None` if it cannot
+    /// move.
     fn lift(
         &self,
         passage: &Passage,
@@ -283,7 +293,8 @@ impl Passage {
         rigid.near(&self.before(), point).distance
     }
 
-    /// Where a point [m] at the end of the step is in the frame of the thing, and the direction away from it there.
+    /// Where a point [m] at the end of the step is in the frame of the thing, and the direction away from it
+    /// there.
     pub fn within(&self, rigid: &Rigid, point: &Vector3<f64>) -> (Vector3<f64>, Near) {
         let local = self.turn.tr_mul(&(point - self.poses[1].translation.vector));
         (local, rigid.near_local(self.growth[1], &local))
@@ -294,11 +305,13 @@ impl Passage {
         (self.poses[1] * Point3::from(*local)).coords
     }
 
-    /// [`near`](Self::near) of a point that is predicted to go from one place [m] to another, and keeps an offset [m]. If it ends in the thing,
-    /// could pass through it or be passed over, it is followed on its way: by its gap, which it can go without reaching the thing, and by
-    /// half of the thinnest part next to that. Where they meet, the tangent plane goes along with the thing; the distance is that from
-    /// the plane, if the point ends behind it on another side or has come far. So nothing comes to another side, however thin the thing is, however far both go and
-    /// however deep forces carry the prediction. Of a depth at the beginning, [`LEFT`] may be left.
+    /// [`near`](Self::near) of a point that is predicted to go from one place [m] to another, and keeps an
+    /// offset [m]. If it ends in the thing, could pass through it or be passed over, it is followed on its
+    /// way: by its gap, which it can go without reaching the thing, and by half of the thinnest part next to
+    /// that. Where they meet, the tangent plane goes along with the thing; the distance is that from the
+    /// plane, if the point ends behind it on another side or has come far. So nothing comes to another side,
+    /// however thin the thing is, however far both go and however deep forces carry the prediction. Of a
+    /// depth at the beginning, [`LEFT`] may be left.
     pub fn meet(&self, rigid: &Rigid, offset: f64, now: &Vector3<f64>, predicted: &Vector3<f64>) -> Near {
         let way = (predicted - now).norm() + self.travel;
         let end = self.near(rigid, predicted);
@@ -341,7 +354,8 @@ impl Passage {
         self.travel
     }
 
-    /// The largest way [m] of a point of the thing from a stance to that at the end of the step; infinite of a half-space that turns.
+    /// The largest way [m] of a point of the thing from a stance to that at the end of the step; infinite of
+    /// a half-space that turns.
     pub fn travel_from(&self, rigid: &Rigid, stance: &Stance) -> f64 {
         let after = self.stance();
         let is_endless = matches!(rigid.shape, Shape::HalfSpace);
@@ -373,8 +387,8 @@ impl Passage {
 pub struct Contact {
     /// Its name.
     pub name: String,
-    /// The surface of a body, nodes numbered in the model and increasing. Points on its triangles touch, too: close enough together for a rigid
-    /// thing.
+    /// The surface of a body, nodes numbered in the model and increasing. Points on its triangles touch, too:
+    /// close enough together for a rigid thing.
     pub surface: Surface,
     /// What it touches.
     pub with: With,
@@ -389,8 +403,9 @@ impl Contact {
         std::iter::once(&self.surface).chain(other)
     }
 
-    /// Its pairs if it is one of bodies, with numbers of nodes that keep their order, and places at rest [m] by these. Bodies are in the order
-    /// of their nodes, with −1 where the contact names them in the other one: results don't depend on that.
+    /// Its pairs if it is one of bodies, with numbers of nodes that keep their order, and places at rest [m]
+    /// by these. Bodies are in the order of their nodes, with −1 where the contact names them in the other
+    /// one: results don't depend on that.
     pub fn pairs(
         &self,
         number: impl Fn(u32) -> u32,
@@ -452,9 +467,11 @@ pub struct Contacts {
     pub rigids: Vec<Rigid>,
     /// Who touches whom.
     pub contacts: Vec<Contact>,
-    /// Rest places [m] of nodes that another solver moves: in surfaces they are numbered after the nodes of the model.
+    /// Rest places [m] of nodes that another solver moves: in surfaces they are numbered after the nodes of
+    /// the model.
     pub coupled_nodes: Vec<Vector<f64>>,
-    /// Of contacts of bodies, by their place, the nodes that keep a smaller distance [m] than their [`Touch`] says, since they are nearer at the start.
+    /// Of contacts of bodies, by their place, the nodes that keep a smaller distance [m] than their [`Touch`]
+    /// says, since they are nearer at the start.
     pub near: BTreeMap<usize, Vec<(u32, f64)>>,
 }
 
@@ -465,7 +482,8 @@ pub fn lattice(parts: usize) -> Vec<[f64; 3]> {
     inner.map(|point| point.map(|k| k as f64 / parts as f64)).collect()
 }
 
-/// Parts of an edge [m] whose points lie close enough together for a thing: nearer than seven tenths of its thinnest part; eight at most.
+/// Parts of an edge [m] whose points lie close enough together for a thing: nearer than seven tenths of its
+/// thinnest part; eight at most.
 pub fn parts_of(edge: f64, shape: &Shape) -> usize {
     let parts = edge / (0.7 * shape.thinnest());
     if parts.is_finite() { parts.ceil().clamp(1.0, 8.0) as usize } else { 1 }
@@ -513,7 +531,8 @@ mod tests {
         assert!(touch.correct(&carried, [0.0, 1.0], now, then, [0.0; 3]).is_none());
     }
 
-    /// A particle at rest on a slope of ½ that steps by 1 ms: with μ = ½ it stays, with less it slides by ½ g (sin − μ cos) t² (A4).
+    /// A particle at rest on a slope of ½ that steps by 1 ms: with μ = ½ it stays, with less it slides by ½ g
+    /// (sin − μ cos) t² (A4).
     #[test]
     fn a_particle_on_an_incline_sticks_exactly_or_slides_by_coulombs_law() {
         let (step, mass) = (1e-3, 0.1);

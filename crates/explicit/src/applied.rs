@@ -1,4 +1,5 @@
-//! The forces of loads and gravity on the nodes of a model at one instant. Weights stay as they are until an acceleration changes.
+//! The forces of loads and gravity on the nodes of a model at one instant. Weights stay as they are until an
+//! acceleration changes.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -173,7 +174,8 @@ mod tests {
 
     use super::*;
 
-    /// Two bodies that fall at times of their own, over instants, while a force comes and goes: blocks have what their nodes have.
+    /// Two bodies that fall at times of their own, over instants, while a force comes and goes: blocks have
+    /// what their nodes have.
     #[test]
     fn forces_of_a_block_are_those_of_its_nodes() {
         let mut model = Model::default();

@@ -1,6 +1,7 @@
-//! Contacts in a step: nodes are predicted, and impulses found that keep them and points between them apart from rigid things, other bodies and
-//! other parts of their own. A point pair x = Σ cᵢ xᵢ with normal n and gap g is a row: impulses cᵢ λ n on its nodes with λ ≥ 0, g ≥ 0 and
-//! λ g = 0, and against its slip by at most μ λ. Projected Gauss–Seidel finds them, in the order of the rows: momentum is kept to the last bit of
+//! Contacts in a step: nodes are predicted, and impulses found that keep them and points between them apart
+//! from rigid things, other bodies and other parts of their own. A point pair x = Σ cᵢ xᵢ with normal n and
+//! gap g is a row: impulses cᵢ λ n on its nodes with λ ≥ 0, g ≥ 0 and λ g = 0, and against its slip by at
+//! most μ λ. Projected Gauss–Seidel finds them, in the order of the rows: momentum is kept to the last bit of
 //! each impulse. A last pass over nodes alone keeps these out of curved rigid things, too.
 
 mod at_rigid;
@@ -121,7 +122,8 @@ pub(crate) struct ContactSolver<R> {
     placed: Vec<u32>,
     /// The latter alone.
     of_bodies: Vec<u32>,
-    /// Displacements [m] of all nodes of the model between the first and the last that touch, when lists were made.
+    /// Displacements [m] of all nodes of the model between the first and the last that touch, when lists were
+    /// made.
     listed: Vec<Vector<R>>,
     nodes: Vec<Node>,
     /// The nodes that may touch something in the step, increasing.
@@ -140,7 +142,8 @@ pub(crate) struct ContactSolver<R> {
     slid: Vec<(u32, f64)>,
     /// The force [N] of each contact on its first surface at the last evaluation.
     pub forces: Vec<Vector<f64>>,
-    /// The moment [N m] of that of each contact with a rigid thing about the origin, where points were before the step.
+    /// The moment [N m] of that of each contact with a rigid thing about the origin, where points were before
+    /// the step.
     pub moments: Vec<Vector<f64>>,
 }
 
@@ -233,7 +236,8 @@ impl<R: LaneNumber> ContactSolver<R> {
         }
     }
 
-    /// Finds the lags of things whose force is limited, after the step between two times [s]; `leg` is where a thing is driven to.
+    /// Finds the lags of things whose force is limited, after the step between two times [s]; `leg` is where
+    /// a thing is driven to.
     pub fn lag<'a>(&self, lags: &mut Vec<Lag>, times: [f64; 2], leg: impl Fn(usize) -> Option<&'a Leg>) {
         let rigids = &self.contacts.rigids;
         if lags.is_empty() {
@@ -270,7 +274,8 @@ impl<R: LaneNumber> ContactSolver<R> {
         touching.map(|(node, number)| (number, over(&(node.then - node.free), &node.own).into()))
     }
 
-    /// Says where coupled nodes go between two times [s]: from one place [m] to the other, at the same speed. Impulses on them count from now on.
+    /// Says where coupled nodes go between two times [s]: from one place [m] to the other, at the same speed.
+    /// Impulses on them count from now on.
     pub fn lead(&mut self, times: [f64; 2], ways: &[[Vector<f64>; 2]]) {
         self.coupled_surfaces.lead(times, ways);
     }
@@ -298,8 +303,8 @@ impl<R: LaneNumber> ContactSolver<R> {
         }
     }
 
-    /// Lists the nodes and faces that may come near rigid things, if a list has expired. Returns a bound on the motion of a node in the
-    /// step [m], from its motion in the step before.
+    /// Lists the nodes and faces that may come near rigid things, if a list has expired. Returns a bound on
+    /// the motion of a node in the step [m], from its motion in the step before.
     fn list(&mut self, now: &Nodes<'_, R>) -> f64 {
         let span = self.span();
         let is_first = self.listed.is_empty();
@@ -472,8 +477,9 @@ impl<R: LaneNumber> ContactSolver<R> {
         rows.retain(|row| row.gap < BAND * deepest);
     }
 
-    /// Impulses of all rows. The side of a thing is that where a node is predicted, which can be deep; where the node comes to lie off this
-    /// side, the side beside it takes its place, and where it lies behind another one, that is one more row.
+    /// Impulses of all rows. The side of a thing is that where a node is predicted, which can be deep; where
+    /// the node comes to lie off this side, the side beside it takes its place, and where it lies behind
+    /// another one, that is one more row.
     fn solve(&mut self) {
         let deepest = self.rows.iter().map(|row| -row.gap).fold(0.0, f64::max);
         if deepest <= 0.0 {
@@ -528,7 +534,8 @@ impl<R: LaneNumber> ContactSolver<R> {
         }
     }
 
-    /// Sides of things beside nodes that impulses have moved, and their impulses, a node at a time. How far that moves a node at most [m].
+    /// Sides of things beside nodes that impulses have moved, and their impulses, a node at a time. How far
+    /// that moves a node at most [m].
     fn settle(&mut self, deepest: f64) -> f64 {
         let Self { contacts, places, nodes, own, rows, .. } = self;
         let mut farthest = 0.0_f64;

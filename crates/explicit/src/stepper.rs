@@ -1,15 +1,16 @@
-//! The central difference method in incremental form: with a = α Δt/2,
-//! Δuⁿ⁺¹ = ((1 − a) Δuⁿ + Δt²/m (R − f)) / (1 + a), uⁿ⁺¹ = uⁿ + Δuⁿ⁺¹
-//! (thesis 5.28–5.32 without the cancellation in 2uⁿ − uⁿ⁻¹). Damping does not lower the stable step.
-//! Where the step changes from Δt⁻ to Δt⁺, velocities go on: with h = (Δt⁻ + Δt⁺)/2 and a = α h/2,
-//! Δuⁿ⁺¹ = ((1 − a) Δt⁺/Δt⁻ Δuⁿ + Δt⁺ h/m (R − f)) / (1 + a).
-//! With v⁻ = Δuⁿ/Δt⁻ and v⁺ = Δuⁿ⁺¹/Δt⁺, so that h a = v⁺ − v⁻, the work of all forces by the trapezoidal rule is
-//! ½ m a (Δt⁻ v⁻ + Δt⁺ v⁺) = ½ m (v⁺² − v⁻²) + ⅛ (Δt⁺² − Δt⁻²) m a². So the change adds ⅛ (Δt⁻² − Δt⁺²) Σ m|a|² to the kinetic
-//! energy, which the book of energies enters beside the work. The velocity at the instant is v⁻ + ½ Δt⁻ a = v⁺ − ½ Δt⁺ a.
+//! The central difference method in incremental form: with a = α Δt/2, Δuⁿ⁺¹ = ((1 − a) Δuⁿ + Δt²/m (R − f))
+//! / (1 + a), uⁿ⁺¹ = uⁿ + Δuⁿ⁺¹ (thesis 5.28–5.32 without the cancellation in 2uⁿ − uⁿ⁻¹). Damping does not
+//! lower the stable step. Where the step changes from Δt⁻ to Δt⁺, velocities go on: with h = (Δt⁻ + Δt⁺)/2
+//! and a = α h/2, Δuⁿ⁺¹ = ((1 − a) Δt⁺/Δt⁻ Δuⁿ + Δt⁺ h/m (R − f)) / (1 + a). With v⁻ = Δuⁿ/Δt⁻ and v⁺ =
+//! Δuⁿ⁺¹/Δt⁺, so that h a = v⁺ − v⁻, the work of all forces by the trapezoidal rule is ½ m a (Δt⁻ v⁻ + Δt⁺
+//! v⁺) = ½ m (v⁺² − v⁻²) + ⅛ (Δt⁺² − Δt⁻²) m a². So the change adds ⅛ (Δt⁻² − Δt⁺²) Σ m|a|² to the kinetic
+//! energy, which the book of energies enters beside the work. The velocity at the instant is v⁻ + ½ Δt⁻ a =
+//! v⁺ − ½ Δt⁺ a.
 //!
-//! A step has two halves: [`CentralDifference::evaluate`] finds forces, the coming increments, reactions and energies
-//! at the current time, so that all that an observer sees belongs to one instant; [`CentralDifference::advance`] moves.
-//! Runs on the current rayon pool; sums go in the order of the nodes for any number of threads.
+//! A step has two halves: [`CentralDifference::evaluate`] finds forces, the coming increments, reactions and
+//! energies at the current time, so that all that an observer sees belongs to one instant;
+//! [`CentralDifference::advance`] moves. Runs on the current rayon pool; sums go in the order of the nodes
+//! for any number of threads.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -83,7 +84,8 @@ pub trait Observable<R> {
         Vec::new()
     }
 
-    /// Moment [N m] about the origin of the force of each contact on the rigid thing that its nodes touch; `None` where it is not found.
+    /// Moment [N m] about the origin of the force of each contact on the rigid thing that its nodes touch;
+    /// `None` where it is not found.
     fn contact_moments(&self) -> Option<Vec<Vector<f64>>> {
         None
     }
@@ -94,7 +96,8 @@ pub trait Observable<R> {
     }
 }
 
-/// The number types of [`CentralDifference`], and what is compiled for them here and not again where a model is stepped.
+/// The number types of [`CentralDifference`], and what is compiled for them here and not again where a model
+/// is stepped.
 pub trait SteppedIn: LaneNumber {
     /// As [`CentralDifference::new`].
     #[doc(hidden)]
@@ -141,8 +144,8 @@ macro_rules! stepped_in {
 stepped_in!(f32);
 stepped_in!(f64);
 
-/// Steps a state of one model by one step size. Holds constants in its number type and scratch, nothing that a restart
-/// would lose.
+/// Steps a state of one model by one step size. Holds constants in its number type and scratch, nothing that
+/// a restart would lose.
 pub struct CentralDifference<R> {
     model: Arc<Model>,
     control: StepControl,
@@ -272,7 +275,8 @@ impl<R: SteppedIn> CentralDifference<R> {
             relaxing: step,
             forces: InternalForces::new(&model, step),
             held: held(&owners, &model.amplitudes(&owners)),
-            // Nodes that follow others have no mass, and no force but where they are held: there next to no mass moves with them.
+            // Nodes that follow others have no mass, and no force but where they are held: there next to no
+            // mass moves with them.
             mass: (0..nodes)
                 .map(|node| {
                     let without = owners[node].map(|owner| if owner == FREE { 1.0 } else { NO_MASS });
@@ -304,7 +308,8 @@ impl<R: SteppedIn> CentralDifference<R> {
         self
     }
 
-    /// [Dissipates](crate::DISSIPATION) the highest modes. Without it, angular momentum of a free body is exact and energies are kept to round-off.
+    /// [Dissipates](crate::DISSIPATION) the highest modes. Without it, angular momentum of a free body is
+    /// exact and energies are kept to round-off.
     #[must_use]
     pub fn dissipating(mut self) -> Self {
         self.dissipates = true;
@@ -327,8 +332,8 @@ impl<R: SteppedIn> CentralDifference<R> {
         self
     }
 
-    /// Says where coupled nodes of contacts ([`Contacts::coupled_nodes`]) go between two times [s], from one place [m] to another, at the same speed, also
-    /// beyond these times.
+    /// Says where coupled nodes of contacts ([`Contacts::coupled_nodes`]) go between two times [s], from one
+    /// place [m] to another, at the same speed, also beyond these times.
     ///
     /// # Panics
     /// If there are not as many ways as coupled nodes.
@@ -348,18 +353,20 @@ impl<R: SteppedIn> CentralDifference<R> {
         self.control.clock(state)
     }
 
-    /// Goes on where another stepper, with steps of length `step` [s], has stood at a state: with the velocities there.
+    /// Goes on where another stepper, with steps of length `step` [s], has stood at a state: with the
+    /// velocities there.
     pub fn go_on(&mut self, clock: &Clock, step: f64, state: &State<R>) {
         self.control.go_on(clock, step, state);
     }
 
-    /// Takes hold of points: these grips and no others act from the next evaluation on. Their work is external.
+    /// Takes hold of points: these grips and no others act from the next evaluation on. Their work is
+    /// external.
     pub fn grip(&mut self, grips: &[Grip]) {
         self.applied.grip(grips);
     }
 
-    /// Takes forces [N] from outside, one a node, or none: they and no others act from the next evaluation on until they are replaced. Their work
-    /// is external.
+    /// Takes forces [N] from outside, one a node, or none: they and no others act from the next evaluation on
+    /// until they are replaced. Their work is external.
     pub fn push(&mut self, forces: &[Vector<f64>]) {
         self.applied.push(forces);
     }
@@ -379,12 +386,12 @@ impl<R: SteppedIn> CentralDifference<R> {
         self.control.step()
     }
 
-    /// Forces, coming increments, reactions and energies at the current time. Where they were found before, also by another stepper, they
-    /// are found again.
+    /// Forces, coming increments, reactions and energies at the current time. Where they were found before,
+    /// also by another stepper, they are found again.
     ///
     /// # Errors
-    /// If the state is not finite, a cell is inverted, the energies do not balance, or the step is above the limit and
-    /// must not be cut.
+    /// If the state is not finite, a cell is inverted, the energies do not balance, or the step is above the
+    /// limit and must not be cut.
     pub fn evaluate(&mut self, state: &mut State<R>) -> Result<(), StepError> {
         R::evaluate(self, state)
     }
@@ -438,7 +445,8 @@ impl<R: SteppedIn> CentralDifference<R> {
         below
     }
 
-    /// Moves to the next instant, at the end of the step or of a part of it; [`evaluate`](Self::evaluate) has gone before.
+    /// Moves to the next instant, at the end of the step or of a part of it; [`evaluate`](Self::evaluate) has
+    /// gone before.
     pub fn advance(&mut self, state: &mut State<R>) {
         R::advance(self, state);
     }
@@ -490,8 +498,8 @@ impl<R: SteppedIn> CentralDifference<R> {
         }
     }
 
-    /// u⁻¹ = u⁰ − Δt v⁰ + ½ Δt² a⁰ with a⁰ = (R − f)/m − α v⁰: the increment before the first step. A prescribed
-    /// component has no velocity of its own.
+    /// u⁻¹ = u⁰ − Δt v⁰ + ½ Δt² a⁰ with a⁰ = (R − f)/m − α v⁰: the increment before the first step. A
+    /// prescribed component has no velocity of its own.
     fn start(&self, state: &mut State<R>, stored: f64) {
         let dt = self.lengths.before;
         let half = 0.5 * dt * dt;
@@ -538,7 +546,8 @@ impl<R: SteppedIn> CentralDifference<R> {
         Predicted { now, displacement: place, mobility: step_squared / inertia, held }
     }
 
-    /// Adds the forces of contacts, from where nodes would go without them; of their mobility this part counts. Whether there are contacts.
+    /// Adds the forces of contacts, from where nodes would go without them; of their mobility this part
+    /// counts. Whether there are contacts.
     fn touch(&mut self, state: &mut State<R>, part: f64) -> bool {
         let Some(mut contact) = self.contact.take() else { return false };
         let mut gripped = std::mem::take(&mut state.gripped);
@@ -611,7 +620,8 @@ impl<R: SteppedIn> CentralDifference<R> {
         !self.collectives.is_empty()
     }
 
-    /// Tasks over nodes that a thread takes at least: one where threads have just shared the cells, so that they are awake.
+    /// Tasks over nodes that a thread takes at least: one where threads have just shared the cells, so that
+    /// they are awake.
     fn least_chunks(&self) -> usize {
         if self.forces.is_shared() { 1 } else { LEAST_CHUNKS }
     }
@@ -650,7 +660,8 @@ impl<R: SteppedIn> CentralDifference<R> {
 
     fn check_state(&self, state: &State<R>, sums: &Sums, found: &Found) -> Result<(), StepError> {
         let finite = sums.is_finite();
-        // An inverted cell comes first: its forces are meaningless, often not finite, so that it is the cause.
+        // An inverted cell comes first: its forces are meaningless, often not finite, so that it is the
+        // cause.
         if let Some((solid, cell, determinant)) = found.inverted
             && (finite || determinant.is_finite())
         {

@@ -1,5 +1,6 @@
-//! Regions of a mesh by the marks of their cells: those of a label (cell data `label`), and those of a body, an obstacle or a tool (cell
-//! data `body`). Users name them to hide them, or to give them a look of their own.
+//! Regions of a mesh by the marks of their cells: those of a label (cell data `label`), and those of a body,
+//! an obstacle or a tool (cell data `body`). Users name them to hide them, or to give them a look of their
+//! own.
 
 use std::collections::BTreeMap;
 

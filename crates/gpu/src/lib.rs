@@ -1,5 +1,5 @@
-//! Explicit dynamics of solids and shells, and the linear equations of implicit steps, on any GPU, through wgpu: Vulkan, Metal or Direct3D 12, found at
-//! run time. Single precision.
+//! Explicit dynamics of solids and shells, and the linear equations of implicit steps, on any GPU, through
+//! wgpu: Vulkan, Metal or Direct3D 12, found at run time. Single precision.
 //!
 //! ```
 //! for adapter in pliant_gpu::adapters() {
@@ -7,7 +7,8 @@
 //! }
 //! ```
 //!
-//! [`GpuStepper`] advances a state of a model as `CentralDifference` does on the CPU, hundreds of steps at a time:
+//! [`GpuStepper`] advances a state of a model as `CentralDifference` does on the CPU, hundreds of steps at a
+//! time:
 //!
 //! ```
 //! use pliant_explicit::{Observable, State, Wanted};
@@ -26,85 +27,98 @@
 //!
 //! # State
 //!
-//! The current state is on the device. The state in memory is what a checkpoint holds: [`GpuStepper::bring_back`] and
-//! [`GpuStepper::upload`] copy it in the same layout of histories, so a run started on a CPU can continue on a GPU and back.
+//! The current state is on the device. The state in memory is what a checkpoint holds:
+//! [`GpuStepper::bring_back`] and [`GpuStepper::upload`] copy it in the same layout of histories, so a run
+//! started on a CPU can continue on a GPU and back.
 //!
 //! # Kernels
 //!
-//! Kernels are WGSL, one file each (`shaders/`), joined when a stepper is made. An *element* computes the forces of a cell with the stress of its
-//! law (`AnyLaw::shader`). A *design* ([`Design`]) finds displacements and takes forces (`displacement_of`, `give`, `internal_force`),
-//! so a new element or law works in every design. Group 0 binds the instant, group 1 the arrays of the cells (in node passes their
+//! Kernels are WGSL, one file each (`shaders/`), joined when a stepper is made. An *element* computes the
+//! forces of a cell with the stress of its law (`AnyLaw::shader`). A *design* ([`Design`]) finds
+//! displacements and takes forces (`displacement_of`, `give`, `internal_force`), so a new element or law
+//! works in every design. Group 0 binds the instant, group 1 the arrays of the cells (in node passes their
 //! forces), group 2 those of the design or of the nodes, group 3 those of blocks and loads.
 //!
 //! # Designs
 //!
-//! [`Design`] lists them, and `paths.rs` counts bytes and operations of each. All but `float-atomics` give the same bits every time, however
-//! the steps are divided. A force beyond the range of whole numbers is an error and never wraps around.
+//! [`Design`] lists them, and `paths.rs` counts bytes and operations of each. All but `float-atomics` give
+//! the same bits every time, however the steps are divided. A force beyond the range of whole numbers is an
+//! error and never wraps around.
 //!
-//! `blocks` adds forces as whole multiples of a small one, in shared memory; a group owns up to 64 nodes. Every block at a border cell computes this cell with the same
-//! numbers and its own copy of the history; any copy can be read back. Displacements and increments have two sides: a kernel reads *now* and
-//! writes *next*, so blocks do not wait for each other, and the instant of a failure stays intact on its side. Each solid has a kernel: the
-//! last one at a node moves it, earlier ones leave their forces. When an instant is evaluated, the forces are left for the node pass.
-//! Averaged pressures have their own kernels before.
+//! `blocks` adds forces as whole multiples of a small one, in shared memory; a group owns up to 64 nodes.
+//! Every block at a border cell computes this cell with the same numbers and its own copy of the history; any
+//! copy can be read back. Displacements and increments have two sides: a kernel reads *now* and writes
+//! *next*, so blocks do not wait for each other, and the instant of a failure stays intact on its side. Each
+//! solid has a kernel: the last one at a node moves it, earlier ones leave their forces. When an instant is
+//! evaluated, the forces are left for the node pass. Averaged pressures have their own kernels before.
 //!
 //! # Submissions
 //!
-//! A submission holds up to 128 instants, of 0.2 s at most together. The values of an instant are a uniform with a moving offset. Factors of curves
-//! are computed in double precision on the CPU and are rows of a table, one per instant.
+//! A submission holds up to 128 instants, of 0.2 s at most together. The values of an instant are a uniform
+//! with a moving offset. Factors of curves are computed in double precision on the CPU and are rows of a
+//! table, one per instant.
 //!
 //! # Evaluations
 //!
-//! Every 1 to 100 steps the stepper evaluates an instant: energies, reactions, extremes of J and |C − I|. The interval halves where the
-//! deformation changed by more than 2 % since the last evaluation. In between, the device sums work in single precision, group by group;
-//! the sums go into the energy balance of the CPU. Every step is evaluated while the energies are off balance. `StepControl` monitors
-//! the critical time step as on the CPU, from displacements read back after a change of 10 % or after 1000 steps.
+//! Every 1 to 100 steps the stepper evaluates an instant: energies, reactions, extremes of J and |C − I|. The
+//! interval halves where the deformation changed by more than 2 % since the last evaluation. In between, the
+//! device sums work in single precision, group by group; the sums go into the energy balance of the CPU.
+//! Every step is evaluated while the energies are off balance. `StepControl` monitors the critical time step
+//! as on the CPU, from displacements read back after a change of 10 % or after 1000 steps.
 //!
 //! # Failures
 //!
-//! The first cell with J ≤ 0, inverted corner or force that is not a number stops the device at that instant: later kernels do nothing. The
-//! state is read back as it was, and one evaluation on the CPU names element, node and time. A lost or full device and a model
-//! beyond its limits are errors of their own ([`GpuError`]).
+//! The first cell with J ≤ 0, inverted corner or force that is not a number stops the device at that instant:
+//! later kernels do nothing. The state is read back as it was, and one evaluation on the CPU names element,
+//! node and time. A lost or full device and a model beyond its limits are errors of their own ([`GpuError`]).
 //!
 //! # Grips and windows
 //!
-//! While a grip holds, a kernel finds its force from the displacements, and marked nodes add it to their loads. Only p − Σ wᵢ Xᵢ is computed
-//! before, in double precision. [`GpuStepper::advance_without_read_back`] takes steps for a given time without any read-back. [`DeviceMapping`] computes points
-//! that are combinations of nodes, with a value each, in an array that a renderer binds. [`Device::read_backs`] counts all read-backs.
+//! While a grip holds, a kernel finds its force from the displacements, and marked nodes add it to their
+//! loads. Only p − Σ wᵢ Xᵢ is computed before, in double precision. [`GpuStepper::advance_without_read_back`]
+//! takes steps for a given time without any read-back. [`DeviceMapping`] computes points that are
+//! combinations of nodes, with a value each, in an array that a renderer binds. [`Device::read_backs`] counts
+//! all read-backs.
 //!
 //! # Contact
 //!
-//! [`GpuStepper::with_contacts`] lets nodes, and points on faces, touch rigid things, other bodies and themselves as `contact.rs` does on the CPU. Where a node would go
-//! without contact is found before the node pass, from the forces of cells; a group solves the rows of points that share nodes, colour by
-//! colour and level by level; the node pass takes the forces. The ways of tools in a step are numbers of its row of the table. [`processor_only`] names what is
-//! not there.
+//! [`GpuStepper::with_contacts`] lets nodes, and points on faces, touch rigid things, other bodies and
+//! themselves as `contact.rs` does on the CPU. Where a node would go without contact is found before the node
+//! pass, from the forces of cells; a group solves the rows of points that share nodes, colour by colour and
+//! level by level; the node pass takes the forces. The ways of tools in a step are numbers of its row of the
+//! table. [`processor_only`] names what is not there.
 //!
-//! Candidates for pairs of surfaces are listed in ordinary memory (`pairs.rs`). A kernel before the forces of an instant stops the device there if
-//! nodes may leave the skin of the lists: the instant is noted in the findings, as that of a failure, and all later kernels do nothing. The
-//! stepper reads that after its last submission, goes back to this instant, lists anew and submits the rest again. So
+//! Candidates for pairs of surfaces are listed in ordinary memory (`pairs.rs`). A kernel before the forces of
+//! an instant stops the device there if nodes may leave the skin of the lists: the instant is noted in the
+//! findings, as that of a failure, and all later kernels do nothing. The stepper reads that after its last
+//! submission, goes back to this instant, lists anew and submits the rest again. So
 //! [`GpuStepper::advance_without_read_back`] does read back there.
 //!
 //! # Ties
 //!
-//! Nodes that follow others have no cells in the pass over the nodes. A kernel before it sums the forces on each of them and writes a part for each node that
-//! it follows into a slot of its own, which that node gathers like those of its cells; with atomic additions it adds the part. Another kernel after
-//! each motion places them, u = Σ w u. `blocks` moves nodes while it finds forces, and refuses ties.
+//! Nodes that follow others have no cells in the pass over the nodes. A kernel before it sums the forces on
+//! each of them and writes a part for each node that it follows into a slot of its own, which that node
+//! gathers like those of its cells; with atomic additions it adds the part. Another kernel after each motion
+//! places them, u = Σ w u. `blocks` moves nodes while it finds forces, and refuses ties.
 //!
 //! # Equations of implicit steps
 //!
-//! [`Device`] is a `LinearDevice` of `pliant-linear`: it solves block matrices by conjugate gradients (`gradients.rs`). What it finds are corrections
-//! under a residual in double precision on the CPU.
+//! [`Device`] is a `LinearDevice` of `pliant-linear`: it solves block matrices by conjugate gradients
+//! (`gradients.rs`). What it finds are corrections under a residual in double precision on the CPU.
 //!
 //! # Shells
 //!
-//! [`GpuShells`] advances shells as `pliant_implicit::ExplicitShells` does (`shells.rs`). A state is read back after each call; whoever wants forces,
-//! energies or reactions there finds them on the CPU.
+//! [`GpuShells`] advances shells as `pliant_implicit::ExplicitShells` does (`shells.rs`). A state is read
+//! back after each call; whoever wants forces, energies or reactions there finds them on the CPU.
 //!
 //! # Tests
 //!
-//! `tests/gpu/stepper/` compares with double precision on the CPU: displacements differ by at most 1e-5 after 200 steps, with every law, element
-//! and load on unordered meshes deformed at random. `tests/gpu/shells.rs` holds shells to the same, with their rotations and the work of loads. `tests/gpu/gradients.rs` compares solutions, pulsing tubes, contact, ties and volumes with the CPU. Tests also run devices opened with
-//! lower limits (`Device::open_within`) and devices destroyed during a run. The gate runs
-//! all of them on Mesa's software Vulkan (`PLIANT_REQUIRE_GPU=1`); elsewhere they report when they are skipped.
+//! `tests/gpu/stepper/` compares with double precision on the CPU: displacements differ by at most 1e-5 after
+//! 200 steps, with every law, element and load on unordered meshes deformed at random. `tests/gpu/shells.rs`
+//! holds shells to the same, with their rotations and the work of loads. `tests/gpu/gradients.rs` compares
+//! solutions, pulsing tubes, contact, ties and volumes with the CPU. Tests also run devices opened with lower
+//! limits (`Device::open_within`) and devices destroyed during a run. The gate runs all of them on Mesa's
+//! software Vulkan (`PLIANT_REQUIRE_GPU=1`); elsewhere they report when they are skipped.
 
 mod blocks;
 mod contacts;

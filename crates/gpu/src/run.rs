@@ -18,7 +18,8 @@ use crate::{Device, GpuError};
 /// Most instants in a submission.
 const MOST: usize = 128;
 
-/// A submission takes about this long [s] at most: systems reset a device that a program occupies for seconds.
+/// A submission takes about this long [s] at most: systems reset a device that a program occupies for
+/// seconds.
 const LONGEST_SUBMISSION: f64 = 0.2;
 
 /// How many instants a submission takes, by the time [s] that one takes, once it is known.
@@ -98,7 +99,8 @@ impl Instant {
     }
 }
 
-/// Instants of the next submission, each with its row of a table of what is found in double precision on the CPU.
+/// Instants of the next submission, each with its row of a table of what is found in double precision on the
+/// CPU.
 pub(crate) struct Rows<I> {
     instants: wgpu::Buffer,
     table: wgpu::Buffer,
@@ -157,7 +159,8 @@ impl<I: Pod> Rows<I> {
         self.count
     }
 
-    /// Submits them: `encode` adds the kernels of each to the pass, from its place and the offset of its numbers.
+    /// Submits them: `encode` adds the kernels of each to the pass, from its place and the offset of its
+    /// numbers.
     pub(crate) fn submit(
         &mut self,
         device: &Device,
@@ -178,7 +181,8 @@ impl<I: Pod> Rows<I> {
     }
 }
 
-/// Instants of solids, with the factors of constraints and loads, and the ways of obstacles and tools, at each.
+/// Instants of solids, with the factors of constraints and loads, and the ways of obstacles and tools, at
+/// each.
 pub(crate) struct Instants {
     /// What all kernels read.
     pub bound: Bound,
@@ -293,7 +297,8 @@ impl Instants {
         self.rows.len()
     }
 
-    /// Submits them: `encode` adds the kernels of each to the pass, from what they read, its place and the offset of its numbers.
+    /// Submits them: `encode` adds the kernels of each to the pass, from what they read, its place and the
+    /// offset of its numbers.
     pub(crate) fn submit(
         &mut self,
         device: &Device,

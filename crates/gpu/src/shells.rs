@@ -1,11 +1,14 @@
-//! Explicit shells on a device: the central differences of `pliant_implicit::ExplicitShells` in single precision.
+//! Explicit shells on a device: the central differences of `pliant_implicit::ExplicitShells` in single
+//! precision.
 //!
-//! Two kernels a step. A facet finds the forces on its corners, and those of pressure. A node sums those of its corners in the order of the
-//! facets, adds its loads and moves. The state on the device is displacements, rotations, velocities and spins. Factors of loads and
-//! velocities of moved nodes are found in double precision on the CPU, and are rows of a table, one per instant.
+//! Two kernels a step. A facet finds the forces on its corners, and those of pressure. A node sums those of
+//! its corners in the order of the facets, adds its loads and moves. The state on the device is
+//! displacements, rotations, velocities and spins. Factors of loads and velocities of moved nodes are found
+//! in double precision on the CPU, and are rows of a table, one per instant.
 //!
-//! Leaves out what [`GpuShells::unsupported`] names, and energies and reactions: the CPU finds these from a state that is read back. The
-//! work of forces from outside is summed on the device, so none of it is lost in between.
+//! Leaves out what [`GpuShells::unsupported`] names, and energies and reactions: the CPU finds these from a
+//! state that is read back. The work of forces from outside is summed on the device, so none of it is lost in
+//! between.
 
 use std::sync::Arc;
 use std::time::Instant as Clock;
@@ -44,10 +47,11 @@ struct Instant {
 pub struct ShellsMoved {
     /// Steps taken.
     pub steps: u64,
-    /// Work [J] of forces from outside on the way, by the trapezoidal rule, less what those at the end do: half of their power × step.
+    /// Work [J] of forces from outside on the way, by the trapezoidal rule, less what those at the end do:
+    /// half of their power × step.
     pub work: f64,
-    /// Whether a facet was broken, in single precision, before all steps were taken. The state is that of this instant; the CPU's forces there
-    /// tell whether it is, and name it.
+    /// Whether a facet was broken, in single precision, before all steps were taken. The state is that of
+    /// this instant; the CPU's forces there tell whether it is, and name it.
     pub broken: bool,
 }
 
@@ -88,7 +92,8 @@ impl GpuShells {
     /// A stepper for steps of a length [s]; those above `ExplicitShells::stable_step` are unstable.
     ///
     /// # Errors
-    /// If something of the model [runs on the CPU only](Self::unsupported), or the device can't take the model.
+    /// If something of the model [runs on the CPU only](Self::unsupported), or the device can't take the
+    /// model.
     pub fn new(device: &Device, model: impl Into<Arc<Assembly>>, step: f64) -> Result<Self, GpuError> {
         let model = model.into();
         if let Some(what) = Self::unsupported(&model) {
@@ -181,7 +186,8 @@ impl GpuShells {
         self.loaded = true;
     }
 
-    /// Takes forces [N] on nodes: they and no others act from the next step on, as loads beside those of the model.
+    /// Takes forces [N] on nodes: they and no others act from the next step on, as loads beside those of the
+    /// model.
     pub fn push(&mut self, forces: &[(u32, [f64; 3])]) {
         if forces.is_empty() && !self.pushed {
             return;
@@ -195,7 +201,8 @@ impl GpuShells {
         self.pushed = !forces.is_empty();
     }
 
-    /// Takes `steps` steps and reads the state back. The first call uploads the state; [`upload`](Self::upload) uploads another one.
+    /// Takes `steps` steps and reads the state back. The first call uploads the state;
+    /// [`upload`](Self::upload) uploads another one.
     ///
     /// # Errors
     /// If the device fails.
@@ -255,7 +262,8 @@ impl GpuShells {
         })
     }
 
-    /// Reads the state back: the first instant at which a facet was broken, and the work of forces from outside [J].
+    /// Reads the state back: the first instant at which a facet was broken, and the work of forces from
+    /// outside [J].
     fn read(&mut self, state: &mut State) -> Result<(u32, f64), GpuError> {
         let model = &self.model;
         let bytes = (32 * model.rest.len()) as u64;
@@ -342,7 +350,8 @@ impl Kernels<'_> {
         Ok(FacetForces { kernel, forces, pressed })
     }
 
-    /// Moves nodes by a step [s], with where their motions are in a row of the table, and forces from outside.
+    /// Moves nodes by a step [s], with where their motions are in a row of the table, and forces from
+    /// outside.
     fn nodes(
         &self,
         FacetForces { forces, pressed, .. }: &FacetForces,
@@ -516,7 +525,8 @@ impl Pressed {
     }
 }
 
-/// Of each corner its normal at rest in the axes of its facet; with the first the control points on straight edges, as bits.
+/// Of each corner its normal at rest in the axes of its facet; with the first the control points on straight
+/// edges, as bits.
 fn normals(model: &Assembly) -> Vec<[Four; 3]> {
     let (surface, rest) = (CurvedSurface::new(model, EdgeRule::Arc), State::at_rest(model));
     let of_facet = |(number, facet): (u32, &pliant_shells::Facet)| {

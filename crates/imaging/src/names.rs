@@ -1,5 +1,6 @@
-//! Names of labels: from the image itself, from tables beside it (ITK-SNAP's label descriptions, colour tables of FreeSurfer and 3D Slicer, JSON),
-//! or as TotalSegmentator publishes them; and the words by which labels are chosen.
+//! Names of labels: from the image itself, from tables beside it (ITK-SNAP's label descriptions, colour
+//! tables of FreeSurfer and 3D Slicer, JSON), or as TotalSegmentator publishes them; and the words by which
+//! labels are chosen.
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
@@ -19,7 +20,8 @@ const TABLE_LIMIT: u64 = 1 << 22;
 /// Longest name [characters]; the rest is cut.
 const LONGEST: usize = 120;
 
-/// The classes of TotalSegmentator v2, task `total`, in their order from 1 (Wasserthal et al. 2023; `class_map` of the program).
+/// The classes of TotalSegmentator v2, task `total`, in their order from 1 (Wasserthal et al. 2023;
+/// `class_map` of the program).
 const TOTAL_SEGMENTATOR: &str = include_str!("totalsegmentator.txt");
 
 /// Names of labels.
@@ -34,8 +36,9 @@ impl LabelNames {
         names
     }
 
-    /// Reads a table of names, or loads the one named `totalsegmentator`: label descriptions of ITK-SNAP, colour tables of FreeSurfer or 3D
-    /// Slicer, lines like `5 liver`, or JSON like `{"5": "liver"}` or `{"labels": {"liver": 5}}`.
+    /// Reads a table of names, or loads the one named `totalsegmentator`: label descriptions of ITK-SNAP,
+    /// colour tables of FreeSurfer or 3D Slicer, lines like `5 liver`, or JSON like `{"5": "liver"}` or
+    /// `{"labels": {"liver": 5}}`.
     pub fn read(table: &Path) -> Result<Self, ImageError> {
         if table == Path::new("totalsegmentator") {
             return Ok(Self::total_segmentator());
@@ -120,7 +123,8 @@ impl LabelNames {
     }
 }
 
-/// A label, a range of labels, a name or a group of them, as people type it: `5`, `5-8`, `liver`, `tissue=1,5,7-9`.
+/// A label, a range of labels, a name or a group of them, as people type it: `5`, `5-8`, `liver`,
+/// `tissue=1,5,7-9`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LabelChoice {
     /// A label by its number.
@@ -213,7 +217,8 @@ fn of_json(text: &str) -> Result<LabelNames, Fault> {
     Ok(names)
 }
 
-/// Lines that begin with the label: with the name in quotes at their end (ITK-SNAP), or after the label and before a colour.
+/// Lines that begin with the label: with the name in quotes at their end (ITK-SNAP), or after the label and
+/// before a colour.
 fn of_lines(text: &str) -> Result<LabelNames, Fault> {
     let mut names = LabelNames::default();
     for (line, number) in text.lines().zip(1..) {
@@ -239,7 +244,8 @@ fn of_lines(text: &str) -> Result<LabelNames, Fault> {
     Ok(names)
 }
 
-/// The names in a `LabelTable` in XML, as Caret and Connectome Workbench write it into extensions of NIfTI, and TotalSegmentator does.
+/// The names in a `LabelTable` in XML, as Caret and Connectome Workbench write it into extensions of NIfTI,
+/// and TotalSegmentator does.
 pub(crate) fn of_xml(text: &str, names: &mut LabelNames) {
     let Some((_, mut rest)) = text.split_once("<LabelTable") else { return };
     while let Some((_, tag)) = rest.split_once("<Label ") {

@@ -1,4 +1,5 @@
-//! Nodes that follow others, in a model: J of displacements, Jᵀ of forces and masses, by the rows of its [`Tie`]s.
+//! Nodes that follow others, in a model: J of displacements, Jᵀ of forces and masses, by the rows of its
+//! [`Tie`]s.
 
 use std::collections::BTreeMap;
 
@@ -49,8 +50,9 @@ impl Model {
         Ok(self.ties.len() - 1)
     }
 
-    /// Lets tied nodes follow no longer along components that a constraint holds or moves, of them and of a node of the other body that they follow: both
-    /// bodies are held there, as at a plane of symmetry. To be called once constraints and ties are there.
+    /// Lets tied nodes follow no longer along components that a constraint holds or moves, of them and of a
+    /// node of the other body that they follow: both bodies are held there, as at a plane of symmetry. To be
+    /// called once constraints and ties are there.
     pub fn prescribe_tied(&mut self) {
         let mut held = vec![[false; 3]; self.node_count()];
         for constraint in self.constraints.iter().filter(|own| !own.motion.is_collective()) {
@@ -102,8 +104,9 @@ impl Model {
         }
     }
 
-    /// Row sums of Jᵀ M J: the masses of nodes that follow others go to these. Where rows have so many negative weights that a followed node
-    /// would lose mass by a tie, as beside a much heavier element, all masses of that tie go by the rows without their negative weights.
+    /// Row sums of Jᵀ M J: the masses of nodes that follow others go to these. Where rows have so many
+    /// negative weights that a followed node would lose mass by a tie, as beside a much heavier element, all
+    /// masses of that tie go by the rows without their negative weights.
     pub(crate) fn give_down(&self, masses: &mut [f64]) {
         for tie in &self.ties {
             let given: Vec<f64> =
@@ -124,7 +127,8 @@ impl Model {
         }
     }
 
-    /// A bound of Jᵀ K J by nodes: |J_ai| Σ_j |J_aj| k_a of the stiffness k_a of each node that follows others goes to the nodes i.
+    /// A bound of Jᵀ K J by nodes: |J_ai| Σ_j |J_aj| k_a of the stiffness k_a of each node that follows
+    /// others goes to the nodes i.
     pub fn give_down_stiffness(&self, stiffness: &mut [f64]) {
         for (node, row) in self.ties.iter().flat_map(Tie::rows) {
             let own = std::mem::take(&mut stiffness[node as usize]);

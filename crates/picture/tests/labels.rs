@@ -1,5 +1,5 @@
-//! Colours of labels: each cell has exactly the colour of its label, hidden cells show the inside, and the legend has a swatch for
-//! each visible label.
+//! Colours of labels: each cell has exactly the colour of its label, hidden cells show the inside, and the
+//! legend has a swatch for each visible label.
 
 mod support;
 
@@ -44,8 +44,9 @@ fn light(byte: u8) -> f64 {
     if s <= 0.040_45 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Pixels of the body with the lit colour of each label from 1 to 3, and other pixels. Light changes the brightness of a colour and
-/// adds a little white; without its white, the rest has the direction of the label's colour.
+/// Pixels of the body with the lit colour of each label from 1 to 3, and other pixels. Light changes the
+/// brightness of a colour and adds a little white; without its white, the rest has the direction of the
+/// label's colour.
 fn counts(picture: &Picture) -> [usize; 4] {
     let pure = |rgb: &[u8]| {
         let rgb = Vector3::from_iterator(rgb[..3].iter().map(|&byte| light(byte)));

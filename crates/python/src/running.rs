@@ -1,4 +1,5 @@
-//! What a simulation owns: the run, what is shown of it, and its displacements where the stepper has none of its own.
+//! What a simulation owns: the run, what is shown of it, and its displacements where the stepper has none of
+//! its own.
 
 use std::sync::Arc;
 
@@ -135,7 +136,8 @@ impl Running {
         }
     }
 
-    /// A field of a body or a surface: numbers, and how many each point or cell has; where it is, if no place is given.
+    /// A field of a body or a surface: numbers, and how many each point or cell has; where it is, if no place
+    /// is given.
     pub fn field(&mut self, name: &str, on: &str, at: Option<At>) -> Result<(Vec<f64>, usize), Trouble> {
         let field = field_named(name)?;
         let at = at.unwrap_or(if field.is_nodal() { At::Points } else { At::Cells });
@@ -160,7 +162,8 @@ impl Running {
         Ok((reader.values()?.into_owned(), reader.components()))
     }
 
-    /// The surface around the point of bodies that is nearest to a place [m]: nodes, counted over all, with weights that sum to 1.
+    /// The surface around the point of bodies that is nearest to a place [m]: nodes, counted over all, with
+    /// weights that sum to 1.
     pub fn around(
         &self,
         at: [f64; 3],

@@ -264,7 +264,8 @@ impl Simulation {
         Ok(array(py, values, columns))
     }
 
-    /// Kinetic, internal, damping, external and hourglass energy and that of step changes [J], and the balance.
+    /// Kinetic, internal, damping, external and hourglass energy and that of step changes [J], and the
+    /// balance.
     fn energies(&self, py: Python<'_>) -> PyResult<[f64; 7]> {
         self.work(py, |running, _| {
             running.evaluate()?;
@@ -312,7 +313,8 @@ impl Simulation {
         })
     }
 
-    /// Goes so many steps on, or until a time [s]; fewer after a signal or where the run ends. The steps done.
+    /// Goes so many steps on, or until a time [s]; fewer after a signal or where the run ends. The steps
+    /// done.
     fn advance(&self, py: Python<'_>, steps: Option<u64>, until: Option<f64>) -> PyResult<u64> {
         self.work(py, move |running, stop| {
             let mut done = 0;
@@ -339,7 +341,8 @@ impl Simulation {
         self.stop.ask();
     }
 
-    /// Replaces all grips: nodes with weights, place [m], stiffness [N/m], at most the stable one of each. The stiffnesses taken.
+    /// Replaces all grips: nodes with weights, place [m], stiffness [N/m], at most the stable one of each.
+    /// The stiffnesses taken.
     fn hold(&self, grips: Vec<Held>) -> PyResult<Vec<f64>> {
         let taken = self.quick(|running| {
             let nodes = running.nodes() as u32;
@@ -382,7 +385,8 @@ impl Simulation {
         Ok(arrival.map_err(|failure| Trouble::Value(failure.message))?)
     }
 
-    /// A tool: its pose, the angle between its jaws [rad], the force [N] of all that touches it, and its moment about the tool's frame [N m].
+    /// A tool: its pose, the angle between its jaws [rad], the force [N] of all that touches it, and its
+    /// moment about the tool's frame [N m].
     fn tool(&self, py: Python<'_>, name: String) -> PyResult<Option<ToolNow>> {
         self.work(py, move |running, _| {
             running.evaluate()?;
@@ -488,9 +492,10 @@ fn view<T: numpy::Element>(
     nodes: usize,
 ) -> Bound<'_, PyArray2<T>> {
     let data: *const T = std::ptr::with_exposed_provenance(address);
-    // SAFETY: the vector at this address has 3 · `nodes` numbers of this type, and stays there as long as the simulation: `work` ends it
-    // where they have moved, and neither `close` nor a panic frees it. The array holds a reference to the simulation, and is not writeable
-    // before anybody sees it. A thread that reads it during a step may see two instants mixed, which the documentation says.
+    // SAFETY: the vector at this address has 3 · `nodes` numbers of this type, and stays there as long as the
+    // simulation: `work` ends it where they have moved, and neither `close` nor a panic frees it. The array
+    // holds a reference to the simulation, and is not writeable before anybody sees it. A thread that reads
+    // it during a step may see two instants mixed, which the documentation says.
     unsafe {
         let own = ArrayView2::from_shape_ptr((nodes, 3), data);
         let array = PyArray2::borrow_from_array(&own, simulation);

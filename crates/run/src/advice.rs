@@ -1,5 +1,5 @@
-//! What to try after a failed step. It depends on what the run does already: nobody is told to switch on what is on, or to damp more where
-//! damping is the trouble.
+//! What to try after a failed step. It depends on what the run does already: nobody is told to switch on what
+//! is on, or to damp more where damping is the trouble.
 
 use pliant_format::tables::OnUnstableName;
 use pliant_geometry::words::{counted, number};

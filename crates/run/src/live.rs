@@ -1,4 +1,5 @@
-//! A scene that is played: it goes on as long as someone looks, is pulled at, and shows what its `[view]` asks.
+//! A scene that is played: it goes on as long as someone looks, is pulled at, and shows what its `[view]`
+//! asks.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -50,8 +51,9 @@ impl Live {
         Ok(Self::of(world, world.simulation()?))
     }
 
-    /// Plays a world on from where a run of another one stands, with displacements, velocities and what relaxing laws remember. `None`
-    /// where this one has another mesh, solver or precision than that `before`.
+    /// Plays a world on from where a run of another one stands, with displacements, velocities and what
+    /// relaxing laws remember. `None` where this one has another mesh, solver or precision than that
+    /// `before`.
     ///
     /// # Errors
     /// If a stepper can't be made.
@@ -85,8 +87,8 @@ impl Live {
         self.restore(state)
     }
 
-    /// Goes on with other numbers (laws, loads, steps) from the present state. False, and nothing changes, where the other world has other
-    /// meshes, solvers or number types.
+    /// Goes on with other numbers (laws, loads, steps) from the present state. False, and nothing changes,
+    /// where the other world has other meshes, solvers or number types.
     ///
     /// # Errors
     /// If the state can't be taken, or a stepper can't be made. The run then stays as it was.
@@ -111,8 +113,8 @@ impl Live {
         }
     }
 
-    /// The points shown at the instant, found on the GPU where the state lies, with a value each; `given` takes the
-    /// place of those given before. `None` where the solver keeps its state in ordinary memory.
+    /// The points shown at the instant, found on the GPU where the state lies, with a value each; `given`
+    /// takes the place of those given before. `None` where the solver keeps its state in ordinary memory.
     #[cfg(feature = "gpu")]
     pub fn place(
         &mut self,
@@ -174,7 +176,8 @@ impl Live {
         moved.unwrap_or(*start)
     }
 
-    /// Where obstacles, tools and driven nodes come on their way to the end of the scene [m]: corners of the box around each, at some instants.
+    /// Where obstacles, tools and driven nodes come on their way to the end of the scene [m]: corners of the
+    /// box around each, at some instants.
     pub fn ways(&self) -> Vec<Vector3> {
         let mut things: BTreeMap<(usize, usize), Vec<Vector3>> = BTreeMap::new();
         for (index, &point) in (0..).zip(&self.shown.mesh().points) {
@@ -237,7 +240,8 @@ impl Live {
         Ok(self.shown.mesh())
     }
 
-    /// Forces [N] that hold or move the nodes of each constraint of all participants, at the instant last evaluated.
+    /// Forces [N] that hold or move the nodes of each constraint of all participants, at the instant last
+    /// evaluated.
     pub fn reactions(&self) -> Vec<[f64; 3]> {
         frames(&self.world, &self.simulation).iter().flat_map(Frame::reactions).collect()
     }
@@ -427,7 +431,8 @@ mod tests {
         }
         assert!((whole.simulation.time() - going.simulation.time()).abs() < 1e-12);
         let [changed, expected] = [going, whole].map(|mut live| height(&mut live));
-        // The errors of both steps are below 2 % of the swing; twice or half the velocity would change it by half.
+        // The errors of both steps are below 2 % of the swing; twice or half the velocity would change it by
+        // half.
         assert!(
             (changed - expected).abs() < 0.05 * largest,
             "{changed} m, {expected} m in short steps, of {largest} m"

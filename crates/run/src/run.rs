@@ -23,8 +23,8 @@ use crate::rollback::{Point, RollbackPoints};
 
 /// Draws an instant of a run.
 pub trait Draw: fmt::Debug + Sync {
-    /// A PNG file of a mesh at rest with the fields of an instant, at a time [s]; and of the constraints and loads of another one, where
-    /// these are marked.
+    /// A PNG file of a mesh at rest with the fields of an instant, at a time [s]; and of the constraints and
+    /// loads of another one, where these are marked.
     ///
     /// # Errors
     /// Why there is no picture.
@@ -47,10 +47,11 @@ pub struct Progress {
 /// What a run can be given beside its scene.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options<'a> {
-    /// Where to go on, in a folder that was [reopened](OutputFolder::reopen) for it and with the plan by which it
-    /// [continues](Checkpoint::continues); at the start of the scene if not given.
+    /// Where to go on, in a folder that was [reopened](OutputFolder::reopen) for it and with the plan by
+    /// which it [continues](Checkpoint::continues); at the start of the scene if not given.
     pub resume: Option<&'a Checkpoint>,
-    /// Ends the run once it is asked, with a checkpoint if the scene asks for some: after the current step, or before it if that takes long.
+    /// Ends the run once it is asked, with a checkpoint if the scene asks for some: after the current step,
+    /// or before it if that takes long.
     pub stop: Option<&'a StopFlag>,
     /// Draws the last instant, as the scene's `[view]` shows it, into `picture.png`.
     pub picture: Option<&'a dyn Draw>,
@@ -61,14 +62,15 @@ const SAMPLES: f64 = 1000.0;
 /// Those of a run on a GPU, which has to stop for each.
 const SAMPLES_ON_DEVICE: f64 = 250.0;
 
-/// Samples from one look at the fields of all cells of solids to the next: a look costs as much as a few steps.
+/// Samples from one look at the fields of all cells of solids to the next: a look costs as much as a few
+/// steps.
 const SAMPLES_A_LOOK: usize = 50;
 
 /// Wall time between two reports of progress.
 const REPORT: Duration = Duration::from_millis(100);
 
-/// Runs a world and writes its outputs, `plot.svg` and `summary.md`. A failure of the run, or of writing while it runs,
-/// is in the summary; whatever was written before stays.
+/// Runs a world and writes its outputs, `plot.svg` and `summary.md`. A failure of the run, or of writing
+/// while it runs, is in the summary; whatever was written before stays.
 ///
 /// # Errors
 /// If the outputs can't be opened.
@@ -286,7 +288,8 @@ impl<'a, 'env> Run<'a, 'env> {
         outcome
     }
 
-    /// Takes all steps. After one that fails it goes back, if shorter steps may avoid the failure, and halves them.
+    /// Takes all steps. After one that fails it goes back, if shorter steps may avoid the failure, and halves
+    /// them.
     fn go(&mut self, simulation: &mut Simulation) -> Result<(), Failure> {
         if self.rollback.as_ref().is_some_and(|points| points.points().is_empty()) {
             self.keep_point(simulation)?;

@@ -62,7 +62,8 @@ impl World {
         }
     }
 
-    /// The two participants of a contact with the surfaces that touch, first the one whose coupled nodes are nodes of the other.
+    /// The two participants of a contact with the surfaces that touch, first the one whose coupled nodes are
+    /// nodes of the other.
     fn sides(&self, name: &str) -> Option<[(usize, &Meet); 2]> {
         let sides = self.participants.iter().enumerate().flat_map(|(part, own)| {
             let meets = own.built.meets.iter().filter(|meet| meet.contact == name);
@@ -137,7 +138,8 @@ impl World {
         Ok(())
     }
 
-    /// Makes the nodes of second surfaces coupled nodes of the first participants; their numbers for each pair of participants.
+    /// Makes the nodes of second surfaces coupled nodes of the first participants; their numbers for each
+    /// pair of participants.
     fn add_coupled_surfaces(&mut self, met: &[(Contact, [usize; 2])]) -> BTreeMap<[usize; 2], Numbers> {
         let mut nodes: BTreeMap<[usize; 2], Vec<u32>> = BTreeMap::new();
         for (contact, pair) in met {
@@ -179,7 +181,8 @@ impl World {
         contacts.contacts.push(contact);
     }
 
-    /// Whether the second body is a sheet whose side towards the first one is that which its normals point away from.
+    /// Whether the second body is a sheet whose side towards the first one is that which its normals point
+    /// away from.
     fn is_behind(&self, sides: [(usize, &Meet); 2]) -> bool {
         let [(host, own), (of, other)] = sides;
         let sheet = &self.participants[of].built.bodies[other.body];
@@ -198,7 +201,8 @@ impl World {
         ways.min_by(|a, b| a.0.total_cmp(&b.0)).is_some_and(|(_, along)| along < 0.0)
     }
 
-    /// A surface of the second participant with its nodes numbered after those of the first, and the places [m] of all at rest.
+    /// A surface of the second participant with its nodes numbered after those of the first, and the places
+    /// [m] of all at rest.
     fn side_by_side(
         &self,
         sides: [(usize, &Meet); 2],

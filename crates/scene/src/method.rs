@@ -15,8 +15,8 @@ use pliant_format::tables::{
     IntegratorName, LinearName, LinearTable, OnUnstableName, PreconditionerName, RunTable, SolverName,
 };
 
-/// Iterations of Newton's method at most in contact, if none are given. The longest step of a lens that snaps out of its tube takes 160 to 210;
-/// halved before its end it would take them twice.
+/// Iterations of Newton's method at most in contact, if none are given. The longest step of a lens that snaps
+/// out of its tube takes 160 to 210; halved before its end it would take them twice.
 const IN_CONTACT: usize = 300;
 /// Iterations from which on a lagged factorisation is made anew.
 const RENEW_AFTER: usize = 10;

@@ -1,5 +1,5 @@
-//! The time step of a run: from the mesh and the laws, or as requested and then compared with the critical time step of the assembled
-//! model.
+//! The time step of a run: from the mesh and the laws, or as requested and then compared with the critical
+//! time step of the assembled model.
 
 use pliant_explicit::critical_step::ElementBound;
 use pliant_format::Scene;
@@ -67,7 +67,8 @@ impl std::fmt::Display for LimitingElement {
 /// Chooses the step and the device.
 ///
 /// # Errors
-/// If the requested step is above the critical time step of the assembled model, or the scene can't run on the requested device.
+/// If the requested step is above the critical time step of the assembled model, or the scene can't run on
+/// the requested device.
 pub fn plan(scene: &Scene, built: &Built) -> Result<Plan, SceneErrors> {
     let fail = |diagnostic| Err(scene.source.errors(vec![diagnostic]));
     let (limits, note) = match &built.implicit {

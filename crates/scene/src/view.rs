@@ -12,8 +12,8 @@ use crate::assemble::{Built, labels_of, touches};
 use crate::world::World;
 
 impl Built {
-    /// The forces [N] of loads on each node at a time [s] and displacements [m], without weights. Pressures on shells give a third of their force
-    /// to each corner of a facet.
+    /// The forces [N] of loads on each node at a time [s] and displacements [m], without weights. Pressures
+    /// on shells give a third of their force to each corner of a facet.
     pub fn load_forces(&self, time: f64, displacement: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let mut forces = self.model.load_forces(time, displacement);
         let Some(implicit) = &self.implicit else { return forces };
@@ -60,8 +60,8 @@ impl World {
         labels
     }
 
-    /// The names of bodies, then of obstacles and tools, by their number in what is shown on a body by name, or of all of them; that of a surface
-    /// on a surface.
+    /// The names of bodies, then of obstacles and tools, by their number in what is shown on a body by name,
+    /// or of all of them; that of a surface on a surface.
     pub fn body_names(&self, on: Option<&str>) -> BTreeMap<i32, String> {
         if let Some(surface) = on.filter(|on| self.scene.surfaces.iter().any(|(name, _)| name == on)) {
             return [(0, surface.to_owned())].into();

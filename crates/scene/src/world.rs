@@ -1,4 +1,5 @@
-//! A scene with its participants, built and planned: all that a run needs, and nothing that changes while it runs.
+//! A scene with its participants, built and planned: all that a run needs, and nothing that changes while it
+//! runs.
 
 use std::sync::Arc;
 
@@ -49,7 +50,8 @@ impl World {
         Self::assemble(scene, &MeshCache::off(), &|_| {})
     }
 
-    /// Builds a scene, with the meshes of images that are kept, and chooses its steps. `watch` hears how far meshes are.
+    /// Builds a scene, with the meshes of images that are kept, and chooses its steps. `watch` hears how far
+    /// meshes are.
     ///
     /// # Errors
     /// All mistakes that were found, with their places.
@@ -210,8 +212,8 @@ impl World {
 
 #[cfg(feature = "gpu")]
 impl World {
-    /// The GPU of the scene, where all bodies move together on one and stay there. A GPU that solves the equations of implicit steps moves none,
-    /// and explicit shells are read back whenever somebody looks.
+    /// The GPU of the scene, where all bodies move together on one and stay there. A GPU that solves the
+    /// equations of implicit steps moves none, and explicit shells are read back whenever somebody looks.
     pub fn device(&self) -> Option<&Device> {
         let part = self.only().filter(|part| part.built.implicit.is_none())?;
         part.plan.target.device.as_ref()

@@ -1,13 +1,17 @@
-//! Contact between participants: the surface of one whose equations are solved is coupled into the contacts of an explicit one.
+//! Contact between participants: the surface of one whose equations are solved is coupled into the contacts
+//! of an explicit one.
 //!
-//! The implicit participant takes its step H. Its surface then goes from where it was to where it is, at the same speed, and the explicit one takes
-//! its steps h against it, as against a tool. Their impulses P give the mean force P/H on the implicit participant. The step is repeated with this force until the
-//! force on the surface differs from it by less than a part of [`FOUND`], [`PASSES`] times at most. The rest acts in the next step, so that momentum
-//! is kept.
+//! The implicit participant takes its step H. Its surface then goes from where it was to where it is, at the
+//! same speed, and the explicit one takes its steps h against it, as against a tool. Their impulses P give
+//! the mean force P/H on the implicit participant. The step is repeated with this force until the force on
+//! the surface differs from it by less than a part of [`FOUND`], [`PASSES`] times at most. The rest acts in
+//! the next step, so that momentum is kept.
 //!
-//! In a pass the surface feels f − k (x − x̄), with f and x̄ of the pass before: at the end nothing but f. The impedance of an explicit body with
-//! the mass m of a surface node is 2 m/h, so that its force changes by 2 m/(h H) (x − x̄) in the step. With twice that as k, passes come together
-//! for walls of a hundredth of the mass of a node and for heavy ones, with and without stiffness; with half of that they do not (measured with bars).
+//! In a pass the surface feels f − k (x − x̄), with f and x̄ of the pass before: at the end nothing but f.
+//! The impedance of an explicit body with the mass m of a surface node is 2 m/h, so that its force changes by
+//! 2 m/(h H) (x − x̄) in the step. With twice that as k, passes come together for walls of a hundredth of the
+//! mass of a node and for heavy ones, with and without stiffness; with half of that they do not (measured
+//! with bars).
 
 use std::ops::Range;
 
@@ -131,7 +135,8 @@ pub(crate) struct Meetings {
 }
 
 impl Meetings {
-    /// Those of a world, from a state on or from none; `ratios` are the steps of each participant between common instants.
+    /// Those of a world, from a state on or from none; `ratios` are the steps of each participant between
+    /// common instants.
     ///
     /// # Errors
     /// If participants can't meet so.
@@ -205,7 +210,8 @@ impl Meetings {
         self.sets.iter().any(|set| set.host == part)
     }
 
-    /// Prepares the first pass of a step from where all participants meet: forces and places to be expected, so that forces can be found there.
+    /// Prepares the first pass of a step from where all participants meet: forces and places to be expected,
+    /// so that forces can be found there.
     pub(crate) fn meet(&mut self, parts: &[Part], participants: &mut [Box<dyn Participant>]) {
         for (set, Places { all, .. }) in self.sets.iter().zip(&self.places) {
             let (step, own) = (parts[set.of].steps.step, participants[set.of].as_ref());
@@ -230,7 +236,8 @@ impl Meetings {
         self.lead(|set| set.of == part, parts, participants);
     }
 
-    /// Tells the hosts of some sets where their coupled nodes go in the step that begins where all participants meet.
+    /// Tells the hosts of some sets where their coupled nodes go in the step that begins where all
+    /// participants meet.
     fn lead(
         &mut self,
         of: impl Fn(&CoupledSurface) -> bool,
@@ -257,7 +264,8 @@ impl Meetings {
         grips.extend(coupled_nodes.filter(|coupled| coupled.is_pushed()).map(CoupledNode::grip));
     }
 
-    /// Ends a pass: whether the step is found, and taken note of, or has to be taken anew with the forces of this one.
+    /// Ends a pass: whether the step is found, and taken note of, or has to be taken anew with the forces of
+    /// this one.
     pub(crate) fn settle(
         &mut self,
         pass: u32,

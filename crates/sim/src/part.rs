@@ -167,8 +167,8 @@ impl Method {
     }
 }
 
-/// Bytes that a solver takes at least for a tet or hex and for a shell, beside the model: by the largest memory of `pliant run` less that of
-/// `pliant check` with growing blocks and plates, 172, 3,250 and 7,800.
+/// Bytes that a solver takes at least for a tet or hex and for a shell, beside the model: by the largest
+/// memory of `pliant run` less that of `pliant check` with growing blocks and plates, 172, 3,250 and 7,800.
 const EXPLICIT_CELL: u64 = 150;
 const IMPLICIT_CELL: u64 = 3000;
 const IMPLICIT_SHELL: u64 = 7000;
@@ -203,8 +203,8 @@ impl Part {
         settings.on_unstable == OnUnstable::Substep && settings.critical_step.is_finite()
     }
 
-    /// Solids by central differences in double precision on the CPU, for a duration [s]. Steps take 0.9 of the critical time step, which is
-    /// monitored: steps are cut where it falls.
+    /// Solids by central differences in double precision on the CPU, for a duration [s]. Steps take 0.9 of
+    /// the critical time step, which is monitored: steps are cut where it falls.
     ///
     /// # Errors
     /// If the model has no cells, or constraints that contradict one another.
@@ -227,14 +227,16 @@ impl Part {
         Ok(Self { name: name.into(), model, method: Method::Explicit(settings), steps })
     }
 
-    /// Equilibria of solids in double precision at the ends of so many equal load steps within a duration [s].
+    /// Equilibria of solids in double precision at the ends of so many equal load steps within a duration
+    /// [s].
     pub fn quasi_static(name: &str, model: impl Into<Arc<Model>>, duration: f64, load_steps: u64) -> Self {
         let method = Method::QuasiStatic { precision: Precision::Double, tolerance: None };
         let steps = Steps::within(duration, duration / load_steps.max(1) as f64);
         Self { name: name.into(), model: model.into(), method, steps }
     }
 
-    /// Equilibria of shells and solids by Newton's method, at the ends of so many equal load steps within a duration [s].
+    /// Equilibria of shells and solids by Newton's method, at the ends of so many equal load steps within a
+    /// duration [s].
     pub fn equilibria(name: &str, model: impl Into<Arc<Assembly>>, duration: f64, load_steps: u64) -> Self {
         let assembly = model.into();
         let model = Arc::clone(&assembly.model);

@@ -1,4 +1,5 @@
-//! A participant under way: bodies that one stepper advances together, with their state. Its stepper and number type stay hidden here.
+//! A participant under way: bodies that one stepper advances together, with their state. Its stepper and
+//! number type stay hidden here.
 
 use pliant_contact::pose::Leg;
 #[cfg(feature = "gpu")]
@@ -24,7 +25,8 @@ pub(crate) trait Participant: Instant + Send {
     /// If forces can't be found there.
     fn evaluate(&mut self, wanted: Wanted) -> Result<(), Failure>;
 
-    /// Goes so many steps on from an evaluated instant, not more than its stride. `watch` hears how far it is, if that takes long.
+    /// Goes so many steps on from an evaluated instant, not more than its stride. `watch` hears how far it
+    /// is, if that takes long.
     ///
     /// # Errors
     /// If a step can't be taken.
@@ -41,13 +43,16 @@ pub(crate) trait Participant: Instant + Send {
         None
     }
 
-    /// Takes hold of points: these grips and no others act from the next evaluation on. False of a stepper that knows none.
+    /// Takes hold of points: these grips and no others act from the next evaluation on. False of a stepper
+    /// that knows none.
     fn grip(&mut self, grips: &[Grip]) -> bool;
 
-    /// Takes forces [N], one a node, or none: they and no others act from the next evaluation on. Only where its method takes some.
+    /// Takes forces [N], one a node, or none: they and no others act from the next evaluation on. Only where
+    /// its method takes some.
     fn push(&mut self, forces: &[Vector<f64>]);
 
-    /// Drives a tool or a jaw from the step on whose forces are found next; only participants with contacts have one.
+    /// Drives a tool or a jaw from the step on whose forces are found next; only participants with contacts
+    /// have one.
     fn drive(&mut self, _rigid: usize, _leg: Leg) {}
 
     /// The stiffness [N/m] up to which a grip leaves steps stable; infinite where they are stable with any.
@@ -59,7 +64,8 @@ pub(crate) trait Participant: Instant + Send {
     /// The point of a grip now [m], and its force on the body [N].
     fn pulled(&self, grip: &Grip) -> [[f64; 3]; 2];
 
-    /// Says where coupled nodes of its contacts go between two times [s], from one place [m] to another; only explicit solids have some.
+    /// Says where coupled nodes of its contacts go between two times [s], from one place [m] to another; only
+    /// explicit solids have some.
     fn lead_coupled_surfaces(&mut self, _times: [f64; 2], _ways: &[[Vector<f64>; 2]]) {}
 
     /// Impulses [N s] on each coupled node since it was led.
@@ -67,7 +73,8 @@ pub(crate) trait Participant: Instant + Send {
         &[]
     }
 
-    /// The displacements that [`Instant::displacements`] shows, for a participant that takes the place of this one.
+    /// The displacements that [`Instant::displacements`] shows, for a participant that takes the place of
+    /// this one.
     fn displacements_mut(&mut self) -> Option<RealsMut<'_>> {
         None
     }
@@ -75,7 +82,8 @@ pub(crate) trait Participant: Instant + Send {
     /// Whether it can go back to a state of its part; else it is made anew for that.
     fn goes_back_to(&self, snapshot: &Snapshot) -> bool;
 
-    /// Goes back to a state that it [can](Self::goes_back_to), with the clock of explicit steps and their length [s].
+    /// Goes back to a state that it [can](Self::goes_back_to), with the clock of explicit steps and their
+    /// length [s].
     ///
     /// # Errors
     /// If equations are too many.
@@ -109,7 +117,8 @@ pub(crate) trait Participant: Instant + Send {
     /// A fingerprint of the motion: the same bits have the same one.
     fn fingerprint(&self) -> u64;
 
-    /// After a step that failed: whether the state found on the way is worth showing; the time is then that of it.
+    /// After a step that failed: whether the state found on the way is worth showing; the time is then that
+    /// of it.
     fn keeps_what_it_found(&mut self) -> bool {
         false
     }

@@ -138,7 +138,8 @@ impl<R: Numeric> Solids<R> {
         Displaced { rest: &self.model.rest, displacement: &self.state.displacement, velocity: &[] }
     }
 
-    /// Takes up what a restart needs beside the state; of a run with other steps how these were counted, and their length [s].
+    /// Takes up what a restart needs beside the state; of a run with other steps how these were counted, and
+    /// their length [s].
     pub(crate) fn resume(&mut self, memory: Memory<R>, steps: Option<(Clock, f64)>) {
         if let Some((clock, step)) = steps {
             self.solver.go_on(&clock, step, &self.state);

@@ -58,7 +58,8 @@ impl<R> Memory<R> {
 pub struct Equilibria {
     /// Equilibria found, that of the start and parts of load steps included.
     pub found: u64,
-    /// Estimated error of the external work [J], a sum of trapezia between them; `None` where a first one says nothing of its own.
+    /// Estimated error of the external work [J], a sum of trapezia between them; `None` where a first one
+    /// says nothing of its own.
     pub external_error: Option<f64>,
     /// Estimated error of the displacements over the largest one, at worst.
     pub displacement_error: f64,
@@ -69,8 +70,8 @@ pub(crate) trait Solver<R>: Send {
     /// Makes what can be asked belong to the state's instant, and of the state what is wanted.
     fn evaluate(&mut self, state: &mut State<R>, wanted: Wanted) -> Result<(), Failure>;
 
-    /// Goes so many steps on from an instant that was evaluated, not more than its stride; tells now and then how far it
-    /// is, if that takes long.
+    /// Goes so many steps on from an instant that was evaluated, not more than its stride; tells now and then
+    /// how far it is, if that takes long.
     fn advance(
         &mut self,
         state: &mut State<R>,
@@ -89,12 +90,14 @@ pub(crate) trait Solver<R>: Send {
         None
     }
 
-    /// Takes hold of points: these grips and no others act from the next evaluation on. False of a solver that knows none.
+    /// Takes hold of points: these grips and no others act from the next evaluation on. False of a solver
+    /// that knows none.
     fn grip(&mut self, grips: &[Grip]) -> bool {
         grips.is_empty()
     }
 
-    /// Takes forces [N], one a node, or none: they and no others act from the next evaluation on. Only where the method takes some.
+    /// Takes forces [N], one a node, or none: they and no others act from the next evaluation on. Only where
+    /// the method takes some.
     fn push(&mut self, _forces: &[Vector<f64>]) {}
 
     /// Says where coupled nodes of contacts go between two times [s], from one place [m] to another.

@@ -41,7 +41,8 @@ fn at_start<R: Numeric>(part: &Part) -> Result<State<R>, Failure> {
     Ok(state)
 }
 
-/// The steps of a run whose state goes on with other numbers: how they are counted, their length [s], and the model.
+/// The steps of a run whose state goes on with other numbers: how they are counted, their length [s], and the
+/// model.
 pub(crate) struct Before<'a> {
     pub clock: Clock,
     pub step: f64,
@@ -49,8 +50,8 @@ pub(crate) struct Before<'a> {
     pub model: Option<&'a Model>,
 }
 
-/// A participant that goes on from a state of a run of the same mesh, of explicit steps with what they were. `None` where this one has
-/// another solver, precision or size.
+/// A participant that goes on from a state of a run of the same mesh, of explicit steps with what they were.
+/// `None` where this one has another solver, precision or size.
 ///
 /// # Errors
 /// If its stepper can't be made.

@@ -20,7 +20,8 @@ const SOFT: f64 = 2e3;
 /// Force on the end of a column [N]: a strain of some percent.
 const FORCE: f64 = 0.08;
 
-/// A column of hexahedra from a height [in columns] up, without volumetric coupling, so that it stretches along itself alone.
+/// A column of hexahedra from a height [in columns] up, without volumetric coupling, so that it stretches
+/// along itself alone.
 fn column(name: &str, from: u32, shear: f64, damping: f64) -> Model {
     let corner = [[0, 0], [1, 0], [1, 1], [0, 1]];
     let layer = |k: u32| corner.map(|[x, y]| [x, y, from * CELLS + k].map(|x| EDGE * f64::from(x)));
@@ -65,14 +66,16 @@ fn momentum(simulation: &mut Simulation) -> f64 {
         (0..part.model.node_count()).map(|node| part.model.mass[node] * now.velocity(node)[2]).sum()
     };
     let bodies: f64 = frame.parts().map(of).sum();
-    // Velocities are means of the steps before and after an instant, so half of the impulses of this instant are in them.
+    // Velocities are means of the steps before and after an instant, so half of the impulses of this instant
+    // are in them.
     let steps: Vec<f64> = simulation.world().parts.iter().map(|part| part.steps.step).collect();
     let tie = simulation.ties().next().unwrap();
     bodies + 0.5 * (0..2).map(|part| steps[part] * tie.forces[part][2]).sum::<f64>()
 }
 
-/// Forces on both sides are opposite at each instant and act for the same time: momentum stays to round-off, and the energy does not
-/// grow though impulses of the slower one hit vibrations of the faster one, whatever the ratio of their steps.
+/// Forces on both sides are opposite at each instant and act for the same time: momentum stays to round-off,
+/// and the energy does not grow though impulses of the slower one hit vibrations of the faster one, whatever
+/// the ratio of their steps.
 #[test]
 fn free_bodies_keep_their_momentum_at_steps_of_their_own() {
     for (stiffer, finer) in

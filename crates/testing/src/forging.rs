@@ -45,8 +45,8 @@ const LARGE: [&[u8]; 3] = [
 /// Lengths, counts and flags lie among the first and the last bytes, before and after long lists of numbers.
 const ENDS: usize = 200;
 
-/// Bytes with a few changes: as [`Random::damaged`] makes them, anywhere or near an end; a rare number in place of eight; a large count in place of
-/// one.
+/// Bytes with a few changes: as [`Random::damaged`] makes them, anywhere or near an end; a rare number in
+/// place of eight; a large count in place of one.
 pub fn forged(random: &mut Random, bytes: &[u8]) -> Vec<u8> {
     let far = bytes.len().saturating_sub(ENDS);
     let mut changed = bytes.to_vec();

@@ -1,5 +1,6 @@
-//! Scenes of tests: texts and mesh files to start from, a temporary folder for them, and what a check or a run of one finds. All of it
-//! happens in this process and in the words of the libraries, so only the tests of the binary itself need the binary.
+//! Scenes of tests: texts and mesh files to start from, a temporary folder for them, and what a check or a
+//! run of one finds. All of it happens in this process and in the words of the libraries, so only the tests
+//! of the binary itself need the binary.
 
 mod said;
 mod texts;
@@ -63,7 +64,8 @@ pub fn run_world(world: &World, folder: &Path) -> Summary {
     summary
 }
 
-/// Meshes of tests are coarse, so a run may end with much energy in hourglass modes; all its outputs are there.
+/// Meshes of tests are coarse, so a run may end with much energy in hourglass modes; all its outputs are
+/// there.
 #[track_caller]
 pub fn assert_complete(summary: &Summary) {
     let is_coarse = summary.error.as_ref().is_some_and(|error| error.kind == FailureKind::Hourglass);
@@ -77,7 +79,8 @@ pub fn last_row(text: &str) -> BTreeMap<String, f64> {
     last_row_in(&out.path().join("out"))
 }
 
-/// Compares two rows: the columns whose names have a word differ by less than its limit, as a part of the largest of them in the first.
+/// Compares two rows: the columns whose names have a word differ by less than its limit, as a part of the
+/// largest of them in the first.
 #[track_caller]
 pub fn assert_rows_agree(what: &str, [one, other]: [&BTreeMap<String, f64>; 2], limits: &[(&str, f64)]) {
     for (word, limit) in limits {
@@ -96,7 +99,8 @@ pub fn last_row_in(folder: &Path) -> BTreeMap<String, f64> {
     names.zip(table.lines().last().unwrap().split(',').map(|value| value.parse().unwrap())).collect()
 }
 
-/// A run of 1 s that is cut off at 0.4 s and taken up again writes the same last row as one without a stop, and looks on the way change no bit.
+/// A run of 1 s that is cut off at 0.4 s and taken up again writes the same last row as one without a stop,
+/// and looks on the way change no bit.
 pub fn resumes(text: &str) {
     let whole = world(text).unwrap();
     let half = world(&text.replace("until = 1", "until = 0.4")).unwrap();
@@ -106,8 +110,8 @@ pub fn resumes(text: &str) {
     assert_eq!(a.lines().last(), b.lines().last(), "{text}");
 }
 
-/// A run that goes on from states taken at instants whose forces are found, and after steps that were stopped, ends in the same bits as one at
-/// which nobody looks.
+/// A run that goes on from states taken at instants whose forces are found, and after steps that were
+/// stopped, ends in the same bits as one at which nobody looks.
 pub fn looks_change_nothing(world: &World) {
     let mut whole = world.simulation().unwrap();
     let steps = world.steps();
@@ -154,7 +158,8 @@ pub fn looks_change_nothing(world: &World) {
     assert_eq!(prints[0], prints[1]);
 }
 
-/// Runs a world without a stop, and after a shorter one from its checkpoint on: that checkpoint, and the table of each.
+/// Runs a world without a stop, and after a shorter one from its checkpoint on: that checkpoint, and the
+/// table of each.
 pub fn taken_up(whole: &World, half: &World, place: &Path) -> (Checkpoint, [String; 2]) {
     for (world, name) in [(whole, "whole"), (half, "half")] {
         run_world(world, &place.join(name));
@@ -308,8 +313,8 @@ impl Workshop {
         self.relative(output)
     }
 
-    /// Runs the scene with the values of some keys set, as `pliant run` does. The outputs are in `out/case`; those of an earlier run
-    /// there are replaced.
+    /// Runs the scene with the values of some keys set, as `pliant run` does. The outputs are in `out/case`;
+    /// those of an earlier run there are replaced.
     pub fn run(&self, set: &[&str]) -> Told {
         self.run_into("out/case", set)
     }
@@ -319,7 +324,8 @@ impl Workshop {
         self.go(None, out, set)
     }
 
-    /// Resumes a run from a checkpoint, or from the last one of a folder, with the outputs in the folder of the checkpoint.
+    /// Resumes a run from a checkpoint, or from the last one of a folder, with the outputs in the folder of
+    /// the checkpoint.
     pub fn resume(&self, checkpoint: &str, set: &[&str]) -> Told {
         let path = Path::new(checkpoint);
         let is_file = path.extension().is_some_and(|ending| ending == "pliant");
@@ -341,7 +347,8 @@ impl Workshop {
         Sweep::new(self.source()?, self.case.clone(), &set)
     }
 
-    /// Runs the scene for all combinations of some values of keys, as `pliant sweep` does; what an earlier sweep left there is removed.
+    /// Runs the scene for all combinations of some values of keys, as `pliant sweep` does; what an earlier
+    /// sweep left there is removed.
     #[track_caller]
     pub fn sweep(&self, out: &str, set: &[&str], options: SweepOptions<'_>) -> SweepSummary {
         let sweep = self.combinations(set).unwrap_or_else(|errors| panic!("{}", errors.plain()));
@@ -509,8 +516,8 @@ pub fn changed(text: &str, good: &str, other: &str) -> String {
     text.replacen(good, other, 1)
 }
 
-/// A scene of [`layered_segmentation`](crate::image_files::layered_segmentation) by the names of its labels, with some replacements, each of which
-/// is found in it.
+/// A scene of [`layered_segmentation`](crate::image_files::layered_segmentation) by the names of its labels,
+/// with some replacements, each of which is found in it.
 pub fn from_names(changes: &[[&str; 2]]) -> String {
     changes.iter().fold(FROM_NAMES.to_owned(), |text, [good, other]| changed(&text, good, other))
 }

@@ -1,8 +1,9 @@
 //! The hand and the pins that hold a body, and tools in the hand.
 //!
-//! A hand has no point: it holds the surface around the one that it took, within two edges of the elements there, with the
-//! weights of a Gaussian whose deviation is one edge. So a pull meets tissue as a grasper does, and not a single element. Its spring gets no
-//! longer than two edges, however far the mouse goes: its force is at most that long times its stiffness.
+//! A hand has no point: it holds the surface around the one that it took, within two edges of the elements
+//! there, with the weights of a Gaussian whose deviation is one edge. So a pull meets tissue as a grasper
+//! does, and not a single element. Its spring gets no longer than two edges, however far the mouse goes: its
+//! force is at most that long times its stiffness.
 //!
 //! There are two hands. Each holds tissue or a tool, and keeps it while the other one is led.
 
@@ -184,7 +185,8 @@ fn edge(corners: [u32; 3], live: &Live) -> f64 {
     if count > 0 { sum / f64::from(count) } else { 0.0 }
 }
 
-/// The surface around a point, as a combination of nodes: what lies within two edges of it at rest and hangs together with it.
+/// The surface around a point, as a combination of nodes: what lies within two edges of it at rest and hangs
+/// together with it.
 fn around(point: &Point, subject: &Subject, live: &Live) -> Option<Nodes> {
     let triangles: Vec<[u32; 3]> = subject.triangles().collect();
     let corners = *triangles.get(point.triangle as usize)?;
@@ -244,7 +246,8 @@ impl Hold {
         self.hands.iter().filter(|holds| matches!(holds, Holds::Tissue)).count()
     }
 
-    /// Does what a hand does, or pins; the stiffness stays below the bound of stable steps. False where the solver knows no hand.
+    /// Does what a hand does, or pins; the stiffness stays below the bound of stable steps. False where the
+    /// solver knows no hand.
     pub fn take(&mut self, which: Which, does: &Hand, subject: &Subject, live: &mut Live) -> bool {
         let grip = |point: &Point, stiffness| grip(point, stiffness, subject, &*live);
         let mut found = true;
@@ -306,7 +309,8 @@ impl Hold {
         self.grip(live) && found
     }
 
-    /// After a step: hands pull on towards their goals. Their forces stay below their limits while what is held gives way.
+    /// After a step: hands pull on towards their goals. Their forces stay below their limits while what is
+    /// held gives way.
     pub fn follow(&mut self, live: &mut Live) {
         let mut moved = false;
         for at in 0..self.first_pin() {
@@ -376,8 +380,9 @@ fn grip(point: &Point, stiffness: f64, subject: &Subject, live: &Live) -> Option
     Some((grip, Taken { stiffness, offset, goal, longest }))
 }
 
-/// The first triangle that a ray meets, and where: Möller and Trumbore (1997), one triangle after the other. A tree over
-/// a deforming surface would have to be renewed for each pick, which takes longer than looking at all of its triangles.
+/// The first triangle that a ray meets, and where: Möller and Trumbore (1997), one triangle after the other.
+/// A tree over a deforming surface would have to be renewed for each pick, which takes longer than looking at
+/// all of its triangles.
 pub fn pick(
     subject: &Subject,
     points: &[Vector3],

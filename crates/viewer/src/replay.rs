@@ -1,5 +1,5 @@
-//! What was done to a run, recorded and repeated: before the same steps, so that it comes to the same bits; or by a mouse that moves as
-//! fast as it did, so that its lag can be measured.
+//! What was done to a run, recorded and repeated: before the same steps, so that it comes to the same bits;
+//! or by a mouse that moves as fast as it did, so that its lag can be measured.
 
 use std::time::{Duration, Instant};
 
@@ -64,7 +64,8 @@ fn stopped() -> String {
     "stopped before the end of the recording".into()
 }
 
-/// Repeats a recording by a mouse that moves when it did, while the run goes on in real time: what was felt then, and when.
+/// Repeats a recording by a mouse that moves when it did, while the run goes on in real time: what was felt
+/// then, and when.
 ///
 /// # Errors
 /// If a world can't be made, the run fails, or a flag is asked for.

@@ -1,5 +1,6 @@
-//! A restless hand: random drags, each of a second in sixty pulls, as a mouse sends them. In a process of its own, whose memory is
-//! watched. An hour of it takes minutes: `cargo test -p pliant -p pliant-viewer --features pliant/viewer --test dragging -- --ignored`.
+//! A restless hand: random drags, each of a second in sixty pulls, as a mouse sends them. In a process of its
+//! own, whose memory is watched. An hour of it takes minutes: `cargo test -p pliant -p pliant-viewer
+//! --features pliant/viewer --test dragging -- --ignored`.
 
 #![allow(unsafe_code)] // The allocator that counts hands every call on.
 
@@ -21,8 +22,8 @@ use support::{BALL, LIVER, subject, wait, wait_up_to, world};
 const PULLS: u32 = 60;
 /// A drag takes that long at most, on a machine that does much else.
 const PATIENCE: Duration = Duration::from_secs(900);
-/// Bytes by which the most that is allocated may differ: lists of held nodes are some KB long, and a leak of 100 bytes a drag would show
-/// within 700.
+/// Bytes by which the most that is allocated may differ: lists of held nodes are some KB long, and a leak of
+/// 100 bytes a drag would show within 700.
 const GROWTH: usize = 64 << 10;
 /// Drags in a row after which all states are kept that ever are: sixteen, of a quarter of a second each.
 const FULL: u64 = 5;
@@ -117,7 +118,8 @@ impl Dragged {
         Self { session, subject, size, steps, random: Random::new(1), broken: 0, strongest: 0.0 }
     }
 
-    /// A drag of a second at a place and with a stiffness of its own; whether the run is where the hand brought it.
+    /// A drag of a second at a place and with a stiffness of its own; whether the run is where the hand
+    /// brought it.
     fn drag(&mut self, drag: u64) -> bool {
         let Self { session, random, .. } = self;
         let triangle = (random.part() * self.subject.triangle_count() as f64) as u32;
@@ -152,7 +154,8 @@ impl Dragged {
         true
     }
 
-    /// Goes back: that makes a second simulation before the first one is dropped, so where runs break, memory takes that much once.
+    /// Goes back: that makes a second simulation before the first one is dropped, so where runs break, memory
+    /// takes that much once.
     fn go_back(&mut self) {
         self.session.order(Order::Back(u64::MAX));
         wait(&mut self.session, |frame| {
@@ -161,16 +164,18 @@ impl Dragged {
     }
 }
 
-/// What broke a drag is told: the body is turned inside out, squeezed until it is too stiff for the step, or gains energy.
+/// What broke a drag is told: the body is turned inside out, squeezed until it is too stiff for the step, or
+/// gains energy.
 fn assert_is_told(message: &str, drag: u64) {
     let reasons = ["is inverted", "the largest stable step has fallen", "the energies are off balance"];
     let is_told = reasons.iter().any(|why| message.contains(why));
     assert!(is_told && message.contains("went back to"), "in drag {drag}: {message}");
 }
 
-/// Drags of a second each at a body, each at a place of its own, with a stiffness between 20 and 500 N/m. The run never ends: after a pull
-/// that would break it, it is where it was before. All that is shown is a number, and after the first tenth memory no longer
-/// grows. Returns how often the run went back, and how many drags there were.
+/// Drags of a second each at a body, each at a place of its own, with a stiffness between 20 and 500 N/m. The
+/// run never ends: after a pull that would break it, it is where it was before. All that is shown is a
+/// number, and after the first tenth memory no longer grows. Returns how often the run went back, and how
+/// many drags there were.
 fn drag(text: &str, until: &Until) -> [u64; 2] {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let mut dragged = Dragged::new(world(text));
@@ -207,7 +212,8 @@ fn drag(text: &str, until: &Until) -> [u64; 2] {
     assert!(late < early + GROWTH, "{early} bytes before, {late} after");
     if let (Some(before), Some(after)) = (before, resident()) {
         println!("{before} pages after the first tenth, {after} in the end");
-        // The allocator's heap has holes between blocks of many lengths: it grows by some percent until they suffice.
+        // The allocator's heap has holes between blocks of many lengths: it grows by some percent until they
+        // suffice.
         assert!(after < before + before / 4, "{before} pages before, {after} after");
     }
     [broken, drags]

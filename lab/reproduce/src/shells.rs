@@ -16,8 +16,8 @@ use crate::CaseError;
 /// Components fixed at a clamped edge.
 pub const CLAMPED: [bool; 6] = [true; 6];
 
-/// The thesis's element, its typing errors put right: constant strain in the plane with hardly any resistance to drilling, and its
-/// bending.
+/// The thesis's element, its typing errors put right: constant strain in the plane with hardly any resistance
+/// to drilling, and its bending.
 pub const THESIS: Formulation =
     Formulation { membrane: Membrane::Cst { drilling: 1e-3 }, bending: Bending::Comas2010 };
 
@@ -34,7 +34,8 @@ pub struct Specimen {
     pub model: Assembly,
 }
 
-/// Held on a plane of symmetry with this normal (0, 1, 2): the displacement along it and the spins about the others.
+/// Held on a plane of symmetry with this normal (0, 1, 2): the displacement along it and the spins about the
+/// others.
 pub fn symmetry(axis: usize) -> [bool; 6] {
     std::array::from_fn(|c| (c % 3 == axis) == (c < 3))
 }

@@ -1,8 +1,9 @@
-//! A ball pressed on a plane, at explicit contact and at a barrier, and a tool pressed into a block, at explicit contact, against an
-//! independent axisymmetric program (`data/coupling`): quarter models of hexes whose size is a part of the distance from the place of contact.
+//! A ball pressed on a plane, at explicit contact and at a barrier, and a tool pressed into a block, at
+//! explicit contact, against an independent axisymmetric program (`data/coupling`): quarter models of hexes
+//! whose size is a part of the distance from the place of contact.
 //!
-//! Only the equilibria count. So where motion leads to them, masses are those with which all cells have about the same critical step, and
-//! motion is damped.
+//! Only the equilibria count. So where motion leads to them, masses are those with which all cells have about
+//! the same critical step, and motion is damped.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -31,7 +32,8 @@ const STAYS: f64 = 900.0;
 /// Damping over the step.
 const DAMPING: f64 = 0.02;
 
-/// A quarter of a body with its pole, where it is pressed along z, at the origin; symmetric about x = 0 and y = 0.
+/// A quarter of a body with its pole, where it is pressed along z, at the origin; symmetric about x = 0 and
+/// y = 0.
 struct Quarter {
     model: Model,
     /// Faces that may touch, outward.
@@ -39,8 +41,8 @@ struct Quarter {
 }
 
 impl Quarter {
-    /// Of E [Pa] and ν = 0.45; the surface that may touch within a distance [m] of the pole where `is_outer` says, and what is held along
-    /// which axes.
+    /// Of E [Pa] and ν = 0.45; the surface that may touch within a distance [m] of the pole where `is_outer`
+    /// says, and what is held along which axes.
     fn new(
         (points, hexes): Hexes,
         young: f64,
@@ -119,8 +121,9 @@ fn radius([x, y, _]: Vector<f64>) -> f64 {
     x.hypot(y)
 }
 
-/// What is found at a depth: the force [N] of the whole body, radii [m] of the last node on the x axis that touches and of the first that does
-/// not, pressure [Pa] around the pole, and by how much the force still changes, over it.
+/// What is found at a depth: the force [N] of the whole body, radii [m] of the last node on the x axis that
+/// touches and of the first that does not, pressure [Pa] around the pole, and by how much the force still
+/// changes, over it.
 struct Pressed {
     force: f64,
     radii: [f64; 2],
@@ -128,8 +131,8 @@ struct Pressed {
     change: f64,
 }
 
-/// Moves a shape from a pose along z to each of the depths [m] and lets the body come to rest there. `near_pole` [m] says up to which
-/// x and y pressure is measured.
+/// Moves a shape from a pose along z to each of the depths [m] and lets the body come to rest there.
+/// `near_pole` [m] says up to which x and y pressure is measured.
 fn pressed(
     quarter: &Quarter,
     shape: Shape,
@@ -207,8 +210,9 @@ fn pressed(
 /// The gap [m] below which the barrier acts: 1 % of the least depth.
 const BARRIER: f64 = 2e-6;
 
-/// Moves a plane from the pole on by each of the depths [m], in load steps of a tenth of a millimetre, in equilibrium with a barrier. It starts
-/// half of the gap of the barrier below, about what remains under pressure.
+/// Moves a plane from the pole on by each of the depths [m], in load steps of a tenth of a millimetre, in
+/// equilibrium with a barrier. It starts half of the gap of the barrier below, about what remains under
+/// pressure.
 fn pressed_at_a_barrier(quarter: &Quarter, depths: &[f64], near_pole: f64) -> Vec<Pressed> {
     let points = depths.iter().zip(1..).map(|(depth, time)| (f64::from(time), *depth));
     let points = std::iter::once((0.0, 0.0)).chain(points).collect();
@@ -265,8 +269,9 @@ fn column(rows: &[&Value], key: &str) -> Vec<f64> {
     rows.iter().map(|row| row[key].as_f64().unwrap()).collect()
 }
 
-/// A quarter of the upper half of a ball of 20 mm, its pole at the origin. Half a ball, fine around the middle of its flat side, is inverted
-/// about the far pole: the flat side becomes the sphere, the sphere the plane of the equator, and angles stay.
+/// A quarter of the upper half of a ball of 20 mm, its pole at the origin. Half a ball, fine around the
+/// middle of its flat side, is inverted about the far pole: the flat side becomes the sphere, the sphere the
+/// plane of the equator, and angles stay.
 fn ball(cells: i32, layers: i32) -> Quarter {
     let (radius, inner) = (0.02, 0.001);
     let size = radius / inner;
@@ -284,8 +289,9 @@ fn ball(cells: i32, layers: i32) -> Quarter {
     Quarter::new(hexes, 1e4, 0.015, |x| height(x).abs() < 1e-9, |x| [false, false, x[2] > radius - 1e-9])
 }
 
-/// Presses the ball on a plane (A3): a finite sphere is stiffer than Hertz's by 4 to 30 %. Its pressure is held to Hertz's relation with the
-/// force, p₀³ = 6 F E*²/(π³ R²), up to 1 mm: the pressure of the reference is up to 8 % below that at the smallest depth, where it is exact.
+/// Presses the ball on a plane (A3): a finite sphere is stiffer than Hertz's by 4 to 30 %. Its pressure is
+/// held to Hertz's relation with the force, p₀³ = 6 F E*²/(π³ R²), up to 1 mm: the pressure of the reference
+/// is up to 8 % below that at the smallest depth, where it is exact.
 fn check_ball(cells: i32, layers: i32, at_a_barrier: bool, wanted: &[f64], limits: [f64; 2]) {
     let data = reference("coupling/hertz_sphere_large.json");
     let rows = data["rows"].as_array().unwrap();

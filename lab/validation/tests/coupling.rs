@@ -1,4 +1,5 @@
-//! Solids with thin walls on their nodes, against closed forms and an independent finite-element program (`data/coupling`).
+//! Solids with thin walls on their nodes, against closed forms and an independent finite-element program
+//! (`data/coupling`).
 
 use std::collections::BTreeMap;
 
@@ -49,7 +50,8 @@ fn equilibrium(model: &Model, steps: u32, tolerance: f64) -> (DynamicRelaxation<
     (solver, state)
 }
 
-/// A coated block stretched to 1.001 … 1.3 of its length, its width held: the homogeneous state is exact. Three laws of the coat.
+/// A coated block stretched to 1.001 … 1.3 of its length, its width held: the homogeneous state is exact.
+/// Three laws of the coat.
 #[test]
 fn a_coated_block_is_stretched_as_in_closed_form() {
     let data = reference("coupling/coated_block_uniaxial.json");
@@ -100,7 +102,8 @@ fn a_coated_block_is_stretched_as_in_closed_form() {
     claim("coated block: force over the closed form", worst, 1e-6);
 }
 
-/// The quarter block of 729 nodes, uncoated and coated, on the meshes of an independent program: linear tets and triangles.
+/// The quarter block of 729 nodes, uncoated and coated, on the meshes of an independent program: linear tets
+/// and triangles.
 #[test]
 fn coated_blocks_stand_where_another_program_puts_them() {
     let data = reference("coupling/coated_block_t4.json");
@@ -173,8 +176,9 @@ fn patch(
     forces.into_iter().map(|(node, f)| (node, [0.0, 0.0, f * total / sum])).collect()
 }
 
-/// A quarter of the block of 40 × 40 × 20 mm with coat A, under a patch of traction of F on the whole block: displacement [m] of the
-/// middle of its top. Six tets a cube, n cubes over the 10 mm at the patch and half as many over the 10 mm beyond.
+/// A quarter of the block of 40 × 40 × 20 mm with coat A, under a patch of traction of F on the whole block:
+/// displacement [m] of the middle of its top. Six tets a cube, n cubes over the 10 mm at the patch and half
+/// as many over the 10 mm beyond.
 fn block_patch(n: u32, force: f64) -> f64 {
     let count = 3 * n / 2 + 1;
     let fine = 0.01 / f64::from(n);
@@ -242,8 +246,8 @@ fn a_coated_block_converges_to_the_reference() {
     }
 }
 
-/// The ellipsoid of 60 × 45 × 30 mm held at its back and pulled at its front, with or without a capsule: displacements [m] of the five
-/// probes over the reference's largest.
+/// The ellipsoid of 60 × 45 × 30 mm held at its back and pulled at its front, with or without a capsule:
+/// displacements [m] of the five probes over the reference's largest.
 fn ellipsoid_off(edge: f64, data: &Value, row: &str) -> f64 {
     let ellipsoid = Ellipsoid { centre: Vector3::zeros(), radii: Vector3::new(0.06, 0.045, 0.03) };
     let mesh = Stuffing::new(edge).mesh(&ellipsoid).unwrap().mesh;
@@ -303,8 +307,8 @@ fn an_ellipsoid_in_its_capsule_converges_to_the_reference() {
 /// A layer of a tube: radii [m] and Young's modulus [Pa], ν = 0.45.
 type Layer = [f64; 3];
 
-/// A quarter of a slice of a tube in plane strain, in full hexahedra: each layer with its own number of cells round and through it. The
-/// inner layer is tied to the next.
+/// A quarter of a slice of a tube in plane strain, in full hexahedra: each layer with its own number of cells
+/// round and through it. The inner layer is tied to the next.
 struct Tube {
     model: Model,
     /// The nodes of the inner and of the outer surface.
@@ -386,7 +390,8 @@ fn tube(layers: &[(Layer, [usize; 2])]) -> Tube {
     Tube { surfaces: [rings[0][0].clone(), rings[last][1].clone()], model }
 }
 
-/// The pressure [Pa] at which the inner surface, moved to a radius [m] as by a balloon, holds, and the radius of the outer one.
+/// The pressure [Pa] at which the inner surface, moved to a radius [m] as by a balloon, holds, and the radius
+/// of the outer one.
 fn inflated(mut tube: Tube, radius: f64) -> [f64; 2] {
     let rest = tube.model.rest.clone();
     let inner = &tube.surfaces[0];
@@ -422,7 +427,8 @@ fn inflated(mut tube: Tube, radius: f64) -> [f64; 2] {
     [force / area, outer.sum::<f64>() / tube.surfaces[1].len() as f64]
 }
 
-/// Thick tubes blown up to twice their radius and more, and tubes of two layers whose meshes do not match, tied.
+/// Thick tubes blown up to twice their radius and more, and tubes of two layers whose meshes do not match,
+/// tied.
 #[test]
 fn thick_and_layered_tubes_are_inflated_as_in_closed_form() {
     let data = reference("coupling/tubes.json");
@@ -447,8 +453,8 @@ fn thick_and_layered_tubes_are_inflated_as_in_closed_form() {
     claim("tubes of two tied layers: pressure and outer radius", worst[1], 0.01);
 }
 
-/// A liver and its portal vein from a scan (TotalSegmentator), as `pliant mesh` makes a scene of them: stiffer in its capsule, with the
-/// energy balanced.
+/// A liver and its portal vein from a scan (TotalSegmentator), as `pliant mesh` makes a scene of them:
+/// stiffer in its capsule, with the energy balanced.
 #[test]
 fn a_segmented_liver_is_pulled_with_and_without_its_capsule() {
     let Some(data) = std::env::var_os("PLIANT_DATA").map(std::path::PathBuf::from) else {

@@ -1,5 +1,5 @@
-//! `scenes/lens/bag.toml`: a lens is folded, pushed through a tube of 2.6 mm and comes into a capsular bag that deforms. Each state is searched for edges that go
-//! through triangles; one would end the run.
+//! `scenes/lens/bag.toml`: a lens is folded, pushed through a tube of 2.6 mm and comes into a capsular bag
+//! that deforms. Each state is searched for edges that go through triangles; one would end the run.
 
 use std::path::Path;
 
@@ -23,8 +23,8 @@ const APART: f64 = 0.28e-3;
 /// Parts of a layer are nearer to each other at rest than this [m].
 const NEIGHBOURS: f64 = 0.36e-3;
 
-/// The least distance [m] of points and triangles, and of edges, of a mesh of triangles that are no neighbours at rest. Those farther apart
-/// than a millimetre are not looked at.
+/// The least distance [m] of points and triangles, and of edges, of a mesh of triangles that are no
+/// neighbours at rest. Those farther apart than a millimetre are not looked at.
 struct Layers {
     edges: Vec<[u32; 2]>,
     triangles: Vec<[u32; 3]>,
@@ -106,7 +106,7 @@ fn a_lens_is_injected_into_a_bag_that_deforms() {
         1e3 * given
     );
     assert!(apart >= APART, "{apart}");
-    // How far the bag gives way while the lens snaps open is decided within a step, and is not resolved: 0.1 mm in steps of 10 ms, 1 mm in
-    // steps of 5 ms. The lens that lies in it leaves 0.04 to 0.05 mm with both.
+    // How far the bag gives way while the lens snaps open is decided within a step, and is not resolved: 0.1
+    // mm in steps of 10 ms, 1 mm in steps of 5 ms. The lens that lies in it leaves 0.04 to 0.05 mm with both.
     assert!(steps == 431 && left < 4.3 && touched > 0 && given > GIVES && largest >= given);
 }

@@ -1,6 +1,6 @@
-//! A thin balloon, R/t = 50, blown up to twice its volume, against the sphere of linear elasticity in its stretch, which the co-rotational
-//! element is: W = 4π R² t E (λ − 1)²/(1 − ν), so p = 2 E t (λ − 1)/((1 − ν) R λ²). A sphere of St. Venant–Kirchhoff, linear in λ²:
-//! p = E t (λ² − 1)/((1 − ν) R λ).
+//! A thin balloon, R/t = 50, blown up to twice its volume, against the sphere of linear elasticity in its
+//! stretch, which the co-rotational element is: W = 4π R² t E (λ − 1)²/(1 − ν), so p = 2 E t (λ − 1)/((1 − ν)
+//! R λ²). A sphere of St. Venant–Kirchhoff, linear in λ²: p = E t (λ² − 1)/((1 − ν) R λ).
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -16,7 +16,8 @@ const THICKNESS: f64 = 0.02;
 const YOUNG: f64 = 1e6;
 const POISSON: f64 = 0.3;
 
-/// An octahedron whose faces are cut in four, drawn onto the sphere of radius 1: facets that differ by a factor of two in area.
+/// An octahedron whose faces are cut in four, drawn onto the sphere of radius 1: facets that differ by a
+/// factor of two in area.
 fn ball(cuts: usize) -> Mesh {
     let mut points: Vec<Vector3> = [1.0, -1.0]
         .into_iter()
@@ -42,7 +43,8 @@ fn ball(cuts: usize) -> Mesh {
     Mesh { points, blocks: vec![CellBlock::new(CellKind::Triangle, nodes)], ..Mesh::default() }
 }
 
-/// Pressure over that of the sphere after so many twentieths of the volume more, largest tilt of a node [rad], least and largest radius.
+/// Pressure over that of the sphere after so many twentieths of the volume more, largest tilt of a node
+/// [rad], least and largest radius.
 fn blown_up(cuts: usize, membrane: Membrane, parts: u32) -> [f64; 4] {
     let formulation = Formulation { membrane, ..Formulation::default() };
     let mut mesh = ball(cuts);
@@ -94,8 +96,8 @@ fn blown_up(cuts: usize, membrane: Membrane, parts: u32) -> [f64; 4] {
     result
 }
 
-/// With constant strain the pressure comes to that of the sphere with the square of the edges, and normals stay radial but for what
-/// the angles of the facets leave; drilling counts for nothing.
+/// With constant strain the pressure comes to that of the sphere with the square of the edges, and normals
+/// stay radial but for what the angles of the facets leave; drilling counts for nothing.
 #[test]
 fn a_balloon_of_constant_strain_has_the_pressure_of_the_sphere() {
     for (cuts, off, tilted) in [(2, 0.012, 0.05), (3, 0.004, 0.03), (4, 0.001, 0.016)] {
@@ -107,7 +109,8 @@ fn a_balloon_of_constant_strain_has_the_pressure_of_the_sphere() {
     }
 }
 
-/// With ANDES the nodes of few facets tilt, five times less with every edge halved; the pressure comes near all the same.
+/// With ANDES the nodes of few facets tilt, five times less with every edge halved; the pressure comes near
+/// all the same.
 #[test]
 fn a_balloon_of_andes_facets_tilts_its_nodes_on_coarse_meshes() {
     let [coarse_off, coarse_tilt, ..] = blown_up(3, FLAT.membrane, 20);
@@ -117,8 +120,8 @@ fn a_balloon_of_andes_facets_tilts_its_nodes_on_coarse_meshes() {
     claim("pressure off the sphere's, 2048 facets", (fine_off - 1.0).abs(), 0.001);
 }
 
-/// Curved elements with the pressure of the curved surface, at 1.35 times the volume (10 % strain); at twice the volume, 26 %, the balloon of
-/// 512 finds no equilibrium any more.
+/// Curved elements with the pressure of the curved surface, at 1.35 times the volume (10 % strain); at twice
+/// the volume, 26 %, the balloon of 512 finds no equilibrium any more.
 #[test]
 fn a_balloon_of_curved_elements_has_the_pressure_of_the_sphere() {
     for (cuts, off) in [(2, 0.03), (3, 0.01)] {

@@ -1,5 +1,6 @@
-//! Large rotations of shells: the benchmarks of Sze, Liu and Lo (2004), FEAD 40:1551, each load step beside the printed table
-//! (`data/shell/large_rotation.json`), and the thesis's clamped plate far beyond small deflections.
+//! Large rotations of shells: the benchmarks of Sze, Liu and Lo (2004), FEAD 40:1551, each load step beside
+//! the printed table (`data/shell/large_rotation.json`), and the thesis's clamped plate far beyond small
+//! deflections.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -21,7 +22,8 @@ fn table(name: &str) -> Vec<Vec<f64>> {
     reference("shell/large_rotation.json")[name]["rows"].as_array().unwrap().iter().map(numbers).collect()
 }
 
-/// Loads in the steps of a table; what is looked at beside its columns, the largest deviations over the last row's values.
+/// Loads in the steps of a table; what is looked at beside its columns, the largest deviations over the last
+/// row's values.
 fn follow(
     what: &str,
     specimen: &Specimen,
@@ -154,7 +156,8 @@ fn pinched_hemisphere_in_large_rotation() {
     claim("hemisphere, U_B", (last[1] - 7.999).abs(), 0.03);
 }
 
-/// Curved membranes, whose strain is linear about rest: 4.067 and 8.178 to 5 % with 8 × 8 cells, where flat ones come to 2.2 %.
+/// Curved membranes, whose strain is linear about rest: 4.067 and 8.178 to 5 % with 8 × 8 cells, where flat
+/// ones come to 2.2 %.
 #[test]
 fn curved_hemisphere_in_large_rotation() {
     let (_, off) = hemisphere(8, Membrane::default());
@@ -219,7 +222,8 @@ fn hinged_roof(cells: usize) -> Vec<[f64; 3]> {
     curve
 }
 
-/// The first limit point, 0.7421 at 11.293, and the second, 0.1729 at 19.852. The prototype's 8 × 8 mesh: 0.737 and 0.1737.
+/// The first limit point, 0.7421 at 11.293, and the second, 0.1729 at 19.852. The prototype's 8 × 8 mesh:
+/// 0.737 and 0.1737.
 #[test]
 fn hinged_roof_snaps_through() {
     let curve = hinged_roof(8);
@@ -231,8 +235,9 @@ fn hinged_roof_snaps_through() {
     }
 }
 
-/// At q = 0.01 linear theory holds: 0.126532 q. At q = 1 to 5 it would give deflections of 1.3 to 6.3 thicknesses, where the
-/// membrane carries most of the load; Table 8.1 of the thesis prints 0.1218 to 0.6374 there, which is linear theory.
+/// At q = 0.01 linear theory holds: 0.126532 q. At q = 1 to 5 it would give deflections of 1.3 to 6.3
+/// thicknesses, where the membrane carries most of the load; Table 8.1 of the thesis prints 0.1218 to 0.6374
+/// there, which is linear theory.
 #[test]
 fn the_plate_of_the_thesis_is_no_linear_case() {
     let small = deflections(&[0.01]).unwrap()[0];

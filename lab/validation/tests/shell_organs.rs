@@ -1,5 +1,6 @@
-//! Shells of real shapes, read through `PLIANT_DATA`: the leaflets of a patient's aortic valve closing under their pressure, an aneurysm and
-//! a rectum blown up. What is told: time, residual, and how far the answer moves with the mesh and with the numbering.
+//! Shells of real shapes, read through `PLIANT_DATA`: the leaflets of a patient's aortic valve closing under
+//! their pressure, an aneurysm and a rectum blown up. What is told: time, residual, and how far the answer
+//! moves with the mesh and with the numbering.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -66,7 +67,8 @@ fn refined(mesh: &Mesh) -> Mesh {
     Mesh { points, blocks: vec![CellBlock::new(CellKind::Triangle, nodes)], ..Mesh::default() }
 }
 
-/// The longest edges of slivers, altitude below a twentieth of that edge, turned to the other diagonal where that is better; how many.
+/// The longest edges of slivers, altitude below a twentieth of that edge, turned to the other diagonal where
+/// that is better; how many.
 fn flip_slivers(mesh: &mut Mesh) -> usize {
     let mut cells = triangles(mesh);
     let sides = |[a, b, c]: [u32; 3]| [[a, b], [b, c], [c, a]];
@@ -216,7 +218,8 @@ fn largest(model: &Assembly, state: &State) -> f64 {
     (0..model.rest.len()).map(|n| state.displacement(model, n).norm()).fold(0.0, f64::max)
 }
 
-/// The largest difference of displacements over the largest displacement; `map` leads from a node of the first to that of the second.
+/// The largest difference of displacements over the largest displacement; `map` leads from a node of the
+/// first to that of the second.
 fn apart(one: &(Assembly, State), other: &(Assembly, State), map: impl Fn(usize) -> usize) -> f64 {
     let differences = (0..one.0.rest.len())
         .map(|n| (one.1.displacement(&one.0, n) - other.1.displacement(&other.0, map(n))).norm());
@@ -308,8 +311,8 @@ fn gap(model: &Assembly, state: &State, leaflet: &[usize], node: usize, limit: f
     least
 }
 
-/// Leaflets of a patient's valve (E = 1 MPa, ν = 0.45, t = 0.4 mm, 1000 kg/m³, as their deck says in mm, g and s: pressures in Pa, damping
-/// 2/s), each fixed along the wall, under the pressure of the deck.
+/// Leaflets of a patient's valve (E = 1 MPa, ν = 0.45, t = 0.4 mm, 1000 kg/m³, as their deck says in mm, g
+/// and s: pressures in Pa, damping 2/s), each fixed along the wall, under the pressure of the deck.
 struct Valve {
     model: Assembly,
     cells: Vec<[u32; 3]>,
@@ -418,8 +421,9 @@ fn valve_leaflets_close() {
     );
 }
 
-/// The part of a grid of lines along the axis of the valve, within four fifths of the radius of its wall, that no leaflet is in the way of: each is
-/// half as thick on either side of its middle surface as two keep from each other [m].
+/// The part of a grid of lines along the axis of the valve, within four fifths of the radius of its wall,
+/// that no leaflet is in the way of: each is half as thick on either side of its middle surface as two keep
+/// from each other [m].
 fn leak(valve: &Valve, state: &State, apart: f64) -> f64 {
     let wall: Vec<Vector3> = valve.held.iter().map(|&n| state.position[n as usize]).collect();
     let centre = wall.iter().sum::<Vector3>() / wall.len() as f64;
@@ -470,8 +474,8 @@ fn leak(valve: &Valve, state: &State, apart: f64) -> f64 {
 /// After the pressure of the deck is highest, 13.03 kPa at 0.305 s [s].
 const PEAK: f64 = 0.32;
 
-/// In contact the leaflets close: they lie on each other along their free edges, let nothing through, and hold the 13 kPa of the deck. No edge
-/// goes through a triangle in any step.
+/// In contact the leaflets close: they lie on each other along their free edges, let nothing through, and
+/// hold the 13 kPa of the deck. No edge goes through a triangle in any step.
 #[test]
 #[ignore = "minutes"]
 fn valve_leaflets_coapt_and_hold_their_pressure() {

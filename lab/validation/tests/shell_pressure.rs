@@ -1,6 +1,7 @@
-//! Pressure on thin curved walls, node by node: free cylinders, whole and a quarter of one, on regular and irregular meshes, and spheres.
-//! A cylinder that is free at its ends bends almost without stretching, so nodal forces that the true load has not show up R²/t² times as
-//! large. Lamé for a thin wall: u = p R²/(E t).
+//! Pressure on thin curved walls, node by node: free cylinders, whole and a quarter of one, on regular and
+//! irregular meshes, and spheres. A cylinder that is free at its ends bends almost without stretching, so
+//! nodal forces that the true load has not show up R²/t² times as large. Lamé for a thin wall: u = p R²/(E
+//! t).
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -23,7 +24,8 @@ enum Cut {
     Irregular(u64),
 }
 
-/// A whole cylinder of height 2, or the eighth between three planes of symmetry, of some cells round and along.
+/// A whole cylinder of height 2, or the eighth between three planes of symmetry, of some cells round and
+/// along.
 fn cylinder(cut: Cut, whole: bool, [round, along]: [usize; 2]) -> Mesh {
     let sheet = Sheet::Cylinder {
         radius: 1.0,
@@ -132,8 +134,8 @@ fn a_quarter_cylinder_before_and_after() {
     }
 }
 
-/// 40 edges round, 13 along, both rims free. Regular meshes up to R/t = 1000, irregular ones up to 100, where edges of 1.6 √(R t) are
-/// below 2.
+/// 40 edges round, 13 along, both rims free. Regular meshes up to R/t = 1000, irregular ones up to 100, where
+/// edges of 1.6 √(R t) are below 2.
 #[test]
 fn a_free_cylinder_under_pressure_stays_round() {
     let (formulation, spread) = DEFAULT;
@@ -145,7 +147,8 @@ fn a_free_cylinder_under_pressure_stays_round() {
             claim(&format!("cylinder, {cut:?}, t = {thickness}"), worst(cut, thickness), limit);
         }
     }
-    // The goal was 1.0 and 2.2 %, measured on one mesh; on twelve the prototype's formulas, in its axes, give 0.6 to 1.1 and 2.0 to 5.0 %.
+    // The goal was 1.0 and 2.2 %, measured on one mesh; on twelve the prototype's formulas, in its axes, give
+    // 0.6 to 1.1 and 2.0 to 5.0 %.
     for (thickness, limit) in [(0.04, 0.012), (0.01, 0.055)] {
         let all: Vec<f64> = (1..=12).map(|seed| worst(Cut::Irregular(seed), thickness)).collect();
         let [least, most] = bounds(&all);
@@ -158,9 +161,9 @@ fn a_free_cylinder_under_pressure_stays_round() {
     }
 }
 
-/// A8 of the acceptance tests of contact: a tube of r = 3 mm and t = 0.3 mm, E = 1 MPa, ν = 0.42, at 5 kPa. Thin walls widen by
-/// u = p r²/(E t) = 150 µm with open ends, by 1 − ν/2 of it with closed ones and by 1 − ν² in plane strain; around the tube the stress is
-/// p r/t = 50 kPa.
+/// A8 of the acceptance tests of contact: a tube of r = 3 mm and t = 0.3 mm, E = 1 MPa, ν = 0.42, at 5 kPa.
+/// Thin walls widen by u = p r²/(E t) = 150 µm with open ends, by 1 − ν/2 of it with closed ones and by 1 −
+/// ν² in plane strain; around the tube the stress is p r/t = 50 kPa.
 #[test]
 fn a_tube_widens_as_its_ends_allow() {
     let (radius, thickness, young, nu, pressure) = (3e-3, 3e-4, 1e6, 0.42, 5e3);
@@ -206,7 +209,8 @@ fn a_tube_widens_as_its_ends_allow() {
     }
 }
 
-/// A thousandth of the pressure moves the wall a thousandth as far: its own stiffness, 11 D/R³ at R/t = 1000, has no part in linear theory.
+/// A thousandth of the pressure moves the wall a thousandth as far: its own stiffness, 11 D/R³ at R/t = 1000,
+/// has no part in linear theory.
 #[test]
 fn linear_theory_is_linear_in_the_pressure() {
     let (formulation, spread) = DEFAULT;
@@ -222,9 +226,10 @@ fn linear_theory_is_linear_in_the_pressure() {
     claim("linear theory, two pressures", apart, 1e-6);
 }
 
-/// R/t = 5000, where flat membranes find no equilibrium: strained by 1e-3 in one load step on regular meshes, also on a crossed one with
-/// edges of 11 √(R t), and by 1e-6 on an irregular one with edges of 2 √(R t), the longest that are advised. Strained by 1e-3, five times
-/// its thickness, the irregular one finds no equilibrium; nor do coarser irregular meshes.
+/// R/t = 5000, where flat membranes find no equilibrium: strained by 1e-3 in one load step on regular meshes,
+/// also on a crossed one with edges of 11 √(R t), and by 1e-6 on an irregular one with edges of 2 √(R t), the
+/// longest that are advised. Strained by 1e-3, five times its thickness, the irregular one finds no
+/// equilibrium; nor do coarser irregular meshes.
 #[test]
 fn a_very_thin_cylinder_finds_its_equilibrium() {
     let (formulation, spread) = DEFAULT;
@@ -265,8 +270,8 @@ fn an_irregular_cylinder_is_blown_up_in_one_step() {
     claim("irregular cylinder, strain 1e-3", off(&found), 0.03);
 }
 
-/// Pressure p cos 2θ bends the wall into an oval: the displacement on a coarse mesh over that of one twice as fine. No cure of scatter may
-/// remove bending.
+/// Pressure p cos 2θ bends the wall into an oval: the displacement on a coarse mesh over that of one twice as
+/// fine. No cure of scatter may remove bending.
 #[test]
 fn pressure_that_varies_bends_a_cylinder() {
     let oval = |[round, along]: [usize; 2], (formulation, spread): (Formulation, Spread)| {
@@ -296,7 +301,8 @@ fn pressure_that_varies_bends_a_cylinder() {
     assert!(fine < 1.02 * ring && fine > 0.91 * 0.98 * ring, "{fine:e} {ring:e}");
 }
 
-/// p R² (1 − ν)/(2 E t) of a sphere under a small pressure: the error falls with each subdivision, R/t = 100 and 1000.
+/// p R² (1 − ν)/(2 E t) of a sphere under a small pressure: the error falls with each subdivision, R/t = 100
+/// and 1000.
 #[test]
 fn spheres_under_pressure() {
     for thickness in [0.01, 0.001] {

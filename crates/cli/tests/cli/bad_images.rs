@@ -1,4 +1,5 @@
-//! Images that cannot be meshed, through the real binary: malformed files of every format, series with slices missing or mixed.
+//! Images that cannot be meshed, through the real binary: malformed files of every format, series with slices
+//! missing or mixed.
 
 #[allow(dead_code)]
 use std::fs;
@@ -22,7 +23,8 @@ fn assert_refused(workshop: &Workshop, image: &str, says: &[&str]) {
     assert!(!workshop.path("out.vtu").exists());
 }
 
-/// Truncated, of wrong byte order, with negative spacing, singular, not finite, with lengths that nothing bears out.
+/// Truncated, of wrong byte order, with negative spacing, singular, not finite, with lengths that nothing
+/// bears out.
 #[test]
 fn malformed_images_are_refused() {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../imaging/tests/corpus");
@@ -94,7 +96,8 @@ fn a_series_with_slices_missing_or_mixed_is_refused() {
     assert_refused(&workshop, "none", &["none"]);
 }
 
-/// More than 2 GiB of voxels are refused by what the header says; `--force` goes on, here to the end of a file that has none of them.
+/// More than 2 GiB of voxels are refused by what the header says; `--force` goes on, here to the end of a
+/// file that has none of them.
 #[test]
 fn images_of_more_than_two_gigabytes_ask_for_force() {
     let workshop = Workshop::new(BLOCK);

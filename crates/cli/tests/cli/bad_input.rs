@@ -1,13 +1,13 @@
-//! Bad input through the real binary: the exit code, the user's own line, a remedy, nothing written, and one JSON object. The tests of
-//! `pliant-run` reject the other bad scenes.
+//! Bad input through the real binary: the exit code, the user's own line, a remedy, nothing written, and one
+//! JSON object. The tests of `pliant-run` reject the other bad scenes.
 
 use std::fs;
 use std::path::Path;
 
 use crate::support::{BLOCK, FROM_FILE, Said, Workshop, changed, series};
 
-/// Asserts that a scene is rejected with these words and with one of these lines underlined, and that the folder does
-/// not change.
+/// Asserts that a scene is rejected with these words and with one of these lines underlined, and that the
+/// folder does not change.
 #[track_caller]
 fn assert_refused(workshop: &Workshop, lines: &[&str], says: &[&str]) {
     let output = workshop.run(&[]);
@@ -151,8 +151,8 @@ fn halves(folder: &Path) -> Vec<String> {
     names.filter(|name| name.ends_with(".tmp")).collect()
 }
 
-/// Runs the scene with a limit on the file size in blocks of 512 or 1024 bytes, so that writing fails as on a full
-/// disk.
+/// Runs the scene with a limit on the file size in blocks of 512 or 1024 bytes, so that writing fails as on a
+/// full disk.
 #[cfg(unix)]
 fn run_limited(workshop: &Workshop, blocks: u32, trap: &str) -> Said {
     let limited = format!("{trap} ulimit -f {blocks}; exec \"$0\" run case --force --json");

@@ -1,5 +1,5 @@
-//! Labels by name, and pictures of labels, through the real binary: a segmentation with names becomes a mesh that keeps them, values and
-//! selections of a scene go by name, and pictures show and hide labels.
+//! Labels by name, and pictures of labels, through the real binary: a segmentation with names becomes a mesh
+//! that keeps them, values and selections of a scene go by name, and pictures show and hide labels.
 
 use pliant_geometry::{Labels, io};
 use pliant_testing::image_files::layered_segmentation;

@@ -210,7 +210,8 @@ fn two_labels_become_one_mesh_of_two_materials() {
     assert!(page.err.contains("wrote two.vtu"), "{}", page.err);
 }
 
-/// The mesh is measured to the faces of the voxels; a protected label gets smaller cells and a distance is held.
+/// The mesh is measured to the faces of the voxels; a protected label gets smaller cells and a distance is
+/// held.
 #[test]
 fn tets_come_in_several_sizes_and_within_a_distance() {
     let workshop = with_image();

@@ -1,5 +1,6 @@
-//! Pictures and films through the real binary: pictures of scenes and of finished runs, rejections, and the message of a build
-//! without pictures. Without an adapter, tests that need one are skipped with a notice; with `PLIANT_REQUIRE_GPU=1` they fail.
+//! Pictures and films through the real binary: pictures of scenes and of finished runs, rejections, and the
+//! message of a build without pictures. Without an adapter, tests that need one are skipped with a notice;
+//! with `PLIANT_REQUIRE_GPU=1` they fail.
 
 #[cfg(not(feature = "viewer"))]
 use crate::support::{BLOCK, Workshop};
@@ -217,8 +218,8 @@ mod with_pictures {
         assert!(output.err.contains("the last picture of each scene"), "{}", output.err);
     }
 
-    /// A bar that is held at one end, moved at the other one, and pressed from above: in its files, and in pictures of the scene, of a surface that it
-    /// carries, of the run and of its files.
+    /// A bar that is held at one end, moved at the other one, and pressed from above: in its files, and in
+    /// pictures of the scene, of a surface that it carries, of the run and of its files.
     #[test]
     fn constraints_and_loads_are_written_and_marked() {
         if !has_gpu() {

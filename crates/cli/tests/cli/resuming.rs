@@ -1,4 +1,5 @@
-//! Killed, interrupted and resumed runs, through the real binary: the same files as an uninterrupted run, exit codes and words.
+//! Killed, interrupted and resumed runs, through the real binary: the same files as an uninterrupted run,
+//! exit codes and words.
 
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};

@@ -445,7 +445,8 @@ fn a_niftysim_model_runs_as_it_is_or_as_the_scene_it_becomes() {
     assert_eq!(output.done()["reactions"], direct["reactions"]);
     workshop.pliant(&["import", "partial.xml", "-o", "partial", "--allow-partial"]).words();
     assert!(workshop.path("partial/scene.toml").is_file());
-    // A plate that turns away from the tip, which moves off it, and a rigid surface that follows a table of poses.
+    // A plate that turns away from the tip, which moves off it, and a rigid surface that follows a table of
+    // poses.
     let contact = "<ContactPlate><a>-1 -1 -1</a><b>1 -1 -1</b><c>-1 1 -1</c><Disp>0 0 -0.1</Disp>\
                    <SlvNodes NumNodes=\"3\">0 1 2</SlvNodes></ContactPlate>\
                    <ContactSurface><Nodes NumNodes=\"3\">-1 -1 -0.5  1 -1 -0.5  0 1 -0.5</Nodes><Elements NumEls=\"1\" Type=\"T3\">0 1 2\

@@ -1,5 +1,6 @@
-//! `pliant mesh --as shells`, then `pliant run` with a pressure on what it wrote: closed surfaces with a flap, a thin gap and a sharp rim.
-//! Organs from files are read through `PLIANT_DATA`; without it that test prints a notice and passes.
+//! `pliant mesh --as shells`, then `pliant run` with a pressure on what it wrote: closed surfaces with a
+//! flap, a thin gap and a sharp rim. Organs from files are read through `PLIANT_DATA`; without it that test
+//! prints a notice and passes.
 
 use pliant_geometry::{CellKind, Mesh, Vector3, io};
 use pliant_meshing::{DEFAULT_CELL_LIMIT, ImplicitField, TriangleMesh};
@@ -137,7 +138,8 @@ fn shells_with_a_flap_or_a_thin_gap_run_under_pressure() {
     }
 }
 
-/// At a rim as sharp as that no normal stands on both sides: its nodes are creases, which the report and the run tell.
+/// At a rim as sharp as that no normal stands on both sides: its nodes are creases, which the report and the
+/// run tell.
 #[test]
 fn the_nodes_of_a_sharp_rim_are_creases() {
     let (report, mesh, run) = pressed(Body(lens), ["--error", "1%"]);
@@ -179,7 +181,8 @@ fn shells_of_all_other_organs_run_under_pressure() {
     press(&ORGANS[..11]);
 }
 
-/// Fitted shells do not cross, their normals are within 60° of their triangles, and a run under pressure accepts them.
+/// Fitted shells do not cross, their normals are within 60° of their triangles, and a run under pressure
+/// accepts them.
 fn press(organs: &[(&str, &str)]) {
     let Some(data) = std::env::var_os("PLIANT_DATA") else {
         println!("skipped: PLIANT_DATA is not set");

@@ -1,5 +1,5 @@
-//! The window on a screen that nobody sees (Xvfb): it opens, draws, pulls, and closes. Without Xvfb or anything that draws the
-//! tests are skipped with a notice; with `PLIANT_REQUIRE_GPU=1` they fail.
+//! The window on a screen that nobody sees (Xvfb): it opens, draws, pulls, and closes. Without Xvfb or
+//! anything that draws the tests are skipped with a notice; with `PLIANT_REQUIRE_GPU=1` they fail.
 
 use std::io::{BufRead, BufReader, IoSlice};
 use std::process::{Child, Command, Stdio};
@@ -97,7 +97,8 @@ impl Input {
         self.connection.intern_atom(false, name.as_bytes()).unwrap().reply().unwrap().atom
     }
 
-    /// An event of a device: its kind, the key or button, and the place of the mouse. The request is `FakeInput` of XTEST.
+    /// An event of a device: its kind, the key or button, and the place of the mouse. The request is
+    /// `FakeInput` of XTEST.
     fn give(&self, kind: u8, detail: u8, [x, y]: [i16; 2]) {
         let mut request = [0; 36];
         request[..6].copy_from_slice(&[self.opcode, 2, 0, 0, kind, detail]);
@@ -147,9 +148,9 @@ fn until(what: &str, window: &mut Child, mut happens: impl FnMut() -> bool) {
     }
 }
 
-/// With a real mouse and real keys: a button copies the view to the clipboard of the screen, V takes a film, and the hand pulls until the window
-/// closes. What holds the body holds against the hand, and a replay comes to the same bits. All else is tested without a screen
-/// (`crates/viewer/src/window/rehearsal`).
+/// With a real mouse and real keys: a button copies the view to the clipboard of the screen, V takes a film,
+/// and the hand pulls until the window closes. What holds the body holds against the hand, and a replay comes
+/// to the same bits. All else is tested without a screen (`crates/viewer/src/window/rehearsal`).
 #[test]
 fn mouse_and_keys_of_a_screen_lead_the_window() {
     if !has_gpu() {
@@ -199,7 +200,8 @@ fn mouse_and_keys_of_a_screen_lead_the_window() {
     input.close();
     assert_eq!(window.wait().unwrap().code(), Some(0));
 
-    // The hand still pulled when it closed: the base holds with the same force, and a replay comes to the same bits.
+    // The hand still pulled when it closed: the base holds with the same force, and a replay comes to the
+    // same bits.
     let replay = || workshop.pliant(&["view", "case", "--replay", "drag"]);
     let (once, twice) = (replay(), replay());
     assert_eq!(once.code, 0, "{}", once.err);
@@ -216,8 +218,8 @@ fn mouse_and_keys_of_a_screen_lead_the_window() {
     }
 }
 
-/// A recording that cannot be written is refused before the window opens; one is whole after a signal, and has all but the last second
-/// where the window is killed.
+/// A recording that cannot be written is refused before the window opens; one is whole after a signal, and
+/// has all but the last second where the window is killed.
 #[test]
 fn recordings_outlive_signals() {
     let workshop = Workshop::new(BALL);

@@ -180,7 +180,8 @@ fn a_surface_in_millimetres_is_not_taken_for_one_in_metres() {
     assert!(output.code == 0 && output.err.contains("larger than any organ"), "{}", output.err);
 }
 
-/// A tumour of 4 mm in millimetres measures as much as a machine in metres: both are possible, and the user is asked.
+/// A tumour of 4 mm in millimetres measures as much as a machine in metres: both are possible, and the user
+/// is asked.
 #[test]
 fn a_small_organ_in_millimetres_is_noted() {
     let workshop = workshop();

@@ -1,5 +1,6 @@
-//! The broad phase: pairs that may come near while nodes stay within wide skins: found by trees of boxes, and kept over lists and steps. Lists are chosen from
-//! them by distances alone, in the order of their numbers, so that what is in a list does not depend on when these pairs were found.
+//! The broad phase: pairs that may come near while nodes stay within wide skins: found by trees of boxes, and
+//! kept over lists and steps. Lists are chosen from them by distances alone, in the order of their numbers,
+//! so that what is in a list does not depend on when these pairs were found.
 
 use nalgebra::Vector3;
 
@@ -77,7 +78,8 @@ impl Pairs {
         self.distance.clear();
     }
 
-    /// Adds those of the next first number: second numbers in any order, with bounds [m] from below of their distances.
+    /// Adds those of the next first number: second numbers in any order, with bounds [m] from below of their
+    /// distances.
     fn add(&mut self, own: &mut Vec<(u32, f64)>) {
         own.sort_unstable_by_key(|pair| pair.0);
         self.second.extend(own.iter().map(|pair| pair.0));
@@ -85,7 +87,8 @@ impl Pairs {
         self.ends.push(self.second.len() as u32);
     }
 
-    /// Calls back with the pairs that may be within a distance [m] and the reaches [m] of both of their primitives.
+    /// Calls back with the pairs that may be within a distance [m] and the reaches [m] of both of their
+    /// primitives.
     fn within(&self, within: f64, [first, second]: [&[f64]; 2], mut found: impl FnMut([u32; 2])) {
         let most = second.iter().copied().fold(0.0, f64::max);
         let mut from = 0;
@@ -130,7 +133,8 @@ pub(super) struct BroadPhase {
     within: f64,
     /// Of each face or edge the number, from 1 on, of the point or edge for which it was last left out.
     left_out: Vec<u32>,
-    /// How far [m] nodes have gone since, with the skins of a list; the same of primitives, and the skins of these.
+    /// How far [m] nodes have gone since, with the skins of a list; the same of primitives, and the skins of
+    /// these.
     reach: Vec<f64>,
     reaches: Lengths,
     skins: Lengths,
@@ -199,7 +203,8 @@ impl BroadPhase {
         }
     }
 
-    /// Numbers of the pairs within a distance [m] of each other at places [m]: points with faces of one surface, and edges.
+    /// Numbers of the pairs within a distance [m] of each other at places [m]: points with faces of one
+    /// surface, and edges.
     pub fn within(
         &mut self,
         sides: &mut [CollisionMesh],
@@ -220,9 +225,9 @@ impl BroadPhase {
         found
     }
 
-    /// Calls back with the pairs that may be within a distance [m] and the skins [m] of their nodes at places [m], sort by sort in the order of
-    /// their numbers, with these lengths together, and with more. Finds pairs anew if nodes have gone too far, with wide skins by the distance
-    /// of the barrier [m].
+    /// Calls back with the pairs that may be within a distance [m] and the skins [m] of their nodes at places
+    /// [m], sort by sort in the order of their numbers, with these lengths together, and with more. Finds
+    /// pairs anew if nodes have gone too far, with wide skins by the distance of the barrier [m].
     pub fn each(
         &mut self,
         sides: &mut [CollisionMesh],

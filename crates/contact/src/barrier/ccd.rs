@@ -1,7 +1,8 @@
-//! How far four points may go until two primitives come near: additive continuous collision detection (Li, Kaufman and Jiang 2021, algorithm 1).
-//! No point of a primitive goes further than its fastest corner, so that a part (d − ξ)/l of the motion is safe, with l the sum of the largest
-//! ways of both sides. The common motion is taken off first. Never later than the exact time in exact arithmetic; rounding of distances
-//! is far below the gap that is kept.
+//! How far four points may go until two primitives come near: additive continuous collision detection (Li,
+//! Kaufman and Jiang 2021, algorithm 1). No point of a primitive goes further than its fastest corner, so
+//! that a part (d − ξ)/l of the motion is safe, with l the sum of the largest ways of both sides. The common
+//! motion is taken off first. Never later than the exact time in exact arithmetic; rounding of distances is
+//! far below the gap that is kept.
 
 use nalgebra::Vector3;
 
@@ -33,8 +34,8 @@ impl Kind {
         }
     }
 
-    /// The way [m] between the middles of both, and the gap between their shadows on it times its length [m²]: no distance is less than that gap.
-    /// A tenth of the work of the distance.
+    /// The way [m] between the middles of both, and the gap between their shadows on it times its length
+    /// [m²]: no distance is less than that gap. A tenth of the work of the distance.
     #[inline]
     fn shadows(self, [a, b, c, d]: [&Vector3<f64>; 4]) -> (Vector3<f64>, f64) {
         match self {
@@ -103,8 +104,9 @@ pub struct Query {
     pub most: f64,
 }
 
-/// The part of a motion, `most` or less, on the way to which at least half of `keep` of the gap at the start is left everywhere. Where it is less
-/// than `most`, no more than `keep` is left at its end. Zero where there is no gap at the start.
+/// The part of a motion, `most` or less, on the way to which at least half of `keep` of the gap at the start
+/// is left everywhere. Where it is less than `most`, no more than `keep` is left at its end. Zero where there
+/// is no gap at the start.
 pub fn collision_free_fraction(
     kind: Kind,
     from: &[Vector3<f64>; 4],
@@ -150,8 +152,8 @@ mod tests {
         std::array::from_fn(|i| Vector3::from_fn(|c, _| all[i][c].as_f64().unwrap()))
     }
 
-    /// The 100 motions of the reference: no hit is missed, no time is later than the exact one, and where it is below 0.8 of it, the gap
-    /// there is a tenth of the first one at most.
+    /// The 100 motions of the reference: no hit is missed, no time is later than the exact one, and where it
+    /// is below 0.8 of it, the gap there is a tenth of the first one at most.
     #[test]
     fn times_of_impact_are_never_late_and_seldom_early() {
         let text = include_str!("../../../../lab/validation/data/coupling/ipc_primitives.json");

@@ -7,7 +7,8 @@ use super::features::Features;
 use crate::pairs::Surface;
 use crate::tree::{Bounds, Tree};
 
-/// Points, edges and triangles of one side of a contact. Nodes of rigid things are numbered after those of the model.
+/// Points, edges and triangles of one side of a contact. Nodes of rigid things are numbered after those of
+/// the model.
 #[derive(Clone, Debug, Default)]
 pub(super) struct CollisionMesh {
     /// Nodes, increasing.

@@ -1,4 +1,5 @@
-//! Collisions at the present state: normal ones of pairs within the reach of the barrier, and those of friction.
+//! Collisions at the present state: normal ones of pairs within the reach of the barrier, and those of
+//! friction.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -98,7 +99,8 @@ pub struct Mollified {
     pub force: f64,
 }
 
-/// A pair with friction: normal force, direction and coefficients are those of the last time that it was taken.
+/// A pair with friction: normal force, direction and coefficients are those of the last time that it was
+/// taken.
 #[derive(Clone, Copy, Debug)]
 pub struct FrictionCollision {
     /// Its nodes.

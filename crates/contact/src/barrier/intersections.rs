@@ -1,5 +1,5 @@
-//! Whether surfaces are in each other: edges against triangles, without the lists that contacts go by. The slow simple check that fast
-//! ones are held to.
+//! Whether surfaces are in each other: edges against triangles, without the lists that contacts go by. The
+//! slow simple check that fast ones are held to.
 
 use nalgebra::Vector3;
 
@@ -28,14 +28,16 @@ pub struct Intersection {
     pub place: [f64; 3],
     /// The nodes of that way: an end and the corners of the triangle, or the ends of two edges.
     pub nodes: [u32; 4],
-    /// Coefficients c of the nodes: Σ c x is the way [m], which ends where the edge and the triangle meet no more.
+    /// Coefficients c of the nodes: Σ c x is the way [m], which ends where the edge and the triangle meet no
+    /// more.
     pub coefficients: [f64; 4],
     /// Σ c x over the depth.
     pub normal: Vector3<f64>,
 }
 
 impl IntersectionCheck {
-    /// A check of the contacts of bodies, except those with nodes that another solver moves. Nodes are at rest at some places [m].
+    /// A check of the contacts of bodies, except those with nodes that another solver moves. Nodes are at
+    /// rest at some places [m].
     pub fn new(contacts: &Contacts, rest: &[[f64; 3]]) -> Self {
         let own = |node: &u32| (*node as usize) < rest.len();
         let place = |node: u32| Vector3::from(rest[node as usize]);
@@ -90,7 +92,8 @@ impl IntersectionCheck {
     }
 }
 
-/// The shortest way that parts an edge and a triangle which it goes through, with its nodes: an end goes to the triangle, or the edge to a side.
+/// The shortest way that parts an edge and a triangle which it goes through, with its nodes: an end goes to
+/// the triangle, or the edge to a side.
 fn way_out(
     [p, q]: [u32; 2],
     [a, b, c]: [u32; 3],
@@ -106,8 +109,8 @@ fn way_out(
     sides.into_iter().fold(shorter(first, second), shorter)
 }
 
-/// Edges that go through triangles: calls back with the ends and the corners. Of one side alone those with a node in common count for
-/// nothing.
+/// Edges that go through triangles: calls back with the ends and the corners. Of one side alone those with a
+/// node in common count for nothing.
 pub(super) fn intersections(
     [edges, faces]: [&CollisionMesh; 2],
     place: &impl Fn(u32) -> Vector3<f64>,
@@ -146,8 +149,8 @@ const FEW: usize = 4;
 /// Volumes over the cube of the largest extent that are none but for round-off: of points in a plane.
 const FLAT: f64 = 1e-14;
 
-/// Whether an edge goes through a triangle: its ends are on both sides of the plane, and the line goes round all three edges in one sense. In
-/// one plane nothing goes through anything.
+/// Whether an edge goes through a triangle: its ends are on both sides of the plane, and the line goes round
+/// all three edges in one sense. In one plane nothing goes through anything.
 fn goes_through([p, q]: [Vector3<f64>; 2], [a, b, c]: [Vector3<f64>; 3]) -> bool {
     // Six times the volume of a tetrahedron.
     let volume = |x: &Vector3<f64>, y: &Vector3<f64>, z: &Vector3<f64>, of: &Vector3<f64>| {
@@ -167,7 +170,8 @@ fn goes_through([p, q]: [Vector3<f64>; 2], [a, b, c]: [Vector3<f64>; 3]) -> bool
 mod tests {
     use super::*;
 
-    /// A spike that goes through a block by a tenth of its edge: by the way back, not by the length of its edges.
+    /// A spike that goes through a block by a tenth of its edge: by the way back, not by the length of its
+    /// edges.
     #[test]
     fn an_intersection_is_as_deep_as_the_way_out() {
         let triangle = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];

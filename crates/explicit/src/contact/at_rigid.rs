@@ -56,8 +56,8 @@ impl AtRigid {
         }
     }
 
-    /// The gap [m] of a node as it lies in the step, less what may be left of it, and the direction away from the thing.
-    /// `now` is its place before the step, `then` that after it [m].
+    /// The gap [m] of a node as it lies in the step, less what may be left of it, and the direction away from
+    /// the thing. `now` is its place before the step, `then` that after it [m].
     pub fn gap(
         &self,
         rigid: &Rigid,
@@ -73,7 +73,8 @@ impl AtRigid {
         (gap, normal)
     }
 
-    /// Whether the list has all that may come nearer than a room [m] in the passage, of nodes that have moved by no more than this [m] since.
+    /// Whether the list has all that may come nearer than a room [m] in the passage, of nodes that have moved
+    /// by no more than this [m] since.
     pub fn holds(&self, rigid: &Rigid, room: f64, moved: f64) -> bool {
         let Listed { reach, stance, .. } = &self.listed;
         let moved = moved + self.passage.travel_from(rigid, stance);
@@ -90,7 +91,8 @@ impl AtRigid {
         room + self.margin + self.passage.travel()
     }
 
-    /// Lists what may come nearer than a room [m] in this passage, and in others till the surface or the thing has moved too far.
+    /// Lists what may come nearer than a room [m] in this passage, and in others till the surface or the
+    /// thing has moved too far.
     pub fn list(&mut self, rigid: &Rigid, room: f64, places: &[Vector3<f64>]) {
         let room = self.room(room);
         let Self { surface, points, margin, passage, listed, .. } = self;
@@ -98,7 +100,8 @@ impl AtRigid {
         if *reach == f64::INFINITY {
             return;
         }
-        // Sampled distances can change faster than a point moves, and those of a half-space that turns without end.
+        // Sampled distances can change faster than a point moves, and those of a half-space that turns
+        // without end.
         let is_first = *reach == 0.0;
         let grows_evenly = !matches!(rigid.shape, Shape::Grid(_))
             && (is_first || passage.travel_from(rigid, stance).is_finite());
@@ -122,7 +125,8 @@ impl AtRigid {
         near.dedup();
     }
 
-    /// Finds the nodes that may come nearer than a room [m] in the passage, of a list that holds; rows of these and of points between them.
+    /// Finds the nodes that may come nearer than a room [m] in the passage, of a list that holds; rows of
+    /// these and of points between them.
     pub fn look(
         &mut self,
         rigid: &Rigid,
@@ -236,7 +240,8 @@ mod tests {
         (Surface { faces: faces.collect(), nodes: nodes.clone() }, nodes.into_iter().map(place).collect())
     }
 
-    /// The rows of a step are those of lists made in this step, however the sheet waves and the thing moves and turns.
+    /// The rows of a step are those of lists made in this step, however the sheet waves and the thing moves
+    /// and turns.
     #[test]
     fn lists_leave_nothing_out() {
         let (surface, rest) = sheet();

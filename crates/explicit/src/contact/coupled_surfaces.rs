@@ -1,4 +1,5 @@
-//! Coupled nodes: nodes of surfaces that another solver moves. That solver gives their places; no impulse moves them, and their impulses are summed for it.
+//! Coupled nodes: nodes of surfaces that another solver moves. That solver gives their places; no impulse
+//! moves them, and their impulses are summed for it.
 
 use nalgebra::Vector3;
 use pliant_mechanics::tensor::{Vector, add};

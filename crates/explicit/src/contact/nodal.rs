@@ -1,4 +1,5 @@
-//! What contacts do to single nodes: forces, [pressures](pliant_contact::pressure), gaps, and how far nodes slide.
+//! What contacts do to single nodes: forces, [pressures](pliant_contact::pressure), gaps, and how far nodes
+//! slide.
 
 use nalgebra::Vector3;
 use pliant_contact::pressure::pressures;
@@ -21,14 +22,16 @@ pub struct NodeContact {
     pub force: Vector<f64>,
     /// Force along the normal over its share of the deformed faces [Pa]; `None` without faces.
     pub pressure: Option<f64>,
-    /// Least signed distance to what it may touch, less the distance that is kept [m]; `None` where no body and no thing is near.
+    /// Least signed distance to what it may touch, less the distance that is kept [m]; `None` where no body
+    /// and no thing is near.
     pub gap: Option<f64>,
     /// How far it has slid since its touch began [m]; `None` where it touches nothing.
     pub slip: Option<f64>,
 }
 
 impl<R: LaneNumber> ContactSolver<R> {
-    /// All nodes that may touch, increasing, at the instant whose forces were found last. `state` is that of the model then.
+    /// All nodes that may touch, increasing, at the instant whose forces were found last. `state` is that of
+    /// the model then.
     pub fn nodal(&self, state: &State<R>) -> Vec<NodeContact> {
         let place = |(rest, &number): (&Vector3<f64>, &u32)| {
             self.coupled_surfaces.place_at(number, rest, &state.displacement)
@@ -106,8 +109,9 @@ impl<R: LaneNumber> ContactSolver<R> {
         gaps
     }
 
-    /// Adds the ways [m] that nodes slide in the step whose forces were found last. Where several points bear on a node, their mean counts,
-    /// weighted by their impulses. A touch lasts while something bears on the node, or while it is as near as that.
+    /// Adds the ways [m] that nodes slide in the step whose forces were found last. Where several points bear
+    /// on a node, their mean counts, weighted by their impulses. A touch lasts while something bears on the
+    /// node, or while it is as near as that.
     pub fn slide(&mut self, slip: &mut Vec<(u32, f64)>) {
         let Self { nodes, rows, slips, near, .. } = self;
         near.iter().for_each(|&index| slips[index as usize] = [0.0; 2]);

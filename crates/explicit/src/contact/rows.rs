@@ -78,7 +78,8 @@ impl Row {
         }
     }
 
-    /// [`push_apart`](Self::push_apart) of so many nodes: loops of a length that the compiler knows take less time.
+    /// [`push_apart`](Self::push_apart) of so many nodes: loops of a length that the compiler knows take less
+    /// time.
     fn push_parts<const N: usize>(&mut self, nodes: &mut [Node], contacts: &Contacts) -> f64 {
         let parts: [(usize, f64); N] = std::array::from_fn(|k| (self.nodes[k] as usize, self.weights[k]));
         let way = |nodes: &[Node]| -> f64 {
@@ -135,7 +136,8 @@ impl Row {
     }
 }
 
-/// Of the rows of a contact on a node alone, one without an impulse, or a new one; `None` if there are as many as can be.
+/// Of the rows of a contact on a node alone, one without an impulse, or a new one; `None` if there are as
+/// many as can be.
 pub(super) fn idle(rows: &mut Vec<Row>, node: &mut Node, new: Row) -> Option<u32> {
     let (mut next, mut last, mut count) = (node.first, NONE, 0);
     while let Some(row) = rows.get(next as usize) {

@@ -1,4 +1,5 @@
-//! How far nodes go and have gone, over all of them at once: no contact looks at a node that is too far from all things.
+//! How far nodes go and have gone, over all of them at once: no contact looks at a node that is too far from
+//! all things.
 
 use std::ops::Range;
 
@@ -23,7 +24,8 @@ pub(crate) struct Nodes<'a, R> {
 }
 
 impl<R: LaneNumber> Nodes<'_, R> {
-    /// Bounds [m] on the motion of these nodes in the step, from that in the step before, and on their motion since they were listed.
+    /// Bounds [m] on the motion of these nodes in the step, from that in the step before, and on their motion
+    /// since they were listed.
     pub fn ways(&self, nodes: Range<usize>, listed: &[Vector<R>]) -> [f64; 2] {
         let increment = self.increment[nodes.clone()].as_flattened();
         let (displacement, listed) = (self.displacement[nodes].as_flattened(), listed.as_flattened());

@@ -80,8 +80,8 @@ fn stepper(model: &Arc<Model>, contacts: &Arc<Contacts>, part: f64) -> CentralDi
     CentralDifference::new(Arc::clone(model), step).unwrap().with_contacts(Arc::clone(contacts))
 }
 
-/// One step; the energy [J] before it that central differences keep: ½ Σ m v⁻·v⁺ of the velocities before and after the instant, and what
-/// is stored there.
+/// One step; the energy [J] before it that central differences keep: ½ Σ m v⁻·v⁺ of the velocities before and
+/// after the instant, and what is stored there.
 pub fn leapfrog_energy(model: &Model, stepper: &mut CentralDifference<f64>, state: &mut State<f64>) -> f64 {
     stepper.evaluate(state).unwrap();
     let before = state.increment.clone();

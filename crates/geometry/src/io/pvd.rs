@@ -7,8 +7,8 @@ use roxmltree::Node;
 
 use super::{MeshFileError, MeshFileProblem, PVD_TAIL, Place, parse_xml};
 
-/// Reads the list of the files of a series: time [s] and file of each frame. Files are relative to the folder of the
-/// list.
+/// Reads the list of the files of a series: time [s] and file of each frame. Files are relative to the folder
+/// of the list.
 ///
 /// # Errors
 /// If it cannot be read, or where it is malformed.
@@ -16,7 +16,8 @@ pub fn read_pvd(path: &Path) -> Result<Vec<(f64, PathBuf)>, MeshFileError> {
     parse(path, &fs::read_to_string(path).map_err(unreadable(path))?)
 }
 
-/// The same of a list whose writer may have been stopped: where its end is torn, the frames of its whole entries.
+/// The same of a list whose writer may have been stopped: where its end is torn, the frames of its whole
+/// entries.
 ///
 /// # Errors
 /// As [`read_pvd`], if more than its end is torn.

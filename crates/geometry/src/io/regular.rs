@@ -1,5 +1,5 @@
-//! Readable files: regular ones of limited size. Reading a pipe could wait forever, reading a device such as `/dev/zero`
-//! would not end.
+//! Readable files: regular ones of limited size. Reading a pipe could wait forever, reading a device such as
+//! `/dev/zero` would not end.
 
 use std::fs::{self, File};
 use std::io::{self, Read};

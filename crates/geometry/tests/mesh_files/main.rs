@@ -85,7 +85,8 @@ fn with_sets() -> Mesh {
     mesh
 }
 
-// --- files of other programs --------------------------------------------------------------------------------
+// --- files of other programs
+// --------------------------------------------------------------------------------
 
 #[test]
 fn names_of_labels_and_bodies_come_back_from_vtu_files() {
@@ -373,7 +374,8 @@ fn surfaces_of_other_programs() {
     }
 }
 
-// --- variants written by hand -------------------------------------------------------------------------------
+// --- variants written by hand
+// -------------------------------------------------------------------------------
 
 fn text(content: &str, format: Format) -> MeshFile {
     read_bytes(content.as_bytes(), format).unwrap_or_else(|error| panic!("{error}"))
@@ -450,7 +452,8 @@ fn endings_of_stl_may_be_two_words() {
     assert!(error.contains("`lop` found instead of `loop` in facet 1"), "{error}");
 }
 
-/// 3D Slicer writes surfaces with x to the left and y to the back, and says so. Images have x to the right and y to the front.
+/// 3D Slicer writes surfaces with x to the left and y to the back, and says so. Images have x to the right
+/// and y to the front.
 #[test]
 fn surfaces_of_3d_slicer_have_the_axes_of_images() {
     let lps = "3D Slicer output. SPACE=LPS";
@@ -632,6 +635,8 @@ fn content_tells_the_format_before_the_ending_does() {
     assert!(file.notes[0].contains("the extension says VTU, but the file is legacy VTK"), "{:?}", file.notes);
 }
 
-// --- errors -------------------------------------------------------------------------------------------------
+// --- errors
+// -------------------------------------------------------------------------------------------------
 
-// --- what we write ------------------------------------------------------------------------------------------
+// --- what we write
+// ------------------------------------------------------------------------------------------

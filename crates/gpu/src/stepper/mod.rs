@@ -31,8 +31,9 @@ use crate::run::{Instants, StepFailure, flags};
 use crate::transfer::{Four, Transfer};
 use crate::{Design, Device, GpuError};
 
-/// Steps a state of one model by one step size, in single precision, on a device. The current state is on the device: of the
-/// state that is passed in, a call changes the clock, the energies, the record of the critical time step, and what it is asked to read back.
+/// Steps a state of one model by one step size, in single precision, on a device. The current state is on the
+/// device: of the state that is passed in, a call changes the clock, the energies, the record of the critical
+/// time step, and what it is asked to read back.
 ///
 /// The first state that is passed in is uploaded; [`upload`](Self::upload) uploads another one.
 pub struct GpuStepper {
@@ -112,7 +113,8 @@ impl GpuStepper {
     /// A stepper of bodies that touch rigid things, each other or themselves; else as [`new`](Self::new).
     ///
     /// # Errors
-    /// As [`new`](Self::new), and if something of the contacts, or of contact in the design, runs [on the CPU only](processor_only).
+    /// As [`new`](Self::new), and if something of the contacts, or of contact in the design, runs
+    /// [on the CPU only](processor_only).
     pub fn with_contacts(
         device: &Device,
         model: impl Into<Arc<Model>>,
@@ -213,7 +215,8 @@ impl GpuStepper {
         self.control.clock(state)
     }
 
-    /// Goes on where another stepper, with steps of length `step` [s], has stood at a state: with the velocities there.
+    /// Goes on where another stepper, with steps of length `step` [s], has stood at a state: with the
+    /// velocities there.
     pub fn go_on(&mut self, clock: &pliant_explicit::Clock, step: f64, state: &State<f32>) {
         self.control.go_on(clock, step, state);
     }
@@ -262,8 +265,8 @@ impl GpuStepper {
     /// Forces, coming increments, reactions and energies at the state's instant.
     ///
     /// # Errors
-    /// If the state is not finite, a cell is inverted, the energies do not balance, the step is above the limit and
-    /// must not be cut, or the device fails.
+    /// If the state is not finite, a cell is inverted, the energies do not balance, the step is above the
+    /// limit and must not be cut, or the device fails.
     pub fn evaluate(&mut self, state: &mut State<f32>, wanted: Wanted) -> Result<(), StepFailure> {
         self.evaluated(state)?;
         if wanted == Wanted::Everything {
@@ -348,9 +351,9 @@ impl GpuStepper {
         Ok(())
     }
 
-    /// Goes up to `steps` whole steps on, as many as take about `within`, and waits for them without any read-back, unless bodies touch each other.
-    /// Returns how many. After a failure the device stops, and the next evaluation reports it. The first instant is
-    /// evaluated where that is not done yet.
+    /// Goes up to `steps` whole steps on, as many as take about `within`, and waits for them without any
+    /// read-back, unless bodies touch each other. Returns how many. After a failure the device stops, and the
+    /// next evaluation reports it. The first instant is evaluated where that is not done yet.
     ///
     /// # Errors
     /// As [`Self::evaluate`] at the first instant, and if the device fails.
@@ -375,7 +378,8 @@ impl GpuStepper {
         Ok(steps)
     }
 
-    /// Takes hold of points: these grips and no others act from the next evaluation on. Their work is external.
+    /// Takes hold of points: these grips and no others act from the next evaluation on. Their work is
+    /// external.
     ///
     /// # Errors
     /// If there are too many for the device.
@@ -387,7 +391,8 @@ impl GpuStepper {
         self.instants.grip(&self.device, &numbers)
     }
 
-    /// What finds points on the device that are combinations of nodes, from their places at rest [m] and the nodes and weights of each.
+    /// What finds points on the device that are combinations of nodes, from their places at rest [m] and the
+    /// nodes and weights of each.
     ///
     /// # Errors
     /// If there are too many for the device.
@@ -403,7 +408,8 @@ impl GpuStepper {
         mapping.apply(value, self.stage.side());
     }
 
-    /// Brings displacements, increments and what relaxing laws remember back to the state, and enters its energies.
+    /// Brings displacements, increments and what relaxing laws remember back to the state, and enters its
+    /// energies.
     ///
     /// # Errors
     /// If the device fails, or a step since the last evaluation could not be taken.

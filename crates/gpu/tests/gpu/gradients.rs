@@ -32,7 +32,8 @@ fn shell(mesh: &Mesh) -> Assembly {
     support::shell(mesh, 0.002, WALL, Formulation::default())
 }
 
-/// A tube of `around` × `along` pairs of shells, fixed at one end and hinged at the other, under a pressure that pulses and its weight.
+/// A tube of `around` × `along` pairs of shells, fixed at one end and hinged at the other, under a pressure
+/// that pulses and its weight.
 fn tube(around: u32, along: u32) -> Assembly {
     let cylinder = Sheet::Cylinder { radius: 0.02, length: 0.2, from: 0.0, span: TAU };
     let counts = [around, along].map(|count| count as usize);
@@ -61,7 +62,8 @@ fn on(device: &Device) -> Option<Arc<dyn LinearDevice>> {
     Some(Arc::new(device.clone()))
 }
 
-/// The state after some steps, and the largest residual of a linear solution, its iterations and how many were left to the CPU.
+/// The state after some steps, and the largest residual of a linear solution, its iterations and how many
+/// were left to the CPU.
 fn run(
     device: Option<Arc<dyn LinearDevice>>,
     model: &Assembly,
@@ -87,8 +89,8 @@ fn off(model: &Assembly, one: &State, other: &State) -> f64 {
 
 const BOTH: [Preconditioner; 2] = [Preconditioner::BlockJacobi, Preconditioner::Aggregates];
 
-/// A solution to 1e-9, far below single precision, is that of factors in double precision: the error of a displacement is larger than
-/// the residual by the condition of the matrix, here 1e3 at most.
+/// A solution to 1e-9, far below single precision, is that of factors in double precision: the error of a
+/// displacement is larger than the residual by the condition of the matrix, here 1e3 at most.
 #[test]
 fn corrections_in_single_precision_add_up_to_a_solution_in_double_precision() {
     let Some(device) = support::device() else { return };
@@ -106,7 +108,8 @@ fn corrections_in_single_precision_add_up_to_a_solution_in_double_precision() {
     }
 }
 
-/// A pulsing tube, a second long, as on the CPU: each step is solved to 1e-3 there and here, so displacements differ by some 1e-3.
+/// A pulsing tube, a second long, as on the CPU: each step is solved to 1e-3 there and here, so displacements
+/// differ by some 1e-3.
 #[test]
 fn a_pulsing_tube_moves_as_on_the_cpu() {
     let Some(device) = support::device() else { return };
@@ -221,7 +224,8 @@ fn balloon() -> Assembly {
     model
 }
 
-/// Contact, ties and enclosed volumes: Newton's method comes to the states of the CPU, where it solves by factors, to the tolerance of a step.
+/// Contact, ties and enclosed volumes: Newton's method comes to the states of the CPU, where it solves by
+/// factors, to the tolerance of a step.
 #[test]
 fn contact_ties_and_volumes_are_solved_as_on_the_cpu() {
     let Some(device) = support::device() else { return };
@@ -299,8 +303,8 @@ fn chain(solver: &mut dyn DeviceSolver, nodes: u32) -> Vec<f32> {
     solution
 }
 
-/// A solver that had a larger and a smaller matrix before, and a pattern that found no room, gives the bits of a fresh one; in the middle of a
-/// chain x = 1/2.
+/// A solver that had a larger and a smaller matrix before, and a pattern that found no room, gives the bits
+/// of a fresh one; in the middle of a chain x = 1/2.
 #[test]
 fn another_pattern_leaves_nothing_behind() {
     let Some(device) = support::device() else { return };
@@ -324,8 +328,8 @@ fn another_pattern_leaves_nothing_behind() {
     assert_eq!(chain(&mut *reused, 40), chain(&mut *device.solver().unwrap(), 40));
 }
 
-/// Six hundred loose pieces of four nodes, each held at one of them, under their weight: their aggregates are limited, and their solution to
-/// 1e-9 is that of factors.
+/// Six hundred loose pieces of four nodes, each held at one of them, under their weight: their aggregates are
+/// limited, and their solution to 1e-9 is that of factors.
 #[test]
 fn many_loose_pieces_are_solved_with_few_aggregates() {
     let Some(device) = support::device() else { return };

@@ -1,4 +1,5 @@
-//! Labels and their names: segmentations in DICOM, names in NRRD and NIfTI, masks, scans without labels, paths that are not files.
+//! Labels and their names: segmentations in DICOM, names in NRRD and NIfTI, masks, scans without labels,
+//! paths that are not files.
 
 use std::fs;
 use std::io::Write;
@@ -128,8 +129,9 @@ fn names_stand_in_the_headers_of_nrrd_and_nifti() {
     }
 }
 
-/// Labels that a program stored as scaled integers are half a step of the scale off at most; those that it interpolated between equal ones
-/// a little. Both are rounded, with a note; what lies between labels is no label.
+/// Labels that a program stored as scaled integers are half a step of the scale off at most; those that it
+/// interpolated between equal ones a little. Both are rounded, with a note; what lies between labels is no
+/// label.
 #[test]
 fn labels_off_by_their_storage_are_rounded() {
     let (slope, intercept) = (0.216_296_65_f32, 7087.5_f32);
@@ -361,7 +363,8 @@ fn pipes_and_devices_are_refused_and_not_waited_for() {
     }
 }
 
-/// Images of more than 16 MB are told how far reading and cutting are, from nothing to the end and never back.
+/// Images of more than 16 MB are told how far reading and cutting are, from nothing to the end and never
+/// back.
 #[test]
 fn reading_and_cutting_a_large_image_tell_how_far_they_are() {
     let dims = [260, 260, 160];
@@ -385,7 +388,8 @@ fn reading_and_cutting_a_large_image_tell_how_far_they_are() {
     assert_eq!(cut.labels.grid.dims, [60, 260, 60]);
 }
 
-/// 760³ labels of one byte are 0.44 GB; reading them from a gzip file and cutting a body out takes half as much again at most.
+/// 760³ labels of one byte are 0.44 GB; reading them from a gzip file and cutting a body out takes half as
+/// much again at most.
 #[test]
 #[ignore = "half a GB of memory and ten seconds; by itself, as it measures the peak of the process"]
 fn a_large_packed_image_takes_little_more_memory_than_its_voxels() {

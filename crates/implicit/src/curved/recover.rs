@@ -1,10 +1,12 @@
 //! Fields of the cells at a state, recovered from displacements and rotations as symmetric tensors in space.
 //!
-//! Shells: membrane forces and bending moments are the means over the facet that do the same work with uniform strains and curvatures
-//! as its nodal forces: n = t Dm Lᵀd/(t A) of the ANDES membrane (Felippa 2003, CMAME 192:2125), whose strain has a part from drilling,
-//! and m = t³/12 Dm κ with the mean curvature of the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980). Stress at a height z along the
-//! facet's normal is σ(z) = n/t + 12 z m/t³ (Timoshenko and Woinowsky-Krieger 1959), in layers Q (ε + z κ) with ε and κ of n and m.
-//! Fields of solids are those of `pliant-explicit`. Leaves out: shear across the thickness, variation within a facet, averages at nodes.
+//! Shells: membrane forces and bending moments are the means over the facet that do the same work with
+//! uniform strains and curvatures as its nodal forces: n = t Dm Lᵀd/(t A) of the ANDES membrane (Felippa
+//! 2003, CMAME 192:2125), whose strain has a part from drilling, and m = t³/12 Dm κ with the mean curvature
+//! of the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980). Stress at a height z along the facet's normal
+//! is σ(z) = n/t + 12 z m/t³ (Timoshenko and Woinowsky-Krieger 1959), in layers Q (ε + z κ) with ε and κ of n
+//! and m. Fields of solids are those of `pliant-explicit`. Leaves out: shear across the thickness, variation
+//! within a facet, averages at nodes.
 
 use nalgebra::{Matrix3, Vector3};
 use pliant_shells::ShellStrain;
@@ -139,7 +141,8 @@ impl ShellFields {
     }
 }
 
-/// Von Mises stress √(3/2 s:s) with s the deviator (von Mises 1913): of plane stress √(σx² − σx σy + σy² + 3 τ²).
+/// Von Mises stress √(3/2 s:s) with s the deviator (von Mises 1913): of plane stress √(σx² − σx σy + σy² + 3
+/// τ²).
 pub fn von_mises(stress: &Matrix3<f64>) -> f64 {
     let deviator = stress - Matrix3::from_diagonal_element(stress.trace() / 3.0);
     (1.5 * deviator.norm_squared()).sqrt()
@@ -171,8 +174,8 @@ mod tests {
         (state, *turn.to_rotation_matrix().matrix())
     }
 
-    /// A plate bent to w = ½ k x²: mxx = −D k, myy = ν mxx, energy ½ D k²; the top in compression. Small, so that linear
-    /// theory is right to 1e-6; turned by a radian, so are its tensors.
+    /// A plate bent to w = ½ k x²: mxx = −D k, myy = ν mxx, energy ½ D k²; the top in compression. Small, so
+    /// that linear theory is right to 1e-6; turned by a radian, so are its tensors.
     #[test]
     fn a_plate_under_a_uniform_moment() {
         let model = model(strip(), 0.1);
@@ -201,7 +204,8 @@ mod tests {
         }
     }
 
-    /// A strip stretched by 1 % and turned by a radian: n = E t ε in its direction alone, energy ½ E t ε², exactly.
+    /// A strip stretched by 1 % and turned by a radian: n = E t ε in its direction alone, energy ½ E t ε²,
+    /// exactly.
     #[test]
     fn a_strip_in_tension_turned_by_a_radian() {
         let model = model(strip(), 0.1);
@@ -227,8 +231,8 @@ mod tests {
         }
     }
 
-    /// A ball under pressure: n = p R/2 in every direction. Its mean is right to 1 % with 512 facets; facets that are unequal scatter, four
-    /// times less with edges of half the length.
+    /// A ball under pressure: n = p R/2 in every direction. Its mean is right to 1 % with 512 facets; facets
+    /// that are unequal scatter, four times less with edges of half the length.
     #[test]
     fn membrane_forces_of_a_ball_under_pressure() {
         let pressure = 10.0;
@@ -252,7 +256,8 @@ mod tests {
         assert!(scatter[1] < scatter[0] / 3.0, "{scatter:?}");
     }
 
-    /// A closed cylinder (its ends are pulled with p R/2): hoop p R, along p R/2. With 48 facets round, 0.5 %.
+    /// A closed cylinder (its ends are pulled with p R/2): hoop p R, along p R/2. With 48 facets round, 0.5
+    /// %.
     #[test]
     fn membrane_forces_of_a_cylinder_under_pressure() {
         cylinder_under_pressure(FLAT, Spread::Lumped, [0.02, 0.002]);

@@ -21,8 +21,9 @@ use crate::solid::refusal;
 /// The least part of a direction that lies in a triangle.
 const ALONG: f64 = 1e-3;
 
-/// A model with shells: what the solvers of this crate work on. It reads as its [`Model`], which holds nodes, masses, solids, loads and
-/// constraints. Nodes have three translations, and three rotations if a facet that bends uses them.
+/// A model with shells: what the solvers of this crate work on. It reads as its [`Model`], which holds nodes,
+/// masses, solids, loads and constraints. Nodes have three translations, and three rotations if a facet that
+/// bends uses them.
 #[derive(Clone, Debug, Default)]
 pub struct Assembly {
     /// Nodes, solids, loads, constraints.
@@ -39,12 +40,14 @@ pub struct Assembly {
     pub springs: Vec<Spring>,
     /// The points of each surface of the model that shells carry.
     pub carried: BTreeMap<usize, Vec<Carried>>,
-    /// The force [N] with which constraints that move nodes push at most, and the pressure [Pa] of constraints of volume, by their numbers. Their nodes lag
-    /// behind their motion together, and their volumes behind their growth, as the static and the implicit solver find.
+    /// The force [N] with which constraints that move nodes push at most, and the pressure [Pa] of
+    /// constraints of volume, by their numbers. Their nodes lag behind their motion together, and their
+    /// volumes behind their growth, as the static and the implicit solver find.
     pub force_limits: BTreeMap<usize, f64>,
     /// Contacts, which the static and the implicit solver keep.
     pub contact: Option<ContactModel>,
-    /// Nodes of shells that turn with the solid that they are in or on. Those of rigid parts turn with these instead.
+    /// Nodes of shells that turn with the solid that they are in or on. Those of rigid parts turn with these
+    /// instead.
     pub turns: Vec<CarriedTurn>,
 }
 
@@ -61,16 +64,18 @@ pub struct Shell {
     pub material: Vec<Wall>,
     /// Its elements.
     pub formulation: Formulation,
-    /// Layers from the bottom (against the normals) to the top; with some, `thickness` and `material` say nothing.
+    /// Layers from the bottom (against the normals) to the top; with some, `thickness` and `material` say
+    /// nothing.
     pub layers: Vec<Layer>,
-    /// The direction that the angles of layers count from, projected on each triangle: one, or one a triangle.
+    /// The direction that the angles of layers count from, projected on each triangle: one, or one a
+    /// triangle.
     pub direction: Vec<Vector3<f64>>,
     /// Tension [N/m] at rest, equal in all directions.
     pub tension: f64,
     /// Triangles that meet at a larger angle [rad] have normals of their own: a crease.
     pub crease: f64,
-    /// Normals of nodes at rest, of any length and to either side: those of a surface that is known better than by its triangles.
-    /// Nodes without one take the mean of their triangles.
+    /// Normals of nodes at rest, of any length and to either side: those of a surface that is known better
+    /// than by its triangles. Nodes without one take the mean of their triangles.
     pub normals: BTreeMap<u32, Vector3<f64>>,
     /// Which triangles are flat, whatever the normals of their nodes: their edges are straight. Empty: none.
     pub flat: Vec<bool>,
@@ -105,10 +110,12 @@ pub struct Notes {
     pub turned: usize,
     /// Elements thicker than their smallest altitude: they answer as plates, but are none.
     pub thick: usize,
-    /// Triangles folded back onto all their neighbours, as inverted ones are: how many, and the number of the first.
+    /// Triangles folded back onto all their neighbours, as inverted ones are: how many, and the number of the
+    /// first.
     pub inverted: Option<(usize, usize)>,
-    /// Mean thickness over width, where there is a border: a strip of length L and width b has two areas over its border, b L/(b + L).
-    /// Shear across the thickness, which is left out, makes a strip softer against twist by 0.63 of it.
+    /// Mean thickness over width, where there is a border: a strip of length L and width b has two areas over
+    /// its border, b L/(b + L). Shear across the thickness, which is left out, makes a strip softer against
+    /// twist by 0.63 of it.
     pub stoutness: Option<f64>,
     /// Elements of Comas (2010), which depend on the numbering and converge to a wrong plate.
     pub comas: usize,
@@ -180,12 +187,12 @@ impl Assembly {
         damping
     }
 
-    /// Adds a shell: its triangles are made to face one side (each connected part keeps the side of most of its triangles),
-    /// become facets, and give mass and normals to their nodes.
+    /// Adds a shell: its triangles are made to face one side (each connected part keeps the side of most of
+    /// its triangles), become facets, and give mass and normals to their nodes.
     ///
     /// # Errors
-    /// If a quantity is out of range, a triangle is degenerate, or an edge has too many triangles. The model then is as it
-    /// was.
+    /// If a quantity is out of range, a triangle is degenerate, or an edge has too many triangles. The model
+    /// then is as it was.
     pub fn add_shell(&mut self, shell: &Shell) -> Result<Notes, ModelError> {
         self.check_quantities(shell)?;
         let (cells, turned) = oriented(shell)?;
@@ -238,8 +245,9 @@ impl Assembly {
         LoadKind::Forces(facets.iter().flat_map(of_facet).collect())
     }
 
-    /// A force per rest length [N/m] along edges that keeps its direction, half to each end. Left out are the drilling moments in the
-    /// plane that the ANDES membrane would take of it at the ends of an edge; they cancel between edges but at the ends of the line.
+    /// A force per rest length [N/m] along edges that keeps its direction, half to each end. Left out are the
+    /// drilling moments in the plane that the ANDES membrane would take of it at the ends of an edge; they
+    /// cancel between edges but at the ends of the line.
     pub fn edge_load(&self, edges: &[[u32; 2]], traction: Vector3<f64>) -> LoadKind {
         let of_edge = |&ends: &[u32; 2]| {
             let [a, b] = ends.map(|node| self.place(node as usize));
@@ -248,7 +256,8 @@ impl Assembly {
         LoadKind::Forces(edges.iter().flat_map(of_edge).collect())
     }
 
-    /// Which nodes have rotations: those of a facet that bends. Without bending rotations would have next to no stiffness.
+    /// Which nodes have rotations: those of a facet that bends. Without bending rotations would have next to
+    /// no stiffness.
     pub fn turning(&self) -> Vec<bool> {
         let mut turning = vec![false; self.rest.len()];
         for facet in self.facets.iter().filter(|facet| facet.turns()) {
@@ -257,7 +266,8 @@ impl Assembly {
         turning
     }
 
-    /// Gives the facets the normals of their corners. A shell that shares edges with others makes creases of them.
+    /// Gives the facets the normals of their corners. A shell that shares edges with others makes creases of
+    /// them.
     fn curve_facets(&mut self) {
         let straight = straight_edges(&self.facets, &self.corner_normals, &self.normals, &self.rest);
         for ((facet, corners), straight) in self.facets.iter_mut().zip(&self.corner_normals).zip(straight) {
@@ -276,7 +286,8 @@ impl Assembly {
         (border > 0.0).then(|| volume / area * border / (2.0 * area))
     }
 
-    /// The triangles with two neighbours or more whose normals are all turned by more than 150°: how many, and the first.
+    /// The triangles with two neighbours or more whose normals are all turned by more than 150°: how many,
+    /// and the first.
     fn inverted(&self, cells: &[[u32; 3]]) -> Option<(usize, usize)> {
         const TURNED: f64 = -0.866;
         let normal = |cell: usize| {
@@ -309,8 +320,8 @@ impl Assembly {
     /// Whether the solvers of this crate can have a solid on nodes of the model.
     ///
     /// # Errors
-    /// If the density is out of range, a cell is degenerate or inverted, or the element or the law has no stiffness here: averages over
-    /// two rings of neighbours, averaged pressures and bars that relax.
+    /// If the density is out of range, a cell is degenerate or inverted, or the element or the law has no
+    /// stiffness here: averages over two rings of neighbours, averaged pressures and bars that relax.
     pub fn check_solid(&self, name: &str, solid: &Solid) -> Result<(), ModelError> {
         if let Some(why) = refusal(solid) {
             return Err(ModelError::NoStiffness { solid: name.into(), why });
@@ -380,8 +391,8 @@ impl Assembly {
         Ok(())
     }
 
-    /// The normals of the nodes of a shell, and those at the corners of its facets: the given ones, else angle-weighted means, one
-    /// for each fan of facets round a node that meet at less than the crease angle.
+    /// The normals of the nodes of a shell, and those at the corners of its facets: the given ones, else
+    /// angle-weighted means, one for each fan of facets round a node that meet at less than the crease angle.
     fn normals_of(
         &self,
         shell: &Shell,
@@ -483,8 +494,8 @@ impl Assembly {
         if loops.is_empty() { Ok(()) } else { Err(ModelError::Open { loops }) }
     }
 
-    /// What round-off leaves of the norm of a residual [N], 8 ε |x| √Σk²: displacements are differences of positions, known to ε |x|,
-    /// and a cell makes forces of them with its largest stiffness k.
+    /// What round-off leaves of the norm of a residual [N], 8 ε |x| √Σk²: displacements are differences of
+    /// positions, known to ε |x|, and a cell makes forces of them with its largest stiffness k.
     pub(crate) fn round_off(&self) -> f64 {
         let extent = self.places().map(|x| x.amax()).fold(0.0, f64::max);
         let stiffness = self.stiffnesses().map(|k| k * k).sum::<f64>().sqrt();

@@ -12,8 +12,10 @@ pub struct ContactModel {
     pub contacts: Arc<Contacts>,
     /// How each contact acts.
     pub settings: Vec<BarrierSettings>,
-    /// How often triangles of shells are divided into four on their curved surface, for each contact; empty: never.
+    /// How often triangles of shells are divided into four on their curved surface, for each contact; empty:
+    /// never.
     pub levels: Vec<u8>,
-    /// Whether each state that is accepted is searched for edges that go through triangles, which would be an error of the program.
+    /// Whether each state that is accepted is searched for edges that go through triangles, which would be an
+    /// error of the program.
     pub check_intersections: bool,
 }

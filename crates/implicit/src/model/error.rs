@@ -211,8 +211,8 @@ pub enum SolveError {
     Blocked {
         /// Time of the step that failed.
         time: f64,
-        /// Of the tools and constraints that move in the step the one that pushes hardest, and its force [N] where the step began, without friction; none where
-        /// a volume is to change.
+        /// Of the tools and constraints that move in the step the one that pushes hardest, and its force [N]
+        /// where the step began, without friction; none where a volume is to change.
         driver: Option<(String, f64)>,
         /// Part of the way that it went, from 0 to 1.
         part: f64,
@@ -221,7 +221,8 @@ pub enum SolveError {
         /// Iterations of the last attempt.
         iterations: usize,
     },
-    /// A volume and the limit of its pressure that cannot both be kept: the state leaps from one side of them to the other.
+    /// A volume and the limit of its pressure that cannot both be kept: the state leaps from one side of them
+    /// to the other.
     #[error(
         "neither the volume of `{constraint}` nor its `pressure-limit` of {limit:.4e} Pa can be kept at t = {time:.6}: {}: the surface snaps; \
          try {}smaller steps or a higher `pressure-limit`",
@@ -238,7 +239,8 @@ pub enum SolveError {
         limit: f64,
         /// The pressure [Pa] in the prescribed volume; `None` if the volume was not prescribed.
         pressure: Option<f64>,
-        /// How far [m³] the volume is beyond the prescribed one at the limit; `None` if the limit was not prescribed.
+        /// How far [m³] the volume is beyond the prescribed one at the limit; `None` if the limit was not
+        /// prescribed.
         ahead: Option<f64>,
         /// Whether the step has inertia.
         inertia: bool,

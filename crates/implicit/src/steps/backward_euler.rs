@@ -1,12 +1,13 @@
-//! Motion in time: backward Euler, whose step is the minimum of elastic energy, loads and Σ m |u − h v|²/(2h²) (the same for rotation
-//! vectors of the step with the rotary inertia); the backward differentiation formula of second order (Gear 1971; for unequal steps
-//! Hairer, Nørsett and Wanner 1993, III.5), which is the same step from a point further on; and explicit central differences. Rayleigh
+//! Motion in time: backward Euler, whose step is the minimum of elastic energy, loads and Σ m |u − h
+//! v|²/(2h²) (the same for rotation vectors of the step with the rotary inertia); the backward
+//! differentiation formula of second order (Gear 1971; for unequal steps Hairer, Nørsett and Wanner 1993,
+//! III.5), which is the same step from a point further on; and explicit central differences. Rayleigh
 //! damping: α M + β K, with K of the start of the step.
 //!
-//! With r = h/h₋ of the steps now and before, a = r²/(1 + 2r), h* = h (1 + r)/(1 + 2r):
-//! x = x₀ + a (x₀ − x₋) + h* v, v = v₀ + a (v₀ − v₋) + h* f/m; backward Euler is a = 0, h* = h. Rotations are rotation vectors from the
-//! start of the step.
-//! Leaves out: gyroscopic moments (the lumped inertia of a node is the same about every axis) and step control by accuracy.
+//! With r = h/h₋ of the steps now and before, a = r²/(1 + 2r), h* = h (1 + r)/(1 + 2r): x = x₀ + a (x₀ −
+//! x₋) + h* v, v = v₀ + a (v₀ − v₋) + h* f/m; backward Euler is a = 0, h* = h. Rotations are rotation vectors
+//! from the start of the step. Leaves out: gyroscopic moments (the lumped inertia of a node is the same about
+//! every axis) and step control by accuracy.
 
 use std::sync::Arc;
 
@@ -29,8 +30,8 @@ pub enum Integrator {
     /// Of first order: a vibration of angular frequency ω is damped by about ω h/2 of critical.
     #[default]
     BackwardEuler,
-    /// Of second order, by differences of two steps: damped by about (ω h)³/4 of critical. The first step, and one after a step that
-    /// was halved, is one of backward Euler.
+    /// Of second order, by differences of two steps: damped by about (ω h)³/4 of critical. The first step,
+    /// and one after a step that was halved, is one of backward Euler.
     Bdf2,
 }
 
@@ -41,22 +42,24 @@ pub struct DynamicSettings {
     pub step: f64,
     /// How it goes on in time.
     pub integrator: Integrator,
-    /// Iterations of Newton's method at the most. With 1 each step is one linear solution and nothing is checked: for real time.
+    /// Iterations of Newton's method at the most. With 1 each step is one linear solution and nothing is
+    /// checked: for real time.
     pub iterations: usize,
     /// Residual allowed, as a part of loads, internal or inertial forces, whichever are larger.
     pub tolerance: f64,
-    /// Speed [m/s] of all nodes below which a Newton step in contact is the last one; if not given, it must move nothing by more than
-    /// counts for a gap.
+    /// Speed [m/s] of all nodes below which a Newton step in contact is the last one; if not given, it must
+    /// move nothing by more than counts for a gap.
     pub speed_tolerance: Option<f64>,
-    /// Whether a step whose iterations run out takes what they have reached instead of being halved: bounded time, accuracy unchecked
-    /// ([`DynamicStep::converged`] tells). In contact such a state has no intersection.
+    /// Whether a step whose iterations run out takes what they have reached instead of being halved: bounded
+    /// time, accuracy unchecked ([`DynamicStep::converged`] tells). In contact such a state has no
+    /// intersection.
     pub accept_unconverged: bool,
     /// How often a step that fails is halved.
     pub halvings: usize,
     /// Solver of the linear equations.
     pub linear: LinearSolver,
-    /// Whether what conjugate gradients have reached when their iterations run out is taken as it is: bounded time, accuracy unchecked
-    /// (`DynamicStep::linear` tells the residual).
+    /// Whether what conjugate gradients have reached when their iterations run out is taken as it is: bounded
+    /// time, accuracy unchecked (`DynamicStep::linear` tells the residual).
     pub accept_stalled: bool,
 }
 
@@ -86,7 +89,8 @@ impl DynamicSettings {
 /// A step that was made.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DynamicStep {
-    /// Residual over the largest of loads, internal and inertial forces, before each iteration and, but for a single one, at the end.
+    /// Residual over the largest of loads, internal and inertial forces, before each iteration and, but for a
+    /// single one, at the end.
     pub residuals: Vec<f64>,
     /// What the last linear solution took.
     pub linear: LinearReport,
@@ -113,7 +117,8 @@ pub struct BackwardEuler {
     /// The product of the damping stiffness with the motion.
     product: Vec<f64>,
     start: State,
-    /// Where the state was a whole step before, for differences of second order; none after a start or a step that was halved.
+    /// Where the state was a whole step before, for differences of second order; none after a start or a step
+    /// that was halved.
     previous: Option<Box<State>>,
     differences: Differences,
     /// No step was taken so far: the state may be off the curves of prescribed components.
@@ -121,8 +126,8 @@ pub struct BackwardEuler {
     attempts: Vec<Attempted>,
 }
 
-/// The equation of a step: positions are `shift` further on plus `step` times the new velocities, these `rate` further on plus `step`
-/// times accelerations.
+/// The equation of a step: positions are `shift` further on plus `step` times the new velocities, these
+/// `rate` further on plus `step` times accelerations.
 #[derive(Clone, Debug, Default)]
 struct Differences {
     /// h* [s].
@@ -195,8 +200,8 @@ impl BackwardEuler {
         Self::on(None, model, settings)
     }
 
-    /// The same with a device, if one is given, that solves the equations by conjugate gradients with blocks or aggregates. Their tolerance
-    /// holds in double precision.
+    /// The same with a device, if one is given, that solves the equations by conjugate gradients with blocks
+    /// or aggregates. Their tolerance holds in double precision.
     ///
     /// # Errors
     /// As [`new`](Self::new), and if the device fails or has no room, or another linear solver is set.
@@ -238,7 +243,8 @@ impl BackwardEuler {
         self.previous.as_deref()
     }
 
-    /// Takes differences with a state a step before, as another solver would have: to go on where that one stood.
+    /// Takes differences with a state a step before, as another solver would have: to go on where that one
+    /// stood.
     pub fn go_on_from(&mut self, previous: Option<State>) {
         self.previous = previous.map(Box::new);
     }
@@ -318,7 +324,8 @@ impl BackwardEuler {
         }
     }
 
-    /// [`newton`](Self::newton) without contact; whether the residual has come below the tolerance, or was not asked for.
+    /// [`newton`](Self::newton) without contact; whether the residual has come below the tolerance, or was
+    /// not asked for.
     fn newton_without_contact(&mut self, state: &mut State, h: f64) -> Result<bool, SolveError> {
         let time = state.time + h;
         self.moved.fill(0.0);
@@ -455,7 +462,8 @@ impl BackwardEuler {
         });
     }
 
-    /// Loads less internal, inertial and damping forces on the free components; its norm and that of the largest of them.
+    /// Loads less internal, inertial and damping forces on the free components; its norm and that of the
+    /// largest of them.
     fn find_residual(&mut self, state: &State) -> (f64, f64) {
         let model = Arc::clone(&self.system.model);
         let Self { system, differences, start, moved, damping, .. } = self;
@@ -589,7 +597,8 @@ impl Contacting for BackwardEuler {
         (norm, self.settings.tolerance * scale + self.round_off)
     }
 
-    /// Σ m |u − s − h v|²/(2 h²) + α m |u − s|²/(2 h), the same of rotation vectors, and β (u − s)ᵀ K (u − s)/(2 h).
+    /// Σ m |u − s − h v|²/(2 h²) + α m |u − s|²/(2 h), the same of rotation vectors, and β (u − s)ᵀ K (u −
+    /// s)/(2 h).
     fn potential(&mut self) -> f64 {
         let model = Arc::clone(&self.system.model);
         let Differences { step: h, shift, rate } = &self.differences;

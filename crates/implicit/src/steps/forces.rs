@@ -1,4 +1,5 @@
-//! What acts on the nodes of a model at a state, without a solver: for reactions, energies and whoever looks at a run.
+//! What acts on the nodes of a model at a state, without a solver: for reactions, energies and whoever looks
+//! at a run.
 
 use std::sync::Arc;
 
@@ -37,8 +38,8 @@ impl Forces {
         Ok(())
     }
 
-    /// Takes hold of nodes: these springs and no others act from the next evaluation on, beside those of the model. Their forces are
-    /// loads.
+    /// Takes hold of nodes: these springs and no others act from the next evaluation on, beside those of the
+    /// model. Their forces are loads.
     pub fn grip(&mut self, springs: &[Spring]) {
         self.system.grip(springs);
     }
@@ -71,9 +72,9 @@ impl Forces {
         [at, at + 1, at + 2].map(|at| self.system.forces.internal[at] - self.system.forces.external[at])
     }
 
-    /// What a constraint of volume encloses at the state last evaluated, which is given, and the force [N] and moment [N m] of its pressure by components,
-    /// six a node; `None` of other constraints. The pressure is the one that balances what its nodes resist with, by least squares: exact
-    /// in equilibrium.
+    /// What a constraint of volume encloses at the state last evaluated, which is given, and the force [N]
+    /// and moment [N m] of its pressure by components, six a node; `None` of other constraints. The pressure
+    /// is the one that balances what its nodes resist with, by least squares: exact in equilibrium.
     pub fn enclosed(&self, constraint: usize, state: &State) -> Option<(Enclosed, Vec<(usize, f64)>)> {
         self.system.enclosed(constraint, state)
     }

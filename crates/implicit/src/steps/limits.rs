@@ -1,9 +1,12 @@
-//! Tools and moved nodes that push with no more than a force, in steps of solvers of equations. Of the way against what it pushes a tool goes a part that falls from
-//! 1 at half of its limit over 0 at the limit to −1 ([`Lag`]), as in explicit steps; but the force is that at the end of the step, so that long steps do not go beyond
-//! the limit. The part is found by solving the step again: the force grows with it, so a root lies between −1 and 1. Moved nodes of a constraint do the same
-//! together: their force is its reaction, their way the mean of theirs.
+//! Tools and moved nodes that push with no more than a force, in steps of solvers of equations. Of the way
+//! against what it pushes a tool goes a part that falls from 1 at half of its limit over 0 at the limit to −1
+//! ([`Lag`]), as in explicit steps; but the force is that at the end of the step, so that long steps do not
+//! go beyond the limit. The part is found by solving the step again: the force grows with it, so a root lies
+//! between −1 and 1. Moved nodes of a constraint do the same together: their force is its reaction, their way
+//! the mean of theirs.
 //!
-//! The pressure in a volume goes up to its limit, and no further: the step is solved with the volume prescribed, or with the limit as a load, whichever holds.
+//! The pressure in a volume goes up to its limit, and no further: the step is solved with the volume
+//! prescribed, or with the limit as a load, whichever holds.
 
 use nalgebra::Vector3;
 use pliant_contact::lag::Lag;
@@ -19,8 +22,8 @@ const TRIES: usize = 12;
 /// How far a part may be off: by this the force is off by half as much of its limit.
 const FOUND: f64 = 0.02;
 
-/// How far a pressure or a volume may be beyond its limit, over it, to begin with: a step ends with a residual. Ten times as far each time that the other was
-/// prescribed in vain.
+/// How far a pressure or a volume may be beyond its limit, over it, to begin with: a step ends with a
+/// residual. Ten times as far each time that the other was prescribed in vain.
 const BEYOND: f64 = 1e-6;
 /// How often the other may be prescribed.
 const CHANGES: i32 = 3;
@@ -87,7 +90,8 @@ struct Valve {
 }
 
 impl Valve {
-    /// Takes a pressure [Pa], how far the volume has yet to grow, and the volume at rest [m³]; whether what is prescribed holds.
+    /// Takes a pressure [Pa], how far the volume has yet to grow, and the volume at rest [m³]; whether what
+    /// is prescribed holds.
     fn take(&mut self, [pressure, gap, rest]: [f64; 3]) -> bool {
         let beyond = BEYOND * 10.0_f64.powi(self.changes);
         let holds = match self.given {
@@ -124,8 +128,8 @@ impl Valve {
     }
 }
 
-/// Solves a step to a time [s] with tools and moved nodes whose force is limited, and volumes whose pressure is; `solve` solves it from its start with these
-/// at their assumed places.
+/// Solves a step to a time [s] with tools and moved nodes whose force is limited, and volumes whose pressure
+/// is; `solve` solves it from its start with these at their assumed places.
 pub(crate) fn within_limits<S: Contacting, T, E: From<SolveError>>(
     solver: &mut S,
     state: &mut State,
@@ -187,7 +191,8 @@ impl System {
         .collect()
     }
 
-    /// Takes pressures and volumes at the residual last found, and how far volumes lag; where what is prescribed does not hold, most often so.
+    /// Takes pressures and volumes at the residual last found, and how far volumes lag; where what is
+    /// prescribed does not hold, most often so.
     fn unkept<'v>(&mut self, valves: &'v mut [Valve]) -> Option<&'v Valve> {
         let lags = self.lags.iter_mut().filter(|lag| encloses(&self.model, lag));
         let mut unkept: Option<&Valve> = None;
@@ -201,7 +206,8 @@ impl System {
         unkept
     }
 
-    /// Finds where they go between two times [s]; increments of prescribed components, six a node, are those without limits before.
+    /// Finds where they go between two times [s]; increments of prescribed components, six a node, are those
+    /// without limits before.
     fn hold_back(&mut self, [from, to]: [f64; 2], guesses: &mut [Guess], pending: &mut [f64]) {
         let moving = self.lags.iter().filter(|lag| !encloses(&self.model, lag)).count();
         let (tools, nodes) = guesses.split_at_mut(guesses.len() - moving);
@@ -226,7 +232,8 @@ impl System {
         self.follow(pending);
     }
 
-    /// Gives each lag the force [N] with which its tool or its nodes push at the state last evaluated; these forces.
+    /// Gives each lag the force [N] with which its tool or its nodes push at the state last evaluated; these
+    /// forces.
     fn bear_on(&mut self) -> Vec<Vector3<f64>> {
         let mut forces = self.contact.as_mut().map(|own| own.bear_on()).unwrap_or_default();
         for lag in self.lags.iter_mut().filter(|lag| !encloses(&self.model, lag)) {
@@ -252,7 +259,8 @@ fn encloses(model: &Assembly, lag: &Lag) -> bool {
 mod tests {
     use super::*;
 
-    /// A step that begins at the limit, and whose volume then takes too much: the numbers of both come one after the other.
+    /// A step that begins at the limit, and whose volume then takes too much: the numbers of both come one
+    /// after the other.
     #[test]
     fn a_valve_tells_what_it_found_and_no_more() {
         let mut model = Assembly::new("ball", [Vector3::zeros()]);

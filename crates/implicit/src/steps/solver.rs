@@ -30,7 +30,8 @@ impl Attempted {
     }
 }
 
-/// A solver of the equations of a model: [`Statics`](crate::Statics) or [`BackwardEuler`](crate::BackwardEuler).
+/// A solver of the equations of a model: [`Statics`](crate::Statics) or
+/// [`BackwardEuler`](crate::BackwardEuler).
 pub trait AssemblySolver {
     /// The equations.
     fn system(&self) -> &System;
@@ -59,8 +60,8 @@ pub trait AssemblySolver {
         self.system_mut().contact.as_deref_mut()
     }
 
-    /// Takes a pattern of the equations with [`pairs`](ContactSystem::pairs) of nodes that contacts added where another solver stood: so this
-    /// one goes on with the same bits.
+    /// Takes a pattern of the equations with [`pairs`](ContactSystem::pairs) of nodes that contacts added
+    /// where another solver stood: so this one goes on with the same bits.
     ///
     /// # Errors
     /// If the equations are too many for the solver chosen.
@@ -68,13 +69,14 @@ pub trait AssemblySolver {
         self.system_mut().take_pairs(pairs)
     }
 
-    /// Values of the older matrix whose factors precondition the next one, if there is one: without them another solver takes other
-    /// iterations.
+    /// Values of the older matrix whose factors precondition the next one, if there is one: without them
+    /// another solver takes other iterations.
     fn factored(&self) -> Option<&[f64]> {
         self.system().stiffness.factored()
     }
 
-    /// Takes the [factors](Self::factored) of another solver with the same [pairs](Self::take_contact_pairs): to continue with the same bits.
+    /// Takes the [factors](Self::factored) of another solver with the same [pairs](Self::take_contact_pairs):
+    /// to continue with the same bits.
     fn precondition_with(&mut self, values: Vec<f64>) {
         self.system_mut().stiffness.precondition_with(values);
     }
@@ -84,8 +86,8 @@ pub trait AssemblySolver {
         self.system_mut().stop = flag.clone();
     }
 
-    /// How far moved nodes whose force is limited are behind their motion, and volumes [m³] whose pressure is limited behind theirs, along
-    /// the first axis, by their constraints.
+    /// How far moved nodes whose force is limited are behind their motion, and volumes [m³] whose pressure is
+    /// limited behind theirs, along the first axis, by their constraints.
     fn lags(&self) -> &[Lag] {
         &self.system().lags
     }

@@ -106,8 +106,8 @@ impl System {
         Ok(())
     }
 
-    /// Solves with the matrix prepared; conjugate gradients start from a multiple of the solution given, and leave what they reached there if
-    /// iterations run out.
+    /// Solves with the matrix prepared; conjugate gradients start from a multiple of the solution given, and
+    /// leave what they reached there if iterations run out.
     pub(crate) fn solve_from(&mut self, right: &[f64], solution: &mut [f64]) -> Result<(), SolveError> {
         let result = self.stiffness.solve(&mut self.phases, right, solution);
         self.conditions.correct(solution, true);
@@ -115,7 +115,8 @@ impl System {
     }
 }
 
-/// Bytes that the factors of a model's equations take, without what contacts couple: found by the order of elimination, without numbers.
+/// Bytes that the factors of a model's equations take, without what contacts couple: found by the order of
+/// elimination, without numbers.
 ///
 /// # Errors
 /// If there are more equations than can be numbered, or the order has no room.

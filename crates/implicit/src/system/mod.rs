@@ -1,5 +1,5 @@
-//! Forces and stiffness of a model at a state: cells side by side, then added up in their order, so that the number of
-//! threads changes no bit.
+//! Forces and stiffness of a model at a state: cells side by side, then added up in their order, so that the
+//! number of threads changes no bit.
 
 mod blocked;
 pub(crate) mod conditions;
@@ -103,8 +103,8 @@ pub struct System {
     /// Nodes that follow others; in a system of forces alone those of ties.
     followers: Option<Followers>,
     pub(crate) conditions: Conditions,
-    /// How far moved nodes whose force is limited are behind their motion, and volumes [m³] whose pressure is limited behind theirs, along the first axis, by
-    /// their constraints; a system of forces alone has none.
+    /// How far moved nodes whose force is limited are behind their motion, and volumes [m³] whose pressure is
+    /// limited behind theirs, along the first axis, by their constraints; a system of forces alone has none.
     pub(crate) lags: Vec<Lag>,
     /// Contacts; a system of forces alone has none.
     pub(crate) contact: Option<Box<ContactSystem>>,
@@ -192,8 +192,8 @@ impl System {
         }
     }
 
-    /// Takes hold of nodes: these springs and no others act from the next evaluation on, beside those of the model. Their forces are
-    /// loads.
+    /// Takes hold of nodes: these springs and no others act from the next evaluation on, beside those of the
+    /// model. Their forces are loads.
     pub(crate) fn grip(&mut self, springs: &[Spring]) {
         self.forces.grip(springs);
     }
@@ -244,7 +244,8 @@ impl System {
         }
     }
 
-    /// Forces at a state and time; with a tangent also the stiffness, and what prescribed increments (six a node) make of it.
+    /// Forces at a state and time; with a tangent also the stiffness, and what prescribed increments (six a
+    /// node) make of it.
     pub(crate) fn evaluate(
         &mut self,
         state: &State,
@@ -351,7 +352,8 @@ impl System {
         spent
     }
 
-    /// Whether a matrix that is indefinite may be so for the change of pressures on the curved surface: it is left out from now on.
+    /// Whether a matrix that is indefinite may be so for the change of pressures on the curved surface: it is
+    /// left out from now on.
     pub(crate) fn gives_way(&mut self, error: &SolveError) -> bool {
         let facets = &mut self.facets;
         let indefinite = matches!(error, SolveError::Indefinite { .. });
@@ -378,7 +380,8 @@ impl System {
         self.follow(increments);
     }
 
-    /// Brings prescribed components that are off their curves back to them between the time of a state and another one [s].
+    /// Brings prescribed components that are off their curves back to them between the time of a state and
+    /// another one [s].
     pub(crate) fn catch_up(&mut self, state: &State, until: f64) {
         let lag = |number: usize| {
             let own = self.lags.iter().find(|lag| lag.number() == number);
@@ -403,8 +406,9 @@ impl System {
         }
     }
 
-    /// Adds to the stiffness what masses of rigid parts and of nodes that turn with a solid resist with: the rate [kg/s²] of each node and its
-    /// force [N], the rate [N m] of its rotary inertia and its moment [N m].
+    /// Adds to the stiffness what masses of rigid parts and of nodes that turn with a solid resist with: the
+    /// rate [kg/s²] of each node and its force [N], the rate [N m] of its rotary inertia and its moment
+    /// [N m].
     pub(crate) fn add_bound_masses(
         &mut self,
         of: impl Fn(u32) -> (f64, Vector3<f64>),
@@ -418,7 +422,8 @@ impl System {
         }
     }
 
-    /// Takes forces [N] and moments [N m] of inertia on nodes of rigid parts, and moments on nodes that turn with a solid, from a residual.
+    /// Takes forces [N] and moments [N m] of inertia on nodes of rigid parts, and moments on nodes that turn
+    /// with a solid, from a residual.
     pub(crate) fn give_inertia_back(
         &self,
         force: impl Fn(u32) -> Vector3<f64>,

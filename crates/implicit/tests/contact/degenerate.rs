@@ -1,5 +1,6 @@
-//! Bodies that meet at corners and edges by barriers (S1, S2): primitive scenes of rigid-body libraries, and the degenerate ones of Erleben
-//! (2018), all of them soft, or rigid what is held. They end in bounds, and no state has an edge in a triangle.
+//! Bodies that meet at corners and edges by barriers (S1, S2): primitive scenes of rigid-body libraries, and
+//! the degenerate ones of Erleben (2018), all of them soft, or rigid what is held. They end in bounds, and no
+//! state has an edge in a triangle.
 
 use nalgebra::Vector3;
 use pliant_contact::barrier::BarrierSettings;

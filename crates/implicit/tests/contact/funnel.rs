@@ -21,7 +21,8 @@ const YOUNG: f64 = 2e4;
 /// Radius [m] of the tube.
 const BORE: f64 = 0.008;
 
-/// The ball is longer than it was by a tenth while it is in the tube, comes out, and has its shape back to 2 %.
+/// The ball is longer than it was by a tenth while it is in the tube, comes out, and has its shape back to 2
+/// %.
 #[test]
 fn a_ball_goes_through_a_narrow_tube_and_is_round_again() {
     let (points, hexes) = ball_of_hexes(RADIUS, 2, 1);

@@ -1,4 +1,5 @@
-//! Shells and solids in contact by a barrier, held to closed forms; every state that is accepted is searched for crossings.
+//! Shells and solids in contact by a barrier, held to closed forms; every state that is accepted is searched
+//! for crossings.
 
 mod arch;
 mod blocks;

@@ -50,7 +50,8 @@ fn prescribe(model: &mut Assembly, name: &str, nodes: Vec<u32>, components: [boo
     model.model_mut().constraints.push(constraint);
 }
 
-/// Force [E I/R² times the width] and approach [R] of the mid-surface between two plates that come nearer in load steps.
+/// Force [E I/R² times the width] and approach [R] of the mid-surface between two plates that come nearer in
+/// load steps.
 fn pressed(edges: u32, thickness: f64, approach: f64, steps: u32) -> Vec<[f64; 2]> {
     let (mut model, own, width) = ring(edges, thickness);
     // Plane strain; the nodes at the sides stay at their height.
@@ -113,7 +114,8 @@ fn reference(approach: f64) -> f64 {
     (0..4).map(|i| own[i][1] * weight(i)).sum()
 }
 
-/// A ring of t/R = 1/100 between two plates, up to where it has a flat part: its force at the approach of its middle surface.
+/// A ring of t/R = 1/100 between two plates, up to where it has a flat part: its force at the approach of its
+/// middle surface.
 #[test]
 fn a_ring_between_plates_is_an_elastica() {
     for (edges, tolerance) in [(48, 0.03), (96, 0.01), (192, 0.01)] {
@@ -136,7 +138,8 @@ fn a_ring_between_plates_is_an_elastica() {
 
 /// What a ring that was dropped does, energies over that of its fall.
 struct Rebound {
-    /// The largest growth of energy in a step, and its change from the start until the ring has left the floor.
+    /// The largest growth of energy in a step, and its change from the start until the ring has left the
+    /// floor.
     grown: f64,
     drift: f64,
     /// Steps in contact.
@@ -179,7 +182,8 @@ fn dropped(integrator: Integrator, step: f64) -> Rebound {
     let mut last = first;
     let (mut iterations, mut steps) = (0, 0);
     let mut rebound = Rebound { grown: 0.0, drift: 0.0, touched: 0, speed: 0.0 };
-    // Until it is a millimetre above the floor on its way up: it trembles, and leaves the floor for some steps before.
+    // Until it is a millimetre above the floor on its way up: it trembles, and leaves the floor for some
+    // steps before.
     let flies_up = |state: &State| {
         let lowest = state.position.iter().map(|x| x.z).fold(f64::INFINITY, f64::min);
         lowest + RADIUS + 3e-3 > 1e-3 && mean(&model, &state.velocity).z > 0.0
@@ -206,9 +210,10 @@ fn dropped(integrator: Integrator, step: f64) -> Rebound {
     rebound
 }
 
-/// A6: energy of the body and the barrier never grows by backward Euler, and the ring flies back more slowly than it came. Differences of two
-/// steps lose less of it and fly back faster, in longer and in shorter steps; what they lose is what goes into vibrations that steps do not
-/// resolve (21 and 16 % of the energy of the fall).
+/// A6: energy of the body and the barrier never grows by backward Euler, and the ring flies back more slowly
+/// than it came. Differences of two steps lose less of it and fly back faster, in longer and in shorter
+/// steps; what they lose is what goes into vibrations that steps do not resolve (21 and 16 % of the energy of
+/// the fall).
 #[test]
 fn a_dropped_ring_gains_no_energy_and_rebounds_higher_by_differences_of_two_steps() {
     for step in [1e-3, 2.5e-4] {
@@ -221,7 +226,8 @@ fn a_dropped_ring_gains_no_energy_and_rebounds_higher_by_differences_of_two_step
     }
 }
 
-/// What is lost goes into vibrations that steps do not resolve, so it falls with the step, below the 10 % of A6 in the end.
+/// What is lost goes into vibrations that steps do not resolve, so it falls with the step, below the 10 % of
+/// A6 in the end.
 #[test]
 #[ignore = "half a minute"]
 fn what_a_rebound_loses_falls_with_the_step() {

@@ -1,5 +1,5 @@
-//! The model: everything constant, built once and shared between threads. Arrays are in the order of the nodes, all
-//! bodies one after another.
+//! The model: everything constant, built once and shared between threads. Arrays are in the order of the
+//! nodes, all bodies one after another.
 
 mod cells;
 mod constraint;
@@ -47,7 +47,8 @@ pub struct Model {
     pub initial_velocity: Vec<Vector<f64>>,
 }
 
-/// Mass that is added to nodes for a larger critical time step; `pliant-explicit` finds it (`mass_scaling.rs`).
+/// Mass that is added to nodes for a larger critical time step; `pliant-explicit` finds it
+/// (`mass_scaling.rs`).
 #[derive(Clone, Debug, PartialEq)]
 pub struct MassScaling {
     /// The critical time step of the assembled model without it [s].
@@ -75,7 +76,8 @@ pub struct Body {
     pub name: String,
     /// The nodes of its own.
     pub nodes: Range<u32>,
-    /// The nodes of other bodies that its cells use, numbered in the model: those of a wall on the boundary of a solid.
+    /// The nodes of other bodies that its cells use, numbered in the model: those of a wall on the boundary
+    /// of a solid.
     pub shared: Vec<u32>,
     /// Mass-proportional damping α [1/s].
     pub damping: f64,
@@ -140,7 +142,8 @@ impl Solid {
         &self.fibre[cell * families..(cell + 1) * families]
     }
 
-    /// The directions of the families of fibres in a cell as its law sees them: those at rest, in a membrane within the frame of the triangle.
+    /// The directions of the families of fibres in a cell as its law sees them: those at rest, in a membrane
+    /// within the frame of the triangle.
     pub fn law_fibres(&self, cell: usize) -> Cow<'_, [Vector<f64>]> {
         let Cells::Membrane(_, sheets) = &self.cells else { return Cow::Borrowed(self.fibres(cell)) };
         let sheet = &sheets[cell];
@@ -152,7 +155,8 @@ impl Solid {
         Cow::Owned(self.fibres(cell).iter().map(in_plane).collect())
     }
 
-    /// An upper bound of ρc² [Pa] at rest: of a membrane that of plane stress, of a bar that of uniaxial stress.
+    /// An upper bound of ρc² [Pa] at rest: of a membrane that of plane stress, of a bar that of uniaxial
+    /// stress.
     pub fn longitudinal_modulus(&self) -> f64 {
         match &self.cells {
             Cells::Membrane(..) => self.material.law.plane_modulus(),
@@ -161,7 +165,8 @@ impl Solid {
         }
     }
 
-    /// The shear modulus at rest [Pa] over which that of a state is the factor on the hourglass stiffness; `None` where that stiffness stays.
+    /// The shear modulus at rest [Pa] over which that of a state is the factor on the hourglass stiffness;
+    /// `None` where that stiffness stays.
     pub fn hourglass_growth(&self) -> Option<f64> {
         let Cells::Hex8(CellBlock { hourglass: Some(control), .. }) = &self.cells else { return None };
         let law = &self.material.law;
@@ -239,7 +244,8 @@ const COMPONENTS: [&str; 6] =
 pub const FREE: u32 = u32::MAX;
 
 impl Model {
-    /// Adds a body of nodes at rest [m], without mass or damping; its number. Solids give it cells and mass, constraints hold it.
+    /// Adds a body of nodes at rest [m], without mass or damping; its number. Solids give it cells and mass,
+    /// constraints hold it.
     ///
     /// ```
     /// use pliant_mechanics::Model;
@@ -265,8 +271,8 @@ impl Model {
         self.bodies.len() - 1
     }
 
-    /// Adds a body on nodes that other bodies have, such as a wall on the boundary of a solid; its number. The nodes stay those of their
-    /// bodies: damping, gravity and velocity at the start are theirs.
+    /// Adds a body on nodes that other bodies have, such as a wall on the boundary of a solid; its number.
+    /// The nodes stay those of their bodies: damping, gravity and velocity at the start are theirs.
     pub fn add_body_on(&mut self, name: &str, shared: Vec<u32>) -> usize {
         let body = self.add_body(name, &[]);
         self.bodies[body].shared = shared;
@@ -284,8 +290,8 @@ impl Model {
         self.constraints.len() - 1
     }
 
-    /// Adds ρV/N of every cell of a solid to its nodes. The cells are brought into an order that is good for the caches;
-    /// [`Solid::original`] goes along.
+    /// Adds ρV/N of every cell of a solid to its nodes. The cells are brought into an order that is good for
+    /// the caches; [`Solid::original`] goes along.
     ///
     /// # Panics
     /// If not every cell has a direction for each of the law's families of fibres.
@@ -333,7 +339,8 @@ impl Model {
         (body, node - self.bodies[body].nodes.start)
     }
 
-    /// The forces [N] of loads on each node at a time [s] and displacements [m], without weights and without what only shells take.
+    /// The forces [N] of loads on each node at a time [s] and displacements [m], without weights and without
+    /// what only shells take.
     pub fn load_forces(&self, time: f64, displacement: &[Vector<f64>]) -> Vec<Vector<f64>> {
         let state = Displaced { rest: &self.rest, displacement, velocity: &[] };
         let mut forces = vec![[0.0; 3]; self.node_count()];
@@ -358,8 +365,8 @@ impl Model {
         weights
     }
 
-    /// The constraint on each component of each node, [`FREE`] where there is none. Two constraints may prescribe the
-    /// same motion of a component (the first keeps the reaction).
+    /// The constraint on each component of each node, [`FREE`] where there is none. Two constraints may
+    /// prescribe the same motion of a component (the first keeps the reaction).
     ///
     /// # Errors
     /// If two constraints prescribe different motions for one component of a node.
@@ -407,7 +414,8 @@ impl Model {
         self.constraints.iter().find(|constraint| constraint.motion.is_collective())
     }
 
-    /// The constraint that binds each node to others, [`FREE`] where there is none: one at most, and no other holds the node.
+    /// The constraint that binds each node to others, [`FREE`] where there is none: one at most, and no other
+    /// holds the node.
     fn check_collective(&self, owners: &[[u32; 3]]) -> Result<Vec<u32>, Contradiction> {
         let mut bound = vec![FREE; self.node_count()];
         for (index, constraint) in self.constraints.iter().enumerate() {
@@ -454,7 +462,8 @@ impl Model {
         Contradiction { first, second, body: self.bodies[body].name.clone(), node, component }
     }
 
-    /// The amplitudes of the motion of each component that has an owner (see [`Motion::amplitudes`]); 0 for the others.
+    /// The amplitudes of the motion of each component that has an owner (see [`Motion::amplitudes`]); 0 for
+    /// the others.
     pub fn amplitudes(&self, owners: &[[u32; 3]]) -> Vec<Amplitudes> {
         let mut amplitudes = vec![Amplitudes::default(); self.node_count()];
         for (index, constraint) in self.constraints.iter().enumerate() {
@@ -475,7 +484,8 @@ mod tests {
     use super::*;
     use crate::curve::{Curve, Shape};
 
-    /// Two constraints of one node: what holds it does not turn it, and turning it twice in the same way is no contradiction.
+    /// Two constraints of one node: what holds it does not turn it, and turning it twice in the same way is
+    /// no contradiction.
     #[test]
     fn nodes_are_turned_in_one_way_only() {
         let ramp = |to| Curve { shape: Shape::Ramp, from: 0.0, to };

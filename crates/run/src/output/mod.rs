@@ -112,7 +112,8 @@ impl<'a> Recovered<'a> {
         self.now.at(solid, cell, step)
     }
 
-    /// Some of all cells of a solid. Those that nobody has asked for before take one pass over the cells together.
+    /// Some of all cells of a solid. Those that nobody has asked for before take one pass over the cells
+    /// together.
     fn of(&self, solid: usize, wanted: &[FieldName]) -> Vec<CellNumbers> {
         let mut known = self.solids[solid].borrow_mut();
         let mut missing: Vec<FieldName> = Vec::new();

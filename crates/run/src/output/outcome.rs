@@ -131,7 +131,8 @@ impl PartOutcome {
     }
 }
 
-/// Tools, and constraints that move nodes or fill volumes, that were held back by the limits of their forces and pressures.
+/// Tools, and constraints that move nodes or fill volumes, that were held back by the limits of their forces
+/// and pressures.
 fn held_back(part: &Part, now: &dyn Instant) -> Vec<HeldBack> {
     let of = |name: &str, is_volume: bool, lag: &Lag| {
         let (lag, time) = lag.longest();
@@ -238,7 +239,8 @@ pub(crate) struct Watched {
     pub solids: SolidStrains,
 }
 
-/// Edges of bodies that go through triangles of others, in the states that outputs have written and in the last one.
+/// Edges of bodies that go through triangles of others, in the states that outputs have written and in the
+/// last one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Intersections {
     /// All of them, counted in each state.
@@ -316,8 +318,9 @@ impl Watched {
     }
 }
 
-/// Hourglass energy over internal energy, if it is above a share; none while both together are below the energy from which on they mean
-/// something. A vibrating body has no internal energy at times, so a hundredth of the largest energy counts as internal at least.
+/// Hourglass energy over internal energy, if it is above a share; none while both together are below the
+/// energy from which on they mean something. A vibrating body has no internal energy at times, so a hundredth
+/// of the largest energy counts as internal at least.
 fn hourglass_share(part: &Part, participant: &dyn Instant, above: f64) -> Option<f64> {
     let Energies { internal, hourglass, .. } = participant.energies();
     let share = hourglass / internal.max(0.01 * participant.largest_energy()).max(f64::MIN_POSITIVE);

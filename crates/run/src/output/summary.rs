@@ -31,9 +31,11 @@ pub struct Summary {
     pub elements: usize,
     /// Mass of the materials [kg].
     pub mass: f64,
-    /// Time [s] from one common instant of all participants to the next: the time step, where all bodies go together.
+    /// Time [s] from one common instant of all participants to the next: the time step, where all bodies go
+    /// together.
     pub step: f64,
-    /// Smallest element bound of the critical step [s]; `null` of shells and with `implicit` and `static`, as the two below.
+    /// Smallest element bound of the critical step [s]; `null` of shells and with `implicit` and `static`, as
+    /// the two below.
     pub element_bound: Option<f64>,
     /// The critical time step of the assembled model [s].
     pub critical_step: Option<f64>,
@@ -53,7 +55,8 @@ pub struct Summary {
     pub ended: Option<String>,
     /// The largest strain of each shell, over up to 1000 sampled instants.
     pub shell_strains: Vec<StrainSummary>,
-    /// Intersections of explicit bodies in the written states; `null` where none were searched for with `check-intersections`.
+    /// Intersections of explicit bodies in the written states; `null` where none were searched for with
+    /// `check-intersections`.
     pub intersections: Option<Intersections>,
     /// The largest change of volume of each nearly incompressible body and of each body with fibres.
     pub volume_changes: Vec<VolumeChange>,
@@ -71,7 +74,8 @@ pub struct Summary {
     pub stability: Option<StabilitySummary>,
     /// What mass scaling adds; `null` without it.
     pub added_mass: Option<AddedMass>,
-    /// Imbalance of the energies at the end, as a fraction of the largest; `null` of shells and with `implicit` and `static`.
+    /// Imbalance of the energies at the end, as a fraction of the largest; `null` of shells and with
+    /// `implicit` and `static`.
     pub energy_balance: Option<f64>,
     /// Force [N] of each constraint at the end, by name.
     #[serde(serialize_with = "as_map")]

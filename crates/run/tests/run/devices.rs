@@ -1,5 +1,5 @@
-//! Scenes on a GPU: the same result as on the CPU, rejections and messages. Without an adapter, the tests that need one are skipped with
-//! a notice; with `PLIANT_REQUIRE_GPU=1` they fail.
+//! Scenes on a GPU: the same result as on the CPU, rejections and messages. Without an adapter, the tests
+//! that need one are skipped with a notice; with `PLIANT_REQUIRE_GPU=1` they fail.
 
 use pliant_mechanics::grip::Grip;
 use pliant_sim::gpu::adapters;
@@ -109,9 +109,10 @@ fn a_scene_of_every_kind_of_part_runs_on_a_device_as_on_the_processor() {
     assert!(gpu.read("out/case/summary.md").contains(json["device"].as_str().unwrap()));
 }
 
-/// The start of a scene in which two organs lie on a table, on each other and on themselves, and a grasper moves in, all with friction. Impulses are
-/// found to a thousandth of the deepest gap, in at most so many passes, and faces at the jaws come in another order: the impulses between the organs at
-/// an instant depend on the last digits, soon also in single and double precision on the processor. Places and energies do not.
+/// The start of a scene in which two organs lie on a table, on each other and on themselves, and a grasper
+/// moves in, all with friction. Impulses are found to a thousandth of the deepest gap, in at most so many
+/// passes, and faces at the jaws come in another order: the impulses between the organs at an instant depend
+/// on the last digits, soon also in single and double precision on the processor. Places and energies do not.
 #[test]
 fn organs_and_a_grasper_touch_on_a_device_as_on_the_processor() {
     if !pliant_testing::has_gpu(adapters().len()) {
@@ -202,7 +203,8 @@ fn equations_of_shells_are_solved_on_a_device_as_on_the_processor() {
     assert!(apart < 1e-5, "displacements are {apart} apart");
 }
 
-/// Residuals in double precision end near 1e-15: the rest of the way to 1e-17 is the CPU's, whose residual is carried on from step to step.
+/// Residuals in double precision end near 1e-15: the rest of the way to 1e-17 is the CPU's, whose residual is
+/// carried on from step to step.
 #[test]
 fn solutions_that_a_device_leaves_to_the_processor_are_counted() {
     if !pliant_testing::has_gpu(adapters().len()) {
@@ -266,7 +268,8 @@ fn explicit_tube(run: &str) -> String {
     changed(&text, "[load.push]", &format!("{moved}[load.push]")) + history
 }
 
-/// 2500 steps. Displacements to 1e-5, the round-off of single precision; reactions and energies of each instant to 1e-4 of the largest.
+/// 2500 steps. Displacements to 1e-5, the round-off of single precision; reactions and energies of each
+/// instant to 1e-4 of the largest.
 #[test]
 fn explicit_shells_run_on_a_device_as_on_the_processor() {
     if !pliant_testing::has_gpu(adapters().len()) {
@@ -312,7 +315,8 @@ fn explicit_shells_that_only_the_processor_has_are_refused_by_name() {
     assert!(output.words().contains("a spring on explicit shells runs on the CPU only"), "{}", output.err);
 }
 
-/// A hand and a force from outside move them as on the processor, and again from a snapshot: 1e-5 of the largest displacement and of the work.
+/// A hand and a force from outside move them as on the processor, and again from a snapshot: 1e-5 of the
+/// largest displacement and of the work.
 #[test]
 fn hands_and_forces_move_explicit_shells_on_a_device() {
     if !pliant_testing::has_gpu(adapters().len()) {

@@ -1,4 +1,5 @@
-//! Scenes of segmented images: labels by number and by name, the cache of meshes, walls and hexes, and mistakes.
+//! Scenes of segmented images: labels by number and by name, the cache of meshes, walls and hexes, and
+//! mistakes.
 
 use std::fs;
 
@@ -50,7 +51,8 @@ fn vessels_belong_to_the_organ_where_they_run_inside_of_it() {
     assert!(words.contains("0.00 ml of the vessels run inside of the organ"), "{words}");
 }
 
-/// The keys `inner-edge` and `distance` of a scene: larger cells inside, and smaller ones where the surface asks for them.
+/// The keys `inner-edge` and `distance` of a scene: larger cells inside, and smaller ones where the surface
+/// asks for them.
 #[test]
 fn a_scene_asks_for_larger_cells_inside_and_for_a_distance() {
     let elements = |edge: &str, more: &str| {

@@ -138,7 +138,8 @@ fn every_selection_finds_its_nodes_in_a_scene() {
 
 #[test]
 fn built_in_shapes_fill_their_volume_with_tets_and_hexes() {
-    // The volume [m³] and how far a coarse mesh may be off: voxels and flat facets miss part of a curved surface.
+    // The volume [m³] and how far a coarse mesh may be off: voxels and flat facets miss part of a curved
+    // surface.
     let pi = std::f64::consts::PI;
     for (shape, volume, of_tets, of_hexes) in [
         ("block = { size = [0.1, 0.06, 0.04] }, edge = 0.02", 2.4e-4, 1e-12, 1e-12),
@@ -228,7 +229,8 @@ fn scale_and_at_bring_a_mesh_to_metres_and_in_place() {
     assert_close(high.x, 0.6, 1e-12, "right end [m]");
 }
 
-/// How much a hollow ball of 30 mm, with a wall of 3 mm, gives way to a pressure inside, in tets of an edge [m]: its energy [J].
+/// How much a hollow ball of 30 mm, with a wall of 3 mm, gives way to a pressure inside, in tets of an edge
+/// [m]: its energy [J].
 fn inflated(workshop: &Workshop, edge: f64) -> f64 {
     let held = |name: &str, at: [f64; 3], components: &str| {
         format!(

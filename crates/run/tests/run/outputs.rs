@@ -180,7 +180,8 @@ fn a_carried_surface_is_written_and_follows_its_body() {
     assert_close(lift(&skin), lift(&body), 1e-9, "lift of the corner [m]");
 }
 
-/// Points of a surface that stand out of its body extrapolate its motion, but not its stress, which became negative there.
+/// Points of a surface that stand out of its body extrapolate its motion, but not its stress, which became
+/// negative there.
 #[test]
 fn stresses_on_a_surface_around_a_body_keep_between_those_of_the_body() {
     let load =
@@ -348,7 +349,8 @@ density = 1000
     assert!(parts.iter().all(|part| *part > 0.003), "{parts:?}");
 }
 
-/// A beam held at one end by a couple that its moved end makes: the moments balance, and the nodal reactions sum up to the reaction.
+/// A beam held at one end by a couple that its moved end makes: the moments balance, and the nodal reactions
+/// sum up to the reaction.
 #[test]
 fn moments_of_reactions_balance_and_a_rotation_twists() {
     let rotate = "rotate = { axis = [0, 0, 2], centre = [0.05, 0.05, 0], angle = 0.3 }";
@@ -423,7 +425,8 @@ fn the_shipped_scenes_leave_no_doubts() {
     for folder in entries.filter(|entry| entry.path().is_dir()) {
         let name = folder.file_name().into_string().unwrap();
         let output = Workshop::shipped(&name).check(&[]);
-        // An intra-ocular lens of 0.3 mm with so few nodes is at the limit of a thin wall, and the scene says so.
+        // An intra-ocular lens of 0.3 mm with so few nodes is at the limit of a thin wall, and the scene says
+        // so.
         if name == "lens" {
             assert!(
                 output.err.contains("of `lens` are thicker than their smallest altitude"),

@@ -1,4 +1,5 @@
-//! Interrupted and resumed runs: the same bits and files as an uninterrupted run, and clear messages for checkpoints that do not fit.
+//! Interrupted and resumed runs: the same bits and files as an uninterrupted run, and clear messages for
+//! checkpoints that do not fit.
 
 use std::fs;
 
@@ -10,8 +11,8 @@ fn on_threads(count: &str) -> String {
     format!("run.threads={count}")
 }
 
-/// Runs a scene completely into `out/whole`, and in two parts into `out/parts`. Files and final state are the same,
-/// bit for bit.
+/// Runs a scene completely into `out/whole`, and in two parts into `out/parts`. Files and final state are the
+/// same, bit for bit.
 #[track_caller]
 fn assert_resumes(scene: &str, threads: [&str; 3], what: &str) {
     let workshop = Workshop::new(scene);
@@ -305,8 +306,9 @@ fn a_failing_resumed_run_loses_nothing() {
     assert_eq!(before.len(), after.len());
 }
 
-/// The list of a series that ends within an entry, or that has lost its end to an entry that was not finished, is whole after the next frame.
-/// One that ends before the frames of the checkpoint, or is broken elsewhere, is refused.
+/// The list of a series that ends within an entry, or that has lost its end to an entry that was not
+/// finished, is whole after the next frame. One that ends before the frames of the checkpoint, or is broken
+/// elsewhere, is refused.
 #[test]
 fn a_list_of_frames_that_is_torn_is_made_whole() {
     let workshop = Workshop::new(&resumable("hex8", "", true));

@@ -114,7 +114,8 @@ fn a_run_on_a_gpu_goes_back_too() {
     assert!((last / other - 1.0).abs() < 1e-3, "{last} {other}");
 }
 
-/// A block that lies on a floor. Going back to the start with half the step leaves the floor's force, since the weight on it is the same.
+/// A block that lies on a floor. Going back to the start with half the step leaves the floor's force, since
+/// the weight on it is the same.
 #[test]
 fn contact_forces_at_the_start_do_not_depend_on_the_step() {
     let fixed = "[constraint.low]\ntype = \"fix\"\nbody = \"b\"\nnodes = { set = \"z-min\" }";

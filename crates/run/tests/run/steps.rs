@@ -1,4 +1,5 @@
-//! Steps of a run: how they are cut and told, load steps, elements and laws in a run, and the errors that end one.
+//! Steps of a run: how they are cut and told, load steps, elements and laws in a run, and the errors that end
+//! one.
 
 use std::fs;
 
@@ -437,8 +438,8 @@ fn a_body_whose_nodes_are_all_prescribed_has_no_limit_and_a_page_without_inf() {
     }
 }
 
-/// A slender beam under a load bends by small forces: a tolerance that leaves much of the way to go is told with an estimate that the true
-/// error bears out.
+/// A slender beam under a load bends by small forces: a tolerance that leaves much of the way to go is told
+/// with an estimate that the true error bears out.
 #[test]
 fn equilibria_that_are_not_reached_are_warned_about_with_their_error() {
     let run = |tolerance: &str| {
@@ -471,8 +472,8 @@ fn equilibria_that_are_not_reached_are_warned_about_with_their_error() {
     }
 }
 
-/// Two bars that lean on each other under a growing force snap through. What they store falls short of the work of the force by what
-/// a snap sets free; led by a displacement they go down without one.
+/// Two bars that lean on each other under a growing force snap through. What they store falls short of the
+/// work of the force by what a snap sets free; led by a displacement they go down without one.
 #[test]
 fn a_snap_between_equilibria_is_told_by_the_energy_that_is_missing() {
     let truss = |load: &str| {
@@ -502,7 +503,8 @@ fn a_snap_between_equilibria_is_told_by_the_energy_that_is_missing() {
     assert!(!led["warnings"].to_string().contains("missing"), "{led}");
 }
 
-/// The first row of a motion held from the start is the stress of the instantaneous law; what relaxes is gone at the end.
+/// The first row of a motion held from the start is the stress of the instantaneous law; what relaxes is gone
+/// at the end.
 #[test]
 fn the_first_row_of_a_jump_is_that_of_the_instantaneous_law() {
     let force = |prony: &str| {

@@ -1,6 +1,6 @@
-//! Random bodies under sudden loads, and bodies that fall onto each other with friction, at the automatic step: neither parametric resonance nor
-//! contact must end their runs.
-//! All 500: `cargo test --release -p pliant-run --test run sudden:: -- --ignored --nocapture`.
+//! Random bodies under sudden loads, and bodies that fall onto each other with friction, at the automatic
+//! step: neither parametric resonance nor contact must end their runs. All 500: `cargo test --release -p
+//! pliant-run --test run sudden:: -- --ignored --nocapture`.
 
 use std::f64::consts::FRAC_PI_4;
 use std::num::NonZero;
@@ -21,8 +21,10 @@ use serde_json::Value;
 /// Steps of each run.
 const STEPS: f64 = 1e5;
 
-/// A body of 0.5 to 20 cm, a block or an ellipsoid of some tens to a thousand cells, fixed at one end. From the start a traction acts on the other
-/// end: it pulls with 2 to 20 % of Young's modulus or pushes with 2 to 5 %. Coarse `hex8` that bend have more energy in hourglass modes than a run may end with; stability is another question.
+/// A body of 0.5 to 20 cm, a block or an ellipsoid of some tens to a thousand cells, fixed at one end. From
+/// the start a traction acts on the other end: it pulls with 2 to 20 % of Young's modulus or pushes with 2 to
+/// 5 %. Coarse `hex8` that bend have more energy in hourglass modes than a run may end with; stability is
+/// another question.
 fn suddenly_loaded(seed: u64) -> String {
     let mut random = Random::new(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x1234_5678);
     // Seeds that lie close have close first numbers.
@@ -118,8 +120,8 @@ fn run(seed: u64) -> (End, u64) {
     (end, halvings)
 }
 
-/// Runs the bodies of some seeds, each on one thread. The step of none is too long; returns how many collapsed and how many went back to an
-/// earlier state.
+/// Runs the bodies of some seeds, each on one thread. The step of none is too long; returns how many
+/// collapsed and how many went back to an earlier state.
 #[track_caller]
 fn no_step_is_too_long(seeds: Range<u64>) -> (usize, usize) {
     let (next, runs) = (AtomicU64::new(seeds.start), Mutex::new(Vec::new()));
@@ -155,7 +157,8 @@ fn twenty_suddenly_loaded_bodies_run_a_hundred_thousand_steps() {
     assert!(collapsed == 0 && saved <= 1);
 }
 
-/// Body 486 collapses at 0.0223 s at steps of 200 to 4 µs: an ellipsoid of 4 `hex8` across. With `hex8-full` it runs.
+/// Body 486 collapses at 0.0223 s at steps of 200 to 4 µs: an ellipsoid of 4 `hex8` across. With `hex8-full`
+/// it runs.
 #[test]
 #[ignore = "10 to 20 s of a core each"]
 fn five_hundred_suddenly_loaded_bodies_run_a_hundred_thousand_steps() {
@@ -163,7 +166,8 @@ fn five_hundred_suddenly_loaded_bodies_run_a_hundred_thousand_steps() {
     assert!(collapsed <= 1 && saved <= 10);
 }
 
-/// The turns that let a falling block meet another one with a face, along an edge, or with a corner; faces and edges are parallel to those below.
+/// The turns that let a falling block meet another one with a face, along an edge, or with a corner; faces
+/// and edges are parallel to those below.
 fn turns() -> [Rotation3<f64>; 4] {
     let about = |axis: Vector3, angle: f64| Rotation3::from_axis_angle(&Unit::new_normalize(axis), angle);
     let on_corner =
@@ -171,7 +175,8 @@ fn turns() -> [Rotation3<f64>; 4] {
     [Rotation3::identity(), about(Vector3::z(), FRAC_PI_4), about(Vector3::x(), FRAC_PI_4), on_corner]
 }
 
-/// A block that falls onto a fixed one with friction, 0.1 mm above it at first: nodes meet nodes, edges or faces exactly, and edges lie on edges.
+/// A block that falls onto a fixed one with friction, 0.1 mm above it at first: nodes meet nodes, edges or
+/// faces exactly, and edges lie on edges.
 fn meeting(seed: u64, folder: &Path) -> String {
     let mut random = Random::new(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15));
     (0..8).for_each(|_| _ = random.number());

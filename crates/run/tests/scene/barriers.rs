@@ -1,10 +1,12 @@
-//! Contact with the solvers `implicit` and `static`: a barrier keeps surfaces apart, from the text of a scene to its outputs, and what is refused.
+//! Contact with the solvers `implicit` and `static`: a barrier keeps surfaces apart, from the text of a scene
+//! to its outputs, and what is refused.
 
 use pliant_scene::BuiltBody;
 use pliant_testing::PeakMemory;
 use pliant_testing::scenes::{last_row, resumes, run, world};
 
-/// A block of 40 × 40 × 20 mm of tissue a little above a floor, and a ball that is pressed into its top; `held` holds its underside.
+/// A block of 40 × 40 × 20 mm of tissue a little above a floor, and a ball that is pressed into its top;
+/// `held` holds its underside.
 pub(super) fn pressed(run: &str, more: &str) -> String {
     format!(
         "[scene]\nuntil = 1\n[run]\n{run}\n\
@@ -37,8 +39,8 @@ fn a_tiny_barrier_distance_takes_no_memory() {
     before.assert_rise_below(512 << 10);
 }
 
-/// What presses on top comes out below: at the floor by a barrier as well, in time, and at the constraint in equilibrium. The gap of the
-/// node under the ball is within the barrier.
+/// What presses on top comes out below: at the floor by a barrier as well, in time, and at the constraint in
+/// equilibrium. The gap of the node under the ball is within the barrier.
 #[test]
 fn a_tool_presses_a_body_onto_an_obstacle_by_barriers() {
     let reach = 1e-3 * (0.04_f64 * 0.04 + 0.04 * 0.04 + 0.02 * 0.02).sqrt();
@@ -61,8 +63,8 @@ fn a_tool_presses_a_body_onto_an_obstacle_by_barriers() {
     assert!((forces[1] / forces[2] - 1.0).abs() < 0.01, "{forces:?}");
 }
 
-/// Bodies of one segmentation overlap by what their meshes round off. They are pushed apart by the distance of the barrier, so that the run
-/// starts without forces between them, and goes on.
+/// Bodies of one segmentation overlap by what their meshes round off. They are pushed apart by the distance
+/// of the barrier, so that the run starts without forces between them, and goes on.
 #[test]
 fn bodies_that_overlap_are_pushed_apart_for_a_barrier() {
     let lid = "[body.lid]\nmesh = { block = { size = [0.03, 0.03, 0.01], cells = [4, 4, 2] }, as = 'hexes', at = [0.005, 0.005, 0.0195] }\n\
@@ -89,7 +91,8 @@ fn bodies_that_overlap_are_pushed_apart_for_a_barrier() {
     assert!(row["energy.internal"].is_finite(), "{row:?}");
 }
 
-/// Two bars of which a ridge of each goes through that of the other, with no node of either inside: no node has a way out, the ridges have.
+/// Two bars of which a ridge of each goes through that of the other, with no node of either inside: no node
+/// has a way out, the ridges have.
 fn crossed(more: &str) -> String {
     format!(
         "[scene]\nuntil = 0.02\n[run]\nsolver = 'implicit'\nstep = 0.01\n\
@@ -117,7 +120,8 @@ fn ridges_that_go_through_each_other_are_parted() {
     assert!(last_row(&crossed("separate = true"))["energy.internal"] > 0.0);
 }
 
-/// Shapes at rest get the gap: the run starts without stress, and neither body overlaps the other. Resumed runs find the same shapes.
+/// Shapes at rest get the gap: the run starts without stress, and neither body overlaps the other. Resumed
+/// runs find the same shapes.
 #[test]
 fn a_gap_parts_the_shapes_at_rest() {
     let text = crossed("gap = 2e-4");
@@ -168,7 +172,8 @@ fn a_run_in_contact_resumes_with_the_same_bits() {
     resumes(&cloth(""));
 }
 
-/// A sheet that hangs in a funnel of revolution bends to its wall, which carries its weight; iterations end by a speed.
+/// A sheet that hangs in a funnel of revolution bends to its wall, which carries its weight; iterations end
+/// by a speed.
 #[test]
 fn a_sheet_hangs_in_a_funnel() {
     let sheet = |more: &str| {
@@ -195,7 +200,8 @@ fn a_sheet_hangs_in_a_funnel() {
     assert!((ends[0] - ends[1]).abs() < 2e-4, "{ends:?}");
 }
 
-/// Steps whose iterations run out are taken as they are, with no edge in a triangle in any of them, and counted.
+/// Steps whose iterations run out are taken as they are, with no edge in a triangle in any of them, and
+/// counted.
 #[test]
 fn steps_that_do_not_converge_have_no_intersection_either() {
     let text = cloth("")
@@ -212,7 +218,8 @@ fn steps_that_do_not_converge_have_no_intersection_either() {
     assert!(message.contains("`accept-unconverged` is for `solver = \"implicit\"`"), "{message}");
 }
 
-/// The block with a coat of a model on its top, on the nodes of the block or on a mesh of its own that is tied, which the ball presses.
+/// The block with a coat of a model on its top, on the nodes of the block or on a mesh of its own that is
+/// tied, which the ball presses.
 fn coated(run: &str, model: &str, mesh: &str, more: &str) -> String {
     let (mesh, tie) = match mesh {
         "on" => ("on = 'block'\nfaces = { set = 'z-max' }".to_owned(), ""),
@@ -230,9 +237,10 @@ fn coated(run: &str, model: &str, mesh: &str, more: &str) -> String {
         .replace("on = 'block', at = [0.02, 0.02, 0.02]", "on = 'coat', at = [0.02, 0.02, 0.02]")
 }
 
-/// What presses a tied coat presses the block below: on the same triangles as on a coat with the nodes of the block, on other meshes in balance
-/// with what holds the block. Nodes touch, so the force depends on where they are: a mesh with a node under the ball, too, gives the same to
-/// 1 %; one without, whose first four nodes touch 3.6 mm beside, 28 % more, with a coat of no stiffness as well.
+/// What presses a tied coat presses the block below: on the same triangles as on a coat with the nodes of the
+/// block, on other meshes in balance with what holds the block. Nodes touch, so the force depends on where
+/// they are: a mesh with a node under the ball, too, gives the same to 1 %; one without, whose first four
+/// nodes touch 3.6 mm beside, 28 % more, with a coat of no stiffness as well.
 #[test]
 fn a_tied_coat_is_pressed_as_one_on_the_nodes_of_its_block() {
     for (run, model, balanced) in [
@@ -303,8 +311,8 @@ fn mistakes_are_refused() {
     }
 }
 
-/// S5: a block at 10 m/s meets two to four thin walls a millimetre apart, all of which it would pass in a step. Nothing passes anything: what lies below
-/// stays below.
+/// S5: a block at 10 m/s meets two to four thin walls a millimetre apart, all of which it would pass in a
+/// step. Nothing passes anything: what lies below stays below.
 #[test]
 fn a_fast_block_passes_no_wall() {
     let wall = |k: usize| {

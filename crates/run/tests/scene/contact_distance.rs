@@ -9,7 +9,8 @@ use pliant_testing::scenes::{last_row, run, world};
 
 use super::contact::{pressed, stacked};
 
-/// Without `thickness` bodies keep 0.5 % of their mean edge, and things nothing; `thickness = 0` is no distance. A note has it.
+/// Without `thickness` bodies keep 0.5 % of their mean edge, and things nothing; `thickness = 0` is no
+/// distance. A note has it.
 #[test]
 fn bodies_keep_a_distance_if_none_is_given() {
     let itself = "[contact.itself]\nbetween = ['lid', 'lid']\n";
@@ -38,7 +39,8 @@ fn bodies_keep_a_distance_if_none_is_given() {
     assert!((row["contact.above.z"] / touching["contact.above.z"] - 1.0).abs() < 0.01);
 }
 
-/// A lid that begins 0.5 mm above a block and is to keep 1 mm keeps 0.5 mm: it is neither refused nor thrown off.
+/// A lid that begins 0.5 mm above a block and is to keep 1 mm keeps 0.5 mm: it is neither refused nor thrown
+/// off.
 #[test]
 fn what_is_nearer_at_the_start_keeps_its_distance() {
     let text = stacked("", "").replace("thickness = 0\n", "thickness = 0.001\n");
@@ -57,7 +59,8 @@ fn what_is_nearer_at_the_start_keeps_its_distance() {
     assert!(row["probe.top.displacement.z"].abs() < 1e-12 && row["energy.kinetic"] < 1e-20, "{row:?}");
 }
 
-/// Writes the pieces of a scene, with those that are held in one body `b0`, the others in `b1`; the nodes of `b0` that are held.
+/// Writes the pieces of a scene, with those that are held in one body `b0`, the others in `b1`; the nodes of
+/// `b0` that are held.
 fn write_crack(folder: &Path) -> Vec<u32> {
     let scene = erleben().into_iter().find(|scene| scene.name == "wedge in a crack").unwrap();
     let mut held = Vec::new();
@@ -75,8 +78,8 @@ fn write_crack(folder: &Path) -> Vec<u32> {
     held
 }
 
-/// A wedge that falls into a crack (Erleben 2018) goes into its sides without a distance, and does not with the one that bodies keep. What is deeper than
-/// 1e-4 of the mean edge is counted, and ends no run.
+/// A wedge that falls into a crack (Erleben 2018) goes into its sides without a distance, and does not with
+/// the one that bodies keep. What is deeper than 1e-4 of the mean edge is counted, and ends no run.
 #[test]
 fn intersections_are_counted() {
     let place = tempfile::tempdir().unwrap();

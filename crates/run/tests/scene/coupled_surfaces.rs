@@ -1,4 +1,5 @@
-//! Contact between participants: an explicit solid and implicit shells (S14), from the text of a scene to its outputs, and what is refused.
+//! Contact between participants: an explicit solid and implicit shells (S14), from the text of a scene to its
+//! outputs, and what is refused.
 
 use nalgebra::UnitQuaternion;
 use pliant_sim::Simulation;
@@ -38,7 +39,8 @@ pub(super) fn column(out: &std::path::Path, name: &str, from: f64) -> Vec<f64> {
     rows.filter(|row| row[time] >= from).map(|row| row[at]).collect()
 }
 
-/// The plate lies on the block with its weight, at its half thickness, for 10 s; half of the step changes that little.
+/// The plate lies on the block with its weight, at its half thickness, for 10 s; half of the step changes
+/// that little.
 #[test]
 fn a_plate_lies_on_a_block_of_another_participant() {
     let mut depths = Vec::new();
@@ -73,7 +75,8 @@ fn a_resumed_run_of_participants_in_contact_has_the_same_bits() {
     resumes(&pressed(0.01, 1.0, "[run]\ncheckpoint = { every = 0.4 }\n"));
 }
 
-/// A step in contact is one step from the start on, and a tool that was driven after a look goes where it is driven.
+/// A step in contact is one step from the start on, and a tool that was driven after a look goes where it is
+/// driven.
 #[test]
 fn a_tool_on_a_guest_goes_where_it_is_driven() {
     let ball = "[tool.ball]\nshape = { sphere = { radius = 0.01 } }\nat = [0.02, 0.02, 0.04]\n\

@@ -1,4 +1,5 @@
-//! Results that are questionable, and their warnings: equilibria that a body would leave, bodies that swell, membranes that wrinkle.
+//! Results that are questionable, and their warnings: equilibria that a body would leave, bodies that swell,
+//! membranes that wrinkle.
 
 use pliant_testing::scenes::{assert_rows_agree, last_row, run};
 use tempfile::TempDir;
@@ -10,7 +11,8 @@ fn warnings(text: &str) -> (Vec<String>, Vec<f64>) {
     (summary.warnings, summary.volume_changes.iter().map(|own| own.change).collect())
 }
 
-/// A sheet of 0.1 mm pressed in its plane far beyond its buckling load stays flat, an equilibrium that no sheet keeps.
+/// A sheet of 0.1 mm pressed in its plane far beyond its buckling load stays flat, an equilibrium that no
+/// sheet keeps.
 #[test]
 fn a_sheet_that_should_buckle_is_doubted() {
     let sheet = |by: f64| {
@@ -78,7 +80,8 @@ fn a_wall_that_swells_is_doubted() {
     assert!(soft && much > 0.05 && !stiff && little > 0.0 && little < 0.01);
 }
 
-/// A capsule is pressed together with its solid: beyond half the force at which it wrinkles the run warns, in tension it does not.
+/// A capsule is pressed together with its solid: beyond half the force at which it wrinkles the run warns, in
+/// tension it does not.
 #[test]
 fn a_membrane_that_wrinkles_is_doubted() {
     let coated = |by: f64| {

@@ -79,7 +79,8 @@ fn warnings(summary: &pliant_run::Summary) -> Vec<&String> {
     summary.warnings.iter().filter(|text| text.contains("was held back by its `force-limit`")).collect()
 }
 
-/// The same by a barrier, in time and as equilibria: in no step the force is above the limit, and nothing is in anything.
+/// The same by a barrier, in time and as equilibria: in no step the force is above the limit, and nothing is
+/// in anything.
 #[test]
 fn a_tool_stops_at_its_limit_under_a_barrier() {
     for run_table in ["solver = 'implicit'\nstep = 0.02", "solver = 'static'\nload-steps = 60"] {
@@ -95,7 +96,8 @@ fn a_tool_stops_at_its_limit_under_a_barrier() {
     }
 }
 
-/// Called back, it goes along, off the body, and a limit that is far away changes no bit, with barriers as well.
+/// Called back, it goes along, off the body, and a limit that is far away changes no bit, with barriers as
+/// well.
 #[test]
 fn a_tool_with_a_limit_is_called_back_from_a_barrier() {
     let table = "curve = { table = [[0.1, 0], [0.6, 1], [0.8, 1], [1.4, 0]] }\nforce-limit = 2";
@@ -138,7 +140,8 @@ fn driven(run: &str, push: &str, until: f64) -> String {
     )
 }
 
-/// Moved nodes that press a body onto another stop where their reaction is the limit, in time and as equilibria. Without a limit they squash it.
+/// Moved nodes that press a body onto another stop where their reaction is the limit, in time and as
+/// equilibria. Without a limit they squash it.
 #[test]
 fn moved_nodes_stop_at_their_limit_under_a_barrier() {
     for run_table in ["solver = 'implicit'\nstep = 0.02", "solver = 'static'\nload-steps = 50"] {
@@ -173,7 +176,8 @@ fn moved_nodes_that_stretch_a_body_stop_at_their_limit() {
     }
 }
 
-/// Called back they are where their motion leads, a limit that is far away changes no bit, and a resumed run has the same ones.
+/// Called back they are where their motion leads, a limit that is far away changes no bit, and a resumed run
+/// has the same ones.
 #[test]
 fn moved_nodes_with_a_limit_are_called_back_and_resumed() {
     let implicit = "solver = 'implicit'\nstep = 0.02";
@@ -202,7 +206,8 @@ fn the_failure_of_a_body_that_a_tool_goes_through_names_the_tool() {
     assert!(failure.contains("where `finger` pushes too hard, give it a `force-limit`"), "{failure}");
 }
 
-/// A table that rises against the held side of a block stands off it, and the failure has the force: that of its barrier at the gap that is left. So do moved nodes.
+/// A table that rises against the held side of a block stands off it, and the failure has the force: that of
+/// its barrier at the gap that is left. So do moved nodes.
 #[test]
 fn what_is_blocked_tells_its_force() {
     let (side, distance, stiffness) = (0.04, 1e-3, 1e5);

@@ -1,5 +1,5 @@
-//! Snapshots and checkpoints with bytes changed at random and a checksum that fits: a run that goes on or an error, never a panic and no run
-//! without end.
+//! Snapshots and checkpoints with bytes changed at random and a checksum that fits: a run that goes on or an
+//! error, never a panic and no run without end.
 
 use std::fs;
 use std::path::Path;
@@ -22,7 +22,8 @@ use super::random_stops::ingredients;
 const HEADS: [usize; 2] = [28, 20];
 const CRC: usize = 4;
 
-/// Scenes with all that states have: small cubes of random ingredients, a plate of shells on a block as participants.
+/// Scenes with all that states have: small cubes of random ingredients, a plate of shells on a block as
+/// participants.
 fn scenes() -> impl Iterator<Item = String> {
     let small = |text: String| {
         let few = if text.contains("iterations") { "[run]\n" } else { "[run]\niterations = 5\n" };

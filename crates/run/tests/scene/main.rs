@@ -1,4 +1,5 @@
-//! Scenes without the binary. One program for all files here; run those of a file with `cargo test -p pliant-run --test scene grips::`.
+//! Scenes without the binary. One program for all files here; run those of a file with
+//! `cargo test -p pliant-run --test scene grips::`.
 
 mod angioplasty;
 mod barrier_curved;

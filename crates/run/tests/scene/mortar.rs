@@ -1,4 +1,5 @@
-//! Faces of solids joined by mortar rows: patch tests in either order, planes of symmetry through the joint, curved joints, and what is refused.
+//! Faces of solids joined by mortar rows: patch tests in either order, planes of symmetry through the joint,
+//! curved joints, and what is refused.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,7 +12,8 @@ use pliant_testing::scenes::{last_row_in, resumes, run, world};
 /// Edge of the blocks [m].
 const SIZE: f64 = 0.02;
 
-/// A cube of so many cells along each edge above a height [m], its points moved by up to a fifth of a cell along the sides that they are on.
+/// A cube of so many cells along each edge above a height [m], its points moved by up to a fifth of a cell
+/// along the sides that they are on.
 fn cube(cells: usize, kind: VolumeCell, height: f64, seed: u64) -> Mesh {
     let mut mesh = Block::new([SIZE; 3]).mesh(Resolution::Counts([cells; 3]), kind, usize::MAX).unwrap();
     let mut random = Random::new(seed);
@@ -61,7 +63,8 @@ fn symmetric(body: &str) -> String {
     [(0, "x"), (1, "y")].map(side).concat()
 }
 
-/// These blocks squeezed by 2 %, the first named following the second, with planes of symmetry through the joint; the other sides are free.
+/// These blocks squeezed by 2 %, the first named following the second, with planes of symmetry through the
+/// joint; the other sides are free.
 fn stacked(place: &Path, solver: &str, blocks: [(usize, &str); 2], order: [&str; 2], more: &str) -> String {
     let [a, b] = ["a", "b"].map(symmetric);
     blocks_of(place, solver, blocks, more)
@@ -76,7 +79,8 @@ fn stacked(place: &Path, solver: &str, blocks: [(usize, &str); 2], order: [&str;
         )
 }
 
-/// Places, displacements [m] and the normal stress along z [Pa] at the end of a run, and the last row of its table.
+/// Places, displacements [m] and the normal stress along z [Pa] at the end of a run, and the last row of its
+/// table.
 struct Ended {
     moved: Vec<[[f64; 3]; 2]>,
     stress: Vec<f64>,
@@ -98,7 +102,8 @@ fn ended(text: &str) -> Ended {
     Ended { moved, stress: stress.flat_map(along).collect(), row: last_row_in(out.path()) }
 }
 
-/// The largest difference of displacements from a uniform strain over the largest displacement, and that of stresses from their mean.
+/// The largest difference of displacements from a uniform strain over the largest displacement, and that of
+/// stresses from their mean.
 fn uneven(ended: &Ended) -> [f64; 2] {
     let far = ended
         .moved
@@ -205,7 +210,8 @@ fn joined_faces_move_on_a_device_as_on_the_processor() {
             super::ties::agrees_on_a_device([&cpu, &gpu], 1.0, "top");
             super::ties::agrees_on_a_device([&cpu, &atomics], 1.0, "top");
         }
-        // A load on tied nodes that are held there is part of the reaction, and not given on to the nodes that they follow.
+        // A load on tied nodes that are held there is part of the reaction, and not given on to the nodes
+        // that they follow.
         let press =
             format!("[load.press]\ntype = 'pressure'\non = 'a'\nfaces = {}\npressure = 100\n", plane(0, 0.0));
         let [cpu, gpu] =
@@ -267,7 +273,8 @@ fn methods_that_do_not_fit_are_refused_by_name() {
     assert!(notes.iter().any(|note| note.contains("(mortar)")), "{notes:?}");
 }
 
-/// A quarter of a ring of one cell along z, between radii [m], of so many cells round it and across it, the inner points moved along it.
+/// A quarter of a ring of one cell along z, between radii [m], of so many cells round it and across it, the
+/// inner points moved along it.
 fn ring(radii: [f64; 2], [round, across]: [u32; 2], seed: u64) -> Mesh {
     let mut random = Random::new(seed);
     let mut mesh = Mesh::default();
@@ -295,8 +302,9 @@ fn ring(radii: [f64; 2], [round, across]: [u32; 2], seed: u64) -> Mesh {
     mesh
 }
 
-/// Two rings that are joined at a cylinder, under a small pressure from inside, in plane strain: against Lamé's solution displacements converge
-/// with the square of the edges, and reactions balance the pressure to round-off.
+/// Two rings that are joined at a cylinder, under a small pressure from inside, in plane strain: against
+/// Lamé's solution displacements converge with the square of the edges, and reactions balance the pressure to
+/// round-off.
 #[test]
 fn a_curved_joint_converges_with_the_square_of_the_edges_and_keeps_the_force() {
     const RADII: [f64; 3] = [0.01, 0.015, 0.02];
@@ -343,7 +351,8 @@ fn a_curved_joint_converges_with_the_square_of_the_edges_and_keeps_the_force() {
                 (0..2).map(|c| (u[c] - lame(r) * x[c] / r).powi(2)).sum::<f64>()
             });
             errors.push((off.sum::<f64>() / moved.len() as f64).sqrt() / lame(RADII[0]));
-            // The resultant of the pressure along an axis is that on the other end of the quarter, whose two nodes differ in place.
+            // The resultant of the pressure along an axis is that on the other end of the quarter, whose two
+            // nodes differ in place.
             for (c, component) in ["x", "y"].iter().enumerate() {
                 let held = row[&format!("reaction.inner{component}.{component}")]
                     + row[&format!("reaction.outer{component}.{component}")];

@@ -1,4 +1,5 @@
-//! Obstacles and tools from mesh files and images: balls in bowls, a brain in its skull, the cache, and what is refused.
+//! Obstacles and tools from mesh files and images: balls in bowls, a brain in its skull, the cache, and what
+//! is refused.
 
 use std::path::Path;
 
@@ -34,7 +35,8 @@ fn rest(text: &str) -> [f64; 3] {
     ["probe.middle.displacement.x", "probe.middle.displacement.z", "contact.falls.z"].map(|key| row[key])
 }
 
-/// Facets of the bowl lie up to 60 µm within it, and its grid is right to about 1 µm: the ball rests as high and as far sideways.
+/// Facets of the bowl lie up to 60 µm within it, and its grid is right to about 1 µm: the ball rests as high
+/// and as far sideways.
 #[test]
 fn a_ball_in_a_bowl_of_triangles_rests_as_in_a_round_one() {
     let folder = tempfile::tempdir().unwrap();
@@ -53,7 +55,8 @@ fn a_ball_in_a_bowl_of_triangles_rests_as_in_a_round_one() {
     }
 }
 
-/// The same bowl in millimetres, turned and shifted in its frame: as a mesh of its own and put in place by the scene.
+/// The same bowl in millimetres, turned and shifted in its frame: as a mesh of its own and put in place by
+/// the scene.
 #[test]
 fn a_shape_from_a_file_stands_where_the_scene_puts_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -87,7 +90,8 @@ fn image_file(folder: &Path) -> String {
     path.display().to_string()
 }
 
-/// A ball of voxels of 2 mm has its surface where a ball has it: to half a voxel at worst, to a tenth as a mean.
+/// A ball of voxels of 2 mm has its surface where a ball has it: to half a voxel at worst, to a tenth as a
+/// mean.
 #[test]
 fn a_bowl_may_come_from_an_image() {
     let folder = tempfile::tempdir().unwrap();
@@ -109,7 +113,8 @@ fn a_bowl_may_come_from_an_image() {
     }
 }
 
-/// The second world reads distances from the cache, another `grow` makes others, and results are the same bits.
+/// The second world reads distances from the cache, another `grow` makes others, and results are the same
+/// bits.
 #[test]
 fn distances_are_made_once() {
     let folder = tempfile::tempdir().unwrap();
@@ -211,7 +216,8 @@ fn shapes_that_cannot_be_are_refused_with_their_line() {
     }
 }
 
-/// A shape a thousand times larger than the bodies is no mistake, but it is asked about; so is the user's line.
+/// A shape a thousand times larger than the bodies is no mistake, but it is asked about; so is the user's
+/// line.
 #[test]
 fn a_shape_much_larger_than_the_bodies_is_doubted() {
     let folder = tempfile::tempdir().unwrap();

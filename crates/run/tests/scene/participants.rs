@@ -1,5 +1,5 @@
-//! One scene with solids and shells: each participant comes out as it does in a scene of its own, outputs see both at common instants,
-//! and a run that was interrupted goes on with the same bits.
+//! One scene with solids and shells: each participant comes out as it does in a scene of its own, outputs see
+//! both at common instants, and a run that was interrupted goes on with the same bits.
 
 use std::fs;
 use std::sync::Arc;
@@ -101,7 +101,8 @@ fn each_participant_comes_out_as_it_does_alone() {
     }
 }
 
-/// A common step may be thousands of steps of a participant: a stop is heard between them, and the simulation stays at the instant before.
+/// A common step may be thousands of steps of a participant: a stop is heard between them, and the simulation
+/// stays at the instant before.
 #[test]
 fn a_stop_is_heard_within_a_common_step() {
     let world = world(&both("").replace(IMPLICIT, "solver = 'explicit'\n"));

@@ -28,7 +28,8 @@ fn at_rest(model: &str) -> f64 {
     last_row(&balloon(model, "solver = 'static'", "by = 0", ""))["volume.air"]
 }
 
-/// A balloon that is filled takes no more than its limit, whether it is a membrane or a shell, filled or emptied. A shell stands where a load of that pressure puts it.
+/// A balloon that is filled takes no more than its limit, whether it is a membrane or a shell, filled or
+/// emptied. A shell stands where a load of that pressure puts it.
 #[test]
 fn a_balloon_is_filled_up_to_its_limit() {
     for (model, volume, limit) in
@@ -74,7 +75,8 @@ fn a_balloon_is_filled_up_to_its_limit() {
     }
 }
 
-/// Called back it follows its curve again, to where it was at rest; a limit that is far away changes no bit, and a resumed run has the same ones.
+/// Called back it follows its curve again, to where it was at rest; a limit that is far away changes no bit,
+/// and a resumed run has the same ones.
 #[test]
 fn a_balloon_at_its_limit_is_called_back_and_resumed() {
     let there = "by = 4e-5\ncurve = { table = [[0, 0], [0.3, 1], [0.5, 1], [0.8, 0]] }";
@@ -93,7 +95,8 @@ fn a_balloon_at_its_limit_is_called_back_and_resumed() {
     }
 }
 
-/// A full balloon is pressed onto a floor: it lets out what its limit does not hold, and takes it in again when it is let go.
+/// A full balloon is pressed onto a floor: it lets out what its limit does not hold, and takes it in again
+/// when it is let go.
 #[test]
 fn a_balloon_that_is_pressed_lets_out_what_its_limit_does_not_hold() {
     let ball = |motion: &str| {
@@ -131,8 +134,9 @@ fn a_balloon_that_is_pressed_lets_out_what_its_limit_does_not_hold() {
     }
 }
 
-/// A load helps a balloon past the largest pressure that its wall bears, and falls. The pressure from then on comes to its limit where the wall gives way
-/// to more air, so that the balloon holds too little pressure or too much volume: no equilibrium keeps both.
+/// A load helps a balloon past the largest pressure that its wall bears, and falls. The pressure from then on
+/// comes to its limit where the wall gives way to more air, so that the balloon holds too little pressure or
+/// too much volume: no equilibrium keeps both.
 #[test]
 fn a_balloon_that_snaps_at_its_limit_ends_the_run_with_pressure_and_volume() {
     let volume = "by = 3e-4\ncurve = { table = [[0, 0], [0.5, 1]] }\npressure-limit = 11000";

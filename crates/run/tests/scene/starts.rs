@@ -1,5 +1,6 @@
-//! Motions, loads and rigid things whose curves do not begin at 0, with every solver. Runs in time begin where the curves say, at rest;
-//! `quasi-static` finds an equilibrium there, and `static` gets there in its first load step. Energy stored at the start is external work.
+//! Motions, loads and rigid things whose curves do not begin at 0, with every solver. Runs in time begin
+//! where the curves say, at rest; `quasi-static` finds an equilibrium there, and `static` gets there in its
+//! first load step. Energy stored at the start is external work.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -66,14 +67,16 @@ fn ends(text: &str) -> [Row; 2] {
     [row(table.lines().nth(1).unwrap()), row(table.lines().last().unwrap())]
 }
 
-/// The largest difference of columns whose names begin with a word, over the largest of them in the second row.
+/// The largest difference of columns whose names begin with a word, over the largest of them in the second
+/// row.
 fn off(word: &str, [one, other]: [&Row; 2]) -> f64 {
     let of_word = || other.iter().filter(|(name, _)| name.starts_with(word));
     let largest = of_word().map(|(_, value)| value.abs()).fold(0.0, f64::max);
     of_word().map(|(name, value)| (value - one[name]).abs()).fold(0.0, f64::max) / largest
 }
 
-/// A run under a curve ends where one from 0 ends; it stands at t = 0 where its curve says, or at rest; energies are balanced.
+/// A run under a curve ends where one from 0 ends; it stands at t = 0 where its curve says, or at rest;
+/// energies are balanced.
 #[track_caller]
 fn begins_where_its_curve_says(
     what: &str,
@@ -112,7 +115,8 @@ fn begins_where_its_curve_says(
             "{what}, {curve}: {stored:e} J of {given:e} J at t = 0"
         );
         let taken = ["kinetic", "internal", "damping", "hourglass"].map(|name| energy(&last, name));
-        // Explicit steps have a balance of their own, which knows what a sudden start keeps from the mean velocity.
+        // Explicit steps have a balance of their own, which knows what a sudden start keeps from the mean
+        // velocity.
         let (balance, limit) = match what.contains("explicit") {
             true => (energy(&last, "balance"), 0.01),
             // Trapezia of few load steps.
@@ -216,7 +220,8 @@ fn volumes_of_shells_begin_where_their_curves_say() {
     }
 }
 
-/// Loads have no place: with them all stands at rest at t = 0, and what they do in the first load step is balanced.
+/// Loads have no place: with them all stands at rest at t = 0, and what they do in the first load step is
+/// balanced.
 #[test]
 fn loads_begin_where_their_curves_say() {
     let faces = "on = 'b'\nfaces = { set = 'z-max' }";

@@ -1,5 +1,5 @@
-//! Solids of any law with the solvers `static` and `implicit`: the same equilibria as by dynamic relaxation, shells beside them in one
-//! system of equations, a resumed run with the same bits, and what is refused.
+//! Solids of any law with the solvers `static` and `implicit`: the same equilibria as by dynamic relaxation,
+//! shells beside them in one system of equations, a resumed run with the same bits, and what is refused.
 
 use std::fs;
 
@@ -7,7 +7,8 @@ use pliant_geometry::{CellKind, io};
 use pliant_run::overview;
 use pliant_testing::scenes::{assert_rows_agree, last_row, resumes, run, world};
 
-/// A block of 100 × 50 × 50 mm, held at one end, turned and pulled at the other, pressed from above, under its weight.
+/// A block of 100 × 50 × 50 mm, held at one end, turned and pulled at the other, pressed from above, under
+/// its weight.
 pub(super) fn block(solver: &str, element: &str, law: &str, more: &str) -> String {
     let cells = if element.starts_with("tet") { "tets" } else { "hexes" };
     format!(
@@ -52,7 +53,8 @@ fn a_check_tells_what_factors_take() {
 pub(super) const MATRIX: &str = "young-modulus = 1e4\npoisson-ratio = 0.45";
 const COMPRESSIBLE: &str = "young-modulus = 1e4\npoisson-ratio = 0.3";
 
-/// The displacements of `static` are those of `quasi-static` to 1e-6 of the largest, its stresses to 1e-5, its reactions too.
+/// The displacements of `static` are those of `quasi-static` to 1e-6 of the largest, its stresses to 1e-5,
+/// its reactions too.
 #[test]
 fn static_equilibria_are_those_of_dynamic_relaxation() {
     let ogden = "type = 'ogden'\npoisson-ratio = 0.45\n\
@@ -90,8 +92,8 @@ fn static_equilibria_are_those_of_dynamic_relaxation() {
     }
 }
 
-/// Laws that relax, in eight steps with a motion that is held after half of them: the equilibria of `static` are those of `quasi-static`, with
-/// stresses and reactions.
+/// Laws that relax, in eight steps with a motion that is held after half of them: the equilibria of `static`
+/// are those of `quasi-static`, with stresses and reactions.
 #[test]
 fn relaxing_equilibria_are_those_of_dynamic_relaxation() {
     let both = "prony = [{ part = 'isochoric', weight = 0.5, time = 0.3 }, { part = 'isochoric', weight = 0.2, time = 2 }, \
@@ -119,7 +121,8 @@ fn relaxing_equilibria_are_those_of_dynamic_relaxation() {
     }
 }
 
-/// Where two constraints hold the same component of a node, the first has its reaction: reactions and weight balance.
+/// Where two constraints hold the same component of a node, the first has its reaction: reactions and weight
+/// balance.
 #[test]
 fn reactions_of_shared_nodes_count_once() {
     let law = format!("type = 'neo-hookean'\n{MATRIX}");
@@ -159,7 +162,8 @@ const WALL: &str = "[law.wall]\ntype = 'neo-hookean'\nyoung-modulus = 1e6\npoiss
     [constraint.rim]\ntype = 'fix'\nbody = 'wall'\nnodes = { set = 'x-min' }\n\
     [output.fields]\ntype = 'vtu'\nevery = 1\ndata = ['displacement', 'von-mises', 'pk2-stress', 'thickness']\n";
 
-/// In one participant, a shell and a solid that do not touch move as in scenes of their own; one file shows both.
+/// In one participant, a shell and a solid that do not touch move as in scenes of their own; one file shows
+/// both.
 #[test]
 fn shells_and_solids_go_together() {
     let law = format!("type = 'neo-hookean'\n{MATRIX}");

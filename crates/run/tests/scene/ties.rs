@@ -9,7 +9,8 @@ use pliant_testing::scenes::{assert_rows_agree, last_row, resumes, world};
 
 use super::static_solids::{MATRIX, block};
 
-/// A block of 40 × 20 × 10 mm of tissue, its width held, stretched along x, and a coat on its top on another mesh.
+/// A block of 40 × 20 × 10 mm of tissue, its width held, stretched along x, and a coat on its top on another
+/// mesh.
 pub fn coated(solver: &str, coat: &str, more: &str) -> String {
     format!(
         "[scene]\nuntil = 1\n[run]\n{solver}\n\
@@ -29,8 +30,8 @@ pub fn coated(solver: &str, coat: &str, more: &str) -> String {
     )
 }
 
-/// The closed form for a coat on the same nodes holds for any mesh of the coat: the deformation is homogeneous. The reference set
-/// `coupling` has 0.319980499 N for coat A at 10 %.
+/// The closed form for a coat on the same nodes holds for any mesh of the coat: the deformation is
+/// homogeneous. The reference set `coupling` has 0.319980499 N for coat A at 10 %.
 #[test]
 fn a_coat_on_another_mesh_pulls_as_in_closed_form() {
     for coat in ["cells = [8, 4]", "cells = [7, 5]", "cells = [13, 3], pattern = 'crossed', distortion = 0.2"]
@@ -49,8 +50,9 @@ fn a_coat_on_another_mesh_pulls_as_in_closed_form() {
     }
 }
 
-/// A vessel through a block that is bent, turned and pressed: the same by Newton's method, dynamic relaxation, and at rest after a damped
-/// motion; as a shell in the systems of equations with its rotations free.
+/// A vessel through a block that is bent, turned and pressed: the same by Newton's method, dynamic
+/// relaxation, and at rest after a damped motion; as a shell in the systems of equations with its rotations
+/// free.
 pub fn vessel(solver: &str, more: &str, model: &str) -> String {
     let law = format!("type = 'neo-hookean'\n{MATRIX}");
     let text = block(solver, "tet4", &law, more);
@@ -211,7 +213,8 @@ fn ties_that_cannot_be_are_refused_by_name_and_gaps_are_told() {
     );
 }
 
-/// The block of [`coated`] as crooked tets: its nodes are moved along the faces that they are on, by up to 0.8 of 5 mm.
+/// The block of [`coated`] as crooked tets: its nodes are moved along the faces that they are on, by up to
+/// 0.8 of 5 mm.
 fn crooked() -> pliant_geometry::Mesh {
     let block = pliant_meshing::Block::new(BLOCK);
     let counts = pliant_meshing::Resolution::Counts([8, 4, 2]);
@@ -250,8 +253,8 @@ fn moved(text: &str) -> (Vec<[[f64; 3]; 2]>, std::collections::BTreeMap<String, 
     (all.collect(), pliant_testing::scenes::last_row_in(out.path()))
 }
 
-/// A block of crooked tets stretched freely, with a wall of no stiffness tied to its top, on its triangles and on others: the strain is
-/// uniform, and the wall takes it on.
+/// A block of crooked tets stretched freely, with a wall of no stiffness tied to its top, on its triangles
+/// and on others: the strain is uniform, and the wall takes it on.
 #[test]
 fn a_uniform_strain_passes_through_ties() {
     let place = tempfile::tempdir().unwrap();
@@ -299,9 +302,10 @@ fn from_file(text: &str, file: &std::path::Path) -> String {
     .replace("{ set = 'z-min' }", &side(2, false))
 }
 
-/// A stretched coat, stiffer than the block of crooked tets under it, on the triangles of the block and on others. Both sides of the block
-/// are held across, so that the rim of the coat is, and its top is free: the uniform strain is the exact solution of the discrete system,
-/// for the forces of a uniform stress vanish on each inner node of the coat, and with them Jᵀ of them.
+/// A stretched coat, stiffer than the block of crooked tets under it, on the triangles of the block and on
+/// others. Both sides of the block are held across, so that the rim of the coat is, and its top is free: the
+/// uniform strain is the exact solution of the discrete system, for the forces of a uniform stress vanish on
+/// each inner node of the coat, and with them Jᵀ of them.
 #[test]
 fn coats_in_equilibrium_keep_a_uniform_strain() {
     let place = tempfile::tempdir().unwrap();
@@ -336,8 +340,9 @@ fn coats_in_equilibrium_keep_a_uniform_strain() {
     assert!((pull([1.1, 1.0, stretch_across([1.1, 1.0])]) / 0.319_980_499 - 1.0).abs() < 1e-8);
 }
 
-/// An oblique stiff sheet of crooked triangles in a block of crooked tets, tied to it, from side to side. The surface of the block is
-/// stretched, sheared and turned by one gradient, which its inside and the sheet follow.
+/// An oblique stiff sheet of crooked triangles in a block of crooked tets, tied to it, from side to side. The
+/// surface of the block is stretched, sheared and turned by one gradient, which its inside and the sheet
+/// follow.
 #[test]
 fn a_sheet_across_a_block_keeps_a_uniform_strain() {
     const GRADIENT: [[f64; 3]; 3] = [[0.1, 0.02, 0.03], [-0.05, 0.08, 0.02], [0.02, 0.01, -0.05]];
@@ -380,7 +385,8 @@ fn a_sheet_across_a_block_keeps_a_uniform_strain() {
 const TISSUE: [f64; 2] = [3e3, 0.45];
 const COAT: [f64; 2] = [1e6, 0.3];
 
-/// The first Piola–Kirchhoff stress [Pa] of the tissue along each axis, Ψ = μ/2 (J^(−2/3) I₁ − 3) + κ/2 (J − 1)².
+/// The first Piola–Kirchhoff stress [Pa] of the tissue along each axis, Ψ = μ/2 (J^(−2/3) I₁ − 3) + κ/2 (J −
+/// 1)².
 fn tissue_stress(stretch: [f64; 3]) -> [f64; 3] {
     let [young, nu] = TISSUE;
     let (shear, bulk) = (young / (2.0 * (1.0 + nu)), young / (3.0 * (1.0 - 2.0 * nu)));
@@ -407,8 +413,9 @@ fn pull(stretch: [f64; 3]) -> f64 {
     BLOCK[1] * (BLOCK[2] * tissue_stress(stretch)[0] + 1e-4 * coat)
 }
 
-/// Runs a scene on the CPU in double precision and on a GPU until a time [s]: displacements of all bodies differ by at most 1e-5, energies and the
-/// reaction of a constraint by 1e-4. Steps are cut at the same instants; how often they were.
+/// Runs a scene on the CPU in double precision and on a GPU until a time [s]: displacements of all bodies
+/// differ by at most 1e-5, energies and the reaction of a constraint by 1e-4. Steps are cut at the same
+/// instants; how often they were.
 #[cfg(feature = "gpu")]
 pub fn agrees_on_a_device([cpu, gpu]: [&World; 2], until: f64, constraint: &str) -> u32 {
     let mut runs = [cpu, gpu].map(|world| world.simulation().unwrap());
@@ -457,7 +464,8 @@ fn tied_bodies_move_on_a_device_as_on_the_processor() {
     assert!(cuts > 0);
     let coat = |run: &str| world(&coated(run, "cells = [7, 5]", "")).unwrap();
     agrees_on_a_device([&coat("precision = 'double'"), &coat("device = 'gpu'")], 1.0, "end");
-    // A checkpoint of a GPU is continued there. Work is summed from one look to the next: of energies the last bits differ.
+    // A checkpoint of a GPU is continued there. Work is summed from one look to the next: of energies the
+    // last bits differ.
     let whole = vessel_text("device = 'gpu'\nstep = 2e-3\ncheckpoint = { every = 0.4 }");
     let half = world(&whole.replace("until = 1", "until = 0.4")).unwrap();
     let place = tempfile::tempdir().unwrap();

@@ -1,10 +1,12 @@
-//! Enclosed volumes with every solver: a balloon of a membrane, one of a shell, a cavity in a solid, and what is refused.
+//! Enclosed volumes with every solver: a balloon of a membrane, one of a shell, a cavity in a solid, and what
+//! is refused.
 
 use std::collections::BTreeMap;
 
 use pliant_testing::scenes::{assert_rows_agree, last_row, resumes, run, world};
 
-/// A balloon of 30 mm that is held at its neck, with a constraint on its volume; at rest it encloses 1.07e-4 m³.
+/// A balloon of 30 mm that is held at its neck, with a constraint on its volume; at rest it encloses 1.07e-4
+/// m³.
 pub fn balloon(model: &str, solver: &str, volume: &str, more: &str) -> String {
     format!(
         "[scene]\nuntil = 1\n[run]\n{solver}\n\
@@ -34,7 +36,8 @@ fn agree(first: &str, others: &[String]) {
     }
 }
 
-/// A membrane that is filled by two fifths stands where every solver puts it under a load from the side; nothing of the volume is lost.
+/// A membrane that is filled by two fifths stands where every solver puts it under a load from the side;
+/// nothing of the volume is lost.
 #[test]
 fn a_balloon_stands_where_every_solver_puts_it() {
     let load = "[load.side]\ntype = 'force'\non = 'balloon'\nnodes = { nearest = { point = [0.03, 0, 0], count = 7 } }\ntotal = [0, 2, 0]\nto = 0.5\n";
@@ -75,8 +78,8 @@ fn the_pressure_in_a_sphere_is_that_of_its_law() {
     assert!(fine.abs() < 0.01 && fine.abs() < 0.4 * coarse.abs(), "{coarse} {fine}");
 }
 
-/// A shell on its curved surface: `static` and `implicit`, filled and emptied, also by conjugate gradients; a load of the
-/// pressure that was found does the same.
+/// A shell on its curved surface: `static` and `implicit`, filled and emptied, also by conjugate gradients; a
+/// load of the pressure that was found does the same.
 #[test]
 fn a_shell_is_filled_and_emptied() {
     for volume in [FILLED, "by = -2e-6\nto = 0.5"] {
@@ -134,8 +137,8 @@ fn hollow_block() -> String {
     text + "CELL_TYPES 26\n" + &"12\n".repeat(26)
 }
 
-/// Water in the cavity of a block keeps its volume while the block is squeezed, with the same pressure by every solver; without it the cavity
-/// loses a tenth.
+/// Water in the cavity of a block keeps its volume while the block is squeezed, with the same pressure by
+/// every solver; without it the cavity loses a tenth.
 #[test]
 fn a_cavity_keeps_its_volume() {
     let folder = tempfile::tempdir().unwrap();
@@ -173,7 +176,8 @@ fn a_cavity_keeps_its_volume() {
     assert!(height(&empty) < height(&row) - 1e-4, "{} {}", height(&empty), height(&row));
 }
 
-/// A full balloon on a floor is pressed by a ball: barriers keep them apart, no volume is lost, the pressure rises, and the floor bears what presses.
+/// A full balloon on a floor is pressed by a ball: barriers keep them apart, no volume is lost, the pressure
+/// rises, and the floor bears what presses.
 #[test]
 fn a_balloon_is_pressed_onto_a_floor() {
     let contacts = "[obstacle.floor]\nshape = 'half-space'\nat = [0, 0, -0.0312]\n\

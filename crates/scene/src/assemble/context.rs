@@ -1,4 +1,4 @@
-//! What all phases of building a model share: the scene, the cache, and what a user is message.
+//! The context that all phases of building a model share: the scene, the cache, and what a user is message.
 
 use pliant_format::Scene;
 use pliant_format::diagnostic::{Diagnostic, SceneErrors};
@@ -15,7 +15,7 @@ pub(super) struct Context<'s> {
     pub watch: &'s dyn Fn(Meshing<'_>),
     /// Mistakes and doubts.
     pub out: Vec<Diagnostic>,
-    /// What a user may want to know, a sentence each.
+    /// Notes for the user, a sentence each.
     pub notes: Vec<String>,
 }
 

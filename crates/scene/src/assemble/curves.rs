@@ -1,4 +1,4 @@
-//! When motions and loads act, and how far things turn.
+//! The curves of motions and loads over time, and the angles of turns.
 
 use std::f64::consts::TAU;
 
@@ -10,8 +10,8 @@ use pliant_mechanics::curve::{Curve, Shape};
 use super::Context;
 
 impl Context<'_> {
-    /// The curve of a motion or a load. What it has at t = 0 comes in within the first load step of a static run, so that the step can be
-    /// halved.
+    /// The curve of a motion or a load. What it has at t = 0 comes in within the first load step of a static
+    /// run, so that the step can be halved.
     pub(super) fn course(&mut self, timing: &Timing, path: &[&str]) -> Option<Curve> {
         let curve = self.curve(timing, path)?;
         Some(self.eased(curve))

@@ -8,7 +8,8 @@ use pliant_format::tables::{
 use super::Context;
 
 impl Context<'_> {
-    /// Rejects scenes of both kinds of bodies without a common solver, and keys that do not go with the model of the implicit solvers.
+    /// Rejects scenes of both kinds of bodies without a common solver, and keys that do not go with the model
+    /// of the implicit solvers.
     pub(super) fn check_models(&mut self) {
         let scene = self.scene;
         let is_implicit = scene.is_implicit();

@@ -1,9 +1,9 @@
-//! From a scene to a model: meshes read or made, laws assigned to cells, selections resolved, references checked.
-//! All mistakes are collected with the user's own lines.
+//! From a scene to a model: meshes read or made, laws assigned to cells, selections resolved, references
+//! checked. All mistakes are collected with the user's own lines.
 //!
-//! The model is built in phases, each a type that owns what it has made, and the only way to the next: [`Meshed`] bodies are [`Tied`],
-//! then [`Loaded`], then [`InContact`], then [`Checked`], then [`Started`], which gives [`Built`]. A phase can do what those before it
-//! can. All share a [`Context`].
+//! The model is built in phases: [`Meshed`], [`Tied`], [`Loaded`], [`InContact`], [`Checked`], [`Started`].
+//! Each phase is a type that owns its results and can do what those before it can. The last one gives
+//! [`Built`]. All phases share a [`Context`].
 
 mod bodies;
 mod built;
@@ -46,14 +46,14 @@ pub fn build_with(scene: &Scene, cache: &MeshCache) -> Result<Built, SceneErrors
     build_watched(scene, cache, &|_| {})
 }
 
-/// How far the mesh of an image or of what a surface encloses is.
+/// The progress of a mesh of an image or of the inside of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Meshing<'a> {
     /// The body.
     pub body: &'a str,
     /// Part of the work, from 0 to 1.
     pub part: f64,
-    /// What is being done.
+    /// The present work.
     pub now: &'static str,
 }
 

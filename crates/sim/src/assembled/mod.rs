@@ -60,7 +60,8 @@ pub(crate) struct Assembled {
     prescribed: Vec<bool>,
     /// The constraint that has the reaction of each component: the first, where two prescribe the same.
     owners: Vec<[u32; 3]>,
-    /// Force [N] and moment [N m] on each node from outside at the instant before, six a node, with its positions and rotations.
+    /// Force [N] and moment [N m] on each node from outside at the instant before, six a node, with its
+    /// positions and rotations.
     before: Option<(Vec<f64>, State)>,
     /// The same forces at the instant that is evaluated.
     outside: Vec<f64>,
@@ -84,7 +85,8 @@ pub(crate) struct Assembled {
     contact: Option<ContactNow>,
     /// Displacements of the solids at the instant last evaluated; `None` without solids.
     solids: Option<pliant_explicit::State<f64>>,
-    /// What takes explicit steps; `None`: the CPU. Forces at instants are found on the CPU, as are energies and reactions.
+    /// What takes explicit steps; `None`: the CPU. Forces at instants are found on the CPU, as are energies
+    /// and reactions.
     #[cfg(feature = "gpu")]
     device: Option<ShellsOnDevice>,
 }
@@ -268,8 +270,9 @@ impl Assembled {
             .map(|at| if self.prescribed[at] { internal[at] - loads[at] } else { 0.0 })
     }
 
-    /// Puts a spring at each node of each grip. Together they pull with k (p − x̄), x̄ the mean of the nodes by their weights; within a step
-    /// they keep the shape of what is held, so that a spring has a node of its own and the equations no entries more.
+    /// Puts a spring at each node of each grip. Together they pull with k (p − x̄), x̄ the mean of the nodes
+    /// by their weights; within a step they keep the shape of what is held, so that a spring has a node of
+    /// its own and the equations no entries more.
     fn put_springs(&mut self) {
         self.springs.clear();
         for grip in &self.grips {

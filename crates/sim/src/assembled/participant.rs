@@ -91,8 +91,8 @@ impl Participant for Assembled {
         }
     }
 
-    /// Explicit steps of 0.9 of the stable step stay stable up to it, as those of solids do. Assembled ones are stable with any, and
-    /// their equations stay well conditioned.
+    /// Explicit steps of 0.9 of the stable step stay stable up to it, as those of solids do. Assembled ones
+    /// are stable with any, and their equations stay well conditioned.
     fn stiffest(&self, grip: &Grip) -> f64 {
         if !matches!(self.method, SolverMethod::Explicit(_)) {
             return FIRM * self.bodies.model.stiffest();

@@ -1,4 +1,4 @@
-//! A simulation: a world and its state, brought from one common instant of all participants to the next, each at its own step.
+//! A world and its state, brought from one common instant of all participants to the next.
 
 mod observer;
 mod state;
@@ -28,8 +28,8 @@ use crate::schedule::steps_to;
 use crate::solver::LoadStepProgress;
 use crate::start::{Before, begin, go_on};
 
-/// A world under way. It owns all it needs, so it can be kept anywhere and moved to another thread. After a failure it stays at the last
-/// good instant.
+/// A world under way. It owns all it needs, so it can be kept anywhere and moved to another thread. After a
+/// failure it stays at the last good instant.
 ///
 /// ```
 /// use pliant_mechanics::Model;
@@ -110,8 +110,8 @@ impl Simulation {
         Self::of(world, participants, between)
     }
 
-    /// From a state that another world was in, with displacements, velocities and the history of relaxing laws. `None` where this world
-    /// has other meshes, solvers or number types.
+    /// From a state that another world was in, with displacements, velocities and the history of relaxing
+    /// laws. `None` where this world has other meshes, solvers or number types.
     ///
     /// # Errors
     /// If a stepper can't be made.
@@ -150,7 +150,8 @@ impl Simulation {
         let first_nodes = nodes.scan(0, |next, nodes| Some(std::mem::replace(next, *next + nodes))).collect();
         let hands = vec![Vec::new(); participants.len()];
         let mut order: Vec<usize> = (0..participants.len()).collect();
-        // Of the same steps, one whose equations are solved goes last; but its coupled nodes go before their hosts.
+        // Of the same steps, one whose equations are solved goes last; but its coupled nodes go before their
+        // hosts.
         let solves = |part: usize| world.parts[part].method.solves_steps();
         order.sort_by_key(|&part| (ratios[part], solves(part) == world.coupled_surfaces.is_empty()));
         let done = vec![0; participants.len()];
@@ -224,11 +225,12 @@ impl Simulation {
         self.observe(until, &mut Looking(look))
     }
 
-    /// Steps until a time [s], the nearest instant to it. The observer sees all instants that its strides do not pass, the first and the
-    /// last ones, too.
+    /// Steps until a time [s], the nearest instant to it. The observer sees all instants that its strides do
+    /// not pass, the first and the last ones, too.
     ///
     /// # Errors
-    /// If forces can't be found, a step can't be taken, or the observer ends the run. The simulation stays at the last good instant.
+    /// If forces can't be found, a step can't be taken, or the observer ends the run. The simulation stays at
+    /// the last good instant.
     pub fn observe(&mut self, until: f64, observer: &mut dyn Observer) -> Result<(), Failure> {
         loop {
             let to_the_end = self.steps_until(until);
@@ -256,7 +258,8 @@ impl Simulation {
         }
     }
 
-    /// Common steps from here to the instant nearest to a time [s]; 0 where it has passed, or the run has [ended](Self::ended).
+    /// Common steps from here to the instant nearest to a time [s]; 0 where it has passed, or the run has
+    /// [ended](Self::ended).
     pub fn steps_until(&self, time: f64) -> u64 {
         let (now, step) = (self.time(), self.step_length());
         let is_last = now + 0.5 * step >= time || self.ended().is_some();
@@ -272,7 +275,8 @@ impl Simulation {
         Ok(Frame { simulation: self })
     }
 
-    /// Finds forces of all participants at the instant, and reads back from devices what is wanted. It does nothing where they are found.
+    /// Finds forces of all participants at the instant, and reads back from devices what is wanted. It does
+    /// nothing where they are found.
     ///
     /// # Errors
     /// If those of a participant can't be found.
@@ -306,7 +310,8 @@ impl Simulation {
         self.evaluated
     }
 
-    /// Goes so many common instants on from an evaluated one, not more than the stride. `watch` hears how far load steps are.
+    /// Goes so many common instants on from an evaluated one, not more than the stride. `watch` hears how far
+    /// load steps are.
     ///
     /// # Errors
     /// If a step of a participant can't be taken.
@@ -328,8 +333,9 @@ impl Simulation {
         }
     }
 
-    /// Looks at a flag from now on within load steps, steps whose equations are solved, and common steps of participants. A step that it ends fails as
-    /// [interrupted](Failure::is_interrupted), and the simulation stays at the instant before, with the same bits as if the step had never begun.
+    /// Looks at a flag from now on within load steps, steps whose equations are solved, and common steps of
+    /// participants. A step that it ends fails as [interrupted](Failure::is_interrupted), and the simulation
+    /// stays at the instant before, with the same bits as if the step had never begun.
     pub fn stop_on(&mut self, flag: &StopFlag) {
         self.participants.iter_mut().for_each(|participant| participant.stop_on(flag));
         self.stop = Some(flag.clone());
@@ -382,13 +388,14 @@ impl Simulation {
         }
     }
 
-    /// One common step of tied participants. The participant at the earliest time takes the next step; at equal times, the one with the
-    /// longest step.
+    /// One common step of tied participants. The participant at the earliest time takes the next step; at
+    /// equal times, the one with the longest step.
     fn advance_tied(&mut self, watch: &mut dyn FnMut(LoadStepProgress)) -> Result<(), Failure> {
         self.done.fill(0);
         while let Some(part) = self.hindmost() {
             self.heed_stop()?;
-            // Forces of the first step are found where all meet; only equations are solved with ties as they are then.
+            // Forces of the first step are found where all meet; only equations are solved with ties as they
+            // are then.
             let first = self.done[part] == 0;
             if !first {
                 self.springs.settle(part, &self.world.parts);
@@ -483,8 +490,9 @@ impl Simulation {
         of.map(|(participant, ratio)| participant.stride() / ratio).min().unwrap_or(1).max(1)
     }
 
-    /// The state, at any instant. What goes on from it finds the forces of its instant again, with the same bits where they were found.
-    /// Hands and forces of [`push`](Self::push) are not part of it; a tool that was driven after the forces were found begins its way in that step.
+    /// The state, at any instant. What goes on from it finds the forces of its instant again, with the same
+    /// bits where they were found. Hands and forces of [`push`](Self::push) are not part of it; a tool that
+    /// was driven after the forces were found begins its way in that step.
     ///
     /// # Errors
     /// If a device fails.
@@ -500,7 +508,8 @@ impl Simulation {
         Ok(self.snapshot())
     }
 
-    /// The state as it lies in ordinary memory, without what participants note of their iterations: that of a GPU is the one last read back.
+    /// The state as it lies in ordinary memory, without what participants note of their iterations: that of a
+    /// GPU is the one last read back.
     pub fn snapshot(&self) -> State {
         let parts = self.world.parts.iter().zip(&self.participants).enumerate();
         let own = parts.map(|(index, (part, now))| {
@@ -510,7 +519,8 @@ impl Simulation {
         State(own.collect(), self.between())
     }
 
-    /// The states at the instant before its forces were found, where participants touch each other and forces are found.
+    /// The states at the instant before its forces were found, where participants touch each other and forces
+    /// are found.
     fn met(&self) -> Option<&[OwnState]> {
         (self.evaluated && !self.meetings.is_empty()).then_some(&self.before[..])
     }
@@ -541,7 +551,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Brings some participants back to states of their parts; those that can't go back are made anew. Where one can't be made, nothing changes.
+    /// Brings some participants back to states of their parts; those that can't go back are made anew. Where
+    /// one can't be made, nothing changes.
     fn put_back(
         &mut self,
         states: &[OwnState],
@@ -569,8 +580,9 @@ impl Simulation {
         Ok(())
     }
 
-    /// Goes on with other numbers (laws, loads, steps) from the present state. Hands let go; forces of [`push`](Self::push) stay. False, and nothing changes, where the other world has other
-    /// meshes, solvers or number types.
+    /// Goes on with other numbers (laws, loads, steps) from the present state. Hands let go; forces of
+    /// [`push`](Self::push) stay. False, and nothing changes, where the other world has other meshes, solvers
+    /// or number types.
     ///
     /// # Errors
     /// Those of [`state`](Self::state), or if a stepper can't be made. The simulation then stays as it was.
@@ -593,7 +605,8 @@ impl Simulation {
         }
     }
 
-    /// The state of each participant as bytes of a checkpoint; with ties or contacts between participants, theirs after them.
+    /// The state of each participant as bytes of a checkpoint; with ties or contacts between participants,
+    /// theirs after them.
     ///
     /// # Errors
     /// If a device fails, or a state can't be encoded.
@@ -627,7 +640,8 @@ impl Simulation {
         self.participants.iter().find_map(|participant| participant.ended())
     }
 
-    /// After a step that failed: whether a state was found on the way that is worth showing. Its forces are then found.
+    /// After a step that failed: whether a state was found on the way that is worth showing. Its forces are
+    /// then found.
     pub fn keeps_what_it_found(&mut self) -> bool {
         let [only] = &mut self.participants[..] else { return false };
         self.evaluated = only.keeps_what_it_found() && only.evaluate(Wanted::Everything).is_ok();
@@ -663,8 +677,8 @@ impl Simulation {
         self.world.parts[part].model.rest[node as usize]
     }
 
-    /// Takes hold of points: these grips and no others act from the next evaluation on. False where a stepper knows none, or where a grip
-    /// holds nodes of several participants.
+    /// Takes hold of points: these grips and no others act from the next evaluation on. False where a stepper
+    /// knows none, or where a grip holds nodes of several participants.
     pub fn grip(&mut self, grips: &[Grip]) -> bool {
         let mut of_parts = vec![Vec::new(); self.participants.len()];
         for grip in grips {
@@ -679,11 +693,13 @@ impl Simulation {
         all
     }
 
-    /// Pushes nodes with forces [N], one a node, counted over the models of all participants: they and no others act from the next evaluation on,
-    /// until they are replaced. An empty slice ends them. Their work is external.
+    /// Pushes nodes with forces [N], one a node, counted over the models of all participants: they and no
+    /// others act from the next evaluation on, until they are replaced. An empty slice ends them. Their work
+    /// is external.
     ///
     /// # Errors
-    /// If there are not as many forces as nodes, a force is not finite, or a stepper takes none: that of a GPU. No force is then replaced.
+    /// If there are not as many forces as nodes, a force is not finite, or a stepper takes none: that of a
+    /// GPU. No force is then replaced.
     pub fn push(&mut self, forces: &[Vector<f64>]) -> Result<(), Failure> {
         let nodes: usize = self.world.parts.iter().map(|part| part.model.node_count()).sum();
         if !forces.is_empty() && forces.len() != nodes {
@@ -729,7 +745,8 @@ impl Simulation {
         pulled.unwrap_or([grip.place, [0.0; 3]])
     }
 
-    /// The participant of a grip, and the grip with the numbers of the nodes there; `None` where it holds nodes of several.
+    /// The participant of a grip, and the grip with the numbers of the nodes there; `None` where it holds
+    /// nodes of several.
     fn own(&self, grip: &Grip) -> Option<(usize, Grip)> {
         let (part, _) = self.locate(grip.nodes.first().map_or(0, |&(node, _)| node));
         let nodes = grip.nodes.iter().map(|&(node, weight)| {
@@ -743,7 +760,8 @@ impl Simulation {
 
 #[cfg(feature = "gpu")]
 impl Simulation {
-    /// Steps without read-backs and points on the GPU, where all bodies go together on one; `None` on the CPU.
+    /// Steps without read-backs and points on the GPU, where all bodies go together on one; `None` on the
+    /// CPU.
     pub fn on_device(&mut self) -> Option<OnDevice<'_>> {
         let [only] = &mut self.participants[..] else { return None };
         let (stepper, state) = only.on_device()?;

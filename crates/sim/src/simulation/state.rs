@@ -70,8 +70,9 @@ impl State {
         self.0.first().map_or(0.0, |own| own.snapshot.at().0)
     }
 
-    /// Halves the steps of all participants of its world that [cut theirs](World::cuts_steps) from here on. False where there are none, or
-    /// where that was done [three times](pliant_explicit::stability::MOST_HALVINGS).
+    /// Halves the steps of all participants of its world that [cut theirs](World::cuts_steps) from here on.
+    /// False where there are none, or where that was done
+    /// [three times](pliant_explicit::stability::MOST_HALVINGS).
     pub fn halve_steps(&mut self, world: &World) -> bool {
         let mut cut = self.0.iter_mut().zip(&world.parts).filter(|(_, part)| part.cuts_steps()).peekable();
         cut.peek().is_some() && cut.all(|(own, _)| own.snapshot.halve_steps())
@@ -89,7 +90,8 @@ impl State {
         if is_own { Ok(()) } else { Err(Failure::input(&"the state is of another model")) }
     }
 
-    /// The state whose participants were [encoded](Simulation::encode); `None` where these bytes are none of this world.
+    /// The state whose participants were [encoded](Simulation::encode); `None` where these bytes are none of
+    /// this world.
     pub fn decode<B: AsRef<[u8]>>(world: &World, bytes: &[B]) -> Option<Self> {
         let (participants, between) = bytes.split_at_checked(world.parts.len())?;
         let between: Between = match between {

@@ -22,8 +22,8 @@ pub struct World {
 }
 
 impl World {
-    /// Participants that meet at common instants: the steps of each become a multiple of those of the participant with the fewest.
-    /// All have the same duration.
+    /// Participants that meet at common instants: the steps of each become a multiple of those of the
+    /// participant with the fewest. All have the same duration.
     pub fn new(mut parts: Vec<Part>) -> Self {
         let common = parts.iter().map(|part| part.steps.number).min().unwrap_or(1);
         for part in &mut parts {
@@ -33,7 +33,8 @@ impl World {
         Self { parts, ties: Vec::new(), coupled_surfaces: Vec::new() }
     }
 
-    /// A fingerprint of its bodies with their meshes, and of its tools and obstacles, by name; not of laws, loads or steps.
+    /// A fingerprint of its bodies with their meshes, and of its tools and obstacles, by name; not of laws,
+    /// loads or steps.
     pub fn fingerprint_of_bodies(&self) -> u64 {
         fn of(part: &Part) -> (Vec<(String, u64)>, Vec<&str>) {
             let things = part.method.contacts().into_iter().flat_map(|all| &all.rigids);
@@ -49,7 +50,8 @@ impl World {
         numbers().map(|number| number / common).collect()
     }
 
-    /// Whether the steps of a participant are cut where they are too long, so that those of a run can be halved.
+    /// Whether the steps of a participant are cut where they are too long, so that those of a run can be
+    /// halved.
     pub fn cuts_steps(&self) -> bool {
         self.parts.iter().any(Part::cuts_steps)
     }

@@ -73,8 +73,8 @@ every = 0.004
 probes.middle = { on = "block", at = [0.05, 0.05, 0.05] }
 "#;
 
-/// A strip of 100 by 20 by 2 mm that is held at one end and bends under its weight: `body` has its keys of mesh and model
-/// (see [`SHELL`], [`HEXES`]), `run` those of the table `[run]`.
+/// A strip of 100 by 20 by 2 mm that is held at one end and bends under its weight: `body` has its keys of
+/// mesh and model (see [`SHELL`], [`HEXES`]), `run` those of the table `[run]`.
 pub fn strip(body: &str, run: &str) -> String {
     format!(
         r#"[scene]
@@ -196,7 +196,8 @@ every = 0.002
 data = ["displacement"]
 "#;
 
-/// A bent block with an output of every kind and a checkpoint every 0.02 s, of an element, with or without history.
+/// A bent block with an output of every kind and a checkpoint every 0.02 s, of an element, with or without
+/// history.
 pub fn resumable(element: &str, run: &str, relaxing: bool) -> String {
     let cells = if element.starts_with("tet") { "tets" } else { "hexes" };
     let prony = "prony = [{ part = \"isochoric\", weight = 0.3, time = 0.05 }, \

@@ -261,7 +261,8 @@ impl<'s> Player<'s> {
         }
     }
 
-    /// How long it may wait for orders: until the simulation is due to go on, or the frame of what has changed is.
+    /// How long it may wait for orders: until the simulation is due to go on, or the frame of what has
+    /// changed is.
     pub(super) fn patience(&self, changed: bool) -> Duration {
         let playback = &self.playback;
         let long = Duration::from_millis(50);
@@ -446,8 +447,9 @@ impl<'s> Player<'s> {
         self.sound.keep(sound, nodes);
     }
 
-    /// After a step that failed: goes back to a state before it and halves the steps there, where no hand has done anything and shorter steps
-    /// may avoid the failure; else hands let go there, or the run stays where it is.
+    /// After a step that failed: goes back to a state before it and halves the steps there, where no hand has
+    /// done anything and shorter steps may avoid the failure; else hands let go there, or the run stays where
+    /// it is.
     pub(super) fn go_back(&mut self, failure: Failure) {
         let broken = self.live.simulation.time();
         let world = Arc::clone(self.live.simulation.world());
@@ -493,7 +495,8 @@ impl<'s> Player<'s> {
         }
     }
 
-    /// Restores a state, releases the hands and continues the recording. Returns the time [s] of the state; `None` if the stepper rejects it.
+    /// Restores a state, releases the hands and continues the recording. Returns the time [s] of the state;
+    /// `None` if the stepper rejects it.
     pub(super) fn restore(&mut self, Sound { state, steps, hold, moves }: Sound) -> Option<f64> {
         self.live.restore(state).ok()?;
         let playback = &mut self.playback;
@@ -582,7 +585,8 @@ impl<'s> Player<'s> {
         seen.at = Some(Instant::now());
     }
 
-    /// Brings the points that are drawn from the device to the instant; `inspected` where their values are new.
+    /// Brings the points that are drawn from the device to the instant; `inspected` where their values are
+    /// new.
     pub(super) fn place(&mut self, inspected: bool) -> Option<DevicePoints> {
         let playback = &mut self.playback;
         let value = point_value(playback.field.as_deref());

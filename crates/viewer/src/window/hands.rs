@@ -46,7 +46,8 @@ impl App {
         }
     }
 
-    /// While the mouse pulls, its hand keeps what it holds, and the mouse goes on with the other one; else that lets go what it keeps.
+    /// While the mouse pulls, its hand keeps what it holds, and the mouse goes on with the other one; else
+    /// that lets go what it keeps.
     pub(super) fn change_hands(&mut self) {
         let other = self.mouse.other();
         match self.context.pointer_latest_pos() {

@@ -194,7 +194,8 @@ impl App {
         }
     }
 
-    /// Squares where nodes are held, dots where they are moved, bars under plates, arrows of loads and weights.
+    /// Squares where nodes are held, dots where they are moved, bars under plates, arrows of loads and
+    /// weights.
     fn draw_marks(&self, painter: &egui::Painter) {
         let unit = arrow_unit(&self.frame.points, largest_load(&self.frame.marks));
         for (place, marked) in &self.frame.marks {

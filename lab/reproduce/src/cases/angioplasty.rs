@@ -1,7 +1,9 @@
-//! Figure 9.5: a stenosis that a balloon widens. The thesis shows it and measures nothing; here it is held to an axisymmetric solution: a
-//! vessel of 1.5 to 2 mm with a deposit that narrows it to 0.75 mm, and a rigid cylinder in it that grows without friction.
+//! Figure 9.5: a stenosis that a balloon widens. The thesis shows it and measures nothing; here it is held to
+//! an axisymmetric solution: a vessel of 1.5 to 2 mm with a deposit that narrows it to 0.75 mm, and a rigid
+//! cylinder in it that grows without friction.
 //!
-//! The wall is as thick as a third of its radius, so both are solids. A quarter of one half is computed, the planes between them are held.
+//! The wall is as thick as a third of its radius, so both are solids. A quarter of one half is computed, the
+//! planes between them are held.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::ops::Range;
@@ -258,8 +260,8 @@ pub fn widened(divisions: Divisions, young: f64, radii: &[f64]) -> Result<Vec<Wi
     Ok(found)
 }
 
-/// The reference for a deposit of a Young's modulus [Pa]: radius of the inner surface at the throat [m], and displacements [m] and force [N]
-/// as in [`Widened`].
+/// The reference for a deposit of a Young's modulus [Pa]: radius of the inner surface at the throat [m], and
+/// displacements [m] and force [N] as in [`Widened`].
 pub fn exact(young: f64) -> Vec<Widened> {
     let data: Value = reference(include_str!("../../../validation/data/coupling/angioplasty.json"));
     let rows = data["rows"][format!("E_deposit_{young}")].as_array().cloned().unwrap_or_default();
@@ -308,7 +310,8 @@ fn compute() -> Result<Findings, CaseError> {
             findings.rows.push(Row::deviation(quantity, 0.05, (own / wanted - 1.0).abs(), SOURCE));
         }
     }
-    // The thesis's wall is a shell: as a thin one at the outside of the deposit it is stiffer than a thick one outside of it.
+    // The thesis's wall is a shell: as a thin one at the outside of the deposit it is stiffer than a thick
+    // one outside of it.
     let thin = Divisions { through: [divisions.through[0], 0], ..divisions };
     for (own, radius) in widened(thin, DEPOSIT, &radii)?.iter().zip(&radii).skip(7) {
         let wanted = exact_at(&rows, own.inner);

@@ -1,6 +1,6 @@
-//! The obstacle course of linear shell elements (MacNeal and Harder 1985; Belytschko et al. 1985; Cook), with the project's element and
-//! the thesis's. Each number, including the references from a prototype of the same formulas, is a displacement over that of the
-//! literature.
+//! The obstacle course of linear shell elements (MacNeal and Harder 1985; Belytschko et al. 1985; Cook), with
+//! the project's element and the thesis's. Each number, including the references from a prototype of the same
+//! formulas, is a displacement over that of the literature.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -112,8 +112,8 @@ pub enum CantileverCells {
     Parallelograms,
 }
 
-/// MacNeal and Harder's slender cantilever of 6 × 1 cells: its tip under a unit force in the plane over 0.1081, and out of it over
-/// 0.4321.
+/// MacNeal and Harder's slender cantilever of 6 × 1 cells: its tip under a unit force in the plane over
+/// 0.1081, and out of it over 0.4321.
 ///
 /// # Errors
 /// If the stiffness is singular.
@@ -140,8 +140,8 @@ pub fn cantilever(cells: CantileverCells, formulation: Formulation) -> Result<[f
     Ok([tip(1, 0.1081)?, tip(2, 0.4321)?])
 }
 
-/// MacNeal and Harder's twisted beam with `across` cells over its width: tip displacement in the plane of the load and out of it, over
-/// those of the literature.
+/// MacNeal and Harder's twisted beam with `across` cells over its width: tip displacement in the plane of the
+/// load and out of it, over those of the literature.
 ///
 /// # Errors
 /// If the stiffness is singular.
@@ -165,7 +165,8 @@ fn forward(shape: Sheet, counts: [usize; 2]) -> Result<Mesh, CaseError> {
     sheet(shape, counts, Pattern::Diagonal)
 }
 
-/// Diagonals and first corners as in the prototype: they affect coarse meshes, the corners only for the thesis's element.
+/// Diagonals and first corners as in the prototype: they affect coarse meshes, the corners only for the
+/// thesis's element.
 fn backward(shape: Sheet, counts: [usize; 2]) -> Result<Mesh, CaseError> {
     let mut mesh = sheet(shape, counts, Pattern::Antidiagonal)?;
     mesh.blocks[0].nodes.chunks_exact_mut(3).for_each(|corners| corners.rotate_left(1));

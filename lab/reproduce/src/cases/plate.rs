@@ -1,5 +1,5 @@
-//! Table 8.1: the thesis's clamped plate under uniform load. L = 10 m, h = 0.1 m, E = 1.092 MPa, ν = 0.3, so D = 100 N m; by linear theory
-//! its centre sinks by 0.126532 q.
+//! Table 8.1: the thesis's clamped plate under uniform load. L = 10 m, h = 0.1 m, E = 1.092 MPa, ν = 0.3, so
+//! D = 100 N m; by linear theory its centre sinks by 0.126532 q.
 
 use pliant_geometry::Mesh;
 use pliant_mechanics::load::LoadKind;
@@ -77,7 +77,8 @@ pub fn held(mesh: Mesh, formulation: Formulation, components: [bool; 6]) -> Resu
         .fold(plate, |plate, edge| plate.prescribe_edge(edge, components)))
 }
 
-/// Centre deflection of the clamped plate under uniform load by linear theory, over Timoshenko's 0.00126532 q L⁴/D.
+/// Centre deflection of the clamped plate under uniform load by linear theory, over Timoshenko's 0.00126532 q
+/// L⁴/D.
 ///
 /// # Errors
 /// If the stiffness is singular.
@@ -87,8 +88,8 @@ pub fn clamped(mesh: Mesh, formulation: Formulation) -> Result<f64, CaseError> {
     Ok(plate.linear(centre)?[2] * RIGIDITY / (0.00126532 * SIDE.powi(4)))
 }
 
-/// Deflections [m] in the middle under loads [Pa] one after the other, up to 5 Pa: equilibria with large rotations, no edge moving in its
-/// plane. A quarter of 16 × 16 cells.
+/// Deflections [m] in the middle under loads [Pa] one after the other, up to 5 Pa: equilibria with large
+/// rotations, no edge moving in its plane. A quarter of 16 × 16 cells.
 ///
 /// # Errors
 /// If one is not found.
@@ -112,8 +113,8 @@ pub fn deflections(loads: &[f64]) -> Result<Vec<f64>, CaseError> {
     Ok(found.split_off(1))
 }
 
-/// The deflection at 1 Pa [m] of the thesis's element alone in bending on 9 × 9 nodes, with the whole load shared alike by all nodes,
-/// clamped ones too.
+/// The deflection at 1 Pa [m] of the thesis's element alone in bending on 9 × 9 nodes, with the whole load
+/// shared alike by all nodes, clamped ones too.
 fn as_in_the_thesis() -> Result<f64, CaseError> {
     let bending = Formulation { membrane: Membrane::None, bending: Bending::Comas2010 };
     let mesh = mesh(8, Pattern::Diagonal)?;

@@ -56,7 +56,8 @@ pub fn distance_over(size: f64, a: &[Vector<f64>], b: &[Vector<f64>]) -> f64 {
     distance(a, b) * length / length.max(size)
 }
 
-/// Runs both from rest, the device in each design, and compares displacements, velocities, energies and reactions.
+/// Runs both from rest, the device in each design, and compares displacements, velocities, energies and
+/// reactions.
 pub fn compare(device: &Device, what: &str, model: &Model, designs: &[Design]) {
     compare_from(device, what, (model, &vec![[0.0; 3]; model.node_count()]), step_of(model), designs);
 }
@@ -77,7 +78,8 @@ pub fn compare_from(
     assert!(found.iter().all(Vec::is_empty));
 }
 
-/// As `compare`, of a body that touches rigid things; the force of each contact on the processor and on the device.
+/// As `compare`, of a body that touches rigid things; the force of each contact on the processor and on the
+/// device.
 pub fn compare_touching(
     device: &Device,
     what: &str,
@@ -90,8 +92,8 @@ pub fn compare_touching(
     let processor = processor.with_contacts(Arc::clone(contacts));
     let single = CentralDifference::new(model.clone(), step).unwrap().dissipating();
     let single = single.with_contacts(Arc::clone(contacts));
-    // A gap is known to the round-off of places, which a step makes a velocity: 6e-8 of 0.1 m over a two-hundredth of the run, beside a way
-    // of some millimetres.
+    // A gap is known to the round-off of places, which a step makes a velocity: 6e-8 of 0.1 m over a
+    // two-hundredth of the run, beside a way of some millimetres.
     run_both(what, (model, &start), (processor, single), (designs, 1e-3), |design| {
         let contacts = Arc::clone(contacts);
         GpuStepper::with_contacts(device, model.clone(), contacts, step, Some(design)).unwrap().dissipating()
@@ -161,8 +163,8 @@ fn errors(
     [displacement, velocity, energy, reaction]
 }
 
-/// Holds errors to limits, or to twice those of the processor in single precision where these are larger, up to a hundred
-/// times the limits.
+/// Holds errors to limits, or to twice those of the processor in single precision where these are larger, up
+/// to a hundred times the limits.
 fn agree(what: &str, errors: [f64; 4], of_processor: [f64; 4], velocities_within: f64) {
     let [of_device, of_single] =
         [errors, of_processor].map(|all| all.map(|error| format!("{error:.1e}")).join(", "));

@@ -17,8 +17,8 @@ use super::contact::{compare, moving, rigid, surface, time_of};
 use super::cube::{elastic, neo_hookean, smooth, tet_block};
 use crate::support;
 
-/// Adds a block of tetrahedra at a place, with nodes moved at random by up to `jitter` of a cell: no edges are parallel, and no faces flat, so
-/// that round-off decides nowhere what touches.
+/// Adds a block of tetrahedra at a place, with nodes moved at random by up to `jitter` of a cell: no edges
+/// are parallel, and no faces flat, so that round-off decides nowhere what touches.
 fn add(model: &mut Model, name: &str, cells: [u32; 3], size: [f64; 3], place: &Isometry3<f64>, jitter: f64) {
     let (mut points, tets) = tet_block(cells, size);
     let mut random = Random::new(23 + model.bodies.len() as u64);
@@ -115,7 +115,8 @@ fn a_lid_slides_on_a_block() {
     compare(&device, "lid", &model, &touching(&model, vec![], 0.3), PLAIN);
 }
 
-/// The lid begins nearer than the distance to keep over a part of the block, and slides on: each node keeps what it had.
+/// The lid begins nearer than the distance to keep over a part of the block, and slides on: each node keeps
+/// what it had.
 #[test]
 fn a_lid_keeps_less_where_it_begins_nearer() {
     let Some(device) = support::device() else { return };
@@ -183,7 +184,8 @@ fn the_arms_of_a_fork_meet() {
     }
 }
 
-/// Two free bodies keep their momentum, and the way in which the steps are divided changes no bit: lists are made at the same instants.
+/// Two free bodies keep their momentum, and the way in which the steps are divided changes no bit: lists are
+/// made at the same instants.
 #[test]
 fn cubes_keep_their_momentum_and_their_bits_however_the_steps_are_divided() {
     let Some(device) = support::device() else { return };
@@ -216,8 +218,9 @@ fn cubes_keep_their_momentum_and_their_bits_however_the_steps_are_divided() {
     assert!(off <= 1e-5, "{off:.1e}");
 }
 
-/// A block of 41,472 tetrahedra, its base held, and a lid of 2,304 above it: the time of a step without contact, with the lid out of reach, within the skin of the
-/// lists, and sunk in. `cargo test --release -p pliant-gpu --test gpu the_cost_of_pairs -- --include-ignored --nocapture`.
+/// A block of 41,472 tetrahedra, its base held, and a lid of 2,304 above it: the time of a step without
+/// contact, with the lid out of reach, within the skin of the lists, and sunk in. `cargo test --release -p
+/// pliant-gpu --test gpu the_cost_of_pairs -- --include-ignored --nocapture`.
 #[test]
 #[ignore = "measures time"]
 fn the_cost_of_pairs() {

@@ -20,8 +20,9 @@ use super::against::{PLAIN, compare_touching, designs, distance, double, load, s
 use super::cube::{EDGE, elastic, free_cube, held_cube, neo_hookean, smooth, tet_block};
 use crate::support;
 
-/// The faces of tetrahedra that no other one has, in the order in which a device takes them: it begins with faces that share no node, then come
-/// others. Impulses are found to a thousandth of the deepest gap, so that another order gives other last digits.
+/// The faces of tetrahedra that no other one has, in the order in which a device takes them: it begins with
+/// faces that share no node, then come others. Impulses are found to a thousandth of the deepest gap, so that
+/// another order gives other last digits.
 pub(super) fn surface(solid: &Solid) -> Surface {
     let mut sides = BTreeMap::new();
     let cells = &solid.cells;
@@ -72,8 +73,8 @@ pub(super) fn with(model: &Model, rigids: Vec<Rigid>, friction: f64) -> Arc<Cont
     Arc::new(Contacts { rigids, contacts, ..Default::default() })
 }
 
-/// Displacements, velocities, energies and reactions as `compare` has them; forces differ by a thousandth of the largest one, or by twice
-/// the error of the processor in single precision.
+/// Displacements, velocities, energies and reactions as `compare` has them; forces differ by a thousandth of
+/// the largest one, or by twice the error of the processor in single precision.
 pub(super) fn compare(
     device: &Device,
     what: &str,
@@ -144,7 +145,8 @@ fn nodes_touch_large_things() {
     }
 }
 
-/// Small things between the nodes. No edge of the box touches a point of a face, since round-off would choose the side there.
+/// Small things between the nodes. No edge of the box touches a point of a face, since round-off would choose
+/// the side there.
 #[test]
 fn points_of_faces_touch_small_things() {
     let Some(device) = support::device() else { return };
@@ -211,8 +213,8 @@ fn jaws_close_on_a_cube() {
     compare(&device, "jaws", &model, &contacts, PLAIN);
 }
 
-/// A tool that points of faces touch, driven from the middle of a run on; the device takes rows in an order that varies, but always finds the same
-/// bits, however the steps are divided.
+/// A tool that points of faces touch, driven from the middle of a run on; the device takes rows in an order
+/// that varies, but always finds the same bits, however the steps are divided.
 #[test]
 fn a_driven_tool_gives_the_same_bits_however_the_steps_are_divided() {
     let Some(device) = support::device() else { return };
@@ -254,7 +256,8 @@ fn a_driven_tool_gives_the_same_bits_however_the_steps_are_divided() {
     assert!(error <= 1e-5, "{error:.1e}");
 }
 
-/// A state in contact continues on the device without a read-back, then on the processor: the state holds no contact data.
+/// A state in contact continues on the device without a read-back, then on the processor: the state holds no
+/// contact data.
 #[test]
 fn a_state_in_contact_goes_from_the_processor_to_the_device_and_back() {
     let Some(device) = support::device() else { return };
@@ -291,8 +294,9 @@ fn a_state_in_contact_goes_from_the_processor_to_the_device_and_back() {
     assert!(error <= 1e-5, "{error:.1e}");
 }
 
-/// A cube of 55,566 tetrahedra, its base held: the time of a step alone, beside a tool out of reach, and with one that is pressed in, which only nodes or
-/// points on faces, too, touch. `cargo test --release -p pliant-gpu --test gpu the_cost_of_contact -- --include-ignored --nocapture`.
+/// A cube of 55,566 tetrahedra, its base held: the time of a step alone, beside a tool out of reach, and with
+/// one that is pressed in, which only nodes or points on faces, too, touch. `cargo test --release -p
+/// pliant-gpu --test gpu the_cost_of_contact -- --include-ignored --nocapture`.
 #[test]
 #[ignore = "measures time"]
 fn the_cost_of_contact() {

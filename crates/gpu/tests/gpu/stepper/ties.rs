@@ -260,7 +260,8 @@ fn relaxing() -> Model {
     barred(tied_blocks("tet4", "hex8", material))
 }
 
-/// The same bits however steps are divided, without a read-back, and from a state that was brought back in between.
+/// The same bits however steps are divided, without a read-back, and from a state that was brought back in
+/// between.
 #[test]
 fn steps_of_tied_bodies_give_the_same_bits_divided_and_resumed() {
     let Some(device) = support::device() else { return };

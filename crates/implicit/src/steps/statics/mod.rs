@@ -1,8 +1,9 @@
-//! Static equilibria: Newton's method with load steps; displacement control and arc length (Crisfield 1981) past limit
-//! points; a prescribed volume for balloons. A control finds the factor of the controlled loads as one more unknown.
-//! Nodes of membranes and bars, which nothing but tension holds across, get an artificial stiffness on the diagonal that is proportional to the
-//! largest residual on them (Levenberg 1944, Marquardt 1963): it bounds what an iteration moves them and vanishes at equilibrium.
-//! Leaves out: branch switching at bifurcations.
+//! Static equilibria: Newton's method with load steps; displacement control and arc length (Crisfield 1981)
+//! past limit points; a prescribed volume for balloons. A control finds the factor of the controlled loads as
+//! one more unknown. Nodes of membranes and bars, which nothing but tension holds across, get an artificial
+//! stiffness on the diagonal that is proportional to the largest residual on them (Levenberg 1944, Marquardt
+//! 1963): it bounds what an iteration moves them and vanishes at equilibrium. Leaves out: branch switching at
+//! bifurcations.
 
 mod control;
 mod held;
@@ -37,8 +38,8 @@ pub struct StaticSettings {
     pub floor: f64,
     /// Largest rotation of a node in an iteration [rad].
     pub rotation_limit: f64,
-    /// Whether iterations that make the residual along them ten times as large are shortened, but for the first two: thin
-    /// shells overshoot there and then converge quadratically.
+    /// Whether iterations that make the residual along them ten times as large are shortened, but for the
+    /// first two: thin shells overshoot there and then converge quadratically.
     pub line_search: bool,
     /// Solver of the linear equations.
     pub linear: LinearSolver,
@@ -58,10 +59,12 @@ impl Default for StaticSettings {
     }
 }
 
-/// Growth of the residual along an increment above which it is shortened. With 1 the slit annulus takes a fifth more iterations.
+/// Growth of the residual along an increment above which it is shortened. With 1 the slit annulus takes a
+/// fifth more iterations.
 const GROWTH: f64 = 10.0;
 
-/// What a residual on a node of a membrane may move it in an iteration, as a part of the extent of the membranes.
+/// What a residual on a node of a membrane may move it in an iteration, as a part of the extent of the
+/// membranes.
 const REACH: f64 = 0.1;
 
 /// The least artificial stiffness of membranes, as a part of the largest stiffness of a cell.
@@ -74,8 +77,8 @@ pub struct Step {
     pub time: f64,
     /// Norm of the residual [N] before each iteration and at the end; moments are divided by the mean edge.
     pub residuals: Vec<f64>,
-    /// Negative pivots of the last stiffness: above 0 the equilibrium is unstable. With conjugate gradients those that
-    /// factors in their preconditioner show.
+    /// Negative pivots of the last stiffness: above 0 the equilibrium is unstable. With conjugate gradients
+    /// those that factors in their preconditioner show.
     pub negative_pivots: usize,
     /// Load steps that it took: 1, or more where it was halved.
     pub parts: usize,
@@ -162,7 +165,8 @@ impl Statics {
         &self.direction
     }
 
-    /// Takes up the [direction](Self::direction) of another solver of the same model; without one, that in which the load grows.
+    /// Takes up the [direction](Self::direction) of another solver of the same model; without one, that in
+    /// which the load grows.
     pub fn go_on_along(&mut self, direction: &[f64]) {
         self.direction.fill(0.0);
         self.direction[..direction.len()].copy_from_slice(direction);
@@ -173,16 +177,17 @@ impl Statics {
         &self.settings
     }
 
-    /// Forces and moments on each node of the model that its elements resist with, less its loads, at the last evaluation:
-    /// on held components these are the reactions [N, N m], six a node.
+    /// Forces and moments on each node of the model that its elements resist with, less its loads, at the
+    /// last evaluation: on held components these are the reactions [N, N m], six a node.
     pub fn reactions(&self) -> impl Iterator<Item = [f64; 6]> {
         let nodes =
             self.system.forces.internal.chunks_exact(6).zip(self.system.forces.external.chunks_exact(6));
         nodes.map(|(internal, external)| [0, 1, 2, 3, 4, 5].map(|c| internal[c] - external[c]))
     }
 
-    /// Displacements and rotations (six a node) by linear theory about a state: one solution with the loads and motions of a time. The
-    /// stiffness is that of the state under the loads of its own time, so it does not depend on how large the new loads are.
+    /// Displacements and rotations (six a node) by linear theory about a state: one solution with the loads
+    /// and motions of a time. The stiffness is that of the state under the loads of its own time, so it does
+    /// not depend on how large the new loads are.
     ///
     /// # Errors
     /// If the stiffness is singular or conjugate gradients fail.
@@ -210,7 +215,8 @@ impl Statics {
     /// The equilibrium at a time. A load step that fails is halved.
     ///
     /// # Errors
-    /// If a step fails as often as it may be halved; the state then is at the last equilibrium found on the way.
+    /// If a step fails as often as it may be halved; the state then is at the last equilibrium found on the
+    /// way.
     pub fn solve(&mut self, state: &mut State, until: f64) -> Result<Step, SolveError> {
         self.attempts.clear();
         let mut done = Step::default();
@@ -243,7 +249,8 @@ impl Statics {
         }
     }
 
-    /// A step under a control to a time [s]. A step that fails is split into two halves, `halvings` times at most.
+    /// A step under a control to a time [s]. A step that fails is split into two halves, `halvings` times at
+    /// most.
     fn halved(
         &mut self,
         state: &mut State,
@@ -471,7 +478,8 @@ impl Statics {
         (self.settings.rotation_limit / largest).min(1.0)
     }
 
-    /// Halves the last increment up to three times while the residual along it, |Δ·r|, is far above what it was.
+    /// Halves the last increment up to three times while the residual along it, |Δ·r|, is far above what it
+    /// was.
     fn shorten(&mut self, state: &mut State, time: f64) -> Result<(), Attempt> {
         let before = dot(&self.solution, &self.residual).abs();
         let mut left = 1.0;
@@ -552,7 +560,8 @@ impl Contacting for Statics {
     }
 }
 
-/// Translational equations of the nodes that belong to membranes and bars only, and the extent of these nodes [m].
+/// Translational equations of the nodes that belong to membranes and bars only, and the extent of these nodes
+/// [m].
 fn slack(model: &Assembly, system: &System) -> (Vec<u32>, f64) {
     let mut slack = vec![false; model.rest.len()];
     let bends = |solid: &Solid| !matches!(solid.cells, Cells::Membrane(..) | Cells::Bar(..));

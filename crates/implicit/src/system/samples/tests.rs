@@ -53,8 +53,8 @@ fn shaken(model: &Assembly, random: &mut Random, size: f64) -> State {
     state
 }
 
-/// A point on an edge is the same whichever of the facets there it is taken from, at creases, too: nothing opens. Each triangle becomes 4^level, and corners are
-/// nodes.
+/// A point on an edge is the same whichever of the facets there it is taken from, at creases, too: nothing
+/// opens. Each triangle becomes 4^level, and corners are nodes.
 #[test]
 fn surfaces_of_points_are_watertight() {
     let mut random = Random::new(3);
@@ -88,7 +88,8 @@ fn surfaces_of_points_are_watertight() {
     }
 }
 
-/// A11: forces and moments on the nodes of a shaken shell are, summed up, the force that the ball bears, and have no moment about its centre.
+/// A11: forces and moments on the nodes of a shaken shell are, summed up, the force that the ball bears, and
+/// have no moment about its centre.
 #[test]
 fn forces_on_points_go_to_nodes_with_their_sum_and_their_moment() {
     let mut random = Random::new(11);
@@ -122,8 +123,9 @@ fn forces_on_points_go_to_nodes_with_their_sum_and_their_moment() {
     }
 }
 
-/// A ball within a sphere of facets is 0.08 from the sphere: flat triangles are nearer by their sag, points of the curved surface leave a quarter of it for
-/// each level, if normals are those of the sphere. With normals that are means of triangles the curved surface of so few is off by a percent itself.
+/// A ball within a sphere of facets is 0.08 from the sphere: flat triangles are nearer by their sag, points
+/// of the curved surface leave a quarter of it for each level, if normals are those of the sphere. With
+/// normals that are means of triangles the curved surface of so few is off by a percent itself.
 #[test]
 fn gaps_come_to_those_of_the_sphere_with_the_level() {
     for with_normals in [false, true] {
@@ -155,8 +157,8 @@ fn gaps_come_to_those_of_the_sphere_with_the_level() {
     }
 }
 
-/// Whatever turns nodes and moves them, the part that is allowed leaves a gap everywhere, and no edge in a triangle; so does a part of that, when it is asked for
-/// again.
+/// Whatever turns nodes and moves them, the part that is allowed leaves a gap everywhere, and no edge in a
+/// triangle; so does a part of that, when it is asked for again.
 #[test]
 fn allowed_parts_leave_gaps_on_curved_ways() {
     let mut random = Random::new(8);

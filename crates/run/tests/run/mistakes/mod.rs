@@ -1,11 +1,12 @@
-//! Every bad scene that the project promises to reject: the user's own line, the wrong number and a remedy, and nothing written.
+//! Every bad scene that the project promises to reject: the user's own line, the wrong number and a remedy,
+//! and nothing written.
 
 mod meshes;
 
 use pliant_testing::scenes::{BLOCK, CORNERS, FROM_FILE, TETS, Told, Workshop, changed, fibres, labels, vtk};
 
-/// Asserts that a scene is rejected with these words and with one of these lines underlined, and that the folder does
-/// not change.
+/// Asserts that a scene is rejected with these words and with one of these lines underlined, and that the
+/// folder does not change.
 #[track_caller]
 fn assert_refused(workshop: &Workshop, lines: &[&str], says: &[&str]) {
     let output = workshop.run(&[]);

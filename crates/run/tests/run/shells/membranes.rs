@@ -2,7 +2,8 @@
 
 use super::{PLATE, STEPS, THICK, from_file, refused, says, wall};
 
-/// Curved membranes take the pressure of the curved surface, flat ones a third to each corner; other pairs are warned about.
+/// Curved membranes take the pressure of the curved surface, flat ones a third to each corner; other pairs
+/// are warned about.
 #[test]
 pub(super) fn pressures_and_membranes_go_in_pairs() {
     let check = |element: &str, spread: &str| {
@@ -30,8 +31,8 @@ pub(super) fn pressures_and_membranes_go_in_pairs() {
     says(&output, &["does not go with the flat membrane of `wall`", "take `element = \"dkt-curved\"`"]);
 }
 
-/// R t = 5e-5 m²: edges up to 14 mm on irregular meshes. Normals of a file without any are estimated, and that is said where the wall is
-/// curved.
+/// R t = 5e-5 m²: edges up to 14 mm on irregular meshes. Normals of a file without any are estimated, and
+/// that is said where the wall is curved.
 #[test]
 pub(super) fn coarse_meshes_of_curved_walls_under_pressure_are_warned_about() {
     let cylinder = |more: &str| {
@@ -74,8 +75,9 @@ pub(super) fn coarse_meshes_of_curved_walls_under_pressure_are_warned_about() {
     );
 }
 
-/// A flat membrane held along its border bulges, with factors and with conjugate gradients, without tension and with some, which flattens
-/// it; the first is told. Held on one side it has no equilibrium under a pressure, and that is told without an infinite residual.
+/// A flat membrane held along its border bulges, with factors and with conjugate gradients, without tension
+/// and with some, which flattens it; the first is told. Held on one side it has no equilibrium under a
+/// pressure, and that is told without an infinite residual.
 #[test]
 pub(super) fn a_slack_membrane_is_told_and_starts() {
     let sides =
@@ -112,7 +114,8 @@ pub(super) fn a_slack_membrane_is_told_and_starts() {
     refused(&[(THICK, plate)], &["`pre-tension` is for a shell that resists in its plane"]);
 }
 
-/// Pulled by half its length the wall is told to be beyond small strain, with body, triangle and time; by 1 % it is not.
+/// Pulled by half its length the wall is told to be beyond small strain, with body, triangle and time; by 1 %
+/// it is not.
 #[test]
 pub(super) fn large_strains_are_told() {
     let pulled = |by: f64| {
@@ -154,14 +157,16 @@ pub(super) fn large_strains_are_told() {
         ],
     );
     let (json, output, page) = pulled(0.002);
-    // A thin wall that is clamped and pulled has unstable equilibria by its triangles; it has no other warning.
+    // A thin wall that is clamped and pulled has unstable equilibria by its triangles; it has no other
+    // warning.
     let warnings = json["warnings"].as_array().unwrap();
     assert!(warnings.iter().all(|own| own.as_str().unwrap().contains("are unstable")), "{}", output.err);
     assert!(json["shell_strains"][0]["above_from"].is_null(), "{json}");
     assert!(page.contains("| wall | 1."), "{page}");
 }
 
-/// What the warning advises: as a membrane of rubber the wall may be stretched by half, without a warning, and keeps its volume.
+/// What the warning advises: as a membrane of rubber the wall may be stretched by half, without a warning,
+/// and keeps its volume.
 #[test]
 pub(super) fn a_membrane_takes_the_strain_that_is_too_large_for_a_shell() {
     let workshop = wall(&[
@@ -186,7 +191,8 @@ pub(super) fn a_membrane_takes_the_strain_that_is_too_large_for_a_shell() {
     assert!((thickness / 1.5_f64.powf(-0.5) - 1.0).abs() < 1e-4, "{thickness}");
 }
 
-/// A wall that is pulled by 1 % between straight ends and free to narrow is thinner by ν times that, and strained by that at its faces.
+/// A wall that is pulled by 1 % between straight ends and free to narrow is thinner by ν times that, and
+/// strained by that at its faces.
 #[test]
 pub(super) fn a_pulled_shell_tells_how_thin_it_is() {
     let workshop = wall(&[

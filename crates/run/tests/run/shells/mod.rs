@@ -217,7 +217,8 @@ fn singular_stiffness_names_the_node_and_what_to_try() {
     );
 }
 
-/// M = F L at the clamp of a cantilever with a force F at its end: in the field of its nodes and about a point; force and moment balance.
+/// M = F L at the clamp of a cantilever with a force F at its end: in the field of its nodes and about a
+/// point; force and moment balance.
 #[test]
 fn a_clamp_resists_the_moment_of_a_force_at_the_end() {
     let force = 1e-6;
@@ -253,7 +254,8 @@ fn a_clamp_resists_the_moment_of_a_force_at_the_end() {
     }
 }
 
-/// Twice the area over the border of 0.2 × 0.1 m is 67 mm: 10 mm are 0.15 of it and 9 % too stiff in torsion, 2 mm are not spoken of.
+/// Twice the area over the border of 0.2 × 0.1 m is 67 mm: 10 mm are 0.15 of it and 9 % too stiff in torsion,
+/// 2 mm are not spoken of.
 #[test]
 fn a_stout_strip_is_noted() {
     let output = |thickness: &str| {
@@ -277,7 +279,8 @@ fn a_stout_strip_is_noted() {
     }
 }
 
-/// A path by arc length ends where the load is as written, or where it is told to; what it says nothing about goes on.
+/// A path by arc length ends where the load is as written, or where it is told to; what it says nothing about
+/// goes on.
 #[test]
 fn a_path_by_arc_length_ends() {
     let path = |stop: &str| {
@@ -315,7 +318,8 @@ fn a_path_by_arc_length_ends() {
     refused(&[(STEPS, &run(volume))], &["`stop` is for `arc-length`"]);
 }
 
-/// What the usual steps damp away in a second is still there with steps of second order; with other solvers they are refused.
+/// What the usual steps damp away in a second is still there with steps of second order; with other solvers
+/// they are refused.
 #[test]
 fn an_integrator_of_second_order_keeps_vibrations() {
     let swing = |integrator: &str| {
@@ -617,7 +621,8 @@ fn a_carried_surface_follows_a_rigid_motion_exactly() {
     }
 }
 
-/// How often each edge of a mesh of triangles is used; points at the same place (moved by `displacement`) are one.
+/// How often each edge of a mesh of triangles is used; points at the same place (moved by `displacement`) are
+/// one.
 fn sides(mesh: &Mesh) -> BTreeMap<[[i64; 3]; 2], u32> {
     let moved = &mesh.point_data["displacement"];
     let place = |node: u32| {

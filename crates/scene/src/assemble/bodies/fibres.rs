@@ -1,6 +1,6 @@
-//! Fibre directions of cells: the same everywhere, from the mesh, or by a rule at the centre of the cell. Tangents are those of the nearest
-//! point of the surface. Walls take the gradient of a harmonic function on the body's own elements. A cell without a direction is an error
-//! that names it.
+//! Fibre directions of cells: the same everywhere, from the mesh, or by a rule at the centre of the cell.
+//! Tangents are those of the nearest point of the surface. Walls take the gradient of a harmonic function on
+//! the body's own elements. A cell without a direction is an error that names it.
 
 use pliant_format::diagnostic::Diagnostic;
 use pliant_format::registry::LawTable;
@@ -19,7 +19,7 @@ const ZERO: f64 = 1e-12;
 /// A direction by a rule is lost where its length is below this part of what it is elsewhere.
 const LOST: f64 = 1e-6;
 
-/// What is wrong with a rule: the keys below it, the message and what to do.
+/// The fault of a rule: the keys below it, the message and what to do.
 struct RuleFault {
     at: Vec<&'static str>,
     message: String,
@@ -382,8 +382,8 @@ mod tests {
     fn tangential_on_a_sphere_is_orthogonal_to_the_radius() {
         let wanted = Vector3::new(0.3, 0.0, 1.0);
         for edge in [0.012, 0.006] {
-            // The nearest point lies on a facet that the cell looks at: it is aside by half the angle that the facet
-            // subtends, at the most. Near the middle of the sphere no facet is nearest.
+            // The nearest point lies on a facet that the cell looks at: it is aside by half the angle that
+            // the facet subtends, at the most. Near the middle of the sphere no facet is nearest.
             let aside = 0.5 * edge / 0.05;
             let mesh = SPHERE.replace("0.012", &edge.to_string());
             let all = fibres(&mesh, "{ tangential = { closest-to = [0.3, 0, 1] } }");
@@ -431,7 +431,8 @@ mod tests {
             };
             let mean = all.iter().map(off).sum::<f64>() / all.len() as f64;
             let worst = all.iter().map(off).fold(0.0, f64::max);
-            // Hexes are symmetric about the radius through their centre; tets are not: first order in the cell size.
+            // Hexes are symmetric about the radius through their centre; tets are not: first order in the
+            // cell size.
             assert!(worst < limit && mean < limit / 2.0, "{cells}: {worst:.3}, mean {mean:.3}");
         }
     }

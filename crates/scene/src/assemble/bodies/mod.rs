@@ -59,8 +59,8 @@ struct MaterialCells {
     cells: Vec<u32>,
 }
 
-/// Bytes that an element of a model takes at least, by the largest memory of `pliant check` with blocks of 48,000 and 384,000 tets and plates of
-/// 20,000 and 80,000 shells: 410 and 9,320.
+/// Bytes that an element of a model takes at least, by the largest memory of `pliant check` with blocks of
+/// 48,000 and 384,000 tets and plates of 20,000 and 80,000 shells: 410 and 9,320.
 const BYTES_OF_CELL: u64 = 400;
 const BYTES_OF_SHELL: u64 = 9000;
 
@@ -254,7 +254,8 @@ impl Meshed<'_> {
         fits
     }
 
-    /// The table of a body with the numbers of labels in place of their names in its mesh; diagnostics where there is no such name.
+    /// The table of a body with the numbers of labels in place of their names in its mesh; diagnostics where
+    /// there is no such name.
     fn by_numbers(&mut self, name: &str, table: &BodyTable, mesh: &Mesh) -> Option<BodyTable> {
         let labels = Labels::of(mesh);
         let mut numbered = table.clone();
@@ -276,7 +277,8 @@ impl Meshed<'_> {
         }
     }
 
-    /// Puts the number of a label in place of its name; whether all names are known. Numbers stay as they are written.
+    /// Puts the number of a label in place of its name; whether all names are known. Numbers stay as they are
+    /// written.
     fn number_keys<T>(&mut self, labels: &Labels, path: &[&str], map: &mut BTreeMap<String, T>) -> bool {
         let mut all = true;
         let mut numbered = BTreeMap::new();
@@ -309,8 +311,8 @@ impl Meshed<'_> {
         all
     }
 
-    /// Where values (law, density, …) go by label: whether each cell's label has one, and each label of theirs a cell. The
-    /// key comes with an example of a value.
+    /// Where values (law, density, …) go by label: whether each cell's label has one, and each label of
+    /// theirs a cell. The key comes with an example of a value.
     fn check_labels<T>(&mut self, name: &str, [key, example]: [&str; 2], values: &ByLabel<T>, mesh: &Mesh) {
         let ByLabel::Each(map) = values else { return };
         let path = ["body", name, key];
@@ -415,7 +417,8 @@ impl Meshed<'_> {
         }
     }
 
-    /// Some cells of a block with their element; hourglass control has a coefficient, if that is given, and a shear modulus [Pa].
+    /// Some cells of a block with their element; hourglass control has a coefficient, if that is given, and a
+    /// shear modulus [Pa].
     fn volume_cells(
         &self,
         element: Option<Element>,

@@ -82,7 +82,8 @@ fn of_data(name: &str, data: &DataArray, nodes: &[u32]) -> Result<Vec<[f64; 3]>,
     nodes.iter().map(vector).collect()
 }
 
-/// The rows of a table by node; `count` nodes are in the mesh file. Empty lines and what follows a # are passed over.
+/// The rows of a table by node; `count` nodes are in the mesh file. Empty lines and what follows a # are
+/// passed over.
 fn read_rows(
     found: io::Result<PathBuf>,
     path: &Path,

@@ -88,7 +88,7 @@ impl Meshed<'_> {
         }
     }
 
-    /// Whether the nodes of a body turn.
+    /// True if the nodes of a body turn.
     pub(in crate::assemble) fn has_rotations(&self, body: usize) -> bool {
         self.shell_cells(body).is_some()
     }

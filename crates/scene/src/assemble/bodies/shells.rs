@@ -1,4 +1,5 @@
-//! The cells of shells: triangles, elements, materials, thickness. And which solids the implicit solvers can have.
+//! The cells of shells: triangles, elements, materials, thickness. And which solids the implicit solvers can
+//! have.
 
 use std::collections::BTreeMap;
 
@@ -213,7 +214,8 @@ impl Meshed<'_> {
         None
     }
 
-    /// The layers of a shell, if it has some, and the direction in each triangle that their angles count from.
+    /// The layers of a shell, if it has some, and the direction in each triangle that their angles count
+    /// from.
     fn layers(&mut self, draft: &Draft<'_>, block: &CellBlock) -> Option<(Vec<Layer>, Vec<Vector3>)> {
         let &Draft { name, table, mesh, .. } = draft;
         if table.layers.is_empty() {
@@ -371,7 +373,8 @@ impl Meshed<'_> {
                     let given = data.item(node as usize);
                     (own.node(node), Vector3::new(given[0], given[1], given[2]))
                 };
-                // Where a fit finds no normal that stands on all triangles it gives none: there they are estimated, with creases.
+                // Where a fit finds no normal that stands on all triangles it gives none: there they are
+                // estimated, with creases.
                 let given: BTreeMap<u32, Vector3> = (0..mesh.points.len() as u32)
                     .map(of)
                     .filter(|(_, normal)| *normal != Vector3::zeros())

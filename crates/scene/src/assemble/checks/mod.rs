@@ -19,7 +19,7 @@ pub(super) struct Checked<'s> {
     pub in_contact: InContact<'s>,
     /// Surfaces that bodies of other participants touch.
     pub meets: Vec<Meet>,
-    /// Whether each body touches something; `None` where a mistake leaves that open.
+    /// The bodies that touch something; `None` where a mistake leaves that open.
     touching: Option<Vec<bool>>,
 }
 

@@ -248,7 +248,8 @@ impl Checked<'_> {
         }
     }
 
-    /// Rejects fields that are not carried by surfaces: those of nodes that say nothing between them, and of bodies that carry none.
+    /// Rejects fields that are not carried by surfaces: those of nodes that say nothing between them, and of
+    /// bodies that carry none.
     fn refuse_fields_off_surfaces(&mut self, fields: &[FieldName], surface: usize, path: &[&str]) {
         let on_shell = self.assembly.carried.contains_key(&surface);
         if let Some(field) = fields.iter().find(|field| on_shell && **field != FieldName::Displacement) {

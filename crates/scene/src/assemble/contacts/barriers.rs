@@ -1,4 +1,5 @@
-//! Contacts of the solvers `implicit` and `static`: how their barriers act, and whether bodies are apart at the start.
+//! Contacts of the solvers `implicit` and `static`: how their barriers act, and whether bodies are apart at
+//! the start.
 
 use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;

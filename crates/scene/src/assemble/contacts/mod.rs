@@ -29,11 +29,11 @@ use barriers::BarrierTables;
 /// Overlap, over the size of all, above which bodies are in each other.
 pub(super) const OVERLAP: f64 = 1e-9;
 
-/// What to do about contact with other solvers.
+/// The remedy for contact with other solvers.
 const EXPLICIT: &str = "take `solver = \"explicit\"` on the CPU, for solids, membranes and bars, or `\"implicit\"` or `\"static\"`, for solids and shells";
 
-/// The distance [m] that surfaces keep without a barrier if none is given, over the mean edge of both. Sharp parts slip by each other where it is
-/// zero.
+/// The distance [m] that surfaces keep without a barrier if none is given, over the mean edge of both. Sharp
+/// parts slip by each other where it is zero.
 const KEPT: f64 = 0.005;
 
 /// The distance [m] that bodies keep if none is given, or parts of one.
@@ -57,7 +57,8 @@ pub(crate) fn told_distance(name: &str, [least, most]: [f64; 2]) -> String {
     )
 }
 
-/// Where two bodies overlap by more than round-off of a size [m]: how deep [m], and the places. `place` has nodes by their numbers in the surfaces.
+/// The places where two bodies overlap by more than round-off of a size [m]: how deep [m], and the places. `place` has
+/// nodes by their numbers in the surfaces.
 pub(crate) fn overlaps(
     sides: [(&BuiltBody, &Surface); 2],
     size: f64,
@@ -89,7 +90,7 @@ pub(crate) fn overlaps(
     inside
 }
 
-/// How two bodies overlap, in words, with the deepest of these places; `None` without any.
+/// The overlap of two bodies in words, with the deepest of these places; `None` without any.
 pub(crate) fn told_overlap([first, second]: [&str; 2], inside: &[(f64, Vector3)]) -> Option<String> {
     let (depth, at) = inside.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(format!(
@@ -144,10 +145,10 @@ pub(super) struct InContact<'s> {
 
 follows!(InContact, loaded: Loaded);
 
-/// What the tables of contacts say beside the contacts themselves.
+/// The terms of the tables of contacts, without the contacts themselves.
 #[derive(Default)]
 struct Terms {
-    /// How barriers act.
+    /// The action of barriers.
     barriers: BarrierTables,
     /// The gap [m] that each contact gets between shapes at rest.
     gaps: Vec<Option<f64>>,
@@ -193,8 +194,8 @@ impl Loaded<'_> {
         all
     }
 
-    /// Notes the contacts of a table whose bodies keep less where they are nearer at the start, and the distances that they keep if none is given. They come
-    /// next after those that there are.
+    /// Notes the contacts of a table whose bodies keep less where they are nearer at the start, and the
+    /// distances that they keep if none is given. They come next after those that there are.
     fn keep_apart(&mut self, name: &str, table: &ContactTable, contacts: &[Contact], all: &mut Contacts) {
         let first = all.contacts.len();
         let mut usual: Option<[f64; 2]> = None;
@@ -274,7 +275,8 @@ impl Loaded<'_> {
         Some(all)
     }
 
-    /// Whether the solver knows contact, and the keys of a table go with it and with each other; mistakes are reported.
+    /// Whether the solver knows contact, and the keys of a table go with it and with each other; mistakes are
+    /// reported.
     fn check_contact(&mut self, name: &str, table: &ContactTable, is_barrier: bool) -> bool {
         let solver = self.scene.run.solver;
         if solver != SolverName::Explicit && !is_barrier {
@@ -441,7 +443,8 @@ impl Loaded<'_> {
         Some(Surface { nodes, faces: halves })
     }
 
-    /// Remarks on parts of a body that are too near each other at rest to touch, and on gaps that are small for its faces.
+    /// Remarks on parts of a body that are too near each other at rest to touch, and on gaps that are small
+    /// for its faces.
     fn note_apart(&mut self, name: &str, surface: &Surface, thickness: Option<f64>) {
         let place = |node: u32| Vector3::from(self.assembly.rest[node as usize]);
         let mut pairs = Pairs::new(surface, None, thickness.unwrap_or(0.0), place);
@@ -502,7 +505,7 @@ impl Loaded<'_> {
         self.error(&path, message, "overlapping", help);
     }
 
-    /// Whether bodies that overlap are moved apart before the run.
+    /// True if bodies that overlap are moved apart before the run.
     fn moves_apart(&self, name: &str, table: &ContactTable, terms: &mut Terms) -> bool {
         if table.separate {
             terms.overlapping.get_or_insert_with(|| name.into());
@@ -583,7 +586,7 @@ impl InContact<'_> {
         scene.meets.iter().filter_map(|table| meet(self, table)).collect()
     }
 
-    /// Whether each body touches something; `None` where a mistake leaves that open.
+    /// The bodies that touch something; `None` where a mistake leaves that open.
     pub fn touching(&self, meets: &[Meet]) -> Option<Vec<bool>> {
         if self.failed() {
             return None;
@@ -597,7 +600,8 @@ impl InContact<'_> {
         Some(touching.collect())
     }
 
-    /// Finds the nodes of bodies that are nearer at the start than the distance to keep; `pushed` are displacements [m] there, if bodies were pushed apart.
+    /// Finds the nodes of bodies that are nearer at the start than the distance to keep; `pushed` are
+    /// displacements [m] there, if bodies were pushed apart.
     pub(crate) fn find_near(&mut self, pushed: Option<&[[f64; 3]]>) {
         let Some(contacts) = &mut self.contacts else { return };
         if contacts.near.is_empty() {
@@ -632,8 +636,8 @@ impl InContact<'_> {
     }
 }
 
-/// How deep [m] faces with edges of a length [m] hang into a round thing on which their corners lie: by up to edge²/(8 R). More than a tenth of it is
-/// no touch any more.
+/// How deep [m] faces with edges of a length [m] hang into a round thing on which their corners lie: by up to
+/// edge²/(8 R). More than a tenth of it is no touch any more.
 pub(super) fn hang(rigid: &Rigid, edge: f64) -> f64 {
     let radius = rigid.shape.thinnest();
     match rigid.shape {
@@ -644,7 +648,7 @@ pub(super) fn hang(rigid: &Rigid, edge: f64) -> f64 {
     }
 }
 
-/// Whether a body touches something.
+/// True if a body touches something.
 pub(crate) fn touches(contacts: &Contacts, body: &Body) -> bool {
     let mut surfaces = contacts.contacts.iter().flat_map(Contact::surfaces);
     surfaces.any(|surface| body.all_nodes().any(|node| surface.nodes.binary_search(&node).is_ok()))

@@ -1,5 +1,5 @@
-//! Shapes of obstacles and tools from mesh files and images: signed distances of a closed surface on a grid, made once or read from the
-//! cache.
+//! Shapes of obstacles and tools from mesh files and images: signed distances of a closed surface on a grid,
+//! made once or read from the cache.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,8 +17,8 @@ use crate::assemble::Meshing;
 use crate::assemble::meshes::{SizeDoubt, content_of};
 use crate::cache::{KeptGrid, Key};
 
-/// Steps of a grid along the diagonal of the box, if no `resolution` is given: the error at a surface as round as the box is below 1e-5 of
-/// its diagonal, and 3.4 million points (13 MiB) are the most.
+/// Steps of a grid along the diagonal of the box, if no `resolution` is given: the error at a surface as
+/// round as the box is below 1e-5 of its diagonal, and 3.4 million points (13 MiB) are the most.
 const STEPS: f64 = 256.0;
 /// Steps along an edge of the surface, if no `resolution` is given and the triangles are small.
 const STEPS_PER_EDGE: f64 = 2.0;

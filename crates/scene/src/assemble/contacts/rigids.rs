@@ -245,7 +245,8 @@ impl Loaded<'_> {
 pub(super) const ROW: &str =
     "each row is `t,x,y,z,qw,qx,qy,qz`: a time in seconds, a position in metres, a unit quaternion";
 
-/// The fastest that a tool goes by a table of poses [m/s]: faster than hands, and slow enough for nodes to be pushed along.
+/// The fastest that a tool goes by a table of poses [m/s]: faster than hands, and slow enough for nodes to be
+/// pushed along.
 pub(super) const FASTEST: f64 = 10.0;
 
 /// How far the length of a quaternion may be off 1.
@@ -261,8 +262,8 @@ pub(super) struct Jump {
     pub(super) late: f64,
 }
 
-/// A table of poses without motions that are faster than [`FASTEST`]: rows come later where the tool cannot be there before, and it catches up
-/// after them. The tool has a radius [m].
+/// A table of poses without motions that are faster than [`FASTEST`]: rows come later where the tool cannot
+/// be there before, and it catches up after them. The tool has a radius [m].
 pub(super) fn slowed(poses: Vec<(f64, Pose)>, reach: f64) -> (Vec<(f64, Pose)>, Option<Jump>) {
     if poses.windows(2).any(|rows| rows[0].0 >= rows[1].0) {
         return (poses, None);

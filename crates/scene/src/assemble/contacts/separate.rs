@@ -1,7 +1,8 @@
-//! Bodies that overlap at the start are pushed apart: with the gap g < 0 of points Σ cᵢ xᵢ along a normal n, xᵢ += cᵢ n λ, λ = −g / Σ cᵢ².
-//! Passes over all contacts go on until nothing overlaps, and no edge of one body goes through another; nodes inside of bodies follow
-//! harmonically. With `separate` the shape at rest stays, so that the run starts deformed; with `gap` the shape at rest moves. Leaves out:
-//! whether bodies could have been moved as a whole.
+//! Bodies that overlap at the start are pushed apart: with the gap g < 0 of points Σ cᵢ xᵢ along a normal n,
+//! xᵢ += cᵢ n λ, λ = −g / Σ cᵢ². Passes over all contacts go on until nothing overlaps, and no edge of one
+//! body goes through another; nodes inside of bodies follow harmonically. With `separate` the shape at rest
+//! stays, so that the run starts deformed; with `gap` the shape at rest moves. Leaves out: whether bodies
+//! could have been moved as a whole.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -25,7 +26,8 @@ use crate::assemble::{BuiltBody, Context, in_metres};
 const LEAST_GAP: f64 = 0.5;
 /// Passes at most.
 const PASSES: usize = 400;
-/// Cosine of the angle between the shortest way out of a thing and that into the own body, below which the latter is taken.
+/// Cosine of the angle between the shortest way out of a thing and that into the own body, below which the
+/// latter is taken.
 const FACING: f64 = 0.3;
 /// Sweeps in which inner nodes follow.
 const SWEEPS: usize = 200;
@@ -41,7 +43,8 @@ struct Pushed {
     places: Vec<Vector3>,
     /// 1 along components that are free, else 0.
     free: Vec<Vector3>,
-    /// Gap [m] below which points are pushed, and the gap that is left between them: that of barriers, without them none.
+    /// Gap [m] below which points are pushed, and the gap that is left between them: that of barriers,
+    /// without them none.
     least: f64,
     left: f64,
     /// Ways [m] up to this have no direction.
@@ -79,8 +82,8 @@ impl Pushed {
 }
 
 impl<'s> InContact<'s> {
-    /// The ways [m] of all nodes to shapes at rest that have the gaps of contacts between them; `None` if nothing has to move, or can't, or did
-    /// already.
+    /// The ways [m] of all nodes to shapes at rest that have the gaps of contacts between them; `None` if
+    /// nothing has to move, or can't, or did already.
     pub(in crate::assemble) fn ways_to_gaps(&mut self) -> Option<Vec<Vector3>> {
         let contacts = self.contacts.clone()?;
         if self.is_parted || self.failed() {
@@ -105,8 +108,8 @@ impl<'s> InContact<'s> {
         ways.iter().any(|way| *way != Vector3::zeros()).then_some(ways)
     }
 
-    /// The bodies with shapes at rest that have gone these ways [m], and a context to begin anew with. It has the remarks on how the bodies
-    /// were made, and how they were parted: the last one.
+    /// The bodies with shapes at rest that have gone these ways [m], and a context to begin anew with. It has
+    /// the remarks on how the bodies were made, and how they were parted: the last one.
     pub(in crate::assemble) fn parted(self, ways: &[Vector3]) -> (Context<'s>, Vec<BuiltBody>) {
         let Tied { meshed, noted, .. } = self.loaded.tied;
         let Meshed { context, assembly, mut bodies, .. } = meshed;
@@ -120,8 +123,8 @@ impl<'s> InContact<'s> {
         (Context { notes, ..Context::new(scene, cache, watch) }, bodies)
     }
 
-    /// Where nodes are [m] once nothing overlaps; `None` if something still does. Of each contact that counts `kept` says below which gap [m] points are
-    /// pushed, and which is left.
+    /// Where nodes are [m] once nothing overlaps; `None` if something still does. Of each contact that counts
+    /// `kept` says below which gap [m] points are pushed, and which is left.
     fn push_all_apart(
         &mut self,
         asked: [&str; 2],
@@ -303,8 +306,9 @@ impl<'s> InContact<'s> {
 }
 
 impl InContact<'_> {
-    /// The displacements [m] that push bodies apart which overlap, of all nodes; `None` if nothing has to, or cannot be. Bodies with a barrier
-    /// are pushed apart by its distance, so that the run starts without forces between them.
+    /// The displacements [m] that push bodies apart which overlap, of all nodes; `None` if nothing has to, or
+    /// cannot be. Bodies with a barrier are pushed apart by its distance, so that the run starts without
+    /// forces between them.
     pub(in crate::assemble) fn separate(
         &mut self,
         start: Option<&pliant_implicit::State>,
@@ -353,7 +357,8 @@ fn size_of(places: &[Vector3]) -> f64 {
     places.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()))
 }
 
-/// Pushes nodes and points of faces out of a rigid thing: the shortest way, unless this leads out of the body. A solid then draws back into itself.
+/// Pushes nodes and points of faces out of a rigid thing: the shortest way, unless this leads out of the
+/// body. A solid then draws back into itself.
 fn push_out(rigid: &Rigid, offset: f64, surface: &Surface, is_solid: bool, pushed: &mut Pushed) {
     let stance = rigid.stance(0.0, None);
     let thinnest = rigid.shape.thinnest();
@@ -394,8 +399,8 @@ fn push_out(rigid: &Rigid, offset: f64, surface: &Surface, is_solid: bool, pushe
     }
 }
 
-/// How far [m] a point has to go along a direction to leave a thing whose thinnest part is known [m]; `None` if it is not that thin there, or without
-/// a direction.
+/// How far [m] a point has to go along a direction to leave a thing whose thinnest part is known [m]; `None`
+/// if it is not that thin there, or without a direction.
 fn way_out(from: &Vector3, along: &Vector3, thinnest: f64, gap: impl Fn(&Vector3) -> f64) -> Option<f64> {
     let mut way = 0.0;
     while way <= 4.0 * thinnest && *along != Vector3::zeros() {

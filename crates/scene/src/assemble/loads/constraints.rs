@@ -138,7 +138,8 @@ impl Tied<'_> {
         self.out.extend(found);
     }
 
-    /// Refuses constraints of rotations that follow a solid, and volumes that shells with such rotations enclose.
+    /// Refuses constraints of rotations that follow a solid, and volumes that shells with such rotations
+    /// enclose.
     fn check_turns(&mut self) {
         let mut turning: Vec<u32> = self.assembly.turns.iter().map(|turn| turn.node).collect();
         turning.sort_unstable();
@@ -274,8 +275,8 @@ impl Tied<'_> {
         }
     }
 
-    /// What of the area of a body's boundary each of some nodes has, of the faces all of whose nodes they are; equal parts without such
-    /// faces. Sums to 1.
+    /// What of the area of a body's boundary each of some nodes has, of the faces all of whose nodes they
+    /// are; equal parts without such faces. Sums to 1.
     fn shares(&self, body: usize, nodes: &[u32]) -> Vec<f64> {
         let (built, own) = (&self.bodies[body], &self.assembly.bodies[body]);
         let places: HashMap<u32, usize> = nodes.iter().copied().zip(0..).collect();

@@ -8,8 +8,8 @@ use pliant_mechanics::model::Motion;
 use crate::assemble::ties::Tied;
 
 impl Tied<'_> {
-    /// The components of a constraint: translations and rotations. By default all translations, and rotations if the body has
-    /// some and `turns`.
+    /// The components of a constraint: translations and rotations. By default all translations, and rotations
+    /// if the body has some and `turns`.
     pub(in crate::assemble) fn components(
         &mut self,
         axes: Option<&[Axis]>,

@@ -1,4 +1,5 @@
-//! The phase [`Loaded`]: constraints, and loads, which are forces on nodes, tractions and pressures on faces, and gravity.
+//! The phase [`Loaded`]: constraints, and loads, which are forces on nodes, tractions and pressures on faces,
+//! and gravity.
 
 mod constraints;
 mod implicit_constraints;
@@ -17,7 +18,7 @@ use super::ties::{Subject, Tied};
 /// The third phase: bodies that are held, moved and loaded.
 pub(super) struct Loaded<'s> {
     pub tied: Tied<'s>,
-    /// What controls a load, if something does.
+    /// The control of a load, if it has one.
     pub control: Option<RunControl>,
 }
 
@@ -57,7 +58,8 @@ impl Tied<'_> {
         }
     }
 
-    /// The bodies that have nodes of their own, and with them mass: that of a wall on another body is the mass of its nodes.
+    /// The bodies that have nodes of their own, and with them mass: that of a wall on another body is the
+    /// mass of its nodes.
     pub(super) fn bodies_with_nodes(&self) -> Vec<usize> {
         (0..self.assembly.bodies.len()).filter(|&body| !self.assembly.bodies[body].nodes.is_empty()).collect()
     }

@@ -10,7 +10,8 @@ use pliant_geometry::words::number;
 
 use crate::assemble::Context;
 
-/// An organ smaller than the first or larger than the last [m] is probably in other units; from the second on it may be.
+/// An organ smaller than the first or larger than the last [m] is probably in other units; from the second on
+/// it may be.
 const PLAUSIBLE_SIZE: [f64; 3] = [1e-3, 2.0, 10.0];
 
 /// A size that no organ has: the mesh is probably not in metres.
@@ -33,7 +34,8 @@ impl SizeDoubt {
         self.size > PLAUSIBLE_SIZE[2]
     }
 
-    /// Whether it is larger than a person, and not too large for a part of a machine: a small organ in millimetres has this size.
+    /// Whether it is larger than a person, and not too large for a part of a machine: a small organ in
+    /// millimetres has this size.
     pub fn is_possible(&self) -> bool {
         (PLAUSIBLE_SIZE[1]..=PLAUSIBLE_SIZE[2]).contains(&self.size)
     }

@@ -1,4 +1,5 @@
-//! Meshes of segmented images and of surface files: read, cut out, cleaned and meshed with the requested cells, or read from the cache.
+//! Meshes of segmented images and of surface files: read, cut out, cleaned and meshed with the requested
+//! cells, or read from the cache.
 
 use std::cell::Cell;
 use std::f64::consts::FRAC_PI_3;
@@ -198,7 +199,8 @@ impl Context<'_> {
     }
 }
 
-/// The labels that a table requests, as far as the image has them, or the threshold above which voxels are inside.
+/// The labels that a table requests, as far as the image has them, or the threshold above which voxels are
+/// inside.
 fn choice(image: &mut Image, table: &MeshTable) -> Result<Choice, MeshFault> {
     if let (Some(threshold), None) = (table.threshold, &table.masks) {
         return Ok(Choice::From(threshold));
@@ -441,7 +443,8 @@ fn goal(table: &MeshTable) -> Result<Goal, MeshFault> {
 }
 
 impl Fineness {
-    /// The edge of the cells [m], or of the first ones where a distance is requested, given the box of the body [m].
+    /// The edge of the cells [m], or of the first ones where a distance is requested, given the box of the
+    /// body [m].
     fn edge_in(&self, bounds: [Vector3; 2]) -> f64 {
         let chosen = self.distance.map_or(0.0, |distance| OrganTets::edge_for(distance, bounds));
         self.edge.unwrap_or(chosen)

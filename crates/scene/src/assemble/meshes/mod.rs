@@ -1,4 +1,5 @@
-//! The mesh of a body or a surface: read from a file or made from a shape, brought to metres, checked and repaired.
+//! The mesh of a body or a surface: read from a file or made from a shape, brought to metres, checked and
+//! repaired.
 
 mod files;
 mod images;
@@ -158,7 +159,8 @@ impl Context<'_> {
             );
             return None;
         }
-        // The scale of an organ is applied to its field, so that `edge` stays in metres; other shapes are in metres.
+        // The scale of an organ is applied to its field, so that `edge` stays in metres; other shapes are in
+        // metres.
         if table.organ.is_none() && table.factor() != 1.0 {
             let help = "give the shape in metres, or use `scale` with `file` or `organ`";
             self.error(&at("scale"), format!("`scale` does not go with `{source}`"), "here", help);
@@ -186,7 +188,8 @@ impl Context<'_> {
         }
     }
 
-    /// Applies the requested repairs of a body's mesh. Returns the number of each node in the file, empty if it is the same.
+    /// Applies the requested repairs of a body's mesh. Returns the number of each node in the file, empty if
+    /// it is the same.
     pub(super) fn repair(&mut self, mesh: &mut Mesh, table: &MeshTable, path: &[&str]) -> Vec<u32> {
         let Some(fixes) = &table.fix else { return Vec::new() };
         let numbers = (0..mesh.points.len()).map(|node| node as f64).collect();
@@ -279,7 +282,8 @@ impl Context<'_> {
     }
 }
 
-/// What keeps a mesh of cells of a dimension from being simulated, with what to do about it. Other cells may be as they are.
+/// What keeps a mesh of cells of a dimension from being simulated, with what to do about it. Other cells may
+/// be as they are.
 fn problems(found: &Diagnosis, fixes: &[Fix], dimension: usize) -> Vec<(String, &'static str)> {
     let own = |cells: &[CellId]| -> Vec<CellId> {
         cells.iter().filter(|cell| cell.kind.dimension() == dimension).copied().collect()

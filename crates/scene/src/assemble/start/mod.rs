@@ -133,7 +133,8 @@ mod tests {
 
     use crate::assemble::build;
 
-    /// A plate that starts rotated by a right angle, as in a table, is not strained: its nodes have turned with it.
+    /// A plate that starts rotated by a right angle, as in a table, is not strained: its nodes have turned
+    /// with it.
     #[test]
     fn a_start_that_is_a_rotation_costs_nothing() {
         let folder = tempfile::tempdir().unwrap();

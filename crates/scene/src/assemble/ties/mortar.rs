@@ -36,8 +36,8 @@ struct Refusal {
 }
 
 impl Meshed<'_> {
-    /// How nodes follow by the method of a tie, which have been found as points. `selected` are all nodes that the tie names, numbered in the
-    /// model.
+    /// How nodes follow by the method of a tie, which have been found as points. `selected` are all nodes
+    /// that the tie names, numbered in the model.
     pub(super) fn by_method(
         &mut self,
         joint: Joint<'_>,
@@ -114,8 +114,8 @@ impl Meshed<'_> {
         Ok(found)
     }
 
-    /// Whether a tie without a method takes its mortar rows: all selected nodes are on them, and none lies deep in the other body or across a
-    /// wide gap.
+    /// Whether a tie without a method takes its mortar rows: all selected nodes are on them, and none lies
+    /// deep in the other body or across a wide gap.
     fn is_glued(&self, joint: Joint<'_>, points: &Attached, found: &MortarRows) -> bool {
         let BuiltBody { boundary, mesh, .. } = &self.bodies[joint.host];
         let most = GAP * median_edge(mesh);

@@ -128,8 +128,8 @@ mod tests {
         }
     }
 
-    /// De Visser and Comas (2008): what goes down by J comes up by its exact transpose, with nodes beyond the body and with
-    /// points beyond the cubes.
+    /// De Visser and Comas (2008): what goes down by J comes up by its exact transpose, with nodes beyond the
+    /// body and with points beyond the cubes.
     #[test]
     fn the_smooth_surface_of_immersed_cubes_follows_them_and_gives_its_forces_back() {
         let own = CUBE.lines().find(|line| line.starts_with("mesh")).unwrap();
@@ -143,7 +143,8 @@ mod tests {
         let apart = |a: &[[f64; 3]], b: &[[f64; 3]]| {
             a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
         };
-        // At rest it is where it was made; turned by 70° about z and moved, and in any affine motion, it is where it goes.
+        // At rest it is where it was made; turned by 70° about z and moved, and in any affine motion, it is
+        // where it goes.
         assert!(apart(&skin.mapping.apply(rest), &skin.rest) < 1e-15);
         let (s, c) = 70.0_f64.to_radians().sin_cos();
         let rows = [

@@ -1,4 +1,4 @@
-//! What loads and outputs act on: bodies and the surfaces that they carry, with their faces.
+//! The targets of loads and outputs: bodies and the surfaces that they carry, with their faces.
 
 use pliant_format::{SCENE, suggestion};
 use pliant_geometry::{Mesh, Selection, Surface, boundary};
@@ -6,7 +6,7 @@ use pliant_mechanics::load::{Face, NO_NODE};
 
 use super::Tied;
 
-/// What a load or an output acts on.
+/// The target of a load or an output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Subject {
     /// A body, by index.
