@@ -361,8 +361,8 @@ impl Group {
         one.kind.reach(one.nodes.map(|node| self.moved[node as usize])) + self.gone * one.nearing
     }
 
-    /// Adds what acts with nodes at the places [m] last taken; false if there is no gap somewhere.
-    pub fn act(&self, place: &[Vector3<f64>], normal_collisions: &mut Vec<NormalCollision>) -> bool {
+    /// Adds the collisions of nodes at the places [m] last taken; false if there is no gap somewhere.
+    pub fn find_collisions(&self, place: &[Vector3<f64>], collisions: &mut Vec<NormalCollision>) -> bool {
         let reach = self.parameters.reach();
         for one in self.nearer_than(reach) {
             let parameters = self.parameters.within(one.most);
@@ -405,7 +405,7 @@ impl Group {
                     collision.stiffness *= mollifier.value;
                 }
             }
-            normal_collisions.push(collision);
+            collisions.push(collision);
         }
         true
     }
@@ -463,11 +463,6 @@ impl Group {
                 found(one.nodes, gap);
             }
         }
-    }
-
-    /// Pairs in the list.
-    pub fn listed(&self) -> usize {
-        self.candidates.len()
     }
 }
 

@@ -1,7 +1,7 @@
 //! Contact by a barrier: surfaces that never go into each other, whatever an iteration of a solver does. The energy κ A b(d − ξ) of a pair of
 //! primitives at a distance d grows without bound as the gap d − ξ vanishes ([law]); [distances](distance) are those of points and
-//! triangles and of edges, and a [filter](ccd) of motions stops before any pair meets. [`Barriers`] lists pairs that come near, evaluates
-//! their energy, forces and stiffness, and filters steps.
+//! triangles and of edges, and a [filter](ccd) of motions stops before any pair meets. [`Barriers`] lists pairs that come near;
+//! a [`BarrierStep`] of them evaluates their energy, forces and stiffness, and filters motions.
 //!
 //! Sources: Li et al. 2020 (TOG 39:49), incremental potential contact; Li, Kaufman and Jiang 2021 (arXiv 2012.04457), thickness and additive
 //! continuous collision detection; Li et al. 2023 (arXiv 2307.15908), weights by area.
@@ -11,12 +11,16 @@ mod candidates;
 pub mod ccd;
 mod collision_mesh;
 mod collisions;
+mod configuration;
 pub mod distance;
 mod features;
+mod filter;
 mod hessian;
 mod intersections;
 pub mod law;
 mod nodal;
+mod step;
+mod stiffness;
 mod system;
 #[cfg(test)]
 mod tests;
@@ -25,4 +29,5 @@ pub use collisions::{FrictionCollision, Mollified, NormalCollision, Stencil};
 pub use hessian::Matrix12;
 pub use intersections::{Intersection, IntersectionCheck};
 pub use nodal::NodeTouch;
+pub use step::BarrierStep;
 pub use system::{BarrierSettings, Barriers, Meeting};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::system::Barriers;
+use super::step::BarrierStep;
 
 /// A node of the model within the reach of a barrier.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -20,7 +20,7 @@ pub struct NodeTouch {
     pub slip: f64,
 }
 
-impl Barriers {
+impl BarrierStep {
     /// All nodes within the reach of a barrier at the state last evaluated, by increasing node. `before` has them at the start of the step:
     /// their slip goes on by the length of the way that they went in it along what they touch, the mean of all that bears on a node, weighted by
     /// its forces. `share` calls back with the nodes that a node of the contacts stands for and their parts in it: itself, or those around it.

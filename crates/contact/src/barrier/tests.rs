@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 use pliant_mechanics::curve::{Curve, Shape as CurveShape};
 use pliant_testing::Random;
 
-use super::{BarrierSettings, Barriers, Stencil};
+use super::{BarrierSettings, BarrierStep, Barriers, Stencil};
 use crate::pairs::Surface;
 use crate::pose::{Pose, Trajectory};
 use crate::shape::Shape;
@@ -37,7 +37,7 @@ fn rigid(shape: Shape, at: [f64; 3], by: [f64; 3]) -> Rigid {
 
 /// Two sheets on top of each other, bumpy, over a thing; the upper one touches itself.
 struct Scene {
-    barriers: Barriers,
+    step: BarrierStep,
     places: Vec<Vector3<f64>>,
 }
 
@@ -65,11 +65,17 @@ impl Scene {
         let settings = BarrierSettings { distance: 0.015, stiffness: 1e4, creep_speed: 1e-3 };
         let rest: Vec<[f64; 3]> = places.iter().map(|&x| x.into()).collect();
         let contacts = Arc::new(Contacts { rigids: vec![thing], contacts, ..Default::default() });
-        Self { barriers: Barriers::new(contacts, &[settings; 3], &rest), places }
+        let step = Barriers::new(contacts, &[settings; 3], &rest).begin(
+            &places,
+            &vec![0.0; 6 * places.len()],
+            [0.0, 1.0],
+        );
+        Self { step, places }
     }
 
+    /// Begins the next step from where nodes are.
     fn begin(&mut self, motion: &[f64]) {
-        self.barriers.begin(&self.places, motion, [0.0, 1.0]);
+        self.step.begin_next(&self.places, motion, [0.0, 1.0]);
     }
 }
 
@@ -106,7 +112,7 @@ fn forces_are_gradients_and_balance() {
         scene.begin(&vec![0.0; 6 * count]);
         let kinds = [0, 1, 2].map(|contact| {
             scene
-                .barriers
+                .step
                 .normal_collisions()
                 .iter()
                 .filter(|collision| collision.stencil.contact == contact)
@@ -116,10 +122,10 @@ fn forces_are_gradients_and_balance() {
         let mut moved = scene.places.clone();
         moved.iter_mut().for_each(|x| *x += 3e-4 * Vector3::from(random.vector()));
         let time_fraction = 0.4;
-        let energy = scene.barriers.evaluate(&moved, time_fraction);
+        let energy = scene.step.evaluate(&moved, time_fraction);
         assert!(energy.is_finite() && energy > 0.0);
         let (mut forces, mut totals) = (vec![0.0; 6 * count], vec![Vector3::zeros(); 3]);
-        scene.barriers.add_forces(&mut forces, &mut totals);
+        scene.step.add_forces(&mut forces, &mut totals);
         let size = forces.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
         let h = 1e-7;
         for _ in 0..150 {
@@ -127,7 +133,7 @@ fn forces_are_gradients_and_balance() {
             let mut at = |by: f64| {
                 let mut moved = moved.clone();
                 moved[node][c] += by;
-                scene.barriers.evaluate(&moved, time_fraction)
+                scene.step.evaluate(&moved, time_fraction)
             };
             let slope = (at(h) - at(-h)) / (2.0 * h);
             let own = -forces[6 * node + c];
@@ -148,11 +154,11 @@ fn stiffness_is_never_negative() {
         let mut scene = Scene::new(thing, 0.4);
         let count = scene.places.len();
         scene.begin(&vec![0.0; 6 * count]);
-        scene.barriers.evaluate(&scene.places.clone(), 0.0);
+        scene.step.evaluate(&scene.places.clone(), 0.0);
         let (normal, friction) =
-            (scene.barriers.normal_collisions().to_vec(), scene.barriers.friction_collisions().to_vec());
+            (scene.step.normal_collisions().to_vec(), scene.step.friction_collisions().to_vec());
         let (mut number, mut at_wall) = (0, 0);
-        scene.barriers.stiffness(0.0, |stencil: &Stencil, block, ways| {
+        scene.step.stiffness(|stencil: &Stencil, block, ways| {
             let values = block.symmetric_eigenvalues();
             assert!(values.min() > -1e-12 * values.max(), "{shape}");
             if stencil.count > 1 {
@@ -198,19 +204,18 @@ fn no_motion_that_is_allowed_goes_through() {
             scene.begin(&motion);
             let (mut time_fraction, mut part) = (0.0, 0.0);
             for _ in 0..4 {
-                part =
-                    scene.barriers.collision_free_fraction(&scene.places, &motion, time_fraction, [0.1, 1.0]);
+                part = scene.step.collision_free_fraction(&scene.places, &motion, time_fraction, [0.1, 1.0]);
                 for (x, way) in scene.places.iter_mut().zip(motion.chunks_exact(6)) {
                     *x += Vector3::new(way[0], way[1], way[2]) * part;
                 }
                 time_fraction += part * (1.0 - time_fraction);
-                let energy = scene.barriers.evaluate(&scene.places, time_fraction);
+                let energy = scene.step.evaluate(&scene.places, time_fraction);
                 assert!(energy.is_finite(), "{shape} {round}");
                 let mut crossed = 0;
-                scene.barriers.intersections(|_, _, _| crossed += 1);
+                scene.step.intersections(|_, _, _| crossed += 1);
                 assert_eq!(crossed, 0, "{shape} {round}");
             }
-            let is_small = round == 0 && scene.barriers.contacts().rigids[0].trajectory.growth(1.0) == 0.0;
+            let is_small = round == 0 && scene.step.contacts().rigids[0].trajectory.growth(1.0) == 0.0;
             assert!(!is_small || part == 1.0, "{shape}: {part}");
         }
     }
@@ -229,27 +234,27 @@ fn neighbours_of_a_thick_sheet_keep_the_guarantee() {
     let mut random = Random::new(5);
     let still = vec![0.0; 6 * flat.len()];
     for round in 0..20 {
-        let mut barriers = Barriers::new(Arc::clone(&contacts), &[settings], &rest);
+        let barriers = Barriers::new(Arc::clone(&contacts), &[settings], &rest);
         assert_eq!(barriers.apart_counts(), [0]);
         let mut places = flat.clone();
-        barriers.begin(&places, &still, [0.0, 1.0]);
-        assert!(barriers.normal_collisions().is_empty() && barriers.least_gap().is_none());
+        let mut step = barriers.begin(&places, &still, [0.0, 1.0]);
+        assert!(step.normal_collisions().is_empty() && step.least_gap().is_none());
         for _ in 0..6 {
             let motion: Vec<f64> = (0..still.len()).map(|_| 0.3 * (2.0 * random.part() - 1.0)).collect();
-            barriers.begin(&places, &motion, [0.0, 1.0]);
-            let part = barriers.collision_free_fraction(&places, &motion, 0.0, [0.1, 1.0]);
+            step.begin_next(&places, &motion, [0.0, 1.0]);
+            let part = step.collision_free_fraction(&places, &motion, 0.0, [0.1, 1.0]);
             let ways = motion.chunks_exact(6).map(|way| Vector3::new(way[0], way[1], way[2]) * part);
             places.iter_mut().zip(ways).for_each(|(x, way)| *x += way);
-            assert!(barriers.evaluate(&places, 0.0).is_finite(), "{round}");
+            assert!(step.evaluate(&places, 0.0).is_finite(), "{round}");
             let mut crossed = 0;
-            barriers.intersections(|_, _, _| crossed += 1);
+            step.intersections(|_, _, _| crossed += 1);
             assert_eq!(crossed, 0, "{round}");
         }
         // Corners across are 0.85 m apart at rest.
         let mut across = flat.clone();
         across[48] = across[0] + Vector3::new(0.0, 0.0, 0.119);
-        barriers.begin(&across, &still, [0.0, 1.0]);
-        assert!(barriers.evaluate(&across, 0.0).is_infinite());
+        step.begin_next(&across, &still, [0.0, 1.0]);
+        assert!(step.evaluate(&across, 0.0).is_infinite());
     }
 }
 
@@ -268,9 +273,9 @@ fn what_grows_presses_like_what_is_larger() {
             let mut scene = Scene::new(thing, 0.0);
             let count = scene.places.len();
             scene.begin(&vec![0.0; 6 * count]);
-            assert!(scene.barriers.evaluate(&scene.places.clone(), time_fraction).is_finite());
+            assert!(scene.step.evaluate(&scene.places.clone(), time_fraction).is_finite());
             let (mut forces, mut totals) = (vec![0.0; 6 * count], vec![Vector3::zeros(); 3]);
-            scene.barriers.add_forces(&mut forces, &mut totals);
+            scene.step.add_forces(&mut forces, &mut totals);
             (forces, totals[2], scene)
         };
         let (own, total, _) = forces(grown.clone(), 1.0);
@@ -281,7 +286,7 @@ fn what_grows_presses_like_what_is_larger() {
         // Forces fall by the stiffness times the way that is left: by differences over the fraction of time.
         let (_, _, scene) = forces(grown.clone(), 0.5);
         let mut slope = vec![0.0; own.len()];
-        scene.barriers.stiffness(0.5, |stencil: &Stencil, block, ways| {
+        scene.step.stiffness(|stencil: &Stencil, block, ways| {
             let way = nalgebra::SVector::<f64, 12>::from_fn(|k, _| ways[k / 3][k % 3]);
             let pull = block * way;
             for (at, (node, _)) in stencil.parts().enumerate().filter(|(_, (node, _))| *node < 74) {
@@ -314,25 +319,47 @@ fn a_turning_thing_goes_through_nothing() {
     scene.begin(&still);
     let mut time_fraction = 0.0;
     for _ in 0..30 {
-        time_fraction +=
-            scene.barriers.collision_free_fraction(&scene.places, &still, time_fraction, [0.1, 1.0])
-                * (1.0 - time_fraction);
-        assert!(scene.barriers.evaluate(&scene.places, time_fraction).is_finite());
+        time_fraction += scene.step.collision_free_fraction(&scene.places, &still, time_fraction, [0.1, 1.0])
+            * (1.0 - time_fraction);
+        assert!(scene.step.evaluate(&scene.places, time_fraction).is_finite());
         let mut crossed = 0;
-        scene.barriers.intersections(|_, _, _| crossed += 1);
+        scene.step.intersections(|_, _, _| crossed += 1);
         assert_eq!(crossed, 0, "{time_fraction}");
     }
     // Its corner comes to the sheet after 0.9 rad or so.
     assert!(time_fraction > 0.1 && time_fraction < 0.5, "{time_fraction}");
 }
 
+/// A search for a fraction elsewhere changes nothing of what was evaluated: neither stiffness nor friction that lags, nor pairs that are near.
+#[test]
+fn a_search_leaves_what_was_evaluated() {
+    for thing in things().into_iter().chain(growing(0.002)) {
+        let mut scene = Scene::new(thing, 0.4);
+        scene.step.evaluate(&scene.places, 0.3);
+        scene.step.lag();
+        let read = |step: &mut BarrierStep| {
+            let (mut blocks, mut near) = (Vec::new(), Vec::new());
+            step.stiffness(|stencil, block, ways| blocks.push((stencil.nodes, *block, ways)));
+            step.near(0.3, |nodes| near.push(nodes.to_vec()));
+            step.lag();
+            near.sort_unstable();
+            (blocks, near, step.friction_limits(), step.least_gap())
+        };
+        let wanted = read(&mut scene.step);
+        let away: Vec<_> = scene.places.iter().map(|x| x + Vector3::new(0.01, 0.02, 0.5)).collect();
+        let motion = vec![0.1; 6 * away.len()];
+        scene.step.collision_free_fraction(&away, &motion, 0.6, [0.1, 1.0]);
+        assert!(wanted.0.len() > 10 && read(&mut scene.step) == wanted);
+    }
+}
+
 /// Bodies that start within each other are reported with contact, node and gap.
 #[test]
 fn what_has_no_gap_at_the_start_is_told() {
     let mut scene = Scene::new(things().remove(0), 0.0);
-    assert!(scene.barriers.meetings(&scene.places, 0.0).is_empty());
+    assert!(scene.step.barriers.clone().meetings(&scene.places, 0.0).is_empty());
     scene.places[60].z -= 0.2;
-    let met = scene.barriers.meetings(&scene.places, 0.0);
+    let met = scene.step.barriers.meetings(&scene.places, 0.0);
     assert!(met.iter().any(|one| one.contact == 0 && one.gap.is_none()), "{met:?}");
 }
 
@@ -350,14 +377,14 @@ fn what_acts_does_not_depend_on_where_one_comes_from() {
             let size = if step % 10 == 9 { 0.05 } else { 0.003 };
             let motion: Vec<f64> = (0..6 * count).map(|_| size * random.number()).collect();
             scene.begin(&motion);
-            let part = scene.barriers.collision_free_fraction(&scene.places, &motion, 0.0, [0.1, 1.0]);
+            let part = scene.step.collision_free_fraction(&scene.places, &motion, 0.0, [0.1, 1.0]);
             let ways = motion.chunks_exact(6).map(|way| Vector3::new(way[0], way[1], way[2]) * part);
             scene.places.iter_mut().zip(ways).for_each(|(x, way)| *x += way);
             let mut fresh = Scene::new(thing.clone(), 0.3);
             fresh.places.clone_from(&scene.places);
             let rows = [&mut scene, &mut fresh].map(|scene| {
                 scene.begin(&vec![0.002; 6 * count]);
-                let rows = scene.barriers.normal_collisions().iter();
+                let rows = scene.step.normal_collisions().iter();
                 rows.map(|collision| (collision.stencil.nodes, collision.energy.to_bits()))
                     .collect::<Vec<_>>()
             });

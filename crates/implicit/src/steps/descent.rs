@@ -506,10 +506,10 @@ fn expand(
 /// Takes friction anew if its size has changed by more than counts; whether it has.
 fn lag(solver: &mut impl Contacting) -> bool {
     let Some(contact) = &mut solver.system_mut().contact else { return false };
-    let [held, now] = contact.barriers.friction_limits();
+    let [held, now] = contact.step.friction_limits();
     let changed = (now - held).abs() > LAGGED * held.max(now);
     if changed {
-        contact.barriers.lag();
+        contact.step.lag();
     }
     changed
 }

@@ -18,7 +18,7 @@ impl System {
         if self.evaluate(state, state.time, None).is_err() {
             return error;
         }
-        let gap = self.contact.as_ref().and_then(|own| own.barriers.least_gap()).unwrap_or(f64::INFINITY);
+        let gap = self.contact.as_ref().and_then(|own| own.step.least_gap()).unwrap_or(f64::INFINITY);
         let driver = self.hardest_driver([state.time, time]);
         if driver.is_none() && self.conditions.are_closed() {
             // Nothing is driven: loads press what does not come to rest.

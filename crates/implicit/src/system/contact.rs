@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
-use pliant_contact::barrier::{Barriers, Meeting, NodeTouch};
+use pliant_contact::barrier::{BarrierStep, Barriers, Meeting, NodeTouch};
 use pliant_contact::lag::Lag;
 use pliant_contact::pose::Leg;
 use pliant_contact::touch::{Contact, Contacts, Rigid, With};
@@ -47,7 +47,7 @@ pub fn apart_counts(contact: &ContactModel, model: &Assembly) -> Vec<usize> {
 
 /// Whatever has no gap at a state: a run can't start there.
 pub fn meetings(contact: &ContactModel, model: &Assembly, state: &State) -> Vec<Meeting> {
-    let (mut barriers, samples) = made(contact, model);
+    let (barriers, samples) = made(contact, model);
     let Some(mut samples) = samples else { return barriers.meetings(&state.position, state.time) };
     samples.place(model, state);
     let met = barriers.meetings(&samples.places, state.time);
@@ -74,7 +74,8 @@ pub struct ContactNow {
 /// Contacts in the equations of a solver.
 pub struct ContactSystem {
     model: Arc<Assembly>,
-    pub(crate) barriers: Barriers,
+    /// The step of the barriers.
+    pub(crate) step: BarrierStep,
     /// Points of contacts that are no nodes, and forces on nodes and them, six each; `None` where surfaces are flat.
     samples: Option<(Samples, Vec<f64>)>,
     /// How far rigid things have gone in the step, from 0 to 1.
@@ -109,6 +110,12 @@ impl ContactSystem {
         let rigids = contact.contacts.rigids.iter().zip(0..);
         let limited = rigids.filter(|(rigid, _)| rigid.trajectory.limit().is_some());
         let (barriers, samples) = made(contact, model);
+        let places = match &samples {
+            Some(samples) => samples.places.clone(),
+            None => model.rest.iter().map(|&place| place.into()).collect(),
+        };
+        // One of no length at rest: there is none without a state.
+        let step = barriers.begin(&places, &vec![0.0; 6 * places.len()], [0.0; 2]);
         let samples = samples.map(|samples| {
             let forces = vec![0.0; 6 * samples.places.len()];
             (samples, forces)
@@ -117,7 +124,7 @@ impl ContactSystem {
             model: Arc::clone(model),
             samples,
             lags: limited.map(|(_, number)| Lag::new(number)).collect(),
-            barriers,
+            step,
             time_fraction: 1.0,
             spent: Duration::ZERO,
             forces: vec![0.0; 6 * model.rest.len()],
@@ -136,11 +143,11 @@ impl ContactSystem {
     pub(crate) fn begin(&mut self, state: &State, motion: &[f64], times: [f64; 2]) {
         let begun = Instant::now();
         match &mut self.samples {
-            None => self.barriers.begin(&state.position, motion, times),
+            None => self.step.begin_next(&state.position, motion, times),
             Some((samples, _)) => {
                 samples.place(&self.model, state);
                 samples.move_along(&self.model, state, motion, 1.0);
-                self.barriers.begin(&samples.places, &samples.motion, times);
+                self.step.begin_next(&samples.places, &samples.motion, times);
             }
         }
         self.time_fraction = 0.0;
@@ -163,7 +170,7 @@ impl ContactSystem {
 
     fn free_part(&mut self, state: &State, increment: &[f64], [keep, most]: [f64; 2]) -> f64 {
         let Some((samples, _)) = &mut self.samples else {
-            return self.barriers.collision_free_fraction(
+            return self.step.collision_free_fraction(
                 &state.position,
                 increment,
                 self.time_fraction,
@@ -177,7 +184,7 @@ impl ContactSystem {
                 break;
             }
             samples.move_along(&self.model, state, increment, part);
-            let free = self.barriers.collision_free_fraction(
+            let free = self.step.collision_free_fraction(
                 &samples.places,
                 &samples.motion,
                 self.time_fraction,
@@ -202,19 +209,19 @@ impl ContactSystem {
         self.forces.fill(0.0);
         match &mut self.samples {
             None => {
-                self.energy = self.barriers.evaluate(&state.position, self.time_fraction);
+                self.energy = self.step.evaluate(&state.position, self.time_fraction);
                 if self.energy.is_finite() {
-                    self.barriers.add_forces(&mut self.forces, &mut self.totals);
-                    self.barriers.find_moments(&state.position, &mut self.moments);
+                    self.step.add_forces(&mut self.forces, &mut self.totals);
+                    self.step.find_moments(&mut self.moments);
                 }
             }
             Some((samples, all)) => {
                 samples.place(&self.model, state);
-                self.energy = self.barriers.evaluate(&samples.places, self.time_fraction);
+                self.energy = self.step.evaluate(&samples.places, self.time_fraction);
                 all.fill(0.0);
                 if self.energy.is_finite() {
-                    self.barriers.add_forces(all, &mut self.totals);
-                    self.barriers.find_moments(&samples.places, &mut self.moments);
+                    self.step.add_forces(all, &mut self.totals);
+                    self.step.find_moments(&mut self.moments);
                 }
                 samples.give_back(&self.model, all, &mut self.forces);
             }
@@ -232,8 +239,8 @@ impl ContactSystem {
             forces: self.forces.clone(),
             totals: self.totals.iter().map(|&total| total.into()).collect(),
             moments: self.moments.iter().map(|&moment| moment.into()).collect(),
-            energy: self.barriers.barrier_energy(),
-            gap: self.barriers.least_gap(),
+            energy: self.step.barrier_energy(),
+            gap: self.step.least_gap(),
             nodes: self.touches.clone(),
         }
     }
@@ -250,9 +257,9 @@ impl ContactSystem {
     pub(crate) fn stand(&mut self, state: &State) {
         let still = vec![0.0; self.forces.len()];
         let shifts = self.lags.iter().map(|lag| (lag.number() as u32, [lag.now(); 2]));
-        *self.barriers.shifts_mut() = shifts.collect();
+        *self.step.shifts_mut() = shifts.collect();
         self.begin(state, &still, [state.time; 2]);
-        self.barriers.drop_friction();
+        self.step.drop_friction();
         self.time_fraction = 1.0;
     }
 
@@ -268,7 +275,7 @@ impl ContactSystem {
             Some((samples, _)) => samples.shares(&self.model, number, found),
             None => found(number, 1.0),
         };
-        self.barriers.touches(&self.touches, share)
+        self.step.touches(&self.touches, share)
     }
 
     /// Goes on where another one stood: with nodes that touch something, increasing, and the lags of tools.
@@ -276,9 +283,9 @@ impl ContactSystem {
         (self.touches, self.lags) = (touches, lags);
     }
 
-    /// The contacts at the state last evaluated.
-    pub fn barriers(&self) -> &Barriers {
-        &self.barriers
+    /// The step of the contacts, at the state last evaluated.
+    pub fn step(&self) -> &BarrierStep {
+        &self.step
     }
 
     /// How far tools whose force is limited are behind their trajectories.
@@ -288,7 +295,7 @@ impl ContactSystem {
 
     /// The force [N] that the tool of a lag pushes with at most.
     pub(crate) fn limit(&self, lag: &Lag) -> f64 {
-        self.barriers.contacts().rigids[lag.number()].trajectory.limit().unwrap_or(f64::INFINITY)
+        self.step.contacts().rigids[lag.number()].trajectory.limit().unwrap_or(f64::INFINITY)
     }
 
     /// Finds where tools whose force is limited go between two times [s]: each a part of its way along a force [N]; how long [m] the whole of
@@ -299,21 +306,21 @@ impl ContactSystem {
         parts: impl Iterator<Item = (Vector3<f64>, f64, &'a mut f64)>,
     ) {
         let mut lags = std::mem::take(&mut self.lags);
-        self.barriers.shifts_mut().clear();
+        self.step.shifts_mut().clear();
         for (lag, (ahead, part, into)) in lags.iter_mut().zip(parts) {
             let number = lag.number() as u32;
-            let leg = self.barriers.legs().get(&number);
-            let rigid = &self.barriers.contacts().rigids[lag.number()];
+            let leg = self.step.legs().get(&number);
+            let rigid = &self.step.contacts().rigids[lag.number()];
             let place = |time| rigid.posture(time, leg).0.translation.vector;
             *into = lag.go(ahead, part, place(to) - place(from), to - from);
-            self.barriers.shifts_mut().push((number, [lag.now(), lag.next()]));
+            self.step.shifts_mut().push((number, [lag.now(), lag.next()]));
         }
         self.lags = lags;
     }
 
     /// Gives each lag the force [N] with which its tool pushes at the state last evaluated; these forces.
     pub(crate) fn bear_on(&mut self) -> Vec<Vector3<f64>> {
-        let rigids = &self.barriers.contacts().rigids;
+        let rigids = &self.step.contacts().rigids;
         let forces: Vec<_> = self.lags.iter().map(|lag| self.push(rigids[lag.number()].tool())).collect();
         self.lags.iter_mut().zip(&forces).for_each(|(lag, force)| lag.found(*force));
         forces
@@ -321,7 +328,7 @@ impl ContactSystem {
 
     /// The force [N] with which a tool pushes at the state last evaluated.
     fn push(&self, tool: &str) -> Vector3<f64> {
-        let Contacts { rigids, contacts, .. } = self.barriers.contacts();
+        let Contacts { rigids, contacts, .. } = self.step.contacts();
         let on = |(contact, force): (&Contact, &Vector3<f64>)| {
             let of_tool = matches!(contact.with, With::Rigid(rigid) if rigids[rigid].tool() == tool);
             of_tool.then_some(*force)
@@ -332,21 +339,21 @@ impl ContactSystem {
     /// Tools and obstacles that move between two times [s], with the size of the force [N] with which they push at the state last evaluated.
     pub(crate) fn pushing(&self, [from, to]: [f64; 2]) -> impl Iterator<Item = (String, f64)> {
         let moves = move |(rigid, number): (&Rigid, u32)| {
-            let leg = self.barriers.legs().get(&number);
+            let leg = self.step.legs().get(&number);
             let goes = rigid.stance(from, leg) != rigid.stance(to, leg);
             goes.then(|| (rigid.tool().to_owned(), self.push(rigid.tool()).norm()))
         };
-        self.barriers.contacts().rigids.iter().zip(0..).filter_map(moves)
+        self.step.contacts().rigids.iter().zip(0..).filter_map(moves)
     }
 
     /// Where rigid things go that are driven from outside, by their number.
     pub fn legs(&self) -> &BTreeMap<u32, Leg> {
-        self.barriers.legs()
+        self.step.legs()
     }
 
     /// The same to change.
     pub fn legs_mut(&mut self) -> &mut BTreeMap<u32, Leg> {
-        self.barriers.legs_mut()
+        self.step.legs_mut()
     }
 
     /// Pairs of nodes that contacts added to the pattern of the equations, increasing.
@@ -376,15 +383,15 @@ impl ContactSystem {
         let mut lacks = false;
         let movers =
             Movers { model: &self.model, followers, samples: self.samples.as_ref().map(|own| &own.0) };
-        self.barriers.acting(|nodes| {
+        self.step.acting(|nodes| {
             movers.each_pair(nodes, |pair| lacks = lacks || !matrix.couples(equations, pair));
         });
         if !lacks {
             return false;
         }
         let mut needed = Vec::new();
-        self.barriers.acting(|nodes| movers.each_pair(nodes, |pair| needed.push(pair)));
-        self.barriers.near(SOON, |nodes| movers.each_pair(nodes, |pair| needed.push(pair)));
+        self.step.acting(|nodes| movers.each_pair(nodes, |pair| needed.push(pair)));
+        self.step.near(SOON, |nodes| movers.each_pair(nodes, |pair| needed.push(pair)));
         needed.sort_unstable();
         needed.dedup();
         if self.pairs.len() > ROOM * needed.len() {
@@ -408,19 +415,12 @@ impl ContactSystem {
     ) {
         if let Some((samples, _)) = &self.samples {
             let movers = Movers { model: &self.model, followers, samples: Some(samples) };
-            return movers.add_stiffness(
-                &self.barriers,
-                self.time_fraction,
-                equations,
-                matrix,
-                moved,
-                coupling,
-            );
+            return movers.add_stiffness(&self.step, equations, matrix, moved, coupling);
         }
-        let nodes = self.barriers.node_count();
+        let nodes = self.step.node_count();
         // Nodes that move those of a collision: their number, its place in the stencil, and their weight.
         let mut movers: Vec<(u32, usize, f64)> = Vec::new();
-        self.barriers.stiffness(self.time_fraction, |stencil, block, mut ways| {
+        self.step.stiffness(|stencil, block, mut ways| {
             let own = |at: usize| stencil.nodes[at] as usize;
             let count = usize::from(stencil.count);
             movers.clear();
@@ -462,7 +462,7 @@ impl ContactSystem {
             return Ok(());
         }
         let (mut count, mut first) = (0, None);
-        self.barriers.intersections(|contact, ends, corners| {
+        self.step.intersections(|contact, ends, corners| {
             count += 1;
             let node = |number: u32| match &self.samples {
                 Some((samples, _)) => samples.node_at(&self.model, number),

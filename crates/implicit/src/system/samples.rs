@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{SMatrix, Vector3, Vector6};
-use pliant_contact::barrier::{Barriers, Matrix12};
+use pliant_contact::barrier::{BarrierStep, Matrix12};
 use pliant_contact::pairs::Surface;
 use pliant_contact::touch::{Contact, Contacts, With};
 use pliant_linear::sparse::{Equations, LowerMatrix};
@@ -286,19 +286,18 @@ impl Movers<'_> {
     /// come make of it to the coupling.
     pub(crate) fn add_stiffness(
         self,
-        barriers: &Barriers,
-        time_fraction: f64,
+        step: &BarrierStep,
         equations: &Equations,
         matrix: &mut LowerMatrix,
         moved: &[f64],
         coupling: &mut [f64],
     ) {
         let mut movers: Vec<(u32, usize, ByNode)> = Vec::new();
-        barriers.stiffness(time_fraction, |stencil, block, mut ways| {
+        step.stiffness(|stencil, block, mut ways| {
             let count = usize::from(stencil.count);
             movers.clear();
-            for at in (0..count)
-                .filter(|&at| (stencil.nodes[at] as usize) < barriers.node_count() && acts(block, at))
+            for at in
+                (0..count).filter(|&at| (stencil.nodes[at] as usize) < step.node_count() && acts(block, at))
             {
                 self.of(stencil.nodes[at], |node, by| movers.push((node, at, by)));
             }

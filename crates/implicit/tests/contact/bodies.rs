@@ -125,7 +125,7 @@ fn a_uniform_pressure_goes_through_cells_that_do_not_match() {
     assert!(off / volume < 0.01, "{}", off / volume);
     // 2 % are asked; pairs at a corner or an edge count for each triangle there, so that single nodes are off by more.
     assert!((mean - 1.0).abs() < 0.02 && least > 0.96 && largest < 1.04, "{mean} {least} {largest}");
-    let contacts = solver.contact().unwrap().barriers().contacts();
+    let contacts = solver.contact().unwrap().step().contacts();
     let numbers = contacts.nodes();
     let places: Vec<Vector3<f64>> = numbers.iter().map(|&node| state.position[node as usize]).collect();
     let push = |node: &u32| {

@@ -110,7 +110,7 @@ fn draped(cells: u32, friction: f64, until: f64) -> f64 {
         iterations += done.residuals.len();
         halved += usize::from(done.parts > 1);
         steps += 1;
-        rows += solver.contact().unwrap().barriers().normal_collisions().len();
+        rows += solver.contact().unwrap().step().normal_collisions().len();
         least = least.min(solver.contact().unwrap().now().gap.unwrap_or(f64::INFINITY));
     }
     let border: Vec<usize> = (0..model.rest.len()).filter(|&n| model.place(n).amax() > 0.1499).collect();

@@ -1,0 +1,340 @@
+//! A step in contact: collisions at a state, their energy and forces, and friction over the step.
+//!
+//! A step goes from one time to another. The part of the way that rigid things have gone in it is its *time fraction*, from 0 to 1: on straight
+//! ways and shortest arcs between their poses, and their growth in proportion. Friction of a step is that of the state where
+//! [`BarrierStep::lag`] was called last, with directions and normal forces as they were there.
+//!
+//! The order of calls is that of types. Only [`Barriers::begin`] makes a step, and it evaluates the start. So there are always collisions to read,
+//! and they are those of the state last evaluated, since a search for a [fraction](BarrierStep::collision_free_fraction) leaves them alone.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Point3, Vector3};
+
+use super::collisions::{FrictionCollision, NormalCollision, Stencil};
+use super::configuration::Configuration;
+use super::intersections::intersections;
+use super::law::Slip;
+use super::system::Barriers;
+use crate::pose::{Leg, Stance};
+use crate::touch::Contacts;
+
+/// A step of the contacts of a model, and then the next one.
+#[derive(Clone, Debug)]
+pub struct BarrierStep {
+    pub(super) barriers: Barriers,
+    /// Rigid things at the start and the end of the step.
+    pub(super) ends: [Vec<Stance>; 2],
+    /// Places [m] of all nodes at the start of the step.
+    start: Vec<Vector3<f64>>,
+    /// The state last evaluated, and how far rigid things have gone there.
+    pub(super) now: Configuration,
+    pub(super) time_fraction: f64,
+    /// Where the search for a fraction starts.
+    pub(super) tried: Configuration,
+    pub(super) normal_collisions: Vec<NormalCollision>,
+    pub(super) friction_collisions: Vec<FrictionCollision>,
+    /// Of barriers and of friction [J].
+    energy: [f64; 2],
+    /// Whether another evaluation of the same state is spared. No longer after a search elsewhere: the order of sums is that of lists.
+    pub(super) is_current: bool,
+}
+
+impl BarrierStep {
+    /// The first step of contacts.
+    pub(super) fn first(
+        barriers: Barriers,
+        position: &[Vector3<f64>],
+        motion: &[f64],
+        times: [f64; 2],
+    ) -> Self {
+        let now = barriers.listed.clone();
+        let mut step = Self {
+            ends: [now.stances.clone(), now.stances.clone()],
+            start: now.place.clone(),
+            tried: now.clone(),
+            now,
+            time_fraction: 0.0,
+            normal_collisions: Vec::new(),
+            friction_collisions: Vec::new(),
+            energy: [0.0; 2],
+            is_current: false,
+            barriers,
+        };
+        step.begin_next(position, motion, times);
+        step
+    }
+
+    /// Begins the next step between two times [s], with nodes at places [m], expected to go by a motion (six numbers a node, translations first).
+    /// Friction is that of the start.
+    pub fn begin_next(&mut self, position: &[Vector3<f64>], motion: &[f64], times: [f64; 2]) {
+        let Self { barriers, ends, .. } = self;
+        for (stances, time) in ends.iter_mut().zip(times) {
+            for ((stance, rigid), number) in stances.iter_mut().zip(&barriers.contacts.rigids).zip(0..) {
+                *stance = rigid.stance(time, barriers.legs.get(&number));
+            }
+        }
+        for (number, shifts) in &barriers.shifts {
+            for (stances, shift) in ends.iter_mut().zip(shifts) {
+                stances[*number as usize].pose.translation.vector += shift;
+            }
+        }
+        let [from, to] = times;
+        for group in &mut barriers.groups {
+            let parameters = &mut group.parameters;
+            parameters.slip = Slip { creep: parameters.creep_speed * (to - from) };
+        }
+        self.friction_collisions.clear();
+        self.is_current = false;
+        self.put(position, 0.0);
+        self.start.copy_from_slice(&self.now.place);
+        self.barriers.set_motion(&self.now, motion, 1.0, &self.ends, 1.0);
+        self.barriers.list(&self.now);
+        self.find_collisions();
+        self.lag();
+    }
+
+    /// Drops friction until the next step begins: a state by itself has none.
+    pub fn drop_friction(&mut self) {
+        self.friction_collisions.clear();
+    }
+
+    /// Puts nodes at places [m], and rigid things where they are at a fraction of the step.
+    fn put(&mut self, position: &[Vector3<f64>], time_fraction: f64) {
+        let Self { barriers, ends, now, .. } = self;
+        self.time_fraction = time_fraction;
+        self.is_current &= now.move_things(ends, time_fraction) & (now.place[..barriers.nodes] == *position);
+        if !self.is_current {
+            now.place_nodes(position, &barriers.rigid_nodes);
+            barriers.grow(&now.stances);
+        }
+    }
+
+    /// Finds the collisions, if they are not known; infinite energy if there is no gap somewhere.
+    fn find_collisions(&mut self) {
+        if std::mem::replace(&mut self.is_current, true) {
+            return;
+        }
+        self.normal_collisions.clear();
+        let apart = self.barriers.find_collisions(&self.now, &mut self.normal_collisions);
+        let energy: f64 = self.normal_collisions.iter().map(|collision| collision.energy).sum();
+        self.energy[0] = if apart { energy } else { f64::INFINITY };
+    }
+
+    /// Takes friction from the state last evaluated on.
+    pub fn lag(&mut self) {
+        let Self { barriers, normal_collisions, friction_collisions, start, .. } = self;
+        friction_collisions.clear();
+        for collision in normal_collisions.iter() {
+            let group = &barriers.groups[collision.stencil.contact as usize];
+            let (normal, force) = collision.pushes();
+            let limit = group.parameters.friction * force;
+            if limit <= 0.0 {
+                continue;
+            }
+            friction_collisions.push(FrictionCollision {
+                stencil: collision.stencil,
+                normal,
+                limit,
+                start: collision.stencil.combine(|node| start[node as usize]),
+                wall: group.wall.filter(|_| collision.stencil.count == 1),
+                slip: Vector3::zeros(),
+                stiffness: 0.0,
+                along: 0.0,
+            });
+        }
+        self.slide();
+    }
+
+    /// Σ μ λ [N] of the friction that is held, and of what would be held now.
+    pub fn friction_limits(&self) -> [f64; 2] {
+        let of = |collision: &NormalCollision| {
+            self.barriers.groups[collision.stencil.contact as usize].parameters.friction
+                * collision.pushes().1
+        };
+        let now = self.normal_collisions.iter().map(of);
+        [self.friction_collisions.iter().map(|collision| collision.limit).sum(), now.sum()]
+    }
+
+    /// Finds the slip of all that friction holds.
+    fn slide(&mut self) {
+        let Self {
+            barriers,
+            ends: [from, _],
+            now: Configuration { place, stances },
+            friction_collisions,
+            ..
+        } = self;
+        let mut energy = 0.0;
+        for collision in friction_collisions.iter_mut() {
+            let start = match collision.wall {
+                Some(wall) => carried([&from[wall as usize], &stances[wall as usize]], &collision.start),
+                None => collision.start,
+            };
+            let way = collision.stencil.combine(|node| place[node as usize]) - start;
+            collision.slip = way - collision.normal * collision.normal.dot(&way);
+            let slip = barriers.groups[collision.stencil.contact as usize].parameters.slip;
+            let length = collision.slip.norm();
+            collision.stiffness = collision.limit * slip.force_over_slip(length);
+            collision.along = collision.limit * slip.slope(length);
+            energy += collision.limit * slip.energy(length);
+        }
+        self.energy[1] = energy;
+    }
+
+    /// How far [m] the first primitive of a stencil has gone from the second in the step: Σ c x less that of its start, which a wall carries along.
+    pub(super) fn way(&self, stencil: &Stencil) -> Vector3<f64> {
+        let start = stencil.combine(|node| self.start[node as usize]);
+        let wall = self.barriers.groups[stencil.contact as usize].wall.filter(|_| stencil.count == 1);
+        let start = match wall.map(|wall| wall as usize) {
+            Some(wall) => carried([&self.ends[0][wall], &self.now.stances[wall]], &start),
+            None => start,
+        };
+        stencil.combine(|node| self.now.place[node as usize]) - start
+    }
+
+    /// The energy [J] with nodes at places [m] and rigid things at a fraction of the step, that of friction with it; infinite if there is no gap
+    /// somewhere.
+    pub fn evaluate(&mut self, position: &[Vector3<f64>], time_fraction: f64) -> f64 {
+        self.put(position, time_fraction);
+        self.find_collisions();
+        self.slide();
+        self.energy[0] + self.energy[1]
+    }
+
+    /// The energy [J] of the barriers at the state last evaluated.
+    pub fn barrier_energy(&self) -> f64 {
+        self.energy[0]
+    }
+
+    /// What acts at the state last evaluated.
+    pub fn normal_collisions(&self) -> &[NormalCollision] {
+        &self.normal_collisions
+    }
+
+    /// What friction holds.
+    pub fn friction_collisions(&self) -> &[FrictionCollision] {
+        &self.friction_collisions
+    }
+
+    /// The least gap [m] at the state last evaluated; none where nothing is within the reach of the barrier.
+    pub fn least_gap(&self) -> Option<f64> {
+        self.normal_collisions.iter().map(|collision| collision.gap).reduce(f64::min)
+    }
+
+    /// Adds the forces [N] at the state last evaluated to those of nodes, six numbers a node, and sets those of each contact on its second
+    /// side.
+    pub fn add_forces(&self, forces: &mut [f64], totals: &mut [Vector3<f64>]) {
+        totals.fill(Vector3::zeros());
+        let mut add = |stencil: &Stencil, force_on: &dyn Fn(usize) -> Vector3<f64>| {
+            let total = &mut totals[stencil.contact as usize];
+            for (at, (node, _)) in stencil.parts().enumerate() {
+                let force = force_on(at);
+                if stencil.count == 1 {
+                    *total -= force;
+                } else if stencil.is_second(at) {
+                    *total += force;
+                }
+                if let Some(own) = forces.get_mut(6 * node as usize..6 * node as usize + 3) {
+                    own.iter_mut().zip(force.iter()).for_each(|(own, force)| *own += force);
+                }
+            }
+        };
+        self.normal_collisions
+            .iter()
+            .for_each(|collision| add(&collision.stencil, &|at| collision.force_on(at)));
+        self.friction_collisions
+            .iter()
+            .for_each(|collision| add(&collision.stencil, &|at| collision.force_on(at)));
+    }
+
+    /// Sets the moments [N m] about the origin of the forces of each contact on its second side at the state last evaluated.
+    /// Forces act where the nodes of the first side are.
+    pub fn find_moments(&self, moments: &mut [Vector3<f64>]) {
+        let places = &self.now.place[..self.barriers.nodes];
+        moments.fill(Vector3::zeros());
+        let mut add = |stencil: &Stencil, force_on: &dyn Fn(usize) -> Vector3<f64>| {
+            let moment = &mut moments[stencil.contact as usize];
+            for (at, (node, _)) in stencil.parts().enumerate() {
+                if let Some(place) =
+                    places.get(node as usize).filter(|_| stencil.count == 1 || !stencil.is_second(at))
+                {
+                    *moment -= place.cross(&force_on(at));
+                }
+            }
+        };
+        self.normal_collisions
+            .iter()
+            .for_each(|collision| add(&collision.stencil, &|at| collision.force_on(at)));
+        self.friction_collisions
+            .iter()
+            .for_each(|collision| add(&collision.stencil, &|at| collision.force_on(at)));
+    }
+
+    /// Calls back with the nodes of the model of each pair that acts or is held.
+    pub fn acting(&self, mut found: impl FnMut(&[u32])) {
+        let stencils = self
+            .normal_collisions
+            .iter()
+            .map(|collision| &collision.stencil)
+            .chain(self.friction_collisions.iter().map(|collision| &collision.stencil));
+        stencils
+            .filter(|stencil| stencil.count > 1)
+            .for_each(|stencil| found(&self.barriers.own(&stencil.nodes)));
+    }
+
+    /// Calls back with the nodes of the model of each pair that may act soon: within so many distances of its barrier more than the reach.
+    pub fn near(&mut self, distances: f64, mut found: impl FnMut(&[u32])) {
+        let Self { barriers, now, .. } = self;
+        // A search for a fraction may have left lists elsewhere.
+        barriers.grow(&now.stances);
+        barriers.relist(now);
+        for group in &barriers.groups {
+            let margin = distances * group.parameters.law.distance;
+            group.pairs(&now.place, margin, |nodes| found(&barriers.own(nodes)));
+        }
+    }
+
+    /// Nodes of the model.
+    pub fn node_count(&self) -> usize {
+        self.barriers.nodes
+    }
+
+    /// Who touches whom.
+    pub fn contacts(&self) -> &Contacts {
+        &self.barriers.contacts
+    }
+
+    /// Where rigid things go that are driven from outside, by their number; from the next step on.
+    pub fn legs_mut(&mut self) -> &mut BTreeMap<u32, Leg> {
+        &mut self.barriers.legs
+    }
+
+    /// The same to look at.
+    pub fn legs(&self) -> &BTreeMap<u32, Leg> {
+        &self.barriers.legs
+    }
+
+    /// Rigid things beside their trajectories, by their number, at the start and the end of a step [m]; from the next step on.
+    pub fn shifts_mut(&mut self) -> &mut Vec<(u32, [Vector3<f64>; 2])> {
+        &mut self.barriers.shifts
+    }
+
+    /// Calls back with each edge that goes through a triangle at the state last evaluated, by its contact, ends and corners. Without the lists
+    /// that contacts go by.
+    pub fn intersections(&self, mut found: impl FnMut(u32, [u32; 2], [u32; 3])) {
+        let place = |node: u32| self.now.place[node as usize];
+        for group in &self.barriers.groups {
+            let (first, second) = (&group.sides[0], group.sides.last().unwrap_or(&group.sides[0]));
+            intersections([first, second], &place, |ends, corners| found(group.number, ends, corners));
+            if group.sides.len() > 1 {
+                intersections([second, first], &place, |ends, corners| found(group.number, ends, corners));
+            }
+        }
+    }
+}
+
+/// Where a point [m] that goes along with a rigid thing is after it has gone from one stance to another.
+fn carried([from, now]: [&Stance; 2], point: &Vector3<f64>) -> Vector3<f64> {
+    (now.pose * from.pose.inverse() * Point3::from(*point)).coords
+}
