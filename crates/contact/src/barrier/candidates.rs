@@ -9,19 +9,23 @@ use super::collisions::{Mollified, NormalCollision, Stencil};
 use super::distance::Mollifier;
 use super::law::{Barrier, Slip};
 
-/// The reach of parts of one surface that are nearer at rest than that of the contact, over their distance at rest.
+/// The reach of parts of one surface that are nearer at rest than that of the contact, over their distance at
+/// rest.
 const NEAR: f64 = 0.98;
-/// Rest distances, over the distance of the barrier, up to which parts of one surface are in one place, and never touch each other.
+/// Rest distances, over the distance of the barrier, up to which parts of one surface are in one place, and
+/// never touch each other.
 const IN_ONE_PLACE: f64 = 1e-3;
-/// The skin of a node beside the motion that it is to make, over that motion; and of a node of a rigid thing, which may turn: an arc of up to half a turn about the
-/// origin of the thing is no further from its chord than half of that. Lists are made anew where another arc leaves its skin.
+/// The skin of a node beside the motion that it is to make, over that motion; and of a node of a rigid thing,
+/// which may turn: an arc of up to half a turn about the origin of the thing is no further from its chord
+/// than half of that. Lists are made anew where another arc leaves its skin.
 const SKIN: [f64; 2] = [0.25, 0.55];
 /// Width of the bins that pairs are sorted into by their distance, over the distance of the barrier.
 const BIN: f64 = 0.2;
 /// The most bins: those beyond are in the last one.
 const BINS: usize = 1 << 12;
-/// The least skin and the longest motion, over the distance of the barrier. The longest is a mean edge if that is more, and that of a surface which touches
-/// itself always: all its parts are near others, and their lists would grow with the square of a motion over an edge.
+/// The least skin and the longest motion, over the distance of the barrier. The longest is a mean edge if
+/// that is more, and that of a surface which touches itself always: all its parts are near others, and their
+/// lists would grow with the square of a motion over an edge.
 const SKINS: [f64; 2] = [0.5, 20.0];
 
 /// A pair that may come near.
@@ -76,7 +80,8 @@ impl ContactParameters {
         Self { growth: 0.0, ..*self }
     }
 
-    /// The same for a pair whose reach is no more than a length [m]: it keeps less, and if that is not enough its barrier begins nearer.
+    /// The same for a pair whose reach is no more than a length [m]: it keeps less, and if that is not enough
+    /// its barrier begins nearer.
     fn within(&self, most: f64) -> Self {
         if most >= self.reach() {
             return *self;
@@ -118,11 +123,13 @@ pub(super) struct Group {
     pub sides: Vec<CollisionMesh>,
     /// The rigid thing whose distance nodes of the first keep, by its number.
     pub wall: Option<u32>,
-    /// The rigid thing of the second, if there is one, by its number; and by how much [m] its surface rises in the motion that is set.
+    /// The rigid thing of the second, if there is one, by its number; and by how much [m] its surface rises
+    /// in the motion that is set.
     pub thing: Option<u32>,
     pub rise: f64,
     pub parameters: ContactParameters,
-    /// Of one surface: places of its nodes at rest [m]; nodes with triangles, and edges, that are in one place there.
+    /// Of one surface: places of its nodes at rest [m]; nodes with triangles, and edges, that are in one
+    /// place there.
     rest: Vec<Vector3<f64>>,
     apart: [Apart; 2],
     /// In bins by their distance, in the order of their numbers within one.
@@ -132,10 +139,12 @@ pub(super) struct Group {
     unsorted: Vec<Candidate>,
     /// Pairs that candidates are chosen from.
     broad_phase: BroadPhase,
-    /// The course [m] for which pairs were listed: a motion of all nodes, less what they have in common; and how much of it they have gone.
+    /// The course [m] for which pairs were listed: a motion of all nodes, less what they have in common; and
+    /// how much of it they have gone.
     course: Vec<Vector3<f64>>,
     gone: f64,
-    /// Of all nodes: skins [m] around the course, and with it; how far [m] they are off the course, and how far [m] they go in a motion.
+    /// Of all nodes: skins [m] around the course, and with it; how far [m] they are off the course, and how
+    /// far [m] they go in a motion.
     skin: Vec<f64>,
     whole: Vec<f64>,
     moved: Vec<f64>,
@@ -198,7 +207,8 @@ impl Group {
         self.apart.iter().map(Apart::len).sum()
     }
 
-    /// Lists what may come near while nodes go by a motion [m] from their places [m], or by so much of it as no node goes too far in; this part.
+    /// Lists what may come near while nodes go by a motion [m] from their places [m], or by so much of it as
+    /// no node goes too far in; this part.
     pub fn list(&mut self, place: &[Vector3<f64>], motion: &[Vector3<f64>]) -> f64 {
         let common = common(&self.sides, |node| motion[node as usize]);
         let Self { sides, course, skin, whole, .. } = self;
@@ -330,13 +340,15 @@ impl Group {
         holds
     }
 
-    /// Whether no node leaves its skin in a motion [m] from the places [m] last taken. On the way there it does not either: the skin around the course is convex.
+    /// Whether no node leaves its skin in a motion [m] from the places [m] last taken. On the way there it
+    /// does not either: the skin around the course is convex.
     pub fn has(&self, place: &[Vector3<f64>], listed: &[Vector3<f64>], motion: &[Vector3<f64>]) -> bool {
         let way = |node: u32| place[node as usize] + motion[node as usize] - listed[node as usize];
         self.off_course(way, |_, _| ()).1
     }
 
-    /// How much of the course nodes have gone that went some ways [m], and whether they are within skins around it; calls back with how far [m] each is off.
+    /// How much of the course nodes have gone that went some ways [m], and whether they are within skins
+    /// around it; calls back with how far [m] each is off.
     fn off_course(&self, way: impl Fn(u32) -> Vector3<f64>, mut off: impl FnMut(u32, f64)) -> (f64, bool) {
         let common = common(&self.sides, &way);
         let nodes = || self.sides.iter().flat_map(|side| &side.points);
@@ -410,7 +422,8 @@ impl Group {
         true
     }
 
-    /// The part, `most` or less, of a motion [m] from the places [m] last taken that keeps a part of every gap.
+    /// The part, `most` or less, of a motion [m] from the places [m] last taken that keeps a part of every
+    /// gap.
     pub fn collision_free_fraction(
         &mut self,
         place: &[Vector3<f64>],
@@ -443,7 +456,8 @@ impl Group {
         most
     }
 
-    /// Calls back with the nodes of all pairs within the reach of the barrier and a margin [m] more, at the places [m] last taken.
+    /// Calls back with the nodes of all pairs within the reach of the barrier and a margin [m] more, at the
+    /// places [m] last taken.
     pub fn pairs(&self, place: &[Vector3<f64>], margin: f64, mut found: impl FnMut(&[u32; 4])) {
         let reach = self.parameters.reach() + margin;
         let near = |one: &&Candidate| {
@@ -466,7 +480,8 @@ impl Group {
     }
 }
 
-/// The reach [m] of a pair of one surface that is near at rest; infinite where it has all of the reach of the contact.
+/// The reach [m] of a pair of one surface that is near at rest; infinite where it has all of the reach of the
+/// contact.
 fn at_rest(kind: Kind, nodes: [u32; 4], rest: &[Vector3<f64>], reach: f64) -> f64 {
     let points = nodes.map(|node| &rest[node as usize]);
     if kind.is_beyond(points, reach / NEAR) {

@@ -14,7 +14,8 @@ pub(super) struct Configuration {
 }
 
 impl Configuration {
-    /// Moves rigid things to where they are at a fraction of the step between both ends; whether they are there already.
+    /// Moves rigid things to where they are at a fraction of the step between both ends; whether they are
+    /// there already.
     pub fn move_things(&mut self, [from, to]: &[Vec<Stance>; 2], time_fraction: f64) -> bool {
         let mut are_there = true;
         for ((now, from), to) in self.stances.iter_mut().zip(from).zip(to) {
@@ -25,7 +26,8 @@ impl Configuration {
         are_there
     }
 
-    /// Takes the places [m] of the nodes of the model. Those of rigid things, each a thing and a place [m] in its frame, go along with them.
+    /// Takes the places [m] of the nodes of the model. Those of rigid things, each a thing and a place [m] in
+    /// its frame, go along with them.
     pub fn place_nodes(&mut self, position: &[Vector3<f64>], rigid_nodes: &[(u32, Vector3<f64>)]) {
         let (own, others) = self.place.split_at_mut(position.len());
         own.copy_from_slice(position);

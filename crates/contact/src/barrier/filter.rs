@@ -16,9 +16,9 @@ const TURNS: usize = 40;
 const SHORTER: f64 = 0.9;
 
 impl BarrierStep {
-    /// The part of a motion (six numbers a node), of so much of it at most, from places [m] at a fraction of the step that leaves at least half of a
-    /// part of every gap, while rigid things go the same part of the way that is left to them. Pairs are listed anew if need be. What was evaluated
-    /// stays as it is.
+    /// The part of a motion (six numbers a node), of so much of it at most, from places [m] at a fraction of
+    /// the step that leaves at least half of a part of every gap, while rigid things go the same part of the
+    /// way that is left to them. Pairs are listed anew if need be. What was evaluated stays as it is.
     pub fn collision_free_fraction(
         &mut self,
         position: &[Vector3<f64>],
@@ -59,8 +59,8 @@ impl BarrierStep {
 }
 
 impl Barriers {
-    /// The part of the motion that is set, in which rigid things go to a fraction of the step between both ends, that leaves at least half of a
-    /// part of every gap.
+    /// The part of the motion that is set, in which rigid things go to a fraction of the step between both
+    /// ends, that leaves at least half of a part of every gap.
     fn filtered(
         &mut self,
         now: &Configuration,
@@ -79,8 +79,8 @@ impl Barriers {
         most
     }
 
-    /// [`filtered`](Self::filtered) of nodes at a wall that goes to a target, with their distances [m] when pairs were listed: no node comes
-    /// nearer to it than both go.
+    /// [`filtered`](Self::filtered) of nodes at a wall that goes to a target, with their distances [m] when
+    /// pairs were listed: no node comes nearer to it than both go.
     fn filtered_at_wall(
         &self,
         (group, wall, distances): (&Group, u32, &[f64]),

@@ -1,4 +1,5 @@
-//! What barriers do to single nodes: how hard they push them along their normals, the least gaps, and how far nodes slide.
+//! What barriers do to single nodes: how hard they push them along their normals, the least gaps, and how far
+//! nodes slide.
 
 use std::collections::BTreeMap;
 
@@ -21,9 +22,10 @@ pub struct NodeTouch {
 }
 
 impl BarrierStep {
-    /// All nodes within the reach of a barrier at the state last evaluated, by increasing node. `before` has them at the start of the step:
-    /// their slip goes on by the length of the way that they went in it along what they touch, the mean of all that bears on a node, weighted by
-    /// its forces. `share` calls back with the nodes that a node of the contacts stands for and their parts in it: itself, or those around it.
+    /// All nodes within the reach of a barrier at the state last evaluated, by increasing node. `before` has
+    /// them at the start of the step: their slip goes on by the length of the way that they went in it along
+    /// what they touch, the mean of all that bears on a node, weighted by its forces. `share` calls back with
+    /// the nodes that a node of the contacts stands for and their parts in it: itself, or those around it.
     pub fn touches(
         &self,
         before: &[NodeTouch],

@@ -1,11 +1,13 @@
 //! A step in contact: collisions at a state, their energy and forces, and friction over the step.
 //!
-//! A step goes from one time to another. The part of the way that rigid things have gone in it is its *time fraction*, from 0 to 1: on straight
-//! ways and shortest arcs between their poses, and their growth in proportion. Friction of a step is that of the state where
-//! [`BarrierStep::lag`] was called last, with directions and normal forces as they were there.
+//! A step goes from one time to another. The part of the way that rigid things have gone in it is its *time
+//! fraction*, from 0 to 1: on straight ways and shortest arcs between their poses, and their growth in
+//! proportion. Friction of a step is that of the state where [`BarrierStep::lag`] was called last, with
+//! directions and normal forces as they were there.
 //!
-//! The order of calls is that of types. Only [`Barriers::begin`] makes a step, and it evaluates the start. So there are always collisions to read,
-//! and they are those of the state last evaluated, since a search for a [fraction](BarrierStep::collision_free_fraction) leaves them alone.
+//! The order of calls is that of types. Only [`Barriers::begin`] makes a step, and it evaluates the start. So
+//! there are always collisions to read, and they are those of the state last evaluated, since a search for a
+//! [fraction](BarrierStep::collision_free_fraction) leaves them alone.
 
 use std::collections::BTreeMap;
 
@@ -36,7 +38,8 @@ pub struct BarrierStep {
     pub(super) friction_collisions: Vec<FrictionCollision>,
     /// Of barriers and of friction [J].
     energy: [f64; 2],
-    /// Whether another evaluation of the same state is spared. No longer after a search elsewhere: the order of sums is that of lists.
+    /// Whether another evaluation of the same state is spared. No longer after a search elsewhere: the order
+    /// of sums is that of lists.
     pub(super) is_current: bool,
 }
 
@@ -65,8 +68,8 @@ impl BarrierStep {
         step
     }
 
-    /// Begins the next step between two times [s], with nodes at places [m], expected to go by a motion (six numbers a node, translations first).
-    /// Friction is that of the start.
+    /// Begins the next step between two times [s], with nodes at places [m], expected to go by a motion (six
+    /// numbers a node, translations first). Friction is that of the start.
     pub fn begin_next(&mut self, position: &[Vector3<f64>], motion: &[f64], times: [f64; 2]) {
         let Self { barriers, ends, .. } = self;
         for (stances, time) in ends.iter_mut().zip(times) {
@@ -182,7 +185,8 @@ impl BarrierStep {
         self.energy[1] = energy;
     }
 
-    /// How far [m] the first primitive of a stencil has gone from the second in the step: Σ c x less that of its start, which a wall carries along.
+    /// How far [m] the first primitive of a stencil has gone from the second in the step: Σ c x less that of
+    /// its start, which a wall carries along.
     pub(super) fn way(&self, stencil: &Stencil) -> Vector3<f64> {
         let start = stencil.combine(|node| self.start[node as usize]);
         let wall = self.barriers.groups[stencil.contact as usize].wall.filter(|_| stencil.count == 1);
@@ -193,8 +197,8 @@ impl BarrierStep {
         stencil.combine(|node| self.now.place[node as usize]) - start
     }
 
-    /// The energy [J] with nodes at places [m] and rigid things at a fraction of the step, that of friction with it; infinite if there is no gap
-    /// somewhere.
+    /// The energy [J] with nodes at places [m] and rigid things at a fraction of the step, that of friction
+    /// with it; infinite if there is no gap somewhere.
     pub fn evaluate(&mut self, position: &[Vector3<f64>], time_fraction: f64) -> f64 {
         self.put(position, time_fraction);
         self.find_collisions();
@@ -222,8 +226,8 @@ impl BarrierStep {
         self.normal_collisions.iter().map(|collision| collision.gap).reduce(f64::min)
     }
 
-    /// Adds the forces [N] at the state last evaluated to those of nodes, six numbers a node, and sets those of each contact on its second
-    /// side.
+    /// Adds the forces [N] at the state last evaluated to those of nodes, six numbers a node, and sets those
+    /// of each contact on its second side.
     pub fn add_forces(&self, forces: &mut [f64], totals: &mut [Vector3<f64>]) {
         totals.fill(Vector3::zeros());
         let mut add = |stencil: &Stencil, force_on: &dyn Fn(usize) -> Vector3<f64>| {
@@ -248,8 +252,8 @@ impl BarrierStep {
             .for_each(|collision| add(&collision.stencil, &|at| collision.force_on(at)));
     }
 
-    /// Sets the moments [N m] about the origin of the forces of each contact on its second side at the state last evaluated.
-    /// Forces act where the nodes of the first side are.
+    /// Sets the moments [N m] about the origin of the forces of each contact on its second side at the state
+    /// last evaluated. Forces act where the nodes of the first side are.
     pub fn find_moments(&self, moments: &mut [Vector3<f64>]) {
         let places = &self.now.place[..self.barriers.nodes];
         moments.fill(Vector3::zeros());
@@ -283,7 +287,8 @@ impl BarrierStep {
             .for_each(|stencil| found(&self.barriers.own(&stencil.nodes)));
     }
 
-    /// Calls back with the nodes of the model of each pair that may act soon: within so many distances of its barrier more than the reach.
+    /// Calls back with the nodes of the model of each pair that may act soon: within so many distances of its
+    /// barrier more than the reach.
     pub fn near(&mut self, distances: f64, mut found: impl FnMut(&[u32])) {
         let Self { barriers, now, .. } = self;
         // A search for a fraction may have left lists elsewhere.
@@ -315,13 +320,14 @@ impl BarrierStep {
         &self.barriers.legs
     }
 
-    /// Rigid things beside their trajectories, by their number, at the start and the end of a step [m]; from the next step on.
+    /// Rigid things beside their trajectories, by their number, at the start and the end of a step [m]; from
+    /// the next step on.
     pub fn shifts_mut(&mut self) -> &mut Vec<(u32, [Vector3<f64>; 2])> {
         &mut self.barriers.shifts
     }
 
-    /// Calls back with each edge that goes through a triangle at the state last evaluated, by its contact, ends and corners. Without the lists
-    /// that contacts go by.
+    /// Calls back with each edge that goes through a triangle at the state last evaluated, by its contact,
+    /// ends and corners. Without the lists that contacts go by.
     pub fn intersections(&self, mut found: impl FnMut(u32, [u32; 2], [u32; 3])) {
         let place = |node: u32| self.now.place[node as usize];
         for group in &self.barriers.groups {

@@ -40,7 +40,8 @@ pub struct Meeting {
     pub gap: Option<f64>,
 }
 
-/// The contacts of a model. They act in the steps that [`begin`](Self::begin) makes of them, and in no other way.
+/// The contacts of a model. They act in the steps that [`begin`](Self::begin) makes of them, and in no other
+/// way.
 #[derive(Clone, Debug)]
 pub struct Barriers {
     pub(super) contacts: Arc<Contacts>,
@@ -57,13 +58,14 @@ pub struct Barriers {
     pub(super) wall_distances: Vec<Vec<f64>>,
     /// Where rigid things go that are driven from outside, by their number.
     pub(super) legs: BTreeMap<u32, Leg>,
-    /// Rigid things beside their trajectories, by their number: how far [m] at the start and the end of the step.
+    /// Rigid things beside their trajectories, by their number: how far [m] at the start and the end of the
+    /// step.
     pub(super) shifts: Vec<(u32, [Vector3<f64>; 2])>,
 }
 
 impl Barriers {
-    /// For contacts, each with its settings, and nodes at rest [m]. The distance that surfaces keep is that of their
-    /// [`Touch`](crate::touch::Touch).
+    /// For contacts, each with its settings, and nodes at rest [m]. The distance that surfaces keep is that
+    /// of their [`Touch`](crate::touch::Touch).
     pub fn new(contacts: Arc<Contacts>, settings: &[BarrierSettings], rest: &[[f64; 3]]) -> Self {
         let mut places: Vec<Vector3<f64>> = rest.iter().map(|&x| x.into()).collect();
         let nodes = places.len();
@@ -129,8 +131,8 @@ impl Barriers {
         BarrierStep::first(self, position, motion, times)
     }
 
-    /// Whatever has no gap at places [m] and a time [s]: pairs within the distance to keep, nodes in walls, and edges through triangles. With
-    /// no regard to what came before.
+    /// Whatever has no gap at places [m] and a time [s]: pairs within the distance to keep, nodes in walls,
+    /// and edges through triangles. With no regard to what came before.
     pub fn meetings(self, position: &[Vector3<f64>], time: f64) -> Vec<Meeting> {
         let none = vec![0.0; 6 * self.nodes];
         let step = self.begin(position, &none, [time; 2]);
@@ -162,8 +164,8 @@ impl Barriers {
         }
     }
 
-    /// Sets the motions of all nodes: so many parts of one (six numbers a node), and rigid things from where they are to a fraction of the step
-    /// between both ends.
+    /// Sets the motions of all nodes: so many parts of one (six numbers a node), and rigid things from where
+    /// they are to a fraction of the step between both ends.
     pub(super) fn set_motion(
         &mut self,
         now: &Configuration,
@@ -186,7 +188,8 @@ impl Barriers {
         }
     }
 
-    /// Lists pairs that may come near in the motion that is set. Returns the part of it for which the lists hold.
+    /// Lists pairs that may come near in the motion that is set. Returns the part of it for which the lists
+    /// hold.
     pub(super) fn list(&mut self, now: &Configuration) -> f64 {
         self.listed.clone_from(now);
         let Self { groups, motion, wall_distances, contacts, .. } = self;
@@ -245,7 +248,8 @@ impl Barriers {
         })
     }
 
-    /// Adds the collisions of nodes with the wall of a contact, whose distances [m] were these when pairs were listed; false if one has no gap.
+    /// Adds the collisions of nodes with the wall of a contact, whose distances [m] were these when pairs
+    /// were listed; false if one has no gap.
     fn find_collisions_at_wall(
         &self,
         group: &Group,

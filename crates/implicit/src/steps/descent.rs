@@ -1,12 +1,15 @@
-//! A step in contact: Newton's method on the energy of a step, each iteration filtered so that nothing goes into anything else (Li et al.
-//! 2020, algorithm 1). Energy is that of cells, inertia, barriers and lagged friction, less the work of loads along an iteration by the
-//! trapezoidal rule, which is exact for loads that do not follow.
+//! A step in contact: Newton's method on the energy of a step, each iteration filtered so that nothing goes
+//! into anything else (Li et al. 2020, algorithm 1). Energy is that of cells, inertia, barriers and lagged
+//! friction, less the work of loads along an iteration by the trapezoidal rule, which is exact for loads that
+//! do not follow.
 //!
-//! * What moves by itself (rigid things, prescribed components) goes its whole way at once, as far as the filter lets it, and the equations
-//!   know what is left of it. Until it is there, energy may grow.
-//! * A direction of a stiffness that is not positive definite is none: its diagonal is raised (Levenberg 1944) until it is.
-//! * A step is found where the residual is below its tolerance, or where the unfiltered Newton step with fresh factors moves nothing by more than
-//!   counts for a gap and the residual is not far above its tolerance, or by less than is asked for; that step is still made.
+//! * What moves by itself (rigid things, prescribed components) goes its whole way at once, as far as the
+//!   filter lets it, and the equations know what is left of it. Until it is there, energy may grow.
+//! * A direction of a stiffness that is not positive definite is none: its diagonal is raised
+//!   (Levenberg 1944) until it is.
+//! * A step is found where the residual is below its tolerance, or where the unfiltered Newton step with
+//!   fresh factors moves nothing by more than counts for a gap and the residual is not far above its
+//!   tolerance, or by less than is asked for; that step is still made.
 //! * A full Newton step that is hardly shorter than the one before is made longer while the energy falls.
 //! * In time, no Newton step takes a node further than a mean edge: longer ones are nearly always halved.
 //! * Friction is then taken anew from the state found, while its size changes by more than a tenth.
@@ -58,7 +61,8 @@ pub(crate) trait Contacting: AssemblySolver {
     /// The part of the increment that may be made, for other reasons than contact.
     fn part(&self) -> f64;
 
-    /// Whether a residual along the increment, before and after it, makes up for an energy that has not fallen.
+    /// Whether a residual along the increment, before and after it, makes up for an energy that has not
+    /// fallen.
     fn accepts(&self, before: f64, after: f64) -> bool;
 
     /// The node with the largest residual.
@@ -84,8 +88,8 @@ pub(crate) struct Limits {
     pub close: Option<f64>,
     /// Whether a state is good enough when iterations run out or the energy does not fall any more.
     pub accept: bool,
-    /// How far [m] an iteration takes nodes at most once all that moves by itself has gone its way: what is found at a state tells nothing of
-    /// what is further away, and pairs need not be listed so far.
+    /// How far [m] an iteration takes nodes at most once all that moves by itself has gone its way: what is
+    /// found at a state tells nothing of what is further away, and pairs need not be listed so far.
     pub farthest: f64,
 }
 
@@ -125,7 +129,8 @@ struct Aim {
     part: f64,
 }
 
-/// Finds the state at the end of a step, or takes what iterations reach; whether it is found. Residuals go to `found` with what is allowed.
+/// Finds the state at the end of a step, or takes what iterations reach; whether it is found. Residuals go to
+/// `found` with what is allowed.
 pub(crate) fn descend(
     solver: &mut impl Contacting,
     state: &mut State,
@@ -280,9 +285,9 @@ fn begin(solver: &mut impl Contacting, state: &State, times: [f64; 2], guess: Op
     }
 }
 
-/// Goes to where the motion of before leads, as far as the filter lets it and cells can follow. Whether the energy is less there is not
-/// asked: it seldom is, but what moves would have to start from rest else, in more iterations and short of where it comes to. Whether it went,
-/// and so found forces and stiffness there.
+/// Goes to where the motion of before leads, as far as the filter lets it and cells can follow. Whether the
+/// energy is less there is not asked: it seldom is, but what moves would have to start from rest else, in
+/// more iterations and short of where it comes to. Whether it went, and so found forces and stiffness there.
 fn start_from(
     solver: &mut impl Contacting,
     state: &mut State,
@@ -368,8 +373,8 @@ fn energy(solver: &mut impl Contacting) -> (f64, f64) {
     (parts.iter().sum(), parts.iter().map(|part| part.abs()).sum())
 }
 
-/// Solves for the residual with a stiffness that is positive definite; the largest translation of it [m], and whether its diagonal is as it
-/// was: else the step tells nothing of how far the solution is.
+/// Solves for the residual with a stiffness that is positive definite; the largest translation of it [m], and
+/// whether its diagonal is as it was: else the step tells nothing of how far the solution is.
 fn find_direction(solver: &mut impl Contacting, raised: &mut f64) -> Result<(f64, bool), SolveError> {
     solver.complete();
     let diagonal: Vec<f64> = (0..solver.system().stiffness.equations.count())
@@ -417,11 +422,13 @@ struct Tries {
     part: f64,
     /// Whether energy has to fall.
     complete: bool,
-    /// Whether the stiffness where it leads is found at once, since it is nearly always the next to be asked for.
+    /// Whether the stiffness where it leads is found at once, since it is nearly always the next to be asked
+    /// for.
     goes_on: bool,
 }
 
-/// Goes along the increment, in halves until the energy has fallen: whether the first try was it; none if it does not fall.
+/// Goes along the increment, in halves until the energy has fallen: whether the first try was it; none if it
+/// does not fall.
 fn search(
     solver: &mut impl Contacting,
     state: &mut State,
@@ -470,7 +477,8 @@ fn search(
     broken.map_or(Ok(None), Err)
 }
 
-/// Goes on along an increment that was made in full, two, four and eight times as far while the energy falls and nothing is in the way.
+/// Goes on along an increment that was made in full, two, four and eight times as far while the energy falls
+/// and nothing is in the way.
 fn expand(
     solver: &mut impl Contacting,
     state: &mut State,

@@ -8,7 +8,8 @@ use crate::model::error::SolveError;
 use crate::model::state::State;
 
 impl System {
-    /// An error of a step that began at a state; where the step is blocked, with what drives it there, its force and the gap.
+    /// An error of a step that began at a state; where the step is blocked, with what drives it there, its
+    /// force and the gap.
     pub(crate) fn blocked_at(&mut self, state: &State, error: SolveError) -> SolveError {
         let SolveError::Blocked { time, part, iterations, .. } = error else { return error };
         self.stand(&state.history);
@@ -27,7 +28,8 @@ impl System {
         SolveError::Blocked { time, driver, part, gap, iterations }
     }
 
-    /// Of tools and constraints that move between two times [s] the one that pushes hardest, with its force [N] at the state last evaluated.
+    /// Of tools and constraints that move between two times [s] the one that pushes hardest, with its force
+    /// [N] at the state last evaluated.
     fn hardest_driver(&self, [from, to]: [f64; 2]) -> Option<(String, f64)> {
         let resisting = |at: usize| self.forces.internal[at] - self.forces.external[at];
         let held = |own: &Constraint| {

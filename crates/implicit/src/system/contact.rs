@@ -1,6 +1,7 @@
-//! Contacts of a model in its equations: their forces are loads and their stiffness is added to that of the cells. The pattern of the matrix grows
-//! with the pairs that may come near, and by more than those, so that it changes seldom. What pushes a tied node pushes those that it
-//! follows, and what pushes a point of the curved surface of a shell the nodes that move it.
+//! Contacts of a model in its equations: their forces are loads and their stiffness is added to that of the
+//! cells. The pattern of the matrix grows with the pairs that may come near, and by more than those, so that
+//! it changes seldom. What pushes a tied node pushes those that it follows, and what pushes a point of the
+//! curved surface of a shell the nodes that move it.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -26,10 +27,12 @@ const ROOM: usize = 2;
 const SHORTENED: usize = 60;
 /// Part of what is free that is tried next.
 const SHORTER: f64 = 0.9;
-/// How near pairs are, beyond the reach of their barrier and over its distance, that are taken into the pattern when it lacks some.
+/// How near pairs are, beyond the reach of their barrier and over its distance, that are taken into the
+/// pattern when it lacks some.
 const SOON: f64 = 0.3;
 
-/// The contacts at work, with nodes at rest where those of a model are, and the points of theirs that are no nodes.
+/// The contacts at work, with nodes at rest where those of a model are, and the points of theirs that are no
+/// nodes.
 fn made(contact: &ContactModel, model: &Assembly) -> (Barriers, Option<Samples>) {
     match Samples::of(model, &contact.contacts, &contact.levels) {
         None => (Barriers::new(Arc::clone(&contact.contacts), &contact.settings, &model.rest), None),
@@ -76,7 +79,8 @@ pub struct ContactSystem {
     model: Arc<Assembly>,
     /// The step of the barriers.
     pub(crate) step: BarrierStep,
-    /// Points of contacts that are no nodes, and forces on nodes and them, six each; `None` where surfaces are flat.
+    /// Points of contacts that are no nodes, and forces on nodes and them, six each; `None` where surfaces
+    /// are flat.
     samples: Option<(Samples, Vec<f64>)>,
     /// How far rigid things have gone in the step, from 0 to 1.
     pub(crate) time_fraction: f64,
@@ -139,7 +143,8 @@ impl ContactSystem {
         }
     }
 
-    /// Begins a step between two times [s] at a state, expected to go by a motion, six numbers a node. Friction is that of the start.
+    /// Begins a step between two times [s] at a state, expected to go by a motion, six numbers a node.
+    /// Friction is that of the start.
     pub(crate) fn begin(&mut self, state: &State, motion: &[f64], times: [f64; 2]) {
         let begun = Instant::now();
         match &mut self.samples {
@@ -154,8 +159,9 @@ impl ContactSystem {
         self.spent += begun.elapsed();
     }
 
-    /// The part of an increment (six numbers a node), of so much of it at most, from a state on that leaves at least half of a part of every gap.
-    /// Points of curved surfaces go on straight ways to where they come: if these are free, nothing has gone through anything.
+    /// The part of an increment (six numbers a node), of so much of it at most, from a state on that leaves
+    /// at least half of a part of every gap. Points of curved surfaces go on straight ways to where they
+    /// come: if these are free, nothing has gone through anything.
     pub(crate) fn collision_free_fraction(
         &mut self,
         state: &State,
@@ -198,7 +204,8 @@ impl ContactSystem {
         0.0
     }
 
-    /// Whether points go on other ways than nodes, so that a part of an increment that is free says nothing of less of it.
+    /// Whether points go on other ways than nodes, so that a part of an increment that is free says nothing
+    /// of less of it.
     pub(crate) fn is_curved(&self) -> bool {
         self.samples.is_some()
     }
@@ -263,7 +270,8 @@ impl ContactSystem {
         self.time_fraction = 1.0;
     }
 
-    /// Ends a step at the state last evaluated, a time [s]: nodes have slid in it, and tools are where they lag.
+    /// Ends a step at the state last evaluated, a time [s]: nodes have slid in it, and tools are where they
+    /// lag.
     pub(crate) fn end_step(&mut self, time: f64) {
         self.touches = self.touched();
         self.lags.iter_mut().for_each(|lag| lag.advance(time));
@@ -298,8 +306,8 @@ impl ContactSystem {
         self.step.contacts().rigids[lag.number()].trajectory.limit().unwrap_or(f64::INFINITY)
     }
 
-    /// Finds where tools whose force is limited go between two times [s]: each a part of its way along a force [N]; how long [m] the whole of
-    /// that is.
+    /// Finds where tools whose force is limited go between two times [s]: each a part of its way along a
+    /// force [N]; how long [m] the whole of that is.
     pub(crate) fn follow<'a>(
         &mut self,
         [from, to]: [f64; 2],
@@ -336,7 +344,8 @@ impl ContactSystem {
         -contacts.iter().zip(&self.totals).filter_map(on).sum::<Vector3<f64>>()
     }
 
-    /// Tools and obstacles that move between two times [s], with the size of the force [N] with which they push at the state last evaluated.
+    /// Tools and obstacles that move between two times [s], with the size of the force [N] with which they
+    /// push at the state last evaluated.
     pub(crate) fn pushing(&self, [from, to]: [f64; 2]) -> impl Iterator<Item = (String, f64)> {
         let moves = move |(rigid, number): (&Rigid, u32)| {
             let leg = self.step.legs().get(&number);
@@ -404,7 +413,8 @@ impl ContactSystem {
         true
     }
 
-    /// Adds the stiffness to a matrix, and what the ways of rigid things yet to come make of it to the coupling.
+    /// Adds the stiffness to a matrix, and what the ways of rigid things yet to come make of it to the
+    /// coupling.
     pub(crate) fn add_stiffness(
         &self,
         equations: &Equations,

@@ -1,7 +1,7 @@
-//! Surfaces of contacts on the curved surface of shells: each facet is divided into n² flat triangles, n = 2^level, whose corners are points of its patch. Points
-//! on an edge belong to both of its facets, so that nothing opens. Points are numbered after the nodes of the model; what acts on them goes to nodes by Jᵀ, with
-//! moments.
-//! Leaves out: dJᵀ/dq f in the stiffness.
+//! Surfaces of contacts on the curved surface of shells: each facet is divided into n² flat triangles, n =
+//! 2^level, whose corners are points of its patch. Points on an edge belong to both of its facets, so that
+//! nothing opens. Points are numbered after the nodes of the model; what acts on them goes to nodes by Jᵀ,
+//! with moments. Leaves out: dJᵀ/dq f in the stiffness.
 
 use std::collections::BTreeMap;
 
@@ -80,7 +80,8 @@ fn gcd(a: u32, b: u32) -> u32 {
 }
 
 impl Samples {
-    /// Points for contacts of a model, each at its level, and the contacts with surfaces of them; `None` if all levels are 0.
+    /// Points for contacts of a model, each at its level, and the contacts with surfaces of them; `None` if
+    /// all levels are 0.
     pub(crate) fn of(model: &Assembly, contacts: &Contacts, levels: &[u8]) -> Option<(Self, Contacts)> {
         if levels.iter().all(|&level| level == 0) {
             return None;
@@ -193,8 +194,8 @@ impl Samples {
             .for_each(|(node, weight)| found(node, weight));
     }
 
-    /// Finds the motion of nodes and points along an increment from a state with the places found last: over a part of it, the way to where they
-    /// come then over that part.
+    /// Finds the motion of nodes and points along an increment from a state with the places found last: over
+    /// a part of it, the way to where they come then over that part.
     pub(crate) fn move_along(&mut self, model: &Assembly, state: &State, increment: &[f64], part: f64) {
         self.tried.clone_from(state);
         self.tried.advance(increment, part);
@@ -230,7 +231,8 @@ impl Samples {
     }
 }
 
-/// What moves the points of contacts: nodes, of tied ones those that they follow, and the nodes around a point of a curved surface.
+/// What moves the points of contacts: nodes, of tied ones those that they follow, and the nodes around a
+/// point of a curved surface.
 #[derive(Clone, Copy)]
 pub(crate) struct Movers<'a> {
     pub model: &'a Assembly,
@@ -282,8 +284,8 @@ impl Movers<'_> {
         }
     }
 
-    /// Adds the stiffness to a matrix whose pattern couples translations and rotations, and what the ways of rigid things and of prescribed nodes yet to
-    /// come make of it to the coupling.
+    /// Adds the stiffness to a matrix whose pattern couples translations and rotations, and what the ways of
+    /// rigid things and of prescribed nodes yet to come make of it to the coupling.
     pub(crate) fn add_stiffness(
         self,
         step: &BarrierStep,

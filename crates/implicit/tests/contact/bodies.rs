@@ -38,7 +38,8 @@ fn between(first: Vec<[u32; 3]>, second: Vec<[u32; 3]>, friction: f64) -> Contac
     }
 }
 
-/// Nominal stress [Pa] of a neo-Hookean tet, P = μ J^(−2/3) (F − I₁/3 F⁻ᵀ) + κ (J − 1) J F⁻ᵀ, and its volume [m³] at rest.
+/// Nominal stress [Pa] of a neo-Hookean tet, P = μ J^(−2/3) (F − I₁/3 F⁻ᵀ) + κ (J − 1) J F⁻ᵀ, and its volume
+/// [m³] at rest.
 fn stress(model: &Assembly, state: &State, nodes: &[u32]) -> (Matrix3<f64>, f64) {
     let edges = |at: &dyn Fn(usize) -> Vector3<f64>| {
         let [a, b, c, d] = [0, 1, 2, 3].map(|k| at(nodes[k] as usize));
@@ -51,7 +52,8 @@ fn stress(model: &Assembly, state: &State, nodes: &[u32]) -> (Matrix3<f64>, f64)
     (isochoric + inverse * (YOUNG / 3.0 * (j - 1.0) * j), rest.determinant() / 6.0)
 }
 
-/// The gap [m] over ĝ that a barrier has under a pressure over its stiffness κ: p/κ = 2 (y − 1) ln y + (y − 1)²/y.
+/// The gap [m] over ĝ that a barrier has under a pressure over its stiffness κ: p/κ = 2 (y − 1) ln y + (y −
+/// 1)²/y.
 fn gap_under(pressure: f64) -> f64 {
     let [mut low, mut high] = [1e-9, 1.0];
     for _ in 0..80 {
@@ -62,7 +64,8 @@ fn gap_under(pressure: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// A1, the patch test of contact: a block of 2 × 2 × 2 cells on one of 3 × 3 × 3 without friction, pressed by about 1 kPa.
+/// A1, the patch test of contact: a block of 2 × 2 × 2 cells on one of 3 × 3 × 3 without friction, pressed by
+/// about 1 kPa.
 #[test]
 fn a_uniform_pressure_goes_through_cells_that_do_not_match() {
     let (barrier, stiffness) = (5e-5, 1e5);
@@ -123,7 +126,8 @@ fn a_uniform_pressure_goes_through_cells_that_do_not_match() {
     );
     assert!((900.0..1100.0).contains(&pressure), "{pressure}");
     assert!(off / volume < 0.01, "{}", off / volume);
-    // 2 % are asked; pairs at a corner or an edge count for each triangle there, so that single nodes are off by more.
+    // 2 % are asked; pairs at a corner or an edge count for each triangle there, so that single nodes are off
+    // by more.
     assert!((mean - 1.0).abs() < 0.02 && least > 0.96 && largest < 1.04, "{mean} {least} {largest}");
     let contacts = solver.contact().unwrap().step().contacts();
     let numbers = contacts.nodes();
@@ -140,8 +144,9 @@ fn a_uniform_pressure_goes_through_cells_that_do_not_match() {
     assert!(least > 0.98 && largest < 1.02, "{least} {largest}");
 }
 
-/// A2: what two free bodies of other masses do to each other has no sum, without friction no moment, and with it none beyond that of friction over
-/// the gap: points of both sides that rub against each other are that far apart.
+/// A2: what two free bodies of other masses do to each other has no sum, without friction no moment, and with
+/// it none beyond that of friction over the gap: points of both sides that rub against each other are that
+/// far apart.
 #[test]
 fn forces_between_bodies_have_no_sum_and_no_moment() {
     for friction in [0.0, 0.4] {

@@ -70,7 +70,8 @@ fn solver(model: &Assembly) -> BackwardEuler {
     BackwardEuler::new(model.clone(), settings).unwrap()
 }
 
-/// The same bits with one thread and with two, and where another solver goes on with the pattern that the first one had.
+/// The same bits with one thread and with two, and where another solver goes on with the pattern that the
+/// first one had.
 #[test]
 fn threads_and_a_restart_change_no_bit() {
     let model = cloth(8, 0.5);

@@ -57,8 +57,8 @@ pub(crate) fn told_distance(name: &str, [least, most]: [f64; 2]) -> String {
     )
 }
 
-/// The places where two bodies overlap by more than round-off of a size [m]: how deep [m], and the places. `place` has
-/// nodes by their numbers in the surfaces.
+/// The places where two bodies overlap by more than round-off of a size [m]: how deep [m], and the places.
+/// `place` has nodes by their numbers in the surfaces.
 pub(crate) fn overlaps(
     sides: [(&BuiltBody, &Surface); 2],
     size: f64,
