@@ -14,7 +14,7 @@ const MORE: f64 = 10.0;
 const LEAST: f64 = 4.0;
 /// The part of the wide skin of before that it is at least.
 const KEPT: f64 = 0.5;
-/// What round-off takes of a distance at most, over it; and a number of single precision.
+/// The most that round-off takes of a distance, over it; and a number of single precision.
 pub(super) const ROUND_OFF: f64 = 1e-9;
 const SINGLE: f64 = 2e-7;
 /// Pairs that are compared at once.
@@ -23,21 +23,21 @@ const BLOCK: usize = 16;
 /// Pairs of numbers, by the first.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Apart {
-    /// Where those of each first number begin.
+    /// The begin of the pairs of each first number.
     start: Vec<u32>,
     /// Second numbers, increasing for each first one.
     second: Vec<u32>,
 }
 
 impl Apart {
-    /// Of pairs whose first numbers are below a count.
+    /// A list of pairs whose first numbers are below a count.
     pub fn new(mut pairs: Vec<[u32; 2]>, count: usize) -> Self {
         pairs.sort_unstable();
         let start = (0..=count as u32).map(|first| pairs.partition_point(|pair| pair[0] < first) as u32);
         Self { start: start.collect(), second: pairs.iter().map(|pair| pair[1]).collect() }
     }
 
-    /// How many pairs there are.
+    /// The number of pairs.
     pub fn len(&self) -> usize {
         self.second.len()
     }
@@ -51,7 +51,7 @@ impl Apart {
     }
 }
 
-/// What sorts of pairs there are.
+/// The sorts of pairs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sort {
     /// A point of a side, by its number, and a face of the other.
@@ -63,7 +63,7 @@ pub(super) enum Sort {
 /// Pairs of a sort, by their first numbers.
 #[derive(Clone, Debug, Default)]
 struct Pairs {
-    /// Where those of each first number end.
+    /// The end of the pairs of each first number.
     ends: Vec<u32>,
     /// Second numbers, increasing for each first one.
     second: Vec<u32>,
@@ -78,7 +78,7 @@ impl Pairs {
         self.distance.clear();
     }
 
-    /// Adds those of the next first number: second numbers in any order, with bounds [m] from below of their
+    /// Adds the pairs of the next first number: second numbers in any order, with bounds [m] from below of their
     /// distances.
     fn add(&mut self, own: &mut Vec<(u32, f64)>) {
         own.sort_unstable_by_key(|pair| pair.0);
@@ -111,7 +111,7 @@ impl Pairs {
         }
     }
 
-    /// All of them.
+    /// All pairs.
     fn all(&self) -> impl Iterator<Item = [u32; 2]> {
         let starts = std::iter::once(&0).chain(&self.ends);
         let ranges = starts.zip(&self.ends).map(|(&from, &end)| from as usize..end as usize);
@@ -149,7 +149,7 @@ struct Lengths {
 }
 
 impl Lengths {
-    /// Takes those of nodes.
+    /// Takes the places of nodes.
     fn take(&mut self, sides: &[CollisionMesh], of: &[f64]) {
         let most = |nodes: &[u32]| nodes.iter().map(|&node| of[node as usize]).fold(0.0, f64::max);
         for (number, side) in sides.iter().enumerate() {

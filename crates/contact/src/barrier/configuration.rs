@@ -7,7 +7,7 @@ use crate::pose::Stance;
 /// Places of nodes and stances of rigid things.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Configuration {
-    /// Places [m] of all nodes, those of rigid things last.
+    /// Places [m] of all nodes, with the nodes of rigid things last.
     pub place: Vec<Vector3<f64>>,
     /// Rigid things.
     pub stances: Vec<Stance>,

@@ -5,7 +5,7 @@
 //! proportion. Friction of a step is that of the state where [`BarrierStep::lag`] was called last, with
 //! directions and normal forces as they were there.
 //!
-//! The order of calls is that of types. Only [`Barriers::begin`] makes a step, and it evaluates the start. So
+//! Types fix the order of calls. Only [`Barriers::begin`] makes a step, and it evaluates the start. So
 //! there are always collisions to read, and they are those of the state last evaluated, since a search for a
 //! [fraction](BarrierStep::collision_free_fraction) leaves them alone.
 
@@ -69,7 +69,7 @@ impl BarrierStep {
     }
 
     /// Begins the next step between two times [s], with nodes at places [m], expected to go by a motion (six
-    /// numbers a node, translations first). Friction is that of the start.
+    /// numbers a node, translations first). Friction is taken from the start.
     pub fn begin_next(&mut self, position: &[Vector3<f64>], motion: &[f64], times: [f64; 2]) {
         let Self { barriers, ends, .. } = self;
         for (stances, time) in ends.iter_mut().zip(times) {
@@ -185,8 +185,8 @@ impl BarrierStep {
         self.energy[1] = energy;
     }
 
-    /// How far [m] the first primitive of a stencil has gone from the second in the step: Σ c x less that of
-    /// its start, which a wall carries along.
+    /// The way [m] of the first primitive of a stencil from the second in the step: Σ c x less Σ c x at the
+    /// start. A wall carries its start along.
     pub(super) fn way(&self, stencil: &Stencil) -> Vector3<f64> {
         let start = stencil.combine(|node| self.start[node as usize]);
         let wall = self.barriers.groups[stencil.contact as usize].wall.filter(|_| stencil.count == 1);

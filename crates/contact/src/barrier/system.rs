@@ -164,7 +164,7 @@ impl Barriers {
         }
     }
 
-    /// Sets the motions of all nodes: so many parts of one (six numbers a node), and rigid things from where
+    /// Sets the motions of all nodes: parts of one motion (six numbers a node), and rigid things from where
     /// they are to a fraction of the step between both ends.
     pub(super) fn set_motion(
         &mut self,

@@ -5,8 +5,8 @@
 //!
 //! * What moves by itself (rigid things, prescribed components) goes its whole way at once, as far as the
 //!   filter lets it, and the equations know what is left of it. Until it is there, energy may grow.
-//! * A direction of a stiffness that is not positive definite is none: its diagonal is raised
-//!   (Levenberg 1944) until it is.
+//! * If the stiffness is not positive definite, the Newton direction is unusable. Its diagonal is then raised
+//!   until it is (Levenberg 1944).
 //! * A step is found where the residual is below its tolerance, or where the unfiltered Newton step with
 //!   fresh factors moves nothing by more than counts for a gap and the residual is not far above its
 //!   tolerance, or by less than is asked for; that step is still made.

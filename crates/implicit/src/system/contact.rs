@@ -144,7 +144,7 @@ impl ContactSystem {
     }
 
     /// Begins a step between two times [s] at a state, expected to go by a motion, six numbers a node.
-    /// Friction is that of the start.
+    /// Friction is taken from the start.
     pub(crate) fn begin(&mut self, state: &State, motion: &[f64], times: [f64; 2]) {
         let begun = Instant::now();
         match &mut self.samples {
