@@ -226,8 +226,8 @@ impl BarrierStep {
         self.normal_collisions.iter().map(|collision| collision.gap).reduce(f64::min)
     }
 
-    /// Adds the forces [N] at the state last evaluated to those of nodes, six numbers a node, and sets those
-    /// of each contact on its second side.
+    /// Adds the forces [N] at the state last evaluated to the forces of nodes, six numbers a node. Sets the
+    /// forces of each contact on its second side.
     pub fn add_forces(&self, forces: &mut [f64], totals: &mut [Vector3<f64>]) {
         totals.fill(Vector3::zeros());
         let mut add = |stencil: &Stencil, force_on: &dyn Fn(usize) -> Vector3<f64>| {
