@@ -53,7 +53,8 @@ typedef enum PliantStatus {
     PLIANT_STATUS_INTERNAL = 17,
 } PliantStatus;
 
-/* What went wrong, and where. The caller owns it; it holds no memory of the library. Texts are UTF-8, end with a zero and are cut where they are longer. */
+/* What went wrong, and where. The caller owns it; it holds no memory of the library. Texts are UTF-8, end
+ * with a zero and are cut where they are longer. */
 typedef struct PliantError {
     /* The code that the call returned. */
     PliantStatus status;
@@ -69,7 +70,8 @@ typedef struct PliantError {
     int64_t element;
     /* Time [s] of the simulation; NaN if it is about none. */
     double time;
-    /* Of `PLIANT_STATUS_FAILED`: `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`, `not-converged`, `blocked`, `intersecting`, `hourglass`, `device`, `output` or `input`. */
+    /* Of `PLIANT_STATUS_FAILED`: `not-finite`, `inverted`, `unbalanced`, `unstable`, `singular`,
+     * `not-converged`, `blocked`, `intersecting`, `hourglass`, `device`, `output` or `input`. */
     char kind[32];
     /* The body that it is about. */
     char body[64];
@@ -81,8 +83,8 @@ typedef struct PliantError {
     char message[2048];
 } PliantError;
 
-/* The version of this interface: a program passes `PLIANT_ABI` of the header that it was built with to `pliant_context_open`. It grows where a change
- * breaks programs. */
+/* The version of this interface: a program passes `PLIANT_ABI` of the header that it was built with to
+ * `pliant_context_open`. It grows where a change breaks programs. */
 #define PLIANT_ABI 1
 
 /* The version of the interface that this library has. */
@@ -91,10 +93,12 @@ uint32_t pliant_abi(void);
 /* The version of Pliant, such as `0.1.0`. It lives as long as the process. */
 const char *pliant_version(void);
 
-/* Opens a context: all that a program opens is in one. `abi` is `PLIANT_ABI`. Contexts know nothing of each other. */
+/* Opens a context: all that a program opens is in one. `abi` is `PLIANT_ABI`. Contexts know nothing of each
+ * other. */
 PliantStatus pliant_context_open(uint32_t abi, PliantContext **context, PliantError *error);
 
-/* Closes a context with all that is open in it. No call on it may be under way, and none may come after; null does nothing. */
+/* Closes a context with all that is open in it. No call on it may be under way, and none may come after;
+ * null does nothing. */
 void pliant_context_close(PliantContext *context);
 
 /* A scene that is open: a number that `pliant_scene_load` or `pliant_scene_parse` gives, never 0. */
@@ -127,18 +131,21 @@ typedef struct PliantCells {
     const int32_t *labels;
 } PliantCells;
 
-/* Opens a scene: the path of a scene file, or of a folder with a `scene.toml`. A simulation that is made of it reports mistakes in its values. */
+/* Opens a scene: the path of a scene file, or of a folder with a `scene.toml`. A simulation that is made of
+ * it reports mistakes in its values. */
 PliantStatus pliant_scene_load(const PliantContext *context, const char *path, PliantScene *scene, PliantError *error);
 
-/* Opens a scene from its text, of so many bytes. Files that it names are relative to `folder`; null is the folder of the process. `name` is what
- * errors call it; null is `scene.toml`. */
+/* Opens a scene from its text, of so many bytes. Files that it names are relative to `folder`; null is the
+ * folder of the process. `name` is what errors call it; null is `scene.toml`. */
 PliantStatus pliant_scene_parse(const PliantContext *context, const char *scene_text, size_t length, const char *folder, const char *name, PliantScene *scene, PliantError *error);
 
-/* Changes a value of a scene, as `--set` does: `law.tissue.young-modulus=4e3`, `scene.until=2`, `run.precision="single"`. */
+/* Changes a value of a scene, as `--set` does: `law.tissue.young-modulus=4e3`, `scene.until=2`,
+ * `run.precision="single"`. */
 PliantStatus pliant_scene_set(const PliantContext *context, PliantScene scene, const char *assignment, PliantError *error);
 
-/* Gives a scene a mesh from memory: bodies take it with `mesh = { given = "NAME" }`. `points` has three numbers [m] a point. Nodes without a cell are a mistake
- * that the simulation reports when it is made. A mesh of the same name takes its place. */
+/* Gives a scene a mesh from memory: bodies take it with `mesh = { given = "NAME" }`. `points` has three
+ * numbers [m] a point. Nodes without a cell are a mistake that the simulation reports when it is made. A
+ * mesh of the same name takes its place. */
 PliantStatus pliant_scene_give_mesh(const PliantContext *context, PliantScene scene, const char *name, const double *points, size_t point_count, const PliantCells *cells, size_t kinds, PliantError *error);
 
 /* Closes a scene. Simulations that were made of it stay. */
@@ -147,11 +154,13 @@ PliantStatus pliant_scene_close(const PliantContext *context, PliantScene scene,
 /* A simulation that is open: a number that `pliant_simulation_open` gives, never 0. */
 typedef uint64_t PliantSimulation;
 
-/* Makes a simulation of a scene as it is now, at its start. It computes on so many threads of its own, 1024 at most; 0 takes `threads` of the scene's
- * `[run]`. Results do not depend on their number. Images are meshed and shapes built here: this can take seconds. */
+/* Makes a simulation of a scene as it is now, at its start. It computes on so many threads of its own, 1024
+ * at most; 0 takes `threads` of the scene's `[run]`. Results do not depend on their number. Images are
+ * meshed and shapes built here: this can take seconds. */
 PliantStatus pliant_simulation_open(const PliantContext *context, PliantScene scene, uint32_t threads, PliantSimulation *simulation, PliantError *error);
 
-/* Closes a simulation. One that is stepped by another thread is stopped first; its memory goes when that call returns. */
+/* Closes a simulation. One that is stepped by another thread is stopped first; its memory goes when that
+ * call returns. */
 PliantStatus pliant_simulation_close(const PliantContext *context, PliantSimulation simulation, PliantError *error);
 
 /* Where a simulation is, and its sizes. */
@@ -169,19 +178,21 @@ typedef struct PliantNow {
 /* Tells where a simulation is. */
 PliantStatus pliant_now(const PliantContext *context, PliantSimulation simulation, PliantNow *now, PliantError *error);
 
-/* Goes so many steps on. `done`, if it is not null, gets how many were taken, also where one fails or another thread asks to stop. After a failure the
- * simulation stands at the last good instant; restore a snapshot, or close it. */
+/* Goes so many steps on. `done`, if it is not null, gets how many were taken, also where one fails or
+ * another thread asks to stop. After a failure the simulation stands at the last good instant; restore a
+ * snapshot, or close it. */
 PliantStatus pliant_step(const PliantContext *context, PliantSimulation simulation, uint64_t count, uint64_t *done, PliantError *error);
 
-/* Goes on until a time [s], to the instant nearest to it; else as `pliant_step`. A time that has passed takes no step. */
+/* Goes on until a time [s], to the instant nearest to it; else as `pliant_step`. A time that has passed
+ * takes no step. */
 PliantStatus pliant_run_until(const PliantContext *context, PliantSimulation simulation, double time, uint64_t *done, PliantError *error);
 
-/* Asks the thread that steps a simulation to stop after its step. A step that takes long is given up: it is not taken. Without such a thread, the next call
- * that steps returns at once. Any thread may ask. */
+/* Asks the thread that steps a simulation to stop after its step. A step that takes long is given up: it is
+ * not taken. Without such a thread, the next call that steps returns at once. Any thread may ask. */
 PliantStatus pliant_stop(const PliantContext *context, PliantSimulation simulation, PliantError *error);
 
-/* Pushes nodes with forces [N], three numbers a node, in the order of `pliant_body`, until they are replaced; their work is external. `count` is the
- * number of nodes of all bodies, or 0 to end all. */
+/* Pushes nodes with forces [N], three numbers a node, in the order of `pliant_body`, until they are
+ * replaced; their work is external. `count` is the number of nodes of all bodies, or 0 to end all. */
 PliantStatus pliant_push(const PliantContext *context, PliantSimulation simulation, const double *forces, size_t count, PliantError *error);
 
 /* What a name is looked for among. */
@@ -202,8 +213,9 @@ PliantStatus pliant_push(const PliantContext *context, PliantSimulation simulati
 /* Warnings about the scene, a sentence each. */
 #define PLIANT_WARNINGS 5
 
-/* Gives the name of a thing of a kind (`PLIANT_BODIES`, …) by its number from 0, with a zero at its end; `PLIANT_STATUS_UNKNOWN` after the last. `length`,
- * if it is not null, gets the bytes without the zero; with a null buffer of 0 bytes nothing else is given. */
+/* Gives the name of a thing of a kind (`PLIANT_BODIES`, …) by its number from 0, with a zero at its end;
+ * `PLIANT_STATUS_UNKNOWN` after the last. `length`, if it is not null, gets the bytes without the zero; with
+ * a null buffer of 0 bytes nothing else is given. */
 PliantStatus pliant_name(const PliantContext *context, PliantSimulation simulation, uint32_t kind, size_t index, char *buffer, size_t capacity, size_t *length, PliantError *error);
 
 /* Numbers are `float`. */
@@ -234,11 +246,12 @@ typedef struct PliantSurface {
     uint32_t triangles;
 } PliantSurface;
 
-/* Opens the boundary of a body, or a surface that one carries, by name; null is the only body. Of a solid only nodes on the boundary are vertices. It stays
- * open as long as the simulation. */
+/* Opens the boundary of a body, or a surface that one carries, by name; null is the only body. Of a solid
+ * only nodes on the boundary are vertices. It stays open as long as the simulation. */
 PliantStatus pliant_surface_open(const PliantContext *context, PliantSimulation simulation, const char *name, PliantSurface *surface, PliantError *error);
 
-/* Copies the three vertices of each triangle, counter-clockwise seen from outside. There is room for so many triangles. */
+/* Copies the three vertices of each triangle, counter-clockwise seen from outside. There is room for so many
+ * triangles. */
 PliantStatus pliant_surface_triangles(const PliantContext *context, PliantSimulation simulation, uint32_t surface, uint32_t *triangles, size_t capacity, PliantError *error);
 
 /* Copies where the vertices are [m]. */
@@ -247,8 +260,9 @@ PliantStatus pliant_surface_positions(const PliantContext *context, PliantSimula
 /* Copies the unit normals of the vertices: the mean of those of the triangles around each, by area. */
 PliantStatus pliant_surface_normals(const PliantContext *context, PliantSimulation simulation, uint32_t surface, PliantBuffer buffer, PliantError *error);
 
-/* Lends positions [m] and unit normals, three `double` a vertex. What is pointed to stays as it is until the next call of this function for this surface,
- * and is there until the simulation is closed; the pointers stay the same. `normals` may be null, which saves their cost. */
+/* Lends positions [m] and unit normals, three `double` a vertex. What is pointed to stays as it is until the
+ * next call of this function for this surface, and is there until the simulation is closed; the pointers
+ * stay the same. `normals` may be null, which saves their cost. */
 PliantStatus pliant_surface_lend(const PliantContext *context, PliantSimulation simulation, uint32_t surface, const double **positions, const double **normals, PliantError *error);
 
 /* The nodes of a body: so many from the first one on, counted over all bodies. */
@@ -259,8 +273,8 @@ typedef struct PliantNodes {
     uint64_t count;
 } PliantNodes;
 
-/* Tells the nodes of a body by name; null is all bodies. They are numbered as in its mesh file, or in the mesh that was given, unless repairs changed these; a wall
- * on a solid has only nodes of its own here. */
+/* Tells the nodes of a body by name; null is all bodies. They are numbered as in its mesh file, or in the
+ * mesh that was given, unless repairs changed these; a wall on a solid has only nodes of its own here. */
 PliantStatus pliant_body(const PliantContext *context, PliantSimulation simulation, const char *body, PliantNodes *found, PliantError *error);
 
 /* Where nodes are [m]. */
@@ -275,7 +289,8 @@ PliantStatus pliant_body(const PliantContext *context, PliantSimulation simulati
 /* Where nodes are at rest [m]. */
 #define PLIANT_REST 3
 
-/* Copies positions, displacements, velocities (`PLIANT_POSITION`, …) of the nodes of a body by name; null is all bodies. */
+/* Copies positions, displacements, velocities (`PLIANT_POSITION`, …) of the nodes of a body by name; null is
+ * all bodies. */
 PliantStatus pliant_nodes(const PliantContext *context, PliantSimulation simulation, const char *body, uint32_t what, PliantBuffer buffer, PliantError *error);
 
 /* Fields are read at the points of a body's mesh: those of elements as means of those around. */
@@ -284,9 +299,10 @@ PliantStatus pliant_nodes(const PliantContext *context, PliantSimulation simulat
 /* Fields are read in the elements, as computed. */
 #define PLIANT_AT_CELLS 1
 
-/* Copies a field, such as `von-mises`, of a body or a surface that one carries, by name; null is the only body. Fields have the names, units and components of
- * `data` in the scene. `items` and `components`, if not null, get how many items there are, and numbers in each; with a null buffer nothing else is given.
- * A field that a body does not have is NaN there. */
+/* Copies a field, such as `von-mises`, of a body or a surface that one carries, by name; null is the only
+ * body. Fields have the names, units and components of `data` in the scene. `items` and `components`, if not
+ * null, get how many items there are, and numbers in each; with a null buffer nothing else is given. A field
+ * that a body does not have is NaN there. */
 PliantStatus pliant_field(const PliantContext *context, PliantSimulation simulation, const char *on, const char *name, uint32_t at, PliantBuffer buffer, size_t *items, size_t *components, PliantError *error);
 
 /* Gives the force [N] by which a constraint holds or moves its nodes. */
@@ -333,25 +349,31 @@ typedef struct PliantTool {
     double torque[3];
 } PliantTool;
 
-/* Leads a tool to a pose within a time [s] from now, on a straight way and the shortest turn; there it stays. Its jaws go on as they were going. `rotation` is a quaternion x, y, z, w of any
- * length but 0. `arrival`, if it is not null, gets the time [s] at which it is there: later than asked for where nodes would be passed over on the way. */
+/* Leads a tool to a pose within a time [s] from now, on a straight way and the shortest turn; there it
+ * stays. Its jaws go on as they were going. `rotation` is a quaternion x, y, z, w of any length but 0.
+ * `arrival`, if it is not null, gets the time [s] at which it is there: later than asked for where nodes
+ * would be passed over on the way. */
 PliantStatus pliant_tool_lead(const PliantContext *context, PliantSimulation simulation, const char *tool, const double *position, const double *rotation, double within, double *arrival, PliantError *error);
 
-/* Opens or closes the jaws of a tool to an angle [rad] within a time [s] from now, while it goes on as it was going; else as `pliant_tool_lead`. */
+/* Opens or closes the jaws of a tool to an angle [rad] within a time [s] from now, while it goes on as it
+ * was going; else as `pliant_tool_lead`. */
 PliantStatus pliant_tool_open(const PliantContext *context, PliantSimulation simulation, const char *tool, double angle, double within, double *arrival, PliantError *error);
 
-/* Leads a tool to a pose and its jaws to an angle [rad], which are there together; else as `pliant_tool_lead`. */
+/* Leads a tool to a pose and its jaws to an angle [rad], which are there together; else as
+ * `pliant_tool_lead`. */
 PliantStatus pliant_tool_lead_open(const PliantContext *context, PliantSimulation simulation, const char *tool, const double *position, const double *rotation, double angle, double within, double *arrival, PliantError *error);
 
 /* Tells where a tool, an obstacle or a jaw (`grasper.upper`, `grasper.lower`) is, and what it feels. */
 PliantStatus pliant_tool(const PliantContext *context, PliantSimulation simulation, const char *tool, PliantTool *now, PliantError *error);
 
-/* Takes hold of nodes by a spring of a stiffness [N/m]; infinite is a pin. It acts on their mean by `weights`, which need not sum to 1; null weighs all the same.
- * The stiffness is at most the one with which steps stay stable; `pliant_grip` tells it. `grip` gets its number. It pulls nothing until it is moved. */
+/* Takes hold of nodes by a spring of a stiffness [N/m]; infinite is a pin. It acts on their mean by
+ * `weights`, which need not sum to 1; null weighs all the same. The stiffness is at most the one with which
+ * steps stay stable; `pliant_grip` tells it. `grip` gets its number. It pulls nothing until it is moved. */
 PliantStatus pliant_grip_nodes(const PliantContext *context, PliantSimulation simulation, const uint32_t *nodes, const double *weights, size_t count, double stiffness, uint32_t *grip, PliantError *error);
 
-/* Takes hold of a surface around its vertex that is nearest to a point [m], as a hand does: of what lies within a radius [m] of it at rest and hangs together with it,
- * less with the distance; else as `pliant_grip_nodes`. With a radius of 0 it holds the vertex alone. */
+/* Takes hold of a surface around its vertex that is nearest to a point [m], as a hand does: of what lies
+ * within a radius [m] of it at rest and hangs together with it, less with the distance; else as
+ * `pliant_grip_nodes`. With a radius of 0 it holds the vertex alone. */
 PliantStatus pliant_grip_surface(const PliantContext *context, PliantSimulation simulation, uint32_t surface, const double *point, double radius, double stiffness, uint32_t *grip, PliantError *error);
 
 /* Moves a grip to a place [m]: what it holds is pulled there from the next step on. */
@@ -381,15 +403,16 @@ typedef uint64_t PliantSnapshot;
 /* Keeps the state of a simulation, at any instant. Nothing that follows is changed by it. */
 PliantStatus pliant_snapshot_take(const PliantContext *context, PliantSimulation simulation, PliantSnapshot *snapshot, PliantError *error);
 
-/* Takes a simulation back, or on, to a snapshot: of itself, or of another simulation of the same scene. What follows has the same bits as it had. Grips and forces
- * of the program stay. */
+/* Takes a simulation back, or on, to a snapshot: of itself, or of another simulation of the same scene. What
+ * follows has the same bits as it had. Grips and forces of the program stay. */
 PliantStatus pliant_snapshot_restore(const PliantContext *context, PliantSimulation simulation, PliantSnapshot snapshot, PliantError *error);
 
-/* Copies a snapshot as bytes, for a file or another process. `length`, if it is not null, gets how many there are; with a null buffer of 0 bytes nothing
- * else is given. */
+/* Copies a snapshot as bytes, for a file or another process. `length`, if it is not null, gets how many
+ * there are; with a null buffer of 0 bytes nothing else is given. */
 PliantStatus pliant_snapshot_bytes(const PliantContext *context, PliantSnapshot snapshot, uint8_t *buffer, size_t capacity, size_t *length, PliantError *error);
 
-/* Reads a snapshot of a simulation of the same scene from bytes. `PLIANT_STATUS_BAD_SNAPSHOT` tells of others, and of damage. */
+/* Reads a snapshot of a simulation of the same scene from bytes. `PLIANT_STATUS_BAD_SNAPSHOT` tells of
+ * others, and of damage. */
 PliantStatus pliant_snapshot_read(const PliantContext *context, PliantSimulation simulation, const uint8_t *bytes, size_t count, PliantSnapshot *snapshot, PliantError *error);
 
 /* Closes a snapshot. */

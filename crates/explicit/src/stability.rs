@@ -12,7 +12,7 @@
 //! the estimate is 0 to 25 % too small; with fibres that carry tension only, whose stiffness jumps at rest,
 //! up to 4.3 % too large: `lab/validation/tests/stability.rs`.
 //!
-//! *When.* Every [`CHECK_EVERY`] steps, and at once where the least J or the largest stretch √(1 + |C − I|)
+//! *When.* Every `CHECK_EVERY` steps, and at once where the least J or the largest stretch √(1 + |C − I|)
 //! has changed by [`CHANGE`]. The force pass finds both at no cost. Checks that leave the parts as they are,
 //! as far as can be foreseen, are passed over (`foresight.rs`).
 //!
@@ -24,7 +24,7 @@
 //!
 //! *Then.* If the estimate would change the steps, the critical time step of the current state is computed,
 //! by Lanczos' iteration of many force evaluations, and the current state becomes the reference. This happens
-//! once in [`REFERENCE_EVERY`] steps at most, and always before [`OnUnstable::Stop`] ends a run. If a part of
+//! once in `REFERENCE_EVERY` steps at most, and always before [`OnUnstable::Stop`] ends a run. If a part of
 //! a step takes more than [`KEEP`] of the limit, whole steps are cut into equal parts that take [`RESERVE`]
 //! at most. Fewer parts are used again once they have kept this reserve for [`REJOIN_AFTER`] steps: a
 //! vibrating body would be cut and rejoined in each period, at phases that add energy. Velocities continue

@@ -147,7 +147,7 @@ impl StepControl {
         if state.is_at_start() || state.evaluated { 0.0 } else { self.lengths(state).before }
     }
 
-    /// Whether a check of the limit is due: the first one, [`CHECK_EVERY`] steps after the last, or where the
+    /// Whether a check of the limit is due: the first one, `CHECK_EVERY` steps after the last, or where the
     /// deformation differs.
     pub fn is_due<R>(&self, state: &State<R>, deformed: &Deformed) -> bool {
         let seen = &state.stability;

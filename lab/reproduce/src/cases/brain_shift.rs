@@ -49,7 +49,7 @@ const EDGE: f64 = 0.0122;
 /// Least [`quality`] of a tet to which a border may press it.
 const WORST: f64 = 0.4;
 
-/// The mesh of `scenes/brain-shift`: about 2,000 nodes, with its regions (see [`with_regions`]) and nodes
+/// The mesh of `scenes/brain-shift`: about 2,000 nodes, with its regions (see `with_regions`) and nodes
 /// along their borders.
 pub fn mesh() -> Mesh {
     stuffed(EDGE)
