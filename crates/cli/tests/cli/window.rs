@@ -53,8 +53,8 @@ impl Drop for Screen {
 
 /// A window whose pixels take a software adapter little time.
 const SMALL: &[&str] = &["--size", "800x600"];
-/// In such a window: the button that copies the view, and a place on the ball.
-const COPY_VIEW: [i16; 2] = [45, 35];
+/// In such a window, while it plays: the button that copies the view, and a place on the ball.
+const COPY_VIEW: [i16; 2] = [93, 35];
 const MIDDLE: [i16; 2] = [270, 240];
 
 fn view(workshop: &Workshop, screen: &Screen, more: &[&str]) -> Said {
