@@ -78,8 +78,8 @@ impl Pairs {
         self.distance.clear();
     }
 
-    /// Adds the pairs of the next first number: second numbers in any order, with bounds [m] from below of their
-    /// distances.
+    /// Adds the pairs of the next first number: second numbers in any order, with bounds [m] from below of
+    /// their distances.
     fn add(&mut self, own: &mut Vec<(u32, f64)>) {
         own.sort_unstable_by_key(|pair| pair.0);
         self.second.extend(own.iter().map(|pair| pair.0));

@@ -330,6 +330,11 @@ impl Group {
 }
 
 impl Group {
+    /// The wall of a stencil of one node.
+    pub fn wall_of(&self, stencil: &Stencil) -> Option<u32> {
+        self.wall.filter(|_| stencil.count == 1)
+    }
+
     /// Takes the places [m] of all nodes; whether no node has left its skin.
     pub fn take(&mut self, place: &[Vector3<f64>], listed: &[Vector3<f64>]) -> bool {
         let mut moved = std::mem::take(&mut self.moved);

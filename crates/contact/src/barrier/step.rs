@@ -140,7 +140,7 @@ impl BarrierStep {
                 normal,
                 limit,
                 start: collision.stencil.combine(|node| start[node as usize]),
-                wall: group.wall.filter(|_| collision.stencil.count == 1),
+                wall: group.wall_of(&collision.stencil),
                 slip: Vector3::zeros(),
                 stiffness: 0.0,
                 along: 0.0,
@@ -170,10 +170,7 @@ impl BarrierStep {
         } = self;
         let mut energy = 0.0;
         for collision in friction_collisions.iter_mut() {
-            let start = match collision.wall {
-                Some(wall) => carried([&from[wall as usize], &stances[wall as usize]], &collision.start),
-                None => collision.start,
-            };
+            let start = carried(collision.wall, [from, stances], &collision.start);
             let way = collision.stencil.combine(|node| place[node as usize]) - start;
             collision.slip = way - collision.normal * collision.normal.dot(&way);
             let slip = barriers.groups[collision.stencil.contact as usize].parameters.slip;
@@ -189,11 +186,8 @@ impl BarrierStep {
     /// start. A wall carries its start along.
     pub(super) fn way(&self, stencil: &Stencil) -> Vector3<f64> {
         let start = stencil.combine(|node| self.start[node as usize]);
-        let wall = self.barriers.groups[stencil.contact as usize].wall.filter(|_| stencil.count == 1);
-        let start = match wall.map(|wall| wall as usize) {
-            Some(wall) => carried([&self.ends[0][wall], &self.now.stances[wall]], &start),
-            None => start,
-        };
+        let wall = self.barriers.groups[stencil.contact as usize].wall_of(stencil);
+        let start = carried(wall, [&self.ends[0], &self.now.stances], &start);
         stencil.combine(|node| self.now.place[node as usize]) - start
     }
 
@@ -230,26 +224,17 @@ impl BarrierStep {
     /// forces of each contact on its second side.
     pub fn add_forces(&self, forces: &mut [f64], totals: &mut [Vector3<f64>]) {
         totals.fill(Vector3::zeros());
-        let mut add = |stencil: &Stencil, force_on: &dyn Fn(usize) -> Vector3<f64>| {
+        self.for_each_force(|stencil, at, node, force| {
             let total = &mut totals[stencil.contact as usize];
-            for (at, (node, _)) in stencil.parts().enumerate() {
-                let force = force_on(at);
-                if stencil.count == 1 {
-                    *total -= force;
-                } else if stencil.is_second(at) {
-                    *total += force;
-                }
-                if let Some(own) = forces.get_mut(6 * node as usize..6 * node as usize + 3) {
-                    own.iter_mut().zip(force.iter()).for_each(|(own, force)| *own += force);
-                }
+            if stencil.count == 1 {
+                *total -= force;
+            } else if stencil.is_second(at) {
+                *total += force;
             }
-        };
-        self.normal_collisions
-            .iter()
-            .for_each(|collision| add(&collision.stencil, &|at| collision.force_on(at)));
-        self.friction_collisions
-            .iter()
-            .for_each(|collision| add(&collision.stencil, &|at| collision.force_on(at)));
+            if let Some(own) = forces.get_mut(6 * node as usize..6 * node as usize + 3) {
+                own.iter_mut().zip(force.iter()).for_each(|(own, force)| *own += force);
+            }
+        });
     }
 
     /// Sets the moments [N m] about the origin of the forces of each contact on its second side at the state
@@ -257,22 +242,28 @@ impl BarrierStep {
     pub fn find_moments(&self, moments: &mut [Vector3<f64>]) {
         let places = &self.now.place[..self.barriers.nodes];
         moments.fill(Vector3::zeros());
-        let mut add = |stencil: &Stencil, force_on: &dyn Fn(usize) -> Vector3<f64>| {
-            let moment = &mut moments[stencil.contact as usize];
+        self.for_each_force(|stencil, at, node, force| {
+            let is_first = stencil.count == 1 || !stencil.is_second(at);
+            if let Some(place) = places.get(node as usize).filter(|_| is_first) {
+                moments[stencil.contact as usize] -= place.cross(&force);
+            }
+        });
+    }
+
+    /// Calls back with each force [N] of a collision on a node: stencil, place of the node in it, node,
+    /// force.
+    fn for_each_force(&self, mut found: impl FnMut(&Stencil, usize, u32, Vector3<f64>)) {
+        let mut each = |stencil: &Stencil, force_on: &dyn Fn(usize) -> Vector3<f64>| {
             for (at, (node, _)) in stencil.parts().enumerate() {
-                if let Some(place) =
-                    places.get(node as usize).filter(|_| stencil.count == 1 || !stencil.is_second(at))
-                {
-                    *moment -= place.cross(&force_on(at));
-                }
+                found(stencil, at, node, force_on(at));
             }
         };
-        self.normal_collisions
-            .iter()
-            .for_each(|collision| add(&collision.stencil, &|at| collision.force_on(at)));
-        self.friction_collisions
-            .iter()
-            .for_each(|collision| add(&collision.stencil, &|at| collision.force_on(at)));
+        for collision in &self.normal_collisions {
+            each(&collision.stencil, &|at| collision.force_on(at));
+        }
+        for collision in &self.friction_collisions {
+            each(&collision.stencil, &|at| collision.force_on(at));
+        }
     }
 
     /// Calls back with the nodes of the model of each pair that acts or is held.
@@ -340,7 +331,8 @@ impl BarrierStep {
     }
 }
 
-/// Where a point [m] that goes along with a rigid thing is after it has gone from one stance to another.
-fn carried([from, now]: [&Stance; 2], point: &Vector3<f64>) -> Vector3<f64> {
-    (now.pose * from.pose.inverse() * Point3::from(*point)).coords
+/// A point [m] that moves with a wall, if there is one, between two stances of rigid things.
+pub(super) fn carried(wall: Option<u32>, [from, now]: [&[Stance]; 2], point: &Vector3<f64>) -> Vector3<f64> {
+    let Some(wall) = wall.map(|wall| wall as usize) else { return *point };
+    (now[wall].pose * from[wall].pose.inverse() * Point3::from(*point)).coords
 }

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use super::collisions::{NormalCollision, Stencil};
 use super::distance::Nearest;
 use super::hessian::{Matrix12, bent, block, of_parallel, of_wall};
-use super::step::BarrierStep;
+use super::step::{BarrierStep, carried};
 
 /// The step of differences of the normal of a wall, over the distance of the barrier.
 const DIFFERENCE: f64 = 0.01;
@@ -26,8 +26,7 @@ impl BarrierStep {
             let rises = |thing: u32| to[thing as usize].growth - now[thing as usize].growth;
             if let Some(wall) = wall.filter(|_| stencil.count == 1) {
                 let place = self.now.place[stencil.nodes[0] as usize];
-                let carried = to[wall as usize].pose * now[wall as usize].pose.inverse();
-                ways[0] = place - (carried * Point3::from(place)).coords - outward * rises(wall);
+                ways[0] = place - carried(Some(wall), [now, to], &place) - outward * rises(wall);
                 return ways;
             }
             // What is left of the rise counts as a way of all nodes of the thing, along the normal by which
