@@ -129,6 +129,14 @@ struct Aim {
     part: f64,
 }
 
+impl Aim {
+    /// Whether the stiffness where the increment leads is found at once: the next iteration nearly always
+    /// asks for it.
+    fn goes_on(&self) -> bool {
+        self.complete && !self.last && !self.expands
+    }
+}
+
 /// Finds the state at the end of a step, or takes what iterations reach; whether it is found. Residuals go to
 /// `found` with what is allowed.
 pub(crate) fn descend(
@@ -170,14 +178,12 @@ pub(crate) fn descend(
         }
         let is_small = norm <= LOOSE * allowed;
         let aim = descent.aim(solver, state, iteration, [complete, is_small])?;
-        let goes_on = complete && !aim.last && !aim.expands;
-        let tries = Tries { part: aim.part, complete, goes_on };
-        match search(solver, state, time, &descent.before, tries)? {
+        match descent.search(solver, state, &aim)? {
             Some(first) if !aim.last => {
                 if aim.expands && first {
-                    expand(solver, state, time, &mut descent.before)?;
+                    descent.expand(solver, state)?;
                 }
-                known = goes_on;
+                known = aim.goes_on();
             }
             Some(_) if descent.lag(solver) => {}
             Some(_) => return check(solver, time).map(|()| true),
@@ -240,6 +246,86 @@ impl<'a> Descent<'a> {
         let is_slow = is_newton && largest > SLOW * std::mem::replace(&mut self.previous, largest);
         let expands = is_slow && complete && part == 1.0 && iteration > 1;
         Ok(Aim { complete, last, expands, part })
+    }
+
+    /// Goes along the increment, in halves until the energy has fallen: whether the first try was it; none if
+    /// it does not fall.
+    fn search(
+        &self,
+        solver: &mut impl Contacting,
+        state: &mut State,
+        aim: &Aim,
+    ) -> Result<Option<bool>, SolveError> {
+        let (before, time) = (&self.before, self.time);
+        let mut part = aim.part;
+        let mut broken = None;
+        for halving in 0..=HALVINGS {
+            state.clone_from(&before.state);
+            let Vectors { system, increment, .. } = solver.vectors();
+            system.advance(state, increment, part);
+            let gone = if before.time_fraction + part * (1.0 - before.time_fraction) >= 1.0 || part == 1.0 {
+                1.0
+            } else {
+                before.time_fraction + part * (1.0 - before.time_fraction)
+            };
+            put(solver, gone);
+            match solver.evaluate(state, time, aim.goes_on()) {
+                Ok(()) if energy(solver).0.is_finite() => {
+                    let fallen = energy(solver).0 - part * work(solver, &before.loads) - before.energy;
+                    let accepted = !aim.complete || fallen <= ROUND_OFF * before.size || {
+                        solver.find_residual(state);
+                        let Vectors { residual, solution, .. } = solver.vectors();
+                        let after = dot(solution, residual);
+                        solver.accepts(before.along, after)
+                    };
+                    if accepted {
+                        let Vectors { pending, .. } = solver.vectors();
+                        pending.iter_mut().for_each(|p| *p *= 1.0 - part);
+                        return Ok(Some(halving == 0));
+                    }
+                }
+                Ok(()) => broken = None,
+                Err(error @ SolveError::Broken { .. }) => broken = Some(error),
+                Err(error) => return Err(error),
+            }
+            part *= 0.5;
+            let Vectors { system, increment, .. } = solver.vectors();
+            if let Some(contact) = system.contact.as_mut().filter(|contact| contact.is_curved()) {
+                contact.time_fraction = before.time_fraction;
+                part = contact.collision_free_fraction(&before.state, increment, [KEEP[0], part]);
+            }
+        }
+        broken.map_or(Ok(None), Err)
+    }
+
+    /// Goes on along an increment that was made in full, two, four and eight times as far while the energy
+    /// falls and nothing is in the way.
+    fn expand(&mut self, solver: &mut impl Contacting, state: &mut State) -> Result<(), SolveError> {
+        let (before, time) = (&mut self.before, self.time);
+        for doubling in 0..DOUBLINGS {
+            before.state.clone_from(state);
+            (before.energy, before.size) = energy(solver);
+            before.loads.copy_from_slice(&own_loads(solver.system()));
+            let Vectors { system, increment, .. } = solver.vectors();
+            if doubling > 0 {
+                increment.iter_mut().for_each(|way| *way *= 2.0);
+            }
+            let Some(contact) = &mut system.contact else { return Ok(()) };
+            let part = contact.collision_free_fraction(state, increment, [KEEP[0], 1.0]);
+            let falls = part == 1.0 && {
+                system.advance(state, increment, 1.0);
+                match solver.evaluate(state, time, false) {
+                    Ok(()) => energy(solver).0 - work(solver, &before.loads) < before.energy,
+                    Err(SolveError::Broken { .. }) => false,
+                    Err(error) => return Err(error),
+                }
+            };
+            if !falls {
+                state.clone_from(&before.state);
+                return Ok(());
+            }
+        }
+        Ok(())
     }
 
     /// Ends a step whose energy does not fall any more: it is round-off, or the direction is none.
@@ -413,102 +499,6 @@ fn find_direction(solver: &mut impl Contacting, raised: &mut f64) -> Result<(f64
     Err(SolveError::Impossible(
         "the stiffness in contact is not positive definite, whatever is added to it; take smaller steps",
     ))
-}
-
-/// How an increment is made.
-#[derive(Clone, Copy)]
-struct Tries {
-    /// The part to begin with.
-    part: f64,
-    /// Whether energy has to fall.
-    complete: bool,
-    /// Whether the stiffness where it leads is found at once, since it is nearly always the next to be asked
-    /// for.
-    goes_on: bool,
-}
-
-/// Goes along the increment, in halves until the energy has fallen: whether the first try was it; none if it
-/// does not fall.
-fn search(
-    solver: &mut impl Contacting,
-    state: &mut State,
-    time: f64,
-    before: &Before,
-    tries: Tries,
-) -> Result<Option<bool>, SolveError> {
-    let Tries { mut part, complete, goes_on } = tries;
-    let mut broken = None;
-    for halving in 0..=HALVINGS {
-        state.clone_from(&before.state);
-        let Vectors { system, increment, .. } = solver.vectors();
-        system.advance(state, increment, part);
-        let gone = if before.time_fraction + part * (1.0 - before.time_fraction) >= 1.0 || part == 1.0 {
-            1.0
-        } else {
-            before.time_fraction + part * (1.0 - before.time_fraction)
-        };
-        put(solver, gone);
-        match solver.evaluate(state, time, goes_on) {
-            Ok(()) if energy(solver).0.is_finite() => {
-                let fallen = energy(solver).0 - part * work(solver, &before.loads) - before.energy;
-                let accepted = !complete || fallen <= ROUND_OFF * before.size || {
-                    solver.find_residual(state);
-                    let Vectors { residual, solution, .. } = solver.vectors();
-                    let after = dot(solution, residual);
-                    solver.accepts(before.along, after)
-                };
-                if accepted {
-                    let Vectors { pending, .. } = solver.vectors();
-                    pending.iter_mut().for_each(|p| *p *= 1.0 - part);
-                    return Ok(Some(halving == 0));
-                }
-            }
-            Ok(()) => broken = None,
-            Err(error @ SolveError::Broken { .. }) => broken = Some(error),
-            Err(error) => return Err(error),
-        }
-        part *= 0.5;
-        let Vectors { system, increment, .. } = solver.vectors();
-        if let Some(contact) = system.contact.as_mut().filter(|contact| contact.is_curved()) {
-            contact.time_fraction = before.time_fraction;
-            part = contact.collision_free_fraction(&before.state, increment, [KEEP[0], part]);
-        }
-    }
-    broken.map_or(Ok(None), Err)
-}
-
-/// Goes on along an increment that was made in full, two, four and eight times as far while the energy falls
-/// and nothing is in the way.
-fn expand(
-    solver: &mut impl Contacting,
-    state: &mut State,
-    time: f64,
-    before: &mut Before,
-) -> Result<(), SolveError> {
-    for doubling in 0..DOUBLINGS {
-        before.state.clone_from(state);
-        (before.energy, before.size) = energy(solver);
-        before.loads.copy_from_slice(&own_loads(solver.system()));
-        let Vectors { system, increment, .. } = solver.vectors();
-        if doubling > 0 {
-            increment.iter_mut().for_each(|way| *way *= 2.0);
-        }
-        let Some(contact) = &mut system.contact else { return Ok(()) };
-        let part = contact.collision_free_fraction(state, increment, [KEEP[0], 1.0]);
-        let falls = part == 1.0 && {
-            system.advance(state, increment, 1.0);
-            match solver.evaluate(state, time, false) {
-                Ok(()) => energy(solver).0 - work(solver, &before.loads) < before.energy,
-                Err(SolveError::Broken { .. }) => false,
-                Err(error) => return Err(error),
-            }
-        };
-        if !falls {
-            state.clone_from(&before.state);
-            return Ok(());
-        }
-    }
-    Ok(())
 }
 
 /// Takes friction anew if its size has changed by more than counts; whether it has.
