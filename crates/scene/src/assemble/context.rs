@@ -1,4 +1,4 @@
-//! The context that all phases of building a model share: the scene, the cache, and what a user is message.
+//! The context that all phases of building a model share: the scene, the cache, the mistakes and the notes.
 
 use pliant_format::Scene;
 use pliant_format::diagnostic::{Diagnostic, SceneErrors};
