@@ -46,7 +46,7 @@ pub fn shell(solver: &str) -> World {
 }
 
 pub fn world(text: &str) -> World {
-    staged(Source::parse("ball.toml", text).unwrap_or_else(|error| panic!("{}", error.plain())), ".".into())
+    scenes::world(text).unwrap()
 }
 
 pub fn staged(source: Source, folder: PathBuf) -> World {

@@ -19,12 +19,9 @@ use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, Rect, vec2};
 use eframe::{App as _, CreationContext, egui};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use pliant_format::Scene;
-use pliant_format::source::Source;
 use pliant_picture::Look;
-use pliant_scene::World;
 use pliant_sim::gpu::Device;
-use pliant_testing::found_or_skipped;
+use pliant_testing::{found_or_skipped, scenes};
 use tempfile::TempDir;
 
 use self::screen::Screen;
@@ -42,13 +39,6 @@ const PATIENCE: Duration = Duration::from_secs(180);
 /// The buttons of the mouse.
 const LEFT: PointerButton = PointerButton::Primary;
 const RIGHT: PointerButton = PointerButton::Secondary;
-
-/// The world of a scene.
-fn world(text: &str) -> World {
-    let source = Source::parse("ball.toml", text).unwrap_or_else(|error| panic!("{}", error.plain()));
-    let scene = Scene::from_source(source, ".".into()).unwrap_or_else(|error| panic!("{}", error.plain()));
-    World::new(&scene).unwrap_or_else(|error| panic!("{}", error.plain()))
-}
 
 /// The ball on a GPU.
 fn on_device() -> String {
@@ -71,7 +61,7 @@ impl Rehearsal {
     /// The window of a scene that plays, if there is anything that draws.
     fn open(scene: &str) -> Option<Self> {
         let device = found_or_skipped(Device::open(None))?;
-        let world = world(scene);
+        let world = scenes::world(scene).unwrap();
         // As the window: on the device of the scene, if it has one.
         let screen = Screen::new(world.device().unwrap_or(&device), SIZE);
         let folder = tempfile::tempdir().unwrap();

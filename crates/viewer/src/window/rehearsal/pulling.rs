@@ -2,9 +2,10 @@
 
 use eframe::egui::{Event, Key, Modifiers, Pos2, vec2};
 use pliant_geometry::Vector3;
+use pliant_testing::scenes;
 
 use super::seen::{inside, known_place};
-use super::{BALL, Rehearsal, on_device, world};
+use super::{BALL, Rehearsal, on_device};
 use crate::hand::Which;
 use crate::replay::{Replayed, replay};
 use crate::window::App;
@@ -103,7 +104,7 @@ fn pulled(scene: &str) -> Option<Replayed> {
     });
     assert_spring(window.app(), start - vec2(0.0, reach));
     let recording = window.close();
-    Some(replay(&world(scene), &recording).unwrap())
+    Some(replay(&scenes::world(scene).unwrap(), &recording).unwrap())
 }
 
 /// The hand's force points from where it holds to where the mouse is, with no more than its stiffness.
