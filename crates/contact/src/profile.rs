@@ -122,7 +122,7 @@ impl Profile {
     }
 
     /// The least distance [m] of a corner from the axis that is not on it.
-    pub fn least_radius(&self) -> f64 {
+    pub(crate) fn least_radius(&self) -> f64 {
         self.corners.iter().map(|corner| corner.at[1]).filter(|&r| r > 0.0).fold(f64::INFINITY, f64::min)
     }
 

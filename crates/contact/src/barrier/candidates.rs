@@ -203,7 +203,7 @@ impl Group {
     }
 
     /// Pairs that never touch, since they are in one place at rest.
-    pub fn apart_count(&self) -> usize {
+    pub(crate) fn apart_count(&self) -> usize {
         self.apart.iter().map(Apart::len).sum()
     }
 
@@ -331,7 +331,7 @@ impl Group {
 
 impl Group {
     /// The wall of a stencil of one node.
-    pub fn wall_of(&self, stencil: &Stencil) -> Option<u32> {
+    pub(crate) fn wall_of(&self, stencil: &Stencil) -> Option<u32> {
         self.wall.filter(|_| stencil.count == 1)
     }
 
@@ -379,7 +379,11 @@ impl Group {
     }
 
     /// Adds the collisions of nodes at the places [m] last taken; false if there is no gap somewhere.
-    pub fn find_collisions(&self, place: &[Vector3<f64>], collisions: &mut Vec<NormalCollision>) -> bool {
+    pub(crate) fn find_collisions(
+        &self,
+        place: &[Vector3<f64>],
+        collisions: &mut Vec<NormalCollision>,
+    ) -> bool {
         let reach = self.parameters.reach();
         for one in self.nearer_than(reach) {
             let parameters = self.parameters.within(one.most);
@@ -474,7 +478,7 @@ impl Group {
     }
 
     /// Calls back with the nodes and gaps [m] of pairs that have no gap.
-    pub fn too_close(&self, place: &[Vector3<f64>], mut found: impl FnMut([u32; 4], f64)) {
+    pub(crate) fn too_close(&self, place: &[Vector3<f64>], mut found: impl FnMut([u32; 4], f64)) {
         for one in &self.candidates {
             let distance = one.kind.nearest(&one.nodes.map(|node| place[node as usize])).distance;
             let gap = distance - self.parameters.within(one.most).offset();

@@ -33,12 +33,12 @@ impl Stencil {
     }
 
     /// Σ c x over vectors of the nodes.
-    pub fn combine(&self, of: impl Fn(u32) -> Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn combine(&self, of: impl Fn(u32) -> Vector3<f64>) -> Vector3<f64> {
         self.parts().map(|(node, c)| of(node) * c).sum()
     }
 
     /// Whether a node of it, by its place in it, is of the second side of the contact.
-    pub fn is_second(&self, at: usize) -> bool {
+    pub(crate) fn is_second(&self, at: usize) -> bool {
         (at < usize::from(self.split)) != self.in_order
     }
 }
@@ -80,7 +80,7 @@ impl NormalCollision {
     }
 
     /// The force [N] on a node, by its place in the stencil.
-    pub fn force_on(&self, at: usize) -> Vector3<f64> {
+    pub(crate) fn force_on(&self, at: usize) -> Vector3<f64> {
         let push = self.normal * (self.force * self.stencil.coefficients[at]);
         self.mollified.map_or(push, |with| push - with.gradient[at] * with.energy)
     }
@@ -123,7 +123,7 @@ pub struct FrictionCollision {
 
 impl FrictionCollision {
     /// The force [N] on a node, by its place in the stencil.
-    pub fn force_on(&self, at: usize) -> Vector3<f64> {
+    pub(crate) fn force_on(&self, at: usize) -> Vector3<f64> {
         self.slip * (-self.stiffness * self.stencil.coefficients[at])
     }
 

@@ -16,7 +16,7 @@ pub(super) struct Configuration {
 impl Configuration {
     /// Moves rigid things to where they are at a fraction of the step between both ends; whether they are
     /// there already.
-    pub fn move_things(&mut self, [from, to]: &[Vec<Stance>; 2], time_fraction: f64) -> bool {
+    pub(crate) fn move_things(&mut self, [from, to]: &[Vec<Stance>; 2], time_fraction: f64) -> bool {
         let mut are_there = true;
         for ((now, from), to) in self.stances.iter_mut().zip(from).zip(to) {
             let stance = if time_fraction == 1.0 { *to } else { Stance::between([from, to], time_fraction) };
@@ -28,7 +28,7 @@ impl Configuration {
 
     /// Takes the places [m] of the nodes of the model. Those of rigid things, each a thing and a place [m] in
     /// its frame, go along with them.
-    pub fn place_nodes(&mut self, position: &[Vector3<f64>], rigid_nodes: &[(u32, Vector3<f64>)]) {
+    pub(crate) fn place_nodes(&mut self, position: &[Vector3<f64>], rigid_nodes: &[(u32, Vector3<f64>)]) {
         let (own, others) = self.place.split_at_mut(position.len());
         own.copy_from_slice(position);
         for (place, (thing, x)) in others.iter_mut().zip(rigid_nodes) {

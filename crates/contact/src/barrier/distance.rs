@@ -1,7 +1,7 @@
 //! Distances of a point and a triangle and of two edges, with the points that are nearest. With the
 //! coefficients c of the four points, Σ cᵢ xᵢ is the way from the second primitive to the first and n = Σ cᵢ
 //! xᵢ / d its direction; ∂d/∂xᵢ = cᵢ n, since the nearest points minimise the distance (envelope theorem).
-//! Edges that are nearly parallel have a smooth factor beside ([`Mollifier`]).
+//! Edges that are nearly parallel have a smooth factor beside (`Mollifier`).
 
 use nalgebra::Vector3;
 use pliant_geometry::barycentric_of_closest;
@@ -49,7 +49,7 @@ impl Nearest {
 }
 
 /// The first point and the triangle of the other three (Ericson 2005, section 5.1.5).
-pub fn point_triangle(points: &[Vector3<f64>; 4]) -> Nearest {
+pub(crate) fn point_triangle(points: &[Vector3<f64>; 4]) -> Nearest {
     let [p, a, b, c] = points;
     let weights = barycentric_of_closest(&[*a, *b, *c], p);
     let coefficients = [1.0, -weights[0], -weights[1], -weights[2]];
@@ -70,7 +70,7 @@ pub fn point_triangle(points: &[Vector3<f64>; 4]) -> Nearest {
 }
 
 /// The edge of the first two points and that of the other two. Of parallel ones an end is taken.
-pub fn edge_edge(points: &[Vector3<f64>; 4]) -> Nearest {
+pub(crate) fn edge_edge(points: &[Vector3<f64>; 4]) -> Nearest {
     let [a, b, c, d] = points;
     let (along, other, between) = (b - a, d - c, a - c);
     let [aa, bb, ab] = [along.norm_squared(), other.norm_squared(), along.dot(&other)];
@@ -154,7 +154,7 @@ fn nearest_difference([a, b, c, d]: &[Vector3<f64>; 4], [s, t]: [f64; 2]) -> Vec
 /// it takes away the jump of the nearest points of parallel edges (Li et al. 2020, equation 24; E are the
 /// edges at rest).
 #[derive(Clone, Copy, Debug)]
-pub struct Mollifier {
+pub(crate) struct Mollifier {
     /// m.
     pub value: f64,
     /// ∂m/∂xᵢ [1/m] of the four points.

@@ -62,7 +62,7 @@ impl Slip {
     }
 
     /// f₁/u [1/m] at a slip u ≥ 0 [m]: an upper bound of f₁' that is never negative.
-    pub fn force_over_slip(&self, slip: f64) -> f64 {
+    pub(crate) fn force_over_slip(&self, slip: f64) -> f64 {
         if slip >= self.creep { 1.0 / slip } else { (2.0 - slip / self.creep) / self.creep }
     }
 }
