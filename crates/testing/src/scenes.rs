@@ -64,10 +64,25 @@ pub fn run_world(world: &World, folder: &Path) -> Summary {
     summary
 }
 
+/// Asserts that an error, as it is shown and as running text, has these words. The object of the run calls it
+/// one of input.
+#[track_caller]
+pub fn assert_input_error([err, words]: [&str; 2], json: &Value, says: &[&str]) {
+    for piece in says {
+        assert!(words.contains(piece), "no `{piece}` in:\n{err}");
+    }
+    assert_eq!(json["status"], "invalid", "{json}");
+    assert_eq!(json["error"]["kind"], "input", "{json}");
+    assert!(json["error"]["message"].as_str().is_some_and(|message| message.len() > 10), "{json}");
+    for key in ["body", "element", "node", "time"] {
+        assert!(json["error"][key].is_null(), "{json}");
+    }
+}
+
 /// Meshes of tests are coarse, so a run may end with much energy in hourglass modes; all its outputs are
 /// there.
 #[track_caller]
-pub fn assert_complete(summary: &Summary) {
+pub(crate) fn assert_complete(summary: &Summary) {
     let is_coarse = summary.error.as_ref().is_some_and(|error| error.kind == FailureKind::Hourglass);
     assert!(summary.status == "done" || is_coarse, "{:?}", summary.error);
 }

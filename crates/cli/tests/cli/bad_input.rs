@@ -4,6 +4,8 @@
 use std::fs;
 use std::path::Path;
 
+use pliant_testing::scenes::assert_input_error;
+
 use crate::support::{BLOCK, FROM_FILE, Said, Workshop, changed, series};
 
 /// Asserts that a scene is rejected with these words and with one of these lines underlined, and that the
@@ -24,17 +26,7 @@ fn assert_refused(workshop: &Workshop, lines: &[&str], says: &[&str]) {
 #[track_caller]
 fn assert_invalid(output: &Said, says: &[&str]) {
     assert_eq!(output.code, 2, "{}\n{}", output.err, output.out);
-    let words = output.words();
-    for piece in says {
-        assert!(words.contains(piece), "no `{piece}` in:\n{}", output.err);
-    }
-    let json = output.json();
-    assert_eq!(json["status"], "invalid", "{json}");
-    assert_eq!(json["error"]["kind"], "input", "{json}");
-    assert!(json["error"]["message"].as_str().is_some_and(|message| message.len() > 10), "{json}");
-    for key in ["body", "element", "node", "time"] {
-        assert!(json["error"][key].is_null(), "{json}");
-    }
+    assert_input_error([&output.err, &output.words()], &output.json(), says);
 }
 
 const MESH_LINE: &str = r#"mesh = { file = "organ.vtk" }"#;

@@ -3,7 +3,9 @@
 
 mod meshes;
 
-use pliant_testing::scenes::{BLOCK, CORNERS, FROM_FILE, TETS, Told, Workshop, changed, fibres, labels, vtk};
+use pliant_testing::scenes::{
+    BLOCK, CORNERS, FROM_FILE, TETS, Told, Workshop, assert_input_error, changed, fibres, labels, vtk,
+};
 
 /// Asserts that a scene is rejected with these words and with one of these lines underlined, and that the
 /// folder does not change.
@@ -23,16 +25,7 @@ fn assert_refused(workshop: &Workshop, lines: &[&str], says: &[&str]) {
 #[track_caller]
 fn assert_invalid(output: &Told, says: &[&str]) {
     assert_eq!(output.status(), "invalid", "{}", output.err);
-    let words = output.words();
-    for piece in says {
-        assert!(words.contains(piece), "no `{piece}` in:\n{}", output.err);
-    }
-    let json = output.json();
-    assert_eq!(json["error"]["kind"], "input", "{json}");
-    assert!(json["error"]["message"].as_str().is_some_and(|message| message.len() > 10), "{json}");
-    for key in ["body", "element", "node", "time"] {
-        assert!(json["error"][key].is_null(), "{json}");
-    }
+    assert_input_error([&output.err, &output.words()], &output.json(), says);
 }
 
 /// [`BLOCK`] with one error is rejected, and the changed lines are shown.
