@@ -133,7 +133,7 @@ pub(crate) fn assembled_about(
 
 /// The critical time step [s] without damping about a deformed state of a run, where the owner of each
 /// component is known. Once three looks at Lanczos' iteration agree to [`ROUGH`] that it is at least `enough`
-/// [s], the iteration ends. What it then overlooks is less than [`RESERVE`](crate::stability::RESERVE)
+/// [s], the iteration ends. What it then overlooks is less than `RESERVE`
 /// leaves: 2 % of the step at most in the tests below.
 ///
 /// The `forces` of the run are used where they can be; afterwards they are those of the last evaluation
@@ -510,7 +510,7 @@ mod tests {
 
     /// Both eigenvalues are right to the tolerance, so the steps differ by half of it, and slopes on one side
     /// add a little. A rough one is at most [`ROUGH`] too large, as its residual is counted in, and it
-    /// overlooks less than [`RESERVE`] leaves. Single precision adds 1e-3 at most.
+    /// overlooks less than `RESERVE` leaves. Single precision adds 1e-3 at most.
     #[test]
     fn the_limit_of_a_run_is_the_critical_time_step() {
         of_deformed_cubes(|name, model, displacement| {

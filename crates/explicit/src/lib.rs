@@ -2,7 +2,8 @@
 //! [`Model`](pliant_mechanics::Model), and equilibria by dynamic relaxation: force kernels in lanes, central
 //! differences, the critical time step and its watch. SI units throughout.
 //!
-//! [`Model`] is constant, [`State`] changes, [`CentralDifference`] advances a state on a model:
+//! [`Model`](pliant_mechanics::Model) is constant, [`State`] changes, [`CentralDifference`] advances a state
+//! on a model:
 //!
 //! ```
 //! use pliant_explicit::{CentralDifference, State, critical_step};

@@ -25,8 +25,8 @@
 //! *Then.* If the estimate would change the steps, the critical time step of the current state is computed,
 //! by Lanczos' iteration of many force evaluations, and the current state becomes the reference. This happens
 //! once in `REFERENCE_EVERY` steps at most, and always before [`OnUnstable::Stop`] ends a run. If a part of
-//! a step takes more than [`KEEP`] of the limit, whole steps are cut into equal parts that take [`RESERVE`]
-//! at most. Fewer parts are used again once they have kept this reserve for [`REJOIN_AFTER`] steps: a
+//! a step takes more than [`KEEP`] of the limit, whole steps are cut into equal parts that take `RESERVE`
+//! at most. Fewer parts are used again once they have kept this reserve for `REJOIN_AFTER` steps: a
 //! vibrating body would be cut and rejoined in each period, at phases that add energy. Velocities continue
 //! (formula in `stepper.rs`), and relaxing laws take coefficients of the new length. Observers, checkpoints
 //! and step counts see whole steps only.

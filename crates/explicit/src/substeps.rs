@@ -12,7 +12,7 @@ pub(crate) const REJOIN_AFTER: u64 = 1000;
 pub const MOST_HALVINGS: u32 = 3;
 
 /// The parts into which a step is cut, from how many there are now and the limit; `None` if more than
-/// [`MOST_SUBSTEPS`] are needed. Fewer than now only where they keep the reserve, so that a limit that hovers
+/// `MOST_SUBSTEPS` are needed. Fewer than now only where they keep the reserve, so that a limit that hovers
 /// at a number of parts does not make it change all the time.
 pub(crate) fn substeps(step: f64, limit: f64, now: u32) -> Option<u32> {
     let enough = (step / (RESERVE * limit)).ceil();

@@ -16,7 +16,7 @@ pub struct Tie {
     /// How each follows, in their order. Each row sums to 1.
     pub mapping: Weights,
     /// The components of each that a constraint holds or moves; see
-    /// [`Model::hold_tied`](crate::Model::hold_tied).
+    /// [`Model::prescribe_tied`](crate::Model::prescribe_tied).
     pub held: Vec<[bool; 3]>,
 }
 

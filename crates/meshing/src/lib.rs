@@ -57,6 +57,7 @@ pub use surface::sampled::SampledDistances;
 pub use surface::surface_volume::{LabelVolume, SurfaceVolume};
 pub use surface::thickness::Thickness;
 pub use surface::triangles::{SurfaceRepairs, TriangleMesh};
+pub use tets::complex::MOST_MATERIALS;
 pub use tets::missed::Missed;
 pub use tets::optimise::Steps;
 pub use tets::organ::{

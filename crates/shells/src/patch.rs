@@ -77,9 +77,8 @@ impl Patch {
     }
 
     /// A unit normal that is quadratic between those at the corners and, at the middle of an edge, the one
-    /// that an S-shaped edge needs (Vlachos et al. 2001, in Bernstein's form). It differs from
-    /// [`Patch::normal`] by a term that falls with the square of the edges, but is the same on both sides of
-    /// an edge.
+    /// that an S-shaped edge needs (Vlachos et al. 2001). It is the same on both sides of an edge. It
+    /// differs from the surface's normal by a term that falls with the square of the edges.
     pub fn shading_normal(&self, weights: [f64; 3]) -> Vector3<f64> {
         let (p, n) = (self.corners(), self.normals());
         let sum = (0..3).fold(Vector3::zeros(), |sum, i| {

@@ -101,7 +101,7 @@ pub enum RelaxationError {
         /// Time [s].
         time: f64,
     },
-    /// Someone [asked](DynamicRelaxation::stop_on) for it.
+    /// Someone [asked](super::DynamicRelaxation::stop_on) for it.
     #[error("the search for the equilibrium at t = {time:.6} s was stopped")]
     Stopped {
         /// Time [s].

@@ -40,7 +40,7 @@ pub struct PictureFields {
     /// weighted by area coordinates.
     pub rotation: Vec<Vector3<f64>>,
     /// Unit normals for shading, the same on both sides of edges but at creases: quadratic, see
-    /// [`Patch::shading_normal`].
+    /// [`Patch::shading_normal`](pliant_shells::Patch::shading_normal).
     pub normal: Vec<Vector3<f64>>,
 }
 

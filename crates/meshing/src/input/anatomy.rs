@@ -56,7 +56,7 @@ impl<'a> Anatomy<'a> {
     ///
     /// # Panics
     /// If the numbers of materials and of points of the grid differ, or a material has no field.
-    pub(crate) fn measured_to_voxels(mut self, grid: Grid, materials: Vec<u8>) -> Self {
+    pub fn measured_to_voxels(mut self, grid: Grid, materials: Vec<u8>) -> Self {
         assert_eq!(materials.len(), grid.len(), "a material for each point of the grid");
         let largest = materials.iter().copied().max().unwrap_or(0);
         assert!(usize::from(largest) <= self.materials.len(), "material {largest} has no field");

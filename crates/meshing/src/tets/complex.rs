@@ -30,7 +30,7 @@ pub(crate) fn materials_of(sides: Sides) -> impl Iterator<Item = usize> {
 }
 
 /// Most materials in a mesh.
-pub(crate) const MOST_MATERIALS: usize = 127;
+pub const MOST_MATERIALS: usize = 127;
 
 /// No step makes an edge longer than this many lattice constants.
 pub(crate) const LONGEST: f64 = 1.6;

@@ -50,7 +50,7 @@ impl OwnState {
 }
 
 impl State {
-    /// The state of each participant as bytes, as [`Simulation::encode`] has it.
+    /// The state of each participant as bytes, as [`Simulation::encode`](crate::Simulation::encode) has it.
     ///
     /// # Errors
     /// If a state can't be encoded.
@@ -90,8 +90,8 @@ impl State {
         if is_own { Ok(()) } else { Err(Failure::input(&"the state is of another model")) }
     }
 
-    /// The state whose participants were [encoded](Simulation::encode); `None` where these bytes are none of
-    /// this world.
+    /// The state whose participants were [encoded](crate::Simulation::encode); `None` where these bytes are
+    /// none of this world.
     pub fn decode<B: AsRef<[u8]>>(world: &World, bytes: &[B]) -> Option<Self> {
         let (participants, between) = bytes.split_at_checked(world.parts.len())?;
         let between: Between = match between {

@@ -97,7 +97,7 @@ pub struct Frame {
     pub on_device: Option<DevicePoints>,
     /// How many inspections there were. Points, values, energies, and what is held are of the last one: of
     /// this instant unless the state lies on a device, where inspections are rare
-    /// ([`INSPECTION`](crate::INSPECTION)).
+    /// (`INSPECTION`).
     pub inspections: u64,
     /// What was read back from the device so far.
     pub read_backs: u64,
