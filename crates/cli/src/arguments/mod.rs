@@ -10,8 +10,10 @@ use pliant_run::SweepPart;
 
 use self::meshing::MESH_HELP;
 pub use self::meshing::{Labels, MeshCells, MeshImage, Tissue};
+#[cfg(feature = "viewer")]
+pub use self::pictures::Frames;
 use self::pictures::RENDER_HELP;
-pub use self::pictures::{Frames, Render, View};
+pub use self::pictures::{Render, View};
 
 /// Real-time simulation of soft organs.
 #[derive(Debug, Parser)]
