@@ -32,9 +32,9 @@ fn files(name: &str) -> Vec<(String, Format, Vec<u8>)> {
 
 #[test]
 fn broken_meshes_give_errors_in_little_memory() {
+    let Some(before) = PeakMemory::alone("broken_meshes_give_errors_in_little_memory") else { return };
     let corpus = files("corpus");
     let seeds = files("data");
-    let before = PeakMemory::now();
     for (name, format, bytes) in &corpus {
         let error = read_bytes(bytes, *format);
         println!("{name}: {}", error.as_ref().err().map_or("read".to_owned(), ToString::to_string));

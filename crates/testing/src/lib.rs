@@ -22,8 +22,10 @@ mod pressed;
 #[cfg(feature = "scenes")]
 pub mod scenes;
 
+use std::env;
 use std::fs;
 use std::io::Write;
+use std::process::Command;
 
 pub use grown::{Hexes, ball_of_hexes, grown_hexes};
 pub use pressed::pressed_cube;
@@ -140,13 +142,36 @@ pub fn has_gpu(adapters: usize) -> bool {
     found_or_skipped((adapters > 0).then_some(()).ok_or("no GPU was found")).is_some()
 }
 
-/// Peak memory of this process [KiB] at an instant, on Linux.
+/// Peak memory of a process that runs one test [KiB] at an instant, on Linux.
 #[derive(Clone, Copy, Debug)]
 pub struct PeakMemory(Option<u64>);
 
+/// Set in the process that runs one test.
+const ALONE: &str = "PLIANT_TEST_ALONE";
+
 impl PeakMemory {
-    /// The peak so far.
-    pub fn now() -> Self {
+    /// The peak so far, in a process that runs the calling test `name` alone: `"module::function"`. Other
+    /// tests in the same process would raise the peak. Any other process starts such a process, waits for its
+    /// end and gets `None`: the calling test is then done.
+    ///
+    /// # Panics
+    /// Where the test fails in its own process, or the program has no test of that name.
+    #[track_caller]
+    pub fn alone(name: &str) -> Option<Self> {
+        if env::var(ALONE).as_deref() == Ok(name) {
+            return Some(Self::now());
+        }
+        let mut command = Command::new(env::current_exe().unwrap());
+        let output =
+            command.args([name, "--exact", "--include-ignored", "--nocapture"]).env(ALONE, name).output();
+        let output = output.unwrap();
+        let [told, failed] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes));
+        print!("{told}");
+        assert!(output.status.success() && told.contains("1 passed"), "{name} in its own process: {failed}");
+        None
+    }
+
+    fn now() -> Self {
         let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
         let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
         Self(peak.and_then(|peak| peak.split_whitespace().next()?.parse().ok()))

@@ -56,10 +56,11 @@ fn scenes() -> Vec<(String, Vec<u8>)> {
 
 #[test]
 fn broken_scenes_give_mistakes() {
+    let Some(before) = PeakMemory::alone("corpus::broken_scenes_give_mistakes") else { return };
     for (name, bytes) in corpus("toml") {
         println!("{name}: {}", mistakes(&bytes).unwrap_or_else(|| panic!("{name} is read")));
     }
-    let (before, mut noise, mut outcomes) = (PeakMemory::now(), Random::new(20_261_122), [0; 2]);
+    let (mut noise, mut outcomes) = (Random::new(20_261_122), [0; 2]);
     for (_, seed) in scenes() {
         assert!(mistakes(&seed).is_none());
         for _ in 0..300 {
@@ -73,6 +74,7 @@ fn broken_scenes_give_mistakes() {
 
 #[test]
 fn broken_models_give_errors() {
+    let Some(before) = PeakMemory::alone("corpus::broken_models_give_errors") else { return };
     let nowhere = Path::new("nowhere/model.xml");
     for (name, bytes) in corpus("xml") {
         let error = import_bytes(nowhere, &bytes).map(|_| ()).unwrap_err();
@@ -80,7 +82,7 @@ fn broken_models_give_errors() {
     }
     let seed = fs::read(folder().join("../../../../lab/validation/data/niftysim/H8_NH.xml")).unwrap();
     assert!(import_bytes(nowhere, &seed).is_ok());
-    let (before, mut noise, mut outcomes) = (PeakMemory::now(), Random::new(20_261_122), [0; 2]);
+    let (mut noise, mut outcomes) = (Random::new(20_261_122), [0; 2]);
     for _ in 0..1500 {
         let imported = import_bytes(nowhere, &noise.damaged(&seed));
         outcomes[usize::from(imported.is_err())] += 1;
@@ -96,6 +98,7 @@ fn broken_models_give_errors() {
 /// Bodies are changed inside a fitting checksum, or no change would come past that.
 #[test]
 fn broken_checkpoints_give_errors() {
+    let Some(before) = PeakMemory::alone("corpus::broken_checkpoints_give_errors") else { return };
     const SCENE: &str = "[scene]\nuntil = 0.02\n[run]\ncheckpoint = { every = 0.01 }\n\
         [law.l]\ntype = 'neo-hookean'\nyoung-modulus = 1e4\npoisson-ratio = 0.3\n\
         [body.b]\nmesh = { block = { size = [0.2, 0.1, 0.1], cells = [2, 1, 1] }, as = 'hexes' }\nlaw = 'l'\ndensity = 1000\n\
@@ -110,7 +113,7 @@ fn broken_checkpoints_give_errors() {
     let whole = fs::read(&path).unwrap();
     let body = &whole[20..whole.len() - 4];
     assert_eq!(Checkpoint::framed(body), whole);
-    let (before, mut noise, mut outcomes) = (PeakMemory::now(), Random::new(20_261_122), [0; 2]);
+    let (mut noise, mut outcomes) = (Random::new(20_261_122), [0; 2]);
     for _ in 0..3000 {
         let read = Checkpoint::from_bytes(&path, &Checkpoint::framed(&noise.damaged(body)));
         outcomes[usize::from(read.is_err())] += 1;
