@@ -1,4 +1,4 @@
-"""Fails if a dependency has a licence that is not permissive (see docs/dependencies.md)."""
+"""Fails if a dependency has a licence that is not permissive (see docs/lab/dependencies.md)."""
 
 import json
 import re

@@ -2,7 +2,7 @@
 //!
 //! Run: `cargo run --release --bin 4-shells`
 //!
-//! Read before: 3 and `docs/shells.md`.
+//! Read before: 3 and `docs/guide/shells.md`.
 
 use std::error::Error;
 

@@ -3,7 +3,7 @@
 //!
 //! Run: `cargo run --release --bin 5-own-law`
 //!
-//! Read before: 2 and `docs/add-a-law.md`.
+//! Read before: 2 and `docs/develop/add-a-law.md`.
 
 use std::error::Error;
 

@@ -2,7 +2,7 @@
 
 Run: `python3 examples/7_haptic_client.py [HOST:PORT] [X,Y,Z] [SECONDS]`
 
-Read before: 1 and `docs/haptics.md`.
+Read before: 1 and `docs/guide/tools-and-haptics.md`.
 """
 
 import math

@@ -3,7 +3,7 @@
 //!
 //! Run: `cargo run --release --bin 7-haptic-client -- 127.0.0.1:4270`
 //!
-//! Read before: 1 and `docs/haptics.md`.
+//! Read before: 1 and `docs/guide/tools-and-haptics.md`.
 
 use std::error::Error;
 use std::net::{SocketAddr, UdpSocket};

@@ -5,7 +5,7 @@
  *      cc examples/6_embed/press.c -I crates/c/include -L target/release -lpliant_c -Wl,-rpath,target/release -o target/press
  *      target/press scenes/palpation
  *
- * Read before: 1 and docs/embedding.md. */
+ * Read before: 1 and docs/guide/c.md. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

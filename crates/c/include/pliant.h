@@ -1,4 +1,4 @@
-/* Pliant: real-time simulation of soft organs, for C and C++. The guide is docs/embedding.md.
+/* Pliant: real-time simulation of soft organs, for C and C++. The guide is docs/guide/c.md.
  * Made from crates/c/src by crates/c/tests/header.rs. */
 #ifndef PLIANT_H
 #define PLIANT_H

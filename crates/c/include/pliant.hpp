@@ -1,4 +1,4 @@
-// Pliant for C++17: owning classes over pliant.h. Errors are exceptions with their place. The guide is docs/embedding.md.
+// Pliant for C++17: owning classes over pliant.h. Errors are exceptions with their place. The guide is docs/guide/c.md.
 #ifndef PLIANT_HPP
 #define PLIANT_HPP
 

@@ -1,6 +1,6 @@
 //! The C interface of Pliant. Programs in C, C++, C# and others load scenes, step them, read positions,
 //! normals, fields and forces, and lead tools and hands. `include/pliant.h` is made of these declarations,
-//! `include/pliant.hpp` wraps it for C++; the guide is `docs/embedding.md`.
+//! `include/pliant.hpp` wraps it for C++; the guide is `docs/guide/c.md`.
 //!
 //! It is thin: a [`World`](pliant_scene::World) is built, a [`Simulation`](pliant_sim::Simulation) stepped,
 //! and what is read comes from [`Skin`](pliant_run::Skin) and [`FieldReader`](pliant_run::FieldReader).

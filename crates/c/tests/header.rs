@@ -9,7 +9,7 @@ use std::path::Path;
 const FILES: [&str; 10] =
     ["status", "version", "scene", "simulation", "buffer", "surface", "values", "tools", "grips", "snapshot"];
 
-const HEAD: &str = "/* Pliant: real-time simulation of soft organs, for C and C++. The guide is docs/embedding.md.\n \
+const HEAD: &str = "/* Pliant: real-time simulation of soft organs, for C and C++. The guide is docs/guide/c.md.\n \
                     * Made from crates/c/src by crates/c/tests/header.rs. */\n\
                     #ifndef PLIANT_H\n#define PLIANT_H\n\n#include <stddef.h>\n#include <stdint.h>\n\n\
                     #ifdef __cplusplus\nextern \"C\" {\n#endif\n\n\

@@ -2,7 +2,7 @@
 //!
 //! What an elastic `tet4` moves and computes in a step, counted from the arrays below for six cells a node,
 //! each number read once from memory; operations are those of a prototype's PTX (sm_90, neo-Hookean). The
-//! node itself (u, Δu read and written, its constants) is 80 B, 13 a cell. Times are in docs/performance.md.
+//! node itself (u, Δu read and written, its constants) is 80 B, 13 a cell. Times are in `docs/lab/`.
 //!
 //! | design | bytes | operations | where they go |
 //! |---|---|---|---|

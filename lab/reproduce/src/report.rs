@@ -1,4 +1,4 @@
-//! The outputs of a reproduction: `results.json`, one page, and a table for `docs/validation.md`.
+//! The outputs of a reproduction: `results.json`, one page, and a table for `docs/lab/validation.md`.
 
 use std::time::{Duration, Instant};
 

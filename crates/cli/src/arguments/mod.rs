@@ -130,7 +130,7 @@ const HAPTICS_HELP: &str = "\
 Examples:
   pliant haptics scenes/palpation --replay scenes/palpation/finger.csv
   pliant haptics scenes/palpation --replay finger.csv --hand --set output={}
-  pliant haptics scenes/palpation --listen 127.0.0.1:4270       devices connect as docs/haptics.md describes
+  pliant haptics scenes/palpation --listen 127.0.0.1:4270       devices connect as docs/guide/tools-and-haptics.md describes
 
 A trace is a table t,x,y,z,qw,qx,qy,qz of the tool in the scene (s, m). It prints the spread of the force period, the latency, the force
 jump, the energy and the stiffest coupling.

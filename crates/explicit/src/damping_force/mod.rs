@@ -15,8 +15,8 @@
 //! of frequency ω and Ω = ω Δt the characteristic polynomial is z (z − 1)² + Ω² ((1 + η) z² − 2 η z + η). A
 //! resolved mode loses ½ η Ω⁴ of its amplitude in a step, so the scheme is accurate to second order: 2.5e-7
 //! at Ω = 0.1, 0.25 % at Ω = 1, 2.8 % at 0.9 of the critical time step. That falls by the factor 1/√(1 + 4
-//! η), 1 %. The moment of the force is of fourth order in the angle of a step. `docs/performance.md` compares
-//! it with shorter steps and with damping of first order.
+//! η), 1 %. The moment of the force is of fourth order in the angle of a step. The page
+//! `docs/lab/performance.md` compares it with shorter steps and with damping of first order.
 //!
 //! *β damps by stiffness*: β ḟ by the difference to the instant before. That is β K v of the tangent K and
 //! the velocities half a step ago, of any law and element. A mode of angular frequency ω is damped with the

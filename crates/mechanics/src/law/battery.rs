@@ -343,7 +343,7 @@ fn page(name: &str) -> String {
 
 #[test]
 fn the_page_of_laws_has_an_entry_for_every_law_and_names_its_parameters() {
-    let page = page("laws.md");
+    let page = page("guide/materials.md");
     let (shared, entries) = page.split_once("\n## neo-hookean\n").unwrap();
     let entries = format!("\n## neo-hookean\n{entries}");
     for name in AnyLaw::NAMES {
@@ -353,18 +353,18 @@ fn the_page_of_laws_has_an_entry_for_every_law_and_names_its_parameters() {
         for key in schema.get("properties").unwrap().as_object().unwrap().keys() {
             let quoted = format!("`{key}`");
             let known = entry.contains(&quoted) || shared.contains(&quoted);
-            assert!(known, "docs/laws.md does not name {quoted} of `{name}`");
+            assert!(known, "docs/guide/materials.md does not name {quoted} of `{name}`");
         }
     }
 }
 
 #[test]
 fn the_worked_example_of_the_docs_is_the_law_as_it_is() {
-    let page = page("add-a-law.md");
+    let page = page("develop/add-a-law.md");
     for (name, text) in
         [("demiray.rs", include_str!("demiray.rs")), ("demiray.wgsl", include_str!("demiray.wgsl"))]
     {
-        assert!(page.contains(text), "copy {name} into docs/add-a-law.md");
+        assert!(page.contains(text), "copy {name} into docs/develop/add-a-law.md");
     }
     for (line, file) in [
         (r#"("demiray", with_moduli(json!({ "exponent": 2.0 }))),"#, include_str!("samples.rs")),

@@ -217,7 +217,7 @@ fn what_is_stored_at_the_start_is_in_the_book() {
         rows[0][internal] > 1e-5
             && (rows[0][internal] + rows[0][hourglass] - rows[0][external]).abs() < 1e-12
     );
-    // Sudden forces unbalance the first steps (`docs/running.md`).
+    // Sudden forces unbalance the first steps (`docs/guide/running.md`).
     let balances: Vec<f64> = rows.iter().map(|row| row[column("energy.balance")]).collect();
     println!("balances {balances:?}");
     assert!(rows.iter().all(|row| row[internal] > 0.0) && balances[10] < 0.05);

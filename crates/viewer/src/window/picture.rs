@@ -20,7 +20,7 @@ const PIN_SIZE: f32 = 5.0;
 const PIN: Color32 = Color32::from_rgb(20, 90, 170);
 const FORCE: Color32 = Color32::from_rgb(190, 40, 40);
 
-/// Keys and what they do, as in `docs/viewer.md`.
+/// Keys and what they do, as in `docs/guide/window.md`.
 const KEYS: [(&str, &str); 29] = [
     ("drag the body", "pull it"),
     ("drag a tool", "lead it; with Shift turn it about where it is held"),
@@ -314,9 +314,12 @@ mod tests {
 
     #[test]
     fn the_manual_lists_the_keys_that_the_window_lists() {
-        let manual = include_str!("../../../../docs/viewer.md");
+        let manual = include_str!("../../../../docs/guide/window.md");
         for (key, does) in KEYS {
-            assert!(manual.contains(&format!("| {key} | {does} |")), "`{key}` is not in docs/viewer.md");
+            assert!(
+                manual.contains(&format!("| {key} | {does} |")),
+                "`{key}` is not in docs/guide/window.md"
+            );
         }
     }
 }
