@@ -28,11 +28,12 @@ pub fn execute(command: Command) -> Result<u8, Failure> {
         Command::Sweep(arguments) => sweep(&arguments),
         Command::Check(arguments) => check(&arguments),
         Command::New { name } => new(&name),
-        Command::Schema { markdown, python } => {
+        Command::Schema { markdown, python, commands } => {
             let sections = registry::sections();
-            match (markdown, python) {
-                (true, _) => say(reference::page(&sections).trim_end())?,
-                (_, true) => say(reference::python(&sections).trim_end())?,
+            match (markdown, python, commands) {
+                (true, ..) => say(reference::page(&sections).trim_end())?,
+                (_, true, _) => say(reference::python(&sections).trim_end())?,
+                (.., true) => say(arguments::page().trim_end())?,
                 _ => say(format_args!("{:#}", registry::scene_schema()))?,
             }
             Ok(SUCCESS)

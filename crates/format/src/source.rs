@@ -606,11 +606,22 @@ fn syntax_error(error: &toml::de::Error, text: &str) -> Diagnostic {
         diagnostic.help("write a digit before the point: 0.5")
     } else if message.starts_with("invalid fraction") {
         diagnostic.help("write a digit after the point: 5.0")
+    } else if breaks_in_escape(before, found) {
+        diagnostic.help(
+            "in \"…\" a backslash begins an escape: write a path in single quotes, 'C:\\mesh.msh', or with /",
+        )
     } else if value_expected {
         diagnostic.help("a value is a number, true, false, a text in quotes, an [array] or a { table }")
     } else {
         diagnostic
     }
+}
+
+/// True if the text breaks off in an escape of a text in double quotes.
+fn breaks_in_escape(before: &str, found: &str) -> bool {
+    let line = before.rsplit('\n').next().unwrap_or_default();
+    let quoted = line.rsplit('"').next().unwrap_or_default();
+    line.matches('"').count() % 2 == 1 && (quoted.contains('\\') || found.contains('\\'))
 }
 
 #[cfg(test)]

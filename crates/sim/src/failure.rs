@@ -241,3 +241,20 @@ pub fn panicked(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message")
 }
+
+#[cfg(test)]
+mod tests {
+    /// Each kind has a row in the page of errors, with what to do.
+    #[test]
+    fn the_page_of_errors_has_every_kind() {
+        let page = include_str!("../../../docs/reference/errors.md");
+        let words = include_str!("failure.rs").lines().filter_map(|line| {
+            line.trim().strip_prefix("Self::")?.split_once(" => \"")?.1.strip_suffix("\",")
+        });
+        let words: Vec<&str> = words.collect();
+        assert!(words.len() >= 14, "{words:?}");
+        for word in words {
+            assert!(page.contains(&format!("\n| `{word}` | ")), "docs/reference/errors.md lacks `{word}`");
+        }
+    }
+}

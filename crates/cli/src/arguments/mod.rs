@@ -1,6 +1,7 @@
 //! Commands and options.
 
 mod meshing;
+mod page;
 mod pictures;
 
 use std::path::PathBuf;
@@ -10,6 +11,7 @@ use pliant_run::SweepPart;
 
 use self::meshing::MESH_HELP;
 pub use self::meshing::{Labels, MeshCells, MeshImage, Tissue};
+pub use self::page::page;
 #[cfg(feature = "viewer")]
 pub use self::pictures::Frames;
 use self::pictures::RENDER_HELP;
@@ -61,6 +63,9 @@ pub enum Command {
         /// Print the classes of the Python package (`pliant.tables`) instead.
         #[arg(long, conflicts_with = "markdown")]
         python: bool,
+        /// Print the reference page of all commands as Markdown instead.
+        #[arg(long, conflicts_with_all = ["markdown", "python"])]
+        commands: bool,
     },
     /// Translate a NiftySim model into a scene.
     #[command(after_help = "Examples:\n  pliant import model.xml -o model && pliant run model\n  \

@@ -155,6 +155,9 @@ fn syntax_errors_have_a_place_and_advice() {
     expect("a = .5\n", "not valid TOML", "", "0.5");
     expect("a = 5.\n", "not valid TOML", "", "5.0");
     expect("[law\na = 1\n", "unclosed table", "", "");
+    expect("file = \"C:\\Users\\me.msh\"\n", "not valid TOML", "", "single quotes");
+    expect("file = \"C:\\mine.msh\"\n", "not valid TOML", "", "single quotes");
+    expect("a = \"b\"c\\d\n", "", "", "");
     expect("a = 99999999999999999999\n", "64 bits", "99999999999999999999", "exponent");
     expect("a = 1e999\n", "64-bit floating point", "1e999", "");
 }
