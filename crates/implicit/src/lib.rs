@@ -1,12 +1,12 @@
-//! Static and implicit solvers of thin structures and solids: co-rotational triangular shells with membrane,
-//! bending and twist in large rotation, and solids of any elastic law, which may share nodes with them. Knows
-//! nothing of files or windows. SI units throughout.
+//! Static and implicit solvers of thin structures and solids. Shells are co-rotational triangles with
+//! membrane, bending and twist in large rotation. Solids follow any elastic law and may share nodes with
+//! shells. The crate knows nothing of files or windows. SI units throughout.
 //!
 //! A shell element is the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980) with the ANDES membrane
-//! (Felippa 2003), which takes the mean strain of the curved triangle, six degrees of freedom a node, in a
-//! frame that turns with the facet; its force is the gradient of its energy. An [`Assembly`] is constant: a
-//! model with shells. A [`State`] changes; [`Statics`] finds equilibria, [`BackwardEuler`] and
-//! [`ExplicitShells`] move a state in time; [`CurvedSurface`] is the smooth surface of the shells for
+//! (Felippa 2003), which takes the mean strain of the curved triangle. It has six degrees of freedom a node,
+//! in a frame that turns with the facet. Its force is the gradient of its energy. An [`Assembly`] is
+//! constant: a model with shells. A [`State`] changes. [`Statics`] finds equilibria; [`BackwardEuler`] and
+//! [`ExplicitShells`] move a state in time. [`CurvedSurface`] is the smooth surface of the shells for
 //! pictures and for forces on any of its points.
 //!
 //! ```

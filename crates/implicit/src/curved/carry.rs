@@ -1,8 +1,8 @@
-//! Visual meshes carried by shells: each of many points finds the nearest place of the curved surface,
-//! follows it, and gives forces back. A search tree holds the flat facets; a patch is at most its bulge away
-//! from its facet, so patches are tried from the nearest facet on until no other can be nearer: the nearest
-//! place of all, at a cost per point that grows with the logarithm of the facets. Leaves out: keeping
-//! neighbouring points of a mesh on the same side of a fold.
+//! Visual meshes carried by shells. Each point finds the nearest place of the curved surface, follows it, and
+//! gives forces back. A search tree holds the flat facets. A patch is at most its bulge away from its facet,
+//! so patches are tried from the nearest facet on until no other can be nearer. The place found is the
+//! nearest of all, at a cost per point that grows with the logarithm of the number of facets. Leaves out:
+//! keeping neighbouring points of a mesh on the same side of a fold.
 
 use nalgebra::Vector3;
 use pliant_geometry::barycentric_of_closest;
@@ -93,7 +93,7 @@ impl CurvedSurface {
         points.par_iter().with_min_len(16).map(bind).collect()
     }
 
-    /// Where carried points are [m], written to a slice of the same length.
+    /// Writes the positions [m] of carried points to a slice of the same length.
     pub fn carried_all(
         &self,
         model: &Assembly,
@@ -120,8 +120,8 @@ mod tests {
     }
 
     /// Around a ball, a cube with creases and a strip with borders, points at any distance find the nearest
-    /// place: no point of a fine picture is nearer by more than 1e-6 (Gauss–Newton is slow where the distance
-    /// is that of the radius), and they stay where they are.
+    /// place. No point of a fine picture is nearer by more than 1e-6 (Gauss–Newton is slow where the distance
+    /// equals the radius). The carried points stay where they are.
     #[test]
     fn points_find_the_nearest_place_of_all() {
         let mut random = Random::new(3);

@@ -28,7 +28,7 @@ pub enum CarriedPoints<'a> {
 }
 
 impl<'a> CarriedPoints<'a> {
-    /// The points of a surface of the model. Those of shells need their curved surface.
+    /// The points of a surface of the model. Points on shells need their curved surface.
     pub fn new(assembly: &'a Assembly, curved: Option<&'a CurvedSurface>, surface: usize) -> Self {
         match (curved, assembly.carried.get(&surface)) {
             (Some(curved), Some(points)) => Self::Shell(assembly, curved, points),

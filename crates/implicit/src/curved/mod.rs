@@ -1,4 +1,5 @@
-//! The curved surface of a model's shells: its points, what follows it, pictures of it, and fields of cells.
+//! The curved surface of a model's shells: its points, things that follow it, its pictures, and fields of
+//! cells.
 
 pub(crate) mod carry;
 pub(crate) mod mapping;

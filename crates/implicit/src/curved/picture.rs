@@ -1,8 +1,8 @@
 //! Pictures of the curved surface: each patch cut into small triangles, with the fields that a writer or a
-//! window needs at their corners. Facets share the points of an edge where they share its normals; where
-//! these differ, at creases, each side has points of its own, at the same places. The number of points is
-//! linear in facets and in the square of the parts of an edge. Leaves out: fewer triangles where the surface
-//! is flat.
+//! window needs at their corners. Facets share the points of an edge where they share its normals. Where the
+//! normals differ, at creases, each side has its own points at the same places. The number of points is
+//! linear in the facets and in the square of the parts of an edge. Leaves out: fewer triangles where the
+//! surface is flat.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use pliant_shells::Place;
@@ -16,12 +16,11 @@ use crate::model::state::State;
 /// Points and triangles that show the surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// Where its points lie on the surface.
+    /// Places of its points on the surface.
     pub places: Vec<Place>,
     /// Its triangles, facet by facet.
     pub triangles: Vec<[u32; 3]>,
-    /// A bit set for each triangle: bit i tells that the side opposite to corner i lies on an edge of the
-    /// facet.
+    /// Bits of each triangle: bit i is set if the side opposite to corner i lies on an edge of the facet.
     pub facet_edges: Vec<u8>,
     /// Its points at rest [m].
     pub rest: Vec<Vector3<f64>>,
@@ -198,8 +197,8 @@ mod tests {
         sides.values().all(|&count| count == 101)
     }
 
-    /// A smooth ball is closed by shared points alone, in V + E (k − 1) + F (k − 1)(k − 2)/2 points and F k²
-    /// triangles: the cost is linear in F.
+    /// A smooth ball is closed by shared points alone. It has V + E (k − 1) + F (k − 1)(k − 2)/2 points and F
+    /// k² triangles, so the cost is linear in F.
     #[test]
     fn pictures_are_watertight_and_their_size_is_linear() {
         for cuts in [1, 2] {
@@ -286,8 +285,8 @@ mod tests {
         }
     }
 
-    /// At rest nothing is displaced; a rigid motion is one of every point, its rotation vector that of the
-    /// body.
+    /// At rest nothing is displaced. In a rigid motion every point moves with the body and has its rotation
+    /// vector.
     #[test]
     fn a_rigid_motion_of_a_picture() {
         let model = model(ball(2), 0.01);
@@ -310,7 +309,7 @@ mod tests {
         }
     }
 
-    /// On a ball of 128 patches shading normals are those of the sphere to 1°.
+    /// On a ball of 128 patches the shading normals agree with the normals of the sphere to 1°.
     #[test]
     fn a_ball_is_shaded_as_a_sphere() {
         let mut model = model(ball(2), 0.01);

@@ -1,12 +1,12 @@
 //! Fields of the cells at a state, recovered from displacements and rotations as symmetric tensors in space.
 //!
-//! Shells: membrane forces and bending moments are the means over the facet that do the same work with
-//! uniform strains and curvatures as its nodal forces: n = t Dm Lᵀd/(t A) of the ANDES membrane (Felippa
-//! 2003, CMAME 192:2125), whose strain has a part from drilling, and m = t³/12 Dm κ with the mean curvature
-//! of the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980). Stress at a height z along the facet's normal
-//! is σ(z) = n/t + 12 z m/t³ (Timoshenko and Woinowsky-Krieger 1959), in layers Q (ε + z κ) with ε and κ of n
-//! and m. Fields of solids are those of `pliant-explicit`. Leaves out: shear across the thickness, variation
-//! within a facet, averages at nodes.
+//! Shells: membrane forces and bending moments are means over the facet. With uniform strains and curvatures
+//! they do the same work as its nodal forces. The forces are n = t Dm Lᵀd/(t A) of the ANDES membrane
+//! (Felippa 2003, CMAME 192:2125), whose strain has a part from drilling. The moments are m = t³/12 Dm κ with
+//! the mean curvature of the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980). Stress at a height z along
+//! the facet's normal is σ(z) = n/t + 12 z m/t³ (Timoshenko and Woinowsky-Krieger 1959). In layers it is Q
+//! (ε + z κ) with ε and κ of n and m. Fields of solids come from `pliant-explicit`. Leaves out: shear across
+//! the thickness, variation within a facet, averages at nodes.
 
 use nalgebra::{Matrix3, Vector3};
 use pliant_shells::ShellStrain;
@@ -82,7 +82,7 @@ pub struct ShellFields {
     pub energy: Vec<ShellEnergy>,
     /// Thickness [m] with the strain across that plane stress asks for; forces do not feel it.
     pub thickness: Vec<f64>,
-    /// How far it is strained.
+    /// Strain of each facet.
     pub strain: Vec<ShellStrain>,
 }
 
@@ -165,7 +165,7 @@ mod tests {
     const YOUNG: f64 = MATERIAL.elastic.young;
     const POISSON: f64 = MATERIAL.elastic.poisson;
 
-    /// All of a state turned by a radian about a skew axis.
+    /// Returns a copy of a state with positions and rotations turned by a radian about a skew axis.
     fn turned(state: &State) -> (State, Matrix3<f64>) {
         let turn = exponential(&Vector3::new(1.0, -2.0, 0.5).normalize());
         let mut state = state.clone();

@@ -41,8 +41,9 @@ impl CurvedSurface {
         Patch::new(p, n, self.straight[facet], self.rule)
     }
 
-    /// The foot of a point on the surface at a state, found from a facet near it: the nearest place of its
-    /// patch, then those of the neighbours across edges on which it lies, as long as they are nearer.
+    /// The foot of a point on the surface at a state, found from a facet near it. The search starts at the
+    /// nearest place of that facet's patch. It moves to neighbours across the edges on which the place lies,
+    /// as long as their places are nearer.
     pub fn project(&self, model: &Assembly, state: &State, point: Vector3<f64>, facet: u32) -> Place {
         let nearest = |facet: u32| {
             let (weights, distance) = self.patch(model, state, facet).closest(&point, [1.0 / 3.0; 3]);
@@ -88,7 +89,7 @@ impl CurvedSurface {
         Carried { place, height: offset.dot(&normal), aside: [offset.dot(&first), offset.dot(&second)] }
     }
 
-    /// Where a carried point is.
+    /// Position [m] of a carried point.
     pub fn carried(&self, model: &Assembly, state: &State, point: &Carried) -> Vector3<f64> {
         self.patch(model, state, point.place.facet).carried(point)
     }

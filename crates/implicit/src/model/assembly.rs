@@ -46,8 +46,8 @@ pub struct Assembly {
     pub force_limits: BTreeMap<usize, f64>,
     /// Contacts, which the static and the implicit solver keep.
     pub contact: Option<ContactModel>,
-    /// Nodes of shells that turn with the solid that they are in or on. Those of rigid parts turn with these
-    /// instead.
+    /// Nodes of shells that turn with the solid that they are in or on. Nodes of rigid parts turn with their
+    /// part instead.
     pub turns: Vec<CarriedTurn>,
 }
 
@@ -60,7 +60,7 @@ pub struct Shell {
     pub cells: Vec<[u32; 3]>,
     /// Thickness [m]: one, or one a triangle.
     pub thickness: Vec<f64>,
-    /// What it is made of: one, or one a triangle.
+    /// Material of the shell: one, or one a triangle.
     pub material: Vec<Wall>,
     /// Its elements.
     pub formulation: Formulation,
@@ -74,12 +74,13 @@ pub struct Shell {
     pub tension: f64,
     /// Triangles that meet at a larger angle [rad] have normals of their own: a crease.
     pub crease: f64,
-    /// Normals of nodes at rest, of any length and to either side: those of a surface that is known better
-    /// than by its triangles. Nodes without one take the mean of their triangles.
+    /// Normals of nodes at rest, of any length and to either side, for a surface that is known better than by
+    /// its triangles. Nodes without one take the mean of their triangles.
     pub normals: BTreeMap<u32, Vector3<f64>>,
-    /// Which triangles are flat, whatever the normals of their nodes: their edges are straight. Empty: none.
+    /// Flags of triangles that are flat, with straight edges, whatever the normals of their nodes. Empty: no
+    /// triangle is flat.
     pub flat: Vec<bool>,
-    /// Whether more than two triangles may meet in an edge.
+    /// True if more than two triangles may meet in an edge.
     pub branches: bool,
 }
 
@@ -103,19 +104,20 @@ impl Shell {
     }
 }
 
-/// What was noticed when a shell was added.
+/// Observations made when a shell was added.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Notes {
     /// Triangles turned over so that all face the same side.
     pub turned: usize,
-    /// Elements thicker than their smallest altitude: they answer as plates, but are none.
+    /// Elements thicker than their smallest altitude. They respond as plates although they are too thick for
+    /// plate theory.
     pub thick: usize,
     /// Triangles folded back onto all their neighbours, as inverted ones are: how many, and the number of the
     /// first.
     pub inverted: Option<(usize, usize)>,
-    /// Mean thickness over width, where there is a border: a strip of length L and width b has two areas over
-    /// its border, b L/(b + L). Shear across the thickness, which is left out, makes a strip softer against
-    /// twist by 0.63 of it.
+    /// Mean thickness over width, where there is a border. A strip of length L and width b has two areas over
+    /// its border, b L/(b + L). Shear across the thickness, which is left out, makes a strip softer in twist
+    /// by 0.63 times this ratio.
     pub stoutness: Option<f64>,
     /// Elements of Comas (2010), which depend on the numbering and converge to a wrong plate.
     pub comas: usize,
@@ -141,7 +143,7 @@ impl Deref for Assembly {
 }
 
 impl Assembly {
-    /// The nodes that turn with a solid: not those of rigid parts, which turn with these.
+    /// The nodes that turn with a solid, without the nodes of rigid parts, which turn with their part.
     pub(crate) fn carried_turns(&self) -> impl Iterator<Item = &CarriedTurn> {
         let rigid = |constraint: &Constraint| matches!(constraint.motion, Motion::Rigid);
         let bound =
@@ -168,17 +170,17 @@ impl Assembly {
         Arc::make_mut(&mut self.model)
     }
 
-    /// Where a node is at rest [m].
+    /// Position of a node at rest [m].
     pub fn place(&self, node: usize) -> Vector3<f64> {
         Vector3::from(self.rest[node])
     }
 
-    /// Where all nodes are at rest [m].
+    /// Positions of all nodes at rest [m].
     pub fn places(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
         self.rest.iter().map(|&place| Vector3::from(place))
     }
 
-    /// The mass-proportional damping [1/s] of each node: that of its body.
+    /// The mass-proportional damping [1/s] of each node, taken from its body.
     pub fn damping(&self) -> Vec<f64> {
         let mut damping = vec![0.0; self.rest.len()];
         for body in &self.bodies {
@@ -187,8 +189,8 @@ impl Assembly {
         damping
     }
 
-    /// Adds a shell: its triangles are made to face one side (each connected part keeps the side of most of
-    /// its triangles), become facets, and give mass and normals to their nodes.
+    /// Adds a shell. Its triangles are turned to face one side: each connected part keeps the side of most of
+    /// its triangles. They become facets, and give mass and normals to their nodes.
     ///
     /// # Errors
     /// If a quantity is out of range, a triangle is degenerate, or an edge has too many triangles. The model
@@ -246,8 +248,8 @@ impl Assembly {
     }
 
     /// A force per rest length [N/m] along edges that keeps its direction, half to each end. Left out are the
-    /// drilling moments in the plane that the ANDES membrane would take of it at the ends of an edge; they
-    /// cancel between edges but at the ends of the line.
+    /// in-plane drilling moments that the ANDES membrane would take from it at the ends of an edge. They
+    /// cancel between edges, except at the ends of the line.
     pub fn edge_load(&self, edges: &[[u32; 2]], traction: Vector3<f64>) -> LoadKind {
         let of_edge = |&ends: &[u32; 2]| {
             let [a, b] = ends.map(|node| self.place(node as usize));
@@ -256,8 +258,8 @@ impl Assembly {
         LoadKind::Forces(edges.iter().flat_map(of_edge).collect())
     }
 
-    /// Which nodes have rotations: those of a facet that bends. Without bending rotations would have next to
-    /// no stiffness.
+    /// Flags of nodes with rotations, which are the nodes of facets that bend. Without bending, rotations
+    /// would have next to no stiffness.
     pub fn turning(&self) -> Vec<bool> {
         let mut turning = vec![false; self.rest.len()];
         for facet in self.facets.iter().filter(|facet| facet.turns()) {
@@ -266,8 +268,7 @@ impl Assembly {
         turning
     }
 
-    /// Gives the facets the normals of their corners. A shell that shares edges with others makes creases of
-    /// them.
+    /// Gives the facets the normals of their corners. Edges shared with another shell become creases.
     fn curve_facets(&mut self) {
         let straight = straight_edges(&self.facets, &self.corner_normals, &self.normals, &self.rest);
         for ((facet, corners), straight) in self.facets.iter_mut().zip(&self.corner_normals).zip(straight) {
@@ -317,11 +318,11 @@ impl Assembly {
         Ok(())
     }
 
-    /// Whether the solvers of this crate can have a solid on nodes of the model.
+    /// Checks that the solvers of this crate can have a solid on nodes of the model.
     ///
     /// # Errors
-    /// If the density is out of range, a cell is degenerate or inverted, or the element or the law has no
-    /// stiffness here: averages over two rings of neighbours, averaged pressures and bars that relax.
+    /// If the density is out of range, or a cell is degenerate or inverted. Also if the element or the law
+    /// has no stiffness here: averages over two rings of neighbours, averaged pressures and bars that relax.
     pub fn check_solid(&self, name: &str, solid: &Solid) -> Result<(), ModelError> {
         if let Some(why) = refusal(solid) {
             return Err(ModelError::NoStiffness { solid: name.into(), why });
@@ -391,8 +392,9 @@ impl Assembly {
         Ok(())
     }
 
-    /// The normals of the nodes of a shell, and those at the corners of its facets: the given ones, else
-    /// angle-weighted means, one for each fan of facets round a node that meet at less than the crease angle.
+    /// The normals of the nodes of a shell, and their numbers at the corners of its facets. They are the
+    /// given normals, else angle-weighted means. Each fan of facets round a node that meet at less than the
+    /// crease angle has one mean.
     fn normals_of(
         &self,
         shell: &Shell,
@@ -410,7 +412,7 @@ impl Assembly {
         for (number, facet) in facets.iter().enumerate() {
             for (corner, &node) in facet.nodes.iter().enumerate() {
                 if is_flat(number) {
-                    // Other than those of its neighbours, which makes its edges straight.
+                    // A normal different from the neighbours' makes the edges straight.
                     corner_normals[number][corner] = (self.normals.len() + normals.len()) as u32;
                     normals.push(Normal { node, direction: face_normals[number], estimated: false });
                     continue;
@@ -464,10 +466,10 @@ impl Assembly {
         facets.iter().map(tet).sum()
     }
 
-    /// Whether facets close.
+    /// Checks that facets form a closed surface.
     ///
     /// # Errors
-    /// If not: the borders that they leave open.
+    /// If the surface has open borders; the error names them.
     pub fn check_closed(&self, cells: &[u32]) -> Result<(), ModelError> {
         let nodes: Vec<[u32; 3]> = cells.iter().map(|&cell| self.facets[cell as usize].nodes).collect();
         let open = edges(&nodes).into_iter().filter(|(_, sides)| sides.len() == 1);
@@ -494,8 +496,8 @@ impl Assembly {
         if loops.is_empty() { Ok(()) } else { Err(ModelError::Open { loops }) }
     }
 
-    /// What round-off leaves of the norm of a residual [N], 8 ε |x| √Σk²: displacements are differences of
-    /// positions, known to ε |x|, and a cell makes forces of them with its largest stiffness k.
+    /// Round-off in the norm of a residual [N], 8 ε |x| √Σk². Displacements are differences of positions,
+    /// known to ε |x|, and a cell turns them into forces with its largest stiffness k.
     pub(crate) fn round_off(&self) -> f64 {
         let extent = self.places().map(|x| x.amax()).fold(0.0, f64::max);
         let stiffness = self.stiffnesses().map(|k| k * k).sum::<f64>().sqrt();

@@ -1,4 +1,4 @@
-//! Which surfaces of a model touch each other by barriers, and how.
+//! Contacts of a model: pairs of surfaces that touch each other by barriers, with their settings.
 
 use std::sync::Arc;
 
@@ -10,12 +10,12 @@ use pliant_contact::touch::Contacts;
 pub struct ContactModel {
     /// Who touches whom.
     pub contacts: Arc<Contacts>,
-    /// How each contact acts.
+    /// Settings of each contact.
     pub settings: Vec<BarrierSettings>,
-    /// How often triangles of shells are divided into four on their curved surface, for each contact; empty:
-    /// never.
+    /// Number of times that triangles of shells are divided into four on their curved surface, for each
+    /// contact; empty: never.
     pub levels: Vec<u8>,
-    /// Whether each state that is accepted is searched for edges that go through triangles, which would be an
-    /// error of the program.
+    /// True if each accepted state is searched for edges that go through triangles, which would be an error
+    /// of the program.
     pub check_intersections: bool,
 }

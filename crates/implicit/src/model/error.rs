@@ -1,11 +1,11 @@
-//! What can be wrong with a model and why a solver stops.
+//! Errors of models, and reasons why a solver stops.
 
 use pliant_linear::memory::OutOfMemory;
 
 use pliant_linear::DeviceError;
 use pliant_shells::Broken;
 
-/// Why a part could not be added to a model.
+/// Reason why a part could not be added to a model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModelError {
     /// A quantity out of its range.
@@ -13,11 +13,11 @@ pub enum ModelError {
     OutOfRange {
         /// Name of the part.
         shell: String,
-        /// Which quantity, with the element where it is one of many.
+        /// Name of the quantity, with the element where the quantity is one of many.
         what: String,
         /// Its value.
         value: f64,
-        /// What it must be.
+        /// Range that the value must be in.
         range: &'static str,
     },
     /// A solid that only explicit steps can move.
@@ -25,7 +25,7 @@ pub enum ModelError {
     NoStiffness {
         /// Name of the solid.
         solid: String,
-        /// Why, and what to do instead.
+        /// The reason, and what to do instead.
         why: &'static str,
     },
     /// Not one value and not one a cell.
@@ -89,7 +89,7 @@ pub enum ModelError {
         /// An element.
         cell: usize,
     },
-    /// A given normal that is none.
+    /// A given normal that does not point away from the surface.
     #[error(
         "the normal given at node {node} of `{shell}` does not point away from the surface at element {cell}"
     )]
@@ -132,7 +132,7 @@ fn borders(loops: &[Vec<u32>]) -> String {
     told.join("; ") + if loops.len() > 3 { "; …" } else { "" }
 }
 
-/// Why a solver stopped. The state holds all that was found before.
+/// Reason why a solver stopped. The state holds all that was found before.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SolveError {
     /// Nothing holds a part.
@@ -154,7 +154,7 @@ pub enum SolveError {
     Singular {
         /// The node.
         node: u32,
-        /// `x`, `y`, `z`, or a rotation about one of them.
+        /// `x`, `y`, `z`, or a rotation about one of these axes.
         component: &'static str,
         /// The pivot over the diagonal entry.
         pivot: f64,
@@ -183,7 +183,7 @@ pub enum SolveError {
     Broken {
         /// Element, facets before the cells of solids.
         cell: usize,
-        /// What happened.
+        /// The failure of the element.
         why: Broken,
     },
     /// No equilibrium, with load steps halved as often as allowed.
@@ -202,7 +202,7 @@ pub enum SolveError {
         /// The element that broke in an attempt with a larger step, the last such, and how.
         broken: Option<(usize, Broken)>,
     },
-    /// A tool or a prescribed motion that cannot go on.
+    /// A tool or a prescribed motion that cannot move further.
     #[error(
         "{}{}: on to t = {time:.6} it has gone {:.1} % of its way after {iterations} iterations; nothing is in anything else. \
          Give it a `force-limit`, let it go less far or more slowly, or take smaller steps",
@@ -211,8 +211,8 @@ pub enum SolveError {
     Blocked {
         /// Time of the step that failed.
         time: f64,
-        /// Of the tools and constraints that move in the step the one that pushes hardest, and its force [N]
-        /// where the step began, without friction; none where a volume is to change.
+        /// The moving tool or constraint that pushes hardest, and its force [N] without friction, where the
+        /// step began. `None` where a volume is to change.
         driver: Option<(String, f64)>,
         /// Part of the way that it went, from 0 to 1.
         part: f64,
@@ -239,10 +239,10 @@ pub enum SolveError {
         limit: f64,
         /// The pressure [Pa] in the prescribed volume; `None` if the volume was not prescribed.
         pressure: Option<f64>,
-        /// How far [m³] the volume is beyond the prescribed one at the limit; `None` if the limit was not
-        /// prescribed.
+        /// Difference [m³] between the volume at the limit and the prescribed one; `None` if the limit was
+        /// not prescribed.
         ahead: Option<f64>,
-        /// Whether the step has inertia.
+        /// True if the step has inertia.
         inertia: bool,
     },
     /// No lower energy along a direction that should have one.
@@ -289,13 +289,13 @@ pub enum SolveError {
     /// A balloon that is not closed.
     #[error(transparent)]
     Open(#[from] ModelError),
-    /// What was asked for cannot be done; the text says why and what to do instead.
+    /// A request that cannot be met; the text says why and what to do instead.
     #[error("{0}")]
     Impossible(&'static str),
 }
 
 impl SolveError {
-    /// Whether smaller steps can't help.
+    /// True if smaller steps can't help.
     pub(crate) fn is_final(&self) -> bool {
         matches!(self, Self::Crossed { .. } | Self::Stopped | Self::Device(_) | Self::OutOfMemory(_))
     }
@@ -309,7 +309,7 @@ impl SolveError {
         }
     }
 
-    /// The same error where a larger step failed before, with the element that broke there.
+    /// Adds the element that broke in a larger step before, if this error names no broken element.
     pub(crate) fn after(mut self, larger: Option<(usize, Broken)>) -> Self {
         if let Self::NotConverged { broken, .. } = &mut self {
             *broken = broken.or(larger);

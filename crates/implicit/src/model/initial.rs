@@ -21,9 +21,9 @@ impl State {
         }
     }
 
-    /// Puts the nodes to positions [m] and turns those of shells with the facets round them: by the rotation
-    /// that best maps corners and normals of these from rest (Kabsch 1976; Procrustes), so that a rigid
-    /// motion costs nothing.
+    /// Puts the nodes to positions [m] and turns the nodes of shells with the facets round them. The rotation
+    /// of a node best maps corners and normals of these facets from rest (Kabsch 1976; Procrustes), so that a
+    /// rigid motion costs nothing.
     pub fn set_positions(&mut self, model: &Assembly, positions: &[Vector3<f64>]) {
         self.position.copy_from_slice(positions);
         let mut moments = vec![Matrix3::zeros(); model.rest.len()];
@@ -73,7 +73,7 @@ mod tests {
         assert!(state.rotation.iter().all(|r| r.angle_to(&turn) < 1e-12));
     }
 
-    /// A free ball that starts as a rigid body in small spin goes on as one: after 0.1 s its centre has gone
+    /// A free ball that starts as a rigid body in small spin moves on as one: after 0.1 s its centre has gone
     /// v t.
     #[test]
     fn a_start_velocity_moves_a_free_body() {
@@ -93,8 +93,8 @@ mod tests {
         }
     }
 
-    /// The free end of a strip is turned about three axes at once: at each factor by exactly exp(factor ·
-    /// vector), statically and step by step.
+    /// The free end of a strip is turned about three axes at once. At each factor it turns by exactly
+    /// exp(factor · vector), statically and step by step.
     #[test]
     fn a_rotation_vector_is_prescribed_exactly() {
         let mut model = cantilever();
@@ -123,7 +123,8 @@ mod tests {
     }
 
     /// A force on a point above a node is that force and the moment of its arm about the node, which turns
-    /// with the shell; the solver finds its equilibrium, and the work of the load is that of the point.
+    /// with the shell. The solver finds its equilibrium, and the work of the load equals force times
+    /// displacement of the point.
     #[test]
     fn a_force_on_a_carried_point_has_its_moment() {
         let mut model = cantilever();

@@ -1,5 +1,5 @@
-//! What is constant during a run, and what changes: models with shells, contacts and turns of theirs, states,
-//! errors. Knows no equations.
+//! Constant and changing data of a run: models with shells, their contacts and turns, states, errors. Knows
+//! no equations.
 
 pub(crate) mod assembly;
 pub(crate) mod contact;

@@ -1,4 +1,5 @@
-//! Whether a mesh is fine enough for pressure on a thin curved wall, and curved by normals of its surface.
+//! Checks that a mesh is fine enough for pressure on a thin curved wall, and curved by normals of its
+//! surface.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,15 +7,15 @@ use nalgebra::Vector3;
 
 use crate::model::assembly::Assembly;
 
-/// How far a node may lie from the mean of its neighbours along the wall, as a part of its edges, in a
-/// regular mesh.
+/// Distance of a node from the mean of its neighbours along the wall, as a part of its edges, that a regular
+/// mesh may have.
 const REGULAR: f64 = 0.05;
 
-/// What is doubtful of facets under pressure.
+/// Doubtful properties of facets under pressure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Resolution {
-    /// Facets of irregular parts of the mesh with an edge above 2 √(R t), where R is the radius of curvature
-    /// along it and t their thickness: there displacements scatter from node to node.
+    /// Facets of irregular parts of the mesh with an edge above 2 √(R t). R is the radius of curvature along
+    /// the edge and t the thickness. Displacements scatter there from node to node.
     pub coarse: usize,
     /// The one with the longest edge for its wall.
     pub worst: u32,

@@ -10,7 +10,7 @@ use crate::solid::relaxation::History;
 /// Nodes that a thread takes at least.
 pub(crate) const NODES: usize = 1024;
 
-/// Where a model is.
+/// Current state of a model: positions, rotations, velocities and time.
 #[derive(Debug, Default, PartialEq)]
 pub struct State {
     /// Time [s], or the curve parameter of a static load.
@@ -25,7 +25,7 @@ pub struct State {
     pub velocity: Vec<Vector3<f64>>,
     /// Spins [rad/s].
     pub spin: Vec<Vector3<f64>>,
-    /// What relaxing laws remember.
+    /// Memory of relaxing laws.
     pub history: History,
 }
 

@@ -1,6 +1,6 @@
-//! A bar: f = A P t along t = (x₂ − x₁)/l, K = ± (A P′/(λ₀ L) t⊗t + A P/l (1 − t⊗t)), with λ₀ the slack. A
+//! A bar: f = A P t along t = (x₂ − x₁)/l, and K = ± (A P′/(λ₀ L) t⊗t + A P/l (1 − t⊗t)). λ₀ is the slack. A
 //! bar under compression makes K indefinite, which the line search and the report of negative eigenvalues
-//! deal with as for membranes; a thread that hangs through has no stiffness.
+//! handle as for membranes. A slack thread has no stiffness.
 
 use pliant_mechanics::element::{Cord, Pull, Rest};
 use pliant_mechanics::tensor::{Vector, scale, sub};

@@ -1,8 +1,8 @@
-//! A triangle of a membrane in plane stress: with the tangents f_i and the gradients g_a in the frame of the
-//! triangle, f_a = V f_i S_ij g_aj and K_ab = V (𝔹_aᵀ D 𝔹_b + (g_a·S g_b) I), D from
-//! [`AnyLaw::plane_tangent`](pliant_mechanics::law::AnyLaw). A membrane under compression makes K indefinite:
-//! it then has wrinkles to find, which the line search and the report of negative eigenvalues deal with as
-//! for other walls.
+//! A triangle of a membrane in plane stress. With the tangents f_i and the gradients g_a in the frame of the
+//! triangle: f_a = V f_i S_ij g_aj and K_ab = V (𝔹_aᵀ D 𝔹_b + (g_a·S g_b) I). D comes from
+//! [`AnyLaw::plane_tangent`](pliant_mechanics::law::AnyLaw). A membrane under compression makes K indefinite,
+//! because wrinkles are then to be found. The line search and the report of negative eigenvalues handle this
+//! as for other walls.
 
 use pliant_mechanics::element::{Axes, Rest};
 use pliant_mechanics::law::plane_stress::{FLAT_WALL, InPlane};

@@ -1,12 +1,12 @@
-//! Cells of solids of any hyperelastic law: energy, nodal forces and stiffness at a state, in total
-//! Lagrangian form (Belytschko, Liu, Moran, *Nonlinear Finite Elements*, 4.9 and 6.4): f_a = Σ w F S B_a,
-//! K_ab = Σ w (𝔹_aᵀ D 𝔹_b + (B_a·S B_b) I), with D from [`AnyLaw::tangent`], and that of the co-rotated
-//! linear law in closed form (`closed.rs`).
+//! Cells of solids of any hyperelastic law: energy, nodal forces and stiffness at a state. The form is total
+//! Lagrangian (Belytschko, Liu, Moran, *Nonlinear Finite Elements*, 4.9 and 6.4): f_a = Σ w F S B_a, K_ab = Σ
+//! w (𝔹_aᵀ D 𝔹_b + (B_a·S B_b) I). D comes from [`AnyLaw::tangent`], for the co-rotated linear law in closed
+//! form (`closed.rs`).
 //!
-//! `hex8` adds its hourglass control, k γ_a·γ_b I, with the derivatives of its factor g where that follows
-//! the law. `hex8-full` takes one mean dilatation J̄ = v/V a cell, whose energy V U(J̄) adds p cof F B_a to
-//! the force, and U″(J̄)/V c_a ⊗ c_b with c_a = Σ w cof F B_a to the stiffness. `tet4-anp` does so for each
-//! node with the tets around it (`star.rs`). Membranes are in plane stress (`membrane.rs`), bars in uniaxial
+//! `hex8` adds its hourglass control, k γ_a·γ_b I, with the derivatives of its factor g where g follows the
+//! law. `hex8-full` takes one mean dilatation J̄ = v/V a cell. Its energy V U(J̄) adds p cof F B_a to the
+//! force, and U″(J̄)/V c_a ⊗ c_b with c_a = Σ w cof F B_a to the stiffness. `tet4-anp` does so for each node
+//! with the tets around it (`star.rs`). Membranes are in plane stress (`membrane.rs`), bars in uniaxial
 //! stress (`bar.rs`).
 
 mod bar;
@@ -31,15 +31,15 @@ pub(crate) use star::Stars;
 /// The most components of a cell: three a node of a hexahedron.
 pub(crate) const MOST: usize = 24;
 
-/// The most evaluation points of a cell: those of a hexahedron.
+/// The most evaluation points of a cell, which a hexahedron has.
 pub(crate) const MOST_POINTS: usize = 8;
 
-/// What a cell makes at a state.
+/// Response of a cell at a state: energy, forces and stiffness.
 #[derive(Clone)]
 pub(crate) struct Response {
     /// Strain energy [J].
     pub(crate) energy: f64,
-    /// What hourglass control holds of it [J].
+    /// Part of the energy in hourglass control [J].
     pub(crate) hourglass: f64,
     /// Internal forces [N], three a node.
     pub(crate) force: [f64; MOST],
@@ -135,8 +135,8 @@ impl Response {
         Ok(())
     }
 
-    /// Adds the energy ½ k g Σ |q_c|² of hourglass control; g is 1 without a `growth`, which has the shear
-    /// modulus at rest [Pa] and the gradients of the shape functions [1/m].
+    /// Adds the energy ½ k g Σ |q_c|² of hourglass control. `growth` gives the shear modulus at rest [Pa] and
+    /// the gradients of the shape functions [1/m]; without `growth`, g is 1.
     fn add_hourglass<const N: usize>(
         &mut self,
         own: CellMaterial<'_>,
@@ -240,25 +240,25 @@ impl Response {
     }
 }
 
-/// What a cell is made of.
+/// Material of a cell.
 #[derive(Clone, Copy)]
 struct CellMaterial<'a> {
     law: &'a AnyLaw,
     fibres: &'a [Vector<f64>],
-    /// How its stresses relax, from the point at hand on.
+    /// Relaxation of its stresses, from the current point on.
     lag: Lag<'a>,
-    /// Whether the stiffness is wanted.
+    /// True if the stiffness is wanted.
     stiffness: bool,
 }
 
 impl CellMaterial<'_> {
-    /// The same at a later point.
+    /// Returns the material with the relaxation from a later point on.
     fn at(self, point: usize) -> Self {
         let kept = self.lag.kept.get(point..).unwrap_or_default();
         Self { lag: Lag { kept, ..self.lag }, ..self }
     }
 
-    /// What a point takes of an elastic stress.
+    /// The stress that a point takes from an elastic stress.
     fn taken(&self, elastic: Split<Symmetric<f64>>, part: Part) -> Symmetric<f64> {
         let [shape, volume] = self.lag.factors;
         part.of(Split { isochoric: elastic.isochoric * shape, volumetric: elastic.volumetric * volume })
@@ -309,10 +309,10 @@ impl CellMaterial<'_> {
     }
 }
 
-/// What of a law a point takes.
+/// Part of a law that a point takes.
 #[derive(Clone, Copy)]
 enum Part {
-    /// All of it.
+    /// The whole stress.
     Whole,
     /// The change of shape, and the pressure U′ [Pa] of an average.
     Shape(f64),
@@ -349,7 +349,7 @@ fn inverted_corner(solid: &Solid, cell: usize, displacement: impl Fn(u32) -> Vec
     is_inverted(determinant).then_some(determinant)
 }
 
-/// Whether a determinant is zero, negative or not a number.
+/// True if a determinant is zero, negative or not a number.
 fn is_inverted(determinant: f64) -> bool {
     determinant.is_nan() || determinant <= 0.0
 }
@@ -365,7 +365,7 @@ fn moved<const N: usize>(
     u.map(|own| sub(own, u[0]))
 }
 
-/// How a point is strained.
+/// Strain of a point.
 pub(crate) enum Strained {
     /// A point of a solid, with ∂u/∂X.
     Solid(Tensor<f64>),
@@ -382,7 +382,7 @@ impl Strained {
         }
     }
 
-    /// The elastic stress of a law [Pa]; that of a wall is isochoric.
+    /// The elastic stress of a law [Pa]. For a wall it is returned as the isochoric part.
     pub(crate) fn stress(&self, law: &AnyLaw, fibres: &[Vector<f64>]) -> Split<Symmetric<f64>> {
         match self {
             Self::Solid(h) => law.stress(&Deformation::from_displacement_gradient(h), fibres),
@@ -488,7 +488,7 @@ fn add_second<const N: usize>(tangent: &mut [f64], second: &[[f64; 9]; 9], shape
     }
 }
 
-/// Adds w (𝔹_aᵀ D 𝔹_b + (B_a·S B_b) I), with 𝔹_a the change of the engineering strains with the place of a
+/// Adds w (𝔹_aᵀ D 𝔹_b + (B_a·S B_b) I). 𝔹_a is the derivative of the engineering strains by the position of a
 /// node.
 fn add_material<const N: usize>(
     tangent: &mut [f64],
@@ -527,7 +527,8 @@ fn add_material<const N: usize>(
     }
 }
 
-/// Adds how p cof F B_a changes: p ε_ikm (F (B_a × B_b))_m between component i of node a and k of b.
+/// Adds the derivative of p cof F B_a by positions. It is p ε_ikm (F (B_a × B_b))_m between component i of
+/// node a and k of b.
 fn add_pressure<const N: usize>(tangent: &mut [f64], f: &Tensor<f64>, shape: &[Vector<f64>; N], p: f64) {
     for b in 0..N {
         for a in 0..N {
@@ -542,7 +543,7 @@ fn add_pressure<const N: usize>(tangent: &mut [f64], f: &Tensor<f64>, shape: &[V
     }
 }
 
-/// Why a solid has no place in a model with stiffness; `None` if it has.
+/// Reason why a solid cannot be in a model with stiffness; `None` if it can.
 pub(crate) fn refusal(solid: &Solid) -> Option<&'static str> {
     let averaging = match &solid.cells {
         Cells::AveragedTet4(_, averaging) => Some(averaging),

@@ -18,16 +18,16 @@ use crate::solid::{MOST_POINTS, visit_points};
 /// Cells that are advanced one after the other.
 const CHUNK: usize = 256;
 
-/// What relaxing laws remember of all solids.
+/// Memory of the relaxing laws of all solids.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct History {
-    /// Whether it has begun.
+    /// True if the history has begun.
     pub begun: bool,
-    /// For each solid, cell by cell and point by point, the tensors [Pa] of its series: Φ of the last instant
-    /// and one h a term, first of the isochoric, then of the volumetric part; none of a solid that does not
-    /// relax.
+    /// Tensors [Pa] of the series of each solid, cell by cell and point by point. A point has Φ of the last
+    /// instant and one h a term, first of the isochoric, then of the volumetric part. Empty for a solid that
+    /// does not relax.
     pub tensors: Vec<Vec<Symmetric<f64>>>,
-    /// What the stresses of each relaxing solid did so far [J].
+    /// Work of the stresses of each relaxing solid so far [J].
     pub work: Vec<f64>,
 }
 
@@ -57,20 +57,20 @@ fn slots_of_cell(solid: &Solid) -> usize {
     solid.cells.points() * solid.material.prony.point_slots(solid.cells.averages_pressure())
 }
 
-/// How stresses of a cell relax: S = f Φ + k at each of its points.
+/// Relaxation of the stresses of a cell: S = f Φ + k at each of its points.
 #[derive(Clone, Copy)]
 pub(crate) struct Lag<'a> {
     /// f of the isochoric and the volumetric part.
     pub(crate) factors: [f64; 2],
     /// k of each point [Pa]; empty for none.
     pub(crate) kept: &'a [Symmetric<f64>],
-    /// Whether k : E is counted as energy, and f ψ of the isochoric and the volumetric part: in a step all
-    /// are; at an instant that of the parts that do not relax is.
+    /// Flags: if k : E counts as energy, if f ψ of the isochoric part does, if f ψ of the volumetric part
+    /// does. In a step all count. At an instant only the f ψ of parts that do not relax count.
     pub(crate) counts: [bool; 3],
 }
 
 impl Lag<'static> {
-    /// Of a law that does not relax.
+    /// Value for a law that does not relax.
     pub(crate) const NONE: Self = Self { factors: [1.0; 2], kept: &[], counts: [true; 3] };
 }
 
@@ -84,7 +84,8 @@ struct StressParts {
 }
 
 impl StressParts {
-    /// Takes the coefficients of a step [s]; without one those of an instant, which leaves h as it is.
+    /// Sets the coefficients for a step [s]. Without a step it sets the coefficients for an instant, which
+    /// leave h unchanged.
     fn set_step(&mut self, Prony { isochoric, volumetric, update }: &Prony, step: Option<f64>) {
         let of_term = |&term: &(f64, f64)| step.map_or((1.0, 0.0), |step| update.coefficients(term, step));
         for (own, terms) in self.coefficients.iter_mut().zip([isochoric, volumetric]) {
@@ -98,7 +99,7 @@ impl StressParts {
 #[derive(Default)]
 pub(crate) struct Relaxation {
     solids: Vec<StressParts>,
-    /// Whether it is that of a step.
+    /// True for a step, false for an instant.
     steps: bool,
     /// Work of each chunk of cells [J].
     sums: Vec<f64>,
@@ -116,7 +117,7 @@ impl Relaxation {
         new
     }
 
-    /// Whether any solid relaxes.
+    /// True if any solid relaxes.
     pub(crate) fn is_there(&self) -> bool {
         !self.solids.is_empty()
     }
@@ -147,7 +148,7 @@ impl Relaxation {
         }
     }
 
-    /// How the stresses of a cell relax.
+    /// Relaxation of the stresses of a cell.
     pub(crate) fn of_cell(&self, number: usize, solid: &Solid, cell: usize) -> Lag<'_> {
         let Some(own) = self.solids.get(number).filter(|own| !own.kept.is_empty()) else { return Lag::NONE };
         let points = solid.cells.points();

@@ -1,6 +1,6 @@
 //! The averaged pressures of `tet4-anp` (Bonet and Burton 1998): J_n = Σ V_e J_e/Σ V_e over the tets at a
-//! node, p_n = U′(J_n). The energy Σ V_n U(J_n), V_n = Σ V_e/4, couples all nodes of the tets at a node, its
-//! star: c ⊗ c U″(J_n)/V_n with c = Σ V_e/4 cof F B_a.
+//! node, p_n = U′(J_n). The energy Σ V_n U(J_n) with V_n = Σ V_e/4 couples all nodes of the tets at a node,
+//! its star. It adds c ⊗ c U″(J_n)/V_n with c = Σ V_e/4 cof F B_a.
 
 use pliant_mechanics::law::AnyLaw;
 use pliant_mechanics::model::{Averaging, CellBlock, Cells, LocalNodes, Solid};
@@ -20,7 +20,7 @@ pub(crate) struct Stars {
 }
 
 impl Stars {
-    /// Of a solid whose element has some.
+    /// Finds the stars of a solid; `None` if its element does not average pressures over nodes.
     pub(crate) fn of(solid: &Solid) -> Option<Self> {
         let Cells::AveragedTet4(block, Averaging::Nodal) = &solid.cells else { return None };
         let local = LocalNodes::new(block);

@@ -148,8 +148,8 @@ fn assert_derivatives(what: &str, system: &mut System, state: &State) {
     }
 }
 
-/// The same of pressures on closed faces, whose stiffness is symmetric: a hexahedron's quads, a tetrahedron's
-/// triangles.
+/// Pressures on closed faces, the quads of a hexahedron and the triangles of a tetrahedron, have a symmetric
+/// stiffness that matches their forces.
 #[test]
 fn pressures_on_faces_have_their_stiffness() {
     let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
@@ -214,8 +214,8 @@ fn pressures_on_faces_have_their_stiffness() {
     }
 }
 
-/// Forces and pressures on a surface that the nodes of a side carry, numbered otherwise, act as those on the
-/// side itself; a point amid four nodes gives a quarter to each.
+/// A surface can be carried by the nodes of a side and numbered differently. Forces and pressures on it then
+/// act as if on the side. A point amid four nodes gives a quarter to each.
 #[test]
 fn loads_on_carried_surfaces_act_through_their_mapping() {
     let loads = |load: Load| {
@@ -433,8 +433,9 @@ fn solids_without_stiffness_and_broken_ones_are_refused() {
     assert!(far.is_ok());
 }
 
-/// Half of a block is squeezed to a seventh, and one corner pushed through: tets turn inside out, hexahedra
-/// are flat and have an inverted corner. Pushed through alone, it inverts tets only.
+/// Half of a block is squeezed to a seventh, and one corner is pushed through. Tets turn inside out;
+/// hexahedra are flat and have an inverted corner. A corner pushed through without squeezing inverts tets
+/// only.
 #[test]
 fn inverted_cells_are_reported() {
     for element in ELEMENTS {

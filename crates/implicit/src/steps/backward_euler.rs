@@ -1,13 +1,13 @@
-//! Motion in time: backward Euler, whose step is the minimum of elastic energy, loads and Σ m |u − h
-//! v|²/(2h²) (the same for rotation vectors of the step with the rotary inertia); the backward
+//! Motion in time by three integrators. Backward Euler minimises elastic energy, loads and Σ m |u − h
+//! v|²/(2h²) in a step; rotation vectors of the step have the same term with the rotary inertia. The backward
 //! differentiation formula of second order (Gear 1971; for unequal steps Hairer, Nørsett and Wanner 1993,
-//! III.5), which is the same step from a point further on; and explicit central differences. Rayleigh
+//! III.5) is the same step from an extrapolated point. Explicit central differences are the third. Rayleigh
 //! damping: α M + β K, with K of the start of the step.
 //!
-//! With r = h/h₋ of the steps now and before, a = r²/(1 + 2r), h* = h (1 + r)/(1 + 2r): x = x₀ + a (x₀ −
-//! x₋) + h* v, v = v₀ + a (v₀ − v₋) + h* f/m; backward Euler is a = 0, h* = h. Rotations are rotation vectors
-//! from the start of the step. Leaves out: gyroscopic moments (the lumped inertia of a node is the same about
-//! every axis) and step control by accuracy.
+//! Let r = h/h₋ for the present and the previous step, a = r²/(1 + 2r), and h* = h (1 + r)/(1 + 2r). Then x =
+//! x₀ + a (x₀ − x₋) + h* v and v = v₀ + a (v₀ − v₋) + h* f/m. Backward Euler has a = 0, h* = h. Rotations are
+//! rotation vectors from the start of the step. Leaves out: gyroscopic moments (the lumped inertia of a node
+//! is the same about every axis) and step control by accuracy.
 
 use std::sync::Arc;
 
@@ -24,42 +24,42 @@ use crate::steps::limits::within_limits;
 use crate::steps::solver::{AssemblySolver, Attempted};
 use crate::system::System;
 
-/// How an implicit step goes on in time.
+/// Time integrator of an implicit step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Integrator {
-    /// Of first order: a vibration of angular frequency ω is damped by about ω h/2 of critical.
+    /// First order: a vibration of angular frequency ω is damped by about ω h/2 of critical.
     #[default]
     BackwardEuler,
-    /// Of second order, by differences of two steps: damped by about (ω h)³/4 of critical. The first step,
-    /// and one after a step that was halved, is one of backward Euler.
+    /// Second order, by differences of two steps: a vibration is damped by about (ω h)³/4 of critical. The
+    /// first step, and a step after a halved one, use backward Euler.
     Bdf2,
 }
 
-/// How an implicit step is solved.
+/// Settings of implicit steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DynamicSettings {
     /// Length of a step [s].
     pub step: f64,
-    /// How it goes on in time.
+    /// Time integrator.
     pub integrator: Integrator,
     /// Iterations of Newton's method at the most. With 1 each step is one linear solution and nothing is
     /// checked: for real time.
     pub iterations: usize,
     /// Residual allowed, as a part of loads, internal or inertial forces, whichever are larger.
     pub tolerance: f64,
-    /// Speed [m/s] of all nodes below which a Newton step in contact is the last one; if not given, it must
-    /// move nothing by more than counts for a gap.
+    /// Speed [m/s] of all nodes below which a Newton step in contact is the last one. If not given, the last
+    /// Newton step must move every node by less than counts for a gap.
     pub speed_tolerance: Option<f64>,
-    /// Whether a step whose iterations run out takes what they have reached instead of being halved: bounded
-    /// time, accuracy unchecked ([`DynamicStep::converged`] tells). In contact such a state has no
-    /// intersection.
+    /// True if a step takes what its iterations have reached when they run out, instead of being halved. Time
+    /// is then bounded and accuracy unchecked; [`DynamicStep::converged`] is false. In contact such a state
+    /// has no intersection.
     pub accept_unconverged: bool,
-    /// How often a step that fails is halved.
+    /// Number of times that a failing step is halved.
     pub halvings: usize,
     /// Solver of the linear equations.
     pub linear: LinearSolver,
-    /// Whether what conjugate gradients have reached when their iterations run out is taken as it is: bounded
-    /// time, accuracy unchecked (`DynamicStep::linear` tells the residual).
+    /// True if conjugate gradients return what they have reached when their iterations run out. Time is then
+    /// bounded and accuracy unchecked; `DynamicStep::linear` holds the residual.
     pub accept_stalled: bool,
 }
 
@@ -92,11 +92,11 @@ pub struct DynamicStep {
     /// Residual over the largest of loads, internal and inertial forces, before each iteration and, but for a
     /// single one, at the end.
     pub residuals: Vec<f64>,
-    /// What the last linear solution took.
+    /// Report on the last linear solution.
     pub linear: LinearReport,
     /// Steps that it took: 1, or more where it was halved.
     pub parts: usize,
-    /// Whether residuals of all parts have come below the tolerance, or were not asked for.
+    /// True if the residuals of all parts came below the tolerance, or no check was wanted.
     pub converged: bool,
 }
 
@@ -117,8 +117,8 @@ pub struct BackwardEuler {
     /// The product of the damping stiffness with the motion.
     product: Vec<f64>,
     start: State,
-    /// Where the state was a whole step before, for differences of second order; none after a start or a step
-    /// that was halved.
+    /// State a whole step before, for differences of second order. `None` after a start or a step that was
+    /// halved.
     previous: Option<Box<State>>,
     differences: Differences,
     /// No step was taken so far: the state may be off the curves of prescribed components.
@@ -164,7 +164,7 @@ impl Differences {
     }
 }
 
-/// What inertia and mass-proportional damping resist with in a step.
+/// Resistance of inertia and mass-proportional damping in a step.
 struct Momentum<'a> {
     model: &'a Assembly,
     differences: &'a Differences,
@@ -200,11 +200,11 @@ impl BackwardEuler {
         Self::on(None, model, settings)
     }
 
-    /// The same with a device, if one is given, that solves the equations by conjugate gradients with blocks
-    /// or aggregates. Their tolerance holds in double precision.
+    /// Makes a solver with a device, if one is given, that solves the equations by conjugate gradients with
+    /// blocks or aggregates. Their tolerance holds in double precision.
     ///
     /// # Errors
-    /// As [`new`](Self::new), and if the device fails or has no room, or another linear solver is set.
+    /// Like [`new`](Self::new), and if the device fails or has no room, or another linear solver is set.
     pub fn on(
         device: Option<Arc<dyn LinearDevice>>,
         model: impl Into<Arc<Assembly>>,
@@ -233,18 +233,18 @@ impl BackwardEuler {
         })
     }
 
-    /// How its steps are solved.
+    /// Settings of its steps.
     pub fn settings(&self) -> &DynamicSettings {
         &self.settings
     }
 
-    /// Where the state was a step before, if the next step takes differences with it.
+    /// State a step before, if the next step takes differences with it.
     pub fn previous(&self) -> Option<&State> {
         self.previous.as_deref()
     }
 
-    /// Takes differences with a state a step before, as another solver would have: to go on where that one
-    /// stood.
+    /// Takes the state a step before from another solver, so that this solver continues where that one
+    /// stopped.
     pub fn go_on_from(&mut self, previous: Option<State>) {
         self.previous = previous.map(Box::new);
     }
@@ -362,7 +362,7 @@ impl BackwardEuler {
                 let residuals = residuals.unwrap_or_default();
                 return Err(SolveError::NotConverged { time, node, residuals, broken: None });
             }
-            // The motion goes on, to begin with.
+            // The motion continues, to begin with.
             let going_on = if iteration == 0 { h } else { 0.0 };
             match self.find_direction(going_on) {
                 Err(error) if self.system.gives_way(&error) => {
@@ -437,7 +437,7 @@ impl BackwardEuler {
         state.time = time;
     }
 
-    /// Solves for the residual, from a motion that goes on for a time [s].
+    /// Solves for the residual, starting from a motion that continues for a time [s].
     fn find_direction(&mut self, going_on: f64) -> Result<(), SolveError> {
         self.add_inertia();
         self.system.prepare()?;
@@ -462,8 +462,8 @@ impl BackwardEuler {
         });
     }
 
-    /// Loads less internal, inertial and damping forces on the free components; its norm and that of the
-    /// largest of them.
+    /// Finds loads less internal, inertial and damping forces on the free components. Returns the norm of
+    /// this residual, and the norm of the largest kind of force.
     fn find_residual(&mut self, state: &State) -> (f64, f64) {
         let model = Arc::clone(&self.system.model);
         let Self { system, differences, start, moved, damping, .. } = self;
@@ -558,7 +558,7 @@ impl BackwardEuler {
     }
 }
 
-/// How often a step takes friction anew.
+/// Number of times that a step updates its friction.
 const LAGS: usize = 1;
 
 impl AssemblySolver for BackwardEuler {
@@ -597,8 +597,8 @@ impl Contacting for BackwardEuler {
         (norm, self.settings.tolerance * scale + self.round_off)
     }
 
-    /// Σ m |u − s − h v|²/(2 h²) + α m |u − s|²/(2 h), the same of rotation vectors, and β (u − s)ᵀ K (u −
-    /// s)/(2 h).
+    /// Energy Σ m |u − s − h v|²/(2 h²) + α m |u − s|²/(2 h), with the same terms for rotation vectors, and β
+    /// (u − s)ᵀ K (u − s)/(2 h).
     fn potential(&mut self) -> f64 {
         let model = Arc::clone(&self.system.model);
         let Differences { step: h, shift, rate } = &self.differences;

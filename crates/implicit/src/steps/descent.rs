@@ -1,18 +1,19 @@
-//! A step in contact: Newton's method on the energy of a step, each iteration filtered so that nothing goes
-//! into anything else (Li et al. 2020, algorithm 1). Energy is that of cells, inertia, barriers and lagged
-//! friction, less the work of loads along an iteration by the trapezoidal rule, which is exact for loads that
-//! do not follow.
+//! A step in contact: Newton's method on the energy of a step. Each iteration is filtered so that nothing
+//! goes into anything else (Li et al. 2020, algorithm 1). The energy has cells, inertia, barriers and lagged
+//! friction. The work of loads along an iteration is subtracted by the trapezoidal rule, which is exact for
+//! loads that do not follow.
 //!
-//! * What moves by itself (rigid things, prescribed components) goes its whole way at once, as far as the
-//!   filter lets it, and the equations know what is left of it. Until it is there, energy may grow.
+//! * Rigid things and prescribed components go their whole way at once, as far as the filter lets them. The
+//!   equations take account of the rest of the way. Until the whole way is made, energy may grow.
 //! * If the stiffness is not positive definite, the Newton direction is unusable. Its diagonal is then raised
 //!   until it is (Levenberg 1944).
-//! * A step is found where the residual is below its tolerance, or where the unfiltered Newton step with
-//!   fresh factors moves nothing by more than counts for a gap and the residual is not far above its
-//!   tolerance, or by less than is asked for; that step is still made.
+//! * A step is found where the residual is below its tolerance. It is also found by an unfiltered Newton step
+//!   with fresh factors that moves every node by less than the tolerance. The default tolerance is the
+//!   distance that counts for a gap, and then the residual must not be far above its own tolerance. That step
+//!   is still made.
 //! * A full Newton step that is hardly shorter than the one before is made longer while the energy falls.
-//! * In time, no Newton step takes a node further than a mean edge: longer ones are nearly always halved.
-//! * Friction is then taken anew from the state found, while its size changes by more than a tenth.
+//! * In time, no Newton step takes a node further than a mean edge: longer steps are nearly always halved.
+//! * Friction is then updated at the state found, while its size changes by more than a tenth.
 
 use pliant_linear::dot;
 
@@ -23,24 +24,24 @@ use crate::system::System;
 
 /// Part of every gap that an iteration keeps, twice over, and that the guess keeps.
 const KEEP: [f64; 2] = [0.1, 0.5];
-/// How often an iteration is halved.
+/// Number of times that an iteration is halved.
 const HALVINGS: usize = 16;
-/// Additions to the diagonal, over it: the first one, the growth, and how many.
+/// Additions to the diagonal, relative to it: the first one, the growth factor, and their number.
 const RAISED: (f64, f64, usize) = (1e-5, 10.0, 8);
-/// Change of the friction that is held, over it, above which it is taken anew.
+/// Relative change of the held friction above which the friction is updated.
 const LAGGED: f64 = 0.1;
-/// Residual over what is allowed below which the size of a Newton step tells that a step is found.
+/// Residual over its tolerance below which the size of a Newton step can show that a step is found.
 const LOOSE: f64 = 100.0;
-/// A Newton step over the one before from which on it is made longer.
+/// Ratio of a Newton step to the previous one above which the step is made longer.
 const SLOW: f64 = 0.6;
-/// How often it is doubled at most.
+/// Number of times that a step is doubled at most.
 const DOUBLINGS: usize = 3;
 /// Round-off of an energy, over the sizes of its parts.
 const ROUND_OFF: f64 = 1e-12;
 
-/// What a step in contact needs of a solver.
+/// Methods of a solver that steps in contact need.
 pub(crate) trait Contacting: AssemblySolver {
-    /// Whether steps have inertia.
+    /// True if steps have inertia.
     const INERTIA: bool;
 
     /// The vectors of an iteration.
@@ -49,19 +50,19 @@ pub(crate) trait Contacting: AssemblySolver {
     /// Finds forces, and the stiffness if it is wanted, at a state.
     fn evaluate(&mut self, state: &State, time: f64, tangent: bool) -> Result<(), SolveError>;
 
-    /// Finds the residual at the state last evaluated: its norm, and what is allowed.
+    /// Finds the residual at the state last evaluated. Returns its norm and its tolerance.
     fn find_residual(&mut self, state: &State) -> (f64, f64);
 
     /// The energy [J] of inertia and damping at the state last evaluated.
     fn potential(&mut self) -> f64;
 
-    /// Adds to the stiffness what is not of cells and contacts.
+    /// Adds all stiffness beyond cells and contacts.
     fn complete(&mut self);
 
     /// The part of the increment that may be made, for other reasons than contact.
     fn part(&self) -> f64;
 
-    /// Whether a residual along the increment, before and after it, makes up for an energy that has not
+    /// True if a residual along the increment, before and after it, makes up for an energy that has not
     /// fallen.
     fn accepts(&self, before: f64, after: f64) -> bool;
 
@@ -79,21 +80,21 @@ pub(crate) struct Vectors<'a> {
     pub solution: &'a mut [f64],
 }
 
-/// How long to try.
+/// Limits of the search for a step.
 pub(crate) struct Limits {
     pub iterations: usize,
-    /// How often friction is taken anew.
+    /// Number of times that friction is updated.
     pub lags: usize,
     /// A Newton step [m] that is the last one, whatever the residual.
     pub close: Option<f64>,
-    /// Whether a state is good enough when iterations run out or the energy does not fall any more.
+    /// True if a state is good enough when iterations run out or the energy does not fall any more.
     pub accept: bool,
-    /// How far [m] an iteration takes nodes at most once all that moves by itself has gone its way: what is
-    /// found at a state tells nothing of what is further away, and pairs need not be listed so far.
+    /// Farthest distance [m] that an iteration takes nodes once all prescribed motion is complete. Forces at
+    /// a state say nothing about states further away, and pairs need not be listed so far.
     pub farthest: f64,
 }
 
-/// What an iteration started from.
+/// Start of an iteration.
 struct Before {
     state: State,
     time_fraction: f64,
@@ -104,41 +105,41 @@ struct Before {
     along: f64,
 }
 
-/// What one iteration of a step leaves to the next.
+/// Data that one iteration of a step leaves to the next.
 struct Descent<'a> {
     limits: &'a Limits,
     time: f64,
     before: Before,
-    /// What was added to the diagonal, over it.
+    /// Addition to the diagonal, relative to it.
     raised: f64,
-    /// How often friction was taken anew.
+    /// Number of times that friction was updated.
     lags: usize,
-    /// The largest translation [m] of the Newton step before.
+    /// The largest translation [m] of the previous Newton step.
     previous: f64,
 }
 
-/// What an iteration is about to do.
+/// Plan of an iteration.
 struct Aim {
-    /// Whether all that moves by itself has gone its way.
+    /// True if all prescribed motion is complete.
     complete: bool,
-    /// Whether the step is found with this iteration.
+    /// True if the step is found with this iteration.
     last: bool,
-    /// Whether an increment made in full is made longer.
+    /// True if an increment made in full is made longer.
     expands: bool,
     /// The part of the increment to begin with.
     part: f64,
 }
 
 impl Aim {
-    /// Whether the stiffness where the increment leads is found at once: the next iteration nearly always
-    /// asks for it.
+    /// True if the stiffness at the end of the increment is found at once: the next iteration nearly always
+    /// needs it.
     fn goes_on(&self) -> bool {
         self.complete && !self.last && !self.expands
     }
 }
 
-/// Finds the state at the end of a step, or takes what iterations reach; whether it is found. Residuals go to
-/// `found` with what is allowed.
+/// Finds the state at the end of a step, or takes what iterations reach. Returns true if the step is found.
+/// Residuals go to `found` with their tolerances.
 pub(crate) fn descend(
     solver: &mut impl Contacting,
     state: &mut State,
@@ -298,7 +299,7 @@ impl<'a> Descent<'a> {
         broken.map_or(Ok(None), Err)
     }
 
-    /// Goes on along an increment that was made in full, two, four and eight times as far while the energy
+    /// Follows an increment that was made in full further: two, four and eight times as far, while the energy
     /// falls and nothing is in the way.
     fn expand(&mut self, solver: &mut impl Contacting, state: &mut State) -> Result<(), SolveError> {
         let (before, time) = (&mut self.before, self.time);
@@ -328,7 +329,7 @@ impl<'a> Descent<'a> {
         Ok(())
     }
 
-    /// Ends a step whose energy does not fall any more: it is round-off, or the direction is none.
+    /// Ends a step whose energy does not fall any more, because of round-off or an unusable direction.
     fn end_uphill(
         &self,
         solver: &mut impl Contacting,
@@ -353,7 +354,7 @@ impl<'a> Descent<'a> {
     }
 }
 
-/// Tells the contacts of the step and what is expected to move in it.
+/// Gives the contacts the step and the motion expected in it.
 fn begin(solver: &mut impl Contacting, state: &State, times: [f64; 2], guess: Option<&[f64]>) {
     let Vectors { system, pending, increment, .. } = solver.vectors();
     match guess {
@@ -371,9 +372,10 @@ fn begin(solver: &mut impl Contacting, state: &State, times: [f64; 2], guess: Op
     }
 }
 
-/// Goes to where the motion of before leads, as far as the filter lets it and cells can follow. Whether the
-/// energy is less there is not asked: it seldom is, but what moves would have to start from rest else, in
-/// more iterations and short of where it comes to. Whether it went, and so found forces and stiffness there.
+/// Goes to where the previous motion leads, as far as the filter lets it and cells can follow. The energy
+/// there is not compared, because it is seldom less. Without this start the motion begins from rest, takes
+/// more iterations and stops short. Returns true if the state moved; forces and stiffness are then known
+/// there.
 fn start_from(
     solver: &mut impl Contacting,
     state: &mut State,
@@ -426,7 +428,7 @@ fn close(solver: &impl Contacting) -> f64 {
     solver.system().contact.as_ref().map_or(0.0, |contact| contact.close)
 }
 
-/// Whether all that moves by itself has gone its way.
+/// True if all prescribed motion is complete.
 fn is_complete(solver: &mut impl Contacting) -> bool {
     let Vectors { system, pending, .. } = solver.vectors();
     time_fraction(system) == 1.0 && pending.iter().all(|&p| p == 0.0) && system.conditions.are_closed()
@@ -459,8 +461,9 @@ fn energy(solver: &mut impl Contacting) -> (f64, f64) {
     (parts.iter().sum(), parts.iter().map(|part| part.abs()).sum())
 }
 
-/// Solves for the residual with a stiffness that is positive definite; the largest translation of it [m], and
-/// whether its diagonal is as it was: else the step tells nothing of how far the solution is.
+/// Solves for the residual with a stiffness that is positive definite. Returns its largest translation [m],
+/// and true if the diagonal is unchanged. With a raised diagonal the size of the step does not show the
+/// distance to the solution.
 fn find_direction(solver: &mut impl Contacting, raised: &mut f64) -> Result<(f64, bool), SolveError> {
     solver.complete();
     let diagonal: Vec<f64> = (0..solver.system().stiffness.equations.count())
@@ -517,7 +520,7 @@ fn check(solver: &mut impl Contacting, time: f64) -> Result<(), SolveError> {
     solver.system().contact.as_ref().map_or(Ok(()), |contact| contact.check(time))
 }
 
-/// Why a step was not found.
+/// Error of a step that was not found.
 fn not_found(solver: &mut impl Contacting, time: f64, iterations: usize) -> SolveError {
     let blocked = !is_complete(solver);
     if let (true, Some(contact)) = (blocked, &solver.system().contact) {

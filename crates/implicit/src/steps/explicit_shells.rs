@@ -101,7 +101,7 @@ impl ExplicitShells {
         &self.forces
     }
 
-    /// The same to change: to take hold of nodes and to push them.
+    /// Mutable forces, to take hold of nodes and to push them.
     pub fn forces_mut(&mut self) -> &mut Forces {
         &mut self.forces
     }

@@ -1,5 +1,5 @@
-//! What acts on the nodes of a model at a state, without a solver: for reactions, energies and whoever looks
-//! at a run.
+//! Forces on the nodes of a model at a state, without a solver: for reactions, energies and displays of a
+//! run.
 
 use std::sync::Arc;
 
@@ -38,7 +38,7 @@ impl Forces {
         Ok(())
     }
 
-    /// Takes hold of nodes: these springs and no others act from the next evaluation on, beside those of the
+    /// Takes hold of nodes: from the next evaluation on only these springs act, besides the springs of the
     /// model. Their forces are loads.
     pub fn grip(&mut self, springs: &[Spring]) {
         self.system.grip(springs);
@@ -66,15 +66,16 @@ impl Forces {
         &self.system.forces.external
     }
 
-    /// What a node resists with beyond its loads [N].
+    /// Resistance of a node beyond its loads [N].
     pub fn resisting(&self, node: u32) -> [f64; 3] {
         let at = 6 * node as usize;
         [at, at + 1, at + 2].map(|at| self.system.forces.internal[at] - self.system.forces.external[at])
     }
 
-    /// What a constraint of volume encloses at the state last evaluated, which is given, and the force [N]
-    /// and moment [N m] of its pressure by components, six a node; `None` of other constraints. The pressure
-    /// is the one that balances what its nodes resist with, by least squares: exact in equilibrium.
+    /// The enclosed volume of a constraint of volume at the state last evaluated, which is given. With it
+    /// come the force [N] and moment [N m] of its pressure by components, six a node. `None` for other
+    /// constraints. The pressure balances the resistance of its nodes by least squares, and is exact in
+    /// equilibrium.
     pub fn enclosed(&self, constraint: usize, state: &State) -> Option<(Enclosed, Vec<(usize, f64)>)> {
         self.system.enclosed(constraint, state)
     }
@@ -84,7 +85,7 @@ impl Forces {
         self.system.forces.energy
     }
 
-    /// What hourglass control holds of it [J].
+    /// Part of the stored energy in hourglass control [J].
     pub fn hourglass_energy(&self) -> f64 {
         self.system.forces.hourglass
     }

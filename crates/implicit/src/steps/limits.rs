@@ -1,12 +1,12 @@
-//! Tools and moved nodes that push with no more than a force, in steps of solvers of equations. Of the way
-//! against what it pushes a tool goes a part that falls from 1 at half of its limit over 0 at the limit to −1
-//! ([`Lag`]), as in explicit steps; but the force is that at the end of the step, so that long steps do not
-//! go beyond the limit. The part is found by solving the step again: the force grows with it, so a root lies
-//! between −1 and 1. Moved nodes of a constraint do the same together: their force is its reaction, their way
-//! the mean of theirs.
+//! Limits on the force of tools and moved nodes, in steps of solvers of equations. A tool goes only a part of
+//! its way against what it pushes ([`Lag`]). The part falls from 1 at half of the force limit over 0 at the
+//! limit to −1, as in explicit steps. The force is taken at the end of the step, so that long steps do not
+//! exceed the limit. The part is found by solving the step again: the force grows with the part, so a root
+//! lies between −1 and 1. Moved nodes of a constraint do the same together: their force is its reaction, and
+//! their way is their mean way.
 //!
-//! The pressure in a volume goes up to its limit, and no further: the step is solved with the volume
-//! prescribed, or with the limit as a load, whichever holds.
+//! The pressure in a volume rises no further than its limit. The step is solved with the volume prescribed,
+//! or with the limit as a load, whichever holds.
 
 use nalgebra::Vector3;
 use pliant_contact::lag::Lag;
@@ -17,15 +17,15 @@ use crate::model::state::State;
 use crate::steps::descent::{Contacting, Vectors};
 use crate::system::System;
 
-/// How often a step is solved again for the limits of forces.
+/// Number of times that a step is solved again for the limits of forces.
 const TRIES: usize = 12;
-/// How far a part may be off: by this the force is off by half as much of its limit.
+/// Tolerance of a part. The force is then off by half as much, relative to its limit.
 const FOUND: f64 = 0.02;
 
-/// How far a pressure or a volume may be beyond its limit, over it, to begin with: a step ends with a
-/// residual. Ten times as far each time that the other was prescribed in vain.
+/// Initial relative tolerance of a pressure or a volume beyond its limit, since a step ends with a residual.
+/// It grows tenfold each time that the other quantity was prescribed in vain.
 const BEYOND: f64 = 1e-6;
-/// How often the other may be prescribed.
+/// Number of times that the solver may switch between prescribed volume and pressure.
 const CHANGES: i32 = 3;
 
 /// The part that a tool or moved nodes go, as it is found.
@@ -34,11 +34,11 @@ struct Guess {
     /// The force [N] along which its way is shortened.
     ahead: Vector3<f64>,
     part: f64,
-    /// Where the root is.
+    /// Interval that contains the root.
     between: [f64; 2],
-    /// The last part, and what the force then asks for beyond it.
+    /// The last part, and the difference between the part that its force asks for and this part.
     last: Option<[f64; 2]>,
-    /// How far [m] it would go against what it pushes.
+    /// Distance [m] that it would go against what it pushes.
     into: f64,
 }
 
@@ -81,17 +81,17 @@ struct Valve {
     limit: f64,
     /// The pressure [Pa] that is prescribed in place of the volume.
     given: Option<f64>,
-    /// How often the other was prescribed.
+    /// Number of switches between prescribed volume and pressure.
     changes: i32,
     /// The pressure [Pa] in the volume, where it was above the limit.
     pressure: Option<f64>,
-    /// How far [m³] the volume was beyond its curve at the limit.
+    /// Excess [m³] of the volume over its curve at the limit.
     ahead: Option<f64>,
 }
 
 impl Valve {
-    /// Takes a pressure [Pa], how far the volume has yet to grow, and the volume at rest [m³]; whether what
-    /// is prescribed holds.
+    /// Takes a pressure [Pa], the growth that the volume still needs, and the volume at rest [m³]. Returns
+    /// true if the prescribed quantity holds.
     fn take(&mut self, [pressure, gap, rest]: [f64; 3]) -> bool {
         let beyond = BEYOND * 10.0_f64.powi(self.changes);
         let holds = match self.given {
@@ -111,7 +111,7 @@ impl Valve {
         holds
     }
 
-    /// That at a time [s] neither the volume nor the limit holds, in a step with inertia or without.
+    /// Error at a time [s] if neither the volume nor the limit holds, in a step with inertia or without.
     fn snaps(&self, model: &Assembly, time: f64, inertia: bool) -> SolveError {
         let own = &model.constraints[self.constraint];
         let (constraint, node) = (own.name.clone(), own.nodes[0]);
@@ -119,7 +119,7 @@ impl Valve {
         SolveError::Snaps { time, constraint, node, limit, pressure, ahead, inertia }
     }
 
-    /// How far the volume is from where it should be [m³].
+    /// Distance of the volume from its prescribed value [m³].
     fn lag(&self, gap: f64) -> f64 {
         match self.given {
             Some(given) if gap * given > 0.0 => -gap,
@@ -151,7 +151,7 @@ pub(crate) fn within_limits<S: Contacting, T, E: From<SolveError>>(
         valves.iter().for_each(|own| system.conditions.give_pressure(own.constraint, own.given));
         let solved = solve(solver, state)?;
         if !valves.is_empty() && solver.system_mut().contact.is_some() {
-            // The last motion of a step in contact was made without a look at what is left.
+            // The last motion of a step in contact was made without finding the residual after it.
             solver.find_residual(state);
         }
         let unkept = solver.system_mut().unkept(&mut valves);
@@ -171,7 +171,7 @@ pub(crate) fn within_limits<S: Contacting, T, E: From<SolveError>>(
 }
 
 impl System {
-    /// What tools, and then moved nodes, whose force is limited are to go.
+    /// First guesses for the tools, and then the moved nodes, whose force is limited.
     fn guesses(&self) -> Vec<Guess> {
         let tools = self.contact.iter().flat_map(|own| own.lags().iter().map(|lag| (lag, own.limit(lag))));
         let nodes = self.lags.iter().filter(|lag| !encloses(&self.model, lag));
@@ -191,8 +191,8 @@ impl System {
         .collect()
     }
 
-    /// Takes pressures and volumes at the residual last found, and how far volumes lag; where what is
-    /// prescribed does not hold, most often so.
+    /// Takes pressures and volumes at the residual last found, and the lags of volumes. Returns the valve
+    /// with the most switches among those whose prescribed quantity does not hold.
     fn unkept<'v>(&mut self, valves: &'v mut [Valve]) -> Option<&'v Valve> {
         let lags = self.lags.iter_mut().filter(|lag| encloses(&self.model, lag));
         let mut unkept: Option<&Valve> = None;
@@ -250,7 +250,7 @@ impl System {
     }
 }
 
-/// Whether a lag is that of a volume.
+/// True if a lag belongs to a volume.
 fn encloses(model: &Assembly, lag: &Lag) -> bool {
     model.constraints[lag.number()].motion.encloses()
 }

@@ -1,4 +1,4 @@
-//! What the solvers of the equations of a model have in common.
+//! Common parts of the solvers of a model's equations.
 
 use pliant_contact::lag::Lag;
 use pliant_mechanics::StopFlag;
@@ -15,11 +15,11 @@ pub struct Attempted {
     pub time: f64,
     /// Factor of the controlled loads at its end.
     pub load_factor: f64,
-    /// Whether it found one.
+    /// True if an equilibrium was found.
     pub found: bool,
     /// Norm of the residual [N] before each iteration and at the end.
     pub residuals: Vec<f64>,
-    /// What was allowed at the end [N].
+    /// Tolerance of the residual at the end [N].
     pub allowed: f64,
 }
 
@@ -36,7 +36,7 @@ pub trait AssemblySolver {
     /// The equations.
     fn system(&self) -> &System;
 
-    /// The same to change.
+    /// The equations, mutable.
     fn system_mut(&mut self) -> &mut System;
 
     /// The attempts of the last step, one after the other, with their relative residuals.
@@ -55,13 +55,13 @@ pub trait AssemblySolver {
         self.system().contact.as_deref()
     }
 
-    /// The same to change.
+    /// Contacts, mutable; `None` without any.
     fn contact_mut(&mut self) -> Option<&mut ContactSystem> {
         self.system_mut().contact.as_deref_mut()
     }
 
-    /// Takes a pattern of the equations with [`pairs`](ContactSystem::pairs) of nodes that contacts added
-    /// where another solver stood: so this one goes on with the same bits.
+    /// Takes a pattern of the equations with [`pairs`](ContactSystem::pairs) of nodes that contacts added in
+    /// another solver. This solver then continues from there bit for bit.
     ///
     /// # Errors
     /// If the equations are too many for the solver chosen.
@@ -86,8 +86,8 @@ pub trait AssemblySolver {
         self.system_mut().stop = flag.clone();
     }
 
-    /// How far moved nodes whose force is limited are behind their motion, and volumes [m³] whose pressure is
-    /// limited behind theirs, along the first axis, by their constraints.
+    /// Lags of moved nodes whose force is limited, behind their motion, and of volumes [m³] whose pressure is
+    /// limited, along the first axis. The order is by constraints.
     fn lags(&self) -> &[Lag] {
         &self.system().lags
     }

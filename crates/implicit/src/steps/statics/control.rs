@@ -11,12 +11,12 @@ use crate::model::error::SolveError;
 use crate::model::state::State;
 
 impl Statics {
-    /// The next equilibrium under a control, which finds the factor of the controlled loads, at a time [s]
-    /// that other loads and prescribed motions reach evenly. A step that fails is halved.
+    /// The next equilibrium under a control, which finds the factor of the controlled loads. Other loads and
+    /// prescribed motions reach a time [s] evenly. A step that fails is halved.
     ///
     /// # Errors
     /// If no load is controlled, the controlled component is held, a balloon is open, or no equilibrium is
-    /// found (the state then is as it was).
+    /// found. The state then is unchanged.
     pub fn control(&mut self, state: &mut State, control: Control, until: f64) -> Result<Step, SolveError> {
         self.attempts.clear();
         if !self.system.model.loads.iter().any(|load| load.controlled) {
@@ -52,7 +52,7 @@ impl Statics {
         }
     }
 
-    /// How far what is controlled is from where it should be; sets its gradient.
+    /// Difference of the controlled quantity from its target (squared for an arc length); sets its gradient.
     pub(super) fn constraint(&mut self, control: Control, state: &State, start: &State) -> f64 {
         self.gradient.fill(0.0);
         match control {
@@ -140,7 +140,7 @@ impl Statics {
     }
 }
 
-/// What fixes the factor of the controlled loads.
+/// Quantity that fixes the factor of the controlled loads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Control {
     /// A component (0 to 2) of a node moves by a distance [m].
@@ -152,7 +152,7 @@ pub enum Control {
         /// Distance [m] from where the node is.
         by: f64,
     },
-    /// All translations together move by a length [m], √Σ|Δx|², onwards from the last step.
+    /// The length √Σ|Δx|² [m] by which all translations together move, onwards from the last step.
     ArcLength {
         /// The length [m].
         length: f64,

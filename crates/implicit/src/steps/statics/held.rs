@@ -1,4 +1,4 @@
-//! Whether every part of a model is held, found before the first step: a free part has no state at rest.
+//! Check that every part of a model is held, made before the first step: a free part has no state at rest.
 
 use nalgebra::{Matrix6, RowVector6, SymmetricEigen, Vector3};
 use pliant_geometry::DisjointSets;
@@ -8,11 +8,11 @@ use pliant_mechanics::tie::Tie;
 use crate::model::assembly::Assembly;
 use crate::model::error::SolveError;
 
-/// Whether every part of a model is held: of its six rigid motions none may leave constraints and springs
+/// Checks that every part of a model is held. None of its six rigid motions may leave constraints and springs
 /// unmoved.
 ///
 /// # Errors
-/// If not: a node of a part, and how many motions it is free in.
+/// If a part is free: one of its nodes, and the number of rigid motions in which it is free.
 pub fn check_held(model: &Assembly) -> Result<(), SolveError> {
     let (mut part, used) = parts(model);
     let turning = model.turning();
@@ -77,7 +77,7 @@ impl<'a> Holding<'a> {
         Self { model, part, length: model.mean_edge(), sums: vec![Matrix6::zeros(); model.rest.len()] }
     }
 
-    /// What rigid motions about the node `first` do to a component of a node.
+    /// Row of the motions of a node's component under the six rigid motions about the node `first`.
     fn row_of(&self, node: usize, component: usize, first: usize) -> RowVector6<f64> {
         let arm = (self.model.place(node) - self.model.place(first)) / self.length;
         if component < 3 {
@@ -131,7 +131,7 @@ impl<'a> Holding<'a> {
     }
 }
 
-/// How many rigid motions of a part that move something are held by nothing.
+/// Number of rigid motions of a part that move something and are held by nothing.
 fn free_modes(mut held: Matrix6<f64>, moved: Matrix6<f64>) -> usize {
     let SymmetricEigen { eigenvalues, eigenvectors } = SymmetricEigen::new(moved);
     let limit = 1e-10 * eigenvalues.max().max(1.0);

@@ -1,9 +1,9 @@
 //! Static equilibria: Newton's method with load steps; displacement control and arc length (Crisfield 1981)
 //! past limit points; a prescribed volume for balloons. A control finds the factor of the controlled loads as
-//! one more unknown. Nodes of membranes and bars, which nothing but tension holds across, get an artificial
-//! stiffness on the diagonal that is proportional to the largest residual on them (Levenberg 1944, Marquardt
-//! 1963): it bounds what an iteration moves them and vanishes at equilibrium. Leaves out: branch switching at
-//! bifurcations.
+//! one more unknown. Only tension holds nodes of membranes and bars crosswise. They get an artificial
+//! stiffness on the diagonal, proportional to the largest residual on them (Levenberg 1944, Marquardt 1963).
+//! This stiffness bounds their motion in an iteration and vanishes at equilibrium. Leaves out: branch
+//! switching at bifurcations.
 
 mod control;
 mod held;
@@ -25,12 +25,12 @@ use crate::steps::limits::within_limits;
 use crate::steps::solver::{AssemblySolver, Attempted};
 use crate::system::System;
 
-/// How equilibria are sought.
+/// Settings of the search for equilibria.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StaticSettings {
     /// Iterations of Newton's method at most in a load step.
     pub iterations: usize,
-    /// How often a load step that fails is halved.
+    /// Number of times that a failing load step is halved.
     pub halvings: usize,
     /// Residual allowed, as a part of the loads or the internal forces, whichever are larger.
     pub tolerance: f64,
@@ -38,8 +38,8 @@ pub struct StaticSettings {
     pub floor: f64,
     /// Largest rotation of a node in an iteration [rad].
     pub rotation_limit: f64,
-    /// Whether iterations that make the residual along them ten times as large are shortened, but for the
-    /// first two: thin shells overshoot there and then converge quadratically.
+    /// True if iterations that make the residual along them ten times as large are shortened. The first two
+    /// are not shortened: thin shells overshoot there and then converge quadratically.
     pub line_search: bool,
     /// Solver of the linear equations.
     pub linear: LinearSolver,
@@ -63,7 +63,7 @@ impl Default for StaticSettings {
 /// fifth more iterations.
 const GROWTH: f64 = 10.0;
 
-/// What a residual on a node of a membrane may move it in an iteration, as a part of the extent of the
+/// Largest motion of a node of a membrane by its residual in an iteration, as a part of the extent of the
 /// membranes.
 const REACH: f64 = 0.1;
 
@@ -90,14 +90,15 @@ pub struct Statics {
     settings: StaticSettings,
     /// Equations of the translations of nodes that only membranes and bars hold.
     slack: Vec<u32>,
-    /// How far a residual may move these in an iteration [m], and their least artificial stiffness [N/m].
+    /// Largest motion of these nodes by a residual in an iteration [m], and their least artificial stiffness
+    /// [N/m].
     reach: f64,
     least: f64,
     /// Attempts of the last call.
     attempts: Vec<Attempted>,
-    /// Mean edge [m]: makes forces of moments.
+    /// Mean edge [m]: divides moments to compare them with forces.
     length: f64,
-    /// What round-off leaves of a residual, about ε E t |x| a node [N].
+    /// Round-off in a residual, about ε E t |x| a node [N].
     round_off: f64,
     /// Increments of prescribed components still to come, six a node.
     pending: Vec<f64>,
@@ -107,9 +108,9 @@ pub struct Statics {
     /// Solution for the controlled loads, and its right-hand side.
     response: Vec<f64>,
     controlled: Vec<f64>,
-    /// Gradient of what is controlled, six a node.
+    /// Gradient of the controlled quantity, six a node.
     gradient: Vec<f64>,
-    /// The last step's translations, six a node: the direction in which arc length goes on.
+    /// The last step's translations, six a node: the direction in which arc length continues.
     direction: Vec<f64>,
     /// No step was taken so far: the state may be off the curves of prescribed components.
     fresh: bool,
@@ -118,7 +119,7 @@ pub struct Statics {
 /// An attempt that failed.
 struct Attempt {
     error: SolveError,
-    /// Whether smaller load steps may help.
+    /// True if smaller load steps may help.
     retry: bool,
 }
 
@@ -172,13 +173,13 @@ impl Statics {
         self.direction[..direction.len()].copy_from_slice(direction);
     }
 
-    /// How its steps are solved.
+    /// Settings of its steps.
     pub fn settings(&self) -> &StaticSettings {
         &self.settings
     }
 
-    /// Forces and moments on each node of the model that its elements resist with, less its loads, at the
-    /// last evaluation: on held components these are the reactions [N, N m], six a node.
+    /// Forces and moments on each node of the model from its elements, less its loads, at the last
+    /// evaluation. On held components these are the reactions [N, N m], six a node.
     pub fn reactions(&self) -> impl Iterator<Item = [f64; 6]> {
         let nodes =
             self.system.forces.internal.chunks_exact(6).zip(self.system.forces.external.chunks_exact(6));
@@ -186,8 +187,8 @@ impl Statics {
     }
 
     /// Displacements and rotations (six a node) by linear theory about a state: one solution with the loads
-    /// and motions of a time. The stiffness is that of the state under the loads of its own time, so it does
-    /// not depend on how large the new loads are.
+    /// and motions of a time. The stiffness is taken at the state under the loads of its time, so it does not
+    /// depend on the size of the new loads.
     ///
     /// # Errors
     /// If the stiffness is singular or conjugate gradients fail.
@@ -418,7 +419,7 @@ impl Statics {
         Ok(negative_pivots)
     }
 
-    /// Loads less internal forces on the free components; its norm and what is allowed [N].
+    /// Finds loads less internal forces on the free components. Returns the norm and its tolerance [N].
     fn find_residual(&mut self, state: &State) -> (f64, f64) {
         let system = &mut self.system;
         for (load, controlled) in system.forces.external.iter_mut().zip(&system.forces.controlled) {
@@ -502,7 +503,7 @@ impl Statics {
     }
 }
 
-/// How often a load step takes friction anew.
+/// Number of times that a load step updates its friction.
 const LAGS: usize = 20;
 
 impl AssemblySolver for Statics {
