@@ -463,7 +463,7 @@ impl BackwardEuler {
     }
 
     /// Finds loads less internal, inertial and damping forces on the free components. Returns the norm of
-    /// this residual, and the norm of the largest kind of force.
+    /// this residual, and the largest norm among loads, internal and inertial forces.
     fn find_residual(&mut self, state: &State) -> (f64, f64) {
         let model = Arc::clone(&self.system.model);
         let Self { system, differences, start, moved, damping, .. } = self;

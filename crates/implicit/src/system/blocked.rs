@@ -1,4 +1,4 @@
-//! What drives a step that is blocked.
+//! The tool or constraint that drives a blocked step.
 
 use nalgebra::Vector3;
 use pliant_mechanics::model::{Constraint, Motion};
@@ -28,7 +28,7 @@ impl System {
         SolveError::Blocked { time, driver, part, gap, iterations }
     }
 
-    /// Of tools and constraints that move between two times [s] the one that pushes hardest, with its force
+    /// The tool or constraint that pushes hardest among those that move between two times [s], with its force
     /// [N] at the state last evaluated.
     fn hardest_driver(&self, [from, to]: [f64; 2]) -> Option<(String, f64)> {
         let resisting = |at: usize| self.forces.internal[at] - self.forces.external[at];

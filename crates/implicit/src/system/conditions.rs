@@ -1,12 +1,12 @@
-//! Means of displacements and enclosed volumes that are prescribed: rows a·u = d beside the equations K u =
+//! Prescribed means of displacements and prescribed enclosed volumes: rows a·u = d beside the equations K u =
 //! f + λ a. A row couples all nodes of a face or a surface, so it is kept out of the matrix. K may be
-//! singular without it: a spring at one node of each row, K' = K + σ e eᵀ, holds it, and is taken back with λ
-//! by one small system (Woodbury): two more solutions with K' for each row.
+//! singular without the row. A spring at one node of each row holds it: K' = K + σ e eᵀ. One small system
+//! (Woodbury) removes the spring again and finds λ. It takes two more solutions with K' for each row.
 //!
-//! Of a volume a is the gradient where the nodes are, and λ the pressure, whose change with the nodes belongs
-//! to K ([`System`](crate::system::System) adds it with the pressure that balances what elements and loads
-//! leave, by least squares). Where a pressure has come to its limit it is a load, λ a with λ given, and the
-//! volume follows.
+//! For a volume, a is the gradient at the positions of the nodes, and λ is the pressure. The change of the
+//! pressure forces with the nodes belongs to K. [`System`](crate::system::System) adds it with the pressure
+//! that balances elements and loads best, by least squares. Where a pressure has come to its limit it is a
+//! load, λ a with λ given, and the volume follows.
 
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 use pliant_linear::dot;
@@ -23,20 +23,20 @@ const CLOSED: f64 = 1e-10;
 /// The means and the volumes that a model prescribes.
 #[derive(Default)]
 pub(crate) struct Conditions {
-    /// Those of constraints, in their order.
+    /// Rows of constraints, in their order.
     rows: Vec<Row>,
     /// Volumes whose pressure [Pa] is given.
     loose: Vec<(Row, f64)>,
-    /// Whether the springs are in the matrix.
+    /// True if the springs are in the matrix.
     pinned: bool,
     small: Option<LU<f64, Dyn, Dyn>>,
 }
 
-/// What a row prescribes.
+/// Quantity that a row prescribes.
 enum Kind {
     /// A component of a mean.
     Mean(usize),
-    /// A volume, which at rest is so large [m³].
+    /// A volume, with its size at rest [m³].
     Volume(f64),
 }
 
@@ -50,10 +50,10 @@ struct Row {
     /// The equation with the largest weight, and the stiffness of its spring [N/m].
     pin: usize,
     spring: f64,
-    /// How far the mean has yet to go [m], or the volume to grow [m³], and what counts as nothing.
+    /// Remaining way of the mean [m] or growth of the volume [m³], and the size that counts as zero.
     gap: f64,
     closed: f64,
-    /// What was taken from the last residual along the row, of a volume minus the pressure [Pa].
+    /// Force taken from the last residual along the row; for a volume minus the pressure [Pa].
     force: f64,
     /// K'⁻¹ a and K'⁻¹ e.
     answers: [Vec<f64>; 2],
@@ -108,12 +108,12 @@ impl Conditions {
         Self { rows, ..Self::default() }
     }
 
-    /// Whether there are rows beside the equations.
+    /// True if there are rows beside the equations.
     pub(crate) fn has_rows(&self) -> bool {
         !self.rows.is_empty()
     }
 
-    /// Whether nothing is prescribed.
+    /// True if nothing is prescribed.
     pub(crate) fn is_empty(&self) -> bool {
         self.rows.is_empty() && self.loose.is_empty()
     }
@@ -140,8 +140,8 @@ impl Conditions {
         }
     }
 
-    /// The pressure [Pa] of a constraint's volume at the residual last found, how far the volume has yet to
-    /// grow [m³], and how large it is at rest [m³].
+    /// The pressure [Pa] of a constraint's volume at the residual last found, the growth that the volume
+    /// still needs [m³], and its size at rest [m³].
     pub(crate) fn enclosed(&self, constraint: usize) -> Option<[f64; 3]> {
         let given = self.loose.iter().map(|(row, pressure)| (row, *pressure));
         let all = self.rows.iter().map(|row| (row, -row.force)).chain(given);
@@ -220,12 +220,12 @@ impl Conditions {
         self.rows.iter().map(|row| (row, None)).chain(loose).filter_map(of).collect()
     }
 
-    /// Whether every mean and every volume is where it should be.
+    /// True if every mean and every volume has its prescribed value.
     pub(crate) fn are_closed(&self) -> bool {
         self.rows.iter().all(|row| row.gap.abs() <= row.closed)
     }
 
-    /// Takes from a residual the forces of means and volumes, by the least squares of what is left.
+    /// Takes the forces of means and volumes from a residual. They minimise its squared norm.
     pub(crate) fn relieve(&mut self, residual: &mut [f64]) {
         for Row { dense, squared, force, .. } in &mut self.rows {
             *force = dot(dense, residual) / *squared;

@@ -1,7 +1,7 @@
-//! Contacts of a model in its equations: their forces are loads and their stiffness is added to that of the
-//! cells. The pattern of the matrix grows with the pairs that may come near, and by more than those, so that
-//! it changes seldom. What pushes a tied node pushes those that it follows, and what pushes a point of the
-//! curved surface of a shell the nodes that move it.
+//! Contacts of a model in its equations. Their forces are loads, and their stiffness is added to the
+//! stiffness of the cells. The pattern of the matrix grows with the pairs that may come near, and by more
+//! than those, so that it changes seldom. Forces on a tied node act on the nodes that it follows. Forces on a
+//! point of the curved surface of a shell act on the nodes that move the point.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -23,16 +23,16 @@ use crate::system::samples::{Movers, Samples, acts, movers_of};
 
 /// Pairs of nodes kept in the pattern at most, over those that are needed.
 const ROOM: usize = 2;
-/// How often an increment is shortened because points of curved surfaces are not free on their way.
+/// Number of times that an increment is shortened because points of curved surfaces collide on their way.
 const SHORTENED: usize = 60;
-/// Part of what is free that is tried next.
+/// Part of the collision-free fraction that is tried next.
 const SHORTER: f64 = 0.9;
-/// How near pairs are, beyond the reach of their barrier and over its distance, that are taken into the
-/// pattern when it lacks some.
+/// Distance of pairs that enter the pattern when it lacks some, beyond the reach of their barrier and
+/// relative to its distance.
 const SOON: f64 = 0.3;
 
-/// The contacts at work, with nodes at rest where those of a model are, and the points of theirs that are no
-/// nodes.
+/// Makes the contacts at work, with nodes at their rest positions in the model, and the points of contacts
+/// that are no nodes.
 fn made(contact: &ContactModel, model: &Assembly) -> (Barriers, Option<Samples>) {
     match Samples::of(model, &contact.contacts, &contact.levels) {
         None => (Barriers::new(Arc::clone(&contact.contacts), &contact.settings, &model.rest), None),
@@ -43,7 +43,7 @@ fn made(contact: &ContactModel, model: &Assembly) -> (Barriers, Option<Samples>)
     }
 }
 
-/// Of each contact the pairs that never touch, since they are in one place at rest.
+/// Number of pairs of each contact that never touch, because they are in one place at rest.
 pub fn apart_counts(contact: &ContactModel, model: &Assembly) -> Vec<usize> {
     made(contact, model).0.apart_counts()
 }
@@ -57,7 +57,7 @@ pub fn meetings(contact: &ContactModel, model: &Assembly, state: &State) -> Vec<
     met.into_iter().map(|one| Meeting { node: samples.node_at(model, one.node), ..one }).collect()
 }
 
-/// What contacts do at an instant.
+/// State of contacts at an instant.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContactNow {
     /// Forces on nodes [N], six numbers a node.
@@ -82,23 +82,23 @@ pub struct ContactSystem {
     /// Points of contacts that are no nodes, and forces on nodes and them, six each; `None` where surfaces
     /// are flat.
     samples: Option<(Samples, Vec<f64>)>,
-    /// How far rigid things have gone in the step, from 0 to 1.
+    /// Fraction of their way in the step that rigid things have gone, from 0 to 1.
     pub(crate) time_fraction: f64,
     /// Time spent so far.
     pub(crate) spent: Duration,
     /// Forces on nodes, six a node, and on the second side of each contact.
     forces: Vec<f64>,
-    /// Those forces where the unknowns are: on the nodes that tied ones follow.
+    /// Contact forces at the unknowns: on the nodes that tied ones follow.
     pub(crate) given: Vec<f64>,
     totals: Vec<Vector3<f64>>,
     moments: Vec<Vector3<f64>>,
-    /// Of barriers and friction [J]; infinite where there is no gap.
+    /// Energy of barriers and friction [J]; infinite where there is no gap.
     pub(crate) energy: f64,
     /// Nodes that touch something at the end of the last step, increasing.
     touches: Vec<NodeTouch>,
-    /// How far tools whose force is limited are behind their trajectories.
+    /// Lags of tools whose force is limited behind their trajectories.
     lags: Vec<Lag>,
-    /// Pairs of nodes in the pattern beside those of cells, increasing.
+    /// Pairs of nodes in the pattern besides the pairs of cells, increasing.
     pub(crate) pairs: Vec<[u32; 2]>,
     pub(crate) check_intersections: bool,
     /// Step of unknowns [m] below which a step is found: it changes gaps by less than counts.
@@ -118,7 +118,7 @@ impl ContactSystem {
             Some(samples) => samples.places.clone(),
             None => model.rest.iter().map(|&place| place.into()).collect(),
         };
-        // One of no length at rest: there is none without a state.
+        // A step of no length at rest, because a step needs a state.
         let step = barriers.begin(&places, &vec![0.0; 6 * places.len()], [0.0; 2]);
         let samples = samples.map(|samples| {
             let forces = vec![0.0; 6 * samples.places.len()];
@@ -159,9 +159,9 @@ impl ContactSystem {
         self.spent += begun.elapsed();
     }
 
-    /// The part of an increment (six numbers a node), of so much of it at most, from a state on that leaves
-    /// at least half of a part of every gap. Points of curved surfaces go on straight ways to where they
-    /// come: if these are free, nothing has gone through anything.
+    /// The largest fraction of an increment (six numbers a node), at most `most`, that keeps at least
+    /// `keep`/2 of every gap. Points of curved surfaces move to their ends on straight lines. If these lines
+    /// are free of collisions, nothing has gone through anything.
     pub(crate) fn collision_free_fraction(
         &mut self,
         state: &State,
@@ -204,8 +204,8 @@ impl ContactSystem {
         0.0
     }
 
-    /// Whether points go on other ways than nodes, so that a part of an increment that is free says nothing
-    /// of less of it.
+    /// True if points move on other paths than nodes. A fraction of an increment that is free then says
+    /// nothing about smaller fractions.
     pub(crate) fn is_curved(&self) -> bool {
         self.samples.is_some()
     }
@@ -240,7 +240,7 @@ impl ContactSystem {
         self.spent += begun.elapsed();
     }
 
-    /// What acts at the state last evaluated.
+    /// State of the contacts at the state last evaluated.
     pub fn now(&self) -> ContactNow {
         ContactNow {
             forces: self.forces.clone(),
@@ -286,7 +286,7 @@ impl ContactSystem {
         self.step.touches(&self.touches, share)
     }
 
-    /// Goes on where another one stood: with nodes that touch something, increasing, and the lags of tools.
+    /// Continues from another solver, with nodes that touch something, increasing, and the lags of tools.
     pub fn go_on_from(&mut self, touches: Vec<NodeTouch>, lags: Vec<Lag>) {
         (self.touches, self.lags) = (touches, lags);
     }
@@ -296,7 +296,7 @@ impl ContactSystem {
         &self.step
     }
 
-    /// How far tools whose force is limited are behind their trajectories.
+    /// Lags of tools whose force is limited behind their trajectories.
     pub fn lags(&self) -> &[Lag] {
         &self.lags
     }
@@ -306,8 +306,8 @@ impl ContactSystem {
         self.step.contacts().rigids[lag.number()].trajectory.limit().unwrap_or(f64::INFINITY)
     }
 
-    /// Finds where tools whose force is limited go between two times [s]: each a part of its way along a
-    /// force [N]; how long [m] the whole of that is.
+    /// Finds the motion of tools whose force is limited between two times [s]. Each tool goes a part of its
+    /// way along a force [N]. Sets the length [m] of the whole way along it.
     pub(crate) fn follow<'a>(
         &mut self,
         [from, to]: [f64; 2],
@@ -355,12 +355,12 @@ impl ContactSystem {
         self.step.contacts().rigids.iter().zip(0..).filter_map(moves)
     }
 
-    /// Where rigid things go that are driven from outside, by their number.
+    /// Motions of rigid things that are driven from outside, by their number.
     pub fn legs(&self) -> &BTreeMap<u32, Leg> {
         self.step.legs()
     }
 
-    /// The same to change.
+    /// Mutable motions of rigid things that are driven from outside.
     pub fn legs_mut(&mut self) -> &mut BTreeMap<u32, Leg> {
         self.step.legs_mut()
     }
@@ -428,7 +428,7 @@ impl ContactSystem {
             return movers.add_stiffness(&self.step, equations, matrix, moved, coupling);
         }
         let nodes = self.step.node_count();
-        // Nodes that move those of a collision: their number, its place in the stencil, and their weight.
+        // Nodes that move a collision's nodes: their number, place in the stencil, and weight.
         let mut movers: Vec<(u32, usize, f64)> = Vec::new();
         self.step.stiffness(|stencil, block, mut ways| {
             let own = |at: usize| stencil.nodes[at] as usize;
@@ -445,7 +445,7 @@ impl ContactSystem {
                     }
                 }
             }
-            // The way that nodes which are moved have yet to go counts as that of rigid things.
+            // The rest of the way of prescribed nodes counts like the way of rigid things.
             for (at, way) in ways.iter_mut().enumerate().take(count).filter(|(at, _)| own(*at) < nodes) {
                 *way += Vector3::from_column_slice(&moved[6 * own(at)..6 * own(at) + 3]);
             }

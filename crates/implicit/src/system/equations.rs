@@ -12,7 +12,8 @@ use super::stiffness::linear_error;
 use crate::model::assembly::Assembly;
 use crate::model::error::SolveError;
 
-/// Nodes of a cell, those that follow others replaced by these, and how many components each has.
+/// Nodes of a cell, with nodes that follow others replaced by the nodes they follow, and the number of
+/// components of each.
 fn expanded(followers: Option<&Followers>, nodes: &[u32], turns: bool) -> (Vec<u32>, usize) {
     let expanded = followers.and_then(|followers| followers.expanded(nodes, turns));
     expanded.unwrap_or_else(|| (nodes.to_vec(), if turns { 6 } else { 3 }))
@@ -98,7 +99,7 @@ impl System {
         self.solve_from(right, solution)
     }
 
-    /// The same with means and volumes that stay as they are.
+    /// Solves with the matrix prepared, while means and volumes keep their values.
     pub(crate) fn respond(&mut self, right: &[f64], solution: &mut [f64]) -> Result<(), SolveError> {
         solution.fill(0.0);
         self.stiffness.solve(&mut self.phases, right, solution)?;

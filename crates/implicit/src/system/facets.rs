@@ -20,25 +20,26 @@ use crate::model::assembly::Assembly;
 use crate::model::error::SolveError;
 use crate::model::state::State;
 
-/// What facets need beside the model.
+/// Data of facets besides the model.
 pub(crate) struct Facets {
-    /// At rest.
+    /// Packs of facets at rest.
     packs: Vec<FacetPack>,
     /// The instructions of the processor.
     arch: Arch,
     pub(super) pressure: Vec<Pressure>,
     /// The curved surface, if a load acts on it.
     pub(super) surface: Option<CurvedSurface>,
-    /// Whether the stiffness has the change of pressures on the curved surface, or that on the flat facets in
-    /// its place, with which conjugate gradients converge more often and Newton's method slowly.
+    /// True if the stiffness has the change of pressures on the curved surface. Otherwise it has the change
+    /// on the flat facets. Conjugate gradients then converge more often, and Newton's method converges
+    /// slowly.
     pub(crate) exact_pressure: bool,
     /// Places in the matrix.
     places: Vec<Vec<u32>>,
-    /// Those with nodes that follow others.
+    /// Flags of facets with nodes that follow others.
     bound: Vec<bool>,
-    /// Of each chunk.
+    /// Corners of each chunk.
     corners: Vec<Corners>,
-    /// Of a chunk of facets that is found and of the one before, whose nodes take it up.
+    /// Results of the current chunk of facets, and of the previous chunk while its nodes take them up.
     results: [ChunkResults; 2],
 }
 
@@ -78,7 +79,7 @@ impl Facets {
         &self.places[facet as usize]
     }
 
-    /// Whether a pressure acts on the curved surface.
+    /// True if a pressure acts on the curved surface.
     pub(super) fn are_pressed(&self) -> bool {
         self.pressure.iter().any(|pressure| pressure.curved != [0.0; 2])
     }
@@ -126,7 +127,7 @@ impl Facets {
     }
 }
 
-/// What forces of facets are found from.
+/// Inputs for the forces of facets.
 struct Finding<'a> {
     model: &'a Assembly,
     state: &'a State,
@@ -165,10 +166,10 @@ impl Finding<'_> {
     }
 }
 
-/// How what is found of facets is added up.
+/// Addition of the results of facets.
 struct Gathering<'a> {
     model: &'a Assembly,
-    /// Whether the stiffness, too.
+    /// True if the stiffness is added, too.
     tangent: bool,
     /// Prescribed increments, where there are some.
     moved: Option<&'a [f64]>,
@@ -178,8 +179,8 @@ struct Gathering<'a> {
 }
 
 impl Gathering<'_> {
-    /// Adds forces of a chunk of facets and, if it is wanted, the stiffness of those whose nodes follow no
-    /// others; with what it makes of prescribed motions.
+    /// Adds forces of a chunk of facets. If wanted, it adds the stiffness of facets whose nodes follow no
+    /// others, and its product with prescribed motions.
     fn gather(&self, (first, corners): (usize, &Corners), results: &[FacetResult], sums: &mut Sums<'_>) {
         let Stiffness { equations, matrix, coupling, .. } = &mut *sums.stiffness;
         let equations = &*equations;
@@ -228,7 +229,7 @@ impl Gathering<'_> {
     }
 }
 
-/// Whether something acts on the curved surface of shells.
+/// True if something acts on the curved surface of shells.
 fn needs_surface(model: &Assembly) -> bool {
     let loads = |load: &Load| {
         let curved = matches!(load.kind, LoadKind::ShellPressure { spread: Spread::Curved, .. });
@@ -245,10 +246,10 @@ pub(super) struct Pressure {
     pub(super) curved: [f64; 2],
 }
 
-/// What is found of the facets of a chunk.
+/// Results of the facets of a chunk.
 #[derive(Default)]
 struct ChunkResults {
-    /// Apart from the rest: one thread looks at all of them.
+    /// Kept apart from the results, because one thread looks at all heads.
     heads: Vec<FacetHead>,
     results: Vec<FacetResult>,
 }
@@ -264,7 +265,7 @@ struct FacetHead {
 #[derive(Clone)]
 struct FacetResult {
     force: Vector18,
-    /// What the fixed and the controlled pressures make.
+    /// Loads from the fixed and the controlled pressures.
     loads: [Vector18; 2],
     tangent: Matrix18,
 }
@@ -280,14 +281,14 @@ fn flat_forces([a, b, c]: &[Vector3<f64>; 3]) -> Vector18 {
     Vector18::from_fn(|i, _| if i % 6 < 3 { third[i % 6] } else { 0.0 })
 }
 
-/// What is wanted of facets.
+/// Wanted results of facets.
 #[derive(Clone, Copy)]
 struct Wanted {
-    /// Whether their stiffness, too.
+    /// True if their stiffness is wanted, too.
     tangent: bool,
-    /// Whether only the symmetric part of it.
+    /// True if only the symmetric part of the stiffness is wanted.
     symmetric: bool,
-    /// Whether the change of pressures on the curved surface is that of the flat facets.
+    /// True for the change of pressures on the curved surface, false for the change on the flat facets.
     exact_pressure: bool,
 }
 

@@ -1,13 +1,13 @@
-//! Nodes whose translations are no unknowns of a system of equations, since others move them: tied nodes, and
-//! the nodes of rigid parts, which go with six unknowns at the first of them. A cell at such nodes becomes a
-//! cell at the nodes that they follow, K ← Tᵀ K T; its forces go there by Tᵀ. Nodes of shells in a rigid part
-//! turn with it, others with the gradient of a solid ([`Turn`]); all other rotations stay with the node
-//! itself.
+//! Nodes whose translations are no unknowns of a system of equations, since other nodes move them. These are
+//! tied nodes and the nodes of rigid parts. A rigid part has six unknowns at its first node. A cell at such
+//! nodes becomes a cell at the nodes that they follow, K ← Tᵀ K T; its forces go there by Tᵀ. Nodes of shells
+//! in a rigid part turn with the part. Nodes of shells in a solid turn with its gradient ([`Turn`]). All
+//! other rotations stay with the node itself.
 //!
-//! In an increment a node goes by Σ w (d + θ × a): d and θ those of the nodes that it follows, a the arm from
-//! a first node of a rigid part, 0 for a tie. Then it stands at x = X + Σ (w u + (R − 1) A), exactly. The
-//! second derivative of x by θ, exp(θ) a ≈ a + θ × a + θ × (θ × a)/2, adds (f aᵀ + a fᵀ)/2 − (f·a) to the
-//! stiffness of θ, with f what cells resist with less what loads pull with.
+//! In an increment a node moves by Σ w (d + θ × a). Here d and θ belong to the nodes that it follows. The arm
+//! a starts at the first node of a rigid part, and is 0 for a tie. The node then is at x = X + Σ (w u +
+//! (R − 1) A), exactly. The second derivative of x by θ comes from exp(θ) a ≈ a + θ × a + θ × (θ × a)/2. It
+//! adds (f aᵀ + a fᵀ)/2 − (f·a) to the stiffness of θ, with f the resistance of cells less the loads.
 
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, SymmetricEigen, Vector3};
 use pliant_linear::sparse::{Cell, Equations, LowerMatrix, NONE};
@@ -50,9 +50,9 @@ struct Followed {
 
 /// Nodes that move as one body.
 struct RigidPart {
-    /// The node whose unknowns are those of the part.
+    /// The node that holds the unknowns of the part.
     first: u32,
-    /// Axes about which a turn moves no node, that of nodes on a line: at rest and now.
+    /// Axes about which a turn moves no node, at rest and in the current state. Nodes on a line have one.
     idle_at_rest: Vec<Vector3<f64>>,
     idle: Vec<Vector3<f64>>,
     /// Mean edge of the model [m].
@@ -77,7 +77,7 @@ impl RigidPart {
 }
 
 impl Followers {
-    /// Those of ties alone, or with those of rigid parts; `None` if there are none.
+    /// Finds the followers of ties alone, or of ties and rigid parts; `None` if there are no followers.
     pub(crate) fn of(model: &Assembly, rigid: bool) -> Option<Self> {
         let mut parts = Vec::new();
         let mut part_of = vec![None; model.rest.len()];
@@ -156,13 +156,13 @@ impl Followers {
         }
     }
 
-    /// How a node turns with a solid, if it does.
+    /// The turn of a node with a solid, if it has one.
     fn carried(&self, node: u32) -> Option<&Turn> {
         let at = self.turns.binary_search_by_key(&node, |turn| turn.node).ok()?;
         Some(&self.turns[at])
     }
 
-    /// What a node follows; nothing, if it follows no other.
+    /// Nodes that a node follows; empty if it follows no other.
     fn followed(&self, node: u32) -> &[Followed] {
         match self.row_of[node as usize] {
             NONE => &[],
@@ -204,8 +204,8 @@ impl Followers {
         own.into_iter().chain(self.followed(node).iter().map(|followed| followed.node))
     }
 
-    /// Tᵀ K T of a cell of so many components a node, on its [`expanded`](Self::expanded) nodes, column by
-    /// column.
+    /// Computes Tᵀ K T of a cell on its [`expanded`](Self::expanded) nodes, column by column, for a number of
+    /// components a node.
     pub(crate) fn condensed(
         &self,
         nodes: &[u32],
@@ -246,7 +246,7 @@ impl Followers {
         };
         let all: Vec<_> = (0..components * nodes.len()).map(moves).collect();
         let (count, size) = (all.len(), wide * expanded.len());
-        // K T, then Tᵀ of it: a component of a carried turn has some thirty entries.
+        // K T first, then Tᵀ (K T): a component of a carried turn has some thirty entries.
         let mut moved = vec![0.0; count * size];
         for (column, entries) in all.iter().zip(tangent.chunks_exact(count)) {
             for &(q, w) in column {
@@ -376,8 +376,8 @@ impl Followers {
         Some((expanded, whole))
     }
 
-    /// What forces [N] and moments [N m] on nodes of rigid parts, and moments on nodes that turn with a
-    /// solid, are at the unknowns of these, component by component.
+    /// Carries forces [N] and moments [N m] on nodes of rigid parts, and moments on nodes that turn with a
+    /// solid, to the unknowns. It calls `add` component by component.
     pub(crate) fn pull(
         &self,
         force: impl Fn(u32) -> Vector3<f64>,
@@ -403,8 +403,8 @@ impl Followers {
         }
     }
 
-    /// Adds to a stiffness how forces of moments [N m] on nodes that turn with a solid change with that, and
-    /// what their rotary inertias [N m] resist with.
+    /// Adds the turns of nodes with a solid to a stiffness. Forces from moments [N m] on these nodes change
+    /// as the solid deforms, and rotary inertias [N m] resist.
     pub(crate) fn add_turns(
         &self,
         equations: &Equations,
@@ -432,9 +432,9 @@ impl Followers {
         self.turns.iter().map(|turn| turn.nodes().collect())
     }
 
-    /// Adds to a stiffness what masses [kg/s²] and rotary inertias [N m] of nodes that go with rigid parts
-    /// resist with, and how the forces [N] that they resist with now turn with them; `of` gives the masses
-    /// with the forces, `rotary` the inertias.
+    /// Adds the resistance of masses [kg/s²] and rotary inertias [N m] of nodes in rigid parts to a
+    /// stiffness. It adds the change of the present resisting forces [N] as the parts turn. `of` gives the
+    /// masses with the forces, `rotary` the inertias.
     pub(crate) fn add_parts(
         &self,
         equations: &Equations,
@@ -494,8 +494,8 @@ impl Assembly {
 }
 
 impl Followed {
-    /// What a force [N] on the node that follows is here: a force and, with an arm, a moment, component by
-    /// component.
+    /// Carries a force [N] on the following node to this node: a force and, with an arm, a moment, component
+    /// by component.
     fn pull(&self, force: &Vector3<f64>, mut add: impl FnMut(usize, f64)) {
         (0..3).for_each(|c| add(c, self.weight * force[c]));
         if self.part.is_some() {

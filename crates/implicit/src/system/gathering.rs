@@ -10,14 +10,14 @@ const SHARE: usize = 32;
 pub(crate) struct Corners {
     /// The nodes, increasing.
     node: Vec<u32>,
-    /// Where the corners of each node start, and the end of the last.
+    /// Start of the corners of each node, and the end of the last.
     start: Vec<u32>,
     /// Three times the facet's place in the chunk, and its corner; increasing at each node.
     corner: Vec<u32>,
 }
 
 impl Corners {
-    /// Those of facets with some nodes.
+    /// Finds the corners of facets with the given nodes.
     pub(crate) fn of(facets: impl Iterator<Item = [u32; 3]>) -> Self {
         let mut all: Vec<(u32, u32)> = facets.flatten().zip(0..).collect();
         all.sort_unstable();
@@ -33,8 +33,8 @@ impl Corners {
         own
     }
 
-    /// Calls, for each node, with its corners (facet in the chunk, corner of it) and the sums of a range of
-    /// nodes that has it.
+    /// Calls `take` for each node with its corners (facet in the chunk, corner of the facet) and with the
+    /// sums of a range of nodes that contains it.
     pub(crate) fn visit(
         &self,
         equations: &Equations,
@@ -80,15 +80,15 @@ pub(crate) struct NodeSums<'a> {
 pub(crate) struct ColumnSums<'a> {
     /// The first of the equations.
     pub(crate) first: usize,
-    /// What prescribed increments make of forces.
+    /// Forces from prescribed increments.
     pub(crate) coupling: &'a mut [f64],
-    /// The columns of the matrix, and where those of all equations start.
+    /// The columns of the matrix, and the starts of the columns of all equations.
     pub(crate) values: Values<'a>,
     pub(crate) column_start: &'a [u32],
 }
 
 impl NodeSums<'_> {
-    /// Those of the nodes before one, and of the rest.
+    /// Splits into the nodes before a node, and the rest.
     fn split_at(self, equations: &Equations, node: u32) -> (Self, Self) {
         let components = 6 * (node - self.first) as usize;
         let [internal, fixed, controlled] = self.forces.map(|forces| forces.split_at_mut(components));
@@ -102,7 +102,7 @@ impl NodeSums<'_> {
 }
 
 impl ColumnSums<'_> {
-    /// Those of the equations before one, and of the rest.
+    /// Splits into the equations before an equation, and the rest.
     fn split_at(self, equation: usize) -> (Self, Self) {
         let Self { first, coupling, values, column_start } = self;
         let (coupling_before, coupling_after) = coupling.split_at_mut(equation - first);
@@ -120,8 +120,8 @@ mod tests {
     use pliant_linear::sparse::{Cell, LowerMatrix};
     use pliant_testing::Random;
 
-    /// Columns of a strip of triangles, some of whose nodes are held, are those of cells added one after the
-    /// other, bit by bit.
+    /// Columns of a strip of triangles, with some nodes held, equal the columns from cells added one after
+    /// the other, bit for bit.
     #[test]
     fn columns_are_summed_in_the_order_of_the_facets() {
         let mut random = Random::new(5);

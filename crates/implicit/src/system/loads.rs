@@ -110,8 +110,9 @@ impl System {
         }
     }
 
-    /// What a constraint of volume encloses at the state last evaluated, with the pressure that balances what
-    /// its nodes resist with, and the forces of that, component by component; `None` of other constraints.
+    /// The enclosed volume of a constraint of volume at the state last evaluated. With it come the pressure
+    /// that balances the resistance of its nodes, and the forces of this pressure, component by component.
+    /// `None` for other constraints.
     pub(crate) fn enclosed(&self, constraint: usize, state: &State) -> Option<(Enclosed, Vec<(usize, f64)>)> {
         let own = &self.model.constraints[constraint];
         let Motion::Volume { enclosure, .. } = &own.motion else { return None };

@@ -1,5 +1,5 @@
-//! Forces and stiffness of a model at a state: cells side by side, then added up in their order, so that the
-//! number of threads changes no bit.
+//! Forces and stiffness of a model at a state. Cells are found side by side, then added up in their order, so
+//! that the number of threads changes no bit.
 
 mod blocked;
 pub(crate) mod conditions;
@@ -58,20 +58,20 @@ pub struct Phases {
     pub preparation: Duration,
     /// Solution of the linear equations.
     pub solution: Duration,
-    /// How often the forces of the cells were found.
+    /// Number of times that the forces of the cells were found.
     pub evaluations: usize,
     /// Linear equations solved.
     pub solutions: usize,
     /// Iterations of conjugate gradients.
     pub iterations: usize,
-    /// What a device took of preparation and solution, where one solves the equations.
+    /// Times of preparation and solution on a device, where one solves the equations.
     pub device: DeviceTimes,
     /// Solutions that single precision on the device could not find, and that the CPU finished.
     pub left_to_cpu: usize,
 }
 
 impl Phases {
-    /// What was spent since an earlier time.
+    /// Times and counts since an earlier state.
     #[must_use]
     pub fn since(&self, earlier: &Self) -> Self {
         let (now, then) = (self.device, earlier.device);
@@ -100,11 +100,11 @@ pub struct System {
     solids: Solids,
     pub(crate) forces: NodalForces,
     pub(crate) stiffness: Stiffness,
-    /// Nodes that follow others; in a system of forces alone those of ties.
+    /// Nodes that follow others; in a system of forces alone only tied nodes.
     followers: Option<Followers>,
     pub(crate) conditions: Conditions,
-    /// How far moved nodes whose force is limited are behind their motion, and volumes [m³] whose pressure is
-    /// limited behind theirs, along the first axis, by their constraints; a system of forces alone has none.
+    /// Lags of moved nodes whose force is limited, behind their motion, and of volumes [m³] whose pressure is
+    /// limited, along the first axis. The order is by constraints; a system of forces alone has no lags.
     pub(crate) lags: Vec<Lag>,
     /// Contacts; a system of forces alone has none.
     pub(crate) contact: Option<Box<ContactSystem>>,
@@ -115,7 +115,7 @@ pub struct System {
     pub(crate) stop: StopFlag,
 }
 
-/// What cells are added to.
+/// Sums that cells are added to.
 struct Sums<'a> {
     forces: &'a mut NodalForces,
     stiffness: &'a mut Stiffness,
@@ -134,7 +134,7 @@ impl System {
         Self::on(None, model, solver)
     }
 
-    /// The same with a device that solves the equations.
+    /// Makes a system with a device that solves the equations.
     pub(crate) fn on(
         device: Option<Arc<dyn LinearDevice>>,
         model: Arc<Assembly>,
@@ -192,7 +192,7 @@ impl System {
         }
     }
 
-    /// Takes hold of nodes: these springs and no others act from the next evaluation on, beside those of the
+    /// Takes hold of nodes: from the next evaluation on only these springs act, besides the springs of the
     /// model. Their forces are loads.
     pub(crate) fn grip(&mut self, springs: &[Spring]) {
         self.forces.grip(springs);
@@ -203,7 +203,7 @@ impl System {
         self.forces.push(forces);
     }
 
-    /// Whether any law relaxes.
+    /// True if any law relaxes.
     pub(crate) fn relaxes(&self) -> bool {
         self.solids.relaxation.is_there()
     }
@@ -244,8 +244,8 @@ impl System {
         }
     }
 
-    /// Forces at a state and time; with a tangent also the stiffness, and what prescribed increments (six a
-    /// node) make of it.
+    /// Finds forces at a state and time. With a tangent it also finds the stiffness, and its product with
+    /// prescribed increments (six a node).
     pub(crate) fn evaluate(
         &mut self,
         state: &State,
@@ -316,7 +316,7 @@ impl System {
         }
     }
 
-    /// Gives what acts on nodes that follow others to these.
+    /// Carries forces on nodes that follow others to the followed nodes.
     fn give_to_followed(&mut self, load_factor: f64, tangent: bool) {
         let Self { forces, stiffness, followers, .. } = self;
         let Some(followers) = followers else { return };
@@ -352,8 +352,8 @@ impl System {
         spent
     }
 
-    /// Whether a matrix that is indefinite may be so for the change of pressures on the curved surface: it is
-    /// left out from now on.
+    /// True if an indefinite matrix may come from the change of pressures on the curved surface. This change
+    /// is then left out until the solver turns `exact_pressure` on again.
     pub(crate) fn gives_way(&mut self, error: &SolveError) -> bool {
         let facets = &mut self.facets;
         let indefinite = matches!(error, SolveError::Indefinite { .. });
@@ -406,9 +406,9 @@ impl System {
         }
     }
 
-    /// Adds to the stiffness what masses of rigid parts and of nodes that turn with a solid resist with: the
-    /// rate [kg/s²] of each node and its force [N], the rate [N m] of its rotary inertia and its moment
-    /// [N m].
+    /// Adds the inertia of rigid parts and of nodes that turn with a solid to the stiffness. The functions
+    /// give the mass rate [kg/s²] of a node and its force [N], the rate [N m] of its rotary inertia, and its
+    /// moment [N m].
     pub(crate) fn add_bound_masses(
         &mut self,
         of: impl Fn(u32) -> (f64, Vector3<f64>),
@@ -422,8 +422,8 @@ impl System {
         }
     }
 
-    /// Takes forces [N] and moments [N m] of inertia on nodes of rigid parts, and moments on nodes that turn
-    /// with a solid, from a residual.
+    /// Takes inertia from a residual: forces [N] and moments [N m] on nodes of rigid parts, and moments on
+    /// nodes that turn with a solid.
     pub(crate) fn give_inertia_back(
         &self,
         force: impl Fn(u32) -> Vector3<f64>,
@@ -447,7 +447,7 @@ impl System {
     }
 }
 
-/// Which components have an equation, six a node.
+/// Flags of components that have an equation, six a node.
 fn free_components(model: &Assembly) -> Vec<bool> {
     let mut free = vec![false; 6 * model.rest.len()];
     for &node in model.facets.iter().flat_map(|facet| &facet.nodes) {

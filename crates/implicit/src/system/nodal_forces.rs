@@ -7,7 +7,7 @@ use crate::model::state::State;
 
 /// Forces and moments at the state last evaluated, six a node [N, N m].
 pub(crate) struct NodalForces {
-    /// What elements and springs resist with.
+    /// Resistance of elements and springs.
     pub(crate) internal: Vec<f64>,
     /// Loads, without their controlled part.
     pub(crate) external: Vec<f64>,
@@ -15,7 +15,7 @@ pub(crate) struct NodalForces {
     pub(crate) controlled: Vec<f64>,
     /// Strain energy [J].
     pub(crate) energy: f64,
-    /// What hourglass control holds of it [J].
+    /// Part of the strain energy in hourglass control [J].
     pub(crate) hourglass: f64,
     /// Largest force on a node of a cell [N].
     pub(crate) largest: f64,
@@ -43,12 +43,12 @@ impl NodalForces {
         [&mut self.internal, &mut self.external, &mut self.controlled]
     }
 
-    /// What a component resists with beyond its loads at a factor of the controlled ones.
+    /// Resistance of a component beyond its loads at a factor of the controlled ones.
     pub(super) fn resisting(&self, component: usize, factor: f64) -> f64 {
         self.internal[component] - self.external[component] - factor * self.controlled[component]
     }
 
-    /// Takes hold of nodes: these springs and no others act from now on, beside those of the model.
+    /// Takes hold of nodes: only these springs act besides the springs of the model.
     pub(super) fn grip(&mut self, springs: &[Spring]) {
         self.held.clear();
         self.held.extend_from_slice(springs);

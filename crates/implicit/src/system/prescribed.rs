@@ -1,6 +1,6 @@
 //! Prescribed motions: the increment of a step is the difference of curves, so that a step keeps all digits.
 //! A state may also be off its curves: at rest under curves that do not begin at 0, or after its scene was
-//! changed. What is missing then comes in by the end of a step.
+//! changed. The difference is then added by the end of a step.
 
 use nalgebra::Vector3;
 use pliant_mechanics::model::{Constraint, Enclosure, Motion, fill};
@@ -49,9 +49,9 @@ impl Gap {
 }
 
 impl Assembly {
-    /// Puts prescribed nodes where their motions are at the time of a state, at rest, with all that follows
-    /// them: as a run in time begins. Nodes with a prescribed mean shift together, those around a prescribed
-    /// volume along its gradient; others stay.
+    /// Puts prescribed nodes, with all that follows them, where their motions are at the time of a state, at
+    /// rest. A run in time begins so. Nodes with a prescribed mean shift together. Nodes around a prescribed
+    /// volume move along its gradient; others stay.
     pub fn place_prescribed(&self, state: &mut State) {
         let gap = missing(self, state, |_| Vector3::zeros());
         state.advance(&gap, 1.0);
@@ -97,9 +97,9 @@ impl Assembly {
 }
 
 /// Translations [m] and rotation vectors [rad], six a node, by which prescribed components are away from
-/// their curves at the time of a state, on a straight way; `lag` is the way [m] by which the nodes of a
-/// constraint lag behind it. Nodes that are fixed stay where they start. Rotations about some axes only are
-/// not followed beyond rest.
+/// their curves at the time of a state. They lie on a straight way. `lag` is the way [m] by which the nodes
+/// of a constraint lag behind it. Nodes that are fixed stay where they start. Rotations about some axes only
+/// are not followed beyond rest.
 fn missing(model: &Assembly, state: &State, lag: impl Fn(usize) -> Vector3<f64>) -> Vec<f64> {
     let mut all = vec![0.0; 6 * model.rest.len()];
     for (number, own) in model.constraints.iter().enumerate() {

@@ -1,7 +1,7 @@
-//! Surfaces of contacts on the curved surface of shells: each facet is divided into n² flat triangles, n =
+//! Surfaces of contacts on the curved surface of shells. Each facet is divided into n² flat triangles, n =
 //! 2^level, whose corners are points of its patch. Points on an edge belong to both of its facets, so that
-//! nothing opens. Points are numbered after the nodes of the model; what acts on them goes to nodes by Jᵀ,
-//! with moments. Leaves out: dJᵀ/dq f in the stiffness.
+//! nothing opens. Points are numbered after the nodes of the model. Forces on them go to nodes by Jᵀ, with
+//! moments. Leaves out: dJᵀ/dq f in the stiffness.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ use crate::model::assembly::Assembly;
 use crate::model::state::State;
 use crate::system::followers::Followers;
 
-/// J of a point: its velocity over those of a node and its spin.
+/// J of a point: its velocity over the velocity and the spin of a node.
 pub(crate) type ByNode = SMatrix<f64, 3, 6>;
 
 /// Points of contacts that are no nodes.
@@ -25,12 +25,12 @@ pub(crate) struct Samples {
     /// Nodes of the model.
     nodes: usize,
     surface: CurvedSurface,
-    /// Where each is; those of a facet follow one another.
+    /// Places of the points on the surface, facet by facet.
     points: Vec<Place>,
-    /// Places [m] of nodes, then of the points, and the J of these.
+    /// Positions [m] of nodes, then of the points.
     pub(crate) places: Vec<Vector3<f64>>,
     jacobians: Vec<SMatrix<f64, 3, 18>>,
-    /// Motions of all of them, six numbers each, of which translations count.
+    /// Motions of nodes and points, six numbers each, of which translations count.
     pub(crate) motion: Vec<f64>,
     /// A state that is tried.
     tried: State,
@@ -80,8 +80,8 @@ fn gcd(a: u32, b: u32) -> u32 {
 }
 
 impl Samples {
-    /// Points for contacts of a model, each at its level, and the contacts with surfaces of them; `None` if
-    /// all levels are 0.
+    /// Makes the points for contacts of a model, each at its level, and contacts with surfaces of these
+    /// points. `None` if all levels are 0.
     pub(crate) fn of(model: &Assembly, contacts: &Contacts, levels: &[u8]) -> Option<(Self, Contacts)> {
         if levels.iter().all(|&level| level == 0) {
             return None;
@@ -106,7 +106,7 @@ impl Samples {
                     faces.push(*face);
                     continue;
                 };
-                // The corners of the face may be in another order than those of its facet.
+                // The corners of the face may be in another order than in its facet.
                 let own = model.facets[facet as usize].nodes;
                 let mut at = |i: u32, j: u32| {
                     let of_face = [n - i - j, i, j];
@@ -177,7 +177,7 @@ impl Samples {
         }
     }
 
-    /// Which point has a number; `None` of nodes.
+    /// Index of the point with a number; `None` if the number belongs to a node.
     fn point(&self, number: u32) -> Option<usize> {
         (number as usize).checked_sub(self.nodes)
     }
@@ -194,8 +194,8 @@ impl Samples {
             .for_each(|(node, weight)| found(node, weight));
     }
 
-    /// Finds the motion of nodes and points along an increment from a state with the places found last: over
-    /// a part of it, the way to where they come then over that part.
+    /// Finds the motion of nodes and points along an increment, from a state with the places found last. The
+    /// motion of a point is its way over a part of the increment, divided by that part.
     pub(crate) fn move_along(&mut self, model: &Assembly, state: &State, increment: &[f64], part: f64) {
         self.tried.clone_from(state);
         self.tried.advance(increment, part);
@@ -212,7 +212,7 @@ impl Samples {
         }
     }
 
-    /// Adds the forces on points, six numbers each from the first node on, to those of nodes by Jᵀ.
+    /// Adds the forces on points, six numbers each from the first node on, to the forces on nodes by Jᵀ.
     pub(crate) fn give_back(&self, model: &Assembly, all: &[f64], forces: &mut [f64]) {
         forces.copy_from_slice(&all[..forces.len()]);
         for (at, point) in self.points.iter().enumerate() {
@@ -231,8 +231,8 @@ impl Samples {
     }
 }
 
-/// What moves the points of contacts: nodes, of tied ones those that they follow, and the nodes around a
-/// point of a curved surface.
+/// Nodes that move the points of contacts: a node itself, the nodes that a tied node follows, or the nodes
+/// around a point of a curved surface.
 #[derive(Clone, Copy)]
 pub(crate) struct Movers<'a> {
     pub model: &'a Assembly,
@@ -284,8 +284,8 @@ impl Movers<'_> {
         }
     }
 
-    /// Adds the stiffness to a matrix whose pattern couples translations and rotations, and what the ways of
-    /// rigid things and of prescribed nodes yet to come make of it to the coupling.
+    /// Adds the stiffness to a matrix whose pattern couples translations and rotations. It adds the forces
+    /// from the remaining ways of rigid things and of prescribed nodes to the coupling.
     pub(crate) fn add_stiffness(
         self,
         step: &BarrierStep,
@@ -312,7 +312,7 @@ impl Movers<'_> {
                     }
                 }
             }
-            // The way that nodes which are moved have yet to go counts as that of rigid things.
+            // The rest of the way of prescribed nodes counts like the way of rigid things.
             for (node, at, by) in &movers {
                 ways[*at] += by * Vector6::from_column_slice(&moved[6 * *node as usize..][..6]);
             }
@@ -340,7 +340,7 @@ pub(crate) fn movers_of(node: u32, followers: Option<&Followers>, mut found: imp
     }
 }
 
-/// Whether the part of a node in a stiffness that is never negative is not zero.
+/// True if a node has a non-zero part in a stiffness that is never negative.
 pub(crate) fn acts(block: &Matrix12, at: usize) -> bool {
     (3 * at..3 * at + 3).any(|k| block[(k, k)] != 0.0)
 }

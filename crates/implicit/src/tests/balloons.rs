@@ -10,7 +10,7 @@ use super::{FLAT, MATERIAL, ball, balloon, fix, quartered, ramp};
 use crate::system::System;
 use crate::*;
 
-/// A membrane sphere: p = 2 E t u/((1 − ν) r²). Facets are softer; halving them halves what is missing.
+/// A membrane sphere: p = 2 E t u/((1 − ν) r²). Facets are softer; halving them halves the error.
 #[test]
 pub(super) fn a_balloon_takes_the_volume_it_is_told() {
     let growth = 1.0003_f64;
@@ -33,9 +33,9 @@ pub(super) fn a_balloon_takes_the_volume_it_is_told() {
 }
 
 /// Twice the volume, 26 % strain. Pressures of both membranes agree to 3 %. With ANDES the nodes of the thin
-/// shell tilt by more than 1 rad, though a sphere stays one: tension loads the drilling of unequal facets,
-/// and on a curved mesh drilling moments of neighbours leave a moment that tilts. It falls with the third
-/// power of the edge; without drilling in the strains there is none.
+/// shell tilt by more than 1 rad, though a sphere stays one. Tension loads the drilling of unequal facets,
+/// and on a curved mesh the drilling moments of neighbours leave a moment that tilts. The tilt falls with the
+/// third power of the edge, and vanishes without drilling in the strains.
 #[test]
 pub(super) fn a_balloon_doubles_its_volume() {
     let inflate = |membrane| {
@@ -62,8 +62,8 @@ pub(super) fn a_balloon_doubles_its_volume() {
     assert!(cst_turn < 0.05, "{cst_turn}");
 }
 
-/// Pressure on the curved surface of a ball: no resultant, and p times the area of a circle on each half; the
-/// flat facets have less.
+/// Pressure on the curved surface of a ball has no resultant, and p times the area of a circle on each half.
+/// The flat facets have less.
 #[test]
 pub(super) fn pressure_on_the_curved_surface_acts_on_its_area() {
     let mut model = balloon(2, 1.0);
@@ -150,7 +150,7 @@ pub(super) fn blown_up(
 
 /// At most five iterations with the change of the pressure on the curved surface; the sphere stays one to
 /// 1e-3. Linear elasticity in the stretch λ has p = 2 E t (λ − 1)/((1 − ν) R λ²): λ = 1.1072 at 500 Pa.
-/// Conjugate gradients meet an indefinite stiffness on the way, and go on.
+/// Conjugate gradients meet an indefinite stiffness on the way, and continue.
 #[test]
 pub(super) fn a_curved_balloon_is_blown_up_in_one_step() {
     let gradients = gradients(Preconditioner::Aggregates);
@@ -185,9 +185,9 @@ pub(super) fn a_balloon_must_be_closed() {
     assert!(error.to_string().contains("1 open border: 3 nodes"), "{error}");
 }
 
-/// A flat round membrane, clamped at its rim, with nothing across but what its tension becomes under
-/// pressure. Hencky (1915): w₀ = 0.653 a (q a/(E t))^⅓ for ν = 0.3; in steps and at once, with factors and
-/// with conjugate which called it buckled.
+/// A flat round membrane, clamped at its rim, whose only stiffness across is its tension under pressure.
+/// Hencky (1915): w₀ = 0.653 a (q a/(E t))^⅓ for ν = 0.3. Solved in steps and at once, with factors and with
+/// conjugate gradients.
 #[test]
 pub(super) fn hencky_slack_membrane_under_pressure() {
     let off = [8, 16, 32].map(|cells| {
@@ -254,8 +254,8 @@ pub(super) fn round_membrane(cells: u32) -> (Assembly, usize) {
     (model, (row * row / 2) as usize)
 }
 
-/// A square membrane of tension n with fixed sides rises by 0.07367 p L²/n under a small pressure, as the
-/// series of Poisson's equation has it; its tension is part of the membrane force.
+/// A square membrane of tension n with fixed sides rises by 0.07367 p L²/n under a small pressure, from the
+/// series of Poisson's equation. Its tension is part of the membrane force.
 #[test]
 pub(super) fn a_taut_membrane_rises_as_by_poisson() {
     let (cells, tension, pressure) = (16_u32, 100.0, 1e-3);

@@ -14,7 +14,7 @@ use pliant_shells::element::{Elasticity, Wall};
 use crate::AssemblySolver;
 use crate::{Assembly, BackwardEuler, DynamicSettings, Phases, Shell, SolveError, State};
 
-/// What a device that is no good does.
+/// Faults of a broken device.
 #[derive(Clone, Copy, Debug)]
 enum Fault {
     /// It fills its solutions with a number and says so.

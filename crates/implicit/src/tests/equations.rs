@@ -38,7 +38,7 @@ pub(super) fn all_linear_solvers_find_the_same_equilibrium() {
     }
 }
 
-/// The same bits with one thread and with three.
+/// Results have the same bits with one thread and with three.
 #[test]
 pub(super) fn threads_change_no_bit() {
     let model = cantilever();
@@ -53,8 +53,8 @@ pub(super) fn threads_change_no_bit() {
     assert_eq!(solve(1), solve(3));
 }
 
-/// The same of sums over enough facets for several threads, with an edge that is moved and, under a pressure
-/// on the curved surface, a stiffness that is not symmetric.
+/// Sums over enough facets for several threads have the same bits with any number of threads. An edge is
+/// moved, and pressure on the curved surface makes the stiffness unsymmetric.
 #[test]
 pub(super) fn threads_change_no_bit_of_sums_over_facets() {
     for spread in [Spread::Lumped, Spread::Curved] {
@@ -80,8 +80,8 @@ pub(super) fn threads_change_no_bit_of_sums_over_facets() {
     }
 }
 
-/// Conjugate gradients on enough nodes for several threads: a balloon of 2,048 facets moves in the same bits,
-/// and with aggregates in fewer iterations than with blocks alone.
+/// Conjugate gradients on enough nodes for several threads move a balloon of 2,048 facets in the same bits.
+/// With aggregates they take fewer iterations than with blocks alone.
 #[test]
 pub(super) fn threads_change_no_bit_of_conjugate_gradients() {
     let model = balloon(4, 50.0);
@@ -131,8 +131,8 @@ pub(super) fn gradients(preconditioner: Preconditioner) -> LinearSolver {
     LinearSolver::ConjugateGradients { tolerance: 1e-9, iterations: 5000, preconditioner }
 }
 
-/// Conjugate gradients say why they stop: too few iterations, or a body that buckles, of which factors of
-/// aggregates tell.
+/// Conjugate gradients say why they stop: too few iterations, or a body that buckles, which factors of
+/// aggregates show.
 #[test]
 pub(super) fn conjugate_gradients_tell_why_they_stop() {
     let model = cantilever();

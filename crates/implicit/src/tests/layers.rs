@@ -32,9 +32,9 @@ pub(super) fn layered(
     model
 }
 
-/// A strip of two layers under a moment at its end, by the theory of beams: bent about its neutral axis with
-/// Σ E I, so that its middle surface stretches (Timoshenko 1925, bimetals); exactly, in statics and where
-/// damped motion comes to rest.
+/// A strip of two layers under a moment at its end follows the theory of beams. It bends about its neutral
+/// axis with Σ E I, so that its middle surface stretches (Timoshenko 1925, bimetals). This is exact, in
+/// statics and where damped motion comes to rest.
 #[test]
 pub(super) fn timoshenko_two_layer_strip_stretches_as_it_bends() {
     let membrane = Membrane::Cst { drilling: 0.01 };
@@ -72,8 +72,8 @@ pub(super) fn timoshenko_two_layer_strip_stretches_as_it_bends() {
     assert!((model.mass.iter().sum::<f64>() - 1600.0).abs() < 1e-9);
 }
 
-/// Uniform strains and curvatures of layers at odd angles: no force on inner nodes, and n = A ε + B κ, m = B
-/// ε + D κ in every triangle, with each membrane.
+/// Uniform strains and curvatures of layers at odd angles give no force on inner nodes. Every triangle has
+/// n = A ε + B κ, m = B ε + D κ, with each membrane.
 #[test]
 pub(super) fn layers_pass_the_patch_test() {
     let elastic = Orthotropic { young: [2e6, 0.5e6], poisson: 0.3, shear: 0.2e6 };

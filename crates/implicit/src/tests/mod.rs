@@ -240,8 +240,8 @@ fn a_singular_stiffness_names_its_node() {
     assert!(matches!(error, SolveError::Singular { component: "rotation about z", .. }), "{error}");
 }
 
-/// ∂(internal − loads)/∂q of a whole balloon by differences against the assembled matrix; the whole matrix of
-/// the unsymmetric solver at rest, where no moments are left: 1e-6.
+/// ∂(internal − loads)/∂q of a whole balloon by differences equals the assembled matrix to 1e-6. The whole
+/// matrix of the unsymmetric solver is compared at rest, where no moments are left.
 #[test]
 fn the_assembled_stiffness_is_the_derivative_of_the_forces() {
     let mut model = balloon(2, 100.0);
@@ -353,7 +353,7 @@ fn arc_length_and_displacement_control_agree() {
     assert!(matches!(error, SolveError::Impossible(_)), "{error}");
 }
 
-/// A load step that fails leaves the last equilibrium on the way, and tells its residuals.
+/// A load step that fails leaves the last equilibrium on the way, and reports its residuals.
 #[test]
 fn a_failed_load_step_keeps_what_was_found() {
     let mut model = cantilever();
@@ -508,7 +508,7 @@ fn add_block(model: &mut Assembly, cells: &[[u32; 4]], density: f64) {
     model.add_solid("block", Solid::new(0, Material::elastic(law, density), cells)).unwrap();
 }
 
-/// A block pulled by a small stress lengthens by σ/E and thins by ν σ/E, exactly for linear tets; turned by a
+/// A block pulled by a small stress lengthens by σ/E and thins by ν σ/E, exactly for linear tets. Turned by a
 /// quarter with its supports it does the same.
 #[test]
 fn a_block_of_tets_is_stretched_as_by_hooke() {
@@ -587,9 +587,9 @@ fn shells_and_tets_move_together() {
     assert!((state.position[8].z - skinned).abs() < 1e-4, "{}", state.position[8].z);
 }
 
-/// A strip of Kirchhoff's theory resists twist with G b t³/3; a bar of the same section with 1 − 0.63 t/b of
-/// that (Timoshenko and Goodier 1951, § 109): the shell is too stiff by that, as shear across the thickness
-/// is left out.
+/// A strip of Kirchhoff's theory resists twist with G b t³/3. A bar of the same section has 1 − 0.63 t/b of
+/// this stiffness (Timoshenko and Goodier 1951, § 109). The shell is too stiff by the difference, as shear
+/// across the thickness is left out.
 #[test]
 fn a_twisted_strip_is_one_of_kirchhoff() {
     let width = 2.0;
@@ -624,8 +624,8 @@ fn a_twisted_strip_is_one_of_kirchhoff() {
     assert!((ratios[0] - ratios[1]).abs() < 1e-3, "{ratios:?}");
 }
 
-/// A ball with given normals of which one triangle is flat: its patch is its facet, edges in common are
-/// straight on both sides, all others curved as before.
+/// A ball with given normals has one flat triangle. Its patch is its facet, its edges are straight on both
+/// sides, and all other edges keep their curves.
 #[test]
 fn flat_triangles_lie_beside_curved_ones() {
     let (points, cells) = ball(1);

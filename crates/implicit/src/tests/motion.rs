@@ -88,8 +88,8 @@ fn a_cantilever_vibrates_at_its_first_frequency() {
     assert!((found / exact - 1.0).abs() < 0.01, "{found} {exact}");
 }
 
-/// A free strip on equal springs for its masses goes to and fro as one body, at 1 Hz: what each integrator
-/// makes of it, after a number of steps a period.
+/// Final state of a free strip after a number of steps a period by an integrator. Its springs are
+/// proportional to its masses, so it moves to and fro as one body, at 1 Hz.
 fn bobbing(integrator: Integrator, steps: u32, periods: u32) -> State {
     let mut model = strip(THIN);
     for node in 0..model.rest.len() {
@@ -122,8 +122,8 @@ fn differences_of_two_steps_are_of_second_order() {
     }
 }
 
-/// Part of critical damping at 1 Hz in steps of 10, 20 and 40 ms: ω h/2 of backward Euler less terms of third
-/// order, 3 to 11 %; (ω h)³/4 of differences of two steps, 0.006 to 0.4 %.
+/// Part of critical damping at 1 Hz in steps of 10, 20 and 40 ms. Backward Euler has ω h/2 less terms of
+/// third order, 3 to 11 %. Differences of two steps have (ω h)³/4, 0.006 to 0.4 %.
 #[test]
 fn each_integrator_damps_as_is_told() {
     for step in [0.01, 0.02, 0.04] {
@@ -144,8 +144,8 @@ fn each_integrator_damps_as_is_told() {
     }
 }
 
-/// A strip that falls about its clamp by more than a right angle: half the step, a quarter of the error; a
-/// step halved on the way, and one taken up by another solver, keep to it.
+/// A strip falls about its clamp by more than a right angle. Half the step gives a quarter of the error. A
+/// step halved on the way, or a change of solver, keeps this order.
 #[test]
 fn large_motion_is_of_second_order_and_goes_on_elsewhere() {
     let mut model = clamped(THIN);
@@ -315,8 +315,8 @@ fn real_time_steps_follow_the_converged_motion() {
     assert!((converged - quick).norm() < 0.02 * converged.z.abs(), "{converged} {quick}");
 }
 
-/// Two triangles that fly apart, each damped as its body says: backward Euler slows the one down by 1/(1 + α
-/// h) a step, central differences by (1 − α h/2)/(1 + α h/2), and leave the other alone.
+/// Two triangles fly apart, each damped as its body says. Backward Euler slows the one down by 1/(1 + α h) a
+/// step, central differences by (1 − α h/2)/(1 + α h/2). The other keeps its speed.
 #[test]
 fn bodies_are_damped_each_by_itself() {
     let triangle = |x: f64| [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|[a, b]| Vector3::new(x + a, b, 0.0));

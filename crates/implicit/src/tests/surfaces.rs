@@ -8,8 +8,8 @@ use pliant_testing::Random;
 use super::{ball, model, strip};
 use crate::{CurvedSurface, State};
 
-/// A plate stretched by 20 % and thinned to match, bent to a radius of 1 m at a thickness of 0.1 m, and
-/// turned by a radian: 20 % in the middle, exactly. Bent alone, κ t/2.
+/// A plate is stretched by 20 % and thinned to match, bent to a radius of 1 m at a thickness of 0.1 m, and
+/// turned by a radian. The strain in the middle is 20 %, exactly. Bent alone, the plate has the strain κ t/2.
 #[test]
 fn stretch_and_bending_are_told_apart() {
     let model = model(strip(), 0.1);
@@ -35,8 +35,8 @@ fn stretch_and_bending_are_told_apart() {
     }
 }
 
-/// A closed surface, shaken: no force and no moment in sum; the change of the forces is symmetric but for
-/// −S(m)/2 of the moments, which those of the elements balance: 1e-12.
+/// A closed surface, shaken, has no resultant force and no moment. The change of the forces is symmetric,
+/// except for −S(m)/2 of the moments, which the moments of the elements balance: 1e-12.
 #[test]
 fn a_closed_surface_has_no_resultant_and_a_symmetric_change() {
     let mut random = Random::new(3);

@@ -28,8 +28,9 @@ fn widths() -> [f64; 2] {
     RADII.map(|radius| 2.0 * radius * (0.5 * PI / BLOCKS as f64).tan())
 }
 
-/// The least friction with which the arch stands: over all thrusts H at its crown, at all heights there, the
-/// smallest of the largest ratios of shear to thrust in a joint, where the thrust goes through all joints.
+/// The least friction with which the arch stands. For each thrust H and each height at the crown with the
+/// thrust inside all joints, a joint has a largest ratio of shear to thrust. The result is the smallest of
+/// these ratios.
 fn least_friction() -> f64 {
     let [inner, outer] = widths();
     let angle = PI / BLOCKS as f64;
@@ -58,7 +59,7 @@ fn least_friction() -> f64 {
     all.map(|(thrust, place)| needed(thrust, place)).fold(f64::INFINITY, f64::min)
 }
 
-/// How far [m] the crown has come down after 0.4 s.
+/// Distance [m] that the crown has come down after 0.4 s.
 fn sunk(friction: f64) -> f64 {
     let mut model = Assembly::default();
     let [inner, outer] = widths().map(|width| width - 0.93 * GAP / (0.5 * PI / BLOCKS as f64).cos());

@@ -53,8 +53,8 @@ fn settings(step: f64) -> DynamicSettings {
     DynamicSettings { iterations: 100, ..DynamicSettings::new(step) }
 }
 
-/// A block that settles on a plane for 0.2 s, which is then an incline; after another 0.1 s, in which shear
-/// waves in it die down, its acceleration [m/s²] and its way [m] over 0.9 s.
+/// Acceleration [m/s²] of a block on an incline, and its way [m] over 0.9 s. The block settles for 0.2 s on a
+/// plane, which then becomes an incline. Another 0.1 s pass until shear waves in the block have died down.
 fn slid(friction: f64, step: f64) -> [f64; 2] {
     let (mut model, under) = block(YOUNG);
     weigh(&mut model, [0.0, 0.0, -9.81 * 0.8_f64.sqrt()], 0.0);
@@ -91,9 +91,9 @@ fn slid(friction: f64, step: f64) -> [f64; 2] {
     [acceleration, way.x]
 }
 
-/// A4: on a slope of ½ a block with μ = 0.51 creeps by less than its creep speed allows, and with less slides
-/// at g (sin − μ cos). At the limit, μ = 0.5, nothing takes away the speed of 6 mm/s that it has from its
-/// first shear wave.
+/// A4: on a slope of ½ a block with μ = 0.51 creeps by less than its creep speed allows. With less friction
+/// it slides at g (sin − μ cos). At the limit, μ = 0.5, nothing takes away the speed of 6 mm/s that it has
+/// from its first shear wave.
 #[test]
 fn a_block_on_an_incline_sticks_or_slides_by_coulombs_law() {
     let step = 2e-3;

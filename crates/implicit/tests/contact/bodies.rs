@@ -38,8 +38,8 @@ fn between(first: Vec<[u32; 3]>, second: Vec<[u32; 3]>, friction: f64) -> Contac
     }
 }
 
-/// Nominal stress [Pa] of a neo-Hookean tet, P = μ J^(−2/3) (F − I₁/3 F⁻ᵀ) + κ (J − 1) J F⁻ᵀ, and its volume
-/// [m³] at rest.
+/// Nominal stress [Pa] of a neo-Hookean tet, and its volume [m³] at rest. The stress is P = μ J^(−2/3) (F −
+/// I₁/3 F⁻ᵀ) + κ (J − 1) J F⁻ᵀ.
 fn stress(model: &Assembly, state: &State, nodes: &[u32]) -> (Matrix3<f64>, f64) {
     let edges = |at: &dyn Fn(usize) -> Vector3<f64>| {
         let [a, b, c, d] = [0, 1, 2, 3].map(|k| at(nodes[k] as usize));
@@ -52,8 +52,8 @@ fn stress(model: &Assembly, state: &State, nodes: &[u32]) -> (Matrix3<f64>, f64)
     (isochoric + inverse * (YOUNG / 3.0 * (j - 1.0) * j), rest.determinant() / 6.0)
 }
 
-/// The gap [m] over ĝ that a barrier has under a pressure over its stiffness κ: p/κ = 2 (y − 1) ln y + (y −
-/// 1)²/y.
+/// The gap [m] over ĝ of a barrier under a pressure over its stiffness κ. It solves p/κ = 2 (y − 1) ln y +
+/// (y − 1)²/y.
 fn gap_under(pressure: f64) -> f64 {
     let [mut low, mut high] = [1e-9, 1.0];
     for _ in 0..80 {
@@ -64,8 +64,8 @@ fn gap_under(pressure: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// A1, the patch test of contact: a block of 2 × 2 × 2 cells on one of 3 × 3 × 3 without friction, pressed by
-/// about 1 kPa.
+/// A1, the patch test of contact: a block of 2 × 2 × 2 cells on another of 3 × 3 × 3, without friction,
+/// pressed by about 1 kPa.
 #[test]
 fn a_uniform_pressure_goes_through_cells_that_do_not_match() {
     let (barrier, stiffness) = (5e-5, 1e5);
@@ -144,9 +144,9 @@ fn a_uniform_pressure_goes_through_cells_that_do_not_match() {
     assert!(least > 0.98 && largest < 1.02, "{least} {largest}");
 }
 
-/// A2: what two free bodies of other masses do to each other has no sum, without friction no moment, and with
-/// it none beyond that of friction over the gap: points of both sides that rub against each other are that
-/// far apart.
+/// A2: forces between two free bodies of different masses have no sum. Without friction they have no moment.
+/// With friction the moment is at most the friction times the gap, because points that rub against each other
+/// are that far apart.
 #[test]
 fn forces_between_bodies_have_no_sum_and_no_moment() {
     for friction in [0.0, 0.4] {

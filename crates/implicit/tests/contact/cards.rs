@@ -19,7 +19,7 @@ const YOUNG: f64 = 1e7;
 /// The lean of a card against the upright [rad].
 const LEAN: f64 = std::f64::consts::FRAC_PI_6;
 
-/// How far [m] the top has come down after half a second.
+/// Distance [m] that the top has come down after half a second.
 fn sunk(friction: f64) -> f64 {
     let barrier = 1e-4;
     let mut model = Assembly::default();

@@ -16,7 +16,7 @@ use pliant_shells::element::Wall;
 
 use super::{at_rigid, fixed, surface, touch};
 
-/// A sheet in the plane z = 0 around the origin, of so many cells, with diagonals that alternate.
+/// A sheet in the plane z = 0 around the origin, with given numbers of cells and diagonals that alternate.
 fn sheet(cells: [u32; 2], size: [f64; 2], thickness: f64, young: f64) -> (Assembly, Vec<[u32; 3]>) {
     let [nx, ny] = cells;
     let node = |i: u32, j: u32| j * (nx + 1) + i;
@@ -70,8 +70,8 @@ fn solver(model: &Assembly) -> BackwardEuler {
     BackwardEuler::new(model.clone(), settings).unwrap()
 }
 
-/// The same bits with one thread and with two, and where another solver goes on with the pattern that the
-/// first one had.
+/// Results have the same bits with one thread and with two, and after another solver continues with the
+/// pattern of the first one.
 #[test]
 fn threads_and_a_restart_change_no_bit() {
     let model = cloth(8, 0.5);

@@ -1,6 +1,6 @@
-//! Bodies that meet at corners and edges by barriers (S1, S2): primitive scenes of rigid-body libraries, and
-//! the degenerate ones of Erleben (2018), all of them soft, or rigid what is held. They end in bounds, and no
-//! state has an edge in a triangle.
+//! Bodies that meet at corners and edges by barriers (S1, S2). Scenes are primitive ones of rigid-body
+//! libraries, and the degenerate ones of Erleben (2018). Bodies are all soft, or the held ones are rigid.
+//! Scenes end within bounds, and no state has an edge in a triangle.
 
 use nalgebra::Vector3;
 use pliant_contact::barrier::BarrierSettings;
@@ -43,7 +43,7 @@ fn rigid(piece: &Piece) -> Rigid {
     super::rigid("held", shape, Trajectory::fixed(at))
 }
 
-/// Plays a scene, with all bodies soft or with rigid ones that are held; what is wrong with it.
+/// Plays a scene, with all bodies soft or with rigid held ones.
 fn play(scene: &Scene, is_rigid: bool) -> Result<(), String> {
     let name = if is_rigid { format!("{}, rigid", scene.name) } else { scene.name.to_owned() };
     let (held, soft): (Vec<&Piece>, Vec<&Piece>) =

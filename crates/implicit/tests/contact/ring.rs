@@ -23,7 +23,7 @@ const RADIUS: f64 = 0.02;
 const YOUNG: f64 = 1e6;
 const POISSON: f64 = 0.3;
 
-/// A ring about the axis y of so many edges round, one wide; its width is that of an edge.
+/// A ring about the axis y with a number of edges round and one across; its width is the length of an edge.
 fn ring(edges: u32, thickness: f64) -> (Assembly, Surface, f64) {
     let width = TAU * RADIUS / f64::from(edges);
     let node = |k: u32, side: u32| 2 * (k % edges) + side;
@@ -114,8 +114,8 @@ fn reference(approach: f64) -> f64 {
     (0..4).map(|i| own[i][1] * weight(i)).sum()
 }
 
-/// A ring of t/R = 1/100 between two plates, up to where it has a flat part: its force at the approach of its
-/// middle surface.
+/// A ring of t/R = 1/100 between two plates, up to where it has a flat part. Its force at an approach of its
+/// middle surface is compared with the elastica.
 #[test]
 fn a_ring_between_plates_is_an_elastica() {
     for (edges, tolerance) in [(48, 0.03), (96, 0.01), (192, 0.01)] {
@@ -136,7 +136,7 @@ fn a_ring_between_plates_is_an_elastica() {
     }
 }
 
-/// What a ring that was dropped does, energies over that of its fall.
+/// Rebound of a ring that was dropped. Energies are divided by the energy of its fall.
 struct Rebound {
     /// The largest growth of energy in a step, and its change from the start until the ring has left the
     /// floor.
@@ -211,9 +211,8 @@ fn dropped(integrator: Integrator, step: f64) -> Rebound {
 }
 
 /// A6: energy of the body and the barrier never grows by backward Euler, and the ring flies back more slowly
-/// than it came. Differences of two steps lose less of it and fly back faster, in longer and in shorter
-/// steps; what they lose is what goes into vibrations that steps do not resolve (21 and 16 % of the energy of
-/// the fall).
+/// than it came. Differences of two steps lose less energy and fly back faster, in longer and in shorter
+/// steps. Their loss goes into vibrations that steps do not resolve (21 and 16 % of the energy of the fall).
 #[test]
 fn a_dropped_ring_gains_no_energy_and_rebounds_higher_by_differences_of_two_steps() {
     for step in [1e-3, 2.5e-4] {
@@ -226,8 +225,8 @@ fn a_dropped_ring_gains_no_energy_and_rebounds_higher_by_differences_of_two_step
     }
 }
 
-/// What is lost goes into vibrations that steps do not resolve, so it falls with the step, below the 10 % of
-/// A6 in the end.
+/// The lost energy goes into vibrations that steps do not resolve. It falls with the step, in the end below
+/// the 10 % of A6.
 #[test]
 #[ignore = "half a minute"]
 fn what_a_rebound_loses_falls_with_the_step() {

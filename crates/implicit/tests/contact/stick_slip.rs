@@ -21,10 +21,10 @@ const PERIOD: f64 = 0.2;
 /// Time [s] in which the block settles before it is pulled.
 const SETTLES: f64 = 0.1;
 
-/// Where the far end of the spring is [m], and the block by the closed form, at a time [s] since the pull
-/// began. It sticks until the spring pulls with μ N, after `stuck`, and goes by v τ − v/ω sin ω τ. After one
-/// oscillation it stands for an instant: there the spring is pulled back, the block sticks twice as long, and
-/// slips back likewise.
+/// Position [m] of the far end of the spring, and of the block by the closed form, at a time [s] since the
+/// pull began. The block sticks until the spring pulls with μ N, after `stuck`, and goes by v τ − v/ω sin ω
+/// τ. After one oscillation it stands for an instant. There the spring is pulled back, the block sticks twice
+/// as long, and slips back likewise.
 fn exact(time: f64, stuck: f64) -> [f64; 2] {
     let slips = |since: f64| SPEED * (since - PERIOD / TAU * (TAU * since / PERIOD).sin());
     let turns = stuck + PERIOD;

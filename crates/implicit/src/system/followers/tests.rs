@@ -175,8 +175,8 @@ fn moves_rigidly(mut model: Assembly) {
     assert!(off < 1e-12 && slower < 1e-12, "{off:e} {slower:e}");
 }
 
-/// Three nodes on a line keep their distances: a turn about the line, which moves none of them, does not make
-/// the stiffness singular.
+/// Three nodes on a line keep their distances. A turn about the line moves no node, but does not make the
+/// stiffness singular.
 #[test]
 fn nodes_on_a_line_are_bound() {
     let mut model = model();

@@ -88,8 +88,8 @@ fn surfaces_of_points_are_watertight() {
     }
 }
 
-/// A11: forces and moments on the nodes of a shaken shell are, summed up, the force that the ball bears, and
-/// have no moment about its centre.
+/// A11: forces and moments on the nodes of a shaken shell add up to the force on the ball. They have no
+/// moment about its centre.
 #[test]
 fn forces_on_points_go_to_nodes_with_their_sum_and_their_moment() {
     let mut random = Random::new(11);
@@ -123,9 +123,9 @@ fn forces_on_points_go_to_nodes_with_their_sum_and_their_moment() {
     }
 }
 
-/// A ball within a sphere of facets is 0.08 from the sphere: flat triangles are nearer by their sag, points
-/// of the curved surface leave a quarter of it for each level, if normals are those of the sphere. With
-/// normals that are means of triangles the curved surface of so few is off by a percent itself.
+/// A ball within a sphere of facets is 0.08 from the sphere. Flat triangles are nearer by their sag. Each
+/// level of points on the curved surface leaves a quarter of this error, if normals are exact. With normals
+/// that are means of triangles, the curved surface of such a coarse mesh is itself off by a percent.
 #[test]
 fn gaps_come_to_those_of_the_sphere_with_the_level() {
     for with_normals in [false, true] {
@@ -157,8 +157,8 @@ fn gaps_come_to_those_of_the_sphere_with_the_level() {
     }
 }
 
-/// Whatever turns nodes and moves them, the part that is allowed leaves a gap everywhere, and no edge in a
-/// triangle; so does a part of that, when it is asked for again.
+/// Nodes turn and move at random. The allowed part of an increment leaves a gap everywhere, and no edge in a
+/// triangle. A part of this part does so too, when it is searched again.
 #[test]
 fn allowed_parts_leave_gaps_on_curved_ways() {
     let mut random = Random::new(8);
