@@ -3,11 +3,11 @@
 //! shells. The crate knows nothing of files or windows. SI units throughout.
 //!
 //! A shell element is the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980) with the ANDES membrane
-//! (Felippa 2003), which takes the mean strain of the curved triangle. It has six degrees of freedom a node,
-//! in a frame that turns with the facet. Its force is the gradient of its energy. An [`Assembly`] is
-//! constant: a model with shells. A [`State`] changes. [`Statics`] finds equilibria; [`BackwardEuler`] and
-//! [`ExplicitShells`] move a state in time. [`CurvedSurface`] is the smooth surface of the shells for
-//! pictures and for forces on any of its points.
+//! (Felippa 2003). The membrane takes the mean strain of the curved triangle. The element has six degrees of
+//! freedom a node, in a frame that turns with the facet. Its force is the gradient of its energy. An
+//! [`Assembly`] is constant: a model with shells. A [`State`] changes. [`Statics`] finds equilibria;
+//! [`BackwardEuler`] and [`ExplicitShells`] move a state in time. [`CurvedSurface`] is the smooth surface of
+//! the shells for pictures and for forces on any of its points.
 //!
 //! ```
 //! use nalgebra::Vector3;

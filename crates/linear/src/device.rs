@@ -17,19 +17,19 @@ pub trait LinearDevice: Debug + Send + Sync {
     fn solver(&self) -> Result<Box<dyn DeviceSolver>, DeviceError>;
 }
 
-/// Where the blocks of a symmetric matrix are, row by row. Nodes go aggregate by aggregate, each with six
+/// Pattern of the blocks of a symmetric matrix, row by row. Nodes go aggregate by aggregate, each with six
 /// components.
 #[derive(Clone, Debug)]
 pub struct BlockPattern<'a> {
-    /// Where the blocks of each node start, and the end of the last.
+    /// Starts of the blocks of each node, and the end of the last.
     pub row_start: &'a [u32],
     /// The column of each block.
     pub column: &'a [u32],
-    /// Where each entry of each block, column by column, comes from in the lower half; `u32::MAX`: it is 0.
+    /// Place in the lower half of each entry of each block, column by column; `u32::MAX`: the entry is 0.
     pub source: &'a [u32],
     /// The components of each node that have an equation, a bit each.
     pub free: Vec<u32>,
-    /// Where the nodes of each aggregate start, and the end of the last.
+    /// Starts of the nodes of each aggregate, and the end of the last.
     pub aggregate_start: &'a [u32],
     /// Pairs of aggregates (row, column) that touch, row ≥ column; `None` where their motions are not solved
     /// for.
@@ -61,16 +61,16 @@ pub struct BlockValues<'a> {
     pub coarse: &'a [f32],
 }
 
-/// What a pass reached.
+/// Result of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pass {
     /// Its iterations.
     pub iterations: usize,
-    /// How it ended.
+    /// End of the pass.
     pub end: PassEnd,
 }
 
-/// How a pass ended.
+/// End of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PassEnd {
     /// Its residual is below the goal.
@@ -96,8 +96,8 @@ pub trait DeviceSolver: Debug + Send + Sync {
     /// If the device fails.
     fn take(&mut self, values: &BlockValues<'_>) -> Result<(), DeviceError>;
 
-    /// Solves for a right-hand side of size 1 from 0 on, until the residual is `goal` or so many iterations
-    /// are done.
+    /// Solves for a right-hand side of size 1, starting from 0, until the residual is `goal` or a number of
+    /// iterations is done.
     ///
     /// # Errors
     /// If the device fails.
@@ -116,9 +116,9 @@ pub trait DeviceSolver: Debug + Send + Sync {
 /// Wall time that a device took for linear equations so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DeviceTimes {
-    /// Handing matrices to the device; it copies and prepares them while the CPU goes on.
+    /// Handing matrices to the device, which copies and prepares them while the CPU continues.
     pub upload: Duration,
-    /// From handing over right-hand sides to the end of the iterations, with what is left of the preparation.
+    /// From handing over right-hand sides to the end of the iterations, with the rest of the preparation.
     pub iterations: Duration,
     /// Reading solutions back.
     pub read_back: Duration,

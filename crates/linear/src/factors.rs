@@ -1,8 +1,8 @@
-//! L D Lᵀ of a symmetric matrix by fronts (multifrontal; Duff and Reid 1983): each supernode adds up its
-//! entries of the matrix and what others have left to it, eliminates its columns and leaves the rest to its
-//! parent. Without pivoting: matrices are positive definite or nearly so, and the signs of pivots are wanted.
-//! They are found on one thread; solutions share two parts of the assembly tree between threads. Bits do not
-//! depend on how many there are.
+//! L D Lᵀ of a symmetric matrix by fronts (multifrontal; Duff and Reid 1983). Each supernode adds up its
+//! entries of the matrix and the updates from other supernodes. It eliminates its columns and leaves an
+//! update to its parent. There is no pivoting: matrices are positive definite or nearly so, and the signs of
+//! pivots are wanted. Factors are found on one thread; solutions share two parts of the assembly tree between
+//! threads. Bits do not depend on the number of threads.
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -19,7 +19,7 @@ pub struct Pivots {
     pub negative: usize,
     /// Equation with the smallest pivot.
     pub weakest: usize,
-    /// That pivot over the diagonal entry.
+    /// The smallest pivot over its diagonal entry.
     pub smallest: f64,
     /// The lowest pivot over the diagonal entry, if one is negative.
     pub lowest: f64,
@@ -34,8 +34,8 @@ const SHARED: usize = 1 << 15;
 /// L D Lᵀ of a matrix.
 pub struct Factors {
     supernodes: Supernodes,
-    /// The supernodes up to the first number and from there up to the second have nothing to do with each
-    /// other; the rest waits for both.
+    /// Ends of two independent shares of supernodes: up to the first number, and from there up to the second.
+    /// The rest waits for both.
     shares: [usize; 2],
     /// L, panel by panel.
     value: Vec<f64>,
@@ -51,12 +51,12 @@ pub struct Factors {
 struct Memory {
     /// L D of some columns of a front.
     scaled: Vec<f64>,
-    /// What supernodes of even and of odd depth have left, and that is not yet taken.
+    /// Updates from supernodes of even and of odd depth that their parents have not taken yet.
     stacks: [Vec<f64>; 2],
-    /// The supernodes that left it, of both.
+    /// The supernodes with these updates, of both parities.
     waiting: Vec<usize>,
-    /// The right-hand side by columns; of each share numbers of the rows below a supernode, and what it takes
-    /// off the columns of the rest.
+    /// The right-hand side by columns. Each share also has numbers of the rows below a supernode, and the
+    /// part that it subtracts from the columns of the rest.
     right: Vec<f64>,
     below: [Vec<f64>; 2],
     taken: [Vec<f64>; 2],
@@ -71,7 +71,7 @@ impl Factors {
         Self::shared_from(matrix, SHARED)
     }
 
-    /// Factors whose solutions are shared if they have at least so many numbers.
+    /// Factors whose solutions are shared if the factors have at least `least` numbers.
     fn shared_from(matrix: &LowerMatrix, least: usize) -> Result<Self, LinearError> {
         let supernodes = Supernodes::new(matrix)?;
         let shares =
@@ -95,7 +95,7 @@ impl Factors {
         })
     }
 
-    /// Bytes that those of a pattern take.
+    /// Bytes that the factors of a pattern take.
     ///
     /// # Errors
     /// If there are more equations than can be numbered, or the order of elimination has no room.
@@ -114,7 +114,7 @@ impl Factors {
         let mut pivots = Pivots { smallest: f64::INFINITY, ..Pivots::default() };
         let columns = self.pivot.iter().zip(&self.diagonal).zip(&self.supernodes.order);
         for ((&pivot, diagonal), &equation) in columns {
-            // What is not finite anywhere comes to the pivot of its row.
+            // A number that is not finite anywhere reaches the pivot of its row.
             if !pivot.is_finite() {
                 return None;
             }
@@ -247,7 +247,7 @@ struct Share<'a> {
     supernodes: &'a Supernodes,
     value: &'a [f64],
     pivot: &'a [f64],
-    /// Where they begin and end.
+    /// Begin and end of the supernodes.
     nodes: [usize; 2],
     /// The first column of the rest.
     beyond: usize,

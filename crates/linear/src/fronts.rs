@@ -14,11 +14,11 @@ use crate::supernodes::{PACK, Run, padded};
 
 /// Columns of a block: their rows stay in the cache while the columns to the right take them off.
 pub(crate) const BLOCK: usize = 48;
-/// Columns of a strip: those of a node.
+/// Columns of a strip, as many as a node has.
 const STRIP: usize = 6;
 
-/// Some rows of some columns in registers. They are filled and passed on in place: the compiler leaves
-/// `array::from_fn` as a call and copies arrays that are returned, which took as long as all the rest.
+/// Some rows of some columns in registers. They are filled and passed on in place. The compiler leaves
+/// `array::from_fn` as a call and copies returned arrays, which took as long as all the rest.
 type Tile<S, const C: usize, const R: usize> = [[<S as Simd>::f64s; R]; C];
 
 /// A few registers.
@@ -38,8 +38,8 @@ fn store<S: Simd, const R: usize>(numbers: &[S::f64s; R], to: &mut [f64]) {
     }
 }
 
-/// Calls a function of some registers of rows for all rows from one on up to another, both multiples of
-/// [`PACK`], as many at once as there are registers for.
+/// Calls a function of some registers of rows for all rows from a first up to a last one, both multiples of
+/// [`PACK`]. Each call takes as many rows as there are registers for.
 macro_rules! for_rows {
     ($simd:ident, $from:expr, $to:expr, $row:ident, $registers:ident => $call:expr) => {{
         let mut $row: usize = $from;
@@ -97,7 +97,7 @@ pub(crate) struct PivotColumns<'a> {
 
 /// Columns of a panel, and in places of them L D where these are.
 struct Strip<'a> {
-    /// The columns from the first of the block on, and L D of them.
+    /// The columns from the first of the block on, and L D of these columns.
     columns: &'a mut [f64],
     scaled: &'a mut [f64],
     /// Rows.
@@ -114,7 +114,7 @@ struct Corner<const C: usize> {
 }
 
 impl Strip<'_> {
-    /// Takes columns before those of the strip off it.
+    /// Subtracts columns before the strip from the strip.
     #[inline(always)]
     fn take_off<S: Simd, const C: usize, const R: usize>(&mut self, simd: S, row: usize) {
         let mut own: Tile<S, C, R> = [[simd.splat_f64s(0.0); R]; C];
@@ -261,7 +261,7 @@ struct Rest<'a> {
     range: [usize; 2],
     /// The row of the panel that is row 0 here.
     shift: usize,
-    /// Whether they are zero so far, whatever is stored.
+    /// True if the columns count as zero so far, whatever is stored.
     is_new: bool,
 }
 
@@ -300,7 +300,8 @@ impl Rest<'_> {
     }
 }
 
-/// L of a panel of some columns, whose rows below begin at the width padded; and what is left for these rows.
+/// Computes L of a panel of some columns, and the update of the rows below. These rows begin at the padded
+/// width.
 #[inline(always)]
 pub(crate) fn eliminate<S: Simd>(
     simd: S,
@@ -330,7 +331,7 @@ pub(crate) fn eliminate<S: Simd>(
     }
 }
 
-/// What a supernode has left for its rows below.
+/// Update of a supernode for its rows below.
 pub(crate) struct Left<'a> {
     pub numbers: &'a [f64],
     /// Rows, padded.
@@ -339,8 +340,8 @@ pub(crate) struct Left<'a> {
 }
 
 impl Left<'_> {
-    /// Adds what comes to the columns of a front from one on up to another to these columns, whose first row
-    /// is that of the first of them.
+    /// Adds the update of the front's columns in a range to `columns`. Their first row belongs to the first
+    /// of these columns.
     #[inline(always)]
     pub(crate) fn add_to(&self, columns: &mut [f64], height: usize, [from, to]: [usize; 2]) {
         let is_there = |run: &Run| (from..to).contains(&(run.to as usize));
@@ -351,7 +352,7 @@ impl Left<'_> {
             // Of its own rows those above the diagonal go along: nobody looks at them.
             for run in &self.runs[number..] {
                 let places = [run.from as usize, run.to as usize - from];
-                // Those of a node or of its translations, mostly. Loops: zipped iterators that fold stay
+                // Rows of a node or of its translations, mostly. Loops: zipped iterators that fold stay
                 // calls.
                 macro_rules! add_columns {
                     ($add:expr) => {
@@ -370,7 +371,7 @@ impl Left<'_> {
     }
 }
 
-/// Adds so many numbers from a place on to others.
+/// Adds `N` numbers from a place on to others.
 #[inline(always)]
 fn add<const N: usize>(from: &[f64], to: &mut [f64], [own, other]: [usize; 2]) {
     let (to, from) = (&mut to[other..other + N], &from[own..own + N]);
@@ -379,7 +380,7 @@ fn add<const N: usize>(from: &[f64], to: &mut [f64], [own, other]: [usize; 2]) {
     }
 }
 
-/// The same of any number, mostly a multiple of three.
+/// Adds any count of numbers, mostly a multiple of three.
 #[inline(always)]
 fn add_all(from: &[f64], to: &mut [f64], places: [usize; 2], len: usize) {
     let mut done = 0;

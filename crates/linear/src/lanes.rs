@@ -8,7 +8,7 @@ use pulp::Simd;
 /// Numbers in a pack: the widest registers in double precision.
 pub const PACK: usize = 8;
 
-/// The same number of each of the cells of a pack.
+/// One number of each cell of a pack.
 pub type Pack = [f64; PACK];
 
 /// Numbers of neighbouring cells in a register.
@@ -19,7 +19,7 @@ pub struct Lane<S: Simd> {
 }
 
 impl<S: Simd> Lane<S> {
-    /// Those of a pack from the register's number on.
+    /// Loads the numbers of one register of a pack.
     #[inline(always)]
     pub fn load(simd: S, pack: &Pack, register: usize) -> Self {
         Self { simd, own: S::as_simd_f64s(&pack[..]).0[register] }
@@ -31,13 +31,13 @@ impl<S: Simd> Lane<S> {
         S::as_mut_simd_f64s(&mut pack[..]).0[register] = self.own;
     }
 
-    /// The same number in all.
+    /// One number in all lanes.
     #[inline(always)]
     pub fn splat(simd: S, number: f64) -> Self {
         Self { simd, own: simd.splat_f64s(number) }
     }
 
-    /// Half of it.
+    /// Half of each number.
     #[inline(always)]
     pub fn half(self) -> Self {
         self * Self::splat(self.simd, 0.5)
@@ -55,7 +55,7 @@ impl<S: Simd> Lane<S> {
         Self { simd: self.simd, own: self.simd.sqrt_f64s(self.own) }
     }
 
-    /// Where this is less than another number, the first of two, and else the second.
+    /// Selects the first of two numbers in lanes where this is less than another number, and else the second.
     #[inline(always)]
     pub fn if_less(self, than: Self, then: Self, other: Self) -> Self {
         let mask = self.simd.less_than_f64s(self.own, than.own);
@@ -107,10 +107,10 @@ impl<S: Simd> Neg for Lane<S> {
     }
 }
 
-/// Three of them.
+/// Three lanes: a vector of each cell.
 pub type Three<S> = [Lane<S>; 3];
 
-/// A 3 × 3 matrix of them, row by row.
+/// A 3 × 3 matrix of each cell, row by row.
 pub type Square<S> = [Three<S>; 3];
 
 /// Three of anything, by their numbers. The closures of `map` and `from_fn` would stay calls, without the

@@ -1,7 +1,7 @@
-//! Linear equations with a sparse matrix, of nodes with six components each: factors L D Lᵀ (`factors.rs`) or
-//! L U (`unsymmetric.rs`), or conjugate gradients (`conjugate_gradients/`), also on a device
-//! (`on_device.rs`). Knows no mechanics. Factors are found on one thread, and sums run in one order, so
-//! results do not depend on the number of threads.
+//! Linear equations with a sparse matrix, of nodes with six components each. Solvers are factors L D Lᵀ
+//! (`factors.rs`) or L U (`unsymmetric.rs`), or conjugate gradients (`conjugate_gradients/`), also on a
+//! device (`on_device.rs`). Knows no mechanics. Factors are found on one thread, and sums run in one order,
+//! so results do not depend on the number of threads.
 //!
 //! ```
 //! use pliant_linear::sparse::{Equations, LowerMatrix};
@@ -44,10 +44,10 @@ pub use self::report::{DeviceError, LinearError, LinearReport};
 use self::sparse::{Equations, LowerMatrix};
 use self::unsymmetric::LuFactors;
 
-/// How linear equations are solved.
+/// Solver of linear equations.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum LinearSolver {
-    /// Factors of the matrix: robust, and they tell unstable equilibria.
+    /// Factors of the matrix: robust, and they show unstable equilibria.
     #[default]
     Direct,
     /// Factors L U with the unsymmetric stiffness of loads: more work, and no sign of instability. Newton's
@@ -59,13 +59,13 @@ pub enum LinearSolver {
         tolerance: f64,
         /// Iterations at the most.
         iterations: usize,
-        /// What the residual is multiplied by.
+        /// Approximate inverse that multiplies the residual.
         preconditioner: Preconditioner,
     },
 }
 
 impl LinearSolver {
-    /// Whether a device can do it.
+    /// True if a device can solve this way.
     pub fn suits_devices(self) -> bool {
         let Self::ConjugateGradients { preconditioner, .. } = self else { return false };
         !matches!(preconditioner, Preconditioner::LaggedFactors { .. })
@@ -93,7 +93,8 @@ pub struct Workspace {
     solver: LinearSolver,
     factors: Option<Factors>,
     unsymmetric: Option<LuFactors>,
-    /// Whether the factors are of some matrix, and so may serve as preconditioner; of the matrix prepared.
+    /// True if the factors belong to some matrix, and so may serve as preconditioner; true if they belong to
+    /// the prepared matrix.
     current: bool,
     fresh: bool,
     /// Values of the matrix whose factors serve later matrices; empty where factors are made for each.
@@ -102,7 +103,7 @@ pub struct Workspace {
     blocks: Option<BlockMatrix>,
     coarse: Option<Coarse>,
     vectors: KrylovVectors,
-    /// Where conjugate gradients run on a device.
+    /// Conjugate gradients on a device, where they run there.
     on_device: Option<OnDevice>,
     /// Solutions that the device left to the CPU.
     left_to_cpu: usize,
@@ -148,7 +149,7 @@ impl Workspace {
                 let solver = kept.map_or_else(|| device.solver(), |kept| Ok(kept.into_solver()));
                 let solver = solver.map_err(LinearError::Device)?;
                 let mut own = OnDevice::new(solver, matrix, blocks, coarse.as_ref());
-                // What is too large from the start is refused before a run begins.
+                // A matrix that is too large from the start is refused before a run begins.
                 if before.is_none() && !empty {
                     own.arrange(blocks, coarse.as_ref()).map_err(LinearError::Device)?;
                 }

@@ -1,5 +1,5 @@
-//! Arrays whose size does not follow from that of a mesh alone, as factors of equations: where the system has
-//! no room for one that is an error, not the end of the program.
+//! Arrays whose size does not follow from the size of a mesh alone, such as factors of equations. A lack of
+//! room for them is an error, not the end of the program.
 //!
 //! ```
 //! use pliant_linear::memory::zeros;
@@ -31,7 +31,7 @@ fn told_free(free: Option<u64>) -> String {
     )
 }
 
-/// So many bytes in a unit that suits them: `8.6 GB`.
+/// A number of bytes in a unit that suits it: `8.6 GB`.
 pub fn in_words(bytes: u64) -> String {
     let bytes = bytes as f64;
     match bytes {
@@ -50,16 +50,16 @@ pub fn free() -> Option<u64> {
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
 }
 
-/// Asks the system for so many bytes and gives them back. A caller asks for the least that a mesh needs
+/// Asks the system for a number of bytes and gives them back. A caller asks for the least that a mesh needs
 /// before it makes the arrays of the mesh.
 ///
 /// # Errors
-/// If it has not.
+/// If the system has no room.
 pub fn room_for(bytes: u64) -> Result<(), OutOfMemory> {
     reserved::<u8>(usize::try_from(bytes).unwrap_or(usize::MAX)).map(|_| ())
 }
 
-/// So many zeros.
+/// An array of `count` zeros.
 ///
 /// # Errors
 /// If the system has no room for them.
@@ -69,7 +69,7 @@ pub fn zeros(count: usize) -> Result<Vec<f64>, OutOfMemory> {
     Ok(all)
 }
 
-/// An empty array with room for so many.
+/// An empty array with room for `count` entries.
 fn reserved<T>(count: usize) -> Result<Vec<T>, OutOfMemory> {
     let bytes = (count as u64).saturating_mul(size_of::<T>() as u64);
     // Linux gives more than it has, and ends the program that uses it.

@@ -1,6 +1,6 @@
 //! Conjugate gradients on a device: the search around its passes. Each pass finds a correction d with A d ≈
-//! r; the residual r = b − A x of the sum of the corrections is found in double precision on the CPU and
-//! alone decides when the solution is good enough. What single precision cannot solve is left to the CPU.
+//! r. The CPU finds the residual r = b − A x of the sum of the corrections in double precision. This residual
+//! alone decides when the solution is good enough. The CPU solves the rest that single precision cannot.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -23,7 +23,7 @@ const WORTHWHILE: f64 = 0.5;
 #[derive(Debug)]
 pub(crate) struct OnDevice {
     solver: Box<dyn DeviceSolver>,
-    /// Whether the solver has the pattern.
+    /// True if the solver has the pattern.
     is_arranged: bool,
     lower: Vec<f32>,
     inverse: Vec<f32>,
@@ -33,10 +33,10 @@ pub(crate) struct OnDevice {
     solution: Vec<f32>,
 }
 
-/// A solution, or that the CPU has to go on.
+/// A solution, or a notice that the CPU has to continue.
 pub(crate) enum Found {
     Solution(Result<LinearReport, LinearError>),
-    /// After so many iterations single precision does no more.
+    /// Number of iterations after which single precision makes no more progress.
     Rest(usize),
 }
 

@@ -1,10 +1,10 @@
-//! What a solution of linear equations took, or why there is none.
+//! Reports of linear solutions, and reasons for failures.
 
 use faer::sparse::FaerError;
 
 use crate::memory::OutOfMemory;
 
-/// What a solution took.
+/// Cost and accuracy of a solution.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LinearReport {
     /// Iterations of conjugate gradients; 0 with factors.
@@ -13,7 +13,7 @@ pub struct LinearReport {
     pub residual: f64,
 }
 
-/// Why a linear solve failed.
+/// Reason why a linear solve failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LinearError {
     /// More equations than factors can number.
@@ -28,15 +28,15 @@ pub enum LinearError {
     /// The matrix or the right-hand side holds a number that is not finite.
     #[error("the matrix is not finite")]
     NotFinite,
-    /// After so many iterations a direction has no positive stiffness.
+    /// A direction has no positive stiffness, after this number of iterations.
     #[error("after {0} iterations a direction has no positive stiffness")]
     Indefinite(usize),
-    /// Iterations ran out; what was reached.
+    /// Iterations ran out; the report of the state reached.
     #[error("after {} iterations the residual is {:e}", .0.iterations, .0.residual)]
     Stalled(LinearReport),
 }
 
-/// Why a device solves no equations, with a remedy.
+/// Reason why a device solves no equations, with a remedy.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct DeviceError(pub String);

@@ -15,7 +15,7 @@ pub const NONE: u32 = u32::MAX;
 /// Lower triangle with diagonal, column by column, rows increasing.
 #[derive(Clone, Debug, Default)]
 pub struct LowerMatrix {
-    /// Where the entries of each column start, and the end of the last.
+    /// Starts of the entries of each column, and the end of the last.
     pub column_start: Vec<u32>,
     /// The row of each entry.
     pub row: Vec<u32>,
@@ -45,17 +45,17 @@ impl Equations {
         Self { number, component }
     }
 
-    /// How many there are.
+    /// Number of equations.
     pub fn count(&self) -> usize {
         self.component.len()
     }
 
-    /// How many equations the nodes before one have.
+    /// Number of equations of the nodes before a node.
     pub fn before(&self, node: u32) -> usize {
         self.component.partition_point(|&component| component < 6 * node)
     }
 
-    /// Those of the first components of a node.
+    /// Equations of the first components of a node.
     fn of<const C: usize>(&self, node: u32) -> &[u32; C] {
         self.number[6 * node as usize..].first_chunk().expect("a node has six components")
     }
@@ -88,7 +88,7 @@ pub struct Values<'a> {
 }
 
 impl Values<'_> {
-    /// Those before a place and those from there on.
+    /// Splits into the values before a place, and the values from there on.
     pub fn split_at(self, place: usize) -> (Self, Self) {
         let Self { first, value, mirror } = self;
         let (value, after) = value.split_at_mut(place - first);
@@ -142,7 +142,7 @@ impl Values<'_> {
                 let place = |row: u32| base.wrapping_add(row - first) as usize - self.first;
                 let j = node * C + c;
                 if all_free {
-                    // Nearly all nodes: their rows follow one another, those of the column's own node from
+                    // Nearly all nodes: their rows follow one another, the rows of the column's own node from
                     // the diagonal on.
                     let own: &[f64; C] =
                         entries[j * size + a * C..].first_chunk().expect("a cell has all rows");
@@ -236,14 +236,14 @@ impl LowerMatrix {
         self.mirror.fill(0.0);
     }
 
-    /// All values, and where each column starts.
+    /// Values of the matrix, and the start of each column.
     pub fn values(&mut self) -> (Values<'_>, &[u32]) {
         let Self { column_start, value, mirror, .. } = self;
         (Values { first: 0, value, mirror }, column_start)
     }
 
-    /// Where in the values the rows of node `row` in an equation's column start, had the row node's first
-    /// equation a place there. Wraps below zero.
+    /// Place in the values where the rows of node `row` start in an equation's column, as if the row node's
+    /// first equation had a place there. Wraps below zero.
     fn base(&self, equations: &Equations, row_node: u32, column: u32) -> u32 {
         let start = self.column_start[column as usize];
         let rows = &self.row[start as usize..self.column_start[column as usize + 1] as usize];
@@ -278,8 +278,8 @@ impl LowerMatrix {
         (0..cell.nodes.len()).for_each(|node| values.add(equations, cell, node));
     }
 
-    /// Whether the pattern couples the translations of two nodes, the lower number first, or one of them has
-    /// none that is free.
+    /// True if the pattern couples the translations of two nodes, the lower number first, or if one of them
+    /// has no free translation.
     pub fn couples(&self, equations: &Equations, [low, high]: [u32; 2]) -> bool {
         let [column, row] = [low, high].map(|node| {
             let translations = &equations.number[6 * node as usize..6 * node as usize + 3];
@@ -288,8 +288,8 @@ impl LowerMatrix {
         column == NONE || row == NONE || self.rows(column).binary_search(&row).is_ok()
     }
 
-    /// Adds to so many components of two nodes that the pattern couples, translations first; the first node
-    /// has the higher number or is the same.
+    /// Adds to a number of components of two nodes that the pattern couples, translations first. The first
+    /// node has the higher number or is the same.
     pub fn add_node_block(
         &mut self,
         equations: &Equations,

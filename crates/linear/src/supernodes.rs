@@ -1,7 +1,8 @@
-//! What the factors of a matrix look like before they have numbers: the order of elimination, columns that
-//! are eliminated together (supernodes), and which takes up what another one leaves (the assembly tree; Duff
-//! and Reid 1983, Liu 1992). Columns with the same rows form one, and others where that stores few zeros
-//! (relaxed amalgamation, Ashcraft and Grimes 1989). A function of the pattern alone.
+//! Structure of the factors of a matrix before they have numbers. It has the order of elimination and the
+//! columns that are eliminated together (supernodes). The assembly tree gives the supernode that takes the
+//! update of another one (Duff and Reid 1983, Liu 1992). Columns with the same rows form one supernode, and
+//! others where that stores few zeros (relaxed amalgamation, Ashcraft and Grimes 1989). The structure is a
+//! function of the pattern alone.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::amd;
@@ -21,8 +22,8 @@ pub(crate) fn padded(rows: usize) -> usize {
     rows.next_multiple_of(PACK)
 }
 
-/// Columns that are eliminated together. Its front has a panel of these columns, with rows for themselves and
-/// for those below, either padded, and what is left for the rows below.
+/// Columns that are eliminated together. Their front has a panel of these columns, and an update for the rows
+/// below. The panel has rows for the columns themselves and for the rows below, both padded.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Supernode {
     /// Its first column, and how many it has.
@@ -30,11 +31,11 @@ pub(crate) struct Supernode {
     pub width: usize,
     /// The rows below, a range of [`Supernodes::rows`].
     rows: [usize; 2],
-    /// Where its panel begins among the values.
+    /// Begin of its panel among the values.
     pub value: usize,
     /// Entries of the matrix in its columns, a range of [`Supernodes::pieces`].
     pieces: [usize; 2],
-    /// Where its rows are in the front of its parent, a range of [`Supernodes::runs`].
+    /// Places of its rows in the front of its parent, a range of [`Supernodes::runs`].
     runs: [usize; 2],
     /// The supernodes just before it in the order that leave something to it.
     pub children: usize,
@@ -71,13 +72,13 @@ pub(crate) struct Piece {
     pub across: bool,
 }
 
-/// Equations that follow one another and have the same neighbours, as those of a node. They are ordered as
-/// one, which is a sixth of the work.
+/// Equations that follow one another and have the same neighbours, such as the equations of a node. They are
+/// ordered as one, which is a sixth of the work.
 struct Groups {
-    /// The first equation of each, and the end.
+    /// The first equation of each group, and the end.
     start: Vec<u32>,
-    /// Where the rows of each begin: groups that it is coupled to, itself first, then those with higher
-    /// numbers.
+    /// Starts of the rows of each group. The rows are groups that it is coupled to: itself first, then groups
+    /// with higher numbers.
     row_start: Vec<u32>,
     row: Vec<u32>,
 }
@@ -191,7 +192,7 @@ impl Members {
 
 /// The factors by groups, which are numbered in the order of elimination.
 struct Columns {
-    /// Where the rows of each group below itself begin, and these.
+    /// Starts of the rows below each group, and these rows.
     row_start: Vec<usize>,
     row: Vec<u32>,
     children: Children,
@@ -253,7 +254,7 @@ impl Columns {
         &self.row[self.row_start[own as usize]..self.row_start[own as usize + 1]]
     }
 
-    /// Merges groups with their parents. Children are those of supernodes then, by their last members.
+    /// Merges groups with their parents. Children then belong to supernodes, by their last members.
     fn merge(&mut self, size: &[usize]) -> Members {
         let count = size.len();
         let below: Vec<usize> =
@@ -301,7 +302,7 @@ impl Columns {
     }
 }
 
-/// All supernodes in the order of elimination.
+/// Supernodes of a matrix, in the order of elimination.
 #[derive(Default)]
 pub(crate) struct Supernodes {
     pub nodes: Vec<Supernode>,
@@ -315,12 +316,12 @@ pub(crate) struct Supernodes {
     pub values: usize,
     pub most_below: usize,
     pub highest: usize,
-    /// Numbers of what is left by supernodes of even and of odd depth until their parents take it.
+    /// Most numbers in updates of supernodes of even and of odd depth that wait for their parents.
     pub stacks: [usize; 2],
 }
 
 impl Supernodes {
-    /// Those of a pattern.
+    /// Finds the supernodes of a pattern.
     pub(crate) fn new(matrix: &LowerMatrix) -> Result<Self, FaerError> {
         let groups = Groups::new(matrix);
         let order = groups.order()?;
@@ -359,12 +360,12 @@ impl Supernodes {
         self.nodes.get(node).map_or(self.order.len(), |node| node.first)
     }
 
-    /// Two numbers: the supernodes up to the first and from there up to the second are whole subtrees, and
-    /// all others come after them. Two threads take a subtree each, and then one of them the rest; the larger
-    /// subtree and the rest are together as small as they can be.
+    /// Ends of two shares of supernodes. The supernodes up to the first number, and from there up to the
+    /// second, are whole subtrees; all others come after them. Two threads take a subtree each, and then one
+    /// thread takes the rest. The larger subtree and the rest are together as small as they can be.
     pub(crate) fn shares(&self) -> [usize; 2] {
         let count = self.nodes.len();
-        // What there is to do before each, and the first of its subtree.
+        // Work before each supernode, and the first of its subtree.
         let (mut work, mut begin) = (vec![0], Vec::with_capacity(count));
         for (number, node) in self.nodes.iter().enumerate() {
             work.push(work[number] + node.height() * node.width);
@@ -450,7 +451,7 @@ impl Supernodes {
                         }
                     };
                     match runs.last_mut() {
-                        // What is in the panel and what is below ends separately.
+                        // Runs end at the border between the panel and the rows below.
                         Some(run) if (run.to + run.len) as usize == to && to != edge => run.len += 1,
                         _ => runs.push(Run { from, to: to as u32, len: 1 }),
                     }
@@ -463,7 +464,7 @@ impl Supernodes {
         Ok(())
     }
 
-    /// Where in the panel of a supernode the row of a column is.
+    /// Row of a column in the panel of a supernode.
     fn row_in(&self, node: &Supernode, column: u32) -> usize {
         match (column as usize).checked_sub(node.first).filter(|own| *own < node.width) {
             Some(own) => own,
@@ -486,7 +487,7 @@ impl Supernodes {
         self.pieces = vec![Piece::default(); next[self.nodes.len()]];
         for group in 0..groups.len() {
             let size = groups.size(group as u32);
-            // Entries of the first column above those of a group of rows.
+            // Entries of the first column above the entries of a group of rows.
             let mut above = 0;
             for &other in groups.rows(group) {
                 let (other, count) = (other as usize, groups.size(other));

@@ -16,7 +16,7 @@ pub(crate) struct LuFactors {
     column_start: Vec<u32>,
     row: Vec<u32>,
     value: Vec<f64>,
-    /// Where each entry comes from: a place in the lower half, or a mirrored one.
+    /// Origin of each entry: a place in the lower half, and true if the entry is mirrored.
     source: Vec<(u32, bool)>,
     memory: MemBuffer,
 }

@@ -20,8 +20,8 @@ pub(crate) struct Point {
     pub(crate) slopes: [[f64; 9]; 2],
 }
 
-/// The rule of 16 points of Dunavant (1985), exact to the eighth degree and the same from each corner: area
-/// coordinates and weight of one point of each kind, which stands for all its permutations.
+/// The rule of 16 points of Dunavant (1985), exact to the eighth degree and the same from each corner. It
+/// lists area coordinates and weight of one point of each kind, which represents all its permutations.
 const RULE: [([f64; 3], f64); 5] = [
     ([1.0 / 3.0; 3], 0.144_315_607_677_787),
     ([0.081_414_823_414_554, 0.459_292_588_292_723, 0.459_292_588_292_723], 0.095_091_634_267_285),

@@ -17,7 +17,7 @@ pub struct Normal {
     pub node: u32,
     /// Unit vector at rest.
     pub direction: Vector3<f64>,
-    /// Whether it is the mean of its triangles, not given.
+    /// True if it is the mean of its triangles, not given.
     pub estimated: bool,
 }
 
@@ -33,8 +33,9 @@ pub fn sides(facets: &[Facet]) -> BTreeMap<[u32; 2], Vec<(usize, usize)>> {
     sides
 }
 
-/// Control points on the straight edge: at creases, whose sides have normals of their own, and where a normal
-/// leans so far from a facet at the edge that a curve along it would fold.
+/// Flags of control points that lie on the straight edge. They lie there at creases, whose sides have
+/// different normals. They also do where a normal leans so far from a facet at the edge that a curve along it
+/// would fold.
 pub fn straight_edges(
     facets: &[Facet],
     corner_normals: &[[u32; 3]],

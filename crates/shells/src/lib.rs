@@ -2,9 +2,9 @@
 //! no model. SI units throughout.
 //!
 //! A shell element is the discrete Kirchhoff triangle (Batoz, Bathe, Ho 1980) with the ANDES membrane
-//! (Felippa 2003), which takes the mean strain of the curved triangle, six degrees of freedom a node, in a
-//! frame that turns with the [`Facet`]; its force is the gradient of its energy. A [`Patch`] is the smooth
-//! surface over a facet, for contact, pressure and pictures.
+//! (Felippa 2003). The membrane takes the mean strain of the curved triangle. The element has six degrees of
+//! freedom a node, in a frame that turns with the [`Facet`]. Its force is the gradient of its energy. A
+//! [`Patch`] is the smooth surface over a facet, for contact, pressure and pictures.
 //!
 //! ```
 //! use nalgebra::Vector3;

@@ -1,7 +1,8 @@
 //! One patch of the curved surface of shells: a cubic Bézier triangle over a facet, from the positions of its
-//! nodes and the normals that turn with them. Its velocity is J times the nodes' velocities and spins; forces
-//! on it go back by the transpose of the same J, so their work is the same. PN triangles (Vlachos et al.
-//! 2001), with control points along edges placed so that an edge with equal end angles is an arc.
+//! nodes and the normals that turn with them. Its velocity is J times the nodes' velocities and spins. Forces
+//! on the patch go back by the transpose of the same J, so their work is the same. The patches are PN
+//! triangles (Vlachos et al. 2001), with control points along edges placed so that an edge with equal end
+//! angles is an arc.
 
 use std::ops::Deref;
 
@@ -30,8 +31,8 @@ pub struct Carried {
     pub place: Place,
     /// Its height above the foot along the normal [m].
     pub height: f64,
-    /// What is left of its offset [m], along the facet's first tangent and the one across: 0 unless the foot
-    /// is on a border.
+    /// Rest of its offset [m], along the facet's first tangent and the tangent across: 0 unless the foot is
+    /// on a border.
     pub aside: [f64; 2],
 }
 
@@ -76,8 +77,8 @@ impl Patch {
         j
     }
 
-    /// A unit normal that is quadratic between those at the corners and, at the middle of an edge, the one
-    /// that an S-shaped edge needs (Vlachos et al. 2001). It is the same on both sides of an edge. It
+    /// A unit normal that is quadratic between the corners' normals. At the middle of an edge it is the
+    /// normal that an S-shaped edge needs (Vlachos et al. 2001). It is the same on both sides of an edge. It
     /// differs from the surface's normal by a term that falls with the square of the edges.
     pub fn shading_normal(&self, weights: [f64; 3]) -> Vector3<f64> {
         let (p, n) = (self.corners(), self.normals());
@@ -92,15 +93,15 @@ impl Patch {
         sum.try_normalize(0.0).unwrap_or(n[0])
     }
 
-    /// Where a carried point is, of which this is the patch [m].
+    /// Position [m] of a carried point on this patch.
     pub fn carried(&self, point: &Carried) -> Vector3<f64> {
         let [first, second, normal] = self.frame(point.place.weights);
         let aside = point.aside[0] * first + point.aside[1] * second;
         self.point(point.place.weights) + aside + point.height * normal
     }
 
-    /// J of a carried point: that of its foot, and of its offset o = α t + β n × t + h n with t = a/|a| and
-    /// n = a × b/|a × b| of the tangents a and b.
+    /// J of a carried point: the sum of J of its foot and J of its offset o = α t + β n × t + h n. Here t =
+    /// a/|a| and n = a × b/|a × b| of the tangents a and b.
     pub fn carried_jacobian(&self, point: &Carried) -> SMatrix<f64, 3, 18> {
         let weights = point.place.weights;
         let [by_second, by_third] = CurvedTriangle::weight_slopes(weights);
@@ -160,7 +161,7 @@ mod tests {
         clamped([(); 3].map(|()| random.number().abs()))
     }
 
-    /// How a point moves with one of the eighteen numbers of a patch, by central differences with 1e-6.
+    /// Derivative of a point by one of the eighteen numbers of a patch, by central differences with 1e-6.
     fn slope(
         (p, n): ([Vector3<f64>; 3], [Vector3<f64>; 3]),
         place: usize,

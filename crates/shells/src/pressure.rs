@@ -1,8 +1,8 @@
-//! Pressure on a curved triangle: the nodal forces and moments ∫ Jᵀ n dA of a pressure of 1, and how they
-//! change. With h_a = ∫ F_a n dA on each control point b_a that is Σ D_aᵀ h_a, where D_a are the control
-//! points' velocities. h is a sum of b_b × b_c with constant weights, so all is exact. Over a closed surface,
-//! or one whose rim does not move, the force is the gradient of the volume, and its change is symmetric; else
-//! the sides at the rim add an unsymmetric part.
+//! Pressure on a curved triangle: the nodal forces and moments ∫ Jᵀ n dA of a pressure of 1, and their
+//! change. Let h_a = ∫ F_a n dA on each control point b_a, and let D_a be the control points' velocities. The
+//! forces are Σ D_aᵀ h_a. h is a sum of b_b × b_c with constant weights, so all is exact. Over a closed
+//! surface, or one whose rim does not move, the force is the gradient of the volume. Its change is then
+//! symmetric; otherwise the sides at the rim add an unsymmetric part.
 
 use std::sync::LazyLock;
 
@@ -33,7 +33,7 @@ static WEIGHTS: LazyLock<[[[f64; 9]; 9]; 9]> = LazyLock::new(|| {
     all
 });
 
-/// The weights of b_b × b_c on each control point, for the pairs b < c in their order: side by side, the sum
+/// The weights of b_b × b_c on each control point, for the pairs b < c in their order. Side by side, the sum
 /// takes a fifth less time.
 static PAIRS: LazyLock<[[f64; 9]; 36]> = LazyLock::new(|| {
     let mut pairs = (0..9).flat_map(|b| (b + 1..9).map(move |c| [b, c]));
@@ -44,8 +44,8 @@ static PAIRS: LazyLock<[[f64; 9]; 36]> = LazyLock::new(|| {
 });
 
 impl Patch {
-    /// Weights of the products b_b × b_c of control points, for the pairs b < c of nine in their order, in ∫
-    /// F_a n dA on each.
+    /// Weights of the products b_b × b_c of control points in ∫ F_a n dA on each, for the pairs b < c of nine
+    /// in their order.
     pub fn pressure_weights() -> &'static [[f64; 9]; 36] {
         &PAIRS
     }
@@ -194,7 +194,7 @@ mod tests {
         (p, [(); 3].map(|()| exponential(&(0.3 * vector(random))) * normal))
     }
 
-    /// What is written out and the whole matrices: 1e-14 of the largest.
+    /// The written-out forces equal the products of whole matrices to 1e-14 of the largest.
     #[test]
     fn forces_are_those_by_the_maps_of_the_control_points() {
         let mut random = Random::new(4);
@@ -229,9 +229,9 @@ mod tests {
         }
     }
 
-    /// f = dV + ⅓ ∮ (x × x_s)·dx over the rim, run through with the surface on its left, with the volume V =
-    /// ⅓ ∫ x·n dA of the cone to the origin: 1e-12. Five points of Gauss are exact for the rim, of the eighth
-    /// degree.
+    /// The force is f = dV + ⅓ ∮ (x × x_s)·dx over the rim, run through with the surface on its left, to
+    /// 1e-12. V = ⅓ ∫ x·n dA is the volume of the cone to the origin. Five points of Gauss are exact for the
+    /// rim, of the eighth degree.
     #[test]
     fn forces_are_the_gradient_of_the_volume_and_a_rim() {
         let mut random = Random::new(2);

@@ -35,8 +35,8 @@ pub(crate) const BERNOULLI: [f64; 8] = [
 /// The angle [rad] below which the series of [`eta`] and [`mu`] leave out less than a rounding.
 const SERIES: f64 = 0.6;
 
-/// The sine squared of half the angle below which [`logarithm`] takes a series, as of most nodes of shells:
-/// in a third of the time of an arctangent. The angle is then below half a radian.
+/// The sine squared of half the angle below which [`logarithm`] takes a series, for most nodes of shells. A
+/// series takes a third of the time of an arctangent. The angle is then below half a radian.
 pub const SMALL: f64 = 0.06;
 
 /// Σ cₖ xᵏ.

@@ -1,4 +1,4 @@
-//! What tests of several files use.
+//! Poses and helpers for tests of several files.
 
 use nalgebra::Vector3;
 
@@ -7,8 +7,8 @@ use crate::rotation::exponential;
 /// Corners and normals of a curved triangle.
 pub(crate) type Pose = ([Vector3<f64>; 3], [Vector3<f64>; 3]);
 
-/// A pose with one of its eighteen numbers changed: six a corner, three of the position [m] and three of a
-/// turn of the normal [rad].
+/// A pose with one of its eighteen numbers changed. Each corner has six: three of the position [m] and three
+/// of a turn of the normal [rad].
 pub(crate) fn moved((p, n): &Pose, place: usize, by: f64) -> Pose {
     let (mut p, mut n) = (*p, *n);
     let mut change = Vector3::zeros();

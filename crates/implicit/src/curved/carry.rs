@@ -1,8 +1,8 @@
 //! Visual meshes carried by shells. Each point finds the nearest place of the curved surface, follows it, and
-//! gives forces back. A search tree holds the flat facets. A patch is at most its bulge away from its facet,
-//! so patches are tried from the nearest facet on until no other can be nearer. The place found is the
-//! nearest of all, at a cost per point that grows with the logarithm of the number of facets. Leaves out:
-//! keeping neighbouring points of a mesh on the same side of a fold.
+//! gives forces back. A search tree holds the flat facets. A patch is at most its bulge away from its facet.
+//! Patches are tried from the nearest facet on, until no other can be nearer. The place found is the nearest
+//! of all, at a cost per point that grows with the logarithm of the number of facets. Leaves out: keeping
+//! neighbouring points of a mesh on the same side of a fold.
 
 use nalgebra::Vector3;
 use pliant_geometry::barycentric_of_closest;

@@ -1,6 +1,6 @@
 //! The co-rotated linear law in closed form. P = 2μ (F − R) + λ tr(Rᵀ F − I) R is the exact gradient of its
-//! energy, so its tangent is symmetric (McAdams et al. 2011, ACM TOG 30:37). The cost is a sixth of the
-//! differences that other laws take.
+//! energy (McAdams et al. 2011, ACM TOG 30:37). Its tangent is therefore symmetric. The cost is a sixth of
+//! the differences that other laws take.
 
 use nalgebra::{Matrix3, Vector3};
 use pliant_mechanics::law::Corotational;

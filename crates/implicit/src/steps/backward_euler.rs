@@ -1,8 +1,8 @@
 //! Motion in time by three integrators. Backward Euler minimises elastic energy, loads and Σ m |u − h
-//! v|²/(2h²) in a step; rotation vectors of the step have the same term with the rotary inertia. The backward
-//! differentiation formula of second order (Gear 1971; for unequal steps Hairer, Nørsett and Wanner 1993,
-//! III.5) is the same step from an extrapolated point. Explicit central differences are the third. Rayleigh
-//! damping: α M + β K, with K of the start of the step.
+//! v|²/(2h²) in a step. Rotation vectors of the step have the same term with the rotary inertia. The backward
+//! differentiation formula of second order takes the same step from an extrapolated point (Gear 1971; for
+//! unequal steps Hairer, Nørsett and Wanner 1993, III.5). Explicit central differences are the third.
+//! Rayleigh damping: α M + β K, with K of the start of the step.
 //!
 //! Let r = h/h₋ for the present and the previous step, a = r²/(1 + 2r), and h* = h (1 + r)/(1 + 2r). Then x =
 //! x₀ + a (x₀ − x₋) + h* v and v = v₀ + a (v₀ − v₋) + h* f/m. Backward Euler has a = 0, h* = h. Rotations are

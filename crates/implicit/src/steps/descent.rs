@@ -299,8 +299,8 @@ impl<'a> Descent<'a> {
         broken.map_or(Ok(None), Err)
     }
 
-    /// Follows an increment that was made in full further: two, four and eight times as far, while the energy
-    /// falls and nothing is in the way.
+    /// Follows an increment that was made in full further, while the energy falls and nothing is in the way.
+    /// It goes two, four and eight times as far.
     fn expand(&mut self, solver: &mut impl Contacting, state: &mut State) -> Result<(), SolveError> {
         let (before, time) = (&mut self.before, self.time);
         for doubling in 0..DOUBLINGS {

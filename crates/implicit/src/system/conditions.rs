@@ -140,8 +140,8 @@ impl Conditions {
         }
     }
 
-    /// The pressure [Pa] of a constraint's volume at the residual last found, the growth that the volume
-    /// still needs [m³], and its size at rest [m³].
+    /// The pressure [Pa] of a constraint's volume at the residual last found, the growth [m³] that the volume
+    /// still needs, and its rest volume [m³].
     pub(crate) fn enclosed(&self, constraint: usize) -> Option<[f64; 3]> {
         let given = self.loose.iter().map(|(row, pressure)| (row, *pressure));
         let all = self.rows.iter().map(|row| (row, -row.force)).chain(given);

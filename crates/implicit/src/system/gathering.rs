@@ -33,8 +33,8 @@ impl Corners {
         own
     }
 
-    /// Calls `take` for each node with its corners (facet in the chunk, corner of the facet) and with the
-    /// sums of a range of nodes that contains it.
+    /// Calls `take` for each node. Its arguments are the node, its corners (facet in the chunk, corner of the
+    /// facet), and the sums of a range of nodes around it.
     pub(crate) fn visit(
         &self,
         equations: &Equations,

@@ -406,9 +406,9 @@ impl System {
         }
     }
 
-    /// Adds the inertia of rigid parts and of nodes that turn with a solid to the stiffness. The functions
-    /// give the mass rate [kg/s²] of a node and its force [N], the rate [N m] of its rotary inertia, and its
-    /// moment [N m].
+    /// Adds the inertia of rigid parts and of nodes that turn with a solid to the stiffness. `of` gives the
+    /// mass rate [kg/s²] of a node and its force [N]; `rotary` the rate [N m] of its rotary inertia; `moment`
+    /// its moment [N m].
     pub(crate) fn add_bound_masses(
         &mut self,
         of: impl Fn(u32) -> (f64, Vector3<f64>),

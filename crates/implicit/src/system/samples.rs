@@ -232,7 +232,7 @@ impl Samples {
 }
 
 /// Nodes that move the points of contacts: a node itself, the nodes that a tied node follows, or the nodes
-/// around a point of a curved surface.
+/// around a point on a curved surface
 #[derive(Clone, Copy)]
 pub(crate) struct Movers<'a> {
     pub model: &'a Assembly,

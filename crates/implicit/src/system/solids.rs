@@ -11,17 +11,17 @@ use crate::model::state::State;
 use crate::solid::relaxation::Relaxation;
 use crate::solid::{Response, Stars};
 
-/// What cells of solids need beside the model.
+/// Data of cells of solids besides the model.
 pub(super) struct Solids {
     /// Places in the matrix of the cells of each solid, and of its stars.
     places: Vec<[Vec<Vec<u32>>; 2]>,
-    /// Of the faces of each load that presses on solids.
+    /// Places in the matrix of the faces of each load that presses on solids.
     face_places: Vec<Vec<Vec<u32>>>,
     /// The averages of each solid that has some.
     stars: Vec<Option<Stars>>,
-    /// How stresses relax in the step or at the instant.
+    /// Relaxation of stresses in the step or at the instant.
     pub(super) relaxation: Relaxation,
-    /// Of a chunk of cells.
+    /// Responses of a chunk of cells.
     results: Vec<Response>,
 }
 
@@ -75,7 +75,8 @@ impl Solids {
         Ok(())
     }
 
-    /// The same of one solid; a cell that breaks is counted from its first.
+    /// Adds the forces of one solid, and its stiffness if wanted. The number of a broken cell counts from the
+    /// first cell of the solid.
     fn add_solid(
         &mut self,
         model: &Assembly,
@@ -121,8 +122,8 @@ impl Solids {
         Ok(())
     }
 
-    /// Adds how pressures on faces change with their nodes, its symmetric part unless both halves are kept:
-    /// all of it where the faces close or end at held nodes.
+    /// Adds the change of pressures on faces with their nodes. Without both halves of the matrix it adds the
+    /// symmetric part, which is the whole where faces close or end at held nodes.
     pub(super) fn add_faces(
         &self,
         model: &Assembly,
@@ -168,9 +169,9 @@ pub(super) fn corners(face: &Face) -> &[u32] {
     if face[3] == NO_NODE { &face[..3] } else { face }
 }
 
-/// The derivative of p ∫ N_a n dA of a face by the places of its nodes, column by column: what the pressure
-/// pushes against the outward normal; its symmetric part alone if that is wanted. By differences, exact: the
-/// areas are of second order in each place.
+/// The derivative of p ∫ N_a n dA of a face by the positions of its nodes, column by column. The pressure
+/// acts against the outward normal. If wanted, only its symmetric part. The derivative is made by
+/// differences, which are exact: the areas are of second order in each position.
 fn pressure_change(face: &Face, count: usize, state: &State, pressure: f64, symmetric: bool) -> Vec<f64> {
     let size = 3 * count;
     let mut tangent = vec![0.0; size * size];

@@ -1,4 +1,4 @@
-//! The matrix of a model's equations: what is added to it, and what solves with it.
+//! The matrix of a model's equations, the additions to it, and its solvers.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -18,12 +18,12 @@ use crate::model::error::SolveError;
 pub(crate) struct Stiffness {
     pub(crate) equations: Equations,
     pub(crate) matrix: LowerMatrix,
-    /// What prescribed increments make of forces on free components: K_fc d_c.
+    /// Forces on free components from prescribed increments: K_fc d_c.
     pub(crate) coupling: Vec<f64>,
     /// The stiffness at the start of a step that damps it; empty without such damping.
     pub(crate) damper: Vec<f64>,
     pub(super) solver: LinearSolver,
-    /// What solves the equations in place of the CPU.
+    /// Device that solves the equations in place of the CPU.
     pub(super) device: Option<Arc<dyn LinearDevice>>,
     /// None in a system of forces alone.
     workspace: Option<Workspace>,
@@ -57,7 +57,7 @@ impl Stiffness {
         Ok(())
     }
 
-    /// Whether only one half of the matrix is kept.
+    /// True if only one half of the matrix is kept.
     pub(super) fn is_symmetric(&self) -> bool {
         self.matrix.mirror.is_empty()
     }
@@ -108,8 +108,8 @@ impl Stiffness {
         }
     }
 
-    /// Adds a stiffness of the first components of nodes at its places, and what prescribed increments make
-    /// of it.
+    /// Adds a stiffness of the first components of nodes at its places, and its forces from prescribed
+    /// increments to the coupling.
     pub(super) fn add_block(
         &mut self,
         (nodes, components): (&[u32], usize),

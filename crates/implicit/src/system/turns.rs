@@ -1,6 +1,6 @@
-//! Rotations of nodes that follow the translations of others, as those of a wall in or on a solid: R is the
-//! rotation nearest to the gradient of the solid there, F = Σ x gᵀ over the nodes of the solid, F = V R
-//! (polar decomposition). With r = R g and W = (tr V I − V)⁻¹
+//! Rotations of nodes that follow the translations of others, for example of a wall in or on a solid. R is
+//! the rotation nearest to the gradient of the solid there: F = Σ x gᵀ over the nodes of the solid, and F = V
+//! R (polar decomposition). With r = R g and W = (tr V I − V)⁻¹
 //!
 //! δω = W Σ r × δx,   so that a moment M gives the forces y × r with y = W M:   Jᵀ,
 //!
@@ -76,8 +76,8 @@ impl Turn {
         self.rows.iter().map(|(node, _, r)| (*node, self.inverse * skew(r)))
     }
 
-    /// The symmetric part of how the forces of a moment [N m] change with the nodes of the solid, column by
-    /// column, and i Jᵀ J with a stiffness i against spins [N m].
+    /// Change of the forces of a moment [N m] with the nodes of the solid: its symmetric part, column by
+    /// column. Adds i Jᵀ J with a stiffness i against spins [N m].
     pub(crate) fn change(&self, moment: &Vector3<f64>, rotary: f64) -> Vec<f64> {
         let y = self.inverse * moment;
         let size = 3 * self.rows.len();
@@ -137,8 +137,8 @@ mod tests {
         moved
     }
 
-    /// J is the change of the rotation, Jᵀ its transpose, and forces that keep no moment back are in balance:
-    /// their sum is 0 and their moment is that of the node.
+    /// J is the change of the rotation, and Jᵀ its transpose. Forces from a moment are in balance: their sum
+    /// is 0 and their moment is the moment on the node.
     #[test]
     fn a_moment_goes_to_the_solid_by_the_transpose_of_the_spin() {
         let (carried, state) = placed();
@@ -175,7 +175,7 @@ mod tests {
             let turn = exponential(&(Vector3::new(0.3, -0.8, 0.5).normalize() * angle));
             let mut state = State::at_rest(&Assembly::new("tet", rest.clone()));
             state.position.iter_mut().for_each(|x| *x = turn * *x + Vector3::new(0.1, 0.2, -0.3));
-            // Coordinates of 0.4 m keep 2e-16 of them, over 1 cm of the tet.
+            // Coordinates of 0.4 m have a relative accuracy of 2e-16, over 1 cm of the tet.
             assert!(Turn::new(&carried).rotation(&state).angle_to(&turn) < 1e-13);
         }
     }

@@ -8,8 +8,9 @@ use pliant_testing::Random;
 use super::{ball, model, strip};
 use crate::{CurvedSurface, State};
 
-/// A plate is stretched by 20 % and thinned to match, bent to a radius of 1 m at a thickness of 0.1 m, and
-/// turned by a radian. The strain in the middle is 20 %, exactly. Bent alone, the plate has the strain κ t/2.
+/// A plate is stretched by 20 % and thinned to match. It is bent to a radius of 1 m at a thickness of 0.1 m,
+/// and turned by a radian. The strain in the middle is 20 %, exactly. Bent alone, the plate has the strain κ
+/// t/2.
 #[test]
 fn stretch_and_bending_are_told_apart() {
     let model = model(strip(), 0.1);

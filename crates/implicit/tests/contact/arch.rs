@@ -28,9 +28,8 @@ fn widths() -> [f64; 2] {
     RADII.map(|radius| 2.0 * radius * (0.5 * PI / BLOCKS as f64).tan())
 }
 
-/// The least friction with which the arch stands. For each thrust H and each height at the crown with the
-/// thrust inside all joints, a joint has a largest ratio of shear to thrust. The result is the smallest of
-/// these ratios.
+/// The least friction with which the arch stands. A thrust H at a height of the crown that passes inside all
+/// joints has a largest ratio of shear to thrust. The result is the smallest of these ratios.
 fn least_friction() -> f64 {
     let [inner, outer] = widths();
     let angle = PI / BLOCKS as f64;

@@ -64,8 +64,8 @@ fn gap_under(pressure: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// A1, the patch test of contact: a block of 2 × 2 × 2 cells on another of 3 × 3 × 3, without friction,
-/// pressed by about 1 kPa.
+/// A1, the patch test of contact without friction. A block of 2 × 2 × 2 cells is pressed by about 1 kPa on
+/// another of 3 × 3 × 3.
 #[test]
 fn a_uniform_pressure_goes_through_cells_that_do_not_match() {
     let (barrier, stiffness) = (5e-5, 1e5);

@@ -43,7 +43,8 @@ fn rigid(piece: &Piece) -> Rigid {
     super::rigid("held", shape, Trajectory::fixed(at))
 }
 
-/// Plays a scene, with all bodies soft or with rigid held ones.
+/// Plays a scene, with all bodies soft or with rigid held ones. An error gives the numbers that are out of
+/// bounds.
 fn play(scene: &Scene, is_rigid: bool) -> Result<(), String> {
     let name = if is_rigid { format!("{}, rigid", scene.name) } else { scene.name.to_owned() };
     let (held, soft): (Vec<&Piece>, Vec<&Piece>) =

@@ -52,8 +52,8 @@ pub(super) fn aggregates(around: &[Vec<u32>], most: usize) -> (Vec<u32>, Vec<u32
     (groups.into_iter().flatten().collect(), start)
 }
 
-/// Groups among which loose parts of fewer than `size` nodes go together until they have as many; `is_within`
-/// tells whether a node has neighbours in the group of a number alone.
+/// Groups of nodes. Loose parts of fewer than `size` nodes join until they have as many. `is_within` returns
+/// true if a node has neighbours only in the group with a number.
 fn joined(groups: Vec<Vec<u32>>, size: usize, is_within: impl Fn(u32, u32) -> bool) -> Vec<Vec<u32>> {
     let mut all: Vec<Vec<u32>> = Vec::new();
     let mut open = None;

@@ -26,14 +26,14 @@ pub(crate) struct BlockMatrix {
     pub(super) equations: Vec<[u32; 6]>,
     /// The node's number in the model.
     pub(super) number: Vec<u32>,
-    /// Where the nodes of each aggregate start, and the end of the last.
+    /// Starts of the nodes of each aggregate, and the end of the last.
     pub(super) aggregate_start: Vec<u32>,
     pub(super) row_start: Vec<u32>,
     pub(super) column: Vec<u32>,
     pub(super) value: Vec<Block>,
-    /// These in single precision, if they are many.
+    /// The blocks in single precision, if they are many.
     pub(super) single: Vec<SingleBlock>,
-    /// Where the entries come from in the lower half.
+    /// Places in the lower half that the entries come from.
     pub(super) source: Vec<[u32; 36]>,
     /// Places of the diagonal blocks, and their inverses.
     pub(super) diagonal: Vec<u32>,
@@ -142,7 +142,7 @@ impl BlockMatrix {
         self.equations.len()
     }
 
-    /// Where everything is, for a device; with the pairs of touching aggregates where they are wanted.
+    /// Pattern of the blocks for a device, with the pairs of touching aggregates where wanted.
     pub(crate) fn pattern(&self, touching: Option<Vec<[u32; 2]>>) -> BlockPattern<'_> {
         let bit = |(c, &equation): (usize, &u32)| u32::from(equation != NONE) << c;
         BlockPattern {
@@ -227,8 +227,8 @@ impl BlockMatrix {
     }
 }
 
-/// What the diagonals of inverses grow by: more than six numbers of a row lose by rounding, so that the
-/// inverse stays positive definite.
+/// Growth factor of the diagonals of inverses. It exceeds the rounding error of six numbers of a row, so that
+/// the inverse stays positive definite.
 const GROWN: f64 = 1.0 + 4.0 * f32::EPSILON as f64;
 
 /// Inverts the diagonal blocks of some nodes from one on, with ones where these have no equation; false if

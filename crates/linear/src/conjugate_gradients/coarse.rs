@@ -13,8 +13,8 @@ use crate::sparse::{Equations, LowerMatrix};
 /// Pivots of the coarse matrix above minus this part of the diagonal are zero but for round-off.
 const ROUND_OFF: f64 = 1e-10;
 
-/// Rigid motions of the aggregates: with P that of the nodes by those of aggregates, the coarse matrix is Pᵀ
-/// A P.
+/// Rigid motions of the aggregates. With P the motion of nodes over the motions of aggregates, the coarse
+/// matrix is Pᵀ A P.
 pub(crate) struct Coarse {
     /// Arm of each node from the middle of its aggregate [m].
     arm: Vec<Vector3<f64>>,
@@ -31,9 +31,9 @@ pub(crate) struct Coarse {
     force: Vec<f64>,
 }
 
-/// Pᵀ A: with what forces on aggregates the motion of a node is resisted.
+/// Pᵀ A: the forces on aggregates that resist the motion of a node.
 struct Projected {
-    /// Where the blocks of each aggregate start, and the end of the last.
+    /// Starts of the blocks of each aggregate, and the end of the last.
     start: Vec<u32>,
     /// Aggregate and node of each block, increasing.
     aggregate: Vec<u32>,
@@ -239,7 +239,7 @@ impl Coarse {
         self.force.iter().zip(&self.motion).map(|(f, m)| f * m).sum()
     }
 
-    /// What the rigid motion does to a node.
+    /// Motion of a node from the rigid motion of its aggregate.
     #[inline(always)]
     pub(super) fn motion(&self, node: usize) -> Node {
         let own = 6 * self.aggregate[node] as usize;

@@ -24,7 +24,7 @@ impl WithSimd for BlockRow<'_> {
     }
 }
 
-/// The same of blocks in single precision.
+/// A row of blocks in single precision, with the vector.
 pub(super) struct SingleRow<'a> {
     pub(super) blocks: &'a [SingleBlock],
     pub(super) columns: &'a [u32],
@@ -120,8 +120,8 @@ fn add_times(block: &Block, x: &Node, to: &mut Node) {
     }
 }
 
-/// Adds B x, four products at a time: of the first four rows, of even and of odd columns; of the last two
-/// rows, of two columns at once.
+/// Adds B x, four products at a time. The first four rows take even and odd columns separately; the last two
+/// rows take two columns at once.
 #[inline(always)]
 fn add_single_times(block: &SingleBlock, x: &Node, sums: &mut [[f64; 4]; 3]) {
     let quads: &[[f32; 4]; 9] = block.as_chunks().0.try_into().expect("nine times four");
@@ -148,7 +148,7 @@ fn added([even, odd, last]: &[[f64; 4]; 3]) -> Node {
     [first[0], first[1], first[2], first[3], last[0] + last[2], last[1] + last[3]]
 }
 
-/// That of the blocks that products read.
+/// Precision of the blocks that products read.
 #[derive(Clone, Copy)]
 pub(super) enum Precision {
     Single,

@@ -39,7 +39,7 @@ pub(crate) struct KrylovVectors {
     ap: Vec<Node>,
     /// Sums of chunks.
     parts: Vec<[f64; 2]>,
-    /// For factors, whose order is that of the equations.
+    /// Vector in the order of the equations, for factors.
     equations: Vec<f64>,
 }
 

@@ -88,8 +88,8 @@ fn what_single_precision_leaves_is_found_in_double_precision() {
     assert!((left / size).sqrt() <= 1e-4 && report.residual <= 1e-4, "{left:e} {report:?}");
 }
 
-/// A chain of springs that is held at one end, with every approximation that iterates: in single precision
-/// the solution is found as in double, and where iterations run out it is not that of the start.
+/// A chain of springs that is held at one end, with every approximation that iterates. Single precision finds
+/// the same solution as double. Where iterations run out, the solution differs from the start.
 #[test]
 fn many_blocks_are_solved_in_single_precision() {
     const NODES: usize = 60;

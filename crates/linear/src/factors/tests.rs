@@ -6,8 +6,8 @@ use pliant_testing::Random;
 use super::*;
 use crate::sparse::Equations;
 
-/// Nodes in a row of cells that share some with the next ones, pairs of other nodes, and components that are
-/// held: widths and heights of fronts of all kinds, wider than a block for many nodes.
+/// Pattern with nodes in a row of cells that share some with the next ones, pairs of other nodes, and held
+/// components. It has fronts of all widths and heights, for many nodes wider than a block.
 fn pattern(random: &mut Random, nodes: usize, held: usize) -> LowerMatrix {
     let mut free = vec![true; 6 * nodes];
     (0..held).for_each(|_| free[random.below(6 * nodes)] = false);
@@ -82,8 +82,8 @@ fn factors_solve_and_count_negative_eigenvalues() {
     }
 }
 
-/// Springs of 1 between six equations that nothing else holds, a matrix of rank 5: its last pivot is zero but
-/// for round-off. So is that of an equation without stiffness.
+/// Springs of 1 between six equations that nothing else holds are a matrix of rank 5. Its last pivot is zero
+/// except for round-off. The pivot of an equation without stiffness is zero, too.
 #[test]
 fn zero_pivots_are_told() {
     let mut matrix = pattern(&mut Random::new(7), 1, 0);
@@ -97,7 +97,7 @@ fn zero_pivots_are_told() {
     assert!(pivots.smallest < ZERO_PIVOT && pivots.weakest == 2, "{pivots:?}");
 }
 
-/// What is not a number, or not finite, is found wherever it stands.
+/// A number that is not finite is found at any place.
 #[test]
 fn numbers_that_are_not_finite_are_told() {
     let mut matrix = pattern(&mut Random::new(7), 12, 0);

@@ -9,8 +9,8 @@ use super::{Corners, Differences, Matrix9, PlaneStress};
 /// (L2, L3) in the middle of the edges: three points that integrate quadratics exactly.
 pub(crate) const MIDSIDES: [[f64; 2]; 3] = [[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]];
 
-/// Curvatures (βx,x, βy,y, βx,y + βy,x) [1/m] over (w, θx, θy) at a point with area coordinates (L2, L3);
-/// strain at a height z is z times them.
+/// Curvatures (βx,x, βy,y, βx,y + βy,x) [1/m] over (w, θx, θy) at a point with area coordinates (L2, L3).
+/// Strain at a height z is z times the curvatures.
 pub(crate) fn curvature(corners: &Corners, [xi, eta]: [f64; 2]) -> SMatrix<f64, 3, 9> {
     let d = Differences::new(corners);
     // k = 4, 5, 6 stand for the edges 23, 31, 12.

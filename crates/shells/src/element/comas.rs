@@ -1,5 +1,5 @@
-//! Bending as in Comas (2010), section 8.3, with its typing errors put right: a cubic deflection of nine
-//! terms in the frame of the first edge. For comparison only; see
+//! Bending as in Comas (2010), section 8.3, with its typing errors corrected: a cubic deflection of nine
+//! terms in the frame of the first edge. It serves only for comparison; see
 //! [`Bending::Comas2010`](super::Bending::Comas2010).
 
 use nalgebra::{SMatrix, Vector2};
@@ -30,8 +30,8 @@ fn curvature(at: Vector2<f64>) -> SMatrix<f64, 3, 9> {
 
 /// Stiffness of the element; not independent of the order of the corners.
 ///
-/// Its 9 × 9 matrix of the polynomial at the corners has the determinant x₂⁵ y₃⁶: it is singular only if the
-/// area is zero, and then the stiffness is not a number.
+/// Its 9 × 9 matrix of the polynomial at the corners has the determinant x₂⁵ y₃⁶. The matrix is singular only
+/// if the area is zero; the stiffness is then not a number.
 pub fn comas_2010(corners: &Corners, elastic: &PlaneStress, thickness: f64) -> Matrix9 {
     let [origin, second, _] = *corners;
     let along = (second - origin).normalize();

@@ -1,9 +1,10 @@
 //! Membrane strain of a curved triangle: the mean over its cubic Bézier patch, linear in the nodes'
-//! displacements and rotations about rest. The edges of the patch turn in their surface by (1 − α) of the
-//! turn of their chord and by α of that of their node about its own normal, which both neighbours share: α =
-//! 3/2, as in the ANDES triangle, which this is on a flat facet. Strain and pressure from one surface that is
-//! continuous over edges leave no nodal forces that bend a thin wall. Leaves out: how the strain changes as
-//! the wall bends far from its rest shape, by the square of an edge's angle.
+//! displacements and rotations about rest. The edges of the patch turn in their surface. Their turn is (1 −
+//! α) times the turn of their chord plus α times the turn of their node about its own normal. Both neighbours
+//! share this normal. α = 3/2, as in the ANDES triangle, which this element becomes on a flat facet. Strain
+//! and pressure come from one surface that is continuous over edges, so they leave no nodal forces that bend
+//! a thin wall. Leaves out: the change of the strain as the wall bends far from its rest shape, by the square
+//! of an edge's angle.
 
 use nalgebra::{Matrix2, Matrix3, RowVector3, SMatrix, Vector2, Vector3};
 
@@ -16,18 +17,19 @@ use crate::patch::Patch;
 /// Something of three rows over (u, v, w, θx, θy, θz) of three nodes.
 pub(crate) type Matrix3x18 = SMatrix<f64, 3, 18>;
 
-/// What a curved membrane resists.
+/// Area, strain and drilling of a curved membrane.
 pub(crate) struct CurvedMembrane {
     /// Area of the patch [m²].
     pub(crate) area: f64,
     /// Mean strain (εxx, εyy, γxy).
     pub(crate) strain: Matrix3x18,
-    /// Rotations of the nodes about their own normals less that of the facet.
+    /// Rotations of the nodes about their own normals, less the rotation of the facet.
     pub(crate) hierarchical: Matrix3x18,
 }
 
 impl CurvedMembrane {
-    /// Of a patch in the axes of its facet, with the gradients of the facet's shape functions.
+    /// Finds the membrane of a patch in the axes of its facet, with the gradients of the facet's shape
+    /// functions.
     pub(crate) fn new(patch: &Patch, gradient: &[Vector2<f64>; 3]) -> Self {
         let normals = own_normals(patch);
         let (place, mut maps) = (patch.controls(), patch.control_maps());

@@ -1,7 +1,7 @@
 //! Walls of layers: classical laminate theory (Reissner and Stavsky 1961, J. Appl. Mech. 28:402; Jones 1999).
-//! With the plane stress Q of each layer, turned to the axes of the wall, membrane forces and moments of
-//! strains ε and curvatures κ are n = A ε + B κ, m = B ε + D κ, (A, B, D) = ∫ Q (1, z, z²) dz. Leaves out:
-//! shear across the thickness, slip between layers.
+//! Each layer has the plane stress Q, turned to the axes of the wall. Strains ε and curvatures κ give the
+//! membrane forces n = A ε + B κ and the moments m = B ε + D κ. Here (A, B, D) = ∫ Q (1, z, z²) dz. Leaves
+//! out: shear across the thickness, slip between layers.
 
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
@@ -25,7 +25,7 @@ impl From<Elasticity> for Orthotropic {
 }
 
 impl Orthotropic {
-    /// Whether every deformation costs energy: moduli above 0, and ν₁₂² < E₁/E₂.
+    /// True if every deformation costs energy: moduli above 0, and ν₁₂² < E₁/E₂.
     pub fn is_stable(&self) -> bool {
         let [first, second] = self.young;
         let all = [first, second, self.shear].iter().all(|modulus| *modulus > 0.0 && modulus.is_finite());
@@ -40,7 +40,7 @@ impl Orthotropic {
         Matrix3::new(first / part, mixed, 0.0, mixed, second / part, 0.0, 0.0, 0.0, self.shear)
     }
 
-    /// The same in axes that axis 1 is turned from by an angle [rad].
+    /// Stress over strain in axes from which axis 1 is turned by an angle [rad].
     fn turned(&self, angle: f64) -> Matrix3<f64> {
         let (s, c) = angle.sin_cos();
         #[rustfmt::skip]
@@ -76,8 +76,8 @@ pub(crate) fn density(layers: &[Layer]) -> f64 {
     layers.iter().map(|layer| layer.density * layer.thickness).sum::<f64>() / thickness(layers)
 }
 
-/// The isotropic elasticity that layers have on the mean over all angles (Tsai and Pagano 1968): what stands
-/// for them where an element wants one number.
+/// The isotropic elasticity that layers have as a mean over all angles (Tsai and Pagano 1968). It represents
+/// the layers where an element needs one number.
 pub(crate) fn mean(layers: &[Layer]) -> Elasticity {
     let whole = thickness(layers);
     let q = layers
@@ -116,8 +116,8 @@ pub struct Section {
 }
 
 impl Section {
-    /// Of layers from the bottom (against the normal) to the top, whose direction is turned by an angle [rad]
-    /// from the first axis.
+    /// Makes the section of layers from the bottom (against the normal) to the top. The direction of the
+    /// layers is turned by an angle [rad] from the first axis.
     pub fn new(layers: &[Layer], direction: f64) -> Self {
         let whole = thickness(layers);
         let mut bottom = -0.5 * whole;
@@ -141,19 +141,20 @@ impl Section {
         Self { stretch: a, coupling: b, flexure: d, compliance, plies, thickness: whole, mean: mean(layers) }
     }
 
-    /// What a homogeneous wall of the same thickness has that stretches as this one, without bending.
+    /// Plane stress of a homogeneous wall of the same thickness that stretches like this one, without
+    /// bending.
     pub fn in_plane(&self) -> PlaneStress {
         PlaneStress { matrix: self.stretch / self.thickness, ..PlaneStress::from(self.mean) }
     }
 
-    /// What a homogeneous wall of the same thickness has that bends as this one, without stretch.
+    /// Plane stress of a homogeneous wall of the same thickness that bends like this one, without stretch.
     pub(crate) fn in_bending(&self) -> PlaneStress {
         let matrix = self.flexure * (12.0 / self.thickness.powi(3));
         PlaneStress { matrix, ..PlaneStress::from(self.mean) }
     }
 
-    /// Stress [Pa] under membrane forces [N/m] and moments [N] at the top, in the middle (of two layers there
-    /// the upper one), at the bottom, and at both faces of each layer.
+    /// Stress [Pa] under membrane forces [N/m] and moments [N]. It is given at the top, in the middle (of two
+    /// layers there the upper one), at the bottom, and at both faces of each layer.
     pub(crate) fn stresses(
         &self,
         forces: &Vector3<f64>,

@@ -95,7 +95,8 @@ pub(super) fn strain(corners: &Corners) -> SMatrix<f64, 3, 9> {
     b
 }
 
-/// The constant-strain triangle; `drilling` G t A/3 holds each node's rotation to that of the triangle.
+/// The constant-strain triangle; `drilling` G t A/3 holds each node's rotation to the rotation of the
+/// triangle.
 pub fn constant_strain(corners: &Corners, elastic: &PlaneStress, thickness: f64, drilling: f64) -> Matrix9 {
     let volume = thickness * area(corners);
     let b = strain(corners);

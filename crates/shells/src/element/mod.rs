@@ -1,6 +1,6 @@
-//! Stiffness of triangles in their rest shape: of flat ones in their own plane, and the membrane of curved
-//! ones. Degrees of freedom of the membrane are (u, v, θz) node by node, those of bending (w, θx, θy), with
-//! θx = ∂w/∂y and θy = −∂w/∂x.
+//! Stiffness of triangles in their rest shape: flat ones in their own plane, and the membrane of curved ones.
+//! Degrees of freedom of the membrane are (u, v, θz) node by node. Degrees of freedom of bending are (w, θx,
+//! θy), with θx = ∂w/∂y and θy = −∂w/∂x.
 
 mod bending;
 mod comas;
@@ -37,13 +37,13 @@ pub(crate) use layers::{density, mean, thickness};
 pub(crate) use membrane::andes_higher;
 pub use membrane::{andes_opt, constant_strain};
 
-/// How a shell resists in its plane.
+/// Membrane element of a shell, its resistance in the plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Membrane {
-    /// The mean strain of the curved triangle (`Opt` on flat facets), which goes with `Spread::Curved`:
-    /// pressure on a curved wall then stretches it and bends it no more than the true load. Not with
-    /// `Spread::Lumped`: either without the other scatters displacements from node to node, the more the
-    /// thinner the wall. Normals of the true surface count: estimated from the triangles they describe
+    /// The mean strain of the curved triangle (`Opt` on flat facets), for use with `Spread::Curved`. Pressure
+    /// on a curved wall then stretches it and bends it no more than the true load. Do not use it with
+    /// `Spread::Lumped`. Either one without the other scatters displacements from node to node, the more the
+    /// thinner the wall. Give normals of the true surface: normals estimated from the triangles describe
     /// another wall.
     Curved {
         /// κ, as in `Opt`; 10 by default.
@@ -51,17 +51,18 @@ pub enum Membrane {
     },
     /// Felippa's optimal ANDES triangle with its higher-order part scaled by min(1, κ t²/A), so that drilling
     /// does not lock thin curved shells. κ = ∞ is Felippa's OPT. In thin curved shells under large tension,
-    /// as balloons, drilling moments of unequal facets tilt the nodes, by about ε h³/(R t²) for a strain ε,
-    /// edges h and a radius R: blown up to twice its volume (R/t = 50) a sphere of 128 facets folds, one of
-    /// 512 tilts by 1.2 rad at a pressure 1.6 % off, one of 2048 by 0.24 rad at 0.02 % (`validation`,
-    /// `shell_balloon`). There take `Curved`, `Cst`, or a mesh with h³ well below R t²/ε.
+    /// such as balloons, drilling moments of unequal facets tilt the nodes. The tilt is about ε h³/(R t²) for
+    /// a strain ε, edges h and a radius R. For example, a sphere with R/t = 50 is blown up to twice its
+    /// volume. With 128 facets it folds. With 512 facets it tilts by 1.2 rad at a pressure 1.6 % off, with
+    /// 2048 by 0.24 rad at 0.02 % (`validation`, `shell_balloon`). In such shells take `Curved`, `Cst`, or a
+    /// mesh with h³ well below R t²/ε.
     Opt {
         /// κ; 10 by default.
         adaptation: f64,
     },
-    /// The constant-strain triangle: for membranes under pressure, where it tilts no node (0.3 % off the
-    /// pressure of the balloon of 512 facets, 0.07 % of 2048), whatever its drilling. Much too stiff for
-    /// bending in its plane: 0.72 of Cook's membrane at N = 8, where `Opt` has 0.95.
+    /// The constant-strain triangle, for membranes under pressure. It tilts no node there, whatever its
+    /// drilling (0.3 % off the pressure of the balloon of 512 facets, 0.07 % of 2048). It is much too stiff
+    /// for bending in its plane: 0.72 of Cook's membrane at N = 8, where `Opt` has 0.95.
     Cst {
         /// Stiffness against drilling as a part of G t A/3 per node.
         drilling: f64,
@@ -76,7 +77,7 @@ impl Default for Membrane {
     }
 }
 
-/// How a shell resists bending and twist.
+/// Bending element of a shell, its resistance to bending and twist.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Bending {
     /// The discrete Kirchhoff triangle.

@@ -138,7 +138,7 @@ fn patch() -> (Vec<Vector2<f64>>, Vec<[usize; 3]>) {
 }
 
 /// The largest deviation of the inner nodes from a displacement given at the outer four, over its largest
-/// value, when each triangle's first corner is `start` places on.
+/// value. Each triangle's first corner is `start` places on.
 fn patch_error(
     stiffness: Stiffness,
     field: impl Fn(&Corners) -> SVector<f64, 9>,

@@ -1,9 +1,9 @@
 //! A flat triangular shell in large rotation: the linear element in a frame that turns with it. The frame is
 //! the facet's normal and the two-dimensional polar rotation in its plane, so it does not depend on the order
-//! of the corners; nodal forces are the exact gradient of the energy ½ dᵀ K d in that frame.
+//! of the corners. Nodal forces are the exact gradient of the energy ½ dᵀ K d in that frame.
 //! Element-independent co-rotation after Felippa and Haugen (2005), CMAME 194:2285; polar frame after Caselli
-//! and Bisegna (2013), IJNME 95:499. Leaves out: large strains (the energy is that of linear elasticity) and
-//! shear of the thickness.
+//! and Bisegna (2013), IJNME 95:499. Leaves out: large strains (the energy is linear elastic) and shear of
+//! the thickness.
 
 #[cfg(test)]
 mod single;
@@ -50,11 +50,11 @@ pub struct Facet {
     pub area: f64,
     /// Mass that it gives to each node [kg].
     pub mass: f64,
-    /// Rotary inertia that it gives to each node [kg m²]: at least that of a square of its area, so that
-    /// rotations do not shorten the steps of an explicit solver.
+    /// Rotary inertia that it gives to each node [kg m²]. It is at least the inertia of a square of its area,
+    /// so that rotations do not shorten the steps of an explicit solver.
     pub inertia: f64,
     elastic: PlaneStress,
-    /// Of a wall of layers.
+    /// Section of a wall of layers.
     section: Option<Box<Section>>,
     /// Corners at rest in the facet's axes, relative to the centroid [m].
     corners: Corners,
@@ -63,10 +63,10 @@ pub struct Facet {
     /// Axes at rest.
     axes: UnitQuaternion<f64>,
     formulation: Formulation,
-    /// Which edges of a curved membrane are straight, and its normals, in the facet's axes; `None` while it
-    /// is flat.
+    /// Normals of a curved membrane in the facet's axes, and flags of its straight edges; `None` while it is
+    /// flat.
     curved: Option<([Vector3<f64>; 3], [bool; 6])>,
-    /// Stiffness of all, in the facet's axes.
+    /// Stiffness of the whole element, in the facet's axes.
     stiffness: Matrix18,
     /// The part of it that resists bending.
     bending: Matrix9,
@@ -78,7 +78,7 @@ pub struct Facet {
     tension: (Vector18, f64),
 }
 
-/// What a facet has at rest, for whoever finds its forces elsewhere.
+/// Data of a facet at rest, for code that finds its forces elsewhere.
 #[derive(Clone, Copy, Debug)]
 pub struct FacetAtRest<'a> {
     /// Its axes as columns; the third is the normal.
@@ -138,15 +138,15 @@ pub struct Placed {
     pub deformation: Vector18,
 }
 
-/// Why a facet or a tetrahedron has no force.
+/// Reason why a facet or a cell of a solid has no force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Broken {
     /// Its area is zero or not finite [m²].
     Area(f64),
     /// A node has turned by this angle [rad] against it.
     Folded(f64),
-    /// Of a cell of a solid: the determinant of its deformation gradient is not positive, there or at a
-    /// corner.
+    /// The determinant of the deformation gradient of a solid's cell is not positive, at an evaluation point
+    /// or at a corner.
     Inverted(f64),
 }
 
@@ -251,7 +251,7 @@ impl Facet {
         spread(BENDING, &self.formulation.mean_curvature(&self.corners))
     }
 
-    /// The same with a tension [N/m] in its rest shape, equal in all directions.
+    /// Adds a tension [N/m] in its rest shape, equal in all directions.
     #[must_use]
     pub fn under_tension(self, tension: f64) -> Self {
         let (strain, area) = self.strain;
@@ -278,10 +278,10 @@ impl Facet {
         self.put_together(membrane, strain, area);
     }
 
-    /// Where the facet is with its nodes at positions [m] and turned from rest by rotations.
+    /// Places the facet, with its nodes at positions [m] and turned from rest by rotations.
     ///
     /// # Errors
-    /// If its area is none, or a node has turned too far against it.
+    /// If its area is zero or not finite, or a node has turned too far against it.
     pub fn place(
         &self,
         x: &[Vector3<f64>; 3],
@@ -320,7 +320,7 @@ impl Facet {
         Ok(Placed { axes, local, deformation })
     }
 
-    /// What it has at rest.
+    /// Data of the facet at rest.
     pub fn at_rest(&self) -> FacetAtRest<'_> {
         FacetAtRest {
             axes: self.axes.to_rotation_matrix().into_inner(),
@@ -346,7 +346,7 @@ impl Facet {
         &self.gradient
     }
 
-    /// What the tension at rest does along a deformation [J], beside the elastic energy.
+    /// Work of the tension at rest along a deformation [J], in addition to the elastic energy.
     fn tension_energy(&self, d: &Vector18) -> f64 {
         d.dot(&self.tension.0)
     }
@@ -366,8 +366,8 @@ impl Facet {
         ShellEnergy { membrane: membrane + self.tension_energy(d), bending, drilling }
     }
 
-    /// Mean forces and moments per length: t D times the mean strain, and those moments whose work with a
-    /// uniform curvature is that of the element's nodal forces (for the discrete Kirchhoff triangle D times
+    /// Mean forces and moments per length. Forces are t D times the mean strain. Moments do the same work
+    /// with a uniform curvature as the element's nodal forces (for the discrete Kirchhoff triangle D times
     /// the mean curvature).
     pub fn resultants(&self, placed: &Placed) -> Resultants {
         let d = &placed.deformation;
@@ -399,7 +399,7 @@ impl Facet {
         SymmetricEigen::new(scaled).eigenvalues.max()
     }
 
-    /// How it resists in its plane.
+    /// Its membrane element.
     pub fn membrane(&self) -> Membrane {
         self.formulation.membrane
     }
@@ -415,7 +415,7 @@ impl Facet {
     }
 
     /// Stress (σxx, σyy, σxy) [Pa] at the top, in the middle and at the bottom, and the largest von Mises
-    /// stress there and, of a wall of layers, at the faces of each.
+    /// stress there. In a wall of layers the largest includes the faces of each layer.
     pub fn stresses(&self, resultants: &Resultants) -> ([Vector3<f64>; 3], f64) {
         let mises = |s: &Vector3<f64>| (s.x * s.x - s.x * s.y + s.y * s.y + 3.0 * s.z * s.z).sqrt();
         let Some(section) = &self.section else {
@@ -430,7 +430,7 @@ impl Facet {
         (all.map(whole), faces.map(|stress| mises(&whole(stress))).fold(0.0, f64::max))
     }
 
-    /// How far it is strained.
+    /// Strain of the facet.
     pub fn strain(&self, placed: &Placed) -> ShellStrain {
         let entry = |row: usize, column: usize| -> f64 {
             (0..3).map(|i| placed.local[i][row] * self.gradient[i][column]).sum()
@@ -440,21 +440,21 @@ impl Facet {
         ShellStrain::new(&strain, &(self.mean_curvature * own), self.thickness)
     }
 
-    /// Thickness [m] with the strain across that plane stress asks for, t (A/A₀)^(−ν/(1 − ν)): −ν/(1 − ν)
-    /// (ε₁ + ε₂) where strains are small, and the same volume for ν = ½ however large they are. Forces do not
-    /// feel it.
+    /// Thickness [m] with the strain across from plane stress, t (A/A₀)^(−ν/(1 − ν)). For small strains the
+    /// strain across is −ν/(1 − ν) (ε₁ + ε₂). For ν = ½ the volume stays the same at any strain. Forces do
+    /// not depend on this thickness.
     pub fn thickness_now(&self, placed: &Placed) -> f64 {
         let nu = self.elastic.poisson;
         let ratio = area(&placed.local) / self.area;
         self.thickness * ratio.powf(-nu / (1.0 - nu))
     }
 
-    /// Whether it resists bending.
+    /// True if it resists bending.
     pub fn bends(&self) -> bool {
         self.bending != Matrix9::zeros()
     }
 
-    /// Whether its nodes turn: not those of a membrane alone.
+    /// True if its nodes turn. Nodes of a mere membrane do not.
     pub fn turns(&self) -> bool {
         self.formulation.bending != Bending::None || self.formulation.membrane == Membrane::None
     }
@@ -495,7 +495,7 @@ pub fn symmetrise(k: &mut Matrix18) {
     }
 }
 
-/// An error if twice an area [m²] is none.
+/// Returns an error if twice an area [m²] is not positive or not finite.
 pub(crate) fn has_area(double_area: f64) -> Result<(), Broken> {
     let is_some = double_area > 0.0 && double_area.is_finite();
     if is_some { Ok(()) } else { Err(Broken::Area(0.5 * double_area)) }

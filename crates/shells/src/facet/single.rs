@@ -35,7 +35,7 @@ impl Facet {
     }
 
     /// The symmetric part of the change of the force: the Hessian of the energy on the group of rotations
-    /// (Simo 1992, CMAME 96:189); the rest vanishes at equilibrium without moments.
+    /// (Simo 1992, CMAME 96:189). The rest vanishes at equilibrium without moments.
     pub(super) fn hessian(&self, placed: &Placed) -> Matrix18 {
         let mut k = self.tangent(placed);
         symmetrise(&mut k);

@@ -46,8 +46,8 @@ fn facet(order: [usize; 3]) -> Facet {
     facet
 }
 
-/// Mean strain and stiffness are those of ANDES-OPT where the normals are the facet's, and where all edges
-/// are straight: 1e-13.
+/// Mean strain and stiffness equal ANDES-OPT where the normals are the facet's, and where all edges are
+/// straight: 1e-13.
 #[test]
 fn a_curved_membrane_without_curvature_is_andes() {
     let [a, b, c] = rest();
@@ -114,7 +114,7 @@ fn evaluate(facet: &Facet, (x, rotation): &Pose) -> (f64, Vector18) {
     facet.force(&facet.place(x, rotation).unwrap())
 }
 
-/// Central differences with steps of 1e-5: 1e-7 of the largest force, as asked by the specification.
+/// Central differences with steps of 1e-5 agree to 1e-7 of the largest force, as the specification demands.
 #[test]
 fn force_is_the_gradient_of_the_energy() {
     let mut random = Random::new(1);
@@ -132,8 +132,8 @@ fn force_is_the_gradient_of_the_energy() {
     }
 }
 
-/// Eight at a time, the last pack not full: energies, forces and stiffness of single facets to round-off,
-/// curved and under tension, also where they are bent by half a radian.
+/// Packs of eight facets, the last one not full, give energies, forces and stiffness of single facets to
+/// round-off. Facets are curved and under tension, some bent by half a radian.
 #[test]
 fn packs_have_forces_and_stiffness_of_single_facets() {
     let mut random = Random::new(21);

@@ -1,13 +1,13 @@
-//! Forces and stiffness of eight facets at a time: what `facet/single.rs` finds one by one, in blocks of 3
-//! × 3. Of the change of the force only the symmetric part is made. With G the spin of the frame over
-//! translations, S the lever arms, K the stiffness over spins and R = K Ψ what rigid turns make of it, its
-//! blocks of translations (T) and turns (R) are
+//! Forces and stiffness of eight facets at a time, in blocks of 3 × 3; `facet/single.rs` finds them one by
+//! one. Only the symmetric part of the change of the force is made. G is the spin of the frame over
+//! translations. S are the lever arms, and K the stiffness over spins. R = K Ψ is the effect of rigid turns.
+//! The blocks of translations (T) and turns (R) are
 //!
 //! * T T: K − Qᵢ Gⱼ − (Qⱼ Gᵢ)ᵀ + ½ (Bᵢⱼ + Bⱼᵢᵀ), Qᵢ = Rᵢ + ½ (S(pᵢ) + S(fᵢ) + tᵢ) − ½ Gᵢᵀ W,
 //! * R T: K − (Rᵢ + ½ S(mᵢ) + cᵢ) Gⱼ, and R R: K + cᵢ on the diagonal,
 //!
-//! with forces f, those left without their resultant p and m, the symmetric parts c of the change of moments
-//! that are conjugate to spins, and B with t of the change of G. A facet takes about 2,500 fused
+//! with forces f, and p and m, the forces and moments without their resultant. The symmetric parts c of the
+//! change of moments are conjugate to spins. B with t is the change of G. A facet takes about 2,500 fused
 //! multiplications and reads 1.6 kB.
 
 mod placing;
@@ -32,7 +32,7 @@ const fn place(row: usize, column: usize) -> usize {
     row * (row + 1) / 2 + column
 }
 
-/// What eight facets have at rest; lanes beyond the last one mean nothing.
+/// Data of eight facets at rest; unused lanes of the last pack mean nothing.
 #[derive(Clone, Debug)]
 pub struct FacetPack {
     stiffness: [Pack; HALF],
@@ -87,10 +87,10 @@ fn put_turn(to: &mut [Pack], lane: usize, turn: &UnitQuaternion<f64>) {
     }
 }
 
-/// Where eight facets are, and what comes of it.
+/// Positions of eight facets, and results.
 #[derive(Clone, Debug)]
 pub struct Work {
-    /// Of the nodes.
+    /// Positions and rotations of the nodes.
     position: [Pack; 9],
     rotation: [Pack; 12],
     double_area: Pack,
@@ -178,7 +178,7 @@ impl Work {
         Ok(())
     }
 
-    /// Why the facet in a lane has no force.
+    /// Reason why the facet in a lane has no force.
     pub fn broken(&self, lane: usize) -> Option<Broken> {
         self.broken[lane]
     }
@@ -260,7 +260,7 @@ struct Now<S: Simd> {
     /// Forces and moments as the stiffness gives them; moments conjugate to spins.
     raw: [Three<S>; 6],
     spun: [Three<S>; 6],
-    /// Those less what has a resultant, and their moment.
+    /// Forces and moments without their resultant, and their moment.
     projected: [Three<S>; 6],
     moment: Three<S>,
     energy: Lane<S>,
@@ -268,13 +268,13 @@ struct Now<S: Simd> {
 
 /// Blocks of the stiffness over spins.
 struct OverSpins<S: Simd> {
-    /// Of turns and translations.
+    /// Blocks of turns and translations.
     mixed: [[Square<S>; 3]; 3],
-    /// Of turns, on and below the diagonal.
+    /// Blocks of turns, on and below the diagonal.
     turned: [Square<S>; 6],
     /// Symmetric parts of the change of moments.
     corrections: [Square<S>; 3],
-    /// What rigid turns make of each row.
+    /// Effect of rigid turns on each row.
     of_rigid: [Square<S>; 6],
 }
 
@@ -450,7 +450,7 @@ impl<S: Simd> Now<S> {
         }
     }
 
-    /// Finds what rigid turns make of it.
+    /// Finds the effect of rigid turns on the stiffness over spins.
     #[inline(always)]
     fn turn_rigidly(&self, over: &mut OverSpins<S>, pack: &FacetPack, register: usize) {
         for i in 0..3 {
@@ -467,7 +467,7 @@ impl<S: Simd> Now<S> {
         }
     }
 
-    /// Half of the symmetric part of what rigid turns make of it, seen from them: ½ W.
+    /// Half of the symmetric part of the effect of rigid turns, in rigid turns: ½ W.
     #[inline(always)]
     fn of_rigid_from_rigid(&self, over: &OverSpins<S>) -> Square<S> {
         let zero = Lane::splat(self.simd, 0.0);

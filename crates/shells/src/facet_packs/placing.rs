@@ -1,6 +1,6 @@
-//! Where eight facets are: axes, corners, turns of nodes and deformations, as
-//! [`Facet::place`](crate::facet::Facet) finds them one by one. A facet takes about 500 operations. Nodes
-//! that have turned by more than half a radian are left to whoever takes the angle of one at a time.
+//! Placing of eight facets: axes, corners, turns of nodes and deformations, like
+//! [`Facet::place`](crate::facet::Facet) one by one. A facet takes about 500 operations. Nodes that have
+//! turned by more than half a radian are left to code that finds one angle at a time.
 
 use pliant_linear::lanes::{Lane, PACK, Pack, Square, Three, cross, dot, three};
 use pulp::{Simd, WithSimd};
