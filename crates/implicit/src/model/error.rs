@@ -239,8 +239,8 @@ pub enum SolveError {
         limit: f64,
         /// The pressure [Pa] in the prescribed volume; `None` if the volume was not prescribed.
         pressure: Option<f64>,
-        /// Difference [m³] between the volume at the limit and the prescribed one; `None` if the limit was
-        /// not prescribed.
+        /// Distance [m³] of the volume at the limit beyond the prescribed one; `None` if the limit was not
+        /// prescribed.
         ahead: Option<f64>,
         /// True if the step has inertia.
         inertia: bool,

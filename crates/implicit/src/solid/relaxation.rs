@@ -64,8 +64,8 @@ pub(crate) struct Lag<'a> {
     pub(crate) factors: [f64; 2],
     /// k of each point [Pa]; empty for none.
     pub(crate) kept: &'a [Symmetric<f64>],
-    /// Flags: if k : E counts as energy, if f ψ of the isochoric part does, if f ψ of the volumetric part
-    /// does. In a step all count. At an instant only the f ψ of parts that do not relax count.
+    /// Three flags: k : E counts as energy, f ψ of the isochoric part counts, f ψ of the volumetric part
+    /// counts. In a step all count. At an instant only the f ψ of parts that do not relax count.
     pub(crate) counts: [bool; 3],
 }
 

@@ -119,7 +119,7 @@ impl Valve {
         SolveError::Snaps { time, constraint, node, limit, pressure, ahead, inertia }
     }
 
-    /// Distance of the volume from its prescribed value [m³].
+    /// Lag of the volume behind its prescribed value [m³]; 0 if the limit does not hold it back.
     fn lag(&self, gap: f64) -> f64 {
         match self.given {
             Some(given) if gap * given > 0.0 => -gap,

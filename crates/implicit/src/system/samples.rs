@@ -27,7 +27,7 @@ pub(crate) struct Samples {
     surface: CurvedSurface,
     /// Places of the points on the surface, facet by facet.
     points: Vec<Place>,
-    /// Positions [m] of nodes, then of the points.
+    /// Positions [m] of nodes, then of the points; J of the points.
     pub(crate) places: Vec<Vector3<f64>>,
     jacobians: Vec<SMatrix<f64, 3, 18>>,
     /// Motions of nodes and points, six numbers each, of which translations count.
@@ -232,7 +232,7 @@ impl Samples {
 }
 
 /// Nodes that move the points of contacts: a node itself, the nodes that a tied node follows, or the nodes
-/// around a point on a curved surface
+/// around a point on a curved surface.
 #[derive(Clone, Copy)]
 pub(crate) struct Movers<'a> {
     pub model: &'a Assembly,

@@ -6,8 +6,8 @@
 //! * T T: K − Qᵢ Gⱼ − (Qⱼ Gᵢ)ᵀ + ½ (Bᵢⱼ + Bⱼᵢᵀ), Qᵢ = Rᵢ + ½ (S(pᵢ) + S(fᵢ) + tᵢ) − ½ Gᵢᵀ W,
 //! * R T: K − (Rᵢ + ½ S(mᵢ) + cᵢ) Gⱼ, and R R: K + cᵢ on the diagonal,
 //!
-//! with forces f, and p and m, the forces and moments without their resultant. The symmetric parts c of the
-//! change of moments are conjugate to spins. B with t is the change of G. A facet takes about 2,500 fused
+//! with forces f, and forces p and moments m without the resultant. The symmetric parts c of the change of
+//! moments are conjugate to spins. B with t is the change of G. A facet takes about 2,500 fused
 //! multiplications and reads 1.6 kB.
 
 mod placing;
@@ -260,7 +260,7 @@ struct Now<S: Simd> {
     /// Forces and moments as the stiffness gives them; moments conjugate to spins.
     raw: [Three<S>; 6],
     spun: [Three<S>; 6],
-    /// Forces and moments without their resultant, and their moment.
+    /// Forces and moments without their resultant; moment of `spun` about the centroid.
     projected: [Three<S>; 6],
     moment: Three<S>,
     energy: Lane<S>,
