@@ -14,10 +14,10 @@ use crate::followed::FollowedPoint;
 /// Wall time between two inspections of a state that lies on a device.
 pub(crate) const INSPECTION: Duration = Duration::from_millis(250);
 
-/// What the last inspection found.
+/// Results of the last inspection.
 #[derive(Debug, Default)]
 pub(crate) struct Seen {
-    /// How many inspections there were.
+    /// Number of inspections so far.
     pub number: u64,
     /// Positions [m].
     pub points: Vec<Vector3>,
@@ -31,22 +31,22 @@ pub(crate) struct Seen {
     pub least_gap: Option<f64>,
     /// Steps that were taken though they had not converged.
     pub unconverged: u64,
-    /// What is held: point [m] and force [N].
+    /// Point [m] and force [N] of each hand that holds something, then of each pin.
     pub held: Vec<[[f64; 3]; 2]>,
-    /// Where each hand is among it.
+    /// Index of each hand in [`Self::held`].
     pub hands: [Option<usize>; 2],
     /// Forces of contacts, where they are asked for.
     pub contacts: Vec<PointForce>,
-    /// Where bodies are held, moved and loaded, where that is asked for.
+    /// Marks of constraints and loads, if the view asks for them.
     pub marks: Vec<Mark>,
     /// Points that the user follows.
     pub followed: Vec<FollowedPoint>,
-    /// When it was; `None` where the next one is due at once.
+    /// Wall time of the inspection; `None` if the next one is due at once.
     pub at: Option<Instant>,
 }
 
 impl Seen {
-    /// Whether an inspection is due while a run goes on.
+    /// True if the next inspection of a playing run is due.
     pub(crate) fn is_old(&self) -> bool {
         self.at.is_none_or(|at| at.elapsed() >= INSPECTION)
     }

@@ -13,7 +13,7 @@ use crate::hand::{Point, nodes_of};
 /// A point that a user follows, at an instant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FollowedPoint {
-    /// Where it is [m].
+    /// Position [m].
     pub place: Vector3,
     /// The field that is shown; `None` without one, or where another surface is shown than when it was
     /// picked.
@@ -28,14 +28,14 @@ pub(crate) struct Followed {
     point: Grip,
     /// Its place at rest [m].
     rest: Vector3,
-    /// Points of what is shown and their weights, until another surface is shown.
+    /// Points of the drawn mesh and their weights, until another surface is shown.
     shown: Vec<(u32, f64)>,
     about: Arc<str>,
 }
 
 impl Followed {
-    /// A point of what is drawn `on` a body or a surface, without hidden cells; `None` of an obstacle or a
-    /// tool.
+    /// Makes a point of the drawn mesh of a body or a surface (`on`), without hidden cells. Returns `None` on
+    /// an obstacle or a tool.
     pub fn new(
         point: &Point,
         subject: &Subject,

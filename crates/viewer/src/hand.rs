@@ -1,9 +1,9 @@
 //! The hand and the pins that hold a body, and tools in the hand.
 //!
-//! A hand has no point: it holds the surface around the one that it took, within two edges of the elements
-//! there, with the weights of a Gaussian whose deviation is one edge. So a pull meets tissue as a grasper
-//! does, and not a single element. Its spring gets no longer than two edges, however far the mouse goes: its
-//! force is at most that long times its stiffness.
+//! A hand does not hold a single point. It holds the surface around the point that it took, within two edges
+//! of the elements there. The weights are those of a Gaussian whose deviation is one edge. So a pull meets
+//! tissue as a grasper does, and not a single element. The spring gets no longer than two edges, however far
+//! the mouse goes. So the force has a limit: that length times the stiffness.
 //!
 //! There are two hands. Each holds tissue or a tool, and keeps it while the other one is led.
 
@@ -16,7 +16,7 @@ use pliant_sim::ToolNow;
 use pliant_sim::contact::pose::Pose;
 use serde::{Deserialize, Serialize};
 
-/// A point of what is drawn: a triangle and the weights of its corners.
+/// A point of a drawn surface: a triangle and the weights of its corners.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Point {
     /// The triangle, counted as drawn.
@@ -25,7 +25,7 @@ pub struct Point {
     pub weights: [f64; 3],
 }
 
-/// What hand and pins do.
+/// Actions of a hand or on a pin.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Hand {
@@ -56,7 +56,7 @@ pub enum Which {
 }
 
 impl Which {
-    /// Both of them.
+    /// Both hands.
     pub const BOTH: [Self; 2] = [Self::First, Self::Second];
 
     /// The other one.
@@ -68,16 +68,16 @@ impl Which {
     }
 }
 
-/// What is held at the moment, by hands and by pins.
+/// Tissue and tools that hands and pins hold at the moment.
 #[derive(Clone, Debug, Default)]
 pub struct Hold {
-    /// Of hands that hold tissue, in their order, then of pins.
+    /// Grips of the hands that hold tissue, in the order of the hands, then of the pins.
     grips: Vec<Grip>,
     taken: Vec<Taken>,
     hands: [Holds; 2],
 }
 
-/// What a hand holds.
+/// The object in a hand.
 #[derive(Clone, Debug, Default)]
 enum Holds {
     #[default]
@@ -92,7 +92,7 @@ struct Tool {
     name: String,
     /// The point that was taken, in the frame of the tool [m].
     point: Vector3,
-    /// Where it is led.
+    /// Pose that the hand leads the tool to.
     goal: Pose,
     /// The angle [rad] between its jaws that it is led to.
     opening: f64,
@@ -136,16 +136,16 @@ impl Tool {
     }
 }
 
-/// How a grip was taken.
+/// Data of a grip from the moment when it was taken.
 #[derive(Clone, Copy, Debug)]
 struct Taken {
     /// Stiffness asked for [N/m].
     stiffness: f64,
-    /// From the middle of what is held to the point that was taken [m].
+    /// Vector from the middle of the held surface to the point that was taken [m].
     offset: Vector3,
-    /// Where the middle is pulled to [m].
+    /// Place that the middle is pulled to [m].
     goal: Vector3,
-    /// How long its spring can become [m], so that its force has a limit; infinite on a device.
+    /// Largest length of the spring [m], which limits its force; infinite on a device.
     longest: f64,
 }
 
@@ -199,13 +199,13 @@ fn around(point: &Point, subject: &Subject, live: &Live) -> Option<Nodes> {
 }
 
 impl Hold {
-    /// Where each hand is among [`Self::shown`]; `None` of one that holds nothing.
+    /// Index of each hand in [`Self::shown`]; `None` for a hand that holds nothing.
     pub fn hands(&self) -> [Option<usize>; 2] {
         let [first, second] = Which::BOTH.map(|which| usize::from(self.holds(which)));
         [(first > 0).then_some(0), (second > 0).then_some(first)]
     }
 
-    /// Whether a hand holds something.
+    /// True if a hand holds something.
     pub fn holds(&self, which: Which) -> bool {
         !matches!(self.hands[which as usize], Holds::Nothing)
     }
@@ -218,7 +218,8 @@ impl Hold {
         })
     }
 
-    /// Of what each hand holds, then of each pin, the point [m], and the force on the body [N].
+    /// Returns the point [m] and the force on the body [N] of each hand that holds something, then of each
+    /// pin.
     pub fn shown<'h>(&'h self, live: &'h Live) -> impl Iterator<Item = [[f64; 3]; 2]> + 'h {
         let grip = |at: usize| {
             let [middle, force] = live.simulation.pulled(&self.grips[at]);
@@ -309,8 +310,8 @@ impl Hold {
         self.grip(live) && found
     }
 
-    /// After a step: hands pull on towards their goals. Their forces stay below their limits while what is
-    /// held gives way.
+    /// Pulls the hands on towards their goals after a step. Their forces stay below their limits while the
+    /// tissue gives way.
     pub fn follow(&mut self, live: &mut Live) {
         let mut moved = false;
         for at in 0..self.first_pin() {
@@ -321,7 +322,7 @@ impl Hold {
         }
     }
 
-    /// Whether the end of a hand's spring goes along with what is held.
+    /// True if the end of a hand's spring moves with the tissue.
     pub fn follows(&self) -> bool {
         self.taken[..self.first_pin()].iter().any(|taken| taken.longest.is_finite())
     }
@@ -366,7 +367,7 @@ impl Hold {
     }
 }
 
-/// A grip where its point is, as stiff as asked for or as steps allow.
+/// Makes a grip around a point, with the desired stiffness or the largest one that the step allows.
 fn grip(point: &Point, stiffness: f64, subject: &Subject, live: &Live) -> Option<(Grip, Taken)> {
     let nodes = around(point, subject, live)?;
     let at = Grip { nodes: nodes_of(point, subject, live)?, ..Grip::default() };

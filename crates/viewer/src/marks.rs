@@ -1,4 +1,4 @@
-//! Where bodies are held, moved and loaded: a mark at each of some nodes, which follows the body.
+//! Marks of constraints and loads at a selection of nodes; they follow the body.
 
 use pliant_geometry::Vector3;
 use pliant_mechanics::model::Motion;

@@ -24,7 +24,7 @@ pub struct Parameter {
     pub number: Number,
     /// Its unit; empty for none.
     pub unit: String,
-    /// What it means.
+    /// Description for the user.
     pub meaning: String,
 }
 

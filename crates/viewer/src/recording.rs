@@ -1,4 +1,4 @@
-//! What was done to a run, so that it can be repeated before the same steps.
+//! Records of the user's actions in a run, so that a replay repeats them before the same steps.
 
 use std::path::{Path, PathBuf};
 
@@ -26,7 +26,7 @@ pub enum Done {
 }
 
 impl Done {
-    /// What one of the hands did.
+    /// Returns the record of an action by one of the hands.
     pub(crate) fn by(which: Which, hand: Hand) -> Self {
         match which {
             Which::First => Self::Hand(hand),
@@ -35,23 +35,23 @@ impl Done {
     }
 }
 
-/// What of a view decides which triangles are drawn.
+/// Part of a view that decides which triangles are drawn.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Surface {
     /// The body or the carried surface; `None` for all bodies.
     pub on: Option<String>,
     /// Parts of each edge of a shell.
     pub curved: u32,
-    /// Whether fibres are drawn.
+    /// True if fibres are drawn.
     pub fibres: bool,
-    /// Whether the critical cell is marked; shells are then flat.
+    /// True if the critical cell is marked; shells are then flat.
     pub critical: bool,
     /// Labels whose cells are left out, as they are typed.
     pub hide: Vec<String>,
 }
 
 impl Surface {
-    /// That of a view.
+    /// Returns the surface of a view.
     pub fn of(view: &ViewTable) -> Self {
         Self {
             on: view.on.clone(),
@@ -73,24 +73,24 @@ impl Surface {
     }
 }
 
-/// When something was done, and what.
+/// A user action and its time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Move {
     /// Steps done before.
     pub steps: u64,
-    /// Whether the forces of that instant were found before, so that the step to come knows nothing of it
-    /// yet.
+    /// True if the forces of that instant were computed before the action, so that the next step does not
+    /// feel it yet.
     pub evaluated: bool,
     /// Wall time since the first one [s].
     pub seconds: f64,
     /// Wall time from when it was asked for to the end of the first step in which it acted [s]; `None` while
     /// the run stood still.
     pub lag: Option<f64>,
-    /// What.
+    /// The action.
     pub done: Done,
 }
 
-/// What was done to a run, from its start on.
+/// All actions of the user in a run, from its start.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Recording {
     /// In the order of time.
@@ -119,14 +119,14 @@ fn part_of(path: &Path) -> PathBuf {
 /// A pull that broke a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Break {
-    /// When it broke, and where the run went back to [s].
+    /// Times [s] at which the run broke and to which it went back.
     pub times: [f64; 2],
-    /// Why.
+    /// Reason of the break.
     pub message: String,
 }
 
 impl Recording {
-    /// As bytes that keep every bit.
+    /// Encodes the recording as bytes that keep every bit.
     ///
     /// # Errors
     /// Never in practice: memory that ran out.
@@ -141,8 +141,8 @@ impl Recording {
         bytes
     }
 
-    /// Writes it into another file beside its own, which then takes the place of this one: a file of a
-    /// recording is whole at any time.
+    /// Writes the recording to a second file, then renames it to `path`. So the file of a recording is
+    /// complete at any time.
     ///
     /// # Errors
     /// What the system says.
@@ -178,7 +178,7 @@ impl Recording {
         body.and_then(|body| postcard::from_bytes(body).ok()).ok_or_else(|| "it is damaged or cut off".into())
     }
 
-    /// Whether it is of a scene.
+    /// Checks that the recording belongs to a scene.
     ///
     /// # Errors
     /// If it is of another one.

@@ -4,18 +4,18 @@ use pliant_format::tables::{LookColour, LookTable, ViewTable};
 use pliant_geometry::RegionNames;
 use pliant_picture::{Coat, Material, Paint, Regions};
 
-/// What a view hides of some regions, and those with a look of their own.
+/// Returns the hidden regions of a view, and the regions with their own look.
 pub fn regions_of(view: &ViewTable, names: &RegionNames) -> Regions {
     let coats = view.looks(names).into_iter().map(|(region, look)| (region, coat_of(look)));
     Regions { hidden: view.hidden(names), coats: coats.collect() }
 }
 
-/// How a picture draws what a scene gives a look of its own.
+/// Converts the look of a region in a scene to a coat of the picture.
 pub fn coat_of(look: LookTable) -> Coat {
     Coat { opacity: look.opacity, paint: paint_of(look.colour) }
 }
 
-/// What colours a region.
+/// Converts the colour of a look to a paint of the picture.
 fn paint_of(colour: LookColour) -> Paint {
     Paint::Plain(match colour {
         LookColour::View => return Paint::AsAll,

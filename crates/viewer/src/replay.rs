@@ -1,5 +1,5 @@
-//! What was done to a run, recorded and repeated: before the same steps, so that it comes to the same bits;
-//! or by a mouse that moves as fast as it did, so that its lag can be measured.
+//! Replays of recorded runs. A replay repeats the actions before the same steps, so it gives the same bits.
+//! In real time it moves the mouse as fast as the user did, so that the lag can be measured.
 
 use std::time::{Duration, Instant};
 
@@ -16,7 +16,7 @@ use crate::parameters::{Number, with_numbers};
 use crate::recording::{Break, Done, Move, Recording, Surface};
 use crate::session::{FRAME, Order, Session};
 
-/// What a replay came to.
+/// Result of a replay.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Replayed {
     /// Simulated time [s].
@@ -33,7 +33,7 @@ pub struct Replayed {
     pub breaks: Vec<Break>,
 }
 
-/// How long it took until what a mouse did was felt.
+/// Times from a movement of the mouse to the end of the first step that felt it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Lags {
     /// Moves that a step has felt.
@@ -49,7 +49,7 @@ pub struct Lags {
 }
 
 impl Lags {
-    /// Of what was recorded.
+    /// Returns the lags of a recording.
     pub fn of(recording: &Recording) -> Self {
         let mut all: Vec<f64> = recording.moves.iter().filter_map(|then| then.lag).collect();
         all.sort_by(f64::total_cmp);
@@ -64,8 +64,8 @@ fn stopped() -> String {
     "stopped before the end of the recording".into()
 }
 
-/// Repeats a recording by a mouse that moves when it did, while the run goes on in real time: what was felt
-/// then, and when.
+/// Repeats a recording in real time, with each action at the wall time of the original. Returns a recording
+/// of the replayed actions and their lags.
 ///
 /// # Errors
 /// If a world can't be made, the run fails, or a flag is asked for.
@@ -121,7 +121,7 @@ pub fn replay(world: &World, recording: &Recording) -> Result<Replayed, String> 
     replay_until(world, recording, &StopFlag::default())
 }
 
-/// As [`replay`], until a flag is asked for.
+/// Runs like [`replay`], until a flag is set.
 ///
 /// # Errors
 /// Why the run could not go on, or that it was stopped.
@@ -141,10 +141,10 @@ pub fn replay_until(world: &World, recording: &Recording, stop: &StopFlag) -> Re
     }
 }
 
-/// How far a replay is.
+/// State of a replay.
 #[derive(Default)]
 struct Replay<'r> {
-    /// What is left of the moves.
+    /// Actions that are still to come.
     moves: &'r [Move],
     steps: u64,
     /// Steps in all.
@@ -158,7 +158,7 @@ struct Replay<'r> {
     stop: StopFlag,
 }
 
-/// What a view shows of a run.
+/// Returns the drawn mesh of a view.
 fn subject_of(world: &World, view: &ViewTable, live: &mut Live) -> Result<Subject, String> {
     let mesh = live.mesh().map_err(|failure| failure.message)?;
     Ok(Subject::new(&visible(mesh, &world.hidden(view))))
@@ -171,7 +171,7 @@ enum Ended<'r> {
 }
 
 impl<'r> Replay<'r> {
-    /// Goes on until numbers are others, or to the end.
+    /// Continues to the next change of numbers, or to the end.
     fn play(&mut self, world: &World, from: Option<(World, Option<State>)>) -> Result<Ended<'r>, String> {
         let (mut live, _) = crate::session::enter(world, from)?;
         live.simulation.stop_on(&self.stop);

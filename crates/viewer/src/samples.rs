@@ -1,5 +1,5 @@
-//! What is plotted over time: samples of a run, few enough to be kept however long it lasts, and the table
-//! that they are written to.
+//! Samples of a run for plots over time, and the table that they are written to. Their number is limited,
+//! however long the run is.
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ pub(crate) const SECOND_HAND: &str = "second-hand";
 /// Samples kept.
 const MOST: usize = 4000;
 
-/// What a run is like at an instant.
+/// State of a run at one instant.
 #[derive(Clone, Debug)]
 pub struct Sample {
     /// Time [s].
@@ -34,9 +34,9 @@ pub struct Samples {
     times: Vec<f64>,
     /// One after the other, each as long as there are columns.
     values: Vec<f64>,
-    /// Of so many samples one is kept …
+    /// Number of samples seen for each one that is kept.
     every: u64,
-    /// … and so many were seen since.
+    /// Number of samples since the last kept one.
     passed: u64,
 }
 
@@ -46,12 +46,12 @@ impl Samples {
         &self.columns
     }
 
-    /// How many there are.
+    /// Returns the number of samples.
     pub fn len(&self) -> usize {
         self.times.len()
     }
 
-    /// Whether there is none.
+    /// True if there are no samples.
     pub fn is_empty(&self) -> bool {
         self.times.is_empty()
     }
@@ -61,8 +61,9 @@ impl Samples {
         *self = Self::default();
     }
 
-    /// Takes a sample, if its time is a later one. Of a run that goes back the later ones are forgotten.
-    /// Where there are too many, every second one goes, and from then on comes.
+    /// Adds a sample if its time differs from the last one. After a run went back, the later samples are
+    /// removed first. When the limit is reached, every second sample is removed, and from then on every
+    /// second one is skipped.
     pub fn take(&mut self, Sample { time, columns, values }: Sample) {
         let last = self.times.last().copied().unwrap_or(-1.0);
         if time < last {
@@ -121,8 +122,8 @@ impl Samples {
         self.times.iter().zip(values).map(|(time, value)| [*time, *value])
     }
 
-    /// Writes a table with a header of names and units, beside the file of a scene: `NAME-probes.csv`, or
-    /// with a number where there is one already. What is not known is empty.
+    /// Writes a table with a header of names and units into the folder of a scene: `NAME-probes.csv`, with a
+    /// number if that file exists. Unknown values are empty.
     ///
     /// # Errors
     /// What the system says.

@@ -1,6 +1,6 @@
-//! Sound states of the last moments of a run. After a step that fails, the run continues from one of them:
-//! hands let go, or without hands steps are halved. The older states are, the farther they lie from each
-//! other, so that they reach over the whole run.
+//! Sound states of the last moments of a run. After a failed step, the run continues from one of these
+//! states: hands let go, or without hands the steps are halved. Older states lie farther from each other, so
+//! that they cover the whole run.
 
 use std::collections::VecDeque;
 
@@ -12,7 +12,7 @@ use crate::hand::Hold;
 const EVERY: f64 = 0.25;
 /// Steps from one to the next at most.
 const MOST_STEPS: u64 = 1000;
-/// How many there are at most, but for that at the start.
+/// Largest number of states, besides the one at the start.
 const MOST: usize = 16;
 /// Memory [bytes] that all of them take, about.
 const MEMORY: usize = 256 << 20;
@@ -31,16 +31,16 @@ pub(crate) struct Sound {
     pub moves: usize,
 }
 
-/// Those of a run as one world, the newest last.
+/// Sound states of a run of one world, the newest last.
 #[derive(Default)]
 pub(crate) struct SoundStates {
     first: Option<Sound>,
     later: VecDeque<Sound>,
     /// Steps done where the run went back last.
     back_at: u64,
-    /// Whether that was the first one.
+    /// True if the state to which the run last went back was the first one.
     at_first: bool,
-    /// Whether hands did something since the run began or last went back.
+    /// True if a hand acted since the run began or last went back.
     touched: bool,
     /// Steps done when they last did.
     touched_at: Option<u64>,
@@ -52,19 +52,19 @@ fn apart(step: f64) -> u64 {
 }
 
 impl SoundStates {
-    /// Hands do something after so many steps.
+    /// Records that a hand acts after `steps` steps.
     pub fn touch(&mut self, steps: u64) {
         (self.touched, self.touched_at) = (true, Some(steps));
     }
 
-    /// Whether a state is due after so many steps of a length [s].
+    /// True if a state is due after `steps` steps of length `step` [s].
     pub fn is_due(&self, steps: u64, step: f64) -> bool {
         let apart = apart(step);
         let newest = self.later.back().or(self.first.as_ref());
         newest.is_none_or(|newest| steps >= newest.steps.max(self.back_at) + apart)
     }
 
-    /// Keeps a state of so many nodes.
+    /// Keeps a state of a model with `nodes` nodes.
     pub fn keep(&mut self, sound: Sound, nodes: usize) {
         if self.first.is_none() {
             self.first = Some(sound);
@@ -89,8 +89,9 @@ impl SoundStates {
         crowded.map(|at| self.later.remove(at));
     }
 
-    /// The newest state of no more than so many steps, of a length [s], and the ones after it are forgotten;
-    /// the oldest that is kept where all have more. The start is one only for a run that was near it.
+    /// Returns the newest state with at most `steps` steps of length `step` [s], and forgets the later ones.
+    /// If all states have more steps, the oldest one is returned. The start counts only if the run was near
+    /// it.
     pub fn before(&mut self, steps: u64, step: f64) -> Option<Sound> {
         let older = self.later.partition_point(|sound| sound.steps <= steps);
         let start = self.first.as_ref()?;
@@ -101,8 +102,8 @@ impl SoundStates {
         Some(sound)
     }
 
-    /// Whether a run of so many steps, of a length [s], has come no farther than one state from where it
-    /// began.
+    /// True if a run of `steps` steps of length `step` [s] is at most the distance of two states from its
+    /// start.
     pub(crate) fn has_just_begun(&self, steps: u64, step: f64) -> bool {
         self.first.as_ref().is_some_and(|first| steps <= first.steps + apart(step))
     }

@@ -1,6 +1,6 @@
-//! A scene on a thread of its own: it is played there in real time, and handed over frame by frame. Neither
-//! side ever waits for the other: orders go through a channel, the newest frame lies in one of three places
-//! of which each side holds one.
+//! A scene played in real time on its own thread, and handed over frame by frame. Neither side waits for the
+//! other. Orders go through a channel. The newest frame lies in one of three places, of which each side holds
+//! one.
 
 mod playback;
 mod player;
@@ -36,16 +36,16 @@ const WRITTEN: Duration = Duration::from_secs(1);
 /// Wall time that the solver may fall behind before it gives up catching up.
 const BEHIND: f64 = 0.1;
 
-/// What the window asks of the solver.
+/// Orders of the window to the solver.
 #[derive(Clone, Debug)]
 pub enum Order {
-    /// Goes on, or stands still.
+    /// Plays or pauses.
     Play(bool),
-    /// Goes so many steps on.
+    /// Plays a number of steps.
     Step(u64),
     /// Starts anew at rest.
     Reset,
-    /// Goes back to the newest kept state of no more than so many steps, and lets go.
+    /// Goes back to the newest kept state with no more steps than this, and lets the hands go.
     Back(u64),
     /// Simulated seconds a second.
     Speed(f64),
@@ -53,8 +53,8 @@ pub enum Order {
     Hand(Hand),
     /// Changes what the second hand or a pin holds.
     Second(Hand),
-    /// Goes on as another world from the next step on, from where the run stands: that of numbers which are
-    /// others than in the file.
+    /// Continues from the current state with another world, from the next step on. The numbers are those that
+    /// differ from the file.
     Change(Box<World>, Vec<Number>),
     /// Finds where bodies are held, moved and loaded in each frame, or not any more.
     Marks(bool),
@@ -62,9 +62,9 @@ pub enum Order {
     Probe(Point),
     /// Follows no point any more but those that the scene names.
     ForgetProbes,
-    /// Keeps what is done to the run from now on.
+    /// Records the user's actions from this moment.
     Record,
-    /// The same, written into a file each second.
+    /// Records the user's actions into a file, written each second.
     RecordTo(PathBuf),
     /// Halves the steps.
     Halve,
@@ -80,26 +80,25 @@ pub enum Order {
 /// An instant as the window shows it.
 #[derive(Clone, Debug, Default)]
 pub struct Frame {
-    /// How many frames came before.
+    /// Number of earlier frames.
     pub number: u64,
-    /// What is drawn: points and triangles at rest. Another one where another surface is shown.
+    /// Drawn mesh: points and triangles at rest. Another surface has another subject.
     pub subject: Arc<Subject>,
-    /// Where obstacles, tools and driven nodes come [m], see [`Live::ways`].
+    /// Paths of obstacles, tools and driven nodes [m], see [`Live::ways`].
     pub ways: Arc<Vec<Vector3>>,
     /// Simulated time [s].
     pub time: f64,
     /// Steps done.
     pub steps: u64,
-    /// Whether it goes on.
+    /// True if the run is playing.
     pub playing: bool,
     /// Points on the device where the state lies, at this instant, to be drawn from there; `None` of a state
     /// in ordinary memory.
     pub on_device: Option<DevicePoints>,
-    /// How many inspections there were. Points, values, energies, and what is held are of the last one: of
-    /// this instant unless the state lies on a device, where inspections are rare
-    /// (`INSPECTION`).
+    /// Number of inspections so far. Points, values, energies and grips come from the last one. That is this
+    /// instant, except on a device, where inspections are rare (`INSPECTION`).
     pub inspections: u64,
-    /// What was read back from the device so far.
+    /// Number of read-backs from the device so far.
     pub read_backs: u64,
     /// Positions [m].
     pub points: Vec<Vector3>,
@@ -113,20 +112,19 @@ pub struct Frame {
     pub least_gap: Option<f64>,
     /// Steps that were taken though they had not converged.
     pub unconverged: u64,
-    /// What is held: the point [m] and the force on the body [N] of each hand that holds something, then of
-    /// each pin.
+    /// Point [m] and force on the body [N] of each hand that holds something, then of each pin.
     pub held: Vec<[[f64; 3]; 2]>,
-    /// Where each hand is among what is held; `None` of one that holds nothing.
+    /// Index of each hand in [`Self::held`]; `None` for a hand that holds nothing.
     pub hands: [Option<usize>; 2],
     /// Forces of contacts on the nodes, where they are asked for.
     pub contacts: Vec<PointForce>,
-    /// Where bodies are held, moved and loaded, where that is asked for.
+    /// Marks of constraints and loads, if the view asks for them.
     pub marks: Vec<Mark>,
     /// Points that the user follows, in the order in which they were picked.
     pub followed: Vec<FollowedPoint>,
     /// The tool that each hand holds.
     pub tools: [Option<String>; 2],
-    /// Whether each triangle of the subject can be taken hold of: those of bodies and tools, not those of
+    /// True for each triangle of the subject that a hand can take: triangles of bodies and tools, but not of
     /// obstacles.
     pub movable: Arc<[bool]>,
     /// A triangle of each tool.
@@ -139,30 +137,31 @@ pub struct Frame {
     pub prepare_seconds: f64,
     /// Simulated over wall time, lately.
     pub real_time_factor: f64,
-    /// The same if the solver did nothing but steps.
+    /// Real-time factor if the solver did nothing but steps.
     pub possible_factor: f64,
     /// From a hand's move to the first step in which it acted [s], of the last one.
     pub input_lag: Option<f64>,
-    /// How often a pull broke the run, which then went back to a state before it.
+    /// Number of times that a pull broke the run, which then went back to an earlier state.
     pub breaks: u64,
     /// The numbers that are others than in the file.
     pub numbers: Vec<Number>,
-    /// How often changed numbers broke the run at once; it then went on with those before.
+    /// Number of times that changed numbers broke the run at once. The run then continued with the earlier
+    /// numbers.
     pub refusals: u64,
-    /// Why it cannot go on: what happened, where, and what to try.
+    /// Reason why the run can't continue: what happened, where, and what to try.
     pub failure: Option<String>,
-    /// What else to tell.
+    /// Further message for the user.
     pub note: Option<String>,
 }
 
 impl Frame {
-    /// What each pin holds: the point [m] and the force on the body [N].
+    /// Returns the point [m] and the force on the body [N] of each pin.
     pub fn pins(&self) -> &[[[f64; 3]; 2]] {
         let hands = self.hands.iter().flatten().count();
         self.held.get(hands..).unwrap_or_default()
     }
 
-    /// What a hand holds: the point [m] and the force on the body [N].
+    /// Returns the point [m] and the force on the body [N] of a hand.
     pub fn hand(&self, which: Which) -> Option<[[f64; 3]; 2]> {
         self.held.get(self.hands[which as usize]?).copied()
     }
@@ -179,8 +178,8 @@ pub struct Session {
     thread: Option<JoinHandle<Recording>>,
 }
 
-/// Begins to play a world, from where a run of another one stands if it can be; whether it goes on from
-/// there.
+/// Starts to play a world, if possible from the current state of another one. Returns true if it continues
+/// from there.
 ///
 /// # Errors
 /// If a stepper can't be made.
@@ -226,7 +225,7 @@ impl Session {
         self.samples.try_iter()
     }
 
-    /// Whether the solver's thread has ended.
+    /// True if the solver's thread has ended.
     pub fn has_ended(&self) -> bool {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }

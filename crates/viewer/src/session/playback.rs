@@ -1,4 +1,4 @@
-//! The clock of a session and what is played.
+//! Clock and state of a played session.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use crate::parameters::Number;
 use crate::recording::{Done, Move, Recording, Surface};
 use crate::samples::Sample;
 
-/// How fast it goes: simulated time follows wall time from an anchor on.
+/// Speed of the run: simulated time follows wall time from an anchor on.
 pub(super) struct Pace {
     pub(super) speed: f64,
     pub(super) anchor: (Instant, f64),
@@ -53,12 +53,12 @@ impl Pace {
     }
 }
 
-/// What of a run lasts when it goes on as another world.
+/// State of a run that lasts when it continues as another world.
 pub(super) struct Playback {
     pub(super) hold: Hold,
     /// Ends a step that takes long.
     pub(super) stop: StopFlag,
-    /// What is shown, and the view that the scene opened with.
+    /// Current view, and the surface of the scene's view.
     pub(super) view: ViewTable,
     pub(super) usual: Surface,
     /// The field that is shown, with its component.
@@ -71,8 +71,8 @@ pub(super) struct Playback {
     pub(super) playing: bool,
     /// Steps that were asked for one by one.
     pub(super) owed: u64,
-    /// What was asked for that no step has felt yet: when, after how many steps it acts, and its number in
-    /// the recording.
+    /// Actions that no step has felt yet: wall time, number of steps after which the action acts, and index
+    /// in the recording.
     pub(super) waiting: Vec<(Instant, u64, usize)>,
     pub(super) input_lag: Option<f64>,
     /// Since the last frame.
@@ -85,15 +85,15 @@ pub(super) struct Playback {
     pub(super) recording: Option<Recording>,
     /// The bodies that are recorded.
     pub(super) of: u64,
-    /// Where the recording is written, and when and after how many moves and steps it was last.
+    /// File of the recording, with the wall time and the number of moves and steps when it was last written.
     pub(super) file: Option<(PathBuf, Instant, (usize, u64))>,
-    /// When the first move was recorded.
+    /// Wall time of the first recorded move.
     pub(super) started: Option<Instant>,
-    /// The world to go on as, and its numbers that are others than in the file.
+    /// World to continue as, with its numbers that differ from the file.
     pub(super) change: Option<(Box<World>, Vec<Number>)>,
     pub(super) numbers: Vec<Number>,
     pub(super) refusals: u64,
-    /// Why changed numbers are refused.
+    /// Reason why changed numbers are refused.
     pub(super) refused: Option<String>,
     pub(super) followed: Vec<Followed>,
     pub(super) columns: Arc<[Column]>,
@@ -101,9 +101,9 @@ pub(super) struct Playback {
     /// Steps done at the last sample.
     pub(super) sampled: Option<u64>,
     pub(super) seen: Seen,
-    /// Whether marks are found.
+    /// True if marks of constraints and loads are needed.
     pub(super) marked: bool,
-    /// Whether every frame comes to ordinary memory.
+    /// True if every frame is copied to ordinary memory.
     pub(super) in_memory: bool,
 }
 
@@ -162,7 +162,7 @@ impl Playback {
         self.pace.anchor(0.0);
     }
 
-    /// Goes back to a run before its numbers were changed; the state from which it goes on.
+    /// Returns to a run before its numbers were changed. Gives the state to continue from.
     pub(super) fn refuse(&mut self, former: &Former, reason: &str) -> Option<State> {
         (self.steps, self.owed, self.hold) = (former.steps, 0, former.hold.clone());
         self.numbers.clone_from(&former.numbers);

@@ -28,7 +28,7 @@ use crate::recording::{Break, Done, Recording, Surface};
 use crate::samples::{HAND, SECOND_HAND, Sample};
 use crate::sound::{Sound, SoundStates};
 
-/// Why a world is left.
+/// Reason to leave a world.
 pub(super) enum Left {
     Quit,
     /// To start anew.
@@ -55,17 +55,17 @@ pub(super) struct Player<'s> {
     pub(super) world: &'s World,
     pub(super) subject: Arc<Subject>,
     pub(super) ways: Arc<Vec<Vector3>>,
-    /// Whether each triangle of the subject can be taken hold of.
+    /// True for each triangle of the subject that a hand can take.
     pub(super) movable: Arc<[bool]>,
     /// A triangle of each tool.
     pub(super) tool_triangles: Arc<[u32]>,
     /// Regions whose cells are not shown.
     pub(super) hidden: Vec<Region>,
     pub(super) live: Live,
-    /// Whether the state lies on a device.
+    /// True if the state lies on a device.
     pub(super) on_device: bool,
     pub(super) sound: SoundStates,
-    /// Whether it goes on from a world with other numbers.
+    /// True if the run continues from a world with other numbers.
     pub(super) is_changed: bool,
     pub(super) playback: Playback,
 }
@@ -136,7 +136,7 @@ pub(super) fn play(
 }
 
 impl<'s> Player<'s> {
-    /// Begins to play a world, or goes on as it from where a run of the world before stands.
+    /// Starts to play a world, or continues as this world from the state of the world before.
     pub(super) fn enter(
         world: &'s World,
         (mut live, goes_on): (Live, bool),
@@ -193,7 +193,7 @@ impl<'s> Player<'s> {
         Some(Former { state, ..former })
     }
 
-    /// The run cannot go on: changed numbers that break it at once are refused.
+    /// Records that the run can't continue. Changed numbers that break the run at once are refused.
     pub(super) fn fail(&mut self, message: String) {
         let playback = &mut self.playback;
         if self.is_changed && self.sound.has_just_begun(playback.steps, self.world.step()) {
@@ -203,12 +203,12 @@ impl<'s> Player<'s> {
         }
     }
 
-    /// What lasts.
+    /// Returns the parts that outlast this world.
     pub(super) fn end(self) -> (Option<Arc<Subject>>, Playback) {
         (Some(self.subject), self.playback)
     }
 
-    /// Follows orders and goes on, until the world is left.
+    /// Follows orders and plays, until the world is left.
     pub(super) fn go(
         &mut self,
         inbox: &Receiver<(Instant, Order)>,
@@ -261,8 +261,7 @@ impl<'s> Player<'s> {
         }
     }
 
-    /// How long it may wait for orders: until the simulation is due to go on, or the frame of what has
-    /// changed is.
+    /// Time that the player may wait for orders: until the next step or a changed frame is due.
     pub(super) fn patience(&self, changed: bool) -> Duration {
         let playback = &self.playback;
         let long = Duration::from_millis(50);
@@ -439,7 +438,7 @@ impl<'s> Player<'s> {
         if !self.sound.is_due(playback.steps, self.world.step()) {
             return;
         }
-        // A device that fails tells so in the next step.
+        // A device that fails reports it in the next step.
         let Ok(state) = simulation.state() else { return };
         let moves = playback.recording.as_ref().map_or(0, |recording| recording.moves.len());
         let sound = Sound { state, steps: playback.steps, hold: playback.hold.clone(), moves };
@@ -447,9 +446,8 @@ impl<'s> Player<'s> {
         self.sound.keep(sound, nodes);
     }
 
-    /// After a step that failed: goes back to a state before it and halves the steps there, where no hand has
-    /// done anything and shorter steps may avoid the failure; else hands let go there, or the run stays where
-    /// it is.
+    /// Goes back to an earlier state after a failed step. If no hand has acted and shorter steps may avoid
+    /// the failure, the steps are halved there. Otherwise the hands let go there, or the run stops.
     pub(super) fn go_back(&mut self, failure: Failure) {
         let broken = self.live.simulation.time();
         let world = Arc::clone(self.live.simulation.world());
@@ -476,14 +474,14 @@ impl<'s> Player<'s> {
 
     /// Halves the steps, as the run did that is replayed.
     pub(super) fn halve(&mut self) {
-        // A device that fails tells so in the next step.
+        // A device that fails reports it in the next step.
         if self.live.halve_steps().is_ok() {
             self.playback.hold.grip_again(&mut self.live);
             self.playback.record(false, Instant::now(), Done::Halve);
         }
     }
 
-    /// As a user wants it: to a state that is still kept.
+    /// Goes back to a kept state when the user asks for it.
     pub(super) fn go_back_before(&mut self, steps: u64) {
         let sound = self.sound.before(steps, self.world.step());
         if let Some(time) = sound.and_then(|sound| self.restore(sound)) {
@@ -517,7 +515,7 @@ impl<'s> Player<'s> {
         Some(time)
     }
 
-    /// Whether the instant is one of those that are sampled: they lie as far apart however a run is played.
+    /// True if a sample is due. The distance of samples does not depend on how a run is played.
     pub(super) fn is_sample_due(&self) -> bool {
         let every = (SAMPLED / self.world.step()).round().max(1.0) as u64;
         self.playback.steps.is_multiple_of(every)

@@ -1,4 +1,4 @@
-//! The list of what is shown: bodies, obstacles, tools and labels, with what of them is seen and how.
+//! The list of bodies, obstacles, tools and labels, with their visibility and look.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,8 @@ use pliant_picture::{Coat, Regions, label_colour};
 use super::App;
 use crate::regions::{coat_of, regions_of};
 
-/// The least opacity of the slider: what is to be gone is hidden, so that it cannot be taken hold of either.
+/// Least opacity of the slider. Below it a region should be hidden instead, so that hands can't take it
+/// either.
 const LEAST: f64 = 0.05;
 /// Height of the list on the screen.
 const HEIGHT: f32 = 280.0;
@@ -21,12 +22,12 @@ type Looks = BTreeMap<String, LookTable>;
 /// A line of the list.
 struct Row {
     region: Region,
-    /// As it is typed in a scene, and as it is read.
+    /// Name as typed in a scene, and its text in the list.
     name: CellLabel,
     text: String,
 }
 
-/// What is shown: bodies by name, then labels.
+/// Returns the rows of the list: bodies by name, then labels.
 fn rows(names: &RegionNames) -> Vec<Row> {
     let labels = names.labels.iter().map(|(label, name)| Row {
         region: Region::Label(label),
@@ -38,7 +39,7 @@ fn rows(names: &RegionNames) -> Vec<Row> {
         name: CellLabel::Name(text.clone()),
         text: text.clone(),
     };
-    // A name that a label has, too, is that of the label.
+    // A name that a label and a body share belongs to the label.
     let finds = |row: &Row| names.find(&row.name).is_ok_and(|found| found.contains(&row.region));
     names.bodies.iter().map(body).filter(finds).chain(labels).collect()
 }
@@ -147,7 +148,7 @@ impl App {
     }
 }
 
-/// The list of a finished run, whose frames keep all cells: what is hidden is invisible.
+/// The list of a finished run. Its frames keep all cells: hidden regions are invisible.
 #[derive(Default)]
 pub(super) struct Listed {
     pub names: RegionNames,

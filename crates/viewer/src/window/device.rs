@@ -49,7 +49,7 @@ impl App {
         }
     }
 
-    /// Where points are now, for what lies under the mouse: one read-back where they are on the device.
+    /// Reads the points back once if they lie on the device, so that the mouse finds the current positions.
     pub(super) fn bring_points(&mut self) {
         let Some(points) = self.on_device().filter(|_| self.frame.playing) else { return };
         match points.read() {
@@ -61,7 +61,7 @@ impl App {
         }
     }
 
-    /// What the figures say of it.
+    /// Returns the line about the device in the figures.
     pub(super) fn told_of_device(&self) -> Option<String> {
         let points = self.on_device()?;
         let name = &points.device().adapter().name;

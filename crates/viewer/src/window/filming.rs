@@ -20,14 +20,14 @@ const LONGEST: Duration = Duration::from_secs(30);
 #[derive(Default)]
 pub(super) struct Filming {
     taking: Taking,
-    /// When it began, and when the last picture was asked for.
+    /// Wall times of the start and of the last request for a picture.
     since: Option<[Instant; 2]>,
     pub pictures: Vec<Picture>,
     written: Option<Receiver<Told>>,
 }
 
 impl Filming {
-    /// Whether pictures are taken.
+    /// True if a film is being recorded.
     pub fn is_on(&self) -> bool {
         self.since.is_some()
     }

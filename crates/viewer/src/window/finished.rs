@@ -49,7 +49,7 @@ pub fn open_finished(run: FinishedRun) -> Result<Option<String>, WindowError> {
     })
 }
 
-/// What is asked of the reader.
+/// Request to the reader.
 #[derive(Clone, Debug, PartialEq)]
 struct Asked {
     file: PathBuf,
@@ -64,11 +64,11 @@ struct Loaded {
     subject: Option<(Arc<Subject>, RegionNames)>,
     points: Vec<Vector3>,
     values: Vec<f64>,
-    /// Fields that colours can tell.
+    /// Fields that colours can show.
     choices: Vec<String>,
 }
 
-/// How many points and cells a mesh has; frames with the same share what is drawn of them.
+/// Number of points and cells of a mesh. Frames of the same shape share their subject.
 type Shape = (usize, Vec<(CellKind, usize)>);
 
 /// Reads the newest frame that is asked for, as long as someone asks.
@@ -93,7 +93,7 @@ fn survey(series: &Series, context: &egui::Context) -> Result<Receiver<Vec<Vecto
     let (frames, context) = (series.frames.clone(), context.clone());
     let work = move || {
         let mut all = Outermost::default();
-        // A frame that cannot be read is told where it is shown.
+        // The message about an unreadable frame appears when it is shown.
         let meshes = frames.iter().filter_map(|(_, file)| pliant_geometry::io::read(file).ok());
         meshes.for_each(|file| all.add(deformed_points(&file.mesh)));
         // Another series may be shown by now.
@@ -127,7 +127,7 @@ fn words(field: &str) -> (String, &'static str) {
     }
 }
 
-/// Where a run stands on its timeline.
+/// Current instant on the timeline of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Timeline {
     /// The instant [s], and the first and the last one.
@@ -146,7 +146,7 @@ impl Timeline {
         Self { at: ends[0], ends, playing: false, looped: true, speed: 1.0 }
     }
 
-    /// Goes on by some wall time [s]; at the end from the start again, or stops.
+    /// Advances by some wall time [s]. At the end the timeline starts again or stops.
     fn go_on(&mut self, wall: f64) {
         if !self.playing {
             return;
@@ -185,9 +185,9 @@ struct Finished {
     listed: Listed,
     asks: Sender<Asked>,
     found: Receiver<Result<Loaded, String>>,
-    /// Where the frames reach, once all are known; `None` after that.
+    /// Points that the frames reach, once all are read; `None` after that.
     surveyed: Option<Receiver<Vec<Vector3>>>,
-    /// What was asked for last, and what is shown.
+    /// Last request, and the request that is shown.
     asked: Option<Asked>,
     shown: Option<Asked>,
     message: Option<Told>,
@@ -277,7 +277,7 @@ impl Finished {
         let unit = loaded.asked.field.as_deref().map_or("", |field| words(field).1);
         let own = self.port.range_seen(unit);
         if !self.port.locked {
-            // The range grows over the frames that were seen, so that colours mean the same in all of them.
+            // The range grows over the frames that were seen, so that colours mean the same in each.
             let before = self.port.style.range.filter(|_| !other);
             self.port.style.range = match (before, own) {
                 (Some([low, high]), Some(own)) => Some([low.min(own[0]), high.max(own[1])]),
@@ -288,7 +288,7 @@ impl Finished {
         self.shown = Some(loaded.asked);
     }
 
-    /// Goes by so many frames.
+    /// Moves by a number of frames.
     fn step(&mut self, by: isize) {
         let last = self.series.frames.len() - 1;
         let frame = self.timeline.frame(&self.series).saturating_add_signed(by).min(last);

@@ -17,8 +17,8 @@ fn length(metres: f64) -> String {
 }
 
 impl App {
-    /// Followed points with their numbers, and what is known of them beside the bar: place, value, body,
-    /// element and label, and the distance of the last two.
+    /// Draws followed points with their numbers, and a list beside the bar: place, value, body, element and
+    /// label. The distance of the last two points stands there, too.
     pub(super) fn draw_followed(&self, painter: &Painter) {
         let followed = &self.frame.followed;
         if let [.., one, two] = &followed[..]

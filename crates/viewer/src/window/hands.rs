@@ -1,4 +1,4 @@
-//! Two hands: the mouse leads one of them, while the other one keeps what it holds or is led by keys.
+//! Two hands. The mouse leads one, while the other keeps its grip or is led by keys.
 
 use eframe::egui::Pos2;
 use pliant_geometry::Vector3;
@@ -46,8 +46,8 @@ impl App {
         }
     }
 
-    /// While the mouse pulls, its hand keeps what it holds, and the mouse goes on with the other one; else
-    /// that lets go what it keeps.
+    /// Changes the hand that the mouse leads. A pulling hand keeps its grip, and the mouse leads the other
+    /// one. If the mouse does not pull, the other hand lets go.
     pub(super) fn change_hands(&mut self) {
         let other = self.mouse.other();
         match self.context.pointer_latest_pos() {
@@ -66,12 +66,12 @@ impl App {
         (self.hands, self.led) = ([None; 2], None);
     }
 
-    /// Whether the mouse leads something.
+    /// True if the mouse leads a hand that holds something.
     pub(super) fn pulls(&self) -> bool {
         self.hands[self.mouse as usize].is_some() && !self.is_led(self.mouse)
     }
 
-    /// Whether keys lead a tool in a hand.
+    /// True if keys lead a tool in a hand.
     pub(super) fn is_led(&self, which: Which) -> bool {
         self.led.is_some_and(|(_, hand)| hand == which)
     }

@@ -1,5 +1,5 @@
-//! What a user takes away: a picture, the view as the table `[view]` of a scene, and the scene with the
-//! numbers that were changed.
+//! Results that a user can save: a picture, the view as the table `[view]` of a scene, and the scene with the
+//! changed numbers.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -35,7 +35,7 @@ impl Taking {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    /// Writes the whole window once it has come; what is wrong.
+    /// Writes the whole window once its picture has arrived.
     pub fn write(&self, file: &Path) -> Option<Result<(), String>> {
         let image = self.taken()?;
         let [width, height] = image.size.map(|size| size as f32);
@@ -85,8 +85,7 @@ fn part(image: &ColorImage, rect: Rect, pixels_per_point: f32) -> Option<Picture
     (!rgba.is_empty()).then_some(Picture { width, height, rgba })
 }
 
-/// What a camera has to look at to see what it sees, where it does not see all: target [m] and magnification
-/// of what fits.
+/// Target [m] and magnification of a camera that does not see everything.
 type Closer = Option<([f64; 3], f64)>;
 
 /// A view as the table `[view]` of a scene.

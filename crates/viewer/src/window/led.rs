@@ -9,8 +9,8 @@ use super::App;
 use super::picture::{OPEN, TURN};
 use crate::hand::{Hand, Point};
 
-/// How far a tool goes in a second while a key is held, over the height of the picture; by how many points of
-/// the mouse it turns, and of the wheel its jaws open.
+/// Speed of a tool while a key is held: heights of the picture in a second. The keys turn it like this many
+/// points of the mouse, and open its jaws like this many of the wheel.
 const SPEED: f64 = 0.15;
 const TURNS: f64 = 60.0;
 const OPENS: f64 = 300.0;
