@@ -1,9 +1,9 @@
 //! The hand and the pins that hold a body, and tools in the hand.
 //!
 //! A hand does not hold a single point. It holds the surface around the point that it took, within two edges
-//! of the elements there. The weights are those of a Gaussian whose deviation is one edge. So a pull meets
-//! tissue as a grasper does, and not a single element. The spring gets no longer than two edges, however far
-//! the mouse goes. So the force has a limit: that length times the stiffness.
+//! of the elements there. The weights of the nodes follow a Gaussian whose deviation is one edge. So a pull
+//! meets tissue as a grasper does, and not a single element. The spring gets no longer than two edges,
+//! however far the mouse goes. So the force is at most this length times the stiffness.
 //!
 //! There are two hands. Each holds tissue or a tool, and keeps it while the other one is led.
 

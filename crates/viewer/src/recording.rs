@@ -90,7 +90,7 @@ pub struct Move {
     pub done: Done,
 }
 
-/// All actions of the user in a run, from its start.
+/// Actions of the user in a run, from its start.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Recording {
     /// In the order of time.
@@ -145,17 +145,17 @@ impl Recording {
     /// complete at any time.
     ///
     /// # Errors
-    /// What the system says.
+    /// If the file can't be written.
     pub fn write(&self, path: &Path) -> Result<(), String> {
         let part = part_of(path);
         let written = std::fs::write(&part, self.to_bytes()?).and_then(|()| std::fs::rename(&part, path));
         written.map_err(|error| error.to_string())
     }
 
-    /// Tries whether a recording can be written into a file, which stays as it is.
+    /// Checks that a recording can be written to a file, whose contents stay unchanged.
     ///
     /// # Errors
-    /// What the system says.
+    /// If the file can't be written.
     pub fn try_path(path: &Path) -> std::io::Result<()> {
         if path.is_dir() {
             return Err(std::io::Error::other("it is a folder"));
@@ -181,7 +181,7 @@ impl Recording {
     /// Checks that the recording belongs to a scene.
     ///
     /// # Errors
-    /// If it is of another one.
+    /// If it belongs to another scene.
     pub fn check(&self, world: &World) -> Result<(), String> {
         if self.of != world.simulated().fingerprint_of_bodies() {
             return Err(

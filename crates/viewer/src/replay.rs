@@ -116,7 +116,7 @@ pub fn replay_in_real_time(
 /// Repeats a recording before the same steps.
 ///
 /// # Errors
-/// Why the run could not go on.
+/// If the run can't continue.
 pub fn replay(world: &World, recording: &Recording) -> Result<Replayed, String> {
     replay_until(world, recording, &StopFlag::default())
 }
@@ -124,7 +124,7 @@ pub fn replay(world: &World, recording: &Recording) -> Result<Replayed, String> 
 /// Runs like [`replay`], until a flag is set.
 ///
 /// # Errors
-/// Why the run could not go on, or that it was stopped.
+/// If the run can't continue, or was stopped.
 pub fn replay_until(world: &World, recording: &Recording, stop: &StopFlag) -> Result<Replayed, String> {
     recording.check(world)?;
     let mut replay =

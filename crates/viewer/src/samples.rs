@@ -61,9 +61,9 @@ impl Samples {
         *self = Self::default();
     }
 
-    /// Adds a sample if its time differs from the last one. After a run went back, the later samples are
-    /// removed first. When the limit is reached, every second sample is removed, and from then on every
-    /// second one is skipped.
+    /// Adds a sample, unless the last one has the same time. If the run went back, the later samples are
+    /// removed first. When the limit is exceeded, every second sample is removed, and later samples are taken
+    /// half as often.
     pub fn take(&mut self, Sample { time, columns, values }: Sample) {
         let last = self.times.last().copied().unwrap_or(-1.0);
         if time < last {
@@ -94,7 +94,7 @@ impl Samples {
         }
     }
 
-    /// Forgets the samples from a time on; all where none is before.
+    /// Removes the samples from a time on; all if none is earlier.
     fn forget_from(&mut self, time: f64) {
         let kept = self.times.partition_point(|known| *known < time);
         if kept == 0 {
@@ -104,7 +104,7 @@ impl Samples {
         self.values.truncate(kept * self.columns.len());
     }
 
-    /// Takes on other columns; those that were not there are not a number until now.
+    /// Changes the columns. Earlier values of new columns are NaN.
     fn rearrange(&mut self, columns: &Arc<[Column]>) {
         let places: Vec<_> =
             columns.iter().map(|new| self.columns.iter().position(|old| old == new)).collect();
@@ -126,7 +126,7 @@ impl Samples {
     /// number if that file exists. Unknown values are empty.
     ///
     /// # Errors
-    /// What the system says.
+    /// If the file can't be written.
     pub fn write_beside(&self, scene: &Path) -> std::io::Result<PathBuf> {
         let (path, file) = create_beside(scene, "probes", "csv")?;
         let mut out = BufWriter::new(file);

@@ -221,7 +221,7 @@ fn pictures_from_the_device_are_those_from_memory_with_and_without_a_section() {
     }
 }
 
-/// Frames of a session until there were so many inspections.
+/// Collects the frames of a session until a number of inspections is reached.
 fn frames(session: &mut Session, inspections: u64) -> Vec<Frame> {
     let mut frames = Vec::new();
     let first = wait(session, |frame| frame.playing).inspections;

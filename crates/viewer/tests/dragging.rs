@@ -22,8 +22,8 @@ use support::{BALL, LIVER, subject, wait, wait_up_to, world};
 const PULLS: u32 = 60;
 /// A drag takes that long at most, on a machine that does much else.
 const PATIENCE: Duration = Duration::from_secs(900);
-/// Bytes by which the most that is allocated may differ: lists of held nodes are some KB long, and a leak of
-/// 100 bytes a drag would show within 700.
+/// Bytes by which the peak of the allocated memory may differ. Lists of held nodes are some KB long. A leak
+/// of 100 bytes a drag would show within 700 drags.
 const GROWTH: usize = 64 << 10;
 /// Drags in a row after which all states are kept that ever are: sixteen, of a quarter of a second each.
 const FULL: u64 = 5;
@@ -39,7 +39,7 @@ static ALLOCATED: AtomicUsize = AtomicUsize::new(0);
 #[global_allocator]
 static COUNTED: Counted = Counted;
 
-// SAFETY: every call goes on to the allocator of the system as it is.
+// SAFETY: every call is passed unchanged to the allocator of the system.
 unsafe impl GlobalAlloc for Counted {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATED.fetch_add(layout.size(), Ordering::Relaxed);
@@ -64,7 +64,7 @@ unsafe impl GlobalAlloc for Counted {
 /// Bodies are dragged one after the other: they share the memory that is watched.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// Pages of memory that the process holds; `None` where nobody tells.
+/// Returns the pages of memory that the process holds; `None` if the system does not report them.
 fn resident() -> Option<usize> {
     std::fs::read_to_string("/proc/self/statm").ok()?.split(' ').nth(1)?.parse().ok()
 }
@@ -74,7 +74,7 @@ fn walk(random: &mut Random) -> Vector3 {
     Vector3::from_fn(|_, _| random.part() - 0.5) * 2.0
 }
 
-/// How long a body is dragged.
+/// Duration of the dragging.
 enum Until {
     Drags(u64),
     Wall(Duration),
@@ -99,7 +99,7 @@ struct Dragged {
     /// Steps of a pull.
     steps: u64,
     random: Random,
-    /// How often the run went back, and the strongest pull [N].
+    /// Number of times that the run went back, and the strongest pull [N].
     broken: u64,
     strongest: f64,
 }
@@ -164,8 +164,8 @@ impl Dragged {
     }
 }
 
-/// What broke a drag is told: the body is turned inside out, squeezed until it is too stiff for the step, or
-/// gains energy.
+/// Checks that the message names the reason of a break. The body is turned inside out, squeezed until it is
+/// too stiff for the step, or gains energy.
 fn assert_is_told(message: &str, drag: u64) {
     let reasons = ["is inverted", "the largest stable step has fallen", "the energies are off balance"];
     let is_told = reasons.iter().any(|why| message.contains(why));

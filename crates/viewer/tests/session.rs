@@ -207,7 +207,7 @@ fn a_run_that_breaks_tells_body_and_element_and_keeps_the_last_good_picture() {
     wait(&mut session, |frame| frame.failure.is_none() && frame.steps == 0);
 }
 
-/// A run that breaks by itself goes back and goes on with halved steps; a replay comes to the same bits.
+/// A run that breaks by itself goes back and continues with halved steps. A replay gives the same bits.
 #[test]
 fn a_run_whose_step_fails_goes_back_and_halves_its_steps() {
     let world = world(&pressed_cube(3.003));
@@ -232,8 +232,8 @@ fn a_run_whose_step_fails_goes_back_and_halves_its_steps() {
     assert_eq!(replay(&world, &recording).unwrap(), replay(&world, &recording).unwrap());
 }
 
-/// A pull that tears the ball does not end the run: it goes back to a state before, where the hand lets go,
-/// and goes on; a replay comes to the same bits, and has the break.
+/// A pull that tears the ball does not end the run. The run goes back to an earlier state, where the hand
+/// lets go, and continues. A replay gives the same bits, and contains the break.
 #[test]
 fn a_pull_that_breaks_a_run_is_undone() {
     let world = world(BALL);
@@ -265,9 +265,9 @@ fn a_pull_that_breaks_a_run_is_undone() {
     assert!(at > back && at - back < 0.6);
 }
 
-/// However far the mouse goes, the hand pulls with its stiffness times two edges at most, also while the body
-/// gives way. It goes on from before the pull with the bits of a run that nobody pulled at; a picked point
-/// tells where it is and what lies there.
+/// The hand pulls with its stiffness times two edges at most, also while the body gives way. After undo, the
+/// run continues from before the pull with the bits of an undisturbed run. A picked point shows its position
+/// and the data of its place.
 #[test]
 fn a_pull_is_taken_back_and_a_picked_point_is_read() {
     let world = world(BALL);
@@ -297,8 +297,8 @@ fn a_pull_is_taken_back_and_a_picked_point_is_read() {
     assert!(recording.breaks.is_empty() && replay(&world, &recording).unwrap().held.is_none());
 }
 
-/// However long ago the pull began, undo does not go to the start, and it goes no farther before the pull
-/// than a part of what the run has done since.
+/// Undo of an old pull does not go to the start. It goes back before the pull by at most a part of the steps
+/// since.
 #[test]
 fn a_pull_of_long_ago_is_taken_back_without_going_to_the_start() {
     let mut session = Session::start(world(BALL), || ()).unwrap();
@@ -323,8 +323,8 @@ fn a_pull_of_long_ago_is_taken_back_without_going_to_the_start() {
     }
 }
 
-/// A number that breaks the run at once is taken back: the run goes on from where it was, with the numbers
-/// before.
+/// A number that breaks the run at once is taken back. The run continues from the same state with the earlier
+/// numbers.
 #[test]
 fn numbers_that_ruin_a_run_are_taken_back() {
     let world = calm();
@@ -650,8 +650,8 @@ fn the_examples_start_and_play() {
 /// A block on a table, and jaws over it.
 const GRASPED: &str = include_str!("support/grasped.toml");
 
-/// Forces of contacts come with the frames where a view asks for them: those of the floor carry what lies on
-/// it.
+/// Forces of contacts come with the frames if a view asks for them. The forces of the floor carry the weight
+/// of the things on it.
 #[test]
 fn forces_of_contacts_are_shown_where_they_are_asked_for() {
     let world = world(GRASPED);
@@ -667,8 +667,8 @@ fn forces_of_contacts_are_shown_where_they_are_asked_for() {
     assert!(frame.contacts.iter().all(|[point, _]| frame.points.contains(point)));
 }
 
-/// The hand takes a tool where it is seen, closes its jaws, turns and lifts it; obstacles are not taken; all
-/// of it is repeated to the same bits.
+/// The hand takes a tool at its visible place, closes its jaws, turns and lifts it. Obstacles are not taken.
+/// A replay gives the same bits.
 #[test]
 fn a_tool_is_led_by_hand_and_repeated() {
     let world = world(GRASPED);
@@ -718,8 +718,8 @@ fn a_tool_is_led_by_hand_and_repeated() {
     assert!(once.largest_force > 0.9 * weight, "{once:?}");
 }
 
-/// Two hands that pull at opposite sides of a ball: each goes on while the other one is led or lets go, and a
-/// replay comes to the same bits.
+/// Two hands pull at opposite sides of a ball. Each continues while the other one is led or lets go. A replay
+/// gives the same bits.
 #[test]
 fn two_hands_pull_each_on_its_own_and_are_repeated() {
     let world = world(BALL);

@@ -1,4 +1,4 @@
-//! The window itself: what is drawn and typed. What is simulated lies behind [`Session`].
+//! The window itself: drawing and input. The simulation lies behind [`Session`].
 
 mod bodies;
 mod device;
@@ -51,28 +51,28 @@ use crate::hand::Which;
 use crate::samples::Samples;
 use crate::session::{Frame, Order, Session};
 
-/// Reads a scene; the message of what is wrong with it.
+/// Reads a scene, or returns an error message.
 pub type Read = Arc<dyn Fn(&Path) -> Result<World, String> + Send + Sync>;
 
-/// What a window opens with.
+/// Settings of a new window.
 pub struct Opening {
     /// The scene.
     pub world: World,
-    /// How a scene asks to be looked at.
+    /// Returns the camera and the style that a scene wants.
     pub look: fn(&Scene) -> Look,
     /// The file of the scene, watched for changes.
     pub file: PathBuf,
     /// Reads a scene, at the start of another one or after a change.
     pub read: Read,
-    /// Where what the hand did is written, each second and when the window closes.
+    /// File for the recording of the hands, written each second and when the window closes.
     pub record: Option<PathBuf>,
     /// Closes the window once it is set.
     pub stop: StopFlag,
-    /// Takes a picture of the window after so much simulated time [s], and closes.
+    /// Takes a picture of the window after this simulated time [s], and closes.
     pub portrait: Option<(f64, PathBuf)>,
     /// Width and height at its start, in pixels of a screen at 100 %.
     pub size: [u32; 2],
-    /// When the user asked for it.
+    /// Instant at which the user asked for the window.
     pub began: Instant,
 }
 
@@ -88,15 +88,15 @@ pub enum WindowError {
     /// A finished run that cannot be shown.
     #[error("{message}")]
     Run {
-        /// What is wrong.
+        /// Error in plain words.
         message: String,
-        /// What to try.
+        /// Advice for the user.
         remedy: &'static str,
     },
 }
 
 impl WindowError {
-    /// What to try.
+    /// Returns advice for the user.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Window(_) => {
@@ -118,10 +118,10 @@ pub fn open(opening: Opening) -> Result<Option<String>, WindowError> {
     run_window(setup, size, |context, outcome| App::new(context, opening, outcome))
 }
 
-/// Where a portrait leaves what came of it.
+/// Result of a portrait: its description, or an error.
 type Outcome = Arc<Mutex<Option<Result<String, String>>>>;
 
-/// Opens a window on a device with what is made in it, until it is closed.
+/// Opens a window on a device and runs the app from `make` in it, until the window is closed.
 fn run_window<A: eframe::App + 'static>(
     wgpu_options: WgpuConfiguration,
     size: [u32; 2],
@@ -153,17 +153,17 @@ struct App {
     session: Session,
     frame: Frame,
     port: Viewport,
-    /// What is shown of the scene.
+    /// View of the scene.
     view: ViewTable,
     /// The labels and bodies that this has.
     names: RegionNames,
-    /// Whether every frame comes to ordinary memory.
+    /// True if every frame is copied to ordinary memory.
     in_memory: bool,
     /// The device of the window, if it is one of a solver.
     device: Option<Device>,
     stiffness: f64,
     speed: f64,
-    /// Where each hand is [m], while it holds something.
+    /// Place of each hand [m], while it holds something.
     hands: [Option<Vector3>; 2],
     /// The hand that the mouse leads.
     mouse: Which,
@@ -175,9 +175,9 @@ struct App {
     help: bool,
     side_shown: bool,
     plots_shown: bool,
-    /// What the window is drawn with.
+    /// Graphics adapter of the window.
     adapter: String,
-    /// What can be taken back, the last at the end.
+    /// Actions that undo can take back, the newest last.
     acts: Vec<Act>,
     /// A picture that was asked for.
     taking: Taking,
@@ -185,7 +185,7 @@ struct App {
     samples: Samples,
     /// Names of the curves that are plotted.
     plotted: BTreeSet<String>,
-    /// Whether plots show the last seconds instead of all.
+    /// True if plots show only the last seconds.
     lately: bool,
     /// Points that the user follows.
     probes: usize,
@@ -200,10 +200,10 @@ struct App {
     filming: Filming,
     /// The tool that keys lead, in the order of tools, and the hand that holds it.
     led: Option<(usize, Which)>,
-    /// What can be opened.
+    /// List of the files that can be opened.
     browser: Browser,
     message: Option<Told>,
-    /// What the scene warns of, with the numbers that are played.
+    /// Warnings of the scene, with the numbers that are played.
     warnings: Vec<String>,
     /// Messages that the user has closed.
     closed: BTreeSet<String>,
@@ -287,7 +287,7 @@ impl App {
         Ok(app)
     }
 
-    /// The field that colours tell.
+    /// Returns the field that colours show.
     fn field(&self) -> Option<FieldName> {
         self.world.scene.field_of(&self.view)
     }
@@ -333,7 +333,7 @@ impl App {
         }
     }
 
-    /// Shows what is asked for; in a section the body in place of a surface that it carries.
+    /// Shows the current view. With a section, the body stands in for a surface that it carries.
     fn show(&mut self) {
         let view = if self.port.cut.on { self.world.scene.in_section(&self.view) } else { self.view.clone() };
         self.names = self.world.region_names(view.on.as_deref());
@@ -481,7 +481,7 @@ impl App {
 /// Width of a window below which the side panel is left out.
 const NARROW: f32 = 520.0;
 
-/// Height of what is left for plots and the picture below which plots are left out.
+/// Least height that is left for the plots and the picture. With less, the plots are left out.
 const LOW: f32 = 380.0;
 
 /// The message after a scene was read again.
@@ -536,7 +536,7 @@ fn begin(world: &World, context: &egui::Context) -> Result<Session, String> {
     Session::start(world.clone(), move || context.request_repaint()).map_err(|error| error.to_string())
 }
 
-/// What a world warns of.
+/// Returns the warnings of a world.
 fn warnings(world: &World) -> Vec<String> {
     world.warnings().map(|warning| warning.message.clone()).collect()
 }

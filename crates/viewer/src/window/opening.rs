@@ -86,8 +86,8 @@ impl Browser {
     }
 }
 
-/// What can be opened in a folder: folders, then scenes and meshes, each by name. What cannot be read has
-/// nothing.
+/// Returns the files of a folder that can be opened: folders, then scenes and meshes, each by name. A folder
+/// that cannot be read has no entries.
 fn entries(folder: &Path) -> Vec<Entry> {
     let read = fs::read_dir(folder).into_iter().flatten().flatten();
     let entry = |path: PathBuf| {
@@ -129,7 +129,7 @@ pub(super) fn remember(scene: &Path) {
 }
 
 impl App {
-    /// The list, while it is shown; opens what is chosen.
+    /// Draws the list while it is shown, and opens the chosen file.
     pub(super) fn browse(&mut self, context: &egui::Context) {
         if !self.browser.shown {
             return;

@@ -1,4 +1,4 @@
-//! What the window draws of bodies: the renderer in a paint callback of egui.
+//! Drawing of bodies in the window: the renderer in a paint callback of egui.
 
 use std::sync::Arc;
 
@@ -10,13 +10,13 @@ use pliant_picture::{Camera, Drawn, Regions, Renderer, Section, Style, Subject, 
 /// Samples a pixel.
 pub const SAMPLES: u32 = 4;
 
-/// What the paint callback draws, kept among egui's resources.
+/// State of the paint callback, kept among egui's resources.
 struct Stageset {
     renderer: Renderer,
     drawn: Drawn,
     section: Section,
     subject: Arc<Subject>,
-    /// What is drawn from where a solver put it.
+    /// Buffer of points that the solver wrote on the device, if it is drawn from there.
     bound: Option<wgpu::Buffer>,
 }
 
@@ -89,7 +89,7 @@ impl CallbackTrait for Paint {
     }
 }
 
-/// Brings what is drawn to the device; pipelines are compiled for the first subject.
+/// Copies a subject to the device. The first subject compiles the pipelines.
 pub fn place(state: &egui_wgpu::RenderState, target: Target, subject: &Arc<Subject>) {
     let resources = &mut state.renderer.write().callback_resources;
     let known = resources.remove::<Stageset>();

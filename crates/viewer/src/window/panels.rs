@@ -1,4 +1,4 @@
-//! The panels around the picture: what is played and shown, and plots.
+//! The panels around the picture: controls of the run and of the view, and plots.
 
 use eframe::egui;
 use pliant_format::tables::{BodyModel, ColourBy, Component, FieldName, Labels, Nothing, SolverName};
@@ -13,7 +13,7 @@ use crate::hand::{Hand, Which};
 use crate::recording::Surface;
 use crate::session::Order;
 
-/// The colours of labels, and those of tissue.
+/// Colours by label, and without a field.
 const LABELS: ColourBy = ColourBy::Labels(Labels::Label);
 const NO_FIELD: ColourBy = ColourBy::Nothing(Nothing::None);
 
@@ -123,7 +123,7 @@ impl App {
         });
     }
 
-    /// What colours tell; whether another field is asked for.
+    /// Draws the choice of the colours. Returns true if another field is asked for.
     fn colours(&mut self, ui: &mut egui::Ui) -> bool {
         let before = (self.colour(), self.view.component);
         let mut colour = before.0;
@@ -172,7 +172,7 @@ impl App {
         before != (self.colour(), self.view.component)
     }
 
-    /// What colours tell now.
+    /// Returns the current choice of the colours.
     fn colour(&self) -> ColourBy {
         match self.field() {
             _ if self.view.shows_labels() => LABELS,
@@ -187,7 +187,7 @@ impl App {
         self.order(Order::Marks(shown));
     }
 
-    /// What is drawn beside colours; whether another surface is asked for.
+    /// Draws the choices of the view besides the colours. Returns true if another surface is asked for.
     fn shape(&mut self, ui: &mut egui::Ui) -> bool {
         let before = (Surface::of(&self.view), self.view.contacts, self.port.cut.on);
         let scene = &self.world.scene;
@@ -255,7 +255,7 @@ impl App {
         }
     }
 
-    /// The fields of what is shown.
+    /// Returns the fields of the current view.
     pub(super) fn fields(&self) -> Vec<FieldName> {
         let on = self.view.on.as_deref();
         let touches = self.world.touches(on);

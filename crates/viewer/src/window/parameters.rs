@@ -21,7 +21,7 @@ type Making = (Vec<f64>, Receiver<Result<World, String>>);
 pub(super) struct Numbers {
     all: Vec<Parameter>,
     in_file: Vec<f64>,
-    /// Those of the world that is played, or waits to be.
+    /// Numbers of the world that is played, or waits to be.
     accepted: Vec<f64>,
     /// A world that is being made of some numbers.
     making: Option<Making>,
@@ -44,7 +44,7 @@ impl Numbers {
         self.all.iter_mut().zip(values).for_each(|(parameter, value)| parameter.number.value = *value);
     }
 
-    /// Goes back to the numbers that are played, those that are others than in the file.
+    /// Returns to the played numbers, of which `played` lists the ones that differ from the file.
     pub(super) fn refuse(&mut self, played: &[Number]) {
         let value = |parameter: &Parameter, file: f64| {
             let own = played.iter().find(|number| number.path == parameter.number.path);
@@ -56,7 +56,7 @@ impl Numbers {
         self.accepted = values;
     }
 
-    /// Those of some values that are others than in the file.
+    /// Returns the numbers among some values that differ from the file.
     fn changed(&self, values: &[f64]) -> Vec<Number> {
         let all = self.all.iter().zip(values).zip(&self.in_file);
         all.filter(|((_, value), file)| value != file)

@@ -1,4 +1,4 @@
-//! The picture in the middle: what the mouse does in it, and what is written over it.
+//! The picture in the middle: actions of the mouse in it, and text over it.
 
 use eframe::egui::{self, Align2, Color32, CursorIcon, FontId, Key, PointerButton, Pos2, Rect, Stroke, vec2};
 use pliant_geometry::Vector3;
@@ -157,14 +157,14 @@ impl App {
         }
     }
 
-    /// What lies under a place of the picture.
+    /// Returns the movable point under a place of the picture, and its position [m].
     pub(super) fn hit(&self, place: [f64; 2]) -> Option<(Point, Vector3)> {
         let (from, along) = self.port.camera.ray(place, self.port.aspect());
         let clip = self.port.style.clip;
         let found = pick(&self.port.subject, &self.port.points, &from, &along, |point| {
             clip.is_none_or(|plane| plane.distance(point) <= 0.0)
         });
-        // Obstacles hide what is behind them, and are not taken hold of.
+        // Obstacles hide the things behind them, but hands can't take them.
         found.filter(|(point, _)| self.frame.movable.get(point.triangle as usize).copied().unwrap_or(true))
     }
 
@@ -173,7 +173,7 @@ impl App {
         self.frame.pins().iter().position(|[point, _]| self.is_at(point, place))
     }
 
-    /// Whether a point that is held is shown there.
+    /// True if a held point is drawn at a place.
     pub(super) fn is_at(&self, point: &[f64; 3], place: Pos2) -> bool {
         let at = self.port.to_screen(&Vector3::from(*point));
         at.is_some_and(|at| at.distance(place) <= PIN_SIZE + 3.0)
@@ -300,7 +300,8 @@ impl App {
     }
 }
 
-/// Where the ray through a place meets the plane through a point that faces the camera.
+/// Returns the intersection of the ray through a place with a plane. The plane contains a point and faces the
+/// camera.
 pub(super) fn on_plane(camera: &Camera, point: &Vector3, place: [f64; 2], aspect: f64) -> Vector3 {
     let (from, along) = camera.ray(place, aspect);
     let towards = camera.axes()[2];

@@ -21,7 +21,7 @@ struct Curve {
     columns: Vec<usize>,
 }
 
-/// The curves that there are: the columns, and before those of a vector its length.
+/// Returns the available curves: the columns, and before the components of a vector its length.
 fn curves(samples: &Samples) -> Vec<Curve> {
     let mut all = Vec::new();
     for (index, column) in samples.columns().iter().enumerate() {
@@ -93,7 +93,7 @@ fn marks(GridInput { bounds: (low, high), .. }: GridInput) -> Vec<GridMark> {
     (3..10).map(marks).find(|marks| marks.len() >= 3).unwrap_or_default()
 }
 
-/// A number at an axis, with the digits that tell it from the next one a step away.
+/// Formats a number at an axis, with enough digits to differ from its neighbour a step away.
 fn number(value: f64, step: f64) -> String {
     let is_whole = |decimals: &usize| {
         let steps = step * 10_f64.powi(*decimals as i32);
@@ -118,7 +118,7 @@ impl App {
         self.order(Order::Probe(point));
     }
 
-    /// The curves, one plot for each unit, and what is to be plotted.
+    /// Draws the curves, one plot for each unit, and the menu to choose them.
     pub(super) fn plots(&mut self, ui: &mut egui::Ui) {
         let all = curves(&self.samples);
         ui.horizontal(|ui| {

@@ -18,7 +18,7 @@ pub(super) struct Portrait {
     stage: Stage,
 }
 
-/// How far it has come.
+/// Progress of a portrait.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Stage {
     Plays,
@@ -33,7 +33,7 @@ impl Portrait {
 }
 
 impl App {
-    /// Goes on with the portrait, if one is asked for; ends the window once it is written.
+    /// Continues a portrait, if one is asked for. Closes the window once it is written.
     pub(super) fn pose(&mut self) {
         let Some(portrait) = &mut self.portrait else { return };
         self.context.request_repaint();
@@ -55,7 +55,7 @@ impl App {
         self.context.send_viewport_cmd(egui::ViewportCommand::Close);
     }
 
-    /// What a picture of the window shows.
+    /// Describes a picture of the window.
     fn shown(&self) -> String {
         let message: String = self.banner().iter().map(|message| format!(": {}", message.text)).collect();
         let first = self.first_picture.unwrap_or_default();

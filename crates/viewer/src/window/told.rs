@@ -5,14 +5,14 @@ use eframe::egui::{self, Color32, Frame, Margin, RichText, Ui};
 
 use super::App;
 
-/// What a message is.
+/// Kind of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// The run cannot go on, or something asked for was not done.
+    /// The run can't continue, or a request was not fulfilled.
     Failure,
     /// A result may be questionable.
     Warning,
-    /// What happens now, or can be done.
+    /// Current state, or a possible action.
     Hint,
     /// Something was done.
     Done,
@@ -59,9 +59,9 @@ impl Kind {
 }
 
 impl App {
-    /// What a user should know now: why the run cannot go on, then what was done last, else what the run
-    /// notes or the scene warns of. A failure, a note and a warning that were closed do not come back; a
-    /// message does where it comes anew.
+    /// Returns the current messages for the user. A failure comes first, then the last action, or else a note
+    /// of the run or a warning of the scene. Closed failures, notes and warnings do not come back. A message
+    /// does if it is sent again.
     pub(super) fn banner(&self) -> Vec<Told> {
         let warned = |text: String| Told { kind: Kind::Warning, text };
         let open = |told: &Told| !self.closed.contains(&told.text);

@@ -8,21 +8,21 @@ use crate::session::Order;
 /// Something that can be taken back.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Act {
-    /// Numbers were changed; those before.
+    /// Numbers were changed; the values are the earlier ones.
     Numbers(Vec<f64>),
     /// A pin was set.
     Pin,
-    /// A pull began after so many steps.
+    /// A pull began after this number of steps.
     Pull(u64),
 }
 
 impl App {
-    /// Does what the hand of the mouse or a pin does, and remembers what can be taken back.
+    /// Sends an action of the mouse's hand or of a pin, and remembers it for undo.
     pub(super) fn act(&mut self, hand: Hand) {
         self.act_with(self.mouse, hand);
     }
 
-    /// The same with one of the hands.
+    /// Sends an action of a given hand or of a pin, and remembers it for undo.
     pub(super) fn act_with(&mut self, which: Which, hand: Hand) {
         match hand {
             Hand::Take(..) => {

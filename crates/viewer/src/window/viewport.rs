@@ -1,5 +1,5 @@
-//! What is looked at, and from where: the body that is drawn, the camera, the style, and what is written
-//! around it. A scene that is played and a finished run are both seen through one.
+//! The view of a body: its subject, the camera, the style, and the text around it. Both a played scene and a
+//! finished run are seen through it.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use pliant_picture::{
 
 use super::paint::{Paint, SAMPLES, place};
 
-/// What occlusion does.
+/// Description of the occlusion for the user.
 pub(super) const OCCLUSION: &str = "folds and contacts are darker, where less light arrives";
 /// Width of the scale of colours on the screen.
 const SCALE: f32 = 110.0;
@@ -29,17 +29,17 @@ const AXES: f32 = 30.0;
 const CORNER: f32 = 46.0;
 /// Length of the bar on the screen, at most.
 const BAR: f64 = 150.0;
-/// Where the bar ends, from the left.
+/// Distance of the bar's end from the left.
 pub(super) const BESIDE_BAR: f32 = 2.0 * CORNER + 24.0 + BAR as f32;
 /// Colours of x, y and z.
 const COLOURS: [Color32; 3] =
     [Color32::from_rgb(196, 54, 46), Color32::from_rgb(46, 138, 60), Color32::from_rgb(50, 92, 196)];
-/// Letters of the sides of a patient to which x, y and z point, and of the other sides: right and left, front
-/// (anterior) and back, head (superior) and feet.
+/// Letters of the sides of a patient to which x, y and z point, and of the opposite sides. They are right and
+/// left, front (anterior) and back, head (superior) and feet.
 const SIDES_OF_PATIENT: [[&str; 2]; 3] = [["R", "L"], ["A", "P"], ["S", "I"]];
 
-/// Azimuth and elevation [°] of the sides: front, back, left, right, top, bottom. Those of a patient, whose
-/// front is along y, or of x.
+/// Azimuth and elevation [°] of the sides: front, back, left, right, top, bottom. The front of a patient is
+/// along y, else along x.
 fn sides(patient: bool) -> [(Key, [f64; 2]); 6] {
     let front = if patient { 90.0 } else { 0.0 };
     [
@@ -59,7 +59,7 @@ pub(super) struct Cut {
     pub on: bool,
     pub normal: Vector3,
     pub part: f64,
-    /// Where the scene has it [m], until it is moved.
+    /// Position in the scene [m], until the plane is moved.
     pub offset: Option<f64>,
 }
 
@@ -101,34 +101,35 @@ fn extent(subject: &Subject, along: &Vector3) -> [f64; 2] {
     places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
 }
 
-/// What is looked at, and from where.
+/// View of a body from a camera.
 pub(super) struct Viewport {
     target: Target,
     pub subject: Arc<Subject>,
     pub points: Arc<Vec<Vector3>>,
     pub values: Arc<Vec<f64>>,
-    /// Whether points or values are other than at the last paint.
+    /// True if points or values have changed since the last paint.
     fresh: bool,
-    /// Whether the subject is other than on the device.
+    /// True if the subject has changed since the last copy to the device.
     renewed: bool,
     pub camera: Camera,
-    /// From where it is seen at first; target and height are those that fit.
+    /// Direction of the first view; target and height fit the body.
     pub home: Camera,
-    /// What is in the middle at first [m], unless all is, and the magnification of what fits.
+    /// Target of the first view [m], unless it shows everything, and its magnification compared with a camera
+    /// that fits.
     closer: (Option<Vector3>, f64),
-    /// Whether software draws.
+    /// True if software draws.
     software: bool,
     pub style: Style,
     /// Regions with a look of their own.
     pub regions: Regions,
-    /// Whether the axes are those of a patient.
+    /// True if the axes are the axes of a patient.
     pub patient: bool,
-    /// Whether the range stays as it is.
+    /// True if the range of colours is fixed.
     pub locked: bool,
-    /// Whether a part of a body has no value of the field.
+    /// True if a part of a body has no value of the field.
     pub missing: bool,
     pub cut: Cut,
-    /// Points on the surface, increasing, and those of regions that show values.
+    /// Points on the surface in increasing order, and the points of regions that show values.
     pub surface: Vec<u32>,
     showing: Vec<u32>,
     /// The regions of which the latter are.
@@ -139,9 +140,9 @@ pub(super) struct Viewport {
     /// The largest value that is seen, and its place [m].
     largest: Option<(Vector3, f64)>,
     section: Section,
-    /// Where something will be or has been [m], as far as it is known.
+    /// Known past and future positions of moving things [m].
     pub reach: Arc<Vec<Vector3>>,
-    /// Where the picture is in the window, in egui's points.
+    /// Rectangle of the picture in the window, in egui's points.
     pub rect: Rect,
 }
 
@@ -263,8 +264,8 @@ impl Viewport {
         }
     }
 
-    /// Takes what is left of the window, and lets the section follow the body; what the mouse does there. A
-    /// name of its own keeps a drag alive where a panel beside it comes or goes.
+    /// Takes the remaining room of the window, and lets the section follow the body. Returns the actions of
+    /// the mouse there. A fixed name keeps a drag alive when a neighbouring panel appears or disappears.
     pub(crate) fn lay_out(&mut self, ui: &mut egui::Ui) -> egui::Response {
         let rect = ui.available_rect_before_wrap();
         let response = ui.interact(rect, egui::Id::unique("picture"), Sense::click_and_drag());
@@ -327,8 +328,8 @@ impl Viewport {
         camera
     }
 
-    /// How far the middle of what is seen lies beside that of the picture, in heights to the right and up:
-    /// beside the scale of colours and below the figures.
+    /// Offset of the view's middle from the middle of the picture, in heights to the right and up. It leaves
+    /// room for the scale of colours and the figures.
     fn beside(&self) -> [f64; 2] {
         let height = self.rect.height().max(SCALE);
         [-0.5 * f64::from(SCALE / height), -0.5 * f64::from(FIGURES / height).min(0.4)]
@@ -345,8 +346,7 @@ impl Viewport {
         camera
     }
 
-    /// What the camera looks at and how near it is where it does not see all: target [m] and magnification of
-    /// what fits.
+    /// Returns the target [m] and magnification of the camera if it does not see everything.
     pub fn closer(&self) -> Option<(Vector3, f64)> {
         let fitted = self.fitted();
         let moved = (self.camera.target - fitted.target).norm() > 0.01 * fitted.height
@@ -357,7 +357,7 @@ impl Viewport {
         moved.then(|| (middle.target, fitted.height / self.camera.height))
     }
 
-    /// Learns where something will be or has been; goes on to see all, if it did.
+    /// Takes the known positions of moving things. A camera that showed everything is fitted again.
     pub(crate) fn learn(&mut self, reach: Arc<Vec<Vector3>>) {
         let (saw_all, at_start) = (self.camera == self.fitted(), self.camera == self.at_start());
         self.reach = reach;
@@ -378,7 +378,7 @@ impl Viewport {
         self.fit();
     }
 
-    /// What a mouse does beside what it holds: turns, moves and comes nearer.
+    /// Turns and moves the camera, or brings it nearer, as the mouse moves while it holds nothing.
     pub fn turn(&mut self, context: &egui::Context, response: &egui::Response, orbiting: bool) {
         let by = response.drag_delta();
         let shift = context.input(|input| input.modifiers.shift);
@@ -432,7 +432,7 @@ impl Viewport {
         cuts
     }
 
-    /// Where a point is seen; `None` behind the eye.
+    /// Returns the place of a point on the screen; `None` behind the eye.
     pub(crate) fn to_screen(&self, point: &Vector3) -> Option<Pos2> {
         let half = 0.5 * self.rect.size();
         let [x, y] = self.camera.place(point, self.aspect())?;
@@ -446,7 +446,7 @@ impl Viewport {
         [f64::from(2.0 * from.x / width), f64::from(-2.0 * from.y / height)]
     }
 
-    /// What text stands on, so that it can be read over a body.
+    /// Draws a pale background, so that text over a body can be read.
     pub fn card(&self, painter: &Painter, place: Rect) {
         let dark = self.style.background == Background::Dark;
         let pale = if dark { Color32::from_black_alpha(150) } else { Color32::from_white_alpha(170) };
@@ -464,7 +464,7 @@ impl Viewport {
         painter.galley(place.min, galley, self.ink());
     }
 
-    /// The colour of what is written over the picture.
+    /// Returns the colour of text over the picture.
     pub fn ink(&self) -> Color32 {
         let [r, g, b] = self.style.background.ink();
         Color32::from_rgb(r, g, b)
@@ -556,8 +556,8 @@ impl Viewport {
         painter.galley(text.min, galley, ink);
     }
 
-    /// The range of colours, typed in the unit of the scale: a typed one is locked. What is wrong with one
-    /// that is not taken.
+    /// Draws the range of colours, typed in the unit of the scale. A typed range is locked. Returns the error
+    /// of a range that is rejected.
     pub(crate) fn edit_range(&mut self, ui: &mut egui::Ui, unit: &str) -> Option<String> {
         let mut refused = None;
         if let Some(range) = self.style.range {
@@ -621,9 +621,8 @@ impl Viewport {
     }
 }
 
-/// The letters at the end of an axis that points somewhere on the screen, and at the other side of the
-/// origin: sides of a patient, of which the other one has no room where the axis is short; or the name of the
-/// axis alone.
+/// Returns the letters at both ends of an axis. For a patient they are sides. If the axis is short on the
+/// screen, only the far one has room. Otherwise the first letter is the name of the axis.
 fn letters(axis: usize, patient: bool, along: Vec2) -> [&'static str; 2] {
     let [far, near] = SIDES_OF_PATIENT[axis];
     match patient {
@@ -633,7 +632,7 @@ fn letters(axis: usize, patient: bool, along: Vec2) -> [&'static str; 2] {
     }
 }
 
-/// A typed number; what is none is not a number, so that it is refused and not passed over.
+/// Parses a typed number. Other text gives NaN, so that it is rejected and not ignored.
 pub(super) fn typed_number(text: &str) -> Option<f64> {
     let text: String = text.chars().filter(|letter| !letter.is_whitespace()).collect();
     Some(text.replace('−', "-").parse().unwrap_or(f64::NAN))

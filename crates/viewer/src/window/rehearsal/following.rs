@@ -28,7 +28,7 @@ fn a_click_with_alt_or_i_follows_a_point_which_is_read() {
     window.frame([released]);
 }
 
-/// The first line tells the distance of the last two points.
+/// Checks that the first line shows the distance of the last two points.
 #[track_caller]
 fn assert_distance(app: &App) {
     let [one, two] = &app.frame.followed[..] else { panic!("two points are followed") };

@@ -1,4 +1,4 @@
-//! What is looked at and from where, what is shown of it, and what a user takes away.
+//! Tests of the camera, of the view, and of saved results.
 
 use eframe::egui::{
     Color32, CursorIcon, Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, OutputCommand, Pos2,

@@ -1,7 +1,7 @@
-//! The window rehearsed without a screen: tests give it what a user does with mouse and keys, as events of
-//! egui, and look at what comes of it. Its own code runs, and the solver on its thread; by egui's clock a
-//! frame takes a sixtieth of a second, however long it really does. Pictures are drawn only where a test
-//! looks at them. Without a GPU the tests are skipped with a notice; with `PLIANT_REQUIRE_GPU=1` they fail.
+//! Tests of the window without a screen. They send mouse and key actions as events of egui, and look at the
+//! effect. The window's own code runs, and the solver on its thread. By egui's clock a frame takes a sixtieth
+//! of a second, however long it really takes. Pictures are drawn only if a test looks at them. Without a GPU
+//! the tests are skipped with a notice. With `PLIANT_REQUIRE_GPU=1` they fail.
 
 mod following;
 mod looking;
@@ -49,11 +49,11 @@ fn on_device() -> String {
 struct Rehearsal {
     harness: Harness<'static, Option<App>>,
     screen: Screen,
-    /// Whether frames are drawn.
+    /// True if frames are drawn.
     painted: bool,
     /// Keys such as Ctrl that are held down.
     held: Modifiers,
-    /// Where the window writes.
+    /// Folder that the window writes to.
     folder: TempDir,
 }
 
@@ -102,7 +102,7 @@ impl Rehearsal {
         Some(window)
     }
 
-    /// The same, at rest at the start.
+    /// Opens a scene that is paused at rest at the start.
     fn paused(scene: &str) -> Option<Self> {
         let mut window = Self::open(scene)?;
         window.key("Space pauses", Key::Space, |app| !app.frame.playing);
@@ -111,7 +111,7 @@ impl Rehearsal {
         Some(window)
     }
 
-    /// The same, and frames are drawn from now on.
+    /// Opens a paused scene; frames are drawn from then on.
     fn painted(scene: &str) -> Option<Self> {
         let mut window = Self::paused(scene)?;
         window.painted = true;
@@ -144,7 +144,7 @@ impl Rehearsal {
         }
     }
 
-    /// Frames until something is as it has to be.
+    /// Draws frames until a check holds.
     #[track_caller]
     fn wait(&mut self, what: &str, mut check: impl FnMut(&App) -> bool) {
         let began = Instant::now();
@@ -167,21 +167,21 @@ impl Rehearsal {
         });
     }
 
-    /// Events of a frame, and what has to come of them.
+    /// Sends the events of a frame, and waits for their effect.
     #[track_caller]
     fn give(&mut self, what: &str, events: impl IntoIterator<Item = Event>, check: impl FnMut(&App) -> bool) {
         self.frame(events);
         self.wait(what, check);
     }
 
-    /// A key of the keyboard, and what has to come of it.
+    /// Presses and releases a key, and waits for the effect.
     #[track_caller]
     fn key(&mut self, what: &str, key: Key, check: impl FnMut(&App) -> bool) {
         let events = [true, false].map(|pressed| self.press(key, pressed));
         self.give(what, events, check);
     }
 
-    /// A key goes down or up.
+    /// Returns the event of a key that goes down or up.
     fn press(&self, key: Key, pressed: bool) -> Event {
         Event::Key { key, physical_key: None, pressed, repeat: false, modifiers: self.held }
     }
@@ -192,18 +192,18 @@ impl Rehearsal {
         self.frame([Event::ModifiersChanged(modifiers)]);
     }
 
-    /// A button of the mouse goes down or up.
+    /// Returns the event of a mouse button that goes down or up.
     fn button(&self, pos: Pos2, button: PointerButton, pressed: bool) -> Event {
         Event::PointerButton { pos, button, pressed, modifiers: self.held }
     }
 
-    /// The mouse goes somewhere, and its left button down.
+    /// Moves the mouse to a place, and presses its left button.
     fn take(&mut self, place: Pos2) {
         let pressed = self.button(place, LEFT, true);
         self.frame([Event::PointerMoved(place), pressed]);
     }
 
-    /// The left button goes up where the mouse is, and what has to come of it.
+    /// Releases the left button at the current place of the mouse, and waits for the effect.
     #[track_caller]
     fn release(&mut self, what: &str, check: impl FnMut(&App) -> bool) {
         let place = self.harness.ctx.pointer_latest_pos().unwrap_or_default();
@@ -211,14 +211,14 @@ impl Rehearsal {
         self.give(what, [released], check);
     }
 
-    /// A click, and what has to come of it.
+    /// Clicks on a place, and waits for the effect.
     #[track_caller]
     fn click(&mut self, what: &str, place: Pos2, check: impl FnMut(&App) -> bool) {
         self.take(place);
         self.release(what, check);
     }
 
-    /// The mouse takes hold of a place and goes on to the right, and what has to come of it.
+    /// Takes hold of a place with the mouse, drags it to the right, and waits for the effect.
     #[track_caller]
     fn drag(&mut self, what: &str, place: Pos2, check: impl FnMut(&App) -> bool) {
         self.take(place);

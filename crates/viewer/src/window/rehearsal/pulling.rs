@@ -12,7 +12,7 @@ use crate::window::App;
 use crate::window::picture::on_plane;
 use crate::window::undo::Act;
 
-/// Simulated time [s] in which what is pulled comes to rest.
+/// Simulated time [s] in which a pulled body comes to rest.
 const SETTLING: f64 = 1.0;
 /// Simulated time [s] from one movement of the mouse to the next: in less than one step they would tear the
 /// body.
@@ -48,8 +48,8 @@ fn a_pull_is_taken_back() {
     window.hold(Modifiers::NONE);
 }
 
-/// What the first hand holds is kept with B, the second hand pulls beside it, and what is kept is taken again
-/// and let go.
+/// B keeps the grip of the first hand, and the second hand pulls at another place. Then the mouse takes the
+/// kept grip again and lets it go.
 #[test]
 fn two_hands_pull_and_keep() {
     let Some(mut window) = Rehearsal::paused(BALL) else { return };
@@ -73,14 +73,14 @@ fn two_hands_pull_and_keep() {
     window.key("B lets go what is kept", Key::B, |app| holds(app) == [false, false]);
 }
 
-/// Where the first hand holds something.
+/// Returns the place of the first hand's grip on the screen.
 fn kept(app: &App) -> Pos2 {
     let [point, _] = app.frame.hand(Which::First).unwrap();
     app.port.to_screen(&Vector3::from(point)).unwrap()
 }
 
-/// Plays, takes hold and pulls upwards, until all is at rest: the hand's force is that of its spring. It
-/// still holds when the window closes. A replay of what was recorded.
+/// Plays, takes hold and pulls upwards, until the body is at rest. Then the hand's force equals the force of
+/// its spring. The hand still holds when the window closes. Returns a replay of the recording.
 fn pulled(scene: &str) -> Option<Replayed> {
     let mut window = Rehearsal::paused(scene)?;
     window.key("Space plays", Key::Space, |app| app.frame.playing);

@@ -1,5 +1,5 @@
-//! What a window without a screen is drawn on, as eframe draws: with the samples and the depth that the
-//! bodies need.
+//! The target of a window without a screen. It has the samples and the depth that eframe uses and the bodies
+//! need.
 
 use eframe::egui::{self, FullOutput, ScreenshotCallback, TexturesDelta, ViewportCommand};
 use eframe::egui_wgpu::capture::CaptureState;
@@ -61,7 +61,7 @@ impl Screen {
         Self { state, device: device.clone(), size, colours, depth, capture }
     }
 
-    /// What takes the textures of each frame.
+    /// Returns the receiver of the textures of each frame.
     pub fn textures(&self) -> impl TestRenderer + use<> {
         Textures(self.state.clone())
     }

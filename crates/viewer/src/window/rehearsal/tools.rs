@@ -32,7 +32,7 @@ fn rest(window: &mut Rehearsal) {
     });
 }
 
-/// A key is held down until what is led has changed as it should, then let go.
+/// Holds a key down until the led tool has changed as it should, then releases the key.
 fn lead(
     window: &mut Rehearsal,
     what: &str,
