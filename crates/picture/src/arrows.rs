@@ -7,10 +7,10 @@ use crate::camera::Camera;
 use crate::legend::readable;
 use crate::picture::Picture;
 
-/// Length of the longest arrow, over the diagonal of the box around what is shown.
+/// Length of the longest arrow, over the diagonal of the box around the drawn points.
 const LENGTH: f64 = 0.14;
-/// Radius of a dot, half the width of a shaft, length and half the width of a head, width of a rim: over the
-/// height of the picture.
+/// Radius of a dot, half the width of a shaft, length and half the width of a head, width of a rim. All are
+/// parts of the picture's height.
 pub(crate) const DOT: f32 = 0.0042;
 const SHAFT: f32 = 0.0021;
 const HEAD: [f32; 2] = [0.019, 0.0078];
@@ -22,8 +22,8 @@ pub(crate) const PALE: [u8; 3] = [255, 255, 255];
 /// A point [m] and the force there [N].
 pub type PointForce = [Vector3; 2];
 
-/// The forces of contacts at the points of a mesh, which are at these places [m]: those of its field
-/// `contact-force`. `None` without it.
+/// Returns the contact forces at the points of a mesh: its field `contact-force`, at the given positions [m].
+/// `None` without the field.
 pub fn contact_forces(mesh: &Mesh, points: &[Vector3]) -> Option<Vec<PointForce>> {
     let forces = mesh.point_data.get("contact-force").filter(|array| array.components == 3)?;
     let all = points.iter().zip(forces.values.chunks_exact(3));
@@ -36,8 +36,8 @@ pub fn largest_force(forces: &[PointForce]) -> f64 {
     forces.iter().map(|[_, force]| force.norm()).fold(0.0, f64::max)
 }
 
-/// The length of arrows over their force [m/N], of which the longest one is that of the `largest` force [N],
-/// among points [m].
+/// Returns the length of arrows over their force [m/N]. The longest arrow shows the `largest` force [N] among
+/// points [m].
 pub fn arrow_unit<'p>(points: impl IntoIterator<Item = &'p Vector3>, largest: f64) -> f64 {
     let finite = points.into_iter().filter(|point| point.iter().all(|x| x.is_finite()));
     let bounds = finite.map(|point| (*point, *point)).reduce(|(a, b), (c, d)| (a.inf(&c), b.sup(&d)));
@@ -55,7 +55,7 @@ pub fn arrow_note(largest: f64) -> String {
     format!("longest arrow {value:.decimals$} {unit}")
 }
 
-/// Where points [m] are in a picture, in pixels; `None` behind the camera.
+/// Returns a function from a point [m] to its place in a picture, in pixels; `None` behind the camera.
 pub(crate) fn pixels(picture: &Picture, camera: &Camera) -> impl Fn(&Vector3) -> Option<[f32; 2]> + use<> {
     let [width, height] = [picture.width, picture.height].map(|pixels| pixels as f32);
     let camera = *camera;
@@ -124,7 +124,7 @@ impl Arrow {
         }
     }
 
-    /// How far a pixel is outside of it; inside negative.
+    /// Returns the distance of a pixel from the arrow; negative inside.
     fn outside(&self, place: [f32; 2]) -> f32 {
         let off = [0, 1].map(|c| place[c] - self.from[c]);
         let along = off[0] * self.along[0] + off[1] * self.along[1];

@@ -1,4 +1,4 @@
-//! Where a picture is taken from: a camera that orbits a point.
+//! A camera that orbits a point.
 
 use nalgebra::{Matrix4, RowVector4, Vector4};
 use pliant_geometry::Vector3;
@@ -62,7 +62,7 @@ impl Axis {
     }
 }
 
-/// How depth becomes size.
+/// Projection of depth to size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Projection {
     /// Perspective: near objects are larger; 30° from top to bottom.
@@ -90,7 +90,7 @@ pub struct Camera {
     pub elevation: f64,
     /// Height of the view at the target [m].
     pub height: f64,
-    /// How depth becomes size.
+    /// Projection of depth to size.
     pub projection: Projection,
     /// The up axis.
     pub up: Axis,
@@ -132,7 +132,7 @@ impl Camera {
         0.5 * self.height / SPREAD
     }
 
-    /// Where the eye is [m].
+    /// Returns the position of the eye [m].
     pub fn eye(&self) -> Vector3 {
         self.target + self.axes()[2] * self.distance()
     }
@@ -154,7 +154,7 @@ impl Camera {
         self.height = (self.height * factor).clamp(1e-9, 1e9);
     }
 
-    /// Looks at all points, for a picture of so many widths a height; finite points count.
+    /// Looks at all finite points, for a picture of this ratio of width to height (`aspect`).
     pub fn fit<'p>(&mut self, points: impl IntoIterator<Item = &'p Vector3>, aspect: f64) {
         let axes = self.axes();
         let seen: Vec<Vector3> = (points.into_iter())
@@ -203,8 +203,8 @@ impl Camera {
         2.0 * half.fold(0.0, f64::max)
     }
 
-    /// From space to clip space of a picture with this ratio of width to height, for objects within a
-    /// distance of the target [m]; depth increases from 0 near to 1 far.
+    /// Returns the matrix from space to clip space, for a picture with this ratio of width to height. Objects
+    /// lie within a distance of the target [m]. Depth increases from 0 near to 1 far.
     pub(crate) fn projection_view(&self, aspect: f64, reach: f64) -> Matrix4<f32> {
         let [x, y, z] = self.axes();
         let eye = self.eye();
@@ -227,8 +227,8 @@ impl Camera {
         (projection * view).cast()
     }
 
-    /// The point and the unit direction of the ray through a place of the picture: x to the right and y up,
-    /// from −1 to 1.
+    /// Returns the point and the unit direction of the ray through a place of the picture. The coordinates
+    /// are x to the right and y up, from −1 to 1.
     pub fn ray(&self, [x, y]: [f64; 2], aspect: f64) -> (Vector3, Vector3) {
         let [right, up, towards] = self.axes();
         let across = (right * (x * aspect) + up * y) * (0.5 * self.height);

@@ -22,7 +22,7 @@ pub enum ColourMap {
 }
 
 impl ColourMap {
-    /// All of them.
+    /// Every map.
     pub const ALL: [Self; 7] =
         [Self::Viridis, Self::Cividis, Self::Magma, Self::Inferno, Self::Plasma, Self::Turbo, Self::BlueRed];
 
@@ -39,13 +39,13 @@ impl ColourMap {
         }
     }
 
-    /// Whether its middle is a colour of its own, which stands for zero.
+    /// True if the middle of the map has a distinct colour, which stands for zero.
     pub(crate) const fn is_diverging(self) -> bool {
         matches!(self, Self::BlueRed)
     }
 
-    /// The part of the map that a value has which all have: the middle of a diverging map, the beginning of
-    /// the others.
+    /// Returns the part of the map for a value that all points share. It is the middle of a diverging map,
+    /// and the beginning of the others.
     pub const fn part_of_one_value(self) -> f64 {
         if self.is_diverging() { 0.5 } else { 0.0 }
     }
@@ -152,9 +152,9 @@ const LEFT_OUT: f64 = 0.005;
 /// precision.
 pub(crate) const EQUAL: f64 = 1e-6;
 
-/// The size below which values of a unit are round-off, on bodies of an extent [m]: displacements of a
-/// millionth of it, and stresses [Pa] that strain the softest tissue (100 Pa) by 10⁻⁵. Zero for other units,
-/// whose scale is not known.
+/// Returns the size below which values of a unit are round-off, on bodies of an extent [m]. For displacements
+/// it is a millionth of the extent. For stresses [Pa] it is the stress that strains the softest tissue (100
+/// Pa) by 10⁻⁵. For other units, whose scale is unknown, it is zero.
 pub fn noise(unit: &str, extent: f64) -> f64 {
     match unit {
         "m" => 1e-6 * extent,
@@ -180,9 +180,9 @@ impl Extremes {
         self.values.extend(values.into_iter().filter(|value| value.is_finite()).map(|value| value as f32));
     }
 
-    /// The range without the outermost values: from zero if no value is negative, around zero if many values
-    /// have either sign or the map diverges; of equal values their own, without a length. `None` without
-    /// values.
+    /// Returns the range without the outermost values; `None` without values. The range begins at zero if no
+    /// value is negative. If many values have either sign, or the map diverges, it lies around zero. Equal
+    /// values have a range of length zero.
     pub fn range(mut self, map: ColourMap) -> Option<[f64; 2]> {
         if self.values.is_empty() {
             return None;

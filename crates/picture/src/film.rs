@@ -8,7 +8,7 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use crate::error::PictureError;
 use crate::picture::{Picture, coding};
 
-/// Whether there is an ffmpeg to make films with.
+/// Returns true if ffmpeg is installed, which makes films.
 pub fn ffmpeg() -> bool {
     let mut command = Command::new("ffmpeg");
     command.arg("-version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
@@ -24,7 +24,7 @@ pub struct Film {
 }
 
 impl Film {
-    /// Starts a film of so many pictures a second, all of one size.
+    /// Starts a film with `rate` pictures a second, all of one size.
     ///
     /// # Errors
     /// If ffmpeg doesn't start.

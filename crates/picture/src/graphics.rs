@@ -9,7 +9,7 @@ use crate::error::PictureError;
 pub struct Graphics {
     /// Its handle.
     pub device: wgpu::Device,
-    /// Where work for it is submitted.
+    /// Queue for work on the device.
     pub queue: wgpu::Queue,
     adapter: String,
     fault: Arc<Mutex<Option<String>>>,
@@ -61,7 +61,7 @@ impl Graphics {
         &self.adapter
     }
 
-    /// What went wrong since it was opened, if anything.
+    /// Returns the error of the device since it was opened, if any.
     pub(crate) fn check(&self) -> Result<(), PictureError> {
         match self.fault.lock().unwrap_or_else(PoisonError::into_inner).clone() {
             Some(reason) => Err(PictureError::Device { adapter: self.adapter.clone(), reason }),

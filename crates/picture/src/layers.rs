@@ -16,7 +16,8 @@ pub(crate) struct Layers {
 }
 
 impl Layers {
-    /// Those of a subject whose kinds of cells have these opacities; `None` where all are opaque.
+    /// Makes the layers of a subject from the opacity of each kind of cells. Returns `None` if all are
+    /// opaque.
     pub fn new(subject: &Subject, opacities: &[f32]) -> Option<Self> {
         if opacities.iter().all(|opacity| *opacity >= 1.0) {
             return None;

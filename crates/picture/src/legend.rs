@@ -25,7 +25,7 @@ pub struct Legend {
     pub hidden: BTreeSet<i32>,
     /// Steps of the run that did not converge and were accepted all the same. The note counts them.
     pub unconverged: u64,
-    /// Whether a part of what is drawn has no value: its grey then has a swatch.
+    /// True if a drawn part has no value: its grey then has a swatch.
     pub missing: bool,
     /// The least and the greatest value that is seen: they are written where the scale leaves them out.
     pub ends: Option<[f64; 2]>,
@@ -33,7 +33,7 @@ pub struct Legend {
 
 /// Part of the picture's width that names of labels take at most.
 const WIDEST: f32 = 0.3;
-/// Where swatches begin and end, as parts of the picture's height.
+/// Beginning and end of the swatches, as parts of the picture's height.
 const SWATCHES: [f32; 2] = [0.12, 0.92];
 /// Distance from swatch to swatch over the height of letters.
 const ROW: f32 = 1.45;
@@ -41,7 +41,7 @@ const ROW: f32 = 1.45;
 /// The text beside the grey of parts without a value.
 pub const NO_VALUE: &str = "no value";
 
-/// Part of the scale by which a value lies beyond an end of it, from which on it is written.
+/// Part of the scale by which a value lies beyond an end before it is written.
 const BEYOND: f64 = 1e-3;
 
 /// Values that lie beyond a range, in words, scaled by a factor and with a unit.
@@ -94,8 +94,8 @@ pub fn ticks([low, high]: [f64; 2], about: usize) -> (Vec<f64>, f64) {
     ((first..=last).map(|n| n as f64 * step).collect(), step)
 }
 
-/// Where a scale of colours has marks, as parts of its length from the low end, and their numbers. Equal ends
-/// have one mark, in the middle.
+/// Returns the marks of a scale of colours, as parts of its length from the low end, and their numbers. Equal
+/// ends have one mark, in the middle.
 pub fn scale_marks([low, high]: [f64; 2], about: usize) -> Vec<(f64, String)> {
     if low == high {
         return vec![(0.5, three_digits(low))];
@@ -266,11 +266,11 @@ impl Legend {
     }
 }
 
-/// How much of a body is hidden behind text.
+/// Opacity of the background that hides a body behind text.
 const GROUND: f32 = 0.82;
 
-/// Lays the background over what is drawn of bodies in a rectangle [pixels] (left, top, right, bottom), so
-/// that text on it can be read.
+/// Lays the background over bodies in a rectangle [pixels] (left, top, right, bottom), so that text on it can
+/// be read.
 pub(crate) fn clear_ground(picture: &mut Picture, style: &Style, [left, top, right, bottom]: [f32; 4]) {
     let [above, below] = style.background.colours();
     for y in top.max(0.0) as u32..(bottom.max(0.0) as u32).min(picture.height) {
@@ -395,7 +395,7 @@ mod tests {
         Legend { labels: organs(5), ..Legend::default() }.write(&mut tiny, &style);
     }
 
-    /// Dark text on a dark body: its ground is that of the picture, and elsewhere the body stays.
+    /// Dark text on a dark body stands on the background of the picture. Elsewhere the body stays.
     #[test]
     fn text_over_a_body_stands_on_a_plain_ground() {
         let black = Picture { width: 320, height: 240, rgba: [0, 0, 0, 255].repeat(320 * 240) };

@@ -1,7 +1,7 @@
-//! Pictures of bodies: smoothly lit surfaces, coloured by a field or by the labels of their cells, with the
-//! edges of their cells, the shape at rest as a ghost and sections that show the inside. Any GPU draws them,
-//! or Mesa's software Vulkan, into a window or off screen. Films from a series of them. Leaves out: the
-//! source of bodies and fields.
+//! Pictures of bodies. Surfaces are smoothly lit, and coloured by a field or by the labels of their cells.
+//! Edges of cells, the shape at rest as a ghost, and sections that show the inside are optional. Any GPU
+//! draws them, or Mesa's software Vulkan, into a window or off screen. A series of pictures makes a film.
+//! Leaves out: the source of bodies and fields.
 //!
 //! ```no_run
 //! use pliant_geometry::{CellKind, Mesh, Vector3};

@@ -1,6 +1,6 @@
 //! Lines that follow a body: fibres, and the edges of a marked cell. Each connects two combinations of
-//! points, the middle ± half of it, so the shader draws it in any deformed state from the points alone. A
-//! fibre is h F·a₀ with F = Σ x_a ⊗ ∇N_a of its cell, hence h Σ x_a (∇N_a·a₀).
+//! points, the middle ± half of the line. So the shader draws a line in any deformed state from the points
+//! alone. A fibre is h F·a₀ with F = Σ x_a ⊗ ∇N_a of its cell, hence h Σ x_a (∇N_a·a₀).
 
 use std::collections::BTreeSet;
 
@@ -15,7 +15,7 @@ pub(crate) struct Line {
     nodes: [u32; 8],
     /// Parts of the nodes in its middle.
     middle: [f32; 8],
-    /// Parts of the nodes in half of it.
+    /// Weights of the nodes in half of the line.
     half: [f32; 8],
 }
 
@@ -101,13 +101,13 @@ fn shape_derivatives(kind: CellKind) -> Vec<Vector3> {
 /// Directions of fibres at rest in volume cells.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Fibres {
-    /// Of each volume cell, in the order of the subject's; nothing if no cell has any.
+    /// Direction in each volume cell, in the order of the subject; empty if no cell has fibres.
     directions: Vec<Vector3>,
     /// Edge of the cubes they are chosen from [m].
     cube: f64,
     /// Half of a length of a fibre [m].
     half: f64,
-    /// Those on the surface.
+    /// Fibres on the surface.
     pub surface: Vec<Line>,
 }
 
@@ -164,7 +164,7 @@ impl Fibres {
         }
     }
 
-    /// Whether there are any.
+    /// True if there are no fibres.
     pub fn is_empty(&self) -> bool {
         self.directions.is_empty()
     }

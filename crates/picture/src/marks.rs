@@ -1,6 +1,6 @@
-//! Marks of constraints and loads, drawn over a picture as forces of contacts are: a square where a node is
-//! held, a dot where it is moved, a bar where it is under a plate, an arrow along the force of loads, and one
-//! along the weight of all from its centre.
+//! Marks of constraints and loads, drawn over a picture like contact forces. A held node has a square, a
+//! moved node a dot, and a node under a plate a bar. A load has an arrow along its force. The weight has an
+//! arrow from the centre of mass.
 
 use pliant_geometry::{DataArray, Mesh, Vector3};
 
@@ -8,7 +8,7 @@ use crate::arrows::{Arrow, DOT, PALE, RIM, pixels};
 use crate::camera::Camera;
 use crate::picture::Picture;
 
-/// What a mark stands for.
+/// Meaning of a mark.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Marked {
     /// A node that stays where it is at rest.
@@ -26,7 +26,7 @@ pub enum Marked {
 /// A mark at a place [m].
 pub type Mark = (Vector3, Marked);
 
-/// Marks of each kind, at most; of more nodes every so many.
+/// Largest number of marks of each kind. If there are more, they are thinned evenly.
 const MOST: usize = 300;
 
 impl Marked {
@@ -83,8 +83,8 @@ pub fn weight_of(weights: impl Iterator<Item = (Vector3, Vector3)>) -> Option<Ma
 /// Length of the arrow of a weight over the height of the view.
 pub const WEIGHT: f64 = 0.12;
 
-/// The marks of a mesh whose points are at some places [m]: those of its fields `constraint`, `load` and
-/// `weight`. `None` without the first two.
+/// Returns the marks of a mesh from its fields `constraint`, `load` and `weight`, with its points at some
+/// places [m]. `None` without the first two fields.
 pub(crate) fn marks_of(mesh: &Mesh, points: &[Vector3]) -> Option<Vec<Mark>> {
     let held = mesh.point_data.get("constraint").filter(|array| array.components == 1);
     let loads = mesh.point_data.get("load").filter(|array| array.components == 3);

@@ -1,5 +1,5 @@
-//! The largest value that colours tell: a ring at its place, dashed where something hides the place, and the
-//! number beside it.
+//! The largest value that colours show. A ring marks its place, dashed if something hides the place. The
+//! number stands next to the ring.
 
 use pliant_geometry::Vector3;
 

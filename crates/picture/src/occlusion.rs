@@ -7,7 +7,7 @@ use std::ops::Range;
 pub(crate) const ROWS: u32 = 240;
 /// Columns at most, which every device supports.
 const WIDEST: u32 = 2048;
-/// How far things take light away, over the height of the picture.
+/// Distance over which things take light away, over the height of the picture.
 pub(crate) const REACH: f64 = 0.07;
 /// Positions, whose differences count; normals; light and depth.
 const PLACES: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
@@ -26,7 +26,7 @@ pub(crate) struct Occlusion {
     one: wgpu::BindGroupLayout,
 }
 
-/// The layout of so many textures for fragments.
+/// Makes the bind group layout of `count` textures for fragments.
 pub(crate) fn textures(device: &wgpu::Device, count: u32) -> wgpu::BindGroupLayout {
     let entry = |binding| wgpu::BindGroupLayoutEntry {
         binding,
@@ -43,7 +43,7 @@ pub(crate) fn textures(device: &wgpu::Device, count: u32) -> wgpu::BindGroupLayo
 }
 
 impl Occlusion {
-    /// Compiles the pipelines; `view` and `shape` are the layouts of the view and of what is drawn.
+    /// Compiles the pipelines. `view` and `shape` are the layouts of the view and of the drawn shape.
     pub fn new(
         device: &wgpu::Device,
         module: &wgpu::ShaderModule,
@@ -99,7 +99,7 @@ impl Occlusion {
     }
 }
 
-/// Columns and rows of a map for pictures of so many widths a height.
+/// Returns the columns and rows of a map for pictures of this ratio of width to height.
 fn size(aspect: f64) -> [u32; 2] {
     [(f64::from(ROWS) * aspect).round().clamp(1.0, f64::from(WIDEST)) as u32, ROWS]
 }
@@ -151,7 +151,7 @@ impl OcclusionMap {
         Self { size, places, facings, depth, rough, light, of_surface, of_rough, group: own }
     }
 
-    /// Whether it is that of pictures of this ratio of width to height.
+    /// True if the map suits pictures of this ratio of width to height.
     pub fn fits(&self, aspect: f64) -> bool {
         self.size == size(aspect)
     }

@@ -1,6 +1,6 @@
-// Ambient occlusion on the screen, in a map that is coarser than the picture: how much of the light from all
-// sides reaches a place, by the estimator of McGuire, Mara and Luebke (2012, Scalable ambient obscurance).
-// What is flat, convex or folded a little stays as it is.
+// Ambient occlusion on the screen, in a map that is coarser than the picture. It is the part of the light
+// from all sides that reaches a place. The estimator is by McGuire, Mara and Luebke (2012, Scalable ambient
+// obscurance). Flat, convex or slightly folded surfaces do not change.
 
 struct Solid {
     // Position [m], and 1.
@@ -33,15 +33,16 @@ fn solid_cut(at: Corner, @builtin(front_facing) front: bool) -> Solid {
 // Samples on a spiral, and the cosine and sine of the angle from one to the next (five turns in all).
 const SAMPLES: i32 = 12;
 const ONWARD: vec2<f32> = vec2(-0.8660254, 0.5);
-// Angle from the spiral of a pixel to that of the next one, of four by four over which the light is smoothed.
+// Turn of the sample spiral from one pixel to the next in a block of four by four. The light is smoothed over
+// such a block.
 const TURN: f32 = 0.39269908;
 // Chosen by eye, in the pictures of the gallery.
 const STRENGTH: f32 = 8.0;
 // Slope below which a surface hides nothing: triangles of a round surface meet at such angles.
 const FLAT: f32 = 0.2;
-// Added to squared distances over the reach: what is nearer than its root hides less, as single triangles do.
+// Added to squared distances over the reach. Places nearer than its root hide less, as single triangles do.
 const NEAR: f32 = 0.05;
-// Depth of what is not there, over the reach.
+// Depth of empty places, over the reach.
 const NOWHERE: f32 = -6.0e4;
 
 // Light that reaches the surface, and its depth over the reach.

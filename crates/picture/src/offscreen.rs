@@ -47,7 +47,7 @@ pub struct Offscreen<'s> {
 const ROW: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
 
 impl<'s> Offscreen<'s> {
-    /// For pictures of so many pixels.
+    /// Prepares pictures of this width and height in pixels.
     ///
     /// # Errors
     /// If the GPU does not support this size, or fails.

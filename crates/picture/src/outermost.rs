@@ -23,7 +23,7 @@ impl Outermost {
         }
     }
 
-    /// Those that are kept.
+    /// Returns the kept points.
     pub fn points(&self) -> &[Vector3] {
         &self.points
     }

@@ -15,26 +15,27 @@ pub struct Picture {
     pub rgba: Vec<u8>,
 }
 
-/// How far a picture is from another one.
+/// Difference between two pictures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
     /// Mean absolute difference of all channels of all pixels, of 255.
     pub everywhere: f64,
-    /// The same over the pixels that a body covers in either picture, of 255.
+    /// Mean absolute difference over the pixels that a body covers in either picture, of 255.
     pub on_bodies: f64,
     /// Pixels that bodies cover in both pictures over those they cover in either.
     pub overlap: f64,
 }
 
 impl Difference {
-    /// Whether the two show the same: below 2 everywhere and 6 on bodies, whose silhouettes overlap to 98 %.
+    /// True if both pictures show the same: the differences are below 2 everywhere and 6 on bodies, and the
+    /// silhouettes overlap to 98 %.
     pub fn is_same(&self) -> bool {
         self.everywhere < 2.0 && self.on_bodies < 6.0 && self.overlap >= 0.98
     }
 }
 
 impl Picture {
-    /// As a PNG file; coverage is left out.
+    /// Encodes the picture as a PNG file, without the coverage.
     ///
     /// # Errors
     /// If the pixels don't fit the size.
@@ -42,7 +43,7 @@ impl Picture {
         self.encode(png::ColorType::Rgb, &self.rgb())
     }
 
-    /// As a PNG file whose opacity is the coverage, to compare with.
+    /// Encodes the picture as a PNG file whose opacity is the coverage, for comparisons.
     ///
     /// # Errors
     /// If the pixels don't fit the size.
@@ -86,7 +87,7 @@ impl Picture {
         Ok(Self { width, height, rgba })
     }
 
-    /// How far it is from a picture of the same size; `None` for another size.
+    /// Compares the picture with another of the same size; `None` for another size.
     pub fn difference(&self, other: &Self) -> Option<Difference> {
         if [self.width, self.height] != [other.width, other.height] {
             return None;

@@ -6,10 +6,10 @@ use pliant_geometry::Region;
 use crate::colour::{label_colour, linear};
 use crate::style::{DULL, Finish, Material, PLAIN};
 
-/// What colours a region.
+/// Colour of a region.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Paint {
-    /// The same as all bodies: values, labels or the colour of tissue; that of steel for obstacles and tools.
+    /// Colour by the rule for all bodies: values, labels or tissue; for obstacles and tools steel.
     #[default]
     AsAll,
     /// The colour of each label.
@@ -18,12 +18,12 @@ pub enum Paint {
     Plain(Material),
 }
 
-/// How a region looks.
+/// Look of a region.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coat {
     /// From 0, which hides it, to 1, through which nothing is seen.
     pub opacity: f64,
-    /// What colours it.
+    /// Colour of the region.
     pub paint: Paint,
 }
 
@@ -36,18 +36,18 @@ impl Default for Coat {
 /// Regions that are hidden, and those with a look of their own.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Regions {
-    /// Those whose cells are left out.
+    /// Regions whose cells are left out.
     pub hidden: Vec<Region>,
-    /// Those with a coat; that of a label counts more than that of a body.
+    /// Regions with a coat. The coat of a label has priority over the coat of a body.
     pub coats: Vec<(Region, Coat)>,
 }
 
-/// What cells have in common that look alike.
+/// Properties by which cells look alike.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Kind {
     pub label: Option<i32>,
     pub body: i32,
-    /// Whether it is an obstacle or a tool.
+    /// True for an obstacle or a tool.
     pub thing: bool,
 }
 
@@ -63,11 +63,11 @@ impl Regions {
     }
 }
 
-/// Colours that are none, for the shader: that of the value, and that of tissue.
+/// Codes for the shader in place of a colour: colour of the value, and colour of tissue.
 const OF_VALUE: f32 = -1.0;
 const OF_TISSUE: f32 = -2.0;
 
-/// What the shader takes of cells: light of their colour and opacity, and their finish; with `labels`,
+/// Returns the shader's data of cells: light of their colour and opacity, and their finish. With `labels`,
 /// colours show labels.
 pub(crate) fn light(kind: Kind, coat: Coat, labels: bool) -> [[f32; 4]; 2] {
     let Finish { shine, sharpness, perfusion } = match coat.paint {

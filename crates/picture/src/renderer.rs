@@ -77,7 +77,7 @@ const EDGES: f32 = 0.55;
 const GHOST: f32 = 0.85;
 /// Half the width of a fibre and of an edge of the marked cell, over the height of the picture.
 const WIDTHS: [f32; 2] = [0.0026, 0.0034];
-/// How far lines are lifted towards the eye, over the size of the body.
+/// Distance by which lines are lifted towards the eye, over the size of the body.
 const LIFT: f64 = 0.004;
 /// Strength of the texture on tissue and under colours of values.
 const SKIN: [f32; 2] = [1.0, 0.45];
@@ -144,12 +144,12 @@ impl Renderer {
     }
 }
 
-/// How things cover each other.
+/// Order and blending of drawn things.
 enum Kind {
     Behind,
     Solid,
     Wire,
-    /// What may be seen through, and hides what is behind in part.
+    /// Section that may be transparent, and partly hides the things behind it.
     Cut,
     Glass,
     Veil,
@@ -159,7 +159,7 @@ enum Kind {
 }
 
 impl Kind {
-    /// Whether its depth is kept for what is drawn later, and how it is compared with what was drawn before.
+    /// Returns true if the depth is kept for later drawing, and the comparison with the depth drawn before.
     fn depth(&self) -> (bool, wgpu::CompareFunction) {
         match self {
             Self::Behind | Self::Mark => (false, wgpu::CompareFunction::Always),
@@ -168,7 +168,7 @@ impl Kind {
         }
     }
 
-    /// How its colour mixes with the one behind, if it does.
+    /// Returns the blending with the colour behind, if any.
     fn blend(&self) -> Option<wgpu::BlendState> {
         use wgpu::BlendFactor::{One, OneMinusSrcAlpha, SrcAlpha, Zero};
         let sum = |src_factor, dst_factor| wgpu::BlendComponent {
@@ -186,7 +186,7 @@ impl Kind {
     }
 }
 
-/// What the pipelines that draw have in common.
+/// Common parts of the pipelines that draw.
 struct Drawing<'a> {
     device: &'a wgpu::Device,
     module: &'a wgpu::ShaderModule,
@@ -258,7 +258,7 @@ pub struct Drawn {
     vertices: wgpu::Buffer,
     offsets: wgpu::Buffer,
     around: wgpu::Buffer,
-    /// As deformed, and at rest.
+    /// Deformed pose, and pose at rest.
     poses: [Pose; 2],
     view: wgpu::Buffer,
     colours: wgpu::Buffer,
@@ -268,14 +268,14 @@ pub struct Drawn {
     kinds: Vec<CellKind>,
     regions: Regions,
     labels: bool,
-    /// Where one sees through something.
+    /// Layers of transparent surfaces, if any.
     layers: Option<Layers>,
     occlusion: OcclusionMap,
     view_group: wgpu::BindGroup,
     map: ColourMap,
     section: wgpu::Buffer,
     section_corners: u32,
-    /// Whether the eye is on the side of the section that is left.
+    /// True if the eye is on the side of the section that is left.
     seen_from_behind: bool,
     /// Edges of the marked cell, bars, fibres on the surface, fibres in the section.
     lines: wgpu::Buffer,
@@ -288,14 +288,14 @@ pub struct Drawn {
     section_fibres: u32,
     /// Lines along which it cuts shells, after these.
     section_shells: u32,
-    /// Of the surface.
+    /// Corners of the surface.
     corners: u32,
-    /// All triangles of the subject; a list in another order lies behind them on the device.
+    /// Number of triangles of the subject. A list in another order lies behind them on the device.
     triangle_count: u32,
     vertex_count: u32,
     /// From the middle of the body at rest to its farthest point so far [m].
     size: f64,
-    /// The same, at rest.
+    /// Distance from the middle of the body at rest to its farthest point at rest [m].
     rest_size: f64,
     middle: Vector3,
     /// Position and value of each point, as last written.
@@ -409,8 +409,7 @@ impl Drawn {
         }
     }
 
-    /// Sets points [m] and a value at each; without values the colour is that of tissue, and grey for
-    /// non-finite ones.
+    /// Sets points [m] and a value at each. Without values the colour is tissue; non-finite values are grey.
     pub fn set(&mut self, queue: &wgpu::Queue, points: &[Vector3], values: &[f64]) {
         self.stage(points, values);
         queue.write_buffer(&self.poses[0].points, 0, bytemuck::cast_slice(&self.staged));
@@ -557,7 +556,7 @@ impl Drawn {
         }
     }
 
-    /// Corners of the surface that hide what is behind, and of those that one sees through.
+    /// Returns the corners of the opaque surface, and the corners of the transparent one.
     fn opaque_and_glass(&self) -> [Range<u32>; 2] {
         let list = 3 * self.triangle_count;
         match &self.layers {
@@ -589,7 +588,8 @@ impl Drawn {
         let first = MOST_EDGES as u32;
         pass.set_pipeline(&renderer.fibres);
         pass.draw(6 * first..6 * (first + self.bars), 2..3);
-        // A section hides what is behind it in part, and is behind what is seen from the other side.
+        // A section partly hides the things behind it, and is itself behind the things seen from the other
+        // side.
         let is_cut = style.clip.is_some() && !style.wireframe;
         let cut = |pass: &mut wgpu::RenderPass<'_>, turned: bool| {
             if is_cut && turned == self.seen_from_behind {
@@ -658,8 +658,9 @@ fn lights_of(kinds: &[CellKind], regions: &Regions, labels: bool) -> Vec<[[f32; 
     kinds.iter().map(|&kind| light(kind, regions.coat(kind), labels)).collect()
 }
 
-/// Strength of the occlusion, its reach [m], the pixels of the map that it has at a metre's distance
-/// (everywhere in parallel projection), and the distance of the target over it.
+/// Returns the strength of the occlusion, its reach [m] and the scale of its map. The scale is the pixels of
+/// the reach at a distance of a metre, or everywhere in parallel projection. The last number is the distance
+/// of the target over the reach.
 fn occlusion(camera: &Camera, style: &Style) -> [f32; 4] {
     let reach = REACH * camera.height;
     let pixels = REACH * f64::from(ROWS);

@@ -21,8 +21,8 @@ pub(crate) struct Corner {
     pub point: [f32; 4],
     /// Position at rest [m].
     pub rest: [f32; 3],
-    /// A bit for each edge of its triangle, that opposite to the corner, which is one of the polygon; beside
-    /// them the marks and the kind of the cell.
+    /// A bit for each edge of the triangle, numbered by the opposite corner and set if it is an edge of the
+    /// polygon. The other bits hold the marks and the kind of the cell.
     pub edges: u32,
 }
 
@@ -32,11 +32,11 @@ pub struct Section {
     /// Three a triangle.
     pub(crate) corners: Vec<Corner>,
     pub(crate) fibres: Vec<Line>,
-    /// Where the plane cuts shells.
+    /// Lines along which the plane cuts shells.
     pub(crate) shells: Vec<Line>,
 }
 
-/// Where a plane cuts an edge of a cell.
+/// Intersection of a plane with an edge of a cell.
 struct Cut {
     angle: f64,
     point: Vector3,

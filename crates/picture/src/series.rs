@@ -69,7 +69,7 @@ pub enum SeriesError {
     /// Colours of labels were requested, but the frames have none.
     #[error("the cells of the frames have no labels (the field `label`)")]
     NoLabels,
-    /// All cells are hidden.
+    /// Every cell is hidden.
     #[error("everything is hidden: nothing is visible")]
     AllHidden,
     /// A frame of another mesh than the first.
@@ -215,11 +215,11 @@ fn quoted(names: &[String]) -> String {
 /// The view of meshes with fields.
 #[derive(Clone, Debug, Default)]
 pub struct Look {
-    /// The field that colours tell (see [`nodal_values`]); `None` for the colour of tissue.
+    /// The field that colours show (see [`nodal_values`]); `None` for the colour of tissue.
     pub field: Option<String>,
     /// Regions that are hidden, and those with a look of their own.
     pub regions: Regions,
-    /// The style of bodies; without a range, that of the values.
+    /// The style of bodies. Without a range, the values decide.
     pub style: Style,
     /// The camera; its target and height fit the body, except for the two below.
     pub camera: Camera,
@@ -239,15 +239,15 @@ pub struct Look {
 /// times as large.
 const LEAST_GAP: f64 = 1e-8;
 
-/// What frames have in common.
+/// Data that the frames share.
 #[derive(Default)]
 struct Common {
     extremes: Extremes,
-    /// Of the surface, in all frames.
+    /// Points of the surface, in all frames.
     points: Outermost,
     /// The largest force of a contact and of a load [N].
     largest: [f64; 2],
-    /// Whether a part of a body has no value.
+    /// True if a part of a body has no value.
     missing: bool,
     /// Labels of which something is seen.
     labels: BTreeSet<i32>,
@@ -265,13 +265,13 @@ struct Shown {
     marks: Vec<Mark>,
 }
 
-/// What all pictures have in common.
+/// Settings that all pictures share.
 struct Settled {
     camera: Camera,
     style: Style,
     /// Length of arrows over their force [m/N], and the largest force [N], of contacts and of loads.
     arrows: [[f64; 2]; 2],
-    /// The text of all of them.
+    /// Text of every picture.
     legend: Legend,
 }
 
@@ -306,7 +306,7 @@ impl Common {
 }
 
 impl Look {
-    /// What is drawn of a mesh with fields; with the marks of another one.
+    /// Prepares the drawing of a mesh with fields, with the marks of another mesh.
     fn frame(&self, mesh: &Mesh, marks: Option<&Mesh>) -> Result<Shown, SeriesError> {
         let missing =
             |field: &str| SeriesError::NoField { field: field.to_owned(), known: quoted(&fields(mesh)) };
@@ -331,7 +331,7 @@ impl Look {
         Ok(Shown { frame: Frame { points, values, critical }, step, forces, gap, marks })
     }
 
-    /// The same with the labels of a mesh in its legend.
+    /// Returns this look with the labels of a mesh in its legend.
     fn with_labels_of(&self, mesh: &Mesh) -> Result<Self, SeriesError> {
         let mut look = self.clone();
         if self.style.labels {
@@ -361,7 +361,7 @@ impl Look {
         Ok(subject)
     }
 
-    /// What frames have in common, before the first.
+    /// Returns the shared data before the first frame.
     fn common(&self, subject: &Subject) -> Common {
         Common { extremes: Extremes::above(noise(&self.legend.unit, subject.extent())), ..Common::default() }
     }
@@ -415,7 +415,7 @@ impl Look {
             legend.hidden = sight.hidden_labels(&self.regions, labels);
         }
         let largest = largest_seen(subject, &self.regions, points, values, style.clip, &section);
-        // What is round-off in this frame has no maximum, whatever the others have.
+        // Round-off in this frame has no maximum, even if the other frames have one.
         let least = noise(&legend.unit, subject.extent());
         if let Some((place, value)) = largest.filter(|(_, value)| is_marked && value.abs() >= least) {
             let [low, high] = style.range.unwrap_or_default();
@@ -510,7 +510,7 @@ impl Look {
     }
 }
 
-/// The least gap [m] in words: round-off is none.
+/// Formats the least gap [m]; round-off counts as 0.
 fn gap_note(gap: f64) -> String {
     let (unit, factor) = readable("m", gap.abs().max(LEAST_GAP));
     match gap.abs() < LEAST_GAP {

@@ -1,4 +1,4 @@
-// Surfaces by vertex pulling: no buffer but that of the points changes from frame to frame.
+// Surfaces by vertex pulling. Only the buffer of the points changes from frame to frame.
 
 struct View {
     projection_view: mat4x4<f32>,
@@ -33,8 +33,9 @@ struct View {
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> colours: array<vec4<f32>, 256>;
-// Of each kind of cells: light of its colour, or −1 for that of the value, −2 for that of tissue, and
-// opacity; then the strength and the exponent of its highlight, and how much its colour varies.
+// Data of each kind of cells. `light` is the light of its colour (−1 for the colour of the value, −2 for
+// tissue) and the opacity. `finish` is the strength and the exponent of the highlight, and the variation of
+// the colour.
 struct Kind {
     light: vec4<f32>,
     finish: vec4<f32>,
@@ -44,9 +45,9 @@ struct Kind {
 
 // Position [m] and value of each point.
 @group(1) @binding(0) var<storage, read> points: array<vec4<f32>>;
-// Three vertices, and a word: bits 0 to 2 tell which edges are drawn, bit 3 that it is of a section, bit 4
-// that it is of an obstacle or tool, bit 5 of one that holds bodies inside, bits 8 to 31 are the number of
-// its kind.
+// Three vertices, and a word of bits. Bits 0 to 2: these edges are drawn. Bit 3: the triangle is of a
+// section. Bit 4: it is of an obstacle or tool. Bit 5: the obstacle or tool holds bodies inside. Bits 8 to
+// 31: number of the kind.
 @group(1) @binding(1) var<storage, read> triangles: array<vec4<u32>>;
 // The point of each vertex.
 @group(1) @binding(2) var<storage, read> vertices: array<u32>;
@@ -125,7 +126,7 @@ fn towards_eye(position: vec3<f32>) -> vec3<f32> {
     return select(view.towards.xyz, normalize(view.eye.xyz - position), view.eye.w > 0.5);
 }
 
-// Light of the value: a colour of the map, or that of tissue where none has one.
+// Light of the value: a colour of the map, or tissue if nothing has a value.
 fn colour_of(value: f32) -> vec3<f32> {
     if view.range.z < 0.5 {
         return view.plain.rgb;
@@ -147,8 +148,9 @@ fn is_cut(at: Corner) -> bool {
     return (at.edges & 8u) != 0u;
 }
 
-// The normal on the side that is seen. Near outlines the smooth normal of a face that is seen may face away:
-// it is turned to the outline, since turned around it would have other light than the faces beside it.
+// The normal on the visible side. Near outlines the smooth normal of a visible face may point away from the
+// eye. Such a normal is turned only as far as the outline. Turned around, it would light the face differently
+// from its neighbours.
 fn seen_normal(at: Corner, front: bool, eye: vec3<f32>) -> vec3<f32> {
     let own = normalize(at.normal);
     let is_front = select(front, dot(own, eye) >= 0.0, is_cut(at));
@@ -182,7 +184,7 @@ fn colour_at(at: Corner) -> vec3<f32> {
     return select(colour_of(at.value), view.plain.rgb, is_tissue(at));
 }
 
-// What is thin glass from the front is thicker where it is seen from the side.
+// Thin glass is thicker when it is seen from the side.
 fn opacity_at(at: Corner, facing: f32) -> f32 {
     let own = kinds[at.edges >> 8u].light.a;
     let grazing = 1.0 - facing;
@@ -195,7 +197,7 @@ fn lit(albedo: vec3<f32>, normal: vec3<f32>, eye: vec3<f32>, finish: vec2<f32>, 
     let key = normalize(view.right.xyz * -0.45 + view.up.xyz * 0.65 + view.towards.xyz * 0.75);
     let fill = normalize(view.right.xyz * 0.8 + view.up.xyz * 0.05 + view.towards.xyz * 0.5);
     let sky = 0.5 + 0.5 * dot(normal, view.up.xyz);
-    // Both lights have a size, the fill a large one: folds receive less of them.
+    // Both lights have a size, the fill a large one: folds receive less of each.
     let direct = max(dot(normal, key), 0.0) * 0.62 * (0.5 + 0.5 * light) + max(dot(normal, fill), 0.0) * 0.16 * light;
     let ambient = mix(0.22, 0.40, sky) * light;
     let half_way = normalize(key + eye);
@@ -241,7 +243,7 @@ fn shade(at: Corner, front: bool) -> vec4<f32> {
     if view.skin.y > 0.0 && !is_thing(at) {
         colour = moist(albedo * mottled(at.rest, is_tissue(at), finish.z), bumpy, eye, finish.xy, light);
     }
-    // In a section colours that tell something are those of the legend, whatever light falls on it.
+    // Colours of values and labels in a section match the legend, whatever light falls on it.
     if is_cut(at) && view.range.z > 0.5 && !is_tissue(at) {
         colour = albedo;
     }
@@ -380,7 +382,7 @@ fn background(@builtin(vertex_index) index: u32) -> Sky {
 
 @fragment
 fn sky(at: Sky) -> @location(0) vec4<f32> {
-    // Alpha tells what is covered by a body.
+    // Alpha marks the pixels that a body covers.
     return vec4(coded(mix(view.bottom.rgb, view.top.rgb, at.height)), 0.0);
 }
 
@@ -482,7 +484,7 @@ fn mottled(rest: vec3<f32>, tissue: bool, perfusion: f32) -> vec3<f32> {
     return select(organ, full, tissue);
 }
 
-// Sharp reflections on what is uneven, and a film that shines where it is seen from the side.
+// Sharp reflections on uneven surfaces, and a film that shines when seen from the side.
 fn moist(albedo: vec3<f32>, normal: vec3<f32>, eye: vec3<f32>, finish: vec2<f32>, light: f32) -> vec3<f32> {
     let key = normalize(view.right.xyz * -0.45 + view.up.xyz * 0.65 + view.towards.xyz * 0.75);
     let facing = max(dot(normal, normalize(key + eye)), 0.0);

@@ -1,4 +1,4 @@
-//! What is seen from a camera: places that nothing opaque hides.
+//! Visibility from a camera: places that nothing opaque hides.
 
 use std::collections::BTreeSet;
 
@@ -10,18 +10,19 @@ use crate::regions::{Paint, Regions};
 use crate::section::Section;
 use crate::subject::{KIND, Subject};
 
-/// Distance from a place over the size of what is shown, below which nothing hides it: the faces around it.
+/// Distance from a place, over the size of the drawn body, below which nothing hides the place. The faces
+/// around it lie there.
 const NEAR: f64 = 1e-5;
 /// Triangles of a label that are looked for, at most, spread evenly over those there are.
 const MOST: usize = 200;
 
-/// What hides places from a camera.
+/// Things that hide places from a camera.
 pub struct Sight<'s> {
     subject: &'s Subject,
     points: &'s [Vector3],
     section: Vec<[Vector3; 3]>,
     section_kinds: Vec<u32>,
-    /// Whether cells of each kind hide what is behind.
+    /// True for each kind of cells that hides the things behind it.
     opaque: Vec<bool>,
     clip: Option<Plane>,
     camera: Camera,
@@ -29,7 +30,8 @@ pub struct Sight<'s> {
 }
 
 impl<'s> Sight<'s> {
-    /// Of a subject whose points are at some places now [m], cut by a plane with this section.
+    /// Prepares the visibility of a subject with its points at some places [m], cut by a plane with this
+    /// section.
     pub fn new(
         subject: &'s Subject,
         points: &'s [Vector3],
@@ -58,7 +60,7 @@ impl<'s> Sight<'s> {
         self.clip.is_none_or(|plane| plane.distance(place) <= self.near)
     }
 
-    /// Whether nothing opaque is between the eye and a place [m].
+    /// True if nothing opaque lies between the eye and a place [m].
     pub fn sees(&self, place: &Vector3) -> bool {
         let eye = self.camera.eye();
         let (along, far) = match self.camera.projection {
@@ -117,8 +119,9 @@ impl<'s> Sight<'s> {
     }
 }
 
-/// How far a triangle is from a place along a unit direction, which goes to the eye, and whether its front is
-/// seen from there; `None` if the ray misses it (Möller and Trumbore 1997).
+/// Returns the distance of a triangle from a place along a unit direction, which points to the eye. The
+/// second value is true if the front of the triangle is seen from there. `None` if the ray misses the
+/// triangle (Möller and Trumbore 1997).
 fn hit([a, b, c]: &[Vector3; 3], from: &Vector3, along: &Vector3) -> Option<(f64, bool)> {
     let (ab, ac) = (b - a, c - a);
     let across = along.cross(&ac);

@@ -1,4 +1,4 @@
-//! How a body is shown.
+//! Styles of bodies.
 
 use crate::colour::ColourMap;
 use crate::plane::Plane;
@@ -59,7 +59,7 @@ pub(crate) const PLAIN: [u8; 3] = [214, 148, 132];
 /// Colour (sRGB) of points without a value where others have one: no map has this grey.
 pub const MISSING: [u8; 3] = [158, 162, 168];
 
-/// What one colour stands for.
+/// Meaning of a plain colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Material {
     /// Soft tissue of any kind.
@@ -84,7 +84,7 @@ pub enum Material {
 }
 
 impl Material {
-    /// All of them.
+    /// Every material.
     pub const ALL: [Self; 9] = [
         Self::Tissue,
         Self::Liver,
@@ -128,18 +128,18 @@ impl Material {
     }
 }
 
-/// How a material shines, and how its colour varies where it has a texture.
+/// Gloss of a material, and the variation of its colour if it has a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Finish {
     /// Light of the highlight of a white lamp.
     pub shine: f32,
     /// Blinn's exponent: the larger, the smaller the highlight.
     pub sharpness: f32,
-    /// How much its colour varies with the blood below, from 0 to 1.
+    /// Variation of the colour with the blood below, from 0 to 1.
     pub perfusion: f32,
 }
 
-/// Of surfaces that show values and labels, and of tissue without a texture.
+/// Finish of surfaces that show values and labels, and of tissue without a texture.
 pub(crate) const DULL: Finish = Finish { shine: 0.10, sharpness: 40.0, perfusion: 0.0 };
 
 impl Material {
@@ -159,30 +159,30 @@ impl Material {
     }
 }
 
-/// How a body is shown.
+/// Style of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Style {
     /// Colours of values.
     pub map: ColourMap,
     /// The values of the first and the last colour; without, a body has the colour of tissue.
     pub range: Option<[f64; 2]>,
-    /// Whether colours show labels instead of values; cells without a label have that of tissue.
+    /// True if colours show labels instead of values. Cells without a label have the colour of tissue.
     pub labels: bool,
-    /// Whether the edges of the cells are drawn.
+    /// True if the edges of the cells are drawn.
     pub edges: bool,
-    /// Whether only the edges of the surface cells are drawn.
+    /// True if only the edges of the surface cells are drawn.
     pub wireframe: bool,
-    /// Whether the shape at rest is drawn, as a ghost.
+    /// True if the shape at rest is drawn, as a ghost.
     pub ghost: bool,
-    /// Whether fibres are drawn, on the surface and in a section.
+    /// True if fibres are drawn, on the surface and in a section.
     pub fibres: bool,
-    /// Whether the forces of contacts are drawn, as arrows through the bodies.
+    /// True if the forces of contacts are drawn, as arrows through the bodies.
     pub contacts: bool,
-    /// Whether the cell with the smallest stable step is marked.
+    /// True if the cell with the smallest stable step is marked.
     pub critical: bool,
-    /// Whether the largest value that colours tell is marked with a ring, and its number written.
+    /// True if the largest value is marked with a ring and its number.
     pub maximum: bool,
-    /// Whether folds and contacts are darker, where less light arrives.
+    /// True if folds and contacts are darker, where less light arrives.
     pub occlusion: bool,
     /// The texture of the surface.
     pub texture: Texture,
@@ -214,12 +214,12 @@ impl Default for Style {
 }
 
 impl Style {
-    /// Whether surfaces take light from each other: edges alone do not.
+    /// True if surfaces take light from each other: edges alone do not.
     pub(crate) fn is_occluded(&self) -> bool {
         self.occlusion && !self.wireframe
     }
 
-    /// Whether colours tell something.
+    /// True if colours show labels or values.
     pub(crate) fn tells(&self) -> bool {
         self.labels || self.range.is_some()
     }

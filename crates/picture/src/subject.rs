@@ -21,23 +21,23 @@ const SHARP: f64 = 0.26;
 pub struct Subject {
     /// Points at rest [m].
     pub points: Vec<Vector3>,
-    /// Three corners, each a vertex, and a bit for each edge, that opposite to the corner, which is one of a
-    /// cell; beside these bits the marks of things and the kind of the cell. Those of the surface, then those
-    /// of borders between labels.
+    /// Three corners, each a vertex, and a word. The word has a bit for each edge, numbered by the opposite
+    /// corner and set if it is an edge of a cell. The other bits hold the marks of things and the kind of the
+    /// cell. First come the triangles of the surface, then the borders between labels.
     pub(crate) triangles: Vec<[u32; 4]>,
-    /// How many are of the surface.
+    /// Number of triangles of the surface.
     pub(crate) outer: usize,
     /// The kind of the cell beyond each triangle of a border.
     pub(crate) beyond: Vec<u32>,
-    /// What the cells are of.
+    /// Kinds of the cells.
     pub(crate) kinds: Vec<Kind>,
     /// The cell of each triangle.
     parents: Vec<CellId>,
     /// The point of each vertex. A point on a sharp edge has several vertices, each with its own normal.
     pub(crate) vertices: Vec<u32>,
-    /// How many are of the surface.
+    /// Number of vertices of the surface.
     outer_vertices: usize,
-    /// Where the triangles around each vertex begin in the next list; one more entry than vertices.
+    /// Beginning of the triangles around each vertex in the next list; one more entry than vertices.
     pub(crate) offsets: Vec<u32>,
     /// Triangles around vertices.
     pub(crate) around: Vec<u32>,
@@ -57,7 +57,7 @@ struct Patch {
     edges: u32,
 }
 
-/// Cell data of the triangles of a subdivided element: bit i tells that the side opposite to corner i is an
+/// Cell data of the triangles of a subdivided element: bit i means that the side opposite to corner i is an
 /// edge of the element.
 const ELEMENT_EDGES: &str = "element-edges";
 
@@ -73,13 +73,13 @@ pub(crate) const THING: &str = "thing";
 /// Marks the faces of things that bodies touch: they are drawn from the front.
 const STEEL: u32 = 0b1_0000;
 
-/// Marks those of things that hold bodies inside: they are drawn from the back.
+/// Mark of the triangles of things that hold bodies inside: they are drawn from the back.
 const HOLLOW: u32 = 0b10_0000;
 
-/// Where the number of the kind begins in the word of a triangle.
+/// First bit of the number of the kind in the word of a triangle.
 pub(crate) const KIND: u32 = 8;
 
-/// What cells are of, each once.
+/// List of the kinds of cells, each once.
 #[derive(Default)]
 struct Kinds {
     list: Vec<Kind>,
@@ -87,8 +87,8 @@ struct Kinds {
 }
 
 impl Kinds {
-    /// What the shader takes of a cell beside the bits of edges: the marks of a thing, and the number of its
-    /// kind.
+    /// Returns the shader's word of a cell without the bits of edges: the marks of a thing, and the number of
+    /// its kind.
     fn word(&mut self, block: Option<&CellBlock>, cell: u32) -> u32 {
         let thing = block.and_then(|block| block.data.get(THING)?.values.get(cell as usize).copied());
         let marks = match thing {
@@ -175,7 +175,7 @@ impl Subject {
         }
     }
 
-    /// Whether its cells have fibres (the field `fibre` of its mesh).
+    /// True if its cells have fibres (the field `fibre` of its mesh).
     pub fn has_fibres(&self) -> bool {
         !self.fibres.is_empty()
     }
@@ -189,13 +189,13 @@ impl Subject {
         cells.skip(cell as usize).take(1).flat_map(|(kind, nodes)| outline(kind, nodes)).collect()
     }
 
-    /// Whether one of some points that show values has none where others have one.
+    /// True if a field has values, but none at one of some points.
     pub fn lacks_value(&self, points: &[u32], values: &[f64]) -> bool {
         !values.is_empty() && points.iter().any(|&point| !values[point as usize].is_finite())
     }
 
-    /// Whether cells of each kind show their values: those of obstacles and tools, of regions with a colour,
-    /// and of invisible ones do not.
+    /// Returns true for each kind of cells that shows its values. Obstacles and tools do not, nor do
+    /// invisible regions or regions with a fixed colour.
     pub(crate) fn showing(&self, regions: &Regions) -> Vec<bool> {
         let shows = |kind: &Kind| {
             let coat = regions.coat(*kind);
@@ -216,8 +216,8 @@ impl Subject {
         points
     }
 
-    /// Labels of which something is seen in colours of labels, of some points that are: on the surface, on
-    /// the borders within bodies that one sees through, and of the kinds of cells that a section cuts.
+    /// Returns the labels that are visible in colours of labels. They are on visible points of the surface,
+    /// on visible borders within transparent bodies, and in the kinds of cells that a section cuts.
     pub(crate) fn labels_seen(
         &self,
         regions: &Regions,
@@ -254,7 +254,7 @@ impl Subject {
         self.outer
     }
 
-    /// Whether a triangle is drawn as seen from its front, or its back: of things only one side is.
+    /// True if a triangle is drawn from its front, or from its back. Things are drawn from one side only.
     pub fn is_drawn(&self, triangle: usize, from_front: bool) -> bool {
         let mark = self.triangles[triangle][3] & (STEEL | HOLLOW);
         mark == 0 || (mark == STEEL) == from_front
@@ -394,8 +394,8 @@ fn normal(face: &[u32], points: &[Vector3]) -> Vector3 {
     vector_area(&corners).try_normalize(0.0).unwrap_or_default()
 }
 
-/// The triangles around each vertex of a group, which are those of all its vertices: where they begin in the
-/// list, and the list.
+/// Returns the triangles around each vertex. They include the triangles of all vertices of its group. The
+/// result has the beginning of each vertex in the list, and the list.
 fn around_vertices(triangles: &[[u32; 4]], groups: &[u32]) -> (Vec<u32>, Vec<u32>) {
     let count = groups.iter().max().map_or(0, |last| *last as usize + 1);
     let mut of_group: Vec<Vec<u32>> = vec![Vec::new(); count];
@@ -412,8 +412,8 @@ fn around_vertices(triangles: &[[u32; 4]], groups: &[u32]) -> (Vec<u32>, Vec<u32
     (offsets, around)
 }
 
-/// For each point of a mesh the first one of the same body at the same place at rest: blocks whose nodes are
-/// doubled where they meet have one surface.
+/// Returns for each point of a mesh the first point of the same body at the same place at rest. So blocks
+/// with doubled nodes at their interface have one surface.
 fn places(mesh: &Mesh, faces: &[Patch]) -> Vec<u32> {
     let mut places: Vec<u32> = (0..mesh.points.len() as u32).collect();
     let mut known: BTreeMap<([u64; 3], i32), u32> = BTreeMap::new();
@@ -434,7 +434,7 @@ struct Split {
     corners: Vec<Vec<u32>>,
     /// The point of each vertex.
     vertices: Vec<u32>,
-    /// The group of each vertex: those of one share their normal.
+    /// The group of each vertex. Vertices of one group share their normal.
     groups: Vec<u32>,
 }
 
@@ -498,8 +498,8 @@ pub fn deformed_points(mesh: &Mesh) -> Vec<Vector3> {
     points
 }
 
-/// Fields of a mesh that colours can show, with their components, by the names that [`nodal_values`] takes;
-/// `label` is one of them.
+/// Returns the fields of a mesh that colours can show, with their components, by the names that
+/// [`nodal_values`] takes. `label` is included.
 pub fn field_choices(mesh: &Mesh) -> Vec<String> {
     let of_cells = mesh.blocks.iter().flat_map(|block| &block.data);
     let all: BTreeMap<&String, usize> =
@@ -597,7 +597,7 @@ pub(crate) mod tests {
         mesh
     }
 
-    /// The same in six tets a hex.
+    /// Returns the unit cube in n³ hexes of six tets each.
     pub fn tets(n: u32) -> Mesh {
         let hexes = block(n);
         let mut mesh = Mesh { points: hexes.points.clone(), ..Mesh::default() };

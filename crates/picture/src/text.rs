@@ -18,7 +18,7 @@ pub(crate) struct Pen {
 }
 
 impl Pen {
-    /// With letters so many pixels high, from the lowest descender to the highest ascender.
+    /// Makes letters of a height in pixels, from the lowest descender to the highest ascender.
     pub fn new(size: f32) -> Option<Self> {
         let font = FontRef::try_from_slice(epaint_default_fonts::UBUNTU_LIGHT).ok()?;
         Some(Self { font, scale: PxScale::from(size) })

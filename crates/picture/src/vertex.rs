@@ -2,8 +2,8 @@
 
 use pliant_geometry::Vector3;
 
-/// Marks a missing value, so that neither it nor an interpolation with it takes a colour of the map: shaders
-/// may replace NaN by any number.
+/// Marks a missing value. Neither this value nor an interpolation with it takes a colour of the map. NaN does
+/// not serve, because shaders may replace it by any number.
 const NO_VALUE: f32 = 1e38;
 
 /// A value for the shader; for a non-finite one the colour is grey.

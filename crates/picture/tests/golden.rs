@@ -41,7 +41,7 @@ fn ball(p: Vector3) -> Vector3 {
     Vector3::new(round(x, y, z), round(y, z, x), round(z, x, y)) * 0.035
 }
 
-/// A straight beam, displaced to a bow; beside it a ball, displaced a little upwards.
+/// Makes a straight beam, displaced to a bow, and a ball near it, displaced a little upwards.
 fn organs(with_ball: bool) -> Mesh {
     let mut mesh = Mesh::default();
     hexes(&mut mesh, [24, 6, 4], |p| Vector3::new(0.2 * p.x - 0.1, 0.05 * p.y - 0.025, 0.02 * p.z));
@@ -306,7 +306,7 @@ fn forces_of_contacts_are_drawn_where_they_act_and_told_in_the_note() {
     assert!(note(&cut) != note(&near), "steps that did not converge are in the note");
 }
 
-/// Dark red reflects 3 % of blue light: what is brighter on a liver is its highlight, which bone lacks.
+/// Dark red reflects 3 % of blue light. Brighter pixels on a liver are its highlight, which bone lacks.
 #[test]
 fn organs_shine_each_in_its_way() {
     let Some(graphics) = graphics() else { return };

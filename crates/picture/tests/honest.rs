@@ -7,8 +7,8 @@ use pliant_geometry::{CellKind, DataArray, Mesh, Vector3};
 use pliant_picture::{Camera, Graphics, Look, Picture, Projection, Style};
 use support::graphics;
 
-/// A square sheet of 8² squares in the plane of y and z, bent around z by 1.6 radians; all of them with nodes
-/// of their own if `doubled`.
+/// Makes a square sheet of 8² squares in the plane of y and z, bent around z by 1.6 radians. If `doubled`, no
+/// squares share nodes.
 fn sheet(doubled: bool) -> Mesh {
     let mut mesh = Mesh::default();
     let place = |i: u32, j: u32| {
@@ -115,7 +115,7 @@ fn equal_values_have_no_maximum() {
         Look { field: Some("pressure".into()), style, ..look() }.picture(&graphics, &mesh, None, 0.0).unwrap()
     };
     assert_eq!(draw(true), draw(false));
-    // The range of a film is that of all its frames.
+    // The range of a film covers all its frames.
     let style = Style { maximum: true, range: Some([0.0, 5.0]), ..Style::default() };
     let drawn = |maximum: bool| {
         let style = Style { maximum, ..style };

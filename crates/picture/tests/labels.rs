@@ -1,4 +1,4 @@
-//! Colours of labels: each cell has exactly the colour of its label, hidden cells show the inside, and the
+//! Colours of labels. Each cell has exactly the colour of its label, hidden cells show the inside, and the
 //! legend has a swatch for each visible label.
 
 mod support;
@@ -113,7 +113,7 @@ fn one_sees_through_half_of_the_body_to_what_lies_inside_and_through_nothing_of_
     };
     let whole = look().picture(&graphics, &cube(), None, 0.0).unwrap();
     assert_eq!(whole.rgba, seen([1.0, 1.0]).rgba);
-    // What is invisible is as hidden as its cells, but for the camera, which still sees all.
+    // Invisible cells look like hidden ones, but the camera still fits them.
     let [left, right, core, _] = counts(&seen([0.0, 0.0]));
     assert!((left, right) == (0, 0) && core > 1000, "{left} {right} {core}");
     let half = seen([0.3, 0.3]);
@@ -145,7 +145,7 @@ fn a_section_has_the_colours_of_the_cells_it_cuts() {
     assert_eq!(swatches(&picture), [1, 2, 3]);
 }
 
-/// Whatever light falls on a section: its colours are those of the legend, byte by byte.
+/// The colours of a section match the legend byte by byte, whatever light falls on it.
 #[test]
 fn colours_of_a_section_are_those_of_the_legend_from_every_side() {
     let Some(graphics) = graphics() else { return };

@@ -10,7 +10,7 @@ use support::graphics;
 
 const SIZE: [u32; 2] = [1280, 800];
 
-/// A box of so many hexes along each side.
+/// Makes a box of `cells` hexes along each side.
 fn block(mesh: &mut Mesh, corner: [f64; 3], size: [f64; 3], cells: u32) {
     let (first, n) = (mesh.points.len() as u32, cells + 1);
     for index in 0..n * n * n {
@@ -78,7 +78,7 @@ fn a_fold_is_darker_and_a_free_plane_is_not() {
     assert_eq!(lit, occluded);
 }
 
-/// Processor time of this process [s], in hundredths; `None` where nobody tells.
+/// Returns the processor time of this process [s], in hundredths; `None` if the system does not report it.
 fn processor_time() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/self/stat").ok()?;
     let mut words = text.rsplit_once(')')?.1.split_whitespace().skip(11);

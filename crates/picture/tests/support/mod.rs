@@ -1,4 +1,4 @@
-//! What several tests of pictures use.
+//! Helpers that several tests of pictures share.
 
 use pliant_picture::Graphics;
 
