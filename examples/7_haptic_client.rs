@@ -20,7 +20,7 @@ const PERIOD: Duration = Duration::from_millis(1);
 /// Depth of the wall's spring and the coupling's, pressed together [m].
 const DEPTH: f64 = 0.003;
 
-/// Presses slowly down to the depth, for so many ticks; the strongest force [N].
+/// Presses slowly down to the depth, within `ticks` ticks. Returns the strongest force [N].
 fn press(address: SocketAddr, ticks: u32) -> Result<[f64; 3], Box<dyn Error>> {
     let device = UdpSocket::bind(if address.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" })?;
     device.connect(address)?;
@@ -39,7 +39,7 @@ fn press(address: SocketAddr, ticks: u32) -> Result<[f64; 3], Box<dyn Error>> {
         };
         device.send(&pose.encode())?;
         let mut bytes = [0; 256];
-        // A lost pose is none to wait for: the next one follows.
+        // A lost pose needs no repetition: the next one follows.
         let Ok(length) = device.recv(&mut bytes) else { continue };
         let Some(answer) = bytes.get(..length).and_then(Force::decode) else { continue };
         if Vector3::from(answer.force).norm() > Vector3::from(force).norm() {

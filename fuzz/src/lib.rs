@@ -1,9 +1,9 @@
-//! The doors of Pliant: each takes any bytes and ends in a result or an error, never in a panic, and takes no
-//! memory beyond what the bytes hold. Those with a checksum get bytes with one that fits, or no change would
-//! come past it.
+//! The doors of Pliant: readers of untrusted bytes. Each takes any bytes and ends in a result or an error,
+//! never in a panic. It takes no memory beyond the content of the bytes. A door with a checksum gets bytes
+//! with a valid one, because no change would pass the check otherwise.
 //!
-//! [`seeds`] are small inputs of each. Every test run tries them with changes at random; `.ci/nightly` has
-//! AFL++ look for others.
+//! [`seeds`] returns small inputs of each door. Every test run tries them with random changes; `.ci/nightly`
+//! has AFL++ look for others.
 //!
 //! ```
 //! let read = |name| pliant_fuzz::DOORS.iter().find(|(own, _)| *own == name).unwrap().1;
@@ -30,10 +30,10 @@ use pliant_scene::World;
 use pliant_sim::Simulation;
 use pliant_viewer::{Break, Done, Hand, Move, Number, Point, Recording, Surface, replay};
 
-/// What takes bytes.
+/// Reader of bytes.
 pub type Door = fn(&[u8]);
 
-/// All of them, by name.
+/// Every door, by name.
 pub const DOORS: [(&str, Door); 10] = [
     ("checkpoint", checkpoint),
     ("datagram", datagram),
@@ -55,7 +55,7 @@ const CHECKPOINT_HEAD: usize = 20;
 const RECORDING_HEAD: usize = 8;
 const SNAPSHOT_HEAD: usize = 28;
 const CRC: usize = 4;
-/// Steps of a replay, which may go on as long as its file says.
+/// Limit of the steps of a replay, whose file may ask for any number.
 const MOST_STEPS: u64 = 50;
 
 /// The world of checkpoints, snapshots and recordings.
@@ -72,8 +72,8 @@ pub fn block() -> &'static World {
     })
 }
 
-/// Small inputs of a door: the files that tests of the readers have, and of checkpoints, datagrams,
-/// recordings, snapshots and traces what this version writes, without head and checksum.
+/// Returns small inputs of a door. For most doors they are the files of the readers' tests. For checkpoints,
+/// datagrams, recordings, snapshots and traces this version writes them, without head and checksum.
 ///
 /// # Errors
 /// If they can't be read or made.

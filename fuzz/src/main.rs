@@ -1,4 +1,4 @@
-//! What AFL++ runs:
+//! Program that AFL++ runs:
 //!
 //! ```text
 //! cargo afl build --release -p pliant-fuzz --features afl

@@ -4,7 +4,7 @@ use pliant_fuzz::{DOORS, seeds};
 use pliant_testing::Random;
 use pliant_testing::forging::{Attempts, forged};
 
-/// Tries each door with so many changes of each of its inputs.
+/// Tries each door with a number of changes of each of its inputs.
 fn try_doors(changes: impl Fn(&str, usize) -> u64) {
     for (name, door) in DOORS {
         let mut attempts = Attempts::default();

@@ -28,21 +28,22 @@ pub struct Coupling {
 }
 
 impl Default for Coupling {
-    /// 1000 N/m and 0.2 N s/m: passive at 1 kHz on a device of 0.7 N s/m, or 1.2 N s/m with a force half a
-    /// tick ahead.
+    /// 1000 N/m and 0.2 N s/m: passive at 1 kHz on a device of 0.7 N s/m. With a force half a tick ahead, the
+    /// device needs 1.2 N s/m.
     fn default() -> Self {
         Self { stiffness: 1000.0, damping: 0.2 }
     }
 }
 
 impl Coupling {
-    /// The largest passive stiffness [N/m] on a device of a damping b [N s/m], with a damping B [N s/m] of
-    /// the coupling, a period T [s] and a delay τ [s] besides; 0 where none is passive.
+    /// Returns the largest passive stiffness [N/m] on a device of a damping b [N s/m]. The coupling has a
+    /// damping B [N s/m], a tick a period T [s], and the force a delay τ [s]. The result is 0 if no stiffness
+    /// is passive.
     pub fn limit(device: f64, damping: f64, period: f64, delay: f64) -> f64 {
         (2.0 * (device - damping.abs()) / (period + 2.0 * delay)).max(0.0)
     }
 
-    /// Rejects what is no spring.
+    /// Rejects stiffnesses and dampings out of range.
     pub(crate) fn check(&self) -> Result<(), HapticsError> {
         let Self { stiffness, damping } = *self;
         let remedy = "give a positive one, 1000 N/m by default";

@@ -1,4 +1,4 @@
-//! What can go wrong, with a remedy.
+//! Errors, with a remedy.
 
 use std::io;
 use std::net::SocketAddr;
@@ -17,11 +17,11 @@ pub enum HapticsError {
     /// A number of a local model or of the settings that makes no sense.
     #[error("{what} is {value}; {remedy}")]
     Number {
-        /// What is invalid.
+        /// Description of the invalid number.
         what: &'static str,
         /// Its value.
         value: f64,
-        /// What to give instead.
+        /// Advice for a valid number.
         remedy: &'static str,
     },
     /// A compliance that is not symmetric and positive.
@@ -39,7 +39,7 @@ pub enum HapticsError {
     Trace {
         /// The line, counted from 1.
         line: usize,
-        /// What is wrong with it.
+        /// Error of the line.
         problem: String,
     },
     /// A file that can't be read.
@@ -47,7 +47,7 @@ pub enum HapticsError {
     File {
         /// Its path.
         path: String,
-        /// Why.
+        /// Reason.
         source: io::Error,
     },
     /// An address that other machines can reach.
@@ -63,13 +63,13 @@ pub enum HapticsError {
     Socket {
         /// The address.
         address: SocketAddr,
-        /// Why.
+        /// Reason.
         source: io::Error,
     },
     /// A thread that can't be started or has ended early.
     #[error("the haptic thread {problem}; close other programs and start again")]
     Thread {
-        /// What happened.
+        /// Description of the failure.
         problem: String,
     },
 }

@@ -1,16 +1,17 @@
-//! How the tissue gives way, from the tool's places p and forces F in successive steps of the simulation. The
-//! stiffness along the force is the slope of the pairs Δd = −n·Δp, ΔF = n·(F − F'), by least squares that
-//! forget:
+//! Estimate of the tissue's stiffness from the tool's places p and forces F in successive steps of the
+//! simulation. The stiffness along the force is the slope of the pairs Δd = −n·Δp, ΔF = n·(F − F'), by least
+//! squares that forget:
 //!
 //! ```text
 //! k = (k₀ s + Σ γʲ Δd ΔF) / (s + Σ γʲ Δd²)
 //! ```
 //!
-//! with a first guess k₀ of the weight s. Across, a body that keeps its volume gives way 1.5 times as much:
-//! (1 − ν/2) / (1 − ν) at ν = 0.5 (Mindlin 1949, a round contact that sticks). The estimate is held in
-//! bounds. It sets how the force changes between two models, not the force at rest, which is that of the
-//! simulation. One that is too stiff is safe, one below half of the tissue's less half of the coupling's is
-//! not: a step of the simulation then changes the force by more than it was wrong, by −(k − k_m) / (K + k_m).
+//! with a first guess k₀ of the weight s. Across the force, a body that keeps its volume gives way 1.5 times
+//! as much: (1 − ν/2) / (1 − ν) at ν = 0.5 (Mindlin 1949, a round contact that sticks). The estimate is held
+//! in bounds. It sets how the force changes between two models. At rest the simulation sets the force. An
+//! estimate k_m above the tissue's stiffness k is safe. One below (k − K)/2 is not, with the stiffness K of
+//! the coupling. A step of the simulation then changes the force by more than its error, by −(k − k_m) / (K +
+//! k_m).
 //!
 //! ```
 //! use nalgebra::Vector3;
@@ -26,11 +27,11 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Part of what is known that the next step leaves.
+/// Part of the earlier sums that remains after the next step.
 const KEPT: f64 = 0.95;
 /// Way [m] below which a step teaches nothing, so that a tool at rest forgets nothing.
 const STILL: f64 = 2e-6;
-/// Weight [m²] of the first guess: that of a way of 0.05 mm.
+/// Weight [m²] of the first guess: as much as a way of 0.05 mm.
 const GUESS: f64 = 2.5e-9;
 /// Compliance across the force over that along it.
 const ACROSS: f64 = 1.5;
@@ -100,7 +101,7 @@ mod tests {
             }
             estimate.stiffness()
         };
-        // What is left of the guess has a weight of 2.5e-9 in about 0.0006² / 2 / 0.05 = 3.6e-6 m².
+        // The guess still has a weight of 2.5e-9 in about 0.0006² / 2 / 0.05 = 3.6e-6 m².
         assert!((press(800.0) - 800.0).abs() < 2e-3 * 800.0);
         assert!((press(1500.0) - 1500.0).abs() < 2e-3 * 1500.0);
         assert_eq!((press(10.0), press(1e5)), (200.0, 2000.0));

@@ -5,22 +5,23 @@
 //! E(n) = E(n−1) − F(n−1)·(x(n) − x(n−1))
 //! ```
 //!
-//! which is exact at the ticks. Where E is below zero the device has got more than it gave, and the guard
-//! adds a damping of its own that takes this back within a tick, up to a limit. Its force changes gently, so
-//! that it is not felt as a click. Source: Hannaford and Ryu (2002), "Time-domain passivity control of haptic
-//! interfaces"; the exact sum is that of Ryu, Kim and Hannaford (2004). Friction would fill the sum without
-//! end, and hide later trouble: what the guard acts on is held below a reserve. What is reported is not.
+//! which is exact at the ticks. A negative E means that the device has got more energy than it gave. The
+//! guard then adds a damping that takes this energy back within a tick, up to a limit. Its force changes
+//! gently, so that it is not felt as a click. Source: Hannaford and Ryu (2002), "Time-domain passivity
+//! control of haptic interfaces". The exact sum is by Ryu, Kim and Hannaford (2004). Friction would fill the
+//! sum without end, and hide later trouble. So the sum for the guard is held below a reserve. The reported
+//! sum is not.
 
 use nalgebra::Vector3;
 
 use crate::error::HapticsError;
 
-/// When and how much a guard damps.
+/// Limits of a guard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Guard {
     /// Most damping [N s/m] that it adds; below m/T of a device of mass m.
     pub most_damping: f64,
-    /// Most that its force changes [N] from a tick to the next.
+    /// Largest change of its force [N] from a tick to the next.
     pub most_jump: f64,
     /// Most energy [J] that it remembers: above what the tissue stores and gives back, F²/2k.
     pub reserve: f64,
@@ -50,11 +51,11 @@ impl Guard {
 /// Energy that the device has put in.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Observer {
-    /// All of it [J].
+    /// Total energy [J].
     pub energy: f64,
-    /// The least of it so far [J].
+    /// Least total energy so far [J].
     pub least: f64,
-    /// What the guard acts on [J].
+    /// Energy [J] for the guard, held below the reserve.
     left: f64,
     /// The force [N] by which the guard damped in the last tick.
     damping: Vector3<f64>,
@@ -69,8 +70,8 @@ impl Observer {
         self.left = (self.left + work).min(reserve);
     }
 
-    /// The force [N] by which a guard damps a device that went a way [m] in the last tick of a period [s]; it
-    /// goes to zero unless energy is missing.
+    /// Returns the force [N] by which a guard damps a device, which moved by a way [m] in the last tick of a
+    /// period [s]. The force goes to zero unless energy is missing.
     pub fn damp(&mut self, guard: &Guard, way: &Vector3<f64>, period: f64) -> Vector3<f64> {
         let square = way.norm_squared();
         // α v² T = −E with v = way / T.

@@ -1,13 +1,13 @@
-//! A simulated device in a simulated hand: a mass m with friction b of its bearings, which a spring and a
-//! damper of the hand pull to where it wants to be,
+//! A simulated device in a simulated hand. The device has a mass m and a friction b of its bearings. A spring
+//! and a damper of the hand pull it to the wanted place,
 //!
 //! ```text
 //! m ẍ = F + k (x_w − x) + c (ẋ_w − ẋ) − b ẋ
 //! ```
 //!
-//! with the force F held over a tick, as an amplifier does. It finds out how stiff a coupling may be before
-//! the device trembles. Numbers of a hand: Hasser and Cutkosky (2002), "System identification of the human
-//! hand grasping a haptic knob": tens to hundreds of N/m.
+//! with the force F held over a tick, as an amplifier does. The simulation finds how stiff a coupling may be
+//! before the device trembles. Numbers of a hand: Hasser and Cutkosky (2002), "System identification of the
+//! human hand grasping a haptic knob": tens to hundreds of N/m.
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -39,7 +39,7 @@ impl Default for Hand {
     }
 }
 
-/// Where the device is and how fast.
+/// Place and velocity of the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Held {
     /// Its place [m].
@@ -56,7 +56,7 @@ impl Hand {
         let speed = (to - from) / time;
         for k in 1..=STEPS {
             let wanted = from.lerp(&to, f64::from(k) / f64::from(STEPS));
-            // Dampers and the hand's spring at the end of the step: stable with any of them.
+            // Implicit in the dampers and the hand's spring, so that any stiffness and damping is stable.
             let pull = (wanted - held.place) * self.stiffness + speed * self.damping + force;
             let slow = self.mass + step * (self.friction + self.damping + step * self.stiffness);
             held.velocity = (held.velocity * self.mass + pull * step) / slow;
@@ -64,9 +64,9 @@ impl Hand {
         }
     }
 
-    /// The stiffest coupling [N/m], to 5 %, that lets this device come to rest on a model when the hand is
-    /// pressed into it by a depth [m]: from that of the settings on, down or up to 1 and 10⁶ N/m. Without a
-    /// guard, it shows the limit of the coupling itself.
+    /// Returns the stiffest coupling [N/m], to 5 % and between 1 and 10⁶ N/m, that lets this device come to
+    /// rest on a model. The hand is pressed into the model by a depth [m]. Without a guard, the result shows
+    /// the limit of the coupling itself.
     ///
     /// # Errors
     /// If a setting is out of range.
@@ -84,8 +84,8 @@ impl Hand {
         Ok(low)
     }
 
-    /// Whether the device comes to rest: pressed for five seconds, the most that it moves in a tick of the
-    /// last one is below 1 µm, or a tenth less than in the one before.
+    /// Returns true if the device comes to rest when it is pressed for five seconds. In the last second its
+    /// largest movement in a tick is below 1 µm, or a tenth less than in the second before.
     fn rests(&self, model: &LocalModel, settings: Settings, depth: f64) -> Result<bool, HapticsError> {
         let mut renderer = Renderer::new(settings)?;
         renderer.take(model.clone());

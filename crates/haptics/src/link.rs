@@ -63,7 +63,7 @@ impl Link {
         Ok(Self { socket, address, device: None, counts: Counts::default() })
     }
 
-    /// Where it listens.
+    /// Returns the address on which the link listens.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
@@ -83,7 +83,7 @@ impl Link {
                 self.counts.foreign += 1;
                 return Ok(false);
             }
-            // Sequence numbers go round: what is less than half of them ahead is newer.
+            // Sequence numbers wrap around: a number less than half of them ahead is newer.
             let ahead = pose.sequence.wrapping_sub(device.pose.sequence);
             if ahead == 0 || ahead > u32::MAX / 2 {
                 self.counts.late += 1;

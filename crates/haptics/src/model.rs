@@ -1,15 +1,15 @@
 //! The contact around a tool, as the simulation last found it: tangent planes and a compliance. A tool at p
-//! that feels the force f has the unloaded place u = p + W f: where it would be if the tissue had not given
-//! way. With a = p₀ + W f₀, that of the simulation, plane i asks
+//! that feels the force f has the unloaded place u = p + W f. There it would be if the tissue had not given
+//! way. With the simulation's unloaded place a = p₀ + W f₀, plane i asks
 //!
 //! ```text
 //! nᵢ·(u − a) + gᵢ ≥ 0
 //! ```
 //!
-//! so that the model gives the simulation's own force f₀ at its own place p₀, whatever W. W only tells how
-//! the force changes around. Source: the local models of Adachi, Kumano and Ogino (1995), "Intermediate
-//! representation for stiff virtual objects", and Mark et al. (1996), "Adding force feedback to graphics
-//! systems", with the compliance of Duriez, Dubois, Kheddar and Andriot (2006). Leaves out: moments,
+//! so that the model gives the simulation's own force f₀ at its own place p₀, whatever W. W only sets the
+//! change of the force around this place. Source: the local models of Adachi, Kumano and Ogino (1995),
+//! "Intermediate representation for stiff virtual objects". Mark et al. (1996), "Adding force feedback to
+//! graphics systems". The compliance is by Duriez, Dubois, Kheddar and Andriot (2006). Leaves out: moments,
 //! curvature of the tool, inertia and viscosity of the tissue between two models.
 //!
 //! ```
@@ -67,16 +67,16 @@ impl LocalModel {
         Self::new(place, Vector3::zeros(), Matrix3::zeros(), &[], period)
     }
 
-    /// Planes around a place [m] at which the simulation pushes the tool with a force [N]. `compliance`
-    /// [m/N], 3 × 3: how far the tissue gives way. `period` [s]: time from the last model to this one, over
-    /// which the force goes over to the new one.
+    /// Makes a model of planes around a place [m] at which the simulation pushes the tool with a force [N].
+    /// `compliance` [m/N], 3 × 3: change of the tool's place with the force. `period` [s]: time from the last
+    /// model to this one, over which the force changes to the new one.
     ///
     /// The force should be one that the planes can give; [`touching`](Self::touching) sees to that.
     ///
     /// # Errors
-    /// With more than 16 planes, numbers that are not finite, normals of another length than 1, negative
-    /// friction, a compliance that is not symmetric or has negative eigenvalues, or a period outside of (0,
-    /// 1] s.
+    /// With more than 16 planes, numbers that are not finite, or normals of another length than 1. With
+    /// negative friction, a compliance that is not symmetric or has negative eigenvalues, or a period outside
+    /// of (0, 1] s.
     pub fn new(
         place: Vector3<f64>,
         force: Vector3<f64>,
@@ -118,12 +118,13 @@ impl LocalModel {
         Ok(Self { planes: own, count: planes.len(), compliance, place, force, period })
     }
 
-    /// A model that gives exactly this force [N] at this place [m]: its first plane touches, and its normal
-    /// has the force in its cone of friction. The normal is that of the nearest of `around`, turned towards
-    /// the force as far as needed. The nearest planes of `around` follow, with gaps of at least 0.
+    /// Makes a model that gives exactly this force [N] at this place [m]. Its first plane touches, and the
+    /// cone of friction around the plane's normal contains the force. The normal is the mean normal of the
+    /// planes of `around` that touch, turned towards the force as far as needed. If none touches, the normal
+    /// is along the force. The nearest planes of `around` follow, with gaps of at least 0.
     ///
     /// # Errors
-    /// Those of [`new`](Self::new).
+    /// As for [`new`](Self::new).
     pub fn touching(
         place: Vector3<f64>,
         force: Vector3<f64>,

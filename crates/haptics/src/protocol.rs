@@ -32,7 +32,7 @@ pub(crate) const POSE_LENGTH: usize = 88;
 /// Bytes of a force.
 pub(crate) const FORCE_LENGTH: usize = 48;
 
-/// What a device sends.
+/// Datagram from a device.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pose {
     /// Increases from pose to pose; after 2³² − 1 follows 0.
@@ -49,17 +49,17 @@ pub struct Pose {
     pub opening: f64,
 }
 
-/// What a device gets back.
+/// Datagram to a device.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Force {
-    /// That of the pose.
+    /// Sequence number of the pose.
     pub sequence: u32,
     /// Bit 0: the guard damps; 1: the force is cut to its limit; 2: the pose was invalid and the last one
     /// holds.
     pub state: u32,
-    /// That of the pose [µs].
+    /// Time of the pose [µs].
     pub time: u64,
-    /// On the device [N].
+    /// Force on the device [N].
     pub force: [f64; 3],
 }
 
@@ -73,7 +73,7 @@ impl Pose {
         bytes
     }
 
-    /// That of a datagram; `None` if it is malformed: of another length, magic, version or kind.
+    /// Reads the pose from a datagram; `None` if it is malformed: of another length, magic, version or kind.
     pub fn decode(bytes: &[u8]) -> Option<Self> {
         let bytes: &[u8; POSE_LENGTH] = bytes.try_into().ok()?;
         let [sequence, buttons] = checked(bytes, 1)?;
@@ -109,7 +109,7 @@ impl Force {
         bytes
     }
 
-    /// That of a datagram; `None` if it is malformed.
+    /// Reads the force from a datagram; `None` if it is malformed.
     pub fn decode(bytes: &[u8]) -> Option<Self> {
         let bytes: &[u8; FORCE_LENGTH] = bytes.try_into().ok()?;
         let [sequence, state] = checked(bytes, 2)?;

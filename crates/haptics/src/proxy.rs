@@ -1,14 +1,15 @@
-//! The proxy: where the tool is although the device is in the tissue. With the coupling's force κ (p − x) = f
-//! and the unloaded place u = p + W f = x + D f, D = 1/κ + W, the planes of a [local model](crate::model) ask
+//! The proxy: the place of the tool at the surface while the device is in the tissue. The coupling's force is
+//! κ (p − x) = f. The unloaded place is u = p + W f = x + D f with D = 1/κ + W. The planes of a
+//! [local model](crate::model) ask
 //!
 //! ```text
 //! 0 ≤ λᵢ ⊥ nᵢ·(u − a) + gᵢ ≥ 0,   |tᵢ| ≤ μᵢ λᵢ against the slip of u,   f = Σ λᵢ nᵢ + tᵢ
 //! ```
 //!
 //! which minimises κ|p − x|² + fᵀ W f without friction. A point that sticks keeps its unloaded place.
-//! Projected Gauss–Seidel finds λ and t, begun from those of the last tick. Sources: Zilles and Salisbury
-//! (1995), "A constraint-based god-object method"; Ruspini et al. (1997) for the coupling; Duriez et al.
-//! (2006) for compliance and friction.
+//! Projected Gauss–Seidel finds λ and t, starting from the values of the last tick. Sources: Zilles and
+//! Salisbury (1995), "A constraint-based god-object method"; Ruspini et al. (1997) for the coupling; Duriez
+//! et al. (2006) for compliance and friction.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -34,8 +35,8 @@ impl Proxy {
         Self { push: [0.0; MOST_PLANES], drag: [Vector3::zeros(); MOST_PLANES], stuck }
     }
 
-    /// The force [N] on the tool whose coupling pulls it to a place [m] with a stiffness [N/m]. The slip goes
-    /// on from the last call.
+    /// Returns the force [N] on the tool, which the coupling pulls to a place [m] with a stiffness [N/m]. The
+    /// slip continues from the last call.
     pub fn force(&mut self, model: &LocalModel, pulled_to: Vector3<f64>, stiffness: f64) -> Vector3<f64> {
         let planes = model.planes();
         let mobility = Matrix3::identity() / stiffness + model.compliance();

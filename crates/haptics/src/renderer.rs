@@ -1,16 +1,16 @@
-//! A tick: the pose of the device in, the force out. Knows no clock, so that tests run it as fast as they
-//! like. The force goes over from one local model to the next in a straight line over the period of the
-//! simulation, f = (1−s) f_old(x) + s f_new(x): it does not jump where a model comes in, and a device that
-//! leaves the tissue is free at once. A next model is taken when the last one is reached.
+//! A tick: the pose of the device in, the force out. The renderer knows no clock, so that tests run it as
+//! fast as they like. Over the period of the simulation the force changes linearly from one local model to
+//! the next, f = (1−s) f_old(x) + s f_new(x). So the force does not jump when a model comes in. A device that
+//! leaves the tissue is free at once. The next model is taken when the last one is reached.
 //!
 //! The coupling κ (p − x) − (B/T) (p′ − x′) = f with κ = K + B/T holds the proxy p; ′ is the tick before. The
 //! proxy has no mass, so the device feels f, less what the [guard](crate::guard) adds, up to the force limit.
 //!
-//! The force is that of a place a little ahead, x + v t with t = T/2 by default: held over the tick, it is
-//! then about the mean of what a spring would give on the way. Without this, a spring K that is held gives
-//! out K v² T/2 (Gillespie and Cutkosky 1996, "Stable user-specific haptic rendering of the virtual wall").
+//! The force is computed for a place a little ahead, x + v t with t = T/2 by default. Held over the tick, it
+//! is then about the mean of a spring's force on the way. Without this, a spring K that is held gives out K
+//! v² T/2 (Gillespie and Cutkosky 1996, "Stable user-specific haptic rendering of the virtual wall").
 //!
-//! The energy of the record is that of the whole force. Leaves out: moments.
+//! The energy of the record includes the whole force. Leaves out: moments.
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -20,16 +20,16 @@ use crate::guard::{Guard, Observer};
 use crate::model::LocalModel;
 use crate::proxy::Proxy;
 
-/// How forces are made.
+/// Settings of the forces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Time [s] between two ticks.
     pub period: f64,
-    /// What ties the proxy to the device.
+    /// Spring and damper between the proxy and the device.
     pub coupling: Coupling,
-    /// Time [s] ahead of the pose for which the force is made; half a period makes up for the hold, a delay
-    /// of the device adds to it. It damps as K times that, which counts in the [limit](Coupling::limit) as a
-    /// delay does.
+    /// Time [s] ahead of the pose for which the force is made. Half a period makes up for the hold; add a
+    /// delay of the device. It damps like K times this time, which counts in the [limit](Coupling::limit)
+    /// like a delay.
     pub ahead: f64,
     /// Largest force [N].
     pub force_limit: f64,
@@ -57,20 +57,20 @@ impl Default for Settings {
     }
 }
 
-/// What a device hears.
+/// Answer to a device.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Answer {
     /// The force [N] on the device.
     pub force: Vector3<f64>,
-    /// Whether the guard damps.
+    /// True if the guard damps.
     pub guarded: bool,
-    /// Whether the force is cut to its limit.
+    /// True if the force is cut to its limit.
     pub limited: bool,
-    /// Whether the pose was invalid, so that the last one holds.
+    /// True if the pose was invalid, so that the last one holds.
     pub held: bool,
 }
 
-/// What has happened so far.
+/// Counts and extremes since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Record {
     /// Ticks.
@@ -106,7 +106,7 @@ struct Last {
     pose: Isometry3<f64>,
     /// Proxy less device [m].
     stretch: Vector3<f64>,
-    /// Of the model [N].
+    /// Force of the model [N].
     touch: Vector3<f64>,
 }
 
@@ -116,12 +116,12 @@ pub struct Renderer {
     settings: Settings,
     old: Option<Layer>,
     new: Option<Layer>,
-    /// How far it has gone over to the new model.
+    /// Progress from the old to the new model, from 0 to 1.
     part: f64,
     last: Option<Last>,
     /// The last force on the device [N], also over a silence.
     felt: Vector3<f64>,
-    /// Of the soft start.
+    /// Factor of the soft start on the force, from 0 to 1.
     gain: f64,
     observer: Observer,
     record: Record,
@@ -162,13 +162,13 @@ impl Renderer {
         })
     }
 
-    /// Whether the last model is reached, so that a next one can be taken.
+    /// True if the last model is reached, so that the next one can be taken.
     pub fn wants_model(&self) -> bool {
         self.part >= 1.0
     }
 
-    /// Goes over to another model, over its period. One that comes before [it is wanted](Self::wants_model)
-    /// makes the force jump.
+    /// Starts the change to another model, over its period. A model that comes before
+    /// [it is wanted](Self::wants_model) makes the force jump.
     pub fn take(&mut self, model: LocalModel) {
         let stuck = match (self.last, model.force() == Vector3::zeros()) {
             // Slip counts from what gives the present force.
@@ -260,13 +260,14 @@ impl Renderer {
         (self.last, self.gain) = (None, 0.0);
     }
 
-    /// Where the simulated tool shall go: the proxy, turned as the device; `None` before the first pose.
+    /// Returns the target of the simulated tool: the proxy, turned like the device; `None` before the first
+    /// pose.
     pub fn proxy(&self) -> Option<Isometry3<f64>> {
         let Last { pose, stretch, .. } = self.last?;
         Some(Isometry3::from_parts((pose.translation.vector + stretch).into(), pose.rotation))
     }
 
-    /// What has happened so far.
+    /// Returns the counts and extremes since the start.
     pub fn record(&self) -> &Record {
         &self.record
     }

@@ -55,7 +55,7 @@ impl Device for Replay {
         let started = *self.started.get_or_insert(now);
         let before = self.tick;
         self.tick += 1;
-        // What is more than a tick late is left out, so that the trace keeps to the clock.
+        // Poses more than a tick late are left out, so that the trace keeps to the clock.
         let present = ((now - started).as_secs_f64() / self.period.as_secs_f64()) as u32;
         if present > self.tick {
             self.counts.overtaken += u64::from(present - self.tick);

@@ -1,4 +1,4 @@
-//! How times spread: a histogram of fixed size, so that counting allocates nothing.
+//! Distribution of times: a histogram of fixed size, so that counting allocates nothing.
 //!
 //! ```
 //! use pliant_haptics::statistics::Spread;
@@ -39,12 +39,12 @@ impl Spread {
         self.largest = self.largest.max(time);
     }
 
-    /// How many there are.
+    /// Returns the number of times.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// The time [s] that a part of them does not pass, to a microsecond; `None` without any.
+    /// Returns the time [s] that a part of the times does not exceed, to a microsecond; `None` without any.
     pub(crate) fn quantile(&self, part: f64) -> Option<f64> {
         let rank = (part * self.count as f64).ceil().max(1.0) as u64;
         let mut below = 0;

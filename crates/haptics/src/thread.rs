@@ -45,14 +45,14 @@ const PATIENCE: Duration = Duration::from_millis(20);
 /// Time without a pose after which the force begins softly again.
 const SILENCE: Duration = Duration::from_millis(100);
 
-/// What the simulation reads of the device.
+/// State of the device for the simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
     /// Ticks so far; 0 before the first pose.
     pub ticks: u64,
-    /// Where the device is [m].
+    /// Pose of the device [m].
     pub device: Isometry3<f64>,
-    /// Where the simulated tool shall go [m].
+    /// Target pose of the simulated tool [m].
     pub proxy: Isometry3<f64>,
     /// The force on the device [N].
     pub force: Vector3<f64>,
@@ -62,7 +62,7 @@ pub struct State {
     pub opening: f64,
 }
 
-/// What a thread has done.
+/// Results of a thread.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
     /// Forces and energies.
@@ -144,7 +144,7 @@ impl Haptics {
         *self.states.read()
     }
 
-    /// Whether the device has gone.
+    /// True if the device has gone.
     pub fn is_over(&self) -> bool {
         self.thread.is_finished()
     }
@@ -224,7 +224,7 @@ mod tests {
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
         socket.connect(link.address()).unwrap();
         socket.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
-        // Without damping, so that the force is that of the last pose, however late this comes.
+        // Without damping, the force belongs to the last pose, however late this comes.
         let coupling = Coupling { stiffness: 1000.0, damping: 0.0 };
         let settings = Settings { soft_start: 0.0, coupling, ..Settings::default() };
         let mut haptics = Haptics::start(settings, link).unwrap();

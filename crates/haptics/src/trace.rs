@@ -1,6 +1,6 @@
-//! Ways of a device over time: read from a table `t,x,y,z,qw,qx,qy,qz`, as that of a scene's poses, or
-//! generated: sines, steps, and a tremor of 8 Hz with noise, as of a surgeon's hand (Elble and Koller 1990:
-//! physiological tremor of 8 to 12 Hz).
+//! Poses of a device over time, read from a table `t,x,y,z,qw,qx,qy,qz` like the poses of a scene, or
+//! generated. Generated traces are sines, steps, and a tremor of 8 Hz with noise. The tremor is like a
+//! surgeon's hand (Elble and Koller 1990: physiological tremor of 8 to 12 Hz).
 //!
 //! ```
 //! use nalgebra::{Isometry3, Vector3};
@@ -32,12 +32,12 @@ const LONGEST: f64 = 3600.0;
 pub struct Trace(Vec<(f64, Isometry3<f64>)>);
 
 impl Trace {
-    /// A table with a first row of names and a row for each pose: time [s], place [m] and quaternion. Lines
-    /// that are empty or begin with `#` are passed over.
+    /// Reads a table with a first row of names and a row for each pose: time [s], place [m] and quaternion.
+    /// Empty lines and lines that begin with `#` are skipped.
     ///
     /// # Errors
-    /// If a row has other columns, numbers that are none or not finite, a time that does not increase, or a
-    /// quaternion that is no rotation; or without any row.
+    /// If there is no row, or a row has other columns or a number that is invalid or not finite. Also if a
+    /// time does not increase, or a quaternion is no rotation.
     pub fn read(text: &str) -> Result<Self, HapticsError> {
         let wrong = |line: usize, problem: String| HapticsError::Trace { line, problem };
         let mut poses: Vec<(f64, Isometry3<f64>)> = Vec::new();
@@ -85,10 +85,10 @@ impl Trace {
         Ok(Self(poses))
     }
 
-    /// That of a file.
+    /// Reads a file.
     ///
     /// # Errors
-    /// If it can't be read, and those of [`read`](Self::read).
+    /// If the file can't be read, and as for [`read`](Self::read).
     pub fn of_file(path: &Path) -> Result<Self, HapticsError> {
         let failed = |source| HapticsError::File { path: path.display().to_string(), source };
         Self::read(&std::fs::read_to_string(path).map_err(failed)?)
@@ -113,8 +113,8 @@ impl Trace {
         [first, last].map(|pose| pose.map_or(0.0, |pose| pose.0))
     }
 
-    /// The pose at a time [s]: between two rows on a straight way and the shortest arc, before the first and
-    /// after the last at rest.
+    /// Returns the pose at a time [s]. Between two rows it follows a straight line and the shortest arc.
+    /// Before the first and after the last row it rests.
     pub fn at(&self, time: f64) -> Isometry3<f64> {
         let after = self.0.partition_point(|&(own, _)| own <= time);
         match (after.checked_sub(1).map(|before| self.0[before]), self.0.get(after)) {
@@ -163,8 +163,8 @@ impl Trace {
         })
     }
 
-    /// Another trace with the tremor of a hand: sines [m] along three axes, of 8 Hz and a phase each, and
-    /// white noise of a standard deviation [m], both from a seed.
+    /// Returns the trace with the tremor of a hand: sines [m] of 8 Hz along three axes, each with its phase.
+    /// White noise of a standard deviation [m] is added. Phases and noise come from a seed.
     ///
     /// # Errors
     /// If a number is not finite, or the trace is longer than 3600 s.

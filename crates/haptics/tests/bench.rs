@@ -1,6 +1,6 @@
 //! The test bench: the renderer between a device and an analytic world, in simulated time. The world is a
-//! linear elastic wall z < 0 with friction, which a slow simulation finds at the place of the proxy, and
-//! publishes a period later, with a compliance that may be wrong.
+//! linear elastic wall z < 0 with friction. A slow simulation finds it at the place of the proxy, and
+//! publishes it a period later. Its compliance may be wrong.
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 use pliant_haptics::coupling::Coupling;
@@ -14,7 +14,7 @@ use pliant_haptics::trace::Trace;
 /// An elastic wall and the simulation that finds its force.
 #[derive(Clone, Copy, Debug)]
 struct World {
-    /// Of the wall, pressed [N/m].
+    /// Stiffness of the wall when pressed [N/m].
     stiffness: f64,
     friction: f64,
     /// Ticks of a step of the simulation.
@@ -22,12 +22,12 @@ struct World {
     told: Told,
 }
 
-/// What the local model says about the stiffness.
+/// Stiffness of the local model.
 #[derive(Clone, Copy, Debug)]
 enum Told {
-    /// The true one times that.
+    /// The true stiffness times a factor.
     Times(f64),
-    /// What is estimated on the way.
+    /// The stiffness that is estimated on the way.
     Estimated,
 }
 
@@ -160,8 +160,8 @@ fn at_rest_the_device_feels_the_force_of_the_simulation() {
     }
 }
 
-/// The largest change of the force in a tick at up to 3.3 N, with steps of the simulation of any length.
-/// Speeds are those of a hand, up to 0.25 m/s: a spring k at a speed v has to change by k v T.
+/// The largest change of the force in a tick at up to 3.3 N, with steps of the simulation of any length. A
+/// hand moves at up to 0.25 m/s. A spring k at a speed v has to change by k v T.
 #[test]
 fn the_force_does_not_jump() {
     let presses = |depth: f64, frequency: f64| {
@@ -226,7 +226,7 @@ fn a_minute_of_pressing_and_scraping_gives_no_energy() {
 }
 
 /// Colgate and Schenkel: a device of b = 1 N s/m holds 2 b/T = 2000 N/m at 1 kHz. A free mass on such a wall
-/// loses b − K T/2 a time, so that the limit of passivity is also that of stability, to the 5 % of the
+/// loses b − K T/2 a time. So the limit of passivity is also the limit of stability, to the 5 % of the
 /// search.
 #[test]
 fn colgate_schenkel_1997_stiffest_wall() {
